@@ -1,0 +1,156 @@
+"""Affine and projective transforms: 4x4 float64 matrices that act on column vectors.
+
+`a @ b` applies `b` first. Points carry w = 1 and are divided by the resulting w, vectors carry w = 0,
+normals go through the inverse transpose.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from clpt.errors import SceneError
+
+Matrix = NDArray[np.float64]
+
+IDENTITY: Matrix = np.eye(4)
+IDENTITY.setflags(write=False)
+
+# Relative to the product of the columns' lengths, so that tiny but regular scales pass.
+SINGULAR_BELOW = 1e-12
+
+
+def translate(offset: ArrayLike) -> Matrix:
+    """Move by `offset` (3,)."""
+    matrix = np.eye(4)
+    matrix[:3, 3] = _triple(offset, "translate")
+    return matrix
+
+
+def scale(factors: ArrayLike) -> Matrix:
+    """Scale by one factor or by three, one an axis."""
+    factors = np.asarray(factors, np.float64)
+    if factors.ndim == 0:
+        factors = np.full(3, factors)
+    return np.diag([*_triple(factors, "scale"), 1.0])
+
+
+def rotate(axis: ArrayLike, degrees: float) -> Matrix:
+    """Rotate by `degrees` about `axis` (3,), counter-clockwise seen from its tip (Rodrigues' formula).
+
+    Raises SceneError for an axis of no length.
+    """
+    x, y, z = _unit(_triple(axis, "rotate"), "rotate: the axis has no length")
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    angle = np.radians(float(degrees))
+    matrix = np.eye(4)
+    matrix[:3, :3] += np.sin(angle) * cross + (1.0 - np.cos(angle)) * (cross @ cross)
+    return matrix
+
+
+def look_at(origin: ArrayLike, target: ArrayLike, up: ArrayLike) -> Matrix:
+    """Camera-to-world matrix of a camera at `origin` that looks at `target` along its +z axis.
+
+    Mitsuba's convention: x = up cross z points to the viewer's left, y upwards, so the frame is
+    right-handed while an image's columns run against x.
+
+    Raises SceneError when origin and target coincide or `up` is parallel to the view.
+    """
+    origin = _triple(origin, "look_at")
+    z = _unit(_triple(target, "look_at") - origin, "look_at: origin and target coincide")
+    x = np.cross(_unit(_triple(up, "look_at"), "look_at: up has no length"), z)
+    x = _unit(x, "look_at: up is parallel to the viewing direction; choose another up")
+    matrix = np.eye(4)
+    matrix[:3, :] = np.column_stack([x, np.cross(z, x), z, origin])
+    return matrix
+
+
+def perspective(fov_degrees: float, near: float, far: float) -> Matrix:
+    """Camera space to clip space: [-1, 1]^2 spans `fov_degrees`, z goes from 0 at near to 1 at far.
+
+    Raises SceneError for a field of view outside (0, 180) or clipping planes out of order.
+    """
+    if not 0.0 < fov_degrees < 180.0:
+        raise SceneError(f"perspective: the field of view {fov_degrees} is not between 0 and 180")
+    _check_planes(near, far, "perspective", lowest=0.0)
+    cot = 1.0 / np.tan(np.radians(fov_degrees) / 2.0)
+    depth = far / (far - near)
+    return np.array(
+        [[cot, 0, 0, 0], [0, cot, 0, 0], [0, 0, depth, -near * depth], [0, 0, 1, 0]], np.float64
+    )
+
+
+def orthographic(near: float, far: float) -> Matrix:
+    """Camera space to clip space without foreshortening: x, y stay, z goes from 0 to 1.
+
+    Raises SceneError for clipping planes out of order.
+    """
+    _check_planes(near, far, "orthographic", lowest=-np.inf)
+    return scale([1.0, 1.0, 1.0 / (far - near)]) @ translate([0.0, 0.0, -near])
+
+
+def transform_points(matrix: ArrayLike, points: ArrayLike) -> Matrix:
+    """Apply to points (..., 3), dividing by w where the matrix is projective."""
+    matrix, points = np.asarray(matrix, np.float64), np.asarray(points, np.float64)
+    moved = points @ matrix[:3, :3].T + matrix[:3, 3]
+    if np.array_equal(matrix[3], IDENTITY[3]):
+        return moved
+    return moved / (points @ matrix[3, :3] + matrix[3, 3])[..., None]
+
+
+def transform_vectors(matrix: ArrayLike, vectors: ArrayLike) -> Matrix:
+    """Apply to directions (..., 3): no translation, lengths are not kept."""
+    return np.asarray(vectors, np.float64) @ np.asarray(matrix, np.float64)[:3, :3].T
+
+
+def transform_normals(matrix: ArrayLike, normals: ArrayLike) -> Matrix:
+    """Apply the inverse transpose to normals (..., 3) and renormalise; zero normals stay zero.
+
+    Raises SceneError for a singular matrix.
+    """
+    turned = np.asarray(normals, np.float64) @ inverse(matrix)[:3, :3]
+    length = np.linalg.norm(turned, axis=-1, keepdims=True)
+    return turned / np.where(length > 0.0, length, 1.0)
+
+
+def inverse(matrix: ArrayLike) -> Matrix:
+    """Inverse of a transform. Raises SceneError for a singular or non-finite matrix."""
+    if is_singular(matrix):
+        raise SceneError("the transform cannot be inverted: it flattens space or is not finite")
+    return np.linalg.inv(np.asarray(matrix, np.float64))
+
+
+def is_singular(matrix: ArrayLike) -> bool:
+    """Whether a 4x4 matrix flattens space (or holds inf or nan), whatever its overall scale."""
+    matrix = np.asarray(matrix, np.float64)
+    if not np.isfinite(matrix).all():
+        return True
+    linear = matrix if matrix[3, :3].any() else matrix[:3, :3]
+    lengths = np.linalg.norm(linear, axis=0)
+    if not lengths.all() or not (matrix[3].any()):
+        return True
+    return bool(abs(np.linalg.det(linear / lengths)) < SINGULAR_BELOW)
+
+
+def flips_handedness(matrix: ArrayLike) -> bool:
+    """Whether the transform mirrors space, so that the winding of triangles is reversed."""
+    return bool(np.linalg.det(np.asarray(matrix, np.float64)[:3, :3]) < 0.0)
+
+
+def _triple(values: ArrayLike, what: str) -> Matrix:
+    values = np.asarray(values, np.float64)
+    if values.shape != (3,) or not np.isfinite(values).all():
+        raise SceneError(f"{what}: expected three finite numbers, found {values.tolist()}")
+    return values
+
+
+def _unit(vector: Matrix, complaint: str) -> Matrix:
+    length = float(np.linalg.norm(vector))
+    if length < 1e-12:
+        raise SceneError(complaint)
+    return vector / length
+
+
+def _check_planes(near: float, far: float, what: str, lowest: float) -> None:
+    if not lowest < near < far:
+        raise SceneError(f"{what}: the clipping planes {near} and {far} are out of order")
