@@ -1,0 +1,89 @@
+"""What can go wrong, told to a person: what is wrong, where, and what to do.
+
+ClptError
+├── SceneError              a scene, mesh or image file, or a scene built in Python
+│   ├── UnknownKindError    a name that no kind has; tells the nearest ones
+│   └── UnusedParameterError  a parameter that the kind does not have
+├── DeviceError             no OpenCL device, or one that cannot do what is asked
+│   └── MemoryBudgetError   asked, available, what to lower
+└── KernelBuildError        a kernel did not compile: stage, file, line, log
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from pathlib import Path
+
+
+class ClptError(Exception):
+    """Base of everything that clpt raises on purpose."""
+
+
+class SceneError(ClptError):
+    """Bad input, with the file, line and element it stands in where these are known."""
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        file: str | Path | None = None,
+        line: int | None = None,
+        where: str | None = None,
+    ):
+        self.message, self.file, self.line, self.where = message, file, line, where
+        place = str(file) if file is not None else ""
+        if line is not None:
+            place += f":{line}"
+        super().__init__(": ".join(part for part in (place, where, message) if part))
+
+
+def _nearest(name: str, known: Iterable[str]) -> str:
+    known = sorted(known)
+    near = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
+    if near:
+        return "; did you mean " + " or ".join(repr(n) for n in near) + "?"
+    return "; known: " + ", ".join(known) if known else ""
+
+
+class UnknownKindError(SceneError):
+    """A `type` that is not in the table of kinds."""
+
+    def __init__(self, category: str, name: str, known: Iterable[str], **place):
+        super().__init__(f"unknown {category} {name!r}" + _nearest(name, known), **place)
+
+
+class UnusedParameterError(SceneError):
+    """A parameter that the kind does not have."""
+
+    def __init__(self, kind: str, name: str, known: Iterable[str], **place):
+        super().__init__(f"{kind} has no parameter {name!r}" + _nearest(name, known), **place)
+
+
+class DeviceError(ClptError):
+    """No device, or one that cannot do what is asked."""
+
+
+class MemoryBudgetError(DeviceError):
+    """More device memory is needed than there is.
+
+    asked, available: bytes.
+    """
+
+    def __init__(self, what: str, asked: int, available: int, advice: str):
+        self.asked, self.available = asked, available
+        super().__init__(
+            f"{what} needs {asked / 2**20:.0f} MiB, the device has {available / 2**20:.0f} MiB: "
+            f"{advice}"
+        )
+
+
+class KernelBuildError(ClptError):
+    """A kernel did not compile: our file and line, the compiler's log, where the text was kept."""
+
+    def __init__(self, stage: str, file: str | None, line: int | None, log: str, kept: str | None):
+        self.stage, self.file, self.line, self.log, self.kept = stage, file, line, log, kept
+        place = f" at {file}:{line}" if file else ""
+        text = f"; its text is in {kept}" if kept else ""
+        first = next((row for row in log.splitlines() if "error" in row), "no log")
+        super().__init__(f"kernel program {stage!r} did not build{place}: {first.strip()}{text}")

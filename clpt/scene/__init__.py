@@ -1,0 +1,48 @@
+"""What to render: plain data, no OpenCL. `KINDS` is the table of all that exists, by category."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from clpt.errors import SceneError
+from clpt.scene import cameras, integrators, lights, materials, shapes, textures
+from clpt.scene.integrators import Film, Path, Sobol
+from clpt.scene.params import Kind
+
+KINDS: dict[str, tuple[type[Kind], ...]] = {
+    "material": materials.KINDS,
+    "light": lights.KINDS,
+    "shape": shapes.KINDS,
+    "camera": cameras.KINDS,
+    "texture": textures.KINDS,
+    "integrator": integrators.KINDS,
+    "sampler": integrators.SAMPLERS,
+    "filter": integrators.FILTERS,
+}
+
+
+def kinds(category: str) -> dict[str, type[Kind]]:
+    """Return the kinds of a category by their names in scene files."""
+    return {cls.kind: cls for cls in KINDS[category]}
+
+
+@dataclass
+class Scene:
+    """A whole scene; `warnings` tells what a loader had to pass over."""
+
+    camera: cameras.Camera
+    shapes: list[shapes.Shape] = field(default_factory=list)
+    lights: list[lights.Light] = field(default_factory=list)
+    integrator: integrators.Integrator = field(default_factory=Path)
+    sampler: integrators.Sampler = field(default_factory=Sobol)
+    film: Film = field(default_factory=Film)
+    spp: int = 64
+    seed: int = 0
+    name: str = ""
+    warnings: list[str] = field(default_factory=list)
+    extra: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self):
+        if isinstance(self.spp, bool) or not isinstance(self.spp, int) or self.spp < 1:
+            raise SceneError(f"must be a whole number above zero, not {self.spp!r}", where="spp")

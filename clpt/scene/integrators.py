@@ -1,0 +1,145 @@
+"""Integrators, samplers, filters and the film: how a scene becomes a picture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from clpt.errors import SceneError
+from clpt.scene.params import Kind, choice, emission, flag, host, real
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Integrator(Kind):
+    """Base of all integrators."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Path(Integrator):
+    """Path tracing with next-event estimation and multiple importance sampling (power heuristic).
+
+    `max_depth` counts surfaces and the light: 1 shows only lights, 2 adds direct light.
+    """
+
+    max_depth: int = host(8, "longest path; -1: no limit")
+    rr_depth: int = host(5, "depth from which Russian roulette may end a path")
+    hide_lights: bool = flag(False, "leave out lights that the camera sees directly")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Direct(Integrator):
+    """Direct light only: `path` with a depth of 2."""
+
+    hide_lights: bool = flag(False, "leave out lights that the camera sees directly")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Whitted(Integrator):
+    """The classic ray tracer (Whitted 1980): ambient, diffuse, highlight, hard shadows, mirrors."""
+
+    max_depth: int = host(5, "most mirror reflections and the first hit")
+    ambient: Any = emission(0.05, "radiance that reaches every surface", "W m^-2 sr^-1 nm^-1")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Aov(Integrator):
+    """Arbitrary output values of the first hit, in the channels named."""
+
+    channels: tuple[str, ...] = host(
+        ("depth", "position", "geometric_normal", "shading_normal", "uv", "albedo", "shape_id",
+         "primitive_id"),
+        "which values, in order",
+    )
+
+
+CHANNELS = {
+    "depth": 1,
+    "position": 3,
+    "geometric_normal": 3,
+    "shading_normal": 3,
+    "uv": 2,
+    "albedo": 3,
+    "shape_id": 1,
+    "primitive_id": 1,
+}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sampler(Kind):
+    """Base of all samplers: each number is a function of (seed, pixel, sample, dimension)."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sobol(Sampler):
+    """Owen-scrambled Sobol points, two dimensions at a time (Burley 2020)."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Independent(Sampler):
+    """Uniform random numbers."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Filter(Kind):
+    """Base of the pixel filters; importance-sampled, so a sample serves one pixel."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Box(Filter):
+    """Constant over the pixel."""
+
+    radius: float = real(0.5, "half width", "pixels", 0.01, 16.0)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Tent(Filter):
+    """Linear fall to zero at the radius."""
+
+    radius: float = real(1.0, "half width", "pixels", 0.01, 16.0)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Gaussian(Filter):
+    """A bell, cut off at four standard deviations."""
+
+    stddev: float = real(0.5, "standard deviation", "pixels", 0.01, 4.0)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Mitchell(Filter):
+    """Mitchell and Netravali 1988, with negative lobes; radius 2."""
+
+    b: float = real(1 / 3, "blur")
+    c: float = real(1 / 3, "ringing")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BlackmanHarris(Filter):
+    """The Blackman-Harris window; radius 1.5."""
+
+    radius: float = real(1.5, "half width", "pixels", 0.01, 16.0)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Film(Kind):
+    """What is recorded: size, mode, wavelengths, filter."""
+
+    width: int = host(768, "pixels")
+    height: int = host(576, "pixels")
+    mode: str = choice("spectral", "what light is made of", ("spectral", "rgb"))
+    filter: Filter = host(Box(), "pixel filter")
+    lambda_min: float = real(360.0, "shortest wavelength", "nm", 200.0, 2000.0)
+    lambda_max: float = real(830.0, "longest wavelength", "nm", 200.0, 2000.0)
+
+    def check(self) -> None:
+        for name in ("width", "height"):
+            size = getattr(self, name)
+            if isinstance(size, bool) or not isinstance(size, int) or not 1 <= size <= 65536:
+                raise SceneError(f"must be 1 to 65536, not {size!r}", where=f"film.{name}")
+        if self.lambda_min >= self.lambda_max:
+            raise SceneError("must be below lambda_max", where="film.lambda_min")
+
+
+KINDS = (Path, Direct, Whitted, Aov)
+SAMPLERS = (Sobol, Independent)
+FILTERS = (Box, Tent, Gaussian, Mitchell, BlackmanHarris)

@@ -1,0 +1,85 @@
+"""Lights. An `Area` light stands on a shape's `emission`; all others stand in a scene's `lights`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from clpt.scene.params import Kind, emission, host, real
+
+RADIANCE = "W m^-2 sr^-1 nm^-1"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Light(Kind):
+    """Base of all lights."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Area(Light):
+    """A surface that emits from its front side, evenly in all directions."""
+
+    radiance: Any = emission(1.0, "emitted radiance", RADIANCE, textured=True)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Point(Light):
+    """A point that emits evenly."""
+
+    position: Any = host((0.0, 0.0, 0.0), "where it is", "m")
+    intensity: Any = emission(1.0, "radiant intensity", "W sr^-1 nm^-1")
+    falloff: bool = host(True, "False: irradiance does not fall with the distance (not physical)")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Spot(Light):
+    """A point that emits into a cone about +z of `to_world`, smoothly cut off at its edge."""
+
+    to_world: Any = host(np.eye(4), "placement, (4, 4); shines along its +z")
+    intensity: Any = emission(1.0, "radiant intensity on the axis", "W sr^-1 nm^-1")
+    cutoff: float = real(20.0, "half angle beyond which it is dark", "degrees", 0.0, 180.0)
+    beam_width: float = real(15.0, "half angle of full intensity", "degrees", 0.0, 180.0)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Directional(Light):
+    """Parallel light from infinitely far away."""
+
+    direction: Any = host((0.0, 0.0, -1.0), "in which the light travels")
+    irradiance: Any = emission(1.0, "on a surface that faces it", "W m^-2 nm^-1")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Constant(Light):
+    """The same radiance from every direction."""
+
+    radiance: Any = emission(1.0, "radiance of the surroundings", RADIANCE)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Envmap(Light):
+    """Radiance from an image in latitude and longitude around the scene.
+
+    In the light's own space +y is up, the middle of the image is +z... see kernels/light/envmap.cl.
+    """
+
+    image: Any = host(None, "path of an .exr or .hdr file, or an array (h, w, 3) float32")
+    scale: float = real(1.0, "factor on the radiance", low=0.0)
+    to_world: Any = host(np.eye(4), "rotation, (4, 4)")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CubeMap(Light):
+    """Radiance from the six faces of a cube around the scene."""
+
+    image: Any = host(
+        None,
+        "six images +x -x +y -y +z -z (paths or arrays), or one image with the faces in a 4x3 cross",
+    )
+    scale: float = real(1.0, "factor on the radiance", low=0.0)
+    to_world: Any = host(np.eye(4), "rotation, (4, 4)")
+
+
+KINDS = (Area, Point, Spot, Directional, Constant, Envmap, CubeMap)

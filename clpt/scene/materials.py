@@ -1,0 +1,166 @@
+"""Materials: what a surface does with light. Local frame: z is the shading normal.
+
+A leaf material has a pair kernels/bsdf/<kind>.cl. A composite (`two_sided`, `mask`, `blend`) has
+none: lowering turns it into rules by which a hit chooses its leaf.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from clpt.scene.params import Kind, choice, flag, host, index, real, reflectance
+
+DISTRIBUTIONS = ("ggx", "beckmann")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Material(Kind):
+    """Base of all materials."""
+
+    name: str = host("", "for messages and for references in scene files")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Diffuse(Material):
+    """Lambertian reflection of the front side."""
+
+    reflectance: Any = reflectance(0.5, "albedo")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Phong(Material):
+    """Modified Phong (Lafortune and Willems 1994): diffuse and a cosine-power lobe, front side.
+
+    Albedos that add up to more than one are scaled down to conserve energy. `reflectivity` is the
+    mirror share that only the `whitted` integrator knows.
+    """
+
+    diffuse: Any = reflectance(0.5, "diffuse albedo")
+    specular: Any = reflectance(0.2, "albedo of the lobe")
+    exponent: Any = real(30.0, "sharpness of the lobe", low=0.0, high=1e5, textured=True)
+    reflectivity: float = real(0.0, "mirror share in the whitted integrator", low=0.0, high=1.0)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Dielectric(Material):
+    """A smooth boundary of two dielectrics; both sides."""
+
+    int_ior: Any = index(1.5046, "inside index, number, glass name or spectrum")
+    ext_ior: Any = index(1.000277, "outside index")
+    specular_reflectance: Any = reflectance(1.0, "factor on reflection; 1 is physical")
+    specular_transmittance: Any = reflectance(1.0, "factor on transmission; 1 is physical")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ThinDielectric(Material):
+    """A thin slab of a dielectric: reflections inside are summed, light passes undeviated."""
+
+    int_ior: Any = index(1.5046, "index of the slab")
+    ext_ior: Any = index(1.000277, "index around it")
+    specular_reflectance: Any = reflectance(1.0, "factor on reflection; 1 is physical")
+    specular_transmittance: Any = reflectance(1.0, "factor on transmission; 1 is physical")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RoughDielectric(Material):
+    """A rough boundary of two dielectrics (Walter et al. 2007); both sides."""
+
+    int_ior: Any = index(1.5046, "inside index")
+    ext_ior: Any = index(1.000277, "outside index")
+    distribution: str = choice("ggx", "of the microfacet normals", DISTRIBUTIONS)
+    alpha_u: Any = real(0.1, "roughness along the tangent", low=1e-4, high=1.0, textured=True)
+    alpha_v: Any = real(0.1, "roughness across it", low=1e-4, high=1.0, textured=True)
+    specular_reflectance: Any = reflectance(1.0, "factor on reflection; 1 is physical")
+    specular_transmittance: Any = reflectance(1.0, "factor on transmission; 1 is physical")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Conductor(Material):
+    """A smooth metal; front side. The default is a perfect mirror."""
+
+    eta: Any = index(0.0, "index of refraction")
+    k: Any = index(1.0, "extinction coefficient")
+    specular_reflectance: Any = reflectance(1.0, "factor on reflection; 1 is physical")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RoughConductor(Material):
+    """A rough metal of microfacets (Cook and Torrance; Heitz 2018 visible normals); front side."""
+
+    eta: Any = index(0.0, "index of refraction")
+    k: Any = index(1.0, "extinction coefficient")
+    distribution: str = choice("ggx", "of the microfacet normals", DISTRIBUTIONS)
+    alpha_u: Any = real(0.1, "roughness along the tangent", low=1e-4, high=1.0, textured=True)
+    alpha_v: Any = real(0.1, "roughness across it", low=1e-4, high=1.0, textured=True)
+    specular_reflectance: Any = reflectance(1.0, "factor on reflection; 1 is physical")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Plastic(Material):
+    """A diffuse base under a smooth dielectric coat, with all internal reflections; front side."""
+
+    diffuse_reflectance: Any = reflectance(0.5, "albedo of the base")
+    int_ior: Any = index(1.49, "index of the coat")
+    ext_ior: Any = index(1.000277, "index outside")
+    specular_reflectance: Any = reflectance(1.0, "factor on the coat's reflection; 1 is physical")
+    nonlinear: bool = flag(False, "whether internal reflection saturates the colour")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RoughPlastic(Material):
+    """A diffuse base under a rough dielectric coat; front side."""
+
+    diffuse_reflectance: Any = reflectance(0.5, "albedo of the base")
+    int_ior: Any = index(1.49, "index of the coat")
+    ext_ior: Any = index(1.000277, "index outside")
+    specular_reflectance: Any = reflectance(1.0, "factor on the coat's reflection; 1 is physical")
+    distribution: str = choice("ggx", "of the microfacet normals", DISTRIBUTIONS)
+    alpha: float = real(0.1, "roughness", low=1e-4, high=1.0)
+    nonlinear: bool = flag(False, "whether internal reflection saturates the colour")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Null(Material):
+    """No surface at all: light passes as if it were not there."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TwoSided(Material):
+    """Gives one-sided materials to both sides of a surface."""
+
+    front: Any = host(Diffuse(), "material of the front")
+    back: Any = host(None, "material of the back; the front's when None")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Mask(Material):
+    """Lets light through where `opacity` is below one."""
+
+    material: Any = host(Diffuse(), "what is there where it is opaque")
+    opacity: Any = real(0.5, "share of light that meets the material", "", 0.0, 1.0, textured=True)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Blend(Material):
+    """A linear mixture of two materials."""
+
+    first: Any = host(Diffuse(), "material where the weight is 0")
+    second: Any = host(Diffuse(), "material where the weight is 1")
+    weight: Any = real(0.5, "share of the second", "", 0.0, 1.0, textured=True)
+
+
+LEAVES = (
+    Diffuse,
+    Phong,
+    Dielectric,
+    ThinDielectric,
+    RoughDielectric,
+    Conductor,
+    RoughConductor,
+    Plastic,
+    RoughPlastic,
+    Null,
+)
+COMPOSITES = (TwoSided, Mask, Blend)
+KINDS = LEAVES + COMPOSITES

@@ -1,0 +1,176 @@
+"""How the parameters of a kind are declared.
+
+A kind is a frozen dataclass that derives from `Kind`; each field is made by one of the functions
+below, which says the parameter's role. From the role follow what a user may give for it, its form on
+the device, and its line in the documentation and the JSON schema:
+
+=============  =====================================  ==========================  ===============
+role           accepted                               in the kernel               texture
+=============  =====================================  ==========================  ===============
+reflectance    number, (r, g, b), Spectrum, Texture   Spectrum in [0, 1]          yes
+emission       number, (r, g, b), Spectrum, Texture   Spectrum, rgb times D65     area, envmap
+index          number, name, Spectrum                 Spectrum, unbounded         no
+real           number, Texture                        real                        yes
+flag           bool                                   int                         no
+choice         one of the names listed                int, the name's position    no
+host           whatever the lowering needs            -                           -
+=============  =====================================  ==========================  ===============
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from clpt.errors import SceneError
+from clpt.spectra import RGB, Constant, Spectrum
+
+DEVICE_ROLES = ("reflectance", "emission", "index", "real", "flag", "choice")
+SPECTRUM_ROLES = ("reflectance", "emission", "index")
+
+
+@dataclass(frozen=True)
+class Param:
+    """One parameter: role (see the table above), documentation, unit and limits."""
+
+    role: str
+    doc: str
+    unit: str = ""
+    low: float = -math.inf
+    high: float = math.inf
+    choices: tuple[str, ...] = ()
+    textured: bool = False
+
+
+def _field(default: Any, param: Param) -> Any:
+    if isinstance(default, (list, dict, np.ndarray)):
+        return field(default_factory=lambda: default, metadata={"param": param})
+    return field(default=default, metadata={"param": param})
+
+
+def reflectance(default: Any, doc: str) -> Any:
+    """Declare a spectrum in [0, 1]; may be a texture."""
+    return _field(default, Param("reflectance", doc, low=0.0, high=1.0, textured=True))
+
+
+def emission(default: Any, doc: str, unit: str, *, textured: bool = False) -> Any:
+    """Declare an emitted spectrum; an rgb triple means that multiple of D65."""
+    return _field(default, Param("emission", doc, unit, low=0.0, textured=textured))
+
+
+def index(default: Any, doc: str) -> Any:
+    """Declare a refractive index or extinction coefficient, possibly by name, possibly dispersive."""
+    return _field(default, Param("index", doc, low=0.0))
+
+
+def real(
+    default: Any,
+    doc: str,
+    unit: str = "",
+    low: float = -math.inf,
+    high: float = math.inf,
+    *,
+    textured: bool = False,
+) -> Any:
+    """Declare a number with its limits; may be a texture where `textured`."""
+    return _field(default, Param("real", doc, unit, low, high, textured=textured))
+
+
+def flag(default: bool, doc: str) -> Any:
+    """Declare a yes or no."""
+    return _field(default, Param("flag", doc))
+
+
+def choice(default: str, doc: str, choices: Sequence[str]) -> Any:
+    """Declare one of several names."""
+    return _field(default, Param("choice", doc, choices=tuple(choices)))
+
+
+def host(default: Any, doc: str, unit: str = "") -> Any:
+    """Declare what only the host needs: geometry, matrices, nested kinds."""
+    return _field(default, Param("host", doc, unit))
+
+
+class classproperty:
+    """A read-only property of a class."""
+
+    def __init__(self, function):
+        self.function = function
+
+    def __get__(self, _, owner):
+        return self.function(owner)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Kind:
+    """Base of everything that can be added: its name in files and kernels follows from the class."""
+
+    @classproperty
+    def kind(cls) -> str:  # noqa: N805
+        """The name in scene files and kernels: RoughConductor -> rough_conductor."""
+        return re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower()
+
+    def __post_init__(self):
+        for name, param in params(type(self)).items():
+            value = _checked(getattr(self, name), param, f"{self.kind}.{name}")
+            object.__setattr__(self, name, value)
+        self.check()
+
+    def check(self) -> None:
+        """Raise SceneError where the parameters contradict each other."""
+
+
+def params(cls: type) -> dict[str, Param]:
+    """Return the declared parameters of a kind, by name, in their order."""
+    return {f.name: f.metadata["param"] for f in dataclasses.fields(cls) if "param" in f.metadata}
+
+
+def device_params(cls: type) -> dict[str, Param]:
+    """Return those parameters that the kernels see."""
+    return {name: p for name, p in params(cls).items() if p.role in DEVICE_ROLES}
+
+
+def _checked(value: Any, param: Param, where: str) -> Any:
+    if param.role == "host":
+        return value
+    if param.role == "flag":
+        if not isinstance(value, (bool, np.bool_)):
+            raise SceneError(f"must be true or false, not {value!r}", where=where)
+        return bool(value)
+    if param.role == "choice":
+        if value not in param.choices:
+            raise SceneError(f"{value!r} is none of {', '.join(param.choices)}", where=where)
+        return value
+    if getattr(value, "is_texture", False):
+        if not param.textured:
+            raise SceneError("cannot be a texture", where=where)
+        return value
+    if param.role == "real":
+        return _number(value, param, where)
+    return _spectrum(value, param, where)
+
+
+def _number(value: Any, param: Param, where: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
+        raise SceneError(f"must be a number, not {value!r}", where=where)
+    if not math.isfinite(value):
+        raise SceneError(f"must be finite, not {value}", where=where)
+    if not param.low <= value <= param.high:
+        raise SceneError(f"{value} is outside [{param.low:g}, {param.high:g}]", where=where)
+    return float(value)
+
+
+def _spectrum(value: Any, param: Param, where: str) -> Any:
+    if isinstance(value, Spectrum) or (isinstance(value, str) and param.role == "index"):
+        return value
+    if isinstance(value, (list, tuple, np.ndarray)) and len(value) == 3:
+        return RGB(*(_number(v, param, where) for v in value))
+    if isinstance(value, (int, float, np.number)):
+        return Constant(_number(value, param, where))
+    raise SceneError(f"must be a number, three numbers or a spectrum, not {value!r}", where=where)

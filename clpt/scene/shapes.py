@@ -1,0 +1,67 @@
+"""Shapes: where surfaces are. A rectangle and a cube are lowered to triangles; so is a mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from clpt.scene.materials import Diffuse
+from clpt.scene.params import Kind, host
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Shape(Kind):
+    """Base of all shapes; placed by `to_world`."""
+
+    material: Any = host(Diffuse(), "of the surface")
+    emission: Any = host(None, "an `area` light, or None")
+    to_world: Any = host(np.eye(4), "placement, (4, 4)")
+    flip_normals: bool = host(False, "turn the front to the other side")
+    name: str = host("", "for messages")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Mesh(Shape):
+    """Triangles, counter-clockwise seen from the front."""
+
+    vertices: Any = host(None, "(n, 3) float32", "m")
+    faces: Any = host(None, "(m, 3) uint32")
+    normals: Any = host(None, "(n, 3) float32 per vertex, or None for flat shading")
+    uvs: Any = host(None, "(n, 2) float32 per vertex, or None")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sphere(Shape):
+    """A sphere; uv from the azimuth and polar angle about z."""
+
+    center: Any = host((0.0, 0.0, 0.0), "before `to_world`", "m")
+    radius: float = host(1.0, "before `to_world`, which may scale it evenly", "m")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Rectangle(Shape):
+    """The square [-1, 1]^2 in the plane z = 0, facing +z; uv run from 0 to 1."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Disk(Shape):
+    """The unit disk in the plane z = 0, facing +z; u is the radius, v the azimuth over 2 pi."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Cube(Shape):
+    """The cube [-1, 1]^3, facing outward; uv run from 0 to 1 on each side."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Cylinder(Shape):
+    """An open tube around the line from p0 to p1, facing outward; u azimuth, v along the line."""
+
+    p0: Any = host((0.0, 0.0, 0.0), "start of the axis", "m")
+    p1: Any = host((0.0, 0.0, 1.0), "end of the axis", "m")
+    radius: float = host(1.0, "before `to_world`, which may scale it evenly", "m")
+
+
+KINDS = (Mesh, Sphere, Rectangle, Disk, Cube, Cylinder)
