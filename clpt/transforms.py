@@ -1,7 +1,7 @@
 """Affine and projective transforms: 4x4 float64 matrices that act on column vectors.
 
-`a @ b` applies `b` first. Points carry w = 1 and are divided by the resulting w, vectors carry w = 0,
-normals go through the inverse transpose.
+`a @ b` applies `b` first. Points carry w = 1 and are divided by the resulting w, vectors carry
+w = 0, normals go through the inverse transpose.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def scale(factors: ArrayLike) -> Matrix:
 
 
 def rotate(axis: ArrayLike, degrees: float) -> Matrix:
-    """Rotate by `degrees` about `axis` (3,), counter-clockwise seen from its tip (Rodrigues' formula).
+    """Rotate by `degrees` about `axis` (3,), counter-clockwise seen from its tip (Rodrigues).
 
     Raises SceneError for an axis of no length.
     """
