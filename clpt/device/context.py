@@ -1,0 +1,252 @@
+"""Which device to run on: listing, choosing, or adopting what the caller has."""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+import pyopencl as cl
+
+from ..errors import DeviceError
+from . import memory, runtimes
+
+log = logging.getLogger(__name__)
+
+ENVIRONMENT = "CLPT_DEVICE"
+_ORDER = ("gpu", "accelerator", "cpu")
+_TRIAL = "__kernel void trial(__global uint *out) { out[get_global_id(0)] = 7u; }"
+
+
+@dataclass(frozen=True)
+class DeviceInfo:
+    """What a device is, before anything is created on it.
+
+    index: its place in `devices()`; kind: "gpu", "accelerator" or "cpu"; memory in bytes;
+    float_width: the driver's native SIMD width in floats.
+    """
+
+    index: int
+    platform: str
+    name: str
+    vendor: str
+    version: str
+    driver: str
+    kind: str
+    compute_units: int
+    global_mem: int
+    max_alloc: int
+    float_width: int
+    cl_device: cl.Device = field(repr=False)
+
+    @property
+    def is_cpu(self) -> bool:
+        return self.kind == "cpu"
+
+    @property
+    def is_gpu(self) -> bool:
+        return self.kind == "gpu"
+
+    @property
+    def lanes(self) -> int:
+        """Paths that one work-item shades: the SIMD width on a CPU, 1 elsewhere."""
+        if not self.is_cpu:
+            return 1
+        return 16 if self.float_width >= 16 else 8
+
+    @property
+    def label(self) -> str:
+        """The text that a name is looked for in: platform, then device."""
+        return f"{self.platform} {self.name}"
+
+    def free_memory(self) -> int:
+        """A guess at what may be allocated now [bytes]."""
+        return memory.free(self.cl_device, self.is_cpu, self.global_mem)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A device that was chosen, and why, as a sentence for people."""
+
+    info: DeviceInfo
+    reason: str
+
+
+@dataclass
+class Builds:
+    """What has been compiled so far: programs, and the seconds that took (summed over threads)."""
+
+    programs: int = 0
+    seconds: float = 0.0
+
+    def add(self, seconds: float) -> None:
+        self.programs += 1
+        self.seconds += seconds
+
+
+class Device:
+    """A context with a queue on one device.
+
+    Everything that clpt runs goes through one of these; `Device.adopt` makes one of a queue that
+    the caller has, whose context is then used for every buffer and program.
+    """
+
+    def __init__(self, context: cl.Context, queue: cl.CommandQueue, info: DeviceInfo):
+        self.context, self.queue, self.info = context, queue, info
+        self.builds = Builds()
+
+    @classmethod
+    def open(cls, info: DeviceInfo, *, profiling: bool = False) -> Device:
+        """A new context and an in-order queue on the device. Raises DeviceError."""
+        try:
+            context = cl.Context([info.cl_device])
+            return cls(context, _queue(context, info.cl_device, profiling), info)
+        except cl.Error as error:
+            raise DeviceError(f"{info.label} cannot be opened: {error}") from error
+
+    @classmethod
+    def adopt(cls, queue: cl.CommandQueue) -> Device:
+        """The device of a caller's queue, with the caller's context."""
+        return cls(queue.context, queue, _info(-1, queue.device))
+
+    @cached_property
+    def lanes(self) -> int:
+        return self.info.lanes
+
+    def free_memory(self) -> int:
+        return self.info.free_memory()
+
+    def __repr__(self) -> str:
+        return f"Device({self.info.label!r})"
+
+
+def devices() -> tuple[DeviceInfo, ...]:
+    """Every device of every platform, in the order of the platforms.
+
+    A platform that has no devices or fails when asked is left out, with a logged warning.
+    """
+    return tuple(_info(index, device) for index, device in enumerate(_cl_devices()))
+
+
+def choose(which: str | int | None = None, *, profiling: bool = False) -> Device:
+    """Open the device named by an index, or by a part of "platform device" in any case.
+
+    None takes the environment variable CLPT_DEVICE if it is set, and otherwise the first device
+    that works: GPUs, then accelerators, then CPUs.
+
+    Raises DeviceError, telling what there is, if none matches or none works.
+    """
+    return Device.open(selection(which).info, profiling=profiling)
+
+
+def selection(which: str | int | None = None) -> Choice:
+    """The device that `choose` would open, and why. Raises DeviceError."""
+    there = devices()
+    if not there:
+        raise DeviceError(f"no OpenCL device: {runtimes.ADVICE}")
+    if which is None and os.environ.get(ENVIRONMENT, "").strip():
+        which = os.environ[ENVIRONMENT].strip()
+        asked = f"{ENVIRONMENT}={which}"
+    else:
+        asked = f"device {which!r}"
+    named = which is not None
+    failures: list[str] = []
+    for info in _matching(which, there) if named else by_preference(there):
+        failure = trial(info)
+        if failure is None:
+            reason = f"asked for by {asked}" if named else _reason(info, there)
+            return Choice(info, "; ".join([reason, *(f"passed over {f}" for f in failures)]))
+        log.warning("%s is passed over: %s", info.label, failure)
+        failures.append(f"{info.label} ({failure})")
+    if failures:
+        raise DeviceError("no OpenCL device works: " + "; ".join(failures))
+    raise DeviceError(f"{asked} is not there; there is " + _listing(there))
+
+
+def by_preference(there: tuple[DeviceInfo, ...]) -> list[DeviceInfo]:
+    """GPUs before accelerators before CPUs; among equals, in the order of the platforms."""
+    return sorted(there, key=lambda info: _ORDER.index(info.kind))
+
+
+def trial(info: DeviceInfo) -> str | None:
+    """Build and run a trivial kernel: None if it worked, else what went wrong in one line."""
+    try:
+        context = cl.Context([info.cl_device])
+        queue = _queue(context, info.cl_device, False)
+        kernel = cl.Kernel(cl.Program(context, _TRIAL).build(), "trial")
+        result = np.zeros(4, np.uint32)
+        buffer = cl.Buffer(context, cl.mem_flags.WRITE_ONLY, result.nbytes)
+        kernel(queue, result.shape, None, buffer)
+        cl.enqueue_copy(queue, result, buffer)
+    except Exception as error:  # whatever a broken driver raises, the next one is tried
+        return " ".join(str(error).split())[:200] or type(error).__name__
+    return None if (result == 7).all() else "a trivial kernel gave a wrong result"
+
+
+def _matching(which: str | int | None, there: tuple[DeviceInfo, ...]) -> list[DeviceInfo]:
+    """The devices that an index or a part of a name means, the preferred ones first."""
+    text = str(which).strip()
+    if text.isdecimal():
+        return [info for info in there if info.index == int(text)]
+    return [info for info in by_preference(there) if text.casefold() in info.label.casefold()]
+
+
+def _reason(info: DeviceInfo, there: tuple[DeviceInfo, ...]) -> str:
+    if len(there) == 1:
+        return "the only device"
+    peers = [other for other in there if other.kind == info.kind]
+    kind = {"gpu": "GPU", "cpu": "CPU"}.get(info.kind, info.kind)
+    which = f"the only {kind}" if len(peers) == 1 else f"the first {kind}"
+    return f"{which}; GPUs are preferred, then accelerators, then CPUs"
+
+
+def _listing(there: tuple[DeviceInfo, ...]) -> str:
+    return ", ".join(f"[{info.index}] {info.label}" for info in there)
+
+
+def _cl_devices() -> Iterator[cl.Device]:
+    runtimes.announce()
+    try:
+        platforms = cl.get_platforms()
+    except cl.Error as error:
+        log.warning("no OpenCL platform: %s", error)
+        return
+    for platform in platforms:
+        try:
+            found = platform.get_devices()
+        except cl.Error as error:
+            log.warning("platform %s is passed over: %s", platform.name, error)
+            continue
+        if not found:
+            log.warning("platform %s has no devices", platform.name)
+        yield from found
+
+
+def _info(index: int, device: cl.Device) -> DeviceInfo:
+    types = cl.device_type
+    if device.type & types.GPU:
+        kind = "gpu"
+    else:
+        kind = "cpu" if device.type & types.CPU else "accelerator"
+    return DeviceInfo(
+        index=index,
+        platform=device.platform.name.strip(),
+        name=device.name.strip(),
+        vendor=device.vendor.strip(),
+        version=device.version.strip(),
+        driver=device.driver_version.strip(),
+        kind=kind,
+        compute_units=device.max_compute_units,
+        global_mem=device.global_mem_size,
+        max_alloc=device.max_mem_alloc_size,
+        float_width=device.native_vector_width_float,
+        cl_device=device,
+    )
+
+
+def _queue(context: cl.Context, device: cl.Device, profiling: bool) -> cl.CommandQueue:
+    flags = cl.command_queue_properties.PROFILING_ENABLE if profiling else 0
+    return cl.CommandQueue(context, device, flags)

@@ -1,0 +1,102 @@
+"""Assembling kernel text: one self-contained text out of the kernels folder and generated parts."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NoReturn
+
+from ..errors import KernelBuildError
+
+_INCLUDE = re.compile(r'\s*#\s*include\s+"([^"]+)"\s*(?://.*|/\*.*\*/\s*)?$')
+_OPEN_IF = re.compile(r"\s*#\s*if")
+_CLOSE_IF = re.compile(r"\s*#\s*endif")
+
+
+@dataclass(frozen=True)
+class Source:
+    """A whole program as text.
+
+    name: the root it was assembled from; text: what the compiler gets; files: every file and
+    virtual file that went in, in order.
+    """
+
+    name: str
+    text: str
+    files: tuple[str, ...]
+
+
+def kernels_folder() -> Path:
+    """The folder with the kernels: inside the installed package, or beside it in a checkout."""
+    package = Path(__file__).resolve().parent.parent
+    installed = package / "kernels"
+    return installed if installed.is_dir() else package.parent / "kernels"
+
+
+def assemble(
+    root: str,
+    virtual: Mapping[str, str] | None = None,
+    defines: Mapping[str, str | int | float] | None = None,
+) -> Source:
+    """The text of `root` with its includes in place, each file once.
+
+    root: a path under the kernels folder ("stage/shade.cl") or the name of a virtual file.
+    virtual: name -> generated text, includable by that name; it wins over a file of that name.
+    defines: written as `#define` lines at the top.
+
+    Every part is announced by `#line`, so that a compiler names our file and line. Includes are
+    resolved before the preprocessor runs and therefore have to stand outside of `#if`.
+
+    Raises KernelBuildError for an include that names nothing, or that stands inside an `#if`.
+    """
+    head = [f"#define {name} {value}" for name, value in (defines or {}).items()]
+    assembly = _Assembly(root, virtual or {}, kernels_folder())
+    assembly.add(root, None, 0)
+    return Source(root, "\n".join([*head, *assembly.rows, ""]), tuple(assembly.files))
+
+
+class _Assembly:
+    """The state of one `assemble`: rows written so far and the files they came from."""
+
+    def __init__(self, root: str, virtual: Mapping[str, str], folder: Path):
+        self.root, self.virtual, self.folder = root, virtual, folder
+        self.rows: list[str] = []
+        self.files: list[str] = []
+
+    def add(self, name: str, includer: str | None, line: int) -> None:
+        """Append the file `name` and, in place of its includes, the files that it names."""
+        label = name if name in self.virtual else f"kernels/{name}"
+        text = self._read(name, includer, line)
+        self.files.append(name)
+        self.rows.append(f'#line 1 "{label}"')
+        depth = 0
+        for number, row in enumerate(text.splitlines(), start=1):
+            depth += bool(_OPEN_IF.match(row)) - bool(_CLOSE_IF.match(row))
+            include = _INCLUDE.match(row)
+            if include is None:
+                self.rows.append(row)
+            elif depth > 0:
+                self._fail(
+                    label,
+                    number,
+                    f'#include "{include[1]}" stands inside an #if; every file is put in once, '
+                    "so it needs no include guard",
+                )
+            elif include[1] in self.files:
+                self.rows.append("")
+            else:
+                self.add(include[1], label, number)
+                self.rows.append(f'#line {number + 1} "{label}"')
+
+    def _read(self, name: str, includer: str | None, line: int) -> str:
+        if name in self.virtual:
+            return self.virtual[name]
+        path = (self.folder / name).resolve()
+        if not path.is_relative_to(self.folder.resolve()) or not path.is_file():
+            self._fail(includer, line, f"no file {name!r} in {self.folder} and no generated one")
+        return path.read_text(encoding="utf-8")
+
+    def _fail(self, file: str | None, line: int, message: str) -> NoReturn:
+        raise KernelBuildError(self.root, file, line or None, f"error: {message}", None)
