@@ -1,0 +1,111 @@
+/* Lanes: the types that all shading code is written in.
+ *
+ * A GPU builds the text with LANES = 1, so that a work-item shades one path; a CPU with LANES = 8 or
+ * 16, so that a work-item shades that many paths in SIMD. `real`, `integer` and `mask` are then
+ * vectors. A kind's functions are branch-free but for `if (any(mask))`, which at one lane is a plain
+ * branch. Masks come from comparisons, combine with & and |, and negate with !, never with ~ (a
+ * true scalar comparison is 1, a true vector one is -1).
+ */
+#define CAT_(a, b) a##b
+#define CAT(a, b) CAT_(a, b)
+
+#if LANES == 1
+typedef float real;
+typedef int integer;
+typedef uint natural;
+#define as_real as_float
+#define as_integer as_int
+#define as_natural as_uint
+#define to_real(x) convert_float(x)
+#define to_integer(x) convert_int(x)
+#define to_natural(x) convert_uint(x)
+#define any(m) (m)
+#define LANE_INDEX 0
+#else
+typedef CAT(float, LANES) real;
+typedef CAT(int, LANES) integer;
+typedef CAT(uint, LANES) natural;
+#define as_real CAT(as_float, LANES)
+#define as_integer CAT(as_int, LANES)
+#define as_natural CAT(as_uint, LANES)
+#define to_real(x) CAT(convert_float, LANES)(x)
+#define to_integer(x) CAT(convert_int, LANES)(x)
+#define to_natural(x) CAT(convert_uint, LANES)(x)
+#if LANES == 8
+#define LANE_INDEX ((integer)(0, 1, 2, 3, 4, 5, 6, 7))
+inline int any(int8 m) { return as_ulong(convert_char8(m)) != 0; }
+#else
+#define LANE_INDEX ((integer)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15))
+inline int any(int16 m)
+{
+    ulong2 q = as_ulong2(convert_char16(m));
+    return (q.x | q.y) != 0;
+}
+#endif
+#endif
+typedef integer mask;
+
+typedef struct { real x, y; } vec2;
+typedef struct { real x, y, z; } vec3;
+
+/* Choice: a where m, else b. */
+inline real sel(mask m, real a, real b) { return m ? a : b; }
+inline integer sel_i(mask m, integer a, integer b) { return m ? a : b; }
+inline natural sel_n(mask m, natural a, natural b) { return m ? a : b; }
+inline vec3 sel3(mask m, vec3 a, vec3 b)
+{
+    vec3 r = {sel(m, a.x, b.x), sel(m, a.y, b.y), sel(m, a.z, b.z)};
+    return r;
+}
+
+inline real min_r(real a, real b) { return a < b ? a : b; }
+inline real max_r(real a, real b) { return a > b ? a : b; }
+inline integer min_i(integer a, integer b) { return a < b ? a : b; }
+inline integer max_i(integer a, integer b) { return a > b ? a : b; }
+inline real clamp_r(real x, real lo, real hi) { return min_r(max_r(x, lo), hi); }
+inline real sqrt_r(real x) { return sqrt(max_r(x, (real)(0.0f))); } /* of a rounded negative: 0 */
+inline real abs_r(real x) { return fabs(x); }
+inline mask both(mask a, mask b) { return a & b; }
+
+/* Memory. `gather` reads table[at] lane by lane; the index of an idle lane must be valid: give 0. */
+#if LANES == 1
+inline real gather(global const float *p, integer at) { return p[at]; }
+inline integer gather_i(global const uint *p, integer at) { return as_int(p[at]); }
+inline void scatter(global float *p, integer at, real v) { p[at] = v; }
+#define FOR_LANES(F) F(0)
+#define LANE(v, i) (v)
+#else
+#define LANES_8(F) F(0) F(1) F(2) F(3) F(4) F(5) F(6) F(7)
+#if LANES == 8
+#define FOR_LANES(F) LANES_8(F)
+#else
+#define FOR_LANES(F) LANES_8(F) F(8) F(9) F(a) F(b) F(c) F(d) F(e) F(f)
+#endif
+#define LANE(v, i) ((v).s##i)
+inline real gather(global const float *p, integer at)
+{
+    real r;
+#define LOAD(i) r.s##i = p[at.s##i];
+    FOR_LANES(LOAD)
+#undef LOAD
+    return r;
+}
+inline integer gather_i(global const uint *p, integer at)
+{
+    integer r;
+#define LOAD(i) r.s##i = as_int(p[at.s##i]);
+    FOR_LANES(LOAD)
+#undef LOAD
+    return r;
+}
+inline void scatter(global float *p, integer at, real v)
+{
+#define STORE(i) p[at.s##i] = v.s##i;
+    FOR_LANES(STORE)
+#undef STORE
+}
+#endif
+/* A word read as a float, and an aligned block of LANES neighbours read or written at once. */
+inline real gather_w(global const uint *p, integer at) { return as_real(gather_i(p, at)); }
+#define block_load(p) (*(global const real *)(p))
+#define block_store(p, v) (*(global real *)(p) = (v))

@@ -1,0 +1,7 @@
+/* Multiple importance sampling, power heuristic with exponent 2 (Veach 1997 eq. 9.13). */
+inline real mis_weight(real pdf_a, real pdf_b)
+{
+    /* in the quotient, so that large pdfs do not overflow when squared */
+    real r = pdf_b / max_r(pdf_a, (real)(1e-20f));
+    return sel(pdf_a > 0.0f, 1.0f / (1.0f + r * r), (real)(0.0f));
+}

@@ -1,0 +1,72 @@
+/* Arithmetic of spectra, for either mode: component by component through SPECTRUM_EACH(F), which
+ * expands F(x) F(y) F(z) and, in spectral mode, F(w). */
+inline Spectrum spectrum_of(real v)
+{
+    Spectrum r;
+#define C(c) r.c = v;
+    SPECTRUM_EACH(C)
+#undef C
+    return r;
+}
+#define BINARY(name, op)                            \
+    inline Spectrum name(Spectrum a, Spectrum b)    \
+    {                                               \
+        Spectrum r;                                 \
+        SPECTRUM_EACH(op)                           \
+        return r;                                   \
+    }
+#define C(c) r.c = a.c + b.c;
+BINARY(spectrum_add, C)
+#undef C
+#define C(c) r.c = a.c - b.c;
+BINARY(spectrum_sub, C)
+#undef C
+#define C(c) r.c = a.c * b.c;
+BINARY(spectrum_mul, C)
+#undef C
+#define C(c) r.c = a.c / b.c;
+BINARY(spectrum_div, C)
+#undef C
+#undef BINARY
+inline Spectrum spectrum_scale(Spectrum a, real s)
+{
+    Spectrum r;
+#define C(c) r.c = a.c * s;
+    SPECTRUM_EACH(C)
+#undef C
+    return r;
+}
+inline Spectrum spectrum_madd(Spectrum a, real s, Spectrum b) /* a s + b */
+{
+    Spectrum r;
+#define C(c) r.c = a.c * s + b.c;
+    SPECTRUM_EACH(C)
+#undef C
+    return r;
+}
+inline Spectrum spectrum_sel(mask m, Spectrum a, Spectrum b)
+{
+    Spectrum r;
+#define C(c) r.c = sel(m, a.c, b.c);
+    SPECTRUM_EACH(C)
+#undef C
+    return r;
+}
+inline real spectrum_max(Spectrum a)
+{
+    real r = max_r(max_r(a.x, a.y), a.z);
+#if SPECTRUM_SIZE == 4
+    r = max_r(r, a.w);
+#endif
+    return r;
+}
+inline real spectrum_mean(Spectrum a) { return SPECTRUM_MEAN(a); }
+/* Whether the components differ: a dispersive index. */
+inline mask spectrum_varies(Spectrum a)
+{
+    mask m = (a.y != a.x) | (a.z != a.x);
+#if SPECTRUM_SIZE == 4
+    m = m | (a.w != a.x);
+#endif
+    return m;
+}

@@ -1,0 +1,34 @@
+/* From the unit square to directions and areas; pdfs per solid angle [1/sr] unless named otherwise. */
+inline vec2 disk_of(vec2 u) /* concentric in the radius only: r = sqrt(u.x), angle 2 pi u.y */
+{
+    real s, c, r = sqrt_r(u.x);
+    sincos_2pi(u.y, &s, &c);
+    vec2 p = {r * c, r * s};
+    return p;
+}
+inline vec3 cosine_hemisphere(vec2 u)
+{
+    vec2 p = disk_of(u);
+    return v3(p.x, p.y, sqrt_r(1.0f - u.x));
+}
+inline real cosine_hemisphere_pdf(real cos_t) { return max_r(cos_t, (real)(0.0f)) * INV_PI; }
+inline vec3 uniform_sphere(vec2 u)
+{
+    real s, c, z = 1.0f - 2.0f * u.x, r = sqrt_r(1.0f - z * z);
+    sincos_2pi(u.y, &s, &c);
+    return v3(r * c, r * s, z);
+}
+/* A cone about +z of solid angle 2 pi (1 - cos_max), given as 1 - cos_max to keep small cones exact. */
+inline vec3 uniform_cone(vec2 u, real one_minus_cos)
+{
+    real s, c, h = u.x * one_minus_cos, z = 1.0f - h, r = sqrt_r(h * (2.0f - h));
+    sincos_2pi(u.y, &s, &c);
+    return v3(r * c, r * s, z);
+}
+/* Barycentrics of vertices 1 and 2, uniform over a triangle (Heitz 2019 would fold; this is the root form). */
+inline vec2 uniform_triangle(vec2 u)
+{
+    real r = sqrt_r(u.x);
+    vec2 b = {1.0f - r, u.y * r};
+    return b;
+}
