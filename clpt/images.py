@@ -1,0 +1,299 @@
+"""Image files as (h, w, c) float32 arrays, and back; row 0 is the top.
+
+Values are linear Rec. 709 unless raw ones are asked for. 8-bit files are read through Pillow,
+EXR through the OpenEXR package; Radiance HDR and PFM are small enough to stand here.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+import OpenEXR
+from numpy.typing import ArrayLike, NDArray
+from PIL import Image, UnidentifiedImageError
+
+from .errors import SceneError
+
+Array = NDArray[np.float32]
+Metadata = Mapping[str, str | int | float]
+
+_HALF_MAX = 65504.0
+_PILLOW = (".png", ".jpg", ".jpeg", ".tga", ".bmp", ".webp", ".gif", ".tif", ".tiff")
+
+
+def read(path: str | Path, *, linear: bool = True) -> Array:
+    """An image file as (h, w, c) float32, c being 1, 3 or 4 (other counts for layered EXR and npy).
+
+    linear: decode the sRGB transfer of 8-bit and 16-bit files; False gives the stored values in
+    [0, 1], as for roughness or normals. Files of floats come as they are either way. Alpha is
+    never decoded, nor multiplied in.
+
+    Raises SceneError if there is no such file, its suffix is unknown, or it is not an image.
+    """
+    path = Path(path)
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        _fail(path, f"unknown image suffix {path.suffix!r}; known: {', '.join(READERS)}")
+    if not path.is_file():
+        _fail(path, "no such image file")
+    try:
+        image = reader(path, linear)
+    except SceneError:
+        raise
+    except Exception as error:  # the libraries raise their own, from struct.error to RuntimeError
+        message = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise SceneError(f"not a readable image: {message}", file=path) from error
+    if image.size == 0:
+        _fail(path, "the image has no pixels")
+    return image
+
+
+def write(
+    path: str | Path,
+    image: ArrayLike,
+    *,
+    half: bool = True,
+    metadata: Metadata | None = None,
+    exposure: float = 0.0,
+    layers: Mapping[str, ArrayLike] | None = None,
+) -> None:
+    """Write a linear (h, w), (h, w, 1), (h, w, 3) or (h, w, 4) image in the format of the suffix.
+
+    .exr: half or float, with attributes from `metadata` and further `layers`, name -> (h, w) as
+    the channel of that name, or (h, w, 3) as its .R, .G, .B. .png: sRGB transfer, 8 bit, scaled by
+    2^exposure; NaN is black there, values beyond [0, 1] are clipped. .hdr, .pfm, .npy: as it is.
+
+    Raises SceneError if the suffix is unknown, the shape does not fit or the file cannot be made.
+    """
+    path = check_output(path)
+    pixels = np.asarray(image, np.float32)
+    pixels = pixels[..., None] if pixels.ndim == 2 else pixels
+    if pixels.ndim != 3 or pixels.shape[2] not in (1, 3, 4) or pixels.size == 0:
+        _fail(path, f"cannot write an image of shape {pixels.shape}; (h, w, 1, 3 or 4) is needed")
+    try:
+        suffix = path.suffix.lower()
+        if suffix == ".exr":
+            _write_exr(path, pixels, half, metadata or {}, layers or {})
+        elif suffix == ".png":
+            stored = to_srgb8(pixels, exposure)
+            Image.fromarray(stored[..., 0] if stored.shape[2] == 1 else stored).save(path)
+        else:
+            {".hdr": _write_hdr, ".pfm": _write_pfm, ".npy": np.save}[suffix](path, pixels)
+    except (OSError, RuntimeError, ValueError) as error:
+        raise SceneError(f"cannot be written: {error}", file=path) from error
+
+
+def check_output(path: str | Path) -> Path:
+    """The path, if `write` knows its suffix and its folder exists. Raises SceneError otherwise."""
+    path = Path(path)
+    if path.suffix.lower() not in WRITABLE:
+        _fail(path, f"unknown image suffix {path.suffix!r}; can write {', '.join(WRITABLE)}")
+    if not path.absolute().parent.is_dir():
+        _fail(path, "its folder does not exist")
+    return path
+
+
+def read_layers(path: str | Path) -> dict[str, Array]:
+    """Every channel of an EXR file by name, each (h, w) float32. Raises SceneError."""
+    path = Path(path)
+    if not path.is_file():
+        _fail(path, "no such image file")
+    try:
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            channels = file.channels()
+            return {name: np.asarray(c.pixels, np.float32) for name, c in channels.items()}
+    except (OSError, RuntimeError, ValueError) as error:
+        raise SceneError(f"not a readable image: {error}", file=path) from error
+
+
+def from_pillow(image: Image.Image, *, linear: bool = True) -> Array:
+    """A Pillow image as (h, w, 1, 3 or 4) float32; `linear` as in `read`."""
+    if image.mode in ("F", "I", "I;16", "I;16B", "I;16L"):
+        values = np.asarray(image, np.float32)[..., None]
+        if image.mode == "F":
+            return values
+        values = values / np.float32(65535.0)
+        return srgb_to_linear(values) if linear else values
+    if image.mode not in ("L", "RGB", "RGBA"):
+        transparent = "A" in image.mode or "a" in image.mode or "transparency" in image.info
+        image = image.convert("RGBA" if transparent else "L" if image.mode == "1" else "RGB")
+    stored = np.asarray(image)
+    stored = stored[..., None] if stored.ndim == 2 else stored
+    scale = np.arange(256, dtype=np.float32) / np.float32(255.0)
+    if not linear:
+        return scale[stored]
+    values = srgb_to_linear(scale)[stored]
+    if stored.shape[2] == 4:
+        values[..., 3] = scale[stored[..., 3]]
+    return values
+
+
+def srgb_to_linear(x: Array) -> Array:
+    """The sRGB transfer decoded (IEC 61966-2-1)."""
+    return np.where(x <= 0.04045, x / 12.92, ((np.maximum(x, 0) + 0.055) / 1.055) ** 2.4).astype(
+        np.float32
+    )
+
+
+def linear_to_srgb(x: Array) -> Array:
+    """The sRGB transfer applied (IEC 61966-2-1)."""
+    power = np.maximum(x, 0.0031308) ** (1 / 2.4)
+    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * power - 0.055).astype(np.float32)
+
+
+def to_srgb8(image: Array, exposure: float = 0.0) -> NDArray[np.uint8]:
+    """Linear (h, w, c) as 8-bit sRGB, scaled by 2^exposure; NaN becomes black, infinity white."""
+    finite = np.nan_to_num(image, nan=0.0, posinf=np.inf, neginf=0.0)
+    colour, alpha = finite[..., :3], finite[..., 3:]
+    shown = linear_to_srgb(np.clip(colour * np.float32(2.0**exposure), 0, 1))
+    values = np.concatenate([shown, np.clip(alpha, 0, 1)], axis=2)
+    return np.round(values * 255).astype(np.uint8)
+
+
+def _fail(path: Path, message: str) -> NoReturn:
+    raise SceneError(message, file=path)
+
+
+def _read_pillow(path: Path, linear: bool) -> Array:
+    try:
+        with Image.open(path) as image:
+            return from_pillow(image, linear=linear)
+    except UnidentifiedImageError:
+        _fail(path, "not an image")
+
+
+def _read_exr(path: Path, linear: bool) -> Array:
+    channels = read_layers(path)
+    if {"RY", "BY"} & channels.keys():
+        _fail(path, "luminance and chroma channels (Y, RY, BY) are not supported; save it as RGB")
+    return np.stack([channels[name] for name in _colour_channels(channels)], axis=2)
+
+
+def _colour_channels(names: Collection[str]) -> list[str]:
+    """R, G, B and A if there; else Y; else those of a single layer; else all, sorted by name."""
+    layers = {name.rpartition(".")[0] for name in names}
+    prefixes = ["", *(f"{layer}." for layer in layers if layer and len(layers) == 1)]
+    for prefix in prefixes:
+        for letters in ("RGBA", "RGB", "Y"):
+            if all(prefix + letter in names for letter in letters):
+                return [prefix + letter for letter in letters]
+    return sorted(names)
+
+
+def _write_exr(
+    path: Path, pixels: Array, half: bool, metadata: Metadata, layers: Mapping[str, ArrayLike]
+) -> None:
+    channels = {}
+    names = {1: "Y", 3: "RGB", 4: "RGBA"}[pixels.shape[2]]
+    parts = [("", names, pixels)]
+    for name, given in layers.items():
+        layer = np.asarray(given, np.float32)
+        layer = layer[..., None] if layer.ndim == 2 else layer
+        if layer.shape[:2] != pixels.shape[:2] or layer.shape[2] not in (1, 3, 4):
+            _fail(path, f"layer {name!r} has shape {layer.shape}, the image {pixels.shape}")
+        letters = {1: ("",), 3: (".R", ".G", ".B"), 4: (".R", ".G", ".B", ".A")}[layer.shape[2]]
+        parts.append((name, letters, layer))
+    for name, letters, layer in parts:
+        stored = np.clip(layer, -_HALF_MAX, _HALF_MAX).astype(np.float16) if half else layer
+        for index, letter in enumerate(letters):
+            channels[name + letter] = np.ascontiguousarray(stored[..., index])
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    OpenEXR.File({**dict(metadata), **header}, channels).write(str(path))
+
+
+def _read_npy(path: Path, linear: bool) -> Array:
+    array = np.load(path, allow_pickle=False)
+    if array.ndim not in (2, 3) or array.dtype.kind not in "fiu":
+        _fail(path, f"not an image: an array of {array.dtype}, shape {array.shape}")
+    return np.asarray(array if array.ndim == 3 else array[..., None], np.float32)
+
+
+def _read_pfm(path: Path, linear: bool) -> Array:
+    data = path.read_bytes()
+    header = re.match(rb"(P[Ff])\s+(\d+)\s+(\d+)\s+([-+.\deE]+)\s", data)
+    if header is None:
+        _fail(path, "not a PFM image: its header is not 'PF' or 'Pf', width, height, scale")
+    width, height, scale = int(header[2]), int(header[3]), float(header[4])
+    channels = 3 if header[1] == b"PF" else 1
+    count = width * height * channels
+    if len(data) - header.end() < 4 * count:
+        _fail(path, f"the file ends early: {width}x{height} pixels are announced")
+    values = np.frombuffer(data, "<f4" if scale < 0 else ">f4", count, header.end())
+    return values.reshape(height, width, channels)[::-1].astype(np.float32)
+
+
+def _write_pfm(path: Path, pixels: Array) -> None:
+    pixels = pixels[..., :3]
+    kind = "PF" if pixels.shape[2] == 3 else "Pf"
+    head = f"{kind}\n{pixels.shape[1]} {pixels.shape[0]}\n-1.0\n"
+    path.write_bytes(head.encode() + pixels[::-1].astype("<f4").tobytes())
+
+
+def _read_hdr(path: Path, linear: bool) -> Array:
+    """Radiance RGBE, flat or run-length coded, rows from the top (Ward 1991)."""
+    data = path.read_bytes()
+    size = re.search(rb"\n\n-Y (\d+) \+X (\d+)\n", data)
+    if not data.startswith(b"#?") or size is None:
+        _fail(path, "not a Radiance HDR image with rows from the top")
+    if b"FORMAT=32-bit_rle_xyze" in data[: size.start()]:
+        _fail(path, "XYZE colours are not supported; save it as RGBE")
+    height, width = int(size[1]), int(size[2])
+    rgbe, at = np.empty((height, width, 4), np.uint8), size.end()
+    try:
+        for y in range(height):
+            at = _hdr_row(data, at, rgbe[y])
+    except (IndexError, ValueError) as error:
+        raise SceneError(f"the file is broken in row {y} of {height}", file=path) from error
+    scale = np.ldexp(np.float32(1), rgbe[..., 3:].astype(np.int32) - 136)
+    return np.where(rgbe[..., 3:] > 0, rgbe[..., :3] * scale, 0).astype(np.float32)
+
+
+def _hdr_row(data: bytes, at: int, row: NDArray[np.uint8]) -> int:
+    """Decode one row into `row` (w, 4); where the next one begins."""
+    width = len(row)
+    if data[at : at + 2] != b"\2\2" or not 8 <= width < 32768 or data[at + 2] > 127:
+        row[:] = np.frombuffer(data, np.uint8, 4 * width, at).reshape(width, 4)
+        if (row[:, :3] == 1).all(axis=1).any():
+            raise ValueError("run-length coding of the first kind")
+        return at + 4 * width
+    at += 4
+    for channel in range(4):
+        values = bytearray()
+        while len(values) < width:
+            count = data[at]
+            if count > 128:
+                values += data[at + 1 : at + 2] * (count - 128)
+                at += 2
+            else:
+                values += data[at + 1 : at + 1 + count]
+                at += 1 + max(count, 1)
+        row[:, channel] = np.frombuffer(values, np.uint8)
+    return at
+
+
+def _write_hdr(path: Path, pixels: Array) -> None:
+    """Radiance RGBE, flat rows: a normalised mantissa cannot look like a run-length code."""
+    colour = np.nan_to_num(np.broadcast_to(pixels[..., :3], (*pixels.shape[:2], 3)), posinf=1e38)
+    colour = np.clip(colour, 0, 1e38)
+    mantissa, exponent = np.frexp(colour.max(axis=2))
+    scale = np.where(mantissa > 0, np.ldexp(256.0, -exponent), 0)
+    rgbe = np.empty((*pixels.shape[:2], 4), np.uint8)
+    rgbe[..., :3] = np.clip(np.round(colour * scale[..., None]), 0, 255)
+    rgbe[..., 3] = np.where((mantissa > 0) & (exponent > -128), np.clip(exponent + 128, 0, 255), 0)
+    head = f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {pixels.shape[0]} +X {pixels.shape[1]}\n"
+    path.write_bytes(head.encode() + rgbe.tobytes())
+
+
+READERS = {
+    ".exr": _read_exr,
+    ".hdr": _read_hdr,
+    ".pic": _read_hdr,
+    ".pfm": _read_pfm,
+    ".npy": _read_npy,
+    **dict.fromkeys(_PILLOW, _read_pillow),
+}
+WRITABLE = (".exr", ".png", ".hdr", ".pfm", ".npy")
