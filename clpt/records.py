@@ -1,0 +1,117 @@
+"""Every record that the host shares with the device. Read this first.
+
+Three slabs hold what is in flight, one slot a path: `Path`, `Hit` and `Shadow`. Tables of words hold
+the scene; `TABLES` lists them once, and the kernels' `Scene` struct and arguments are made of it.
+"""
+
+from __future__ import annotations
+
+from clpt.layout import Record
+
+PATH = Record(
+    "Path",
+    "State of one light path; stays in its slot.",
+    o=("vec3", "origin of the ray in flight [m]"),
+    d=("vec3", "its direction, unit length"),
+    beta=("spectrum", "throughput, per wavelength"),
+    radiance=("spectrum", "what the path has gathered so far"),
+    lambdas=("spectrum", "wavelengths [nm]; unused in RGB mode"),
+    pdf=("real", "of the direction d [1/sr]; below 0 if the last event was delta, or at the camera"),
+    eta=("real", "product of the relative indices so far, for Russian roulette"),
+    state=("integer", "PATH_ bits and depth, see kernels/lib/path_state.cl"),
+    place=("integer", "which place of the film is being worked on, in the order of the tiles"),
+    sample=("integer", "which sample of that pixel"),
+    sum=("vec3", "of the samples of this place so far: xyz, or rgb in RGB mode"),
+    rest=("vec3", "what rounding took from `sum` (Neumaier)"),
+)
+
+HIT = Record(
+    "Hit",
+    "Where the ray in flight ends.",
+    t=("real", "distance [m]"),
+    u=("real", "barycentric of vertex 1; u of an analytic shape"),
+    v=("real", "barycentric of vertex 2; v of an analytic shape"),
+    n=("vec3", "geometric normal; of a triangle not normalised, twice its area long"),
+    prim=("integer", "primitive; -1: nothing was hit"),
+    shape=("integer", "row of the shape in `shapes`"),
+    material=("integer", "material word of the side that was hit, see kernels/lib/surface.cl"),
+)
+
+SHADOW = Record(
+    "Shadow",
+    "A ray to a light that waits to be tested, and what it carries.",
+    o=("vec3", "origin [m]"),
+    d=("vec3", "direction, unit length"),
+    t=("real", "distance to the light [m]; not above 0: no ray"),
+    value=("spectrum", "radiance that arrives if nothing is in the way"),
+)
+
+SETTINGS = Record(
+    "Settings",
+    "What holds for a whole render.",
+    width=("natural", "of the film [pixels]"),
+    height=("natural", "of the film [pixels]"),
+    tiles_x=("natural", "4x4-pixel tiles in a row"),
+    places=("natural", "16 times the number of tiles"),
+    slots=("natural", "paths in flight"),
+    per_plane=("natural", "slots that work on one film plane"),
+    planes=("natural", "film planes; slots of different planes share pixels"),
+    seed=("natural", "of the sampler"),
+    max_depth=("integer", "longest path"),
+    rr_depth=("integer", "depth from which Russian roulette is played"),
+    hide_lights=("integer", "1: the camera does not see lights"),
+    light_count=("integer", "rows in `lights`"),
+    infinite_count=("integer", "how many of them are infinite; these come first"),
+    lambda_min=("real", "[nm]"),
+    lambda_max=("real", "[nm]"),
+    sensor=("real", "factor from the film's sum to the picture"),
+    scene_radius=("real", "of the sphere around the scene [m]"),
+    center=("vec3", "of that sphere [m]"),
+)
+
+SHAPE = Record(
+    "ShapeRow",
+    "One shape.",
+    kind=("integer", "0: triangles; else 1 + position in the table of analytic shapes"),
+    front=("integer", "material word of its front"),
+    back=("integer", "material word of its back"),
+    light=("integer", "first of its rows in `lights`; -1: it does not emit"),
+    flags=("integer", "SHAPE_ bits, see kernels/lib/surface.cl"),
+    prim=("integer", "its first primitive"),
+    params=("integer", "first word of its parameters in `geometry`; analytic shapes"),
+    spare=("integer", "keeps rows at 32 bytes"),
+)
+
+LIGHT = Record(
+    "LightRow",
+    "One light that can be chosen: a lamp, an analytic shape, or one triangle.",
+    kind=("integer", "position in the table of device lights"),
+    params=("integer", "first word of its parameters, in `geometry` or `lamps`"),
+    pmf=("real", "probability of being chosen"),
+    keep=("real", "probability that the alias table keeps this row"),
+    alias=("integer", "the row taken otherwise"),
+    shape=("integer", "row of its shape; -1: not on a shape"),
+    radiance=("integer", "first word of its emission parameter in `lamps`"),
+    spare=("integer", "keeps rows at 32 bytes"),
+)
+
+SLABS = (PATH, HIT, SHADOW)
+
+# name: (element type, what it holds); all read-only
+TABLES: dict[str, tuple[str, str]] = {
+    "vertices": ("float", "x y z per vertex [m]"),
+    "normals": ("float", "x y z per vertex; zero where the shape has none"),
+    "uvs": ("float", "u v per vertex"),
+    "faces": ("uint", "three vertices per triangle"),
+    "shapes": ("uint", "ShapeRow per shape"),
+    "geometry": ("uint", "parameters of analytic shapes, and of shapes as lights"),
+    "materials": ("uint", "parameters of the leaf materials, a row each"),
+    "mixtures": ("uint", "rules of masks and blends, see kernels/stage/sort.cl"),
+    "lights": ("uint", "LightRow per light, infinite ones first"),
+    "lamps": ("uint", "parameters of the lights that are not shapes, and emissions"),
+    "spectra": ("float", "tabulated spectra on the common grid"),
+    "textures": ("uint", "parameters of the textures, a row each"),
+    "texels": ("float", "of all bitmaps and environment maps"),
+    "distributions": ("float", "cumulative distributions of the environment maps"),
+    "camera": ("float", "the camera's parameters"),
+}

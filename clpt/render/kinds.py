@@ -1,0 +1,78 @@
+"""Generated text of the kinds: structs, loaders, dispatch. The physics is always in a file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from clpt.scene.params import SPECTRUM_ROLES, Kind, Param, device_params
+
+# How many words a parameter takes in a row of `materials`, `textures` or `lamps`.
+SPECTRUM_WORDS = 5  # x y z w and where the value comes from: 0 here, > 0 texture, < 0 table
+REAL_WORDS = 2  # the value, and 0 or 1 + the texture
+
+
+def words(param: Param) -> int:
+    """Return the number of 4-byte words that a parameter takes in its row."""
+    if param.role in SPECTRUM_ROLES:
+        return SPECTRUM_WORDS
+    return REAL_WORDS if param.role == "real" else 1
+
+
+def lane_type(param: Param) -> str:
+    """Return the parameter's type in a kind's struct."""
+    if param.role in SPECTRUM_ROLES:
+        return "Spectrum"
+    return "real" if param.role == "real" else "integer"
+
+
+def struct_text(cls: type[Kind]) -> str:
+    """Return `typedef struct {...} Kind;` with one member per device parameter."""
+    rows = [f"    {lane_type(p)} {n}; /* {p.doc} */" for n, p in device_params(cls).items()]
+    rows = rows or ["    integer unused; /* no parameters */"]
+    return "\n".join(["typedef struct {", *rows, f"}} {cls.__name__};", ""])
+
+
+def load_text(cls: type[Kind], sources: Mapping[str, frozenset[str]], table: str) -> str:
+    """Return `kind_load(scene, row, uv, lambdas)`, which reads a row at the path's wavelengths.
+
+    sources: per parameter, where the values in this scene come from: "constant", "table" (a
+    tabulated spectrum), "texture". Text is made only for what is there.
+    """
+    body, at = [], 0
+    for name, param in device_params(cls).items():
+        found = sources.get(name) or frozenset({"constant"})
+        kind = {"Spectrum": "spectrum", "real": "real", "integer": "integer"}[lane_type(param)]
+        body += _member(name, param, kind, f"row + {at}", found, table)
+        at += words(param)
+    head = (
+        f"inline {cls.__name__} {cls.kind}_load"
+        "(Scene scene, integer row, vec2 uv, Wavelengths lambdas)"
+    )
+    body = body or ["    r.unused = 0;"]
+    return "\n".join([head, "{", f"    {cls.__name__} r;", *body, "    return r;", "}", ""])
+
+
+def _member(
+    name: str, param: Param, kind: str, at: str, found: frozenset[str], table: str
+) -> list[str]:
+    """The lines that load one member from the sources that occur."""
+    if kind == "integer":
+        return [f"    r.{name} = gather_i(scene.{table}, {at});"]
+    forms = {
+        "constant": f"{kind}_constant(scene.{table}, {at}, lambdas)",
+        "table": f"{kind}_table(scene, scene.{table}, {at}, lambdas)",
+        "texture": f"{kind}_texture_{param.role}(scene, scene.{table}, {at}, uv, lambdas)",
+    }
+    present = [form for form in forms if form in found]
+    lines = [f"    r.{name} = {forms[present[0]]};"]
+    source = f"{at} + {(SPECTRUM_WORDS if kind == 'spectrum' else REAL_WORDS) - 1}"
+    choose = "spectrum_sel" if kind == "spectrum" else "sel"
+    for form in present[1:]:
+        test = "< 0" if form == "table" else "> 0"
+        lines += [
+            "    {",
+            f"        mask m = gather_i(scene.{table}, {source}) {test};",
+            f"        if (any(m)) r.{name} = {choose}(m, {forms[form]}, r.{name});",
+            "    }",
+        ]
+    return lines
