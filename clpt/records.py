@@ -64,7 +64,8 @@ SETTINGS = Record(
     infinite_count=("integer", "how many of them are infinite; these come first"),
     lambda_min=("real", "[nm]"),
     lambda_max=("real", "[nm]"),
-    sensor=("real", "factor from the film's sum to the picture"),
+    tanh_min=("real", "tanh of the wavelength importance at lambda_min"),
+    tanh_max=("real", "and at lambda_max"),
     scene_radius=("real", "of the sphere around the scene [m]"),
     center=("vec3", "of that sphere [m]"),
 )

@@ -1,0 +1,21 @@
+/* The contract of a camera kind: kernels/camera/<kind>.cl has
+ *
+ *   CameraRay <kind>_ray(global const <Kind>Camera *camera, vec2 film, vec2 lens);
+ *
+ * film: position on the film, x and y in [0, 1], y down; lens: a point of the unit square.
+ * The struct is a uniform Record in clpt/render/cameras.py.
+ */
+typedef struct {
+    vec3 o, d; /* [m]; unit length. The origin lies on the near plane. */
+} CameraRay;
+
+inline vec3 matrix_point(global const float *m, real x, real y, real z) /* row-major, affine */
+{
+    return v3(m[0] * x + m[1] * y + m[2] * z + m[3], m[4] * x + m[5] * y + m[6] * z + m[7],
+              m[8] * x + m[9] * y + m[10] * z + m[11]);
+}
+inline vec3 matrix_vector(global const float *m, real x, real y, real z)
+{
+    return v3(m[0] * x + m[1] * y + m[2] * z, m[4] * x + m[5] * y + m[6] * z,
+              m[8] * x + m[9] * y + m[10] * z);
+}

@@ -1,0 +1,6 @@
+/* Numbers that stand in a row of parameters; spectra are read in spectrum/<mode>_read.cl, textures in
+ * the generated dispatch. */
+inline real real_constant(global const uint *table, integer at, Wavelengths lambdas)
+{
+    return gather_w(table, at);
+}

@@ -1,0 +1,17 @@
+/* Path.state: depth in bits 0 to 11, flags, and the number of shadow rays from bit 16 up. */
+#define PATH_DEPTH 0x0fff
+#define PATH_ALIVE 0x1000 /* a ray is in flight */
+#define PATH_FRESH 0x2000 /* no sample has been begun: there is nothing to deposit */
+#define PATH_DONE 0x4000  /* the slot has walked its whole list */
+#define PATH_SHADOW 0x10000
+
+/* Dimensions of a sample, in pairs: film, lens, wavelength, then DIMENSIONS_A_VERTEX per vertex. */
+#define DIMENSION_FILM 0
+#define DIMENSION_LENS 1
+#define DIMENSION_WAVELENGTH 2
+#define DIMENSION_VERTEX 3
+#define DIMENSIONS_A_VERTEX 4
+#define DIMENSION_LIGHT 0    /* a point on a light */
+#define DIMENSION_BSDF 1     /* a direction */
+#define DIMENSION_CHOICE 2   /* which light, which lobe */
+#define DIMENSION_ROULETTE 3 /* whether to go on; which part of a mixture */

@@ -1,0 +1,11 @@
+/* Hashes of counters; there is no state. */
+
+/* PCG's output permutation (Jarzynski and Olano 2020). */
+inline natural hash_natural(natural x)
+{
+    x = x * 747796405u + 2891336453u;
+    x = ((x >> ((x >> 28u) + 4u)) ^ x) * 277803737u;
+    return (x >> 22u) ^ x;
+}
+/* [0, 1): 23 bits put into a mantissa, so that 1 never comes out. */
+inline real unit_interval(natural x) { return as_real((x >> 9u) | 0x3f800000u) - 1.0f; }

@@ -1,0 +1,21 @@
+/* One triangle as a light: sampled evenly over its area. Rays meet triangles through kernels/bvh. */
+ShapeSample triangle_sample(Triangle s, vec3 p, vec2 u)
+{
+    vec2 b = uniform_triangle(u);
+    vec3 to = sub3(madd3(s.e1, b.x, madd3(s.e2, b.y, s.v0)), p), n = cross3(s.e1, s.e2);
+    real t2 = max_r(dot3(to, to), (real)(1e-20f)), twice = max_r(sqrt(dot3(n, n)), (real)(1e-30f));
+    ShapeSample r;
+    r.t = sqrt(t2);
+    r.wi = scale3(to, 1.0f / r.t);
+    r.n = scale3(n, s.side / twice);
+    r.uv.x = b.x; /* barycentrics: the caller turns them into the mesh's uv */
+    r.uv.y = b.y;
+    r.pdf = solid_angle_pdf(2.0f / twice, r.t, fabs(dot3(r.n, r.wi)));
+    return r;
+}
+
+real triangle_pdf(Triangle s, vec3 p, vec3 wi, real t, vec3 n)
+{
+    vec3 twice = cross3(s.e1, s.e2);
+    return solid_angle_pdf(2.0f / max_r(sqrt(dot3(twice, twice)), (real)(1e-30f)), t, fabs(dot3(n, wi)));
+}

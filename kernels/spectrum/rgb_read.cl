@@ -1,0 +1,35 @@
+/* Reading spectra from tables, and from light to film, in RGB mode. Same functions in spectral_read.cl. */
+typedef Spectrum Wavelengths;
+
+/* A value that stands in the row itself: linear rgb. */
+inline Spectrum spectrum_constant(global const uint *table, integer at, Wavelengths lambdas)
+{
+    Spectrum r = {gather_w(table, at), gather_w(table, at + 1), gather_w(table, at + 2)};
+    return r;
+}
+/* Tabulated spectra were turned to rgb on the host. */
+inline Spectrum spectrum_table(Scene scene, global const uint *table, integer at, Wavelengths lambdas)
+{
+    return spectrum_constant(table, at, lambdas);
+}
+/* What a texel of a bitmap means: linear rgb. */
+inline Spectrum spectrum_texel(real x, real y, real z, real w, Wavelengths lambdas)
+{
+    Spectrum r = {x, y, z};
+    return r;
+}
+/* A texel of an emission image or environment map: linear rgb. */
+inline Spectrum spectrum_light_texel(Scene scene, real x, real y, real z, real w, Wavelengths lambdas)
+{
+    Spectrum r = {x, y, z};
+    return r;
+}
+inline Wavelengths wavelengths_sample(Scene scene, real u)
+{
+    return spectrum_of(0.0f);
+}
+/* What a film place adds for a sample: rgb. */
+inline vec3 film_value(Scene scene, Spectrum radiance, Wavelengths lambdas)
+{
+    return v3(radiance.x, radiance.y, radiance.z);
+}

@@ -1,0 +1,83 @@
+/* Reading spectra at a path's wavelengths, and from light to film. Same functions in rgb_read.cl.
+ * Tables lie on a grid of SPECTRA_STEP nm from settings->lambda_min; row 0 is D65, then the sensor. */
+typedef Spectrum Wavelengths;
+
+/* Linear interpolation in row `row` of `spectra`. */
+inline Spectrum spectra_row(Scene scene, integer row, Wavelengths lambdas)
+{
+    integer first = row * SPECTRA_SIZE;
+    real lo = scene.settings->lambda_min;
+    Spectrum r;
+#define C(c)                                                                                    \
+    {                                                                                           \
+        real x = clamp_r((lambdas.c - lo) * (1.0f / SPECTRA_STEP), (real)(0.0f), (real)(SPECTRA_SIZE - 1.001f)); \
+        integer i = to_integer(x);                                                              \
+        real a = gather(scene.spectra, first + i), b = gather(scene.spectra, first + i + 1);    \
+        r.c = a + (x - to_real(i)) * (b - a);                                                   \
+    }
+    SPECTRUM_EACH(C)
+#undef C
+    return r;
+}
+/* Jakob and Hanika 2019 eq. 5: w (1/2 + x / (2 sqrt(1 + x^2))), x = (c0 lambda + c1) lambda + c2. */
+inline Spectrum sigmoid_spectrum(real c0, real c1, real c2, real w, Wavelengths lambdas)
+{
+    Spectrum r;
+#define C(c)                                                    \
+    {                                                           \
+        real x = (c0 * lambdas.c + c1) * lambdas.c + c2;        \
+        r.c = w * (0.5f + 0.5f * x / sqrt(1.0f + x * x));       \
+    }
+    SPECTRUM_EACH(C)
+#undef C
+    return r;
+}
+/* A value that stands in the row itself: sigmoid coefficients and a factor. */
+inline Spectrum spectrum_constant(global const uint *table, integer at, Wavelengths lambdas)
+{
+    return sigmoid_spectrum(gather_w(table, at), gather_w(table, at + 1), gather_w(table, at + 2),
+                            gather_w(table, at + 3), lambdas);
+}
+/* A tabulated spectrum: the fifth word is -1 - its row, the fourth a factor. */
+inline Spectrum spectrum_table(Scene scene, global const uint *table, integer at, Wavelengths lambdas)
+{
+    integer row = max_i(-1 - gather_i(table, at + 4), (integer)(0));
+    return spectrum_scale(spectra_row(scene, row, lambdas), gather_w(table, at + 3));
+}
+/* What a texel of a bitmap means: sigmoid coefficients and a factor. */
+inline Spectrum spectrum_texel(real x, real y, real z, real w, Wavelengths lambdas)
+{
+    return sigmoid_spectrum(x, y, z, w, lambdas);
+}
+/* A texel of an emission image or environment map: the same, times D65. */
+inline Spectrum spectrum_light_texel(Scene scene, real x, real y, real z, real w, Wavelengths lambdas)
+{
+    return spectrum_mul(sigmoid_spectrum(x, y, z, w, lambdas), spectra_row(scene, (integer)(0), lambdas));
+}
+
+/* Visible importance: pdf proportional to sech^2(0.0072 (lambda - 538)), cut to the film's range
+ * (Radziszewski et al. 2009; pbrt-v4's constants). tanh at the range's ends comes in SENSOR_TANH_. */
+#define IMPORTANCE_SLOPE 0.0072f
+#define IMPORTANCE_PEAK 538.0f
+inline Wavelengths wavelengths_sample(Scene scene, real u)
+{
+    real a = scene.settings->tanh_min, b = scene.settings->tanh_max, offset = 0.0f;
+    Wavelengths r;
+#define C(c)                                                                              \
+    {                                                                                     \
+        real v = u + offset;                                                              \
+        real t = clamp_r(a + (v - floor(v)) * (b - a), (real)(-0.999999f), (real)(0.999999f)); \
+        r.c = IMPORTANCE_PEAK + log_r((1.0f + t) / (1.0f - t)) * (0.5f / IMPORTANCE_SLOPE); \
+        offset += 0.25f;                                                                  \
+    }
+    SPECTRUM_EACH(C)
+#undef C
+    return r;
+}
+/* What a film place adds for a sample: XYZ; rows 1 to 3 hold the sensor's curves over the pdf. */
+inline vec3 film_value(Scene scene, Spectrum radiance, Wavelengths lambdas)
+{
+    return v3(spectrum_mean(spectrum_mul(radiance, spectra_row(scene, (integer)(1), lambdas))),
+              spectrum_mean(spectrum_mul(radiance, spectra_row(scene, (integer)(2), lambdas))),
+              spectrum_mean(spectrum_mul(radiance, spectra_row(scene, (integer)(3), lambdas))));
+}
