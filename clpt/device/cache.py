@@ -1,13 +1,18 @@
-"""What is kept on disk: the text of programs that did not build."""
+"""Files that clpt keeps in the user's cache folder; all of them may be deleted at any time."""
 
 from __future__ import annotations
 
 import hashlib
+import logging
+import os
+import tempfile
 from pathlib import Path
 
 import platformdirs
 
 from .source import Source
+
+log = logging.getLogger(__name__)
 
 
 def folder() -> Path:
@@ -15,13 +20,51 @@ def folder() -> Path:
     return Path(platformdirs.user_cache_dir("clpt", appauthor=False))
 
 
+def write_atomically(path: Path, content: bytes) -> None:
+    """Write a file that other processes see whole or not at all. Raises OSError."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, partial = tempfile.mkstemp(dir=path.parent, prefix=path.name)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+        os.replace(partial, path)
+    except BaseException:
+        Path(partial).unlink(missing_ok=True)
+        raise
+
+
+def store(entry: str, header: str, binary: bytes) -> None:
+    """Keep a program's binary under a key, with a line of text; a full disk is no error."""
+    content = header.encode() + b"\n" + binary
+    check = hashlib.sha256(content).hexdigest().encode()
+    try:
+        write_atomically(folder() / "programs" / entry, check + b"\n" + content)
+    except OSError as error:
+        log.debug("the cache cannot be written: %s", error)
+
+
+def load(entry: str) -> tuple[str, bytes] | None:
+    """What `store` kept: (header, binary). None if it is not there or is damaged.
+
+    The sum is checked here, since drivers crash on a damaged binary.
+    """
+    try:
+        check, _, content = (folder() / "programs" / entry).read_bytes().partition(b"\n")
+    except OSError:
+        return None
+    if hashlib.sha256(content).hexdigest().encode() != check:
+        return None
+    header, _, binary = content.partition(b"\n")
+    return header.decode(), binary
+
+
 def keep_failed(source: Source) -> str | None:
     """Write a program that did not build where it can be read; its path, or None if that fails."""
     digest = hashlib.sha256(source.text.encode()).hexdigest()[:12]
-    path = folder() / "failed" / f"{source.name.replace('/', '_').removesuffix('.cl')}-{digest}.cl"
+    stem = source.name.replace("/", "_").removesuffix(".cl")
+    path = folder() / "failed" / f"{stem}-{digest}.cl"
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(source.text, encoding="utf-8")
+        write_atomically(path, source.text.encode())
     except OSError:
         return None
     return str(path)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import threading
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -81,10 +82,12 @@ class Builds:
 
     programs: int = 0
     seconds: float = 0.0
+    _lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
 
     def add(self, seconds: float) -> None:
-        self.programs += 1
-        self.seconds += seconds
+        with self._lock:
+            self.programs += 1
+            self.seconds += seconds
 
 
 class Device:
@@ -124,7 +127,7 @@ class Device:
 
 
 def devices() -> tuple[DeviceInfo, ...]:
-    """Every device of every platform, in the order of the platforms.
+    """Every device of every platform, in the order of the platforms' names.
 
     A platform that has no devices or fails when asked is left out, with a logged warning.
     """
@@ -214,7 +217,7 @@ def _cl_devices() -> Iterator[cl.Device]:
     except cl.Error as error:
         log.warning("no OpenCL platform: %s", error)
         return
-    for platform in platforms:
+    for platform in sorted(platforms, key=lambda platform: platform.name):
         try:
             found = platform.get_devices()
         except cl.Error as error:
@@ -227,10 +230,8 @@ def _cl_devices() -> Iterator[cl.Device]:
 
 def _info(index: int, device: cl.Device) -> DeviceInfo:
     types = cl.device_type
-    if device.type & types.GPU:
-        kind = "gpu"
-    else:
-        kind = "cpu" if device.type & types.CPU else "accelerator"
+    kinds = {"gpu": types.GPU, "cpu": types.CPU}
+    kind = next((name for name, flag in kinds.items() if device.type & flag), "accelerator")
     return DeviceInfo(
         index=index,
         platform=device.platform.name.strip(),

@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
+import logging
 import os
 import re
 import time
+import warnings
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import astuple, dataclass
 from typing import Any
 
 import numpy as np
 import pyopencl as cl
+from pyopencl.characterize import has_src_build_cache
 
 from ..errors import DeviceError, KernelBuildError
 from . import cache
 from .context import Device
 from .source import Source
+
+log = logging.getLogger(__name__)
+
+# a driver's remarks on a program that did build go to the log, not to the terminal
+warnings.filterwarnings("ignore", category=cl.CompilerWarning)
 
 OPTIONS = ("-cl-std=CL1.2", "-cl-kernel-arg-info")
 
@@ -64,22 +73,24 @@ class Argument:
         return packed
 
 
+Signatures = Mapping[str, tuple[Argument, ...]]
+
+
 class Program:
-    """A built program; its kernels are kept, one object each."""
+    """A built program; its kernels are kept, one object each.
 
-    def __init__(self, name: str, cl_program: cl.Program):
-        self.name, self.cl_program = name, cl_program
+    signatures: kernel name -> what it takes.
+    """
+
+    def __init__(self, name: str, cl_program: cl.Program, signatures: Signatures):
+        self.name, self.cl_program, self.signatures = name, cl_program, signatures
         self._kernels: dict[str, Kernel] = {}
-
-    @cached_property
-    def kernel_names(self) -> tuple[str, ...]:
-        return tuple(sorted(filter(None, self.cl_program.kernel_names.split(";"))))
 
     def kernel(self, name: str) -> Kernel:
         """The kernel of that name. Raises KeyError, telling which there are."""
         if name not in self._kernels:
-            if name not in self.kernel_names:
-                known = ", ".join(self.kernel_names) or "no kernel"
+            if name not in self.signatures:
+                known = ", ".join(sorted(self.signatures)) or "no kernel"
                 raise KeyError(f"program {self.name!r} has no kernel {name!r}; it has {known}")
             self._kernels[name] = Kernel(self, name)
         return self._kernels[name]
@@ -90,7 +101,7 @@ class Kernel:
 
     def __init__(self, program: Program, name: str):
         self.program, self.name = program, name
-        self.arguments = _arguments(cl.Kernel(program.cl_program, name))
+        self.arguments = program.signatures[name]
 
     def bind(self, **named: Any) -> Bound:
         """The kernel with every argument set, by name.
@@ -154,16 +165,22 @@ class Bound:
 def build(device: Device, source: Source, options: Sequence[str] = ()) -> Program:
     """Compile a program, or take it from the cache.
 
+    The driver's own cache is relied on where it has one (PoCL, NVIDIA); for the others the binary
+    is kept in the user's cache folder.
+
     Raises KernelBuildError with our file and line, the log, and where the text was kept.
     """
     flags = [*OPTIONS, *options]
     start = time.perf_counter()
-    try:
-        cl_program = cl.Program(device.context, source.text).build(flags)
-    except cl.Error as error:
-        raise _build_error(source, str(error)) from error
+    entry = None if has_src_build_cache(device.info.cl_device) else _entry(device, source, flags)
+    program = _from_cache(device, source, flags, entry) if entry else None
+    if program is None:
+        program = _from_source(device, source, flags)
+        if entry:
+            binary = program.cl_program.get_info(cl.program_info.BINARIES)[0]
+            cache.store(entry, _encode(program.signatures), binary)
     device.builds.add(time.perf_counter() - start)
-    return Program(source.name, cl_program)
+    return program
 
 
 def build_all(
@@ -173,6 +190,54 @@ def build_all(
     with ThreadPoolExecutor(max_workers=max(1, min(len(sources), os.cpu_count() or 1))) as pool:
         futures = {name: pool.submit(build, device, s, options) for name, s in sources.items()}
         return {name: future.result() for name, future in futures.items()}
+
+
+def _from_source(device: Device, source: Source, flags: list[str]) -> Program:
+    try:
+        # cache_dir=False: PyOpenCL's own cache would lose the names of the arguments
+        built = cl.Program(device.context, source.text).build(flags, cache_dir=False)
+    except cl.Error as error:
+        raise _build_error(source, str(error)) from error
+    remarks = built.get_build_info(device.info.cl_device, cl.program_build_info.LOG).strip()
+    if remarks:
+        log.debug("%s: %s", source.name, remarks)
+    try:
+        return Program(
+            source.name, built, {k.function_name: _signature(k) for k in _kernels(built)}
+        )
+    except cl.Error as error:
+        raise DeviceError(
+            f"{device.info.label} does not tell the arguments of its kernels ({error}); "
+            "clpt cannot run on this driver"
+        ) from error
+
+
+def _from_cache(device: Device, source: Source, flags: list[str], entry: str) -> Program | None:
+    """The program as it was kept; None if it was not, or the driver no longer takes it."""
+    kept = cache.load(entry)
+    if kept is None:
+        return None
+    try:
+        loaded = cl.Program(device.context, [device.info.cl_device], [kept[1]]).build(flags)
+        return Program(source.name, loaded, _decode(kept[0]))
+    except (cl.Error, TypeError, ValueError) as error:
+        log.debug("%s is built again: %s", source.name, error)
+        return None
+
+
+def _entry(device: Device, source: Source, flags: list[str]) -> str:
+    """The cache's key: everything that the binary follows from."""
+    info = device.info
+    parts = (source.text, *flags, info.platform, info.name, info.version, info.driver)
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()
+
+
+def _encode(signatures: Signatures) -> str:
+    return json.dumps({name: [astuple(a) for a in args] for name, args in signatures.items()})
+
+
+def _decode(text: str) -> Signatures:
+    return {name: tuple(Argument(*a) for a in args) for name, args in json.loads(text).items()}
 
 
 _PLACE = re.compile(r"""["']?([\w./ -]+\.\w+)["']?(?::|, line |\()(\d+)""")
@@ -186,7 +251,11 @@ def _build_error(source: Source, log: str) -> KernelBuildError:
     return KernelBuildError(source.name, file, line, log, cache.keep_failed(source))
 
 
-def _arguments(kernel: cl.Kernel) -> tuple[Argument, ...]:
+def _kernels(program: cl.Program) -> list[cl.Kernel]:
+    return [cl.Kernel(program, name) for name in program.kernel_names.split(";") if name]
+
+
+def _signature(kernel: cl.Kernel) -> tuple[Argument, ...]:
     info, address = cl.kernel_arg_info, cl.kernel_arg_address_qualifier
     spaces = {getattr(address, name): name.lower() for name in ("GLOBAL", "LOCAL", "CONSTANT")}
     return tuple(

@@ -1,12 +1,82 @@
-"""OpenCL runtimes that pip installed: told to the loader before it looks for platforms."""
+"""OpenCL runtimes that pip installed, told to the loader before it looks for platforms.
+
+The loader reads ICD files, each naming a driver's library, from /etc/OpenCL/vendors or from the
+folder in OCL_ICD_VENDORS. Intel's CPU runtime as a wheel (extra `clpt[cpu]`) brings such a file
+with a placeholder for a path, in a folder that no loader reads. So clpt writes a folder of its own
+that names the library where it is, repeats every ICD file of the system, and points
+OCL_ICD_VENDORS there. Where the user has set OCL_ICD_VENDORS, it stays as it is: whoever sets it
+wants exactly those drivers.
+"""
 
 from __future__ import annotations
+
+import functools
+import hashlib
+import importlib.metadata
+import logging
+import os
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+from . import cache
+
+log = logging.getLogger(__name__)
 
 ADVICE = (
     "install a driver (Debian, Ubuntu: apt-get install pocl-opencl-icd) "
     'or a CPU runtime with pip install "clpt[cpu]"'
 )
+VARIABLE = "OCL_ICD_VENDORS"
+_SYSTEM = Path("/etc/OpenCL/vendors")
+_WHEEL, _LIBRARY = "intel-opencl-rt", "libintelocl.so"
 
 
+@functools.cache
 def announce() -> None:
-    """Make the runtimes of this Python environment known to the OpenCL loader."""
+    """Make the runtimes of this Python environment known to the OpenCL loader, once."""
+    library = wheel_library()
+    if library is None or os.environ.get(VARIABLE) or not sys.platform.startswith("linux"):
+        return
+    drivers = icd_files((_SYSTEM, Path(sys.prefix) / "etc/OpenCL/vendors"))
+    if any(Path(driver).name == _LIBRARY for driver in drivers.values()):
+        return
+    drivers["clpt-intel-cpu.icd"] = str(library)
+    try:
+        os.environ[VARIABLE] = str(write_vendors(drivers))
+    except OSError as error:
+        log.warning("%s cannot be made known to the OpenCL loader: %s", library, error)
+
+
+def wheel_library() -> Path | None:
+    """The library of Intel's CPU runtime if its wheel is installed in this environment."""
+    try:
+        files = importlib.metadata.files(_WHEEL) or []
+    except importlib.metadata.PackageNotFoundError:
+        return None
+    found = (Path(str(file.locate())).resolve() for file in files if file.name == _LIBRARY)
+    return next((path for path in found if path.is_file()), None)
+
+
+def icd_files(folders: Iterable[Path]) -> dict[str, str]:
+    """Name -> content of the ICD files in the folders, without those that name a missing path."""
+    drivers = {}
+    for folder in folders:
+        for path in sorted(folder.glob("*.icd")):
+            try:
+                driver = path.read_text(encoding="utf-8").strip()
+            except (OSError, UnicodeDecodeError):
+                continue
+            if driver and (not os.path.isabs(driver) or os.path.exists(driver)):
+                drivers[path.name] = driver
+    return drivers
+
+
+def write_vendors(drivers: dict[str, str]) -> Path:
+    """A folder in the user's cache with these ICD files; its name follows from its content."""
+    digest = hashlib.sha256(repr(sorted(drivers.items())).encode()).hexdigest()[:16]
+    folder = cache.folder() / "vendors" / digest
+    for name, driver in drivers.items():
+        if not (folder / name).is_file():
+            cache.write_atomically(folder / name, driver.encode())
+    return folder
