@@ -1,0 +1,71 @@
+# Each target works as the first command after a clone: it makes .venv, installs clpt into it, and
+# sees to an OpenCL device. Another Python: make PYTHON=python3.12 test
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+SHELL := /bin/bash
+
+# a prefix that lets apt-get install: nothing for root, sudo where it asks no password, else false
+SUDO := $(shell if [ "$$(id -u)" = 0 ]; then echo env; \
+	elif sudo -n true 2>/dev/null; then echo sudo -n; else echo false; fi)
+APT := $(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get
+PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
+OFFLINE := "make: pip could not install clpt; the lines above tell why (is there a network?)"
+
+.PHONY: help demo test test-all bench lint clean
+help:
+	@echo "make demo      render a scene to demo.exr and demo.png"
+	@echo "make test      the tests;  make test-all  the slow ones too"
+	@echo "make bench     measure;  make lint  ruff and mypy;  make clean  remove .venv"
+
+demo: $(VENV)/.run
+	$(BIN)/clpt render scenes/three_spheres -o demo.exr -o demo.png
+
+test: $(VENV)/.dev
+	$(BIN)/python -m pytest -q
+
+test-all: $(VENV)/.dev
+	$(BIN)/python -m pytest -q -m ""
+
+bench: $(VENV)/.dev
+	$(BIN)/python -m bench
+
+lint: $(VENV)/.dev
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+clean:
+	rm -rf $(VENV)
+
+$(BIN)/python:
+	@command -v $(PYTHON) >/dev/null || { $(APT) update -qq && $(APT) install -y -qq python3; } \
+		|| { echo "make: there is no $(PYTHON); install Python 3.10 or newer" >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' \
+		|| { echo "make: $(PYTHON) is older than 3.10; try make PYTHON=python3.12" >&2; exit 1; }
+	@$(PYTHON) -c 'import ensurepip' 2>/dev/null \
+		|| { $(APT) update -qq && $(APT) install -y -qq python3-venv; } \
+		|| { echo "make: $(PYTHON) has no venv; run apt-get install python3-venv" >&2; exit 1; }
+	@$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); exit 1; }
+
+$(VENV)/.run: pyproject.toml | $(BIN)/python
+	@$(PIP) --editable . || { echo $(OFFLINE) >&2; exit 1; }
+	@$(MAKE) --no-print-directory $(VENV)/.opencl
+	@touch $@
+
+$(VENV)/.dev: pyproject.toml | $(BIN)/python
+	@$(PIP) --editable '.[dev,peers]' \
+		|| { echo "make: going on without the renderers that tests compare with"; \
+			$(PIP) --editable '.[dev]'; } \
+		|| { echo $(OFFLINE) >&2; exit 1; }
+	@$(MAKE) --no-print-directory $(VENV)/.opencl
+	@touch $@
+
+# a device that runs a kernel; else PoCL by apt-get; else Intel's CPU runtime by pip
+WORKS := $(BIN)/python -c 'from clpt.device.context import selection; selection()'
+$(VENV)/.opencl:
+	@$(WORKS) 2>/dev/null \
+		|| { $(APT) update -qq && $(APT) install -y -qq pocl-opencl-icd && $(WORKS); } 2>/dev/null \
+		|| { $(PIP) --editable '.[cpu]' && $(WORKS); } \
+		|| { echo "make: no OpenCL device; install a driver, e.g. apt-get install pocl-opencl-icd," \
+			"and see $(BIN)/clpt devices" >&2; exit 1; }
+	@touch $@
