@@ -1,0 +1,67 @@
+"""Spectra: observers, illuminants, metals, glasses, and RGB made spectral.
+
+Wavelengths are in nm throughout. A scene holds `Spectrum` objects; `on_grid` fills device tables.
+"""
+
+from clpt.spectra.cie import (
+    CIE_Y_INTEGRAL,
+    LAMBDA_MAX,
+    LAMBDA_MIN,
+    REC709_TO_XYZ,
+    XYZ_TO_REC709,
+    cie_xyz,
+    luminance,
+    rgb_to_xyz,
+    sample_wavelengths,
+    wavelength_pdf,
+    xyz_to_rgb,
+)
+from clpt.spectra.files import read_refractive_index, read_table
+from clpt.spectra.named import glass, glasses, illuminant, illuminants, metal, metals
+from clpt.spectra.spectrum import (
+    RGB,
+    Blackbody,
+    Cauchy,
+    Constant,
+    RGBIlluminant,
+    RGBUnbounded,
+    Sellmeier,
+    Spectrum,
+    Tabulated,
+    on_grid,
+)
+from clpt.spectra.uplift import unbounded, uplift
+
+__all__ = [
+    "CIE_Y_INTEGRAL",
+    "LAMBDA_MAX",
+    "LAMBDA_MIN",
+    "REC709_TO_XYZ",
+    "RGB",
+    "XYZ_TO_REC709",
+    "Blackbody",
+    "Cauchy",
+    "Constant",
+    "RGBIlluminant",
+    "RGBUnbounded",
+    "Sellmeier",
+    "Spectrum",
+    "Tabulated",
+    "cie_xyz",
+    "glass",
+    "glasses",
+    "illuminant",
+    "illuminants",
+    "luminance",
+    "metal",
+    "metals",
+    "on_grid",
+    "read_refractive_index",
+    "read_table",
+    "rgb_to_xyz",
+    "sample_wavelengths",
+    "unbounded",
+    "uplift",
+    "wavelength_pdf",
+    "xyz_to_rgb",
+]

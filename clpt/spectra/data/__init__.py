@@ -1,0 +1,26 @@
+"""The tables that ship with clpt; LICENSES.md names the source and licence of each."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+ROOT = Path(str(files(__name__)))
+
+
+@cache
+def table(name: str) -> NDArray[np.float64]:
+    """Rows of the CSV file `name`, read-only (n, columns) float64."""
+    rows = np.loadtxt(ROOT / name, delimiter=",", comments="#", ndmin=2)
+    rows.setflags(write=False)
+    return rows
+
+
+@cache
+def names(folder: str) -> tuple[str, ...]:
+    """Stems of the CSV files in a folder, sorted."""
+    return tuple(sorted(path.stem for path in (ROOT / folder).glob("*.csv")))

@@ -1,0 +1,90 @@
+"""Write the tables in clpt/spectra/data from their sources; run by hand.
+
+    python -m clpt.spectra.make_data [refractiveindex.info-database]
+
+Observers and illuminants come from colour-science (BSD-3, the extra clpt[test]). The metals are
+rewritten only when a checkout of refractiveindex.info's database (CC0) is given.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from clpt.spectra import files
+from clpt.spectra.data import ROOT
+
+FLUORESCENT = tuple(f"F{i}" for i in range(1, 13))
+METALS_WITHIN = (300.0, 1100.0)  # [nm]
+
+
+def write_csv(path: Path, notes: list[str], header: str, rows: np.ndarray) -> None:
+    """Write rows (n, m) float64 as CSV under `#` comments."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    lines = [f"# {note}" for note in [*notes, header]]
+    lines += [",".join(f"{value:.9g}" for value in row) for row in rows]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def write_observers() -> None:
+    """Colour matching functions at 1 nm from 360 to 830 nm."""
+    import colour
+
+    for year, name in (("1931", "2 Degree"), ("1964", "10 Degree")):
+        cmfs = colour.MSDS_CMFS[f"CIE {year} {name} Standard Observer"]
+        write_csv(
+            ROOT / f"cie{year}.csv",
+            [f"CIE {year} {name.lower()} standard observer, from colour-science (BSD-3-Clause)"],
+            "lambda [nm], x, y, z",
+            np.column_stack([cmfs.wavelengths, cmfs.values]),
+        )
+
+
+def write_illuminants() -> None:
+    """Relative powers: A and the D series by their CIE 15 formulas, the fluorescent tables."""
+    import colour
+
+    def daylight(kelvin: float) -> colour.SpectralDistribution:
+        # CIE 15 rescales the nominal temperature to today's value of c2 in Planck's law.
+        xy = colour.temperature.CCT_to_xy_CIE_D(kelvin * 1.4388 / 1.4380)
+        return colour.sd_CIE_illuminant_D_series(xy)
+
+    tables = {
+        "A": colour.sd_CIE_standard_illuminant_A(colour.SpectralShape(300, 830, 5)),
+        "D50": daylight(5000.0),
+        "D65": daylight(6500.0),
+    }
+    tables |= {name: colour.SDS_ILLUMINANTS[name.replace("F", "FL")] for name in FLUORESCENT}
+    for name, table in tables.items():
+        write_csv(
+            ROOT / "illuminants" / f"{name}.csv",
+            [f"CIE illuminant {name}, from colour-science (BSD-3-Clause)"],
+            "lambda [nm], relative power",
+            np.column_stack([table.wavelengths, table.values]),
+        )
+
+
+def rewrite_metals(database: Path) -> None:
+    """Read each metal again from the page its file names."""
+    for path in sorted((ROOT / "metals").glob("*.csv")):
+        notes = [line[2:] for line in path.read_text("utf-8").splitlines()[:2]]
+        page = notes[1].split("main/")[1].split(",")[0]
+        material, author = page.split("/")
+        found = sorted(database.glob(f"**/main/{material}/**/{author}"))
+        if not found:
+            print(f"{page}: not in {database}, kept as it is")
+            continue
+        eta, k = files.read_refractive_index(found[0])
+        lambdas = np.array(eta.lambdas)
+        rows = np.column_stack([lambdas, eta.values, k.values])
+        keep = (lambdas >= METALS_WITHIN[0]) & (lambdas <= METALS_WITHIN[1])
+        write_csv(path, notes, "lambda [nm], eta, k", rows[keep])
+
+
+if __name__ == "__main__":
+    write_observers()
+    write_illuminants()
+    if len(sys.argv) > 1:
+        rewrite_metals(Path(sys.argv[1]))

@@ -1,0 +1,104 @@
+"""Fit the table behind `uplift` and write data/uplift.npz; run by hand, about a minute.
+
+    python -m clpt.spectra.make_uplift
+
+For every colour of the grid: the polynomial under the sigmoid whose reflectance, lit by D65, has
+that colour, by damped Gauss-Newton steps on the difference in CIELAB (Jakob and Hanika 2019).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.spectra import cie
+from clpt.spectra.data import ROOT
+from clpt.spectra.spectrum import d65
+from clpt.spectra.uplift import NODES, node_colours, shrinkage, to_unit
+
+Array = NDArray[np.float64]
+
+STEP = 5  # [nm] of the quadrature while fitting
+ITERATIONS = 12  # a layer, from its neighbour's solution
+POLISH = 12  # on all layers at once
+# Keeps slopes that the colour does not determine from growing; costs less than 0.01 in Delta E.
+SLOPE_PENALTY = 1e-6
+
+
+def hat_weights() -> tuple[Array, Array]:
+    """Unit coordinates (m,) and XYZ weights (m, 3) of reflectances given every STEP nm."""
+    coarse = cie.GRID[::STEP]
+    hats = np.array([np.interp(cie.GRID, coarse, row) for row in np.eye(coarse.size)])
+    return to_unit(coarse), hats @ (
+        cie.cie_xyz(cie.GRID) * d65().sample(cie.GRID)[:, None] / cie.CIE_Y_INTEGRAL
+    )
+
+
+def lab(xyz: Array) -> tuple[Array, Array]:
+    """CIELAB under D65 of XYZ (n, 3), and its Jacobian (n, 3, 3)."""
+    relative = np.maximum(xyz / cie.D65_WHITE, 0.0)
+    dark = relative < (6.0 / 29.0) ** 3
+    root = np.cbrt(np.where(dark, 1.0, relative))
+    slope = (29.0 / 6.0) ** 2 / 3.0
+    f = np.where(dark, slope * relative + 4.0 / 29.0, root)
+    df = np.where(dark, slope, 1.0 / (3.0 * root * root)) / cie.D65_WHITE
+    mix = np.array([[0.0, 116.0, 0.0], [500.0, -500.0, 0.0], [0.0, 200.0, -200.0]])
+    return f @ mix.T - [16.0, 0.0, 0.0], mix * df[:, None, :]
+
+
+def gauss_newton(rgb: Array, start: Array, iterations: int) -> Array:
+    """Coefficients (n, 3) over the unit coordinate, improved from `start`, for colours (n, 3)."""
+    unit, weights = hat_weights()
+    powers = unit[:, None] ** [2, 1, 0]
+    slopes = np.concatenate([weights * powers[:, j : j + 1] for j in range(3)], axis=1)
+    target = lab(cie.rgb_to_xyz(rgb))[0]
+    penalty = SLOPE_PENALTY * shrinkage(rgb)[:, None] ** 2 * [1.0, 1.0, 0.0]
+
+    def cost_at(c: Array) -> tuple[Array, Array, Array]:
+        x = c @ powers.T
+        inverse = 1.0 / np.sqrt(1.0 + x * x)
+        error, jacobian = lab((0.5 + 0.5 * x * inverse) @ weights)
+        error -= target
+        dxyz = (0.5 * inverse**3 @ slopes).reshape(-1, 3, 3)  # [n, coefficient, xyz]
+        cost = (error**2).sum(1) + (penalty * c * c).sum(1)
+        return cost, error, jacobian @ dxyz.transpose(0, 2, 1)
+
+    c, damping = start.copy(), np.full(len(start), 1e-3)
+    cost, error, jacobian = cost_at(c)
+    for _ in range(iterations):
+        normal = jacobian.transpose(0, 2, 1) @ jacobian + penalty[:, :, None] * np.eye(3)
+        diagonal = np.einsum("nii->ni", normal)
+        damped = normal + (damping[:, None] * (diagonal + 1e-12))[:, :, None] * np.eye(3)
+        gradient = np.einsum("nij,ni->nj", jacobian, error) + penalty * c
+        trial = c - np.linalg.solve(damped, gradient[:, :, None])[:, :, 0]
+        trial_cost, trial_error, trial_jacobian = cost_at(trial)
+        better = trial_cost < cost
+        c[better], cost[better] = trial[better], trial_cost[better]
+        error[better], jacobian[better] = trial_error[better], trial_jacobian[better]
+        damping = np.clip(np.where(better, damping / 5.0, damping * 4.0), 1e-9, 1e6)
+    return c
+
+
+def fit() -> Array:
+    """Coefficients (3, NODES, NODES, NODES, 3) at `node_colours()`, from the middle layers out."""
+    colours = node_colours()
+    table = np.zeros(colours.shape)
+    middle = NODES // 2
+    layer = np.zeros(colours[:, middle].reshape(-1, 3).shape)
+    layer = gauss_newton(colours[:, middle].reshape(-1, 3), layer, 5 * ITERATIONS)
+    for order in (range(middle, NODES), range(middle - 1, -1, -1)):
+        current, previous = layer, colours[:, middle].reshape(-1, 3)
+        for z in order:
+            rgb = colours[:, z].reshape(-1, 3)
+            # A flat spectrum's coefficients grow like 1 / shrinkage towards black and white.
+            start = current * (shrinkage(previous) / shrinkage(rgb))[:, None]
+            current, previous = gauss_newton(rgb, start, ITERATIONS), rgb
+            table[:, z] = current.reshape(table[:, z].shape)
+    flat = gauss_newton(colours.reshape(-1, 3), table.reshape(-1, 3), POLISH)
+    return flat.reshape(table.shape)
+
+
+if __name__ == "__main__":
+    scaled = fit() * shrinkage(node_colours())[..., None]
+    np.savez_compressed(ROOT / "uplift.npz", scaled=scaled.astype(np.float16))
+    print(f"{ROOT / 'uplift.npz'}: {(ROOT / 'uplift.npz').stat().st_size / 1024:.0f} KiB")

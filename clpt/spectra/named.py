@@ -1,0 +1,75 @@
+"""Illuminants, metals and glasses by name."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from typing import Any
+
+from clpt.errors import UnknownKindError
+from clpt.spectra import data
+from clpt.spectra.spectrum import Constant, Sellmeier, Spectrum, Tabulated, with_luminance_one
+
+
+def illuminants() -> tuple[str, ...]:
+    """Names that `illuminant` knows."""
+    return (*data.names("illuminants"), "E")
+
+
+def metals() -> tuple[str, ...]:
+    """Names that `metal` knows."""
+    return (*data.names("metals"), "none")
+
+
+def glasses() -> tuple[str, ...]:
+    """Names that `glass` knows."""
+    return tuple(_glasses())
+
+
+@cache
+def illuminant(name: str) -> Spectrum:
+    """CIE illuminant (A, D50, D65, E, F1 to F12) as emission of luminance 1.
+
+    Raises UnknownKindError.
+    """
+    if name == "E":
+        return Constant(1.0)
+    if name not in illuminants():
+        raise UnknownKindError("illuminant", name, illuminants())
+    return with_luminance_one(data.table(f"illuminants/{name}.csv"))
+
+
+@cache
+def metal(name: str) -> tuple[Spectrum, Spectrum]:
+    """Complex index (eta, k) of a metal by its symbol; "none" reflects everything.
+
+    A suffix `_palik`, which tells two tables of one metal apart in Mitsuba, is ignored.
+    Raises UnknownKindError.
+    """
+    if name == "none":
+        return Constant(0.0), Constant(1.0)
+    symbol = name.removesuffix("_palik")
+    if symbol not in metals():
+        raise UnknownKindError("metal", name, metals())
+    lambdas, eta, k = data.table(f"metals/{symbol}.csv").T
+    return Tabulated(lambdas, eta, "hold"), Tabulated(lambdas, k, "hold")
+
+
+@cache
+def glass(name: str, dispersion: bool = True) -> Constant | Sellmeier:
+    """Index of a glass, liquid, crystal or gas, by its name in any case.
+
+    With `dispersion`, Sellmeier's formula where one is published here; otherwise, and for the
+    rest, the constant that Mitsuba and Hecht's Optics list. Raises UnknownKindError.
+    """
+    entry = _glasses().get(name.lower())
+    if entry is None:
+        raise UnknownKindError("glass", name, glasses())
+    if dispersion and "b" in entry:
+        return Sellmeier(entry["b"], entry["c"], entry.get("a", 1.0))
+    return Constant(entry["eta"])
+
+
+@cache
+def _glasses() -> dict[str, dict[str, Any]]:
+    return json.loads((data.ROOT / "glasses.json").read_text("utf-8"))

@@ -1,0 +1,204 @@
+"""Spectra as plain immutable data: what a scene holds, sampled in nm.
+
+`to_rgb(role)` is what an RGB renderer uses in its place, by Mitsuba 3's rules: a "reflectance" is
+seen under D65 and clamped to [0, 1], an "unbounded" quantity (eta, k, extinction) is seen under D65
+and only kept from being negative, an "emission" is integrated as it is.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from clpt.errors import SceneError
+from clpt.spectra import cie, data, uplift
+
+Role = Literal["reflectance", "unbounded", "emission"]
+Samples = NDArray[np.float64]
+
+# CODATA 2018, exact: Planck [J s], light [m/s], Boltzmann [J/K].
+PLANCK, LIGHT, BOLTZMANN = 6.62607015e-34, 299792458.0, 1.380649e-23
+
+
+class Spectrum(ABC):
+    """A function of the wavelength."""
+
+    @abstractmethod
+    def sample(self, lambdas: ArrayLike) -> Samples:
+        """Values at `lambdas` [nm], of the same shape, float64."""
+
+    def to_rgb(self, role: Role = "reflectance") -> Samples:
+        """Linear Rec.709 stand-in (3,) float64 for the given role; never negative."""
+        values = self.sample(cie.GRID)
+        if role == "emission":
+            return np.maximum(cie.xyz_to_rgb(cie.spectrum_to_xyz(values)), 0.0)
+        rgb = cie.xyz_to_rgb(cie.spectrum_to_xyz(values * d65().sample(cie.GRID)))
+        return np.clip(rgb, 0.0, 1.0 if role == "reflectance" else None)
+
+
+@dataclass(frozen=True)
+class Constant(Spectrum):
+    """The same value at every wavelength."""
+
+    value: float
+
+    def sample(self, lambdas: ArrayLike) -> Samples:
+        return np.full(np.shape(lambdas), self.value, np.float64)
+
+    def to_rgb(self, role: Role = "reflectance") -> Samples:
+        """(value, value, value), but as emission the colour of the equal-energy spectrum."""
+        return super().to_rgb(role) if role == "emission" else np.full(3, float(self.value))
+
+
+@dataclass(frozen=True)
+class Tabulated(Spectrum):
+    """Linear between points; outside them zero, or the end values if `outside` is "hold".
+
+    Raises SceneError for wavelengths that do not ascend, or values that are not as many or finite.
+    """
+
+    lambdas: tuple[float, ...]
+    values: tuple[float, ...]
+    outside: Literal["zero", "hold"] = "zero"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "lambdas", _floats(self.lambdas))
+        object.__setattr__(self, "values", _floats(self.values))
+        if len(self.lambdas) != len(self.values) or not self.lambdas:
+            raise SceneError(
+                f"a spectrum needs as many values as wavelengths, found {len(self.values)} and "
+                f"{len(self.lambdas)}"
+            )
+        if not (np.diff(self.lambdas) > 0.0).all():
+            raise SceneError("the wavelengths of a spectrum must ascend")
+        if not np.isfinite([*self.lambdas, *self.values]).all():
+            raise SceneError("a spectrum has a value that is not finite")
+        if self.outside not in ("zero", "hold"):
+            raise SceneError(f"outside its points a spectrum can zero or hold, not {self.outside}")
+
+    def sample(self, lambdas: ArrayLike) -> Samples:
+        end = 0.0 if self.outside == "zero" else None
+        lambdas = np.asarray(lambdas, np.float64)
+        return np.asarray(np.interp(lambdas, self.lambdas, self.values, end, end))
+
+
+@dataclass(frozen=True)
+class Blackbody(Spectrum):
+    """Planck's law, the radiance of a black body at `kelvin` [W m^-2 sr^-1 nm^-1], times `scale`."""
+
+    kelvin: float
+    scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not self.kelvin > 0.0:
+            raise SceneError(f"a black body's temperature must be positive, found {self.kelvin} K")
+
+    def sample(self, lambdas: ArrayLike) -> Samples:
+        metres = np.asarray(lambdas, np.float64) * 1e-9
+        exponent = PLANCK * LIGHT / (metres * BOLTZMANN * self.kelvin)
+        per_metre = 2.0 * PLANCK * LIGHT**2 / metres**5 / np.expm1(np.minimum(exponent, 700.0))
+        return self.scale * 1e-9 * per_metre
+
+
+@dataclass(frozen=True)
+class _Colour(Spectrum):
+    """Linear Rec.709 that an RGB renderer uses as it is."""
+
+    r: float
+    g: float
+    b: float
+
+    def to_rgb(self, role: Role = "reflectance") -> Samples:
+        """The colour itself, whatever the role."""
+        return np.array([self.r, self.g, self.b], np.float64)
+
+
+@dataclass(frozen=True)
+class RGB(_Colour):
+    """A reflectance in [0, 1] (clipped), made a smooth spectrum by `uplift`."""
+
+    def sample(self, lambdas: ArrayLike) -> Samples:
+        return uplift.evaluate(uplift.uplift(self.to_rgb()), lambdas)
+
+
+@dataclass(frozen=True)
+class RGBUnbounded(_Colour):
+    """A colour that may exceed 1, such as an index or an extinction coefficient."""
+
+    def sample(self, lambdas: ArrayLike) -> Samples:
+        scale, coefficients = uplift.unbounded(self.to_rgb())
+        return scale * uplift.evaluate(coefficients, lambdas)
+
+
+@dataclass(frozen=True)
+class RGBIlluminant(RGBUnbounded):
+    """Emission of that colour: an unbounded spectrum times D65, (1, 1, 1) having luminance 1."""
+
+    def sample(self, lambdas: ArrayLike) -> Samples:
+        return super().sample(lambdas) * d65().sample(lambdas)
+
+
+@dataclass(frozen=True)
+class Sellmeier(Spectrum):
+    """Index with n^2 = a + sum b l^2 / (l^2 - c), l and sqrt(c) in um (Sellmeier 1871)."""
+
+    b: tuple[float, ...]
+    c: tuple[float, ...]
+    a: float = 1.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "b", _floats(self.b))
+        object.__setattr__(self, "c", _floats(self.c))
+        if len(self.b) != len(self.c):
+            raise SceneError(
+                f"Sellmeier's formula needs as many b as c, found {len(self.b)} and {len(self.c)}"
+            )
+
+    def sample(self, lambdas: ArrayLike) -> Samples:
+        squared = (np.asarray(lambdas, np.float64)[..., None] * 1e-3) ** 2
+        terms = np.array(self.b) * squared / (squared - np.array(self.c))
+        # Beyond a resonance the formula turns negative; there is no glass to describe there.
+        return np.sqrt(np.maximum(self.a + terms.sum(axis=-1), 0.0))
+
+
+@dataclass(frozen=True)
+class Cauchy(Spectrum):
+    """Index n = a + b / l^2 + c / l^4 with l in um."""
+
+    a: float
+    b: float = 0.0
+    c: float = 0.0
+
+    def sample(self, lambdas: ArrayLike) -> Samples:
+        inverse = (np.asarray(lambdas, np.float64) * 1e-3) ** -2.0
+        return self.a + (self.b + self.c * inverse) * inverse
+
+
+@cache
+def d65() -> Tabulated:
+    """CIE standard illuminant D65 with luminance 1."""
+    return with_luminance_one(data.table("illuminants/D65.csv"))
+
+
+def with_luminance_one(rows: Samples) -> Tabulated:
+    """Emission from (wavelength [nm], relative power) rows (n, 2), scaled to luminance 1."""
+    on_observer = np.interp(cie.GRID, rows[:, 0], rows[:, 1], 0.0, 0.0)
+    return Tabulated(rows[:, 0], rows[:, 1] / cie.spectrum_to_xyz(on_observer)[1])
+
+
+def on_grid(spectrum: Spectrum, lo: float, hi: float, step: float = 1.0) -> NDArray[np.float32]:
+    """Samples at lo, lo + step, ... up to the first one at or past hi [nm], float32."""
+    if not (0.0 < lo < hi and step > 0.0):
+        raise SceneError(f"cannot tabulate a spectrum over [{lo}, {hi}] nm in steps of {step}")
+    count = int(np.ceil((hi - lo) / step - 1e-9)) + 1
+    return spectrum.sample(lo + step * np.arange(count)).astype(np.float32)
+
+
+def _floats(values: Iterable[float]) -> tuple[float, ...]:
+    return tuple(float(value) for value in values)

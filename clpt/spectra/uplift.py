@@ -1,0 +1,125 @@
+"""Rec.709 colours made smooth reflectance spectra (Jakob and Hanika 2019).
+
+S(lambda) = 1/2 + x / (2 sqrt(1 + x^2)),  x = (c0 lambda + c1) lambda + c2,  lambda in nm.
+
+The table is indexed by the largest component, its value and the ratios of the other two to it. It
+holds the coefficients over a unit coordinate times `shrinkage`, which makes them finite and smooth
+up to black and white, and linear for greys, so that these are flat to rounding.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from clpt.spectra.data import ROOT
+
+Array = NDArray[np.float64]
+
+NODES = 32
+CENTRE, HALF_WIDTH = 595.0, 235.0  # [nm] of the unit coordinate
+DARKEST = 1e-9  # flat reflectances stay this far inside (0, 1), where x is finite
+EDGE = 1e-4  # the outermost layers, in place of black and white
+CHUNK = 1 << 15  # colours at a time, so that the gathered corners stay in the cache
+
+
+def to_unit(lambdas: ArrayLike) -> Array:
+    """Wavelengths [nm] to the coordinate of the fit, [-1, 1] over 360 to 830 nm."""
+    return (np.asarray(lambdas, np.float64) - CENTRE) / HALF_WIDTH
+
+
+def shrinkage(rgb: ArrayLike) -> Array:
+    """sqrt(m (1 - m)) for the mean m of the components (..., 3): x = (m - 1/2) / this for a grey."""
+    mean = np.clip(np.mean(np.asarray(rgb, np.float64), axis=-1), DARKEST, 1.0 - DARKEST)
+    return np.sqrt(mean * (1.0 - mean))
+
+
+def node_values() -> Array:
+    """Values of the largest component at the layers (NODES,), dense near black and white."""
+    x = np.linspace(0.0, 1.0, NODES)
+    return x * x * (3.0 - 2.0 * x)
+
+
+def node_ratios() -> Array:
+    """Ratios of the other components (NODES,), dense near saturated colours."""
+    return np.linspace(0.0, 1.0, NODES) ** 1.5
+
+
+def node_colours() -> Array:
+    """The colours fitted (3, NODES, NODES, NODES, 3): [largest, its value, ratio, ratio, rgb]."""
+    value, first, second = np.meshgrid(
+        np.clip(node_values(), EDGE, 1.0 - EDGE), node_ratios(), node_ratios(), indexing="ij"
+    )
+    shape = np.stack([value, value * first, value * second], axis=-1)
+    return np.stack([np.roll(shape, largest, axis=-1) for largest in range(3)])
+
+
+def uplift(rgb: ArrayLike) -> NDArray[np.float32]:
+    """Coefficients c0, c1, c2 of reflectances of linear Rec.709 colours (..., 3) -> (..., 3) float32.
+
+    Colours are clipped to [0, 1]; nan counts as black.
+    """
+    colours = np.clip(np.nan_to_num(np.asarray(rgb, np.float64)), 0.0, 1.0)
+    flat = colours.reshape(-1, 3)
+    coefficients = np.empty(flat.shape, np.float32)
+    for start in range(0, len(flat), CHUNK):
+        coefficients[start : start + CHUNK] = _look_up(flat[start : start + CHUNK])
+    return coefficients.reshape(colours.shape)
+
+
+def unbounded(rgb: ArrayLike) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Scale (...) = 2 max(rgb) and coefficients (..., 3) of colours (..., 3) that may exceed 1.
+
+    The spectrum is the scale times the reflectance, as in Mitsuba 3; negative components count as 0.
+    """
+    colours = np.maximum(np.nan_to_num(np.asarray(rgb, np.float64)), 0.0)
+    scale = 2.0 * colours.max(axis=-1)
+    divisor = np.where(scale > 0.0, scale, 1.0)[..., None]
+    return scale.astype(np.float32), uplift(colours / divisor)
+
+
+def evaluate(coefficients: ArrayLike, lambdas: ArrayLike) -> Array:
+    """Reflectances of coefficients (..., 3) at `lambdas` [nm] (n,): (..., n) float64 in [0, 1]."""
+    c = np.asarray(coefficients, np.float64)[..., None]
+    lambdas = np.asarray(lambdas, np.float64)
+    x = (c[..., 0, :] * lambdas + c[..., 1, :]) * lambdas + c[..., 2, :]
+    return 0.5 + 0.5 * x / np.sqrt(1.0 + x * x)
+
+
+@cache
+def _table() -> NDArray[np.float32]:
+    with np.load(ROOT / "uplift.npz") as file:
+        return file["scaled"].astype(np.float32).reshape(-1, 3)
+
+
+def _look_up(rgb: Array) -> Array:
+    largest = np.argmax(rgb, axis=1)
+    rows = np.arange(len(rgb))
+    value = rgb[rows, largest]
+    divisor = np.where(value > 0.0, value, 1.0)
+    others = [rgb[rows, (largest + i) % 3] / divisor for i in (1, 2)]
+    black = value <= 0.0
+    for ratio in others:
+        ratio[black] = 1.0
+    cell, weights = largest, []
+    layers = np.clip(node_values(), EDGE, 1.0 - EDGE)
+    for nodes, at in zip((layers, node_ratios(), node_ratios()), (value, *others), strict=True):
+        below = np.clip(np.searchsorted(nodes, at, "right") - 1, 0, NODES - 2)
+        cell = cell * NODES + below
+        t = (at - nodes[below]) / (nodes[below + 1] - nodes[below])
+        weights.append(np.clip(t, 0.0, 1.0).astype(np.float32)[:, None])
+    a, b, c = _blend(cell, weights).T.astype(np.float64) / shrinkage(rgb)
+    # From the unit coordinate to nm.
+    a /= HALF_WIDTH**2
+    b /= HALF_WIDTH
+    return np.column_stack([a, b - 2.0 * CENTRE * a, c + (a * CENTRE - b) * CENTRE])
+
+
+def _blend(cell: NDArray[np.int64], weights: list[NDArray[np.float32]]) -> NDArray[np.float32]:
+    table, strides = _table(), (NODES * NODES, NODES, 1)
+    corners = [table[cell + z + y + x] for z in (0, strides[0]) for y in (0, NODES) for x in (0, 1)]
+    for weight in reversed(weights):
+        corners = [low + weight * (high - low) for low, high in zip(*[iter(corners)] * 2)]
+    return corners[0]
