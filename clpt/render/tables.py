@@ -1,0 +1,166 @@
+"""Tables: the scene as arrays of words and floats, filled while it is lowered."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from clpt import spectra
+from clpt.records import TABLES
+from clpt.render.kinds import REAL_WORDS, SPECTRUM_WORDS
+from clpt.scene.params import Kind, device_params
+from clpt.spectra import RGB, Constant, RGBIlluminant, RGBUnbounded, Spectrum
+from clpt.spectra.spectrum import d65, on_grid
+
+STEP = 1.0  # [nm] of the tabulated spectra
+ONE = 1e4  # sigmoid coefficient at which it is 1 in float32
+Words = NDArray[np.uint32]
+
+
+def as_words(values: ArrayLike) -> Words:
+    """Return float32 values as the words that hold them."""
+    return np.ascontiguousarray(values, np.float32).view(np.uint32)
+
+
+class Tables:
+    """The read-only tables of a scene, by the names in clpt.records.TABLES.
+
+    mode: "spectral" or "rgb"; lambda_min, lambda_max: the film's range [nm].
+    `sources` tells, per kind and parameter, where values come from: "constant", "table", "texture".
+    """
+
+    def __init__(self, mode: str, lambda_min: float = 360.0, lambda_max: float = 830.0):
+        self.mode, self.lambda_min, self.lambda_max = mode, lambda_min, lambda_max
+        self.sources: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
+        self.textures: dict[tuple[int, str], int] = {}
+        self.texture_roles: set[tuple[str, str]] = set()  # (kind, role) that occur
+        self._kept: list[Any] = []  # what `textures` and `_rows` know by identity stays alive
+        self._parts: dict[str, list[np.ndarray]] = {name: [] for name in TABLES}
+        self._sizes: dict[str, int] = dict.fromkeys(TABLES, 0)
+        self._spectra: dict[Any, int] = {}
+        self._rows: dict[tuple[int, str], int] = {}
+        if mode == "spectral":
+            self._sensor()
+
+    @property
+    def spectral(self) -> bool:
+        return self.mode == "spectral"
+
+    @property
+    def spectra_size(self) -> int:
+        """Samples in a row of `spectra`."""
+        return int(np.ceil((self.lambda_max - self.lambda_min) / STEP - 1e-9)) + 1
+
+    def append(self, name: str, words: ArrayLike) -> int:
+        """Append words to a table of `uint`; return the index of the first."""
+        return self._append(name, "uint", np.ascontiguousarray(words, np.uint32).reshape(-1))
+
+    def append_floats(self, name: str, values: ArrayLike) -> int:
+        """Append values to a table of `float`; return the index of the first."""
+        return self._append(name, "float", np.ascontiguousarray(values, np.float32).reshape(-1))
+
+    def _append(self, name: str, element: str, values: np.ndarray) -> int:
+        if TABLES[name][0] != element:
+            raise TypeError(f"table {name!r} holds {TABLES[name][0]}, not {element}")
+        first = self._sizes[name]
+        self._parts[name].append(values)
+        self._sizes[name] += values.size
+        return first
+
+    def size(self, name: str) -> int:
+        """Return how many elements a table has so far."""
+        return self._sizes[name]
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Return every table as one array; an empty one has a single zero, for OpenCL's sake."""
+        made = {}
+        for name, (element, _) in TABLES.items():
+            dtype = np.float32 if element == "float" else np.uint32
+            parts = self._parts[name]
+            joined = parts[0] if len(parts) == 1 else np.concatenate([*parts, np.zeros(0, dtype)])
+            made[name] = joined if joined.size else np.zeros(1, dtype)
+        return made
+
+    def spectra_row(self, spectrum: Spectrum) -> int:
+        """Tabulate a spectrum on the common grid; return its row in `spectra`."""
+        if spectrum not in self._spectra:
+            values = on_grid(spectrum, self.lambda_min, self.lambda_max, STEP)
+            self._spectra[spectrum] = self.append_floats("spectra", values) // self.spectra_size
+        return self._spectra[spectrum]
+
+    def _sensor(self) -> None:
+        """Rows 0 to 3: D65, and the observer's curves over the wavelength pdf, so Y of 1 is 1."""
+        self.spectra_row(d65())
+        lambdas = self.lambda_min + STEP * np.arange(self.spectra_size)
+        inside = np.minimum(lambdas, self.lambda_max)  # the last sample may lie past the end
+        pdf = spectra.wavelength_pdf(inside, self.lambda_min, self.lambda_max)
+        curves = spectra.cie_xyz(inside) / pdf[:, None] / spectra.CIE_Y_INTEGRAL
+        self.append_floats("spectra", curves.T)
+
+    def spectrum_words(self, value: Spectrum | str, role: str) -> tuple[Words, str]:
+        """Return the five words of a spectrum and its source: "constant" or "table".
+
+        role: "reflectance", "emission" or "index"; an index may be a glass's name.
+        """
+        if isinstance(value, str):
+            value = spectra.glass(value)
+        if role == "emission" and isinstance(value, RGB):
+            value = RGBIlluminant(value.r, value.g, value.b)
+        if role == "index" and isinstance(value, RGB):
+            value = RGBUnbounded(value.r, value.g, value.b)
+        words = np.zeros(SPECTRUM_WORDS, np.uint32)
+        if not self.spectral:
+            words[:3] = as_words(value.to_rgb("unbounded" if role == "index" else role))
+            return words, "constant"
+        if isinstance(value, Constant):
+            words[:4] = as_words([0.0, 0.0, ONE, value.value])
+        elif type(value) is RGB:
+            words[:4] = as_words([*spectra.uplift(value.to_rgb()), 1.0])
+        else:
+            words[3] = as_words([1.0])[0]
+            words[4] = np.int32(-1 - self.spectra_row(value)).view(np.uint32)
+            return words, "table"
+        return words, "constant"
+
+    def row(self, kind: Kind, table: str) -> int:
+        """Append the device parameters of a kind to a table; return its first word.
+
+        The same object is put in once.
+        """
+        key = (id(kind), table)
+        if key not in self._rows:
+            words: list[ArrayLike] = []
+            for name, param in device_params(type(kind)).items():
+                value, source = self.param_words(getattr(kind, name), param.role, param.choices)
+                words.append(value)
+                self.sources[kind.kind][name].add(source)
+            flat = np.concatenate(words) if words else np.zeros(1, np.uint32)
+            self._rows[key] = self.append(table, flat)
+            self._kept.append(kind)
+        return self._rows[key]
+
+    def param_words(
+        self, value: Any, role: str, choices: tuple[str, ...] = ()
+    ) -> tuple[Words, str]:
+        """Return the words of one parameter and where its value comes from."""
+        if getattr(value, "is_texture", False):
+            from clpt.render.textures import lower_texture
+
+            words = np.zeros(REAL_WORDS if role == "real" else SPECTRUM_WORDS, np.uint32)
+            words[-1] = 1 + lower_texture(value, role, self)
+            return words, "texture"
+        if role in ("flag", "choice"):
+            number = choices.index(value) if choices else int(value)
+            return np.array([number], np.uint32), "constant"
+        if role == "real":
+            return np.array([as_words([value])[0], 0], np.uint32), "constant"
+        return self.spectrum_words(value, role)
+
+    def emission_words(self, value: Any) -> Words:
+        """Return the five words that `emission_load` reads: a spectrum or a texture."""
+        words, source = self.param_words(value, "emission")
+        self.sources["emission"]["value"].add(source)
+        return words
