@@ -30,7 +30,7 @@ from clpt.spectra.spectrum import (
     Tabulated,
     on_grid,
 )
-from clpt.spectra.uplift import unbounded, uplift
+from clpt.spectra.upsampling import unbounded, uplift
 
 __all__ = [
     "CIE_Y_INTEGRAL",

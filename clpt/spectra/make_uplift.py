@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from clpt.spectra import cie
 from clpt.spectra.data import ROOT
 from clpt.spectra.spectrum import d65
-from clpt.spectra.uplift import NODES, node_colours, shrinkage, to_unit
+from clpt.spectra.upsampling import NODES, node_colours, shrinkage, to_unit
 
 Array = NDArray[np.float64]
 

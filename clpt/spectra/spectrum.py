@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt.errors import SceneError
-from clpt.spectra import cie, data, uplift
+from clpt.spectra import cie, data, upsampling
 
 Role = Literal["reflectance", "unbounded", "emission"]
 Samples = NDArray[np.float64]
@@ -124,7 +124,7 @@ class RGB(_Colour):
     """A reflectance in [0, 1] (clipped), made a smooth spectrum by `uplift`."""
 
     def sample(self, lambdas: ArrayLike) -> Samples:
-        return uplift.evaluate(uplift.uplift(self.to_rgb()), lambdas)
+        return upsampling.evaluate(upsampling.uplift(self.to_rgb()), lambdas)
 
 
 @dataclass(frozen=True)
@@ -132,8 +132,8 @@ class RGBUnbounded(_Colour):
     """A colour that may exceed 1, such as an index or an extinction coefficient."""
 
     def sample(self, lambdas: ArrayLike) -> Samples:
-        scale, coefficients = uplift.unbounded(self.to_rgb())
-        return scale * uplift.evaluate(coefficients, lambdas)
+        scale, coefficients = upsampling.unbounded(self.to_rgb())
+        return scale * upsampling.evaluate(coefficients, lambdas)
 
 
 @dataclass(frozen=True)
