@@ -1,0 +1,266 @@
+/* A binary tree made 8 wide with the least SAH cost, by dynamic programming (Ylitie 2017, sec. 3).
+ *
+ * costs[node]: lanes 0 to 6 are C(node, i), the least cost of at most i = 1 .. 7 wide trees that
+ * together hold what is below the node; lane 7 keeps the choices, as bits: for i = 2 .. 8 how many
+ * of the i trees the left child gets (0: as for i - 1), then COLLAPSE_LEAF if C(node, 1) is a leaf.
+ *
+ * Wide nodes are 8 rows of float8: low x, high x, low y, high y, low z, high z of the children,
+ * their words, and a spare one; a child's word is its wide node, or its block with BVH_LEAF set.
+ * Blocks are 11 rows: v0, e1 = v1 - v0, e2 = v2 - v0 (x, y, z each), prim, tag.
+ */
+#include "bvh/build.cl"
+#include "bvh/hit.cl"
+
+#define COLLAPSE_LEAF (1u << 21)
+#define COLLAPSE_NODE_COST 1.0f
+#define COLLAPSE_BLOCK_COST 1.0f
+#define WIDE_STACK (8 * BVH_DEPTH)
+
+inline uint collapse_share(uint choices, uint trees) { return choices >> 3 * (trees - 2) & 7u; }
+
+/* The chance that a random line through the node's box meets a triangle in it: area of one side over
+ * a quarter of the box's surface times one half (Cauchy); dependence among them is neglected. */
+inline float collapse_leaf_occlusion(global const float8 *items, float8 node)
+{
+    float through = 1.0f, half_area = node_half_area(node);
+    for (uint i = node_link(node); i < node_link(node) + node_count(node); i++)
+        through *= 1.0f - min(items[i].s7 / (2.0f * half_area), 1.0f);
+    return half_area > 0.0f ? 1.0f - through : 0.0f;
+}
+
+inline void collapse_node(global const float8 *nodes, global const float8 *items, global float8 *costs,
+                          global float *occlusion, uint at)
+{
+    float8 node = nodes[at];
+    float area = node_half_area(node), block = area * COLLAPSE_BLOCK_COST;
+    if (node_is_leaf(node)) {
+        costs[at] = (float8)((float4)(block), (float3)(block), as_float(COLLAPSE_LEAF));
+        occlusion[at] = collapse_leaf_occlusion(items, node);
+        return;
+    }
+    uint left = node_link(node), right = left + 1, choices = 0;
+    union { float8 v; float at[8]; } l, r, c;
+    l.v = costs[left];
+    r.v = costs[right];
+    float least = INFINITY;
+    for (uint trees = 8; trees >= 2; trees--) {
+        least = INFINITY;
+        uint share = 1;
+        for (uint k = 1; k < trees; k++) {
+            float cost = l.at[k - 1] + r.at[trees - k - 1];
+            share = cost < least ? k : share;
+            least = min(cost, least);
+        }
+        c.at[trees - 1] = least;
+        choices |= share << 3 * (trees - 2);
+    }
+    c.at[0] = c.at[7] + area * COLLAPSE_NODE_COST;
+    if (node_count(node) <= 8 && block <= c.at[0]) {
+        c.at[0] = block;
+        choices |= COLLAPSE_LEAF;
+    }
+    for (uint trees = 2; trees <= 7; trees++)
+        if (c.at[trees - 2] <= c.at[trees - 1]) {
+            c.at[trees - 1] = c.at[trees - 2];
+            choices &= ~(7u << 3 * (trees - 2));
+        }
+    c.at[7] = as_float(choices);
+    costs[at] = c.v;
+    float pl = occlusion[left] * node_half_area(nodes[left]);
+    float pr = occlusion[right] * node_half_area(nodes[right]);
+    occlusion[at] = area > 0.0f ? 1.0f - (1.0f - pl / area) * (1.0f - pr / area) : 0.0f;
+}
+
+/* Costs below the ranges that build_subtree was given, children before parents. */
+kernel void collapse_subtree(global const float8 *restrict nodes, global const float8 *restrict items,
+                             global const Range *restrict ranges, uint begin,
+                             global float8 *restrict costs, global float *restrict occlusion)
+{
+    Range r = ranges[begin + get_global_id(0)];
+    uint waiting[2 * BVH_DEPTH + 2]; /* node; with BVH_LEAF set once its children wait above it */
+    int n = 0;
+    if (r.count) waiting[n++] = r.node;
+    while (n) {
+        uint at = waiting[n - 1];
+        float8 node = nodes[at & ~BVH_LEAF];
+        if (at & BVH_LEAF || node_is_leaf(node)) {
+            collapse_node(nodes, items, costs, occlusion, at & ~BVH_LEAF);
+            n--;
+        } else {
+            waiting[n - 1] |= BVH_LEAF;
+            waiting[n++] = node_link(node) + 1;
+            waiting[n++] = node_link(node);
+        }
+    }
+}
+
+/* Costs of one level of the heap of ranges; those below it are there. */
+kernel void collapse_level(global const float8 *restrict nodes, global const float8 *restrict items,
+                           global const Range *restrict ranges, uint begin,
+                           global float8 *restrict costs, global float *restrict occlusion)
+{
+    Range r = ranges[begin + get_global_id(0)];
+    if (r.count) collapse_node(nodes, items, costs, occlusion, r.node);
+}
+
+inline uint collapse_choices(global const float8 *costs, uint node)
+{
+    return as_uint(((global const float *)(costs + node))[7]);
+}
+
+inline int collapse_is_leaf(global const float8 *costs, uint node)
+{
+    return (collapse_choices(costs, node) & COLLAPSE_LEAF) != 0;
+}
+
+/* The binary nodes that become the children of the wide node at `root`; returns their number. */
+inline uint collapse_children(global const float8 *nodes, global const float8 *costs, uint root,
+                              uint children[8])
+{
+    uint waiting[8], trees[8], n = 0, found = 0;
+    uint choices = collapse_choices(costs, root);
+    if (choices & COLLAPSE_LEAF) { /* only the root of the whole tree: a few triangles */
+        children[0] = root;
+        return 1;
+    }
+    uint at = root, i = 8;
+    for (;;) {
+        uint share = 0;
+        while (i > 1 && (share = collapse_share(choices, i)) == 0) i--;
+        if (i > 1) {
+            uint left = node_link(nodes[at]);
+            waiting[n] = left + 1;
+            trees[n++] = i - share;
+            at = left;
+            i = share;
+        } else {
+            children[found++] = at;
+            if (!n) return found;
+            at = waiting[--n];
+            i = trees[n];
+        }
+        choices = collapse_choices(costs, at);
+    }
+}
+
+/* Numbers the wide nodes and blocks: a node's child nodes, and its blocks, have neighbouring numbers.
+ * roots, leaf_roots: the binary node of each; firsts: a node's first child node and first block.
+ * totals: nodes, blocks, depth. */
+kernel void collapse_number(global const float8 *restrict nodes, global const float8 *restrict costs,
+                            global uint *restrict roots, global uint2 *restrict firsts,
+                            global uint *restrict leaf_roots, global uint *restrict totals)
+{
+    uint waiting[WIDE_STACK], depths[WIDE_STACK], children[8];
+    uint n = 1, n_nodes = 1, n_blocks = 0, deepest = 0;
+    waiting[0] = roots[0] = depths[0] = 0;
+    while (n) {
+        uint at = waiting[--n], depth = depths[n];
+        uint found = collapse_children(nodes, costs, roots[at], children);
+        firsts[at] = (uint2)(n_nodes, n_blocks);
+        deepest = max(deepest, depth);
+        for (uint i = 0; i < found; i++) {
+            if (collapse_is_leaf(costs, children[i])) {
+                leaf_roots[n_blocks++] = children[i];
+            } else {
+                waiting[n] = n_nodes;
+                depths[n++] = depth + 1;
+                roots[n_nodes++] = children[i];
+            }
+        }
+    }
+    totals[0] = n_nodes;
+    totals[1] = n_blocks;
+    totals[2] = deepest;
+}
+
+/* How much sooner than others a shadow ray ought to look into a child: chance to end over cost. */
+inline float collapse_promise(global const float8 *nodes, global const float8 *costs,
+                              global const float *occlusion, uint node)
+{
+    float cost = ((global const float *)(costs + node))[0];
+    return cost > 0.0f ? occlusion[node] * node_half_area(nodes[node]) / cost : 0.0f;
+}
+
+/* Writes one wide node. Children stand in ascending promise, for traversals visit the last slot
+ * first. Boxes grow by a few rounding errors of the scene's size, so that no ray slips between two
+ * of them; empty slots hold what no ray meets, and lead to block 0 if one does nevertheless. */
+kernel void collapse_nodes(global const float8 *restrict nodes, global const float8 *restrict costs,
+                           global const float *restrict occlusion, global const uint *restrict roots,
+                           global const uint2 *restrict firsts, uint count,
+                           global float *restrict wide)
+{
+    uint w = get_global_id(0);
+    if (w >= count) return;
+    uint children[8], words[8];
+    float promise[8];
+    uint found = collapse_children(nodes, costs, roots[w], children);
+    uint2 next = firsts[w];
+    for (uint i = 0; i < found; i++) {
+        uint child = children[i];
+        uint word = collapse_is_leaf(costs, child) ? BVH_LEAF | next.y++ : next.x++;
+        float p = collapse_promise(nodes, costs, occlusion, child);
+        uint k = i;
+        for (; k > 0 && promise[k - 1] > p; k--) {
+            promise[k] = promise[k - 1];
+            children[k] = children[k - 1];
+            words[k] = words[k - 1];
+        }
+        promise[k] = p;
+        children[k] = child;
+        words[k] = word;
+    }
+    float4 reach = fmax(fabs(nodes[0].lo), fabs(nodes[0].hi));
+    float pad = 0x1p-21f * fmax(reach.x, fmax(reach.y, reach.z));
+    global float *row = wide + (ulong)w * 64;
+    for (uint k = 0; k < 8; k++, row++) {
+        float8 node = (float8)((float4)(FLT_MAX), (float4)(-FLT_MAX));
+        if (k < found) {
+            node = nodes[children[k]];
+            node = (float8)(node.lo - pad, node.hi + pad);
+        }
+        row[0] = node.s0;
+        row[8] = node.s4;
+        row[16] = node.s1;
+        row[24] = node.s5;
+        row[32] = node.s2;
+        row[40] = node.s6;
+        row[48] = as_float(k < found ? words[k] : BVH_LEAF);
+        row[56] = 0.0f;
+    }
+}
+
+/* Writes one block; slots beyond its triangles hold a point, which nothing hits. */
+kernel void collapse_blocks(global const float8 *restrict nodes, global const float8 *restrict items,
+                            global const uint *restrict leaf_roots, uint count,
+                            global const float *restrict vertices, global const uint *restrict faces,
+                            global const uint *restrict tags, global float *restrict blocks)
+{
+    uint b = get_global_id(0);
+    if (b >= count) return;
+    float8 node = nodes[leaf_roots[b]];
+    uint n = node_count(node);
+    while (!node_is_leaf(node)) node = nodes[node_link(node)];
+    uint first = node_link(node);
+    global float *row = blocks + (ulong)b * 88;
+    for (uint k = 0; k < 8; k++, row++) {
+        uint prim = k < n ? item_index(items[first + k]) : BVH_MISS;
+        float3 v0 = (float3)(0.0f), v1 = v0, v2 = v0;
+        if (k < n) {
+            v0 = vload3(faces[3 * prim], vertices);
+            v1 = vload3(faces[3 * prim + 1], vertices);
+            v2 = vload3(faces[3 * prim + 2], vertices);
+        }
+        float3 e1 = v1 - v0, e2 = v2 - v0;
+        row[0] = v0.x;
+        row[8] = v0.y;
+        row[16] = v0.z;
+        row[24] = e1.x;
+        row[32] = e1.y;
+        row[40] = e1.z;
+        row[48] = e2.x;
+        row[56] = e2.y;
+        row[64] = e2.z;
+        row[72] = as_float(prim);
+        row[80] = as_float(k < n ? tags[prim] : 0u);
+    }
+}

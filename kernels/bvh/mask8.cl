@@ -1,0 +1,19 @@
+/* Eight truth values as bits, and the first of them; the one place with a compiler's own words.
+ *
+ * On x86 the sign bits of a vector are one instruction away; elsewhere eight bytes of a ulong serve.
+ */
+#if defined(__AVX__) && defined(__has_builtin)
+#if __has_builtin(__builtin_ia32_movmskps256) && __has_builtin(__builtin_ctz)
+#define MASK8_NATIVE
+#endif
+#endif
+
+#ifdef MASK8_NATIVE
+typedef uint Mask8;
+inline Mask8 mask8(int8 m) { return (uint)__builtin_ia32_movmskps256(as_float8(m)); }
+inline uint mask8_first(Mask8 m) { return (uint)__builtin_ctz(m); }
+#else
+typedef ulong Mask8;
+inline Mask8 mask8(int8 m) { return as_ulong(convert_char8(m)) & 0x0101010101010101ul; }
+inline uint mask8_first(Mask8 m) { return (uint)(63 - clz(m & -m)) >> 3; }
+#endif
