@@ -1,0 +1,78 @@
+/* Fresnel's equations for unpolarised light: the share of radiance that a smooth boundary reflects.
+ * Cosines are signed (negative inside); an index is always that of the inside over the outside. */
+typedef struct {
+    real f;     /* reflectance in [0, 1] */
+    real cos_t; /* signed cosine of the refracted direction; 0 on total internal reflection */
+    real eta;   /* index of the side that light is refracted to, over that of the side of cos_i */
+} Fresnel;
+
+/* Two dielectrics (Born and Wolf 1999, 1.5.2). An index of one is no boundary: f = 0 at any angle. */
+inline Fresnel fresnel_dielectric(real cos_i, real eta)
+{
+    Fresnel r;
+    real c = fabs(cos_i);
+    r.eta = sel(cos_i >= 0.0f, eta, 1.0f / eta);
+    real cos2_t = 1.0f - (1.0f - c * c) / (r.eta * r.eta);
+    real t = sqrt_r(cos2_t);
+    real s_polarised = (c - r.eta * t) / max_r(c + r.eta * t, (real)(1e-20f));
+    real p_polarised = (r.eta * c - t) / max_r(r.eta * c + t, (real)(1e-20f));
+    real f = 0.5f * (s_polarised * s_polarised + p_polarised * p_polarised);
+    f = sel((cos2_t <= 0.0f) | (c == 0.0f), (real)(1.0f), f);
+    r.f = sel(eta == 1.0f, (real)(0.0f), f);
+    r.cos_t = sel(cos_i >= 0.0f, -t, t);
+    return r;
+}
+
+/* The reflectance per wavelength; computed once where the index does not vary. */
+inline Spectrum fresnel_spectrum(real cos_i, Spectrum eta)
+{
+    Spectrum f = spectrum_of(fresnel_dielectric(cos_i, eta.x).f);
+    if (any(spectrum_varies(eta))) {
+#define C(c) f.c = fresnel_dielectric(cos_i, eta.c).f;
+        SPECTRUM_EACH(C)
+#undef C
+    }
+    return f;
+}
+
+/* Index of a boundary. In RGB mode light is refracted as a whole, by the channels' mean. */
+inline Spectrum relative_index(Spectrum inside, Spectrum outside)
+{
+    Spectrum eta = spectrum_div(inside, outside);
+#if SPECTRUM_SIZE == 3
+    eta = spectrum_of(spectrum_mean(eta));
+#endif
+    return eta;
+}
+
+/* Vacuum and a metal of index eta + i k (Born and Wolf 1999, 14.4; as in Lazanyi and
+ * Szirmay-Kalos 2005), cos_i >= 0. */
+inline real fresnel_metal(real cos_i, real eta, real k)
+{
+    real c2 = cos_i * cos_i, s2 = 1.0f - c2;
+    real d = eta * eta - k * k - s2;
+    real q = sqrt_r(d * d + 4.0f * eta * eta * k * k); /* a^2 + b^2, where a + i b is the normal component */
+    real a = sqrt_r(0.5f * (q + d));
+    real t = 2.0f * cos_i * a;
+    real s_polarised = (q + c2 - t) / max_r(q + c2 + t, (real)(1e-20f));
+    real p = (q * c2 + s2 * s2 - t * s2) / max_r(q * c2 + s2 * s2 + t * s2, (real)(1e-20f));
+    return min_r(0.5f * s_polarised * (1.0f + p), (real)(1.0f));
+}
+inline Spectrum fresnel_conductor(real cos_i, Spectrum eta, Spectrum k)
+{
+    Spectrum f;
+#define C(c) f.c = fresnel_metal(cos_i, eta.c, k.c);
+    SPECTRUM_EACH(C)
+#undef C
+    return f;
+}
+
+/* Reflectance of a smooth boundary averaged over a cosine-weighted hemisphere of the outside:
+ * Egan and Hilgeman 1973 for eta < 1, d'Eon and Irving 2011 for eta >= 1. */
+inline real fresnel_diffuse(real eta)
+{
+    real x = 1.0f / eta;
+    real denser = 0.919317f + x * (-3.4793f + x * (6.75335f + x * (-7.80989f + x * (4.98554f - x * 1.36881f))));
+    real thinner = 0.6681f + 0.0636f * x + eta * (0.7099f - eta * 1.4399f);
+    return sel(eta < 1.0f, thinner, denser);
+}

@@ -1,0 +1,87 @@
+/* Microfacet normals: density D [1/sr], Smith's masking G1, and sampling of the normals that wo sees.
+ * Directions in the local frame; the normal m is on the front (m.z >= 0). Anisotropic along x and y.
+ * GGX and Beckmann as in Walter et al. 2007; Beckmann's G1 is their rational fit (eq. 27). */
+typedef struct {
+    mask beckmann; /* else GGX: the positions in materials.DISTRIBUTIONS */
+    real alpha_u, alpha_v;
+} Microfacets;
+
+inline Microfacets microfacets_of(integer distribution, real alpha_u, real alpha_v)
+{
+    Microfacets d = {distribution == 1, max_r(alpha_u, (real)(1e-4f)), max_r(alpha_v, (real)(1e-4f))};
+    return d;
+}
+
+/* D(m), normalised so that the integral of D(m) m.z over the hemisphere is one. */
+inline real microfacet_d(Microfacets d, vec3 m)
+{
+    real c2 = m.z * m.z, s = sqr(m.x / d.alpha_u) + sqr(m.y / d.alpha_v), area = PI * d.alpha_u * d.alpha_v;
+    real r = 1.0f / (area * sqr(s + c2));
+    if (any(d.beckmann)) {
+        real safe = max_r(c2, (real)(1e-12f));
+        r = sel(d.beckmann, exp_r(-s / safe) / (area * safe * safe), r);
+    }
+    return sel((m.z > 0.0f) & (r * m.z > 1e-20f), r, (real)(0.0f));
+}
+
+/* Smith's G1(v, m): the share of the facets of normal m that v sees; 0 for their backs. */
+inline real microfacet_g1(Microfacets d, vec3 v, vec3 m)
+{
+    real z = fabs(v.z), s2 = sqr(d.alpha_u * v.x) + sqr(d.alpha_v * v.y);
+    real r = 2.0f * z / max_r(z + sqrt(z * z + s2), (real)(1e-20f));
+    if (any(d.beckmann)) {
+        real a = z / max_r(sqrt(s2), (real)(1e-20f)); /* 1 / (alpha tan theta) */
+        real fit = a * (3.535f + 2.181f * a) / (1.0f + a * (2.276f + 2.577f * a));
+        r = sel(d.beckmann, sel(a < 1.6f, fit, (real)(1.0f)), r);
+    }
+    return sel(dot3(v, m) * v.z > 0.0f, r, (real)(0.0f));
+}
+
+/* Density of the normals that w sees, w.z > 0 [1/sr] (Heitz 2018 eq. 3). */
+inline real microfacet_visible_pdf(Microfacets d, vec3 w, vec3 m)
+{
+    return microfacet_d(d, m) * microfacet_g1(d, w, m) * fabs(dot3(w, m)) / max_r(fabs(w.z), (real)(1e-20f));
+}
+
+/* GGX normals seen by w after stretching: a spherical cap about w (Dupuy and Benyoub 2023). */
+inline vec3 ggx_visible_slopes(vec3 w, vec2 u)
+{
+    real s, c, up = (1.0f - u.x) * (1.0f + w.z), z = up - w.z, r = sqrt_r(1.0f - z * z);
+    sincos_2pi(u.y, &s, &c);
+    return v3(r * c + w.x, r * s + w.y, up);
+}
+
+/* Beckmann normals seen by w after stretching. Along w, the slope x of a visible facet has a
+ * distribution function proportional to 1 + erf x + tan(theta) exp(-x^2) / sqrt(pi) up to the slope
+ * that faces away; it is inverted by Newton's method in erf x, where its derivative is plain
+ * (Heitz and d'Eon 2014; Jakob 2014). Across w, the slope is normal. */
+inline vec3 beckmann_visible_slopes(vec3 w, vec2 u)
+{
+    real sin_t = sqrt_r(w.x * w.x + w.y * w.y), tan_t = sin_t / max_r(w.z, (real)(1e-6f));
+    real cot = w.z / max_r(sin_t, (real)(1e-6f));
+    real high = erf_r(cot), k = tan_t * 0.564189584f; /* 1 / sqrt(pi) */
+    real target = clamp_r(u.x, (real)(1e-6f), (real)(0.999999f));
+    real b = high - (high + 1.0f) * erf_r(sqrt_r(-log_r(target)));
+    target *= 1.0f + high + k * exp_r(-cot * cot);
+    for (int i = 0; i < 3; ++i) {
+        real x = erfinv_r(b);
+        real slope = 1.0f - x * tan_t;
+        b -= (1.0f + b + k * exp_r(-x * x) - target) / max_r(slope, (real)(1e-6f));
+        b = clamp_r(b, (real)(-0.999999f), min_r(high, (real)(0.999999f)));
+    }
+    real x = erfinv_r(b), y = erfinv_r(clamp_r(2.0f * u.y - 1.0f, (real)(-0.999999f), (real)(0.999999f)));
+    mask tilted = sin_t > 0.0f;
+    real inv = 1.0f / max_r(sin_t, (real)(1e-20f));
+    real cos_p = sel(tilted, w.x * inv, (real)(1.0f)), sin_p = sel(tilted, w.y * inv, (real)(0.0f));
+    return v3(-(cos_p * x - sin_p * y), -(sin_p * x + cos_p * y), (real)(1.0f));
+}
+
+/* A normal that w sees, w.z >= 0. */
+inline vec3 microfacet_visible(Microfacets d, vec3 w, vec2 u)
+{
+    vec3 stretched = normalize3(v3(w.x * d.alpha_u, w.y * d.alpha_v, w.z));
+    vec3 h = ggx_visible_slopes(stretched, u);
+    if (any(d.beckmann))
+        h = sel3(d.beckmann, beckmann_visible_slopes(stretched, u), h);
+    return normalize3(v3(h.x * d.alpha_u, h.y * d.alpha_v, max_r(h.z, (real)(1e-12f))));
+}
