@@ -1,0 +1,272 @@
+"""Triangle meshes from .obj, .ply, .stl, .off, .glb and .gltf files, read through trimesh.
+
+Normals and texture coordinates are kept where the file has them. Nodes of a glTF scene become one
+mesh each, placed by `to_world`, and share their arrays. Of materials, base colours are taken.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import warnings
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from clpt import transforms
+from clpt.errors import SceneError
+from clpt.scene.materials import Diffuse, Material, TwoSided
+from clpt.scene.shapes import Mesh
+from clpt.scene.textures import Bitmap
+from clpt.spectra import RGB
+
+SUFFIXES = (".obj", ".ply", ".stl", ".off", ".glb", ".gltf")
+# What trimesh decodes, and what changes neither shape nor base colour.
+KNOWN_EXTENSIONS = (
+    "KHR_mesh_quantization", "KHR_texture_transform", "KHR_lights_punctual", "EXT_texture_webp",
+    "FB_ngon_encoding",
+)  # fmt: skip
+# Reading on without these would misplace triangles, even where a file calls them optional.
+NEEDED_EXTENSIONS = ("EXT_mesh_gpu_instancing",)
+USEMTL = re.compile(rb"(?m)^[ \t]*usemtl[^\n]*")
+GREY = TwoSided(front=Diffuse(reflectance=0.6, name="grey"))
+
+
+@dataclass
+class MeshFile:
+    """The meshes of a file, and what had to be passed over."""
+
+    meshes: list[Mesh]
+    warnings: list[str] = field(default_factory=list)
+
+
+def read_mesh(path: Path, *, materials: bool = True) -> MeshFile:
+    """Read all meshes of a file, with the file's base colours if `materials`.
+
+    Raises SceneError for a file that is missing, broken or without triangles, for vertices that are
+    not finite and for faces that name vertices which are not there.
+    """
+    notes: list[str] = []
+    if path.suffix.lower() in (".glb", ".gltf"):
+        _check_extensions(path, notes)
+    scene = _open(path, materials)
+    shared: dict[str, Mesh | None] = {}
+    meshes: list[Mesh] = []
+    for node in scene.graph.nodes_geometry:
+        to_world, key = scene.graph[node]
+        if key not in shared:
+            shared[key] = _mesh(path, key, scene.geometry[key], materials, notes)
+        mesh = shared[key]
+        if mesh is not None:
+            meshes.append(_placed(path, mesh, np.asarray(to_world, np.float64)))
+    if not meshes:
+        raise SceneError("holds no triangles", file=path)
+    return MeshFile(meshes, list(dict.fromkeys(notes)))
+
+
+def join(meshes: list[Mesh]) -> Mesh:
+    """Return one mesh that holds all triangles, in world space, with the first one's material."""
+    first = meshes[0]
+    if len(meshes) == 1 and np.array_equal(first.to_world, np.eye(4)):
+        return first
+    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])])
+    faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=True)]
+    whole: dict[str, Any] = {"normals": None, "uvs": None}
+    if all(mesh.normals is not None for mesh in meshes):
+        turned = [transforms.transform_normals(m.to_world, m.normals) for m in meshes]
+        whole["normals"] = np.concatenate(turned).astype(np.float32)
+    if any(mesh.uvs is not None for mesh in meshes):
+        none = [np.zeros((len(m.vertices), 2)) if m.uvs is None else m.uvs for m in meshes]
+        whole["uvs"] = np.concatenate(none).astype(np.float32)
+    moved = [transforms.transform_points(m.to_world, m.vertices) for m in meshes]
+    return Mesh(
+        vertices=np.concatenate(moved).astype(np.float32),
+        faces=np.concatenate(faces).astype(np.uint32),
+        material=first.material,
+        name=first.name,
+        **whole,
+    )
+
+
+def smooth_normals(vertices: NDArray[Any], faces: NDArray[Any]) -> NDArray[np.float32]:
+    """Vertex normals (n, 3): faces' normals weighted by their angles (Thuermer and Wuethrich 1998)."""
+    corners = vertices[faces].astype(np.float64)
+    total = np.zeros((len(vertices), 3))
+    normals = _unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    for i in range(3):
+        a = _unit(corners[:, (i + 1) % 3] - corners[:, i])
+        b = _unit(corners[:, (i + 2) % 3] - corners[:, i])
+        angles = np.arccos(np.clip((a * b).sum(axis=1), -1.0, 1.0))
+        for axis in range(3):
+            weights = angles * normals[:, axis]
+            total[:, axis] += np.bincount(faces[:, i], weights, len(vertices))
+    return _unit(total).astype(np.float32)
+
+
+def checked(
+    path: Path | None,
+    name: str,
+    vertices: NDArray[Any],
+    faces: NDArray[Any],
+    normals: NDArray[Any] | None,
+    uvs: NDArray[Any] | None,
+    notes: list[str],
+) -> dict[str, Any]:
+    """Return a mesh's arrays without zero-area triangles and unused vertices; notes tell what went.
+
+    Raises SceneError for indices out of range and vertices that are not finite.
+    """
+    where = name or None
+    if len(faces) and (faces.min() < 0 or faces.max() >= len(vertices)):
+        bad = int(np.argmax(((faces < 0) | (faces >= len(vertices))).any(axis=1)))
+        message = f"triangle {bad} names a vertex outside 0 to {len(vertices) - 1}"
+        raise SceneError(message, file=path, where=where)
+    with np.errstate(over="ignore", invalid="ignore"):
+        points = np.ascontiguousarray(vertices, np.float32)
+        corners = points[faces].astype(np.float64)
+        if not np.isfinite(corners).all():
+            bad = int(np.argmin(np.isfinite(corners).all(axis=(1, 2))))
+            message = f"triangle {bad} has a vertex that is not a finite number"
+            raise SceneError(message, file=path, where=where)
+        sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    solid = sides.any(axis=1)
+    if not solid.all():
+        notes.append(f"{name or 'mesh'}: left out {int((~solid).sum())} triangles without area")
+        faces = faces[solid]
+    used = np.zeros(len(points), bool)
+    used[faces.reshape(-1)] = True
+    arrays = {"vertices": points, "normals": normals, "uvs": uvs}
+    if not used.all():
+        arrays = {key: None if a is None else a[used] for key, a in arrays.items()}
+        faces = (np.cumsum(used) - 1)[faces]
+    normals, uvs = arrays["normals"], arrays["uvs"]
+    if normals is not None:
+        arrays["normals"] = _usable_normals(arrays["vertices"], faces, normals)
+    if uvs is not None and not np.isfinite(uvs).all():
+        notes.append(f"{name or 'mesh'}: left out texture coordinates that are not finite")
+        arrays["uvs"] = None
+    return {**arrays, "faces": np.ascontiguousarray(faces, np.uint32)}
+
+
+def _check_extensions(path: Path, notes: list[str]) -> None:
+    """Refuse glTF extensions without which the geometry would be wrong, note the others."""
+    try:
+        data = path.read_bytes()
+        if data[:4] == b"glTF":
+            data = data[20 : 20 + int.from_bytes(data[12:16], "little")]
+        document = json.loads(data)
+        used = [str(name) for name in document.get("extensionsUsed", [])]
+        required = [str(name) for name in document.get("extensionsRequired", [])]
+    except OSError as error:
+        raise SceneError(f"cannot be read: {error.strerror}", file=path) from None
+    except (ValueError, TypeError, AttributeError, RecursionError) as error:
+        raise SceneError(f"is not glTF: {str(error)[:80]}", file=path) from None
+    for name in [*required, *(name for name in NEEDED_EXTENSIONS if name in used)]:
+        if name not in KNOWN_EXTENSIONS:
+            raise SceneError(f"needs the glTF extension {name}, which is not supported", file=path)
+    notes += [f"glTF extension {name} left out" for name in used if name not in KNOWN_EXTENSIONS]
+
+
+def _open(path: Path, materials: bool) -> trimesh.Scene:
+    suffix = path.suffix.lower()
+    try:
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore")
+            if suffix == ".obj" and not materials:
+                # In one piece: trimesh cuts the mesh, and its normals, where the material changes.
+                text = io.BytesIO(USEMTL.sub(b"", path.read_bytes()))
+                return trimesh.load_scene(text, "obj", process=False, skip_materials=True)
+            return trimesh.load_scene(path, process=False)
+    except Exception as error:  # trimesh's readers raise whatever their parsing runs into
+        reason = str(error).splitlines()[0][:100] if str(error) else type(error).__name__
+        raise SceneError(f"cannot be read as a {suffix} mesh: {reason}", file=path) from None
+
+
+def _mesh(
+    path: Path, name: str, geometry: Any, materials: bool, notes: list[str]
+) -> Mesh | None:
+    if not isinstance(geometry, trimesh.Trimesh):
+        notes.append(f"{name}: left out, since it has no triangles")
+        return None
+    vertices = np.asarray(geometry.vertices).reshape(-1, 3)
+    faces = np.asarray(geometry.faces, np.int64).reshape(-1, 3)
+    # Asking for `vertex_normals` would compute them; the file's own wait in the cache.
+    normals = _per_vertex(geometry._cache.cache.get("vertex_normals"), vertices, 3)
+    uvs = _per_vertex(getattr(geometry.visual, "uv", None), vertices, 2)
+    arrays = checked(path, name, vertices, faces, normals, uvs, notes)
+    if not len(arrays["faces"]):
+        return None
+    material = _material(geometry.visual, notes) if materials else GREY
+    return Mesh(name=name, material=material, **arrays)
+
+
+def _placed(path: Path, mesh: Mesh, to_world: NDArray[np.float64]) -> Mesh:
+    if np.array_equal(to_world, np.eye(4)):
+        return mesh
+    if transforms.is_singular(to_world):
+        raise SceneError("a node's transform flattens space", file=path, where=mesh.name)
+    return Mesh(
+        name=mesh.name,
+        material=mesh.material,
+        to_world=to_world,
+        vertices=mesh.vertices,
+        faces=mesh.faces,
+        normals=mesh.normals,
+        uvs=mesh.uvs,
+    )
+
+
+def _per_vertex(values: Any, vertices: NDArray[Any], width: int) -> NDArray[np.float32] | None:
+    if values is None or np.shape(values) != (len(vertices), width):
+        return None
+    return np.ascontiguousarray(values, np.float32)
+
+
+def _usable_normals(
+    vertices: NDArray[Any], faces: NDArray[Any], normals: NDArray[Any]
+) -> NDArray[np.float32]:
+    """Normals of length one; where the file's are zero or not finite, those of the faces around."""
+    unit = _unit(np.nan_to_num(normals, nan=0.0, posinf=0.0, neginf=0.0))
+    bad = ~unit.any(axis=1)
+    if bad.any():
+        unit[bad] = smooth_normals(vertices, faces)[bad]
+    return unit.astype(np.float32)
+
+
+def _unit(vectors: NDArray[Any]) -> NDArray[Any]:
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return vectors / np.where(length > 0.0, length, 1.0)
+
+
+def _material(visual: Any, notes: list[str]) -> Material:
+    material = getattr(visual, "material", None)
+    if material is None:
+        if getattr(visual, "kind", None) in ("vertex", "face"):
+            notes.append("vertex colours left out")
+        return GREY
+    colour, image = _base_colour(material)
+    extra = ("metallicRoughnessTexture", "normalTexture", "emissiveTexture", "occlusionTexture")
+    if any(getattr(material, name, None) is not None for name in extra):
+        notes.append("of materials, only base colours are taken")
+    if image is None:
+        return TwoSided(front=Diffuse(reflectance=RGB(*colour), name=material.name or ""))
+    texels = np.asarray(image.convert("RGB"), np.float32) / 255.0
+    linear = np.where(texels <= 0.04045, texels / 12.92, ((texels + 0.055) / 1.055) ** 2.4)
+    texture = Bitmap(image=(linear * colour).astype(np.float32), raw=True)
+    return TwoSided(front=Diffuse(reflectance=texture, name=material.name or ""))
+
+
+def _base_colour(material: Any) -> tuple[list[float], Any]:
+    """Return linear r, g, b of a trimesh material, and its image or None."""
+    if isinstance(material, trimesh.visual.material.PBRMaterial):
+        factor, image = material.baseColorFactor, material.baseColorTexture
+    else:
+        factor, image = getattr(material, "diffuse", None), getattr(material, "image", None)
+    if factor is None or (image is not None and not hasattr(material, "baseColorFactor")):
+        return [1.0, 1.0, 1.0], image
+    return [float(value) / 255.0 for value in np.asarray(factor).reshape(-1)[:3]], image

@@ -1,0 +1,76 @@
+"""Scenes in Mitsuba 3's XML; names of Mitsuba 0.6 and 2 in camel case are read as well.
+
+What is not supported, and a parameter that nothing asks for, is an error that names the element, the
+file and the line; so a picture is never silently a different one.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from clpt.formats.mitsuba import sensors
+from clpt.formats.mitsuba.bsdfs import bsdf
+from clpt.formats.mitsuba.emitters import emitter
+from clpt.formats.mitsuba.sensors import sensor
+from clpt.formats.mitsuba.shapes import shape
+from clpt.formats.mitsuba.spectra import texture
+from clpt.formats.mitsuba.values import Context, Properties
+from clpt.formats.mitsuba.xml import Element, parse
+from clpt.formats.studio import framing_camera
+from clpt.scene import Scene, integrators
+
+__all__ = ["load"]
+
+
+def load(path: Path, **variables: object) -> Scene:
+    """Read a Mitsuba scene; `variables` stand for its `$names`.
+
+    Raises SceneError with file, line and element for anything broken or not supported.
+    """
+    document = parse(path, variables)
+    context = Context(document)
+    props = Properties(document.root, context)
+    shapes = [shape(element, context) for element in props.objects("shape")]
+    lights = [emitter(element, context) for element in props.objects("emitter")]
+    for element in props.objects("bsdf"):
+        bsdf(element, context)
+    for element in _textures(props):
+        texture(element, props)
+    integrator = props.object("integrator")
+    seen = _first_sensor(props, context)
+    props.finish()
+    camera = framing_camera(shapes) if seen is None else seen.camera
+    return Scene(
+        camera=camera,
+        shapes=shapes,
+        lights=lights,
+        integrator=_default() if integrator is None else sensors.integrator(integrator, context),
+        sampler=integrators.Independent() if seen is None else seen.sampler,
+        film=sensors.default_film() if seen is None else seen.film,
+        spp=4 if seen is None else seen.spp,
+        seed=0 if seen is None else seen.seed,
+        name=path.stem,
+        warnings=context.warnings,
+        extra={"format": "mitsuba"},
+    )
+
+
+def _default() -> integrators.Integrator:
+    return integrators.Path(max_depth=-1)
+
+
+def _textures(props: Properties) -> list[Element]:
+    """Take the textures that stand in the scene itself, for references."""
+    named = [name for name, child in props.named.items() if child.tag == "texture"]
+    return [child for name in named if (child := props.take(name)) is not None] + props.objects(
+        "texture"
+    )
+
+
+def _first_sensor(props: Properties, context: Context) -> sensors.Sensor | None:
+    found = [sensor(element, context) for element in props.objects("sensor")]
+    if len(found) > 1:
+        context.warn(props.element, f"only the first of {len(found)} sensors is used")
+    if not found:
+        context.warn(props.element, "has no sensor; a camera that sees everything is used")
+    return found[0] if found else None

@@ -1,0 +1,161 @@
+"""Materials of a Mitsuba scene. Defaults that differ from ours are Mitsuba's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from clpt import spectra
+from clpt.errors import UnknownKindError
+from clpt.formats.mitsuba.spectra import index, ior, real, reflectance
+from clpt.formats.mitsuba.values import Context, Properties, placed
+from clpt.formats.mitsuba.xml import Element
+from clpt.scene import materials
+from clpt.scene.materials import Material
+
+Parameters = dict[str, Any]
+SMOOTHEST = 1e-4  # Mitsuba's own floor of a roughness
+
+
+def bsdf(element: Element, context: Context) -> Material:
+    """Make the material that a <bsdf> describes, once for all references to it."""
+    return context.once(element, lambda _: _bsdf(element, context))
+
+
+def _bsdf(element: Element, context: Context) -> Material:
+    if element.type not in PLUGINS:
+        raise UnknownKindError("bsdf", element.type, PLUGINS, **element.place())
+    cls, read = PLUGINS[element.type]
+    props = Properties(element, context)
+    with placed(element):
+        made = cls(name=element.attributes.get("id", ""), **read(props))
+    props.finish()
+    return made
+
+
+def _diffuse(props: Properties) -> Parameters:
+    return {"reflectance": reflectance(props, "reflectance", 0.5)}
+
+
+def _phong(props: Properties) -> Parameters:
+    return {
+        "diffuse": reflectance(props, "diffuse_reflectance", 0.5),
+        "specular": reflectance(props, "specular_reflectance", 0.2),
+        "exponent": real(props, "exponent", 30.0),
+    }
+
+
+def _dielectric(props: Properties) -> Parameters:
+    return {
+        "int_ior": ior(props, "int_ior", "bk7"),
+        "ext_ior": ior(props, "ext_ior", "air"),
+        "specular_reflectance": reflectance(props, "specular_reflectance", 1.0),
+        "specular_transmittance": reflectance(props, "specular_transmittance", 1.0),
+    }
+
+
+def _rough_dielectric(props: Properties) -> Parameters:
+    return {**_dielectric(props), **_roughness(props)}
+
+
+def _conductor(props: Properties) -> Parameters:
+    named = "material" in props.named
+    if named and ("eta" in props.named or "k" in props.named):
+        raise props.element.error("give either 'material' or 'eta' and 'k', not both")
+    child = props.take("material")
+    if child is not None:
+        with placed(child):
+            eta, k = spectra.metal(child.attribute("value"))
+    else:
+        eta, k = index(props, "eta", 0.0), index(props, "k", 1.0)
+    return {
+        "eta": eta,
+        "k": k,
+        "specular_reflectance": reflectance(props, "specular_reflectance", 1.0),
+    }
+
+
+def _rough_conductor(props: Properties) -> Parameters:
+    return {**_conductor(props), **_roughness(props)}
+
+
+def _distribution(props: Properties) -> str:
+    props.ignore("sample_visible")
+    return props.text("distribution", "beckmann", materials.DISTRIBUTIONS)
+
+
+def _roughness(props: Properties) -> Parameters:
+    distribution = _distribution(props)
+    if "alpha" in props.named and ("alpha_u" in props.named or "alpha_v" in props.named):
+        raise props.element.error("give either 'alpha' or 'alpha_u' and 'alpha_v', not both")
+    alpha = _alpha(props, "alpha", 0.1)
+    return {
+        "distribution": distribution,
+        "alpha_u": _alpha(props, "alpha_u", alpha),
+        "alpha_v": _alpha(props, "alpha_v", alpha),
+    }
+
+
+def _alpha(props: Properties, name: str, default: Any) -> Any:
+    value = real(props, name, default)
+    return max(value, SMOOTHEST) if isinstance(value, float) and value >= 0.0 else value
+
+
+def _plastic(props: Properties) -> Parameters:
+    return {
+        "diffuse_reflectance": reflectance(props, "diffuse_reflectance", 0.5),
+        "int_ior": ior(props, "int_ior", "polypropylene"),
+        "ext_ior": ior(props, "ext_ior", "air"),
+        "specular_reflectance": reflectance(props, "specular_reflectance", 1.0),
+        "nonlinear": props.flag("nonlinear", False),
+    }
+
+
+def _rough_plastic(props: Properties) -> Parameters:
+    distribution = _distribution(props)
+    return {**_plastic(props), "distribution": distribution, "alpha": _alpha(props, "alpha", 0.1)}
+
+
+def _null(props: Properties) -> Parameters:
+    return {}
+
+
+def _two_sided(props: Properties) -> Parameters:
+    sides = _nested(props, 1, 2)
+    return {"front": sides[0], "back": sides[1] if len(sides) == 2 else None}
+
+
+def _mask(props: Properties) -> Parameters:
+    return {"material": _nested(props, 1, 1)[0], "opacity": real(props, "opacity", 0.5)}
+
+
+def _blend(props: Properties) -> Parameters:
+    if "weight" not in props.named:
+        raise props.element.error("needs the parameter 'weight'")
+    first, second = _nested(props, 2, 2)
+    return {"first": first, "second": second, "weight": real(props, "weight", 0.5)}
+
+
+def _nested(props: Properties, low: int, high: int) -> list[Material]:
+    inner = props.objects("bsdf")
+    if not low <= len(inner) <= high:
+        wanted = str(low) if low == high else f"{low} or {high}"
+        raise props.element.error(f"needs {wanted} nested <bsdf>, not {len(inner)}")
+    return [bsdf(element, props.context) for element in inner]
+
+
+PLUGINS: dict[str, tuple[type[Material], Callable[[Properties], Parameters]]] = {
+    "diffuse": (materials.Diffuse, _diffuse),
+    "phong": (materials.Phong, _phong),
+    "dielectric": (materials.Dielectric, _dielectric),
+    "thindielectric": (materials.ThinDielectric, _dielectric),
+    "roughdielectric": (materials.RoughDielectric, _rough_dielectric),
+    "conductor": (materials.Conductor, _conductor),
+    "roughconductor": (materials.RoughConductor, _rough_conductor),
+    "plastic": (materials.Plastic, _plastic),
+    "roughplastic": (materials.RoughPlastic, _rough_plastic),
+    "null": (materials.Null, _null),
+    "twosided": (materials.TwoSided, _two_sided),
+    "mask": (materials.Mask, _mask),
+    "blendbsdf": (materials.Blend, _blend),
+}

@@ -1,0 +1,242 @@
+"""Sensors, films, filters, samplers and integrators of a Mitsuba scene."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from clpt.errors import UnknownKindError
+from clpt.formats.mitsuba.values import Context, Properties, placed
+from clpt.formats.mitsuba.xml import Element
+from clpt.scene import cameras, integrators
+from clpt.scene.integrators import Film, Filter, Integrator, Sampler
+
+FULL_FRAME = math.hypot(36.0, 24.0)  # diagonal of 35 mm film [mm], which focal_length refers to
+SAMPLERS = ("independent", "stratified", "multijitter", "orthogonal", "ldsampler")
+CHANNELS = {
+    "depth": "depth",
+    "position": "position",
+    "uv": "uv",
+    "geo_normal": "geometric_normal",
+    "sh_normal": "shading_normal",
+    "albedo": "albedo",
+    "shape_index": "shape_id",
+    "prim_index": "primitive_id",
+}
+
+
+@dataclass
+class Sensor:
+    """What a <sensor> and its children say."""
+
+    camera: cameras.Camera
+    film: Film
+    sampler: Sampler
+    spp: int
+    seed: int
+
+
+def sensor(element: Element, context: Context) -> Sensor:
+    """Make the camera, film and sampler that a <sensor> describes."""
+    if element.type not in CAMERAS:
+        raise UnknownKindError("sensor", element.type, CAMERAS, **element.place())
+    props = Properties(element, context)
+    film = default_film() if (child := props.object("film")) is None else _film(child, context)
+    sampler, spp, seed = _sampler(props.object("sampler"), context)
+    props.ignore("shutter_open", "shutter_close")
+    with placed(element):
+        camera = CAMERAS[element.type](props, film)
+    props.finish()
+    return Sensor(camera, film, sampler, spp, seed)
+
+
+def default_film() -> Film:
+    """Mitsuba's film: 768 x 576 with a Gaussian filter."""
+    return Film(filter=integrators.Gaussian())
+
+
+def _perspective(props: Properties, film: Film) -> cameras.Camera:
+    return cameras.Perspective(**_pinhole(props, film))
+
+
+def _thin_lens(props: Properties, film: Film) -> cameras.Camera:
+    if "aperture_radius" not in props.named:
+        raise props.element.error("needs the parameter 'aperture_radius'")
+    pinhole = _pinhole(props, film)
+    return cameras.ThinLens(
+        aperture_radius=props.number("aperture_radius", 0.0),
+        focus_distance=props.number("focus_distance", pinhole["far"]),
+        **pinhole,
+    )
+
+
+def _orthographic(props: Properties, _: Film) -> cameras.Camera:
+    near, far = _clip(props)
+    return cameras.Orthographic(to_world=props.placement(), near=near, far=far)
+
+
+CAMERAS: dict[str, Callable[[Properties, Film], cameras.Camera]] = {
+    "perspective": _perspective,
+    "thinlens": _thin_lens,
+    "orthographic": _orthographic,
+}
+
+
+def _pinhole(props: Properties, film: Film) -> dict[str, Any]:
+    to_world = props.placement()
+    if not np.allclose(np.linalg.norm(to_world[:3, :3], axis=0), 1.0, atol=1e-3):
+        raise props.element.error("to_world must not scale")
+    fov, axis = _field_of_view(props, film)
+    near, far = _clip(props)
+    return {
+        "to_world": to_world,
+        "fov": fov,
+        "fov_axis": axis,
+        "near": near,
+        "far": far,
+        "offset_x": props.number("principal_point_offset_x", 0.0),
+        "offset_y": props.number("principal_point_offset_y", 0.0),
+    }
+
+
+def _clip(props: Properties) -> tuple[float, float]:
+    near, far = props.number("near_clip", 1e-2), props.number("far_clip", 1e4)
+    if not 0.0 <= near < far:
+        raise props.element.error("near_clip must be below far_clip, and neither negative")
+    return near, far
+
+
+def _field_of_view(props: Properties, film: Film) -> tuple[float, str]:
+    """Return the angle [degrees] and its axis; a diagonal one is turned into that along x."""
+    axes = ("x", "y", "diagonal", "smaller", "larger")
+    axis = props.text("fov_axis", "x", axes)
+    if "fov" in props.named:
+        props.ignore("focal_length")
+        fov = props.number("fov", 0.0)
+    else:
+        fov, axis = _from_focal_length(props), "diagonal"
+    if not 0.0 < fov < 180.0:
+        raise props.element.error(f"the field of view must lie between 0 and 180, not {fov:g}")
+    if axis == "diagonal":
+        share = film.width / math.hypot(film.width, film.height)
+        fov, axis = math.degrees(2.0 * math.atan(math.tan(math.radians(fov) / 2.0) * share)), "x"
+    return fov, axis
+
+
+def _from_focal_length(props: Properties) -> float:
+    text = props.text("focal_length", "50mm")
+    try:
+        length = float(text.removesuffix("mm"))
+    except ValueError:
+        length = 0.0
+    if not 0.0 < length < math.inf:
+        raise props.element.error(f"focal_length looks like 50mm, not {text[:20]!r}")
+    return math.degrees(2.0 * math.atan(FULL_FRAME / (2.0 * length)))
+
+
+def _film(element: Element, context: Context) -> Film:
+    if element.type != "hdrfilm":
+        raise UnknownKindError("film", element.type, ["hdrfilm"], **element.place())
+    props = Properties(element, context)
+    # How a file is stored is decided when it is written.
+    props.ignore("file_format", "pixel_format", "component_format", "sample_border", "compensate")
+    child = props.object("rfilter")
+    with placed(element):
+        film = Film(
+            width=props.integer("width", 768, 1),
+            height=props.integer("height", 576, 1),
+            filter=integrators.Gaussian() if child is None else _filter(child, context),
+        )
+    props.finish()
+    return film
+
+
+def _filter(element: Element, context: Context) -> Filter:
+    props = Properties(element, context)
+    makers: dict[str, Callable[[], Filter]] = {
+        "box": lambda: integrators.Box(),
+        "tent": lambda: integrators.Tent(radius=props.number("radius", 1.0)),
+        "gaussian": lambda: integrators.Gaussian(stddev=props.number("stddev", 0.5)),
+        "mitchell": lambda: integrators.Mitchell(
+            b=props.number("b", 1 / 3), c=props.number("c", 1 / 3)
+        ),
+        "catmullrom": lambda: integrators.Mitchell(b=0.0, c=0.5),
+    }
+    if element.type not in makers:
+        raise UnknownKindError("rfilter", element.type, makers, **element.place())
+    with placed(element):
+        made = makers[element.type]()
+    props.finish()
+    return made
+
+
+def _sampler(element: Element | None, context: Context) -> tuple[Sampler, int, int]:
+    """Return the sampler, the samples of a pixel and the seed."""
+    if element is None:
+        return integrators.Independent(), 4, 0
+    if element.type not in SAMPLERS:
+        raise UnknownKindError("sampler", element.type, SAMPLERS, **element.place())
+    props = Properties(element, context)
+    spp, seed = props.integer("sample_count", 4, 1), props.integer("seed", 0)
+    props.ignore("jitter")
+    props.finish()
+    independent = element.type == "independent"
+    return integrators.Independent() if independent else integrators.Sobol(), spp, seed
+
+
+def integrator(element: Element, context: Context) -> Integrator:
+    """Make the integrator that an <integrator> describes."""
+    if element.type not in INTEGRATORS:
+        raise UnknownKindError("integrator", element.type, INTEGRATORS, **element.place())
+    props = Properties(element, context)
+    with placed(element):
+        made = INTEGRATORS[element.type](props)
+    props.finish()
+    return made
+
+
+def _path(props: Properties) -> Integrator:
+    return integrators.Path(
+        max_depth=props.integer("max_depth", -1, -1),
+        rr_depth=props.integer("rr_depth", 5, 1),
+        hide_lights=props.flag("hide_emitters", False),
+    )
+
+
+def _direct(props: Properties) -> Integrator:
+    # How many samples each strategy gets changes the noise, not the picture.
+    props.ignore("shading_samples", "emitter_samples", "bsdf_samples")
+    return integrators.Direct(hide_lights=props.flag("hide_emitters", False))
+
+
+def _aov(props: Properties) -> Integrator:
+    for nested in props.objects("integrator"):
+        integrator(nested, props.context)
+        props.context.warn(nested, "only the values around it are rendered")
+    channels = []
+    for entry in props.text("aovs", "").split(","):
+        kind = entry.strip().rpartition(":")[2]
+        if kind not in CHANNELS:
+            raise UnknownKindError("aov", kind, CHANNELS, **props.element.place())
+        channels.append(CHANNELS[kind])
+    return integrators.Aov(channels=tuple(dict.fromkeys(channels)))
+
+
+def _moment(props: Properties) -> Integrator:
+    nested = props.object("integrator")
+    if nested is None:
+        raise props.element.error("needs a nested <integrator>")
+    props.context.warn(props.element, "its second moments are left out")
+    return integrator(nested, props.context)
+
+
+INTEGRATORS: dict[str, Callable[[Properties], Integrator]] = {
+    "path": _path,
+    "direct": _direct,
+    "aov": _aov,
+    "moment": _moment,
+}

@@ -1,0 +1,112 @@
+"""Shapes of a Mitsuba scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from clpt import transforms
+from clpt.errors import SceneError, UnknownKindError
+from clpt.formats import mesh
+from clpt.formats.mitsuba.bsdfs import bsdf
+from clpt.formats.mitsuba.emitters import area
+from clpt.formats.mitsuba.values import Context, Properties, placed
+from clpt.formats.mitsuba.xml import Element
+from clpt.scene import shapes
+from clpt.scene.materials import Diffuse
+from clpt.scene.shapes import Shape
+
+Parameters = dict[str, Any]
+
+
+def shape(element: Element, context: Context) -> Shape:
+    """Make the shape that a <shape> describes."""
+    if element.type not in PLUGINS:
+        raise UnknownKindError("shape", element.type, PLUGINS, **element.place())
+    cls, read = PLUGINS[element.type]
+    props = Properties(element, context)
+    material, emitter = props.object("bsdf"), props.object("emitter")
+    common = {
+        "material": Diffuse() if material is None else bsdf(material, context),
+        "emission": None if emitter is None else area(emitter, context),
+        "flip_normals": props.flag("flip_normals", False),
+        "name": element.attributes.get("id", ""),
+    }
+    with placed(element):
+        made = cls(**common, **read(props))
+    props.finish()
+    return made
+
+
+def _placed_only(props: Properties) -> Parameters:
+    return {"to_world": props.placement()}
+
+
+def _sphere(props: Properties) -> Parameters:
+    return {
+        "center": props.vector("center", (0.0, 0.0, 0.0)),
+        "radius": _radius(props),
+        "to_world": props.placement(),
+    }
+
+
+def _cylinder(props: Properties) -> Parameters:
+    p0, p1 = props.vector("p0", (0.0, 0.0, 0.0)), props.vector("p1", (0.0, 0.0, 1.0))
+    if np.array_equal(p0, p1):
+        raise props.element.error("p0 and p1 are the same point")
+    return {"p0": p0, "p1": p1, "radius": _radius(props), "to_world": props.placement()}
+
+
+def _radius(props: Properties) -> float:
+    radius = props.number("radius", 1.0)
+    if radius <= 0.0:
+        raise props.element.error(f"the radius must be positive, not {radius:g}")
+    return radius
+
+
+def _obj(props: Properties) -> Parameters:
+    return _mesh(props, ".obj", flip_v=props.flag("flip_tex_coords", True))
+
+
+def _ply(props: Properties) -> Parameters:
+    return _mesh(props, ".ply", flip_v=props.flag("flip_tex_coords", False))
+
+
+def _mesh(props: Properties, suffix: str, *, flip_v: bool) -> Parameters:
+    """Read a mesh into world space, where Mitsuba makes the normals that the file lacks."""
+    path = props.file()
+    flat = props.flag("face_normals", False)
+    to_world = props.placement()
+    if path.suffix.lower() != suffix:
+        raise props.element.error(f"{path.name!r} is not a {suffix} file")
+    try:
+        loaded = mesh.read_mesh(path, materials=False)
+    except SceneError as error:
+        raise props.element.error(f"{path.name}: {error.message}") from None
+    for note in loaded.warnings:
+        props.context.warn(props.element, f"{path.name}: {note}")
+    whole = mesh.join(loaded.meshes)
+    vertices = transforms.transform_points(to_world, whole.vertices).astype(np.float32)
+    uvs = whole.uvs
+    if uvs is not None and flip_v:
+        uvs = np.column_stack([uvs[:, 0], 1.0 - uvs[:, 1]]).astype(np.float32)
+    if flat:
+        normals = None
+    elif whole.normals is None:
+        normals = mesh.smooth_normals(vertices, whole.faces)
+    else:
+        normals = transforms.transform_normals(to_world, whole.normals).astype(np.float32)
+    return {"vertices": vertices, "faces": whole.faces, "normals": normals, "uvs": uvs}
+
+
+PLUGINS: dict[str, tuple[type[Shape], Callable[[Properties], Parameters]]] = {
+    "obj": (shapes.Mesh, _obj),
+    "ply": (shapes.Mesh, _ply),
+    "sphere": (shapes.Sphere, _sphere),
+    "rectangle": (shapes.Rectangle, _placed_only),
+    "disk": (shapes.Disk, _placed_only),
+    "cube": (shapes.Cube, _placed_only),
+    "cylinder": (shapes.Cylinder, _cylinder),
+}

@@ -1,0 +1,240 @@
+"""Colours, spectra and textures of a Mitsuba scene.
+
+An <rgb> or a number in an emitter is a multiple of D65; a <spectrum> there is taken as it is. Mitsuba's
+bitmaps have v = 0 in their top row and ours in the bottom row, which `to_uv` makes up for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from clpt import spectra
+from clpt.errors import UnknownKindError
+from clpt.formats.mitsuba.values import Properties, number, numbers, placed
+from clpt.formats.mitsuba.xml import Element
+from clpt.scene.textures import Bitmap, Checkerboard, Texture
+from clpt.spectra import RGB, Blackbody, Constant, RGBIlluminant, RGBUnbounded, Spectrum, Tabulated
+
+COLOURS: dict[str, type[Spectrum]] = {
+    "reflectance": RGB,
+    "index": RGBUnbounded,
+    "emission": RGBIlluminant,
+}
+TOP_DOWN = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
+
+
+def reflectance(props: Properties, name: str, default: float) -> Spectrum | Texture:
+    """Take a reflectance: a number, a colour, a spectrum or a texture."""
+    return _take(props, name, "reflectance", Constant(default))
+
+
+def emission(props: Properties, name: str, *, textured: bool = False) -> Spectrum | Texture:
+    """Take an emitted spectrum, D65 where none is given."""
+    value = _take(props, name, "emission", RGBIlluminant(1.0, 1.0, 1.0))
+    if isinstance(value, Texture) and not textured:
+        raise props.element.error(f"{name!r} cannot be a texture")
+    return value
+
+
+def index(props: Properties, name: str, default: float) -> Spectrum:
+    """Take an optical constant of a conductor: a number, a colour or a spectrum."""
+    value = _take(props, name, "index", Constant(default))
+    if isinstance(value, Texture):
+        raise props.element.error(f"{name!r} cannot be a texture")
+    return value
+
+
+def ior(props: Properties, name: str, default: str) -> Spectrum:
+    """Take a refractive index: a number or a name, without dispersion as Mitsuba has it."""
+    child = props.take(name)
+    if child is None:
+        return spectra.glass(default, dispersion=False)
+    if child.tag == "string":
+        with placed(child):
+            return spectra.glass(child.attribute("value"), dispersion=False)
+    value = number(child)
+    if value < 0.0:
+        raise child.error("an index of refraction cannot be negative")
+    return Constant(value)
+
+
+def real(props: Properties, name: str, default: float) -> float | Texture:
+    """Take a number or a texture of numbers."""
+    child = props.take(name)
+    if child is None:
+        return default
+    target = props.context.resolve(child)
+    return texture(target, props) if target.tag == "texture" else number(target)
+
+
+def _take(props: Properties, name: str, role: str, default: Spectrum) -> Spectrum | Texture:
+    child = props.take(name)
+    if child is None:
+        return default
+    target = props.context.resolve(child)
+    if target.tag == "texture":
+        return texture(target, props)
+    with placed(target):
+        return _spectrum(target, role, props)
+
+
+def _spectrum(child: Element, role: str, props: Properties) -> Spectrum:
+    if child.tag in ("float", "integer"):
+        value = number(child)
+        return RGBIlluminant(value, value, value) if role == "emission" else Constant(value)
+    if child.tag in ("rgb", "srgb"):
+        return COLOURS[role](*_colour(child))
+    if child.tag != "spectrum":
+        raise child.error("must be a number, a colour, a spectrum or a texture")
+    if child.type:
+        return _plugin(child, props)
+    outside = "hold" if role == "index" else "zero"
+    if "filename" in child.attributes:
+        path = props.context.document.find_file(child, child.attributes["filename"])
+        return spectra.read_table(path, outside)
+    text = child.attribute("value")
+    if ":" not in text:
+        return Constant(numbers(child, "value", 1)[0])
+    points = numbers(_with_value(child, text.replace(":", " ")), "value")
+    if len(points) % 2:
+        raise child.error("value must be pairs like 400:0.1, 700:0.5")
+    return Tabulated(points[0::2], points[1::2], outside)
+
+
+def _with_value(child: Element, value: str) -> Element:
+    return Element(child.tag, {**child.attributes, "value": value}, child.file, child.line)
+
+
+def _colour(child: Element) -> list[float]:
+    """Return linear r, g and b of <rgb value="r, g, b"> or <srgb value="#rrggbb">."""
+    text = child.attribute("value").strip()
+    if child.tag == "srgb" and text.startswith("#"):
+        try:
+            encoded = np.frombuffer(bytes.fromhex(text[1:]), np.uint8) / 255.0
+        except ValueError:
+            encoded = np.empty(0)
+        if encoded.size != 3:
+            raise child.error(f"a colour looks like #rrggbb, not {text[:20]!r}")
+    else:
+        encoded = np.array(numbers(child, "value"))
+        if encoded.size == 1:
+            encoded = np.repeat(encoded, 3)
+        if encoded.size != 3:
+            raise child.error(f"a colour has 1 or 3 numbers, not {encoded.size}")
+    if child.tag == "srgb":
+        curve = ((np.maximum(encoded, 0.0) + 0.055) / 1.055) ** 2.4
+        encoded = np.where(encoded <= 0.04045, encoded / 12.92, curve)
+    return encoded.tolist()
+
+
+def _uniform(props: Properties) -> Spectrum:
+    return Constant(props.number("value", 1.0))
+
+
+def _blackbody(props: Properties) -> Spectrum:
+    return Blackbody(props.number("temperature", 5000.0), props.number("scale", 1.0))
+
+
+def _d65(props: Properties) -> Spectrum:
+    colour = props.take("color")
+    rgb = _colour(colour) if colour is not None else [1.0, 1.0, 1.0]
+    scale = props.number("scale", 1.0)
+    return RGBIlluminant(*(scale * value for value in rgb))
+
+
+def _srgb(props: Properties) -> Spectrum:
+    colour = props.take("color")
+    if colour is None:
+        raise props.element.error("needs the parameter 'color'")
+    return RGBUnbounded(*_colour(colour))
+
+
+def _irregular(props: Properties) -> Spectrum:
+    return Tabulated(_list(props, "wavelengths"), _list(props, "values"))
+
+
+def _regular(props: Properties) -> Spectrum:
+    values = _list(props, "values")
+    low, high = props.number("wavelength_min", 360.0), props.number("wavelength_max", 830.0)
+    return Tabulated(np.linspace(low, high, len(values)), values)
+
+
+def _list(props: Properties, name: str) -> list[float]:
+    child = props.take(name)
+    if child is None:
+        raise props.element.error(f"needs the parameter {name!r}")
+    return numbers(child, "value")
+
+
+PLUGINS: dict[str, Callable[[Properties], Spectrum]] = {
+    "uniform": _uniform,
+    "blackbody": _blackbody,
+    "d65": _d65,
+    "srgb": _srgb,
+    "irregular": _irregular,
+    "regular": _regular,
+}
+
+
+def _plugin(child: Element, outer: Properties) -> Spectrum:
+    if child.type not in PLUGINS:
+        raise UnknownKindError("spectrum", child.type, PLUGINS, **child.place())
+    props = Properties(child, outer.context)
+    made = PLUGINS[child.type](props)
+    props.finish()
+    return made
+
+
+def texture(element: Element, outer: Properties) -> Texture:
+    """Make the texture that an element describes, once for all references."""
+    return outer.context.once(element, lambda _: _texture(element, outer))
+
+
+def _texture(element: Element, outer: Properties) -> Texture:
+    props = Properties(element, outer.context)
+    makers: dict[str, Callable[[Properties], Any]] = {
+        "bitmap": _bitmap,
+        "checkerboard": _checkerboard,
+    }
+    if element.type not in makers:
+        raise UnknownKindError("texture", element.type, makers, **element.place())
+    with placed(element):
+        made = makers[element.type](props)
+    props.finish()
+    return made
+
+
+def _bitmap(props: Properties) -> Bitmap:
+    wraps = {"repeat": "repeat", "clamp": "clamp", "mirror": "mirror"}
+    props.ignore("format", "accel")
+    return Bitmap(
+        image=props.file(),
+        raw=props.flag("raw", False),
+        filter=props.text("filter_type", "bilinear", ("bilinear", "nearest")),
+        wrap=wraps[props.text("wrap_mode", "repeat", tuple(wraps))],
+        to_uv=TOP_DOWN @ _to_uv(props),
+    )
+
+
+def _checkerboard(props: Properties) -> Checkerboard:
+    return Checkerboard(
+        color0=_plain(props, "color0", 0.4),
+        color1=_plain(props, "color1", 0.2),
+        to_uv=_to_uv(props),
+    )
+
+
+def _plain(props: Properties, name: str, default: float) -> Spectrum:
+    value = reflectance(props, name, default)
+    if isinstance(value, Texture):
+        raise props.element.error(f"{name!r} cannot be a texture")
+    return value
+
+
+def _to_uv(props: Properties) -> np.ndarray:
+    """Take a uv transform, (3, 3): what the 4x4 matrix does to (u, v, 0, 1)."""
+    matrix = props.matrix("to_uv")
+    return matrix[np.ix_([0, 1, 3], [0, 1, 3])]

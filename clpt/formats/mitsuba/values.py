@@ -1,0 +1,278 @@
+"""The parameters of one object of a Mitsuba scene: typed, with defaults, each taken exactly once."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from clpt import transforms
+from clpt.errors import SceneError, UnusedParameterError
+from clpt.formats.mitsuba.xml import Document, Element
+
+VALUES = {
+    "integer", "float", "string", "boolean", "vector", "point", "rgb", "srgb", "spectrum", "transform",
+}  # fmt: skip
+OBJECTS = {
+    "integrator", "sensor", "sampler", "film", "rfilter", "bsdf", "texture", "emitter", "shape", "ref",
+}  # fmt: skip
+SEPARATOR = re.compile(r"[\s,]+")
+LARGEST_INTEGER = 2**31 - 1
+
+
+@contextmanager
+def placed(element: Element) -> Iterator[None]:
+    """Give errors that know no file the place of `element`."""
+    try:
+        yield
+    except SceneError as error:
+        if error.file is not None:
+            raise
+        where = f"{error.where}: " if error.where else ""
+        raise element.error(where + error.message) from None
+
+
+class Context:
+    """What all parts of the loader share: the document, its ids, objects already made, warnings."""
+
+    def __init__(self, document: Document):
+        self.document = document
+        self.warnings: list[str] = []
+        self.ids: dict[str, Element] = {}
+        self._made: dict[int, Any] = {}
+        for element in document.root.walk():
+            name = element.attributes.get("id")
+            if name is not None and element.tag != "ref":
+                if name in self.ids:
+                    raise element.error(f"the id {name!r} is already used in this scene")
+                self.ids[name] = element
+
+    def resolve(self, element: Element) -> Element:
+        """Follow a <ref> to the object that it names; anything else is returned as it is."""
+        if element.tag != "ref":
+            return element
+        name = element.attribute("id")
+        if name not in self.ids:
+            raise element.error(f"there is no object with the id {name!r}")
+        return self.ids[name]
+
+    def once(self, element: Element, make: Any) -> Any:
+        """Return make(element), the same object for every reference to the element."""
+        key = id(element)
+        if key not in self._made:
+            self._made[key] = None
+            self._made[key] = make(element)
+        if self._made[key] is None:
+            raise element.error("refers to itself")
+        return self._made[key]
+
+    def warn(self, element: Element, message: str) -> None:
+        """Remember what the picture will lack."""
+        self.warnings.append(f"{element.file.name}:{element.line}: {element.label()}: {message}")
+
+
+class Properties:
+    """The children of an object element; `finish` refuses those that nothing asked for."""
+
+    def __init__(self, element: Element, context: Context):
+        self.element, self.context = element, context
+        self.named: dict[str, Element] = {}
+        self.nested: list[Element] = []
+        self.asked: list[str] = []
+        for child in element.children:
+            if child.tag not in VALUES and child.tag not in OBJECTS:
+                raise child.error("is not supported")
+            if not child.name and child.tag in VALUES:
+                raise child.error("needs the attribute 'name'")
+            if child.name in self.named:
+                raise child.error(f"{child.name!r} is given twice")
+            if child.name and (child.tag in VALUES or child.tag in ("texture", "ref")):
+                self.named[child.name] = child
+            else:
+                self.nested.append(child)
+
+    def take(self, name: str) -> Element | None:
+        """Take a parameter's element, or None where it is not given."""
+        self.asked.append(name)
+        return self.named.pop(name, None)
+
+    def objects(self, tag: str) -> list[Element]:
+        """Take the nested objects of a tag, references to such included."""
+        for name, child in list(self.named.items()):
+            if child.tag == "ref" and self.context.resolve(child).tag == tag:
+                self.nested.append(self.named.pop(name))
+        found = [child for child in self.nested if self.context.resolve(child).tag == tag]
+        self.nested = [child for child in self.nested if child not in found]
+        return [self.context.resolve(child) for child in found]
+
+    def object(self, tag: str) -> Element | None:
+        """Take the one nested object of a tag, or None."""
+        found = self.objects(tag)
+        if len(found) > 1:
+            raise self.element.error(f"holds more than one <{tag}>")
+        return found[0] if found else None
+
+    def number(self, name: str, default: float) -> float:
+        """Take a finite number."""
+        child = self.take(name)
+        return default if child is None else number(child)
+
+    def integer(self, name: str, default: int, low: int = 0) -> int:
+        """Take a whole number of at least `low`."""
+        child = self.take(name)
+        if child is None:
+            return default
+        self._expect(child, "integer")
+        try:
+            value = int(child.attribute("value"))
+        except ValueError:
+            shown = child.attribute("value")[:40]
+            raise child.error(f"must be a whole number, not {shown!r}") from None
+        if not low <= value <= LARGEST_INTEGER:
+            raise child.error(f"must be at least {low} and below 2^31")
+        return value
+
+    def flag(self, name: str, default: bool) -> bool:
+        """Take true or false."""
+        child = self.take(name)
+        if child is None:
+            return default
+        self._expect(child, "boolean")
+        text = child.attribute("value").strip().lower()
+        if text not in ("true", "false"):
+            raise child.error(f"must be true or false, not {text[:40]!r}")
+        return text == "true"
+
+    def text(self, name: str, default: str, choices: Sequence[str] = ()) -> str:
+        """Take a string, one of `choices` if there are any."""
+        child = self.take(name)
+        if child is None:
+            return default
+        self._expect(child, "string")
+        value = child.attribute("value")
+        if choices and value not in choices:
+            raise child.error(f"{value[:40]!r} is none of {', '.join(choices)}")
+        return value
+
+    def ignore(self, *names: str) -> None:
+        """Take parameters that change no picture."""
+        for name in names:
+            self.take(name)
+
+    def file(self, name: str = "filename") -> Path:
+        """Take a file name that must be given, and must exist."""
+        child = self.take(name)
+        if child is None:
+            raise self.element.error(f"needs the parameter {name!r}")
+        self._expect(child, "string")
+        return self.context.document.find_file(child, child.attribute("value"))
+
+    def vector(self, name: str, default: Sequence[float] | None) -> Any:
+        """Take a point or a vector, (3,) float64."""
+        child = self.take(name)
+        if child is None:
+            return default
+        if child.tag not in ("point", "vector"):
+            raise child.error("must be a <point> or a <vector>")
+        return triple(child, "value", 0.0)
+
+    def matrix(self, name: str) -> transforms.Matrix:
+        """Take a transform, (4, 4) float64; the identity where it is not given."""
+        child = self.take(name)
+        if child is None:
+            return np.eye(4)
+        self._expect(child, "transform")
+        return transform(child)
+
+    def placement(self, name: str = "to_world") -> transforms.Matrix:
+        """Take a transform that can be inverted."""
+        child = self.named.get(name)
+        matrix = self.matrix(name)
+        if child is not None and transforms.is_singular(matrix):
+            raise child.error("the transform cannot be inverted: it flattens space")
+        return matrix
+
+    def finish(self) -> None:
+        """Raise UnusedParameterError or SceneError for what nothing asked for."""
+        label = f"{self.element.tag} {self.element.type!r}"
+        for name, child in self.named.items():
+            raise UnusedParameterError(label, name, set(self.asked), **child.place())
+        for child in self.nested:
+            self.context.resolve(child)
+            raise child.error(f"cannot stand in {label}")
+
+    def _expect(self, child: Element, tag: str) -> None:
+        if child.tag != tag:
+            raise child.error(f"must be a <{tag}>")
+
+
+def number(child: Element) -> float:
+    """Return the finite number that <float> or <integer> holds."""
+    if child.tag not in ("float", "integer"):
+        raise child.error("must be a <float>")
+    return numbers(child, "value", 1)[0]
+
+
+def numbers(child: Element, attribute: str, count: int = 0) -> list[float]:
+    """Return the finite numbers in an attribute, `count` of them unless that is 0."""
+    text = child.attribute(attribute)
+    try:
+        values = [float(part) for part in SEPARATOR.split(text.strip())]
+    except ValueError:
+        raise child.error(f"{attribute} must be numbers, not {text[:40]!r}") from None
+    if not all(math.isfinite(value) for value in values):
+        raise child.error(f"{attribute} must be finite, not {text[:40]!r}")
+    if count and len(values) != count:
+        raise child.error(f"{attribute} must be {count} numbers, not {len(values)}")
+    return values
+
+
+def triple(child: Element, attribute: str, default: float) -> np.ndarray:
+    """Return (3,) from one attribute, or from x, y and z that fall back on `default`."""
+    if attribute in child.attributes:
+        values = numbers(child, attribute)
+        if len(values) == 1:
+            values *= 3
+        if len(values) != 3:
+            raise child.error(f"{attribute} must be 3 numbers, not {len(values)}")
+        return np.array(values)
+    return np.array([
+        numbers(child, axis, 1)[0] if axis in child.attributes else default for axis in "xyz"
+    ])
+
+
+def transform(element: Element) -> transforms.Matrix:
+    """Return the product of a <transform>'s steps, (4, 4); the first is applied first."""
+    matrix = np.eye(4)
+    for step in element.children:
+        with placed(step):
+            matrix = _step(step) @ matrix
+    if not np.isfinite(matrix).all():
+        raise element.error("the transform is not finite")
+    return matrix
+
+
+def _step(step: Element) -> transforms.Matrix:
+    if step.tag == "translate":
+        return transforms.translate(triple(step, "value", 0.0))
+    if step.tag == "scale":
+        return transforms.scale(triple(step, "value", 1.0))
+    if step.tag == "rotate":
+        return transforms.rotate(triple(step, "value", 0.0), numbers(step, "angle", 1)[0])
+    if step.tag == "lookat":
+        return transforms.look_at(*(numbers(step, name, 3) for name in ("origin", "target", "up")))
+    if step.tag == "matrix":
+        values = np.array(numbers(step, "value"))
+        if values.size == 9:
+            matrix = np.eye(4)
+            matrix[:3, :3] = values.reshape(3, 3)
+            return matrix
+        if values.size != 16:
+            raise step.error(f"a matrix has 16 or 9 numbers, not {values.size}")
+        return values.reshape(4, 4)
+    raise step.error("is no transform; known: translate, scale, rotate, lookat, matrix")

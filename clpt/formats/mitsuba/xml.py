@@ -1,0 +1,209 @@
+"""Mitsuba's XML as a tree of elements that know their file and line.
+
+`default`, `$name`, `include` and `path` are resolved here, in document order, so that the rest of the
+loader sees objects and values only. Document types are refused, and with them every entity bomb.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from xml.parsers import expat
+
+from clpt.errors import SceneError
+
+MAX_NESTING = 64
+MAX_INCLUDES = 16
+VARIABLE = re.compile(r"\$(?:\{(\w+)\}|(\w+))")
+# Before Mitsuba 2, names were written in camel case.
+HUMP = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
+RENAMED = {"lookAt": "lookat"}
+
+
+@dataclass
+class Element:
+    """One XML element: tag, attributes, children, and where it stands."""
+
+    tag: str
+    attributes: dict[str, str]
+    file: Path
+    line: int
+    children: list[Element] = field(default_factory=list)
+
+    @property
+    def type(self) -> str:
+        """The plugin's name, or ""."""
+        return self.attributes.get("type", "")
+
+    @property
+    def name(self) -> str:
+        """The parameter's name in snake case, or ""."""
+        return HUMP.sub("_", self.attributes.get("name", "")).lower()
+
+    def label(self) -> str:
+        """What messages call it: <bsdf type="diffuse">."""
+        shown = next((k for k in ("type", "name", "id") if k in self.attributes), None)
+        return f'<{self.tag} {shown}="{self.attributes[shown]}">' if shown else f"<{self.tag}>"
+
+    def place(self) -> dict[str, Any]:
+        """Keyword arguments that tell an exception where it happened."""
+        return {"file": self.file, "line": self.line, "where": self.label()}
+
+    def error(self, message: str) -> SceneError:
+        """Return an exception that names this element."""
+        return SceneError(message, **self.place())
+
+    def attribute(self, name: str) -> str:
+        """Return an attribute that must be there."""
+        if name not in self.attributes:
+            raise self.error(f"needs the attribute {name!r}")
+        return self.attributes[name]
+
+    def walk(self) -> Iterator[Element]:
+        """Yield this element and all below it."""
+        yield self
+        for child in self.children:
+            yield from child.walk()
+
+
+@dataclass
+class Document:
+    """An expanded scene file: its root, and the folders in which file names are looked up."""
+
+    root: Element
+    folders: list[Path]
+
+    def find_file(self, element: Element, name: str) -> Path:
+        """Resolve a file name that `element` gives. Raises SceneError where there is no such file."""
+        return _find(element, name, self.folders)
+
+
+def parse(path: Path, variables: Mapping[str, object]) -> Document:
+    """Read a scene file and all that it includes; `variables` stand for its `$names`.
+
+    Raises SceneError for broken XML, undefined or unused variables and missing includes.
+    """
+    expander = _Expander(path, variables)
+    root = _read(path)
+    if root.tag != "scene":
+        raise root.error("the outermost element must be <scene>")
+    expander.expand(root, 0)
+    unused = sorted(set(variables) - expander.used)
+    if unused:
+        known = ", ".join(sorted(expander.values)) or "none"
+        raise SceneError(f"has no variable {unused[0]!r}; variables: {known}", file=path)
+    return Document(root, expander.folders)
+
+
+def _find(element: Element, name: str, folders: list[Path]) -> Path:
+    for folder in [element.file.parent, *folders]:
+        candidate = folder / name
+        try:
+            if candidate.is_file():
+                return candidate
+        except (OSError, ValueError):
+            break
+    raise element.error(f"there is no file {name!r}")
+
+
+def _read(path: Path) -> Element:
+    """Parse one file into raw elements."""
+    top = Element("", {}, path, 0)
+    stack = [top]
+    parser = expat.ParserCreate()
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        element = Element(RENAMED.get(tag, tag), attributes, path, parser.CurrentLineNumber)
+        if len(stack) > MAX_NESTING:
+            raise element.error(f"nested deeper than {MAX_NESTING} elements")
+        stack[-1].children.append(element)
+        stack.append(element)
+
+    def text(data: str) -> None:
+        if data.strip():
+            shown = data.strip()[:20]
+            raise SceneError(f"stray text {shown!r}", file=path, line=parser.CurrentLineNumber)
+
+    def doctype(*_: object) -> None:
+        line = parser.CurrentLineNumber
+        raise SceneError("a document type is not allowed in a scene", file=path, line=line)
+
+    parser.StartElementHandler = start
+    parser.EndElementHandler = lambda tag: stack.pop()
+    parser.CharacterDataHandler = text
+    parser.StartDoctypeDeclHandler = doctype
+    try:
+        parser.Parse(path.read_bytes(), True)
+    except expat.ExpatError as error:
+        reason = expat.errors.messages.get(error.code, "not XML")
+        raise SceneError(f"broken XML: {reason}", file=path, line=error.lineno) from None
+    except (LookupError, ValueError) as error:
+        raise SceneError(f"broken XML: {error}", file=path, line=1) from None
+    except OSError as error:
+        raise SceneError(f"cannot be read: {error.strerror}", file=path) from None
+    return top.children[0]
+
+
+class _Expander:
+    """Walks a document in its order and resolves default, $name, include and path."""
+
+    def __init__(self, path: Path, variables: Mapping[str, object]):
+        self.given = {name: _as_text(value) for name, value in variables.items()}
+        self.values = dict(self.given)
+        self.used: set[str] = set()
+        self.folders = [path.parent]
+
+    def expand(self, element: Element, includes: int) -> None:
+        kept: list[Element] = []
+        for child in element.children:
+            child.attributes = {k: self.substitute(child, v) for k, v in child.attributes.items()}
+            if child.tag == "default":
+                self.define(child)
+            elif child.tag == "path":
+                self.add_folder(child)
+            elif child.tag == "include":
+                kept += self.include(child, includes + 1)
+            else:
+                self.expand(child, includes)
+                kept.append(child)
+        element.children = kept
+
+    def substitute(self, element: Element, text: str) -> str:
+        def value(match: re.Match) -> str:
+            name = match[1] or match[2]
+            if name not in self.values:
+                raise element.error(f"the variable ${name} is not defined")
+            self.used.add(name)
+            return self.values[name]
+
+        return VARIABLE.sub(value, text) if "$" in text else text
+
+    def define(self, element: Element) -> None:
+        name = element.attribute("name")
+        self.values.setdefault(name, element.attribute("value"))
+
+    def add_folder(self, element: Element) -> None:
+        folder = element.file.parent / element.attribute("value")
+        try:
+            found = folder.is_dir()
+        except (OSError, ValueError):
+            found = False
+        if not found:
+            raise element.error(f"there is no folder {element.attribute('value')!r}")
+        self.folders.append(folder)
+
+    def include(self, element: Element, depth: int) -> list[Element]:
+        if depth > MAX_INCLUDES:
+            raise element.error(f"more than {MAX_INCLUDES} files include each other")
+        path = _find(element, element.attribute("filename"), self.folders)
+        root = _read(path)
+        holder = root if root.tag == "scene" else Element("", {}, path, 0, [root])
+        self.expand(holder, depth)
+        return holder.children
+
+
+def _as_text(value: object) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)

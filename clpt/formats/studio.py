@@ -1,0 +1,126 @@
+"""A place to show what comes without one: a camera that frames it, a ground and a soft light.
+
+Up is +z for .stl, where printers and CAD have it, and +y for every other format.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import transforms
+from clpt.errors import SceneError
+from clpt.formats import mesh
+from clpt.scene import Scene, integrators, lights, shapes
+from clpt.scene.cameras import Perspective
+from clpt.scene.materials import Diffuse
+from clpt.spectra import RGBIlluminant
+
+FOV = 35.0
+FROM = (0.4, 0.35, 1.0)  # the camera, seen from the middle of the scene, +y up
+KEY_FROM = (-0.8, 1.3, 0.7)  # the key light, likewise
+Z_UP = transforms.rotate([1.0, 0.0, 0.0], 90.0)
+
+
+def load(path: Path) -> Scene:
+    """Read a bare mesh and put it into the studio, whatever its size and place."""
+    file = mesh.read_mesh(path)
+    up = Z_UP if path.suffix.lower() == ".stl" else np.eye(4)
+    low, high = world_bounds(file.meshes)
+    middle, radius = (low + high) / 2.0, _radius(low, high)
+    if not np.isfinite(radius):
+        raise SceneError("is too large to be framed", file=path)
+    floor, axis = middle.copy(), int(np.argmax(up[:3, 1]))
+    floor[axis] = low[axis]
+    return Scene(
+        camera=framing_camera(file.meshes, up),
+        shapes=[*file.meshes, _ground(floor, radius, up), _key(middle, radius, up)],
+        lights=[lights.Constant(radiance=RGBIlluminant(0.35, 0.35, 0.35))],
+        film=integrators.Film(filter=integrators.Gaussian()),
+        name=path.stem,
+        warnings=file.warnings,
+        extra={"format": path.suffix.lower()[1:]},
+    )
+
+
+def framing_camera(
+    things: Sequence[shapes.Shape], up: transforms.Matrix = transforms.IDENTITY
+) -> Perspective:
+    """Return a camera that sees the bounding sphere of all shapes, from the front and above."""
+    low, high = world_bounds(things) if things else (-np.ones(3), np.ones(3))
+    middle, radius = (low + high) / 2.0, _radius(low, high)
+    distance = 1.05 * radius / np.sin(np.radians(FOV / 2.0))
+    origin = middle + distance * _direction(FROM, up)
+    return Perspective(
+        to_world=transforms.look_at(origin, middle, up[:3, 1]),
+        fov=FOV,
+        fov_axis="smaller",
+        near=1e-3 * distance,
+        far=1e3 * distance,
+    )
+
+
+def world_bounds(
+    things: Sequence[shapes.Shape],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Least and largest corner (3,) of all shapes in world space."""
+    boxes = [shape_bounds(thing) for thing in things]
+    return np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)
+
+
+def shape_bounds(thing: shapes.Shape) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Least and largest corner (3,) of a shape in world space."""
+    matrix = np.asarray(thing.to_world, np.float64)
+    linear = matrix[:3, :3]
+    if isinstance(thing, shapes.Sphere):
+        points = transforms.transform_points(matrix, [thing.center])
+        reach = thing.radius * np.linalg.norm(linear, axis=1)
+    elif isinstance(thing, shapes.Disk):
+        points, reach = matrix[None, :3, 3], np.linalg.norm(linear[:, :2], axis=1)
+    elif isinstance(thing, shapes.Cylinder):
+        points = transforms.transform_points(matrix, [thing.p0, thing.p1])
+        axis = np.subtract(thing.p1, thing.p0) / np.linalg.norm(np.subtract(thing.p1, thing.p0))
+        # A circle about the axis reaches r |row x axis| along each row of the matrix.
+        reach = thing.radius * np.linalg.norm(np.cross(linear, axis), axis=1)
+    else:
+        points, reach = transforms.transform_points(matrix, _corners(thing)), np.zeros(3)
+    return points.min(axis=0) - reach, points.max(axis=0) + reach
+
+
+def _corners(thing: shapes.Shape) -> NDArray[np.float64]:
+    if isinstance(thing, shapes.Mesh):
+        return np.asarray(thing.vertices, np.float64)
+    depth = (-1.0, 1.0) if isinstance(thing, shapes.Cube) else (0.0,)
+    return np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in depth])
+
+
+def _radius(low: NDArray[np.float64], high: NDArray[np.float64]) -> float:
+    """Radius of the sphere around a box; one that is not zero, even around a point."""
+    radius = float(np.linalg.norm(high - low)) / 2.0
+    return radius if radius > 0.0 else max(1.0, float(np.abs(low).max()))
+
+
+def _direction(from_: Sequence[float], up: transforms.Matrix) -> NDArray[np.float64]:
+    turned = transforms.transform_vectors(up, from_)
+    return turned / np.linalg.norm(turned)
+
+
+def _ground(floor: NDArray[np.float64], radius: float, up: transforms.Matrix) -> shapes.Shape:
+    flat = up @ transforms.rotate([1.0, 0.0, 0.0], -90.0)
+    to_world = transforms.translate(floor) @ flat @ transforms.scale(40.0 * radius)
+    return shapes.Disk(to_world=to_world, material=Diffuse(reflectance=0.5), name="ground")
+
+
+def _key(middle: NDArray[np.float64], radius: float, up: transforms.Matrix) -> shapes.Shape:
+    """A square light of 3 radii, 4 radii away, that shines on the middle."""
+    origin = middle + 4.0 * radius * _direction(KEY_FROM, up)
+    to_world = transforms.look_at(origin, middle, up[:3, 1]) @ transforms.scale(1.5 * radius)
+    return shapes.Rectangle(
+        to_world=to_world,
+        material=Diffuse(reflectance=0.0),
+        emission=lights.Area(radiance=RGBIlluminant(4.5, 4.5, 4.5)),
+        name="key light",
+    )
