@@ -1,0 +1,354 @@
+"""Shapes on their way to the device: triangles, or a row of parameters for shapes met as they are.
+
+A rectangle is both: rays meet its two triangles, light is sampled on it as a whole.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from clpt import transforms
+from clpt.errors import SceneError
+from clpt.layout import Record
+from clpt.scene import shapes
+from clpt.scene.shapes import Shape
+
+Points = NDArray[np.float32]
+Faces = NDArray[np.uint32]
+Words = NDArray[np.uint32]
+
+ANALYTIC = ("sphere", "disk", "cylinder")  # rays meet these as they are
+UNEVEN = 1e-5  # relative difference of lengths or cosine of axes from which a sphere is none
+PADDING = 1e-6  # of the size of an analytic shape, for what float32 rounds in its kernel
+
+_FLAT = {
+    "center": ("vec3", "[m]"),
+    "s": ("vec3", "from the centre to where local x is 1 [m]"),
+    "t": ("vec3", "the same for local y"),
+    "n": ("vec3", "unit normal, toward the front"),
+}
+RECORDS: dict[str, Record] = {
+    "triangle": Record(
+        "Triangle",
+        "One triangle as a light.",
+        v0=("vec3", "first vertex [m]"),
+        e1=("vec3", "from it to the second"),
+        e2=("vec3", "from it to the third"),
+        side=("real", "1: counter-clockwise seen from the front; -1: clockwise"),
+    ),
+    "rectangle": Record("Rectangle", "A parallelogram, local x and y in [-1, 1].", **_FLAT),
+    "disk": Record("Disk", "A disk or ellipse, x^2 + y^2 <= 1 in local x and y.", **_FLAT),
+    "sphere": Record(
+        "Sphere",
+        "A sphere.",
+        center=("vec3", "[m]"),
+        radius=("real", "[m]"),
+        side=("real", "1: the front is outside; -1: inside"),
+        x=("vec3", "unit axis where the azimuth is 0"),
+        y=("vec3", "unit axis where it is 90 degrees"),
+        z=("vec3", "unit axis to the pole"),
+    ),
+    "cylinder": Record(
+        "Cylinder",
+        "An open tube.",
+        p0=("vec3", "start of the axis [m]"),
+        axis=("vec3", "from there to its end"),
+        radius=("real", "[m]"),
+        side=("real", "1: the front is outside; -1: inside"),
+        x=("vec3", "unit axis where the azimuth is 0, across the line"),
+        y=("vec3", "unit axis where it is 90 degrees"),
+    ),
+}
+
+# Corners of the cube's sides in the order of _CORNER_UVS, as Mitsuba has them.
+_CUBE = (
+    "+-- +-+ --+ ---",
+    "++- -+- -++ +++",
+    "+-- ++- +++ +-+",
+    "+-+ +++ -++ --+",
+    "--+ -++ -+- ---",
+    "++- +-- --- -+-",
+)
+_CORNER_UVS = ((0, 1), (1, 1), (1, 0), (0, 0))
+_CORNER_FACES = ((0, 1, 2), (3, 0, 2))
+
+
+def virtual_files() -> dict[str, str]:
+    """Return generated/shape/<kind>.cl per kind: its struct, its loader and its functions."""
+    return {
+        f"generated/shape/{kind}.cl": f'{record.row_text()}#include "shape/{kind}.cl"\n'
+        for kind, record in RECORDS.items()
+    }
+
+
+def where(shape: Shape) -> str:
+    """Return how a message names the shape."""
+    return f"{shape.kind} {shape.name!r}" if shape.name else shape.kind
+
+
+def triangles(
+    shape: Shape, warnings: list[str] | None = None
+) -> tuple[Points, Faces, Points | None, Points | None]:
+    """Return a rectangle, cube or mesh in world space: vertices, faces, normals and uvs.
+
+    vertices (n, 3) float32 [m], faces (m, 3) uint32 counter-clockwise seen from the front, normals
+    (n, 3) float32 or None, uvs (n, 2) float32 or None. Triangles without an area are left out; a
+    line about them is appended to `warnings`.
+
+    Raises SceneError for a mesh that is empty, not finite or inconsistent, or a singular transform.
+    """
+    matrix = _matrix(shape)
+    vertices, faces, normals, uvs = _local(shape)
+    if not np.array_equal(matrix, transforms.IDENTITY):
+        vertices = transforms.transform_points(matrix, vertices).astype(np.float32)
+        if not np.isfinite(vertices).all():
+            raise SceneError("its transform moves vertices out of float32", where=where(shape))
+        if normals is not None:
+            normals = transforms.transform_normals(matrix, normals).astype(np.float32)
+    if normals is not None and shape.flip_normals:
+        normals = -normals
+    if transforms.flips_handedness(matrix) != shape.flip_normals:
+        faces = faces[:, ::-1]
+    faces = _without_slivers(shape, vertices, faces, warnings)
+    return vertices, np.ascontiguousarray(faces), normals, uvs
+
+
+def _without_slivers(
+    shape: Shape, vertices: Points, faces: Faces, warnings: list[str] | None
+) -> Faces:
+    """The faces whose cross product is not zero in float32."""
+    twice = np.linalg.norm(_crosses(vertices, faces), axis=1)
+    good = twice > 0.0
+    if good.all():
+        return faces
+    if not good.any():
+        raise SceneError("none of its triangles has an area", where=where(shape))
+    if warnings is not None:
+        count = int(len(good) - good.sum())
+        warnings.append(f"{where(shape)}: {count} of {len(good)} triangles have no area, left out")
+    return faces[good]
+
+
+def _crosses(vertices: Points, faces: Faces) -> Points:
+    """Cross products of the edges at each triangle's first vertex, (m, 3) float32."""
+    v0, v1, v2 = (vertices[faces[:, i]] for i in range(3))
+    return np.cross(v1 - v0, v2 - v0)
+
+
+def triangle_areas(vertices: Points, faces: Faces) -> NDArray[np.float64]:
+    """Return the area of every triangle [m^2], (m,) float64."""
+    return 0.5 * np.linalg.norm(_crosses(vertices, faces).astype(np.float64), axis=1)
+
+
+def triangle_rows(vertices: Points, faces: Faces) -> Words:
+    """Return a row of `Triangle` per face, (m, 10) uint32; the front is on the winding's side."""
+    v0, v1, v2 = (vertices[faces[:, i]] for i in range(3))
+    side = np.ones((len(faces), 1), np.float32)
+    return np.ascontiguousarray(np.hstack([v0, v1 - v0, v2 - v0, side])).view(np.uint32)
+
+
+def row(shape: Shape) -> Words:
+    """Return the words of a rectangle, sphere, disk or cylinder in `geometry`, placed.
+
+    Raises SceneError for a singular transform, or one after which it is no such shape any more.
+    """
+    matrix = _matrix(shape)
+    record = RECORDS[shape.kind]
+    if shape.kind in ("rectangle", "disk"):
+        s, t, center = matrix[:3, 0], matrix[:3, 1], matrix[:3, 3]
+        values = {"center": center, "s": s, "t": t, "n": _side(shape) * _facing(matrix)}
+    else:
+        values = {"sphere": _sphere, "cylinder": _cylinder}[shape.kind](shape, matrix)
+    flat = np.concatenate([np.ravel(values[m.name]) for m in record.members])
+    return flat.astype(np.float32).view(np.uint32)
+
+
+def _side(shape: Shape) -> float:
+    return -1.0 if shape.flip_normals else 1.0
+
+
+def _facing(matrix: ArrayLike) -> NDArray[np.float64]:
+    """Where local +z faces in the world, unit length."""
+    return transforms.transform_normals(matrix, [0.0, 0.0, 1.0])
+
+
+def _sphere(shape: shapes.Sphere, matrix: NDArray[np.float64]) -> dict[str, ArrayLike]:
+    radius = _positive(shape.radius, "radius", shape)
+    center = _three(shape.center, "center", shape)
+    axes, scale = _even_axes(matrix[:3, :3], shape)
+    return {
+        "center": transforms.transform_points(matrix, center),
+        "radius": radius * scale,
+        "side": _side(shape),
+        "x": axes[:, 0],
+        "y": axes[:, 1],
+        "z": axes[:, 2],
+    }
+
+
+def _cylinder(shape: shapes.Cylinder, matrix: NDArray[np.float64]) -> dict[str, ArrayLike]:
+    radius = _positive(shape.radius, "radius", shape)
+    p0, p1 = _three(shape.p0, "p0", shape), _three(shape.p1, "p1", shape)
+    length = np.linalg.norm(p1 - p0)
+    if not length > 0.0:
+        raise SceneError("p0 and p1 coincide", where=where(shape))
+    frame = np.column_stack([*_across((p1 - p0) / length), p1 - p0])
+    placed = matrix[:3, :3] @ frame
+    stretch = np.linalg.norm(placed[:, 2]) / np.linalg.norm(placed[:, 0])
+    axes, scale = _even_axes(placed / [1.0, 1.0, stretch], shape)
+    return {
+        "p0": transforms.transform_points(matrix, p0),
+        "axis": placed[:, 2],
+        "radius": radius * scale,
+        "side": _side(shape),
+        "x": axes[:, 0],
+        "y": axes[:, 1],
+    }
+
+
+def _across(n: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Two unit axes across a unit vector (Duff et al. 2017)."""
+    sign = np.copysign(1.0, n[2])
+    a = -1.0 / (sign + n[2])
+    b = n[0] * n[1] * a
+    s = np.array([1.0 + sign * n[0] ** 2 * a, sign * b, -sign * n[0]])
+    return s, np.array([b, sign + n[1] ** 2 * a, -n[1]])
+
+
+def _even_axes(linear: NDArray[np.float64], shape: Shape) -> tuple[NDArray[np.float64], float]:
+    """The unit columns of a matrix that scales evenly, and its scale."""
+    lengths = np.linalg.norm(linear, axis=0)
+    axes = linear / lengths
+    uneven = np.ptp(lengths) > UNEVEN * lengths.max()
+    if uneven or np.abs(axes.T @ axes - np.eye(3)).max() > UNEVEN:
+        raise SceneError(
+            f"its transform stretches or shears it, and then it is no {shape.kind}; "
+            "use a mesh for that",
+            where=where(shape),
+        )
+    return axes, float(lengths[0])
+
+
+def area(shape: Shape) -> float:
+    """Return the area of a shape in world space [m^2]."""
+    if shape.kind not in RECORDS:
+        vertices, faces, _, _ = triangles(shape)
+        return float(triangle_areas(vertices, faces).sum())
+    row_ = _members(shape)
+    if shape.kind == "sphere":
+        return float(4.0 * np.pi * row_["radius"] ** 2)
+    if shape.kind == "cylinder":
+        return float(2.0 * np.pi * row_["radius"] * np.linalg.norm(row_["axis"]))
+    parallelogram = float(np.linalg.norm(np.cross(row_["s"], row_["t"])))
+    return (np.pi if shape.kind == "disk" else 4.0) * parallelogram
+
+
+def bounds(shape: Shape) -> tuple[Points, Points]:
+    """Return the corners (3,) float32 of a box around the shape [m]."""
+    if shape.kind not in ANALYTIC:
+        vertices = triangles(shape)[0]
+        return vertices.min(axis=0), vertices.max(axis=0)
+    row_ = _members(shape)
+    if shape.kind == "sphere":
+        ends, reach = row_["center"][None], np.full(3, row_["radius"])
+    elif shape.kind == "disk":
+        ends, reach = row_["center"][None], np.hypot(row_["s"], row_["t"])
+    else:
+        ends = np.stack([row_["p0"], row_["p0"] + row_["axis"]])
+        reach = row_["radius"] * np.hypot(row_["x"], row_["y"])
+    lo, hi = ends.min(axis=0) - reach, ends.max(axis=0) + reach
+    pad = PADDING * max(np.ptp([lo, hi], axis=0).max(), np.abs([lo, hi]).max())
+    return (lo - pad).astype(np.float32), (hi + pad).astype(np.float32)
+
+
+def _members(shape: Shape) -> dict[str, NDArray[np.float64]]:
+    """The members of a shape's row as float64."""
+    record = RECORDS[shape.kind]
+    values = row(shape).view(record.dtype)[0]
+    return {m.name: np.asarray(values[m.name], np.float64) for m in record.members}
+
+
+def _local(shape: Shape) -> tuple[Points, Faces, Points | None, Points | None]:
+    """Vertices, faces, normals and uvs before the transform."""
+    if shape.kind == "mesh":
+        return _mesh(shape)
+    if shape.kind == "rectangle":
+        corners = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], np.float32)
+        faces = np.array([(0, 1, 2), (0, 2, 3)], np.uint32)
+        return corners, faces, None, (corners[:, :2] + np.float32(1.0)) * np.float32(0.5)
+    corners = [[{"+": 1, "-": -1}[c] for c in v] for side in _CUBE for v in side.split()]
+    faces = 4 * np.arange(6)[:, None, None] + np.array(_CORNER_FACES)
+    uvs = np.tile(np.array(_CORNER_UVS, np.float32), (6, 1))
+    return np.array(corners, np.float32), faces.reshape(-1, 3).astype(np.uint32), None, uvs
+
+
+def _mesh(shape: shapes.Mesh) -> tuple[Points, Faces, Points | None, Points | None]:
+    if shape.vertices is None or shape.faces is None:
+        raise SceneError("a mesh needs vertices and faces", where=where(shape))
+    vertices = _array(shape, "vertices", 3)
+    faces = np.asarray(shape.faces)
+    if faces.size == 0 or len(vertices) == 0:
+        raise SceneError("the mesh is empty: it has no triangle", where=where(shape))
+    if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iu":
+        found = f"{faces.shape} {faces.dtype}"
+        raise SceneError(f"faces must be (m, 3) whole numbers, found {found}", where=where(shape))
+    lowest, highest = int(faces.min()), int(faces.max())
+    if lowest < 0 or highest >= len(vertices):
+        wrong = lowest if lowest < 0 else highest
+        raise SceneError(
+            f"a face names vertex {wrong}, there are {len(vertices)}", where=where(shape)
+        )
+    normals = None if shape.normals is None else _array(shape, "normals", 3, len(vertices))
+    uvs = None if shape.uvs is None else _array(shape, "uvs", 2, len(vertices))
+    return vertices, faces.astype(np.uint32), normals, uvs
+
+
+def _array(shape: Shape, name: str, columns: int, rows: int | None = None) -> Points:
+    """A mesh's array as float32. Raises SceneError for a wrong shape or values not finite."""
+    try:
+        values = np.asarray(getattr(shape, name), np.float32)
+    except (TypeError, ValueError) as error:
+        raise SceneError(f"{name} are not numbers: {error}", where=where(shape)) from error
+    wanted = f"({'n' if rows is None else rows}, {columns})"
+    if values.size == 0 and rows is None:
+        raise SceneError(f"the mesh is empty: it has no {name}", where=where(shape))
+    if values.ndim != 2 or values.shape[1] != columns or rows not in (None, len(values)):
+        raise SceneError(f"{name} must be {wanted}, found {values.shape}", where=where(shape))
+    wrong = ~np.isfinite(values).all(axis=1)
+    if wrong.any():
+        first = int(np.argmax(wrong))
+        raise SceneError(
+            f"{name}[{first}] is not finite: {values[first].tolist()}", where=where(shape)
+        )
+    return values
+
+
+def _matrix(shape: Shape) -> NDArray[np.float64]:
+    """The shape's transform. Raises SceneError if it is singular, or no affine 4x4 matrix."""
+    try:
+        matrix = np.asarray(shape.to_world, np.float64)
+    except (TypeError, ValueError) as error:
+        raise SceneError(f"to_world is not a matrix: {error}", where=where(shape)) from error
+    if matrix.shape != (4, 4):
+        raise SceneError(f"to_world must be (4, 4), found {matrix.shape}", where=where(shape))
+    if transforms.is_singular(matrix):
+        raise SceneError(
+            "its transform is singular: it flattens space or is not finite", where=where(shape)
+        )
+    if not np.array_equal(matrix[3], transforms.IDENTITY[3]):
+        raise SceneError("its transform is a projection, not affine", where=where(shape))
+    return matrix
+
+
+def _three(value: ArrayLike, name: str, shape: Shape) -> NDArray[np.float64]:
+    values = np.asarray(value, np.float64)
+    if values.shape != (3,) or not np.isfinite(values).all():
+        raise SceneError(f"{name} must be three finite numbers, found {value}", where=where(shape))
+    return values
+
+
+def _positive(value: float, name: str, shape: Shape) -> float:
+    if not (np.isfinite(value) and value > 0.0):
+        raise SceneError(f"{name} must be above zero, found {value}", where=where(shape))
+    return float(value)
