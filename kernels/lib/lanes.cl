@@ -67,11 +67,13 @@ inline real sqrt_r(real x) { return sqrt(max_r(x, (real)(0.0f))); } /* of a roun
 inline real abs_r(real x) { return fabs(x); }
 inline mask both(mask a, mask b) { return a & b; }
 
-/* Memory. `gather` reads table[at] lane by lane; the index of an idle lane must be valid: give 0. */
+/* Memory. `gather` reads table[at] lane by lane; the index of an idle lane must be valid: give 0.
+ * `scatter_if` writes only where m. */
 #if LANES == 1
 inline real gather(global const float *p, integer at) { return p[at]; }
 inline integer gather_i(global const uint *p, integer at) { return as_int(p[at]); }
-inline void scatter(global float *p, integer at, real v) { p[at] = v; }
+inline void scatter_if(global float *p, integer at, mask m, real v) { if (m) p[at] = v; }
+inline int sum_lanes(integer v) { return v; }
 #define FOR_LANES(F) F(0)
 #define LANE(v, i) (v)
 #else
@@ -98,11 +100,19 @@ inline integer gather_i(global const uint *p, integer at)
 #undef LOAD
     return r;
 }
-inline void scatter(global float *p, integer at, real v)
+inline void scatter_if(global float *p, integer at, mask m, real v)
 {
-#define STORE(i) p[at.s##i] = v.s##i;
+#define STORE(i) if (m.s##i) p[at.s##i] = v.s##i;
     FOR_LANES(STORE)
 #undef STORE
+}
+inline int sum_lanes(integer v)
+{
+    int r = 0;
+#define ADD(i) r += v.s##i;
+    FOR_LANES(ADD)
+#undef ADD
+    return r;
 }
 #endif
 /* A word read as a float, and an aligned block of LANES neighbours read or written at once. */

@@ -1,13 +1,5 @@
 /* Where a path is: the point that a ray hit, with all that shading asks for. */
-#define SHAPE_NORMALS 1   /* its vertices have normals */
-#define SHAPE_UVS 2       /* its vertices have uv */
-#define SHAPE_FLIP 4      /* its front is on the other side */
-#define SHAPE_ONE_LIGHT 8 /* all of its primitives are one row of `lights` */
-#define SHAPE_TWO_SIDED 16 /* the back is shaded as if it were a front */
-
-/* A material word names a leaf: its kind in the upper 8 bits, the first word of its row below. */
-#define MATERIAL_KIND(w) (((w) >> 24) & 0xff)
-#define MATERIAL_ROW(w) ((w) & 0xffffff)
+#include "lib/surface_flags.cl"
 
 typedef struct {
     vec3 p;       /* [m] */
@@ -17,3 +9,99 @@ typedef struct {
     vec2 uv;
     integer light; /* row in `lights`, -1: does not emit */
 } Surface;
+
+inline vec3 vertex_vec3(global const float *table, integer vertex)
+{
+    integer at = vertex * 3;
+    return v3(gather(table, at), gather(table, at + 1), gather(table, at + 2));
+}
+inline vec2 vertex_vec2(global const float *table, integer vertex)
+{
+    vec2 r = {gather(table, vertex * 2), gather(table, vertex * 2 + 1)};
+    return r;
+}
+
+/* The surface at a hit; `d` is the ray's direction. `front` tells which side was hit. A two-sided
+ * back is turned round, so that the BSDF sees a front. USES_NORMALS, USES_UVS and USES_TANGENTS say
+ * what the scene needs; uv_of_shape and dpdu_of_shape are generated for its analytic shapes. */
+inline Surface surface_load(Scene scene, Slab hit, At at, mask active, vec3 o, vec3 d, mask *front)
+{
+    Surface s;
+    ShapeRow shape = shape_row_row(scene.shapes, sel_i(active, load_hit_shape(hit, at), (integer)(0)) * SHAPE_ROW_WORDS);
+    vec3 n = load_hit_n(hit, at);
+    s.n = normalize3(sel3(active, n, v3(0.0f, 0.0f, 1.0f)));
+    s.p = madd3(d, load_hit_t(hit, at), o);
+    s.ns = s.n;
+    s.uv.x = load_hit_u(hit, at);
+    s.uv.y = load_hit_v(hit, at);
+    s.dpdu = v3(0.0f, 0.0f, 0.0f);
+    s.light = -1;
+    integer prim = sel_i(active, load_hit_prim(hit, at), (integer)(0));
+    mask emits = active & (shape.light >= 0);
+    if (any(emits)) {
+        integer offset = sel_i((shape.flags & SHAPE_ONE_LIGHT) != 0, (integer)(0), prim - shape.prim);
+        s.light = sel_i(emits, shape.light + offset, (integer)(-1));
+    }
+#if USES_NORMALS || USES_UVS || USES_TANGENTS
+    mask triangle = active & (shape.kind == 0);
+    integer corner = sel_i(triangle, prim, (integer)(0)) * 3;
+    integer a = gather_i(scene.faces, corner), b = gather_i(scene.faces, corner + 1), c = gather_i(scene.faces, corner + 2);
+    real u = s.uv.x, v = s.uv.y, w = 1.0f - u - v;
+#endif
+#if USES_NORMALS
+    mask smooth = triangle & ((shape.flags & SHAPE_NORMALS) != 0);
+    if (any(smooth)) {
+        vec3 ns = madd3(vertex_vec3(scene.normals, a), w,
+                        madd3(vertex_vec3(scene.normals, b), u, scale3(vertex_vec3(scene.normals, c), v)));
+        mask usable = smooth & (dot3(ns, ns) > 1e-12f);
+        s.ns = sel3(usable, normalize3(ns), s.ns);
+    }
+#endif
+#if USES_UVS
+    mask mapped = triangle & ((shape.flags & SHAPE_UVS) != 0);
+    if (any(mapped)) {
+        vec2 ta = vertex_vec2(scene.uvs, a), tb = vertex_vec2(scene.uvs, b), tc = vertex_vec2(scene.uvs, c);
+        s.uv.x = sel(mapped, ta.x * w + tb.x * u + tc.x * v, s.uv.x);
+        s.uv.y = sel(mapped, ta.y * w + tb.y * u + tc.y * v, s.uv.y);
+#if USES_TANGENTS
+        vec3 pa = vertex_vec3(scene.vertices, a);
+        vec3 e1 = sub3(vertex_vec3(scene.vertices, b), pa), e2 = sub3(vertex_vec3(scene.vertices, c), pa);
+        real du1 = tb.x - ta.x, dv1 = tb.y - ta.y, du2 = tc.x - ta.x, dv2 = tc.y - ta.y;
+        real det = du1 * dv2 - dv1 * du2;
+        mask regular = mapped & (fabs(det) > 1e-20f);
+        s.dpdu = sel3(regular, scale3(sub3(scale3(e1, dv2), scale3(e2, dv1)), 1.0f / sel(regular, det, (real)(1.0f))), s.dpdu);
+#endif
+    }
+#endif
+#if USES_ANALYTIC && USES_TANGENTS
+    mask analytic = active & (shape.kind != 0);
+    if (any(analytic)) s.dpdu = sel3(analytic, dpdu_of_shape(scene, shape, s.p, s.uv), s.dpdu);
+#endif
+    *front = dot3(s.n, d) < 0.0f;
+    mask turn = !*front & ((shape.flags & SHAPE_TWO_SIDED) != 0);
+    s.n = sel3(turn, neg3(s.n), s.n);
+    s.ns = sel3(turn, neg3(s.ns), s.ns);
+    return s;
+}
+
+/* The shading frame: s along dpdu where there is one (Mitsuba's and pbrt's convention). */
+inline Frame surface_frame(Surface s)
+{
+    Frame f = frame_of(s.ns);
+#if USES_TANGENTS
+    vec3 t = sub3(s.dpdu, scale3(s.ns, dot3(s.ns, s.dpdu)));
+    mask given = dot3(t, t) > 1e-20f;
+    t = normalize3(sel3(given, t, f.s));
+    f.s = t;
+    f.t = cross3(s.ns, t);
+#endif
+    return f;
+}
+
+/* Where a ray toward `w` starts: off the surface by more than what rounding may have put it under. */
+inline vec3 surface_offset(Surface s, vec3 w)
+{
+    real size = 1.0f + max_r(max_r(fabs(s.p.x), fabs(s.p.y)), fabs(s.p.z));
+    real side = sel(dot3(s.n, w) < 0.0f, -size, size);
+    return madd3(s.n, side * RAY_EPSILON, s.p);
+}

@@ -1,0 +1,79 @@
+/* One vertex of a path: the light that is met, next-event estimation, and the direction to go on.
+ * Both ways of finding light are weighted by the power heuristic (Veach 1997, 9.2.4). */
+void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mask active)
+{
+    global const Settings *settings = scene.settings;
+    vec3 o = load_path_o(path, at), d = load_path_d(path, at);
+    Wavelengths lambdas = load_path_lambdas(path, at);
+    Spectrum beta = load_path_beta(path, at);
+    integer state = load_path_state(path, at), depth = state & PATH_DEPTH;
+    mask front;
+    Surface s = surface_load(scene, hit, at, active, o, d, &front);
+
+    /* The light that this ray has met. */
+    mask lit = active & (s.light >= 0) & front & ((depth > 0) | (settings->hide_lights == 0));
+    if (any(lit)) {
+        integer light = sel_i(lit, s.light, (integer)(0));
+        real pdf = load_path_pdf(path, at);
+        real other = light_pdf(scene, light, o, d, load_hit_t(hit, at), s.n);
+        real w = sel(pdf < 0.0f, (real)(1.0f), mis_weight(pdf, other));
+        Spectrum le = spectrum_scale(spectrum_mul(beta, light_radiance(scene, light, s.uv, lambdas)), w);
+        store_path_radiance(path, at, lit, spectrum_add(load_path_radiance(path, at), le));
+    }
+    mask next = active & (depth + 1 < settings->max_depth);
+
+    Sampler sampler = sampler_start(settings->seed, as_natural(load_path_place(path, at)), as_natural(load_path_sample(path, at)));
+    natural dimension = as_natural(DIMENSION_VERTEX + depth * DIMENSIONS_A_VERTEX);
+    vec2 choice = {0.0f, 0.0f};
+#if USES_CHOICE
+    choice = sampler_pair(sampler, dimension + DIMENSION_CHOICE);
+#endif
+    Bsdf m = bsdf_load(scene, MATERIAL_ROW(sel_i(active, load_hit_material(hit, at), (integer)(0))), s.uv, lambdas);
+    Frame frame = surface_frame(s);
+    vec3 wo = to_local(frame, neg3(d));
+
+#if !BSDF_DELTA
+    /* Next-event estimation. */
+    LightSample ls = light_sample(scene, s.p, choice.x, sampler_pair(sampler, dimension + DIMENSION_LIGHT), lambdas);
+    vec3 wi = to_local(frame, ls.wi);
+    Spectrum f = bsdf_eval(m, wo, wi);
+    real w = sel(ls.pdf < 0.0f, (real)(1.0f), mis_weight(ls.pdf, bsdf_pdf(m, wo, wi)));
+    mask shine = next & (ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
+    Spectrum value = spectrum_scale(spectrum_mul(spectrum_mul(beta, f), ls.radiance), w / sel(shine, fabs(ls.pdf), (real)(1.0f)));
+    store_shadow_o(shadow, at, shine, surface_offset(s, ls.wi));
+    store_shadow_d(shadow, at, shine, ls.wi);
+    store_shadow_t(shadow, at, active, sel(shine, ls.t * SHADOW_SHORTER, (real)(-1.0f)));
+    store_shadow_value(shadow, at, shine, value);
+    state += sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
+#endif
+
+    /* The next direction. */
+    vec2 uv = sampler_pair(sampler, dimension + DIMENSION_BSDF);
+    BsdfSample bs = bsdf_sample(m, wo, v3(uv.x, uv.y, choice.y));
+    next = next & (bs.pdf > 0.0f);
+    vec3 onward = normalize3(to_world(frame, bs.wi));
+    beta = spectrum_mul(beta, bs.weight);
+#if USES_DISPERSION
+    beta = hero_only((bs.lobe & LOBE_DISPERSE) != 0, beta);
+#endif
+    real eta = load_path_eta(path, at) * bs.eta;
+
+    /* Russian roulette. */
+    integer survivor = depth + 1 >= settings->rr_depth;
+    real strength = spectrum_max(beta);
+    next = next & (strength > 0.0f);
+    if (any(next & survivor)) {
+        real q = min_r(strength * eta * eta, (real)(0.95f));
+        vec2 u = sampler_pair(sampler, dimension + DIMENSION_ROULETTE);
+        next = next & (!survivor | (u.x < q));
+        beta = spectrum_scale(beta, sel(survivor, 1.0f / max_r(q, (real)(1e-6f)), (real)(1.0f)));
+    }
+
+    store_path_o(path, at, next, surface_offset(s, onward));
+    store_path_d(path, at, next, onward);
+    store_path_beta(path, at, next, beta);
+    store_path_pdf(path, at, next, sel((bs.lobe & LOBE_DELTA) != 0, (real)(-1.0f), bs.pdf));
+    store_path_eta(path, at, next, eta);
+    state = sel_i(next, state, state - (state & PATH_ALIVE)) + sel_i(active, (integer)(1), (integer)(0));
+    store_path_state(path, at, active, state);
+}

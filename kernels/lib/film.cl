@@ -1,0 +1,77 @@
+/* The film while it is being exposed: places (pixels in the order of 4x4 tiles), planes, counters.
+ * A slot owns its place, so nothing here is atomic but the counters. */
+#define FILM_WORDS 7 /* sum and rest of three channels, and how many samples; a stream of `places` per word and plane */
+
+/* a / b for 0 <= a < 2^23; an integer division would run lane by lane. */
+inline integer divide(integer a, int b) { return to_integer((to_real(a) + 0.5f) / (float)b); }
+
+/* The pixel of a place: x and y, whole numbers. */
+inline vec2 place_pixel(global const Settings *settings, integer place)
+{
+    integer tile = place >> 4, row = divide(tile, settings->tiles_x), column = tile - row * settings->tiles_x;
+    vec2 p = {to_real(column * 4 + (place & 3)), to_real(row * 4 + ((place >> 2) & 3))};
+    return p;
+}
+
+/* `place`, or the first one after it in steps of `step` whose pixel lies inside the film. */
+inline integer place_inside(global const Settings *settings, integer place)
+{
+    for (;;) {
+        vec2 p = place_pixel(settings, place);
+        mask outside = (place < settings->places) & ((p.x >= (float)settings->width) | (p.y >= (float)settings->height));
+        if (!any(outside)) return place;
+        place += sel_i(outside, (integer)(settings->per_plane), (integer)(0));
+    }
+}
+
+/* The first sample at or after `first` that belongs to a plane. */
+inline integer plane_sample(integer plane, int planes, int first)
+{
+    integer ahead = plane - first % planes;
+    return first + sel_i(ahead < 0, ahead + planes, ahead);
+}
+
+/* Compensated addition (Neumaier 1974): what rounding takes from the sum is kept in `rest`. */
+inline void sum_add(real *sum, real *rest, real v)
+{
+    real total = *sum + v;
+    *rest += sel(fabs(*sum) >= fabs(v), (*sum - total) + v, (v - total) + *sum);
+    *sum = total;
+}
+
+typedef struct {
+    vec3 sum, rest;
+    real samples;
+} Exposure;
+
+inline Exposure film_load(global const Settings *settings, global const float *film, mask m, integer plane, integer place)
+{
+    integer places = settings->places, at = plane * FILM_WORDS * places + sel_i(m, place, (integer)(0));
+    Exposure e;
+    e.sum = v3(gather(film, at), gather(film, at + places), gather(film, at + 2 * places));
+    e.rest = v3(gather(film, at + 3 * places), gather(film, at + 4 * places), gather(film, at + 5 * places));
+    e.samples = gather(film, at + 6 * places);
+    return e;
+}
+inline void film_store(global const Settings *settings, global float *film, mask m, integer plane, integer place, Exposure e)
+{
+    integer places = settings->places, at = plane * FILM_WORDS * places + place;
+    scatter_if(film, at, m, e.sum.x);
+    scatter_if(film, at + places, m, e.sum.y);
+    scatter_if(film, at + 2 * places, m, e.sum.z);
+    scatter_if(film, at + 3 * places, m, e.rest.x);
+    scatter_if(film, at + 4 * places, m, e.rest.y);
+    scatter_if(film, at + 5 * places, m, e.rest.z);
+    scatter_if(film, at + 6 * places, m, e.samples);
+}
+
+/* Counters that the host reads while it enqueues. */
+#define COUNTER_DONE 0     /* slots that have walked their list */
+#define COUNTER_SAMPLES 1  /* paths put on the film */
+#define COUNTER_CLOSEST 2  /* rays of them */
+#define COUNTER_SHADOW 3   /* shadow rays of them */
+#define COUNTER_REJECTED 4 /* samples that were not finite and count as black */
+inline void count(global uint *counters, int which, mask m, integer v)
+{
+    if (any(m)) atomic_add(&counters[which], (uint)sum_lanes(sel_i(m, v, (integer)(0))));
+}

@@ -1,0 +1,39 @@
+/* Tracing one ray a work-item: triangles through LAYOUT(verb), analytic shapes through bvh/shapes.cl. */
+#include "lib/trace.cl"
+#include "generated/layout.cl"
+#if USES_ANALYTIC
+typedef Scene ShapeTable;
+#define TRACE_ARGS global const float *nodes, global const float *leaves, global const float *shape_nodes, global const uint *shape_items
+#define TRACE nodes, leaves, shape_nodes, shape_items
+#else
+#define TRACE_ARGS global const float *nodes, global const float *leaves
+#define TRACE nodes, leaves
+#endif
+#include "generated/shape_tree.cl"
+
+inline TraceHit trace_closest(TRACE_ARGS, Scene scene, vec3 o, vec3 d, mask active)
+{
+    TriHit t = LAYOUT(closest)(nodes, leaves, o.x, o.y, o.z, d.x, d.y, d.z, 0.0f, FAR);
+    TraceHit h = {t.t, t.u, t.v, {t.nx, t.ny, t.nz}, as_int(t.prim), as_int(t.tag)};
+#if USES_ANALYTIC
+    uint shape = shapes_closest(shape_nodes, shape_items, scene, o.x, o.y, o.z, d.x, d.y, d.z, 0.0f, &h.t);
+    if (shape != BVH_MISS) {
+        h.prim = as_int(shape);
+        h.shape = FIRST_ANALYTIC(scene) + h.prim;
+        ShapeHit s = shape_hit(scene, shape_row_row(scene.shapes, h.shape * SHAPE_ROW_WORDS), o, d, 0.0f, FAR);
+        h.n = s.n;
+        h.u = s.uv.x;
+        h.v = s.uv.y;
+    }
+#endif
+    return h;
+}
+inline mask trace_occluded(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real t, mask active)
+{
+    if (LAYOUT(occluded)(nodes, leaves, o.x, o.y, o.z, d.x, d.y, d.z, 0.0f, t)) return 1;
+#if USES_ANALYTIC
+    return shapes_occluded(shape_nodes, shape_items, scene, o.x, o.y, o.z, d.x, d.y, d.z, 0.0f, t);
+#else
+    return 0;
+#endif
+}

@@ -1,0 +1,98 @@
+/* Ends what is finished and begins what comes next: a path that missed gathers the light from
+ * infinity, a path that ended is put on the film, and its slot starts the next sample of its list. */
+#include "lib/base.cl"
+#include "generated/sampler.cl"
+#include "lib/camera.cl"
+#include "generated/camera.cl"
+#include "lib/filter.cl"
+#include "lib/film.cl"
+#include "lib/shape.cl"
+#include "lib/light.cl"
+#include "generated/lights.cl"
+
+kernel void generate(SLAB_ARGS, SCENE_ARGS, global float *film, global uint *counters, int first, int end)
+{
+    SLABS
+    SCENE
+    global const Settings *settings = scene.settings;
+    uint at = get_global_id(0) * LANES;
+    integer state = load_path_state(path, at), depth = state & PATH_DEPTH;
+    mask began = (state & PATH_FRESH) == 0;
+    mask missed = began & ((state & PATH_ALIVE) != 0) & (load_hit_prim(hit, at) < 0);
+    mask ended = ((state & PATH_DONE) == 0) & (((state & PATH_ALIVE) == 0) | missed);
+    if (any(ended)) {
+        Spectrum radiance = load_path_radiance(path, at);
+        Wavelengths lambdas = load_path_lambdas(path, at);
+#if USES_INFINITE
+        mask sky = missed & ((depth > 0) | (settings->hide_lights == 0));
+        if (any(sky)) {
+            real pdf = load_path_pdf(path, at);
+            vec3 d = load_path_d(path, at);
+            Spectrum arrives = infinite_gather(scene, d, pdf, lambdas);
+            radiance = spectrum_sel(sky, spectrum_add(radiance, spectrum_mul(load_path_beta(path, at), arrives)), radiance);
+        }
+#endif
+        /* Deposit. */
+        integer place = load_path_place(path, at), sample = load_path_sample(path, at);
+        Exposure e = {load_path_sum(path, at), load_path_rest(path, at), load_path_samples(path, at)};
+        mask deposit = ended & began;
+        vec3 value = film_value(scene, radiance, lambdas);
+        real weight = load_path_weight(path, at);
+        mask sane = deposit & (fabs(value.x) + fabs(value.y) + fabs(value.z) < 1e30f); /* false for NaN */
+        weight = sel(sane, weight, (real)(0.0f));
+        value = sel3(sane, value, v3(0.0f, 0.0f, 0.0f));
+        sum_add(&e.sum.x, &e.rest.x, value.x * weight);
+        sum_add(&e.sum.y, &e.rest.y, value.y * weight);
+        sum_add(&e.sum.z, &e.rest.z, value.z * weight);
+        e.samples += 1.0f;
+        count(counters, COUNTER_SAMPLES, deposit, (integer)(1));
+        count(counters, COUNTER_CLOSEST, deposit, depth + sel_i(missed, (integer)(1), (integer)(0)));
+        count(counters, COUNTER_SHADOW, deposit, state >> 16);
+        count(counters, COUNTER_REJECTED, deposit & !sane, (integer)(1));
+
+        /* The next sample of the place, or the next place. */
+        int planes = settings->planes, per_plane = settings->per_plane;
+        integer slot = LANE_INDEX + (int)at, plane = divide(slot, per_plane);
+        integer start = plane_sample(plane, planes, first);
+        sample += planes;
+        mask turn = ended & (!began | (sample >= end));
+        mask done = (integer)(0);
+        if (any(turn)) {
+            film_store(settings, film, turn & began, plane, place, e);
+            integer next = place_inside(settings, sel_i(began, place + per_plane, slot - plane * per_plane));
+            done = turn & ((next >= settings->places) | (start >= end));
+            mask begin = turn & !done;
+            place = sel_i(begin, next, place);
+            sample = sel_i(begin, start, sample);
+            Exposure next_place = film_load(settings, film, begin, plane, place);
+            e.sum = sel3(begin, next_place.sum, e.sum);
+            e.rest = sel3(begin, next_place.rest, e.rest);
+            e.samples = sel(begin, next_place.samples, e.samples);
+            store_path_place(path, at, begin, place);
+            count(counters, COUNTER_DONE, done, (integer)(1));
+        }
+        mask go = ended & !done;
+        store_path_sample(path, at, go, sample);
+        store_path_sum(path, at, go, e.sum);
+        store_path_rest(path, at, go, e.rest);
+        store_path_samples(path, at, go, e.samples);
+
+        /* The camera's ray. */
+        vec2 pixel = place_pixel(settings, place);
+        Sampler sampler = sampler_start(settings->seed, as_natural(place), as_natural(sample));
+        vec2 offset;
+        filter_sample(scene, sampler_pair(sampler, (natural)(DIMENSION_FILM)), &offset, &weight);
+        vec2 position = {(pixel.x + 0.5f + offset.x) / (float)settings->width, (pixel.y + 0.5f + offset.y) / (float)settings->height};
+        CameraRay ray = camera_ray(scene, position, sampler_pair(sampler, (natural)(DIMENSION_LENS)));
+        lambdas = wavelengths_sample(scene, sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH)).x);
+        store_path_weight(path, at, go, weight);
+        store_path_o(path, at, go, ray.o);
+        store_path_d(path, at, go, ray.d);
+        store_path_lambdas(path, at, go, lambdas);
+        store_path_beta(path, at, go, spectrum_of(1.0f));
+        store_path_radiance(path, at, go, spectrum_of(0.0f));
+        store_path_pdf(path, at, go, (real)(-1.0f));
+        store_path_eta(path, at, go, (real)(1.0f));
+        store_path_state(path, at, ended, sel_i(done, (integer)(PATH_DONE), (integer)(PATH_ALIVE)));
+    }
+}

@@ -1,0 +1,28 @@
+/* Finds where every ray in flight ends. Triangles go through a layout of kernels/bvh, LAYOUT_LANES
+ * rays a work-item; analytic shapes through a tree of their own, one ray at a time. The hit takes
+ * along what shading needs first: the normal and the material of the side that was met. */
+#include "lib/base.cl"
+#include "lib/shape.cl"
+#include "lib/surface_flags.cl"
+#include "generated/trace.cl"
+
+kernel void intersect(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS)
+{
+    SLABS
+    SCENE
+    uint at = get_global_id(0) * LANES;
+    mask active = (load_path_state(path, at) & PATH_ALIVE) != 0;
+    if (any(active)) {
+        vec3 o = load_path_o(path, at), d = load_path_d(path, at);
+        TraceHit h = trace_closest(TRACE, scene, o, d, active);
+        integer shape = sel_i(h.prim >= 0, h.shape, (integer)(0)), row = shape * SHAPE_ROW_WORDS;
+        ShapeRow s = shape_row_row(scene.shapes, row);
+        store_hit_t(hit, at, active, h.t);
+        store_hit_u(hit, at, active, h.u);
+        store_hit_v(hit, at, active, h.v);
+        store_hit_n(hit, at, active, h.n);
+        store_hit_prim(hit, at, active, h.prim);
+        store_hit_shape(hit, at, active, shape);
+        store_hit_material(hit, at, active, sel_i(dot3(h.n, d) < 0.0f, s.front, s.back));
+    }
+}

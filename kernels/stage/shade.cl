@@ -1,0 +1,37 @@
+/* Shades the paths that met one kind of material. Built once per kind, so it holds no switch: as
+ * dense blocks that mask out other kinds, or, where QUEUED, along the sorted queue. */
+#include "lib/base.cl"
+#include "generated/sampler.cl"
+#include "lib/shape.cl"
+#include "lib/light.cl"
+#include "generated/textures.cl"
+#include "generated/shapes.cl"
+#include "generated/lights.cl"
+#include "lib/surface.cl"
+#include "lib/fresnel.cl"
+#include "lib/microfacet.cl"
+#include "lib/bsdf.cl"
+#include "generated/bsdf.cl"
+#include "generated/integrator.cl"
+
+kernel void shade(SLAB_ARGS, SCENE_ARGS QUEUE_ARGS)
+{
+    SLABS
+    SCENE
+#if QUEUED
+    uint first = get_global_id(0) * LANES, count = queue_counts[BSDF_KIND];
+    if (first < count) {
+        integer i = LANE_INDEX + (int)first;
+        At at = gather_i(queue, (int)queue_starts[BSDF_KIND] + min_i(i, (integer)((int)count - 1)));
+        mask active = i < (int)count;
+#else
+    At at = get_global_id(0) * LANES;
+    mask active = ((load_path_state(path, at) & PATH_ALIVE) != 0) & (load_hit_prim(hit, at) >= 0);
+#if BSDF_COUNT > 1
+    active = active & (MATERIAL_KIND(load_hit_material(hit, at)) == BSDF_KIND);
+#endif
+    if (any(active)) {
+#endif
+        integrator_vertex(scene, path, hit, shadow, at, active);
+    }
+}
