@@ -1,17 +1,22 @@
 """How to run: choosing a device, building programs, buffers and timing. Knows no scenes."""
 
+from .buffers import Buffers
 from .context import Device, DeviceInfo, choose, devices
 from .program import Argument, Bound, Kernel, Program, build, build_all
 from .source import Source, assemble
+from .timing import Timing, Timings
 
 __all__ = [
     "Argument",
     "Bound",
+    "Buffers",
     "Device",
     "DeviceInfo",
     "Kernel",
     "Program",
     "Source",
+    "Timing",
+    "Timings",
     "assemble",
     "build",
     "build_all",

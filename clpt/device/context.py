@@ -185,7 +185,8 @@ def trial(info: DeviceInfo) -> str | None:
         kernel(queue, result.shape, None, buffer)
         cl.enqueue_copy(queue, result, buffer)
     except Exception as error:  # whatever a broken driver raises, the next one is tried
-        return " ".join(str(error).split())[:200] or type(error).__name__
+        rows = str(error).splitlines() or [type(error).__name__]
+        return next((row for row in rows if "error:" in row), rows[0]).strip()[:200]
     return None if (result == 7).all() else "a trivial kernel gave a wrong result"
 
 

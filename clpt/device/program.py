@@ -260,7 +260,8 @@ def _signature(kernel: cl.Kernel) -> tuple[Argument, ...]:
     spaces = {getattr(address, name): name.lower() for name in ("GLOBAL", "LOCAL", "CONSTANT")}
     return tuple(
         Argument(
-            name=kernel.get_arg_info(index, info.NAME),
+            # PoCL has macros that rename what is called as a builtin: sign becomes _cl_sign
+            name=kernel.get_arg_info(index, info.NAME).removeprefix("_cl_"),
             type=kernel.get_arg_info(index, info.TYPE_NAME).replace("unsigned ", "u"),
             space=spaces.get(kernel.get_arg_info(index, info.ADDRESS_QUALIFIER), "private"),
         )

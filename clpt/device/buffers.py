@@ -1,0 +1,83 @@
+"""Device memory, counted: what does not fit is told before a driver fails in its own way."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pyopencl as cl
+from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+from ..errors import MemoryBudgetError
+from .context import Device
+
+_SMALLEST = 64  # [bytes] OpenCL has no empty buffer, and kernels want something to point at
+_ADVICE = "lower the size of the image or simplify the scene, or choose another device"
+
+
+class Buffers:
+    """Buffers on one device within a budget.
+
+    limit: bytes that all of them together may take; by default what the device has free now.
+    used: bytes given out so far. A buffer lives as long as it is referred to; `release` gives it
+    back at once.
+    """
+
+    def __init__(self, device: Device, limit: int | None = None):
+        self.device = device
+        self.limit = device.free_memory() if limit is None else limit
+        self.used = 0
+
+    @property
+    def available(self) -> int:
+        """The largest buffer that can be had now [bytes]."""
+        return max(0, min(self.limit - self.used, self.device.info.max_alloc))
+
+    def allocate(self, what: str, nbytes: int, advice: str = _ADVICE) -> cl.Buffer:
+        """A buffer whose content is not defined.
+
+        what, advice: for the message of the MemoryBudgetError that is raised if it does not fit.
+        """
+        return self._create(what, max(nbytes, _SMALLEST), advice, None)
+
+    def upload(
+        self, what: str, array: ArrayLike, dtype: DTypeLike = None, advice: str = _ADVICE
+    ) -> cl.Buffer:
+        """A read-only copy of an array, C-contiguous; an empty one becomes a small buffer of zeros.
+
+        Raises MemoryBudgetError if it does not fit.
+        """
+        host = np.ascontiguousarray(array, dtype)
+        if host.nbytes < _SMALLEST:
+            padded = np.zeros(_SMALLEST, np.uint8)
+            padded[: host.nbytes] = np.frombuffer(host.tobytes(), np.uint8)
+            host = padded
+        return self._create(what, host.nbytes, advice, host)
+
+    def download(self, buffer: cl.Buffer, shape: Sequence[int], dtype: DTypeLike) -> NDArray:
+        """A buffer's content as an array; waits for the device's queue."""
+        host = np.empty(tuple(shape), dtype)
+        if host.nbytes:
+            cl.enqueue_copy(self.device.queue, host, buffer, is_blocking=True)
+        return host
+
+    def release(self, *buffers: cl.Buffer) -> None:
+        """Give buffers back."""
+        for buffer in buffers:
+            self.used -= buffer.size
+            buffer.release()
+
+    def _create(self, what: str, nbytes: int, advice: str, host: NDArray | None) -> cl.Buffer:
+        if nbytes > self.available:
+            raise MemoryBudgetError(what, nbytes, self.available, advice)
+        access = cl.mem_flags.READ_WRITE
+        if host is not None:
+            access = cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR
+        try:
+            buffer = cl.Buffer(
+                self.device.context, access, size=0 if host is not None else nbytes, hostbuf=host
+            )
+        except (cl.MemoryError, cl.RuntimeError) as error:
+            raise MemoryBudgetError(what, nbytes, self.available, f"{advice} ({error})") from error
+        self.used += nbytes
+        return buffer

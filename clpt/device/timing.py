@@ -1,0 +1,45 @@
+"""How long kernels took, by name, from the device's own clock."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import pyopencl as cl
+
+
+@dataclass
+class Timing:
+    """calls: how often a kernel ran; seconds: how long in all."""
+
+    calls: int = 0
+    seconds: float = 0.0
+
+
+class Timings:
+    """An accumulator: hand it every event with a name, ask for the sums at the end.
+
+    On a queue without profiling it keeps nothing and costs nothing.
+    """
+
+    def __init__(self, queue: cl.CommandQueue):
+        self.enabled = bool(queue.properties & cl.command_queue_properties.PROFILING_ENABLE)
+        self._pending: list[tuple[str, cl.Event]] = []
+        self._sums: dict[str, Timing] = {}
+
+    def add(self, name: str, event: cl.Event) -> cl.Event:
+        """Note an event, which need not be over; the same event, for chaining."""
+        if self.enabled:
+            self._pending.append((name, event))
+            if len(self._pending) >= 4096:  # an event that is held costs the driver memory
+                self.collect()
+        return event
+
+    def collect(self) -> dict[str, Timing]:
+        """Wait for all events so far; name -> Timing, the longest first."""
+        for name, event in self._pending:
+            event.wait()
+            timing = self._sums.setdefault(name, Timing())
+            timing.calls += 1
+            timing.seconds += (event.profile.end - event.profile.start) * 1e-9
+        self._pending.clear()
+        return dict(sorted(self._sums.items(), key=lambda item: -item[1].seconds))

@@ -1,0 +1,132 @@
+"""Choosing a device: order, names, broken drivers, the environment."""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+
+import pyopencl as cl
+import pytest
+
+from clpt.device import Device, choose, context, devices
+from clpt.errors import DeviceError
+
+
+@pytest.fixture
+def machine(monkeypatch, device):
+    """A machine with three devices of which all are, in truth, the one that is there."""
+    kinds = (("cpu", "Alpha", "Old Core"), ("gpu", "Beta", "Fast 1"), ("gpu", "Gamma", "Fast 2"))
+    there = tuple(
+        dataclasses.replace(device.info, index=i, kind=kind, platform=platform, name=name)
+        for i, (kind, platform, name) in enumerate(kinds)
+    )
+    monkeypatch.setattr(context, "devices", lambda: there)
+    monkeypatch.delenv("CLPT_DEVICE", raising=False)
+    return there
+
+
+def test_devices_tell_what_they_are(device):
+    info = devices()[device.info.index]
+    assert info == device.info
+    assert info.kind in ("gpu", "accelerator", "cpu")
+    assert 0 < info.free_memory() <= info.global_mem
+    assert info.lanes in ((8, 16) if info.is_cpu else (1,))
+
+
+def test_a_gpu_is_preferred(machine):
+    choice = context.selection()
+    assert choice.info.name == "Fast 1"
+    assert "first GPU" in choice.reason
+
+
+@pytest.mark.parametrize(
+    ("which", "name"),
+    [
+        (0, "Old Core"),
+        ("2", "Fast 2"),
+        ("gamma", "Fast 2"),
+        ("ALPHA old", "Old Core"),
+        ("fast", "Fast 1"),
+    ],
+)
+def test_by_index_or_name(machine, which, name):
+    assert choose(which).info.name == name
+
+
+def test_by_the_environment(machine, monkeypatch):
+    monkeypatch.setenv("CLPT_DEVICE", "core")
+    choice = context.selection()
+    assert choice.info.name == "Old Core"
+    assert "CLPT_DEVICE=core" in choice.reason
+    assert choose("Fast 2").info.name == "Fast 2"  # what is asked for in the call wins
+
+
+@pytest.mark.parametrize("which", [7, "-1", "radeon"])
+def test_an_unknown_one_lists_what_there_is(machine, which):
+    with pytest.raises(
+        DeviceError, match=r"is not there; there is \[0\] Alpha Old Core, \[1\] Beta"
+    ):
+        choose(which)
+
+
+def test_a_driver_that_fails_is_passed_over(machine, monkeypatch, caplog):
+    failing = {"Fast 1": "the compiler is broken"}
+    monkeypatch.setattr(context, "trial", lambda info: failing.get(info.name))
+    with caplog.at_level(logging.WARNING):
+        choice = context.selection()
+    assert choice.info.name == "Fast 2"
+    assert "passed over Beta Fast 1 (the compiler is broken)" in choice.reason
+    assert "the compiler is broken" in caplog.text
+
+
+def test_no_driver_works(machine, monkeypatch):
+    monkeypatch.setattr(context, "trial", lambda info: "it is broken")
+    with pytest.raises(DeviceError, match="no OpenCL device works: Beta Fast 1"):
+        choose()
+
+
+def test_the_trial_reports_instead_of_raising(device, monkeypatch):
+    assert context.trial(device.info) is None
+    monkeypatch.setattr(context, "_TRIAL", "__kernel void trial(__global uint *out) { broken }")
+    assert "broken" in context.trial(device.info)
+    monkeypatch.setattr(
+        context, "_TRIAL", "__kernel void trial(__global uint *out) { out[0] = 1; }"
+    )
+    assert context.trial(device.info) == "a trivial kernel gave a wrong result"
+
+
+def test_no_device_tells_what_to_do(monkeypatch):
+    monkeypatch.setattr(context, "devices", lambda: ())
+    with pytest.raises(DeviceError, match="pocl-opencl-icd"):
+        choose()
+
+
+class Platform:
+    def __init__(self, name, found):
+        self.name, self.found = name, found
+
+    def get_devices(self):
+        if isinstance(self.found, Exception):
+            raise self.found
+        return self.found
+
+
+def test_platforms_without_devices_are_left_out(device, monkeypatch, caplog):
+    platforms = [
+        Platform("Z", []),
+        Platform("B", cl.Error("no")),
+        Platform("A", [device.info.cl_device]),
+    ]
+    monkeypatch.setattr(cl, "get_platforms", lambda: platforms)
+    with caplog.at_level(logging.WARNING):
+        assert len(devices()) == 1
+    assert "Z has no devices" in caplog.text
+    assert "B is passed over" in caplog.text
+
+
+def test_adopting_a_queue(device):
+    queue = cl.CommandQueue(device.context)
+    adopted = Device.adopt(queue)
+    assert adopted.queue is queue
+    assert adopted.context == device.context
+    assert adopted.info.label == device.info.label

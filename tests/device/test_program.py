@@ -1,0 +1,148 @@
+"""Programs: arguments by name, errors with our lines, the cache."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyopencl as cl
+import pytest
+
+from clpt.device import Buffers, assemble, build, build_all, cache, program
+from clpt.errors import KernelBuildError
+
+TEXT = """
+__kernel void fill(__global float *restrict out, const float4 v, float3 w, uint n, int sign,
+                   __global const uint *unused, __local float *scratch)
+{
+    uint i = get_global_id(0);
+    if (i < n) out[i] = v.s1 * w.z + sign;
+}
+__kernel void other(__global uint *x) { x[0] = 1u; }
+"""
+
+
+def source(text: str = TEXT, **virtual: str):
+    return assemble("test.cl", {"test.cl": text, **virtual})
+
+
+@pytest.fixture
+def fill(device):
+    return build(device, source()).kernel("fill")
+
+
+@pytest.fixture
+def out(device):
+    return Buffers(device).upload("out", np.zeros(16, np.float32))
+
+
+def arguments(out, **changed):
+    named = {"out": out, "v": (1, 2, 3, 4), "w": (5, 6, 7), "n": 16, "sign": -1}
+    return {**named, "unused": None, "scratch": cl.LocalMemory(64), **changed}
+
+
+def result(device, bound, out):
+    bound.enqueue(device.queue, (16,), (16,))
+    return Buffers(device).download(out, (16,), np.float32)
+
+
+def test_signature(fill):
+    places = {a.name: (a.type, a.space) for a in fill.arguments}
+    assert places["out"] == ("float*", "global")
+    assert places["v"] == ("float4", "private")
+    assert places["n"] == ("uint", "private")
+    assert places["scratch"][1] == "local"
+
+
+def test_runs_and_sets_again(device, fill, out):
+    bound = fill.bind(**arguments(out))
+    assert (result(device, bound, out) == 2 * 7 - 1).all()
+    bound.set(sign=1, v=np.float32([0, 3, 0, 0]))
+    assert (result(device, bound, out) == 3 * 7 + 1).all()
+
+
+def test_two_bindings_do_not_disturb(device, fill, out):
+    first, second = fill.bind(**arguments(out)), fill.bind(**arguments(out, sign=100))
+    assert (result(device, second, out) == 114).all()
+    assert (result(device, first, out) == 13).all()
+
+
+def test_events_chain(device, fill, out):
+    bound = fill.bind(**arguments(out))
+    first = bound.enqueue(device.queue, (16,), (16,))
+    second = bound.enqueue(device.queue, (16,), (16,), wait_for=[first])
+    second.wait()
+    assert first.command_execution_status == cl.command_execution_status.COMPLETE
+
+
+def test_missing_unknown_and_unfit_arguments(fill, out):
+    named = arguments(out)
+    with pytest.raises(TypeError, match="'fill' takes no 'speed'; it takes out, v, w"):
+        fill.bind(**named, speed=1)
+    del named["sign"]
+    with pytest.raises(TypeError, match="'fill' also takes sign"):
+        fill.bind(**named)
+    for bad in ({"n": -1}, {"n": 2**32}, {"v": (1, 2)}, {"out": 3.5}, {"sign": "x"}):
+        with pytest.raises(TypeError, match=f"{next(iter(bad))} is .* does not fit"):
+            fill.bind(**{**arguments(out), **bad})
+
+
+def test_kernels_are_kept_and_named(device):
+    built = build(device, source())
+    assert built.kernel("fill") is built.kernel("fill")
+    with pytest.raises(KeyError, match="no kernel 'fil'; it has fill, other"):
+        built.kernel("fil")
+
+
+def test_an_error_names_our_file_and_line(device, cache_folder):
+    broken = source(
+        '#include "part.cl"\n',
+        **{"part.cl": "constant int fine = 1;\n\nconstant int broken = nothing;\n"},
+    )
+    with pytest.raises(KernelBuildError, match=r"part\.cl:3") as raised:
+        build(device, broken)
+    error = raised.value
+    assert (error.stage, error.file, error.line) == ("test.cl", "part.cl", 3)
+    assert "nothing" in error.log
+    assert str(cache_folder) in error.kept
+    with open(error.kept) as kept:
+        assert kept.read() == broken.text
+
+
+def test_an_unwritable_cache_does_not_hide_the_error(device, tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("in the way")
+    monkeypatch.setattr(cache, "folder", lambda: tmp_path / "file")
+    with pytest.raises(KernelBuildError) as raised:
+        build(device, source("constant int x = nothing;"))
+    assert raised.value.kept is None
+
+
+def test_build_all(device):
+    before = device.builds.programs
+    texts = {
+        f"p{i}": source(f"__kernel void k{i}(__global int *x) {{ x[0] = {i}; }}") for i in (1, 2)
+    }
+    built = build_all(device, texts)
+    assert [list(built[name].signatures) for name in texts] == [["k1"], ["k2"]]
+    assert device.builds.programs == before + 2
+    with pytest.raises(KernelBuildError):
+        build_all(device, {**texts, "broken": source("constant int x = nothing;")})
+
+
+def test_our_cache(device, cache_folder, monkeypatch):
+    """As for a driver without a cache of its own: kept, taken again, rebuilt when damaged."""
+    monkeypatch.setattr(program, "has_src_build_cache", lambda device: False)
+    from_source = program._from_source
+    built = []
+    monkeypatch.setattr(program, "_from_source", lambda *a: built.append(1) or from_source(*a))
+
+    cold = build(device, source())
+    warm = build(device, source())
+    assert len(built) == 1
+    assert warm.signatures == cold.signatures
+
+    (entry,) = (cache_folder / "programs").iterdir()
+    entry.write_bytes(entry.read_bytes()[:-1])
+    build(device, source())
+    assert len(built) == 2
+
+    build(device, source(), ["-DX=1"])
+    assert len(built) == 3

@@ -1,0 +1,62 @@
+"""Intel's CPU runtime from a wheel: found, listed beside the system's drivers, never forced."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+
+from clpt.device import runtimes
+
+
+@pytest.fixture
+def wheel(tmp_path, monkeypatch, cache_folder):
+    """An environment with the wheel, and a system with one driver and one placeholder."""
+    library = tmp_path / "lib" / "libintelocl.so"
+    library.parent.mkdir()
+    library.touch()
+    system = tmp_path / "vendors"
+    system.mkdir()
+    (system / "pocl.icd").write_text("libpocl.so.2\n")
+    (system / "placeholder.icd").write_text("/opt/placeholder/libintelocl.so")
+    monkeypatch.setattr(runtimes, "_SYSTEM", system)
+    monkeypatch.setattr(runtimes, "wheel_library", lambda: library)
+    monkeypatch.setattr(runtimes.sys, "platform", "linux")
+    monkeypatch.setattr(runtimes.sys, "prefix", str(tmp_path))
+    monkeypatch.setenv(runtimes.VARIABLE, "")
+    return library
+
+
+def announce() -> str | None:
+    runtimes.announce.__wrapped__()
+    return os.environ.get(runtimes.VARIABLE)
+
+
+def test_both_are_listed(wheel):
+    folder = announce()
+    assert runtimes.icd_files([runtimes.Path(folder)]) == {
+        "clpt-intel-cpu.icd": str(wheel),
+        "pocl.icd": "libpocl.so.2",
+    }
+
+
+def test_what_the_user_set_stays(wheel, monkeypatch):
+    monkeypatch.setenv(runtimes.VARIABLE, "/my/own")
+    assert announce() == "/my/own"
+
+
+def test_a_system_that_has_it_is_left_alone(wheel):
+    (runtimes._SYSTEM / "intel.icd").write_text(str(wheel))
+    assert not announce()
+
+
+def test_nothing_without_the_wheel(wheel, monkeypatch):
+    monkeypatch.setattr(runtimes, "wheel_library", lambda: None)
+    assert not announce()
+
+
+def test_an_unwritable_cache_is_a_warning(wheel, monkeypatch, tmp_path, caplog):
+    (tmp_path / "file").touch()
+    monkeypatch.setattr(runtimes.cache, "folder", lambda: tmp_path / "file")
+    assert not announce()
+    assert "cannot be made known" in caplog.text
