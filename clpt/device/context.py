@@ -179,7 +179,7 @@ def trial(info: DeviceInfo) -> str | None:
     try:
         context = cl.Context([info.cl_device])
         queue = _queue(context, info.cl_device, False)
-        kernel = cl.Kernel(cl.Program(context, _TRIAL).build(), "trial")
+        kernel = cl.Kernel(cl.Program(context, _TRIAL).build(cache_dir=False), "trial")
         result = np.zeros(4, np.uint32)
         buffer = cl.Buffer(context, cl.mem_flags.WRITE_ONLY, result.nbytes)
         kernel(queue, result.shape, None, buffer)

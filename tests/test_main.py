@@ -1,0 +1,58 @@
+"""The entry point: one line and a status, whatever happens."""
+
+from __future__ import annotations
+
+import click
+import pytest
+
+from clpt import __main__ as entry
+from clpt import cli
+from clpt.errors import SceneError
+
+
+@pytest.fixture
+def failing(monkeypatch):
+    """Make the command `fail` of the command line raise something."""
+
+    def install(error: BaseException) -> None:
+        @click.command()
+        def fail() -> None:
+            raise error
+
+        monkeypatch.setattr(cli._Commands, "get_command", lambda self, ctx, name: fail)
+
+    return install
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "line"),
+    [
+        (SceneError("no shape", file="a.xml", line=3), 2, "clpt: error: a.xml:3: no shape\n"),
+        (SceneError("two\nlines"), 2, "clpt: error: two lines\n"),
+        (click.UsageError("what?"), 2, "clpt: error: what?\n"),
+        (KeyboardInterrupt(), 130, "clpt: error: interrupted\n"),
+    ],
+)
+def test_status_and_line(failing, capsys, error, status, line):
+    failing(error)
+    assert entry.run(["fail"]) == status
+    assert capsys.readouterr().err.lstrip("\n") == line
+
+
+def test_a_fault_of_our_own_keeps_its_traceback(failing, capsys, monkeypatch, tmp_path):
+    monkeypatch.setattr(entry.platformdirs, "user_log_dir", lambda *a, **k: str(tmp_path / "log"))
+    failing(ZeroDivisionError("division by zero"))
+    assert entry.run(["fail"]) == 1
+    err = capsys.readouterr().err
+    assert err.startswith("clpt: error: ZeroDivisionError: division by zero (a fault of clpt")
+    assert err.count("\n") == 1
+    assert "raise error" in (tmp_path / "log" / "traceback.txt").read_text()
+
+
+def test_help_and_unknown_commands(capsys):
+    assert entry.run([]) == 0
+    assert "devices" in capsys.readouterr().out
+    assert entry.run(["unknown"]) == 2
+    assert capsys.readouterr().err == "clpt: error: No such command 'unknown'.\n"
+    assert entry.run(["devices", "--colour"]) == 2
+    assert "--colour" in capsys.readouterr().err
