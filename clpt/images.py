@@ -81,8 +81,12 @@ def write(
         elif suffix == ".png":
             stored = to_srgb8(pixels, exposure)
             Image.fromarray(stored[..., 0] if stored.shape[2] == 1 else stored).save(path)
+        elif suffix == ".hdr":
+            _write_hdr(path, pixels)
+        elif suffix == ".pfm":
+            _write_pfm(path, pixels)
         else:
-            {".hdr": _write_hdr, ".pfm": _write_pfm, ".npy": np.save}[suffix](path, pixels)
+            np.save(path, pixels)
     except (OSError, RuntimeError, ValueError) as error:
         raise SceneError(f"cannot be written: {error}", file=path) from error
 
@@ -188,14 +192,13 @@ def _write_exr(
     path: Path, pixels: Array, half: bool, metadata: Metadata, layers: Mapping[str, ArrayLike]
 ) -> None:
     channels = {}
-    names = {1: "Y", 3: "RGB", 4: "RGBA"}[pixels.shape[2]]
-    parts = [("", names, pixels)]
+    parts = [("", tuple({1: "Y", 3: "RGB", 4: "RGBA"}[pixels.shape[2]]), pixels)]
     for name, given in layers.items():
         layer = np.asarray(given, np.float32)
         layer = layer[..., None] if layer.ndim == 2 else layer
         if layer.shape[:2] != pixels.shape[:2] or layer.shape[2] not in (1, 3, 4):
             _fail(path, f"layer {name!r} has shape {layer.shape}, the image {pixels.shape}")
-        letters = {1: ("",), 3: (".R", ".G", ".B"), 4: (".R", ".G", ".B", ".A")}[layer.shape[2]]
+        letters = (".R", ".G", ".B", ".A")[: layer.shape[2]] if layer.shape[2] > 1 else ("",)
         parts.append((name, letters, layer))
     for name, letters, layer in parts:
         stored = np.clip(layer, -_HALF_MAX, _HALF_MAX).astype(np.float16) if half else layer
