@@ -11,7 +11,7 @@ import pyopencl as cl
 from .. import device as dev
 from ..errors import MemoryBudgetError
 
-_GROUP = 64  # work-items of a group in kernels with one for each triangle or node
+_GROUP = 8  # work-items of a group in kernels with one for each triangle or node
 _RUN = 2048  # items whose bounds one work-item finds
 _PROGRAMS: weakref.WeakKeyDictionary[dev.Device, dict[str, dev.Program]]
 _PROGRAMS = weakref.WeakKeyDictionary()
@@ -70,9 +70,7 @@ class Tree:
     levels: int
 
 
-def over_triangles(
-    device: dev.Device, count: int, vertices: cl.Buffer, faces: cl.Buffer
-) -> Tree:
+def over_triangles(device: dev.Device, count: int, vertices: cl.Buffer, faces: cl.Buffer) -> Tree:
     """Build over `count` triangles."""
     return _build(device, count, "build_triangles", vertices=vertices, faces=faces)
 

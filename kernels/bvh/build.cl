@@ -14,7 +14,7 @@
 
 #define BVH_ITEM 0x40000000u
 #define BUILD_BINS 8
-#define BUILD_LEAF 2 /* items of a leaf, at most */
+#define BUILD_LEAF 4 /* items of a leaf, at most */
 
 typedef struct { uint node, first, count, depth; } Range;
 
