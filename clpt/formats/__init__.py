@@ -1,4 +1,4 @@
-"""Scene files: `load(path)` returns the plain-data Scene that a file of any known format describes."""
+"""Scene files: `load(path)` returns the plain-data Scene that a file of any format describes."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from clpt.errors import SceneError
-from clpt.formats import mesh, mitsuba, studio
+from clpt.formats import mesh, mitsuba, native, studio
 from clpt.scene import Scene
 
 FORMATS: dict[str, Callable[..., Scene]] = {
+    ".json": native.load,
     ".xml": mitsuba.load,
     **dict.fromkeys(mesh.SUFFIXES, studio.load),
 }

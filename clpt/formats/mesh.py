@@ -18,12 +18,11 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from clpt import transforms
+from clpt import images, transforms
 from clpt.errors import SceneError
 from clpt.scene.materials import Diffuse, Material, TwoSided
 from clpt.scene.shapes import Mesh
 from clpt.scene.textures import Bitmap
-from clpt.spectra import RGB
 
 SUFFIXES = (".obj", ".ply", ".stl", ".off", ".glb", ".gltf")
 # What trimesh decodes, and what changes neither shape nor base colour.
@@ -94,7 +93,7 @@ def join(meshes: list[Mesh]) -> Mesh:
 
 
 def smooth_normals(vertices: NDArray[Any], faces: NDArray[Any]) -> NDArray[np.float32]:
-    """Vertex normals (n, 3): faces' normals weighted by their angles (Thuermer and Wuethrich 1998)."""
+    """Vertex normals (n, 3): those of the faces, weighted by angle (Thuermer, Wuethrich 1998)."""
     corners = vertices[faces].astype(np.float64)
     total = np.zeros((len(vertices), 3))
     normals = _unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
@@ -187,9 +186,7 @@ def _open(path: Path, materials: bool) -> trimesh.Scene:
         raise SceneError(f"cannot be read as a {suffix} mesh: {reason}", file=path) from None
 
 
-def _mesh(
-    path: Path, name: str, geometry: Any, materials: bool, notes: list[str]
-) -> Mesh | None:
+def _mesh(path: Path, name: str, geometry: Any, materials: bool, notes: list[str]) -> Mesh | None:
     if not isinstance(geometry, trimesh.Trimesh):
         notes.append(f"{name}: left out, since it has no triangles")
         return None
@@ -254,10 +251,9 @@ def _material(visual: Any, notes: list[str]) -> Material:
     if any(getattr(material, name, None) is not None for name in extra):
         notes.append("of materials, only base colours are taken")
     if image is None:
-        return TwoSided(front=Diffuse(reflectance=RGB(*colour), name=material.name or ""))
-    texels = np.asarray(image.convert("RGB"), np.float32) / 255.0
-    linear = np.where(texels <= 0.04045, texels / 12.92, ((texels + 0.055) / 1.055) ** 2.4)
-    texture = Bitmap(image=(linear * colour).astype(np.float32), raw=True)
+        return TwoSided(front=Diffuse(reflectance=tuple(colour), name=material.name or ""))
+    texels = images.from_pillow(image.convert("RGB")) * np.asarray(colour, np.float32)
+    texture = Bitmap(image=texels, raw=True)
     return TwoSided(front=Diffuse(reflectance=texture, name=material.name or ""))
 
 

@@ -1,7 +1,7 @@
 """Scenes in Mitsuba 3's XML; names of Mitsuba 0.6 and 2 in camel case are read as well.
 
-What is not supported, and a parameter that nothing asks for, is an error that names the element, the
-file and the line; so a picture is never silently a different one.
+What is not supported, and a parameter that nothing asks for, is an error that names the element,
+the file and the line; so a picture is never silently a different one.
 """
 
 from __future__ import annotations

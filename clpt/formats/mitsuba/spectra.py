@@ -1,7 +1,7 @@
 """Colours, spectra and textures of a Mitsuba scene.
 
-An <rgb> or a number in an emitter is a multiple of D65; a <spectrum> there is taken as it is. Mitsuba's
-bitmaps have v = 0 in their top row and ours in the bottom row, which `to_uv` makes up for.
+An <rgb> or a number in an emitter is a multiple of D65; a <spectrum> there is taken as it is.
+Mitsuba's bitmaps have v = 0 in their top row, ours in the bottom row, which `to_uv` makes up for.
 """
 
 from __future__ import annotations
@@ -13,25 +13,21 @@ import numpy as np
 
 from clpt import spectra
 from clpt.errors import UnknownKindError
+from clpt.formats.colour import colour
 from clpt.formats.mitsuba.values import Properties, number, numbers, placed
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene.textures import Bitmap, Checkerboard, Texture
-from clpt.spectra import RGB, Blackbody, Constant, RGBIlluminant, RGBUnbounded, Spectrum, Tabulated
+from clpt.spectra import Blackbody, Constant, RGBIlluminant, Spectrum, Tabulated
 
-COLOURS: dict[str, type[Spectrum]] = {
-    "reflectance": RGB,
-    "index": RGBUnbounded,
-    "emission": RGBIlluminant,
-}
 TOP_DOWN = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
 
 
-def reflectance(props: Properties, name: str, default: float) -> Spectrum | Texture:
+def reflectance(props: Properties, name: str, default: float) -> Any:
     """Take a reflectance: a number, a colour, a spectrum or a texture."""
-    return _take(props, name, "reflectance", Constant(default))
+    return _take(props, name, "reflectance", default)
 
 
-def emission(props: Properties, name: str, *, textured: bool = False) -> Spectrum | Texture:
+def emission(props: Properties, name: str, *, textured: bool = False) -> Any:
     """Take an emitted spectrum, D65 where none is given."""
     value = _take(props, name, "emission", RGBIlluminant(1.0, 1.0, 1.0))
     if isinstance(value, Texture) and not textured:
@@ -39,15 +35,15 @@ def emission(props: Properties, name: str, *, textured: bool = False) -> Spectru
     return value
 
 
-def index(props: Properties, name: str, default: float) -> Spectrum:
+def index(props: Properties, name: str, default: float) -> Any:
     """Take an optical constant of a conductor: a number, a colour or a spectrum."""
-    value = _take(props, name, "index", Constant(default))
+    value = _take(props, name, "index", default)
     if isinstance(value, Texture):
         raise props.element.error(f"{name!r} cannot be a texture")
     return value
 
 
-def ior(props: Properties, name: str, default: str) -> Spectrum:
+def ior(props: Properties, name: str, default: str) -> Any:
     """Take a refractive index: a number or a name, without dispersion as Mitsuba has it."""
     child = props.take(name)
     if child is None:
@@ -55,10 +51,7 @@ def ior(props: Properties, name: str, default: str) -> Spectrum:
     if child.tag == "string":
         with placed(child):
             return spectra.glass(child.attribute("value"), dispersion=False)
-    value = number(child)
-    if value < 0.0:
-        raise child.error("an index of refraction cannot be negative")
-    return Constant(value)
+    return number(child)
 
 
 def real(props: Properties, name: str, default: float) -> float | Texture:
@@ -70,7 +63,7 @@ def real(props: Properties, name: str, default: float) -> float | Texture:
     return texture(target, props) if target.tag == "texture" else number(target)
 
 
-def _take(props: Properties, name: str, role: str, default: Spectrum) -> Spectrum | Texture:
+def _take(props: Properties, name: str, role: str, default: Any) -> Any:
     child = props.take(name)
     if child is None:
         return default
@@ -81,12 +74,12 @@ def _take(props: Properties, name: str, role: str, default: Spectrum) -> Spectru
         return _spectrum(target, role, props)
 
 
-def _spectrum(child: Element, role: str, props: Properties) -> Spectrum:
+def _spectrum(child: Element, role: str, props: Properties) -> Any:
     if child.tag in ("float", "integer"):
         value = number(child)
-        return RGBIlluminant(value, value, value) if role == "emission" else Constant(value)
+        return colour(role, [value] * 3) if role == "emission" else value
     if child.tag in ("rgb", "srgb"):
-        return COLOURS[role](*_colour(child))
+        return colour(role, _colour(child))
     if child.tag != "spectrum":
         raise child.error("must be a number, a colour, a spectrum or a texture")
     if child.type:
@@ -139,17 +132,17 @@ def _blackbody(props: Properties) -> Spectrum:
 
 
 def _d65(props: Properties) -> Spectrum:
-    colour = props.take("color")
-    rgb = _colour(colour) if colour is not None else [1.0, 1.0, 1.0]
+    child = props.take("color")
+    rgb = _colour(child) if child is not None else [1.0, 1.0, 1.0]
     scale = props.number("scale", 1.0)
-    return RGBIlluminant(*(scale * value for value in rgb))
+    return colour("emission", [scale * value for value in rgb])
 
 
 def _srgb(props: Properties) -> Spectrum:
-    colour = props.take("color")
-    if colour is None:
+    child = props.take("color")
+    if child is None:
         raise props.element.error("needs the parameter 'color'")
-    return RGBUnbounded(*_colour(colour))
+    return colour("index", _colour(child))
 
 
 def _irregular(props: Properties) -> Spectrum:
@@ -227,7 +220,7 @@ def _checkerboard(props: Properties) -> Checkerboard:
     )
 
 
-def _plain(props: Properties, name: str, default: float) -> Spectrum:
+def _plain(props: Properties, name: str, default: float) -> Any:
     value = reflectance(props, name, default)
     if isinstance(value, Texture):
         raise props.element.error(f"{name!r} cannot be a texture")

@@ -1,4 +1,4 @@
-"""The parameters of one object of a Mitsuba scene: typed, with defaults, each taken exactly once."""
+"""The parameters of an object of a Mitsuba scene: typed, with defaults, each taken once."""
 
 from __future__ import annotations
 
@@ -16,10 +16,12 @@ from clpt.errors import SceneError, UnusedParameterError
 from clpt.formats.mitsuba.xml import Document, Element
 
 VALUES = {
-    "integer", "float", "string", "boolean", "vector", "point", "rgb", "srgb", "spectrum", "transform",
+    "integer", "float", "string", "boolean", "vector", "point", "rgb", "srgb", "spectrum",
+    "transform",
 }  # fmt: skip
 OBJECTS = {
-    "integrator", "sensor", "sampler", "film", "rfilter", "bsdf", "texture", "emitter", "shape", "ref",
+    "integrator", "sensor", "sampler", "film", "rfilter", "bsdf", "texture", "emitter", "shape",
+    "ref",
 }  # fmt: skip
 SEPARATOR = re.compile(r"[\s,]+")
 LARGEST_INTEGER = 2**31 - 1
@@ -241,9 +243,9 @@ def triple(child: Element, attribute: str, default: float) -> np.ndarray:
         if len(values) != 3:
             raise child.error(f"{attribute} must be 3 numbers, not {len(values)}")
         return np.array(values)
-    return np.array([
-        numbers(child, axis, 1)[0] if axis in child.attributes else default for axis in "xyz"
-    ])
+    return np.array(
+        [numbers(child, axis, 1)[0] if axis in child.attributes else default for axis in "xyz"]
+    )
 
 
 def transform(element: Element) -> transforms.Matrix:

@@ -1,7 +1,7 @@
 """Mitsuba's XML as a tree of elements that know their file and line.
 
-`default`, `$name`, `include` and `path` are resolved here, in document order, so that the rest of the
-loader sees objects and values only. Document types are refused, and with them every entity bomb.
+`default`, `$name`, `include` and `path` are resolved here, in document order, so that the rest of
+the loader sees objects and values only. Document types are refused, and with them entity bombs.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ class Document:
     folders: list[Path]
 
     def find_file(self, element: Element, name: str) -> Path:
-        """Resolve a file name that `element` gives. Raises SceneError where there is no such file."""
+        """Resolve a file name that `element` gives. Raises SceneError where there is none."""
         return _find(element, name, self.folders)
 
 

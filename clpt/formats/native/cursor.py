@@ -1,0 +1,152 @@
+"""Values of a JSON file that know where they stand: "shapes[3].material.alpha_u", file and line.
+
+The values come from the standard library's parser; the line is looked for only when a message needs
+it, by walking the text along the value's path.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from json.decoder import scanstring
+from pathlib import Path
+from typing import Any
+
+from clpt.errors import SceneError
+
+LARGEST_INTEGER = 2**31 - 1
+SKIPPED = re.compile(r"[\s,:]*")
+NAMES = {
+    dict: "an object", list: "a list", str: "a string", bool: "true or false", float: "a number",
+    int: "a number", type(None): "null",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Twice:
+    """Stands for an object in which a key is given twice."""
+
+    key: str
+
+
+@dataclass(frozen=True)
+class Cursor:
+    """A value of a JSON file and the keys that lead to it."""
+
+    value: Any
+    file: Path
+    text: str
+    path: tuple[str | int, ...] = ()
+
+    def place(self) -> dict[str, Any]:
+        """Keyword arguments that tell an exception where it happened."""
+        where = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in self.path)
+        line = _line(self.text, self.path)
+        return {"file": self.file, "line": line, "where": where.removeprefix(".") or None}
+
+    def error(self, message: str) -> SceneError:
+        """Return an exception that names this value."""
+        return SceneError(message, **self.place())
+
+    def expect(self, kind: type, what: str = "") -> Any:
+        """Return the value, which must be of a type."""
+        if isinstance(self.value, Twice):
+            raise self.error(f"the key {self.value.key!r} is given twice")
+        if not isinstance(self.value, kind):
+            found = NAMES.get(type(self.value), "something else")
+            raise self.error(f"must be {what or NAMES[kind]}, not {found}")
+        return self.value
+
+    def at(self, key: str | int) -> Cursor:
+        """Return the value of a key or an index."""
+        return Cursor(self.value[key], self.file, self.text, (*self.path, key))
+
+    def items(self) -> Iterator[tuple[str, Cursor]]:
+        """Yield the keys and values of an object."""
+        for key in self.expect(dict):
+            yield key, self.at(key)
+
+    def entries(self, count: int = 0) -> list[Cursor]:
+        """Return the values of a list, `count` of them unless that is 0."""
+        values = self.expect(list)
+        if count and len(values) != count:
+            raise self.error(f"must have {count} entries, not {len(values)}")
+        return [self.at(i) for i in range(len(values))]
+
+    def number(self) -> float:
+        """Return a finite number."""
+        if isinstance(self.value, bool) or not isinstance(self.value, (int, float)):
+            self.expect(str if isinstance(self.value, Twice) else float, "a number")
+            raise self.error("must be a number, not true or false")
+        try:
+            value = float(self.value)
+        except OverflowError:
+            value = math.inf
+        if not math.isfinite(value):
+            raise self.error("must be a finite number")
+        return value
+
+    def integer(self) -> int:
+        """Return a whole number below 2^31."""
+        value = self.number()
+        if value != int(value) or abs(value) > LARGEST_INTEGER:
+            raise self.error(f"must be a whole number below 2^31, not {value:g}")
+        return int(value)
+
+    def numbers(self, count: int = 0) -> list[float]:
+        """Return a list of finite numbers, `count` of them unless that is 0."""
+        return [entry.number() for entry in self.entries(count)]
+
+
+def parse(path: Path) -> Cursor:
+    """Read a JSON file whose outermost value is an object.
+
+    Raises SceneError with the line for what is not JSON.
+    """
+    try:
+        text = path.read_text("utf-8-sig")
+        value = json.loads(text, object_pairs_hook=_object)
+    except json.JSONDecodeError as error:
+        raise SceneError(f"is not JSON: {error.msg}", file=path, line=error.lineno) from None
+    except OSError as error:
+        raise SceneError(f"cannot be read: {error.strerror}", file=path) from None
+    except RecursionError:
+        raise SceneError("is nested too deeply", file=path) from None
+    except ValueError as error:
+        raise SceneError(f"is not JSON: {str(error)[:100]}", file=path) from None
+    cursor = Cursor(value, path, text)
+    cursor.expect(dict)
+    return cursor
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any] | Twice:
+    values = dict(pairs)
+    if len(values) == len(pairs):
+        return values
+    keys = [key for key, _ in pairs]
+    return Twice(next(key for i, key in enumerate(keys) if key in keys[:i]))
+
+
+def _line(text: str, path: tuple[str | int, ...]) -> int:
+    """Line on which the value at `path` starts, in a text that is known to be JSON."""
+    decoder = json.JSONDecoder()
+    at = _skip(text, 0)
+    for wanted in path:
+        at, count = _skip(text, at + 1), 0
+        while True:
+            key: str | int = count
+            if isinstance(wanted, str):
+                key, at = scanstring(text, at + 1)
+                at = _skip(text, at)
+            if key == wanted:
+                break
+            at, count = _skip(text, decoder.raw_decode(text, at)[1]), count + 1
+    return text.count("\n", 0, at) + 1
+
+
+def _skip(text: str, at: int) -> int:
+    match = SKIPPED.match(text, at)
+    return match.end() if match else at

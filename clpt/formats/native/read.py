@@ -1,0 +1,315 @@
+"""scene.json, one-to-one with the dataclasses of clpt.scene: a kind reads what it declares."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from clpt import spectra, transforms
+from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
+from clpt.formats import mesh
+from clpt.formats.native import spectra as json_spectra
+from clpt.formats.native.cursor import Cursor, parse
+from clpt.formats.native.spectra import find_file, kind_name
+from clpt.scene import Scene, cameras, integrators, kinds, lights, materials, shapes
+from clpt.scene.params import SPECTRUM_ROLES, Kind, Param, params
+
+KEYS = (
+    "$schema", "name", "camera", "film", "integrator", "sampler", "materials", "shapes", "lights",
+    "spp", "seed",
+)  # fmt: skip
+# A mesh's arrays: numbers in a row, and of what type.
+ARRAYS = {
+    "vertices": (3, "number"),
+    "faces": (3, "integer"),
+    "normals": (3, "number"),
+    "uvs": (2, "number"),
+}
+BASES: dict[str, type[Kind]] = {
+    "material": materials.Material,
+    "light": lights.Light,
+    "shape": shapes.Shape,
+    "camera": cameras.Camera,
+    "integrator": integrators.Integrator,
+    "sampler": integrators.Sampler,
+    "filter": integrators.Filter,
+}
+
+
+def load(path: Path) -> Scene:
+    """Read a scene.json.
+
+    Raises SceneError, UnknownKindError and UnusedParameterError with file, line and place.
+    """
+    return _Reader(parse(path)).scene()
+
+
+def default(field: dataclasses.Field) -> Any:
+    """Return the default of a dataclass's field."""
+    made = field.default_factory
+    return field.default if made is dataclasses.MISSING else made()
+
+
+class _Reader:
+    """Reads one file; keeps the materials by name so that they are shared."""
+
+    def __init__(self, root: Cursor):
+        self.root = root
+        self.materials: dict[str, materials.Material | None] = {}
+        self.warnings: list[str] = []
+        self.special: dict[str, Callable[[Cursor], Any]] = {
+            "back": self.material,
+            "emission": lambda c: None if c.value is None else self.kind(c, "light"),
+            "image": _image,
+            **{name: _array_reader(*form) for name, form in ARRAYS.items()},
+        }
+
+    def scene(self) -> Scene:
+        root = self.root
+        for key in root.value:
+            if key not in KEYS:
+                raise UnusedParameterError("a scene", key, KEYS, **root.at(key).place())
+        if "camera" not in root.value:
+            raise root.error("needs a 'camera'")
+        given: dict[str, Any] = {}
+        for key, read in {
+            "camera": lambda c: self.kind(c, "camera"),
+            "film": lambda c: self.make(c, integrators.Film, ()),
+            "integrator": lambda c: self.kind(c, "integrator"),
+            "sampler": lambda c: self.kind(c, "sampler"),
+            "lights": lambda c: [self.light(entry) for entry in c.entries()],
+            "shapes": lambda c: [made for entry in c.entries() for made in self.shape(entry)],
+            "spp": Cursor.integer,
+            "seed": Cursor.integer,
+            "name": lambda c: c.expect(str),
+        }.items():
+            if key in root.value:
+                given[key] = read(root.at(key))
+        if "materials" in root.value:
+            for _, cursor in root.at("materials").items():
+                self.material(cursor)
+        given.setdefault("name", root.file.stem)
+        with_place = root.at("spp") if "spp" in root.value else root
+        return _placed(
+            with_place,
+            lambda: Scene(**given, warnings=self.warnings, extra={"format": "native"}),
+        )
+
+    def kind(self, cursor: Cursor, category: str) -> Any:
+        """Read an object of one of a category's kinds."""
+        table = kinds(category)
+        return self.make(cursor, table[kind_name(cursor, category, table)], ("type",))
+
+    def make(self, cursor: Cursor, cls: type[Kind], more: tuple[str, ...]) -> Any:
+        """Read an object of a kind; `more` are keys that are no parameters."""
+        declared = params(cls)
+        shortcut = ("metal",) if {"eta", "k"} <= declared.keys() else ()
+        defaults = {field.name: default(field) for field in dataclasses.fields(cls)}
+        given: dict[str, Any] = {}
+        for key, child in cursor.items():
+            if key in declared:
+                given[key] = self.parameter(child, key, declared[key], defaults[key])
+            elif key not in (*more, *shortcut):
+                known = (*declared, *shortcut)
+                raise UnusedParameterError(cls.kind, key, known, **child.place())
+        if shortcut and "metal" in cursor.value:
+            if "eta" in given or "k" in given:
+                raise cursor.at("metal").error("stands for 'eta' and 'k'; give either")
+            given["eta"], given["k"] = _metal(cursor.at("metal"))
+        return _placed(cursor, lambda: cls(**given))
+
+    def parameter(self, cursor: Cursor, name: str, param: Param, value: Any) -> Any:
+        """Read one parameter by its role, or what only the host needs by its name or default."""
+        if param.role in ("flag", "choice"):
+            return cursor.value
+        texture = isinstance(cursor.value, dict) and cursor.value.get("type") in kinds("texture")
+        if texture and param.textured:
+            return self.kind(cursor, "texture")
+        if param.role in SPECTRUM_ROLES:
+            return json_spectra.read(cursor, param.role, name)
+        if param.role == "real":
+            return cursor.number()
+        return self.special[name](cursor) if name in self.special else self.plain(cursor, value)
+
+    def plain(self, cursor: Cursor, value: Any) -> Any:
+        """Read what has the type of a default."""
+        if isinstance(value, materials.Material):
+            return self.material(cursor)
+        if isinstance(value, Kind):
+            return self.kind(
+                cursor, next(c for c, base in BASES.items() if isinstance(value, base))
+            )
+        if isinstance(value, np.ndarray):
+            return _matrix(cursor, len(value))
+        if isinstance(value, (bool, str)):
+            return cursor.expect(type(value))
+        if isinstance(value, int):
+            return cursor.integer()
+        if isinstance(value, float):
+            return cursor.number()
+        if isinstance(value, tuple) and value and isinstance(value[0], str):
+            return tuple(entry.expect(str) for entry in cursor.entries())
+        return tuple(cursor.numbers(len(value)))
+
+    def light(self, cursor: Cursor) -> Any:
+        if kind_name(cursor, "light", kinds("light")) == "area":
+            raise cursor.error("an area light stands in a shape's 'emission'")
+        return self.kind(cursor, "light")
+
+    def material(self, cursor: Cursor) -> Any:
+        """Read a material, or find the one of that name."""
+        if cursor.value is None or isinstance(cursor.value, dict):
+            in_table = len(cursor.path) == 2 and cursor.path[0] == "materials"
+            if in_table:
+                return self.named(str(cursor.path[1]), cursor)
+            return self.kind(cursor, "material") if cursor.value is not None else None
+        return self.named(cursor.expect(str, "a material or its name"), cursor)
+
+    def named(self, name: str, asked_by: Cursor) -> Any:
+        if name not in self.materials:
+            table = self.root.value.get("materials", {})
+            if not isinstance(table, dict) or name not in table:
+                known = table if isinstance(table, dict) else ()
+                raise UnknownKindError("material name", name, known, **asked_by.place())
+            cursor = self.root.at("materials").at(name)
+            self.materials[name] = None
+            made = self.kind(cursor, "material")
+            self.materials[name] = made if made.name else dataclasses.replace(made, name=name)
+        if self.materials[name] is None:
+            raise asked_by.error(f"the material {name!r} refers to itself")
+        return self.materials[name]
+
+    def shape(self, cursor: Cursor) -> list[shapes.Shape]:
+        """Read a shape; a mesh file may hold several, with materials of their own."""
+        kind = kind_name(cursor, "shape", kinds("shape"))
+        if kind != "mesh" or "file" not in cursor.value:
+            made = self.kind(cursor, "shape")
+            return [_checked_mesh(cursor, made, self.warnings)] if kind == "mesh" else [made]
+        for key in ARRAYS:
+            if key in cursor.value:
+                raise cursor.at(key).error("stands in the 'file' already; give either")
+        frame = self.make(cursor, shapes.Mesh, ("type", "file"))
+        child = cursor.at("file")
+        loaded = _placed(child, lambda: mesh.read_mesh(find_file(child)))
+        self.warnings += [f"{child.value}: {note}" for note in loaded.warnings]
+        return [_in_frame(part, frame, "material" in cursor.value) for part in loaded.meshes]
+
+
+def _in_frame(part: shapes.Mesh, frame: shapes.Mesh, dressed: bool) -> shapes.Mesh:
+    return dataclasses.replace(
+        frame,
+        material=frame.material if dressed else part.material,
+        to_world=np.asarray(frame.to_world) @ part.to_world,
+        name=frame.name or part.name,
+        vertices=part.vertices,
+        faces=part.faces,
+        normals=part.normals,
+        uvs=part.uvs,
+    )
+
+
+def _checked_mesh(cursor: Cursor, made: shapes.Mesh, notes: list[str]) -> shapes.Mesh:
+    """Check the arrays of a mesh that is given in the JSON itself."""
+    if made.vertices is None or made.faces is None:
+        raise cursor.error("a mesh needs a 'file', or 'vertices' and 'faces'")
+    for name in ("normals", "uvs"):
+        values = getattr(made, name)
+        if values is not None and len(values) != len(made.vertices):
+            raise cursor.at(name).error(f"must be one for each of {len(made.vertices)} vertices")
+    faces = made.faces.astype(np.int64)
+    arrays = _placed(
+        cursor,
+        lambda: mesh.checked(None, "", made.vertices, faces, made.normals, made.uvs, notes),
+    )
+    if not len(arrays["faces"]):
+        raise cursor.error("holds no triangles")
+    return dataclasses.replace(made, **arrays)
+
+
+def _placed(cursor: Cursor, make: Callable[[], Any]) -> Any:
+    """Return make(); errors that know no line get the cursor's, or that of the key they name."""
+    try:
+        return make()
+    except SceneError as error:
+        if error.line is not None:
+            raise
+        key = (error.where or "").rpartition(".")[2]
+        inner = isinstance(cursor.value, dict) and key in cursor.value
+        raise (cursor.at(key) if inner else cursor).error(error.message) from None
+
+
+def _metal(cursor: Cursor) -> tuple[spectra.Spectrum, spectra.Spectrum]:
+    name = cursor.expect(str)
+    if name not in spectra.metals():
+        raise UnknownKindError("metal", name, spectra.metals(), **cursor.place())
+    return spectra.metal(name)
+
+
+def _image(cursor: Cursor) -> Any:
+    if isinstance(cursor.value, list):
+        return [find_file(entry) for entry in cursor.entries(6)]
+    return find_file(cursor)
+
+
+def _array_reader(width: int, item: str) -> Callable[[Cursor], np.ndarray | None]:
+    return lambda cursor: _array(cursor, width, np.uint32 if item == "integer" else np.float32)
+
+
+def _array(cursor: Cursor, width: int, dtype: type) -> np.ndarray | None:
+    if cursor.value is None:
+        return None
+    rows = cursor.expect(list)
+    try:
+        values = np.asarray(rows, np.float64).reshape(-1, width)
+        valid = len(values) == len(rows) and not any(isinstance(row, (int, float)) for row in rows)
+    except (ValueError, TypeError, OverflowError):
+        valid = False
+    if not valid:
+        raise cursor.error(f"must be a list of rows of {width} numbers")
+    if dtype is np.uint32 and not ((values >= 0) & (values < 2**31) & (values % 1 == 0)).all():
+        raise cursor.error("must be whole numbers from zero")
+    return values.astype(dtype)
+
+
+STEPS: dict[str, Callable[[Cursor], transforms.Matrix]] = {
+    "translate": lambda c: transforms.translate(c.numbers(3)),
+    "scale": lambda c: transforms.scale(c.numbers(3) if isinstance(c.value, list) else c.number()),
+    "rotate": lambda c: transforms.rotate(
+        *_fields(c, axis=lambda a: a.numbers(3), angle=Cursor.number)
+    ),
+    "look_at": lambda c: transforms.look_at(
+        *_fields(c, **dict.fromkeys(("origin", "target", "up"), lambda v: v.numbers(3)))
+    ),
+}
+
+
+def _matrix(cursor: Cursor, size: int) -> transforms.Matrix:
+    """Read a transform: rows of a matrix, or steps of which the first is applied first."""
+    value = cursor.value
+    if isinstance(value, list) and all(isinstance(row, list) for row in value):
+        return np.array([row.numbers(size) for row in cursor.entries(size)])
+    steps = [cursor] if isinstance(value, dict) else cursor.entries()
+    matrix = np.eye(4)
+    for step in steps:
+        for name, child in step.items():
+            if name not in STEPS or len(step.value) != 1:
+                raise UnknownKindError("transform", name, STEPS, **child.place())
+            matrix = _placed(child, lambda n=name, c=child: STEPS[n](c)) @ matrix
+    if not np.isfinite(matrix).all():
+        raise cursor.error("the transform is not finite")
+    return matrix if size == 4 else matrix[np.ix_([0, 1, 3], [0, 1, 3])]
+
+
+def _fields(cursor: Cursor, **readers: Callable[[Cursor], Any]) -> list[Any]:
+    """Read an object that must have exactly these keys."""
+    for key in cursor.expect(dict):
+        if key not in readers:
+            raise UnusedParameterError(str(cursor.path[-1]), key, readers, **cursor.at(key).place())
+    missing = [key for key in readers if key not in cursor.value]
+    if missing:
+        raise cursor.error(f"needs {missing[0]!r}")
+    return [read(cursor.at(key)) for key, read in readers.items()]

@@ -1,0 +1,146 @@
+"""Writes a Scene as scene.json, with meshes as .ply and arrays of texels as .npy beside it."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+
+from clpt.errors import SceneError
+from clpt.formats.native import spectra as json_spectra
+from clpt.formats.native.read import ARRAYS, default
+from clpt.scene import Scene, materials, shapes
+from clpt.scene.params import SPECTRUM_ROLES, Kind, Param, params
+
+NUMBERS = re.compile(r"\[\s+([^\[\]{}\"]*?)\s+\]")
+
+
+def save(scene: Scene, path: str | Path) -> None:
+    """Write a scene such that `load` gives the same content back; its folder must exist.
+
+    Raises SceneError where a file cannot be written.
+    """
+    path = Path(path)
+    writer = _Writer(path)
+    try:
+        text = json.dumps(writer.scene(scene), indent=2)
+        path.write_text(NUMBERS.sub(_on_one_line, text) + "\n", "utf-8")
+    except OSError as error:
+        raise SceneError(f"cannot be written: {error.strerror}", file=path) from None
+
+
+class _Writer:
+    """Writes one scene; what several shapes share is written once."""
+
+    def __init__(self, path: Path):
+        self.path = path
+        self.materials: dict[str, Any] = {}
+        self.names: dict[int, str] = {}
+        self.files: dict[Any, str] = {}
+
+    def scene(self, scene: Scene) -> dict[str, Any]:
+        document: dict[str, Any] = {"name": scene.name} if scene.name else {}
+        film = self.kind(scene.film)
+        del film["type"]
+        document |= {
+            "camera": self.kind(scene.camera),
+            "film": film,
+            "integrator": self.kind(scene.integrator),
+            "sampler": self.kind(scene.sampler),
+            "spp": scene.spp,
+            "seed": scene.seed,
+            "materials": self.materials,
+            "shapes": [self.kind(shape) for shape in scene.shapes],
+            "lights": [self.kind(light) for light in scene.lights],
+        }
+        return document
+
+    def kind(self, thing: Kind) -> dict[str, Any]:
+        """Return the object that stands for a thing; what has its default is left out."""
+        given: dict[str, Any] = {"type": thing.kind}
+        plain = type(thing)
+        declared = params(plain)
+        if isinstance(thing, shapes.Mesh):
+            given["file"] = self.mesh(thing)
+            declared = {name: p for name, p in declared.items() if name not in ARRAYS}
+        defaults = {field.name: default(field) for field in dataclasses.fields(plain)}
+        for name, param in declared.items():
+            written = self.parameter(name, getattr(thing, name), param)
+            implied = None if name == "image" else self.parameter(name, defaults[name], param)
+            if name == "material" or written != implied:
+                given[name] = written
+        return given
+
+    def parameter(self, name: str, value: Any, param: Param) -> Any:
+        if name == "image":
+            six = isinstance(value, (list, tuple))
+            return [self.image(face) for face in value] if six else self.image(value)
+        if isinstance(value, materials.Material):
+            return self.material(value)
+        if isinstance(value, Kind):
+            return self.kind(value)
+        if param.role in SPECTRUM_ROLES and not isinstance(value, (int, float, tuple)):
+            return json_spectra.write(value, param.role)
+        if isinstance(value, np.ndarray):
+            return value.tolist()
+        return list(value) if isinstance(value, tuple) else value
+
+    def material(self, material: materials.Material) -> Any:
+        """Return a material, or its name in the table of named ones."""
+        if not material.name:
+            return self.kind(material)
+        if id(material) not in self.names:
+            key, count = material.name, 1
+            while key in self.materials:
+                count += 1
+                key = f"{material.name} {count}"
+            self.names[id(material)] = key
+            self.materials[key] = None
+            written = self.kind(material)
+            if key == material.name:
+                del written["name"]
+            self.materials[key] = written
+        return self.names[id(material)]
+
+    def image(self, image: Any) -> str:
+        """Return the name of an image's file, which is written if there is none."""
+        if not isinstance(image, np.ndarray):
+            return os.path.relpath(image, self.path.parent)
+        if id(image) not in self.files:
+            name = f"{self.path.stem}.image{len(self.files)}.npy"
+            np.save(self.path.parent / name, np.asarray(image, np.float32))
+            self.files[id(image)] = name
+        return self.files[id(image)]
+
+    def mesh(self, mesh: shapes.Mesh) -> str:
+        """Write a mesh's arrays, unless another shape shares them; return the file's name."""
+        key = tuple(id(getattr(mesh, name)) for name in ARRAYS)
+        if key not in self.files:
+            label = re.sub(r"\W+", "_", mesh.name) or "mesh"
+            name = f"{self.path.stem}.{label}{len(self.files)}.ply"
+            (self.path.parent / name).write_bytes(_ply(mesh))
+            self.files[key] = name
+        return self.files[key]
+
+
+def _on_one_line(match: re.Match) -> str:
+    return "[" + re.sub(r"\s+", " ", match[1]) + "]"
+
+
+def _ply(mesh: shapes.Mesh) -> bytes:
+    visual = None if mesh.uvs is None else trimesh.visual.TextureVisuals(uv=mesh.uvs)
+    whole = trimesh.Trimesh(
+        vertices=mesh.vertices,
+        faces=np.asarray(mesh.faces, np.int64),
+        vertex_normals=mesh.normals,
+        visual=visual,
+        process=False,
+    )
+    written = trimesh.exchange.ply.export_ply(whole, vertex_normal=mesh.normals is not None)
+    return bytes(written)

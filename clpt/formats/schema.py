@@ -1,0 +1,209 @@
+"""The JSON Schema of scene.json, made from the dataclasses' own declarations.
+
+`python -m clpt.formats.schema` writes it to scenes/schema.json.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from clpt import spectra
+from clpt.formats.native.read import ARRAYS, BASES, default
+from clpt.formats.native.spectra import SPECTRA
+from clpt.scene import KINDS, integrators, materials
+from clpt.scene.params import SPECTRUM_ROLES, Kind, Param, params
+
+Schema = dict[str, Any]
+
+
+def _rows(width: int, item: str = "number", count: int = 0) -> Schema:
+    """An array of rows of numbers."""
+    row = {"type": "array", "items": {"type": item}, "minItems": width, "maxItems": width}
+    exact = {"minItems": count, "maxItems": count} if count else {}
+    return {"type": "array", "items": row, **exact}
+
+
+NUMBERS = {"type": "array", "items": {"type": "number"}}
+TRIPLE = {**NUMBERS, "minItems": 3, "maxItems": 3}
+ANY_OF_SCALE = {"anyOf": [{"type": "number"}, TRIPLE]}
+
+
+def schema() -> Schema:
+    """Return the JSON Schema (draft 2020-12) of a scene.json."""
+    defs: Schema = {category: _category(category) for category in KINDS}
+    defs |= {f"spectrum_{role}": _spectrum(role) for role in SPECTRUM_ROLES}
+    defs |= {"spectrum": _typed_spectra(), "step": _step(), "transform": _transform()}
+    film = _kind(integrators.Film)
+    del film["properties"]["type"], film["required"]
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "clpt scene",
+        "description": "A scene for clpt; file names are relative to this file.",
+        "type": "object",
+        "additionalProperties": False,
+        "required": ["camera"],
+        "properties": {
+            "$schema": {"type": "string"},
+            "name": {"type": "string"},
+            "camera": _ref("camera"),
+            "film": film,
+            "integrator": _ref("integrator"),
+            "sampler": _ref("sampler"),
+            "materials": {"type": "object", "additionalProperties": _ref("material")},
+            "shapes": {"type": "array", "items": _ref("shape")},
+            "lights": {"type": "array", "items": _ref("light")},
+            "spp": {"type": "integer", "minimum": 1, "description": "samples of a pixel"},
+            "seed": {"type": "integer", "description": "of the random numbers"},
+        },
+        "$defs": defs,
+    }
+
+
+def _ref(name: str) -> Schema:
+    return {"$ref": f"#/$defs/{name}"}
+
+
+def _category(category: str) -> Schema:
+    return {"oneOf": [_kind(cls) for cls in KINDS[category]]}
+
+
+def _kind(cls: type[Kind]) -> Schema:
+    """An object of one kind."""
+    defaults = {field.name: default(field) for field in dataclasses.fields(cls)}
+    properties: Schema = {"type": {"const": cls.kind}}
+    for name, param in params(cls).items():
+        properties[name] = _described(name, param, defaults[name])
+    if {"eta", "k"} <= properties.keys():
+        known = {"enum": list(spectra.metals()), "description": "stands for eta and k"}
+        properties["metal"] = known
+    if "vertices" in properties:
+        properties["file"] = {"type": "string", "description": "a mesh, in place of the arrays"}
+    summary = (cls.__doc__ or "").strip().splitlines()[0]
+    return {
+        "type": "object",
+        "description": summary,
+        "properties": properties,
+        "required": ["type"],
+        "additionalProperties": False,
+    }
+
+
+def _described(name: str, param: Param, value: Any) -> Schema:
+    made = _value(name, param, value)
+    doc = f"{param.doc} [{param.unit}]" if param.unit else param.doc
+    shown = value.tolist() if isinstance(value, np.ndarray) else value
+    shown = list(shown) if isinstance(shown, tuple) else shown
+    plain = isinstance(shown, (bool, int, float, str, list))
+    return {"description": doc, **({"default": shown} if plain else {}), **made}
+
+
+def _value(name: str, param: Param, value: Any) -> Schema:
+    if param.role == "flag":
+        return {"type": "boolean"}
+    if param.role == "choice":
+        return {"enum": list(param.choices)}
+    if param.role in SPECTRUM_ROLES:
+        made = _ref(f"spectrum_{param.role}")
+        return {"anyOf": [made, _ref("texture")]} if param.textured else made
+    if param.role == "real":
+        limits = {"minimum": param.low, "maximum": param.high}
+        number = {"type": "number", **{k: v for k, v in limits.items() if math.isfinite(v)}}
+        return {"anyOf": [number, _ref("texture")]} if param.textured else number
+    return _host(name, value)
+
+
+def _host(name: str, value: Any) -> Schema:
+    """What only the host needs, by its name or by the type of its default."""
+    if name in ARRAYS:
+        return _rows(*ARRAYS[name])
+    if name == "image":
+        name_of_file = {"type": "string"}
+        six = {"type": "array", "items": name_of_file, "minItems": 6, "maxItems": 6}
+        return {"anyOf": [name_of_file, six]}
+    if name == "emission":
+        return {"anyOf": [_ref("light"), {"type": "null"}]}
+    if name == "back" or isinstance(value, materials.Material):
+        name_in_table = {"type": "string", "description": "a name in the scene's materials"}
+        return {"anyOf": [_ref("material"), name_in_table]}
+    if isinstance(value, Kind):
+        return _ref(next(c for c, base in BASES.items() if isinstance(value, base)))
+    if isinstance(value, np.ndarray):
+        return _ref("transform")
+    if isinstance(value, tuple):
+        return {"type": "array", "items": {"type": "string"}} if _names(value) else TRIPLE
+    names = {bool: "boolean", int: "integer", float: "number", str: "string"}
+    return {"type": names[type(value)]}
+
+
+def _names(value: tuple[Any, ...]) -> bool:
+    return bool(value) and isinstance(value[0], str)
+
+
+def _spectrum(role: str) -> Schema:
+    number = {"type": "number", "minimum": 0}
+    one_of = [number, {**TRIPLE, "description": "linear Rec. 709"}, _ref("spectrum")]
+    if role == "reflectance":
+        number["maximum"] = 1
+    elif role == "emission":
+        one_of.append({"enum": list(spectra.illuminants()), "description": "an illuminant"})
+    else:
+        one_of.append({"enum": list(spectra.glasses()), "description": "a glass or liquid"})
+    return {"anyOf": one_of}
+
+
+def _typed_spectra() -> Schema:
+    file = {"type": "string", "description": "two columns, or refractiveindex.info's YAML"}
+    made = [
+        _object({"file": file}, ["file"]),
+        _object({"values": {**_rows(2), "description": "[nm, value]"}}, ["values"]),
+    ]
+    for kind, cls in SPECTRA.items():
+        properties: Schema = {"type": {"const": kind}}
+        needed = ["type"]
+        for field in dataclasses.fields(cls):  # type: ignore[arg-type]
+            listed = "tuple" in str(field.type)
+            properties[field.name] = NUMBERS if listed else {"type": "number"}
+            if field.name == "outside":
+                properties[field.name] = {"enum": ["zero", "hold"]}
+            if field.default is dataclasses.MISSING:
+                needed.append(field.name)
+        made.append(_object(properties, needed))
+    return {"anyOf": made}
+
+
+def _step() -> Schema:
+    look_at = _object(dict.fromkeys(("origin", "target", "up"), TRIPLE), ["origin", "target", "up"])
+    turn = _object({"axis": TRIPLE, "angle": {"type": "number"}}, ["axis", "angle"])
+    steps = {"translate": TRIPLE, "scale": ANY_OF_SCALE, "rotate": turn, "look_at": look_at}
+    return {"oneOf": [_object({name: made}, [name]) for name, made in steps.items()]}
+
+
+def _transform() -> Schema:
+    matrices = [_rows(size, count=size) for size in (4, 3)]
+    return {"anyOf": [*matrices, _ref("step"), {"type": "array", "items": _ref("step")}]}
+
+
+def _object(properties: Schema, required: list[str]) -> Schema:
+    return {
+        "type": "object",
+        "properties": properties,
+        "required": required,
+        "additionalProperties": False,
+    }
+
+
+def text() -> str:
+    """Return the schema as the published file has it."""
+    return json.dumps(schema(), indent=1) + "\n"
+
+
+if __name__ == "__main__":
+    target = Path(sys.argv[1] if len(sys.argv) > 1 else "scenes/schema.json")
+    target.write_text(text(), "utf-8")
