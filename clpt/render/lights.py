@@ -1,0 +1,384 @@
+"""Lights on their way to the device: their rows, how often each is chosen, and the dispatch text.
+
+What is chosen is a row of `lights`: a lamp, a shape that is sampled as a whole, or one triangle of
+an emissive mesh or cube. Infinite lights come first, for the rays that leave the scene.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from clpt import transforms
+from clpt.errors import SceneError
+from clpt.layout import Record
+from clpt.records import LIGHT, SHAPE
+from clpt.render import shapes
+from clpt.scene import lights
+from clpt.scene.lights import Light
+from clpt.scene.shapes import Shape
+
+INFINITE = ("constant", "envmap", "cube_map")  # a ray that leaves the scene meets these
+INFINITE_SHARE = 0.5  # of the choices, where there are other lights too
+
+_RADIANCE = ("integer", "first word of the emission parameter in `lamps`")
+RECORDS: dict[str, Record] = {
+    "point": Record(
+        "Point",
+        "A point light.",
+        position=("vec3", "[m]"),
+        falloff=("real", "1: irradiance falls with the square of the distance; 0: it does not"),
+        radiance=_RADIANCE,
+    ),
+    "spot": Record(
+        "Spot",
+        "A spot light.",
+        position=("vec3", "[m]"),
+        axis=("vec3", "unit vector in which it shines"),
+        cutoff=("real", "half angle beyond which it is dark [rad]"),
+        beam_width=("real", "half angle of full intensity [rad]"),
+        radiance=_RADIANCE,
+    ),
+    "directional": Record(
+        "Directional",
+        "Parallel light.",
+        direction=("vec3", "unit vector in which it travels"),
+        radiance=_RADIANCE,
+    ),
+    "constant": Record("Constant", "Even radiance from everywhere.", radiance=_RADIANCE),
+}
+KINDS = (*RECORDS, *shapes.RECORDS)  # LightRow.kind is a position in this tuple
+
+
+class Sink(Protocol):
+    """What is needed of clpt.render.tables.Tables."""
+
+    def append(self, name: str, words: ArrayLike) -> int: ...
+    def append_floats(self, name: str, values: ArrayLike) -> int: ...
+    def emission_words(self, value: Any) -> NDArray[np.uint32]: ...
+
+
+@dataclass(frozen=True)
+class Emitter:
+    """A shape with an `emission`.
+
+    shape_row: its row in `shapes`; vertices, faces: its triangles as `shapes.triangles` gave them,
+    needed for a mesh and a cube.
+    """
+
+    shape: Shape
+    shape_row: int
+    vertices: shapes.Points | None = None
+    faces: shapes.Faces | None = None
+
+
+@dataclass(frozen=True)
+class LightRows:
+    """The table `lights` and what follows from it.
+
+    rows: structured (n,) of LIGHT.dtype; infinite: how many of them, the first ones, are infinite;
+    kinds: those that occur, for `dispatch_text`; first: per emitter, its first row; whole: per
+    emitter, whether that one row stands for all of it.
+    """
+
+    rows: np.ndarray
+    infinite: int
+    kinds: tuple[str, ...]
+    first: tuple[int, ...]
+    whole: tuple[bool, ...]
+
+
+def light_rows(
+    lamps: Sequence[Light], emitters: Sequence[Emitter], tables: Sink, scene_radius: float
+) -> LightRows:
+    """Put the parameters of all lights into the tables, and make the rows of `lights`.
+
+    scene_radius: of a sphere around the scene [m]. Raises SceneError for a light that has no place.
+    """
+    ordered = sorted(lamps, key=lambda lamp: lamp.kind not in INFINITE)
+    infinite = sum(lamp.kind in INFINITE for lamp in ordered)
+    blocks = [_lamp_block(lamp, tables, scene_radius) for lamp in ordered]
+    blocks += [_emitter_block(emitter, tables) for emitter in emitters]
+    sizes = [len(rows) for rows, _ in blocks]
+    first = np.cumsum([0, *sizes])[len(ordered) : -1]
+    rows = np.concatenate([np.zeros(0, LIGHT.dtype), *(rows for rows, _ in blocks)])
+    if len(rows):
+        weights = np.concatenate([weights for _, weights in blocks])
+        rows["pmf"], rows["keep"], rows["alias"] = alias_table(_shared(weights, infinite))
+    kinds = tuple(KINDS[i] for i in np.unique(rows["kind"]))
+    return LightRows(
+        rows=rows,
+        infinite=infinite,
+        kinds=kinds,
+        first=tuple(int(i) for i in first),
+        whole=tuple(_whole(emitter.shape) for emitter in emitters),
+    )
+
+
+def _whole(shape: Shape) -> bool:
+    """Whether the shape is sampled as one light; a mesh and a cube are many."""
+    return shape.kind in shapes.RECORDS
+
+
+def _block(count: int, kind: str, params: ArrayLike, radiance: int, shape_row: int) -> np.ndarray:
+    rows = np.zeros(count, LIGHT.dtype)
+    rows["kind"], rows["params"] = KINDS.index(kind), params
+    rows["radiance"], rows["shape"] = radiance, shape_row
+    return rows
+
+
+def _lamp_block(lamp: Light, tables: Sink, scene_radius: float) -> tuple[np.ndarray, np.ndarray]:
+    """The row of a light that is not on a shape, and its power."""
+    values = _lamp_values(lamp)
+    radiance = tables.append("lamps", tables.emission_words(_emitted(lamp)))
+    record = RECORDS[lamp.kind]
+    words = np.zeros((), record.dtype)
+    for name, value in {**values, "radiance": radiance}.items():
+        words[name] = value
+    at = tables.append("lamps", words.reshape(1).view(np.uint32))
+    return _block(1, lamp.kind, at, radiance, -1), np.array([power(lamp, scene_radius)])
+
+
+def _emitted(lamp: Light) -> Any:
+    """The value of a light's one emission parameter, whatever its name."""
+    names = {"point": "intensity", "spot": "intensity", "directional": "irradiance"}
+    return getattr(lamp, names.get(lamp.kind, "radiance"))
+
+
+def _lamp_values(lamp: Light) -> dict[str, ArrayLike]:
+    """The members of a lamp's record but for its radiance."""
+    if isinstance(lamp, lights.Point):
+        return {"position": _three(lamp.position, "point.position"), "falloff": lamp.falloff}
+    if isinstance(lamp, lights.Directional):
+        return {"direction": _unit(lamp.direction, "directional.direction")}
+    if isinstance(lamp, lights.Spot):
+        matrix = _matrix(lamp)
+        return {
+            "position": matrix[:3, 3],
+            "axis": _unit(matrix[:3, 2], "spot.to_world"),
+            "cutoff": np.radians(lamp.cutoff),
+            "beam_width": np.radians(min(lamp.beam_width, lamp.cutoff)),
+        }
+    return {}
+
+
+def _emitter_block(emitter: Emitter, tables: Sink) -> tuple[np.ndarray, np.ndarray]:
+    """The rows of a shape that emits, and their power."""
+    shape = emitter.shape
+    radiance = tables.append("lamps", tables.emission_words(shape.emission.radiance))
+    strength = np.pi * brightness(shape.emission.radiance)
+    if _whole(shape):
+        at = tables.append("geometry", shapes.row(shape))
+        rows = _block(1, shape.kind, at, radiance, emitter.shape_row)
+        return rows, np.array([strength * shapes.area(shape)])
+    if emitter.vertices is None or emitter.faces is None:
+        raise SceneError("its triangles are missing", where=shapes.where(shape))
+    geometry = shapes.triangle_rows(emitter.vertices, emitter.faces)
+    count, words = geometry.shape
+    at = tables.append("geometry", geometry) + words * np.arange(count)
+    rows = _block(count, "triangle", at, radiance, emitter.shape_row)
+    return rows, strength * shapes.triangle_areas(emitter.vertices, emitter.faces)
+
+
+def _matrix(lamp: Light) -> NDArray[np.float64]:
+    """A light's transform. Raises SceneError where it cannot be inverted."""
+    matrix = np.asarray(lamp.to_world, np.float64)
+    if matrix.shape != (4, 4) or transforms.is_singular(matrix):
+        raise SceneError("must be an invertible (4, 4) matrix", where=f"{lamp.kind}.to_world")
+    return matrix
+
+
+def _three(value: ArrayLike, where: str) -> NDArray[np.float64]:
+    values = np.asarray(value, np.float64)
+    if values.shape != (3,) or not np.isfinite(values).all():
+        raise SceneError(f"must be three finite numbers, found {value}", where=where)
+    return values
+
+
+def _unit(value: ArrayLike, where: str) -> NDArray[np.float64]:
+    vector = _three(value, where)
+    length = float(np.linalg.norm(vector))
+    if not length > 0.0:
+        raise SceneError("has no length", where=where)
+    return vector / length
+
+
+def power(lamp: Light, scene_radius: float) -> float:
+    """Estimate what a light off all shapes sends into the scene, mean of channels [W/nm]."""
+    strength = brightness(_emitted(lamp))
+    disk = np.pi * scene_radius**2
+    if isinstance(lamp, lights.Point):
+        return 4.0 * np.pi * strength
+    if isinstance(lamp, lights.Spot):
+        edge = np.radians([min(lamp.beam_width, lamp.cutoff), lamp.cutoff])
+        return 2.0 * np.pi * (1.0 - float(np.cos(edge).mean())) * strength
+    if isinstance(lamp, lights.Directional):
+        return disk * strength
+    return 4.0 * np.pi * disk * strength
+
+
+def brightness(value: Any) -> float:
+    """Return the mean over channels, and over a texture, of an emission."""
+    if getattr(value, "is_texture", False):
+        return 1.0
+    return float(np.mean(value.to_rgb("emission")))
+
+
+def _shared(weights: np.ndarray, infinite: int) -> np.ndarray:
+    """Weights with the infinite lights' share fixed where there are others; even if all are 0."""
+    ours, others = weights[:infinite].sum(), weights[infinite:].sum()
+    if not ours + others > 0.0:
+        return np.ones_like(weights)
+    if not (ours > 0.0 and others > 0.0):
+        return weights
+    shared = weights / others * (1.0 - INFINITE_SHARE)
+    shared[:infinite] = weights[:infinite] / ours * INFINITE_SHARE
+    return shared
+
+
+def alias_table(
+    weights: ArrayLike,
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int32]]:
+    """Return pmf, keep and alias (n,) to choose a row by its weight (Vose 1991).
+
+    Row i of n, chosen evenly, is kept with probability keep[i], else alias[i] is taken.
+    """
+    weights = np.asarray(weights, np.float64)
+    pmf = weights / weights.sum()
+    left = (pmf * len(pmf)).tolist()
+    keep, alias = [1.0] * len(left), list(range(len(left)))
+    small = [i for i, p in enumerate(left) if p < 1.0]
+    large = [i for i, p in enumerate(left) if p >= 1.0]
+    while small and large:
+        i, j = small.pop(), large[-1]
+        keep[i], alias[i] = left[i], j
+        left[j] -= 1.0 - left[i]
+        if left[j] < 1.0:
+            small.append(large.pop())
+    return pmf.astype(np.float32), np.array(keep, np.float32), np.array(alias, np.int32)
+
+
+def virtual_files() -> dict[str, str]:
+    """Return generated/light/<kind>.cl per kind: its struct, its loader and its functions."""
+    return {
+        f"generated/light/{kind}.cl": f'{record.row_text()}#include "light/{kind}.cl"\n'
+        for kind, record in RECORDS.items()
+    }
+
+
+def dispatch_text(kinds: Iterable[str], textured: bool = False) -> str:
+    """Return the functions over all lights, for the kinds in the scene (`LightRows.kinds`).
+
+    textured: some emission is a texture, so that triangles need the uv of their mesh. It includes
+    the files of `virtual_files`, here and in clpt.render.shapes.
+
+    light_sample(scene, p, pick, u, lambdas)      chooses a light and a direction to it
+    light_pdf(scene, row, p, wi, t, n)            of it, [1/sr], for a ray that met a shape
+    light_radiance(scene, row, uv, lambdas)       of a shape
+    infinite_light(scene, row, d, lambdas, ...)   radiance and pdf of one infinite light
+    infinite_gather(scene, d, pdf, lambdas)       what they all add to a path that left the scene
+    """
+    present = [kind for kind in KINDS if kind in set(kinds)]
+    lamps = [kind for kind in present if kind in RECORDS]
+    surfaces = [kind for kind in present if kind in shapes.RECORDS]
+    includes = ["lib/surface_flags.cl", "lib/shape.cl", "lib/light.cl", "lib/mis.cl"]
+    includes += ["lib/light_choice.cl"]
+    includes += [f"generated/light/{kind}.cl" for kind in lamps]
+    includes += [f"generated/shape/{kind}.cl" for kind in surfaces]
+    includes += ["light/area.cl"] if surfaces else []
+    parts = [f"#define LIGHT_ROW_WORDS {LIGHT.words}", f"#define SHAPE_ROW_WORDS {SHAPE.words}"]
+    parts += [f"#define LIGHT_{kind.upper()} {KINDS.index(kind)}" for kind in present]
+    parts += [f'#include "{name}"' for name in includes]
+    parts += _sample_text(lamps, surfaces, textured)
+    parts += _pdf_text(surfaces)
+    parts += _infinite_text([kind for kind in lamps if kind in INFINITE])
+    return "\n".join(parts) + "\n"
+
+
+def _case(kind: str, only: bool, body: Sequence[str]) -> list[str]:
+    """Lines that do `body` where the light `l` is of a kind, under the mask `m`; `only`: always."""
+    if only:
+        rows = ["mask m = (integer)(-1);", *body]
+        return ["    {", *(f"        {line}" for line in rows), "    }"]
+    head = ["    {", f"        mask m = l.kind == LIGHT_{kind.upper()};", "        if (any(m)) {"]
+    return [*head, *(f"            {line}" for line in body), "        }", "    }"]
+
+
+def _row_of(kind: str) -> str:
+    """The kind's parameters of the light `l`; other lanes read the table's first words."""
+    table = "lamps" if kind in RECORDS else "geometry"
+    return f"{kind}_row(scene.{table}, sel_i(m, l.params, (integer)(0)))"
+
+
+def _sample_text(lamps: list[str], surfaces: list[str], textured: bool) -> list[str]:
+    only = len(lamps) + len(surfaces) == 1
+    head = "LightSample light_sample(Scene scene, vec3 p, real pick, vec2 u, Wavelengths lambdas)"
+    if not lamps and not surfaces:
+        return [f"inline {head} {{ return light_nothing(); }}"]
+    lines = [
+        f"inline {head}",
+        "{",
+        "    integer row = light_pick(scene, pick);",
+        "    LightRow l = light_at(scene, row);",
+        "    LightSample s = light_nothing();",
+    ]
+    for kind in lamps:
+        sampled = f"{kind}_sample({_row_of(kind)}, scene, p, u, lambdas)"
+        lines += _case(kind, only, [f"s = light_sel(m, {sampled}, s);"])
+    if surfaces:
+        lines.append("    ShapeSample q = shape_sample_nothing();")
+    for kind in surfaces:
+        body = [f"ShapeSample r = {kind}_sample({_row_of(kind)}, p, u);"]
+        if kind == "triangle" and textured:
+            body += [
+                "integer at = sel_i(m, l.shape, (integer)(0)) * SHAPE_ROW_WORDS;",
+                "ShapeRow shape = shape_row_row(scene.shapes, at);",
+                "r.uv = area_triangle_uv(scene, shape, sel_i(m, row, shape.light), r.uv);",
+            ]
+        lines += _case(kind, only, [*body, "q = shape_sample_sel(m, r, q);"])
+    if surfaces:
+        lines += [
+            "    Spectrum le = emission_load(scene, l.radiance, q.uv, lambdas);",
+            "    s = light_sel(l.shape >= 0, area_sample(q, le), s);",
+        ]
+    return [*lines, "    return light_chosen(s, l.pmf);", "}"]
+
+
+def _pdf_text(surfaces: list[str]) -> list[str]:
+    lines = [
+        "inline real light_pdf(Scene scene, integer row, vec3 p, vec3 wi, real t, vec3 n)",
+        "{",
+        "    LightRow l = light_at(scene, row);",
+        "    real pdf = 0.0f;",
+    ]
+    for kind in surfaces:
+        body = f"pdf = sel(m, {kind}_pdf({_row_of(kind)}, p, wi, t, n), pdf);"
+        lines += _case(kind, len(surfaces) == 1, [body])
+    return [*lines, "    return pdf * l.pmf;", "}"]
+
+
+def _infinite_text(kinds: list[str]) -> list[str]:
+    """`row` is the same in all lanes."""
+    if not kinds:
+        return []
+    lines = [
+        "inline void infinite_light(Scene scene, int row, vec3 d, Wavelengths lambdas,",
+        "                           Spectrum *radiance, real *pdf)",
+        "{",
+        "    LightRow l = light_at(scene, (integer)(row));",
+        "    *radiance = spectrum_of(0.0f);",
+        "    *pdf = 0.0f;",
+    ]
+    for kind in kinds:
+        body = [
+            f"{RECORDS[kind].name} light = {_row_of(kind)};",
+            f"*radiance = spectrum_sel(m, {kind}_radiance(light, scene, d, lambdas), *radiance);",
+            f"*pdf = sel(m, {kind}_pdf(light, scene, d) * l.pmf, *pdf);",
+        ]
+        lines += _case(kind, len(kinds) == 1, body)
+    return [*lines, "}", '#include "lib/infinite.cl"']
+

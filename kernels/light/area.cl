@@ -1,0 +1,26 @@
+/* Light from a shape: it leaves the front only, evenly in all directions. */
+inline LightSample area_sample(ShapeSample q, Spectrum radiance)
+{
+    mask front = dot3(q.n, q.wi) < 0.0f;
+    LightSample s;
+    s.wi = q.wi;
+    s.t = q.t;
+    s.radiance = spectrum_sel(front, radiance, spectrum_of(0.0f));
+    s.pdf = sel(front, q.pdf, (real)(0.0f));
+    return s;
+}
+
+/* The uv at barycentrics b of the triangle that row `row` of `lights` stands for: the mesh's, or
+ * the barycentrics themselves where it has none. */
+inline vec2 area_triangle_uv(Scene scene, ShapeRow shape, integer row, vec2 b)
+{
+    integer corner = 3 * (shape.prim + row - shape.light);
+    integer i0 = 2 * gather_i(scene.faces, corner), i1 = 2 * gather_i(scene.faces, corner + 1);
+    integer i2 = 2 * gather_i(scene.faces, corner + 2);
+    mask mapped = (shape.flags & SHAPE_UVS) != 0;
+    real b0 = 1.0f - b.x - b.y;
+    vec2 uv;
+    uv.x = sel(mapped, gather(scene.uvs, i0) * b0 + gather(scene.uvs, i1) * b.x + gather(scene.uvs, i2) * b.y, b.x);
+    uv.y = sel(mapped, gather(scene.uvs, i0 + 1) * b0 + gather(scene.uvs, i1 + 1) * b.x + gather(scene.uvs, i2 + 1) * b.y, b.y);
+    return uv;
+}
