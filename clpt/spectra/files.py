@@ -14,6 +14,7 @@ from clpt.errors import SceneError
 from clpt.spectra.spectrum import Cauchy, Constant, Sellmeier, Spectrum, Tabulated
 
 MICROMETRE = 1000.0  # [nm]
+FORMULA_POINTS = 2001  # at which a formula without a class of its own is tabulated
 
 
 def read_table(path: str | Path, outside: Literal["zero", "hold"] = "zero") -> Tabulated:
@@ -76,7 +77,7 @@ def read_refractive_index(path: str | Path) -> tuple[Spectrum, Spectrum]:
         kind = str(part.get("type", ""))
         try:
             if kind.startswith("formula"):
-                eta = _formula(int(kind.split()[1]), _numbers(part, "coefficients"), part)
+                eta = _formula(kind.removeprefix("formula").strip(), part)
             elif kind in ("tabulated n", "tabulated k", "tabulated nk"):
                 columns = _columns(part, 3 if kind.endswith("nk") else 2)
                 if "n" in kind.split()[1]:
@@ -86,23 +87,29 @@ def read_refractive_index(path: str | Path) -> tuple[Spectrum, Spectrum]:
             else:
                 raise SceneError(f"unknown type of data {kind!r}")
         except SceneError as error:
-            raise SceneError(error.message, file=path, line=_line_of(text, kind)) from None
+            line = _line_of(text, error.where or kind)
+            raise SceneError(error.message, file=path, line=line) from None
     if eta is None:
         raise SceneError("no refractive index in this file", file=path)
     return eta, k
 
 
-def _formula(number: int, c: list[float], part: dict[str, Any]) -> Spectrum:
+def _formula(name: str, part: dict[str, Any]) -> Spectrum:
     """Dispersion formula of refractiveindex.info, by its number; wavelengths in um."""
-    pairs = list(zip(c[1::2], c[2::2], strict=len(c) % 2 == 1))
+    if name not in ("1", "2", "3", "4", "5", "6"):
+        raise SceneError(f"dispersion formula {name!r} is not known; 1 to 6 are")
+    number, c = int(name), _numbers(part, "coefficients")
+    if number != 4 and len(c) % 2 == 0:
+        raise SceneError(f"formula {number} takes an odd number of coefficients, found {len(c)}")
+    pairs = list(zip(c[1::2], c[2::2], strict=False))
     if number in (1, 2):
         b = tuple(pair[0] for pair in pairs)
         squares = tuple(pair[1] ** (3 - number) for pair in pairs)
         return Sellmeier(b, squares, 1.0 + c[0])
     if number == 5 and [p for _, p in pairs] in ([-2.0], [-2.0, -4.0]):
         return Cauchy(c[0], *(b for b, _ in pairs))
-    lo, hi = (float(end) for end in str(part.get("wavelength_range", "0.3 1")).split())
-    um = np.linspace(lo, hi, 2001)
+    ends = _numbers(part, "wavelength_range")
+    um = np.linspace(ends[0], ends[-1], FORMULA_POINTS)
     if number in (3, 5):
         total = c[0] + sum(b * um**p for b, p in pairs)
         index = np.sqrt(total) if number == 3 else total
@@ -113,18 +120,18 @@ def _formula(number: int, c: list[float], part: dict[str, Any]) -> Spectrum:
         rest = c[9:]
         total = total + sum(b * um**p for b, p in zip(rest[::2], rest[1::2], strict=False))
         index = np.sqrt(total)
-    elif number == 6:
-        index = 1.0 + c[0] + sum(b / (s - um**-2.0) for b, s in pairs)
     else:
-        raise SceneError(f"dispersion formula {number} is not known; 1 to 6 are")
+        index = 1.0 + c[0] + sum(b / (s - um**-2.0) for b, s in pairs)
     return Tabulated(um * MICROMETRE, index, "hold")
 
 
 def _columns(part: dict[str, Any], count: int) -> NDArray[np.float64]:
-    rows = [line.split() for line in str(part.get("data", "")).strip().splitlines()]
-    for row in rows:
+    lines = str(part.get("data", "")).strip().splitlines()
+    rows = [line.split() for line in lines]
+    for line, row in zip(lines, rows, strict=True):
         if len(row) != count or not all(_is_number(field) for field in row):
-            raise SceneError(f"expected {count} numbers a line, found {' '.join(row)!r}")
+            message = f"expected {count} numbers a line, found {line.strip()!r}"
+            raise SceneError(message, where=line.strip())
     if not rows:
         raise SceneError("a table without rows")
     return np.array(rows, np.float64).T
@@ -137,9 +144,9 @@ def _numbers(part: dict[str, Any], name: str) -> list[float]:
     return [float(field) for field in fields]
 
 
-def _line_of(text: str, kind: str) -> int | None:
+def _line_of(text: str, part: str) -> int | None:
     lines = text.splitlines()
-    return next((i for i, line in enumerate(lines, 1) if kind and kind in line), None)
+    return next((i for i, line in enumerate(lines, 1) if part and part in line), None)
 
 
 def _is_number(field: str) -> bool:

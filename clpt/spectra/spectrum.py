@@ -90,7 +90,7 @@ class Tabulated(Spectrum):
 
 @dataclass(frozen=True)
 class Blackbody(Spectrum):
-    """Planck's law, the radiance of a black body at `kelvin` [W m^-2 sr^-1 nm^-1], times `scale`."""
+    """Planck's law: radiance [W m^-2 sr^-1 nm^-1] of a black body at `kelvin`, times `scale`."""
 
     kelvin: float
     scale: float = 1.0

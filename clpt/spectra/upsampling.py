@@ -18,10 +18,11 @@ from clpt.spectra.data import ROOT
 
 Array = NDArray[np.float64]
 
-NODES = 32
+NODES = 40
+QUANTUM = 1.0 / 2048.0  # of the table's values, which are stored as differences along each axis
 CENTRE, HALF_WIDTH = 595.0, 235.0  # [nm] of the unit coordinate
 DARKEST = 1e-9  # flat reflectances stay this far inside (0, 1), where x is finite
-EDGE = 1e-4  # the outermost layers, in place of black and white
+EDGE = 1e-5  # the outermost layers, in place of black and white
 CHUNK = 1 << 15  # colours at a time, so that the gathered corners stay in the cache
 
 
@@ -31,33 +32,31 @@ def to_unit(lambdas: ArrayLike) -> Array:
 
 
 def shrinkage(rgb: ArrayLike) -> Array:
-    """sqrt(m (1 - m)) for the mean m of the components (..., 3): x = (m - 1/2) / this for a grey."""
+    """sqrt(m (1 - m)) for the mean m of the components (..., 3); a grey has x = (m - 1/2) / it."""
     mean = np.clip(np.mean(np.asarray(rgb, np.float64), axis=-1), DARKEST, 1.0 - DARKEST)
     return np.sqrt(mean * (1.0 - mean))
 
 
 def node_values() -> Array:
     """Values of the largest component at the layers (NODES,), dense near black and white."""
-    x = np.linspace(0.0, 1.0, NODES)
-    return x * x * (3.0 - 2.0 * x)
+    x = _smoothstep(np.linspace(0.0, 1.0, NODES))
+    return np.clip(0.3 * x + 0.7 * _smoothstep(x), EDGE, 1.0 - EDGE)
 
 
 def node_ratios() -> Array:
-    """Ratios of the other components (NODES,), dense near saturated colours."""
-    return np.linspace(0.0, 1.0, NODES) ** 1.5
+    """Ratios of the other components (NODES,), dense near saturated colours and greys."""
+    return _smoothstep(np.linspace(0.0, 1.0, NODES)) ** 1.3
 
 
 def node_colours() -> Array:
     """The colours fitted (3, NODES, NODES, NODES, 3): [largest, its value, ratio, ratio, rgb]."""
-    value, first, second = np.meshgrid(
-        np.clip(node_values(), EDGE, 1.0 - EDGE), node_ratios(), node_ratios(), indexing="ij"
-    )
+    value, first, second = np.meshgrid(node_values(), node_ratios(), node_ratios(), indexing="ij")
     shape = np.stack([value, value * first, value * second], axis=-1)
     return np.stack([np.roll(shape, largest, axis=-1) for largest in range(3)])
 
 
 def uplift(rgb: ArrayLike) -> NDArray[np.float32]:
-    """Coefficients c0, c1, c2 of reflectances of linear Rec.709 colours (..., 3) -> (..., 3) float32.
+    """Coefficients c0, c1, c2 (..., 3) float32 of reflectances of linear Rec.709 colours (..., 3).
 
     Colours are clipped to [0, 1]; nan counts as black.
     """
@@ -72,7 +71,7 @@ def uplift(rgb: ArrayLike) -> NDArray[np.float32]:
 def unbounded(rgb: ArrayLike) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Scale (...) = 2 max(rgb) and coefficients (..., 3) of colours (..., 3) that may exceed 1.
 
-    The spectrum is the scale times the reflectance, as in Mitsuba 3; negative components count as 0.
+    The spectrum is the scale times the reflectance, as in Mitsuba 3; negative components are 0.
     """
     colours = np.maximum(np.nan_to_num(np.asarray(rgb, np.float64)), 0.0)
     scale = 2.0 * colours.max(axis=-1)
@@ -91,7 +90,14 @@ def evaluate(coefficients: ArrayLike, lambdas: ArrayLike) -> Array:
 @cache
 def _table() -> NDArray[np.float32]:
     with np.load(ROOT / "uplift.npz") as file:
-        return file["scaled"].astype(np.float32).reshape(-1, 3)
+        steps = file["steps"]
+    for axis in (1, 2, 3):
+        steps = steps.cumsum(axis=axis + 1, dtype=np.int32)
+    return np.ascontiguousarray(steps.reshape(3, -1).T) * np.float32(QUANTUM)
+
+
+def _smoothstep(x: Array) -> Array:
+    return x * x * (3.0 - 2.0 * x)
 
 
 def _look_up(rgb: Array) -> Array:
@@ -104,8 +110,9 @@ def _look_up(rgb: Array) -> Array:
     for ratio in others:
         ratio[black] = 1.0
     cell, weights = largest, []
-    layers = np.clip(node_values(), EDGE, 1.0 - EDGE)
-    for nodes, at in zip((layers, node_ratios(), node_ratios()), (value, *others), strict=True):
+    for nodes, at in zip(
+        (node_values(), node_ratios(), node_ratios()), (value, *others), strict=True
+    ):
         below = np.clip(np.searchsorted(nodes, at, "right") - 1, 0, NODES - 2)
         cell = cell * NODES + below
         t = (at - nodes[below]) / (nodes[below + 1] - nodes[below])
@@ -118,8 +125,10 @@ def _look_up(rgb: Array) -> Array:
 
 
 def _blend(cell: NDArray[np.int64], weights: list[NDArray[np.float32]]) -> NDArray[np.float32]:
-    table, strides = _table(), (NODES * NODES, NODES, 1)
-    corners = [table[cell + z + y + x] for z in (0, strides[0]) for y in (0, NODES) for x in (0, 1)]
+    """Trilinear table entries (n, 3): halve the corners axis by axis, the last axis first."""
+    table, offsets = _table(), (0, NODES * NODES)
+    corners = [table[cell + z + y + x] for z in offsets for y in (0, NODES) for x in (0, 1)]
     for weight in reversed(weights):
-        corners = [low + weight * (high - low) for low, high in zip(*[iter(corners)] * 2)]
+        pairs = zip(corners[::2], corners[1::2], strict=True)
+        corners = [low + weight * (high - low) for low, high in pairs]
     return corners[0]
