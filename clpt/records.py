@@ -63,6 +63,7 @@ SETTINGS = Record(
     rr_depth=("integer", "depth from which Russian roulette is played"),
     hide_lights=("integer", "1: the camera does not see lights"),
     light_count=("integer", "rows in `lights`"),
+    first_analytic=("integer", "row in `shapes` of the first shape that is not of triangles"),
     infinite_count=("integer", "how many of them are infinite; these come first"),
     lambda_min=("real", "[nm]"),
     lambda_max=("real", "[nm]"),

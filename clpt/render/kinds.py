@@ -76,3 +76,21 @@ def _member(
             "    }",
         ]
     return lines
+
+
+def emission_text(found: frozenset[str]) -> str:
+    """Return `emission_load(scene, at, uv, lambdas)`, which reads five words of `lamps`."""
+    param = Param("emission", "", textured=True)
+    body = _member("value", param, "spectrum", "at", found, "lamps")
+    head = "inline Spectrum emission_load(Scene scene, integer at, vec2 uv, Wavelengths lambdas)"
+    return "\n".join(
+        [
+            head,
+            "{",
+            "    struct { Spectrum value; } r;",
+            *body,
+            "    return r.value;",
+            "}",
+            "",
+        ]
+    )

@@ -7,7 +7,7 @@ none: lowering turns it into rules by which a hit chooses its leaf.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from clpt.scene.params import Kind, choice, flag, host, index, real, reflectance
 
@@ -17,6 +17,9 @@ DISTRIBUTIONS = ("ggx", "beckmann")
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Material(Kind):
     """Base of all materials."""
+
+    delta: ClassVar[bool] = False  # every lobe is one: a light cannot be sampled through it
+    choosy: ClassVar[bool] = False  # `sample` uses u.z
 
     name: str = host("", "for messages and for references in scene files")
 
@@ -36,6 +39,8 @@ class Phong(Material):
     mirror share that only the `whitted` integrator knows.
     """
 
+    choosy = True
+
     diffuse: Any = reflectance(0.5, "diffuse albedo")
     specular: Any = reflectance(0.2, "albedo of the lobe")
     exponent: Any = real(30.0, "sharpness of the lobe", low=0.0, high=1e5, textured=True)
@@ -45,6 +50,9 @@ class Phong(Material):
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Dielectric(Material):
     """A smooth boundary of two dielectrics; both sides."""
+
+    delta = True
+    choosy = True
 
     int_ior: Any = index(1.5046, "inside index, number, glass name or spectrum")
     ext_ior: Any = index(1.000277, "outside index")
@@ -56,6 +64,9 @@ class Dielectric(Material):
 class ThinDielectric(Material):
     """A thin slab of a dielectric: reflections inside are summed, light passes undeviated."""
 
+    delta = True
+    choosy = True
+
     int_ior: Any = index(1.5046, "index of the slab")
     ext_ior: Any = index(1.000277, "index around it")
     specular_reflectance: Any = reflectance(1.0, "factor on reflection; 1 is physical")
@@ -65,6 +76,8 @@ class ThinDielectric(Material):
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RoughDielectric(Material):
     """A rough boundary of two dielectrics (Walter et al. 2007); both sides."""
+
+    choosy = True
 
     int_ior: Any = index(1.5046, "inside index")
     ext_ior: Any = index(1.000277, "outside index")
@@ -78,6 +91,8 @@ class RoughDielectric(Material):
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Conductor(Material):
     """A smooth metal; front side. The default is a perfect mirror."""
+
+    delta = True
 
     eta: Any = index(0.0, "index of refraction")
     k: Any = index(1.0, "extinction coefficient")
@@ -100,6 +115,8 @@ class RoughConductor(Material):
 class Plastic(Material):
     """A diffuse base under a smooth dielectric coat, with all internal reflections; front side."""
 
+    choosy = True
+
     diffuse_reflectance: Any = reflectance(0.5, "albedo of the base")
     int_ior: Any = index(1.49, "index of the coat")
     ext_ior: Any = index(1.000277, "index outside")
@@ -110,6 +127,8 @@ class Plastic(Material):
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RoughPlastic(Material):
     """A diffuse base under a rough dielectric coat; front side."""
+
+    choosy = True
 
     diffuse_reflectance: Any = reflectance(0.5, "albedo of the base")
     int_ior: Any = index(1.49, "index of the coat")
@@ -123,6 +142,8 @@ class RoughPlastic(Material):
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Null(Material):
     """No surface at all: light passes as if it were not there."""
+
+    delta = True
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -11,6 +11,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     Surface s = surface_load(scene, hit, at, active, o, d, &front);
 
     /* The light that this ray has met. */
+#if USES_SURFACE_LIGHTS
     mask lit = active & (s.light >= 0) & front & ((depth > 0) | (settings->hide_lights == 0));
     if (any(lit)) {
         integer light = sel_i(lit, s.light, (integer)(0));
@@ -20,6 +21,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
         Spectrum le = spectrum_scale(spectrum_mul(beta, light_radiance(scene, light, s.uv, lambdas)), w);
         store_path_radiance(path, at, lit, spectrum_add(load_path_radiance(path, at), le));
     }
+#endif
     mask next = active & (depth + 1 < settings->max_depth);
 
     Sampler sampler = sampler_start(settings->seed, as_natural(load_path_place(path, at)), as_natural(load_path_sample(path, at)));
@@ -32,7 +34,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     Frame frame = surface_frame(s);
     vec3 wo = to_local(frame, neg3(d));
 
-#if !BSDF_DELTA
+#if USES_LIGHTS && !BSDF_DELTA
     /* Next-event estimation. */
     LightSample ls = light_sample(scene, s.p, choice.x, sampler_pair(sampler, dimension + DIMENSION_LIGHT), lambdas);
     vec3 wi = to_local(frame, ls.wi);

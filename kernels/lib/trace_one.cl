@@ -19,7 +19,7 @@ inline TraceHit trace_closest(TRACE_ARGS, Scene scene, vec3 o, vec3 d, mask acti
     uint shape = shapes_closest(shape_nodes, shape_items, scene, o.x, o.y, o.z, d.x, d.y, d.z, 0.0f, &h.t);
     if (shape != BVH_MISS) {
         h.prim = as_int(shape);
-        h.shape = FIRST_ANALYTIC(scene) + h.prim;
+        h.shape = scene.settings->first_analytic + h.prim;
         ShapeHit s = shape_hit(scene, shape_row_row(scene.shapes, h.shape * SHAPE_ROW_WORDS), o, d, 0.0f, FAR);
         h.n = s.n;
         h.u = s.uv.x;

@@ -14,6 +14,12 @@
 #include "generated/bsdf.cl"
 #include "generated/integrator.cl"
 
+#if QUEUED
+#define QUEUE_ARGS , global const uint *queue, global const uint *queue_starts, global const uint *queue_counts
+#else
+#define QUEUE_ARGS
+#endif
+
 kernel void shade(SLAB_ARGS, SCENE_ARGS QUEUE_ARGS)
 {
     SLABS

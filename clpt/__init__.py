@@ -1,0 +1,46 @@
+"""clpt: a spectral path tracer in OpenCL.
+
+>>> import clpt
+>>> scene = clpt.load("scenes/cornell_box")
+>>> image = clpt.render(scene, spp=64)
+>>> clpt.write("out.exr", image)
+"""
+
+from importlib import metadata
+
+from clpt.errors import (
+    ClptError,
+    DeviceError,
+    KernelBuildError,
+    MemoryBudgetError,
+    SceneError,
+    UnknownKindError,
+    UnusedParameterError,
+)
+from clpt.formats import load
+from clpt.images import read, write
+from clpt.render.renderer import Progress, Renderer, render
+from clpt.scene import Scene
+
+try:
+    __version__ = metadata.version("clpt")
+except metadata.PackageNotFoundError:  # a checkout that is not installed
+    __version__ = "0.0.0"
+
+__all__ = [
+    "ClptError",
+    "DeviceError",
+    "KernelBuildError",
+    "MemoryBudgetError",
+    "Progress",
+    "Renderer",
+    "Scene",
+    "SceneError",
+    "UnknownKindError",
+    "UnusedParameterError",
+    "__version__",
+    "load",
+    "read",
+    "render",
+    "write",
+]

@@ -1,0 +1,40 @@
+"""Features: what a lowered scene needs of the kernels. They alone decide the kernels' text."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+Sources = dict[str, dict[str, frozenset[str]]]
+
+
+@dataclass(frozen=True)
+class Features:
+    """What occurs in a scene.
+
+    materials: leaf kinds in their order, a material word's upper bits count in it;
+    lights: device kinds of lights (see clpt.render.lights); textures, texture_roles: kinds and
+    (kind, role) pairs; analytic: kinds of shapes that rays meet as they are; sources: see
+    clpt.render.tables.
+    """
+
+    mode: str
+    camera: str
+    sampler: str
+    filter: str
+    integrator: str
+    materials: tuple[str, ...]
+    lights: tuple[str, ...] = ()
+    textures: tuple[str, ...] = ()
+    texture_roles: tuple[tuple[str, str], ...] = ()
+    analytic: tuple[str, ...] = ()
+    normals: bool = False
+    uvs: bool = False
+    tangents: bool = False
+    mixtures: bool = False
+    infinite: bool = False
+    light_choice: bool = False  # there is more than one light to choose from
+    dispersion: bool = False
+    channel: str = ""
+    spectra_size: int = 0
+    spectra_step: float = 1.0
+    sources: Sources = field(default_factory=dict)

@@ -1,0 +1,306 @@
+"""Lowering: a scene as plain data becomes tables of words, features and settings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import scene as sc
+from clpt.errors import SceneError
+from clpt.records import SETTINGS, SHAPE
+from clpt.render import cameras, filters, lights, shapes
+from clpt.render.features import Features
+from clpt.render.tables import STEP, Tables
+from clpt.scene import materials as mt
+from clpt.scene.params import device_params, params
+from clpt.spectra.cie import _tanh_ends as tanh_ends
+
+SHAPE_NORMALS, SHAPE_UVS, SHAPE_TWO_SIDED, SHAPE_ONE_LIGHT = 1, 2, 4, 8
+MIXTURE = 0xFF
+DEEPEST = 4000  # path state has 12 bits for the depth
+
+
+@dataclass
+class Lowered:
+    """A scene ready for the device.
+
+    vertices (n, 3) float32, faces (m, 3) uint32 and tags (m,) uint32 (the shape of each triangle)
+    are what the acceleration structure is built of; boxes (k, 2, 3) float32 those of the analytic
+    shapes, which are the last rows of `shapes`. tables: every other read-only array by name.
+    """
+
+    features: Features
+    settings: NDArray[np.void]
+    tables: dict[str, np.ndarray]
+    vertices: NDArray[np.float32]
+    faces: NDArray[np.uint32]
+    tags: NDArray[np.uint32]
+    boxes: NDArray[np.float32]
+    warnings: list[str]
+
+    @property
+    def bytes(self) -> int:
+        """Size of all arrays."""
+        return sum(a.nbytes for a in (*self.tables.values(), self.vertices, self.faces, self.tags))
+
+
+def lower(scene: sc.Scene, *, channel: str = "") -> Lowered:
+    """Lower a scene. `channel` names the value that the `aov` integrator writes.
+
+    Raises SceneError where the scene makes no sense: it names the shape, light or material.
+    """
+    return _Lowering(scene, channel).run()
+
+
+class _Lowering:
+    """The state of one `lower`."""
+
+    def __init__(self, scene: sc.Scene, channel: str):
+        film = scene.film
+        self.scene, self.channel = scene, channel
+        self.mode = "rgb" if channel else film.mode
+        self.tables = Tables(self.mode, film.lambda_min, film.lambda_max)
+        self.warnings: list[str] = []
+        self.leaves = _leaf_kinds(scene)
+        self.words: dict[tuple[int, str], int] = {}
+        self.uses = dict.fromkeys(("normals", "uvs", "tangents", "mixtures"), False)
+        self.triangles: list[tuple[np.ndarray, np.ndarray, int]] = []  # vertices, faces, shape
+        self.n_vertices = self.n_faces = 0
+
+    def run(self) -> Lowered:
+        scene, tables = self.scene, self.tables
+        filters.lower_filter(scene.film.filter, tables)  # first in its table
+        flat = [s for s in scene.shapes if s.kind not in shapes.ANALYTIC]
+        analytic = [s for s in scene.shapes if s.kind in shapes.ANALYTIC]
+        emitters: list[lights.Emitter] = []
+        rows = [self._shape(i, s, emitters) for i, s in enumerate([*flat, *analytic])]
+        boxes = np.array([shapes.bounds(s) for s in analytic], np.float32).reshape(-1, 2, 3)
+        vertices, faces, tags = self._joined()
+        center, radius = _sphere_around(vertices, boxes)
+        self.lights = lights.light_rows(scene.lights, emitters, tables, radius)
+        tables.append("lights", self.lights.rows.view(np.uint32))
+        for emitter, first, whole in zip(
+            emitters, self.lights.first, self.lights.whole, strict=True
+        ):
+            rows[emitter.shape_row]["light"] = first
+            rows[emitter.shape_row]["flags"] |= SHAPE_ONE_LIGHT if whole else 0
+        for row in rows:
+            tables.append("shapes", row.reshape(1).view(np.uint32))
+        camera, words = cameras.lower_camera(scene.camera, scene.film.width, scene.film.height)
+        tables.append_floats("camera", words)
+        integrator = self._integrator()
+        features = self._features(analytic, camera, integrator)
+        arrays = tables.arrays()
+        settings = self._settings(center, radius)
+        return Lowered(
+            features, settings, arrays, vertices, faces, tags, boxes, self.warnings
+        )
+
+    def _shape(self, number: int, shape: Any, emitters: list) -> np.ndarray:
+        """One row of `shapes`; its triangles, or its parameters, go into the tables."""
+        row = np.zeros((), SHAPE.dtype)
+        row["spare"] = next(i for i, s in enumerate(self.scene.shapes) if s is shape)
+        row["light"] = -1
+        row["front"], row["back"], row["flags"] = self._sides(shape)
+        triangles: tuple[Any, Any] = (None, None)
+        if shape.kind in shapes.ANALYTIC:
+            row["kind"] = 1 + shapes.ANALYTIC.index(shape.kind)
+            row["params"] = self.tables.append("geometry", shapes.row(shape))
+        else:
+            vertices, faces, normals, uvs = shapes.triangles(shape, self.warnings)
+            triangles = vertices, faces
+            row["prim"] = self.n_faces
+            row["flags"] |= self._attributes(vertices, normals, uvs)
+            self.triangles.append((vertices, faces + np.uint32(self.n_vertices), number))
+            self.n_vertices += len(vertices)
+            self.n_faces += len(faces)
+        if shape.emission is not None:
+            emitters.append(lights.Emitter(shape, number, *triangles))
+            if getattr(shape.emission.radiance, "is_texture", False):
+                self.uses["uvs"] = True
+        return row
+
+    def _attributes(self, vertices: Any, normals: Any, uvs: Any) -> int:
+        """Append normals and uvs of a mesh, zeros where it has none; return its SHAPE_ bits."""
+        zeros = np.zeros_like(vertices)
+        self.tables.append_floats("normals", zeros if normals is None else normals)
+        self.tables.append_floats("uvs", zeros[:, :2] if uvs is None else uvs)
+        self.uses["normals"] |= normals is not None
+        return (SHAPE_NORMALS if normals is not None else 0) | (SHAPE_UVS if uvs is not None else 0)
+
+    def _joined(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """All triangles in one array."""
+        if not self.triangles:
+            return np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint32), np.zeros(0, np.uint32)
+        vertices = np.concatenate([v for v, _, _ in self.triangles])
+        faces = np.concatenate([f for _, f, _ in self.triangles])
+        tags = np.concatenate([np.full(len(f), n, np.uint32) for _, f, n in self.triangles])
+        self.triangles.clear()
+        return vertices, faces, tags
+
+    def _sides(self, shape: Any) -> tuple[int, int, int]:
+        """Material words of front and back, and whether the back is turned round."""
+        two_sided = _any_of(shape.material, mt.TwoSided)
+        name = shapes.where(shape)
+        if two_sided and _any_of(shape.material, (mt.Dielectric, mt.RoughDielectric, mt.ThinDielectric)):
+            raise SceneError("a transmissive material cannot be mixed with a two-sided one", where=name)
+        front = self._word(shape.material, "front", two_sided)
+        back = self._word(shape.material, "back", two_sided)
+        return front, back, SHAPE_TWO_SIDED if two_sided else 0
+
+    def _word(self, material: Any, side: str, turned: bool, inside: bool = False) -> int:
+        """The material word of one side. `inside`: below a TwoSided."""
+        key = (id(material), f"{side}{turned}{inside}")
+        if key not in self.words:
+            self.words[key] = self._made_word(material, side, turned, inside)
+        return self.words[key]
+
+    def _made_word(self, material: Any, side: str, turned: bool, inside: bool) -> int:
+        if isinstance(material, mt.TwoSided):
+            chosen = material.front if side == "front" or material.back is None else material.back
+            return self._word(chosen, side, turned, True)
+        if isinstance(material, mt.Mask):
+            return self._mixture(material.opacity, _NULL, material.material, side, turned, inside)
+        if isinstance(material, mt.Blend):
+            return self._mixture(
+                material.weight, material.first, material.second, side, turned, inside
+            )
+        if side == "back" and turned and not inside and not isinstance(material, mt.Null):
+            material = _BLACK  # the back of a one-sided part, though the surface is turned
+        row = self.tables.row(material, "materials")
+        if row >= 1 << 24:
+            raise SceneError("the scene has more than 16 million words of material parameters")
+        for name, param in device_params(type(material)).items():
+            if getattr(getattr(material, name), "is_texture", False):
+                self.uses["uvs"] = True
+        self.uses["tangents"] |= _anisotropic(material)
+        return self.leaves.index(material.kind) << 24 | row
+
+    def _mixture(
+        self, weight: Any, first: Any, second: Any, side: str, turned: bool, inside: bool
+    ) -> int:
+        words, source = self.tables.param_words(weight, "real")
+        self.tables.sources["mixture"]["weight"].add(source)
+        self.uses["mixtures"] = True
+        self.uses["uvs"] |= source == "texture"
+        children = [self._word(m, side, turned, inside) for m in (first, second)]
+        return MIXTURE << 24 | self.tables.append("mixtures", [*words, *children])
+
+    def _integrator(self) -> Any:
+        """Put the integrator's own parameters into `lamps`, where its kernel finds them."""
+        integrator = self.scene.integrator
+        if isinstance(integrator, sc.integrators.Aov) and not self.channel:
+            raise SceneError("aov needs a channel", where="integrator")
+        return integrator
+
+    def _features(self, analytic: Any, camera: str, integrator: Any) -> Features:
+        scene, tables = self.scene, self.tables
+        sources = {
+            kind: {name: frozenset(found) for name, found in values.items()}
+            for kind, values in tables.sources.items()
+        }
+        index_tables = any(
+            "table" in found
+            for kind in ("dielectric", "rough_dielectric")
+            for name, found in sources.get(kind, {}).items()
+            if name in ("int_ior", "ext_ior")
+        )
+        return Features(
+            mode=self.mode,
+            camera=camera,
+            sampler=scene.sampler.kind,
+            filter=scene.film.filter.kind,
+            integrator={"direct": "path"}.get(integrator.kind, integrator.kind),
+            materials=self.leaves,
+            lights=self.lights.kinds,
+            textures=tuple(sorted({kind for kind, _ in tables.texture_roles})),
+            texture_roles=tuple(sorted(tables.texture_roles)),
+            analytic=tuple(k for k in shapes.ANALYTIC if any(s.kind == k for s in analytic)),
+            normals=self.uses["normals"],
+            uvs=self.uses["uvs"] or self.uses["tangents"] or self.channel == "uv",
+            tangents=self.uses["tangents"],
+            mixtures=self.uses["mixtures"],
+            infinite=self.lights.infinite > 0,
+            light_choice=len(self.lights.rows) > 1,
+            dispersion=index_tables,
+            channel=self.channel,
+            spectra_size=tables.spectra_size,
+            spectra_step=STEP,
+            sources=sources,
+        )
+
+    def _settings(self, center: Any, radius: float) -> np.ndarray:
+        """The settings that do not depend on how the device is used; the renderer adds those."""
+        scene, film = self.scene, self.scene.film
+        integrator = scene.integrator
+        settings = np.zeros((), SETTINGS.dtype)
+        settings["width"], settings["height"] = film.width, film.height
+        settings["tiles_x"] = -(-film.width // 4)
+        settings["places"] = 16 * settings["tiles_x"] * -(-film.height // 4)
+        settings["seed"] = scene.seed % 2**32
+        depth = {"direct": 2, "aov": 1}.get(integrator.kind)
+        depth = getattr(integrator, "max_depth", depth) if depth is None else depth
+        settings["max_depth"] = DEEPEST if depth < 0 else min(depth, DEEPEST)
+        settings["rr_depth"] = min(getattr(integrator, "rr_depth", DEEPEST), DEEPEST)
+        settings["hide_lights"] = getattr(integrator, "hide_lights", False)
+        settings["light_count"] = len(self.lights.rows)
+        settings["infinite_count"] = self.lights.infinite
+        settings["first_analytic"] = sum(s.kind not in shapes.ANALYTIC for s in scene.shapes)
+        settings["lambda_min"], settings["lambda_max"] = film.lambda_min, film.lambda_max
+        settings["tanh_min"], settings["tanh_max"] = tanh_ends(film.lambda_min, film.lambda_max)
+        settings["scene_radius"], settings["center"] = radius, center
+        return settings
+
+
+_NULL, _BLACK = mt.Null(), mt.Diffuse(reflectance=0.0)
+
+
+def _leaf_kinds(scene: sc.Scene) -> tuple[str, ...]:
+    """The leaf kinds of a scene, in the order of the table of kinds."""
+    found: set[type] = set()
+
+    def walk(material: Any, turned: bool) -> None:
+        children = [getattr(material, n) for n, p in params(type(material)).items() if p.role == "host"]
+        children = [c for c in children if isinstance(c, mt.Material)]
+        if isinstance(material, mt.Mask):
+            found.add(mt.Null)
+        if not isinstance(material, mt.COMPOSITES):
+            found.add(type(material))
+        for child in children:
+            walk(child, turned)
+
+    for shape in scene.shapes:
+        if not isinstance(shape.material, mt.Material):
+            raise SceneError(f"{shape.material!r} is not a material", where=shapes.where(shape))
+        walk(shape.material, False)
+        if _any_of(shape.material, mt.TwoSided) and not isinstance(shape.material, mt.TwoSided):
+            found.add(mt.Diffuse)  # the black back of a part that is not two-sided
+    return tuple(cls.kind for cls in mt.LEAVES if cls in found) or (mt.Diffuse.kind,)
+
+
+def _any_of(material: Any, classes: Any) -> bool:
+    """Whether a material or one inside it is of these classes."""
+    inner = (getattr(material, n) for n, p in params(type(material)).items() if p.role == "host")
+    return isinstance(material, classes) or any(
+        _any_of(m, classes) for m in inner if isinstance(m, mt.Material)
+    )
+
+
+def _anisotropic(material: Any) -> bool:
+    u, v = (getattr(material, name, None) for name in ("alpha_u", "alpha_v"))
+    return u is not v and u != v
+
+
+def _sphere_around(vertices: np.ndarray, boxes: np.ndarray) -> tuple[np.ndarray, float]:
+    """The sphere around the bounding box of the whole scene; a unit one if it is empty."""
+    lows = [a.min(axis=0) for a in (vertices, boxes[:, 0]) if len(a)]
+    highs = [a.max(axis=0) for a in (vertices, boxes[:, 1]) if len(a)]
+    if not lows:
+        return np.zeros(3), 1.0
+    low, high = np.min(lows, axis=0), np.max(highs, axis=0)
+    return (low + high) / 2, max(float(np.linalg.norm(high - low)) / 2, 1e-3)
+
+

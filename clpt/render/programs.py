@@ -1,0 +1,237 @@
+"""Programs: the kernel text of every stage, for the features of a scene.
+
+A stage's text holds only what the scene has; one program per material kind shades, so that a new
+material in a scene rebuilds nothing else.
+"""
+
+from __future__ import annotations
+
+from clpt import device
+from clpt.layout import Record
+from clpt.records import LIGHT, SETTINGS, SHAPE, SLABS, TABLES
+from clpt.render import cameras, kinds, lights, shapes, textures
+from clpt.render.features import Features
+from clpt.scene import materials
+from clpt.spectra import XYZ_TO_REC709
+
+LEAVES = {cls.kind: cls for cls in materials.LEAVES}
+
+
+def sources(features: Features, layout: str, lanes: int, *, queued: bool) -> dict[str, device.Source]:
+    """Return the text of every program that a scene needs, by program name.
+
+    layout: of the triangles, a name in clpt.bvh.LAYOUTS; lanes: paths that a work-item shades;
+    queued: whether shading goes along sorted queues.
+    """
+    trace_lanes = lanes if layout == "brute" else 1
+    shared = _shared(features, layout)
+    common = _defines(features)
+    made = {
+        "generate": _source("generate", shared, common, lanes),
+        "intersect": _source("intersect", shared, common, trace_lanes),
+        "shadow": _source("shadow", shared, common, trace_lanes),
+        "accumulate": _source("accumulate", shared, common, 1),
+    }
+    if features.mixtures:
+        made["mix"] = _source("mix", shared, common, lanes)
+    if queued:
+        made["sort"] = _source("sort", shared, common, 1)
+    for number, kind in enumerate(features.materials):
+        own = {**shared, "generated/bsdf.cl": _bsdf_text(features, kind)}
+        defines = {
+            **common,
+            "BSDF_KIND": number,
+            "BSDF_DELTA": int(LEAVES[kind].delta),
+            "USES_CHOICE": int(LEAVES[kind].choosy or features.light_choice),
+            "QUEUED": int(queued),
+        }
+        made[f"shade_{kind}"] = _source("shade", own, defines, lanes)
+    return made
+
+
+def _source(stage: str, virtual: dict[str, str], defines: dict, lanes: int) -> device.Source:
+    return device.assemble(f"stage/{stage}.cl", virtual, {"LANES": lanes, "QUEUED": 0, **defines})
+
+
+def _defines(features: Features) -> dict[str, str | int | float]:
+    made: dict[str, str | int | float] = {
+        "BSDF_COUNT": len(features.materials),
+        "USES_NORMALS": int(features.normals),
+        "USES_UVS": int(features.uvs),
+        "USES_TANGENTS": int(features.tangents),
+        "USES_ANALYTIC": int(bool(features.analytic)),
+        "USES_INFINITE": int(features.infinite),
+        "USES_DISPERSION": int(features.dispersion and features.mode == "spectral"),
+        "SPECTRA_SIZE": features.spectra_size,
+        "SPECTRA_STEP": f"{features.spectra_step}f",
+        "USES_LIGHTS": int(bool(features.lights)),
+        "USES_SURFACE_LIGHTS": int(bool(set(features.lights) & set(shapes.RECORDS))),
+    }
+    if features.filter == "box":
+        made["FILTER_BOX"] = 1
+    if features.channel:
+        made["CHANNEL"] = f"CHANNEL_{features.channel.upper()}"
+    for i, value in enumerate(XYZ_TO_REC709.ravel()):
+        made[f"XYZ_TO_REC709_{i}"] = f"{value:.9g}f"
+    return made
+
+
+def _shared(features: Features, layout: str) -> dict[str, str]:
+    """The generated files that are the same for all programs of a scene."""
+    return {
+        **shapes.virtual_files(),
+        **lights.virtual_files(),
+        "generated/scene.cl": scene_text(),
+        "generated/spectrum.cl": f'#include "spectrum/{features.mode}.cl"\n',
+        "generated/spectrum_read.cl": f'#include "spectrum/{features.mode}_read.cl"\n',
+        "generated/sampler.cl": f'#include "sampler/{features.sampler}.cl"\n',
+        "generated/camera.cl": _camera_text(features.camera),
+        "generated/textures.cl": textures.dispatch_text(features.textures, features.texture_roles),
+        "generated/lights.cl": _lights_text(features),
+        "generated/shapes.cl": _tangents_text(features),
+        "generated/trace.cl": _trace_text(layout),
+        "generated/layout.cl": f'#include "bvh/{layout}.cl"\n#define LAYOUT(verb) {layout}_##verb\n',
+        "generated/shape_tree.cl": _shape_tree_text(features),
+        "generated/integrator.cl": f'#include "integrator/{features.integrator}.cl"\n',
+    }
+
+
+def scene_text() -> str:
+    """Return records, the `Scene` struct and the macros that carry it through a kernel's arguments."""
+    slabs = [record.slab_text() for record in SLABS]
+    rows = [record.row_text() for record in (SHAPE, LIGHT)]
+    pointers = [f"global const {element} *" for element, _ in TABLES.values()]
+    members = [
+        f"    {pointer}{name}; /* {doc} */"
+        for pointer, (name, (_, doc)) in zip(pointers, TABLES.items(), strict=True)
+    ]
+    args = [f"{pointer}restrict {name}" for pointer, name in zip(pointers, TABLES, strict=True)]
+    args.append("global const Settings *restrict settings")
+    words = [f"{record.name.lower()}_words" for record in SLABS]
+    slab_args = [f"global float *restrict {name}" for name in words]
+    slab_sets = [
+        f"{record.name.lower()} = {{{name}, stride}}"
+        for record, name in zip(SLABS, words, strict=True)
+    ]
+    return "\n".join(
+        [
+            SETTINGS.uniform_text(),
+            *slabs,
+            "typedef struct {",
+            *members,
+            "    global const Settings *settings;",
+            "} Scene;",
+            *rows,
+            f"#define SHAPE_ROW_WORDS {SHAPE.words}",
+            f"#define LIGHT_ROW_WORDS {LIGHT.words}",
+            f"#define SCENE_ARGS {', '.join(args)}",
+            f"#define SCENE Scene scene = {{{', '.join([*TABLES, 'settings'])}}};",
+            f"#define SLAB_ARGS {', '.join([*slab_args, 'uint stride'])}",
+            f"#define SLABS Slab {', '.join(slab_sets)};",
+            "",
+        ]
+    )
+
+
+def _camera_text(kind: str) -> str:
+    record: Record = cameras.RECORDS[kind]
+    return (
+        f'{record.uniform_text()}#include "camera/{kind}.cl"\n'
+        f"#define camera_ray(scene, film, lens) "
+        f"{kind}_ray((global const {record.name} *)(scene).camera, film, lens)\n"
+    )
+
+
+def _lights_text(features: Features) -> str:
+    """The loader of emissions, from wherever they come in this scene, and the lights' dispatch."""
+    found = features.sources.get("emission", {}).get("value", frozenset({"constant"}))
+    return kinds.emission_text(found) + lights.dispatch_text(features.lights)
+
+
+def _trace_text(layout: str) -> str:
+    return f'#include "lib/trace_{"lanes" if layout == "brute" else "one"}.cl"\n'
+
+
+def _includes(features: Features) -> list[str]:
+    return [f'#include "generated/shape/{kind}.cl"' for kind in features.analytic]
+
+
+def _cases(features: Features, line: str) -> list[str]:
+    """A line per analytic kind, where `{kind}` stands for it, and for its row in `geometry`."""
+    return [
+        f"    if (shape.kind == {1 + shapes.ANALYTIC.index(kind)}) " + line.format(kind=kind)
+        for kind in features.analytic
+    ]
+
+
+def _shape_tree_text(features: Features) -> str:
+    """Meeting one analytic shape, and the tree over all of them; one ray at a time."""
+    if not features.analytic:
+        return ""
+    hit = "return {kind}_intersect({kind}_row(scene.geometry, shape.params), o, d, tmin, tmax);"
+    return "\n".join(
+        [
+            *_includes(features),
+            '#include "bvh/ray.cl"',
+            "inline ShapeHit shape_hit(Scene scene, ShapeRow shape, vec3 o, vec3 d, real tmin, real tmax)",
+            "{",
+            *_cases(features, hit),
+            "    ShapeHit none = {FAR, {0.0f, 0.0f, 1.0f}, {0.0f, 0.0f}};",
+            "    return none;",
+            "}",
+            "inline int shape_intersect(Scene scene, uint prim, const Ray *ray, float *t)",
+            "{",
+            "    ShapeRow shape = shape_row_row(scene.shapes, (scene.settings->first_analytic + (int)prim) * SHAPE_ROW_WORDS);",
+            "    vec3 o = {ray->o.x, ray->o.y, ray->o.z}, d = {ray->d.x, ray->d.y, ray->d.z};",
+            "    ShapeHit hit = shape_hit(scene, shape, o, d, ray->tmin, *t);",
+            "    if (!(hit.t < *t)) return 0;",
+            "    *t = hit.t;",
+            "    return 1;",
+            "}",
+            '#include "bvh/shapes.cl"',
+            "",
+        ]
+    )
+
+
+def _tangents_text(features: Features) -> str:
+    """dpdu of analytic shapes, in lanes."""
+    if not (features.analytic and features.tangents):
+        return ""
+    body = []
+    for kind in features.analytic:
+        body += [
+            "    {",
+            f"        mask m = shape.kind == {1 + shapes.ANALYTIC.index(kind)};",
+            f"        if (any(m)) r = sel3(m, {kind}_dpdu({kind}_row(scene.geometry, "
+            "sel_i(m, shape.params, (integer)(0))), p, uv), r);",
+            "    }",
+        ]
+    return "\n".join(
+        [
+            *_includes(features),
+            "inline vec3 dpdu_of_shape(Scene scene, ShapeRow shape, vec3 p, vec2 uv)",
+            "{",
+            "    vec3 r = v3(0.0f, 0.0f, 0.0f);",
+            *body,
+            "    return r;",
+            "}",
+            "",
+        ]
+    )
+
+
+def _bsdf_text(features: Features, kind: str) -> str:
+    """A kind's struct, functions and loader, under the names that the integrators use."""
+    cls = LEAVES[kind]
+    verbs = ("sample", "eval", "pdf", "albedo", "load")
+    return "\n".join(
+        [
+            kinds.struct_text(cls),
+            f'#include "bsdf/{kind}.cl"',
+            kinds.load_text(cls, features.sources.get(kind, {}), "materials"),
+            f"typedef {cls.__name__} Bsdf;",
+            *(f"#define bsdf_{verb} {kind}_{verb}" for verb in verbs),
+            "",
+        ]
+    )

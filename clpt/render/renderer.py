@@ -1,0 +1,124 @@
+"""A renderer: a scene on a device, exposed step by step."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import device as dev
+from clpt.errors import SceneError
+from clpt.render.lower import lower
+from clpt.render.wavefront import Wavefront
+from clpt.scene import Scene
+from clpt.scene.integrators import CHANNELS, Aov
+
+Image = NDArray[np.float32]
+
+
+@dataclasses.dataclass(frozen=True)
+class Progress:
+    """How far a render is.
+
+    samples, total: per pixel, in the mean; paths: samples of all pixels; rays: traced so far;
+    seconds: since the first.
+    """
+
+    samples: float
+    total: int
+    paths: int
+    rays: int
+    seconds: float
+
+
+class Renderer:
+    """Renders a scene; its picture can be asked for at any time.
+
+    device: where to render, a name or index (see clpt.device.choose), or a clpt.device.Device.
+    The other parameters are those of clpt.render.wavefront.Wavefront.
+
+    Raises SceneError for a scene that makes no sense, DeviceError, MemoryBudgetError.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        device: dev.Device | str | int | None = None,
+        *,
+        profiling: bool = False,
+        **wavefront: Any,
+    ):
+        self.scene = scene
+        if not isinstance(device, dev.Device):
+            device = dev.choose(device, profiling=profiling)
+        self.device = device
+        self.channels: tuple[str, ...] = ()
+        if isinstance(scene.integrator, Aov):
+            self.channels = scene.integrator.channels
+        self.wavefronts = [
+            Wavefront(device, lower(scene, channel=channel), **wavefront)
+            for channel in self.channels or ("",)
+        ]
+        self.warnings = list(self.wavefronts[0].lowered.warnings)
+        self.samples = 0
+        self._began: float | None = None
+
+    def step(self, samples: int, progress: Callable[[Progress], bool] | None = None) -> bool:
+        """Add samples to every pixel; `samples` in all are kept in `self.samples`.
+
+        progress: called every few milliseconds to seconds; if it returns False the step stops soon.
+        Returns whether the step ran to its end.
+        """
+        start = time.perf_counter()
+        first, end = self.samples, self.samples + samples
+
+        def tell(_: Any) -> bool:
+            counts = [w.counts for w in self.wavefronts]
+            paths = sum(c.samples for c in counts)
+            pixels = self.scene.film.width * self.scene.film.height * len(counts)
+            seconds = time.perf_counter() - start
+            rays = sum(c.rays for c in counts)
+            return progress is None or progress(Progress(paths / pixels, end, paths, rays, seconds))
+
+        for wavefront in self.wavefronts:
+            if not wavefront.expose(first, end, tell):
+                return False
+        self.samples = end
+        return True
+
+    def image(self) -> Image:
+        """The picture so far: (h, w, 3) float32 linear Rec. 709; of `aov`, (h, w, channels)."""
+        if not self.channels:
+            return self.wavefronts[0].image()
+        return np.concatenate(list(self.layers().values()), axis=2)
+
+    def layers(self) -> dict[str, Image]:
+        """The values of the `aov` integrator by name, (h, w, 1 to 3) float32."""
+        return {
+            name: wavefront.image()[:, :, : CHANNELS[name]]
+            for name, wavefront in zip(self.channels, self.wavefronts, strict=True)
+        }
+
+
+def render(
+    scene: Scene,
+    spp: int | None = None,
+    *,
+    device: dev.Device | str | int | None = None,
+    progress: Callable[[Progress], bool] | None = None,
+    **wavefront: Any,
+) -> Image:
+    """Render a scene: (h, w, 3) float32 linear Rec. 709 (of `aov`, all its channels).
+
+    spp: samples per pixel, the scene's own by default. Raises as `Renderer` does.
+    """
+    spp = scene.spp if spp is None else spp
+    if isinstance(spp, bool) or not isinstance(spp, (int, np.integer)) or spp < 1:
+        raise SceneError(f"samples per pixel must be a whole number above zero, not {spp!r}")
+    renderer = Renderer(scene, device, **wavefront)
+    renderer.step(int(spp), progress)
+    return renderer.image()

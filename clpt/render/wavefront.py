@@ -1,0 +1,240 @@
+"""The wavefront: slabs of paths in flight, and the loop that moves them through the stages.
+
+A slot owns its pixels and regenerates its path as soon as that ends, so the device stays full at any
+depth. The host only enqueues; it reads the counters of an iteration while later ones run.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pyopencl as cl
+
+from clpt import bvh, device
+from clpt.device.buffers import Buffers
+from clpt.device.timing import Timings
+from clpt.errors import MemoryBudgetError
+from clpt.records import PATH, SLABS, TABLES
+from clpt.render import programs
+from clpt.render.lower import Lowered
+
+FILM_WORDS = 7  # kernels/lib/film.cl
+FRESH = 0x2000  # kernels/lib/path_state.cl
+COUNTERS = ("done", "samples", "closest", "shadow", "rejected")
+PADDING = 80  # words between streams: powers of two collide in a cache
+GROUP = 64  # slots are a multiple of it, and it is the local size of one-lane kernels
+BATCH = 8  # iterations that are enqueued before counters are asked for
+CPU_SLOTS, GPU_SLOTS = 1 << 14, 1 << 20
+CHUNK = 256  # slots that a work-item of the sort counts
+
+
+@dataclass
+class Counts:
+    """What has happened so far: samples on the film, rays traced, samples that were not finite."""
+
+    samples: int = 0
+    closest: int = 0
+    shadow: int = 0
+    rejected: int = 0
+
+    @property
+    def rays(self) -> int:
+        return self.closest + self.shadow
+
+
+class Wavefront:
+    """The device side of a render: buffers, programs, and `expose`, which runs the bounce loop.
+
+    layout: of the triangles, None for what suits the device; slots: paths in flight, None likewise;
+    queued: whether shading is sorted, None likewise.
+
+    Raises MemoryBudgetError, KernelBuildError, DeviceError.
+    """
+
+    def __init__(
+        self,
+        on: device.Device,
+        lowered: Lowered,
+        *,
+        layout: str | None = None,
+        slots: int | None = None,
+        queued: bool | None = None,
+    ):
+        self.device, self.lowered = on, lowered
+        self.counts = Counts()
+        self.timings = Timings(on.queue)
+        self.buffers = Buffers(on)
+        features = lowered.features
+        if layout is None:
+            layout = bvh.choose_layout(on, len(lowered.faces))
+        if features.analytic and layout == "brute":
+            layout = "wide8" if on.info.is_cpu else "binary"
+        self.lanes = on.lanes
+        kinds = len(features.materials)
+        self.queued = kinds > 1 and (not on.info.is_cpu or kinds > 4) if queued is None else queued
+        texts = programs.sources(features, layout, self.lanes, queued=self.queued)
+        self.programs = device.build_all(on, texts)
+        self._place_slots(slots or (CPU_SLOTS if on.info.is_cpu else GPU_SLOTS))
+        self._allocate(layout)
+        self._bind()
+
+    def _place_slots(self, wanted: int) -> None:
+        """Divide the film among slots: as many as wanted, or as memory allows."""
+        settings = self.lowered.settings
+        places = int(settings["places"])
+        words = sum(record.words for record in SLABS) + 2
+        largest = max(record.words for record in SLABS)
+        room = min(self.buffers.limit // 2 // (4 * words), self.device.info.max_alloc // 4 // largest)
+        wanted = min(wanted, int(room) - PADDING)
+        if wanted < GROUP:
+            raise MemoryBudgetError(
+                "the least number of paths", 4 * words * GROUP, self.buffers.limit,
+                "close other programs or choose another device",
+            )  # fmt: skip
+        whole = -(-places // GROUP) * GROUP
+        per_plane = min(wanted // GROUP * GROUP, whole)
+        planes = max(1, wanted // whole) if per_plane == whole else 1
+        settings["per_plane"], settings["planes"] = per_plane, planes
+        settings["slots"] = per_plane * planes
+        self.slots, self.stride = per_plane * planes, per_plane * planes + PADDING
+
+    def _allocate(self, layout: str) -> None:
+        lowered, give = self.lowered, self.buffers
+        settings = lowered.settings
+        self.named: dict[str, Any] = {"stride": self.stride}
+        for name in TABLES:
+            array = {"vertices": lowered.vertices, "faces": lowered.faces}.get(name)
+            array = lowered.tables[name] if array is None else array
+            self.named[name] = give.upload(f"the table of {name}", array)
+        tags = give.upload("the shapes of the triangles", lowered.tags)
+        tree = bvh.build(
+            self.device, self.named["vertices"] if len(lowered.faces) else lowered.vertices,
+            self.named["faces"] if len(lowered.faces) else lowered.faces,
+            tags if len(lowered.faces) else lowered.tags, layout,
+        )  # fmt: skip
+        give.release(tags)
+        self.tree = tree
+        self.named.update(tree.buffers, triangles=max(tree.count, 0))
+        if lowered.features.analytic:
+            shapes = bvh.build_boxes(self.device, lowered.boxes)
+            self.named["shape_nodes"] = shapes.buffers["nodes"]
+            self.named["shape_items"] = shapes.buffers["indices"]
+        for record in SLABS:
+            name = f"{record.name.lower()}_words"
+            advice = "lower the number of slots"
+            self.named[name] = give.allocate(name, 4 * record.words * self.stride, advice)
+            cl.enqueue_fill_buffer(
+                self.device.queue, self.named[name], np.uint32(0), 0, 4 * record.words * self.stride
+            )
+        self.film_bytes = 4 * FILM_WORDS * int(settings["places"]) * int(settings["planes"])
+        self.named["film"] = give.allocate("the film", self.film_bytes, "lower the image's size")
+        pixels = int(settings["width"]) * int(settings["height"])
+        self.named["image"] = give.allocate("the image", 12 * pixels, "lower the image's size")
+        self.named["counters"] = give.allocate("the counters", 4 * len(COUNTERS))
+        self.named["settings"] = give.upload("the settings", settings.reshape(1).view(np.uint32))
+        if self.queued:
+            kinds = len(lowered.features.materials)
+            chunks = -(-self.slots // CHUNK)
+            self.named["queue"] = give.allocate("the queue", 4 * self.slots)
+            self.named["counts"] = give.allocate("the sort", 4 * chunks * kinds)
+            for name in ("queue_starts", "queue_counts"):
+                self.named[name] = give.allocate(name, 4 * kinds)
+            self.named.update(chunk=CHUNK, chunks=chunks, slots=self.slots)
+        self.clear()
+
+    def _bind(self) -> None:
+        """Give every kernel its arguments; they are told by their names in its signature."""
+        brute = self.tree.layout == "brute"
+        self.steps: list[tuple[str, device.Bound, tuple[int], tuple[int] | None]] = []
+        self.generate = self._step("generate", "generate", self.lanes, first=0, end=0)
+        self._step("intersect", "intersect", self.lanes if brute else 1)
+        if "mix" in self.programs:
+            self._step("mix", "mix_materials", self.lanes)
+        if self.queued:
+            chunks = -(-self.slots // CHUNK)
+            for name, size in (("sort_count", chunks), ("sort_scan", 1), ("sort_place", chunks)):
+                bound = self._bound("sort", name)
+                self.steps.append((name, bound, (size,), None))
+        for kind in self.lowered.features.materials:
+            self._step(f"shade_{kind}", "shade", self.lanes)
+        if any(not programs.LEAVES[k].delta for k in self.lowered.features.materials):
+            self._step("shadow", "shadow", self.lanes if brute else 1)
+        self.accumulate = self._bound("accumulate", "accumulate", raw=0)
+
+    def _bound(self, program: str, name: str, **given: Any) -> device.Bound:
+        kernel = self.programs[program].kernel(name)
+        named = {**self.named, **given}
+        return kernel.bind(**{a.name: named[a.name] for a in kernel.arguments})
+
+    def _step(self, program: str, name: str, lanes: int, **given: Any) -> device.Bound:
+        """Append a stage to the loop; a work-item serves `lanes` slots."""
+        bound = self._bound(program, name, **given)
+        local = (GROUP // lanes,) if lanes > 1 else (GROUP,)
+        self.steps.append((program, bound, (self.slots // lanes,), local))
+        return bound
+
+    def clear(self) -> None:
+        """Empty the film and begin again at sample 0."""
+        self.counts = Counts()
+        self._fill("film", 0, 0, self.film_bytes)
+
+    def _fill(self, name: str, value: int, offset: int, size: int) -> None:
+        cl.enqueue_fill_buffer(
+            self.device.queue, self.named[name], np.uint32(value), offset, size
+        )
+
+    def expose(self, first: int, end: int, on_batch: Callable[[Counts], bool] | None = None) -> bool:
+        """Add samples first to end - 1 of every pixel to the film.
+
+        on_batch is called every few iterations with the counts; if it returns False, every path is
+        brought to its end and the exposure stops: a valid film, but pixels differ in their number of
+        samples. Returns whether it ran to its end.
+        """
+        word = next(m.word for m in PATH.members if m.name == "state")
+        self._fill("path_words", FRESH, 4 * word * self.stride, 4 * self.slots)
+        self._fill("counters", 0, 0, 4 * len(COUNTERS))
+        self.generate.set(first=first, end=end)
+        finished = True
+        reads: deque[tuple[np.ndarray, cl.Event]] = deque()
+        last = np.zeros(len(COUNTERS), np.uint32)
+        while True:
+            for _ in range(BATCH):
+                self._iterate()
+            host = np.zeros(len(COUNTERS), np.uint32)
+            event = cl.enqueue_copy(self.device.queue, host, self.named["counters"], is_blocking=False)
+            self.device.queue.flush()
+            reads.append((host, event))
+            if len(reads) < 2:
+                continue
+            now, event = reads.popleft()
+            event.wait()
+            self._count(now - last)  # unsigned: right even after they wrapped around
+            last = now
+            if on_batch and finished and not on_batch(self.counts):
+                self.generate.set(end=first)
+                finished = False
+            if now[0] >= self.slots:
+                break
+        for host, event in reads:
+            event.wait()
+        return finished
+
+    def _iterate(self) -> None:
+        """One bounce of every path."""
+        for name, bound, size, local in self.steps:
+            self.timings.add(name, bound.enqueue(self.device.queue, size, local))
+
+    def _count(self, new: np.ndarray) -> None:
+        for name, n in zip(COUNTERS[1:], new[1:].tolist(), strict=True):
+            setattr(self.counts, name, getattr(self.counts, name) + n)
+
+    def image(self) -> np.ndarray:
+        """The picture so far, (h, w, 3) float32 linear Rec. 709."""
+        width, height = (int(self.lowered.settings[n]) for n in ("width", "height"))
+        self.accumulate.enqueue(self.device.queue, (width, height))
+        return self.buffers.download(self.named["image"], (height, width, 3), np.float32)
+
