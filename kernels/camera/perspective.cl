@@ -1,11 +1,11 @@
 /* A pinhole: every ray passes the camera's origin. */
 CameraRay perspective_ray(global const PerspectiveCamera *camera, vec2 film, vec2 lens)
 {
-    vec3 d = normalize3(v3((0.5f - film.x) * camera->extent[0] + camera->extent[2],
-                           (0.5f - film.y) * camera->extent[1] + camera->extent[3], (real)(1.0f)));
+    vec3 d = normalize3(v3((0.5f - film.x - camera->offset[0]) * camera->extent[0],
+                           (0.5f - film.y - camera->offset[1]) * camera->extent[1], (real)(1.0f)));
     real near = camera->near / d.z;
     CameraRay r;
-    r.d = matrix_vector(camera->to_world, d.x, d.y, d.z);
+    r.d = normalize3(matrix_vector(camera->to_world, d.x, d.y, d.z));
     r.o = matrix_point(camera->to_world, d.x * near, d.y * near, d.z * near);
     return r;
 }
