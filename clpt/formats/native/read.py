@@ -196,15 +196,17 @@ class _Reader:
         child = cursor.at("file")
         loaded = _placed(child, lambda: mesh.read_mesh(find_file(child)))
         self.warnings += [f"{child.value}: {note}" for note in loaded.warnings]
-        return [_in_frame(part, frame, "material" in cursor.value) for part in loaded.meshes]
+        dressed, several = "material" in cursor.value, len(loaded.meshes) > 1
+        return [_in_frame(part, frame, dressed, several) for part in loaded.meshes]
 
 
-def _in_frame(part: shapes.Mesh, frame: shapes.Mesh, dressed: bool) -> shapes.Mesh:
+def _in_frame(part: shapes.Mesh, frame: shapes.Mesh, dressed: bool, several: bool) -> shapes.Mesh:
+    """Return a part of a file, placed and dressed as the scene says."""
     return dataclasses.replace(
         frame,
         material=frame.material if dressed else part.material,
         to_world=np.asarray(frame.to_world) @ part.to_world,
-        name=frame.name or part.name,
+        name=frame.name or (part.name if several else ""),
         vertices=part.vertices,
         faces=part.faces,
         normals=part.normals,
