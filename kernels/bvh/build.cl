@@ -104,6 +104,9 @@ kernel void build_boxes(global const float *restrict boxes, uint count, uint run
 
 /* --- cutting a range --- */
 
+/* Small ranges are cut with fewer bins: there they cost more than they find. */
+inline int build_bins(uint count) { return count > 24 ? BUILD_BINS : 4; }
+
 inline int4 build_bin(float8 item, float4 low, float4 scale)
 {
     return clamp(convert_int4((item.lo - item.hi - low) * scale), 0, BUILD_BINS - 1);
@@ -112,10 +115,11 @@ inline int4 build_bin(float8 item, float4 low, float4 scale)
 /* The cheapest plane: axis in x, last bin of the left side in y; x < 0 if no plane divides. */
 inline int2 build_plane(global const float8 *items, uint first, uint count, float4 low, float4 scale)
 {
+    int bins = build_bins(count);
     float8 bounds[3][BUILD_BINS];
     uint counts[3][BUILD_BINS];
     for (int axis = 0; axis < 3; axis++)
-        for (int k = 0; k < BUILD_BINS; k++) {
+        for (int k = 0; k < bins; k++) {
             bounds[axis][k] = (float8)(INFINITY);
             counts[axis][k] = 0;
         }
@@ -135,14 +139,14 @@ inline int2 build_plane(global const float8 *items, uint first, uint count, floa
         float left[BUILD_BINS];
         float8 side = bounds[axis][0];
         uint below = counts[axis][0];
-        for (int k = 0; k < BUILD_BINS - 1; k++) {
+        for (int k = 0; k < bins - 1; k++) {
             left[k] = below ? build_half_area(side) * below : INFINITY;
             side = build_union(side, bounds[axis][k + 1]);
             below += counts[axis][k + 1];
         }
-        side = bounds[axis][BUILD_BINS - 1];
-        uint above = counts[axis][BUILD_BINS - 1];
-        for (int k = BUILD_BINS - 2; k >= 0; k--) {
+        side = bounds[axis][bins - 1];
+        uint above = counts[axis][bins - 1];
+        for (int k = bins - 2; k >= 0; k--) {
             float cost = above ? left[k] + build_half_area(side) * above : INFINITY;
             if (cost < cheapest) {
                 cheapest = cost;
@@ -164,7 +168,7 @@ inline uint build_cut(global float8 *items, Range r, float8 span, Half *left, Ha
     uint levels = 32 - clz(r.count - 1); /* of a balanced tree */
     float4 extent = -span.hi - span.lo;
     if (r.depth + levels < BVH_DEPTH) {
-        float4 scale = extent > 0.0f ? (BUILD_BINS * 0.999999f) / extent : (float4)(0.0f);
+        float4 scale = extent > 0.0f ? (build_bins(r.count) * 0.999999f) / extent : (float4)(0.0f);
         int2 plane = build_plane(items, r.first, r.count, span.lo, scale);
         if (plane.x >= 0) {
             uint end = r.first + r.count;
