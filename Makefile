@@ -9,6 +9,9 @@ SHELL := /bin/bash
 SUDO := $(shell if [ "$$(id -u)" = 0 ]; then echo env; \
 	elif sudo -n true 2>/dev/null; then echo sudo -n; else echo false; fi)
 APT := $(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get
+# $(call apt,packages): install them, quietly; fails where that is not allowed
+apt = { [ "$(SUDO)" != false ] && echo "make: apt-get install $(1)" && $(APT) update -qq >/dev/null \
+	&& $(APT) install -y -qq --no-install-recommends $(1) >/dev/null; }
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 OFFLINE := "make: pip could not install clpt; the lines above tell why (is there a network?)"
 
@@ -38,13 +41,14 @@ clean:
 	rm -rf $(VENV)
 
 $(BIN)/python:
-	@command -v $(PYTHON) >/dev/null || { $(APT) update -qq && $(APT) install -y -qq python3; } \
+	@command -v $(PYTHON) >/dev/null || $(call apt,python3) \
 		|| { echo "make: there is no $(PYTHON); install Python 3.10 or newer" >&2; exit 1; }
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' \
 		|| { echo "make: $(PYTHON) is older than 3.10; try make PYTHON=python3.12" >&2; exit 1; }
 	@$(PYTHON) -c 'import ensurepip' 2>/dev/null \
-		|| { $(APT) update -qq && $(APT) install -y -qq python3-venv; } \
+		|| $(call apt,python3-venv) \
 		|| { echo "make: $(PYTHON) has no venv; run apt-get install python3-venv" >&2; exit 1; }
+	@echo "make: setting up $(VENV)"
 	@$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); exit 1; }
 
 $(VENV)/.run: pyproject.toml | $(BIN)/python
@@ -64,8 +68,8 @@ $(VENV)/.dev: pyproject.toml | $(BIN)/python
 WORKS := $(BIN)/python -c 'from clpt.device.context import selection; selection()'
 $(VENV)/.opencl:
 	@$(WORKS) 2>/dev/null \
-		|| { $(APT) update -qq && $(APT) install -y -qq pocl-opencl-icd && $(WORKS); } 2>/dev/null \
-		|| { $(PIP) --editable '.[cpu]' && $(WORKS); } \
+		|| { $(call apt,pocl-opencl-icd) && $(WORKS) 2>/dev/null; } \
+		|| { echo "make: pip install clpt[cpu]" && $(PIP) --editable '.[cpu]' && $(WORKS); } \
 		|| { echo "make: no OpenCL device; install a driver, e.g. apt-get install pocl-opencl-icd," \
 			"and see $(BIN)/clpt devices" >&2; exit 1; }
 	@touch $@
