@@ -240,14 +240,13 @@ def _decode(text: str) -> Signatures:
     return {name: tuple(Argument(*a) for a in args) for name, args in json.loads(text).items()}
 
 
-_PLACE = re.compile(r"""["']?([\w./ -]+\.\w+)["']?(?::|, line |\()(\d+)""")
-
-
 def _build_error(source: Source, log: str) -> KernelBuildError:
     """The first error row of a compiler's log, as our file and line; the text is kept on disk."""
-    rows = [row for row in log.splitlines() if re.search(r"\berror\b", row)]
-    places = [match for match in map(_PLACE.search, rows) if match]
-    file, line = (places[0][1].strip(), int(places[0][2])) if places else (None, None)
+    names = "|".join(rf"(?:kernels/)?{re.escape(name)}" for name in source.files)
+    place = re.compile(rf"""(?<![\w/.])({names})["']?(?::|, line |\()(\d+)""")
+    rows = (row for row in log.splitlines() if re.search(r"\berror\b", row))
+    first = next(filter(None, map(place.search, rows)), None)
+    file, line = (first[1], int(first[2])) if first else (None, None)
     return KernelBuildError(source.name, file, line, log, cache.keep_failed(source))
 
 
