@@ -1,0 +1,62 @@
+/* An open tube; sampled evenly over its area. u is the azimuth over 2 pi, v runs along the axis. */
+#include "lib/analytic.cl"
+
+inline real cylinder_pdf_area(Cylinder q)
+{
+    return INV_2PI / max_r(q.radius * sqrt(dot3(q.axis, q.axis)), (real)(1e-30f));
+}
+
+ShapeSample cylinder_sample(Cylinder q, vec3 p, vec2 u)
+{
+    real s, c;
+    sincos_2pi(u.x, &s, &c);
+    vec3 outward = madd3(q.x, c, scale3(q.y, s));
+    vec3 to = sub3(madd3(outward, q.radius, madd3(q.axis, u.y, q.p0)), p);
+    ShapeSample r;
+    r.t = sqrt(max_r(dot3(to, to), (real)(1e-20f)));
+    r.wi = scale3(to, 1.0f / r.t);
+    r.n = scale3(outward, q.side);
+    r.uv = u;
+    r.pdf = solid_angle_pdf(cylinder_pdf_area(q), r.t, fabs(dot3(outward, r.wi)));
+    return r;
+}
+
+real cylinder_pdf(Cylinder q, vec3 p, vec3 wi, real t, vec3 n)
+{
+    return solid_angle_pdf(cylinder_pdf_area(q), t, fabs(dot3(n, wi)));
+}
+
+/* As a sphere (see there), in the plane across the axis; both walls are tried. */
+ShapeHit cylinder_intersect(Cylinder q, vec3 o, vec3 d, real tmin, real tmax)
+{
+    vec3 f = sub3(o, q.p0);
+    real fx = dot3(f, q.x), fy = dot3(f, q.y), dx = dot3(d, q.x), dy = dot3(d, q.y);
+    real a = dx * dx + dy * dy, over_a = 1.0f / max_r(a, (real)(1e-20f));
+    real b = -(fx * dx + fy * dy) * over_a, length = sqrt(fx * fx + fy * fy);
+    real lx = fx + b * dx, ly = fy + b * dy;
+    real disc = (q.radius * q.radius - lx * lx - ly * ly) * over_a, s = sqrt_r(disc);
+    real height = length - q.radius;
+    real rounding = SURFACE_ROUNDING * (size3(q.p0) + size3(f) + q.radius);
+    real c = sel(fabs(height) < rounding, (real)(0.0f), height * (length + q.radius) * over_a);
+    real far = b + sel(b < 0.0f, -s, s), near = safe_div(c, far);
+    real lo = min_r(near, far), hi = max_r(near, far);
+    real along = 1.0f / dot3(q.axis, q.axis), v0 = dot3(f, q.axis) * along, dv = dot3(d, q.axis) * along;
+    real v_lo = v0 + lo * dv, v_hi = v0 + hi * dv;
+    mask first = (lo > tmin) & (v_lo >= 0.0f) & (v_lo <= 1.0f);
+    real t = sel(first, lo, hi), v = sel(first, v_lo, v_hi), step = sel(first, -s, s);
+    mask met = (a > 1e-20f) & (disc >= 0.0f) & (t > tmin) & (t < tmax) & (v >= 0.0f) & (v <= 1.0f);
+    real x = lx + step * dx, y = ly + step * dy;
+    ShapeHit h;
+    h.t = sel(met, t, (real)(FAR));
+    h.n = scale3(normalize3(madd3(q.x, x, scale3(q.y, y))), q.side);
+    h.uv.x = turn_of(y, x);
+    h.uv.y = v;
+    return h;
+}
+
+vec3 cylinder_dpdu(Cylinder q, vec3 p, vec2 uv)
+{
+    real s, c, around = 2.0f * PI * q.radius;
+    sincos_2pi(uv.x, &s, &c);
+    return add3(scale3(q.x, -around * s), scale3(q.y, around * c));
+}

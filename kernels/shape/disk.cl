@@ -1,0 +1,54 @@
+/* A disk, or an ellipse where its transform stretches it; sampled evenly over its area. u is the
+ * distance from the centre (1 at the rim), v the azimuth over 2 pi. */
+#include "lib/analytic.cl"
+
+inline real disk_pdf_area(Disk q)
+{
+    vec3 c = cross3(q.s, q.t);
+    return INV_PI / max_r(sqrt(dot3(c, c)), (real)(1e-30f));
+}
+
+ShapeSample disk_sample(Disk q, vec3 p, vec2 u)
+{
+    vec2 b = disk_of(u);
+    vec3 to = sub3(madd3(q.s, b.x, madd3(q.t, b.y, q.center)), p);
+    ShapeSample r;
+    r.t = sqrt(max_r(dot3(to, to), (real)(1e-20f)));
+    r.wi = scale3(to, 1.0f / r.t);
+    r.n = q.n;
+    r.uv.x = sqrt_r(u.x);
+    r.uv.y = u.y;
+    r.pdf = solid_angle_pdf(disk_pdf_area(q), r.t, fabs(dot3(q.n, r.wi)));
+    return r;
+}
+
+real disk_pdf(Disk q, vec3 p, vec3 wi, real t, vec3 n)
+{
+    return solid_angle_pdf(disk_pdf_area(q), t, fabs(dot3(q.n, wi)));
+}
+
+/* An origin that lies in the plane to rounding does not meet the disk. */
+ShapeHit disk_intersect(Disk q, vec3 o, vec3 d, real tmin, real tmax)
+{
+    vec3 to = sub3(q.center, o), c = cross3(q.s, q.t);
+    real height = dot3(q.n, to), slope = dot3(q.n, d), t = safe_div(height, slope);
+    vec3 at = sub3(scale3(d, t), to);
+    real inverse = 1.0f / max_r(dot3(c, c), (real)(1e-37f));
+    real x = dot3(at, cross3(q.t, c)) * inverse, y = dot3(at, cross3(c, q.s)) * inverse;
+    real radius2 = x * x + y * y;
+    mask met = (slope != 0.0f) & (radius2 <= 1.0f) & (t > tmin) & (t < tmax)
+             & (fabs(height) > SURFACE_ROUNDING * (size3(q.center) + size3(to)));
+    ShapeHit h;
+    h.t = sel(met, t, (real)(FAR));
+    h.n = q.n;
+    h.uv.x = sqrt(radius2);
+    h.uv.y = turn_of(y, x);
+    return h;
+}
+
+vec3 disk_dpdu(Disk q, vec3 p, vec2 uv) /* along the radius */
+{
+    real s, c;
+    sincos_2pi(uv.y, &s, &c);
+    return madd3(q.s, c, scale3(q.t, s));
+}

@@ -1,0 +1,92 @@
+/* A sphere. As a light it is sampled evenly over the cone that it fills from outside, and evenly over
+ * its area from inside. u is the azimuth about its z axis over 2 pi, v the angle from it over pi. */
+#include "lib/analytic.cl"
+
+inline vec2 sphere_uv(Sphere q, vec3 outward)
+{
+    real x = dot3(outward, q.x), y = dot3(outward, q.y), z = dot3(outward, q.z);
+    vec2 uv;
+    uv.x = turn_of(y, x);
+    uv.y = atan2_r(sqrt(x * x + y * y), z) * INV_PI;
+    return uv;
+}
+
+/* sin^2 of the cone's half angle from a distance d > radius, and 1 - cos without cancellation. */
+inline real sphere_cone(Sphere q, real d, real *sin2)
+{
+    *sin2 = sqr(q.radius / d);
+    return *sin2 / (1.0f + sqrt_r((d - q.radius) * (d + q.radius)) / d);
+}
+
+ShapeSample sphere_sample(Sphere q, vec3 p, vec2 u)
+{
+    vec3 to = sub3(q.center, p);
+    real d = sqrt(max_r(dot3(to, to), (real)(1e-30f))), sin2_max;
+    mask outside = d > q.radius;
+
+    /* From inside. */
+    vec3 outward = uniform_sphere(u), there = madd3(outward, q.radius, to);
+    real t = sqrt(max_r(dot3(there, there), (real)(1e-20f)));
+    ShapeSample r;
+    r.t = t;
+    r.wi = scale3(there, 1.0f / t);
+    real pdf = solid_angle_pdf(INV_4PI / sqr(q.radius), t, fabs(dot3(outward, r.wi)));
+    r.pdf = pdf;
+
+    if (any(outside)) { /* The nearer of the two points along a direction in the cone (pbrt-v4 6.2.4). */
+        Frame f = frame_of(scale3(to, 1.0f / d));
+        real one_minus_cos = sphere_cone(q, sel(outside, d, 2.0f * q.radius), &sin2_max);
+        vec3 w = uniform_cone(u, one_minus_cos);
+        real sin2 = w.x * w.x + w.y * w.y, depth = sqrt_r(1.0f - sin2 / sin2_max);
+        real near = (d - q.radius) * (d + q.radius) / max_r(d * w.z + q.radius * depth, (real)(1e-30f));
+        real across = near / q.radius;
+        vec3 normal = v3(w.x * across, w.y * across, -(sin2 / sqrt(sin2_max) + w.z * depth));
+        r.t = sel(outside, near, r.t);
+        r.wi = sel3(outside, to_world(f, w), r.wi);
+        outward = sel3(outside, normalize3(to_world(f, normal)), outward);
+        r.pdf = sel(outside, INV_2PI / one_minus_cos, pdf);
+    }
+    r.n = scale3(outward, q.side);
+    r.uv = sphere_uv(q, outward);
+    return r;
+}
+
+real sphere_pdf(Sphere q, vec3 p, vec3 wi, real t, vec3 n)
+{
+    vec3 to = sub3(q.center, p);
+    real d = sqrt(max_r(dot3(to, to), (real)(1e-30f))), sin2;
+    mask outside = d > q.radius;
+    real one_minus_cos = sphere_cone(q, sel(outside, d, 2.0f * q.radius), &sin2);
+    real inside = solid_angle_pdf(INV_4PI / sqr(q.radius), t, fabs(dot3(n, wi)));
+    return sel(outside, INV_2PI / one_minus_cos, inside);
+}
+
+/* Haines et al. 2019 (Ray Tracing Gems, 7): the discriminant from the ray's distance to the centre. An
+ * origin that lies on the surface to rounding is taken to lie on it, so that it does not meet itself. */
+ShapeHit sphere_intersect(Sphere q, vec3 o, vec3 d, real tmin, real tmax)
+{
+    vec3 f = sub3(o, q.center);
+    real b = -dot3(f, d), length = sqrt(dot3(f, f));
+    vec3 l = madd3(d, b, f);
+    real disc = q.radius * q.radius - dot3(l, l), s = sqrt_r(disc);
+    real height = length - q.radius;
+    real rounding = SURFACE_ROUNDING * (size3(q.center) + q.radius);
+    real c = sel(fabs(height) < rounding, (real)(0.0f), height * (length + q.radius));
+    real far = b + sel(b < 0.0f, -s, s), near = safe_div(c, far);
+    real lo = min_r(near, far), hi = max_r(near, far);
+    mask first = lo > tmin;
+    real t = sel(first, lo, hi);
+    mask met = (disc >= 0.0f) & (t > tmin) & (t < tmax);
+    vec3 outward = normalize3(madd3(d, sel(first, -s, s), l));
+    ShapeHit h;
+    h.t = sel(met, t, (real)(FAR));
+    h.n = scale3(outward, q.side);
+    h.uv = sphere_uv(q, outward);
+    return h;
+}
+
+vec3 sphere_dpdu(Sphere q, vec3 p, vec2 uv)
+{
+    vec3 f = sub3(p, q.center);
+    return add3(scale3(q.x, -2.0f * PI * dot3(f, q.y)), scale3(q.y, 2.0f * PI * dot3(f, q.x)));
+}
