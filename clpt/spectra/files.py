@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import yaml
 from numpy.typing import NDArray
 
 from clpt.errors import SceneError
-from clpt.spectra.spectrum import Cauchy, Constant, Sellmeier, Spectrum, Tabulated
+from clpt.spectra.spectrum import Cauchy, Constant, Outside, Sellmeier, Spectrum, Tabulated
 
 MICROMETRE = 1000.0  # [nm]
 FORMULA_POINTS = 2001  # at which a formula without a class of its own is tabulated
 
 
-def read_table(path: str | Path, outside: Literal["zero", "hold"] = "zero") -> Tabulated:
+def read_table(path: str | Path, outside: Outside = "zero") -> Tabulated:
     """Read `wavelength [nm], value` lines, separated by blanks, commas or semicolons.
 
     `#` starts a comment; one line of column titles is allowed. Raises SceneError with the line.
@@ -111,17 +111,17 @@ def _formula(name: str, part: dict[str, Any]) -> Spectrum:
     ends = _numbers(part, "wavelength_range")
     um = np.linspace(ends[0], ends[-1], FORMULA_POINTS)
     if number in (3, 5):
-        total = c[0] + sum(b * um**p for b, p in pairs)
+        total = sum((b * um**p for b, p in pairs), np.full(um.shape, c[0]))
         index = np.sqrt(total) if number == 3 else total
     elif number == 4:
         c = c + [0.0] * (9 - len(c))
         total = c[0] + c[1] * um ** c[2] / (um**2 - c[3] ** c[4])
         total = total + c[5] * um ** c[6] / (um**2 - c[7] ** c[8])
         rest = c[9:]
-        total = total + sum(b * um**p for b, p in zip(rest[::2], rest[1::2], strict=False))
-        index = np.sqrt(total)
+        powers = zip(rest[::2], rest[1::2], strict=False)
+        index = np.sqrt(sum((b * um**p for b, p in powers), total))
     else:
-        index = 1.0 + c[0] + sum(b / (s - um**-2.0) for b, s in pairs)
+        index = sum((b / (s - um**-2.0) for b, s in pairs), np.full(um.shape, 1.0 + c[0]))
     return Tabulated(um * MICROMETRE, index, "hold")
 
 
@@ -134,7 +134,9 @@ def _columns(part: dict[str, Any], count: int) -> NDArray[np.float64]:
             raise SceneError(message, where=line.strip())
     if not rows:
         raise SceneError("a table without rows")
-    return np.array(rows, np.float64).T
+    columns = np.array(rows, np.float64).T
+    # Curves read off figures repeat a wavelength now and then; its first row counts.
+    return columns[:, np.unique(columns[0], return_index=True)[1]]
 
 
 def _numbers(part: dict[str, Any], name: str) -> list[float]:

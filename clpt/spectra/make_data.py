@@ -15,6 +15,7 @@ import numpy as np
 
 from clpt.spectra import files
 from clpt.spectra.data import ROOT
+from clpt.spectra.spectrum import Tabulated
 
 FLUORESCENT = tuple(f"F{i}" for i in range(1, 13))
 METALS_WITHIN = (300.0, 1100.0)  # [nm]
@@ -77,6 +78,7 @@ def rewrite_metals(database: Path) -> None:
             print(f"{page}: not in {database}, kept as it is")
             continue
         eta, k = files.read_refractive_index(found[0])
+        assert isinstance(eta, Tabulated) and isinstance(k, Tabulated), f"{page} has no table"
         lambdas = np.array(eta.lambdas)
         rows = np.column_stack([lambdas, eta.values, k.values])
         keep = (lambdas >= METALS_WITHIN[0]) & (lambdas <= METALS_WITHIN[1])

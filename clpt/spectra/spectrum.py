@@ -20,6 +20,7 @@ from clpt.errors import SceneError
 from clpt.spectra import cie, data, upsampling
 
 Role = Literal["reflectance", "unbounded", "emission"]
+Outside = Literal["zero", "hold"]
 Samples = NDArray[np.float64]
 
 # CODATA 2018, exact: Planck [J s], light [m/s], Boltzmann [J/K].
@@ -56,7 +57,7 @@ class Constant(Spectrum):
         return super().to_rgb(role) if role == "emission" else np.full(3, float(self.value))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False)
 class Tabulated(Spectrum):
     """Linear between points; outside them zero, or the end values if `outside` is "hold".
 
@@ -65,22 +66,25 @@ class Tabulated(Spectrum):
 
     lambdas: tuple[float, ...]
     values: tuple[float, ...]
-    outside: Literal["zero", "hold"] = "zero"
+    outside: Outside = "zero"
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "lambdas", _floats(self.lambdas))
-        object.__setattr__(self, "values", _floats(self.values))
+    def __init__(
+        self, lambdas: Iterable[float], values: Iterable[float], outside: Outside = "zero"
+    ) -> None:
+        object.__setattr__(self, "lambdas", _floats(lambdas))
+        object.__setattr__(self, "values", _floats(values))
+        object.__setattr__(self, "outside", outside)
         if len(self.lambdas) != len(self.values) or not self.lambdas:
             raise SceneError(
                 f"a spectrum needs as many values as wavelengths, found {len(self.values)} and "
                 f"{len(self.lambdas)}"
             )
-        if not (np.diff(self.lambdas) > 0.0).all():
-            raise SceneError("the wavelengths of a spectrum must ascend")
         if not np.isfinite([*self.lambdas, *self.values]).all():
             raise SceneError("a spectrum has a value that is not finite")
-        if self.outside not in ("zero", "hold"):
-            raise SceneError(f"outside its points a spectrum can zero or hold, not {self.outside}")
+        if not (np.diff(self.lambdas) > 0.0).all():
+            raise SceneError("the wavelengths of a spectrum must ascend")
+        if outside not in ("zero", "hold"):
+            raise SceneError(f"outside its points a spectrum is zero or holds, not {outside!r}")
 
     def sample(self, lambdas: ArrayLike) -> Samples:
         end = 0.0 if self.outside == "zero" else None

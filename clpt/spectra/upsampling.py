@@ -22,7 +22,7 @@ NODES = 40
 QUANTUM = 1.0 / 2048.0  # of the table's values, which are stored as differences along each axis
 CENTRE, HALF_WIDTH = 595.0, 235.0  # [nm] of the unit coordinate
 DARKEST = 1e-9  # flat reflectances stay this far inside (0, 1), where x is finite
-EDGE = 1e-5  # the outermost layers, in place of black and white
+EDGE = 1e-4  # the outermost layers, in place of black and white
 CHUNK = 1 << 15  # colours at a time, so that the gathered corners stay in the cache
 
 

@@ -1,0 +1,113 @@
+"""clpt.spectra.files: what is read, and how bad files are told."""
+
+import numpy as np
+import pytest
+
+from clpt import spectra
+from clpt.errors import SceneError
+
+
+def write(tmp_path, text, name="s.spd"):
+    path = tmp_path / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "# from somewhere\n400 1\n\n500.5\t2 # end\n",
+        "wavelength,value\n400,1\n500.5,2\n",
+        "nm;power\r\n400;1\r\n500.5;2\r\n",
+    ],
+)
+def test_tables(tmp_path, text):
+    expected = spectra.Tabulated((400, 500.5), (1, 2), "hold")
+    assert spectra.read_table(write(tmp_path, text), "hold") == expected
+
+
+@pytest.mark.parametrize(
+    "text, line, message",
+    [
+        ("400 1\n500 x\n", 2, "expected a wavelength"),
+        ("400 1 2\n", 1, "expected a wavelength"),
+        ("# a\n500 1\n400 2\n", 3, "ascend"),
+        ("400 1\nnm power\n", 2, "expected a wavelength"),
+        ("# only a comment\n", None, "no wavelengths"),
+        ("400 nan\n", None, "finite"),
+    ],
+)
+def test_bad_tables_tell_the_line(tmp_path, text, line, message):
+    path = write(tmp_path, text)
+    with pytest.raises(SceneError, match=message) as caught:
+        spectra.read_table(path)
+    assert caught.value.file == path and caught.value.line == line
+
+
+def test_missing_file(tmp_path):
+    with pytest.raises(SceneError, match="cannot be read"):
+        spectra.read_table(tmp_path / "none.spd")
+
+
+def page(kind, body):
+    return f"REFERENCES: someone\nDATA:\n  - type: {kind}\n{body}\n"
+
+
+def formula(number, coefficients):
+    body = f"    wavelength_range: 0.3 2.5\n    coefficients: {coefficients}"
+    return page(f"formula {number}", body)
+
+
+N_BK7 = "0 1.03961212 0.00600069867 0.231792344 0.0200179144 1.01046945 103.560653"
+
+
+@pytest.mark.parametrize(
+    "text, index",
+    [
+        (formula(2, N_BK7), 1.51680),
+        (formula(1, "0 1.4313493 0.0726631 0.65054713 0.1193242 5.3414021 18.028251"), 1.76817),
+        (formula(3, "2.25 0.01 -2"), np.sqrt(2.25 + 0.01 / 0.5875618**2)),
+        (formula(4, "5.913 0.2441 0 0.0803 1"), 2.61427),
+        (formula(5, "1.5 0.004 -2"), 1.5 + 0.004 / 0.5875618**2),
+        (formula(5, "1.5 0.004 -2.5"), 1.5 + 0.004 / 0.5875618**2.5),
+        (formula(6, "0 0.05792105 238.0185 0.00167917 57.362"), 1.00027717),
+    ],
+)
+def test_dispersion_formulas(tmp_path, text, index):
+    eta, k = spectra.read_refractive_index(write(tmp_path, text))
+    assert eta.sample(587.5618) == pytest.approx(index, abs=2e-5)
+    assert k == spectra.Constant(0.0)
+
+
+def test_tabulated_pages(tmp_path):
+    body = "    data: |\n        0.40 1.5 2.0\n        0.40 1.6 2.0\n        0.60 2.5 4.0"
+    eta, k = spectra.read_refractive_index(write(tmp_path, page("tabulated nk", body)))
+    np.testing.assert_allclose(eta.sample([300, 400, 500, 900]), [1.5, 1.5, 2.0, 2.5])
+    np.testing.assert_allclose(k.sample([300, 500, 900]), [2.0, 3.0, 4.0])
+    both = (
+        formula(2, N_BK7)
+        + "  - type: tabulated k\n    data: |\n        0.4 1e-6\n        0.6 2e-6\n"
+    )
+    eta, k = spectra.read_refractive_index(write(tmp_path, both))
+    assert isinstance(eta, spectra.Sellmeier)
+    assert k.sample(500.0) == pytest.approx(1.5e-6)
+
+
+@pytest.mark.parametrize(
+    "text, line, message",
+    [
+        ("DATA: [", 1, "not YAML"),
+        ("a: 1", None, "no list DATA"),
+        (formula(9, "1 2 3"), 3, "formula '9'"),
+        (formula(2, "1 2"), 3, "odd number"),
+        (formula(2, "1 x 2"), 3, "expected numbers"),
+        (page("tabulated nk", "    data: |\n        0.4 1.5"), 5, "expected 3 numbers"),
+        (page("tabulated k", "    data: |\n        0.4 1.5"), None, "no refractive index"),
+        (page("drawing", "    data: 1"), 3, "unknown type"),
+    ],
+)
+def test_bad_pages_tell_the_line(tmp_path, text, line, message):
+    path = write(tmp_path, text, "page.yml")
+    with pytest.raises(SceneError, match=message) as caught:
+        spectra.read_refractive_index(path)
+    assert caught.value.file == path and caught.value.line == line
