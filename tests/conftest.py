@@ -12,7 +12,7 @@ HERE = Path(__file__).resolve().parent
 
 @pytest.fixture(scope="session")
 def assets() -> Path:
-    """The folder of third-party test scenes: `shared/assets` beside the checkout or $CLPT_ASSETS."""
+    """Third-party test scenes: `shared/assets` beside the checkout, or $CLPT_ASSETS."""
     beside = HERE.parent.parent / "shared" / "assets"
     folder = Path(os.environ.get("CLPT_ASSETS", beside))
     if not folder.is_dir():

@@ -31,6 +31,8 @@ KNOWN_EXTENSIONS = (
     "FB_ngon_encoding",
 )  # fmt: skip
 # Reading on without these would misplace triangles, even where a file calls them optional.
+TRIANGLE_FAN = 6
+APPEARANCE = "KHR_materials_"  # the triangles are right without
 NEEDED_EXTENSIONS = ("EXT_mesh_gpu_instancing",)
 USEMTL = re.compile(rb"(?m)^[ \t]*usemtl[^\n]*")
 GREY = TwoSided(front=Diffuse(reflectance=0.6, name="grey"))
@@ -52,7 +54,7 @@ def read_mesh(path: Path, *, materials: bool = True) -> MeshFile:
     """
     notes: list[str] = []
     if path.suffix.lower() in (".glb", ".gltf"):
-        _check_extensions(path, notes)
+        _check_gltf(path, notes)
     scene = _open(path, materials)
     shared: dict[str, Mesh | None] = {}
     meshes: list[Mesh] = []
@@ -152,8 +154,8 @@ def checked(
     return {**arrays, "faces": np.ascontiguousarray(faces, np.uint32)}
 
 
-def _check_extensions(path: Path, notes: list[str]) -> None:
-    """Refuse glTF extensions without which the geometry would be wrong, note the others."""
+def _check_gltf(path: Path, notes: list[str]) -> None:
+    """Refuse a glTF file whose geometry trimesh would get wrong; note extensions left out."""
     try:
         data = path.read_bytes()
         if data[:4] == b"glTF":
@@ -161,12 +163,16 @@ def _check_extensions(path: Path, notes: list[str]) -> None:
         document = json.loads(data)
         used = [str(name) for name in document.get("extensionsUsed", [])]
         required = [str(name) for name in document.get("extensionsRequired", [])]
+        primitives = [p for m in document.get("meshes", []) for p in m.get("primitives", [])]
+        fans = any(primitive.get("mode") == TRIANGLE_FAN for primitive in primitives)
     except OSError as error:
         raise SceneError(f"cannot be read: {error.strerror}", file=path) from None
     except (ValueError, TypeError, AttributeError, RecursionError) as error:
         raise SceneError(f"is not glTF: {str(error)[:80]}", file=path) from None
+    if fans:  # trimesh passes over them without a word
+        raise SceneError("holds triangle fans, which are not supported", file=path)
     for name in [*required, *(name for name in NEEDED_EXTENSIONS if name in used)]:
-        if name not in KNOWN_EXTENSIONS:
+        if name not in KNOWN_EXTENSIONS and not name.startswith(APPEARANCE):
             raise SceneError(f"needs the glTF extension {name}, which is not supported", file=path)
     notes += [f"glTF extension {name} left out" for name in used if name not in KNOWN_EXTENSIONS]
 

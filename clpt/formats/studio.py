@@ -35,14 +35,15 @@ def load(path: Path) -> Scene:
         raise SceneError("is too large to be framed", file=path)
     floor, axis = middle.copy(), int(np.argmax(up[:3, 1]))
     floor[axis] = low[axis]
+    furniture = [_ground(floor, radius, up), _key(middle, radius, up)]
     return Scene(
         camera=framing_camera(file.meshes, up),
-        shapes=[*file.meshes, _ground(floor, radius, up), _key(middle, radius, up)],
+        shapes=[*file.meshes, *furniture],
         lights=[lights.Constant(radiance=RGBIlluminant(0.35, 0.35, 0.35))],
         film=integrators.Film(filter=integrators.Gaussian()),
         name=path.stem,
         warnings=file.warnings,
-        extra={"format": path.suffix.lower()[1:]},
+        extra={"format": path.suffix.lower()[1:], "studio": len(furniture)},
     )
 
 

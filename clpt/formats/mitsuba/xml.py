@@ -93,7 +93,9 @@ def parse(path: Path, variables: Mapping[str, object]) -> Document:
     expander.expand(root, 0)
     unused = sorted(set(variables) - expander.used)
     if unused:
-        known = ", ".join(sorted(expander.values)) or "none"
+        known = (
+            ", ".join(sorted(expander.used | expander.values.keys() - variables.keys())) or "none"
+        )
         raise SceneError(f"has no variable {unused[0]!r}; variables: {known}", file=path)
     return Document(root, expander.folders)
 

@@ -1,0 +1,116 @@
+"""`clpt info`: what a scene file holds, without rendering it."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.console import Console
+from rich.table import Table
+
+from ..formats import load, studio
+from ..scene import Scene, materials, shapes, textures
+from ..scene.params import Kind
+
+FLAT_TRIANGLES = {shapes.Rectangle: 2, shapes.Cube: 12}
+
+
+@click.command()
+@click.argument("scene", type=click.Path(path_type=Path))
+@click.option("-D", "defines", multiple=True, metavar="NAME=VALUE", help="Set a $name of an .xml.")
+@click.option("--json", "as_json", is_flag=True, help="Write JSON instead of a table.")
+def info(scene: Path, defines: tuple[str, ...], as_json: bool) -> None:
+    """Tell what the file or folder SCENE holds, without rendering it."""
+    found = summary(load(scene, **variables(defines)))
+    if as_json:
+        click.echo(json.dumps(found, indent=2))
+        return
+    table = Table(show_header=False, title=str(scene), title_justify="left")
+    for name, value in found.items():
+        table.add_row(name.replace("_", " "), _shown(value))
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=200)  # a file or a pipe has no edge to wrap at
+    console.print(table)
+
+
+def variables(defines: Iterable[str]) -> dict[str, str]:
+    """Return NAME=VALUE options as a dictionary. Raises click.BadParameter."""
+    pairs = [define.partition("=") for define in defines]
+    wrong = next((name for name, equals, _ in pairs if not (name and equals)), None)
+    if wrong is not None:
+        raise click.BadParameter(f"{wrong!r} does not look like NAME=VALUE", param_hint="-D")
+    return {name: value for name, _, value in pairs}
+
+
+def summary(scene: Scene) -> dict[str, Any]:
+    """Return what a scene's file holds; of a bare mesh, not the studio around it.
+
+    `triangles` counts those of meshes, cubes and rectangles once, `triangles_instanced` at each
+    placement.
+    """
+    bare = "studio" in scene.extra
+    own = scene.shapes[: -scene.extra["studio"]] if bare else scene.shapes
+    counts = {_arrays(shape): _triangles(shape) for shape in own}
+    kinds = list(_nested(own))
+    lights = [] if bare else [light.kind for light in scene.lights]
+    lights += [shape.emission.kind for shape in own if shape.emission is not None]
+    bounds = [corner.tolist() for corner in studio.world_bounds(own)] if own else None
+    return {
+        "format": scene.extra.get("format", "python"),
+        "triangles": sum(counts.values()),
+        "triangles_instanced": sum(_triangles(shape) for shape in own),
+        "instances": len(own) - len(counts),
+        "bounds": bounds,
+        "shapes": dict(Counter(shape.kind for shape in own)),
+        "cameras": [] if bare else [scene.camera.kind],
+        "lights": dict(Counter(lights)),
+        "materials": _by_kind(kinds, materials.Material),
+        "textures": _by_kind(kinds, textures.Texture),
+        "film": _film(scene),
+        "warnings": scene.warnings,
+    }
+
+
+def _arrays(shape: shapes.Shape) -> int:
+    """Identity of a mesh's triangles; a shape of any other kind is its own."""
+    return id(shape.faces) if isinstance(shape, shapes.Mesh) else id(shape)
+
+
+def _triangles(shape: shapes.Shape) -> int:
+    if isinstance(shape, shapes.Mesh):
+        return len(shape.faces)
+    return FLAT_TRIANGLES.get(type(shape), 0)
+
+
+def _nested(things: Iterable[Kind]) -> Iterator[Kind]:
+    """Yield the kinds within things: materials, lights and the textures in them."""
+    for thing in things:
+        yield thing
+        values = [getattr(thing, field.name) for field in dataclasses.fields(thing)]
+        yield from _nested(value for value in values if isinstance(value, Kind))
+
+
+def _by_kind(things: Iterable[Kind], base: type[Kind]) -> dict[str, int]:
+    distinct = {id(thing): thing for thing in things if isinstance(thing, base)}
+    return dict(Counter(thing.kind for thing in distinct.values()))
+
+
+def _film(scene: Scene) -> dict[str, Any]:
+    film = scene.film
+    return {"width": film.width, "height": film.height, "filter": film.filter.kind}
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{key}: {count}" for key, count in value.items()) or "none"
+    if isinstance(value, list) and value and isinstance(value[0], list):
+        return " to ".join("(" + ", ".join(f"{x:g}" for x in corner) + ")" for corner in value)
+    if isinstance(value, list):
+        return "\n".join(str(entry) for entry in value) or "none"
+    return f"{value:,}" if isinstance(value, int) else str(value)
