@@ -111,3 +111,24 @@ def test_bad_pages_tell_the_line(tmp_path, text, line, message):
     with pytest.raises(SceneError, match=message) as caught:
         spectra.read_refractive_index(path)
     assert caught.value.file == path and caught.value.line == line
+
+
+def test_database_pages_agree_with_the_tables(assets):
+    """Pages of the database are read, and hold what our transcriptions of them hold."""
+    folder = assets / "spectral" / "refractiveindex.info"
+    pages = {f"{p.parent.parent.name}/{p.stem}": p for p in folder.glob("main/*/nk/*.yml")}
+    if not pages:
+        pytest.skip("no refractiveindex.info pages among the assets")
+    visible = np.arange(400.0, 700.0, 3.0)
+    for page in pages.values():
+        eta, k = spectra.read_refractive_index(page)
+        assert (eta.sample(visible) > 0).all() and (k.sample(visible) >= 0).all(), page
+    for name, author in (("Au", "Johnson"), ("Ag", "Johnson"), ("Cr", "Johnson"), ("Al", "Rakic")):
+        for ours, theirs in zip(
+            spectra.metal(name),
+            spectra.read_refractive_index(pages[f"{name}/{author}"]),
+            strict=True,
+        ):
+            np.testing.assert_allclose(ours.sample(visible), theirs.sample(visible), rtol=1e-9)
+    diamond, _ = spectra.read_refractive_index(pages["C/Peter"])
+    np.testing.assert_allclose(spectra.glass("diamond").sample(visible), diamond.sample(visible))
