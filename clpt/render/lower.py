@@ -95,9 +95,7 @@ class _Lowering:
         features = self._features(analytic, camera, integrator)
         arrays = tables.arrays()
         settings = self._settings(center, radius)
-        return Lowered(
-            features, settings, arrays, vertices, faces, tags, boxes, self.warnings
-        )
+        return Lowered(features, settings, arrays, vertices, faces, tags, boxes, self.warnings)
 
     def _shape(self, number: int, shape: Any, emitters: list) -> np.ndarray:
         """One row of `shapes`; its triangles, or its parameters, go into the tables."""
@@ -145,8 +143,12 @@ class _Lowering:
         """Material words of front and back, and whether the back is turned round."""
         two_sided = _any_of(shape.material, mt.TwoSided)
         name = shapes.where(shape)
-        if two_sided and _any_of(shape.material, (mt.Dielectric, mt.RoughDielectric, mt.ThinDielectric)):
-            raise SceneError("a transmissive material cannot be mixed with a two-sided one", where=name)
+        if two_sided and _any_of(
+            shape.material, (mt.Dielectric, mt.RoughDielectric, mt.ThinDielectric)
+        ):
+            raise SceneError(
+                "a transmissive material cannot be mixed with a two-sided one", where=name
+            )
         front = self._word(shape.material, "front", two_sided)
         back = self._word(shape.material, "back", two_sided)
         return front, back, SHAPE_TWO_SIDED if two_sided else 0
@@ -263,7 +265,9 @@ def _leaf_kinds(scene: sc.Scene) -> tuple[str, ...]:
     found: set[type] = set()
 
     def walk(material: Any, turned: bool) -> None:
-        children = [getattr(material, n) for n, p in params(type(material)).items() if p.role == "host"]
+        children = [
+            getattr(material, n) for n, p in params(type(material)).items() if p.role == "host"
+        ]
         children = [c for c in children if isinstance(c, mt.Material)]
         if isinstance(material, mt.Mask):
             found.add(mt.Null)
@@ -302,5 +306,3 @@ def _sphere_around(vertices: np.ndarray, boxes: np.ndarray) -> tuple[np.ndarray,
         return np.zeros(3), 1.0
     low, high = np.min(lows, axis=0), np.max(highs, axis=0)
     return (low + high) / 2, max(float(np.linalg.norm(high - low)) / 2, 1e-3)
-
-

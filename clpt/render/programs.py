@@ -17,7 +17,9 @@ from clpt.spectra import XYZ_TO_REC709
 LEAVES = {cls.kind: cls for cls in materials.LEAVES}
 
 
-def sources(features: Features, layout: str, lanes: int, *, queued: bool) -> dict[str, device.Source]:
+def sources(
+    features: Features, layout: str, lanes: int, *, queued: bool
+) -> dict[str, device.Source]:
     """Return the text of every program that a scene needs, by program name.
 
     layout: of the triangles, a name in clpt.bvh.LAYOUTS; lanes: paths that a work-item shades;

@@ -88,7 +88,9 @@ class Wavefront:
         places = int(settings["places"])
         words = sum(record.words for record in SLABS) + 2
         largest = max(record.words for record in SLABS)
-        room = min(self.buffers.limit // 2 // (4 * words), self.device.info.max_alloc // 4 // largest)
+        room = min(
+            self.buffers.limit // 2 // (4 * words), self.device.info.max_alloc // 4 // largest
+        )
         wanted = min(wanted, int(room) - PADDING)
         if wanted < GROUP:
             raise MemoryBudgetError(
@@ -183,11 +185,11 @@ class Wavefront:
         self._fill("film", 0, 0, self.film_bytes)
 
     def _fill(self, name: str, value: int, offset: int, size: int) -> None:
-        cl.enqueue_fill_buffer(
-            self.device.queue, self.named[name], np.uint32(value), offset, size
-        )
+        cl.enqueue_fill_buffer(self.device.queue, self.named[name], np.uint32(value), offset, size)
 
-    def expose(self, first: int, end: int, on_batch: Callable[[Counts], bool] | None = None) -> bool:
+    def expose(
+        self, first: int, end: int, on_batch: Callable[[Counts], bool] | None = None
+    ) -> bool:
         """Add samples first to end - 1 of every pixel to the film.
 
         on_batch is called every few iterations with the counts; if it returns False, every path is
@@ -205,7 +207,9 @@ class Wavefront:
             for _ in range(BATCH):
                 self._iterate()
             host = np.zeros(len(COUNTERS), np.uint32)
-            event = cl.enqueue_copy(self.device.queue, host, self.named["counters"], is_blocking=False)
+            event = cl.enqueue_copy(
+                self.device.queue, host, self.named["counters"], is_blocking=False
+            )
             self.device.queue.flush()
             reads.append((host, event))
             if len(reads) < 2:
@@ -237,4 +241,3 @@ class Wavefront:
         width, height = (int(self.lowered.settings[n]) for n in ("width", "height"))
         self.accumulate.enqueue(self.device.queue, (width, height))
         return self.buffers.download(self.named["image"], (height, width, 3), np.float32)
-

@@ -12,13 +12,13 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
 
     /* The light that this ray has met. */
 #if USES_SURFACE_LIGHTS
-    mask lit = active & (s.light >= 0) & front & ((depth > 0) | (settings->hide_lights == 0));
+    mask lit = active & (s.light >= 0) & front & ((depth > 0) | mask_of(settings->hide_lights == 0));
     if (any(lit)) {
         integer light = sel_i(lit, s.light, (integer)(0));
         real pdf = load_path_pdf(path, at);
         real other = light_pdf(scene, light, o, d, load_hit_t(hit, at), s.n);
         real w = sel(pdf < 0.0f, (real)(1.0f), mis_weight(pdf, other));
-        Spectrum le = spectrum_scale(spectrum_mul(beta, light_radiance(scene, light, s.uv, lambdas)), w);
+        Spectrum le = spectrum_scale(spectrum_mul(beta, emission_load(scene, light_at(scene, light).radiance, s.uv, lambdas)), w);
         store_path_radiance(path, at, lit, spectrum_add(load_path_radiance(path, at), le));
     }
 #endif

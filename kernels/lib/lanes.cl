@@ -33,10 +33,10 @@ typedef CAT(uint, LANES) natural;
 #define to_natural(x) CAT(convert_uint, LANES)(x)
 #if LANES == 8
 #define LANE_INDEX ((integer)(0, 1, 2, 3, 4, 5, 6, 7))
-inline int any(int8 m) { return as_ulong(convert_char8(m)) != 0; }
+inline int any_lane(int8 m) { return as_ulong(convert_char8(m)) != 0; }
 #else
 #define LANE_INDEX ((integer)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15))
-inline int any(int16 m)
+inline int any_lane(int16 m)
 {
     ulong2 q = as_ulong2(convert_char16(m));
     return (q.x | q.y) != 0;
@@ -44,9 +44,19 @@ inline int any(int16 m)
 #endif
 #endif
 typedef integer mask;
+#if LANES > 1
+#define any(m) any_lane(m) /* OpenCL's own any() is slow on some runtimes */
+#endif
 
 typedef struct { real x, y; } vec2;
 typedef struct { real x, y, z; } vec3;
+
+/* A scalar condition as a mask: in a vector it would be 1, which selects nothing. */
+#if LANES == 1
+#define mask_of(condition) (condition)
+#else
+#define mask_of(condition) ((mask)((condition) ? -1 : 0))
+#endif
 
 /* Choice: a where m, else b. */
 inline real sel(mask m, real a, real b) { return m ? a : b; }

@@ -14,7 +14,6 @@ kernel void generate(SLAB_ARGS, SCENE_ARGS, global float *film, global uint *cou
 {
     SLABS
     SCENE
-    global const Settings *settings = scene.settings;
     uint at = get_global_id(0) * LANES;
     integer state = load_path_state(path, at), depth = state & PATH_DEPTH;
     mask began = (state & PATH_FRESH) == 0;
@@ -24,7 +23,7 @@ kernel void generate(SLAB_ARGS, SCENE_ARGS, global float *film, global uint *cou
         Spectrum radiance = load_path_radiance(path, at);
         Wavelengths lambdas = load_path_lambdas(path, at);
 #if USES_INFINITE
-        mask sky = missed & ((depth > 0) | (settings->hide_lights == 0));
+        mask sky = missed & ((depth > 0) | mask_of(settings->hide_lights == 0));
         if (any(sky)) {
             real pdf = load_path_pdf(path, at);
             vec3 d = load_path_d(path, at);
