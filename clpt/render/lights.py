@@ -17,7 +17,7 @@ from clpt import transforms
 from clpt.errors import SceneError
 from clpt.layout import Record
 from clpt.records import LIGHT, SHAPE
-from clpt.render import shapes
+from clpt.render import image_lights, shapes
 from clpt.scene import lights
 from clpt.scene.lights import Light
 from clpt.scene.shapes import Shape
@@ -50,6 +50,7 @@ RECORDS: dict[str, Record] = {
         radiance=_RADIANCE,
     ),
     "constant": Record("Constant", "Even radiance from everywhere.", radiance=_RADIANCE),
+    **image_lights.RECORDS,
 }
 KINDS = (*RECORDS, *shapes.RECORDS)  # LightRow.kind is a position in this tuple
 
@@ -60,6 +61,9 @@ class Sink(Protocol):
     def append(self, name: str, words: ArrayLike) -> int: ...
     def append_floats(self, name: str, values: ArrayLike) -> int: ...
     def emission_words(self, value: Any) -> NDArray[np.uint32]: ...
+
+    @property
+    def spectral(self) -> bool: ...
 
 
 @dataclass(frozen=True)
@@ -133,14 +137,19 @@ def _block(count: int, kind: str, params: ArrayLike, radiance: int, shape_row: i
 
 def _lamp_block(lamp: Light, tables: Sink, scene_radius: float) -> tuple[np.ndarray, np.ndarray]:
     """The row of a light that is not on a shape, and its power."""
-    values = _lamp_values(lamp)
-    radiance = tables.append("lamps", tables.emission_words(_emitted(lamp)))
+    if lamp.kind in image_lights.RECORDS:
+        values, strength = image_lights.lower_image(lamp, tables)
+        radiance = 0
+    else:
+        radiance = tables.append("lamps", tables.emission_words(_emitted(lamp)))
+        values = {**_lamp_values(lamp), "radiance": radiance}
+        strength = brightness(_emitted(lamp))
     record = RECORDS[lamp.kind]
     words = np.zeros((), record.dtype)
-    for name, value in {**values, "radiance": radiance}.items():
+    for name, value in values.items():
         words[name] = value
     at = tables.append("lamps", words.reshape(1).view(np.uint32))
-    return _block(1, lamp.kind, at, radiance, -1), np.array([power(lamp, scene_radius)])
+    return _block(1, lamp.kind, at, radiance, -1), np.array([power(lamp, strength, scene_radius)])
 
 
 def _emitted(lamp: Light) -> Any:
@@ -207,9 +216,11 @@ def _unit(value: ArrayLike, where: str) -> NDArray[np.float64]:
     return vector / length
 
 
-def power(lamp: Light, scene_radius: float) -> float:
-    """Estimate what a light off all shapes sends into the scene, mean of channels [W/nm]."""
-    strength = brightness(_emitted(lamp))
+def power(lamp: Light, strength: float, scene_radius: float) -> float:
+    """Estimate what a light off all shapes sends into the scene, mean of channels [W/nm].
+
+    strength: the mean of its intensity, irradiance or radiance.
+    """
     disk = np.pi * scene_radius**2
     if isinstance(lamp, lights.Point):
         return 4.0 * np.pi * strength
@@ -381,4 +392,3 @@ def _infinite_text(kinds: list[str]) -> list[str]:
         ]
         lines += _case(kind, len(kinds) == 1, body)
     return [*lines, "}", '#include "lib/infinite.cl"']
-

@@ -1,0 +1,210 @@
+"""Images around the scene on their way to the device: texels, and a grid to choose directions by.
+
+A grid has a weight at every corner of its cells and is bilinear inside them; it follows radiance
+times solid angle. Cells are chosen by rows and then columns, points in a cell by the bilinear
+function itself (kernels/lib/grid.cl).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from clpt import images, spectra, transforms
+from clpt.errors import SceneError
+from clpt.layout import Record
+from clpt.scene.lights import CubeMap, Envmap
+
+Array = NDArray[np.float32]
+
+_IMAGE = {
+    "x": ("vec3", "the light's own axes in the world, unit length"),
+    "y": ("vec3", "up"),
+    "z": ("vec3", ""),
+    "width": ("integer", "of the image, or of a face [texels]"),
+    "height": ("integer", "[texels]"),
+    "texels": ("integer", "first float of the first texel in `texels`"),
+    "corners": ("integer", "first weight in `distributions`"),
+    "marginal": ("integer", "first of the cumulative sums over rows"),
+    "conditional": ("integer", "first of those within rows"),
+    "norm": ("real", "one over the sum of the cells' mean weights"),
+}
+RECORDS: dict[str, Record] = {
+    "envmap": Record("Envmap", "An image in latitude and longitude.", **_IMAGE),
+    "cube_map": Record("CubeMap", "Six square images, with a border of one texel.", **_IMAGE),
+}
+
+FACES = "+x -x +y -y +z -z"
+# Columns and rows of the faces in crosses of 4x3 and 3x4; the last one stands on its head.
+_WIDE = ((2, 1), (0, 1), (1, 0), (1, 2), (1, 1), (3, 1))
+_TALL = ((2, 1), (0, 1), (1, 0), (1, 2), (1, 1), (1, 3))
+
+
+def lower_image(lamp: Envmap | CubeMap, tables: Any) -> tuple[dict[str, ArrayLike], float]:
+    """Put an image light's texels and grid into the tables; its members, and its mean radiance.
+
+    Raises SceneError for what is no image, or a transform that is more than a rotation.
+    """
+    where = f"{lamp.kind}.image"
+    axes = _axes(lamp)
+    if isinstance(lamp, Envmap):
+        image = _loaded(lamp.image, where) * np.float32(lamp.scale)
+        image = np.repeat(image, 2, axis=0) if len(image) == 1 else image
+        height, width, _ = image.shape
+        texels, corners = image, _latitude_weights(_brightness(image))[None]
+    else:
+        faces = _faces(lamp.image, where) * np.float32(lamp.scale)
+        height = width = faces.shape[1]
+        texels = _bordered(faces)
+        corners = _cube_weights(_brightness(texels))
+    marginal, conditional, total = _cumulative(corners)
+    members: dict[str, ArrayLike] = {name: axes[:, i] for i, name in enumerate("xyz")}
+    members |= {
+        "width": width,
+        "height": height,
+        "texels": tables.append_floats("texels", _texels(texels, tables.spectral)),
+        "corners": tables.append_floats("distributions", corners),
+        "marginal": tables.append_floats("distributions", marginal),
+        "conditional": tables.append_floats("distributions", conditional),
+        "norm": 1.0 / total if total > 0.0 else 0.0,
+    }
+    cell = np.pi / (height - 1) * 2.0 * np.pi / width if isinstance(lamp, Envmap) else width**-2.0
+    return members, total * cell / (4.0 * np.pi)
+
+
+def _axes(lamp: Envmap | CubeMap) -> NDArray[np.float64]:
+    """Where the light's own axes point, the columns of (3, 3)."""
+    matrix = np.asarray(lamp.to_world, np.float64)
+    where = f"{lamp.kind}.to_world"
+    if matrix.shape != (4, 4) or transforms.is_singular(matrix):
+        raise SceneError("must be an invertible (4, 4) matrix", where=where)
+    axes = matrix[:3, :3] / np.linalg.norm(matrix[:3, :3], axis=0)
+    if np.abs(axes.T @ axes - np.eye(3)).max() > 1e-5:
+        raise SceneError("must be a rotation: this one shears", where=where)
+    return axes
+
+
+def _loaded(image: Any, where: str) -> Array:
+    """An image as (h, w, 3) float32 without negative values. Raises SceneError."""
+    if image is None:
+        raise SceneError("an image is needed: a path, or an array (h, w, 3)", where=where)
+    values = images.read(image) if isinstance(image, (str, Path)) else np.asarray(image, np.float32)
+    if values.ndim == 2:
+        values = values[..., None]
+    if values.ndim != 3 or values.shape[2] not in (1, 3, 4) or 0 in values.shape:
+        raise SceneError(f"must be (h, w, 3), found {values.shape}", where=where)
+    values = np.repeat(values, 3, axis=2) if values.shape[2] == 1 else values[..., :3]
+    if not np.isfinite(values).all():
+        raise SceneError("has a texel that is not finite", where=where)
+    return np.maximum(values, np.float32(0.0))
+
+
+def _faces(image: Any, where: str) -> Array:
+    """The six faces of a cube map (6, n, n, 3), in the order of FACES."""
+    if isinstance(image, (list, tuple)) or (isinstance(image, np.ndarray) and image.ndim == 4):
+        if len(image) != 6:
+            raise SceneError(f"six faces are needed ({FACES}), found {len(image)}", where=where)
+        faces = [_loaded(face, where) for face in image]
+    else:
+        cross = _loaded(image, where)
+        height, width, _ = cross.shape
+        if width * 3 == height * 4:
+            n, places = width // 4, _WIDE
+        elif width * 4 == height * 3:
+            n, places = width // 3, _TALL
+        else:
+            raise SceneError(
+                f"one image must be a cross of 4x3 or 3x4 faces, found {width}x{height}",
+                where=where,
+            )
+        faces = [cross[r * n : (r + 1) * n, c * n : (c + 1) * n] for c, r in places]
+        if places is _TALL:
+            faces[5] = faces[5][::-1, ::-1]
+    if any(face.shape != (faces[0].shape[0],) * 2 + (3,) for face in faces):
+        raise SceneError("the faces must be squares of one size", where=where)
+    return np.stack(faces).astype(np.float32)
+
+
+def face_directions(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
+    """Directions (6, ..., 3), not normalised, at face coordinates: a to the right, b down, [-1, 1].
+
+    OpenGL's cube map (OpenGL 4.6 core, table 8.19).
+    """
+    a, b = np.broadcast_arrays(np.asarray(a, np.float64), np.asarray(b, np.float64))
+    one = np.ones_like(a)
+    rows = [(one, -b, -a), (-one, -b, a), (a, one, b), (a, -one, -b), (a, -b, one), (-a, -b, -one)]
+    return np.stack([np.stack(row, axis=-1) for row in rows])
+
+
+def face_coordinates(d: ArrayLike) -> tuple[NDArray[np.int64], Any, Any]:
+    """The face that a direction (..., 3) meets, and a and b there."""
+    x, y, z = np.moveaxis(np.asarray(d, np.float64), -1, 0)
+    major = np.argmax(np.abs([x, y, z]), axis=0)
+    size = np.choose(major, np.abs([x, y, z]))
+    negative = np.choose(major, [x, y, z]) < 0.0
+    face = 2 * major + negative
+    a = np.choose(face, [-z, z, x, x, x, -x]) / size
+    b = np.choose(face, [-y, -y, z, -z, -y, -y]) / size
+    return face, a, b
+
+
+def _bordered(faces: Array) -> Array:
+    """The faces (6, n + 2, n + 2, 3) with the nearest texels of their neighbours around them."""
+    n = faces.shape[1]
+    centers = (np.arange(-1, n + 1) + 0.5) / n * 2.0 - 1.0
+    face, a, b = face_coordinates(face_directions(centers[None, :], centers[:, None]))
+    column, row = (np.clip(((c + 1.0) * 0.5 * n).astype(int), 0, n - 1) for c in (a, b))
+    return faces[face, row, column]
+
+
+def _brightness(image: Array) -> NDArray[np.float64]:
+    return image.mean(axis=-1, dtype=np.float64)
+
+
+def _latitude_weights(bright: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Weights (h, w + 1) at the texels' centres; the first column comes again at the end."""
+    height = len(bright)
+    rows = np.arange(height, dtype=np.float64)
+    rows[0], rows[-1] = 0.25, height - 1.25  # the poles have no area, but light comes from there
+    weights = bright * np.sin(np.pi * rows / (height - 1))[:, None]
+    return np.concatenate([weights, weights[:, :1]], axis=1)
+
+
+def _cube_weights(bright: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Weights (6, 2n + 1, 2n + 1) at the texels' edges and centres, of bordered faces."""
+    n = bright.shape[1] - 2
+    wide = np.empty((6, 2 * n + 1, n + 2))
+    wide[:, 1::2], wide[:, ::2] = bright[:, 1:-1], 0.5 * (bright[:, 1:] + bright[:, :-1])
+    weights = np.empty((6, 2 * n + 1, 2 * n + 1))
+    weights[..., 1::2], weights[..., ::2] = wide[..., 1:-1], 0.5 * (wide[..., 1:] + wide[..., :-1])
+    at = np.linspace(-1.0, 1.0, 2 * n + 1)
+    return weights * (1.0 + at[None, :] ** 2 + at[:, None] ** 2) ** -1.5
+
+
+def _cumulative(
+    corners: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Sums over rows and within rows, each up to 1, of the cells of grids (k, r + 1, c + 1)."""
+    cells = 0.25 * (
+        corners[:, 1:, 1:] + corners[:, :-1, 1:] + corners[:, 1:, :-1] + corners[:, :-1, :-1]
+    )
+    sums = np.cumsum(cells.reshape(-1, cells.shape[2]), axis=1)
+    rows = np.cumsum(sums[:, -1])
+    total = float(rows[-1])
+    conditional = sums / np.where(sums[:, -1:] > 0.0, sums[:, -1:], 1.0)
+    marginal = rows / (total if total > 0.0 else 1.0)
+    conditional[:, -1] = marginal[-1] = 1.0
+    return marginal, conditional, total
+
+
+def _texels(image: Array, spectral: bool) -> Array:
+    """Four floats a texel: rgb, or what `spectrum_light_texel` makes a spectrum of."""
+    texels = np.zeros((*image.shape[:-1], 4), np.float32)
+    if spectral:
+        texels[..., 3], texels[..., :3] = spectra.unbounded(image)
+    else:
+        texels[..., :3] = image
+    return texels
