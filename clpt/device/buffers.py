@@ -41,7 +41,7 @@ class Buffers:
         return self._create(what, max(nbytes, _SMALLEST), advice, None)
 
     def upload(
-        self, what: str, array: ArrayLike, dtype: DTypeLike = None, advice: str = _ADVICE
+        self, what: str, array: ArrayLike, dtype: DTypeLike | None = None, advice: str = _ADVICE
     ) -> cl.Buffer:
         """A read-only copy of an array, C-contiguous; an empty one becomes a small buffer of zeros.
 
