@@ -64,7 +64,9 @@ def table(chosen: Filter) -> NDArray[np.float32]:
     middle = value(chosen, (edges[1:] + edges[:-1]) / 2.0)
     absolute, signed = (np.concatenate([[0.0], np.cumsum(f)]) for f in (np.abs(middle), middle))
     if not (np.isfinite(absolute[-1]) and signed[-1] > 1e-6 * absolute[-1]):
-        raise SceneError("the filter's integral must be positive", where=f"film.filter {chosen.kind}")
+        raise SceneError(
+            "the filter's integral must be positive", where=f"film.filter {chosen.kind}"
+        )
     distances = np.interp(np.linspace(0.0, absolute[-1], CELLS + 1), absolute, edges)
     weights = np.diff(np.interp(distances, edges, signed)) * CELLS / signed[-1]
     return np.concatenate([[CELLS], distances, weights]).astype(np.float32)

@@ -1,10 +1,204 @@
-"""Textures on their way to the device."""
+"""Textures on their way to the device: their rows and the dispatch text.
+
+A row of `textures` belongs to one texture in one role. Row 0 is blank and valid as any kind in any
+role, so that lanes which look up nothing have something to read.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from clpt.errors import SceneError
+from clpt.layout import Record
+from clpt.render.kinds import REAL_WORDS, SPECTRUM_WORDS
+from clpt.render.texels import pixels, texels
+from clpt.scene.params import device_params, params
+from clpt.scene.textures import Bitmap, Checkerboard, Texture
+
+_COMMON = {
+    "kind": ("integer", "position in the table of textures"),
+    "to_u": ("vec3", "u of the texture from (u, v, 1) of the surface"),
+    "to_v": ("vec3", "and v"),
+}
+RECORDS: dict[str, Record] = {
+    "bitmap": Record(
+        "Bitmap",
+        "An image.",
+        **_COMMON,
+        width=("integer", "[texels]"),
+        height=("integer", "[texels]"),
+        first=("integer", "of its floats in `texels`; four a texel, one for a real"),
+        filter=("integer", "BITMAP_FILTER_"),
+        wrap=("integer", "BITMAP_WRAP_"),
+    ),
+    "checkerboard": Record(
+        "Checkerboard",
+        "Two colours.",
+        **_COMMON,
+        color0=("integer", "first of its five words in `textures`"),
+        color1=("integer", "first of its five words in `textures`"),
+    ),
+}
+KINDS = tuple(RECORDS)
+LARGEST = 2**31 - 1  # floats in `texels` that an index reaches
+
+
+class Sink(Protocol):
+    """What is needed of clpt.render.tables.Tables."""
+
+    textures: dict[Any, int]
+    texture_roles: set[tuple[str, str]]
+
+    @property
+    def spectral(self) -> bool: ...
+    def size(self, name: str) -> int: ...
+    def append(self, name: str, words: ArrayLike) -> int: ...
+    def append_floats(self, name: str, values: ArrayLike) -> int: ...
+    def spectrum_words(self, value: Any, role: str) -> tuple[NDArray[np.uint32], str]: ...
+
+
+def lower_texture(texture: Texture, role: str, tables: Sink) -> int:
+    """Put a texture in a role ("reflectance", "emission", "real") into the tables.
+
+    Returns the first word of its row in `textures`; the same texture in the same role is put in
+    once. Raises SceneError for an image or a uv transform that cannot be used.
+    """
+    key = (_identity(texture), role)
+    if key not in tables.textures:
+        if tables.size("textures") == 0:
+            _blank(tables)
+        members = MEMBERS[type(texture)](texture, role, tables)
+        tables.textures[key] = _row(texture.kind, members, tables)
+        tables.texture_roles.add((texture.kind, role))
+    return tables.textures[key]
+
+
+def _identity(texture: Texture) -> Any:
+    """What makes two textures the same: for an image file its parameters, else being one object."""
+    if isinstance(texture, Bitmap) and isinstance(texture.image, (str, Path)):
+        values = (getattr(texture, name) for name in ("raw", "filter", "wrap"))
+        return (str(texture.image), *values, texture.to_uv.tobytes())
+    return id(texture)
+
+
+def _row(kind: str, members: dict[str, Any], tables: Sink) -> int:
+    words = np.zeros(1, RECORDS[kind].dtype)
+    words["kind"] = KINDS.index(kind)
+    for name, value in members.items():
+        words[name] = value
+    return tables.append("textures", words.view(np.uint32))
+
+
+def _blank(tables: Sink) -> None:
+    first = tables.append_floats("texels", np.zeros(4))
+    _row("bitmap", {"width": 1, "height": 1, "first": first}, tables)
+
+
+def _uv(texture: Texture, down: bool) -> dict[str, Any]:
+    """The rows of `to_uv`; `down`: with v turned round, as an image's rows run."""
+    matrix = np.asarray(texture.to_uv, np.float64)
+    if not np.allclose(matrix[2, :2], 0.0) or np.isclose(matrix[2, 2], 0.0):
+        raise SceneError("its last row must be 0 0 1", where=f"{texture.kind}.to_uv")
+    u, v = matrix[:2] / matrix[2, 2]
+    return {"to_u": u, "to_v": [0.0, 0.0, 1.0] - v if down else v}
+
+
+def _checkerboard(texture: Checkerboard, role: str, tables: Sink) -> dict[str, Any]:
+    members = _uv(texture, down=False)
+    for name in ("color0", "color1"):
+        value = getattr(texture, name)
+        if role == "real":
+            words = np.zeros(SPECTRUM_WORDS, np.float32)
+            words[0] = np.mean(value.to_rgb("unbounded"))
+            members[name] = tables.append("textures", words.view(np.uint32))
+        else:
+            members[name] = tables.append("textures", tables.spectrum_words(value, role)[0])
+    return members
+
+
+def _bitmap(texture: Bitmap, role: str, tables: Sink) -> dict[str, Any]:
+    image = pixels(texture)
+    values = texels(image, role, tables.spectral)
+    if tables.size("texels") + values.size > LARGEST:
+        raise SceneError("all images together have too many texels", where="bitmap.image")
+    choices = {name: params(Bitmap)[name].choices for name in ("filter", "wrap")}
+    return {
+        **_uv(texture, down=True),
+        "width": image.shape[1],
+        "height": image.shape[0],
+        "first": tables.append_floats("texels", values),
+        **{name: names.index(getattr(texture, name)) for name, names in choices.items()},
+    }
+
+
+MEMBERS: dict[type[Texture], Callable[..., dict[str, Any]]] = {
+    Bitmap: _bitmap,
+    Checkerboard: _checkerboard,
+}
 
 
 def dispatch_text(kinds: Iterable[str], roles: Iterable[tuple[str, str]]) -> str:
-    """Return the functions that look textures up, for the (kind, role) pairs in the scene."""
-    return ""
+    """Return the look-ups of the (kind, role) pairs in the scene, and the loaders that call them.
+
+    texture_<role>(scene, row, uv, lambdas)                 the texture whose row is at a word
+    spectrum_texture_<role>(scene, table, at, uv, lambdas)  the one that the parameter at `at` names
+    real_texture_real(scene, table, at, uv, lambdas)        the same for a real
+    """
+    pairs, found = set(roles), set(kinds)
+    present = [cls for cls in MEMBERS if cls.kind in found]
+    parts = ['#include "lib/texture.cl"'] if present else []
+    for cls in present:
+        parts += [*_choice_lines(cls), RECORDS[cls.kind].row_text()]
+        parts += [f'#include "texture/{cls.kind}.cl"']
+    for role in sorted({role for _, role in pairs}):
+        parts += _look_up(role, [cls.kind for cls in present if (cls.kind, role) in pairs])
+    return "\n".join([*parts, ""])
+
+
+def _choice_lines(cls: type[Texture]) -> list[str]:
+    """#define KIND_PARAMETER_CHOICE for the choices that a kind's row holds as numbers."""
+    return [
+        f"#define {f'{cls.kind}_{name}_{choice}'.upper()} {number}"
+        for name, param in device_params(cls).items()
+        for number, choice in enumerate(param.choices)
+    ]
+
+
+def _look_up(role: str, kinds: list[str]) -> list[str]:
+    if role == "real":
+        form, type_, choose, zero, more = "real", "real", "sel", "0.0f", ""
+    else:
+        form, type_, choose, more = "spectrum", "Spectrum", "spectrum_sel", ", lambdas"
+        zero = "spectrum_of(0.0f)"
+    source = (REAL_WORDS if role == "real" else SPECTRUM_WORDS) - 1
+    lines = [
+        f"inline {type_} texture_{role}(Scene scene, integer row, vec2 uv, Wavelengths lambdas)",
+        "{",
+        "    integer kind = gather_i(scene.textures, row);",
+        f"    {type_} value = {zero};",
+    ]
+    for kind in kinds:
+        loaded = f"{kind}_row(scene.textures, sel_i(m, row, (integer)(0)))"
+        call = f"{kind}_{role}({loaded}, scene, uv{more})"
+        lines += [
+            "    {",
+            f"        mask m = kind == {KINDS.index(kind)};",
+            f"        if (any(m)) value = {choose}(m, {call}, value);",
+            "    }",
+        ]
+    return [
+        *lines,
+        "    return value;",
+        "}",
+        f"inline {type_} {form}_texture_{role}"
+        "(Scene scene, global const uint *table, integer at, vec2 uv, Wavelengths lambdas)",
+        "{",
+        f"    integer word = gather_i(table, at + {source}); /* 1 + the row, or no texture */",
+        f"    return texture_{role}(scene, max_i(word - 1, (integer)(0)), uv, lambdas);",
+        "}",
+    ]

@@ -1,0 +1,77 @@
+"""Images as the kernels read them: texels of colours, of spectra, or of numbers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import images, spectra
+from clpt.errors import SceneError
+from clpt.scene.textures import Bitmap
+
+Floats = NDArray[np.float32]
+
+
+def pixels(texture: Bitmap) -> Floats:
+    """Return a bitmap's image, (h, w, 1 or 3) float32 without alpha, top row first.
+
+    Raises SceneError if it cannot be read or is no image.
+    """
+    image = texture.image
+    if isinstance(image, (str, Path)):
+        image = images.read(image, linear=not texture.raw)
+    image = np.asarray(image)
+    image = image[..., None] if image.ndim == 2 else image
+    if image.dtype.kind != "f":
+        raise SceneError("must be a path or an array of floats", where="bitmap.image")
+    if image.ndim != 3 or image.shape[2] not in (1, 3, 4) or image.size == 0:
+        wanted = "must be (h, w) or (h, w, 1, 3 or 4) and not empty"
+        raise SceneError(f"{wanted}, not {image.shape}", where="bitmap.image")
+    return np.nan_to_num(image[..., :3].astype(np.float32))
+
+
+def texels(image: Floats, role: str, spectral: bool) -> Floats:
+    """Return what stands in `texels` for an image (h, w, 1 or 3), row by row from the top.
+
+    (h * w, 4): rgb, or sigmoid coefficients and a factor where `spectral`; (h * w,) for "real".
+    """
+    if role == "real":
+        return image.mean(axis=2, dtype=np.float64).astype(np.float32).reshape(-1)
+    colours = np.broadcast_to(image, (*image.shape[:2], 3)).reshape(-1, 3)
+    made = np.ones((len(colours), 4), np.float32)
+    if not spectral:
+        made[:, :3] = np.clip(colours, 0.0, 1.0 if role == "reflectance" else None)
+    elif role == "reflectance":
+        distinct, which = _palette(np.clip(colours, 0.0, 1.0))
+        made[:, :3] = spectra.uplift(distinct)[which]
+    else:
+        made[:, 3], made[:, :3] = spectra.unbounded(colours)
+    return made
+
+
+def _palette(colours: Floats) -> tuple[Floats, Any]:
+    """Distinct colours (k, 3), and which of them each of (n, 3) is, if channels have few values.
+
+    The channels of an 8-bit image have at most 256. Other images come back as they are.
+    """
+    number, counts = np.zeros(len(colours), np.int64), 1
+    for channel in colours.T:
+        coarse = np.ascontiguousarray(channel).view(np.uint32) >> 12
+        values = np.zeros(1 << 20, np.float32)
+        values[coarse] = channel
+        present = np.zeros(1 << 20, bool)
+        present[coarse] = True
+        levels = int(present.sum())
+        if levels > 256 or not np.array_equal(values[coarse], channel):
+            return colours, slice(None)
+        number = number * levels + (np.cumsum(present) - 1)[coarse]
+        counts *= levels
+    chosen = np.full(counts, -1, np.int64)
+    chosen[number] = np.arange(len(colours))
+    used = np.flatnonzero(chosen >= 0)
+    place = np.zeros(counts, np.int64)
+    place[used] = np.arange(len(used))
+    return colours[chosen[used]], place[number]

@@ -1,0 +1,85 @@
+/* An image on the unit square of uv: texel centres at (i + 1/2) / size, as in Mitsuba's bitmap. Row 0
+ * lies at v = 0 of the transformed uv; the host has turned v round. Between texels the evaluated
+ * values are interpolated, not the coefficients of their spectra. */
+typedef struct {
+    integer x0, x1, y0, y1; /* columns and rows of the four texels, inside the image */
+    real tx, ty;            /* how far toward the second ones */
+} BitmapPlace;
+
+inline integer bitmap_wrap(integer i, integer size, integer wrap)
+{
+    integer repeated = sel_i(i < 0, i + size, sel_i(i >= size, i - size, i));
+    integer mirrored = sel_i(i >= size, 2 * size - 1 - i, i);
+    i = sel_i(wrap == BITMAP_WRAP_REPEAT, repeated, sel_i(wrap == BITMAP_WRAP_MIRROR, mirrored, i));
+    return min_i(max_i(i, (integer)(0)), size - 1);
+}
+
+/* One axis. A coordinate that is huge or not a number still ends inside the image. */
+inline void bitmap_axis(real x, integer size, integer wrap, mask smooth, integer *i0, integer *i1, real *t)
+{
+    real period = sel(wrap == BITMAP_WRAP_MIRROR, (real)(2.0f), (real)(1.0f)), turns = x / period;
+    x = sel(wrap == BITMAP_WRAP_CLAMP, x, (turns - floor(turns)) * period);
+    x = clamp_r(x, (real)(0.0f), period) * to_real(size) - sel(smooth, (real)(0.5f), (real)(0.0f));
+    real below = floor(x);
+    *t = sel(smooth, x - below, (real)(0.0f));
+    *i0 = bitmap_wrap(to_integer(below), size, wrap);
+    *i1 = bitmap_wrap(to_integer(below) + 1, size, wrap);
+}
+
+inline BitmapPlace bitmap_place(Bitmap t, vec2 uv)
+{
+    vec3 p = v3(uv.x, uv.y, (real)(1.0f));
+    mask smooth = t.filter == BITMAP_FILTER_BILINEAR;
+    BitmapPlace b;
+    bitmap_axis(dot3(t.to_u, p), t.width, t.wrap, smooth, &b.x0, &b.x1, &b.tx);
+    bitmap_axis(dot3(t.to_v, p), t.height, t.wrap, smooth, &b.y0, &b.y1, &b.ty);
+    return b;
+}
+
+/* One of the four texels: its index in the image, and its weight. */
+inline integer bitmap_corner(Bitmap t, BitmapPlace b, int corner, real *weight)
+{
+    int right = corner & 1, next = corner >> 1;
+    *weight = (right ? b.tx : 1.0f - b.tx) * (next ? b.ty : 1.0f - b.ty);
+    return (next ? b.y1 : b.y0) * t.width + (right ? b.x1 : b.x0);
+}
+
+Spectrum bitmap_reflectance(Bitmap t, Scene scene, vec2 uv, Wavelengths lambdas)
+{
+    BitmapPlace b = bitmap_place(t, uv);
+    Spectrum sum = spectrum_of(0.0f);
+    for (int corner = 0; corner < 4; corner++) {
+        real weight;
+        integer at = t.first + 4 * bitmap_corner(t, b, corner, &weight);
+        Spectrum texel = spectrum_texel(gather(scene.texels, at), gather(scene.texels, at + 1),
+                                        gather(scene.texels, at + 2), gather(scene.texels, at + 3), lambdas);
+        sum = spectrum_madd(texel, weight, sum);
+    }
+    return sum;
+}
+
+Spectrum bitmap_emission(Bitmap t, Scene scene, vec2 uv, Wavelengths lambdas)
+{
+    BitmapPlace b = bitmap_place(t, uv);
+    Spectrum sum = spectrum_of(0.0f);
+    for (int corner = 0; corner < 4; corner++) {
+        real weight;
+        integer at = t.first + 4 * bitmap_corner(t, b, corner, &weight);
+        Spectrum texel = spectrum_light_texel(scene, gather(scene.texels, at), gather(scene.texels, at + 1),
+                                              gather(scene.texels, at + 2), gather(scene.texels, at + 3), lambdas);
+        sum = spectrum_madd(texel, weight, sum);
+    }
+    return sum;
+}
+
+real bitmap_real(Bitmap t, Scene scene, vec2 uv)
+{
+    BitmapPlace b = bitmap_place(t, uv);
+    real sum = 0.0f;
+    for (int corner = 0; corner < 4; corner++) {
+        real weight;
+        integer at = t.first + bitmap_corner(t, b, corner, &weight);
+        sum += weight * gather(scene.texels, at);
+    }
+    return sum;
+}
