@@ -182,7 +182,10 @@ def main(json_file: str | None, layouts: tuple[str, ...], rounds: int, side: int
     reference = Embree(vertices, faces)
     sets = ray_sets(vertices, faces, reference, side)
     print(f"{device.info.label}, one thread, {len(faces)} triangles; Mrays/s")
-    print(f"{'layout':8}{'rays':10}{'query':10}{'clpt':>8}{'Embree':>8}{'ratio':>7}  agreement", flush=True)
+    print(
+        f"{'layout':8}{'rays':10}{'query':10}{'clpt':>8}{'Embree':>8}{'ratio':>7}  agreement",
+        flush=True,
+    )
     for layout in layouts:
         tracer = Tracer(device, bvh.build(device, vertices, faces, layout=layout))
         for name, rays in sets.items():

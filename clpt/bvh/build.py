@@ -15,6 +15,7 @@ from ..errors import SceneError
 from . import tree
 
 BRUTE_LIMIT = 32
+_LEAF = 0x80000000  # BVH_LEAF of kernels/bvh/node.cl
 _REACH = 1e12  # products of three coordinates stay inside a float
 
 
@@ -50,19 +51,19 @@ class _Mesh:
 
 def _brute(device: dev.Device, mesh: _Mesh) -> tuple[dict[str, cl.Buffer], dict[str, float]]:
     items = tree.items_only(device, mesh.count, mesh.vertices, mesh.faces)
-    return {"tris": _records(device, mesh, items)}, {}
+    return {"tris": _records(device, mesh, items, with_edges=1)}, {}
 
 
 def _binary(device: dev.Device, mesh: _Mesh) -> tuple[dict[str, cl.Buffer], dict[str, float]]:
     built = tree.over_triangles(device, mesh.count, mesh.vertices, mesh.faces)
-    return {"nodes": built.nodes, "leaves": _records(device, mesh, built.items)}, {}
+    return {"nodes": built.nodes, "leaves": _records(device, mesh, built.items, with_edges=0)}, {}
 
 
-def _records(device: dev.Device, mesh: _Mesh, items: cl.Buffer) -> cl.Buffer:
+def _records(device: dev.Device, mesh: _Mesh, items: cl.Buffer, with_edges: int) -> cl.Buffer:
     records = tree.allocate(device, 64 * mesh.count)
     tree.run_each(device, "bvh/pack.cl", "pack_triangles", mesh.count, items=items,
                   records=records, vertices=mesh.vertices, faces=mesh.faces,
-                  tags=mesh.tags)  # fmt: skip
+                  tags=mesh.tags, with_edges=with_edges)  # fmt: skip
     return records
 
 
@@ -148,16 +149,17 @@ def build_boxes(device: dev.Device, boxes: np.ndarray) -> Bvh:
     start = time.perf_counter()
     boxes = np.asarray(boxes, np.float32).reshape(-1, 2, 3)
     _check_reach(boxes, "a shape's box")
-    count = len(boxes)
-    if count == 0:  # one box that is inside out: nothing enters it
-        boxes = np.array([[[1, 1, 1], [-1, -1, -1]]], np.float32)
-    n = max(count, 1)
-    built = tree.over_boxes(device, n, tree.upload(device, boxes, np.float32))
+    n = len(boxes)
     indices = tree.allocate(device, 4 * n)
-    tree.run_each(device, "bvh/pack.cl", "pack_indices", n, items=built.items, indices=indices)
+    if n:
+        built = tree.over_boxes(device, n, tree.upload(device, boxes, np.float32))
+        nodes = built.nodes
+        tree.run_each(device, "bvh/pack.cl", "pack_indices", n, items=built.items, indices=indices)
+    else:
+        nodes = tree.upload(device, np.array([0, 0, 0, _LEAF, 0, 0, 0, 0]), np.uint32)
     device.queue.finish()
-    buffers = {"nodes": built.nodes, "indices": indices}
-    return Bvh("shapes", count, buffers, {"seconds": time.perf_counter() - start})
+    buffers = {"nodes": nodes, "indices": indices}
+    return Bvh("shapes", n, buffers, {"seconds": time.perf_counter() - start})
 
 
 def _read(device: dev.Device, buffer: cl.Buffer, dtype: type) -> np.ndarray:

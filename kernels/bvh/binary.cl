@@ -7,6 +7,7 @@
 inline TriHit binary_trace(global const float *nodes, global const float *leaves, Ray ray, float tmax,
                            int first_only)
 {
+    Shear shear = shear_make(ray.o.x, ray.o.y, ray.o.z, ray.d.x, ray.d.y, ray.d.z);
     global const float8 *tree = (global const float8 *)nodes;
     uint waiting[BVH_DEPTH];
     float entries[BVH_DEPTH];
@@ -33,7 +34,8 @@ inline TriHit binary_trace(global const float *nodes, global const float *leaves
         }
         if (entry < INFINITY) {
             uint begin = node_link(node), end = begin + node_count(node);
-            for (uint i = begin; i < end; i++) triangle_intersect(leaves + (ulong)i * 16, &ray, &hit);
+            for (uint i = begin; i < end; i++)
+                triangle_intersect(leaves + (ulong)i * 16, &shear, ray.tmin, &hit);
             if (first_only && hit.prim != BVH_MISS) return hit;
         }
         do {

@@ -6,10 +6,13 @@
 #include "bvh/hit.cl"
 #include "lib/lanes.cl"
 
+#define BRUTE_EDGE 2e-6f
+
 typedef struct { real t, u, v; natural prim, tag; vec3 n; } BruteHit;
 
 /* The lanes that meet a record between tmin and tmax. With s = v0 - o and w = s x d, Cramer's rule
- * gives t = s.n / d.n, u = e2.w / d.n, v = -e1.w / d.n; edges belong to both sides. */
+ * gives t = s.n / d.n, u = e2.w / d.n, v = -e1.w / d.n. Triangles reach a few rounding errors beyond
+ * their edges, so that no ray slips between two of them. */
 inline mask brute_test(global const float *tri, vec3 o, vec3 d, real tmin, real tmax, real *t, real *u,
                        real *v)
 {
@@ -21,7 +24,8 @@ inline mask brute_test(global const float *tri, vec3 o, vec3 d, real tmin, real 
     *t = (tri[9] * sx + tri[10] * sy + tri[11] * sz) * inverse;
     *u = (tri[6] * wx + tri[7] * wy + tri[8] * wz) * inverse;
     *v = (tri[3] * wx + tri[4] * wy + tri[5] * wz) * -inverse;
-    return (min_r(*u, *v) >= 0.0f) & (*u + *v <= 1.0f) & (*t > tmin) & (*t < tmax);
+    mask inside = (min_r(*u, *v) >= -BRUTE_EDGE) & (*u + *v <= 1.0f + BRUTE_EDGE);
+    return inside & (*t > tmin) & (*t < tmax);
 }
 
 /* The nearest hit of each active lane between tmin and tmax; prim is BVH_MISS where there is none. */

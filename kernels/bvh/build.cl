@@ -58,9 +58,17 @@ inline float8 build_item(float4 lo, float4 hi, uint index, float area)
 
 inline uint item_index(float8 item) { return as_uint(item.s3) & ~BVH_ITEM; }
 
-inline float8 build_node(float8 bounds, uint link, uint count)
+/* By how much nodes are larger than what they hold: a few rounding errors of the scene's size, so
+ * that no ray from within it slips between two that touch, nor along a side. */
+inline float build_pad(float8 scene)
 {
-    float8 node = (float8)(bounds.lo, -bounds.hi);
+    float4 reach = fmax(fabs(scene.lo), fabs(scene.hi));
+    return 0x1p-21f * fmax(reach.x, fmax(reach.y, reach.z));
+}
+
+inline float8 build_node(float8 bounds, float pad, uint link, uint count)
+{
+    float8 node = (float8)(bounds.lo - pad, pad - bounds.hi);
     node.s3 = as_float(link);
     node.s7 = as_float(count);
     return node;
@@ -199,15 +207,15 @@ inline uint build_cut(global float8 *items, Range r, float8 span, Half *left, Ha
 }
 
 /* Writes the node of a range; if it is to be divided, does so and returns 1. */
-inline int build_range(global float8 *items, global float8 *nodes, Range r, Half h, Range children[2],
-                       Half halves[2])
+inline int build_range(global float8 *items, global float8 *nodes, float pad, Range r, Half h,
+                       Range children[2], Half halves[2])
 {
     if (r.count <= BUILD_LEAF) {
-        nodes[r.node] = build_node(h.bounds, BVH_LEAF | r.first, r.count);
+        nodes[r.node] = build_node(h.bounds, pad, BVH_LEAF | r.first, r.count);
         return 0;
     }
     uint mid = build_cut(items, r, h.span, &halves[0], &halves[1]);
-    nodes[r.node] = build_node(h.bounds, 2 * mid, r.count);
+    nodes[r.node] = build_node(h.bounds, pad, 2 * mid, r.count);
     children[0] = (Range){2 * mid, r.first, mid - r.first, r.depth + 1};
     children[1] = (Range){2 * mid + 1, mid, r.first + r.count - mid, r.depth + 1};
     return 1;
@@ -232,9 +240,10 @@ kernel void build_level(global float8 *restrict items, global float8 *restrict n
                         global Range *restrict ranges, global Half *restrict halves, uint begin)
 {
     uint k = begin + get_global_id(0);
-    Range children[2] = {{0, 0, 0, 0}, {0, 0, 0, 0}};
+    float pad = build_pad(halves[0].bounds);
+    Range r = ranges[k], children[2] = {{0, 0, 0, 0}, {0, 0, 0, 0}};
     Half sides[2];
-    if (ranges[k].count && build_range(items, nodes, ranges[k], halves[k], children, sides)) {
+    if (r.count && build_range(items, nodes, pad, r, halves[k], children, sides)) {
         halves[2 * k + 1] = sides[0];
         halves[2 * k + 2] = sides[1];
     }
@@ -249,10 +258,11 @@ kernel void build_subtree(global float8 *restrict items, global float8 *restrict
     Range waiting[BVH_DEPTH];
     Half waiting_halves[BVH_DEPTH];
     int n = 0;
+    float pad = build_pad(halves[0].bounds);
     Range r = ranges[begin + get_global_id(0)], children[2];
     Half h = halves[begin + get_global_id(0)], sides[2];
     while (r.count) {
-        if (build_range(items, nodes, r, h, children, sides)) {
+        if (build_range(items, nodes, pad, r, h, children, sides)) {
             waiting[n] = children[1];
             waiting_halves[n++] = sides[1];
             r = children[0];

@@ -6,7 +6,7 @@
  *
  * Wide nodes are 8 rows of float8: low x, high x, low y, high y, low z, high z of the children,
  * their words, and a spare one; a child's word is its wide node, or its block with BVH_LEAF set.
- * Blocks are 11 rows: v0, e1 = v1 - v0, e2 = v2 - v0 (x, y, z each), prim, tag.
+ * Blocks are 11 rows: v0, v1, v2 (x, y, z each), prim, tag.
  */
 #include "bvh/build.cl"
 #include "bvh/hit.cl"
@@ -182,8 +182,7 @@ inline float collapse_promise(global const float8 *nodes, global const float8 *c
 }
 
 /* Writes one wide node. Children stand in ascending promise, for traversals visit the last slot
- * first. Boxes grow by a few rounding errors of the scene's size, so that no ray slips between two
- * of them; empty slots hold what no ray meets, and lead to block 0 if one does nevertheless. */
+ * first. Empty slots hold what no ray meets, and lead to block 0 if one does nevertheless. */
 kernel void collapse_nodes(global const float8 *restrict nodes, global const float8 *restrict costs,
                            global const float *restrict occlusion, global const uint *restrict roots,
                            global const uint2 *restrict firsts, uint count,
@@ -209,15 +208,10 @@ kernel void collapse_nodes(global const float8 *restrict nodes, global const flo
         children[k] = child;
         words[k] = word;
     }
-    float4 reach = fmax(fabs(nodes[0].lo), fabs(nodes[0].hi));
-    float pad = 0x1p-21f * fmax(reach.x, fmax(reach.y, reach.z));
     global float *row = wide + (ulong)w * 64;
     for (uint k = 0; k < 8; k++, row++) {
         float8 node = (float8)((float4)(FLT_MAX), (float4)(-FLT_MAX));
-        if (k < found) {
-            node = nodes[children[k]];
-            node = (float8)(node.lo - pad, node.hi + pad);
-        }
+        if (k < found) node = nodes[children[k]];
         row[0] = node.s0;
         row[8] = node.s4;
         row[16] = node.s1;
@@ -244,22 +238,13 @@ kernel void collapse_blocks(global const float8 *restrict nodes, global const fl
     global float *row = blocks + (ulong)b * 88;
     for (uint k = 0; k < 8; k++, row++) {
         uint prim = k < n ? item_index(items[first + k]) : BVH_MISS;
-        float3 v0 = (float3)(0.0f), v1 = v0, v2 = v0;
-        if (k < n) {
-            v0 = vload3(faces[3 * prim], vertices);
-            v1 = vload3(faces[3 * prim + 1], vertices);
-            v2 = vload3(faces[3 * prim + 2], vertices);
+        for (uint corner = 0; corner < 3; corner++) {
+            float3 v = (float3)(0.0f);
+            if (k < n) v = vload3(faces[3 * prim + corner], vertices);
+            row[24 * corner] = v.x;
+            row[24 * corner + 8] = v.y;
+            row[24 * corner + 16] = v.z;
         }
-        float3 e1 = v1 - v0, e2 = v2 - v0;
-        row[0] = v0.x;
-        row[8] = v0.y;
-        row[16] = v0.z;
-        row[24] = e1.x;
-        row[32] = e1.y;
-        row[40] = e1.z;
-        row[48] = e2.x;
-        row[56] = e2.y;
-        row[64] = e2.z;
         row[72] = as_float(prim);
         row[80] = as_float(k < n ? tags[prim] : 0u);
     }

@@ -5,6 +5,7 @@
 #include "bvh/hit.cl"
 #include "bvh/mask8.cl"
 #include "bvh/ray.cl"
+#include "bvh/shear.cl"
 
 #define WIDE8_STACK (7 * BVH_DEPTH + 8) /* a node on the way leaves 7 children waiting */
 
@@ -13,6 +14,7 @@ typedef struct {
     float rx, ry, rz;    /* 1 / d */
     float qx, qy, qz;    /* o / d */
     uint nx, ny, nz;     /* rows of a node with the near planes; the far ones are in row ^ 1 */
+    Shear shear;
 } Wide8Ray;
 
 inline float8 wide8_min(float8 a, float8 b) { return a < b ? a : b; }
@@ -22,7 +24,8 @@ inline Wide8Ray wide8_ray(float ox, float oy, float oz, float dx, float dy, floa
 {
     float rx = ray_reciprocal(dx), ry = ray_reciprocal(dy), rz = ray_reciprocal(dz);
     Wide8Ray r = {ox, oy, oz, dx, dy, dz, tmin, rx, ry, rz, ox * rx, oy * ry, oz * rz,
-                  rx < 0.0f, 2 + (ry < 0.0f), 4 + (rz < 0.0f)};
+                  rx < 0.0f, 2 + (ry < 0.0f), 4 + (rz < 0.0f),
+                  shear_make(ox, oy, oz, dx, dy, dz)};
     return r;
 }
 
@@ -37,50 +40,41 @@ inline Mask8 wide8_boxes(global const float8 *node, const Wide8Ray *r, float t, 
     return mask8(*entry <= exit);
 }
 
-/* The triangles of a block that the ray meets between tmin and t, and the distances (Moeller and
- * Trumbore 1997, without its division; edges belong to both sides). */
+inline float8 wide8_edge(float8 px, float8 py, float8 qx, float8 qy)
+{
+#pragma OPENCL FP_CONTRACT OFF
+    return px * qy - py * qx;
+}
+
+/* The triangles of a block that the ray meets between tmin and t, and the distances. Edges belong to
+ * both sides; shear.cl tells why nothing slips between two triangles. */
 inline Mask8 wide8_triangles(global const float8 *b, const Wide8Ray *r, float t, float8 *distance)
 {
-    float8 e1x = b[3], e1y = b[4], e1z = b[5], e2x = b[6], e2y = b[7], e2z = b[8];
-    float8 hx = r->dy * e2z - r->dz * e2y;
-    float8 hy = r->dz * e2x - r->dx * e2z;
-    float8 hz = r->dx * e2y - r->dy * e2x;
-    float8 sx = r->ox - b[0], sy = r->oy - b[1], sz = r->oz - b[2];
-    float8 gx = sy * e1z - sz * e1y;
-    float8 gy = sz * e1x - sx * e1z;
-    float8 gz = sx * e1y - sy * e1x;
-    float8 det = e1x * hx + e1y * hy + e1z * hz;
+    const Shear *s = &r->shear;
+    float8 az = b[s->kz] - s->oz, bz = b[3 + s->kz] - s->oz, cz = b[6 + s->kz] - s->oz;
+    float8 ax = mad(-s->x, az, b[s->kx] - s->ox), ay = mad(-s->y, az, b[s->ky] - s->oy);
+    float8 bx = mad(-s->x, bz, b[3 + s->kx] - s->ox), by = mad(-s->y, bz, b[3 + s->ky] - s->oy);
+    float8 cx = mad(-s->x, cz, b[6 + s->kx] - s->ox), cy = mad(-s->y, cz, b[6 + s->ky] - s->oy);
+    float8 u = wide8_edge(cx, cy, bx, by), v = wide8_edge(ax, ay, cx, cy), w = wide8_edge(bx, by, ax, ay);
+    int8 inside = (wide8_min(wide8_min(u, v), w) >= 0.0f) | (wide8_max(wide8_max(u, v), w) <= 0.0f);
+    float8 det = u + v + w, q = (u * az + v * bz + w * cz) * s->z;
     int8 sign = as_int8(det) & (int8)(0x80000000);
     float8 size = as_float8(as_int8(det) ^ sign);
-    float8 u = as_float8(as_int8(sx * hx + sy * hy + sz * hz) ^ sign);
-    float8 v = as_float8(as_int8(r->dx * gx + r->dy * gy + r->dz * gz) ^ sign);
-    float8 q = as_float8(as_int8(e2x * gx + e2y * gy + e2z * gz) ^ sign);
+    q = as_float8(as_int8(q) ^ sign);
     *distance = q / size;
-    return mask8((wide8_min(u, v) >= 0.0f) & (u + v <= size) & (q > r->tmin * size) & (q < t * size));
+    return mask8(inside & (q > r->tmin * size) & (q < t * size));
 }
 
 /* The hit record of one triangle of a block, computed again for that one alone. */
 inline TriHit wide8_hit(global const float *leaves, uint slot, float t, const Wide8Ray *r)
 {
     global const float *b = leaves + (ulong)(slot >> 3) * 88 + (slot & 7);
-    float e1x = b[24], e1y = b[32], e1z = b[40], e2x = b[48], e2y = b[56], e2z = b[64];
-    float sx = r->ox - b[0], sy = r->oy - b[8], sz = r->oz - b[16];
-    float hx = r->dy * e2z - r->dz * e2y;
-    float hy = r->dz * e2x - r->dx * e2z;
-    float hz = r->dx * e2y - r->dy * e2x;
-    float gx = sy * e1z - sz * e1y;
-    float gy = sz * e1x - sx * e1z;
-    float gz = sx * e1y - sy * e1x;
-    float inverse = 1.0f / (e1x * hx + e1y * hy + e1z * hz);
-    TriHit hit;
-    hit.t = t;
-    hit.u = (sx * hx + sy * hy + sz * hz) * inverse;
-    hit.v = (r->dx * gx + r->dy * gy + r->dz * gz) * inverse;
-    hit.prim = as_uint(b[72]);
-    hit.tag = as_uint(b[80]);
-    hit.nx = e1y * e2z - e1z * e2y;
-    hit.ny = e1z * e2x - e1x * e2z;
-    hit.nz = e1x * e2y - e1y * e2x;
+    float again, u, v;
+    shear_intersect(&r->shear, b, 8, &again, &u, &v);
+    float e1x = b[24] - b[0], e1y = b[32] - b[8], e1z = b[40] - b[16];
+    float e2x = b[48] - b[0], e2y = b[56] - b[8], e2z = b[64] - b[16];
+    TriHit hit = {t, u, v, as_uint(b[72]), as_uint(b[80]),
+                  e1y * e2z - e1z * e2y, e1z * e2x - e1x * e2z, e1x * e2y - e1y * e2x};
     return hit;
 }
 

@@ -11,44 +11,45 @@ from clpt import device as dev
 
 TREE = """
 #include "bvh/{layout}.cl"
+#define RAY r.s0, r.s1, r.s2, r.s4, r.s5, r.s6, r.s3, r.s7
 kernel void closest(global const float *nodes, global const float *leaves,
                     global const float8 *rays, global TriHit *hits)
 {{
     float8 r = rays[get_global_id(0)];
-    hits[get_global_id(0)] = {layout}_closest(nodes, leaves, r.s0, r.s1, r.s2, r.s4, r.s5, r.s6, r.s3, r.s7);
+    hits[get_global_id(0)] = {layout}_closest(nodes, leaves, RAY);
 }}
 kernel void occluded(global const float *nodes, global const float *leaves,
                      global const float8 *rays, global int *hits)
 {{
     float8 r = rays[get_global_id(0)];
-    hits[get_global_id(0)] = {layout}_occluded(nodes, leaves, r.s0, r.s1, r.s2, r.s4, r.s5, r.s6, r.s3, r.s7);
+    hits[get_global_id(0)] = {layout}_occluded(nodes, leaves, RAY);
 }}
 """
 BRUTE = """
 #include "bvh/brute.cl"
-inline real part(global const float *rays, int k)
+#define AT ((integer)((int)get_global_id(0) * LANES) + LANE_INDEX)
+#define RAY(k) gather(rays, AT * 8 + k)
+#define EVERY ((mask)(1) == (mask)(1))
+kernel void closest(global const float *tris, uint count, global const float *rays,
+                    global float *hits)
 {
-    return gather(rays, ((integer)((int)get_global_id(0) * LANES) + LANE_INDEX) * 8 + k);
+    vec3 o = {RAY(0), RAY(1), RAY(2)}, d = {RAY(4), RAY(5), RAY(6)};
+    BruteHit h = brute_closest(tris, count, o, d, RAY(3), RAY(7), EVERY);
+    scatter_if(hits, AT * 8, EVERY, h.t);
+    scatter_if(hits, AT * 8 + 1, EVERY, h.u);
+    scatter_if(hits, AT * 8 + 2, EVERY, h.v);
+    scatter_if(hits, AT * 8 + 3, EVERY, as_real(h.prim));
+    scatter_if(hits, AT * 8 + 4, EVERY, as_real(h.tag));
+    scatter_if(hits, AT * 8 + 5, EVERY, h.n.x);
+    scatter_if(hits, AT * 8 + 6, EVERY, h.n.y);
+    scatter_if(hits, AT * 8 + 7, EVERY, h.n.z);
 }
-kernel void closest(global const float *tris, uint count, global const float *rays, global float *hits)
+kernel void occluded(global const float *tris, uint count, global const float *rays,
+                     global float *hits)
 {
-    vec3 o = {part(rays, 0), part(rays, 1), part(rays, 2)}, d = {part(rays, 4), part(rays, 5), part(rays, 6)};
-    BruteHit h = brute_closest(tris, count, o, d, part(rays, 3), part(rays, 7), (mask)(1) == (mask)(1));
-    integer at = ((integer)((int)get_global_id(0) * LANES) + LANE_INDEX) * 8;
-    scatter(hits, at, h.t);
-    scatter(hits, at + 1, h.u);
-    scatter(hits, at + 2, h.v);
-    scatter(hits, at + 3, as_real(h.prim));
-    scatter(hits, at + 4, as_real(h.tag));
-    scatter(hits, at + 5, h.n.x);
-    scatter(hits, at + 6, h.n.y);
-    scatter(hits, at + 7, h.n.z);
-}
-kernel void occluded(global const float *tris, uint count, global const float *rays, global float *hits)
-{
-    vec3 o = {part(rays, 0), part(rays, 1), part(rays, 2)}, d = {part(rays, 4), part(rays, 5), part(rays, 6)};
-    mask m = brute_occluded(tris, count, o, d, part(rays, 3), part(rays, 7), (mask)(1) == (mask)(1));
-    scatter(hits, (integer)((int)get_global_id(0) * LANES) + LANE_INDEX, as_real(m & 1));
+    vec3 o = {RAY(0), RAY(1), RAY(2)}, d = {RAY(4), RAY(5), RAY(6)};
+    mask met = brute_occluded(tris, count, o, d, RAY(3), RAY(7), EVERY);
+    scatter_if(hits, AT, EVERY, as_real(met & 1));
 }
 """
 HIT = np.dtype(
@@ -64,7 +65,7 @@ def device() -> dev.Device:
 
 @pytest.fixture(scope="session")
 def trace(device) -> Callable:
-    """trace(bvh, rays, lanes=8) -> hits (n,) HIT, occluded (n,) bool; rays are (n, 8) o tmin d tmax."""
+    """trace(bvh, rays, lanes=8) -> hits (n,) HIT, occluded (n,) bool; rays (n, 8): o tmin d tmax."""
     programs = {}
 
     def program(layout: str, lanes: int) -> dev.Program:
