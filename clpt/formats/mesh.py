@@ -234,8 +234,12 @@ def _usable_normals(
     vertices: NDArray[Any], faces: NDArray[Any], normals: NDArray[Any]
 ) -> NDArray[np.float32]:
     """Normals of length one; where the file's are zero or not finite, those of the faces around."""
-    unit = _unit(np.nan_to_num(normals, nan=0.0, posinf=0.0, neginf=0.0))
-    bad = ~unit.any(axis=1)
+    length = np.linalg.norm(normals.astype(np.float64), axis=1, keepdims=True)
+    bad = ~(np.isfinite(length) & (length > 0.0))[:, 0]
+    # What is of length one stays as it is to the last bit, so that a saved mesh is read unchanged.
+    exact = np.abs(length - 1.0) < 1e-6
+    with np.errstate(divide="ignore", invalid="ignore"):
+        unit = np.where(exact, normals, normals / length)
     if bad.any():
         unit[bad] = smooth_normals(vertices, faces)[bad]
     return unit.astype(np.float32)

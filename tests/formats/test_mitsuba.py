@@ -177,7 +177,7 @@ def test_shapes(scene):
     ).shapes
     assert [s.kind for s in made] == ["sphere", "rectangle", "disk", "cube", "cylinder", "mesh"]
     assert (*made[0].center, made[0].radius, made[0].flip_normals) == (1, 2, 3, 2, True)
-    assert (made[4].p1 == [0, 0, 4]).all()
+    assert made[4].p1 == (0, 0, 4)
 
 
 @pytest.mark.parametrize("flat", [True, False])
@@ -262,9 +262,9 @@ def test_lights(scene):
         '<shape type="disk"><emitter type="area"><rgb name="radiance" value="2"/></emitter></shape>'
     )
     point, spot, directional, constant, envmap = made.lights
-    assert (point.position == [1, 2, 3]).all()
+    assert point.position == (1, 2, 3)
     assert (spot.cutoff, spot.beam_width) == (40.0, 30.0)
-    assert (directional.direction == [0, -1, 0]).all()
+    assert directional.direction == (0, -1, 0)
     assert constant.radiance == RGBIlluminant(1, 1, 1)
     assert (envmap.scale, envmap.image.name) == (2.0, "t.png")
     assert made.shapes[0].emission.radiance == RGBIlluminant(2, 2, 2)

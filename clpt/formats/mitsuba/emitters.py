@@ -54,7 +54,7 @@ def _area(props: Properties) -> Parameters:
 def _point(props: Properties) -> Parameters:
     position = props.vector("position", None)
     if position is None:
-        position = props.matrix("to_world")[:3, 3]
+        position = tuple(props.matrix("to_world")[:3, 3].tolist())
     return {"position": position, "intensity": emission(props, "intensity")}
 
 
@@ -74,7 +74,7 @@ def _spot(props: Properties) -> Parameters:
 def _directional(props: Properties) -> Parameters:
     direction = props.vector("direction", None)
     if direction is None:
-        direction = props.placement()[:3, 2]
+        direction = tuple(props.placement()[:3, 2].tolist())
     if not np.any(direction):
         raise props.element.error("the direction has no length")
     return {"direction": direction, "irradiance": emission(props, "irradiance")}

@@ -54,7 +54,7 @@ def _sphere(props: Properties) -> Parameters:
 
 def _cylinder(props: Properties) -> Parameters:
     p0, p1 = props.vector("p0", (0.0, 0.0, 0.0)), props.vector("p1", (0.0, 0.0, 1.0))
-    if np.array_equal(p0, p1):
+    if p0 == p1:
         raise props.element.error("p0 and p1 are the same point")
     return {"p0": p0, "p1": p1, "radius": _radius(props), "to_world": props.placement()}
 

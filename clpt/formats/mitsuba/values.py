@@ -175,13 +175,13 @@ class Properties:
         return self.context.document.find_file(child, child.attribute("value"))
 
     def vector(self, name: str, default: Sequence[float] | None) -> Any:
-        """Take a point or a vector, (3,) float64."""
+        """Take a point or a vector."""
         child = self.take(name)
         if child is None:
             return default
         if child.tag not in ("point", "vector"):
             raise child.error("must be a <point> or a <vector>")
-        return triple(child, "value", 0.0)
+        return tuple(triple(child, "value", 0.0).tolist())
 
     def matrix(self, name: str) -> transforms.Matrix:
         """Take a transform, (4, 4) float64; the identity where it is not given."""

@@ -126,9 +126,10 @@ class _Reader:
         """Read one parameter by its role, or what only the host needs by its name or default."""
         if param.role in ("flag", "choice"):
             return cursor.value
-        texture = isinstance(cursor.value, dict) and cursor.value.get("type") in kinds("texture")
-        if texture and param.textured:
-            return self.kind(cursor, "texture")
+        if param.textured and isinstance(cursor.value, dict) and "type" in cursor.value:
+            known = {**kinds("texture"), **json_spectra.SPECTRA}
+            if kind_name(cursor, "texture or spectrum", known) in kinds("texture"):
+                return self.kind(cursor, "texture")
         if param.role in SPECTRUM_ROLES:
             return json_spectra.read(cursor, param.role, name)
         if param.role == "real":
