@@ -7,7 +7,7 @@ import logging
 
 import click
 
-COMMANDS = ("devices",)
+COMMANDS = ("devices", "info")
 
 
 class _Commands(click.Group):
