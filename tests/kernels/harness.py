@@ -32,7 +32,7 @@ def root_text(mode: str, files: tuple[str, ...] = ()) -> str:
 
 @cache
 def _program(text: str, lanes: int) -> device.Program:
-    source = device.assemble("probe.cl", {"probe.cl": text}, {"LANES": lanes} | ({"any": "lanes_any"} if lanes > 1 else {}))
+    source = device.assemble("probe.cl", {"probe.cl": text}, {"LANES": lanes})
     return device.build(opened(), source)
 
 
@@ -51,7 +51,7 @@ def run(text: str, kernel: str, lanes: int, given: np.ndarray, rows: int) -> np.
     source = cl.Buffer(dev.context, flags.READ_ONLY | flags.COPY_HOST_PTR, hostbuf=data)
     target = cl.Buffer(dev.context, flags.WRITE_ONLY, out.nbytes)
     bound = _program(text, lanes).kernel(kernel).bind(**{"in": source, "out": target, "n": padded})
-    bound.enqueue(dev.queue, (padded // lanes,))
+    bound.enqueue(dev.queue, (padded // lanes,), (1,))
     cl.enqueue_copy(dev.queue, out, target)
     return out[:, :n]
 
@@ -108,7 +108,8 @@ class Probe:
             members = [f"m.{name}.{c}" for c in names] if form == "Spectrum" else [f"m.{name}"]
             for member in members:
                 row = f"block_load(in + {at} * n + at)"
-                reads.append(f"    {member} = {f'to_integer({row})' if form == 'integer' else row};")
+                value = f"to_integer({row})" if form == "integer" else row
+                reads.append(f"    {member} = {value};")
                 at += 1
         spectra = {name: [f"{name}.{c}" for c in names] for name in ("f", "again", "albedo")}
         weight = [f"s.weight.{c}" for c in names]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from clpt.scene.params import Kind, Param, device_params
+from clpt.scene.params import SPECTRUM_ROLES, Kind, Param, device_params
+from tests.kernels.harness import COMPONENTS
 
 
 def directions(rng: np.random.Generator, n: int) -> np.ndarray:
@@ -13,10 +14,59 @@ def directions(rng: np.random.Generator, n: int) -> np.ndarray:
     return v / np.linalg.norm(v, axis=1, keepdims=True)
 
 
-def cosine_pairs(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
+def pairs(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
     """Pairs of directions (n, 3): uniform ones, and pairs near mirror reflection."""
     wo, wi = directions(rng, n), directions(rng, n)
     near = wi * 0.3 + wo * [-1.0, -1.0, 1.0]
     near /= np.linalg.norm(near, axis=1, keepdims=True)
-    half = np.arange(n) % 2 == 0
-    return wo, np.where(half[:, None], wi, near)
+    return wo, np.where((np.arange(n) % 2 == 0)[:, None], wi, near)
+
+
+def tilted(degrees: float, azimuth: float = 0.7) -> np.ndarray:
+    """The direction (3,) at an angle to the normal; beyond 90 degrees it lies on the back."""
+    t = np.radians(degrees)
+    return np.array([np.sin(t) * np.cos(azimuth), np.sin(t) * np.sin(azimuth), np.cos(t)])
+
+
+def settings(
+    cls: type[Kind], mode: str, rng: np.random.Generator, count: int, **fixed: object
+) -> list[dict[str, np.ndarray]]:
+    """Random valid parameters, by name: numbers and spectra (components,); `fixed` wins.
+
+    Indices of refraction are by turns near 1 and well above, in either order, as lobes refracted by
+    a ratio near one are too narrow for bins. The first half of them is equal at all wavelengths.
+    """
+    result = []
+    for i in range(count):
+        disperses, turn = 2 * i >= count, int(rng.integers(2))
+        drawn = {}
+        for name, param in device_params(cls).items():
+            if param.role == "index":
+                turn += 1
+                drawn[name] = _draw_index(turn % 2 == 0, mode, rng, disperses)
+            else:
+                drawn[name] = _draw(param, mode, rng)
+        result.append(drawn | {k: v for k, v in fixed.items() if k in drawn})
+    return result
+
+
+def white(cls: type[Kind]) -> dict[str, float]:
+    """Values for `settings` that make every reflectance one."""
+    return {k: 1.0 for k, p in device_params(cls).items() if p.role == "reflectance"}
+
+
+def _draw_index(dense: bool, mode: str, rng: np.random.Generator, disperses: bool) -> np.ndarray:
+    c = COMPONENTS[mode]
+    middle = rng.uniform(1.4, 2.0) if dense else rng.uniform(1.0, 1.1)
+    return np.full(c, middle) + disperses * rng.uniform(0.0, 0.03, c)
+
+
+def _draw(param: Param, mode: str, rng: np.random.Generator) -> np.ndarray:
+    if param.role in SPECTRUM_ROLES:
+        return rng.uniform(0.0, 1.0, COMPONENTS[mode])
+    if param.role == "flag":
+        return np.array(rng.integers(2))
+    if param.role == "choice":
+        return np.array(rng.integers(len(param.choices)))
+    high = min(param.high, param.low + 100.0)  # lobes no narrower than a grid of bins can tell
+    return np.array(param.low + rng.uniform(0.1, 1.0) * (high - param.low))
