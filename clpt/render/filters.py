@@ -13,7 +13,7 @@ from clpt.scene.integrators import BlackmanHarris, Box, Filter, Gaussian, Mitche
 
 Values = NDArray[np.float64]
 
-CELLS = 512  # of equal probability, on one side
+CELLS = 1024  # of equal probability, on one side
 STEPS = 1 << 16  # in which a filter is integrated
 CUT = 4.0  # standard deviations at which a Gaussian ends
 

@@ -1,0 +1,232 @@
+"""Cameras: the rays that a film position stands for, against Mitsuba and against matrices."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from clpt import transforms
+from clpt.errors import SceneError
+from clpt.render import cameras
+from clpt.scene import cameras as scene
+from tests.kernels.scene_harness import SceneProbe
+
+BODY = """
+    vec2 film = {x[0], x[1]}, lens = {x[2], x[3]};
+    CameraRay ray = RAY((global const RECORD *)scene.camera, film, lens);
+    r[0] = ray.o.x; r[1] = ray.o.y; r[2] = ray.o.z;
+    r[3] = ray.d.x; r[4] = ray.d.y; r[5] = ray.d.z;
+"""
+PLACE = transforms.look_at([3.0, 2.0, -1.5], [0.2, 0.4, 0.1], [0.1, 1.0, 0.2])
+
+
+@cache
+def _text(kind: str) -> dict[str, str]:
+    record = cameras.RECORDS[kind]
+    return {"generated/camera.cl": f'{record.uniform_text()}#include "camera/{kind}.cl"\n'}
+
+
+def rays(camera, width, height, film, lens=None, lanes=8):
+    """Origins and directions (n, 3) at film positions (n, 2)."""
+    kind, words = cameras.lower_camera(camera, width, height)
+    defines = {"RAY": f"{kind}_ray", "RECORD": cameras.RECORDS[kind].name}
+    probe = SceneProbe(
+        BODY,
+        4,
+        6,
+        files=("lib/camera.cl", "generated/camera.cl"),
+        lanes=lanes,
+        virtual=_text(kind),
+        defines=defines,
+        tables={"camera": words},
+    )
+    lens = np.full_like(film, 0.5) if lens is None else lens
+    out = probe(*film.T, *lens.T)
+    return out[:3].T, out[3:].T
+
+
+def _samples(n=64, seed=1):
+    rng = np.random.default_rng(seed)
+    film, lens = rng.random((2, n, 2), np.float32)
+    film[:4] = [[0, 0], [1, 0], [0, 1], [0.5, 0.5]]
+    return film, lens
+
+
+FULL = {"fov": 50.0, "near": 0.3, "far": 80.0}
+PEERS = {
+    "x": (scene.Perspective(to_world=PLACE, **FULL), 64, 48, "perspective", {"fov_axis": "x"}),
+    "y": (
+        scene.Perspective(to_world=PLACE, fov_axis="y", **FULL),
+        64,
+        48,
+        "perspective",
+        {"fov_axis": "y"},
+    ),
+    "smaller": (
+        scene.Perspective(to_world=PLACE, fov_axis="smaller", **FULL),
+        30,
+        70,
+        "perspective",
+        {"fov_axis": "smaller"},
+    ),
+    "larger": (
+        scene.Perspective(to_world=PLACE, fov_axis="larger", **FULL),
+        30,
+        70,
+        "perspective",
+        {"fov_axis": "larger"},
+    ),
+    "offset": (
+        scene.Perspective(to_world=PLACE, offset_x=0.2, offset_y=-0.1, **FULL),
+        64,
+        32,
+        "perspective",
+        {"principal_point_offset_x": 0.2, "principal_point_offset_y": -0.1},
+    ),
+    "lens": (
+        scene.ThinLens(to_world=PLACE, aperture_radius=0.3, focus_distance=4.0, **FULL),
+        64,
+        32,
+        "thinlens",
+        {"aperture_radius": 0.3, "focus_distance": 4.0},
+    ),
+    "parallel": (
+        scene.Orthographic(to_world=PLACE @ transforms.scale([2.0, 3.0, 1.5]), near=0.3, far=80.0),
+        64,
+        32,
+        "orthographic",
+        {},
+    ),
+}
+
+
+@pytest.mark.peers
+@pytest.mark.parametrize("name", PEERS)
+def test_same_rays_as_mitsuba(name):
+    mi = pytest.importorskip("mitsuba", reason="the renderer that we compare with is not installed")
+    mi.set_variant("scalar_rgb")
+    ours, width, height, plugin, more = PEERS[name]
+    film, lens = _samples()
+    origins, directions = rays(ours, width, height, film, lens)
+    if plugin != "orthographic":
+        more = {**more, "fov": ours.fov}
+    theirs = mi.load_dict(
+        {
+            "type": plugin,
+            "to_world": mi.ScalarTransform4f(ours.to_world),
+            "near_clip": ours.near,
+            "far_clip": ours.far,
+            "film": {"type": "hdrfilm", "width": width, "height": height},
+            **more,
+        }
+    )
+    for o, d, f, s in zip(origins, directions, film, lens, strict=True):
+        ray, _ = theirs.sample_ray(0.0, 0.5, mi.Point2f(*map(float, f)), mi.Point2f(*map(float, s)))
+        np.testing.assert_allclose(o, [*ray.o], atol=2e-5)
+        np.testing.assert_allclose(d, [*ray.d], atol=2e-6)
+
+
+def _gl_perspective(fov, aspect, near, far=None):
+    f = 1.0 / np.tan(np.radians(fov) / 2.0)
+    z = (
+        (-1.0, -2.0 * near)
+        if far is None
+        else (
+            (far + near) / (near - far),
+            2.0 * far * near / (near - far),
+        )
+    )
+    return np.array([[f / aspect, 0, 0, 0], [0, f, 0, 0], [0, 0, *z], [0, 0, -1, 0]])
+
+
+@pytest.mark.parametrize("far", [5.0, 1e6, None], ids=["near", "far", "infinite"])
+@pytest.mark.parametrize("size", [1.0, 1e-4, 1e4])
+def test_matrix_is_the_perspective_camera(far, size):
+    """The same pinhole as an OpenGL camera, whose eye looks along -z with +x to the right."""
+    place = PLACE.copy()
+    place[:3, 3] *= size
+    camera = scene.Perspective(to_world=place, fov=50.0, fov_axis="y", near=0.5 * size, far=1e9)
+    view = np.linalg.inv(place @ np.diag([-1.0, 1.0, -1.0, 1.0]))
+    planes = (0.5 * size, None if far is None else far * size)
+    matrix = scene.Matrix(view=view, projection=_gl_perspective(50.0, 2.0, *planes))
+    film, _ = _samples()
+    origins, directions = rays(camera, 64, 32, film)
+    again, along = rays(matrix, 64, 32, film)
+    np.testing.assert_allclose(along, directions, atol=1e-6)
+    np.testing.assert_allclose(again / size, origins / size, atol=3e-6)
+
+
+def test_matrix_of_parallel_rays():
+    """glOrtho(-3, 3, -2, 2, 1, 9) from (0, 0, 5): rays along -z that start at z = 4."""
+    projection = np.diag([1 / 3, 1 / 2, -2 / 8, 1.0])
+    projection[2, 3] = -10 / 8
+    matrix = scene.Matrix(view=transforms.translate([0, 0, -5]), projection=projection)
+    film, _ = _samples()
+    origins, directions = rays(matrix, 60, 40, film)
+    expected = np.column_stack([6 * film[:, 0] - 3, 2 - 4 * film[:, 1], np.full(len(film), 4.0)])
+    np.testing.assert_allclose(origins, expected, atol=1e-6)
+    np.testing.assert_allclose(directions, [[0, 0, -1]] * len(film), atol=1e-7)
+
+
+def test_spherical_directions():
+    film = np.array([[0.5, 0.5], [0.25, 0.5], [0.75, 0.5], [0.3, 0.0], [0.3, 1.0], [1.0, 0.5]])
+    _, directions = rays(scene.Spherical(), 8, 4, film.astype(np.float32))
+    expected = [[0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, -1]]
+    np.testing.assert_allclose(directions, expected, atol=1e-6)
+
+
+def test_spherical_wraps_beyond_the_film():
+    film = np.array([[-0.1, 0.3], [0.9, 0.3], [0.2, -0.1], [0.7, 0.1], [0.2, 1.1], [0.7, 0.9]])
+    _, directions = rays(scene.Spherical(to_world=PLACE), 8, 4, film.astype(np.float32))
+    np.testing.assert_allclose(directions[::2], directions[1::2], atol=1e-6)
+
+
+def test_lens_in_focus():
+    """All rays of one film position meet in the plane of focus; the aperture is filled evenly."""
+    _, lens = _samples(4096)
+    film = np.tile(np.float32([[0.3, 0.8]]), (len(lens), 1))
+    camera = scene.ThinLens(aperture_radius=0.5, focus_distance=3.0, near=0.0)
+    origins, directions = rays(camera, 64, 64, film, lens)
+    pinhole, along = rays(scene.Perspective(near=0.0), 64, 64, film[:1])
+    target = pinhole[0] + along[0] * 3.0 / along[0, 2]
+    met = origins + directions * (3.0 / directions[:, 2:])
+    np.testing.assert_allclose(met, np.tile(target, (len(met), 1)), atol=5e-6)
+    radius = np.linalg.norm(origins[:, :2], axis=1) / 0.5
+    assert radius.max() <= 1.0 + 1e-6
+    # r^2 is uniform: its mean is 1/2 within 5 standard errors (two-sided significance 6e-7)
+    assert abs(np.mean(radius**2) - 0.5) < 5 * np.sqrt(1 / 12 / len(lens))
+
+
+@pytest.mark.parametrize("cls", scene.KINDS)
+def test_unit_directions_in_all_lane_widths(cls):
+    film, lens = _samples()
+    camera = cls() if cls is scene.Matrix else cls(to_world=PLACE)
+    single = rays(camera, 40, 30, film, lens, lanes=1)
+    np.testing.assert_allclose(np.linalg.norm(single[1], axis=1), 1.0, atol=3e-7)
+    for lanes in (8, 16):
+        for a, b in zip(rays(camera, 40, 30, film, lens, lanes=lanes), single, strict=True):
+            np.testing.assert_allclose(a, b, atol=1e-6)
+
+
+SINGULAR = np.diag([1.0, 0.0, 1.0, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("camera", "part"),
+    [
+        (scene.Perspective(to_world=SINGULAR), "perspective.to_world"),
+        (scene.Perspective(to_world=np.eye(3)), "4x4"),
+        (scene.Perspective(to_world="here"), "4x4"),
+        (scene.Perspective(to_world=np.full((4, 4), np.nan)), "finite"),
+        (scene.Perspective(to_world=transforms.scale(2.0)), "scale"),
+        (scene.Orthographic(to_world=_gl_perspective(50, 1, 1)), "0 0 0 1"),
+        (scene.ThinLens(near=2.0, far=1.0), "near"),
+        (scene.Matrix(view=SINGULAR), "matrix.view"),
+        (scene.Matrix(projection=SINGULAR), "matrix.projection"),
+    ],
+)
+def test_unusable_cameras(camera, part):
+    with pytest.raises(SceneError, match=part.replace(".", r"\.")):
+        cameras.lower_camera(camera, 4, 4)

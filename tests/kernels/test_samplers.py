@@ -1,0 +1,141 @@
+"""Samplers: uniform, stratified where they claim to be, and unrelated where they must be.
+
+Significance: every statistical test below fails with a probability of about 1e-6 for a perfect
+sampler; the seeds are fixed, so a run is either always or never unlucky.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from clpt.scene.integrators import SAMPLERS
+from tests.kernels.scene_harness import SceneProbe
+
+BODY = """
+    Sampler sampler = sampler_start(SEED, to_natural(x[0]), to_natural(x[1]));
+    vec2 u = sampler_pair(sampler, to_natural(x[2]));
+    r[0] = u.x; r[1] = u.y;
+"""
+KINDS = [cls.kind for cls in SAMPLERS]
+SIGNIFICANCE = 1e-6
+
+
+@cache
+def _probe(kind, seed, lanes):
+    return SceneProbe(
+        BODY, 3, 2, files=(f"sampler/{kind}.cl",), lanes=lanes, defines={"SEED": f"{seed}u"}
+    )
+
+
+def pairs(kind, pixel, sample, dimension, seed=0, lanes=8):
+    """Points (n, 2) for whole numbers that broadcast against each other."""
+    given = np.broadcast_arrays(pixel, sample, dimension)
+    return _probe(kind, seed, lanes)(*(np.ravel(g) for g in given)).T
+
+
+def _is_net(points, k):
+    """Whether 2^k points have exactly one in every elementary interval of area 2^-k."""
+    n = 1 << k
+    for across in range(k + 1):
+        columns = (points[:, 0] * (1 << across)).astype(int)
+        rows = (points[:, 1] * (1 << (k - across))).astype(int)
+        if len(np.unique(columns * (1 << (k - across)) + rows)) != n:
+            return False
+    return True
+
+
+@pytest.mark.parametrize("seed", [0, 1, 0xDEADBEEF])
+def test_sobol_pairs_are_nets(seed):
+    """(0, k, 2)-nets in base 2 for every k, also after scrambling, and in later blocks of samples."""
+    k = 10
+    for pixel in (0, 1, 77, 1_000_003):
+        for dimension in (0, 1, 2, 3, 12, 51):
+            points = pairs("sobol", pixel, np.arange(1 << k), dimension, seed)
+            for smaller in range(k + 1):
+                assert _is_net(points[: 1 << smaller], smaller)
+            assert _is_net(points[256:512], 8)
+
+
+def test_sobol_scrambles_deeply():
+    """Owen's scrambling moves every bit: within an elementary interval points are uniform."""
+    count = 4096
+    for sample in (0, 5):
+        points = pairs("sobol", np.arange(count), sample, 3)
+        for axis in range(2):
+            for strata in (1, 256):
+                inside = (points[:, axis] * strata) % 1.0
+                assert stats.kstest(inside, "uniform").pvalue > SIGNIFICANCE
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_uniform(kind):
+    """Chi-square over 32 x 32 cells of points from many pixels and dimensions, one sample each."""
+    pixel, dimension = np.meshgrid(np.arange(1024), np.arange(64))
+    points = pairs(kind, pixel, 3, dimension)
+    counts, _, _ = np.histogram2d(*points.T, bins=32, range=[[0, 1], [0, 1]])
+    assert stats.chisquare(counts.ravel()).pvalue > SIGNIFICANCE
+    assert points.min() >= 0.0
+    assert points.max() < 1.0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("other", ["pixel", "far pixel", "dimension", "far dimension", "axis"])
+def test_unrelated(kind, other):
+    """Joint chi-square of one number and another of a neighbour, a far one, or the same pair.
+
+    Whole pixels are pooled: their own points are stratified, but their pairings are not.
+    """
+    step = {"pixel": (1, 0), "far pixel": (4096, 0), "dimension": (0, 1), "far dimension": (0, 8)}
+    pixel, dimension = np.meshgrid(np.arange(2048), np.arange(8))
+    move, turn = step.get(other, (0, 0))
+    for sample in (0, 1, 6):
+        a = pairs(kind, pixel, sample, dimension)
+        b = pairs(kind, pixel + move, sample, dimension + turn)
+        for first, second in ((0, 1),) if other == "axis" else ((0, 0), (1, 1), (0, 1)):
+            counts, _, _ = np.histogram2d(
+                a[:, first], b[:, second], bins=16, range=[[0, 1], [0, 1]]
+            )
+            assert stats.chisquare(counts.ravel()).pvalue > SIGNIFICANCE
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_samples_of_a_pixel_pair_up_at_random(kind):
+    """Across dimension pairs the samples of one pixel have no common order (correlation below 5 s)."""
+    n, close = 256, 0
+    for pixel in range(64):
+        a = pairs(kind, pixel, np.arange(n), 0)[:, 0]
+        b = pairs(kind, pixel, np.arange(n), 1)[:, 0]
+        close += abs(np.corrcoef(a, b)[0, 1]) > 5.0 / np.sqrt(n)
+    assert close == 0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_seeds_differ(kind):
+    a, b = (pairs(kind, np.arange(4096), 2, 0, seed)[:, 0] for seed in (1, 2))
+    assert np.mean(a == b) < 0.01
+    assert abs(np.corrcoef(a, b)[0, 1]) < 5.0 / np.sqrt(len(a))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_all_lane_widths_give_the_same_bits(kind):
+    rng = np.random.default_rng(8)
+    pixel, sample, dimension = (rng.integers(0, 1 << b, 512) for b in (20, 16, 7))
+    single = pairs(kind, pixel, sample, dimension, lanes=1)
+    for lanes in (8, 16):
+        np.testing.assert_array_equal(pairs(kind, pixel, sample, dimension, lanes=lanes), single)
+
+
+def test_sobol_converges_faster_than_random():
+    """Error of a smooth integral over 64 pixels at 256 samples: far below that of random points."""
+    pixel, sample = np.meshgrid(np.arange(64), np.arange(256), indexing="ij")
+    errors = {}
+    for kind in KINDS:
+        points = pairs(kind, pixel, sample, 1).reshape(64, 256, 2).astype(np.float64)
+        values = np.sin(3.0 * points[..., 0]) * np.exp(points[..., 1])
+        exact = (1.0 - np.cos(3.0)) / 3.0 * (np.e - 1.0)
+        errors[kind] = np.sqrt(np.mean((values.mean(axis=1) - exact) ** 2))
+    assert errors["sobol"] < errors["independent"] / 15.0
