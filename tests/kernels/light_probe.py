@@ -1,0 +1,127 @@
+"""Kernel functions of lights and shapes on arrays, with the tables of a scene behind them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pyopencl as cl
+
+from clpt import device
+from clpt.records import SETTINGS, SHAPE
+from clpt.render import kinds, lights, programs, shapes
+from clpt.render.tables import STEP, Tables
+from tests.kernels.harness import opened
+
+LAMBDAS = (450.0, 520.0, 580.0, 640.0)  # of the spectral mode's probes [nm]
+INCLUDES = ("lib/base.cl", "lib/shape.cl", "lib/light.cl", "generated/lights.cl")
+
+
+@dataclass
+class Lit:
+    """A scene of lights alone: its tables, and what `light_rows` gave."""
+
+    tables: Tables
+    rows: lights.LightRows
+    files: tuple[str, ...] = ()
+    radius: float = 1.0
+    buffers: dict[str, Any] = field(default_factory=dict)
+
+    def __call__(self, body: str, given: np.ndarray, results: int, lanes: int = 8) -> np.ndarray:
+        """Run `body`, which sets r[0..results) from x[0..k), on given (k, n): (results, n)."""
+        n = given.shape[1]
+        padded = -(-n // 16) * 16
+        data = np.concatenate([given, np.repeat(given[:, -1:], padded - n, axis=1)], axis=1)
+        data = np.ascontiguousarray(data, np.float32)
+        out = np.empty((results, padded), np.float32)
+        dev, flags = opened(), cl.mem_flags
+        if not self.buffers:
+            arrays = {**self.tables.arrays(), "settings": self._settings()}
+            self.buffers = {name: self._buffer(values) for name, values in arrays.items()}
+        found = self.tables.sources["emission"]["value"] or {"constant"}
+        text = kinds.emission_text(frozenset(found)) + lights.dispatch_text(self.rows.kinds)
+        program = _program(
+            self.tables.mode, text, body, given.shape[0], results, self.files, lanes
+        )
+        target = cl.Buffer(dev.context, flags.WRITE_ONLY, out.nbytes)
+        there = {"in": self._buffer(data), "out": target, "n": padded, **self.buffers}
+        kernel = program.kernel("probe")
+        kernel.bind(**there).enqueue(dev.queue, (padded // lanes,), (1,))
+        cl.enqueue_copy(dev.queue, out, target)
+        return out[:, :n]
+
+    def _settings(self) -> np.ndarray:
+        settings = np.zeros(1, SETTINGS.dtype)
+        settings["light_count"] = len(self.rows.rows)
+        settings["infinite_count"] = self.rows.infinite
+        settings["lambda_min"], settings["lambda_max"] = 360.0, 830.0
+        settings["scene_radius"] = self.radius
+        return settings
+
+    def _buffer(self, values: np.ndarray) -> cl.Buffer:
+        flags = cl.mem_flags
+        return cl.Buffer(
+            opened().context, flags.READ_ONLY | flags.COPY_HOST_PTR, hostbuf=values.reshape(-1)
+        )
+
+
+@cache
+def _program(
+    mode: str, light_text: str, body: str, arguments: int, results: int, files: tuple, lanes: int
+) -> device.Program:
+    reads = "".join(f"    x[{i}] = block_load(in + {i} * n + at);\n" for i in range(arguments))
+    writes = "".join(f"    block_store(out + {i} * n + at, r[{i}]);\n" for i in range(results))
+    nm = ", ".join(f"{v}f" for v in (LAMBDAS if mode == "spectral" else (0.0,) * 3))
+    probe = (
+        "".join(f'#include "{name}"\n' for name in (*INCLUDES, *files))
+        + "kernel void probe(SCENE_ARGS, global const float *in, global float *out, uint n)\n{\n"
+        + "    SCENE\n    uint at = get_global_id(0) * LANES;\n"
+        + f"    real x[{max(arguments, 1)}], r[{results}];\n    Wavelengths lambdas = {{{nm}}};\n"
+        + f"{reads}    {body}\n{writes}}}\n"
+    )
+    virtual = {
+        **shapes.virtual_files(),
+        **lights.virtual_files(),
+        "probe.cl": probe,
+        "generated/scene.cl": programs.scene_text(),
+        "generated/spectrum.cl": f'#include "spectrum/{mode}.cl"\n',
+        "generated/spectrum_read.cl": f'#include "spectrum/{mode}_read.cl"\n',
+        "generated/lights.cl": light_text,
+    }
+    defines = {"LANES": lanes, "QUEUED": 0, "SPECTRA_STEP": f"{STEP}f"}
+    defines["SPECTRA_SIZE"] = Tables("spectral").spectra_size
+    return device.build(opened(), device.assemble("probe.cl", virtual, defines))
+
+
+def lit(lamps=(), emitters=(), mode: str = "rgb", radius: float = 1.0, files=()) -> Lit:
+    """A scene of lamps and emissive shapes; `files` are further includes."""
+    tables = Tables(mode)
+    made, first = [], 0
+    for number, shape in enumerate(emitters):
+        row = np.zeros(1, SHAPE.dtype)
+        row["prim"] = first
+        vertices = faces = None
+        if shape.kind not in shapes.ANALYTIC:
+            vertices, faces, _, uvs = shapes.triangles(shape)
+            base = tables.size("uvs") // 2
+            tables.append("faces", faces + np.uint32(base))
+            tables.append_floats("uvs", np.zeros((len(vertices), 2)) if uvs is None else uvs)
+            row["flags"] = 0 if uvs is None else 2
+            first += len(faces)
+        made.append((row, lights.Emitter(shape, number, vertices, faces)))
+    rows = lights.light_rows(lamps, [emitter for _, emitter in made], tables, radius)
+    for (row, _), at in zip(made, rows.first, strict=True):
+        row["light"] = at
+        tables.append("shapes", row.view(np.uint32))
+    tables.append("lights", rows.rows.view(np.uint32))
+    return Lit(tables, rows, tuple(files), radius)
+
+
+def shape_probe(shape) -> Lit:
+    """A scene whose `geometry` holds one shape, and the kind's functions."""
+    tables = Tables("rgb")
+    tables.append("geometry", shapes.row(shape))
+    none = lights.light_rows((), (), tables, 1.0)
+    return Lit(tables, none, (f"generated/shape/{shape.kind}.cl",))
