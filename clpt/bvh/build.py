@@ -1,4 +1,4 @@
-"""Building acceleration structures: triangles or boxes in, buffers for the traversal kernels out."""
+"""Building acceleration structures: triangles or boxes in, buffers for traversal out."""
 
 from __future__ import annotations
 

@@ -10,10 +10,9 @@
 #define WIDE8_STACK (7 * BVH_DEPTH + 8) /* a node on the way leaves 7 children waiting */
 
 typedef struct {
-    float ox, oy, oz, dx, dy, dz, tmin;
-    float rx, ry, rz;    /* 1 / d */
-    float qx, qy, qz;    /* o / d */
-    uint nx, ny, nz;     /* rows of a node with the near planes; the far ones are in row ^ 1 */
+    float rx, ry, rz, tmin; /* 1 / d */
+    float qx, qy, qz;       /* o / d */
+    uint nx, ny, nz;        /* rows of a node with the near planes; the far ones are in row ^ 1 */
     Shear shear;
 } Wide8Ray;
 
@@ -23,18 +22,18 @@ inline float8 wide8_max(float8 a, float8 b) { return a > b ? a : b; }
 inline Wide8Ray wide8_ray(float ox, float oy, float oz, float dx, float dy, float dz, float tmin)
 {
     float rx = ray_reciprocal(dx), ry = ray_reciprocal(dy), rz = ray_reciprocal(dz);
-    Wide8Ray r = {ox, oy, oz, dx, dy, dz, tmin, rx, ry, rz, ox * rx, oy * ry, oz * rz,
-                  rx < 0.0f, 2 + (ry < 0.0f), 4 + (rz < 0.0f),
-                  shear_make(ox, oy, oz, dx, dy, dz)};
+    Wide8Ray r = {rx, ry, rz, tmin, ox * rx, oy * ry, oz * rz, rx < 0.0f, 2 + (ry < 0.0f),
+                  4 + (rz < 0.0f), shear_make(ox, oy, oz, dx, dy, dz)};
     return r;
 }
 
 /* The children whose box the ray meets between tmin and t, and where it enters each. */
-inline Mask8 wide8_boxes(global const float8 *node, const Wide8Ray *r, float t, float8 *entry)
+inline Mask8 wide8_boxes(global const float *node, const Wide8Ray *r, float t, float8 *entry)
 {
-    float8 x = mad(node[r->nx], r->rx, -r->qx), far_x = mad(node[r->nx ^ 1], r->rx, -r->qx);
-    float8 y = mad(node[r->ny], r->ry, -r->qy), far_y = mad(node[r->ny ^ 1], r->ry, -r->qy);
-    float8 z = mad(node[r->nz], r->rz, -r->qz), far_z = mad(node[r->nz ^ 1], r->rz, -r->qz);
+    global const float8 *row = (global const float8 *)node;
+    float8 x = mad(row[r->nx], r->rx, -r->qx), far_x = mad(row[r->nx ^ 1], r->rx, -r->qx);
+    float8 y = mad(row[r->ny], r->ry, -r->qy), far_y = mad(row[r->ny ^ 1], r->ry, -r->qy);
+    float8 z = mad(row[r->nz], r->rz, -r->qz), far_z = mad(row[r->nz ^ 1], r->rz, -r->qz);
     *entry = wide8_max(wide8_max(x, y), wide8_max(z, (float8)(r->tmin)));
     float8 exit = wide8_min(wide8_min(far_x, far_y), wide8_min(far_z, (float8)(t)));
     return mask8(*entry <= exit);
@@ -46,10 +45,12 @@ inline float8 wide8_edge(float8 px, float8 py, float8 qx, float8 qy)
     return px * qy - py * qx;
 }
 
-/* The triangles of a block that the ray meets between tmin and t, and the distances. Edges belong to
- * both sides; shear.cl tells why nothing slips between two triangles. */
-inline Mask8 wide8_triangles(global const float8 *b, const Wide8Ray *r, float t, float8 *distance)
+/* The triangles of a block that the ray meets between tmin and t; at what distances, times `det`.
+ * shear.cl tells why nothing slips between two of them. */
+inline Mask8 wide8_triangles(global const float *block, const Wide8Ray *r, float t, float8 *distance,
+                             float8 *det)
 {
+    global const float8 *b = (global const float8 *)block;
     const Shear *s = &r->shear;
     float8 az = b[s->kz] - s->oz, bz = b[3 + s->kz] - s->oz, cz = b[6 + s->kz] - s->oz;
     float8 ax = mad(-s->x, az, b[s->kx] - s->ox), ay = mad(-s->y, az, b[s->ky] - s->oy);
@@ -57,12 +58,13 @@ inline Mask8 wide8_triangles(global const float8 *b, const Wide8Ray *r, float t,
     float8 cx = mad(-s->x, cz, b[6 + s->kx] - s->ox), cy = mad(-s->y, cz, b[6 + s->ky] - s->oy);
     float8 u = wide8_edge(cx, cy, bx, by), v = wide8_edge(ax, ay, cx, cy), w = wide8_edge(bx, by, ax, ay);
     int8 inside = (wide8_min(wide8_min(u, v), w) >= 0.0f) | (wide8_max(wide8_max(u, v), w) <= 0.0f);
-    float8 det = u + v + w, q = (u * az + v * bz + w * cz) * s->z;
-    int8 sign = as_int8(det) & (int8)(0x80000000);
-    float8 size = as_float8(as_int8(det) ^ sign);
+    float8 sum = u + v + w, q = (u * az + v * bz + w * cz) * s->z;
+    int8 sign = as_int8(sum) & (int8)(0x80000000);
+    sum = as_float8(as_int8(sum) ^ sign);
     q = as_float8(as_int8(q) ^ sign);
-    *distance = q / size;
-    return mask8(inside & (q > r->tmin * size) & (q < t * size));
+    *distance = q;
+    *det = sum;
+    return mask8(inside & (q > r->tmin * sum) & (q < t * sum));
 }
 
 /* The hit record of one triangle of a block, computed again for that one alone. */
@@ -83,47 +85,41 @@ inline TriHit wide8_closest(global const float *nodes, global const float *leave
 {
     if (!ray_finite(ox, oy, oz, dx, dy, dz)) return tri_miss(tmax);
     Wide8Ray r = wide8_ray(ox, oy, oz, dx, dy, dz, tmin);
-    uint waiting[WIDE8_STACK];
-    float entries[WIDE8_STACK];
+    ulong waiting[WIDE8_STACK]; /* entry distance, as bits, above the word: compared at once */
     uint n = 0, at = 0, best = BVH_MISS;
     float t = tmax;
     for (;;) {
-        union { float8 v; float at[8]; } entry;
-        Mask8 m = 0;
+        union { float8 v; uint at[8]; } entry;
+        Mask8 m;
         while (!(at & BVH_LEAF)) {
             global const float *node = nodes + (ulong)at * 64;
             global const uint *words = (global const uint *)(node + 48);
-            m = wide8_boxes((global const float8 *)node, &r, t, &entry.v);
+            m = wide8_boxes(node, &r, t, &entry.v);
             if (!m) break;
             uint i = mask8_first(m);
             at = words[i];
             m &= m - 1;
             if (!m) continue; /* one child */
-            float near = entry.at[i];
+            ulong near = (ulong)entry.at[i] << 32 | at;
             uint base = n;
             do { /* the nearest goes on, the others wait in descending order */
                 i = mask8_first(m);
                 m &= m - 1;
-                uint word = words[i];
-                float d = entry.at[i];
-                uint closer = d < near, far_word = closer ? at : word;
-                float far = closer ? near : d;
-                at = closer ? word : at;
-                near = closer ? d : near;
+                ulong c = (ulong)entry.at[i] << 32 | words[i];
+                ulong far = max(near, c);
+                near = min(near, c);
                 uint k = n++;
-                for (; k > base && entries[k - 1] < far; k--) {
-                    waiting[k] = waiting[k - 1];
-                    entries[k] = entries[k - 1];
-                }
-                waiting[k] = far_word;
-                entries[k] = far;
+                for (; k > base && waiting[k - 1] < far; k--) waiting[k] = waiting[k - 1];
+                waiting[k] = far;
             } while (m);
-            m = 1;
+            at = (uint)near;
         }
         if (at & BVH_LEAF) {
             uint block = at & ~BVH_LEAF;
             union { float8 v; float at[8]; } q;
-            m = wide8_triangles((global const float8 *)(leaves + (ulong)block * 88), &r, t, &q.v);
+            float8 det;
+            m = wide8_triangles(leaves + (ulong)block * 88, &r, t, &q.v, &det);
+            if (m) q.v /= det;
             for (; m; m &= m - 1) {
                 uint i = mask8_first(m);
                 if (q.at[i] < t) {
@@ -135,8 +131,8 @@ inline TriHit wide8_closest(global const float *nodes, global const float *leave
         do {
             if (!n) return best == BVH_MISS ? tri_miss(tmax) : wide8_hit(leaves, best, t, &r);
             n--;
-        } while (entries[n] >= t);
-        at = waiting[n];
+        } while (as_float((uint)(waiting[n] >> 32)) >= t);
+        at = (uint)waiting[n];
     }
 }
 
@@ -148,15 +144,15 @@ inline int wide8_occluded(global const float *nodes, global const float *leaves,
     Wide8Ray r = wide8_ray(ox, oy, oz, dx, dy, dz, tmin);
     uint waiting[WIDE8_STACK];
     uint n = 0, at = 0;
-    float8 unused;
+    float8 unused[2];
     for (;;) {
         if (at & BVH_LEAF) {
             global const float *block = leaves + (ulong)(at & ~BVH_LEAF) * 88;
-            if (wide8_triangles((global const float8 *)block, &r, tmax, &unused)) return 1;
+            if (wide8_triangles(block, &r, tmax, &unused[0], &unused[1])) return 1;
         } else {
             global const float *node = nodes + (ulong)at * 64;
             global const uint *words = (global const uint *)(node + 48);
-            Mask8 m = wide8_boxes((global const float8 *)node, &r, tmax, &unused);
+            Mask8 m = wide8_boxes(node, &r, tmax, &unused[0]);
             for (; m; m &= m - 1) waiting[n++] = words[mask8_first(m)];
         }
         if (!n) return 0;
