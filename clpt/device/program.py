@@ -187,7 +187,9 @@ def build_all(
     device: Device, sources: Mapping[str, Source], options: Sequence[str] = ()
 ) -> dict[str, Program]:
     """Build several programs at once, each in a thread of its own. Raises as `build` does."""
-    with ThreadPoolExecutor(max_workers=max(1, min(len(sources), os.cpu_count() or 1))) as pool:
+    # Oclgrind's compiler is not safe in threads.
+    threads = 1 if "oclgrind" in device.info.platform.casefold() else os.cpu_count() or 1
+    with ThreadPoolExecutor(max_workers=max(1, min(len(sources), threads))) as pool:
         futures = {name: pool.submit(build, device, s, options) for name, s in sources.items()}
         return {name: future.result() for name, future in futures.items()}
 
