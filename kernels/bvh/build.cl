@@ -117,7 +117,8 @@ inline int build_bins(uint count) { return count > 24 ? BUILD_BINS : 4; }
 
 inline int4 build_bin(float8 item, float4 low, float4 scale)
 {
-    return clamp(convert_int4((item.lo - item.hi - low) * scale), 0, BUILD_BINS - 1);
+    int4 bin = convert_int4((item.lo - item.hi - low) * scale);
+    return clamp(bin, (int4)(0), (int4)(BUILD_BINS - 1));
 }
 
 /* The cheapest plane: axis in x, last bin of the left side in y; x < 0 if no plane divides. */
