@@ -50,7 +50,7 @@ def _is_net(points, k):
 
 @pytest.mark.parametrize("seed", [0, 1, 0xDEADBEEF])
 def test_sobol_pairs_are_nets(seed):
-    """(0, k, 2)-nets in base 2 for every k, also after scrambling, and in later blocks of samples."""
+    """(0, k, 2)-nets in base 2 for every k, scrambled as they are, also in later blocks."""
     k = 10
     for pixel in (0, 1, 77, 1_000_003):
         for dimension in (0, 1, 2, 3, 12, 51):
@@ -104,7 +104,7 @@ def test_unrelated(kind, other):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_samples_of_a_pixel_pair_up_at_random(kind):
-    """Across dimension pairs the samples of one pixel have no common order (correlation below 5 s)."""
+    """Across dimension pairs the samples of a pixel have no common order: correlation below 5 s."""
     n, close = 256, 0
     for pixel in range(64):
         a = pairs(kind, pixel, np.arange(n), 0)[:, 0]

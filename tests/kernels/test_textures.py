@@ -1,0 +1,365 @@
+"""Textures: look-ups against a reference in numpy and against Mitsuba, in every role."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from clpt import spectra
+from clpt.errors import SceneError
+from clpt.render import textures
+from clpt.render.tables import Tables
+from clpt.scene import textures as scene
+from clpt.spectra.spectrum import d65
+from clpt.spectra.upsampling import evaluate
+from tests.kernels.scene_harness import SceneProbe
+
+FILE = "generated/textures.cl"
+LAMBDAS = [420.0, 500.5, 577.25, 690.0]
+PLAIN = np.eye(3)
+TURNED = np.array([[1.5, -0.4, 0.3], [0.7, 2.0, -1.2], [0.0, 0.0, 1.0]])
+COLOURS = np.random.default_rng(1).random((5, 7, 3)).astype(np.float32)
+
+
+@cache
+def _dispatch(roles):
+    return textures.dispatch_text({kind for kind, _ in roles}, roles)
+
+
+def _body(role, mode):
+    """Text that looks row x[0] up at (x[1], x[2]), and how many numbers it sets."""
+    components = "xyzw" if mode == "spectral" else "xyz"
+    lines = ["integer row = to_integer(x[0]);", "vec2 uv = {x[1], x[2]};", "Wavelengths lambdas;"]
+    lines += [f"lambdas.{c} = {v}f;" for c, v in zip(components, LAMBDAS, strict=False)]
+    if role == "real":
+        return " ".join([*lines, "r[0] = texture_real(scene, row, uv, lambdas);"]), 1
+    lines.append(f"Spectrum s = texture_{role}(scene, row, uv, lambdas);")
+    lines += [f"r[{i}] = s.{c};" for i, c in enumerate(components)]
+    return " ".join(lines), len(components)
+
+
+def look_up(made, role, uv, mode="rgb", lanes=8, rows=None):
+    """Values (n, 3 or 4) or (n,) of textures in a role; rows: which of them each uv reads."""
+    tables = Tables(mode)
+    words = np.array([textures.lower_texture(t, role, tables) for t in made])
+    which = words[np.zeros(len(uv), int) if rows is None else rows]
+    body, components = _body(role, mode)
+    probe = SceneProbe(
+        body,
+        3,
+        components,
+        files=(FILE,),
+        mode=mode,
+        lanes=lanes,
+        virtual={FILE: _dispatch(frozenset(tables.texture_roles))},
+        defines={"SPECTRA_SIZE": tables.spectra_size},
+        tables=tables.arrays(),
+        settings={"lambda_min": 360.0, "lambda_max": 830.0},
+    )
+    out = probe(which, *np.asarray(uv, np.float32).T).T
+    return out[:, 0] if role == "real" else out
+
+
+def _wrapped(i, size, wrap):
+    if wrap == "clamp":
+        return np.clip(i, 0, size - 1)
+    if wrap == "repeat":
+        return i % size
+    i = i % (2 * size)
+    return np.where(i < size, i, 2 * size - 1 - i)
+
+
+def reference(image, uv, to_uv=PLAIN, filter="bilinear", wrap="repeat"):
+    """A bitmap's values (n, c) in float64; v = 0 is the bottom of the image."""
+    place = np.column_stack([uv, np.ones(len(uv))]).astype(np.float64) @ np.asarray(to_uv)[:2].T
+    h, w, _ = image.shape
+    x, y = place[:, 0] * w, (1.0 - place[:, 1]) * h
+    if filter == "nearest":
+        return image[
+            _wrapped(np.floor(y).astype(int), h, wrap), _wrapped(np.floor(x).astype(int), w, wrap)
+        ]
+    x, y = x - 0.5, y - 0.5
+    i, j = np.floor(x).astype(int), np.floor(y).astype(int)
+    total = np.zeros((len(uv), image.shape[2]))
+    for dj in (0, 1):
+        for di in (0, 1):
+            weight = np.abs(1 - di - (x - i)) * np.abs(1 - dj - (y - j))
+            texel = image[_wrapped(j + dj, h, wrap), _wrapped(i + di, w, wrap)]
+            total += weight[:, None] * texel
+    return total
+
+
+def _uvs(n=400, seed=2):
+    uv = np.random.default_rng(seed).uniform(-2.5, 3.5, (n, 2)).astype(np.float32)
+    uv[:5] = [[0, 0], [1, 1], [0.5, 0.5], [-1, 2], [0.999999, 1e-7]]
+    return uv
+
+
+@pytest.mark.parametrize("wrap", ["repeat", "clamp", "mirror"])
+@pytest.mark.parametrize("filter", ["bilinear", "nearest"])
+@pytest.mark.parametrize("to_uv", [PLAIN, TURNED], ids=["plain", "turned"])
+def test_bitmap(wrap, filter, to_uv):
+    bitmap = scene.Bitmap(image=COLOURS, wrap=wrap, filter=filter, to_uv=to_uv)
+    uv = _uvs()
+    expected = reference(COLOURS, uv, to_uv, filter, wrap)
+    found = look_up([bitmap], "reflectance", uv)
+    off = np.abs(found - expected).max(axis=1) > 2e-5
+    if filter == "bilinear":
+        assert not off.any()
+    else:  # at the border of two texels rounding may choose either
+        assert off.mean() < 0.01
+
+
+def test_v_runs_up():
+    image = np.array([[[1.0, 0.0, 0.0]], [[0.0, 0.0, 1.0]]])  # red above blue
+    found = look_up([scene.Bitmap(image=image)], "reflectance", [[0.5, 0.25], [0.5, 0.75]])
+    np.testing.assert_allclose(found, [[0, 0, 1], [1, 0, 0]], atol=1e-6)
+
+
+def test_real_is_the_mean_of_the_channels():
+    alpha = np.dstack([COLOURS, np.full(COLOURS.shape[:2], 9.0, np.float32)])
+    uv = _uvs()
+    expected = reference(COLOURS.mean(axis=2, keepdims=True), uv)[:, 0]
+    for image in (COLOURS, alpha, COLOURS.mean(axis=2)):
+        found = look_up([scene.Bitmap(image=image)], "real", uv)
+        np.testing.assert_allclose(found, expected, atol=1e-5)
+
+
+def test_reflectance_is_clipped_and_emission_is_not():
+    image = np.array([[[3.0, -1.0, 0.5]]])
+    bitmap, uv = scene.Bitmap(image=image), [[0.3, 0.3]]
+    np.testing.assert_allclose(look_up([bitmap], "reflectance", uv), [[1, 0, 0.5]], atol=1e-6)
+    np.testing.assert_allclose(look_up([bitmap], "emission", uv), [[3, 0, 0.5]], atol=1e-6)
+
+
+@pytest.mark.parametrize("role", ["reflectance", "emission"])
+def test_spectral_bitmap_interpolates_values(role):
+    """Not coefficients: between two texels lies the mean of their spectra."""
+    image = COLOURS * (1.0 if role == "reflectance" else 40.0)
+    uv = _uvs()
+    if role == "reflectance":
+        values = evaluate(spectra.uplift(image), LAMBDAS)
+    else:
+        scale, coefficients = spectra.unbounded(image)
+        values = scale[..., None] * evaluate(coefficients, LAMBDAS) * d65().sample(LAMBDAS)
+    found = look_up([scene.Bitmap(image=image)], role, uv, mode="spectral")
+    np.testing.assert_allclose(found, reference(values, uv), rtol=2e-3, atol=2e-4 * values.max())
+
+
+def test_eight_bit_images_share_their_colours():
+    """The short cut for images of few levels gives what uplifting every texel gives."""
+    levels = np.round(np.random.default_rng(3).random((40, 50, 3)) * 255) / 255
+    made = textures.texels(levels.astype(np.float32), "reflectance", True)
+    np.testing.assert_array_equal(
+        made[:, :3], spectra.uplift(levels.astype(np.float32).reshape(-1, 3))
+    )
+    np.testing.assert_array_equal(made[:, 3], 1.0)
+
+
+@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+def test_checkerboard(mode):
+    tabulated = spectra.Tabulated((360.0, 830.0), (0.1, 0.8))
+    board = scene.Checkerboard(color0=(0.2, 0.5, 0.7), color1=tabulated, to_uv=TURNED)
+    uv = _uvs()
+    place = np.column_stack([uv, np.ones(len(uv))]) @ TURNED[:2].T
+    same = np.equal(*((place % 1.0) > 0.5).T)
+    if mode == "rgb":
+        colours = [[0.2, 0.5, 0.7], tabulated.to_rgb()]
+    else:
+        colours = [spectra.RGB(0.2, 0.5, 0.7).sample(LAMBDAS), tabulated.sample(LAMBDAS)]
+    expected = np.where(same[:, None], *np.asarray(colours))
+    found = look_up([board], "reflectance", uv, mode=mode)
+    off = np.abs(found - expected).max(axis=1) > (2e-3 if mode == "spectral" else 1e-6)
+    assert off.mean() < 0.01  # at a border rounding may choose either colour
+
+
+def test_checkerboard_real_and_emission():
+    board = scene.Checkerboard(color0=0.25, color1=(0.2, 0.4, 0.9))
+    uv = [[0.2, 0.2], [0.7, 0.2], [0.7, 0.7], [-0.2, 0.2]]
+    np.testing.assert_allclose(look_up([board], "real", uv), [0.25, 0.5, 0.25, 0.5], atol=1e-6)
+    found = look_up([board], "emission", uv, mode="spectral")
+    lamp = spectra.RGBIlluminant(0.2, 0.4, 0.9).sample(LAMBDAS)
+    np.testing.assert_allclose(found[1], lamp, rtol=2e-3)
+    np.testing.assert_allclose(found[0], 0.25, rtol=1e-6)
+
+
+@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+def test_neighbouring_lanes_read_different_textures(mode):
+    made = [
+        scene.Bitmap(image=COLOURS),
+        scene.Checkerboard(),
+        scene.Bitmap(image=COLOURS[:2, :3], wrap="mirror", filter="nearest"),
+    ]
+    uv = _uvs(96)
+    rows = np.arange(len(uv)) * 7 % 3
+    mixed = look_up(made, "reflectance", uv, mode=mode, rows=rows)
+    single = look_up(made, "reflectance", uv, mode=mode, rows=rows, lanes=1)
+    np.testing.assert_allclose(mixed, single, atol=1e-6)
+    for i, texture in enumerate(made):
+        alone = look_up([texture], "reflectance", uv[rows == i], mode=mode)
+        np.testing.assert_allclose(mixed[rows == i], alone, atol=1e-6)
+    wide = look_up(made, "reflectance", uv, mode=mode, rows=rows, lanes=16)
+    np.testing.assert_allclose(wide, mixed, atol=1e-6)
+
+
+def test_wild_coordinates_stay_inside_the_image():
+    """Texels around the image hold 1000: none of it may come out, whatever uv is."""
+    hot = np.full((4, 4, 1), 1000.0, np.float32)
+    wild = [
+        np.nan,
+        np.inf,
+        -np.inf,
+        3e38,
+        -3e38,
+        1e10,
+        -1e10,
+        2**31,
+        -(2**31),
+        16777217.5,
+        1e-45,
+        -1e-9,
+    ]
+    uv = np.stack(np.meshgrid(wild, wild), axis=-1).reshape(-1, 2)
+    for wrap in ("repeat", "clamp", "mirror"):
+        for filter in ("bilinear", "nearest"):
+            made = [
+                scene.Bitmap(image=hot),
+                scene.Bitmap(image=COLOURS.mean(axis=2), wrap=wrap, filter=filter),
+                scene.Bitmap(image=hot.copy()),
+            ]
+            found = look_up(made, "real", uv, rows=np.ones(len(uv), int))
+            assert (found >= 0.0).all()
+            assert (found <= 1.0).all()
+
+
+LOADERS = """
+    integer word = to_integer(x[0]);
+    vec2 uv = {x[1], x[2]};
+    Wavelengths lambdas = spectrum_of(0.0f);
+    Spectrum s = spectrum_texture_reflectance(scene, scene.materials, word, uv, lambdas);
+    r[0] = s.x; r[1] = s.y; r[2] = s.z;
+    r[3] = real_texture_real(scene, scene.materials, word + 5, uv, lambdas);
+"""
+
+
+def test_parameters_that_are_textures():
+    """As the generated loaders read them; lanes without a texture read something unused."""
+    tables, uv = Tables("rgb"), _uvs(32)
+    colour = scene.Bitmap(image=COLOURS)
+    words = [
+        *tables.param_words(spectra.Constant(0.5), "reflectance")[0],
+        *tables.param_words(0.5, "real")[0],
+        *tables.param_words(colour, "reflectance")[0],
+        *tables.param_words(colour, "real")[0],
+    ]
+    tables.append("materials", words)
+    probe = SceneProbe(
+        LOADERS,
+        3,
+        4,
+        files=(FILE,),
+        virtual={FILE: _dispatch(frozenset(tables.texture_roles))},
+        tables=tables.arrays(),
+    )
+    textured = np.arange(len(uv)) % 2 == 1
+    found = probe(np.where(textured, 7, 0), *uv.T).T[textured]
+    np.testing.assert_allclose(found[:, :3], reference(COLOURS, uv)[textured], atol=1e-5)
+    np.testing.assert_allclose(found[:, 3], found[:, :3].mean(axis=1), atol=1e-5)
+
+
+def test_a_texture_is_put_in_once(tmp_path):
+    path = tmp_path / "a.png"
+    Image.fromarray(np.zeros((3, 4, 3), np.uint8)).save(path)
+    tables = Tables("rgb")
+    board, file = scene.Checkerboard(), scene.Bitmap(image=path)
+    first = [textures.lower_texture(t, "reflectance", tables) for t in (board, file)]
+    sizes = tables.size("textures"), tables.size("texels")
+    again = [
+        textures.lower_texture(t, "reflectance", tables)
+        for t in (board, scene.Bitmap(image=str(path)))
+    ]
+    assert first == again
+    assert sizes == (tables.size("textures"), tables.size("texels"))
+    assert textures.lower_texture(file, "real", tables) not in first
+    assert tables.texture_roles == {
+        ("checkerboard", "reflectance"),
+        ("bitmap", "reflectance"),
+        ("bitmap", "real"),
+    }
+
+
+def test_no_textures_no_text():
+    assert textures.dispatch_text((), ()).strip() == ""
+
+
+@pytest.mark.parametrize(
+    ("texture", "part"),
+    [
+        (scene.Bitmap(), "path or an array"),
+        (scene.Bitmap(image="no/such.png"), "no/such.png"),
+        (scene.Bitmap(image=np.zeros((2, 2, 3), np.uint8)), "floats"),
+        (scene.Bitmap(image=np.zeros((2, 2, 2))), r"\(2, 2, 2\)"),
+        (scene.Bitmap(image=np.zeros((0, 2, 3))), "not empty"),
+        (scene.Bitmap(image=COLOURS, to_uv=np.diag([1.0, 1.0, 0.0])), "bitmap.to_uv"),
+    ],
+)
+def test_unusable_textures(texture, part):
+    with pytest.raises(SceneError, match=part):
+        textures.lower_texture(texture, "reflectance", Tables("rgb"))
+
+
+def test_texels_that_are_not_finite_are_black():
+    image = np.array([[[np.nan, 0.5, 0.5]]])
+    found = look_up([scene.Bitmap(image=image)], "emission", [[0.5, 0.5]])
+    np.testing.assert_allclose(found, [[0.0, 0.5, 0.5]], atol=1e-6)
+
+
+@pytest.mark.peers
+@pytest.mark.parametrize("wrap", ["repeat", "clamp", "mirror"])
+@pytest.mark.parametrize("filter", ["bilinear", "nearest"])
+@pytest.mark.parametrize("raw", [False, True])
+def test_same_bitmap_as_mitsuba(wrap, filter, raw, tmp_path):
+    """Its v = 0 is the top row, so the rows are given to it in the other order."""
+    mi = pytest.importorskip("mitsuba", reason="the renderer that we compare with is not installed")
+    mi.set_variant("scalar_rgb")
+    stored = (COLOURS * 255).astype(np.uint8)
+    for name, rows in (("ours", stored), ("theirs", stored[::-1])):
+        Image.fromarray(rows).save(tmp_path / f"{name}.png")
+    common = {"raw": raw, "wrap_mode": wrap, "filter_type": filter}
+    theirs = mi.load_dict(
+        {
+            "type": "bitmap",
+            "filename": str(tmp_path / "theirs.png"),
+            "to_uv": mi.ScalarTransform3f(TURNED),
+            **common,
+        }
+    )
+    ours = scene.Bitmap(
+        image=tmp_path / "ours.png", raw=raw, wrap=wrap, filter=filter, to_uv=TURNED
+    )
+    uv = _uvs(200)
+    found = look_up([ours], "reflectance", uv)
+    si = mi.SurfaceInteraction3f()
+    expected = []
+    for u, v in uv:
+        si.uv = mi.Point2f(float(u), float(v))
+        expected.append([*theirs.eval(si)])
+    # it keeps texels in half precision; at the border of two texels rounding may choose either
+    off = np.abs(found - expected).max(axis=1) > (5e-3 if filter == "bilinear" else 1e-3)
+    assert off.mean() <= (0.0 if filter == "bilinear" else 0.02)
+
+
+@pytest.mark.peers
+def test_same_checkerboard_as_mitsuba():
+    mi = pytest.importorskip("mitsuba", reason="the renderer that we compare with is not installed")
+    mi.set_variant("scalar_rgb")
+    theirs = mi.load_dict({"type": "checkerboard", "to_uv": mi.ScalarTransform3f(TURNED)})
+    uv, si, expected = _uvs(200), mi.SurfaceInteraction3f(), []
+    for u, v in uv:
+        si.uv = mi.Point2f(float(u), float(v))
+        expected.append([*theirs.eval(si)])
+    found = look_up([scene.Checkerboard(to_uv=TURNED)], "reflectance", uv)
+    assert (np.abs(found - expected).max(axis=1) > 1e-5).mean() < 0.01
