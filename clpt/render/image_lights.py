@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt import images, spectra, transforms
+from clpt import images, transforms
 from clpt.errors import SceneError
 from clpt.layout import Record
+from clpt.render.texels import texels
 from clpt.scene.lights import CubeMap, Envmap
 
 Array = NDArray[np.float32]
@@ -54,18 +55,19 @@ def lower_image(lamp: Envmap | CubeMap, tables: Any) -> tuple[dict[str, ArrayLik
         image = _loaded(lamp.image, where) * np.float32(lamp.scale)
         image = np.repeat(image, 2, axis=0) if len(image) == 1 else image
         height, width, _ = image.shape
-        texels, corners = image, _latitude_weights(_brightness(image))[None]
+        corners = _latitude_weights(_brightness(image))[None]
     else:
         faces = _faces(lamp.image, where) * np.float32(lamp.scale)
         height = width = faces.shape[1]
-        texels = _bordered(faces)
-        corners = _cube_weights(_brightness(texels))
+        image = _bordered(faces)
+        corners = _cube_weights(_brightness(image))
+    made = texels(image.reshape(1, -1, 3), "emission", tables.spectral)
     marginal, conditional, total = _cumulative(corners)
     members: dict[str, ArrayLike] = {name: axes[:, i] for i, name in enumerate("xyz")}
     members |= {
         "width": width,
         "height": height,
-        "texels": tables.append_floats("texels", _texels(texels, tables.spectral)),
+        "texels": tables.append_floats("texels", made),
         "corners": tables.append_floats("distributions", corners),
         "marginal": tables.append_floats("distributions", marginal),
         "conditional": tables.append_floats("distributions", conditional),
@@ -199,12 +201,3 @@ def _cumulative(
     conditional[:, -1] = marginal[-1] = 1.0
     return marginal, conditional, total
 
-
-def _texels(image: Array, spectral: bool) -> Array:
-    """Four floats a texel: rgb, or what `spectrum_light_texel` makes a spectrum of."""
-    texels = np.zeros((*image.shape[:-1], 4), np.float32)
-    if spectral:
-        texels[..., 3], texels[..., :3] = spectra.unbounded(image)
-    else:
-        texels[..., :3] = image
-    return texels

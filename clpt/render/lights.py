@@ -8,62 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt import transforms
 from clpt.errors import SceneError
-from clpt.layout import Record
 from clpt.records import LIGHT, SHAPE
-from clpt.render import image_lights, shapes
-from clpt.scene import lights
-from clpt.scene.lights import Light
+from clpt.render import shapes
+from clpt.render.lamps import INFINITE, RECORDS, Sink, brightness, lower_lamp
+from clpt.scene.lights import Area, Light
 from clpt.scene.shapes import Shape
 
-INFINITE = ("constant", "envmap", "cube_map")  # a ray that leaves the scene meets these
 INFINITE_SHARE = 0.5  # of the choices, where there are other lights too
-
-_RADIANCE = ("integer", "first word of the emission parameter in `lamps`")
-RECORDS: dict[str, Record] = {
-    "point": Record(
-        "Point",
-        "A point light.",
-        position=("vec3", "[m]"),
-        falloff=("real", "1: irradiance falls with the square of the distance; 0: it does not"),
-        radiance=_RADIANCE,
-    ),
-    "spot": Record(
-        "Spot",
-        "A spot light.",
-        position=("vec3", "[m]"),
-        axis=("vec3", "unit vector in which it shines"),
-        cutoff=("real", "half angle beyond which it is dark [rad]"),
-        beam_width=("real", "half angle of full intensity [rad]"),
-        radiance=_RADIANCE,
-    ),
-    "directional": Record(
-        "Directional",
-        "Parallel light.",
-        direction=("vec3", "unit vector in which it travels"),
-        radiance=_RADIANCE,
-    ),
-    "constant": Record("Constant", "Even radiance from everywhere.", radiance=_RADIANCE),
-    **image_lights.RECORDS,
-}
 KINDS = (*RECORDS, *shapes.RECORDS)  # LightRow.kind is a position in this tuple
-
-
-class Sink(Protocol):
-    """What is needed of clpt.render.tables.Tables."""
-
-    def append(self, name: str, words: ArrayLike) -> int: ...
-    def append_floats(self, name: str, values: ArrayLike) -> int: ...
-    def emission_words(self, value: Any) -> NDArray[np.uint32]: ...
-
-    @property
-    def spectral(self) -> bool: ...
 
 
 @dataclass(frozen=True)
@@ -137,47 +94,15 @@ def _block(count: int, kind: str, params: ArrayLike, radiance: int, shape_row: i
 
 def _lamp_block(lamp: Light, tables: Sink, scene_radius: float) -> tuple[np.ndarray, np.ndarray]:
     """The row of a light that is not on a shape, and its power."""
-    if lamp.kind in image_lights.RECORDS:
-        values, strength = image_lights.lower_image(lamp, tables)
-        radiance = 0
-    else:
-        radiance = tables.append("lamps", tables.emission_words(_emitted(lamp)))
-        values = {**_lamp_values(lamp), "radiance": radiance}
-        strength = brightness(_emitted(lamp))
-    record = RECORDS[lamp.kind]
-    words = np.zeros((), record.dtype)
-    for name, value in values.items():
-        words[name] = value
-    at = tables.append("lamps", words.reshape(1).view(np.uint32))
-    return _block(1, lamp.kind, at, radiance, -1), np.array([power(lamp, strength, scene_radius)])
-
-
-def _emitted(lamp: Light) -> Any:
-    """The value of a light's one emission parameter, whatever its name."""
-    names = {"point": "intensity", "spot": "intensity", "directional": "irradiance"}
-    return getattr(lamp, names.get(lamp.kind, "radiance"))
-
-
-def _lamp_values(lamp: Light) -> dict[str, ArrayLike]:
-    """The members of a lamp's record but for its radiance."""
-    if isinstance(lamp, lights.Point):
-        return {"position": _three(lamp.position, "point.position"), "falloff": lamp.falloff}
-    if isinstance(lamp, lights.Directional):
-        return {"direction": _unit(lamp.direction, "directional.direction")}
-    if isinstance(lamp, lights.Spot):
-        matrix = _matrix(lamp)
-        return {
-            "position": matrix[:3, 3],
-            "axis": _unit(matrix[:3, 2], "spot.to_world"),
-            "cutoff": np.radians(lamp.cutoff),
-            "beam_width": np.radians(min(lamp.beam_width, lamp.cutoff)),
-        }
-    return {}
+    at, radiance, power = lower_lamp(lamp, tables, scene_radius)
+    return _block(1, lamp.kind, at, radiance, -1), np.array([power])
 
 
 def _emitter_block(emitter: Emitter, tables: Sink) -> tuple[np.ndarray, np.ndarray]:
     """The rows of a shape that emits, and their power."""
     shape = emitter.shape
+    if not isinstance(shape.emission, Area):
+        raise SceneError("its emission must be an `area` light", where=shapes.where(shape))
     radiance = tables.append("lamps", tables.emission_words(shape.emission.radiance))
     strength = np.pi * brightness(shape.emission.radiance)
     if _whole(shape):
@@ -191,52 +116,6 @@ def _emitter_block(emitter: Emitter, tables: Sink) -> tuple[np.ndarray, np.ndarr
     at = tables.append("geometry", geometry) + words * np.arange(count)
     rows = _block(count, "triangle", at, radiance, emitter.shape_row)
     return rows, strength * shapes.triangle_areas(emitter.vertices, emitter.faces)
-
-
-def _matrix(lamp: Light) -> NDArray[np.float64]:
-    """A light's transform. Raises SceneError where it cannot be inverted."""
-    matrix = np.asarray(lamp.to_world, np.float64)
-    if matrix.shape != (4, 4) or transforms.is_singular(matrix):
-        raise SceneError("must be an invertible (4, 4) matrix", where=f"{lamp.kind}.to_world")
-    return matrix
-
-
-def _three(value: ArrayLike, where: str) -> NDArray[np.float64]:
-    values = np.asarray(value, np.float64)
-    if values.shape != (3,) or not np.isfinite(values).all():
-        raise SceneError(f"must be three finite numbers, found {value}", where=where)
-    return values
-
-
-def _unit(value: ArrayLike, where: str) -> NDArray[np.float64]:
-    vector = _three(value, where)
-    length = float(np.linalg.norm(vector))
-    if not length > 0.0:
-        raise SceneError("has no length", where=where)
-    return vector / length
-
-
-def power(lamp: Light, strength: float, scene_radius: float) -> float:
-    """Estimate what a light off all shapes sends into the scene, mean of channels [W/nm].
-
-    strength: the mean of its intensity, irradiance or radiance.
-    """
-    disk = np.pi * scene_radius**2
-    if isinstance(lamp, lights.Point):
-        return 4.0 * np.pi * strength
-    if isinstance(lamp, lights.Spot):
-        edge = np.radians([min(lamp.beam_width, lamp.cutoff), lamp.cutoff])
-        return 2.0 * np.pi * (1.0 - float(np.cos(edge).mean())) * strength
-    if isinstance(lamp, lights.Directional):
-        return disk * strength
-    return 4.0 * np.pi * disk * strength
-
-
-def brightness(value: Any) -> float:
-    """Return the mean over channels, and over a texture, of an emission."""
-    if getattr(value, "is_texture", False):
-        return 1.0
-    return float(np.mean(value.to_rgb("emission")))
 
 
 def _shared(weights: np.ndarray, infinite: int) -> np.ndarray:

@@ -155,11 +155,13 @@ def row(shape: Shape) -> Words:
     """
     matrix = _matrix(shape)
     record = RECORDS[shape.kind]
-    if shape.kind in ("rectangle", "disk"):
+    if isinstance(shape, shapes.Sphere):
+        values = _sphere(shape, matrix)
+    elif isinstance(shape, shapes.Cylinder):
+        values = _cylinder(shape, matrix)
+    else:
         s, t, center = matrix[:3, 0], matrix[:3, 1], matrix[:3, 3]
         values = {"center": center, "s": s, "t": t, "n": _side(shape) * _facing(matrix)}
-    else:
-        values = {"sphere": _sphere, "cylinder": _cylinder}[shape.kind](shape, matrix)
     flat = np.concatenate([np.ravel(values[m.name]) for m in record.members])
     return flat.astype(np.float32).view(np.uint32)
 
@@ -271,12 +273,12 @@ def _members(shape: Shape) -> dict[str, NDArray[np.float64]]:
 
 def _local(shape: Shape) -> tuple[Points, Faces, Points | None, Points | None]:
     """Vertices, faces, normals and uvs before the transform."""
-    if shape.kind == "mesh":
+    if isinstance(shape, shapes.Mesh):
         return _mesh(shape)
     if shape.kind == "rectangle":
-        corners = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], np.float32)
-        faces = np.array([(0, 1, 2), (0, 2, 3)], np.uint32)
-        return corners, faces, None, (corners[:, :2] + np.float32(1.0)) * np.float32(0.5)
+        square = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], np.float32)
+        halves = np.array([(0, 1, 2), (0, 2, 3)], np.uint32)
+        return square, halves, None, (square[:, :2] + np.float32(1.0)) * np.float32(0.5)
     corners = [[{"+": 1, "-": -1}[c] for c in v] for side in _CUBE for v in side.split()]
     faces = 4 * np.arange(6)[:, None, None] + np.array(_CORNER_FACES)
     uvs = np.tile(np.array(_CORNER_UVS, np.float32), (6, 1))
@@ -344,7 +346,7 @@ def _matrix(shape: Shape) -> NDArray[np.float64]:
 def _three(value: ArrayLike, name: str, shape: Shape) -> NDArray[np.float64]:
     values = np.asarray(value, np.float64)
     if values.shape != (3,) or not np.isfinite(values).all():
-        raise SceneError(f"{name} must be three finite numbers, found {value}", where=where(shape))
+        raise SceneError(f"{name} must be three finite numbers, found {value!r}", where=where(shape))
     return values
 
 

@@ -67,7 +67,7 @@ def met(shape, o, d, tmin=0.0, tmax=1e30, lanes: int = 8) -> np.ndarray:
 
 
 def reference(shape, o, d) -> list[tuple[np.ndarray, np.ndarray]]:
-    """The crossings of lines with a shape in float64: (t, normal) each, t nan where there is none."""
+    """The crossings of lines with a shape in float64: (t, normal) each, t nan where none is."""
     row = rs._members(shape)
     if shape.kind in ("disk", "rectangle"):
         n = row["n"][:, None]

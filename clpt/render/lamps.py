@@ -1,0 +1,151 @@
+"""Lights off all shapes on their way to the device: their rows in `lamps`, and their power."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from clpt import transforms
+from clpt.errors import SceneError
+from clpt.layout import Record
+from clpt.render import image_lights
+from clpt.render.texels import pixels
+from clpt.scene import lights
+from clpt.scene.lights import Light
+from clpt.scene.textures import Bitmap, Checkerboard
+
+INFINITE = ("constant", "envmap", "cube_map")  # a ray that leaves the scene meets these
+
+_RADIANCE = ("integer", "first word of the emission parameter in `lamps`")
+RECORDS: dict[str, Record] = {
+    "point": Record(
+        "Point",
+        "A point light.",
+        position=("vec3", "[m]"),
+        falloff=("real", "1: irradiance falls with the square of the distance; 0: it does not"),
+        radiance=_RADIANCE,
+    ),
+    "spot": Record(
+        "Spot",
+        "A spot light.",
+        position=("vec3", "[m]"),
+        axis=("vec3", "unit vector in which it shines"),
+        cutoff=("real", "half angle beyond which it is dark [rad]"),
+        beam_width=("real", "half angle of full intensity [rad]"),
+        radiance=_RADIANCE,
+    ),
+    "directional": Record(
+        "Directional",
+        "Parallel light.",
+        direction=("vec3", "unit vector in which it travels"),
+        radiance=_RADIANCE,
+    ),
+    "constant": Record("Constant", "Even radiance from everywhere.", radiance=_RADIANCE),
+    **image_lights.RECORDS,
+}
+
+
+class Sink(Protocol):
+    """What is needed of clpt.render.tables.Tables."""
+
+    def append(self, name: str, words: ArrayLike) -> int: ...
+    def append_floats(self, name: str, values: ArrayLike) -> int: ...
+    def emission_words(self, value: Any) -> NDArray[np.uint32]: ...
+
+    @property
+    def spectral(self) -> bool: ...
+
+
+def lower_lamp(lamp: Light, tables: Sink, scene_radius: float) -> tuple[int, int, float]:
+    """Put a light into the tables; its row and its emission in `lamps`, and its power [W/nm].
+
+    The power is an estimate, the mean of channels; scene_radius: of a sphere around the scene [m].
+    Raises SceneError for a light that has no place or no direction.
+    """
+    if lamp.kind not in RECORDS:
+        raise SceneError(f"a light of kind {lamp.kind!r} is a shape's `emission`", where="lights")
+    if isinstance(lamp, (lights.Envmap, lights.CubeMap)):
+        members, strength = image_lights.lower_image(lamp, tables)
+        radiance = 0
+    else:
+        radiance = tables.append("lamps", tables.emission_words(_emitted(lamp)))
+        members = {**_members(lamp), "radiance": radiance}
+        strength = brightness(_emitted(lamp))
+    words = np.zeros(1, RECORDS[lamp.kind].dtype)
+    for name, value in members.items():
+        words[name] = value
+    at = tables.append("lamps", words.view(np.uint32))
+    return at, radiance, power(lamp, strength, scene_radius)
+
+
+def _emitted(lamp: Light) -> Any:
+    """The value of a light's one emission parameter, whatever its name."""
+    names = {"point": "intensity", "spot": "intensity", "directional": "irradiance"}
+    return getattr(lamp, names.get(lamp.kind, "radiance"))
+
+
+def _members(lamp: Light) -> dict[str, ArrayLike]:
+    """The members of a light's record but for its radiance."""
+    if isinstance(lamp, lights.Point):
+        return {"position": _three(lamp.position, "point.position"), "falloff": lamp.falloff}
+    if isinstance(lamp, lights.Directional):
+        return {"direction": _unit(lamp.direction, "directional.direction")}
+    if isinstance(lamp, lights.Spot):
+        matrix = _matrix(lamp)
+        return {
+            "position": matrix[:3, 3],
+            "axis": _unit(matrix[:3, 2], "spot.to_world"),
+            "cutoff": np.radians(lamp.cutoff),
+            "beam_width": np.radians(min(lamp.beam_width, lamp.cutoff)),
+        }
+    return {}
+
+
+def _matrix(lamp: lights.Spot) -> NDArray[np.float64]:
+    """A light's transform. Raises SceneError where it cannot be inverted."""
+    matrix = np.asarray(lamp.to_world, np.float64)
+    if matrix.shape != (4, 4) or transforms.is_singular(matrix):
+        raise SceneError("must be an invertible (4, 4) matrix", where="spot.to_world")
+    return matrix
+
+
+def _three(value: ArrayLike, where: str) -> NDArray[np.float64]:
+    values = np.asarray(value, np.float64)
+    if values.shape != (3,) or not np.isfinite(values).all():
+        raise SceneError(f"must be three finite numbers, found {value!r}", where=where)
+    return values
+
+
+def _unit(value: ArrayLike, where: str) -> NDArray[np.float64]:
+    vector = _three(value, where)
+    length = float(np.linalg.norm(vector))
+    if not length > 0.0:
+        raise SceneError("has no length", where=where)
+    return vector / length
+
+
+def power(lamp: Light, strength: float, scene_radius: float) -> float:
+    """Estimate what a light off all shapes sends into the scene, mean of channels [W/nm].
+
+    strength: the mean of its intensity, irradiance or radiance.
+    """
+    disk = np.pi * scene_radius**2
+    if isinstance(lamp, lights.Point):
+        return 4.0 * np.pi * strength
+    if isinstance(lamp, lights.Spot):
+        edge = np.radians([min(lamp.beam_width, lamp.cutoff), lamp.cutoff])
+        return 2.0 * np.pi * (1.0 - float(np.cos(edge).mean())) * strength
+    if isinstance(lamp, lights.Directional):
+        return disk * strength
+    return 4.0 * np.pi * disk * strength
+
+
+def brightness(value: Any) -> float:
+    """Return the mean over channels, and over a texture, of an emission."""
+    if isinstance(value, Bitmap):
+        return float(np.maximum(pixels(value), 0.0).mean(dtype=np.float64))
+    if isinstance(value, Checkerboard):
+        return 0.5 * (brightness(value.color0) + brightness(value.color1))
+    return float(np.mean(value.to_rgb("emission")))
