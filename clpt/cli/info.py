@@ -103,7 +103,8 @@ def _by_kind(things: Iterable[Kind], base: type[Kind]) -> dict[str, int]:
 
 def _film(scene: Scene) -> dict[str, Any]:
     film = scene.film
-    return {"width": film.width, "height": film.height, "filter": film.filter.kind}
+    size = {"width": film.width, "height": film.height}
+    return {**size, "mode": film.mode, "filter": film.filter.kind}
 
 
 def _shown(value: Any) -> str:

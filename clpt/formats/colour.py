@@ -8,7 +8,11 @@ from typing import Any
 from clpt.errors import SceneError
 from clpt.spectra import RGB, RGBIlluminant, RGBUnbounded
 
-COLOURS = {"reflectance": RGB, "index": RGBUnbounded, "emission": RGBIlluminant}
+COLOURS: dict[str, type[Any]] = {
+    "reflectance": RGB,
+    "index": RGBUnbounded,
+    "emission": RGBIlluminant,
+}
 
 
 def colour(role: str, rgb: Sequence[float]) -> Any:

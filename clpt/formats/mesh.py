@@ -34,6 +34,7 @@ KNOWN_EXTENSIONS = (
 TRIANGLE_FAN = 6
 APPEARANCE = "KHR_materials_"  # the triangles are right without
 NEEDED_EXTENSIONS = ("EXT_mesh_gpu_instancing",)
+DUMMIES = (None, (2, 2))  # sizes of the image in trimesh's default material
 USEMTL = re.compile(rb"(?m)^[ \t]*usemtl[^\n]*")
 GREY = TwoSided(front=Diffuse(reflectance=0.6, name="grey"))
 
@@ -141,7 +142,7 @@ def checked(
         faces = faces[solid]
     used = np.zeros(len(points), bool)
     used[faces.reshape(-1)] = True
-    arrays = {"vertices": points, "normals": normals, "uvs": uvs}
+    arrays: dict[str, Any] = {"vertices": points, "normals": normals, "uvs": uvs}
     if not used.all():
         arrays = {key: None if a is None else a[used] for key, a in arrays.items()}
         faces = (np.cumsum(used) - 1)[faces]
@@ -252,7 +253,7 @@ def _unit(vectors: NDArray[Any]) -> NDArray[Any]:
 
 def _material(visual: Any, notes: list[str]) -> Material:
     material = getattr(visual, "material", None)
-    if material is None:
+    if material is None or _made_up(material):
         if getattr(visual, "kind", None) in ("vertex", "face"):
             notes.append("vertex colours left out")
         return GREY
@@ -265,6 +266,12 @@ def _material(visual: Any, notes: list[str]) -> Material:
     texels = images.from_pillow(image.convert("RGB")) * np.asarray(colour, np.float32)
     texture = Bitmap(image=texels, raw=True)
     return TwoSided(front=Diffuse(reflectance=texture, name=material.name or ""))
+
+
+def _made_up(material: Any) -> bool:
+    """Whether trimesh put this material where the file has texture coordinates but names none."""
+    simple = isinstance(material, trimesh.visual.material.SimpleMaterial)
+    return simple and not material.kwargs and getattr(material.image, "size", None) in DUMMIES
 
 
 def _base_colour(material: Any) -> tuple[list[float], Any]:

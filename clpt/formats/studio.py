@@ -20,6 +20,7 @@ from clpt.scene.materials import Diffuse
 from clpt.spectra import RGBIlluminant
 
 FOV = 35.0
+MARGIN = 1.05
 FROM = (0.4, 0.35, 1.0)  # the camera, seen from the middle of the scene, +y up
 KEY_FROM = (-0.8, 1.3, 0.7)  # the key light, likewise
 Z_UP = transforms.rotate([1.0, 0.0, 0.0], 90.0)
@@ -50,10 +51,15 @@ def load(path: Path) -> Scene:
 def framing_camera(
     things: Sequence[shapes.Shape], up: transforms.Matrix = transforms.IDENTITY
 ) -> Perspective:
-    """Return a camera that sees the bounding sphere of all shapes, from the front and above."""
+    """Return a camera from the front and above, whose shorter side all shapes together fill."""
     low, high = world_bounds(things) if things else (-np.ones(3), np.ones(3))
     middle, radius = (low + high) / 2.0, _radius(low, high)
-    distance = 1.05 * radius / np.sin(np.radians(FOV / 2.0))
+    view = transforms.look_at(_direction(FROM, up), np.zeros(3), up[:3, 1])[:3, :3]
+    distance = 1.5 * radius
+    for thing in things:
+        seen = (_outline(thing) - middle) @ view
+        aside = np.abs(seen[:, :2]).max(axis=1) / np.tan(np.radians(FOV / 2.0))
+        distance = max(distance, MARGIN * float(np.max(aside - seen[:, 2])))
     origin = middle + distance * _direction(FROM, up)
     return Perspective(
         to_world=transforms.look_at(origin, middle, up[:3, 1]),
@@ -91,6 +97,14 @@ def shape_bounds(thing: shapes.Shape) -> tuple[NDArray[np.float64], NDArray[np.f
     return points.min(axis=0) - reach, points.max(axis=0) + reach
 
 
+def _outline(thing: shapes.Shape) -> NDArray[np.float64]:
+    """Points (n, 3) in world space whose hull holds the shape."""
+    if isinstance(thing, shapes.Mesh):
+        return transforms.transform_points(thing.to_world, thing.vertices)
+    low, high = shape_bounds(thing)
+    return low + (high - low) * (_corners(shapes.Cube()) + 1.0) / 2.0
+
+
 def _corners(thing: shapes.Shape) -> NDArray[np.float64]:
     if isinstance(thing, shapes.Mesh):
         return np.asarray(thing.vertices, np.float64)
@@ -122,6 +136,6 @@ def _key(middle: NDArray[np.float64], radius: float, up: transforms.Matrix) -> s
     return shapes.Rectangle(
         to_world=to_world,
         material=Diffuse(reflectance=0.0),
-        emission=lights.Area(radiance=RGBIlluminant(4.5, 4.5, 4.5)),
+        emission=lights.Area(radiance=RGBIlluminant(8.0, 8.0, 8.0)),
         name="key light",
     )

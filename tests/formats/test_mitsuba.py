@@ -469,3 +469,40 @@ def test_the_assets_agree_with_what_mitsuba_found(assets):
 
 def test_glass_has_mitsubas_index():
     assert glass("bk7", dispersion=False) == Constant(1.5046)
+
+
+LAMBDAS = np.array([450.0, 520.0, 560.0, 620.0])
+MEANINGS = [
+    ("emission", '<float name="radiance" value="2"/>'),
+    ("emission", '<spectrum name="radiance" value="2"/>'),
+    ("emission", '<rgb name="radiance" value="1, 2, 3"/>'),
+    ("emission", '<spectrum name="radiance" value="400:1, 500:2, 700:3"/>'),
+    ("emission", '<spectrum name="radiance" type="d65"><float name="scale" value="2"/></spectrum>'),
+    ("reflectance", '<float name="reflectance" value="0.5"/>'),
+    ("reflectance", '<rgb name="reflectance" value="0.1, 0.2, 0.3"/>'),
+    ("reflectance", '<spectrum name="reflectance" value="400:0.1, 500:0.2, 700:0.3"/>'),
+]
+
+
+@pytest.mark.peers
+@pytest.mark.parametrize("variant", ["scalar_rgb", "scalar_spectral"])
+@pytest.mark.parametrize(("role", "xml"), MEANINGS)
+def test_spectra_mean_what_they_mean_to_mitsuba(scene, variant, role, xml):
+    mi = pytest.importorskip("mitsuba")
+    mi.set_variant(variant)
+    si = mi.SurfaceInteraction3f()
+    si.wi = [0, 0, 1]
+    if variant == "scalar_spectral":
+        si.wavelengths = LAMBDAS
+    if role == "emission":
+        ours = scene(f'<emitter type="constant">{xml}</emitter>').lights[0].radiance
+        text = f'<emitter version="3.0.0" type="constant">{xml}</emitter>'
+        theirs = np.array(mi.load_string(text).eval(si))
+    else:
+        text = f'<bsdf version="3.0.0" type="diffuse">{xml}</bsdf>'
+        ours = scene(f'<shape type="cube">{text}</shape>').shapes[0].material.reflectance
+        bsdf = mi.load_string(text)
+        theirs = np.pi * np.array(bsdf.eval(mi.BSDFContext(), si, mi.Vector3f(0, 0, 1)))
+    found = ours.sample(LAMBDAS) if variant == "scalar_spectral" else ours.to_rgb(role)
+    # Tables of the observer and of D65 at 1 nm and 5 nm differ by less than this.
+    assert np.allclose(found, theirs, rtol=2e-3)

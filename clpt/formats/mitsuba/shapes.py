@@ -28,7 +28,7 @@ def shape(element: Element, context: Context) -> Shape:
     cls, read = PLUGINS[element.type]
     props = Properties(element, context)
     material, emitter = props.object("bsdf"), props.object("emitter")
-    common = {
+    common: Parameters = {
         "material": Diffuse() if material is None else bsdf(material, context),
         "emission": None if emitter is None else area(emitter, context),
         "flip_normals": props.flag("flip_normals", False),

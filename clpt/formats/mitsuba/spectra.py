@@ -84,7 +84,7 @@ def _spectrum(child: Element, role: str, props: Properties) -> Any:
         raise child.error("must be a number, a colour, a spectrum or a texture")
     if child.type:
         return _plugin(child, props)
-    outside = "hold" if role == "index" else "zero"
+    outside: Any = "hold" if role == "index" else "zero"
     if "filename" in child.attributes:
         path = props.context.document.find_file(child, child.attributes["filename"])
         return spectra.read_table(path, outside)

@@ -11,7 +11,6 @@ import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from json.decoder import scanstring
 from pathlib import Path
 from typing import Any
 
@@ -139,7 +138,7 @@ def _line(text: str, path: tuple[str | int, ...]) -> int:
         while True:
             key: str | int = count
             if isinstance(wanted, str):
-                key, at = scanstring(text, at + 1)
+                key, at = decoder.raw_decode(text, at)
                 at = _skip(text, at)
             if key == wanted:
                 break

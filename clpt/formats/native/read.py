@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -301,7 +302,7 @@ def _matrix(cursor: Cursor, size: int) -> transforms.Matrix:
         for name, child in step.items():
             if name not in STEPS or len(step.value) != 1:
                 raise UnknownKindError("transform", name, STEPS, **child.place())
-            matrix = _placed(child, lambda n=name, c=child: STEPS[n](c)) @ matrix
+            matrix = _placed(child, partial(STEPS[name], child)) @ matrix
     if not np.isfinite(matrix).all():
         raise cursor.error("the transform is not finite")
     return matrix if size == 4 else matrix[np.ix_([0, 1, 3], [0, 1, 3])]

@@ -53,18 +53,17 @@ def _read(cursor: Cursor, role: str, name: str) -> Any:
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return cursor.number()
     cursor.expect(dict, "a number, [r, g, b] or a spectrum")
-    outside = "hold" if role == "index" else "zero"
+    outside: Any = "hold" if role == "index" else "zero"
     if "file" in value:
         return _from_file(cursor, outside, name)
     if "values" in value and "type" not in value:
         _refuse(cursor, "spectrum", ("values",))
         rows = [row.numbers(2) for row in cursor.at("values").entries()]
-        return spectra.Tabulated(*zip(*rows, strict=True), outside) if rows else _empty(cursor)
+        if not rows:
+            raise cursor.error("a spectrum needs at least one [nm, value]")
+        lambdas, samples = zip(*rows, strict=True)
+        return spectra.Tabulated(lambdas, samples, outside)
     return _typed(cursor)
-
-
-def _empty(cursor: Cursor) -> Spectrum:
-    raise cursor.error("a spectrum needs at least one [nm, value]")
 
 
 def _from_file(cursor: Cursor, outside: Any, name: str) -> Spectrum:
