@@ -69,12 +69,15 @@ def map_text(body: str, arguments: int, results: int, mode: str = "rgb", files=(
 
 
 class Probe:
-    """The functions of one material kind in one mode, as functions of arrays."""
+    """The functions of one material kind in one mode, as functions of arrays.
 
-    def __init__(self, cls: type[Kind], mode: str, lanes: int = 16):
+    source: the kind's kernel text; by default its file in kernels/bsdf.
+    """
+
+    def __init__(self, cls: type[Kind], mode: str, lanes: int = 16, source: str | None = None):
         self.cls, self.mode, self.lanes = cls, mode, lanes
         self.components = COMPONENTS[mode]
-        self.text = self._text()
+        self.text = self._text(source or f'#include "bsdf/{cls.kind}.cl"')
 
     def __call__(
         self, params: Mapping[str, object], wo: np.ndarray, wi: np.ndarray, u: np.ndarray
@@ -100,7 +103,7 @@ class Probe:
         named["lobe"] = named["lobe"].astype(int)
         return {k: v[:, 0] if v.shape[1] == 1 else v for k, v in named.items()}
 
-    def _text(self) -> str:
+    def _text(self, source: str) -> str:
         kind, names = self.cls.kind, "xyzw"[: self.components]
         at, reads = 9, []
         for name, param in device_params(self.cls).items():
@@ -123,7 +126,7 @@ class Probe:
         return "\n".join(
             [
                 root_text(self.mode) + struct_text(self.cls),
-                f'#include "bsdf/{kind}.cl"',
+                source,
                 "kernel void probe(global const float *in, global float *out, uint n)",
                 "{",
                 "    uint at = get_global_id(0) * LANES;",
