@@ -191,6 +191,23 @@ def test_mesh_normals(scene, flat):
     assert np.allclose(mesh.uvs, [[0, 1], [1, 1], [0, 0]])  # Mitsuba turns v of an OBJ around
 
 
+MIRROR = '<transform name="to_world"><scale x="-1"/></transform>'
+
+
+def test_mirrored_shapes_face_as_mitsubas_do(scene, tmp_path):
+    (tmp_path / "n.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//1\n")
+    sphere, disk, bare, given = scene(
+        f'<shape type="sphere">{MIRROR}</shape><shape type="disk">{MIRROR}</shape>'
+        f'<shape type="obj"><string name="filename" value="t.obj"/>{MIRROR}</shape>'
+        f'<shape type="obj"><string name="filename" value="n.obj"/>{MIRROR}</shape>'
+    ).shapes
+    assert (sphere.flip_normals, disk.flip_normals) == (True, False)
+    for mesh, front in ((bare, -1.0), (given, 1.0)):
+        a, b, c = mesh.vertices[mesh.faces[0]]
+        assert np.cross(b - a, c - a)[2] == front
+        assert (mesh.normals[:, 2] == front).all()
+
+
 BSDFS = {
     '<bsdf type="diffuse"/>': materials.Diffuse(),
     '<bsdf type="diffuse"><rgb name="reflectance" value=".1,.2,.3"/></bsdf>': materials.Diffuse(

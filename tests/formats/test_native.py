@@ -153,6 +153,8 @@ ERRORS = [
     ({"shapes": [{}]}, "shapes[0]", "needs the key 'type'"),
     ({"shapes": [{**CUBE, "radius": 1}]}, "shapes[0].radius", "cube has no parameter 'radius'"),
     ({"shapes": [{**CUBE, "material": "red"}]}, "shapes[0].material", "unknown material name"),
+    ({"shapes": [{**CUBE, "emission": {"type": "point"}}]}, "shapes[0].emission", "only an area"),
+    ({"shapes": [{**CUBE, "to_world": {"scale": 0}}]}, "shapes[0].to_world", "cannot be inverted"),
     ({"shapes": {}}, "shapes", "must be a list, not an object"),
     ({"lights": [{"type": "area"}]}, "lights[0]", "stands in a shape's 'emission'"),
     ({"spp": 0}, "spp", "above zero"),

@@ -28,14 +28,18 @@ def shape(element: Element, context: Context) -> Shape:
     cls, read = PLUGINS[element.type]
     props = Properties(element, context)
     material, emitter = props.object("bsdf"), props.object("emitter")
-    common: Parameters = {
+    parameters: Parameters = {
         "material": Diffuse() if material is None else bsdf(material, context),
         "emission": None if emitter is None else area(emitter, context),
         "flip_normals": props.flag("flip_normals", False),
         "name": element.attributes.get("id", ""),
     }
+    parameters |= read(props)
+    if cls is shapes.Sphere and transforms.flips_handedness(parameters["to_world"]):
+        # A mirror turns Mitsuba's spheres inside out, and no other shape.
+        parameters["flip_normals"] = not parameters["flip_normals"]
     with placed(element):
-        made = cls(**common, **read(props))
+        made = cls(**parameters)
     props.finish()
     return made
 
@@ -92,13 +96,14 @@ def _mesh(props: Properties, suffix: str, *, flip_v: bool) -> Parameters:
     uvs = whole.uvs
     if uvs is not None and flip_v:
         uvs = np.column_stack([uvs[:, 0], 1.0 - uvs[:, 1]]).astype(np.float32)
-    if flat:
-        normals = None
-    elif whole.normals is None:
-        normals = mesh.smooth_normals(vertices, whole.faces)
-    else:
+    normals, faces = None, whole.faces
+    if not flat and whole.normals is None:
+        normals = mesh.smooth_normals(vertices, faces)
+    elif not flat:
         normals = transforms.transform_normals(to_world, whole.normals).astype(np.float32)
-    return {"vertices": vertices, "faces": whole.faces, "normals": normals, "uvs": uvs}
+        if transforms.flips_handedness(to_world):
+            faces = faces[:, ::-1].copy()  # the file's normals tell the front, not the winding
+    return {"vertices": vertices, "faces": faces, "normals": normals, "uvs": uvs}
 
 
 PLUGINS: dict[str, tuple[type[Shape], Callable[[Properties], Parameters]]] = {

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -149,3 +149,15 @@ def _line(text: str, path: tuple[str | int, ...]) -> int:
 def _skip(text: str, at: int) -> int:
     match = SKIPPED.match(text, at)
     return match.end() if match else at
+
+
+def placed(cursor: Cursor, make: Callable[[], Any]) -> Any:
+    """Return make(); errors that know no line get the cursor's, or that of the key they name."""
+    try:
+        return make()
+    except SceneError as error:
+        if error.line is not None:
+            raise
+        key = (error.where or "").rpartition(".")[2]
+        inner = isinstance(cursor.value, dict) and key in cursor.value
+        raise (cursor.at(key) if inner else cursor).error(error.message) from None

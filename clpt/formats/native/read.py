@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from clpt import spectra, transforms
-from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
+from clpt import spectra
+from clpt.errors import UnknownKindError, UnusedParameterError
 from clpt.formats import mesh
 from clpt.formats.native import spectra as json_spectra
-from clpt.formats.native.cursor import Cursor, parse
+from clpt.formats.native.cursor import Cursor, parse, placed
 from clpt.formats.native.spectra import find_file, kind_name
+from clpt.formats.native.transforms import matrix
 from clpt.scene import Scene, cameras, integrators, kinds, lights, materials, shapes
 from clpt.scene.params import SPECTRUM_ROLES, Kind, Param, params
 
@@ -64,7 +64,7 @@ class _Reader:
         self.warnings: list[str] = []
         self.special: dict[str, Callable[[Cursor], Any]] = {
             "back": self.material,
-            "emission": lambda c: None if c.value is None else self.kind(c, "light"),
+            "emission": self.emission,
             "image": _image,
             **{name: _array_reader(*form) for name, form in ARRAYS.items()},
         }
@@ -95,7 +95,7 @@ class _Reader:
                 self.material(cursor)
         given.setdefault("name", root.file.stem)
         with_place = root.at("spp") if "spp" in root.value else root
-        return _placed(
+        return placed(
             with_place,
             lambda: Scene(**given, warnings=self.warnings, extra={"format": "native"}),
         )
@@ -121,7 +121,7 @@ class _Reader:
             if "eta" in given or "k" in given:
                 raise cursor.at("metal").error("stands for 'eta' and 'k'; give either")
             given["eta"], given["k"] = _metal(cursor.at("metal"))
-        return _placed(cursor, lambda: cls(**given))
+        return placed(cursor, lambda: cls(**given))
 
     def parameter(self, cursor: Cursor, name: str, param: Param, value: Any) -> Any:
         """Read one parameter by its role, or what only the host needs by its name or default."""
@@ -146,7 +146,7 @@ class _Reader:
                 cursor, next(c for c, base in BASES.items() if isinstance(value, base))
             )
         if isinstance(value, np.ndarray):
-            return _matrix(cursor, len(value))
+            return matrix(cursor, len(value))
         if isinstance(value, (bool, str)):
             return cursor.expect(type(value))
         if isinstance(value, int):
@@ -160,6 +160,13 @@ class _Reader:
     def light(self, cursor: Cursor) -> Any:
         if kind_name(cursor, "light", kinds("light")) == "area":
             raise cursor.error("an area light stands in a shape's 'emission'")
+        return self.kind(cursor, "light")
+
+    def emission(self, cursor: Cursor) -> Any:
+        if cursor.value is None:
+            return None
+        if kind_name(cursor, "light", kinds("light")) != "area":
+            raise cursor.error("only an area light can stand on a shape")
         return self.kind(cursor, "light")
 
     def material(self, cursor: Cursor) -> Any:
@@ -196,7 +203,7 @@ class _Reader:
                 raise cursor.at(key).error("stands in the 'file' already; give either")
         frame = self.make(cursor, shapes.Mesh, ("type", "file"))
         child = cursor.at("file")
-        loaded = _placed(child, lambda: mesh.read_mesh(find_file(child)))
+        loaded = placed(child, lambda: mesh.read_mesh(find_file(child)))
         self.warnings += [f"{child.value}: {note}" for note in loaded.warnings]
         dressed, several = "material" in cursor.value, len(loaded.meshes) > 1
         return [_in_frame(part, frame, dressed, several) for part in loaded.meshes]
@@ -225,25 +232,13 @@ def _checked_mesh(cursor: Cursor, made: shapes.Mesh, notes: list[str]) -> shapes
         if values is not None and len(values) != len(made.vertices):
             raise cursor.at(name).error(f"must be one for each of {len(made.vertices)} vertices")
     faces = made.faces.astype(np.int64)
-    arrays = _placed(
+    arrays = placed(
         cursor,
         lambda: mesh.checked(None, "", made.vertices, faces, made.normals, made.uvs, notes),
     )
     if not len(arrays["faces"]):
         raise cursor.error("holds no triangles")
     return dataclasses.replace(made, **arrays)
-
-
-def _placed(cursor: Cursor, make: Callable[[], Any]) -> Any:
-    """Return make(); errors that know no line get the cursor's, or that of the key they name."""
-    try:
-        return make()
-    except SceneError as error:
-        if error.line is not None:
-            raise
-        key = (error.where or "").rpartition(".")[2]
-        inner = isinstance(cursor.value, dict) and key in cursor.value
-        raise (cursor.at(key) if inner else cursor).error(error.message) from None
 
 
 def _metal(cursor: Cursor) -> tuple[spectra.Spectrum, spectra.Spectrum]:
@@ -277,43 +272,3 @@ def _array(cursor: Cursor, width: int, dtype: type) -> np.ndarray | None:
     if dtype is np.uint32 and not ((values >= 0) & (values < 2**31) & (values % 1 == 0)).all():
         raise cursor.error("must be whole numbers from zero")
     return values.astype(dtype)
-
-
-STEPS: dict[str, Callable[[Cursor], transforms.Matrix]] = {
-    "translate": lambda c: transforms.translate(c.numbers(3)),
-    "scale": lambda c: transforms.scale(c.numbers(3) if isinstance(c.value, list) else c.number()),
-    "rotate": lambda c: transforms.rotate(
-        *_fields(c, axis=lambda a: a.numbers(3), angle=Cursor.number)
-    ),
-    "look_at": lambda c: transforms.look_at(
-        *_fields(c, **dict.fromkeys(("origin", "target", "up"), lambda v: v.numbers(3)))
-    ),
-}
-
-
-def _matrix(cursor: Cursor, size: int) -> transforms.Matrix:
-    """Read a transform: rows of a matrix, or steps of which the first is applied first."""
-    value = cursor.value
-    if isinstance(value, list) and all(isinstance(row, list) for row in value):
-        return np.array([row.numbers(size) for row in cursor.entries(size)])
-    steps = [cursor] if isinstance(value, dict) else cursor.entries()
-    matrix = np.eye(4)
-    for step in steps:
-        for name, child in step.items():
-            if name not in STEPS or len(step.value) != 1:
-                raise UnknownKindError("transform", name, STEPS, **child.place())
-            matrix = _placed(child, partial(STEPS[name], child)) @ matrix
-    if not np.isfinite(matrix).all():
-        raise cursor.error("the transform is not finite")
-    return matrix if size == 4 else matrix[np.ix_([0, 1, 3], [0, 1, 3])]
-
-
-def _fields(cursor: Cursor, **readers: Callable[[Cursor], Any]) -> list[Any]:
-    """Read an object that must have exactly these keys."""
-    for key in cursor.expect(dict):
-        if key not in readers:
-            raise UnusedParameterError(str(cursor.path[-1]), key, readers, **cursor.at(key).place())
-    missing = [key for key in readers if key not in cursor.value]
-    if missing:
-        raise cursor.error(f"needs {missing[0]!r}")
-    return [read(cursor.at(key)) for key, read in readers.items()]
