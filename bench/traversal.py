@@ -126,8 +126,8 @@ class Tracer:
 def agreement(hits: np.ndarray, t: np.ndarray, prim: np.ndarray, rays: np.ndarray) -> float:
     """The share of rays for which both have no hit, or hits at the same distance.
 
-    The same: within 1e-4 of it, or within 1e-5, a few roundings of the scene's coordinates, which is
-    more where a ray begins on a surface that it leaves at a grazing angle.
+    The same: within 1e-4 of it, or within 1e-5, a few roundings of the scene's coordinates; that is
+    more where a ray begins on a surface and leaves it at a grazing angle.
     """
     met, other = hits["prim"] != MISS, prim != MISS
     with np.errstate(invalid="ignore"):

@@ -3,29 +3,32 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 import pyopencl as cl
+from numpy.typing import NDArray
 
-from .. import device as dev
+from ..device import Device
 from ..errors import SceneError
 from . import tree
+from .building import Array, Building
+from .layouts import LAYOUTS, Mesh
 
-BRUTE_LIMIT = 32
+BRUTE_LIMIT = 96  # triangles up to which brute force is faster; measured, see bench/NOTES.md
+
+_BOX_LEAF = 2  # boxes of a leaf, at most
 _LEAF = 0x80000000  # BVH_LEAF of kernels/bvh/node.cl
-_REACH = 1e12  # products of three coordinates stay inside a float
+_REACH = 1e12  # so that products of three coordinates stay inside a float
 
 
 @dataclass(frozen=True)
 class Bvh:
     """An acceleration structure on a device.
 
-    layout: the name of its traversal in kernels/bvh; count: triangles or boxes;
-    buffers: by the names of that traversal's arguments; stats: nodes, leaves, depth, cost (SAH, in
-    node visits of a random line through the scene), seconds; what a layout does not have is missing.
+    layout: the name of its traversal in kernels/bvh; count: triangles or boxes; buffers: by the
+    names of that traversal's arguments; stats: seconds, and for wide8 nodes, leaves, depth and cost
+    (nodes and blocks that a random line through the scene is tested against).
     """
 
     layout: str
@@ -39,67 +42,7 @@ class Bvh:
         return sum(buffer.size for buffer in self.buffers.values())
 
 
-@dataclass(frozen=True)
-class _Mesh:
-    """Triangles on the device: (n, 3) float32, (count, 3) uint32, (count,) uint32."""
-
-    count: int
-    vertices: cl.Buffer
-    faces: cl.Buffer
-    tags: cl.Buffer
-
-
-def _brute(device: dev.Device, mesh: _Mesh) -> tuple[dict[str, cl.Buffer], dict[str, float]]:
-    items = tree.items_only(device, mesh.count, mesh.vertices, mesh.faces)
-    return {"tris": _records(device, mesh, items, with_edges=1)}, {}
-
-
-def _binary(device: dev.Device, mesh: _Mesh) -> tuple[dict[str, cl.Buffer], dict[str, float]]:
-    built = tree.over_triangles(device, mesh.count, mesh.vertices, mesh.faces)
-    return {"nodes": built.nodes, "leaves": _records(device, mesh, built.items, with_edges=0)}, {}
-
-
-def _records(device: dev.Device, mesh: _Mesh, items: cl.Buffer, with_edges: int) -> cl.Buffer:
-    records = tree.allocate(device, 64 * mesh.count)
-    tree.run_each(device, "bvh/pack.cl", "pack_triangles", mesh.count, items=items,
-                  records=records, vertices=mesh.vertices, faces=mesh.faces,
-                  tags=mesh.tags, with_edges=with_edges)  # fmt: skip
-    return records
-
-
-def _wide8(device: dev.Device, mesh: _Mesh) -> tuple[dict[str, cl.Buffer], dict[str, float]]:
-    built = tree.over_triangles(device, mesh.count, mesh.vertices, mesh.faces)
-    n, root = mesh.count, "bvh/collapse.cl"
-    costs, occlusion = tree.allocate(device, 64 * n), tree.allocate(device, 8 * n)
-    shared: dict[str, Any] = dict(nodes=built.nodes, items=built.items, ranges=built.ranges,
-                                  costs=costs, occlusion=occlusion)  # fmt: skip
-    begin = 2**built.levels - 1
-    tree.run(device, root, "collapse_subtree", 2**built.levels, begin=begin, **shared)
-    for level in reversed(range(built.levels)):
-        tree.run(device, root, "collapse_level", 2**level, begin=2**level - 1, **shared)
-    roots, firsts = tree.allocate(device, 4 * n), tree.allocate(device, 8 * n)
-    leaf_roots, totals = tree.allocate(device, 4 * n), tree.allocate(device, 16)
-    tree.run(device, root, "collapse_number", 1, nodes=built.nodes, costs=costs, roots=roots,
-             firsts=firsts, leaf_roots=leaf_roots, totals=totals)  # fmt: skip
-    n_nodes, n_blocks, depth = (int(x) for x in _read(device, totals, np.uint32)[:3])
-    wide, blocks = tree.allocate(device, 256 * n_nodes), tree.allocate(device, 352 * n_blocks)
-    tree.run_each(device, root, "collapse_nodes", n_nodes, nodes=built.nodes, costs=costs,
-                  occlusion=occlusion, roots=roots, firsts=firsts, wide=wide)  # fmt: skip
-    tree.run_each(device, root, "collapse_blocks", n_blocks, nodes=built.nodes, items=built.items,
-                  leaf_roots=leaf_roots, vertices=mesh.vertices, faces=mesh.faces,
-                  tags=mesh.tags, blocks=blocks)  # fmt: skip
-    stats = {"nodes": n_nodes, "leaves": n_blocks, "depth": depth}
-    return {"nodes": wide, "leaves": blocks}, stats
-
-
-LAYOUTS: dict[str, Callable[[dev.Device, _Mesh], tuple[dict[str, cl.Buffer], dict[str, float]]]] = {
-    "brute": _brute,
-    "binary": _binary,
-    "wide8": _wide8,
-}
-
-
-def choose_layout(device: dev.Device, n_triangles: int) -> str:
+def choose_layout(device: Device, n_triangles: int) -> str:
     """The layout that traces fastest on the device: a key of LAYOUTS."""
     if n_triangles <= BRUTE_LIMIT:
         return "brute"
@@ -107,41 +50,44 @@ def choose_layout(device: dev.Device, n_triangles: int) -> str:
 
 
 def build(
-    device: dev.Device,
-    vertices: np.ndarray | cl.Buffer,
-    faces: np.ndarray | cl.Buffer,
-    tags: np.ndarray | cl.Buffer | None = None,
+    device: Device,
+    vertices: Array,
+    faces: Array,
+    tags: Array | None = None,
     layout: str | None = None,
 ) -> Bvh:
     """An acceleration structure over triangles.
 
     vertices: (n, 3) float32; faces: (m, 3) uint32; tags: (m,) uint32, a word for each triangle that
-    comes back in its hits (zeros if None). Buffers of these types are read in place and not checked.
+    comes back in its hits (zeros if None). Buffers of these types are read in place, not checked.
     layout: a key of LAYOUTS; None asks `choose_layout`.
 
-    Depth is bounded (kernels/bvh/node.cl), so no traversal overflows its stack.
+    While it runs it takes up to 280 bytes a triangle on the device for wide8, 170 for binary, 110
+    for brute, of which about 70, 130 and 64 stay; no buffer is larger than 64 bytes a triangle.
+    Trees are never deeper than BVH_DEPTH of kernels/bvh/node.cl: traversals cannot overflow.
 
     Raises SceneError for vertices that are not finite or beyond 1e12 and for indices out of range,
-    MemoryBudgetError where a buffer would be larger than the device allows.
+    MemoryBudgetError if the device has too little memory.
     """
     start = time.perf_counter()
     count = _check(vertices, faces, tags)
     if count == 0:  # one triangle that is a point: nothing hits it
         vertices, faces, tags = np.zeros((1, 3)), np.zeros((1, 3)), None
     layout = layout or choose_layout(device, count)
-    n = max(count, 1)
-    mesh = _Mesh(
+    n, building = max(count, 1), Building(device)
+    mesh = Mesh(
         n,
-        tree.upload(device, vertices, np.float32),
-        tree.upload(device, faces, np.uint32),
-        tree.upload(device, np.zeros(n) if tags is None else tags, np.uint32),
+        building.upload(vertices, np.float32),
+        building.upload(faces, np.uint32),
+        building.upload(np.zeros(n) if tags is None else tags, np.uint32),
     )
-    buffers, stats = LAYOUTS[layout](device, mesh)
+    packed = LAYOUTS[layout](building, mesh)
     device.queue.finish()
-    return Bvh(layout, count, buffers, {**stats, "seconds": time.perf_counter() - start})
+    stats = {**packed.stats, "seconds": time.perf_counter() - start}
+    return Bvh(layout, count, packed.buffers, stats)
 
 
-def build_boxes(device: dev.Device, boxes: np.ndarray) -> Bvh:
+def build_boxes(device: Device, boxes: NDArray) -> Bvh:
     """A tree over boxes, (m, 2, 3) float32 low and high corners, for kernels/bvh/shapes.cl.
 
     Raises as `build` does.
@@ -149,26 +95,20 @@ def build_boxes(device: dev.Device, boxes: np.ndarray) -> Bvh:
     start = time.perf_counter()
     boxes = np.asarray(boxes, np.float32).reshape(-1, 2, 3)
     _check_reach(boxes, "a shape's box")
-    n = len(boxes)
-    indices = tree.allocate(device, 4 * n)
+    n, building = len(boxes), Building(device)
+    indices = building.allocate(4 * n)
     if n:
-        built = tree.over_boxes(device, n, tree.upload(device, boxes, np.float32))
-        nodes = built.nodes
-        tree.run_each(device, "bvh/pack.cl", "pack_indices", n, items=built.items, indices=indices)
-    else:
-        nodes = tree.upload(device, np.array([0, 0, 0, _LEAF, 0, 0, 0, 0]), np.uint32)
+        items, parts = tree.items_of_boxes(building, n, building.upload(boxes, np.float32))
+        nodes = tree.over(building, n, items, parts, _BOX_LEAF).nodes
+        building.run_each("bvh/pack.cl", "pack_indices", n, items=items, indices=indices)
+    else:  # a leaf with nothing in it
+        nodes = building.upload(np.array([0, 0, 0, _LEAF, 0, 0, 0, 0]), np.uint32)
     device.queue.finish()
     buffers = {"nodes": nodes, "indices": indices}
     return Bvh("shapes", n, buffers, {"seconds": time.perf_counter() - start})
 
 
-def _read(device: dev.Device, buffer: cl.Buffer, dtype: type) -> np.ndarray:
-    array = np.empty(buffer.size // np.dtype(dtype).itemsize, dtype)
-    cl.enqueue_copy(device.queue, array, buffer)
-    return array
-
-
-def _check(vertices: Any, faces: Any, tags: Any) -> int:
+def _check(vertices: Array, faces: Array, tags: Array | None) -> int:
     """The number of triangles, after looking at arrays for what a tree cannot hold."""
     count = faces.size // 12 if isinstance(faces, cl.Buffer) else len(faces)
     if isinstance(faces, np.ndarray) and count:
@@ -184,6 +124,6 @@ def _check(vertices: Any, faces: Any, tags: Any) -> int:
     return count
 
 
-def _check_reach(corners: np.ndarray, what: str) -> None:
+def _check_reach(corners: NDArray, what: str) -> None:
     if corners.size and not (np.abs(corners).max() < _REACH):  # NaN fails the comparison
         raise SceneError(f"{what} has a coordinate that is not finite, or beyond {_REACH:g}")

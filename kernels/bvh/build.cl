@@ -14,7 +14,13 @@
 
 #define BVH_ITEM 0x40000000u
 #define BUILD_BINS 8
-#define BUILD_LEAF 4 /* items of a leaf, at most */
+
+/* What the whole tree shares. */
+typedef struct {
+    global float8 *items, *nodes;
+    float pad;      /* of the nodes' boxes */
+    uint leaf_size; /* items of a leaf, at most */
+} Build;
 
 typedef struct { uint node, first, count, depth; } Range;
 
@@ -208,15 +214,14 @@ inline uint build_cut(global float8 *items, Range r, float8 span, Half *left, Ha
 }
 
 /* Writes the node of a range; if it is to be divided, does so and returns 1. */
-inline int build_range(global float8 *items, global float8 *nodes, float pad, Range r, Half h,
-                       Range children[2], Half halves[2])
+inline int build_range(const Build *b, Range r, Half h, Range children[2], Half halves[2])
 {
-    if (r.count <= BUILD_LEAF) {
-        nodes[r.node] = build_node(h.bounds, pad, BVH_LEAF | r.first, r.count);
+    if (r.count <= b->leaf_size) {
+        b->nodes[r.node] = build_node(h.bounds, b->pad, BVH_LEAF | r.first, r.count);
         return 0;
     }
-    uint mid = build_cut(items, r, h.span, &halves[0], &halves[1]);
-    nodes[r.node] = build_node(h.bounds, pad, 2 * mid, r.count);
+    uint mid = build_cut(b->items, r, h.span, &halves[0], &halves[1]);
+    b->nodes[r.node] = build_node(h.bounds, b->pad, 2 * mid, r.count);
     children[0] = (Range){2 * mid, r.first, mid - r.first, r.depth + 1};
     children[1] = (Range){2 * mid + 1, mid, r.first + r.count - mid, r.depth + 1};
     return 1;
@@ -238,13 +243,14 @@ kernel void build_root(global const Half *restrict parts, uint n_parts, uint cou
 
 /* Ranges from `begin` on in the heap, a level of it. Those with no items are no ranges. */
 kernel void build_level(global float8 *restrict items, global float8 *restrict nodes,
-                        global Range *restrict ranges, global Half *restrict halves, uint begin)
+                        global Range *restrict ranges, global Half *restrict halves, uint begin,
+                        uint leaf_size)
 {
     uint k = begin + get_global_id(0);
-    float pad = build_pad(halves[0].bounds);
+    Build b = {items, nodes, build_pad(halves[0].bounds), leaf_size};
     Range r = ranges[k], children[2] = {{0, 0, 0, 0}, {0, 0, 0, 0}};
     Half sides[2];
-    if (r.count && build_range(items, nodes, pad, r, halves[k], children, sides)) {
+    if (r.count && build_range(&b, r, halves[k], children, sides)) {
         halves[2 * k + 1] = sides[0];
         halves[2 * k + 2] = sides[1];
     }
@@ -254,16 +260,16 @@ kernel void build_level(global float8 *restrict items, global float8 *restrict n
 
 kernel void build_subtree(global float8 *restrict items, global float8 *restrict nodes,
                           global const Range *restrict ranges, global const Half *restrict halves,
-                          uint begin)
+                          uint begin, uint leaf_size)
 {
+    Build b = {items, nodes, build_pad(halves[0].bounds), leaf_size};
     Range waiting[BVH_DEPTH];
     Half waiting_halves[BVH_DEPTH];
     int n = 0;
-    float pad = build_pad(halves[0].bounds);
     Range r = ranges[begin + get_global_id(0)], children[2];
     Half h = halves[begin + get_global_id(0)], sides[2];
     while (r.count) {
-        if (build_range(items, nodes, pad, r, h, children, sides)) {
+        if (build_range(&b, r, h, children, sides)) {
             waiting[n] = children[1];
             waiting_halves[n++] = sides[1];
             r = children[0];

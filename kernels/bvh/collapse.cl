@@ -2,7 +2,8 @@
  *
  * costs[node]: lanes 0 to 6 are C(node, i), the least cost of at most i = 1 .. 7 wide trees that
  * together hold what is below the node; lane 7 keeps the choices, as bits: for i = 2 .. 8 how many
- * of the i trees the left child gets (0: as for i - 1), then COLLAPSE_LEAF if C(node, 1) is a leaf.
+ * of the i trees the left child gets (0: as for i - 1). A leaf of the binary tree, which has 8
+ * triangles at most, is a block; testing one costs the same however few they are.
  *
  * Wide nodes are 8 rows of float8: low x, high x, low y, high y, low z, high z of the children,
  * their words, and a spare one; a child's word is its wide node, or its block with BVH_LEAF set.
@@ -11,12 +12,9 @@
 #include "bvh/build.cl"
 #include "bvh/hit.cl"
 
-#define COLLAPSE_LEAF (1u << 21)
 #define COLLAPSE_NODE_COST 1.0f
 #define COLLAPSE_BLOCK_COST 1.0f
 #define WIDE_STACK (8 * BVH_DEPTH)
-
-inline uint collapse_share(uint choices, uint trees) { return choices >> 3 * (trees - 2) & 7u; }
 
 /* The chance that a random line through the node's box meets a triangle in it: area of one side over
  * a quarter of the box's surface times one half (Cauchy); dependence among them is neglected. */
@@ -34,7 +32,7 @@ inline void collapse_node(global const float8 *nodes, global const float8 *items
     float8 node = nodes[at];
     float area = node_half_area(node), block = area * COLLAPSE_BLOCK_COST;
     if (node_is_leaf(node)) {
-        costs[at] = (float8)((float4)(block), (float3)(block), as_float(COLLAPSE_LEAF));
+        costs[at] = (float8)(block);
         occlusion[at] = collapse_leaf_occlusion(items, node);
         return;
     }
@@ -55,10 +53,6 @@ inline void collapse_node(global const float8 *nodes, global const float8 *items
         choices |= share << 3 * (trees - 2);
     }
     c.at[0] = c.at[7] + area * COLLAPSE_NODE_COST;
-    if (node_count(node) <= 8 && block <= c.at[0]) {
-        c.at[0] = block;
-        choices |= COLLAPSE_LEAF;
-    }
     for (uint trees = 2; trees <= 7; trees++)
         if (c.at[trees - 2] <= c.at[trees - 1]) {
             c.at[trees - 1] = c.at[trees - 2];
@@ -103,30 +97,21 @@ kernel void collapse_level(global const float8 *restrict nodes, global const flo
     if (r.count) collapse_node(nodes, items, costs, occlusion, r.node);
 }
 
-inline uint collapse_choices(global const float8 *costs, uint node)
+/* Of so many trees below a node, how many the left child gets. */
+inline uint collapse_share(global const float8 *costs, uint node, uint trees)
 {
-    return as_uint(((global const float *)(costs + node))[7]);
-}
-
-inline int collapse_is_leaf(global const float8 *costs, uint node)
-{
-    return (collapse_choices(costs, node) & COLLAPSE_LEAF) != 0;
+    return as_uint(((global const float *)(costs + node))[7]) >> 3 * (trees - 2) & 7u;
 }
 
 /* The binary nodes that become the children of the wide node at `root`; returns their number. */
 inline uint collapse_children(global const float8 *nodes, global const float8 *costs, uint root,
                               uint children[8])
 {
-    uint waiting[8], trees[8], n = 0, found = 0;
-    uint choices = collapse_choices(costs, root);
-    if (choices & COLLAPSE_LEAF) { /* only the root of the whole tree: a few triangles */
-        children[0] = root;
-        return 1;
-    }
-    uint at = root, i = 8;
+    uint waiting[8], trees[8], n = 0, found = 0, at = root, i = 8;
     for (;;) {
         uint share = 0;
-        while (i > 1 && (share = collapse_share(choices, i)) == 0) i--;
+        if (node_is_leaf(nodes[at])) i = 1;
+        while (i > 1 && (share = collapse_share(costs, at, i)) == 0) i--;
         if (i > 1) {
             uint left = node_link(nodes[at]);
             waiting[n] = left + 1;
@@ -139,18 +124,18 @@ inline uint collapse_children(global const float8 *nodes, global const float8 *c
             at = waiting[--n];
             i = trees[n];
         }
-        choices = collapse_choices(costs, at);
     }
 }
 
 /* Numbers the wide nodes and blocks: a node's child nodes, and its blocks, have neighbouring numbers.
  * roots, leaf_roots: the binary node of each; firsts: a node's first child node and first block.
- * totals: nodes, blocks, depth. */
+ * totals: nodes, blocks, depth, and as a float the tree's cost for a line that meets its box. */
 kernel void collapse_number(global const float8 *restrict nodes, global const float8 *restrict costs,
                             global uint *restrict roots, global uint2 *restrict firsts,
                             global uint *restrict leaf_roots, global uint *restrict totals)
 {
     uint waiting[WIDE_STACK], depths[WIDE_STACK], children[8];
+    float area = node_half_area(nodes[0]);
     uint n = 1, n_nodes = 1, n_blocks = 0, deepest = 0;
     waiting[0] = roots[0] = depths[0] = 0;
     while (n) {
@@ -159,7 +144,7 @@ kernel void collapse_number(global const float8 *restrict nodes, global const fl
         firsts[at] = (uint2)(n_nodes, n_blocks);
         deepest = max(deepest, depth);
         for (uint i = 0; i < found; i++) {
-            if (collapse_is_leaf(costs, children[i])) {
+            if (node_is_leaf(nodes[children[i]])) {
                 leaf_roots[n_blocks++] = children[i];
             } else {
                 waiting[n] = n_nodes;
@@ -171,6 +156,7 @@ kernel void collapse_number(global const float8 *restrict nodes, global const fl
     totals[0] = n_nodes;
     totals[1] = n_blocks;
     totals[2] = deepest;
+    totals[3] = as_uint(area > 0.0f ? ((global const float *)costs)[0] / area : 0.0f);
 }
 
 /* How much sooner than others a shadow ray ought to look into a child: chance to end over cost. */
@@ -196,7 +182,7 @@ kernel void collapse_nodes(global const float8 *restrict nodes, global const flo
     uint2 next = firsts[w];
     for (uint i = 0; i < found; i++) {
         uint child = children[i];
-        uint word = collapse_is_leaf(costs, child) ? BVH_LEAF | next.y++ : next.x++;
+        uint word = node_is_leaf(nodes[child]) ? BVH_LEAF | next.y++ : next.x++;
         float p = collapse_promise(nodes, costs, occlusion, child);
         uint k = i;
         for (; k > 0 && promise[k - 1] > p; k--) {
@@ -232,9 +218,7 @@ kernel void collapse_blocks(global const float8 *restrict nodes, global const fl
     uint b = get_global_id(0);
     if (b >= count) return;
     float8 node = nodes[leaf_roots[b]];
-    uint n = node_count(node);
-    while (!node_is_leaf(node)) node = nodes[node_link(node)];
-    uint first = node_link(node);
+    uint first = node_link(node), n = node_count(node);
     global float *row = blocks + (ulong)b * 88;
     for (uint k = 0; k < 8; k++, row++) {
         uint prim = k < n ? item_index(items[first + k]) : BVH_MISS;

@@ -65,7 +65,7 @@ def device() -> dev.Device:
 
 @pytest.fixture(scope="session")
 def trace(device) -> Callable:
-    """trace(bvh, rays, lanes=8) -> hits (n,) HIT, occluded (n,) bool; rays (n, 8): o tmin d tmax."""
+    """trace(bvh, rays, lanes=8) -> hits (n,) HIT, occluded (n,) bool; rays: o tmin d tmax."""
     programs = {}
 
     def program(layout: str, lanes: int) -> dev.Program:

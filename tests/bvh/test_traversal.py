@@ -154,7 +154,8 @@ typedef global const float4 *ShapeTable;
 inline int shape_intersect(ShapeTable table, uint prim, const Ray *ray, float *t)
 {
     float3 s = ray->o - table[prim].xyz;
-    float a = dot(ray->d, ray->d), b = dot(ray->d, s), c = dot(s, s) - table[prim].w * table[prim].w;
+    float a = dot(ray->d, ray->d), b = dot(ray->d, s);
+    float c = dot(s, s) - table[prim].w * table[prim].w;
     float discriminant = b * b - a * c;
     if (discriminant < 0.0f) return 0;
     float at = (-b - sqrt(discriminant)) / a;

@@ -1,0 +1,55 @@
+"""One build under way: the device, the memory it takes, the kernels it runs."""
+
+from __future__ import annotations
+
+import weakref
+from typing import Any
+
+import pyopencl as cl
+from numpy.typing import DTypeLike, NDArray
+
+from ..device import Buffers, Device, Program, assemble
+from ..device import build as build_program
+
+Array = NDArray | cl.Buffer
+
+_GROUP = 8  # work-items of a group where each has one triangle or node
+_RAISED = "use fewer triangles, or a device with more memory"
+_programs: weakref.WeakKeyDictionary[Device, dict[str, Program]] = weakref.WeakKeyDictionary()
+
+
+class Building:
+    """What the steps of a build share. Programs are compiled once for each device."""
+
+    def __init__(self, device: Device):
+        self.device = device
+        self.buffers = Buffers(device)
+
+    def run(self, root: str, kernel: str, n: int, **arguments: Any) -> None:
+        """Enqueue n work-items of a kernel of the program at `root`, each by itself."""
+        self._enqueue(root, kernel, n, 1, arguments)
+
+    def run_each(self, root: str, kernel: str, n: int, **arguments: Any) -> None:
+        """As `run`, in groups, for kernels that are told n as `count` and leave the rest alone."""
+        self._enqueue(root, kernel, n, _GROUP, {"count": n, **arguments})
+
+    def allocate(self, nbytes: int) -> cl.Buffer:
+        """Raises MemoryBudgetError if the device has no such buffer left."""
+        return self.buffers.allocate("building the scene's tree", nbytes, _RAISED)
+
+    def upload(self, array: Array, dtype: DTypeLike) -> cl.Buffer:
+        """The array on the device; a buffer is taken as it is. Raises as `allocate` does."""
+        if isinstance(array, cl.Buffer):
+            return array
+        return self.buffers.upload("the scene's triangles", array, dtype, _RAISED)
+
+    def read(self, buffer: cl.Buffer, n: int, dtype: DTypeLike) -> NDArray:
+        """The first n values of a buffer."""
+        return self.buffers.download(buffer, (n,), dtype)
+
+    def _enqueue(self, root: str, kernel: str, n: int, group: int, arguments: dict) -> None:
+        programs = _programs.setdefault(self.device, {})
+        if root not in programs:
+            programs[root] = build_program(self.device, assemble(root))
+        bound = programs[root].kernel(kernel).bind(**arguments)
+        bound.enqueue(self.device.queue, (-(-n // group) * group,), (group,))
