@@ -58,6 +58,16 @@ class Sink(Protocol):
     def spectral(self) -> bool: ...
 
 
+def blank_row() -> NDArray[np.uint32]:
+    """Return what stands at word 0 of `lamps`: valid as a dark light of any kind.
+
+    It is what idle lanes read; an image light's smallest size keeps them inside its tables.
+    """
+    words = np.zeros(1, RECORDS["envmap"].dtype)
+    words["width"], words["height"] = 1, 2
+    return words.view(np.uint32)
+
+
 def lower_lamp(lamp: Light, tables: Sink, scene_radius: float) -> tuple[int, int, float]:
     """Put a light into the tables; its row and its emission in `lamps`, and its power [W/nm].
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from clpt.errors import SceneError
 from clpt.records import LIGHT, SHAPE
 from clpt.render import shapes
-from clpt.render.lamps import INFINITE, RECORDS, Sink, brightness, lower_lamp
+from clpt.render.lamps import INFINITE, RECORDS, Sink, blank_row, brightness, lower_lamp
 from clpt.scene.lights import Area, Light
 from clpt.scene.shapes import Shape
 
@@ -60,6 +60,8 @@ def light_rows(
 
     scene_radius: of a sphere around the scene [m]. Raises SceneError for a light that has no place.
     """
+    if tables.append("lamps", blank_row()) != 0:
+        raise ValueError("`lamps` must be empty before the lights are put in")
     ordered = sorted(lamps, key=lambda lamp: lamp.kind not in INFINITE)
     infinite = sum(lamp.kind in INFINITE for lamp in ordered)
     blocks = [_lamp_block(lamp, tables, scene_radius) for lamp in ordered]
@@ -199,7 +201,7 @@ def _case(kind: str, only: bool, body: Sequence[str]) -> list[str]:
 
 
 def _row_of(kind: str) -> str:
-    """The kind's parameters of the light `l`; other lanes read the table's first words."""
+    """The kind's parameters of the light `l`; other lanes read the first row, see `blank_row`."""
     table = "lamps" if kind in RECORDS else "geometry"
     return f"{kind}_row(scene.{table}, sel_i(m, l.params, (integer)(0)))"
 

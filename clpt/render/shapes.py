@@ -346,7 +346,8 @@ def _matrix(shape: Shape) -> NDArray[np.float64]:
 def _three(value: ArrayLike, name: str, shape: Shape) -> NDArray[np.float64]:
     values = np.asarray(value, np.float64)
     if values.shape != (3,) or not np.isfinite(values).all():
-        raise SceneError(f"{name} must be three finite numbers, found {value!r}", where=where(shape))
+        message = f"{name} must be three finite numbers, found {value!r}"
+        raise SceneError(message, where=where(shape))
     return values
 
 

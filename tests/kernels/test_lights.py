@@ -1,0 +1,437 @@
+"""Lights: choice, sampling against pdf, irradiance against formulas, images against Mitsuba."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from clpt import transforms as T
+from clpt.errors import SceneError
+from clpt.render import image_lights, lights, shapes
+from clpt.render.image_lights import face_coordinates, face_directions
+from clpt.scene.lights import Area, Constant, CubeMap, Directional, Envmap, Point, Spot
+from clpt.scene.shapes import Cube, Cylinder, Disk, Mesh, Rectangle, Sphere
+from clpt.scene.textures import Checkerboard
+from clpt.spectra import RGBIlluminant
+from tests.kernels.light_probe import LAMBDAS, lit
+
+SIGMAS = 4.5  # of the Monte Carlo estimates: a chance of 7e-6 each
+TURNED = T.rotate([1, 2, 3], 50.0)
+NAMES = {"rgb": "xyz", "spectral": "xyzw"}
+
+SAMPLE = """
+    vec2 u = {x[4], x[5]};
+    LightSample s = light_sample(scene, v3(x[0], x[1], x[2]), x[3], u, lambdas);
+    r[0] = s.wi.x; r[1] = s.wi.y; r[2] = s.wi.z; r[3] = s.t; r[4] = s.pdf;
+    r[5] = s.radiance.x; r[6] = s.radiance.y; r[7] = s.radiance.z;
+"""
+INFINITE = """
+    Spectrum s;
+    real pdf;
+    infinite_light(scene, 0, v3(x[0], x[1], x[2]), lambdas, &s, &pdf);
+    r[0] = s.x; r[1] = s.y; r[2] = s.z; r[3] = pdf;
+"""
+PDF = """
+    r[0] = light_pdf(scene, to_integer(x[0]), v3(x[1], x[2], x[3]), v3(x[4], x[5], x[6]), x[7],
+                     v3(x[8], x[9], x[10]));
+"""
+
+
+def samples(scene, p, n: int, seed: int = 1, lanes: int = 8) -> np.ndarray:
+    u = np.random.default_rng(seed).random((3, n))
+    return scene(SAMPLE, np.vstack([np.tile(np.array(p)[:, None], n), u]), 8, lanes).astype(float)
+
+
+def directions(n: int, seed: int) -> np.ndarray:
+    d = np.random.default_rng(seed).normal(size=(3, n))
+    return d / np.linalg.norm(d, axis=0)
+
+
+def irradiance(scene, p, n=(0.0, 0.0, 1.0), count: int = 1 << 16, seed: int = 1):
+    """Estimate (3,) of the irradiance at p with normal n, and its standard error."""
+    r = samples(scene, p, count, seed)
+    cos = np.maximum(np.array(n) @ r[:3], 0.0)
+    pdf = np.where(r[4] < 0.0, 1.0, r[4])
+    value = np.where(pdf > 0.0, r[5:8] * cos / np.where(pdf > 0.0, pdf, 1.0), 0.0)
+    return value.mean(axis=1), value.std(axis=1) / np.sqrt(count)
+
+
+def glows(cls, place=None, radiance=(1.0, 2.0, 3.0), **more):
+    place = np.eye(4) if place is None else place
+    return cls(to_world=place, emission=Area(radiance=radiance), **more)
+
+
+def facing_down(height: float) -> np.ndarray:
+    return T.translate([0, 0, height]) @ T.rotate([1, 0, 0], 180.0)
+
+
+def polygon_irradiance(corners: np.ndarray, p, n) -> float:
+    """Of a polygon of radiance 1, seen whole (Lambert; Arvo 1995 eq. 3.6)."""
+    v = corners - p
+    v /= np.linalg.norm(v, axis=1, keepdims=True)
+    total = 0.0
+    for a, b in zip(v, np.roll(v, -1, axis=0), strict=True):
+        edge = np.cross(a, b)
+        total += np.arccos(np.clip(a @ b, -1, 1)) * (edge @ n) / np.linalg.norm(edge)
+    return abs(total) / 2.0
+
+
+# ---- irradiance
+
+
+TILTED = np.array([0.3, -0.2, 1.0]) / np.linalg.norm([0.3, -0.2, 1.0])
+TRIANGLE = np.array([[0.5, 0.2, 1.0], [-0.8, 0.9, 1.6], [0.1, -0.7, 1.2]])
+PLATE = T.translate([0.2, 0.1, 1.4]) @ T.rotate([1, 1, 0], 170.0) @ T.scale([0.5, 0.8, 1.0])
+SQUARE = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+
+FORMULAS = {
+    "disk": (glows(Disk, facing_down(1.5) @ T.scale(0.7)), np.pi * 0.49 / (0.49 + 2.25)),
+    "sphere": (glows(Sphere, center=(0.0, 0.0, 2.0), radius=0.5), np.pi * 0.25 / 4.0),
+    "inside": (glows(Sphere, radius=3.0, flip_normals=True), np.pi),
+    "rectangle": (glows(Rectangle, PLATE), None),
+    "triangle": (
+        glows(Mesh, vertices=TRIANGLE.astype(np.float32), faces=np.array([[0, 2, 1]])),
+        polygon_irradiance(TRIANGLE, np.zeros(3), np.array([0.0, 0.0, 1.0])),
+    ),
+    "tube": (
+        glows(Cylinder, p0=(0, 0, -200.0), p1=(0, 0, 200.0), radius=2.0, flip_normals=True),
+        np.pi,
+    ),
+}
+FORMULAS["rectangle"] = (
+    FORMULAS["rectangle"][0],
+    polygon_irradiance(T.transform_points(PLATE, SQUARE), np.zeros(3), np.array([0.0, 0.0, 1.0])),
+)
+
+
+@pytest.mark.parametrize("name", FORMULAS)
+def test_irradiance_of_shapes(name):
+    """Radiance (1, 2, 3) through light_sample against the closed form, within SIGMAS."""
+    shape, unit = FORMULAS[name]
+    count = 1 << (20 if name == "tube" else 16)
+    mean, error = irradiance(lit(emitters=[shape]), (0.0, 0.0, 0.0), count=count)
+    expected = unit * np.array([1.0, 2.0, 3.0])
+    assert (np.abs(mean - expected) < SIGMAS * error + 2e-4 * expected).all()
+    assert (error < 0.05 * expected).all()
+
+
+def test_a_front_that_faces_away_is_dark():
+    above = T.translate([0, 0, 1.5])
+    for cls in (Disk, Rectangle, Cube):
+        scene = lit(emitters=[glows(cls, above @ T.scale(0.3))])
+        back = samples(scene, (0.0, 0.0, 0.0), 2000)
+        if cls is not Cube:
+            assert (back[4] == 0.0).all() and (back[5:] == 0.0).all()
+        else:
+            assert (back[4] == 0.0).any() and (back[5:, back[4] == 0.0] == 0.0).all()
+
+
+def test_lamps_follow_their_formulas():
+    p, n = np.array([0.3, -0.2, 0.1]), TILTED
+    at = np.array([1.0, 2.0, 3.0])
+    to = at - p
+    cos = to @ n / np.linalg.norm(to)
+    cases = [
+        (Point(position=at, intensity=(2.0, 4.0, 6.0)), 2.0 * cos / (to @ to)),
+        (Point(position=at, intensity=(2.0, 4.0, 6.0), falloff=False), 2.0 * cos),
+        (Directional(direction=-2.0 * to, irradiance=(2.0, 4.0, 6.0)), 2.0 * cos),
+        (Constant(radiance=(2.0, 4.0, 6.0)), 2.0 * np.pi),
+        (Envmap(image=np.tile(np.float32([2, 4, 6]), (4, 8, 1)), to_world=TURNED), 2.0 * np.pi),
+        (CubeMap(image=np.tile(np.float32([2, 4, 6]), (6, 3, 3, 1))), 2.0 * np.pi),
+    ]
+    for lamp, first in cases:
+        mean, error = irradiance(lit([lamp]), p, n)
+        expected = first * np.array([1.0, 2.0, 3.0])
+        assert (np.abs(mean - expected) < SIGMAS * error + 1e-5 * expected).all(), lamp.kind
+
+
+def test_all_lights_together_are_their_sum():
+    """The choice among twelve kinds of rows: every pmf counts once."""
+    p, n = np.zeros(3), TILTED
+    lamps = [
+        Point(position=(1.0, 2.0, 3.0), intensity=(3.0, 1.0, 2.0)),
+        Spot(to_world=T.look_at([0, 1, 3], [0, 0, 0], [0, 1, 0]), intensity=(1.0, 5.0, 2.0)),
+        Constant(radiance=(0.3, 0.2, 0.1)),
+        Directional(direction=(0.1, 0.2, -1.0), irradiance=(0.5, 0.4, 1.0)),
+        Envmap(image=np.random.default_rng(1).random((5, 6, 3)), to_world=TURNED, scale=0.3),
+        CubeMap(image=np.random.default_rng(2).random((6, 4, 4, 3)), scale=0.2),
+    ]
+    glowing = [FORMULAS[k][0] for k in ("disk", "sphere", "rectangle", "triangle")]
+    glowing += [glows(Cube, T.translate([2.0, 0.3, 1.0]) @ T.scale(0.4))]
+    glowing += [glows(Cylinder, T.translate([-1.0, 2.0, 1.0]), radius=0.3)]
+    alone = [lit([lamp]) for lamp in lamps] + [lit(emitters=[shape]) for shape in glowing]
+    parts = [irradiance(scene, p, n, seed=i) for i, scene in enumerate(alone)]
+    together = lit(lamps, glowing, radius=3.0)
+    assert set(together.rows.kinds) == set(lights.KINDS)
+    mean, error = irradiance(together, p, n, count=1 << 18, seed=77)
+    expected = np.sum([m for m, _ in parts], axis=0)
+    spread = np.sqrt(error**2 + np.sum([e**2 for _, e in parts], axis=0))
+    assert (np.abs(mean - expected) < SIGMAS * spread + 1e-4 * expected).all()
+    assert (spread < 0.02 * expected).all()
+
+
+# ---- pdf
+
+
+def skies(seed: int = 3):
+    """Images of strong contrast, black in places, of odd sizes."""
+    rng = np.random.default_rng(seed)
+    wide, faces = rng.random((6, 9, 3)) ** 6, rng.random((6, 5, 5, 3)) ** 6
+    wide[2:4, 3:6], faces[1, :3] = 0.0, 0.0
+    wide[1, 8], faces[4, 2, 2] = 40.0, 40.0
+    return {
+        "constant": Constant(radiance=2.0),
+        "envmap": Envmap(image=wide, to_world=TURNED),
+        "cube_map": CubeMap(image=faces, to_world=TURNED @ T.scale([-1, 1, 1])),
+        "one_row": Envmap(image=wide[:1]),
+    }
+
+
+@pytest.mark.parametrize("name", skies())
+def test_samples_follow_the_pdf(name):
+    """Chi-square at 2.5e-4 each, so 1e-3 for the four; the pdf integrates to 1."""
+    scene, n, bins, fine = lit([skies()[name]]), 100_000, (24, 48), 16
+    r = samples(scene, (0.0, 0.0, 0.0), n)
+    counts = np.histogram2d(
+        r[2], np.arctan2(r[1], r[0]), bins=bins, range=[(-1, 1), (-np.pi, np.pi)]
+    )[0]
+    z = -1.0 + 2.0 * (np.arange(bins[0] * fine) + 0.5) / (bins[0] * fine)
+    phi = -np.pi + 2.0 * np.pi * (np.arange(bins[1] * fine) + 0.5) / (bins[1] * fine)
+    z, phi = (g.ravel() for g in np.meshgrid(z, phi, indexing="ij"))
+    s = np.sqrt(1.0 - z * z)
+    density = scene(INFINITE, np.stack([s * np.cos(phi), s * np.sin(phi), z]), 4)[3].astype(float)
+    blocks = density.reshape(bins[0], fine, bins[1], fine).sum(axis=(1, 3))
+    expected = n * blocks * 4.0 * np.pi / density.size
+    assert expected.sum() == pytest.approx(n, rel=3e-3)
+    full = expected > 8.0
+    rest = expected[~full].sum()
+    statistic = ((counts - expected)[full] ** 2 / expected[full]).sum()
+    statistic += (counts[~full].sum() - rest) ** 2 / max(rest, 8.0)
+    assert chi2.sf(statistic, full.sum()) > 2.5e-4
+    # Radiance and pdf of a sample are those of its direction.
+    again = scene(INFINITE, r[:3], 4)
+    np.testing.assert_allclose(again[3], r[4], rtol=3e-3, atol=1e-4 * r[4].max())
+    np.testing.assert_allclose(again[:3], r[5:], rtol=3e-3, atol=1e-4 * r[5:].max())
+
+
+@pytest.mark.parametrize("name", ["envmap", "cube_map"])
+def test_images_are_chosen_by_what_they_send(name):
+    """The estimate of the whole sphere's mean hardly varies: radiance over pdf is nearly even."""
+    rng, cls = np.random.default_rng(6), {"envmap": Envmap, "cube_map": CubeMap}[name]
+    size = {"envmap": (24, 40, 1), "cube_map": (6, 16, 16, 1)}[name]
+    lamp = cls(image=np.repeat(rng.random(size) ** 8, 3, axis=-1), to_world=TURNED)
+    scene = lit([lamp])
+    r = samples(scene, (0.0, 0.0, 0.0), 50_000)
+    value = r[5] / r[4]
+    assert (r[4] > 0.0).all()
+    assert value.std() < 0.1 * value.mean()
+    _, mean = image_lights.lower_image(lamp, scene.tables)
+    assert value.mean() == pytest.approx(4.0 * np.pi * mean, rel=0.02)
+
+
+@pytest.mark.parametrize("name", ["disk", "sphere", "rectangle", "triangle"])
+def test_light_pdf_is_that_of_the_sample(name):
+    """What a ray that meets an emissive shape is told, the chance of the choice included."""
+    lamps = [Constant(), Point()]
+    scene = lit(lamps, [FORMULAS[name][0], FORMULAS["rectangle"][0]])
+    row = scene.rows.first[0]
+    pmf = scene.rows.rows["pmf"][row]
+    assert 0.0 < pmf < 1.0 and scene.rows.infinite == 1
+    alone = lit(emitters=[FORMULAS[name][0]])
+    r = samples(alone, (0.0, 0.0, 0.0), 500)
+    kind = FORMULAS[name][0].kind
+    if kind == "sphere":
+        n = (r[:3] * r[3] - np.array([[0], [0], [2.0]])) / 0.5
+    else:
+        flat = TRIANGLE if kind == "mesh" else T.transform_points(
+            FORMULAS[name][0].to_world, SQUARE[:3]
+        )  # fmt: skip
+        normal = np.cross(flat[1] - flat[0], flat[2] - flat[0])
+        n = np.tile((normal / np.linalg.norm(normal))[:, None], 500)
+    given = np.vstack([np.full(500, row), np.zeros((3, 500)), r[:4], n])
+    np.testing.assert_allclose(scene(PDF, given, 1)[0], r[4] * pmf, rtol=2e-3)
+
+
+# ---- images
+
+
+@pytest.mark.peers
+@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+def test_envmap_is_mitsuba_s(mode):
+    mi = pytest.importorskip("mitsuba")
+    mi.set_variant(f"scalar_{mode}")
+    image = 0.02 + np.random.default_rng(5).random((7, 11, 3)).astype(np.float32) ** 3
+    if mode == "spectral":  # a grey is the same spectrum whatever the table of the uplift
+        image = np.repeat(image[..., :1], 3, axis=2)
+    theirs = mi.load_dict(
+        {"type": "envmap", "bitmap": mi.Bitmap(image), "to_world": mi.ScalarTransform4f(TURNED)}
+    )
+    d = directions(300, 8)
+    ours = lit([Envmap(image=image, to_world=TURNED)], mode=mode)(INFINITE, d, 4)[:3]
+    si = mi.SurfaceInteraction3f()
+    if mode == "spectral":
+        si.wavelengths = list(LAMBDAS)
+    for i in range(d.shape[1]):
+        si.wi = (-d[:, i]).tolist()
+        expected = np.array(theirs.eval(si)).ravel()[:3]
+        np.testing.assert_allclose(ours[:, i], expected, rtol=2e-3, atol=1e-5)
+
+
+@pytest.mark.peers
+def test_spot_is_mitsuba_s():
+    mi = pytest.importorskip("mitsuba")
+    mi.set_variant("scalar_rgb")
+    place = T.look_at([1, 2, 3], [0.1, 0.2, 0], [0, 1, 0])
+    theirs = mi.load_dict({
+        "type": "spot", "to_world": mi.ScalarTransform4f(place), "cutoff_angle": 25.0,
+        "beam_width": 12.0, "intensity": {"type": "rgb", "value": [1.0, 2.0, 3.0]},
+    })  # fmt: skip
+    scene = lit([Spot(to_world=place, intensity=(1.0, 2.0, 3.0), cutoff=25.0, beam_width=12.0)])
+    p = np.random.default_rng(4).normal(size=(3, 300)) * [[1.2], [1.2], [0.1]]
+    ours = scene(SAMPLE, np.vstack([p, np.zeros((3, 300))]), 8)
+    for i in range(300):
+        it = mi.SurfaceInteraction3f()
+        it.p = p[:, i].tolist()
+        sample, weight = theirs.sample_direction(it, [0.5, 0.5])
+        np.testing.assert_allclose(ours[5:, i], np.array(weight).ravel(), rtol=1e-3, atol=1e-6)
+        np.testing.assert_allclose(ours[:3, i], np.array(sample.d).ravel(), atol=1e-5)
+    assert 50 < (ours[5] > 0.0).sum() < 290
+
+
+def sky_colour(d: np.ndarray) -> np.ndarray:
+    """A smooth function of unit directions (..., 3)."""
+    return 1.0 + 0.5 * d + 0.3 * d[..., ::-1] * d
+
+
+def test_cube_map_shows_the_directions_of_its_faces():
+    """Faces painted by a function of the direction give that function back, across all seams."""
+    n = 64
+    at = (np.arange(n) + 0.5) / n * 2.0 - 1.0
+    d = face_directions(at[None, :], at[:, None])
+    faces = sky_colour(d / np.linalg.norm(d, axis=-1, keepdims=True)).astype(np.float32)
+    cross = np.zeros((3 * n, 4 * n, 3), np.float32)
+    tall = np.zeros((4 * n, 3 * n, 3), np.float32)
+    # +y above, -y below, and -x +z +x -z from left to right; upright, -z hangs below -y
+    for i, (row, column) in enumerate([(1, 2), (1, 0), (0, 1), (2, 1), (1, 1), (1, 3)]):
+        cross[row * n : row * n + n, column * n : column * n + n] = faces[i]
+    for i, (row, column) in enumerate([(1, 2), (1, 0), (0, 1), (2, 1), (1, 1), (3, 1)]):
+        tall[row * n : row * n + n, column * n : column * n + n] = (
+            faces[5][::-1, ::-1] if i == 5 else faces[i]
+        )
+    looked = directions(4000, 2)
+    expected = sky_colour(looked.T).T
+    for image in (faces, list(faces), cross, tall):
+        found = lit([CubeMap(image=image)])(INFINITE, looked, 4)[:3]
+        assert np.abs(found - expected).max() < 0.02
+    # The cross hangs together: a face's edge continues on its neighbour.
+    assert np.abs(np.diff(cross[n : 2 * n], axis=1)).max() < 0.06
+    assert np.abs(np.diff(cross[:, n : 2 * n], axis=0)).max() < 0.06
+    assert np.abs(np.diff(tall[:, n : 2 * n], axis=0)).max() < 0.06
+
+
+def test_faces_and_directions_are_inverse():
+    rng = np.random.default_rng(9)
+    a, b = rng.uniform(-0.99, 0.99, (2, 50))
+    face, a2, b2 = face_coordinates(face_directions(a, b))
+    assert (face == np.arange(6)[:, None]).all()
+    np.testing.assert_allclose(a2, np.tile(a, (6, 1)))
+    np.testing.assert_allclose(b2, np.tile(b, (6, 1)))
+
+
+@pytest.mark.parametrize("mode", NAMES)
+def test_lanes_agree(mode):
+    scene = lit(list(skies().values()), [FORMULAS["sphere"][0], FORMULAS["triangle"][0]], mode)
+    one, wide = (samples(scene, (0.1, 0.2, 0.0), 500, lanes=k) for k in (1, 16))
+    np.testing.assert_allclose(one, wide, rtol=2e-4, atol=1e-4)
+
+
+def test_spectral_lights_have_their_spectrum():
+    scene = lit([Constant(radiance=(0.2, 0.5, 1.5))], mode="spectral")
+    expected = RGBIlluminant(0.2, 0.5, 1.5).sample(LAMBDAS)[:3]
+    found = scene(INFINITE, directions(16, 1), 4)[:3]
+    np.testing.assert_allclose(found, np.tile(expected[:, None], 16), rtol=2e-3)
+
+
+# ---- rows
+
+
+def test_alias_table_is_exact():
+    weights = np.array([0.0, 5.0, 1e-3, 2.0, 0.5, 0.0, 11.0])
+    pmf, keep, alias = lights.alias_table(weights)
+    chance = keep.astype(float) / len(keep)
+    np.add.at(chance, alias, (1.0 - keep.astype(float)) / len(keep))
+    np.testing.assert_allclose(pmf, weights / weights.sum(), rtol=1e-6)
+    np.testing.assert_allclose(chance, pmf, atol=1e-7)
+    assert keep[0] == keep[5] == 0.0
+    one = lights.alias_table([3.0])
+    assert [v.tolist() for v in one] == [[1.0], [1.0], [0]]
+
+
+def test_rows_are_infinite_lights_then_lamps_then_shapes():
+    shapes_ = [glows(Cube, radiance=2.0), FORMULAS["disk"][0]]
+    scene = lit([Point(), Constant(), Directional()], shapes_)
+    rows = scene.rows
+    kinds = [lights.KINDS[k] for k in rows.rows["kind"]]
+    assert kinds == ["constant", "point", "directional", *["triangle"] * 12, "disk"]
+    assert rows.infinite == 1 and rows.first == (3, 15) and rows.whole == (False, True)
+    pmf = rows.rows["pmf"].astype(float)
+    assert pmf.sum() == pytest.approx(1.0) and pmf[0] == pytest.approx(0.5)
+    assert pmf[3] == pytest.approx(pmf[14])
+    cube, disk = 24.0 * 2.0, np.pi * 0.49 * 2.0
+    assert pmf[3:15].sum() / pmf[15] == pytest.approx(cube / disk, rel=0.06)  # 2 is not quite D65
+
+
+def test_lights_that_send_nothing_may_be_chosen_evenly():
+    rows = lit([Point(intensity=0.0), Constant(radiance=0.0)]).rows.rows
+    np.testing.assert_allclose(rows["pmf"], 0.5)
+
+
+def test_uv_on_a_mesh():
+    """A light on a triangle is looked up at the mesh's uv, not at the barycentrics."""
+    uvs = np.array([[0.1, 0.9], [0.4, 0.2], [0.8, 0.7], [0.3, 0.5]], np.float32)
+    vertices = np.array([[0, 0, 2], [0, 1, 2], [1, 0, 2], [1, 1, 2]], np.float32)
+    mesh = glows(Mesh, vertices=vertices, faces=np.array([[0, 1, 2], [1, 3, 2]]), uvs=uvs)
+    scene = lit(emitters=[FORMULAS["triangle"][0], mesh])
+    first = scene.rows.first[1]
+    body = """
+        ShapeRow shape = shape_row_row(scene.shapes, (integer)(SHAPE_ROW_WORDS));
+        vec2 b = {x[1], x[2]};
+        vec2 uv = area_triangle_uv(scene, shape, to_integer(x[0]), b);
+        r[0] = uv.x; r[1] = uv.y;
+    """
+    given = np.array([[first, first + 1], [0.25, 0.5], [0.125, 0.25]])
+    _, faces, _, _ = shapes.triangles(mesh)
+    weights = np.stack([1.0 - given[1] - given[2], given[1], given[2]], axis=1)
+    expected = [w @ uvs[f] for w, f in zip(weights, faces, strict=True)]
+    np.testing.assert_allclose(scene(body, given, 2).T, expected, atol=1e-6)
+
+
+def test_brightness_of_a_texture_is_its_mean():
+    from clpt.render.lamps import brightness
+
+    board = Checkerboard(color0=(1.0, 1.0, 1.0), color1=(0.0, 0.5, 1.0))
+    assert brightness(board) == pytest.approx(0.75)
+
+
+@pytest.mark.parametrize(
+    ("lamp", "words"),
+    [
+        (Directional(direction=(0, 0, 0)), "no length"),
+        (Point(position=(0, np.nan, 0)), "finite"),
+        (Spot(to_world=np.zeros((4, 4))), "spot.to_world"),
+        (Area(), "emission"),
+        (Envmap(), "an image is needed"),
+        (Envmap(image=np.zeros((0, 4, 3))), "(h, w, 3)"),
+        (Envmap(image=np.full((2, 2, 3), np.inf)), "not finite"),
+        (Envmap(image=np.ones((2, 2, 3)), to_world=T.scale([1, 1, 0])), "invertible"),
+        (Envmap(image="there_is_no_such_file.exr"), "there_is_no_such_file"),
+        (CubeMap(image=np.ones((4, 4, 3))), "cross"),
+        (CubeMap(image=[np.ones((4, 4, 3))] * 5), "six faces"),
+        (CubeMap(image=[np.ones((4, 5, 3))] * 6), "squares"),
+    ],
+)
+def test_bad_lights_are_named(lamp, words):
+    with pytest.raises(SceneError) as caught:
+        lit([lamp])
+    assert words in str(caught.value)
