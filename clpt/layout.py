@@ -82,7 +82,9 @@ class Record:
 
     def lane_text(self) -> str:
         """Return `typedef struct {...} Name;` of lane types."""
-        return self._struct([f"    {TYPES[m.type][2]} {m.name}; /* {m.doc} */" for m in self.members])
+        return self._struct(
+            [f"    {TYPES[m.type][2]} {m.name}; /* {m.doc} */" for m in self.members]
+        )
 
     def _struct(self, rows: list[str]) -> str:
         return "\n".join([f"/* {self.doc} */", "typedef struct {", *rows, f"}} {self.name};", ""])

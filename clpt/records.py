@@ -16,7 +16,10 @@ PATH = Record(
     beta=("spectrum", "throughput, per wavelength"),
     radiance=("spectrum", "what the path has gathered so far"),
     lambdas=("spectrum", "wavelengths [nm]; unused in RGB mode"),
-    pdf=("real", "of the direction d [1/sr]; below 0 if the last event was delta, or at the camera"),
+    pdf=(
+        "real",
+        "of the direction d [1/sr]; below 0 if the last event was delta, or at the camera",
+    ),
     eta=("real", "product of the relative indices so far, for Russian roulette"),
     weight=("real", "of the sample, from the pixel filter"),
     state=("integer", "PATH_ bits and depth, see kernels/lib/path_state.cl"),

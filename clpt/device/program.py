@@ -171,6 +171,8 @@ def build(device: Device, source: Source, options: Sequence[str] = ()) -> Progra
     Raises KernelBuildError with our file and line, the log, and where the text was kept.
     """
     flags = [*OPTIONS, *options]
+    if _is_oclgrind(device):  # it cannot interpret all that its compiler's optimiser makes
+        flags.append("-cl-opt-disable")
     start = time.perf_counter()
     entry = None if has_src_build_cache(device.info.cl_device) else _entry(device, source, flags)
     program = _from_cache(device, source, flags, entry) if entry else None
@@ -188,10 +190,14 @@ def build_all(
 ) -> dict[str, Program]:
     """Build several programs at once, each in a thread of its own. Raises as `build` does."""
     # Oclgrind's compiler is not safe in threads.
-    threads = 1 if "oclgrind" in device.info.platform.casefold() else os.cpu_count() or 1
+    threads = 1 if _is_oclgrind(device) else os.cpu_count() or 1
     with ThreadPoolExecutor(max_workers=max(1, min(len(sources), threads))) as pool:
         futures = {name: pool.submit(build, device, s, options) for name, s in sources.items()}
         return {name: future.result() for name, future in futures.items()}
+
+
+def _is_oclgrind(device: Device) -> bool:
+    return "oclgrind" in device.info.platform.casefold()
 
 
 def _from_source(device: Device, source: Source, flags: list[str]) -> Program:
