@@ -12,22 +12,27 @@ constant float coat_azimuth[4] = {0.923880f, 0.382683f, -0.382683f, -0.923880f};
  * Mitsuba 3 tabulates. Off by less than 0.015, weighted by the cosine by less than 0.002. */
 inline real coat_transmittance(Microfacets d, real cos_i, real eta)
 {
-    real sin_i = sqrt_r(1.0f - cos_i * cos_i), sum = 0.0f, seen = 0.0f;
-    vec3 up = v3((real)(0.0f), (real)(0.0f), (real)(1.0f));
+    real sin_i = sqrt_r(1.0f - cos_i * cos_i), inv = 1.0f / eta, a2 = sqr(d.alpha_u), sum = 0.0f, seen = 1e-20f;
     for (int i = 0; i < 3; ++i) {
         real radius = sel(d.beckmann, (real)(coat_radius_beckmann[i]), (real)(coat_radius_ggx[i])) * d.alpha_u;
-        real cos_h = 1.0f / sqrt(1.0f + radius * radius);
+        real cos_h = 1.0f / sqrt(1.0f + radius * radius), lean = sin_i * radius;
         for (int j = 0; j < 4; ++j) {
-            real area = max_r(cos_i + sin_i * radius * coat_azimuth[j], (real)(0.0f)) * coat_weight[i];
-            real c = min_r(area * cos_h / coat_weight[i], (real)(1.0f));
-            Fresnel f = fresnel_dielectric(c, eta);
-            real z = (c / eta + f.cos_t) * cos_h - cos_i / eta; /* of the refracted direction */
-            vec3 t = v3(sqrt_r(1.0f - z * z), (real)(0.0f), z);
-            sum += area * (1.0f - f.f) * sel(z < 0.0f, microfacet_g1(d, t, up), (real)(0.0f));
+            real area = max_r(cos_i + lean * coat_azimuth[j], (real)(0.0f));
+            real c = min_r(area * cos_h, (real)(1.0f));
+            real t = sqrt_r(1.0f - (1.0f - c * c) * inv * inv); /* cosine of refraction */
+            real s = c + eta * t, p = eta * c + t;
+            real passed = 2.0f * eta * c * t * (s * s + p * p) / max_r(sqr(s * p), (real)(1e-20f)); /* 1 - F */
+            real z = max_r(cos_i * inv + (t - c * inv) * cos_h, (real)(0.0f)); /* how far down it then goes */
+            real spread = sqrt_r(a2 * (1.0f - z * z)), w = z / max_r(spread, (real)(1e-20f));
+            real ggx = 2.0f * z / (z + sqrt(z * z + spread * spread) + 1e-20f);
+            real beckmann = w * (3.535f + 2.181f * w) / (1.0f + w * (2.276f + 2.577f * w));
+            real g1 = sel(d.beckmann, sel(w < 1.6f, beckmann, (real)(1.0f)), ggx);
+            area *= coat_weight[i];
+            sum += area * passed * g1;
             seen += area;
         }
     }
-    return sum / max_r(seen, (real)(1e-20f));
+    return sum / seen;
 }
 inline Spectrum coat_transmittance_spectrum(Microfacets d, real cos_i, Spectrum eta)
 {
