@@ -13,6 +13,7 @@ from clpt.errors import SceneError
 from clpt.records import SETTINGS, SHAPE
 from clpt.render import cameras, filters, lights, shapes
 from clpt.render.features import Features
+from clpt.render.kinds import words
 from clpt.render.tables import STEP, Tables
 from clpt.scene import materials as mt
 from clpt.scene.params import device_params, params
@@ -21,6 +22,7 @@ from clpt.spectra.cie import _tanh_ends as tanh_ends
 SHAPE_NORMALS, SHAPE_UVS, SHAPE_TWO_SIDED, SHAPE_ONE_LIGHT = 1, 2, 4, 8
 MIXTURE = 0xFF
 DEEPEST = 4000  # path state has 12 bits for the depth
+LONGEST_ROW = max(sum(map(words, device_params(cls).values())) for cls in mt.LEAVES)
 
 
 @dataclass
@@ -73,6 +75,7 @@ class _Lowering:
     def run(self) -> Lowered:
         scene, tables = self.scene, self.tables
         filters.lower_filter(scene.film.filter, tables)  # first in its table
+        tables.append("materials", np.zeros(LONGEST_ROW, np.uint32))  # what idle lanes read
         flat = [s for s in scene.shapes if s.kind not in shapes.ANALYTIC]
         analytic = [s for s in scene.shapes if s.kind in shapes.ANALYTIC]
         emitters: list[lights.Emitter] = []
@@ -102,7 +105,8 @@ class _Lowering:
         row = np.zeros((), SHAPE.dtype)
         row["spare"] = next(i for i, s in enumerate(self.scene.shapes) if s is shape)
         row["light"] = -1
-        row["front"], row["back"], row["flags"] = self._sides(shape)
+        front, back, row["flags"] = self._sides(shape)
+        row["front"], row["back"] = np.array([front, back], np.uint32).view(np.int32)
         triangles: tuple[Any, Any] = (None, None)
         if shape.kind in shapes.ANALYTIC:
             row["kind"] = 1 + shapes.ANALYTIC.index(shape.kind)
