@@ -1,0 +1,91 @@
+"""Independent exposures of a scene, and how likely it is that two sets of them agree."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pyopencl as cl
+from numpy.typing import ArrayLike, NDArray
+from scipy import stats
+
+import clpt
+from clpt.scene import Scene, integrators
+
+SIGNIFICANCE = 1e-4  # of every statistical test here: how often a right program would fail it
+ROUNDING = 1e-5  # relative error of a picture in float32
+
+Values = NDArray[np.float64]
+
+
+def with_film(scene: Scene, **changes: Any) -> Scene:
+    """The scene with another film: mode, width, height, filter, lambda_min, lambda_max."""
+    return dataclasses.replace(scene, film=dataclasses.replace(scene.film, **changes))
+
+
+def with_path(scene: Scene, **changes: Any) -> Scene:
+    """The scene under the path integrator, with these parameters and else its own."""
+    own = scene.integrator if isinstance(scene.integrator, integrators.Path) else integrators.Path()
+    return dataclasses.replace(scene, integrator=dataclasses.replace(own, **changes))
+
+
+def exposures(scene: Scene, count: int, spp: int, first_seed: int = 1, **wavefront: Any) -> Values:
+    """Render `count` times with different seeds: (count, h, w, 3) float64."""
+    renderer = clpt.Renderer(scene, **wavefront)
+    (front,) = renderer.wavefronts
+    settings = front.lowered.settings
+    made = []
+    for seed in range(first_seed, first_seed + count):
+        settings["seed"] = seed
+        cl.enqueue_copy(renderer.device.queue, front.named["settings"], settings.reshape(1))
+        front.clear()
+        assert front.expose(0, spp)
+        assert front.counts.rejected == 0, "samples were not finite"
+        made.append(renderer.image().astype(np.float64))
+    return np.array(made)
+
+
+def blocks(images: ArrayLike, size: int = 4) -> Values:
+    """Means over blocks of size x size pixels: (..., h, w, c) to (..., h // size, w // size, c)."""
+    a = np.asarray(images, np.float64)
+    h, w, c = a.shape[-3] // size, a.shape[-2] // size, a.shape[-1]
+    a = a[..., : h * size, : w * size, :].reshape(*a.shape[:-3], h, size, w, size, c)
+    return a.mean(axis=(-4, -2))
+
+
+def agreement(ours: ArrayLike, reference: ArrayLike) -> float:
+    """How likely such a difference is where both have the same expectation.
+
+    ours: (k, ...), k independent estimates of each value; reference: (m, ...) likewise, or (1, ...)
+    for values that are exact. Welch's t-test of every value; the smallest probability is corrected
+    for their number (Sidak 1967). What float32 rounds counts as spread.
+    """
+    a, b = np.asarray(ours, np.float64), np.asarray(reference, np.float64)
+    rounding = (ROUNDING * np.abs(b).mean(axis=0)) ** 2 + 1e-16
+    va = a.var(axis=0, ddof=1) / len(a) + rounding
+    vb = b.var(axis=0, ddof=1) / len(b) if len(b) > 1 else np.zeros(b.shape[1:])
+    t = (a.mean(axis=0) - b.mean(axis=0)) / np.sqrt(va + vb)
+    freedom = va**2 / (len(a) - 1) + (vb**2 / (len(b) - 1) if len(b) > 1 else 0.0)
+    p = 2.0 * stats.t.sf(np.abs(t), (va + vb) ** 2 / freedom)
+    return float(-np.expm1(p.size * np.log1p(-min(p.min(), 1.0 - 1e-12))))
+
+
+def assert_agree(ours: ArrayLike, reference: ArrayLike, what: str = "") -> None:
+    """Fail where `agreement` is below SIGNIFICANCE; the message tells the means."""
+    p = agreement(ours, reference)
+    a, b = np.mean(ours, axis=(0, -3, -2)), np.mean(reference, axis=(0, -3, -2))
+    assert p > SIGNIFICANCE, f"{what}: p = {p:.1e}; mean {a}, reference {b}, ratio {a / b}"
+
+
+def assert_mean(ours: ArrayLike, expected: ArrayLike, within: float) -> None:
+    """Fail where the mean picture is off by more than chance, or by more than a share `within`.
+
+    ours: (k, h, w, 3) exposures; expected: (3,) or broadcast to it, the exact mean.
+    """
+    means = np.asarray(ours, np.float64).mean(axis=(1, 2))
+    exact = np.broadcast_to(np.asarray(expected, np.float64), means.shape[1:])
+    p = agreement(means, exact[None])
+    mean = means.mean(axis=0)
+    assert p > SIGNIFICANCE, f"p = {p:.1e}; mean {mean}, expected {exact}, ratio {mean / exact}"
+    assert np.allclose(mean, exact, rtol=within, atol=1e-9), f"mean {mean}, expected {exact}"
