@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import weakref
-from typing import Any
+from typing import Any, TypeAlias
 
 import pyopencl as cl
 from numpy.typing import DTypeLike, NDArray
@@ -11,7 +11,7 @@ from numpy.typing import DTypeLike, NDArray
 from ..device import Buffers, Device, Program, assemble
 from ..device import build as build_program
 
-Array = NDArray | cl.Buffer
+Array: TypeAlias = NDArray | cl.Buffer
 
 _GROUP = 8  # work-items of a group where each has one triangle or node
 _RAISED = "use fewer triangles, or a device with more memory"
