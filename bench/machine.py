@@ -11,6 +11,8 @@ import subprocess
 from collections.abc import Iterable
 from pathlib import Path
 
+from rich.console import Console
+
 ROOT = Path(__file__).parent.parent
 
 
@@ -62,6 +64,12 @@ def circumstances() -> dict[str, object]:
         "cores": os.cpu_count(),
         "load": round(os.getloadavg()[0], 1),
     }
+
+
+def console() -> Console:
+    """Where tables are printed; a file or a pipe has no edge to wrap at."""
+    there = Console()
+    return there if there.is_terminal else Console(width=200)
 
 
 def append(path: str | Path | None, bench: str, rows: Iterable[dict[str, object]]) -> None:

@@ -3,8 +3,8 @@
     python -m bench.scenes FOLDER
 
 writes cornell.xml (42 triangles), atrium.xml (284 thousand, under an even sky) and glass.xml (82
-thousand, a caustic) with their meshes: 256x256, box filter, next-event estimation and MIS, path depth
-8 (glass 12). The variables `spp`, `res` and `sampler` can be set when a file is loaded.
+thousand, a caustic) with their meshes: 256x256, box filter, next-event estimation and MIS, path
+depth 8 (glass 12). The variables `spp`, `res` and `sampler` can be set when a file is loaded.
 """
 
 from __future__ import annotations
@@ -25,7 +25,9 @@ HEAD = """<scene version="3.0.0">
   <integrator type="path"><integer name="max_depth" value="{depth}"/></integrator>
   <sensor type="perspective">
     <float name="fov" value="{fov}"/>
-    <transform name="to_world"><lookat origin="{origin}" target="{target}" up="0, 1, 0"/></transform>
+    <transform name="to_world">
+      <lookat origin="{origin}" target="{target}" up="0, 1, 0"/>
+    </transform>
     <sampler type="$sampler"><integer name="sample_count" value="$spp"/></sampler>
     <film type="hdrfilm">
       <integer name="width" value="$res"/><integer name="height" value="$res"/>
@@ -214,8 +216,8 @@ def write_glass(folder: Path) -> Path:
     parts = {
         "white": (joined([ground, wall]), diffuse((0.8, 0.8, 0.8))),
         "light": (lamp, light(12)),
-        "sphere": ((np.array(ball.vertices) + [-0.8, 0.75, 0], np.array(ball.faces)), GLASS),
-        "prism": ((np.concatenate([end, end + [0, 0, 1.4]]), np.array(sides)), GLASS),
+        "sphere": ((ball.vertices + np.array([-0.8, 0.75, 0]), ball.faces), GLASS),
+        "prism": ((np.concatenate([end, end + np.array([0, 0, 1.4])]), np.array(sides)), GLASS),
     }
     view = {"depth": 12, "fov": 45, "origin": "0, 2, 4.5", "target": "0, 0.6, 0"}
     return _write(folder, "glass", parts, view)
