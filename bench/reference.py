@@ -56,7 +56,8 @@ def mean_error(variance: np.ndarray) -> np.ndarray:
 
 def reference(scene: Path, mode: str, spp: int, cores: Sequence[int]) -> Reference:
     """The reference of a scene file, from the cache or rendered now."""
-    digest = hashlib.sha256(Path(__file__).with_name("scenes.py").read_bytes()).hexdigest()[:12]
+    files = b"".join(file.read_bytes() for file in sorted(scene.parent.glob(f"{scene.stem}*")))
+    digest = hashlib.sha256(files).hexdigest()[:12]
     folder = Path(platformdirs.user_cache_dir("clpt", appauthor=False)) / "bench"
     path = folder / f"{scene.stem}-{mode}-{spp}-{digest}.npz"
     if not path.is_file():
