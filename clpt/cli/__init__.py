@@ -7,7 +7,7 @@ import logging
 
 import click
 
-COMMANDS = ("devices", "info")
+COMMANDS = ("render", "devices", "info", "kernels")
 
 
 class _Commands(click.Group):

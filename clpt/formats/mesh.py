@@ -12,10 +12,9 @@ import re
 import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from clpt import images, transforms
@@ -23,6 +22,9 @@ from clpt.errors import SceneError
 from clpt.scene.materials import Diffuse, Material, TwoSided
 from clpt.scene.shapes import Mesh
 from clpt.scene.textures import Bitmap
+
+if TYPE_CHECKING:
+    import trimesh  # imported where it is used: it takes a second, which scenes without files save
 
 SUFFIXES = (".obj", ".ply", ".stl", ".off", ".glb", ".gltf")
 # What trimesh decodes, and what changes neither shape nor base colour.
@@ -179,6 +181,8 @@ def _check_gltf(path: Path, notes: list[str]) -> None:
 
 
 def _open(path: Path, materials: bool) -> trimesh.Scene:
+    import trimesh
+
     suffix = path.suffix.lower()
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
@@ -194,7 +198,9 @@ def _open(path: Path, materials: bool) -> trimesh.Scene:
 
 
 def _mesh(path: Path, name: str, geometry: Any, materials: bool, notes: list[str]) -> Mesh | None:
-    if not isinstance(geometry, trimesh.Trimesh):
+    from trimesh import Trimesh
+
+    if not isinstance(geometry, Trimesh):
         notes.append(f"{name}: left out, since it has no triangles")
         return None
     vertices = np.asarray(geometry.vertices).reshape(-1, 3)
@@ -270,13 +276,17 @@ def _material(visual: Any, notes: list[str]) -> Material:
 
 def _made_up(material: Any) -> bool:
     """Whether trimesh put this material where the file has texture coordinates but names none."""
-    simple = isinstance(material, trimesh.visual.material.SimpleMaterial)
+    from trimesh.visual.material import SimpleMaterial
+
+    simple = isinstance(material, SimpleMaterial)
     return simple and not material.kwargs and getattr(material.image, "size", None) in DUMMIES
 
 
 def _base_colour(material: Any) -> tuple[list[float], Any]:
     """Return linear r, g, b of a trimesh material, and its image or None."""
-    if isinstance(material, trimesh.visual.material.PBRMaterial):
+    from trimesh.visual.material import PBRMaterial
+
+    if isinstance(material, PBRMaterial):
         factor, image = material.baseColorFactor, material.baseColorTexture
     else:
         factor, image = getattr(material, "diffuse", None), getattr(material, "image", None)

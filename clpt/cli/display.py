@@ -1,0 +1,139 @@
+"""What a render shows while it runs, on stderr: a bar on a terminal, else a line now and then."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import click
+
+from ..render.renderer import Progress
+
+EVERY = 5.0  # seconds between lines
+REFRESH = 0.1  # seconds between changes of the bar
+
+
+def display(quiet: bool, limit: float | None) -> Display:
+    """The display for where stderr goes. limit: seconds that the render may take, or None."""
+    if quiet:
+        return Display(limit)
+    return Bar(limit) if sys.stderr.isatty() else Lines(limit)
+
+
+class Display:
+    """Shows nothing; the base of those that do."""
+
+    def __init__(self, limit: float | None = None):
+        self.limit = limit
+        self.last = time.perf_counter()
+
+    @contextmanager
+    def phase(self, text: str) -> Iterator[None]:
+        """Say what is being done meanwhile."""
+        yield
+
+    @contextmanager
+    def rendering(self) -> Iterator[None]:
+        """The time in which `show` is called."""
+        yield
+
+    def show(self, progress: Progress) -> None:
+        """Show how far the render is, if it is time to."""
+
+    def note(self, text: str) -> None:
+        """A line that stays."""
+
+    def due(self, progress: Progress, every: float) -> bool:
+        """Whether `every` seconds are over since this last said so, or the render is."""
+        end = bool(progress.total) and progress.samples >= progress.total
+        if not end and time.perf_counter() - self.last < every:
+            return False
+        self.last = time.perf_counter()
+        return True
+
+    def fraction(self, progress: Progress) -> float:
+        """How much of the render is done: of its samples or of its time, whichever ends it."""
+        done = progress.samples / progress.total if progress.total else 0.0
+        return min(1.0, max(done, progress.seconds / self.limit if self.limit else 0.0))
+
+
+class Lines(Display):
+    """A line for every phase and every few seconds."""
+
+    @contextmanager
+    def phase(self, text: str) -> Iterator[None]:
+        self.note(f"{text} ...")
+        yield
+
+    def show(self, progress: Progress) -> None:
+        if self.due(progress, EVERY):
+            numbers = figures(progress, self.fraction(progress))
+            self.note("  ".join(numbers.values()))
+
+    def note(self, text: str) -> None:
+        click.echo(text, err=True)
+
+
+class Bar(Lines):
+    """A spinner for every phase, then a bar."""
+
+    def __init__(self, limit: float | None = None):
+        super().__init__(limit)
+        from rich.console import Console
+
+        self.console = Console(stderr=True, highlight=False)
+
+    @contextmanager
+    def phase(self, text: str) -> Iterator[None]:
+        with self.console.status(text):
+            yield
+
+    @contextmanager
+    def rendering(self) -> Iterator[None]:
+        from rich.progress import BarColumn, TextColumn
+        from rich.progress import Progress as RichProgress
+
+        columns = [TextColumn(f"{{task.fields[{name}]}}") for name in FIGURES]
+        bar = RichProgress(BarColumn(24), *columns, console=self.console, auto_refresh=False)
+        nothing: dict[str, Any] = dict.fromkeys(FIGURES, "")
+        self._task = bar.add_task("", total=1.0, **nothing)
+        with bar:
+            self._bar = bar
+            yield
+
+    def show(self, progress: Progress) -> None:
+        if self.due(progress, REFRESH):
+            fraction = self.fraction(progress)
+            fields: dict[str, Any] = figures(progress, fraction)
+            self._bar.update(self._task, completed=fraction, **fields)
+            self._bar.refresh()
+
+    def note(self, text: str) -> None:
+        self.console.print(text, markup=False)
+
+
+FIGURES = ("samples", "speed", "rays", "elapsed", "left")
+
+
+def figures(progress: Progress, fraction: float) -> dict[str, str]:
+    """What is shown, by the names in FIGURES."""
+    seconds = max(progress.seconds, 1e-9)
+    left = f"{clock(seconds * (1.0 / fraction - 1.0))} left" if fraction > 0.0 else ""
+    samples = int(progress.samples)
+    return {
+        "samples": f"{samples}/{progress.total} spp" if progress.total else f"{samples} spp",
+        "speed": f"{progress.paths / seconds * 1e-6:.3g} Msamples/s",
+        "rays": f"{progress.rays / seconds * 1e-6:.3g} Mrays/s",
+        "elapsed": clock(progress.seconds),
+        "left": left,
+    }
+
+
+def clock(seconds: float) -> str:
+    """A time as m:ss or h:mm:ss."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"

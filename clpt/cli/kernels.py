@@ -1,0 +1,50 @@
+"""`clpt kernels`: the OpenCL sources that a scene is rendered with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from ..bvh.layouts import LAYOUTS
+from ..errors import SceneError
+from ..formats import load
+from ..render.lower import lower
+from ..render.programs import sources
+from .info import variables
+
+
+@click.command()
+@click.argument("scene", type=click.Path(path_type=Path))
+@click.option(
+    "-o", "--output", "folder", type=click.Path(path_type=Path), required=True,
+    help="Folder for the files; made if it is not there.",
+)  # fmt: skip
+@click.option(
+    "--lanes", type=click.Choice(["1", "8", "16"]), default="8", show_default=True,
+    help="Paths that a work-item shades: 1 as on a GPU, 8 or 16 as on a CPU.",
+)  # fmt: skip
+@click.option(
+    "--layout", type=click.Choice(list(LAYOUTS)), default="wide8", show_default=True,
+    help="Acceleration structure of the triangles.",
+)  # fmt: skip
+@click.option("--queued", is_flag=True, help="Shade along queues that are sorted by material.")
+@click.option("-D", "defines", multiple=True, metavar="NAME=VALUE", help="Set a $name of an .xml.")
+def kernels(
+    scene: Path, folder: Path, lanes: str, layout: str, queued: bool, defines: tuple[str, ...]
+) -> None:
+    """Write the OpenCL programs that SCENE is rendered with, one file each.
+
+    Each is a whole program: any OpenCL compiler takes it as it is. No device is needed.
+    """
+    features = lower(load(scene, **variables(defines))).features
+    made = sources(features, layout, int(lanes), queued=queued)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, source in made.items():
+            (folder / f"{name}.cl").write_text(source.text, encoding="utf-8")
+    except OSError as error:
+        raise SceneError(f"cannot be written: {error}", file=folder) from error
+    for name, source in made.items():
+        rows, files = source.text.count("\n"), len(source.files)
+        click.echo(f"{folder / name}.cl  {rows:,} lines from {files} files")

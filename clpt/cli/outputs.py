@@ -1,0 +1,106 @@
+"""The files that `clpt render` writes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from .. import __version__, images
+from ..errors import SceneError
+from ..render.renderer import Image, Renderer
+from ..scene import Scene
+from ..scene.integrators import Aov
+
+AOV_FORMATS = (".exr", ".png")
+COLUMNS = 4  # of the sheet of an aov .png
+
+
+def default(scene: Path) -> tuple[Path, ...]:
+    """Where to write a scene's picture if nobody says: in the current folder, by its name."""
+    path = scene.resolve()
+    name = path.parent.name if path.is_file() and path.stem == "scene" else path.stem
+    return Path(f"{name}.exr"), Path(f"{name}.png")
+
+
+def checked(paths: tuple[Path, ...], scene: Scene) -> list[Path]:
+    """Return the paths if the scene's picture can be written there. Raises SceneError."""
+    for path in paths:
+        images.check_output(path)
+        if isinstance(scene.integrator, Aov) and path.suffix.lower() not in AOV_FORMATS:
+            formats = " and ".join(AOV_FORMATS)
+            raise SceneError(f"the integrator aov is written to {formats}", file=path)
+    return list(paths)
+
+
+def metadata(renderer: Renderer, scene: Path, seconds: float) -> dict[str, str | int | float]:
+    """What an .exr tells about how it was made. spp is the mean over all pixels."""
+    plan = renderer.scene
+    pixels = plan.film.width * plan.film.height * len(renderer.wavefronts)
+    return {
+        "software": f"clpt {__version__}",
+        "scene": str(scene),
+        "mode": plan.film.mode,
+        "integrator": plan.integrator.kind,
+        "sampler": plan.sampler.kind,
+        "seed": plan.seed,
+        "spp": sum(wavefront.counts.samples for wavefront in renderer.wavefronts) / pixels,
+        "device": renderer.device.info.label,
+        "seconds": round(seconds, 3),
+    }
+
+
+def write(
+    path: Path, renderer: Renderer, facts: dict[str, str | int | float], exposure: float
+) -> None:
+    """Write the picture so far. Raises SceneError."""
+    if not renderer.channels:
+        images.write(path, renderer.image(), metadata=facts, exposure=exposure)
+    elif path.suffix.lower() == ".png":
+        images.write(path, sheet(renderer.layers()), exposure=exposure)
+    else:
+        _write_layers(path, renderer.layers(), facts)
+
+
+def _write_layers(
+    path: Path, layers: dict[str, Image], facts: dict[str, str | int | float]
+) -> None:
+    """One .exr: the first layer of colours as its picture, each layer by its name, in float."""
+    colours = [layer for layer in layers.values() if layer.shape[2] == 3]
+    first = next(iter(layers.values()))
+    picture = layers.get("albedo", colours[0] if colours else first[..., :1])
+    named: dict[str, Image] = {}
+    for name, layer in layers.items():
+        if layer.shape[2] == 2:
+            named |= {f"{name}.u": layer[..., 0], f"{name}.v": layer[..., 1]}
+        else:
+            named[name] = layer
+    images.write(path, picture, half=False, metadata=facts, layers=named)
+
+
+def sheet(layers: dict[str, Image]) -> Image:
+    """All layers side by side as people can see them, (h, w, 3) float32."""
+    shown = [viewable(name, layer) for name, layer in layers.items()]
+    columns = min(COLUMNS, len(shown))
+    shown += [np.zeros_like(shown[0])] * (-len(shown) % columns)
+    rows = [np.hstack(shown[at : at + columns]) for at in range(0, len(shown), columns)]
+    return np.vstack(rows)
+
+
+def viewable(name: str, layer: Image) -> Image:
+    """Values (h, w, 1 to 3) as colours in [0, 1], (h, w, 3) float32."""
+    if name == "albedo":
+        return layer
+    if name.endswith("_normal"):
+        return layer * np.float32(0.5) + np.float32(0.5)
+    if name.endswith("_id"):  # neighbours in number differ in hue
+        turns = layer * np.float32(0.618034) + np.arange(3, dtype=np.float32) / np.float32(3.0)
+        return np.where(layer < 0, 0, 0.5 + 0.5 * np.cos(2 * np.pi * turns)).astype(np.float32)
+    finite = np.where(np.isfinite(layer) & (np.abs(layer) < 1e30), layer, np.nan)
+    low, high = np.nanmin(finite, (0, 1)), np.nanmax(finite, (0, 1))
+    scaled = (finite - low) / np.maximum(high - low, 1e-20)
+    scaled = np.nan_to_num(1.0 - scaled if name == "depth" else scaled)
+    missing = 3 - scaled.shape[2]
+    if scaled.shape[2] == 1:
+        return np.repeat(scaled, 3, axis=2).astype(np.float32)
+    return np.pad(scaled, ((0, 0), (0, 0), (0, missing))).astype(np.float32)

@@ -1,0 +1,158 @@
+"""`clpt render`: a scene file to image files."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import time
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .. import device as dev
+from ..formats import load
+from ..render.renderer import Renderer
+from ..scene import Scene, kinds
+from ..scene.params import Kind, params
+from . import outputs, report
+from .display import display
+from .exposing import expose
+from .info import variables
+
+INTERRUPTED = 130
+LARGEST = 65536  # pixels of a side
+
+
+class Size(click.ParamType):
+    """WIDTHxHEIGHT in pixels."""
+
+    name = "WxH"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[int, int]:
+        found = re.fullmatch(r"(\d{1,9})x(\d{1,9})", str(value).strip().lower())
+        if not found:
+            self.fail(f"{value!r} does not look like 640x480", param, ctx)
+        width, height = int(found[1]), int(found[2])
+        if not (1 <= width <= LARGEST and 1 <= height <= LARGEST):
+            self.fail(f"{width}x{height}: each side can be 1 to {LARGEST} pixels", param, ctx)
+        return width, height
+
+
+class Duration(click.ParamType):
+    """A time such as 30s, 5m, 1h30m or 2.5; returned in seconds."""
+
+    name = "TIME"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> float:
+        text = str(value).strip().lower()
+        number = r"(\d+(?:\.\d+)?)"
+        found = re.fullmatch(rf"(?:{number}h)?(?:{number}m)?(?:{number}s?)?", text)
+        if not text or not found:
+            self.fail(f"{value!r} does not look like 30s, 5m or 1h30m", param, ctx)
+        hours, minutes, rest = (float(n or 0) for n in found.groups())
+        seconds = 3600 * hours + 60 * minutes + rest
+        if not 0 < seconds < 1e9:
+            self.fail(f"{value!r} is no time to render in", param, ctx)
+        return seconds
+
+
+@click.command()
+@click.argument("scene", type=click.Path(path_type=Path))
+@click.option(
+    "-o", "--output", "paths", multiple=True, type=click.Path(path_type=Path),
+    help="Where to write: .exr .png .hdr .pfm .npy; may be given several times."
+    "  [default: the scene's name, as .exr and .png]",
+)  # fmt: skip
+@click.option("--mode", type=click.Choice(["spectral", "rgb"]), help="What light is made of.")
+@click.option("--spp", type=click.IntRange(1, 2**31 - 1), help="Samples of a pixel.")
+@click.option("--time", "limit", type=Duration(), help="Stop after 30s, 5m, 1h30m of rendering.")
+@click.option("--size", type=Size(), help="Size of the picture.")
+@click.option("--seed", type=click.IntRange(0, 2**31 - 1), help="Of the random numbers.")
+@click.option("--device", metavar="NAME-OR-INDEX", help="Where to render: see `clpt devices`.")
+@click.option("--integrator", metavar="NAME", help=f"One of {', '.join(kinds('integrator'))}.")
+@click.option("--max-depth", type=click.IntRange(-1, 4000), help="Longest path; -1: no limit.")
+@click.option("--exposure", type=float, default=0.0, help="Brighten .png by this many stops.")
+@click.option("-D", "defines", multiple=True, metavar="NAME=VALUE", help="Set a $name of an .xml.")
+@click.option("--verbose", is_flag=True, help="Tell of memory, trees, programs and stages.")
+@click.option("--quiet", is_flag=True, help="Show no progress and no warnings.")
+def render(
+    scene: Path,
+    paths: tuple[Path, ...],
+    limit: float | None,
+    device: str | None,
+    exposure: float,
+    defines: tuple[str, ...],
+    verbose: bool,
+    quiet: bool,
+    **changes: Any,
+) -> int:
+    """Render the scene file, mesh or folder SCENE.
+
+    What is not given is as the scene says. With --time but no --spp the render goes on until the
+    time is over. Ctrl-C stops it within a second; what is there is written all the same, and the
+    exit status is 130.
+    """
+    shown = display(quiet, limit)
+    plan = changed(load(scene, **variables(defines)), **changes)
+    spp = changes["spp"] if limit is not None else plan.spp
+    targets = outputs.checked(paths or outputs.default(scene), plan)
+    on = dev.choose(device, profiling=verbose)
+    with shown.phase(f"building kernels for {on.info.name}"):
+        began = time.perf_counter()
+        renderer = Renderer(plan, on)
+        built = time.perf_counter() - began
+    for warning in [*plan.warnings, *renderer.warnings]:
+        shown.note(f"clpt: warning: {warning}")
+    if verbose:
+        report.before(renderer, built)
+    began = time.perf_counter()
+    with shown.rendering():
+        finished = expose(renderer, spp, limit, shown.show)
+    seconds = time.perf_counter() - began
+    rejected = sum(wavefront.counts.rejected for wavefront in renderer.wavefronts)
+    if rejected:
+        shown.note(f"clpt: warning: {rejected} samples were not finite and count as black")
+    facts = outputs.metadata(renderer, scene, seconds)
+    for target in targets:
+        outputs.write(target, renderer, facts, exposure)
+        shown.note(f"{target}  {facts['spp']:g} spp, {seconds:.1f} s")
+    if verbose:
+        report.after(renderer)
+    return 0 if finished else INTERRUPTED
+
+
+def changed(
+    scene: Scene,
+    *,
+    mode: str | None = None,
+    spp: int | None = None,
+    size: tuple[int, int] | None = None,
+    seed: int | None = None,
+    integrator: str | None = None,
+    max_depth: int | None = None,
+) -> Scene:
+    """Return the scene with what is not None in place of its own. Raises click.BadParameter."""
+    film: dict[str, Any] = {} if size is None else {"width": size[0], "height": size[1]}
+    film |= {} if mode is None else {"mode": mode}
+    given: dict[str, Any] = {"spp": spp, "seed": seed}
+    given["film"] = dataclasses.replace(scene.film, **film)
+    if integrator is not None and integrator != scene.integrator.kind:
+        given["integrator"] = _integrator(integrator, scene.integrator)
+    if max_depth is not None:
+        how: Any = given.get("integrator", scene.integrator)
+        if not hasattr(how, "max_depth"):
+            message = f"the integrator {how.kind} has no depth"
+            raise click.BadParameter(message, param_hint="--max-depth")
+        given["integrator"] = dataclasses.replace(how, max_depth=max_depth)
+    return dataclasses.replace(scene, **{k: v for k, v in given.items() if v is not None})
+
+
+def _integrator(name: str, former: Kind) -> Any:
+    """Return an integrator of another kind, with what both have in common."""
+    known = kinds("integrator")
+    if name not in known:
+        message = f"{name!r} is none of {', '.join(known)}"
+        raise click.BadParameter(message, param_hint="--integrator")
+    shared = params(known[name]).keys() & params(type(former)).keys()
+    return known[name](**{key: getattr(former, key) for key in shared})
