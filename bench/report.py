@@ -1,0 +1,142 @@
+"""`python -m bench.report` makes bench/results/README.md from the JSON lines beside it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+RESULTS = Path(__file__).parent / "results"
+WHICH = ("scene", "mode", "renderer", "sampler", "threads", "layout", "rays", "query")
+
+HEAD = """# What was measured
+
+Made by `python -m bench.report` from the JSON lines beside it, which `make bench` writes; the
+newest record of each figure. What the figures mean: the first lines of `bench/*.py`. What was
+tried: `bench/NOTES.md`.
+"""
+
+Row = dict[str, object]
+
+
+def newest(records: Iterable[Row]) -> list[Row]:
+    """The last record of each figure, in the order in which they first came."""
+    kept = {(r["bench"], *(r.get(name) for name in WHICH)): r for r in records}
+    return list(kept.values())
+
+
+def table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A Markdown table."""
+    lines = [headings, ["---"] * len(headings), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
+
+
+def renders(rows: Sequence[Row]) -> str:
+    """Pictures against Mitsuba's."""
+
+    def cells(row: Row) -> list[str]:
+        off = (np.array(row["mean_ratio"]) - 1) * 100
+        worst = int(np.abs(off).argmax())
+        ratios = (row.get("speed_ratio"), row.get("efficiency_ratio"))
+        return [
+            *(str(row[name]) for name in ("scene", "mode", "renderer", "sampler", "threads")),
+            f"{row['msamples']:.3f}",
+            f"{row['relmse']:.4f} / {row['relmse_trimmed']:.4f}",
+            f"{row['efficiency']:.2f}",
+            *("" if ratio is None else f"**{ratio:.2f}**" for ratio in ratios),
+            f"{off[worst]:+.2f} ± {row['mean_ratio_se'][worst] * 100:.2f} %",
+        ]
+
+    headings = [
+        *("scene", "mode", "renderer", "sampler", "threads", "Msamples/s"),
+        *("relMSE / trimmed", "efficiency", "speed : Mitsuba", "efficiency : Mitsuba"),
+        "mean - reference",
+    ]
+    return table(headings, map(cells, rows)) + "\n" + stages(rows)
+
+
+def stages(rows: Sequence[Row]) -> str:
+    """Where clpt's time goes, milliseconds per million closest-hit rays."""
+    found = [row for row in rows if "stages" in row]
+    names = list(dict.fromkeys(name for row in found for name in row["stages"]["milliseconds"]))
+
+    def cells(row: Row) -> list[str]:
+        taken = row["stages"]["milliseconds"]
+        million = row["stages"]["rays"]["closest"] * 1e-6
+        each = (f"{taken[name] / million:.1f}" if name in taken else "" for name in names)
+        return [row["scene"], row["mode"], row["stages"]["layout"], *each]
+
+    text = "Milliseconds per million closest-hit rays, by the device's clock:\n\n"
+    return text + table(["scene", "mode", "layout", *names], map(cells, found))
+
+
+def startup(rows: Sequence[Row]) -> str:
+    """Whole processes."""
+
+    def cells(row: Row) -> list[str]:
+        ratio = row.get("memory_ratio")
+        return [
+            str(row["renderer"]),
+            str(row["mode"]),
+            f"{row['cold']:.2f} s",
+            f"{row['warm']:.2f} s",
+            f"{row['memory'] / 2**20:.0f} MiB" + (f" ({ratio:.2f} of Mitsuba's)" if ratio else ""),
+        ]
+
+    return table(["renderer", "mode", "cold", "warm", "peak memory, atrium"], map(cells, rows))
+
+
+def plain(rows: Sequence[Row]) -> str:
+    """Records as they are, without what is the same for all."""
+    about = ("bench", "date", "commit", "processor", "cores", "load", "device")
+    names = [name for name in rows[0] if name not in about]
+
+    def cell(value: object) -> str:
+        return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+    return table(names, ([cell(row.get(name, "")) for name in names] for row in rows))
+
+
+TABLES: dict[str, Callable[[Sequence[Row]], str]] = {
+    "renders": renders,
+    "startup": startup,
+    "traversal": plain,
+    "building": plain,
+}
+
+
+def page(machines: dict[str, list[Row]]) -> str:
+    """The whole page, from the records of each processor."""
+    text = HEAD
+    for processor, records in machines.items():
+        text += f"\n## {processor}\n"
+        for bench, show in TABLES.items():
+            rows = [row for row in newest(records) if row["bench"] == bench]
+            if rows:
+                last = max(rows, key=lambda row: str(row["date"]))
+                load = max(float(row["load"]) for row in rows)
+                text += f"\n### {bench.capitalize()}\n\n{show.__doc__.splitlines()[0]} "
+                text += f"{str(last['date'])[:10]}, commit {last['commit']}, load {load}.\n\n"
+                text += show(rows)
+    return text
+
+
+def write() -> Path:
+    """Write the page; where it is."""
+    machines: dict[str, list[Row]] = {}
+    for file in sorted(RESULTS.glob("*.jsonl")):
+        for line in file.read_text(encoding="utf-8").splitlines():
+            record = json.loads(line)
+            machines.setdefault(f"{record['processor']}, {record['cores']} cores", []).append(
+                record
+            )
+    RESULTS.mkdir(exist_ok=True)
+    path = RESULTS / "README.md"
+    path.write_text(page(machines), encoding="utf-8")
+    return path
+
+
+if __name__ == "__main__":
+    print(write())
