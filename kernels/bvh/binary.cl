@@ -57,5 +57,6 @@ inline int binary_occluded(global const float *nodes, global const float *leaves
                            float oz, float dx, float dy, float dz, float tmin, float tmax)
 {
     if (!ray_finite(ox, oy, oz, dx, dy, dz)) return 0;
-    return binary_trace(nodes, leaves, ray_make(ox, oy, oz, dx, dy, dz, tmin), tmax, 1).prim != BVH_MISS;
+    Ray ray = ray_make(ox, oy, oz, dx, dy, dz, tmin);
+    return binary_trace(nodes, leaves, ray, tmax, 1).prim != BVH_MISS;
 }

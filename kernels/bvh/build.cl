@@ -10,6 +10,7 @@
  * The first levels run one kernel a level, one work-item a range; what is left are subtrees, one
  * work-item each. Ranges stand in a binary heap: those under range k are 2k + 1 and 2k + 2.
  */
+#include "bvh/apart.cl"
 #include "bvh/node.cl"
 
 #define BVH_ITEM 0x40000000u
@@ -83,9 +84,9 @@ inline float8 build_node(float8 bounds, float pad, uint link, uint count)
 /* --- items --- */
 
 /* One work-item takes `run` neighbours and leaves the bounds of all of them in `halves`. */
-kernel void build_triangles(global const float *restrict vertices, global const uint *restrict faces,
-                            uint count, uint run, global float8 *restrict items,
-                            global Half *restrict halves)
+kernel APART void build_triangles(global const float *restrict vertices,
+                                  global const uint *restrict faces, uint count, uint run,
+                                  global float8 *restrict items, global Half *restrict halves)
 {
     uint begin = get_global_id(0) * run, end = min(begin + run, count);
     Half h = build_empty();
@@ -102,8 +103,8 @@ kernel void build_triangles(global const float *restrict vertices, global const 
 }
 
 /* The same for boxes given as low and high corner; what is inside is taken for an ellipsoid. */
-kernel void build_boxes(global const float *restrict boxes, uint count, uint run,
-                        global float8 *restrict items, global Half *restrict halves)
+kernel APART void build_boxes(global const float *restrict boxes, uint count, uint run,
+                              global float8 *restrict items, global Half *restrict halves)
 {
     uint begin = get_global_id(0) * run, end = min(begin + run, count);
     Half h = build_empty();
@@ -229,8 +230,8 @@ inline int build_range(const Build *b, Range r, Half h, Range children[2], Half 
 
 /* --- kernels, in the order they run --- */
 
-kernel void build_root(global const Half *restrict parts, uint n_parts, uint count,
-                       global Range *restrict ranges, global Half *restrict halves)
+kernel APART void build_root(global const Half *restrict parts, uint n_parts, uint count,
+                             global Range *restrict ranges, global Half *restrict halves)
 {
     Half h = build_empty();
     for (uint i = 0; i < n_parts; i++) {
@@ -242,9 +243,9 @@ kernel void build_root(global const Half *restrict parts, uint n_parts, uint cou
 }
 
 /* Ranges from `begin` on in the heap, a level of it. Those with no items are no ranges. */
-kernel void build_level(global float8 *restrict items, global float8 *restrict nodes,
-                        global Range *restrict ranges, global Half *restrict halves, uint begin,
-                        uint leaf_size)
+kernel APART void build_level(global float8 *restrict items, global float8 *restrict nodes,
+                              global Range *restrict ranges, global Half *restrict halves,
+                              uint begin, uint leaf_size)
 {
     uint k = begin + get_global_id(0);
     Build b = {items, nodes, build_pad(halves[0].bounds), leaf_size};
@@ -258,9 +259,9 @@ kernel void build_level(global float8 *restrict items, global float8 *restrict n
     ranges[2 * k + 2] = children[1];
 }
 
-kernel void build_subtree(global float8 *restrict items, global float8 *restrict nodes,
-                          global const Range *restrict ranges, global const Half *restrict halves,
-                          uint begin, uint leaf_size)
+kernel APART void build_subtree(global float8 *restrict items, global float8 *restrict nodes,
+                                global const Range *restrict ranges,
+                                global const Half *restrict halves, uint begin, uint leaf_size)
 {
     Build b = {items, nodes, build_pad(halves[0].bounds), leaf_size};
     Range waiting[BVH_DEPTH];

@@ -66,9 +66,10 @@ inline void collapse_node(global const float8 *nodes, global const float8 *items
 }
 
 /* Costs below the ranges that build_subtree was given, children before parents. */
-kernel void collapse_subtree(global const float8 *restrict nodes, global const float8 *restrict items,
-                             global const Range *restrict ranges, uint begin,
-                             global float8 *restrict costs, global float *restrict occlusion)
+kernel APART void collapse_subtree(global const float8 *restrict nodes,
+                                   global const float8 *restrict items,
+                                   global const Range *restrict ranges, uint begin,
+                                   global float8 *restrict costs, global float *restrict occlusion)
 {
     Range r = ranges[begin + get_global_id(0)];
     uint waiting[2 * BVH_DEPTH + 2]; /* node; with BVH_LEAF set once its children wait above it */
@@ -89,9 +90,10 @@ kernel void collapse_subtree(global const float8 *restrict nodes, global const f
 }
 
 /* Costs of one level of the heap of ranges; those below it are there. */
-kernel void collapse_level(global const float8 *restrict nodes, global const float8 *restrict items,
-                           global const Range *restrict ranges, uint begin,
-                           global float8 *restrict costs, global float *restrict occlusion)
+kernel APART void collapse_level(global const float8 *restrict nodes,
+                                 global const float8 *restrict items,
+                                 global const Range *restrict ranges, uint begin,
+                                 global float8 *restrict costs, global float *restrict occlusion)
 {
     Range r = ranges[begin + get_global_id(0)];
     if (r.count) collapse_node(nodes, items, costs, occlusion, r.node);
@@ -130,9 +132,10 @@ inline uint collapse_children(global const float8 *nodes, global const float8 *c
 /* Numbers the wide nodes and blocks: a node's child nodes, and its blocks, have neighbouring numbers.
  * roots, leaf_roots: the binary node of each; firsts: a node's first child node and first block.
  * totals: nodes, blocks, depth, and as a float the tree's cost for a line that meets its box. */
-kernel void collapse_number(global const float8 *restrict nodes, global const float8 *restrict costs,
-                            global uint *restrict roots, global uint2 *restrict firsts,
-                            global uint *restrict leaf_roots, global uint *restrict totals)
+kernel APART void collapse_number(global const float8 *restrict nodes,
+                                  global const float8 *restrict costs, global uint *restrict roots,
+                                  global uint2 *restrict firsts, global uint *restrict leaf_roots,
+                                  global uint *restrict totals)
 {
     uint waiting[WIDE_STACK], depths[WIDE_STACK], children[8];
     float area = node_half_area(nodes[0]);
@@ -169,10 +172,12 @@ inline float collapse_promise(global const float8 *nodes, global const float8 *c
 
 /* Writes one wide node. Children stand in ascending promise, for traversals visit the last slot
  * first. Empty slots hold what no ray meets, and lead to block 0 if one does nevertheless. */
-kernel void collapse_nodes(global const float8 *restrict nodes, global const float8 *restrict costs,
-                           global const float *restrict occlusion, global const uint *restrict roots,
-                           global const uint2 *restrict firsts, uint count,
-                           global float *restrict wide)
+kernel APART void collapse_nodes(global const float8 *restrict nodes,
+                                 global const float8 *restrict costs,
+                                 global const float *restrict occlusion,
+                                 global const uint *restrict roots,
+                                 global const uint2 *restrict firsts, uint count,
+                                 global float *restrict wide)
 {
     uint w = get_global_id(0);
     if (w >= count) return;
@@ -210,10 +215,12 @@ kernel void collapse_nodes(global const float8 *restrict nodes, global const flo
 }
 
 /* Writes one block; slots beyond its triangles hold a point, which nothing hits. */
-kernel void collapse_blocks(global const float8 *restrict nodes, global const float8 *restrict items,
-                            global const uint *restrict leaf_roots, uint count,
-                            global const float *restrict vertices, global const uint *restrict faces,
-                            global const uint *restrict tags, global float *restrict blocks)
+kernel APART void collapse_blocks(global const float8 *restrict nodes,
+                                  global const float8 *restrict items,
+                                  global const uint *restrict leaf_roots, uint count,
+                                  global const float *restrict vertices,
+                                  global const uint *restrict faces,
+                                  global const uint *restrict tags, global float *restrict blocks)
 {
     uint b = get_global_id(0);
     if (b >= count) return;

@@ -5,6 +5,8 @@
  * for it; n = cross(v1 - v0, v2 - v0), not normalised: its length is twice the triangle's area.
  * A hit has tmin < t < tmax.
  */
+#include "bvh/apart.cl"
+
 #define BVH_MISS 0xffffffffu
 
 typedef struct { float t, u, v; uint prim, tag; float nx, ny, nz; } TriHit;

@@ -5,7 +5,8 @@
  */
 #include "bvh/build.cl"
 
-inline void pack_record(global float *record, float4 v0, float4 b, float4 c, float4 n, uint prim, uint tag)
+inline void pack_record(global float *record, float4 v0, float4 b, float4 c, float4 n, uint prim,
+                        uint tag)
 {
     vstore4((float4)(v0.xyz, b.x), 0, record);
     vstore4((float4)(b.yz, c.xy), 1, record);
@@ -13,10 +14,11 @@ inline void pack_record(global float *record, float4 v0, float4 b, float4 c, flo
     vstore4((float4)(as_float(prim), as_float(tag), 0.0f, 0.0f), 3, record);
 }
 
-kernel void pack_triangles(global const float8 *restrict items, uint count,
-                           global const float *restrict vertices, global const uint *restrict faces,
-                           global const uint *restrict tags, uint with_edges,
-                           global float *restrict records)
+kernel APART void pack_triangles(global const float8 *restrict items, uint count,
+                                 global const float *restrict vertices,
+                                 global const uint *restrict faces,
+                                 global const uint *restrict tags, uint with_edges,
+                                 global float *restrict records)
 {
     uint i = get_global_id(0);
     if (i >= count) return;
@@ -30,7 +32,8 @@ kernel void pack_triangles(global const float8 *restrict items, uint count,
 }
 
 /* The items' indices alone, for trees over shapes that the caller keeps. */
-kernel void pack_indices(global const float8 *restrict items, uint count, global uint *restrict indices)
+kernel APART void pack_indices(global const float8 *restrict items, uint count,
+                               global uint *restrict indices)
 {
     uint i = get_global_id(0);
     if (i < count) indices[i] = item_index(items[i]);

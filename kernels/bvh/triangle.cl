@@ -9,7 +9,8 @@ inline int triangle_intersect(global const float *record, const Shear *shear, fl
     float t, u, v;
     int inside = shear_intersect(shear, record, 1, &t, &u, &v);
     if (!(inside && t > tmin && t < hit->t)) return 0;
-    TriHit found = {t, u, v, as_uint(record[12]), as_uint(record[13]), record[9], record[10], record[11]};
+    TriHit found = {t, u, v, as_uint(record[12]), as_uint(record[13]),
+                    record[9], record[10], record[11]};
     *hit = found;
     return 1;
 }

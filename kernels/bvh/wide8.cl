@@ -56,7 +56,8 @@ inline Mask8 wide8_triangles(global const float *block, const Wide8Ray *r, float
     float8 ax = mad(-s->x, az, b[s->kx] - s->ox), ay = mad(-s->y, az, b[s->ky] - s->oy);
     float8 bx = mad(-s->x, bz, b[3 + s->kx] - s->ox), by = mad(-s->y, bz, b[3 + s->ky] - s->oy);
     float8 cx = mad(-s->x, cz, b[6 + s->kx] - s->ox), cy = mad(-s->y, cz, b[6 + s->ky] - s->oy);
-    float8 u = wide8_edge(cx, cy, bx, by), v = wide8_edge(ax, ay, cx, cy), w = wide8_edge(bx, by, ax, ay);
+    float8 u = wide8_edge(cx, cy, bx, by), v = wide8_edge(ax, ay, cx, cy);
+    float8 w = wide8_edge(bx, by, ax, ay);
     int8 inside = (wide8_min(wide8_min(u, v), w) >= 0.0f) | (wide8_max(wide8_max(u, v), w) <= 0.0f);
     float8 sum = u + v + w, q = (u * az + v * bz + w * cz) * s->z;
     int8 sign = as_int8(sum) & (int8)(0x80000000);
