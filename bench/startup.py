@@ -2,7 +2,7 @@
 
 `clpt render` of the Cornell box at 64x64 with one sample, and the same by Mitsuba; cold is with
 empty cache folders of everything involved. Memory is the largest resident set of a process that
-renders the atrium.
+renders the atrium, when it compiles kernels (cold) and when it finds them in caches.
 """
 
 from __future__ import annotations
@@ -95,6 +95,7 @@ def measure(folder: Path, mode: str, rounds: int) -> list[dict]:
                 "mode": mode,
                 "cold": statistics.median(cold),
                 "warm": statistics.median(warm),
+                "memory_cold": run(atrium[renderer], caches).memory,
                 "memory": run(atrium[renderer], caches).memory,
             }
         )
