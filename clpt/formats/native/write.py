@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import trimesh
 
 from clpt.errors import SceneError
 from clpt.formats.native import spectra as json_spectra
@@ -134,6 +133,8 @@ def _on_one_line(match: re.Match) -> str:
 
 
 def _ply(mesh: shapes.Mesh) -> bytes:
+    import trimesh  # takes a second
+
     visual = None if mesh.uvs is None else trimesh.visual.TextureVisuals(uv=mesh.uvs)
     whole = trimesh.Trimesh(
         vertices=mesh.vertices,
