@@ -19,7 +19,7 @@
 /* What the whole tree shares. */
 typedef struct {
     global float8 *items, *nodes;
-    float pad;      /* of the nodes' boxes */
+    float reach;    /* the largest coordinate of the scene */
     uint leaf_size; /* items of a leaf, at most */
 } Build;
 
@@ -65,20 +65,21 @@ inline float8 build_item(float4 lo, float4 hi, uint index, float area)
 
 inline uint item_index(float8 item) { return as_uint(item.s3) & ~BVH_ITEM; }
 
-/* By how much nodes are larger than what they hold: a few rounding errors of the scene's size, so
- * that no ray from within it slips between two that touch, nor along a side. */
-inline float build_pad(float8 scene)
+inline float build_reach(float8 scene)
 {
     float4 reach = fmax(fabs(scene.lo), fabs(scene.hi));
-    return 0x1p-21f * fmax(reach.x, fmax(reach.y, reach.z));
+    return fmax(reach.x, fmax(reach.y, reach.z));
 }
 
-inline float8 build_node(float8 bounds, float pad, uint link, uint count)
+/* Nodes are larger than what they hold by an ulp or two, and a trifle where a coordinate is 0: rays in
+ * the very plane of a side, whose direction has no component across it, are inside. */
+inline float8 build_node(float8 bounds, float reach, uint link, uint count)
 {
-    float8 node = (float8)(bounds.lo - pad, pad - bounds.hi);
-    node.s3 = as_float(link);
-    node.s7 = as_float(count);
-    return node;
+    float4 lo = bounds.lo - fabs(bounds.lo) * 0x1p-22f - reach * 0x1p-40f;
+    float4 hi = -bounds.hi + fabs(bounds.hi) * 0x1p-22f + reach * 0x1p-40f;
+    lo.w = as_float(link);
+    hi.w = as_float(count);
+    return (float8)(lo, hi);
 }
 
 /* --- items --- */
@@ -218,11 +219,11 @@ inline uint build_cut(global float8 *items, Range r, float8 span, Half *left, Ha
 inline int build_range(const Build *b, Range r, Half h, Range children[2], Half halves[2])
 {
     if (r.count <= b->leaf_size) {
-        b->nodes[r.node] = build_node(h.bounds, b->pad, BVH_LEAF | r.first, r.count);
+        b->nodes[r.node] = build_node(h.bounds, b->reach, BVH_LEAF | r.first, r.count);
         return 0;
     }
     uint mid = build_cut(b->items, r, h.span, &halves[0], &halves[1]);
-    b->nodes[r.node] = build_node(h.bounds, b->pad, 2 * mid, r.count);
+    b->nodes[r.node] = build_node(h.bounds, b->reach, 2 * mid, r.count);
     children[0] = (Range){2 * mid, r.first, mid - r.first, r.depth + 1};
     children[1] = (Range){2 * mid + 1, mid, r.first + r.count - mid, r.depth + 1};
     return 1;
@@ -248,7 +249,7 @@ kernel APART void build_level(global float8 *restrict items, global float8 *rest
                               uint begin, uint leaf_size)
 {
     uint k = begin + get_global_id(0);
-    Build b = {items, nodes, build_pad(halves[0].bounds), leaf_size};
+    Build b = {items, nodes, build_reach(halves[0].bounds), leaf_size};
     Range r = ranges[k], children[2] = {{0, 0, 0, 0}, {0, 0, 0, 0}};
     Half sides[2];
     if (r.count && build_range(&b, r, halves[k], children, sides)) {
@@ -263,7 +264,7 @@ kernel APART void build_subtree(global float8 *restrict items, global float8 *re
                                 global const Range *restrict ranges,
                                 global const Half *restrict halves, uint begin, uint leaf_size)
 {
-    Build b = {items, nodes, build_pad(halves[0].bounds), leaf_size};
+    Build b = {items, nodes, build_reach(halves[0].bounds), leaf_size};
     Range waiting[BVH_DEPTH];
     Half waiting_halves[BVH_DEPTH];
     int n = 0;

@@ -1,9 +1,11 @@
 /* A ray as the one-ray traversals keep it, and its test against one box.
  *
- * Boxes are widened by a few rounding errors at the ray's distance, so that no ray slips between
- * two that touch.
+ * Differences of coordinates come first, so that errors are relative to the distance from the ray's
+ * origin; far planes are put a few of them farther, so that no ray slips between two boxes that touch.
  */
 #include "bvh/node.cl"
+
+#define RAY_WIDER 1.0000005f /* 1 + 2^-21 */
 
 typedef struct {
     float3 o, d, r; /* r = 1 / d */
@@ -41,7 +43,7 @@ inline float ray_enter(const Ray *ray, float8 node, float t)
     float z0 = (node.s2 - ray->o.z) * ray->r.z, z1 = (node.s6 - ray->o.z) * ray->r.z;
     float near = ray_max(ray_max(ray_min(x0, x1), ray_min(y0, y1)), ray_min(z0, z1));
     float far = ray_min(ray_min(ray_max(x0, x1), ray_max(y0, y1)), ray_max(z0, z1));
-    far += 5e-7f * fabs(far);
     near = ray_max(near, ray->tmin);
+    far = ray_max(far, far * RAY_WIDER); /* a negative one is as it was */
     return near <= ray_min(far, t) ? near : INFINITY;
 }

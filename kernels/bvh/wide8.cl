@@ -10,9 +10,10 @@
 #define WIDE8_STACK (7 * BVH_DEPTH + 8) /* a node on the way leaves 7 children waiting */
 
 typedef struct {
-    float rx, ry, rz, tmin; /* 1 / d */
-    float qx, qy, qz;       /* o / d */
-    uint nx, ny, nz;        /* rows of a node with the near planes; the far ones are in row ^ 1 */
+    float ox, oy, oz, tmin;
+    float rx, ry, rz;    /* 1 / d */
+    float fx, fy, fz;    /* the same for far planes, by rounding errors longer */
+    uint nx, ny, nz;     /* rows of a node with the near planes; the far ones are in row ^ 1 */
     Shear shear;
 } Wide8Ray;
 
@@ -22,8 +23,8 @@ inline float8 wide8_max(float8 a, float8 b) { return a > b ? a : b; }
 inline Wide8Ray wide8_ray(float ox, float oy, float oz, float dx, float dy, float dz, float tmin)
 {
     float rx = ray_reciprocal(dx), ry = ray_reciprocal(dy), rz = ray_reciprocal(dz);
-    Wide8Ray r = {rx, ry, rz, tmin, ox * rx, oy * ry, oz * rz, rx < 0.0f, 2 + (ry < 0.0f),
-                  4 + (rz < 0.0f), shear_make(ox, oy, oz, dx, dy, dz)};
+    Wide8Ray r = {ox, oy, oz, tmin, rx, ry, rz, rx * RAY_WIDER, ry * RAY_WIDER, rz * RAY_WIDER,
+                  rx < 0.0f, 2 + (ry < 0.0f), 4 + (rz < 0.0f), shear_make(ox, oy, oz, dx, dy, dz)};
     return r;
 }
 
@@ -31,9 +32,9 @@ inline Wide8Ray wide8_ray(float ox, float oy, float oz, float dx, float dy, floa
 inline Mask8 wide8_boxes(global const float *node, const Wide8Ray *r, float t, float8 *entry)
 {
     global const float8 *row = (global const float8 *)node;
-    float8 x = mad(row[r->nx], r->rx, -r->qx), far_x = mad(row[r->nx ^ 1], r->rx, -r->qx);
-    float8 y = mad(row[r->ny], r->ry, -r->qy), far_y = mad(row[r->ny ^ 1], r->ry, -r->qy);
-    float8 z = mad(row[r->nz], r->rz, -r->qz), far_z = mad(row[r->nz ^ 1], r->rz, -r->qz);
+    float8 x = (row[r->nx] - r->ox) * r->rx, far_x = (row[r->nx ^ 1] - r->ox) * r->fx;
+    float8 y = (row[r->ny] - r->oy) * r->ry, far_y = (row[r->ny ^ 1] - r->oy) * r->fy;
+    float8 z = (row[r->nz] - r->oz) * r->rz, far_z = (row[r->nz ^ 1] - r->oz) * r->fz;
     *entry = wide8_max(wide8_max(x, y), wide8_max(z, (float8)(r->tmin)));
     float8 exit = wide8_min(wide8_min(far_x, far_y), wide8_min(far_z, (float8)(t)));
     return mask8(*entry <= exit);

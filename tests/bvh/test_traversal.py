@@ -148,6 +148,28 @@ def test_nothing_escapes_from_a_closed_surface(device, trace, layout, lanes, lev
     assert escaped == (0, 0)
 
 
+@pytest.mark.parametrize("layout", ["binary", "wide8"])
+def test_nothing_slips_through_from_afar(device, trace, layout):
+    """A small sphere on a vast ground, seen from a thousand times its size away."""
+    rng = np.random.default_rng(14)
+    sphere = trimesh.creation.icosphere(5)
+    ground = 1e4 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) - [0, 0, 1]
+    vertices = np.concatenate([sphere.vertices, ground])
+    first = len(sphere.vertices)
+    faces = np.concatenate([sphere.faces, first + np.array([[0, 1, 2], [0, 2, 3]])])
+    tree = bvh.build(device, vertices, faces, layout=layout)
+    at = rng.normal(0, 1, (200_000, 3))
+    at *= 0.8 * rng.random((len(at), 1)) ** (1 / 3) / np.linalg.norm(at, axis=1, keepdims=True)
+    o = rng.normal(0, 1, at.shape)
+    o *= 1000 / np.linalg.norm(o, axis=1, keepdims=True)
+    o[:, 2] = np.abs(o[:, 2]) + 1
+    ends = [np.full((len(o), 1), end) for end in (0, np.inf)]
+    rays = np.concatenate([o, ends[0], at - o, ends[1]], 1).astype(np.float32)
+    hits, occluded = trace(tree, rays)
+    assert occluded.all()
+    assert (hits["prim"] < len(sphere.faces)).all()
+
+
 SPHERES = """
 #include "bvh/ray.cl"
 typedef global const float4 *ShapeTable;
