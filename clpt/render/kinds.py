@@ -80,15 +80,23 @@ def _member(
 
 def emission_text(found: frozenset[str]) -> str:
     """Return `emission_load(scene, at, uv, lambdas)`, which reads five words of `lamps`."""
-    param = Param("emission", "", textured=True)
-    body = _member("value", param, "spectrum", "at", found, "lamps")
-    head = "inline Spectrum emission_load(Scene scene, integer at, vec2 uv, Wavelengths lambdas)"
+    return _value_text("emission_load", Param("emission", "", textured=True), found, "lamps")
+
+
+def mixture_text(found: frozenset[str]) -> str:
+    """Return `mixture_weight(scene, at, uv, lambdas)`, which reads two words of `mixtures`."""
+    return _value_text("mixture_weight", Param("real", "", textured=True), found, "mixtures")
+
+
+def _value_text(name: str, param: Param, found: frozenset[str], table: str) -> str:
+    """A function that loads a single parameter."""
+    form = lane_type(param)
     return "\n".join(
         [
-            head,
+            f"inline {form} {name}(Scene scene, integer at, vec2 uv, Wavelengths lambdas)",
             "{",
-            "    struct { Spectrum value; } r;",
-            *body,
+            f"    struct {{ {form} value; }} r;",
+            *_member("value", param, form.lower(), "at", found, table),
             "    return r.value;",
             "}",
             "",

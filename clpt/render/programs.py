@@ -90,6 +90,7 @@ def _shared(features: Features, layout: str) -> dict[str, str]:
         "generated/camera.cl": _camera_text(features.camera),
         "generated/textures.cl": textures.dispatch_text(features.textures, features.texture_roles),
         "generated/lights.cl": _lights_text(features),
+        "generated/mixture.cl": _mixture_text(features),
         "generated/shapes.cl": _tangents_text(features),
         "generated/trace.cl": _trace_text(layout),
         "generated/layout.cl": f'#include "bvh/{layout}.cl"\n#define LAYOUT(verb) {layout}_##verb\n',
@@ -147,7 +148,13 @@ def _camera_text(kind: str) -> str:
 def _lights_text(features: Features) -> str:
     """The loader of emissions, from wherever they come in this scene, and the lights' dispatch."""
     found = features.sources.get("emission", {}).get("value", frozenset({"constant"}))
-    return kinds.emission_text(found) + lights.dispatch_text(features.lights)
+    return kinds.emission_text(found) + lights.dispatch_text(features.lights, "texture" in found)
+
+
+def _mixture_text(features: Features) -> str:
+    """The loader of the weights of masks and blends."""
+    found = features.sources.get("mixture", {}).get("weight", frozenset({"constant"}))
+    return kinds.mixture_text(found)
 
 
 def _trace_text(layout: str) -> str:

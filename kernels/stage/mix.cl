@@ -5,6 +5,7 @@
 #include "generated/sampler.cl"
 #include "lib/shape.cl"
 #include "generated/textures.cl"
+#include "generated/mixture.cl"
 #include "generated/shapes.cl"
 #include "lib/surface.cl"
 
