@@ -62,8 +62,8 @@ def build(
     comes back in its hits (zeros if None). Buffers of these types are read in place, not checked.
     layout: a key of LAYOUTS; None asks `choose_layout`.
 
-    While it runs it takes up to 280 bytes a triangle on the device for wide8, 170 for binary, 110
-    for brute, of which about 70, 130 and 64 stay; no buffer is larger than 64 bytes a triangle.
+    While it runs it takes up to 280 bytes a triangle on the device for wide8 and 170 for
+    binary, of which about 70 and 130 stay; single buffers up to 64 bytes a triangle.
     Trees are never deeper than BVH_DEPTH of kernels/bvh/node.cl: traversals cannot overflow.
 
     Raises SceneError for vertices that are not finite or beyond 1e12 and for indices out of range,

@@ -35,15 +35,26 @@ class Packed:
 
 
 def brute(building: Building, mesh: Mesh) -> Packed:
-    """Records of the triangles in the caller's order."""
-    items, _ = tree.items_of_triangles(building, mesh.count, mesh.vertices, mesh.faces)
-    return Packed({"tris": _records(building, mesh, items, with_edges=True)}, {})
+    """Records of the triangles, on the host: so few are not worth compiling a kernel for."""
+    size = mesh.vertices.size // 12
+    vertices = building.read(mesh.vertices, 3 * size, np.float32).reshape(size, 3)
+    faces = building.read(mesh.faces, 3 * mesh.count, np.uint32).reshape(-1, 3)
+    v0, v1, v2 = vertices[faces].transpose(1, 0, 2)
+    edges = [v1 - v0, v2 - v0]
+    words = np.zeros((mesh.count, 4), np.uint32)
+    words[:, 0] = np.arange(mesh.count)
+    words[:, 1] = building.read(mesh.tags, mesh.count, np.uint32)
+    records = np.concatenate([v0, *edges, np.cross(*edges), words.view(np.float32)], 1)
+    return Packed({"tris": building.upload(records, np.float32)}, {})
 
 
 def binary(building: Building, mesh: Mesh) -> Packed:
     """The binary tree as it was built, and records in the order of its leaves."""
     built = _binary_tree(building, mesh, _BINARY_LEAF)
-    records = _records(building, mesh, built.items, with_edges=False)
+    records = building.allocate(64 * mesh.count)
+    source = {"vertices": mesh.vertices, "faces": mesh.faces, "tags": mesh.tags}
+    packing = {"items": built.items, "records": records}
+    building.run_each("bvh/pack.cl", "pack_triangles", mesh.count, **packing, **source)
     return Packed({"nodes": built.nodes, "leaves": records}, {})
 
 
@@ -86,13 +97,3 @@ LAYOUTS: dict[str, Callable[[Building, Mesh], Packed]] = {
 def _binary_tree(building: Building, mesh: Mesh, leaf_size: int) -> tree.Tree:
     items, parts = tree.items_of_triangles(building, mesh.count, mesh.vertices, mesh.faces)
     return tree.over(building, mesh.count, items, parts, leaf_size)
-
-
-def _records(building: Building, mesh: Mesh, items: cl.Buffer, with_edges: bool) -> cl.Buffer:
-    records = building.allocate(64 * mesh.count)
-    source = {"vertices": mesh.vertices, "faces": mesh.faces, "tags": mesh.tags}
-    building.run_each(
-        "bvh/pack.cl", "pack_triangles", mesh.count, items=items, with_edges=with_edges,
-        records=records, **source,
-    )  # fmt: skip
-    return records

@@ -9,7 +9,7 @@ import pyopencl as cl
 
 from .building import Building
 
-_PROGRAM = "bvh/build.cl"
+_BUILD, _PACK = "bvh/build.cl", "bvh/pack.cl"
 _RUN = 2048  # items whose bounds one work-item finds
 _SUBTREES = 64  # for each compute unit, so that they even out
 
@@ -32,12 +32,12 @@ def items_of_triangles(
     building: Building, count: int, vertices: cl.Buffer, faces: cl.Buffer
 ) -> tuple[cl.Buffer, cl.Buffer]:
     """The triangles' boxes in the caller's order, and what `over` needs beside them."""
-    return _items(building, "build_triangles", count, vertices=vertices, faces=faces)
+    return _items(building, "items_of_triangles", count, vertices=vertices, faces=faces)
 
 
 def items_of_boxes(building: Building, count: int, boxes: cl.Buffer) -> tuple[cl.Buffer, cl.Buffer]:
     """The same of boxes given by a low and a high corner."""
-    return _items(building, "build_boxes", count, boxes=boxes)
+    return _items(building, "items_of_boxes", count, boxes=boxes)
 
 
 def _items(
@@ -46,7 +46,7 @@ def _items(
     n_parts = -(-count // _RUN)
     items, parts = building.allocate(32 * count), building.allocate(64 * n_parts)
     building.run(
-        _PROGRAM, kernel, n_parts, count=count, run=_RUN, items=items, halves=parts, **source
+        _PACK, kernel, n_parts, count=count, run=_RUN, items=items, extents=parts, **source
     )
     return items, parts
 
@@ -58,13 +58,13 @@ def over(
     wanted = _SUBTREES * building.device.info.compute_units
     levels = int(math.log2(max(1, min(wanted, count // leaf_size))))
     ranges = building.allocate(16 * (2 << levels))
-    halves = building.allocate(64 * (2 << levels))
+    extents = building.allocate(64 * (2 << levels))
     nodes = building.allocate(64 * count)
     n_parts = -(-count // _RUN)
-    heap = {"ranges": ranges, "halves": halves}
-    building.run(_PROGRAM, "build_root", 1, parts=parts, n_parts=n_parts, count=count, **heap)
+    heap = {"ranges": ranges, "extents": extents}
+    building.run(_BUILD, "build_root", 1, parts=parts, n_parts=n_parts, count=count, **heap)
     shared = {"items": items, "nodes": nodes, "leaf_size": leaf_size, **heap}
     for level in range(levels):
-        building.run(_PROGRAM, "build_level", 1 << level, begin=(1 << level) - 1, **shared)
-    building.run(_PROGRAM, "build_subtree", 1 << levels, begin=(1 << levels) - 1, **shared)
+        building.run(_BUILD, "build_level", 1 << level, begin=(1 << level) - 1, **shared)
+    building.run(_BUILD, "build_subtree", 1 << levels, begin=(1 << levels) - 1, **shared)
     return Tree(items, nodes, ranges, levels)

@@ -1,7 +1,8 @@
 /* Every triangle against every ray, in lanes: the layout for tiny scenes.
  *
- * `tris` holds the triangle records of pack.cl in the caller's order. A record is read once and
- * tested against all lanes of the work-item.
+ * `tris` holds a record of 16 floats for each triangle, in the caller's order: v0, e1 = v1 - v0,
+ * e2 = v2 - v0, n = cross(e1, e2), prim, tag, two unused. A record is read once and tested against
+ * all lanes of the work-item.
  */
 #include "bvh/hit.cl"
 #include "lib/lanes.cl"

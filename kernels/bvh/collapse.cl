@@ -9,8 +9,9 @@
  * their words, and a spare one; a child's word is its wide node, or its block with BVH_LEAF set.
  * Blocks are 11 rows: v0, v1, v2 (x, y, z each), prim, tag.
  */
-#include "bvh/build.cl"
 #include "bvh/hit.cl"
+#include "bvh/items.cl"
+#include "bvh/node.cl"
 
 #define COLLAPSE_NODE_COST 1.0f
 #define COLLAPSE_BLOCK_COST 1.0f
