@@ -63,6 +63,7 @@ def figures(worker: Worker, shots: Sequence[Shot], spp: int, against: Reference)
         "sampler": worker.sampler,
         "spp": spp,
         "seconds": seconds,
+        "cpu_seconds": statistics.median(shot.cpu for shot in shots),
         "msamples": spp * pixels / seconds * 1e-6,
         "relmse": full,
         "relmse_trimmed": trimmed,
@@ -86,16 +87,13 @@ def compare(
             if number > 0:  # the first one compiles
                 taken.append(shot)
     rows = [figures(w, taken, spp, against) for w, taken in zip(workers, shots, strict=True)]
-    times = {
-        key: [shot.seconds for shot in taken] for key, taken in zip(CONTENDERS, shots, strict=True)
-    }
-    for row in rows:
+    for row, ours in zip(rows, shots, strict=True):
         if row["renderer"] == "clpt":
-            ours = times["clpt", row["sampler"]]
-            theirs = times["mitsuba", RIVAL[row["sampler"]]]
-            rival = rows[CONTENDERS.index(("mitsuba", RIVAL[row["sampler"]]))]
-            faster = statistics.median(b / a for a, b in zip(ours, theirs, strict=True))
+            index = CONTENDERS.index(("mitsuba", RIVAL[row["sampler"]]))
+            rival, pairs = rows[index], list(zip(ours, shots[index], strict=True))
+            faster = statistics.median(b.seconds / a.seconds for a, b in pairs)
             row["speed_ratio"] = faster
+            row["cpu_ratio"] = statistics.median(b.cpu / a.cpu for a, b in pairs)
             for which in ("", "_trimmed"):
                 gain = rival[f"relmse{which}"] / row[f"relmse{which}"]
                 row[f"efficiency{which}_ratio"] = faster * gain
@@ -109,7 +107,7 @@ def compare(
 def shown(rows: Sequence[dict]) -> Iterator[list[str]]:
     """Rows as cells of a table."""
     for row in rows:
-        ratio = [row.get(key) for key in ("speed_ratio", "efficiency_ratio")]
+        ratio = [row.get(key) for key in ("speed_ratio", "cpu_ratio", "efficiency_ratio")]
         off = np.subtract(row["mean_ratio"], 1) * 100
         worst = int(np.abs(off).argmax())
         yield [
@@ -128,7 +126,7 @@ def shown(rows: Sequence[dict]) -> Iterator[list[str]]:
 
 HEADINGS = (
     "scene", "mode", "renderer", "sampler", "Msamples/s", "relMSE", "trimmed", "efficiency",
-    "speed : Mitsuba", "efficiency : Mitsuba", "mean - reference",
+    "speed : Mitsuba", "by CPU time", "efficiency : Mitsuba", "mean - reference",
 )  # fmt: skip
 
 

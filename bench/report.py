@@ -39,7 +39,7 @@ def renders(rows: Sequence[Row]) -> str:
     def cells(row: Row) -> list[str]:
         off = (np.array(row["mean_ratio"]) - 1) * 100
         worst = int(np.abs(off).argmax())
-        ratios = (row.get("speed_ratio"), row.get("efficiency_ratio"))
+        ratios = (row.get(f"{name}_ratio") for name in ("speed", "cpu", "efficiency"))
         return [
             *(str(row[name]) for name in ("scene", "mode", "renderer", "sampler", "threads")),
             f"{row['msamples']:.3f}",
@@ -51,7 +51,8 @@ def renders(rows: Sequence[Row]) -> str:
 
     headings = [
         *("scene", "mode", "renderer", "sampler", "threads", "Msamples/s"),
-        *("relMSE / trimmed", "efficiency", "speed : Mitsuba", "efficiency : Mitsuba"),
+        *("relMSE / trimmed", "efficiency", "speed : Mitsuba", "by CPU time"),
+        "efficiency : Mitsuba",
         "mean - reference",
     ]
     return table(headings, map(cells, rows)) + "\n" + stages(rows)

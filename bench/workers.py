@@ -24,10 +24,14 @@ _open: Any = None  # what this process renders
 
 @dataclass(frozen=True)
 class Shot:
-    """One picture: (h, w, 3) float32, and the seconds from the call to the picture on the host."""
+    """One picture: (h, w, 3) float32, and the seconds from the call to the picture on the host.
+
+    cpu: processor time of the process meanwhile, which other work on the machine hardly moves.
+    """
 
     image: np.ndarray
     seconds: float
+    cpu: float
 
 
 class Worker:
@@ -148,9 +152,9 @@ def _start(opener: Any, scene: Path, mode: str, sampler: str) -> str:
 
 
 def _render(spp: int, number: int) -> Shot:
-    start = time.perf_counter()
+    start, cpu = time.perf_counter(), time.process_time()
     image = _open.render(spp, number)
-    return Shot(image, time.perf_counter() - start)
+    return Shot(image, time.perf_counter() - start, time.process_time() - cpu)
 
 
 def _stages(spp: int) -> dict[str, Any]:
