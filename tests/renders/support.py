@@ -54,38 +54,45 @@ def blocks(images: ArrayLike, size: int = 4) -> Values:
     return a.mean(axis=(-4, -2))
 
 
-def agreement(ours: ArrayLike, reference: ArrayLike) -> float:
+def agreement(ours: ArrayLike, reference: ArrayLike, allowed: float = 0.0) -> float:
     """How likely such a difference is where both have the same expectation.
 
     ours: (k, ...), k independent estimates of each value; reference: (m, ...) likewise, or (1, ...)
-    for values that are exact. Welch's t-test of every value; the smallest probability is corrected
-    for their number (Sidak 1967). What float32 rounds counts as spread.
+    for values that are exact. allowed: a relative difference that is none. Welch's t-test of every
+    value; the smallest probability is corrected for their number (Sidak 1967). What float32 rounds
+    counts as spread.
     """
     a, b = np.asarray(ours, np.float64), np.asarray(reference, np.float64)
-    rounding = (ROUNDING * np.abs(b).mean(axis=0)) ** 2 + 1e-16
-    va = a.var(axis=0, ddof=1) / len(a) + rounding
+    size = np.abs(b).mean(axis=0)
+    va = a.var(axis=0, ddof=1) / len(a) + (ROUNDING * size) ** 2 + 1e-16
     vb = b.var(axis=0, ddof=1) / len(b) if len(b) > 1 else np.zeros(b.shape[1:])
-    t = (a.mean(axis=0) - b.mean(axis=0)) / np.sqrt(va + vb)
+    off = np.abs(a.mean(axis=0) - b.mean(axis=0))
+    t = np.maximum(off - allowed * size, 0.0) / np.sqrt(va + vb)
     freedom = va**2 / (len(a) - 1) + (vb**2 / (len(b) - 1) if len(b) > 1 else 0.0)
-    p = 2.0 * stats.t.sf(np.abs(t), (va + vb) ** 2 / freedom)
+    p = 2.0 * stats.t.sf(t, (va + vb) ** 2 / freedom)
     return float(-np.expm1(p.size * np.log1p(-min(p.min(), 1.0 - 1e-12))))
 
 
-def assert_agree(ours: ArrayLike, reference: ArrayLike, what: str = "") -> None:
+def assert_agree(
+    ours: ArrayLike, reference: ArrayLike, what: str = "", allowed: float = 0.0
+) -> None:
     """Fail where `agreement` is below SIGNIFICANCE; the message tells the means."""
-    p = agreement(ours, reference)
+    p = agreement(ours, reference, allowed)
     a, b = np.mean(ours, axis=(0, -3, -2)), np.mean(reference, axis=(0, -3, -2))
     assert p > SIGNIFICANCE, f"{what}: p = {p:.1e}; mean {a}, reference {b}, ratio {a / b}"
 
 
-def assert_mean(ours: ArrayLike, expected: ArrayLike, within: float) -> None:
+def assert_mean(
+    ours: ArrayLike, expected: ArrayLike, within: float, allowed: float = 2e-4
+) -> None:
     """Fail where the mean picture is off by more than chance, or by more than a share `within`.
 
-    ours: (k, h, w, 3) exposures; expected: (3,) or broadcast to it, the exact mean.
+    ours: (k, h, w, 3) exposures; expected: (3,) or broadcast to it, the exact mean; allowed: what
+    the offset of rays from their surface may change.
     """
     means = np.asarray(ours, np.float64).mean(axis=(1, 2))
     exact = np.broadcast_to(np.asarray(expected, np.float64), means.shape[1:])
-    p = agreement(means, exact[None])
+    p = agreement(means, exact[None], allowed)
     mean = means.mean(axis=0)
     assert p > SIGNIFICANCE, f"p = {p:.1e}; mean {mean}, expected {exact}, ratio {mean / exact}"
     assert np.allclose(mean, exact, rtol=within, atol=1e-9), f"mean {mean}, expected {exact}"

@@ -22,12 +22,16 @@ SCENES = (
     "cornell", "delta_lights", "envmap", "glass_metal", "orthographic", "plastic", "textures",
     "thin_lens",
 )  # fmt: skip
-MODES = ("rgb", "spectral")
+# Mitsuba's envmap is up to a quarter off its own RGB picture in spectral mode, where texels are
+# saturated; tests/renders/test_modes.py holds ours to the RGB picture instead.
+CASES = [(name, mode) for name in SCENES for mode in ("rgb", "spectral")]
+CASES.remove(("envmap", "spectral"))
 MEAN_WITHIN = 0.015  # relative; at a quick test's number of samples most of it is noise
+COLOURS = 2e-3  # relative; the steps of the two programs' colour tables differ
 
 
 def mitsuba_exposures(path: Path, mode: str, count: int, spp: int, **defaults: int) -> np.ndarray:
-    """Render `count` times with Mitsuba: (count, h, w, 3) float64. `defaults` fill in its $names."""
+    """Render `count` times with Mitsuba: (count, h, w, 3) float64; `defaults` fill in $names."""
     mi.set_variant(f"scalar_{mode}")  # of its variants the ones that need no LLVM
     scene = mi.load_file(str(path), **{name: str(value) for name, value in defaults.items()})
     images = [np.array(mi.render(scene, spp=spp, seed=seed))[:, :, :3] for seed in range(count)]
@@ -39,21 +43,19 @@ def compare(path: Path, mode: str, count: int, spp: int, within: float) -> None:
     reference = mitsuba_exposures(path, mode, count, spp)
     ours = exposures(with_film(clpt.load(path), mode=mode), 2 * count, spp)
     ratio = ours.mean() / reference.mean()
-    assert_agree(blocks(ours), blocks(reference), f"blocks of {path.stem}, {mode}")
+    assert_agree(blocks(ours), blocks(reference), f"blocks of {path.stem}, {mode}", COLOURS)
     means = [a.mean(axis=(1, 2), keepdims=True) for a in (ours, reference)]
-    assert_agree(*means, f"mean of {path.stem}, {mode}")
+    assert_agree(*means, f"mean of {path.stem}, {mode}", COLOURS)
     assert abs(ratio - 1.0) < within, f"mean radiance is {ratio:.4f} of Mitsuba's"
 
 
-@pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(("name", "mode"), CASES)
 def test_pictures(scenes: Path, name: str, mode: str) -> None:
     compare(scenes / f"{name}.xml", mode, 24, 8, MEAN_WITHIN)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(("name", "mode"), CASES)
 def test_pictures_of_many_samples(scenes: Path, name: str, mode: str) -> None:
     compare(scenes / f"{name}.xml", mode, 64, 64, 0.003)
 
@@ -63,7 +65,5 @@ def test_depths(scenes: Path, depth: int) -> None:
     """A path of depth 1 sees lights only, 2 adds direct light, 3 one reflection more."""
     path = scenes / "cornell.xml"
     reference = mitsuba_exposures(path, "rgb", 16, 4, max_depth=depth)
-    ours = exposures(
-        with_path(with_film(clpt.load(path), mode="rgb"), max_depth=depth), 32, 4
-    )
-    assert_agree(blocks(ours), blocks(reference))
+    scene = with_path(with_film(clpt.load(path), mode="rgb"), max_depth=depth)
+    assert_agree(blocks(exposures(scene, 32, 4)), blocks(reference), allowed=COLOURS)
