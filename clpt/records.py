@@ -16,10 +16,7 @@ PATH = Record(
     beta=("spectrum", "throughput, per wavelength"),
     radiance=("spectrum", "what the path has gathered so far"),
     lambdas=("spectrum", "wavelengths [nm]; unused in RGB mode"),
-    pdf=(
-        "real",
-        "of the direction d [1/sr]; below 0 if the last event was delta, or at the camera",
-    ),
+    pdf=("real", "of d [1/sr]; below 0 if the last event was delta; at the camera, -(its far end)"),
     eta=("real", "product of the relative indices so far, for Russian roulette"),
     weight=("real", "of the sample, from the pixel filter"),
     state=("integer", "PATH_ bits and depth, see kernels/lib/path_state.cl"),
@@ -66,6 +63,7 @@ SETTINGS = Record(
     rr_depth=("integer", "depth from which Russian roulette is played"),
     hide_lights=("integer", "1: the camera does not see lights"),
     light_count=("integer", "rows in `lights`"),
+    ambient=("integer", "first word in `lamps` of what the whitted integrator adds everywhere"),
     first_analytic=("integer", "row in `shapes` of the first shape that is not of triangles"),
     infinite_count=("integer", "how many of them are infinite; these come first"),
     lambda_min=("real", "[nm]"),
@@ -86,7 +84,7 @@ SHAPE = Record(
     flags=("integer", "SHAPE_ bits, see kernels/lib/surface.cl"),
     prim=("integer", "its first primitive"),
     params=("integer", "first word of its parameters in `geometry`; analytic shapes"),
-    spare=("integer", "keeps rows at 32 bytes"),
+    number=("integer", "its place among the scene's shapes"),
 )
 
 LIGHT = Record(

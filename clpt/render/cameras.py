@@ -15,11 +15,13 @@ from clpt.scene.cameras import Camera, Matrix, Orthographic, Perspective, Spheri
 
 _TO_WORLD = ("matrix", "camera space to world, row-major")
 _NEAR = ("real", "distance of the near plane [m]")
+_FAR = ("real", "distance of the far plane [m]")
 _PINHOLE = {
     "to_world": _TO_WORLD,
     "extent": ("vec2", "width and height of the film at distance 1"),
     "offset": ("vec2", "of the principal point, in widths and heights of the film"),
     "near": _NEAR,
+    "far": _FAR,
 }
 
 RECORDS: dict[str, Record] = {
@@ -37,6 +39,7 @@ RECORDS: dict[str, Record] = {
         to_world=_TO_WORLD,
         aspect=("real", "height of the film over its width"),
         near=_NEAR,
+        far=_FAR,
     ),
     "spherical": Record("SphericalCamera", "All directions around a point.", to_world=_TO_WORLD),
     "matrix": Record(
@@ -105,6 +108,7 @@ def _pinhole(camera: Perspective, width: int, height: int) -> dict[str, Any]:
         "extent": [pixel * width, pixel * height],
         "offset": [camera.offset_x, camera.offset_y],
         "near": camera.near,
+        "far": camera.far,
     }
 
 
@@ -115,7 +119,8 @@ def _thin_lens(camera: ThinLens, width: int, height: int) -> dict[str, Any]:
 
 def _orthographic(camera: Orthographic, width: int, height: int) -> dict[str, Any]:
     _check_planes(camera)
-    return {"to_world": _to_world(camera), "aspect": height / width, "near": camera.near}
+    planes = {"near": camera.near, "far": camera.far}
+    return {"to_world": _to_world(camera), "aspect": height / width, **planes}
 
 
 def _check_planes(camera: Any) -> None:

@@ -94,8 +94,11 @@ class _Lowering:
             tables.append("shapes", row.reshape(1).view(np.uint32))
         camera, words = cameras.lower_camera(scene.camera, scene.film.width, scene.film.height)
         tables.append_floats("camera", words)
-        integrator = self._integrator()
-        features = self._features(analytic, camera, integrator)
+        if isinstance(scene.integrator, sc.integrators.Aov) and not self.channel:
+            raise SceneError("aov is lowered a channel at a time", where="integrator")
+        ambient = getattr(scene.integrator, "ambient", 0.0)
+        self.ambient = tables.append("lamps", tables.emission_words(ambient)) if ambient else 0
+        features = self._features(analytic, camera)
         arrays = tables.arrays()
         settings = self._settings(center, radius)
         return Lowered(features, settings, arrays, vertices, faces, tags, boxes, self.warnings)
@@ -103,7 +106,7 @@ class _Lowering:
     def _shape(self, number: int, shape: Any, emitters: list) -> np.ndarray:
         """One row of `shapes`; its triangles, or its parameters, go into the tables."""
         row = np.zeros((), SHAPE.dtype)
-        row["spare"] = next(i for i, s in enumerate(self.scene.shapes) if s is shape)
+        row["number"] = next(i for i, s in enumerate(self.scene.shapes) if s is shape)
         row["light"] = -1
         front, back, row["flags"] = self._sides(shape)
         row["front"], row["back"] = np.array([front, back], np.uint32).view(np.int32)
@@ -195,14 +198,7 @@ class _Lowering:
         children = [self._word(m, side, turned, inside) for m in (first, second)]
         return MIXTURE << 24 | self.tables.append("mixtures", [*words, *children])
 
-    def _integrator(self) -> Any:
-        """Put the integrator's own parameters into `lamps`, where its kernel finds them."""
-        integrator = self.scene.integrator
-        if isinstance(integrator, sc.integrators.Aov) and not self.channel:
-            raise SceneError("aov needs a channel", where="integrator")
-        return integrator
-
-    def _features(self, analytic: Any, camera: str, integrator: Any) -> Features:
+    def _features(self, analytic: Any, camera: str) -> Features:
         scene, tables = self.scene, self.tables
         sources = {
             kind: {name: frozenset(found) for name, found in values.items()}
@@ -219,7 +215,7 @@ class _Lowering:
             camera=camera,
             sampler=scene.sampler.kind,
             filter=scene.film.filter.kind,
-            integrator={"direct": "path"}.get(integrator.kind, integrator.kind),
+            integrator={"direct": "path"}.get(scene.integrator.kind, scene.integrator.kind),
             materials=self.leaves,
             lights=self.lights.kinds,
             textures=tuple(sorted({kind for kind, _ in tables.texture_roles})),
@@ -229,7 +225,7 @@ class _Lowering:
             uvs=self.uses["uvs"] or self.uses["tangents"] or self.channel == "uv",
             tangents=self.uses["tangents"],
             mixtures=self.uses["mixtures"],
-            infinite=self.lights.infinite > 0,
+            infinite=self.lights.infinite > 0 and not self.channel,
             light_choice=len(self.lights.rows) > 1,
             dispersion=index_tables,
             channel=self.channel,
@@ -254,6 +250,7 @@ class _Lowering:
         settings["hide_lights"] = getattr(integrator, "hide_lights", False)
         settings["light_count"] = len(self.lights.rows)
         settings["infinite_count"] = self.lights.infinite
+        settings["ambient"] = self.ambient
         settings["first_analytic"] = sum(s.kind not in shapes.ANALYTIC for s in scene.shapes)
         settings["lambda_min"], settings["lambda_max"] = film.lambda_min, film.lambda_max
         settings["tanh_min"], settings["tanh_max"] = tanh_ends(film.lambda_min, film.lambda_max)

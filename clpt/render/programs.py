@@ -12,6 +12,7 @@ from clpt.records import LIGHT, SETTINGS, SHAPE, SLABS, TABLES
 from clpt.render import cameras, kinds, lights, shapes, textures
 from clpt.render.features import Features
 from clpt.scene import materials
+from clpt.scene.params import device_params
 from clpt.spectra import XYZ_TO_REC709
 
 LEAVES = {cls.kind: cls for cls in materials.LEAVES}
@@ -233,6 +234,7 @@ def _tangents_text(features: Features) -> str:
 def _bsdf_text(features: Features, kind: str) -> str:
     """A kind's struct, functions and loader, under the names that the integrators use."""
     cls = LEAVES[kind]
+    reflectivity = "(m).reflectivity" if "reflectivity" in device_params(cls) else "(real)(0.0f)"
     verbs = ("sample", "eval", "pdf", "albedo", "load")
     return "\n".join(
         [
@@ -240,6 +242,7 @@ def _bsdf_text(features: Features, kind: str) -> str:
             f'#include "bsdf/{kind}.cl"',
             kinds.load_text(cls, features.sources.get(kind, {}), "materials"),
             f"typedef {cls.__name__} Bsdf;",
+            f"#define BSDF_REFLECTIVITY(m) {reflectivity}",
             *(f"#define bsdf_{verb} {kind}_{verb}" for verb in verbs),
             "",
         ]

@@ -7,6 +7,7 @@ CameraRay matrix_ray(global const MatrixCamera *camera, vec2 film, vec2 lens)
     CameraRay r;
     r.d = normalize3(v3(AFFINE(direction, 0), AFFINE(direction, 1), AFFINE(direction, 2)));
     r.o = v3(AFFINE(near, 0) * w, AFFINE(near, 1) * w, AFFINE(near, 2) * w);
+    r.far = FAR;
 #undef AFFINE
     return r;
 }

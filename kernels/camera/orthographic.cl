@@ -5,5 +5,6 @@ CameraRay orthographic_ray(global const OrthographicCamera *camera, vec2 film, v
     CameraRay r;
     r.d = normalize3(matrix_vector(camera->to_world, z, z, z + 1.0f));
     r.o = matrix_point(camera->to_world, x, y, z + camera->near);
+    r.far = camera->far - camera->near;
     return r;
 }

@@ -7,5 +7,6 @@ CameraRay perspective_ray(global const PerspectiveCamera *camera, vec2 film, vec
     CameraRay r;
     r.d = normalize3(matrix_vector(camera->to_world, d.x, d.y, d.z));
     r.o = matrix_point(camera->to_world, d.x * near, d.y * near, d.z * near);
+    r.far = (camera->far - camera->near) / d.z;
     return r;
 }

@@ -9,5 +9,6 @@ CameraRay spherical_ray(global const SphericalCamera *camera, vec2 film, vec2 le
     CameraRay r;
     r.d = normalize3(matrix_vector(camera->to_world, st * sp, ct, st * cp));
     r.o = matrix_point(camera->to_world, zero, zero, zero);
+    r.far = FAR;
     return r;
 }

@@ -24,5 +24,6 @@ CameraRay thin_lens_ray(global const ThinLensCamera *camera, vec2 film, vec2 len
     CameraRay r;
     r.d = normalize3(matrix_vector(camera->to_world, d.x, d.y, d.z));
     r.o = matrix_point(camera->to_world, p.x + d.x * near, p.y + d.y * near, d.z * near);
+    r.far = (camera->far - camera->near) / d.z;
     return r;
 }

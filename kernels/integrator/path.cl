@@ -42,15 +42,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     real w = sel(ls.pdf < 0.0f, (real)(1.0f), mis_weight(ls.pdf, bsdf_pdf(m, wo, wi)));
     mask shine = next & (ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
     Spectrum value = spectrum_scale(spectrum_mul(spectrum_mul(beta, f), ls.radiance), w / sel(shine, fabs(ls.pdf), (real)(1.0f)));
-    /* From off the surface to the point on the light: along ls.wi it would meet another one, and a
-     * light seen at a grazing angle would shade itself. */
-    vec3 from = surface_offset(s, ls.wi), to = sub3(madd3(ls.wi, ls.t, s.p), from);
-    real t = sqrt(dot3(to, to));
-    mask near = ls.t < FAR;
-    store_shadow_o(shadow, at, shine, from);
-    store_shadow_d(shadow, at, shine, sel3(near, scale3(to, 1.0f / t), ls.wi));
-    store_shadow_t(shadow, at, active, sel(shine, sel(near, t, ls.t) * SHADOW_SHORTER, (real)(-1.0f)));
-    store_shadow_value(shadow, at, shine, value);
+    shadow_toward(shadow, at, active, shine, s, ls, value);
     state += sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
 #endif
 
@@ -61,7 +53,9 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     vec3 onward = normalize3(to_world(frame, bs.wi));
     beta = spectrum_mul(beta, bs.weight);
 #if USES_DISPERSION
-    beta = hero_only((bs.lobe & LOBE_DISPERSE) != 0, beta);
+    mask parted = ((bs.lobe & LOBE_DISPERSE) != 0) & ((state & PATH_HERO) == 0);
+    beta = spectrum_sel(parted, spectrum_hero(beta), beta);
+    state |= sel_i(next & parted, (integer)(PATH_HERO), (integer)(0));
 #endif
     real eta = load_path_eta(path, at) * bs.eta;
 

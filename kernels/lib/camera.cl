@@ -7,6 +7,7 @@
  */
 typedef struct {
     vec3 o, d; /* [m]; unit length. The origin lies on the near plane. */
+    real far;  /* distance from there to the far plane [m]; FAR: none */
 } CameraRay;
 
 inline vec3 matrix_point(global const float *m, real x, real y, real z) /* row-major, affine */

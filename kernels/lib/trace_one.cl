@@ -11,9 +11,9 @@ typedef Scene ShapeTable;
 #endif
 #include "generated/shape_tree.cl"
 
-inline TraceHit trace_closest(TRACE_ARGS, Scene scene, vec3 o, vec3 d, mask active)
+inline TraceHit trace_closest(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real far, mask active)
 {
-    TriHit t = LAYOUT(closest)(nodes, leaves, o.x, o.y, o.z, d.x, d.y, d.z, 0.0f, FAR);
+    TriHit t = LAYOUT(closest)(nodes, leaves, o.x, o.y, o.z, d.x, d.y, d.z, 0.0f, far);
     TraceHit h = {t.t, t.u, t.v, {t.nx, t.ny, t.nz}, as_int(t.prim), as_int(t.tag)};
 #if USES_ANALYTIC
     uint shape = shapes_closest(shape_nodes, shape_items, scene, o.x, o.y, o.z, d.x, d.y, d.z, 0.0f, &h.t);

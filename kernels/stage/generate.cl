@@ -90,7 +90,7 @@ kernel void generate(SLAB_ARGS, SCENE_ARGS, global float *film, global uint *cou
         store_path_lambdas(path, at, go, lambdas);
         store_path_beta(path, at, go, spectrum_of(1.0f));
         store_path_radiance(path, at, go, spectrum_of(0.0f));
-        store_path_pdf(path, at, go, (real)(-1.0f));
+        store_path_pdf(path, at, go, -ray.far);
         store_path_eta(path, at, go, (real)(1.0f));
         store_path_state(path, at, ended, sel_i(done, (integer)(PATH_DONE), (integer)(PATH_ALIVE)));
     }

@@ -1,5 +1,5 @@
-/* Finds where every ray in flight ends. Triangles go through a layout of kernels/bvh, LAYOUT_LANES
- * rays a work-item; analytic shapes through a tree of their own, one ray at a time. The hit takes
+/* Finds where every ray in flight ends. Triangles go through a layout of kernels/bvh, as many
+ * rays a work-item as it likes; analytic shapes through a tree of their own, one ray at a time. The hit takes
  * along what shading needs first: the normal and the material of the side that was met. */
 #include "lib/base.cl"
 #include "lib/shape.cl"
@@ -11,10 +11,12 @@ kernel void intersect(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS)
     SLABS
     SCENE
     uint at = get_global_id(0) * LANES;
-    mask active = (load_path_state(path, at) & PATH_ALIVE) != 0;
+    integer state = load_path_state(path, at);
+    mask active = (state & PATH_ALIVE) != 0;
     if (any(active)) {
         vec3 o = load_path_o(path, at), d = load_path_d(path, at);
-        TraceHit h = trace_closest(TRACE, scene, o, d, active);
+        real far = sel((state & PATH_DEPTH) == 0, -load_path_pdf(path, at), (real)(FAR));
+        TraceHit h = trace_closest(TRACE, scene, o, d, far, active);
         integer shape = sel_i(h.prim >= 0, h.shape, (integer)(0)), row = shape * SHAPE_ROW_WORDS;
         ShapeRow s = shape_row_row(scene.shapes, row);
         store_hit_t(hit, at, active, h.t);

@@ -8,6 +8,7 @@
 #include "generated/shapes.cl"
 #include "generated/lights.cl"
 #include "lib/surface.cl"
+#include "lib/next_event.cl"
 #include "lib/fresnel.cl"
 #include "lib/microfacet.cl"
 #include "lib/bsdf.cl"

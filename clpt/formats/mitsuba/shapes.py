@@ -29,7 +29,7 @@ def shape(element: Element, context: Context) -> Shape:
     props = Properties(element, context)
     material, emitter = props.object("bsdf"), props.object("emitter")
     parameters: Parameters = {
-        "material": Diffuse() if material is None else bsdf(material, context),
+        "material": _plain(emitter) if material is None else bsdf(material, context),
         "emission": None if emitter is None else area(emitter, context),
         "flip_normals": props.flag("flip_normals", False),
         "name": element.attributes.get("id", ""),
@@ -42,6 +42,11 @@ def shape(element: Element, context: Context) -> Shape:
         made = cls(**parameters)
     props.finish()
     return made
+
+
+def _plain(emitter: Element | None) -> Diffuse:
+    """What a shape without a bsdf is made of: grey, but black where it emits."""
+    return Diffuse() if emitter is None else Diffuse(reflectance=0.0)
 
 
 def _placed_only(props: Properties) -> Parameters:

@@ -1,0 +1,66 @@
+/* The classic ray tracer (Whitted 1980): ambient and direct light, and one ray onward where a surface
+ * mirrors: with the weight of a material's `reflectivity`, or as a delta material sends it. Direct
+ * light comes from one light a sample, chosen at random, so several lights converge to their sum. */
+void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mask active)
+{
+    global const Settings *settings = scene.settings;
+    vec3 o = load_path_o(path, at), d = load_path_d(path, at);
+    Wavelengths lambdas = load_path_lambdas(path, at);
+    Spectrum beta = load_path_beta(path, at), radiance = load_path_radiance(path, at);
+    integer state = load_path_state(path, at), depth = state & PATH_DEPTH;
+    mask front;
+    Surface s = surface_load(scene, hit, at, active, o, d, &front);
+#if USES_SURFACE_LIGHTS
+    mask lit = active & (s.light >= 0) & front;
+    if (any(lit)) {
+        integer light = sel_i(lit, s.light, (integer)(0));
+        Spectrum le = emission_load(scene, light_at(scene, light).radiance, s.uv, lambdas);
+        radiance = spectrum_sel(lit, spectrum_add(radiance, spectrum_mul(beta, le)), radiance);
+    }
+#endif
+    Bsdf m = bsdf_load(scene, MATERIAL_ROW(sel_i(active, load_hit_material(hit, at), (integer)(0))), s.uv, lambdas);
+    Frame frame = surface_frame(s);
+    vec3 wo = to_local(frame, neg3(d));
+    Sampler sampler = sampler_start(settings->seed, as_natural(load_path_place(path, at)), as_natural(load_path_sample(path, at)));
+    natural dimension = as_natural(DIMENSION_VERTEX + depth * DIMENSIONS_A_VERTEX);
+    vec2 choice = sampler_pair(sampler, dimension + DIMENSION_CHOICE);
+    real mirror = BSDF_REFLECTIVITY(m);
+
+#if !BSDF_DELTA
+    Spectrum own = spectrum_scale(beta, 1.0f - mirror);
+    Spectrum ambient = emission_load(scene, (integer)(settings->ambient), s.uv, lambdas);
+    Spectrum everywhere = spectrum_mul(spectrum_mul(own, bsdf_albedo(m)), ambient);
+    radiance = spectrum_sel(active, spectrum_add(radiance, everywhere), radiance);
+#if USES_LIGHTS
+    LightSample ls = light_sample(scene, s.p, choice.x, sampler_pair(sampler, dimension + DIMENSION_LIGHT), lambdas);
+    Spectrum f = bsdf_eval(m, wo, to_local(frame, ls.wi));
+    mask shine = active & (ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
+    Spectrum value = spectrum_scale(spectrum_mul(spectrum_mul(own, f), ls.radiance), 1.0f / sel(shine, fabs(ls.pdf), (real)(1.0f)));
+    shadow_toward(shadow, at, active, shine, s, ls, value);
+    state += sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
+#endif
+    vec3 wi = reflect_z(wo);
+    beta = spectrum_scale(beta, mirror);
+    mask next = active & (mirror > 0.0f) & (wo.z > 0.0f);
+#else
+    vec2 uv = sampler_pair(sampler, dimension + DIMENSION_BSDF);
+    BsdfSample bs = bsdf_sample(m, wo, v3(uv.x, uv.y, choice.y));
+    vec3 wi = bs.wi;
+    beta = spectrum_mul(beta, bs.weight);
+    mask next = active & (bs.pdf > 0.0f);
+#if USES_DISPERSION
+    mask parted = ((bs.lobe & LOBE_DISPERSE) != 0) & ((state & PATH_HERO) == 0);
+    beta = spectrum_sel(parted, spectrum_hero(beta), beta);
+    state |= sel_i(next & parted, (integer)(PATH_HERO), (integer)(0));
+#endif
+#endif
+    next = next & (depth + 1 < settings->max_depth);
+    vec3 onward = normalize3(to_world(frame, wi));
+    store_path_radiance(path, at, active, radiance);
+    store_path_o(path, at, next, surface_offset(s, onward));
+    store_path_d(path, at, next, onward);
+    store_path_beta(path, at, next, beta);
+    store_path_pdf(path, at, next, (real)(-1.0f));
+    state = sel_i(next, state, state - (state & PATH_ALIVE)) + sel_i(active, (integer)(1), (integer)(0));
+    store_path_state(path, at, active, state);
+}
