@@ -116,7 +116,7 @@ def render(
     facts = outputs.metadata(renderer, scene, seconds)
     for target in targets:
         outputs.write(target, renderer, facts, exposure)
-        shown.note(f"{target}  {facts['spp']:g} spp, {seconds:.1f} s")
+        shown.note(f"{target}  {facts['spp']:.4g} spp, {seconds:.1f} s")
     if verbose:
         report.after(renderer)
     return 0 if finished else INTERRUPTED
