@@ -28,7 +28,7 @@ log = logging.getLogger(__name__)
 # a driver's remarks on a program that did build go to the log, not to the terminal
 warnings.filterwarnings("ignore", category=cl.CompilerWarning)
 
-OPTIONS = ("-cl-std=CL1.2", "-cl-kernel-arg-info")
+OPTIONS = ("-cl-std=CL1.2", "-cl-kernel-arg-info", "-w")
 
 _SCALARS = {
     "char": np.int8,

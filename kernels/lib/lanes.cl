@@ -19,6 +19,7 @@ typedef uint natural;
 #define to_real(x) convert_float(x)
 #define to_integer(x) convert_int(x)
 #define to_natural(x) convert_uint(x)
+#undef any
 #define any(m) (m)
 #define LANE_INDEX 0
 #else
@@ -45,6 +46,7 @@ inline int any_lane(int16 m)
 #endif
 typedef integer mask;
 #if LANES > 1
+#undef any
 #define any(m) any_lane(m) /* OpenCL's own any() is slow on some runtimes */
 #endif
 
