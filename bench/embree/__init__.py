@@ -53,7 +53,7 @@ class Embree:
         self.build_seconds = self._library.harness_build_seconds(self._harness)
 
     def closest(self, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-        """t (n,), prim (n,) uint32 (2^32 - 1: none), and the seconds it took."""
+        """t (n,), prim (n,) uint32 (2^32 - 1: none), and the seconds of processor time it took."""
         t, prim = np.empty(len(rays), np.float32), np.empty(len(rays), np.uint32)
         count = ctypes.c_size_t(len(rays))
         seconds = self._library.harness_closest(

@@ -13,7 +13,7 @@ typedef struct { RTCDevice device; RTCScene scene; double seconds; } Harness;
 static double now(void)
 {
     struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t); /* a busy machine leaves it alone */
     return t.tv_sec + 1e-9 * t.tv_nsec;
 }
 
