@@ -1,6 +1,7 @@
 /* Ends what is finished and begins what comes next: a path that missed gathers the light from
  * infinity, a path that ended is put on the film, and its slot starts the next sample of its list. */
 #include "lib/base.cl"
+#include "bvh/apart.cl"
 #include "generated/sampler.cl"
 #include "lib/camera.cl"
 #include "generated/camera.cl"
@@ -10,7 +11,7 @@
 #include "lib/light.cl"
 #include "generated/lights.cl"
 
-kernel void generate(SLAB_ARGS, SCENE_ARGS, global float *film, global uint *counters, int first, int end)
+kernel APART void generate(SLAB_ARGS, SCENE_ARGS, global float *film, global uint *counters, int first, int end)
 {
     SLABS
     SCENE

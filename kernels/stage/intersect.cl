@@ -5,8 +5,9 @@
 #include "lib/shape.cl"
 #include "lib/surface_flags.cl"
 #include "generated/trace.cl"
+#include "bvh/apart.cl"
 
-kernel void intersect(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS)
+kernel APART void intersect(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS)
 {
     SLABS
     SCENE

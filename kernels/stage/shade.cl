@@ -1,6 +1,7 @@
 /* Shades the paths that met one kind of material. Built once per kind, so it holds no switch: as
  * dense blocks that mask out other kinds, or, where QUEUED, along the sorted queue. */
 #include "lib/base.cl"
+#include "bvh/apart.cl"
 #include "generated/sampler.cl"
 #include "lib/shape.cl"
 #include "lib/light.cl"
@@ -21,7 +22,7 @@
 #define QUEUE_ARGS
 #endif
 
-kernel void shade(SLAB_ARGS, SCENE_ARGS QUEUE_ARGS)
+kernel APART void shade(SLAB_ARGS, SCENE_ARGS QUEUE_ARGS)
 {
     SLABS
     SCENE

@@ -2,8 +2,9 @@
 #include "lib/base.cl"
 #include "lib/shape.cl"
 #include "generated/trace.cl"
+#include "bvh/apart.cl"
 
-kernel void shadow(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS)
+kernel APART void shadow(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS)
 {
     SLABS
     SCENE
