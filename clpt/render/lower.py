@@ -49,21 +49,22 @@ class Lowered:
         return sum(a.nbytes for a in (*self.tables.values(), self.vertices, self.faces, self.tags))
 
 
-def lower(scene: sc.Scene, *, channel: str = "") -> Lowered:
-    """Lower a scene. `channel` names the value that the `aov` integrator writes.
+def lower(scene: sc.Scene) -> Lowered:
+    """Lower a scene; of the `aov` integrator, for its first channel.
 
     Raises SceneError where the scene makes no sense: it names the shape, light or material.
     """
-    return _Lowering(scene, channel).run()
+    return _Lowering(scene).run()
 
 
 class _Lowering:
     """The state of one `lower`."""
 
-    def __init__(self, scene: sc.Scene, channel: str):
+    def __init__(self, scene: sc.Scene):
         film = scene.film
-        self.scene, self.channel = scene, channel
-        self.mode = "rgb" if channel else film.mode
+        self.scene = scene
+        self.channels = getattr(scene.integrator, "channels", ())
+        self.mode = "rgb" if self.channels else film.mode
         self.tables = Tables(self.mode, film.lambda_min, film.lambda_max)
         self.warnings: list[str] = []
         self.leaves = _leaf_kinds(scene)
@@ -94,8 +95,6 @@ class _Lowering:
             tables.append("shapes", row.reshape(1).view(np.uint32))
         camera, words = cameras.lower_camera(scene.camera, scene.film.width, scene.film.height)
         tables.append_floats("camera", words)
-        if isinstance(scene.integrator, sc.integrators.Aov) and not self.channel:
-            raise SceneError("aov is lowered a channel at a time", where="integrator")
         ambient = getattr(scene.integrator, "ambient", 0.0)
         self.ambient = tables.append("lamps", tables.emission_words(ambient)) if ambient else 0
         features = self._features(analytic, camera)
@@ -222,13 +221,13 @@ class _Lowering:
             texture_roles=tuple(sorted(tables.texture_roles)),
             analytic=tuple(k for k in shapes.ANALYTIC if any(s.kind == k for s in analytic)),
             normals=self.uses["normals"],
-            uvs=self.uses["uvs"] or self.uses["tangents"] or self.channel == "uv",
+            uvs=self.uses["uvs"] or self.uses["tangents"] or "uv" in self.channels,
             tangents=self.uses["tangents"],
             mixtures=self.uses["mixtures"],
-            infinite=self.lights.infinite > 0 and not self.channel,
+            infinite=self.lights.infinite > 0 and not self.channels,
             light_choice=len(self.lights.rows) > 1,
             dispersion=index_tables,
-            channel=self.channel,
+            channel=self.channels[0] if self.channels else "",
             spectra_size=tables.spectra_size,
             spectra_step=STEP,
             sources=sources,

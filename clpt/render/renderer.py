@@ -59,10 +59,8 @@ class Renderer:
         self.channels: tuple[str, ...] = ()
         if isinstance(scene.integrator, Aov):
             self.channels = scene.integrator.channels
-        self.wavefronts = [
-            Wavefront(device, lower(scene, channel=channel), **wavefront)
-            for channel in self.channels or ("",)
-        ]
+        first = Wavefront(device, lower(scene), **wavefront)
+        self.wavefronts = [first, *(first.sibling(channel) for channel in self.channels[1:])]
         self.warnings = list(self.wavefronts[0].lowered.warnings)
         self.samples = 0
         self._began: float | None = None

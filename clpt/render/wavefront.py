@@ -6,6 +6,8 @@ depth. The host only enqueues; it reads the counters of an iteration while later
 
 from __future__ import annotations
 
+import copy
+import dataclasses
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -80,7 +82,23 @@ class Wavefront:
         self.programs = device.build_all(on, texts)
         self._place_slots(slots or (CPU_SLOTS if on.info.is_cpu else GPU_SLOTS))
         self._allocate(layout)
-        self._bind()
+        self._expose_new()
+
+    def sibling(self, channel: str) -> Wavefront:
+        """Another film of the same scene, for another channel of the `aov` integrator.
+
+        It shares everything on the device but the film and the picture.
+        """
+        other = copy.copy(self)
+        features = dataclasses.replace(self.lowered.features, channel=channel)
+        other.lowered = dataclasses.replace(self.lowered, features=features)
+        other.named = dict(self.named)
+        texts = programs.sources(features, self.tree.layout, self.lanes, queued=self.queued)
+        other.programs = self.programs | device.build_all(
+            self.device, {n: text for n, text in texts.items() if n.startswith("shade_")}
+        )
+        other._expose_new()
+        return other
 
     def _place_slots(self, wanted: int) -> None:
         """Divide the film among slots: as many as wanted, or as memory allows."""
@@ -132,10 +150,6 @@ class Wavefront:
             cl.enqueue_fill_buffer(
                 self.device.queue, self.named[name], np.uint32(0), 0, 4 * record.words * self.stride
             )
-        self.film_bytes = 4 * FILM_WORDS * int(settings["places"]) * int(settings["planes"])
-        self.named["film"] = give.allocate("the film", self.film_bytes, "lower the image's size")
-        pixels = int(settings["width"]) * int(settings["height"])
-        self.named["image"] = give.allocate("the image", 12 * pixels, "lower the image's size")
         self.named["counters"] = give.allocate("the counters", 4 * len(COUNTERS))
         self.named["settings"] = give.upload("the settings", settings.reshape(1).view(np.uint32))
         if self.queued:
@@ -146,7 +160,16 @@ class Wavefront:
             for name in ("queue_starts", "queue_counts"):
                 self.named[name] = give.allocate(name, 4 * kinds)
             self.named.update(chunk=CHUNK, chunks=chunks, slots=self.slots)
+
+    def _expose_new(self) -> None:
+        """A film and a picture of its own, and kernels bound to them."""
+        settings = self.lowered.settings
+        self.film_bytes = 4 * FILM_WORDS * int(settings["places"]) * int(settings["planes"])
+        pixels = int(settings["width"]) * int(settings["height"])
+        for name, size in (("film", self.film_bytes), ("image", 12 * pixels)):
+            self.named[name] = self.buffers.allocate(f"the {name}", size, "lower the image's size")
         self.clear()
+        self._bind()
 
     def _bind(self) -> None:
         """Give every kernel its arguments; they are told by their names in its signature."""
