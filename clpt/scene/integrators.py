@@ -5,13 +5,33 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from clpt.errors import SceneError
+from clpt.errors import SceneError, UnknownKindError
 from clpt.scene.params import Kind, choice, emission, flag, host, real
+
+
+CHANNELS = {  # of the aov integrator: how many values each has
+    "depth": 1,
+    "position": 3,
+    "geometric_normal": 3,
+    "shading_normal": 3,
+    "uv": 2,
+    "albedo": 3,
+    "shape_id": 1,
+    "primitive_id": 1,
+}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Integrator(Kind):
     """Base of all integrators."""
+
+    def check(self) -> None:
+        for name in ("max_depth", "rr_depth"):
+            depth = getattr(self, name, 1)
+            unlimited = name == "max_depth" and depth == -1
+            if isinstance(depth, bool) or not isinstance(depth, int) or (depth < 1 and not unlimited):
+                least = "1 or more, or -1 for no limit" if name == "max_depth" else "1 or more"
+                raise SceneError(f"must be {least}, not {depth!r}", where=f"{self.kind}.{name}")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -43,25 +63,18 @@ class Whitted(Integrator):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Aov(Integrator):
-    """Arbitrary output values of the first hit, in the channels named."""
+    """Arbitrary output values of the first hit, in the channels named; a pixel holds their mean."""
 
-    channels: tuple[str, ...] = host(
-        ("depth", "position", "geometric_normal", "shading_normal", "uv", "albedo", "shape_id",
-         "primitive_id"),
-        "which values, in order",
-    )
+    channels: tuple[str, ...] = host(tuple(CHANNELS), f"of {', '.join(CHANNELS)}")
 
-
-CHANNELS = {
-    "depth": 1,
-    "position": 3,
-    "geometric_normal": 3,
-    "shading_normal": 3,
-    "uv": 2,
-    "albedo": 3,
-    "shape_id": 1,
-    "primitive_id": 1,
-}
+    def check(self) -> None:
+        channels = (self.channels,) if isinstance(self.channels, str) else tuple(self.channels)
+        object.__setattr__(self, "channels", channels)
+        for name in channels:
+            if name not in CHANNELS:
+                raise UnknownKindError("channel", str(name), CHANNELS, where="aov.channels")
+        if not channels:
+            raise SceneError("names no channel", where="aov.channels")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
