@@ -14,6 +14,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 
 class ClptError(Exception):
@@ -49,14 +50,14 @@ def _nearest(name: str, known: Iterable[str]) -> str:
 class UnknownKindError(SceneError):
     """A `type` that is not in the table of kinds."""
 
-    def __init__(self, category: str, name: str, known: Iterable[str], **place):
+    def __init__(self, category: str, name: str, known: Iterable[str], **place: Any):
         super().__init__(f"unknown {category} {name!r}" + _nearest(name, known), **place)
 
 
 class UnusedParameterError(SceneError):
     """A parameter that the kind does not have."""
 
-    def __init__(self, kind: str, name: str, known: Iterable[str], **place):
+    def __init__(self, kind: str, name: str, known: Iterable[str], **place: Any):
         super().__init__(f"{kind} has no parameter {name!r}" + _nearest(name, known), **place)
 
 

@@ -1,7 +1,7 @@
 """Records: one declaration, from which the numpy dtype and the OpenCL text follow.
 
-Every member consists of 4-byte words, so that no compiler pads anything; a test compares the offsets
-with every device. Three forms of text are made of a record:
+Every member consists of 4-byte words, so that no compiler pads anything; a test compares offsets
+with the device. Three forms of text are made of a record:
 
 - `uniform_text`: a struct of scalars in memory, the same for all lanes (settings, cameras);
 - `row_text`: a lane struct and a loader that gathers one row per lane from a table of words;
@@ -90,7 +90,7 @@ class Record:
         return "\n".join([f"/* {self.doc} */", "typedef struct {", *rows, f"}} {self.name};", ""])
 
     def row_text(self) -> str:
-        """Return the lane struct and `name_row(table, at)`; `at` is the row's first word, per lane."""
+        """Return the lane struct and `name_row(table, at)`; `at`: a row's first word, per lane."""
         lower = _snake(self.name)
         body = []
         for m in self.members:
@@ -109,7 +109,7 @@ class Record:
         )
 
     def slab_text(self) -> str:
-        """Return `load_name_member(slab, at)` and `store_name_member(slab, at, m, v)` per member."""
+        """Return `load_name_member(slab, at)` and `store_name_member(slab, at, m, v)`, for each."""
         lower = _snake(self.name)
         parts = [f"#define {lower.upper()}_WORDS {self.words}"]
         for m in self.members:

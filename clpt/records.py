@@ -1,7 +1,7 @@
 """Every record that the host shares with the device. Read this first.
 
-Three slabs hold what is in flight, one slot a path: `Path`, `Hit` and `Shadow`. Tables of words hold
-the scene; `TABLES` lists them once, and the kernels' `Scene` struct and arguments are made of it.
+Three slabs hold what is in flight, one slot a path: `Path`, `Hit` and `Shadow`. Tables of words
+hold the scene; `TABLES` lists them once; the kernels' `Scene` struct and arguments follow from it.
 """
 
 from __future__ import annotations

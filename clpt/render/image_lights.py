@@ -200,4 +200,3 @@ def _cumulative(
     marginal = rows / (total if total > 0.0 else 1.0)
     conditional[:, -1] = marginal[-1] = 1.0
     return marginal, conditional, total
-

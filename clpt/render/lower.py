@@ -181,7 +181,7 @@ class _Lowering:
         row = self.tables.row(material, "materials")
         if row >= 1 << 24:
             raise SceneError("the scene has more than 16 million words of material parameters")
-        for name, param in device_params(type(material)).items():
+        for name in device_params(type(material)):
             if getattr(getattr(material, name), "is_texture", False):
                 self.uses["uvs"] = True
         self.uses["tangents"] |= _anisotropic(material)
@@ -242,8 +242,8 @@ class _Lowering:
         settings["tiles_x"] = -(-film.width // 4)
         settings["places"] = 16 * settings["tiles_x"] * -(-film.height // 4)
         settings["seed"] = scene.seed % 2**32
-        depth = {"direct": 2, "aov": 1}.get(integrator.kind)
-        depth = getattr(integrator, "max_depth", depth) if depth is None else depth
+        depth: int = {"direct": 2, "aov": 1}.get(integrator.kind, 0)
+        depth = depth or getattr(integrator, "max_depth", -1)
         settings["max_depth"] = DEEPEST if depth < 0 else min(depth, DEEPEST)
         settings["rr_depth"] = min(getattr(integrator, "rr_depth", DEEPEST), DEEPEST)
         settings["hide_lights"] = getattr(integrator, "hide_lights", False)

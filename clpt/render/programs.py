@@ -94,14 +94,16 @@ def _shared(features: Features, layout: str) -> dict[str, str]:
         "generated/mixture.cl": _mixture_text(features),
         "generated/shapes.cl": _tangents_text(features),
         "generated/trace.cl": _trace_text(layout),
-        "generated/layout.cl": f'#include "bvh/{layout}.cl"\n#define LAYOUT(verb) {layout}_##verb\n',
+        "generated/layout.cl": (
+            f'#include "bvh/{layout}.cl"\n#define LAYOUT(verb) {layout}_##verb\n'
+        ),
         "generated/shape_tree.cl": _shape_tree_text(features),
         "generated/integrator.cl": f'#include "integrator/{features.integrator}.cl"\n',
     }
 
 
 def scene_text() -> str:
-    """Return records, the `Scene` struct and the macros that carry it through a kernel's arguments."""
+    """Return records, the `Scene` struct and the macros that carry it through arguments."""
     slabs = [record.slab_text() for record in SLABS]
     rows = [record.row_text() for record in (SHAPE, LIGHT)]
     pointers = [f"global const {element} *" for element, _ in TABLES.values()]
@@ -183,7 +185,8 @@ def _shape_tree_text(features: Features) -> str:
         [
             *_includes(features),
             '#include "bvh/ray.cl"',
-            "inline ShapeHit shape_hit(Scene scene, ShapeRow shape, vec3 o, vec3 d, real tmin, real tmax)",
+            "inline ShapeHit shape_hit(Scene scene, ShapeRow shape, vec3 o, vec3 d, "
+            "real tmin, real tmax)",
             "{",
             *_cases(features, hit),
             "    ShapeHit none = {FAR, {0.0f, 0.0f, 1.0f}, {0.0f, 0.0f}};",
@@ -191,7 +194,8 @@ def _shape_tree_text(features: Features) -> str:
             "}",
             "inline int shape_intersect(Scene scene, uint prim, const Ray *ray, float *t)",
             "{",
-            "    ShapeRow shape = shape_row_row(scene.shapes, (scene.settings->first_analytic + (int)prim) * SHAPE_ROW_WORDS);",
+            "    int row = scene.settings->first_analytic + (int)prim;",
+            "    ShapeRow shape = shape_row_row(scene.shapes, row * SHAPE_ROW_WORDS);",
             "    vec3 o = {ray->o.x, ray->o.y, ray->o.z}, d = {ray->d.x, ray->d.y, ray->d.z};",
             "    ShapeHit hit = shape_hit(scene, shape, o, d, ray->tmin, *t);",
             "    if (!(hit.t < *t)) return 0;",

@@ -13,10 +13,16 @@ from clpt.records import TABLES
 from clpt.render.kinds import REAL_WORDS, SPECTRUM_WORDS
 from clpt.scene.params import Kind, device_params
 from clpt.spectra import RGB, Constant, RGBIlluminant, RGBUnbounded, Spectrum
-from clpt.spectra.spectrum import d65, on_grid
+from clpt.spectra.spectrum import Role, d65, on_grid
 
 STEP = 1.0  # [nm] of the tabulated spectra
 ONE = 1e4  # sigmoid coefficient at which it is 1 in float32
+# How a spectrum is turned to rgb, by the role of the parameter (see clpt.spectra.spectrum).
+RGB_ROLES: dict[str, Role] = {
+    "reflectance": "reflectance",
+    "emission": "emission",
+    "index": "unbounded",
+}
 Words = NDArray[np.uint32]
 
 
@@ -113,7 +119,7 @@ class Tables:
             value = RGBUnbounded(value.r, value.g, value.b)
         words = np.zeros(SPECTRUM_WORDS, np.uint32)
         if not self.spectral:
-            words[:3] = as_words(value.to_rgb("unbounded" if role == "index" else role))
+            words[:3] = as_words(value.to_rgb(RGB_ROLES[role]))
             return words, "constant"
         if isinstance(value, Constant):
             words[:4] = as_words([0.0, 0.0, ONE, value.value])

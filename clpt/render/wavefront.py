@@ -1,7 +1,7 @@
 """The wavefront: slabs of paths in flight, and the loop that moves them through the stages.
 
-A slot owns its pixels and regenerates its path as soon as that ends, so the device stays full at any
-depth. The host only enqueues; it reads the counters of an iteration while later ones run.
+A slot owns its pixels and regenerates its path as soon as that ends, so the device stays full at
+any depth. The host only enqueues; it reads the counters of an iteration while later ones run.
 """
 
 from __future__ import annotations
@@ -216,8 +216,8 @@ class Wavefront:
         """Add samples first to end - 1 of every pixel to the film.
 
         on_batch is called every few iterations with the counts; if it returns False, every path is
-        brought to its end and the exposure stops: a valid film, but pixels differ in their number of
-        samples. Returns whether it ran to its end.
+        brought to its end and the exposure stops: a valid film, whose pixels differ in their number
+        of samples. Returns whether it ran to its end.
         """
         word = next(m.word for m in PATH.members if m.name == "state")
         self._fill("path_words", FRESH, 4 * word * self.stride, 4 * self.slots)
@@ -246,7 +246,7 @@ class Wavefront:
                 finished = False
             if now[0] >= self.slots:
                 break
-        for host, event in reads:
+        for _, event in reads:
             event.wait()
         return finished
 

@@ -43,6 +43,6 @@ class Scene:
     warnings: list[str] = field(default_factory=list)
     extra: dict[str, Any] = field(default_factory=dict)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if isinstance(self.spp, bool) or not isinstance(self.spp, int) or self.spp < 1:
             raise SceneError(f"must be a whole number above zero, not {self.spp!r}", where="spp")

@@ -8,7 +8,6 @@ from typing import Any
 from clpt.errors import SceneError, UnknownKindError
 from clpt.scene.params import Kind, choice, emission, flag, host, real
 
-
 CHANNELS = {  # of the aov integrator: how many values each has
     "depth": 1,
     "position": 3,
@@ -29,7 +28,8 @@ class Integrator(Kind):
         for name in ("max_depth", "rr_depth"):
             depth = getattr(self, name, 1)
             unlimited = name == "max_depth" and depth == -1
-            if isinstance(depth, bool) or not isinstance(depth, int) or (depth < 1 and not unlimited):
+            whole = isinstance(depth, int) and not isinstance(depth, bool)
+            if not whole or (depth < 1 and not unlimited):
                 least = "1 or more, or -1 for no limit" if name == "max_depth" else "1 or more"
                 raise SceneError(f"must be {least}, not {depth!r}", where=f"{self.kind}.{name}")
 
@@ -68,7 +68,8 @@ class Aov(Integrator):
     channels: tuple[str, ...] = host(tuple(CHANNELS), f"of {', '.join(CHANNELS)}")
 
     def check(self) -> None:
-        channels = (self.channels,) if isinstance(self.channels, str) else tuple(self.channels)
+        given: Any = self.channels
+        channels = (given,) if isinstance(given, str) else tuple(given)
         object.__setattr__(self, "channels", channels)
         for name in channels:
             if name not in CHANNELS:

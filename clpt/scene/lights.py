@@ -1,4 +1,4 @@
-"""Lights. An `Area` light stands on a shape's `emission`; all others stand in a scene's `lights`."""
+"""Lights. An `Area` light is a shape's `emission`; all others stand in a scene's `lights`."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class CubeMap(Light):
 
     image: Any = host(
         None,
-        "six images +x -x +y -y +z -z (paths or arrays), or one image with the faces in a 4x3 cross",
+        "six images +x -x +y -y +z -z (paths or arrays), or one with the faces in a 4x3 cross",
     )
     scale: float = real(1.0, "factor on the radiance", low=0.0)
     to_world: Any = host(np.eye(4), "rotation, (4, 4)")

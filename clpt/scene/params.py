@@ -1,8 +1,8 @@
 """How the parameters of a kind are declared.
 
 A kind is a frozen dataclass that derives from `Kind`; each field is made by one of the functions
-below, which says the parameter's role. From the role follow what a user may give for it, its form on
-the device, and its line in the documentation and the JSON schema:
+below, which says its role. From the role follow what a user may give for it, its form on the
+device, and its line in the documentation and the JSON schema:
 
 =============  =====================================  ==========================  ===============
 role           accepted                               in the kernel               texture
@@ -22,7 +22,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -65,7 +65,7 @@ def emission(default: Any, doc: str, unit: str, *, textured: bool = False) -> An
 
 
 def index(default: Any, doc: str) -> Any:
-    """Declare a refractive index or extinction coefficient, possibly by name, possibly dispersive."""
+    """Declare a refractive index or extinction coefficient, perhaps by name, perhaps dispersive."""
     return _field(default, Param("index", doc, low=0.0))
 
 
@@ -100,23 +100,23 @@ def host(default: Any, doc: str, unit: str = "") -> Any:
 class classproperty:
     """A read-only property of a class."""
 
-    def __init__(self, function):
+    def __init__(self, function: Callable[[Any], str]):
         self.function = function
 
-    def __get__(self, _, owner):
+    def __get__(self, _: Any, owner: type) -> str:
         return self.function(owner)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Kind:
-    """Base of everything that can be added: its name in files and kernels follows from the class."""
+    """Base of all that can be added: its name in files and kernels follows from the class."""
 
     @classproperty
-    def kind(cls) -> str:  # noqa: N805
+    def kind(cls) -> str:
         """The name in scene files and kernels: RoughConductor -> rough_conductor."""
-        return re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower()
+        return re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower()  # type: ignore[attr-defined]
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name, param in params(type(self)).items():
             value = _checked(getattr(self, name), param, f"{self.kind}.{name}")
             object.__setattr__(self, name, value)

@@ -28,9 +28,9 @@ class Texture(Kind):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Bitmap(Texture):
-    """An image; v = 0 is its bottom row. For a `real` parameter the mean of its channels is used."""
+    """An image; v = 0 is its bottom row. A `real` parameter takes the mean of its channels."""
 
-    image: Any = host(None, "path of an image file, or an array (h, w) or (h, w, 1|3|4) float32")
+    image: Any = host(None, "path of an image, or an array (h, w) or (h, w, 1|3|4) float32")
     raw: bool = host(False, "True: values as they are, without the sRGB decoding of 8-bit files")
     filter: str = choice("bilinear", "between texels", ("bilinear", "nearest"))
     wrap: str = choice("repeat", "outside [0, 1]", ("repeat", "clamp", "mirror"))
