@@ -82,9 +82,7 @@ def assert_agree(
     assert p > SIGNIFICANCE, f"{what}: p = {p:.1e}; mean {a}, reference {b}, ratio {a / b}"
 
 
-def assert_mean(
-    ours: ArrayLike, expected: ArrayLike, within: float, allowed: float = 2e-4
-) -> None:
+def assert_mean(ours: ArrayLike, expected: ArrayLike, within: float, allowed: float = 2e-4) -> None:
     """Fail where the mean picture is off by more than chance, or by more than a share `within`.
 
     ours: (k, h, w, 3) exposures; expected: (3,) or broadcast to it, the exact mean; allowed: what
