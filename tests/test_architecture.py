@@ -1,0 +1,147 @@
+"""The house keeps its shape: who imports whom, what is public, where kernels stand."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+import clpt
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGE, KERNELS = ROOT / "clpt", ROOT / "kernels"
+
+BASE = {"errors", "layout", "records", "transforms", "images", "spectra"}
+# What a part may import of the others; itself always.
+MAY_IMPORT = {
+    **dict.fromkeys(BASE, BASE),
+    "scene": BASE,
+    "device": BASE,
+    "bvh": BASE | {"device"},
+    "render": BASE | {"scene", "device", "bvh"},
+    "formats": BASE | {"scene"},
+}
+OPENCL = {"device", "bvh", "render"}  # only these import pyopencl
+# kernels/<folder>: the folders that its files may include; generated text stands between them.
+MAY_INCLUDE = {
+    "lib": {"lib", "generated", "bvh"},
+    "spectrum": {"lib", "spectrum"},
+    "stage": {"lib", "generated", "bvh"},
+    "integrator": {"lib", "generated"},
+    "bvh": {"lib", "bvh", "generated"},
+    **{k: {"lib"} for k in ("bsdf", "light", "shape", "camera", "texture", "medium", "sampler")},
+}
+
+
+def modules() -> list[Path]:
+    """The Python files of the package."""
+    return sorted(PACKAGE.rglob("*.py"))
+
+
+def imports(path: Path) -> set[str]:
+    """The modules that a file imports, anywhere in it, with full names."""
+    inside = path.relative_to(ROOT).with_suffix("").parts
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            package = ".".join(inside[: len(inside) - node.level]) if node.level else ""
+            base = ".".join(part for part in (package, node.module or "") if part)
+            found.add(base)
+            found |= {f"{base}.{alias.name}" for alias in node.names}
+    return found
+
+
+def part_of(name: str) -> str | None:
+    """The part of clpt that a full name belongs to: "render" of clpt.render.lower."""
+    parts = name.split(".")
+    return parts[1] if parts[0] == "clpt" and len(parts) > 1 else None
+
+
+@pytest.mark.parametrize("path", modules(), ids=lambda p: str(p.relative_to(ROOT)))
+def test_imports_follow_the_direction(path: Path) -> None:
+    own = part_of(".".join(path.relative_to(ROOT).with_suffix("").parts))
+    if own not in MAY_IMPORT:
+        return
+    parts = {p.name.removesuffix(".py") for p in PACKAGE.iterdir()}
+    found = {part_of(name) for name in imports(path)} & parts
+    wrong = found - MAY_IMPORT[own] - {own, None}
+    assert not wrong, f"{own} imports {', '.join(sorted(wrong))}"
+
+
+@pytest.mark.parametrize("path", modules(), ids=lambda p: str(p.relative_to(ROOT)))
+def test_who_imports_pyopencl(path: Path) -> None:
+    own = part_of(".".join(path.relative_to(ROOT).with_suffix("").parts))
+    if own not in OPENCL:
+        assert not any(name.split(".")[0] == "pyopencl" for name in imports(path))
+
+
+@pytest.mark.parametrize("name", ["scene", "formats", "spectra", "layout", "transforms", "images"])
+def test_data_does_not_need_opencl(name: str) -> None:
+    """No chain of imports leads from plain data to pyopencl."""
+    seen: set[str] = set()
+    open_ = [f"clpt.{name}"]
+    while open_:
+        module = open_.pop()
+        if module in seen or module == "clpt":
+            continue
+        seen.add(module)
+        base = ROOT.joinpath(*module.split("."))
+        path = base / "__init__.py" if base.is_dir() else base.with_suffix(".py")
+        if path.is_file():
+            open_ += [m for m in imports(path) if m.split(".")[0] in ("clpt", "pyopencl")]
+    assert not any(m.split(".")[0] == "pyopencl" for m in seen)
+
+
+@pytest.mark.parametrize("path", modules(), ids=lambda p: str(p.relative_to(ROOT)))
+def test_the_library_never_prints(path: Path) -> None:
+    if "cli" in path.parts or path.name == "__main__.py" or path.name.startswith("make_"):
+        return
+    calls = [
+        n for n in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(n, ast.Call)
+    ]
+    assert not any(isinstance(c.func, ast.Name) and c.func.id == "print" for c in calls)
+
+
+def test_public_names() -> None:
+    """`__all__` is sorted, names what is there, and all that the front page imports on purpose."""
+    assert clpt.__all__ == sorted(clpt.__all__)
+    assert len(set(clpt.__all__)) == len(clpt.__all__)
+    tree = ast.parse((PACKAGE / "__init__.py").read_text(encoding="utf-8"))
+    imported = {
+        alias.asname or alias.name
+        for node in tree.body
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("clpt")
+        for alias in node.names
+    }
+    assert set(clpt.__all__) == imported | {"__version__"}
+    for name in clpt.__all__:
+        assert hasattr(clpt, name)
+        assert getattr(clpt, name).__doc__ or name == "__version__"
+
+
+def kernel_files() -> list[Path]:
+    """The OpenCL files."""
+    return sorted(KERNELS.rglob("*.cl"))
+
+
+@pytest.mark.parametrize("path", kernel_files(), ids=lambda p: str(p.relative_to(KERNELS)))
+def test_kernel_files(path: Path) -> None:
+    """A comment first; includes in their direction; entry points only in stage/ and bvh/."""
+    text = path.read_text(encoding="utf-8")
+    assert text.startswith("/*"), "a kernel file begins with what it is for"
+    folder = path.relative_to(KERNELS).parts[0]
+    included = {name.split("/")[0] for name in re.findall(r'#include "([^"]+)"', text)}
+    wrong = included - MAY_INCLUDE[folder]
+    assert not wrong, f"{folder}/ includes {', '.join(sorted(wrong))}/"
+    if re.search(r"\bkernel void\b", text):
+        assert folder in ("stage", "bvh")
+    code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+    if folder in ("bsdf", "light", "shape", "camera", "texture", "medium", "integrator"):
+        assert "#pragma" not in code
+    assert "double" not in re.findall(r"\w+", code)
+    in_memory = re.findall(r"global\s+(?:const\s+)?(\w+)\s*\*", code)
+    assert not {"float3", "int3", "uint3", "bool", "size_t"} & set(in_memory)

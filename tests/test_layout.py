@@ -1,0 +1,140 @@
+"""Records: the numpy form, the OpenCL form and what a device makes of it are the same."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyopencl as cl
+import pytest
+
+from clpt import device
+from clpt.layout import TYPES, Record
+from clpt.records import LIGHT, PATH, SETTINGS, SHAPE, SLABS
+from clpt.render import cameras
+from clpt.render.programs import scene_text
+
+UNIFORM = [SETTINGS, *cameras.RECORDS.values()]
+
+
+@pytest.fixture(scope="module")
+def opened() -> device.Device:
+    """The device that the tests run on."""
+    return device.choose()
+
+
+def run(on: device.Device, text: str, lanes: int, queued: int, *arrays: np.ndarray) -> None:
+    """Run `probe` on one work-item; arrays are read and written in place."""
+    virtual = {
+        "probe.cl": text,
+        "generated/scene.cl": scene_text(),
+        "generated/spectrum.cl": '#include "spectrum/spectral.cl"\n',
+        "generated/spectrum_read.cl": '#include "spectrum/spectral_read.cl"\n',
+    }
+    defines = {"LANES": lanes, "QUEUED": queued, "SPECTRA_SIZE": 471, "SPECTRA_STEP": "1.0f"}
+    program = device.build(on, device.assemble("probe.cl", virtual, defines))
+    flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
+    buffers = [cl.Buffer(on.context, flags, hostbuf=a) for a in arrays]
+    bound = program.kernel("probe").bind(**dict(zip("abcd", buffers, strict=False)))
+    bound.enqueue(on.queue, (1,), (1,))
+    for array, buffer in zip(arrays, buffers, strict=True):
+        cl.enqueue_copy(on.queue, array, buffer)
+
+
+def test_declared_order_is_memory_order() -> None:
+    record = Record("R", "doc", a=("real", ""), b=("vec3", ""), c=("integer", ""), d=("matrix", ""))
+    assert [m.word for m in record.members] == [0, 1, 4, 5]
+    assert record.words == 21
+    assert record.dtype.itemsize == 84
+    assert [record.dtype.fields[m.name][1] for m in record.members] == [0, 4, 16, 20]
+
+
+def test_an_unknown_type_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"R\.a: 'float3'"):
+        Record("R", "doc", a=("float3", ""))
+
+
+@pytest.mark.parametrize("record", [*SLABS, SETTINGS, SHAPE, LIGHT], ids=lambda r: r.name)
+def test_members_are_words_without_gaps(record: Record) -> None:
+    word = 0
+    for member in record.members:
+        assert member.word == word
+        assert record.dtype.fields[member.name][1] == 4 * word
+        assert member.words == TYPES[member.type][0]
+        assert member.doc
+        word += member.words
+    assert record.dtype.itemsize == 4 * word
+
+
+@pytest.mark.parametrize("record", UNIFORM, ids=lambda r: r.name)
+def test_offsets_on_the_device(opened: device.Device, record: Record) -> None:
+    """The compiler's offset of every member, and its size of the struct."""
+    text = record.uniform_text() if record is not SETTINGS else ""
+    writes = "".join(
+        f"    a[{i}] = (uint)((global char *)&r->{m.name} - (global char *)r);\n"
+        for i, m in enumerate(record.members)
+    )
+    n = len(record.members)
+    kernel = (
+        f'#include "lib/base.cl"\n{text}kernel void probe(global uint *a, global uint *b)\n{{\n'
+        f"    global {record.name} *r = (global {record.name} *)b;\n{writes}"
+        f"    a[{n}] = sizeof({record.name});\n}}\n"
+    )
+    found = np.zeros(n + 1, np.uint32)
+    run(opened, kernel, 1, 0, found, np.zeros(record.words, np.uint32))
+    expected = [4 * m.word for m in record.members]
+    assert found.tolist() == [*expected, record.dtype.itemsize]
+
+
+@pytest.mark.parametrize("queued", [0, 1])
+@pytest.mark.parametrize("lanes", [1, 8, 16])
+def test_slab_members_go_in_and_out(opened: device.Device, lanes: int, queued: int) -> None:
+    """Every word of a slab, loaded and stored elsewhere member by member, lands where it should."""
+    stride = 48
+    rng = np.random.default_rng(1)
+    source = rng.normal(size=(PATH.words, stride)).astype(np.float32)
+    target = np.zeros_like(source)
+    slots = np.arange(16, 16 + lanes, dtype=np.uint32)
+    if queued:
+        slots = rng.permutation(stride)[:lanes].astype(np.uint32)
+    lane_mask = (rng.random(lanes) < 0.6).astype(np.uint32)
+    at = "*(global const integer *)c" if queued and lanes > 1 else "c[0]"
+    read = "(*(global const integer *)d)" if lanes > 1 else "((integer)d[0])"
+    moves = "".join(
+        f"    store_path_{m.name}(to, at, m, load_path_{m.name}(from, at));\n" for m in PATH.members
+    )
+    kernel = (
+        '#include "lib/base.cl"\n'
+        "kernel void probe(global float *a, global float *b, global const uint *c, "
+        "global const uint *d)\n{\n"
+        f"    Slab from = {{a, {stride}}}, to = {{b, {stride}}};\n"
+        f"    At at = {at};\n    mask m = {read} != 0;\n{moves}}}\n"
+    )
+    run(opened, kernel, lanes, queued, source, target, slots, lane_mask)
+    expected = np.zeros_like(source)
+    kept = slots[lane_mask != 0]
+    expected[:, kept] = source[:, kept]
+    assert np.array_equal(target, expected)
+
+
+@pytest.mark.parametrize("lanes", [1, 8, 16])
+@pytest.mark.parametrize("record", [SHAPE, LIGHT], ids=lambda r: r.name)
+def test_rows_are_gathered(opened: device.Device, record: Record, lanes: int) -> None:
+    """`row` reads the members of one row per lane."""
+    rng = np.random.default_rng(2)
+    rows = rng.integers(0, 1 << 22, (32, record.words)).astype(np.uint32)
+    chosen = rng.integers(0, 32, lanes).astype(np.uint32)
+    at = "*(global const integer *)c" if lanes > 1 else "(integer)c[0]"
+    name = {"ShapeRow": "shape_row", "LightRow": "light_row"}[record.name]
+    writes = "".join(
+        f"    block_store(b + {i * lanes}, "
+        f"{'as_real(r.%s)' % m.name if m.type == 'integer' else 'r.%s' % m.name});\n"  # noqa: UP031
+        for i, m in enumerate(record.members)
+    )
+    kernel = (
+        '#include "lib/base.cl"\n'
+        "kernel void probe(global const uint *a, global float *b, global const uint *c)\n{\n"
+        f"    integer row = {at};\n"
+        f"    {record.name} r = {name}_row(a, row * {record.words});\n{writes}}}\n"
+    )
+    found = np.zeros((record.words, lanes), np.uint32)
+    run(opened, kernel, lanes, 0, rows.reshape(-1), found.reshape(-1), chosen)
+    assert np.array_equal(found, rows[chosen].T)
