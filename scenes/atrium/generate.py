@@ -2,14 +2,20 @@
 
 Everything is made from formulas: 309,472 triangles. y is up; the court is 40 long (x), 16 high and
 18 wide (z), open to the sky in the middle.
+
+    python scenes/atrium/generate.py
+
+writes the meshes that scene.json is made of, 8 MB.
 """
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
+import trimesh
 
 LENGTH, HEIGHT, WIDTH = 40.0, 16.0, 18.0
 ROWS = (4.5, 13.5)  # z of the two rows of columns
@@ -228,3 +234,20 @@ def relief() -> list[Mesh]:
         return 38.6 + depth, 1 + 5 * v, 6.5 + 5 * u
 
     return [grid(panel, 110, 110)]
+
+
+def main() -> None:
+    """Write every part as a .ply beside this script, where scene.json looks for them."""
+    folder = Path(__file__).parent
+    vertices, faces, parts = atrium()
+    del parts["floor"]  # a rectangle in scene.json, where it has texture coordinates
+    for name, which in parts.items():
+        used, own = np.unique(faces[which], return_inverse=True)
+        mesh = trimesh.Trimesh(vertices[used], own.reshape(-1, 3), process=False)
+        mesh.update_faces(mesh.nondegenerate_faces())  # at the poles of the lamps
+        mesh.export(folder / f"{name}.ply", vertex_normal=True)  # the grids are smooth
+        print(f"{name}.ply: {len(mesh.faces):,} triangles")
+
+
+if __name__ == "__main__":
+    main()
