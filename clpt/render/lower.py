@@ -12,6 +12,7 @@ from clpt import scene as sc
 from clpt.errors import SceneError
 from clpt.records import SETTINGS, SHAPE
 from clpt.render import cameras, filters, lights, shapes
+from clpt.render.checks import check
 from clpt.render.features import Features
 from clpt.render.kinds import words
 from clpt.render.tables import STEP, Tables
@@ -54,6 +55,7 @@ def lower(scene: sc.Scene) -> Lowered:
 
     Raises SceneError where the scene makes no sense: it names the shape, light or material.
     """
+    check(scene)
     return _Lowering(scene).run()
 
 

@@ -1,0 +1,41 @@
+"""Whether a scene is made of what it should be; values are checked where each is declared."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from clpt.errors import SceneError
+from clpt.render import shapes
+from clpt.scene import Scene
+from clpt.scene.cameras import Camera
+from clpt.scene.integrators import Film, Filter, Integrator, Sampler
+from clpt.scene.lights import Area, Light
+from clpt.scene.shapes import Shape
+
+LARGEST = 1 << 26  # pixels of a film; its tiles are divided in float32, see kernels/lib/film.cl
+
+
+def check(scene: Scene) -> None:
+    """Raise SceneError for an entry of a scene that is of the wrong kind, or a film too large."""
+    for name, base in (
+        ("camera", Camera), ("integrator", Integrator), ("sampler", Sampler), ("film", Film),
+    ):  # fmt: skip
+        _check_kind(getattr(scene, name), base, name)
+    _check_kind(scene.film.filter, Filter, "film.filter")
+    if isinstance(scene.seed, bool) or not isinstance(scene.seed, int):
+        raise SceneError(f"must be a whole number, not {scene.seed!r}", where="seed")
+    for i, light in enumerate(scene.lights):
+        _check_kind(light, Light, f"lights[{i}]")
+    for i, shape in enumerate(scene.shapes):
+        _check_kind(shape, Shape, f"shapes[{i}]")
+        if not isinstance(shape.emission, (Area, type(None))):
+            raise SceneError("its emission must be an `area` light", where=shapes.where(shape))
+    width, height = scene.film.width, scene.film.height
+    if width * height > LARGEST:
+        raise SceneError(f"{width}x{height} are more than {LARGEST >> 20} Mi pixels", where="film")
+
+
+def _check_kind(value: Any, base: type, where: str) -> None:
+    if not isinstance(value, base):
+        wanted = base.__name__.lower()
+        raise SceneError(f"must be of a kind of {wanted}, not {value!r}", where=where)

@@ -1,0 +1,103 @@
+"""The generated text of every kind builds, at every lane width and in both modes."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+
+from clpt import device, spectra
+from clpt import scene as sc
+from clpt.render import kinds, programs
+from clpt.render.lower import Lowered, lower
+from clpt.scene import Film, Scene, textures
+from clpt.scene import materials as m
+from clpt.scene.cameras import Perspective
+from clpt.scene.lights import Area, Constant, Point
+from clpt.scene.params import SPECTRUM_ROLES, device_params
+from clpt.scene.shapes import Cube, Rectangle, Sphere
+from clpt.spectra import Tabulated
+
+GREY = Tabulated((400.0, 700.0), (0.2, 0.8))
+
+
+def lowered(materials: list[m.Material], mode: str, **changes: object) -> Lowered:
+    """A scene with squares and a ball of these materials, a lamp and a sky."""
+    shapes: list = [Rectangle(material=material) for material in materials]
+    shapes += [Sphere(material=materials[0]), Cube(emission=Area(radiance=GREY))]
+    lights = [Point(), Constant()]
+    film = Film(width=4, height=4, mode=mode)
+    return lower(Scene(camera=Perspective(), shapes=shapes, lights=lights, film=film, **changes))
+
+
+def textured(cls: type[m.Material]) -> m.Material:
+    """A material whose parameters come from everywhere that they may come from."""
+    board = textures.Checkerboard(color0=0.3, color1=GREY)
+    given: dict = {}
+    for name, param in device_params(cls).items():
+        if param.textured:
+            given[name] = board
+        elif param.role in SPECTRUM_ROLES:
+            given[name] = GREY
+    return cls(**given)
+
+
+def plain(cls: type[m.Material]) -> m.Material:
+    return cls()
+
+
+@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+@pytest.mark.parametrize("cls", m.LEAVES, ids=lambda c: c.kind)
+def test_loaders_of_materials_build(cls: type[m.Material], mode: str) -> None:
+    """The loader of a kind with constants, tables and textures, eight lanes wide."""
+    features = lowered([textured(cls), plain(cls)], mode).features
+    texts = programs.sources(features, "wide8", 8, queued=False)
+    device.build(device.choose(), texts[f"shade_{cls.kind}"])
+
+
+@pytest.mark.parametrize("lanes", [1, 8, 16])
+@pytest.mark.parametrize("queued", [False, True])
+def test_stages_build(lanes: int, queued: bool) -> None:
+    """Every stage of a scene with mixtures, analytic shapes, textures and lights."""
+    mask = m.Mask(material=textured(m.Diffuse), opacity=textures.Checkerboard())
+    features = lowered([mask, m.Diffuse()], "spectral").features
+    texts = programs.sources(features, "binary", lanes, queued=queued)
+    assert {"mix", "shade_diffuse", "shade_null"} <= set(texts)
+    assert ("sort" in texts) == queued
+    device.build_all(device.choose(), texts)
+
+
+def test_text_holds_only_what_the_scene_has() -> None:
+    texts = programs.sources(lowered([m.Diffuse()], "rgb").features, "wide8", 8, queued=False)
+    assert set(texts) == {"generate", "intersect", "shadow", "accumulate", "shade_diffuse"}
+    shade = texts["shade_diffuse"].text
+    assert not any(f"{kind}_row(" in shade for kind in ("bitmap", "checkerboard", "sphere"))
+    assert "rough_conductor" not in shade
+
+
+def test_a_material_more_does_not_change_the_others() -> None:
+    one = lowered([m.Diffuse(), m.Null()], "rgb").features
+    two = dataclasses.replace(one, materials=("diffuse", "null"))
+    texts = programs.sources(one, "wide8", 8, queued=False)
+    again = programs.sources(two, "wide8", 8, queued=False)
+    assert {name: s.text for name, s in texts.items()} == {
+        name: s.text for name, s in again.items()
+    }
+
+
+@pytest.mark.parametrize("category", sc.KINDS)
+def test_structs_of_every_kind(category: str) -> None:
+    """A member per device parameter, in their order."""
+    for cls in sc.KINDS[category]:
+        text = kinds.struct_text(cls)
+        names = list(device_params(cls)) or ["unused"]
+        assert text.rstrip().endswith(f"}} {cls.__name__};")
+        places = [text.index(f" {name};") for name in names]
+        assert places == sorted(places)
+
+
+def test_index_by_name_is_a_spectrum() -> None:
+    """A glass's name is looked up where the scene is lowered."""
+    features = lowered([m.Dielectric(int_ior="bk7")], "spectral").features
+    assert features.dispersion
+    assert spectra.glass("bk7")
