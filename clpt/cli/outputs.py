@@ -19,7 +19,7 @@ COLUMNS = 4  # of the sheet of an aov .png
 def default(scene: Path) -> tuple[Path, ...]:
     """Where to write a scene's picture if nobody says: in the current folder, by its name."""
     path = scene.resolve()
-    name = path.parent.name if path.is_file() and path.stem == "scene" else path.stem
+    name = path.parent.name if path.stem == "scene" else path.stem
     return Path(f"{name}.exr"), Path(f"{name}.png")
 
 
@@ -93,14 +93,11 @@ def viewable(name: str, layer: Image) -> Image:
         return layer
     if name.endswith("_normal"):
         return layer * np.float32(0.5) + np.float32(0.5)
+    if name == "depth":  # the nearest is white, what is twice as far half as bright
+        near = np.min(layer, where=layer > 0, initial=np.inf)
+        return np.repeat(np.divide(near, layer, where=layer > 0, out=np.zeros_like(layer)), 3, 2)
     if name.endswith("_id"):  # neighbours in number differ in hue
         turns = layer * np.float32(0.618034) + np.arange(3, dtype=np.float32) / np.float32(3.0)
-        return np.where(layer < 0, 0, 0.5 + 0.5 * np.cos(2 * np.pi * turns)).astype(np.float32)
-    finite = np.where(np.isfinite(layer) & (np.abs(layer) < 1e30), layer, np.nan)
-    low, high = np.nanmin(finite, (0, 1)), np.nanmax(finite, (0, 1))
-    scaled = (finite - low) / np.maximum(high - low, 1e-20)
-    scaled = np.nan_to_num(1.0 - scaled if name == "depth" else scaled)
-    missing = 3 - scaled.shape[2]
-    if scaled.shape[2] == 1:
-        return np.repeat(scaled, 3, axis=2).astype(np.float32)
-    return np.pad(scaled, ((0, 0), (0, 0), (0, missing))).astype(np.float32)
+        return (0.5 + 0.5 * np.cos(2 * np.pi * turns)).astype(np.float32)
+    cells = np.mod(layer, np.float32(1.0))  # positions and uv: one run of colours a unit
+    return np.pad(cells, ((0, 0), (0, 0), (0, 3 - cells.shape[2])))

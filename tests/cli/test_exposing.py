@@ -1,0 +1,98 @@
+"""The passes of `clpt render`, with a renderer that only counts."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+
+import pytest
+
+from clpt.cli import exposing
+from clpt.cli.display import Lines, clock, figures
+from clpt.cli.exposing import expose, pass_size
+from clpt.render.renderer import Progress
+
+
+class Counting:
+    """Takes `seconds` for a sample and asks after each."""
+
+    def __init__(self, seconds: float = 0.0):
+        self.samples, self.seconds, self.passes = 0, seconds, []
+
+    def step(self, samples, progress):
+        self.passes.append(samples)
+        for done in range(samples):
+            time.sleep(self.seconds)
+            if not progress(Progress(self.samples + done + 1, 0, 0, 0, 0.0)):
+                return False
+        self.samples += samples
+        return True
+
+
+def test_passes_grow_and_end_at_the_last_sample():
+    renderer = Counting()
+    assert expose(renderer, 100, None, lambda progress: None)
+    assert renderer.passes == [1, 3, 12, 48, 36]
+
+
+def test_the_limit_ends_a_pass_but_not_the_first():
+    renderer = Counting(0.05)
+    assert expose(renderer, None, 0.01, lambda progress: None)
+    assert renderer.samples == 1
+    renderer = Counting(0.01)
+    began = time.perf_counter()
+    assert expose(renderer, None, 0.3, lambda progress: None)
+    assert 0.3 <= time.perf_counter() - began < 1.0
+
+
+@pytest.mark.skipif(
+    threading.current_thread() is not threading.main_thread(), reason="signals need it"
+)
+def test_ctrl_c_ends_the_rendering_and_a_second_one_the_program():
+    shown = []
+
+    def press(progress):
+        shown.append(progress)
+        if len(shown) == 9:
+            signal.raise_signal(signal.SIGINT)
+
+    before = signal.getsignal(signal.SIGINT)
+    assert not expose(Counting(), 1000, None, press)
+    assert len(shown) == 9
+    assert signal.getsignal(signal.SIGINT) is before
+
+    def press_twice(progress):
+        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        expose(Counting(), 1000, None, press_twice)
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_size_of_a_pass():
+    everything = float("inf")
+    assert pass_size(10, 1e9, everything, everything) == 10 * exposing.GROWTH
+    assert pass_size(1000, 2.0, everything, everything) == int(2 * exposing.PASS_SECONDS)
+    assert pass_size(1000, 2.0, 3, everything) == 3
+    assert pass_size(1000, 2.0, everything, 0.9) == 1
+    assert pass_size(1, 1e-3, everything, everything) == 1  # slower than a sample in a pass
+
+
+def test_figures():
+    told = figures(Progress(32.4, 64, 2_000_000, 9_000_000, 2.0), 0.5)
+    assert list(told.values()) == ["32/64 spp", "1 Msamples/s", "4.5 Mrays/s", "0:02", "0:02 left"]
+    assert clock(59.6) == "1:00" and clock(3661) == "1:01:01"
+
+
+def test_lines_come_now_and_then(monkeypatch, capsys):
+    now = [100.0]
+    monkeypatch.setattr(time, "perf_counter", lambda: now[0])
+    lines = Lines(limit=100.0)
+    for second in range(12):
+        now[0] = 100.0 + second
+        lines.show(Progress(second, 0, 10**6, 10**6, float(second)))
+    told = capsys.readouterr().err.splitlines()
+    assert [line.split()[0] for line in told] == ["5", "10"]
+    assert "0:05" in told[0] and "1:35 left" in told[0]

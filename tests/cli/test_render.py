@@ -1,0 +1,151 @@
+"""`clpt render`: what it writes, when it stops, and that bad input is one line."""
+
+from __future__ import annotations
+
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import pytest
+
+from clpt import __version__, images
+from clpt.__main__ import run
+from clpt.cli import outputs
+from clpt.cli.render import changed
+from clpt.formats import load
+from clpt.render.renderer import Renderer
+
+ROOT = Path(__file__).resolve().parents[2]
+CORNELL = str(ROOT / "scenes" / "cornell_box")
+
+
+def test_several_formats_and_the_facts_in_the_exr(tmp_path, capsys):
+    paths = [tmp_path / f"out{suffix}" for suffix in (".exr", ".png", ".npy")]
+    given = [word for path in paths for word in ("-o", str(path))]
+    assert run(["render", CORNELL, *given, "--size", "20x12", "--spp", "3", "--seed", "5"]) == 0
+    told = capsys.readouterr().err
+    assert all(str(path) in told for path in paths)
+    assert {images.read(path).shape for path in paths} == {(12, 20, 3)}
+    with OpenEXR.File(str(paths[0])) as file:
+        header = dict(file.header())
+    expected = {"mode": "spectral", "integrator": "path", "sampler": "sobol", "seed": 5, "spp": 3.0}
+    assert {name: header[name] for name in expected} == expected
+    assert header["software"] == f"clpt {__version__}" and header["seconds"] > 0
+    assert header["scene"] == CORNELL and header["device"]
+
+
+def test_passes_add_up_to_one_step(tmp_path):
+    """21 samples are 1 + 3 + 12 + 5, bit for bit."""
+    path = tmp_path / "out.npy"
+    common = ["--size", "17x9", "--spp", "21", "--mode", "rgb", "--quiet"]
+    assert run(["render", CORNELL, "-o", str(path), *common]) == 0
+    whole = Renderer(changed(load(CORNELL), size=(17, 9), mode="rgb"))
+    whole.step(21)
+    assert np.array_equal(np.load(path), whole.image())
+
+
+def test_a_limit_of_time_leaves_a_whole_picture(tmp_path, capsys):
+    path = tmp_path / "out.exr"
+    arguments = ["-o", str(path), "--size", "64x64", "--time", "0.01s"]
+    assert run(["render", CORNELL, *arguments]) == 0
+    with OpenEXR.File(str(path)) as file:
+        assert file.header()["spp"] >= 1
+    assert (images.read(path).mean(axis=2) > 0).mean() > 0.5  # one sample a pixel at least
+    assert "building kernels" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT for other processes")
+def test_ctrl_c_writes_what_is_there(tmp_path):
+    path = tmp_path / "out.npy"
+    command = [sys.executable, "-m", "clpt", "render", CORNELL, "-o", str(path), "--time", "1h"]
+    with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        lines = iter(process.stderr.readline, "")
+        assert any("Msamples/s" in line for line in lines)
+        process.send_signal(signal.SIGINT)
+        rest = process.stderr.read()
+        assert process.wait(20) == 130
+    assert str(path) in rest and "Traceback" not in rest
+    assert np.isfinite(np.load(path)).all()
+
+
+def test_quiet_says_nothing(tmp_path, capfd):
+    path = tmp_path / "out.png"
+    assert run(["render", CORNELL, "-o", str(path), "--size", "8x8", "--spp", "1", "--quiet"]) == 0
+    out, err = capfd.readouterr()
+    assert out == "" and "spp" not in err and path.is_file()
+
+
+def test_verbose_tells_of_tables_and_stages(tmp_path, capsys):
+    path = tmp_path / "out.png"
+    arguments = ["-o", str(path), "--size", "8x8", "--spp", "1", "--verbose"]
+    assert run(["render", CORNELL, *arguments]) == 0
+    told = capsys.readouterr().err
+    for words in ("36 triangles", "tree", "table vertices", "programs", "stage shade_diffuse"):
+        assert words in told
+
+
+def test_aov_has_its_layers(tmp_path):
+    path, picture = tmp_path / "out.exr", tmp_path / "out.png"
+    common = ["--size", "8x8", "--spp", "2", "--quiet", "--integrator", "aov"]
+    assert run(["render", CORNELL, "-o", str(path), "-o", str(picture), *common]) == 0
+    layers = images.read_layers(path)
+    expected = {"R", "depth", "uv.u", "uv.v", "shading_normal.R", "albedo.G", "shape_id"}
+    assert expected <= layers.keys()
+    assert layers["depth"].min() > 1  # the camera stands in front of the box
+    assert images.read(picture).shape == (16, 32, 3)  # eight values, four in a row
+
+
+def test_names_of_pictures():
+    assert outputs.default(Path(CORNELL)) == (Path("cornell_box.exr"), Path("cornell_box.png"))
+    assert outputs.default(Path("a/scene.json"))[0] == Path("a.exr")  # though there is no such file
+    assert outputs.default(ROOT / "tests" / "scenes" / "bowl.obj")[1] == Path("bowl.png")
+
+
+def test_the_picture_goes_to_the_current_folder(tmp_path, monkeypatch):
+    shutil.copy(ROOT / "tests" / "scenes" / "bowl.obj", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    assert run(["render", "bowl.obj", "--size", "8x8", "--spp", "1", "--quiet"]) == 0
+    assert {path.name for path in tmp_path.iterdir()} == {"bowl.obj", "bowl.exr", "bowl.png"}
+
+
+def test_changes_of_a_scene():
+    scene = changed(load(CORNELL), size=(30, 20), spp=7, integrator="direct", seed=3)
+    assert (scene.film.width, scene.film.height) == (30, 20)
+    assert (scene.spp, scene.integrator.kind, scene.seed) == (7, "direct", 3)
+    assert changed(load(CORNELL), max_depth=3).integrator.max_depth == 3
+    assert changed(load(CORNELL), integrator="whitted").integrator.max_depth == 8  # as it was
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--size", "0x5"], "1 to 65536"),
+        (["--size", "100000x10"], "1 to 65536"),
+        (["--size", "large"], "640x480"),
+        (["--spp", "0"], "--spp"),
+        (["--time", "soon"], "30s"),
+        (["--time", "0s"], "no time"),
+        (["--mode", "cmyk"], "spectral"),
+        (["--integrator", "magic"], "whitted"),
+        (["--integrator", "direct", "--max-depth", "3"], "no depth"),
+        (["--device", "no such device"], "is not there"),
+        (["-o", "picture.jpeg"], ".exr"),
+        (["-o", "no/such/folder/a.png"], "folder"),
+        (["--integrator", "aov", "-o", "a.hdr"], ".exr and .png"),
+        (["-D", "spp=3"], "only .xml"),
+    ],
+)
+def test_bad_input_is_one_line_before_anything_is_rendered(
+    tmp_path, monkeypatch, capsys, arguments, words
+):
+    monkeypatch.chdir(tmp_path)
+    assert run(["render", CORNELL, *arguments]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("clpt: error: ") and error.count("\n") == 1
+    assert words in error
+    assert not list(tmp_path.iterdir())
