@@ -1,6 +1,7 @@
 /* A sphere. As a light it is sampled evenly over the cone that it fills from outside, and evenly over
  * its area from inside. u is the azimuth about its z axis over 2 pi, v the angle from it over pi. */
 #include "lib/analytic.cl"
+#include "lib/surface_flags.cl"
 
 inline vec2 sphere_uv(Sphere q, vec3 outward)
 {
@@ -9,6 +10,13 @@ inline vec2 sphere_uv(Sphere q, vec3 outward)
     uv.x = turn_of(y, x);
     uv.y = atan2_r(sqrt(x * x + y * y), z) * INV_PI;
     return uv;
+}
+
+/* Whether a point at distance d from the centre is outside. One on the surface is not, though rounding
+ * may put it there: it would find no light, while a ray from its offset inside meets all of it. */
+inline mask sphere_outside(Sphere q, real d)
+{
+    return d > q.radius + 2.0f * RAY_EPSILON * (1.0f + size3(q.center) + q.radius);
 }
 
 /* sin^2 of the cone's half angle from a distance d > radius, and 1 - cos without cancellation. */
@@ -22,7 +30,7 @@ ShapeSample sphere_sample(Sphere q, vec3 p, vec2 u)
 {
     vec3 to = sub3(q.center, p);
     real d = sqrt(max_r(dot3(to, to), (real)(1e-30f))), sin2_max;
-    mask outside = d > q.radius;
+    mask outside = sphere_outside(q, d);
 
     /* From inside. */
     vec3 outward = uniform_sphere(u), there = madd3(outward, q.radius, to);
@@ -55,7 +63,7 @@ real sphere_pdf(Sphere q, vec3 p, vec3 wi, real t, vec3 n)
 {
     vec3 to = sub3(q.center, p);
     real d = sqrt(max_r(dot3(to, to), (real)(1e-30f))), sin2;
-    mask outside = d > q.radius;
+    mask outside = sphere_outside(q, d);
     real one_minus_cos = sphere_cone(q, sel(outside, d, 2.0f * q.radius), &sin2);
     real inside = solid_angle_pdf(INV_4PI / sqr(q.radius), t, fabs(dot3(n, wi)));
     return sel(outside, INV_2PI / one_minus_cos, inside);
