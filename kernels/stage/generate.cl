@@ -64,10 +64,12 @@ kernel APART void generate(SLAB_ARGS, SCENE_ARGS, global float *film, global uin
             mask begin = turn & !done;
             place = sel_i(begin, next, place);
             sample = sel_i(begin, start, sample);
-            Exposure next_place = film_load(settings, film, begin, plane, place);
-            e.sum = sel3(begin, next_place.sum, e.sum);
-            e.rest = sel3(begin, next_place.rest, e.rest);
-            e.samples = sel(begin, next_place.samples, e.samples);
+            if (any(begin)) {
+                Exposure next_place = film_load(settings, film, begin, plane, place);
+                e.sum = sel3(begin, next_place.sum, e.sum);
+                e.rest = sel3(begin, next_place.rest, e.rest);
+                e.samples = sel(begin, next_place.samples, e.samples);
+            }
             store_path_place(path, at, begin, place);
             count(counters, COUNTER_DONE, done, (integer)(1));
         }
