@@ -151,7 +151,12 @@ def _camera_text(kind: str) -> str:
 def _lights_text(features: Features) -> str:
     """The loader of emissions, from wherever they come in this scene, and the lights' dispatch."""
     found = features.sources.get("emission", {}).get("value", frozenset({"constant"}))
-    return kinds.emission_text(found) + lights.dispatch_text(features.lights, "texture" in found)
+    textured = "texture" in found
+    return (
+        ('#include "generated/textures.cl"\n' if textured else "")
+        + kinds.emission_text(found)
+        + lights.dispatch_text(features.lights, textured)
+    )
 
 
 def _mixture_text(features: Features) -> str:
