@@ -1,0 +1,113 @@
+"""Kernels under Oclgrind, a simulator that checks every access: no invalid one, no race.
+
+Its device is one lane wide; rendering eight lanes wide shows what idle lanes touch. Those may read
+what another work-item writes (and drop it), so races are looked for at one lane.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import clpt
+from clpt import transforms
+from clpt.scene import Film, Scene, cameras, lights, materials, shapes, textures
+
+ROOT = Path(__file__).resolve().parents[1]
+
+pytestmark = pytest.mark.skipif(
+    shutil.which("oclgrind") is None, reason="oclgrind (a Debian package) is not installed"
+)
+
+RENDER = """
+import sys
+import clpt
+from clpt import device
+from tests.test_oclgrind import small_scene
+name, mode, lanes, layout, queued = sys.argv[1:]
+device.Device.lanes = property(lambda self: int(lanes))
+image = clpt.render(small_scene(name, mode), 2, slots=64, layout=layout, queued=queued == "1")
+assert image.shape == (5, 6, 3) and image.min() >= 0.0 and image.max() > 0.0
+"""
+OUT_OF_BOUNDS = """
+import numpy as np, pyopencl as cl
+context = cl.create_some_context(interactive=False)
+queue = cl.CommandQueue(context)
+text = "kernel void probe(global int *a) { a[get_global_id(0) + 1] = 1; }"
+program = cl.Program(context, text).build(cache_dir=False)
+program.probe(queue, (4,), None, cl.Buffer(context, cl.mem_flags.READ_WRITE, 16))
+queue.finish()
+"""
+
+
+def small_scene(name: str, mode: str) -> Scene:
+    """A scene of the tests, or one without triangles, on a film of 6x5 pixels."""
+    film = Film(width=6, height=5, mode=mode)
+    if name != "ball":
+        scene = clpt.load(ROOT / "tests" / "scenes" / f"{name}.xml")
+        return dataclasses.replace(scene, film=dataclasses.replace(film, filter=scene.film.filter))
+    board = textures.Checkerboard(color0=0.8)
+    matte = materials.Diffuse(reflectance=board)
+    metal = materials.RoughConductor(alpha_u=board)
+    glowing = lights.Area(radiance=board)
+    view = transforms.look_at([0, 0, 5], [0, 0, 0], [0, 1, 0])
+    return Scene(
+        camera=cameras.Perspective(to_world=view),
+        shapes=[
+            shapes.Sphere(material=matte),
+            shapes.Disk(material=metal),
+            shapes.Cylinder(p0=(-1.6, -1, 0), p1=(-1.6, 1, 0), radius=0.3, emission=glowing),
+        ],
+        film=film,
+    )
+
+
+def checked(tmp_path: Path, script: str, *arguments: str, races: bool = False) -> str:
+    """Run a script under Oclgrind; return what it found."""
+    log = tmp_path / "oclgrind.log"
+    command = ["oclgrind", "--log", str(log), *(["--data-races"] if races else [])]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    environment.pop("CLPT_DEVICE", None)
+    done = subprocess.run(
+        [*command, sys.executable, "-c", script, *arguments],
+        capture_output=True, text=True, timeout=300, cwd=tmp_path, env=environment, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-2000:]
+    return log.read_text(encoding="utf-8").strip() if log.exists() else ""
+
+
+def test_it_finds_what_is_wrong(tmp_path: Path) -> None:
+    assert "Invalid write" in checked(tmp_path, OUT_OF_BOUNDS)
+
+
+QUICK = [
+    ("ball", "spectral", "8", "binary", "0"),
+    ("plastic", "spectral", "1", "binary", "1"),
+    ("textures", "rgb", "8", "wide8", "0"),
+    ("delta_lights", "rgb", "8", "binary", "0"),
+    ("cornell", "rgb", "1", "brute", "0"),
+]
+NAMES = ("ball", "glass_metal", "plastic", "textures", "thin_lens", "envmap")
+WAYS = (
+    ("rgb", "1", "wide8", "0"),
+    ("spectral", "8", "binary", "1"),
+    ("spectral", "16", "wide8", "0"),
+)
+MORE = [(name, *way) for name in NAMES for way in WAYS]
+
+
+@pytest.mark.parametrize("case", QUICK, ids="-".join)
+def test_a_render(tmp_path: Path, case: tuple[str, ...]) -> None:
+    assert checked(tmp_path, RENDER, *case, races=case[2] == "1") == ""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", MORE, ids="-".join)
+def test_more_renders(tmp_path: Path, case: tuple[str, ...]) -> None:
+    assert checked(tmp_path, RENDER, *case, races=case[2] == "1") == ""
