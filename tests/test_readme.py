@@ -1,0 +1,48 @@
+"""What README.md says is so: its links lead somewhere, its Python runs, its commands exist."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import clpt
+from clpt.cli import cli
+
+ROOT = Path(__file__).resolve().parents[1]
+README = (ROOT / "README.md").read_text("utf-8")
+
+
+def test_links_lead_somewhere():
+    links = re.findall(r"\]\(([^)#]+)\)", README)
+    local = [link for link in links if not link.startswith("http")]
+    assert len(local) > 10
+    assert [link for link in local if not (ROOT / link).exists()] == []
+
+
+def test_the_scene_from_dataclasses_renders():
+    code = next(c for c in re.findall(r"```python\n(.*?)```", README, re.S) if "Sphere" in c)
+    names: dict = {}
+    exec(code, names)
+    scene = names["scene"]
+    scene.film = dataclasses.replace(scene.film, width=16, height=12)
+    image = clpt.render(scene, spp=64)
+    assert image.shape == (12, 16, 3) and np.isfinite(image).all()
+    assert image[0, 0] == pytest.approx(1.0, abs=0.1)  # the sky; gold in the middle is yellow
+    assert image[6, 8, 0] > 1.2 * image[6, 8, 2]
+
+
+def test_commands_and_options_exist():
+    context = cli.make_context("clpt", ["devices"])
+    lines = [line for line in README.splitlines() if line.startswith("clpt ")]
+    assert len(lines) > 5
+    for line in lines:
+        _, name, *words = shlex.split(line.split("   ")[0])
+        command = cli.get_command(context, name)
+        assert command is not None, name
+        known = {option for parameter in command.params for option in parameter.opts}
+        assert {word for word in words if word.startswith("-")} <= known
