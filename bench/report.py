@@ -74,15 +74,14 @@ def stages(rows: Sequence[Row]) -> str:
 
 
 def startup(rows: Sequence[Row]) -> str:
-    """Whole processes."""
+    """Whole processes; in brackets, processor time."""
 
     def cells(row: Row) -> list[str]:
         ratio = row.get("memory_ratio")
         return [
             str(row["renderer"]),
             str(row["mode"]),
-            f"{row['cold']:.2f} s",
-            f"{row['warm']:.2f} s",
+            *(f"{row[name]:.2f} s ({row[f'{name}_cpu']:.2f} s)" for name in ("cold", "warm")),
             f"{row['memory'] / 2**20:.0f} MiB" + (f" ({ratio:.2f} of Mitsuba's)" if ratio else ""),
         ]
 

@@ -37,9 +37,10 @@ SIZES = {"cornell": (64, 1), "atrium": (256, 16)}  # a side's pixels, spp
 
 @dataclass(frozen=True)
 class Process:
-    """What a process took: seconds from its start to its end, the peak of its memory in bytes."""
+    """What a process took: seconds from start to end, of processor time, peak memory in bytes."""
 
     seconds: float
+    cpu: float
     memory: int
 
 
@@ -63,7 +64,7 @@ def run(command: Sequence[str], caches: Path) -> Process:
             output.seek(0)
             raise SystemExit(f"{' '.join(command)}: failed\n{output.read()}")
     process.returncode = 0
-    return Process(seconds, usage.ru_maxrss * 1024)
+    return Process(seconds, usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024)
 
 
 def commands(scene: Path, mode: str, out: Path) -> dict[str, list[str]]:
@@ -87,14 +88,16 @@ def measure(folder: Path, mode: str, rounds: int) -> list[dict]:
         cold, warm = [], []
         for n in range(rounds):
             caches = folder / f"{renderer}{n}"
-            cold.append(run(cornell[renderer], caches).seconds)
-            warm.append(run(cornell[renderer], caches).seconds)
+            cold.append(run(cornell[renderer], caches))
+            warm.append(run(cornell[renderer], caches))
         rows.append(
             {
                 "renderer": renderer,
                 "mode": mode,
-                "cold": statistics.median(cold),
-                "warm": statistics.median(warm),
+                "cold": statistics.median(process.seconds for process in cold),
+                "warm": statistics.median(process.seconds for process in warm),
+                "cold_cpu": statistics.median(process.cpu for process in cold),
+                "warm_cpu": statistics.median(process.cpu for process in warm),
                 "memory_cold": run(atrium[renderer], caches).memory,
                 "memory": run(atrium[renderer], caches).memory,
             }
@@ -108,13 +111,15 @@ def measure(folder: Path, mode: str, rounds: int) -> list[dict]:
 @click.option("--rounds", default=3, show_default=True)
 @click.option("--json", "json_file", type=click.Path(), help="append the figures as JSON lines")
 def main(modes: tuple[str, ...], rounds: int, json_file: str | None) -> None:
-    table = Table("renderer", "mode", "cold", "warm", "memory", title="Whole processes")
+    table = Table("renderer", "mode", "cold", "warm", "memory", title="Whole processes (CPU time)")
     with tempfile.TemporaryDirectory() as folder:
         for mode in modes:
             rows = measure(Path(folder), mode, rounds)
             machine.append(json_file, "startup", rows)
             for row in rows:
-                seconds = (f"{row[name]:.2f} s" for name in ("cold", "warm"))
+                seconds = (
+                    f"{row[name]:.2f} s ({row[f'{name}_cpu']:.2f} s)" for name in ("cold", "warm")
+                )
                 table.add_row(row["renderer"], mode, *seconds, f"{row['memory'] / 2**20:.0f} MiB")
     machine.console().print(table)
 
