@@ -16,8 +16,9 @@ from clpt.scene import Film, Scene
 from clpt.scene import materials as m
 from clpt.scene.cameras import Orthographic
 from clpt.scene.integrators import Direct, Independent, Path
-from clpt.scene.lights import Constant
+from clpt.scene.lights import Area, Constant
 from clpt.scene.shapes import Rectangle, Sphere
+from clpt.scene.textures import Checkerboard
 from tests.renders.builders import (
     ALBEDO,
     EXPECTED,
@@ -54,8 +55,8 @@ def test_independent_sampler(kind: str) -> None:
 
 
 def replaced(scene: Scene, kind: str, **changes: object) -> Scene:
-    """The scene with other parameters of its shape of a kind."""
-    shapes = [dataclasses.replace(s, **changes) if s.kind == kind else s for s in scene.shapes]
+    """The scene with other parameters of its light of a kind."""
+    shapes = [dataclasses.replace(s, **changes) if s.name == kind else s for s in scene.shapes]
     return dataclasses.replace(scene, shapes=shapes)
 
 
@@ -64,6 +65,19 @@ def test_small_and_huge_sphere_lights(radius: float) -> None:
     """Tiny ones are found by sampling the light, huge ones mostly by sampling the surface."""
     scene = replaced(lit_ground("sphere", "rgb"), "sphere", radius=radius)
     assert_mean(exposures(scene, 24, 64), [ALBEDO * RADIANCE * radius**2] * 3, 0.005, 5e-4)
+
+
+@pytest.mark.parametrize("kind", ["rectangle", "mesh"])
+def test_textured_light(kind: str) -> None:
+    """Small squares by turns bright and dim shine like their mean."""
+    uv = np.diag([32.0, 32.0, 1.0])
+    board = Checkerboard(color0=(0.9, 0.9, 0.9), color1=(0.3, 0.3, 0.3), to_uv=uv)
+    scene = replaced(lit_ground(kind, "rgb"), kind, emission=Area(radiance=board))
+    if kind == "mesh":
+        uvs = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], np.float32)
+        scene = replaced(scene, kind, uvs=uvs)
+    expected = ALBEDO / np.pi * 0.6 * EXPECTED[kind]
+    assert_mean(exposures(scene, 24, 64), [expected] * 3, 0.02, 5e-3)
 
 
 def test_light_leaves_the_front_only() -> None:
