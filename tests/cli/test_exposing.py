@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import io
 import signal
 import threading
 import time
 
 import pytest
+from rich.console import Console
 
 from clpt.cli import exposing
-from clpt.cli.display import Lines, clock, figures
+from clpt.cli.display import Bar, Lines, clock, figures
 from clpt.cli.exposing import expose, pass_size
 from clpt.render.renderer import Progress
 
@@ -96,3 +98,16 @@ def test_lines_come_now_and_then(monkeypatch, capsys):
     told = capsys.readouterr().err.splitlines()
     assert [line.split()[0] for line in told] == ["5", "10"]
     assert "0:05" in told[0] and "1:35 left" in told[0]
+
+
+def test_a_terminal_gets_a_bar():
+    bar = Bar(limit=None)
+    bar.console = Console(file=io.StringIO(), force_terminal=True, width=120, highlight=False)
+    with bar.phase("building kernels"):
+        pass
+    with bar.rendering():
+        bar.show(Progress(64.0, 64, 2_000_000, 9_000_000, 2.0))
+    bar.note("a warning with [brackets]")
+    told = bar.console.file.getvalue()
+    for words in ("64/64 spp", "1 Msamples/s", "4.5 Mrays/s", "0:00 left", "[brackets]"):
+        assert words in told
