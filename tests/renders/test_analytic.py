@@ -111,7 +111,7 @@ def test_depth_in_a_closed_furnace(path: dict, bounces: float) -> None:
     """
     scene = furnace(m.Diffuse(reflectance=ALBEDO), "rgb", closed=True, **path)
     expected = (1.0 - ALBEDO ** (bounces + 1.0)) / (1.0 - ALBEDO)
-    assert_mean(exposures(scene, 24, 32), [expected] * 3, 0.01, 5e-4)
+    assert_mean(exposures(scene, 16, 16), [expected] * 3, 0.01, 5e-4)
 
 
 def test_hidden_lights() -> None:
