@@ -32,7 +32,7 @@ class Features:
     tangents: bool = False
     mixtures: bool = False
     infinite: bool = False
-    light_choice: bool = False  # there is more than one light to choose from
+    many_lights: bool = False  # too many to be chosen by the number that also places the point
     dispersion: bool = False
     channel: str = ""
     spectra_size: int = 0

@@ -214,7 +214,7 @@ def _sample_text(lamps: list[str], surfaces: list[str], textured: bool) -> list[
     lines = [
         f"inline {head}",
         "{",
-        "    integer row = light_pick(scene, pick);",
+        "    integer row = light_pick(scene, FEW_LIGHTS ? &u.x : &pick);",
         "    LightRow l = light_at(scene, row);",
         "    LightSample s = light_nothing();",
     ]

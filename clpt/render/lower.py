@@ -22,6 +22,7 @@ from clpt.spectra.cie import _tanh_ends as tanh_ends
 
 SHAPE_NORMALS, SHAPE_UVS, SHAPE_TWO_SIDED, SHAPE_ONE_LIGHT = 1, 2, 4, 8
 MIXTURE = 0xFF
+FEW_LIGHTS = 256  # up to which one random number chooses a light and a point on it
 DEEPEST = 4000  # path state has 12 bits for the depth
 LONGEST_ROW = max(sum(map(words, device_params(cls).values())) for cls in mt.LEAVES)
 
@@ -227,7 +228,7 @@ class _Lowering:
             tangents=self.uses["tangents"],
             mixtures=self.uses["mixtures"],
             infinite=self.lights.infinite > 0 and not self.channels,
-            light_choice=len(self.lights.rows) > 1,
+            many_lights=len(self.lights.rows) > FEW_LIGHTS,
             dispersion=index_tables,
             channel=self.channels[0] if self.channels else "",
             spectra_size=tables.spectra_size,

@@ -45,7 +45,7 @@ def sources(
             **common,
             "BSDF_KIND": number,
             "BSDF_DELTA": int(LEAVES[kind].delta),
-            "USES_CHOICE": int(LEAVES[kind].choosy or features.light_choice),
+            "USES_CHOICE": int(LEAVES[kind].choosy or features.many_lights),
             "QUEUED": int(queued),
         }
         made[f"shade_{kind}"] = _source("shade", own, defines, lanes)
@@ -67,6 +67,7 @@ def _defines(features: Features) -> dict[str, str | int | float]:
         "USES_DISPERSION": int(features.dispersion and features.mode == "spectral"),
         "SPECTRA_SIZE": features.spectra_size,
         "SPECTRA_STEP": f"{features.spectra_step}f",
+        "FEW_LIGHTS": int(not features.many_lights),
         "USES_LIGHTS": int(bool(features.lights)),
         "USES_SURFACE_LIGHTS": int(bool(set(features.lights) & set(shapes.RECORDS))),
     }

@@ -39,7 +39,7 @@ def texels(image: Floats, role: str, spectral: bool) -> Floats:
     (h * w, 4): rgb, or sigmoid coefficients and a factor where `spectral`; (h * w,) for "real".
     """
     if role == "real":
-        return image.mean(axis=2, dtype=np.float64).astype(np.float32).reshape(-1)
+        return _numbers(image).astype(np.float32).reshape(-1)
     colours = np.broadcast_to(image, (*image.shape[:2], 3)).reshape(-1, 3)
     made = np.ones((len(colours), 4), np.float32)
     if not spectral:
@@ -50,6 +50,11 @@ def texels(image: Floats, role: str, spectral: bool) -> Floats:
     else:
         made[:, 3], made[:, :3] = spectra.unbounded(colours)
     return made
+
+
+def _numbers(image: Floats) -> NDArray[np.float64]:
+    """What (h, w, 1 or 3) says where a number is asked for: of a colour its luminance."""
+    return image[..., 0].astype(np.float64) if image.shape[2] == 1 else spectra.luminance(image)
 
 
 def _palette(colours: Floats) -> tuple[Floats, Any]:

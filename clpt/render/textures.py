@@ -19,6 +19,7 @@ from clpt.render.kinds import REAL_WORDS, SPECTRUM_WORDS
 from clpt.render.texels import pixels, texels
 from clpt.scene.params import device_params, params
 from clpt.scene.textures import Bitmap, Checkerboard, Texture
+from clpt.spectra import luminance
 
 _COMMON = {
     "kind": ("integer", "position in the table of textures"),
@@ -114,7 +115,7 @@ def _checkerboard(texture: Checkerboard, role: str, tables: Sink) -> dict[str, A
         value = getattr(texture, name)
         if role == "real":
             words = np.zeros(SPECTRUM_WORDS, np.float32)
-            words[0] = np.mean(value.to_rgb("unbounded"))
+            words[0] = luminance(value.to_rgb("unbounded"))
             members[name] = tables.append("textures", words.view(np.uint32))
         else:
             members[name] = tables.append("textures", tables.spectrum_words(value, role)[0])

@@ -6,6 +6,10 @@
  * branch. Masks come from comparisons, combine with & and |, and negate with !, never with ~ (a
  * true scalar comparison is 1, a true vector one is -1).
  */
+/* Left to themselves, compilers call small functions and return their structs through memory, lane by
+ * lane: a third of the time of shading. */
+#define inline __attribute__((always_inline)) inline
+
 #define CAT_(a, b) a##b
 #define CAT(a, b) CAT_(a, b)
 

@@ -4,15 +4,26 @@ inline LightRow light_at(Scene scene, integer row)
     return light_row_row(scene.lights, row * LIGHT_ROW_WORDS);
 }
 
-/* A row by the alias method (Walker 1977): `pick` chooses a place, its rest whether to stay. */
-inline integer light_pick(Scene scene, real pick)
+/* Where there are few lights, the number that chooses one is good enough to go on with: the light and
+ * the point on it then come from one well-spread pair. Of many, it would have no bits left. */
+#ifndef FEW_LIGHTS
+#define FEW_LIGHTS 0
+#endif
+
+/* A row by the alias method (Walker 1977): *u chooses a place, its rest whether to stay; what is left
+ * of it is uniform in [0, 1) again. */
+inline integer light_pick(Scene scene, real *u)
 {
     int count = scene.settings->light_count;
     if (count == 1) return (integer)(0);
-    real place = pick * (float)count;
+    real place = *u * (float)count;
     integer row = min_i(to_integer(place), (integer)(count - 1));
     LightRow l = light_at(scene, row);
-    return sel_i(place - to_real(row) < l.keep, row, l.alias);
+    real rest = place - to_real(row);
+    mask stay = rest < l.keep;
+    real left = sel(stay, rest, rest - l.keep), share = sel(stay, l.keep, 1.0f - l.keep);
+    *u = clamp_r(left / max_r(share, (real)(1e-20f)), (real)(0.0f), (real)(0.99999994f));
+    return sel_i(stay, row, l.alias);
 }
 
 /* With the probability of the row in it; a delta light keeps its mark and carries it as a factor. */

@@ -6,10 +6,21 @@ inline vec2 disk_of(vec2 u) /* concentric in the radius only: r = sqrt(u.x), ang
     vec2 p = {r * c, r * s};
     return p;
 }
-inline vec3 cosine_hemisphere(vec2 u)
+/* The unit square onto the unit disk, rings to rings (Shirley and Chiu 1997). */
+inline vec2 concentric_disk(vec2 u)
 {
-    vec2 p = disk_of(u);
-    return v3(p.x, p.y, sqrt_r(1.0f - u.x));
+    real x = 2.0f * u.x - 1.0f, y = 2.0f * u.y - 1.0f;
+    mask upright = fabs(x) < fabs(y);
+    real r = sel(upright, y, x), turn = 0.125f * safe_div(sel(upright, x, y), r), s, c;
+    turn = sel(upright, 0.25f - turn, turn);
+    sincos_2pi(turn - floor(turn), &s, &c);
+    vec2 p = {r * c, r * s};
+    return p;
+}
+inline vec3 cosine_hemisphere(vec2 u) /* Malley: a point of the disk, raised to the hemisphere */
+{
+    vec2 p = concentric_disk(u);
+    return v3(p.x, p.y, sqrt_r(1.0f - p.x * p.x - p.y * p.y));
 }
 inline real cosine_hemisphere_pdf(real cos_t) { return max_r(cos_t, (real)(0.0f)) * INV_PI; }
 inline vec3 uniform_sphere(vec2 u)
