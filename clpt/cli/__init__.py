@@ -7,7 +7,7 @@ import logging
 
 import click
 
-COMMANDS = ("render", "devices", "info", "kernels")
+COMMANDS = ("render", "devices", "info", "kernels", "bench")
 
 
 class _Commands(click.Group):
