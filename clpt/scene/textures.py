@@ -28,7 +28,7 @@ class Texture(Kind):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Bitmap(Texture):
-    """An image; v = 0 is its bottom row. A `real` parameter takes the mean of its channels."""
+    """An image; v = 0 is its bottom row. A `real` parameter takes its luminance."""
 
     image: Any = host(None, "path of an image, or an array (h, w) or (h, w, 1|3|4) float32")
     raw: bool = host(False, "True: values as they are, without the sRGB decoding of 8-bit files")

@@ -330,6 +330,27 @@ def test_textures(bsdf):
     assert (made.color0, made.color1) == (RGB(0.7, 0.7, 0.7), Constant(0.2))
 
 
+def test_checkerboard_of_numbers_is_mitsubas(scene):
+    """It swaps the two where it asks for a number; a reference elsewhere sees them as they are."""
+    mi = pytest.importorskip("mitsuba")
+    mi.set_variant("scalar_rgb")
+    theirs = mi.load_dict({"type": "checkerboard", "color0": 0.1, "color1": 0.5})
+    made = scene(
+        '<texture type="checkerboard" id="t"><float name="color0" value="0.1"/>'
+        '<float name="color1" value="0.5"/></texture><shape type="sphere"><bsdf type="mask">'
+        '<ref name="opacity" id="t"/><bsdf type="diffuse"><ref name="reflectance" id="t"/></bsdf>'
+        "</bsdf></shape>"
+    )
+    mask = made.shapes[0].material
+    near, far = mi.SurfaceInteraction3f(), mi.SurfaceInteraction3f()
+    near.uv, far.uv = (0.2, 0.2), (0.7, 0.2)
+    ours = [mask.opacity.color0.value, mask.opacity.color1.value]
+    assert ours == pytest.approx([theirs.eval_1(near), theirs.eval_1(far)])
+    board = mask.material.reflectance
+    ours = [board.color0.value, board.color1.value]
+    assert ours == pytest.approx([theirs.eval(near)[0], theirs.eval(far)[0]])
+
+
 ERRORS = {
     '<bsdf type="principled" id="p"/>': r":2: <bsdf type=.principled.>: unknown bsdf",
     '<bsdf type="difuse"/>': "did you mean 'diffuse'",

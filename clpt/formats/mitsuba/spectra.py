@@ -7,6 +7,7 @@ Mitsuba's bitmaps have v = 0 in their top row, ours in the bottom row, which `to
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -60,7 +61,12 @@ def real(props: Properties, name: str, default: float) -> float | Texture:
     if child is None:
         return default
     target = props.context.resolve(child)
-    return texture(target, props) if target.tag == "texture" else number(target)
+    if target.tag != "texture":
+        return number(target)
+    made = texture(target, props)
+    if isinstance(made, Checkerboard):  # whose colours Mitsuba swaps where it asks for a number
+        return replace(made, color0=made.color1, color1=made.color0)
+    return made
 
 
 def _take(props: Properties, name: str, role: str, default: Any) -> Any:

@@ -1,0 +1,60 @@
+"""Small scenes that isolate one feature of Mitsuba's XML, rendered by Mitsuba and here."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import clpt
+from tests.renders.support import exposures, with_film
+
+mi = pytest.importorskip("mitsuba", reason="the renderer that we compare with is not installed")
+pytestmark = pytest.mark.peers
+
+FILM = (
+    '<film type="hdrfilm"><integer name="width" value="16"/><integer name="height" value="16"/>'
+    '<rfilter type="box"/></film>'
+)
+CAMERA = (
+    '<sensor type="perspective"><transform name="to_world">'
+    f'<lookat origin="0,0,4" target="0,0,0" up="0,1,0"/></transform>{FILM}</sensor>'
+)
+
+
+@pytest.fixture
+def write(tmp_path: Path):
+    """Write a scene file of these elements and a camera."""
+
+    def of(body: str, camera: str = CAMERA) -> Path:
+        path = tmp_path / "scene.xml"
+        path.write_text(f'<scene version="3.0.0">{body}{camera}</scene>', "utf-8")
+        return path
+
+    return of
+
+
+def mitsuba_mean(path: Path, mode: str, spp: int) -> np.ndarray:
+    """Mean of Mitsuba's picture over its middle half, float64 per channel."""
+    mi.set_variant(f"scalar_{mode}")
+    image = np.array(mi.render(mi.load_file(str(path), optimize=False), spp=spp), np.float64)
+    return image[4:12, 4:12].mean(axis=(0, 1))
+
+
+def our_mean(path: Path, mode: str, spp: int) -> np.ndarray:
+    """The same of ours."""
+    image = exposures(with_film(clpt.load(path), mode=mode), 1, spp)[0]
+    return image[4:12, 4:12].mean(axis=(0, 1))
+
+
+def test_primitives_of_spheres_count_from_zero(write):
+    sphere = '<shape type="sphere"><float name="radius" value="{}"/></shape>'
+    path = write(
+        '<integrator type="aov"><string name="aovs" value="i:prim_index"/></integrator>'
+        + '<shape type="cube"><transform name="to_world"><translate x="9"/></transform></shape>'
+        + sphere.format(0.5)
+        + sphere.format(3.0)
+    )
+    assert mitsuba_mean(path, "rgb", 2)[-1] == 0.0
+    assert our_mean(path, "rgb", 2)[0] == 0.0
