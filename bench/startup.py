@@ -2,7 +2,9 @@
 
 `clpt render` of the Cornell box at 64x64 with one sample, and the same by Mitsuba; cold is with
 empty cache folders of everything involved. Memory is the largest resident set of a process that
-renders the atrium, when it compiles kernels (cold) and when it finds them in caches.
+renders the atrium, when it compiles kernels (cold) and when it finds them in caches. What else is
+installed matters: trimesh imports scipy where it finds it, so `--python` names the Python of an
+environment that has clpt and nothing more.
 """
 
 from __future__ import annotations
@@ -67,22 +69,22 @@ def run(command: Sequence[str], caches: Path) -> Process:
     return Process(seconds, usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024)
 
 
-def commands(scene: Path, mode: str, out: Path) -> dict[str, list[str]]:
+def commands(scene: Path, mode: str, out: Path, python: str) -> dict[str, list[str]]:
     """What renders a scene, by renderer."""
     size, spp = SIZES[scene.stem]
     ours = ["-m", "clpt", "render", str(scene), "--mode", mode, "--size", f"{size}x{size}"]
     theirs = ["-c", MITSUBA, str(scene), mode, str(size), str(spp), str(out)]
     return {
-        "clpt": [sys.executable, *ours, "--spp", str(spp), "--quiet", "-o", str(out)],
+        "clpt": [python, *ours, "--spp", str(spp), "--quiet", "-o", str(out)],
         "mitsuba": [sys.executable, *theirs],
     }
 
 
-def measure(folder: Path, mode: str, rounds: int) -> list[dict]:
+def measure(folder: Path, mode: str, rounds: int, python: str) -> list[dict]:
     """A row for each renderer."""
     find_llvm()
-    cornell = commands(write_cornell(folder), mode, folder / "out.exr")
-    atrium = commands(write_atrium(folder), mode, folder / "out.exr")
+    cornell = commands(write_cornell(folder), mode, folder / "out.exr", python)
+    atrium = commands(write_atrium(folder), mode, folder / "out.exr", python)
     rows = []
     for renderer in cornell:
         cold, warm = [], []
@@ -109,12 +111,13 @@ def measure(folder: Path, mode: str, rounds: int) -> list[dict]:
 @click.command(help=__doc__)
 @click.option("--mode", "modes", multiple=True, default=("rgb", "spectral"), show_default=True)
 @click.option("--rounds", default=3, show_default=True)
+@click.option("--python", default=sys.executable, help="which one runs clpt")
 @click.option("--json", "json_file", type=click.Path(), help="append the figures as JSON lines")
-def main(modes: tuple[str, ...], rounds: int, json_file: str | None) -> None:
+def main(modes: tuple[str, ...], rounds: int, python: str, json_file: str | None) -> None:
     table = Table("renderer", "mode", "cold", "warm", "memory", title="Whole processes (CPU time)")
     with tempfile.TemporaryDirectory() as folder:
         for mode in modes:
-            rows = measure(Path(folder), mode, rounds)
+            rows = measure(Path(folder), mode, rounds, python)
             machine.append(json_file, "startup", rows)
             for row in rows:
                 seconds = (

@@ -15,8 +15,8 @@ DELTA = 4
 MODES = tuple(COMPONENTS)
 ANGLES = (1.0, 30.0, 60.0, 80.0, 88.0, 100.0, 135.0, 178.0)
 SAMPLES = 8192
-# Its coat's transmittance comes from twelve nodes: .2% at most, but 2.1% where the coat is optically
-# thinner than what is outside, which no plastic is.
+# Its coat's transmittance comes from twelve nodes: .2% at most, but 2.1% where the coat is thinner
+# to light than what is outside, which no plastic is.
 TOLERANCE = {m.RoughPlastic: 0.025}
 
 kinds = pytest.mark.parametrize("cls", LEAVES, ids=lambda cls: cls.kind)
