@@ -37,6 +37,7 @@ TRIANGLE_FAN = 6
 APPEARANCE = "KHR_materials_"  # the triangles are right without
 NEEDED_EXTENSIONS = ("EXT_mesh_gpu_instancing",)
 DUMMIES = (None, (2, 2))  # sizes of the image in trimesh's default material
+CHUNK = 1 << 14  # triangles that are checked at a time: in float64 they take 400 bytes each
 USEMTL = re.compile(rb"(?m)^[ \t]*usemtl[^\n]*")
 GREY = TwoSided(front=Diffuse(reflectance=0.6, name="grey"))
 
@@ -132,13 +133,16 @@ def checked(
         raise SceneError(message, file=path, where=where)
     with np.errstate(over="ignore", invalid="ignore"):
         points = np.ascontiguousarray(vertices, np.float32)
-        corners = points[faces].astype(np.float64)
-        if not np.isfinite(corners).all():
-            bad = int(np.argmin(np.isfinite(corners).all(axis=(1, 2))))
-            message = f"triangle {bad} has a vertex that is not a finite number"
-            raise SceneError(message, file=path, where=where)
-        sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    solid = sides.any(axis=1)
+        solid = np.ones(len(faces), bool)
+        for first in range(0, len(faces), CHUNK):
+            corners = points[faces[first : first + CHUNK]].astype(np.float64)
+            finite = np.isfinite(corners).all(axis=(1, 2))
+            if not finite.all():
+                bad = first + int(np.argmin(finite))
+                message = f"triangle {bad} has a vertex that is not a finite number"
+                raise SceneError(message, file=path, where=where)
+            sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            solid[first : first + CHUNK] = sides.any(axis=1)
     if not solid.all():
         notes.append(f"{name or 'mesh'}: left out {int((~solid).sum())} triangles without area")
         faces = faces[solid]
