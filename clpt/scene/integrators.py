@@ -43,14 +43,14 @@ class Path(Integrator):
 
     max_depth: int = host(8, "longest path; -1: no limit")
     rr_depth: int = host(5, "depth from which Russian roulette may end a path")
-    hide_lights: bool = flag(False, "leave out lights that the camera sees directly")
+    hide_lights: bool = flag(False, "the camera sees through lights, also those on shapes")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Direct(Integrator):
     """Direct light only: `path` with a depth of 2."""
 
-    hide_lights: bool = flag(False, "leave out lights that the camera sees directly")
+    hide_lights: bool = flag(False, "the camera sees through lights, also those on shapes")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -10,9 +10,15 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     mask front;
     Surface s = surface_load(scene, hit, at, active, o, d, &front);
 
-    /* The light that this ray has met. */
+    /* The light that this ray has met; the camera's ray goes on behind one that is to be hidden. */
+    mask hidden = mask_of(0);
 #if USES_SURFACE_LIGHTS
-    mask lit = active & (s.light >= 0) & front & ((depth > 0) | mask_of(settings->hide_lights == 0));
+    hidden = active & (s.light >= 0) & (depth == 0) & mask_of(settings->hide_lights != 0);
+    if (any(hidden)) {
+        store_path_o(path, at, hidden, surface_offset(s, d));
+        store_path_pdf(path, at, hidden, load_path_pdf(path, at) + load_hit_t(hit, at));
+    }
+    mask lit = active & (s.light >= 0) & front & !hidden;
     if (any(lit)) {
         integer light = sel_i(lit, s.light, (integer)(0));
         real pdf = load_path_pdf(path, at);
@@ -22,7 +28,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
         store_path_radiance(path, at, lit, spectrum_add(load_path_radiance(path, at), le));
     }
 #endif
-    mask next = active & (depth + 1 < settings->max_depth);
+    mask next = active & !hidden & (depth + 1 < settings->max_depth);
 
     Sampler sampler = sampler_start(settings->seed, as_natural(load_path_place(path, at)), as_natural(load_path_sample(path, at)));
     natural dimension = as_natural(DIMENSION_VERTEX + depth * DIMENSIONS_A_VERTEX);
@@ -75,6 +81,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     store_path_beta(path, at, next, beta);
     store_path_pdf(path, at, next, sel((bs.lobe & LOBE_DELTA) != 0, (real)(-1.0f), bs.pdf));
     store_path_eta(path, at, next, eta);
-    state = sel_i(next, state, state - (state & PATH_ALIVE)) + sel_i(active, (integer)(1), (integer)(0));
-    store_path_state(path, at, active, state);
+    mask met = active & !hidden;
+    state = sel_i(next, state, state - (state & PATH_ALIVE)) + sel_i(met, (integer)(1), (integer)(0));
+    store_path_state(path, at, met, state);
 }

@@ -58,3 +58,18 @@ def test_primitives_of_spheres_count_from_zero(write):
     )
     assert mitsuba_mean(path, "rgb", 2)[-1] == 0.0
     assert our_mean(path, "rgb", 2)[0] == 0.0
+
+
+@pytest.mark.parametrize("integrator", ["path", "direct"])
+def test_camera_sees_through_hidden_lights(write, integrator):
+    """Significance of the bound: the spread of 64 pixels of 256 samples is below 0.3%."""
+    hide = '<boolean name="hide_emitters" value="true"/>'
+    path = write(
+        f'<integrator type="{integrator}">{hide}</integrator>'
+        '<shape type="rectangle"><transform name="to_world"><rotate x="1" angle="180"/>'
+        '<translate z="1.5"/></transform><emitter type="area"/></shape>'
+        '<shape type="rectangle"><transform name="to_world"><scale value="3"/></transform></shape>'
+    )
+    theirs, ours = (mean(path, "rgb", 256) for mean in (mitsuba_mean, our_mean))
+    assert theirs.min() > 0.1
+    np.testing.assert_allclose(ours, theirs, rtol=0.02)
