@@ -330,6 +330,23 @@ def test_textures(bsdf):
     assert (made.color0, made.color1) == (RGB(0.7, 0.7, 0.7), Constant(0.2))
 
 
+def test_look_at_without_up(scene):
+    mi = pytest.importorskip("mitsuba")
+    mi.set_variant("scalar_rgb")
+    for line in ("1,-2,5", "1,-2,-5", "-3,0,0"):
+        look = f'<lookat origin="{line}" target=".2,.1,.3"/>'
+        steps = f'<transform name="to_world">{look}</transform>'
+        sensor = f'<sensor type="perspective">{steps}</sensor>'
+        theirs = mi.load_string(f'<scene version="3.0.0">{sensor}</scene>').sensors()[0]
+        found = scene("", sensor).camera.to_world
+        np.testing.assert_allclose(found, theirs.world_transform().matrix, atol=1e-5)
+
+
+def test_direct_light_by_one_strategy_only_is_a_warning(scene):
+    none = '<integrator type="direct"><integer name="bsdf_samples" value="0"/></integrator>'
+    assert "bsdf_samples of 0" in scene(none).warnings[0]
+
+
 def test_checkerboard_of_numbers_is_mitsubas(scene):
     """It swaps the two where it asks for a number; a reference elsewhere sees them as they are."""
     mi = pytest.importorskip("mitsuba")

@@ -208,8 +208,11 @@ def _path(props: Properties) -> Integrator:
 
 
 def _direct(props: Properties) -> Integrator:
-    # How many samples each strategy gets changes the noise, not the picture.
-    props.ignore("shading_samples", "emitter_samples", "bsdf_samples")
+    # How many samples each strategy gets changes the noise, not the picture; but none at all does.
+    for name in ("emitter_samples", "bsdf_samples"):
+        if props.integer(name, 1) == 0:
+            props.context.warn(props.element, f"{name} of 0: both ways to find light are used")
+    props.ignore("shading_samples")
     return integrators.Direct(hide_lights=props.flag("hide_emitters", False))
 
 

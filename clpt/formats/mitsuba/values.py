@@ -259,6 +259,16 @@ def transform(element: Element) -> transforms.Matrix:
     return matrix
 
 
+def _look_at(step: Element) -> transforms.Matrix:
+    origin, target = numbers(step, "origin", 3), numbers(step, "target", 3)
+    if "up" in step.attributes:
+        return transforms.look_at(origin, target, numbers(step, "up", 3))
+    x, y, z = np.subtract(target, origin) / max(math.dist(target, origin), 1e-30)
+    sign = math.copysign(1.0, z)  # any direction across will do: that of Duff et al. 2017
+    up = [1.0 - x * x / (1.0 + abs(z)), -x * y / (1.0 + abs(z)), -sign * x]
+    return transforms.look_at(origin, target, up)
+
+
 def _step(step: Element) -> transforms.Matrix:
     if step.tag == "translate":
         return transforms.translate(triple(step, "value", 0.0))
@@ -267,7 +277,7 @@ def _step(step: Element) -> transforms.Matrix:
     if step.tag == "rotate":
         return transforms.rotate(triple(step, "value", 0.0), numbers(step, "angle", 1)[0])
     if step.tag == "lookat":
-        return transforms.look_at(*(numbers(step, name, 3) for name in ("origin", "target", "up")))
+        return _look_at(step)
     if step.tag == "matrix":
         values = np.array(numbers(step, "value"))
         if values.size == 9:
