@@ -172,7 +172,7 @@ def build(device: Device, source: Source, options: Sequence[str] = ()) -> Progra
     """
     flags = [*OPTIONS, *options]
     if _is_oclgrind(device):  # it cannot interpret all that its compiler's optimiser makes
-        flags.append("-cl-opt-disable")
+        flags += ["-cl-opt-disable", "-DNOT_INLINED"]
     start = time.perf_counter()
     entry = None if has_src_build_cache(device.info.cl_device) else _entry(device, source, flags)
     program = _from_cache(device, source, flags, entry) if entry else None

@@ -7,8 +7,10 @@
  * true scalar comparison is 1, a true vector one is -1).
  */
 /* Left to themselves, compilers call small functions and return their structs through memory, lane by
- * lane: a third of the time of shading. */
+ * lane: a third of the time of shading. (Oclgrind cannot run what comes of it.) */
+#ifndef NOT_INLINED
 #define inline __attribute__((always_inline)) inline
+#endif
 
 #define CAT_(a, b) a##b
 #define CAT(a, b) CAT_(a, b)
