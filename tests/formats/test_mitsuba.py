@@ -342,6 +342,13 @@ def test_look_at_without_up(scene):
         np.testing.assert_allclose(found, theirs.world_transform().matrix, atol=1e-5)
 
 
+def test_rotation_about_a_long_axis_is_a_warning(scene):
+    step = '<transform name="to_world"><rotate x="{}" angle="30"/></transform>'
+    made = [scene(f'<shape type="cube">{step.format(x)}</shape>') for x in (1, 2)]
+    assert np.allclose(made[0].shapes[0].to_world, made[1].shapes[0].to_world)
+    assert not made[0].warnings and "unit length" in made[1].warnings[0]
+
+
 def test_direct_light_by_one_strategy_only_is_a_warning(scene):
     none = '<integrator type="direct"><integer name="bsdf_samples" value="0"/></integrator>'
     assert "bsdf_samples of 0" in scene(none).warnings[0]

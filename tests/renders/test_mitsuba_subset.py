@@ -73,3 +73,34 @@ def test_camera_sees_through_hidden_lights(write, integrator):
     theirs, ours = (mean(path, "rgb", 256) for mean in (mitsuba_mean, our_mean))
     assert theirs.min() > 0.1
     np.testing.assert_allclose(ours, theirs, rtol=0.02)
+
+
+def checks(name: str, low: float, high: float) -> str:
+    return (
+        f'<texture type="checkerboard" name="{name}"><float name="color0" value="{low}"/>'
+        f'<float name="color1" value="{high}"/>'
+        '<transform name="to_uv"><scale x="3" y="2"/></transform></texture>'
+    )
+
+
+PLAIN = '<bsdf type="diffuse"><rgb name="reflectance" value="0.2,0.5,0.8"/></bsdf>'
+MIXED = {
+    "alpha": f'<bsdf type="roughconductor">{checks("alpha", 0.2, 0.5)}</bsdf>',
+    "opacity": f'<bsdf type="mask">{checks("opacity", 0.1, 0.8)}{PLAIN}</bsdf>',
+    "weight": f'<bsdf type="blendbsdf">{checks("weight", 0.1, 0.8)}{PLAIN}'
+    '<bsdf type="diffuse"/></bsdf>',
+}
+
+
+@pytest.mark.parametrize("name", MIXED)
+def test_numbers_from_textures(write, name):
+    """By `direct`: Mitsuba's `path` takes the light on a mask times its opacity twice."""
+    path = write(
+        '<integrator type="direct"/>'
+        '<emitter type="point"><point name="position" x="1" y="2" z="4"/>'
+        '<rgb name="intensity" value="20"/></emitter>'
+        '<shape type="sphere"><transform name="to_world"><rotate x="1" angle="40"/></transform>'
+        f"{MIXED[name]}</shape>"
+    )
+    theirs, ours = (mean(path, "rgb", 256) for mean in (mitsuba_mean, our_mean))
+    np.testing.assert_allclose(ours, theirs, rtol=0.02)

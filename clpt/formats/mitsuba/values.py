@@ -49,7 +49,7 @@ class Context:
         self._made: dict[int, Any] = {}
         for element in document.root.walk():
             name = element.attributes.get("id")
-            if name is not None and element.tag != "ref":
+            if name is not None and element.tag not in ("ref", "alias"):
                 if name in self.ids:
                     raise element.error(f"the id {name!r} is already used in this scene")
                 self.ids[name] = element
@@ -189,6 +189,12 @@ class Properties:
         if child is None:
             return np.eye(4)
         self._expect(child, "transform")
+        for step in child.children:
+            axis = triple(step, "value", 0.0) if step.tag == "rotate" else (1.0, 0.0, 0.0)
+            if abs(np.linalg.norm(axis) - 1.0) > 1e-3:
+                self.context.warn(
+                    step, "its axis has not unit length; Mitsuba 3 shears by that, here it turns"
+                )
         return transform(child)
 
     def placement(self, name: str = "to_world") -> transforms.Matrix:
