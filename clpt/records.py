@@ -65,6 +65,7 @@ SETTINGS = Record(
     light_count=("integer", "rows in `lights`"),
     ambient=("integer", "first word in `lamps` of what the whitted integrator adds everywhere"),
     first_analytic=("integer", "row in `shapes` of the first shape that is not of triangles"),
+    analytic_count=("integer", "how many shapes there are from there on"),
     infinite_count=("integer", "how many of them are infinite; these come first"),
     lambda_min=("real", "[nm]"),
     lambda_max=("real", "[nm]"),

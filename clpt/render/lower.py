@@ -253,7 +253,9 @@ class _Lowering:
         settings["light_count"] = len(self.lights.rows)
         settings["infinite_count"] = self.lights.infinite
         settings["ambient"] = self.ambient
-        settings["first_analytic"] = sum(s.kind not in shapes.ANALYTIC for s in scene.shapes)
+        analytic = sum(s.kind in shapes.ANALYTIC for s in scene.shapes)
+        settings["first_analytic"] = len(scene.shapes) - analytic
+        settings["analytic_count"] = analytic
         settings["lambda_min"], settings["lambda_max"] = film.lambda_min, film.lambda_max
         settings["tanh_min"], settings["tanh_max"] = tanh_ends(film.lambda_min, film.lambda_max)
         settings["scene_radius"], settings["center"] = radius, center

@@ -99,6 +99,7 @@ def _shared(features: Features, layout: str) -> dict[str, str]:
             f'#include "bvh/{layout}.cl"\n#define LAYOUT(verb) {layout}_##verb\n'
         ),
         "generated/shape_tree.cl": _shape_tree_text(features),
+        "generated/shape_traversal.cl": '#include "bvh/shapes.cl"\n' if features.analytic else "",
         "generated/integrator.cl": f'#include "integrator/{features.integrator}.cl"\n',
     }
 
@@ -174,41 +175,28 @@ def _includes(features: Features) -> list[str]:
     return [f'#include "generated/shape/{kind}.cl"' for kind in features.analytic]
 
 
-def _cases(features: Features, line: str) -> list[str]:
-    """A line per analytic kind, where `{kind}` stands for it, and for its row in `geometry`."""
-    return [
-        f"    if (shape.kind == {1 + shapes.ANALYTIC.index(kind)}) " + line.format(kind=kind)
-        for kind in features.analytic
-    ]
-
-
 def _shape_tree_text(features: Features) -> str:
-    """Meeting one analytic shape, and the tree over all of them; one ray at a time."""
+    """Meeting one analytic shape, the same for all lanes, and for one ray the tree over them."""
     if not features.analytic:
         return ""
-    hit = "return {kind}_intersect({kind}_row(scene.geometry, shape.params), o, d, tmin, tmax);"
+    word = {member.name: member.word for member in SHAPE.members}
+    cases = [
+        f"    if (kind == {1 + shapes.ANALYTIC.index(kind)})\n"
+        f"        return {kind}_intersect({kind}_row(scene.geometry, params), o, d, tmin, tmax);"
+        for kind in features.analytic
+    ]
     return "\n".join(
         [
             *_includes(features),
-            '#include "bvh/ray.cl"',
-            "inline ShapeHit shape_hit(Scene scene, ShapeRow shape, vec3 o, vec3 d, "
-            "real tmin, real tmax)",
+            "inline ShapeHit shape_hit(Scene scene, int row, vec3 o, vec3 d, real tmin, real tmax)",
             "{",
-            *_cases(features, hit),
+            "    global const uint *shape = scene.shapes + row * SHAPE_ROW_WORDS;",
+            f"    int kind = (int)shape[{word['kind']}];",
+            f"    integer params = (int)shape[{word['params']}];",
+            *cases,
             "    ShapeHit none = {FAR, {0.0f, 0.0f, 1.0f}, {0.0f, 0.0f}};",
             "    return none;",
             "}",
-            "inline int shape_intersect(Scene scene, uint prim, const Ray *ray, float *t)",
-            "{",
-            "    int row = scene.settings->first_analytic + (int)prim;",
-            "    ShapeRow shape = shape_row_row(scene.shapes, row * SHAPE_ROW_WORDS);",
-            "    vec3 o = {ray->o.x, ray->o.y, ray->o.z}, d = {ray->d.x, ray->d.y, ray->d.z};",
-            "    ShapeHit hit = shape_hit(scene, shape, o, d, ray->tmin, *t);",
-            "    if (!(hit.t < *t)) return 0;",
-            "    *t = hit.t;",
-            "    return 1;",
-            "}",
-            '#include "bvh/shapes.cl"',
             "",
         ]
     )

@@ -31,6 +31,7 @@ PADDING = 80  # words between streams: powers of two collide in a cache
 GROUP = 64  # slots are a multiple of it, and it is the local size of one-lane kernels
 BATCH = 8  # iterations that are enqueued before counters are asked for
 CPU_SLOTS, GPU_SLOTS = 1 << 14, 1 << 20
+BRUTE_SHAPES = 32  # analytic shapes up to which all of them are tried
 CHUNK = 256  # slots that a work-item of the sort counts
 
 
@@ -73,8 +74,8 @@ class Wavefront:
         features = lowered.features
         if layout is None:
             layout = bvh.choose_layout(on, len(lowered.faces))
-        if features.analytic and layout == "brute":
-            layout = "wide8" if on.info.is_cpu else "binary"
+            if layout == "brute" and len(lowered.boxes) > BRUTE_SHAPES:
+                layout = "wide8" if on.info.is_cpu else "binary"
         self.lanes = on.lanes
         kinds = len(features.materials)
         self.queued = kinds > 1 and (not on.info.is_cpu or kinds > 4) if queued is None else queued
@@ -139,7 +140,7 @@ class Wavefront:
         give.release(tags)
         self.tree = tree
         self.named.update(tree.buffers, triangles=max(tree.count, 0))
-        if lowered.features.analytic:
+        if lowered.features.analytic and layout != "brute":
             shapes = bvh.build_boxes(self.device, lowered.boxes)
             self.named["shape_nodes"] = shapes.buffers["nodes"]
             self.named["shape_items"] = shapes.buffers["indices"]

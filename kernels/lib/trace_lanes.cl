@@ -1,6 +1,7 @@
-/* Tracing in lanes: every triangle against all rays of the work-item. */
+/* Tracing in lanes: every triangle and every analytic shape against all rays of the work-item. */
 #include "lib/trace.cl"
 #include "bvh/brute.cl"
+#include "generated/shape_tree.cl"
 #define TRACE_ARGS global const float *tris, uint triangles
 #define TRACE tris, triangles
 
@@ -8,9 +9,29 @@ inline TraceHit trace_closest(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real far,
 {
     BruteHit b = brute_closest(tris, triangles, o, d, (real)(0.0f), far, active);
     TraceHit h = {b.t, b.u, b.v, b.n, as_integer(b.prim), as_integer(b.tag)};
+#if USES_ANALYTIC
+    for (int i = 0; i < scene.settings->analytic_count; i++) {
+        int row = scene.settings->first_analytic + i;
+        ShapeHit s = shape_hit(scene, row, o, d, (real)(0.0f), h.t);
+        mask nearer = active & (s.t < h.t);
+        h.t = sel(nearer, s.t, h.t);
+        h.u = sel(nearer, s.uv.x, h.u);
+        h.v = sel(nearer, s.uv.y, h.v);
+        h.n = sel3(nearer, s.n, h.n);
+        h.prim = sel_i(nearer, (integer)(i), h.prim);
+        h.shape = sel_i(nearer, (integer)(row), h.shape);
+    }
+#endif
     return h;
 }
 inline mask trace_occluded(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real t, mask active)
 {
-    return brute_occluded(tris, triangles, o, d, (real)(0.0f), t, active);
+    mask met = brute_occluded(tris, triangles, o, d, (real)(0.0f), t, active);
+#if USES_ANALYTIC
+    for (int i = 0; i < scene.settings->analytic_count && any(active & !met); i++) {
+        ShapeHit s = shape_hit(scene, scene.settings->first_analytic + i, o, d, (real)(0.0f), t);
+        met = met | (active & (s.t < t));
+    }
+#endif
+    return met;
 }

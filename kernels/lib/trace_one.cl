@@ -2,7 +2,6 @@
 #include "lib/trace.cl"
 #include "generated/layout.cl"
 #if USES_ANALYTIC
-typedef Scene ShapeTable;
 #define TRACE_ARGS global const float *nodes, global const float *leaves, global const float *shape_nodes, global const uint *shape_items
 #define TRACE nodes, leaves, shape_nodes, shape_items
 #else
@@ -10,6 +9,8 @@ typedef Scene ShapeTable;
 #define TRACE nodes, leaves
 #endif
 #include "generated/shape_tree.cl"
+#include "lib/trace_shapes.cl"
+#include "generated/shape_traversal.cl"
 
 inline TraceHit trace_closest(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real far, mask active)
 {
@@ -20,7 +21,7 @@ inline TraceHit trace_closest(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real far,
     if (shape != BVH_MISS) {
         h.prim = as_int(shape);
         h.shape = scene.settings->first_analytic + h.prim;
-        ShapeHit s = shape_hit(scene, shape_row_row(scene.shapes, h.shape * SHAPE_ROW_WORDS), o, d, 0.0f, FAR);
+        ShapeHit s = shape_hit(scene, h.shape, o, d, 0.0f, FAR);
         h.n = s.n;
         h.u = s.uv.x;
         h.v = s.uv.y;
