@@ -82,8 +82,6 @@ inline integer min_i(integer a, integer b) { return a < b ? a : b; }
 inline integer max_i(integer a, integer b) { return a > b ? a : b; }
 inline real clamp_r(real x, real lo, real hi) { return min_r(max_r(x, lo), hi); }
 inline real sqrt_r(real x) { return sqrt(max_r(x, (real)(0.0f))); } /* of a rounded negative: 0 */
-inline real abs_r(real x) { return fabs(x); }
-inline mask both(mask a, mask b) { return a & b; }
 
 /* Memory. `gather` reads table[at] lane by lane; the index of an idle lane must be valid: give 0.
  * `scatter_if` writes only where m. */
