@@ -17,6 +17,7 @@ PATH = Record(
     radiance=("spectrum", "what the path has gathered so far"),
     lambdas=("spectrum", "wavelengths [nm]; unused in RGB mode"),
     pdf=("real", "of d [1/sr]; below 0 if the last event was delta; at the camera, -(its far end)"),
+    ratio=("spectrum", "pdf of the path at each wavelength, over the mean of the four"),
     eta=("real", "product of the relative indices so far, for Russian roulette"),
     weight=("real", "of the sample, from the pixel filter"),
     state=("integer", "PATH_ bits and depth, see kernels/lib/path_state.cl"),

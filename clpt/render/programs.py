@@ -45,6 +45,7 @@ def sources(
             **common,
             "BSDF_KIND": number,
             "BSDF_DELTA": int(LEAVES[kind].delta),
+            "BSDF_CHROMATIC": int(LEAVES[kind].chromatic),
             "USES_CHOICE": int(LEAVES[kind].choosy or features.many_lights),
             "QUEUED": int(queued),
         }
@@ -233,7 +234,7 @@ def _bsdf_text(features: Features, kind: str) -> str:
     """A kind's struct, functions and loader, under the names that the integrators use."""
     cls = LEAVES[kind]
     reflectivity = "(m).reflectivity" if "reflectivity" in device_params(cls) else "(real)(0.0f)"
-    verbs = ("sample", "eval", "pdf", "albedo", "load")
+    verbs = ("sample", "eval", "pdf", "albedo", "load", *(("pdfs",) if cls.chromatic else ()))
     return "\n".join(
         [
             kinds.struct_text(cls),

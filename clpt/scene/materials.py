@@ -20,6 +20,7 @@ class Material(Kind):
 
     delta: ClassVar[bool] = False  # every lobe is one: a light cannot be sampled through it
     choosy: ClassVar[bool] = False  # `sample` uses u.z
+    chromatic: ClassVar[bool] = False  # the pdf differs between wavelengths: it has `pdfs`
 
     name: str = host("", "for messages and for references in scene files")
 
@@ -78,6 +79,7 @@ class RoughDielectric(Material):
     """A rough boundary of two dielectrics (Walter et al. 2007); both sides."""
 
     choosy = True
+    chromatic = True
 
     int_ior: Any = index(1.5046, "inside index")
     ext_ior: Any = index(1.000277, "outside index")

@@ -1,5 +1,5 @@
 /* Smooth boundary of two dielectrics, both sides: mirror reflection and refraction by Snell's law,
- * chosen by the hero's Fresnel reflectance. Radiance that is refracted is scaled by 1 / eta^2. */
+ * chosen by the mean of Fresnel's reflectance at the path's wavelengths. Radiance that is refracted is scaled by 1 / eta^2. */
 #include "lib/fresnel.cl"
 
 BsdfSample dielectric_sample(Dielectric m, vec3 wo, vec3 u)
@@ -8,14 +8,16 @@ BsdfSample dielectric_sample(Dielectric m, vec3 wo, vec3 u)
     Spectrum eta = relative_index(m.int_ior, m.ext_ior), one = spectrum_of(1.0f);
     Fresnel hero = fresnel_dielectric(wo.z, eta.x);
     Spectrum f = fresnel_spectrum(wo.z, eta);
-    mask reflected = u.z < hero.f;
+    real p = spectrum_mean(f);
+    mask reflected = u.z < p;
     real bend = -1.0f / hero.eta;
     vec3 refracted = v3(wo.x * bend, wo.y * bend, hero.cos_t);
     Spectrum r = spectrum_mul(m.specular_reflectance, f);
     Spectrum t = spectrum_scale(spectrum_mul(m.specular_transmittance, spectrum_sub(one, f)), bend * bend);
     s.wi = sel3(reflected, reflect_z(wo), normalize3(refracted));
-    s.pdf = sel(reflected, hero.f, 1.0f - hero.f);
-    s.weight = spectrum_scale(spectrum_sel(reflected, r, t), 1.0f / s.pdf);
+    real chosen = sel(reflected, p, 1.0f - p);
+    s.weight = spectrum_scale(spectrum_sel(reflected, r, t), 1.0f / chosen);
+    s.pdf = sel(reflected | (hero.cos_t != 0.0f), chosen, (real)(0.0f)); /* the hero alone may be reflected totally */
     s.eta = sel(reflected, (real)(1.0f), hero.eta);
     integer disperse = sel_i(spectrum_varies(eta), (integer)(LOBE_DISPERSE), (integer)(0));
     s.lobe = sel_i(reflected, (integer)(LOBE_REFLECT), LOBE_TRANSMIT | disperse) | LOBE_DELTA;

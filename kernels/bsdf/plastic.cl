@@ -31,7 +31,7 @@ BsdfSample plastic_sample(Plastic m, vec3 wo, vec3 u)
     BsdfSample s = bsdf_nothing();
     Spectrum eta = relative_index(m.int_ior, m.ext_ior), one = spectrum_of(1.0f);
     Spectrum f = fresnel_spectrum(fabs(wo.z), eta);
-    real p = plastic_mirror_probability(m, f.x);
+    real p = plastic_mirror_probability(m, spectrum_mean(f));
     mask mirror = u.z < p;
     vec2 uv = {u.x, u.y};
     vec3 wi = cosine_hemisphere(uv);
@@ -58,7 +58,7 @@ Spectrum plastic_eval(Plastic m, vec3 wo, vec3 wi)
 real plastic_pdf(Plastic m, vec3 wo, vec3 wi)
 {
     Spectrum eta = relative_index(m.int_ior, m.ext_ior);
-    real p = plastic_mirror_probability(m, fresnel_dielectric(fabs(wo.z), eta.x).f);
+    real p = plastic_mirror_probability(m, spectrum_mean(fresnel_spectrum(fabs(wo.z), eta)));
     return sel(wo.z > 0.0f, (1.0f - p) * cosine_hemisphere_pdf(wi.z), (real)(0.0f));
 }
 

@@ -2,7 +2,7 @@
  * reflect or refract by Fresnel's share; normals are sampled as wo sees them. Radiance that is
  * refracted is scaled by 1 / eta^2. One event at a facet: the energy of further ones is lost.
  * With a dispersive index each wavelength has its own half vector, so eval is exact at all of them;
- * directions are sampled, and pdf given, for the hero. */
+ * directions are sampled for the hero. */
 #include "lib/fresnel.cl"
 #include "lib/microfacet.cl"
 
@@ -64,12 +64,31 @@ Spectrum rough_dielectric_eval(RoughDielectric m, vec3 wo, vec3 wi)
     return spectrum_mul(v, spectrum_sel(reflected, m.specular_reflectance, m.specular_transmittance));
 }
 
+/* pdf, were the hero's index this one. */
+inline real rough_dielectric_density(Microfacets d, vec3 wo, vec3 wi, real index)
+{
+    RoughDielectricPair p = rough_dielectric_pair(wo, wi, index);
+    real share = sel(wo.z * wi.z > 0.0f, p.f, 1.0f - p.f);
+    return sel(p.facing, share * microfacet_visible_pdf(d, wo, p.h) * p.jacobian, (real)(0.0f));
+}
+
+Spectrum rough_dielectric_pdfs(RoughDielectric m, vec3 wo, vec3 wi)
+{
+    Microfacets d = microfacets_of(m.distribution, m.alpha_u, m.alpha_v);
+    Spectrum eta = rough_dielectric_index(m);
+    Spectrum v = spectrum_of(rough_dielectric_density(d, wo, wi, eta.x));
+    if (any(spectrum_varies(eta))) {
+#define C(c) v.c = rough_dielectric_density(d, wo, wi, eta.c);
+        SPECTRUM_EACH(C)
+#undef C
+    }
+    return v;
+}
+
 real rough_dielectric_pdf(RoughDielectric m, vec3 wo, vec3 wi)
 {
     Microfacets d = microfacets_of(m.distribution, m.alpha_u, m.alpha_v);
-    RoughDielectricPair p = rough_dielectric_pair(wo, wi, rough_dielectric_index(m).x);
-    real share = sel(wo.z * wi.z > 0.0f, p.f, 1.0f - p.f);
-    return sel(p.facing, share * microfacet_visible_pdf(d, wo, p.h) * p.jacobian, (real)(0.0f));
+    return rough_dielectric_density(d, wo, wi, rough_dielectric_index(m).x);
 }
 
 BsdfSample rough_dielectric_sample(RoughDielectric m, vec3 wo, vec3 u)

@@ -10,7 +10,7 @@ inline Microfacets rough_plastic_facets(RoughPlastic m)
     return microfacets_of(m.distribution, m.alpha, m.alpha);
 }
 
-/* The probability of the coat's reflection, from the two parts' strengths; t: the hero's T(wo). */
+/* The probability of the coat's reflection, from the two parts' strengths; t: the mean of T(wo). */
 inline real rough_plastic_coat_probability(RoughPlastic m, real t)
 {
     real r = (1.0f - t) * spectrum_mean(m.specular_reflectance), d = t * spectrum_mean(m.diffuse_reflectance);
@@ -57,8 +57,9 @@ Spectrum rough_plastic_eval(RoughPlastic m, vec3 wo, vec3 wi)
 
 real rough_plastic_pdf(RoughPlastic m, vec3 wo, vec3 wi)
 {
-    real eta = relative_index(m.int_ior, m.ext_ior).x;
-    return rough_plastic_density(m, wo, wi, coat_transmittance(rough_plastic_facets(m), fabs(wo.z), eta));
+    Spectrum eta = relative_index(m.int_ior, m.ext_ior);
+    Spectrum t = coat_transmittance_spectrum(rough_plastic_facets(m), fabs(wo.z), eta);
+    return rough_plastic_density(m, wo, wi, spectrum_mean(t));
 }
 
 BsdfSample rough_plastic_sample(RoughPlastic m, vec3 wo, vec3 u)
@@ -68,8 +69,9 @@ BsdfSample rough_plastic_sample(RoughPlastic m, vec3 wo, vec3 u)
     Spectrum t = coat_transmittance_spectrum(d, fabs(wo.z), relative_index(m.int_ior, m.ext_ior));
     vec2 uv = {u.x, u.y};
     vec3 mirrored = reflect_at(wo, microfacet_visible(d, wo, uv));
-    s.wi = sel3(u.z < rough_plastic_coat_probability(m, t.x), mirrored, cosine_hemisphere(uv));
-    s.pdf = rough_plastic_density(m, wo, s.wi, t.x);
+    real t_mean = spectrum_mean(t);
+    s.wi = sel3(u.z < rough_plastic_coat_probability(m, t_mean), mirrored, cosine_hemisphere(uv));
+    s.pdf = rough_plastic_density(m, wo, s.wi, t_mean);
     Spectrum f = rough_plastic_value(m, wo, s.wi, t);
     s.weight = spectrum_scale(f, sel(s.pdf > 0.0f, 1.0f / s.pdf, (real)(0.0f)));
     return s;

@@ -16,11 +16,12 @@ BsdfSample thin_dielectric_sample(ThinDielectric m, vec3 wo, vec3 u)
     BsdfSample s = bsdf_nothing();
     Spectrum eta = relative_index(m.int_ior, m.ext_ior);
     Spectrum f = thin_dielectric_reflected(fresnel_spectrum(fabs(wo.z), eta));
-    mask reflected = u.z < f.x;
+    real p = spectrum_mean(f);
+    mask reflected = u.z < p;
     Spectrum r = spectrum_mul(m.specular_reflectance, f);
     Spectrum t = spectrum_mul(m.specular_transmittance, spectrum_sub(spectrum_of(1.0f), f));
     s.wi = sel3(reflected, reflect_z(wo), neg3(wo));
-    s.pdf = sel(reflected, f.x, 1.0f - f.x);
+    s.pdf = sel(reflected, p, 1.0f - p);
     s.weight = spectrum_scale(spectrum_sel(reflected, r, t), 1.0f / s.pdf);
     s.lobe = sel_i(reflected, (integer)(LOBE_REFLECT), (integer)(LOBE_TRANSMIT)) | LOBE_DELTA;
     return s;

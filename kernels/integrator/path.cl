@@ -5,7 +5,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     global const Settings *settings = scene.settings;
     vec3 o = load_path_o(path, at), d = load_path_d(path, at);
     Wavelengths lambdas = load_path_lambdas(path, at);
-    Spectrum beta = load_path_beta(path, at);
+    Spectrum beta = load_path_beta(path, at), ratio = hero_ratio(path, at);
     integer state = load_path_state(path, at), depth = state & PATH_DEPTH;
     mask front;
     Surface s = surface_load(scene, hit, at, active, o, d, &front);
@@ -45,7 +45,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     LightSample ls = light_sample(scene, s.p, choice.x, sampler_pair(sampler, dimension + DIMENSION_LIGHT), lambdas);
     vec3 wi = to_local(frame, ls.wi);
     Spectrum f = bsdf_eval(m, wo, wi);
-    real w = sel(ls.pdf < 0.0f, (real)(1.0f), mis_weight(ls.pdf, bsdf_pdf(m, wo, wi)));
+    real w = sel(ls.pdf < 0.0f, (real)(1.0f), mis_weight(ls.pdf, hero_pdf(m, wo, wi, ratio)));
     mask shine = next & (ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
     Spectrum value = spectrum_scale(spectrum_mul(spectrum_mul(beta, f), ls.radiance), w / sel(shine, fabs(ls.pdf), (real)(1.0f)));
     shadow_toward(shadow, at, active, shine, s, ls, value);
@@ -54,15 +54,10 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
 
     /* The next direction. */
     vec2 uv = sampler_pair(sampler, dimension + DIMENSION_BSDF);
-    BsdfSample bs = bsdf_sample(m, wo, v3(uv.x, uv.y, choice.y));
+    BsdfSample bs = hero_sample(m, wo, v3(uv.x, uv.y, choice.y), &ratio);
     next = next & (bs.pdf > 0.0f);
     vec3 onward = normalize3(to_world(frame, bs.wi));
     beta = spectrum_mul(beta, bs.weight);
-#if USES_DISPERSION
-    mask parted = ((bs.lobe & LOBE_DISPERSE) != 0) & ((state & PATH_HERO) == 0);
-    beta = spectrum_sel(parted, spectrum_hero(beta), beta);
-    state |= sel_i(next & parted, (integer)(PATH_HERO), (integer)(0));
-#endif
     real eta = load_path_eta(path, at) * bs.eta;
 
     /* Russian roulette. */
@@ -81,6 +76,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     store_path_beta(path, at, next, beta);
     store_path_pdf(path, at, next, sel((bs.lobe & LOBE_DELTA) != 0, (real)(-1.0f), bs.pdf));
     store_path_eta(path, at, next, eta);
+    hero_keep(path, at, next, ratio);
     mask met = active & !hidden;
     state = sel_i(next, state, state - (state & PATH_ALIVE)) + sel_i(met, (integer)(1), (integer)(0));
     store_path_state(path, at, met, state);

@@ -44,15 +44,12 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     mask next = active & (mirror > 0.0f) & (wo.z > 0.0f);
 #else
     vec2 uv = sampler_pair(sampler, dimension + DIMENSION_BSDF);
-    BsdfSample bs = bsdf_sample(m, wo, v3(uv.x, uv.y, choice.y));
+    Spectrum ratio = hero_ratio(path, at);
+    BsdfSample bs = hero_sample(m, wo, v3(uv.x, uv.y, choice.y), &ratio);
     vec3 wi = bs.wi;
     beta = spectrum_mul(beta, bs.weight);
     mask next = active & (bs.pdf > 0.0f);
-#if USES_DISPERSION
-    mask parted = ((bs.lobe & LOBE_DISPERSE) != 0) & ((state & PATH_HERO) == 0);
-    beta = spectrum_sel(parted, spectrum_hero(beta), beta);
-    state |= sel_i(next & parted, (integer)(PATH_HERO), (integer)(0));
-#endif
+    hero_keep(path, at, next, ratio);
 #endif
     next = next & (depth + 1 < settings->max_depth);
     vec3 onward = normalize3(to_world(frame, wi));

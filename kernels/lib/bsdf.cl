@@ -4,11 +4,14 @@
  *   Spectrum   <kind>_eval  (<Kind> m, vec3 wo, vec3 wi);    f |cos|, of the lobes that are not delta
  *   real       <kind>_pdf   (<Kind> m, vec3 wo, vec3 wi);    [1/sr], likewise
  *   Spectrum   <kind>_albedo(<Kind> m);                      the colour a person would name
+ *   Spectrum   <kind>_pdfs  (<Kind> m, vec3 wo, vec3 wi);    only of `chromatic` kinds: pdf, were each wavelength the hero
  *
  * wo points to the viewer, wi to the light, both away from the surface, in the local frame whose z is
  * the shading normal, on the front's side: wo.z < 0 is a look at the back. The struct <Kind> is
  * generated from the dataclass: Spectrum for spectra, real for numbers, integer for flags and choices
  * (the choice's position). Textures and wavelengths have been resolved by the loader.
+ * What is sampled may depend on the hero (x) where LOBE_DISPERSE or `pdfs` tell; else a probability
+ * must be symmetric in the wavelengths: take it from a spectrum_mean. lib/hero.cl relies on that.
  * Functions are pure and free of branches but for if (any(mask)); lanes that have nothing to do
  * compute what they like, but their result must not be NaN where pdf > 0.
  */

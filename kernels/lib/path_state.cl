@@ -3,7 +3,6 @@
 #define PATH_ALIVE 0x1000 /* a ray is in flight */
 #define PATH_FRESH 0x2000 /* no sample has been begun: there is nothing to deposit */
 #define PATH_DONE 0x4000  /* the slot has walked its whole list */
-#define PATH_HERO 0x8000  /* only the hero wavelength is left */
 #define PATH_SHADOW 0x10000
 
 /* Dimensions of a sample, in pairs: film, lens, wavelength, then DIMENSIONS_A_VERTEX per vertex. */

@@ -61,14 +61,6 @@ inline real spectrum_max(Spectrum a)
     return r;
 }
 inline real spectrum_mean(Spectrum a) { return SPECTRUM_MEAN(a); }
-#if SPECTRUM_SIZE == 4
-/* Ends all wavelengths but the hero's, which then stands for the four. */
-inline Spectrum spectrum_hero(Spectrum a)
-{
-    Spectrum r = {a.x * 4.0f, (real)(0.0f), (real)(0.0f), (real)(0.0f)};
-    return r;
-}
-#endif
 /* Whether the components differ: a dispersive index. */
 inline mask spectrum_varies(Spectrum a)
 {

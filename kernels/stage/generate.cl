@@ -95,6 +95,9 @@ kernel APART void generate(SLAB_ARGS, SCENE_ARGS, global float *film, global uin
         store_path_radiance(path, at, go, spectrum_of(0.0f));
         store_path_pdf(path, at, go, -ray.far);
         store_path_eta(path, at, go, (real)(1.0f));
+#if USES_DISPERSION
+        store_path_ratio(path, at, go, spectrum_of(1.0f));
+#endif
         store_path_state(path, at, ended, sel_i(done, (integer)(PATH_DONE), (integer)(PATH_ALIVE)));
     }
 }

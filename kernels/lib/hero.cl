@@ -1,0 +1,48 @@
+/* Hero wavelength sampling (Wilkie et al. 2014). Where what is sampled depends on the wavelength, it is
+ * sampled for the hero; but any of a path's four wavelengths might have been the hero, so the pdf that
+ * counts is the mean of what the four would have: the balance heuristic between them, their eq. 8.
+ * Vertex by vertex: `ratio` holds the pdf of the path so far at each wavelength over the mean of the
+ * four, so the pdf of a direction is the mean of ratio p, and ratio becomes ratio p over that mean. A
+ * direction that holds for the hero alone leaves (4, 0, 0, 0), and the path goes on with one wavelength.
+ */
+#if USES_DISPERSION
+#define hero_ratio(path, at) load_path_ratio(path, at)
+#define hero_keep(path, at, m, ratio) store_path_ratio(path, at, m, ratio)
+#else
+#define hero_ratio(path, at) spectrum_of(1.0f)
+#define hero_keep(path, at, m, ratio)
+#endif
+
+/* pdf of the directions that are not delta [1/sr]. */
+inline real hero_pdf(Bsdf m, vec3 wo, vec3 wi, Spectrum ratio)
+{
+#if USES_DISPERSION && BSDF_CHROMATIC
+    return spectrum_mean(spectrum_mul(ratio, bsdf_pdfs(m, wo, wi)));
+#else
+    return bsdf_pdf(m, wo, wi);
+#endif
+}
+
+/* bsdf_sample, its pdf and weight those of the four together. */
+inline BsdfSample hero_sample(Bsdf m, vec3 wo, vec3 u, Spectrum *ratio)
+{
+    BsdfSample s = bsdf_sample(m, wo, u);
+#if USES_DISPERSION
+#if BSDF_CHROMATIC
+    Spectrum pdfs = spectrum_mul(*ratio, bsdf_pdfs(m, wo, s.wi));
+    real pdf = spectrum_mean(pdfs);
+    mask usable = (s.pdf > 0.0f) & (pdf > 0.0f);
+    real inv = 1.0f / sel(usable, pdf, (real)(1.0f));
+    *ratio = spectrum_sel(usable, spectrum_scale(pdfs, inv), *ratio);
+    s.weight = spectrum_scale(s.weight, sel(usable, s.pdf * inv, (real)(1.0f)));
+    s.pdf = sel(usable, pdf, (real)(0.0f));
+#endif
+    mask alone = (s.lobe & LOBE_DISPERSE) != 0;
+    if (any(alone)) {
+        Spectrum hero = {(real)(4.0f), (real)(0.0f), (real)(0.0f), (real)(0.0f)};
+        s.weight = spectrum_sel(alone, spectrum_scale(spectrum_mul(s.weight, hero), 1.0f / ratio->x), s.weight);
+        *ratio = spectrum_sel(alone, hero, *ratio);
+    }
+#endif
+    return s;
+}
