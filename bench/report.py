@@ -9,7 +9,9 @@ from pathlib import Path
 import numpy as np
 
 RESULTS = Path(__file__).parent / "results"
-WHICH = ("scene", "mode", "renderer", "sampler", "threads", "layout", "rays", "query")
+WHICH = (
+    "scene", "mode", "renderer", "sampler", "threads", "layout", "rays", "query", "effect",
+)  # fmt: skip
 
 HEAD = """# What was measured
 
@@ -101,6 +103,7 @@ def plain(rows: Sequence[Row]) -> str:
 
 TABLES: dict[str, Callable[[Sequence[Row]], str]] = {
     "renders": renders,
+    "effects": plain,
     "startup": startup,
     "traversal": plain,
     "building": plain,
