@@ -86,6 +86,7 @@ ROLES = {
     "index": "index",
     "real": "number",
     "flag": "true or false",
+    "orders": "list of numbers",
 }
 
 

@@ -18,7 +18,7 @@ from clpt import spectra
 from clpt.formats.native.read import ARRAYS, BASES, default
 from clpt.formats.native.spectra import SPECTRA
 from clpt.scene import KINDS, integrators, materials
-from clpt.scene.params import SPECTRUM_ROLES, Kind, Param, params
+from clpt.scene.params import ORDERS, SPECTRUM_ROLES, Kind, Param, params
 
 Schema = dict[str, Any]
 
@@ -116,6 +116,8 @@ def _value(name: str, param: Param, value: Any) -> Schema:
         limits = {"minimum": param.low, "maximum": param.high}
         number = {"type": "number", **{k: v for k, v in limits.items() if math.isfinite(v)}}
         return {"anyOf": [number, _ref("texture")]} if param.textured else number
+    if param.role == "orders":
+        return {**NUMBERS, "minItems": 1, "maxItems": 2 * ORDERS + 1}
     return _host(name, value)
 
 

@@ -4,30 +4,41 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from clpt.scene.params import SPECTRUM_ROLES, Kind, Param, device_params
+from clpt.scene.params import ORDERS, SPECTRUM_ROLES, Kind, Param, device_params
 
 # How many words a parameter takes in a row of `materials`, `textures` or `lamps`.
 SPECTRUM_WORDS = 5  # x y z w and where the value comes from: 0 here, > 0 texture, < 0 table
 REAL_WORDS = 2  # the value, and 0 or 1 + the texture
+ORDERS_WORDS = 2 * ORDERS + 1
 
 
 def words(param: Param) -> int:
     """Return the number of 4-byte words that a parameter takes in its row."""
     if param.role in SPECTRUM_ROLES:
         return SPECTRUM_WORDS
-    return REAL_WORDS if param.role == "real" else 1
+    return {"real": REAL_WORDS, "orders": ORDERS_WORDS}.get(param.role, 1)
 
 
 def lane_type(param: Param) -> str:
     """Return the parameter's type in a kind's struct."""
     if param.role in SPECTRUM_ROLES:
         return "Spectrum"
-    return "real" if param.role == "real" else "integer"
+    return "real" if param.role in ("real", "orders") else "integer"
+
+
+def array_size(param: Param) -> int:
+    """Return how many values of `lane_type` a parameter has in a kind's struct."""
+    return ORDERS_WORDS if param.role == "orders" else 1
 
 
 def struct_text(cls: type[Kind]) -> str:
     """Return `typedef struct {...} Kind;` with one member per device parameter."""
-    rows = [f"    {lane_type(p)} {n}; /* {p.doc} */" for n, p in device_params(cls).items()]
+    rows = []
+    for name, param in device_params(cls).items():
+        size = f"[{array_size(param)}]" if array_size(param) > 1 else ""
+        rows.append(f"    {lane_type(param)} {name}{size}; /* {param.doc} */")
+    if cls.needs_wavelengths:
+        rows.append("    Spectrum lambdas; /* the path's wavelengths [nm] */")
     rows = rows or ["    integer unused; /* no parameters */"]
     return "\n".join(["typedef struct {", *rows, f"}} {cls.__name__};", ""])
 
@@ -42,12 +53,20 @@ def load_text(cls: type[Kind], sources: Mapping[str, frozenset[str]], table: str
     for name, param in device_params(cls).items():
         found = sources.get(name) or frozenset({"constant"})
         kind = {"Spectrum": "spectrum", "real": "real", "integer": "integer"}[lane_type(param)]
-        body += _member(name, param, kind, f"row + {at}", found, table)
+        if array_size(param) > 1:
+            body += [
+                f"    for (int i = 0; i < {array_size(param)}; i++)",
+                f"        r.{name}[i] = gather_w(scene.{table}, row + {at} + i);",
+            ]
+        else:
+            body += _member(name, param, kind, f"row + {at}", found, table)
         at += words(param)
     head = (
         f"inline {cls.__name__} {cls.kind}_load"
         "(Scene scene, integer row, vec2 uv, Wavelengths lambdas)"
     )
+    if cls.needs_wavelengths:
+        body.append("    r.lambdas = lambdas;")
     body = body or ["    r.unused = 0;"]
     return "\n".join([head, "{", f"    {cls.__name__} r;", *body, "    return r;", "}", ""])
 

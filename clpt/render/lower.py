@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -152,9 +153,7 @@ class _Lowering:
         """Material words of front and back, and whether the back is turned round."""
         two_sided = _any_of(shape.material, mt.TwoSided)
         name = shapes.where(shape)
-        if two_sided and _any_of(
-            shape.material, (mt.Dielectric, mt.RoughDielectric, mt.ThinDielectric)
-        ):
+        if two_sided and any(_transmits(part) for part in _parts(shape.material)):
             raise SceneError(
                 "a transmissive material cannot be mixed with a two-sided one", where=name
             )
@@ -229,7 +228,7 @@ class _Lowering:
             mixtures=self.uses["mixtures"],
             infinite=self.lights.infinite > 0 and not self.channels,
             many_lights=len(self.lights.rows) > FEW_LIGHTS,
-            dispersion=index_tables,
+            dispersion=index_tables or any(_LEAVES[kind].disperses for kind in self.leaves),
             channel=self.channels[0] if self.channels else "",
             spectra_size=tables.spectra_size,
             spectra_step=STEP,
@@ -263,6 +262,7 @@ class _Lowering:
 
 
 _NULL, _BLACK = mt.Null(), mt.Diffuse(reflectance=0.0)
+_LEAVES = {cls.kind: cls for cls in mt.LEAVES}
 
 
 def _leaf_kinds(scene: sc.Scene) -> tuple[str, ...]:
@@ -290,15 +290,29 @@ def _leaf_kinds(scene: sc.Scene) -> tuple[str, ...]:
     return tuple(cls.kind for cls in mt.LEAVES if cls in found) or (mt.Diffuse.kind,)
 
 
+def _parts(material: Any) -> Iterator[Any]:
+    """A material and those inside it."""
+    yield material
+    for name, param in params(type(material)).items():
+        inner = getattr(material, name)
+        if param.role == "host" and isinstance(inner, mt.Material):
+            yield from _parts(inner)
+
+
 def _any_of(material: Any, classes: Any) -> bool:
     """Whether a material or one inside it is of these classes."""
-    inner = (getattr(material, n) for n, p in params(type(material)).items() if p.role == "host")
-    return isinstance(material, classes) or any(
-        _any_of(m, classes) for m in inner if isinstance(m, mt.Material)
-    )
+    return any(isinstance(part, classes) for part in _parts(material))
+
+
+def _transmits(material: Any) -> bool:
+    if isinstance(material, mt.Grating):
+        return material.mode == "transmissive"
+    return isinstance(material, (mt.Dielectric, mt.RoughDielectric, mt.ThinDielectric))
 
 
 def _anisotropic(material: Any) -> bool:
+    if isinstance(material, mt.Grating):
+        return True
     u, v = (getattr(material, name, None) for name in ("alpha_u", "alpha_v"))
     return u is not v and u != v
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt import spectra
 from clpt.records import TABLES
-from clpt.render.kinds import REAL_WORDS, SPECTRUM_WORDS
+from clpt.render.kinds import ORDERS_WORDS, REAL_WORDS, SPECTRUM_WORDS
 from clpt.scene.params import Kind, device_params
 from clpt.spectra import RGB, Constant, RGBIlluminant, RGBUnbounded, Spectrum
 from clpt.spectra.spectrum import Role, d65, on_grid
@@ -163,6 +163,9 @@ class Tables:
             return np.array([number], np.uint32), "constant"
         if role == "real":
             return np.array([as_words([value])[0], 0], np.uint32), "constant"
+        if role == "orders":
+            beyond = (ORDERS_WORDS - len(value)) // 2
+            return as_words(np.pad(value, beyond)), "constant"
         return self.spectrum_words(value, role)
 
     def emission_words(self, value: Any) -> Words:

@@ -9,7 +9,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from clpt.scene.params import Kind, choice, flag, host, index, real, reflectance
+from clpt.errors import SceneError
+from clpt.scene.params import (
+    ORDERS,
+    Kind,
+    choice,
+    flag,
+    host,
+    index,
+    per_order,
+    real,
+    reflectance,
+)
 
 DISTRIBUTIONS = ("ggx", "beckmann")
 
@@ -21,6 +32,7 @@ class Material(Kind):
     delta: ClassVar[bool] = False  # every lobe is one: a light cannot be sampled through it
     choosy: ClassVar[bool] = False  # `sample` uses u.z
     chromatic: ClassVar[bool] = False  # the pdf differs between wavelengths: it has `pdfs`
+    disperses: ClassVar[bool] = False  # whatever its parameters, directions depend on wavelength
 
     name: str = host("", "for messages and for references in scene files")
 
@@ -142,6 +154,42 @@ class RoughPlastic(Material):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Grating(Material):
+    """A diffraction grating: every order leaves in its own direction, by wavelength.
+
+    Its grooves follow each other along the tangent (u of the surface; a disk's radius), turned by
+    `angle`. Reflective: a metal's front. Transmissive: a thin plate, both sides.
+    """
+
+    delta = True
+    choosy = True
+    disperses = True
+    needs_wavelengths = True
+
+    mode: str = choice("reflective", "whether light is turned back", ("reflective", "transmissive"))
+    profile: str = choice(
+        "sinusoidal",
+        "of the grooves, or explicit `efficiencies`",
+        ("sinusoidal", "lamellar", "blazed", "explicit"),
+    )
+    period: Any = real(1600.0, "from groove to groove", "nm", 100.0, 1e5, textured=True)
+    angle: Any = real(0.0, "tangent to next groove", "degrees", -360.0, 360.0, textured=True)
+    depth: Any = real(150.0, "of a groove", "nm", 0.0, 1000.0, textured=True)
+    fill: float = real(0.5, "share of the period that lamellar crests take", low=0.0, high=1.0)
+    orders: float = real(float(ORDERS), "highest order that is followed", low=0.0, high=ORDERS)
+    efficiencies: Any = per_order((1.0, 1.0, 1.0), "how strong orders -n to n are, explicitly")
+    ior: Any = index(1.5, "index of a transmissive plate")
+    eta: Any = index(0.0, "index of refraction of the metal; the default is a perfect mirror")
+    k: Any = index(1.0, "extinction coefficient of the metal")
+    reflectance: Any = reflectance(1.0, "factor on the light of all orders; 1 is physical")
+
+    def check(self) -> None:
+        """Raise SceneError for efficiencies of which none is above zero."""
+        if self.profile == "explicit" and not any(self.efficiencies):
+            raise SceneError("one must be above zero", where="grating.efficiencies")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Null(Material):
     """No surface at all: light passes as if it were not there."""
 
@@ -183,6 +231,7 @@ LEAVES = (
     RoughConductor,
     Plastic,
     RoughPlastic,
+    Grating,
     Null,
 )
 COMPOSITES = (TwoSided, Mask, Blend)

@@ -13,6 +13,7 @@ index          number, name, Spectrum                 Spectrum, unbounded       
 real           number, Texture                        real                        yes
 flag           bool                                   int                         no
 choice         one of the names listed                int, the name's position    no
+orders         numbers of orders -n to n              real[17], of -8 to 8        no
 host           whatever the lowering needs            -                           -
 =============  =====================================  ==========================  ===============
 """
@@ -24,15 +25,16 @@ import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from clpt.errors import SceneError
 from clpt.spectra import RGB, Constant, Spectrum
 
-DEVICE_ROLES = ("reflectance", "emission", "index", "real", "flag", "choice")
+DEVICE_ROLES = ("reflectance", "emission", "index", "real", "flag", "choice", "orders")
 SPECTRUM_ROLES = ("reflectance", "emission", "index")
+ORDERS = 8  # highest order of diffraction, see kernels/lib/diffraction.cl
 
 
 @dataclass(frozen=True)
@@ -92,6 +94,11 @@ def choice(default: str, doc: str, choices: Sequence[str]) -> Any:
     return _field(default, Param("choice", doc, choices=tuple(choices)))
 
 
+def per_order(default: Sequence[float], doc: str) -> Any:
+    """Declare a number for each order of diffraction from -n to n, n at most ORDERS."""
+    return _field(tuple(default), Param("orders", doc, low=0.0))
+
+
 def host(default: Any, doc: str, unit: str = "") -> Any:
     """Declare what only the host needs: geometry, matrices, nested kinds."""
     return _field(default, Param("host", doc, unit))
@@ -110,6 +117,8 @@ class classproperty:
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Kind:
     """Base of all that can be added: its name in files and kernels follows from the class."""
+
+    needs_wavelengths: ClassVar[bool] = False  # its struct in the kernels has them as `lambdas`
 
     @classproperty
     def kind(cls) -> str:
@@ -153,6 +162,8 @@ def _checked(value: Any, param: Param, where: str) -> Any:
         return value
     if param.role == "real":
         return _number(value, param, where)
+    if param.role == "orders":
+        return _orders(value, param, where)
     return _spectrum(value, param, where)
 
 
@@ -164,6 +175,17 @@ def _number(value: Any, param: Param, where: str) -> float:
     if not param.low <= value <= param.high:
         raise SceneError(f"{value} is outside [{param.low:g}, {param.high:g}]", where=where)
     return float(value)
+
+
+def _orders(value: Any, param: Param, where: str) -> tuple[float, ...]:
+    if not isinstance(value, (list, tuple, np.ndarray)):
+        raise SceneError(f"must be a list of numbers, not {value!r}", where=where)
+    if len(value) % 2 == 0 or len(value) > 2 * ORDERS + 1:
+        raise SceneError(
+            f"must be an odd count of numbers, for orders -n to n with n up to {ORDERS}",
+            where=where,
+        )
+    return tuple(_number(v, param, where) for v in value)
 
 
 def _spectrum(value: Any, param: Param, where: str) -> Any:

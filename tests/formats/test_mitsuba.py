@@ -236,6 +236,18 @@ BSDFS = {
         nonlinear=True
     ),
     '<bsdf type="roughplastic"/>': materials.RoughPlastic(distribution="beckmann"),
+    '<bsdf type="grating"/>': materials.Grating(),
+    '<bsdf type="grating"><string name="profile" value="explicit"/>'
+    '<float name="period" value="900"/><string name="efficiencies" value="1, 2, 0"/>'
+    '<string name="material" value="Al"/></bsdf>': (
+        materials.Grating(
+            profile="explicit",
+            period=900.0,
+            efficiencies=(1, 2, 0),
+            eta=metal("Al")[0],
+            k=metal("Al")[1],
+        )
+    ),
     '<bsdf type="null"/>': materials.Null(),
 }
 

@@ -188,6 +188,8 @@ ERRORS = [
      "lights[0].radiance", "needs the parameter 'kelvin'"),
     ({"lights": [{"type": "constant", "radiance": {"values": [[700, 1], [400, 2]]}}]},
      "lights[0].radiance", "must ascend"),
+    ({"materials": {"a": {"type": "grating", "efficiencies": [1, 2]}}},
+     "materials.a.efficiencies", "odd count"),
     ({"gravity": 1}, "gravity", "a scene has no parameter 'gravity'"),
 ]  # fmt: skip
 

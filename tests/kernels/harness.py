@@ -9,10 +9,11 @@ import numpy as np
 import pyopencl as cl
 
 from clpt import device
-from clpt.render.kinds import lane_type, struct_text
+from clpt.render.kinds import array_size, lane_type, struct_text
 from clpt.scene.params import Kind, device_params
 
 COMPONENTS = {"rgb": 3, "spectral": 4}
+LAMBDAS = (532.0, 590.0, 655.0, 441.0)  # [nm], of kinds that ask for the path's wavelengths
 SHADING = ("lanes", "math", "spectrum", "frame", "warp", "bsdf")
 RESULTS = ("wi", "weight", "sampled_pdf", "eta", "lobe", "eval", "pdf", "eval_again", "pdf_again")
 
@@ -91,10 +92,13 @@ class Probe:
         n = max(len(wo), len(wi), len(u))
         columns = [np.broadcast_to(a, (n, 3)) for a in (wo, wi, u)]
         for name, param in device_params(self.cls).items():
-            wide = self.components if lane_type(param) == "Spectrum" else 1
+            wide = self.components if lane_type(param) == "Spectrum" else array_size(param)
             value = np.asarray(params[name], float)
             value = value[:, None] if wide == 1 and value.ndim == 1 else value
             columns.append(np.broadcast_to(value, (n, wide)))
+        if self.cls.needs_wavelengths:
+            value = params.get("lambdas", LAMBDAS[: self.components])
+            columns.append(np.broadcast_to(np.asarray(value, float), (n, self.components)))
         given = np.concatenate(columns, axis=1).T.astype(np.float32)
         c = self.components
         out = run(self.text, "probe", self.lanes, given, 8 + 4 * c).T
@@ -109,11 +113,16 @@ class Probe:
         for name, param in device_params(self.cls).items():
             form = lane_type(param)
             members = [f"m.{name}.{c}" for c in names] if form == "Spectrum" else [f"m.{name}"]
+            if (size := array_size(param)) > 1:
+                members = [f"m.{name}[{i}]" for i in range(size)]
             for member in members:
                 row = f"block_load(in + {at} * n + at)"
                 value = f"to_integer({row})" if form == "integer" else row
                 reads.append(f"    {member} = {value};")
                 at += 1
+        if self.cls.needs_wavelengths:
+            for i, c in enumerate(names):
+                reads.append(f"    m.lambdas.{c} = block_load(in + {at + i} * n + at);")
         spectra = {name: [f"{name}.{c}" for c in names] for name in ("f", "again", "albedo")}
         weight = [f"s.weight.{c}" for c in names]
         results = ["s.wi.x", "s.wi.y", "s.wi.z", *weight, "s.pdf", "s.eta", "to_real(s.lobe)"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from clpt.render.kinds import array_size
 from clpt.scene.params import SPECTRUM_ROLES, Kind, Param, device_params
 from tests.kernels.harness import COMPONENTS
 
@@ -29,7 +30,7 @@ def tilted(degrees: float, azimuth: float = 0.7) -> np.ndarray:
 
 
 def settings(
-    cls: type[Kind], mode: str, rng: np.random.Generator, count: int, **fixed: object
+    cls: type[Kind], mode: str, rng: np.random.Generator, count: int, /, **fixed: object
 ) -> list[dict[str, np.ndarray]]:
     """Random valid parameters, by name: numbers and spectra (components,); `fixed` wins.
 
@@ -64,6 +65,8 @@ def _draw_index(dense: bool, mode: str, rng: np.random.Generator, disperses: boo
 def _draw(param: Param, mode: str, rng: np.random.Generator) -> np.ndarray:
     if param.role in SPECTRUM_ROLES:
         return rng.uniform(0.0, 1.0, COMPONENTS[mode])
+    if param.role == "orders":
+        return rng.uniform(0.0, 1.0, array_size(param))
     if param.role == "flag":
         return np.array(rng.integers(2))
     if param.role == "choice":

@@ -8,10 +8,11 @@ from typing import Any
 from clpt import spectra
 from clpt.errors import UnknownKindError
 from clpt.formats.mitsuba.spectra import index, ior, real, reflectance
-from clpt.formats.mitsuba.values import Context, Properties, placed
+from clpt.formats.mitsuba.values import Context, Properties, numbers, placed
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene import materials
 from clpt.scene.materials import Material
+from clpt.scene.params import params
 
 Parameters = dict[str, Any]
 SMOOTHEST = 1e-4  # Mitsuba's own floor of a roughness
@@ -58,7 +59,7 @@ def _rough_dielectric(props: Properties) -> Parameters:
     return {**_dielectric(props), **_roughness(props)}
 
 
-def _conductor(props: Properties) -> Parameters:
+def _metal(props: Properties) -> Parameters:
     named = "material" in props.named
     if named and ("eta" in props.named or "k" in props.named):
         raise props.element.error("give either 'material' or 'eta' and 'k', not both")
@@ -68,9 +69,12 @@ def _conductor(props: Properties) -> Parameters:
             eta, k = spectra.metal(child.attribute("value"))
     else:
         eta, k = index(props, "eta", 0.0), index(props, "k", 1.0)
+    return {"eta": eta, "k": k}
+
+
+def _conductor(props: Properties) -> Parameters:
     return {
-        "eta": eta,
-        "k": k,
+        **_metal(props),
         "specular_reflectance": reflectance(props, "specular_reflectance", 1.0),
     }
 
@@ -116,6 +120,25 @@ def _rough_plastic(props: Properties) -> Parameters:
     return {**_plastic(props), "distribution": distribution, "alpha": _alpha(props, "alpha", 0.1)}
 
 
+def _grating(props: Properties) -> Parameters:
+    """Ours, see docs/mitsuba_plugins.md: names are those of clpt.scene.materials.Grating."""
+    kind = materials.Grating
+    declared = params(kind)
+    given: Parameters = {
+        name: props.text(name, getattr(kind, name), declared[name].choices)
+        for name in ("mode", "profile")
+    }
+    for name in ("period", "angle", "depth", "fill"):
+        given[name] = real(props, name, getattr(kind, name))
+    given["orders"] = float(props.integer("orders", int(kind.orders)))
+    child = props.take("efficiencies")
+    if child is not None:
+        given["efficiencies"] = numbers(child, "value")
+    if "ior" in props.named:
+        given["ior"] = ior(props, "ior", "bk7")
+    return {**given, **_metal(props), "reflectance": reflectance(props, "reflectance", 1.0)}
+
+
 def _null(props: Properties) -> Parameters:
     return {}
 
@@ -154,6 +177,7 @@ PLUGINS: dict[str, tuple[type[Material], Callable[[Properties], Parameters]]] = 
     "roughconductor": (materials.RoughConductor, _rough_conductor),
     "plastic": (materials.Plastic, _plastic),
     "roughplastic": (materials.RoughPlastic, _rough_plastic),
+    "grating": (materials.Grating, _grating),
     "null": (materials.Null, _null),
     "twosided": (materials.TwoSided, _two_sided),
     "mask": (materials.Mask, _mask),

@@ -135,6 +135,8 @@ class _Reader:
             return json_spectra.read(cursor, param.role, name)
         if param.role == "real":
             return cursor.number()
+        if param.role == "orders":
+            return tuple(cursor.numbers())
         return self.special[name](cursor) if name in self.special else self.plain(cursor, value)
 
     def plain(self, cursor: Cursor, value: Any) -> Any:
