@@ -20,6 +20,7 @@ PATH = Record(
     ratio=("spectrum", "pdf of the path at each wavelength, over the mean of the four"),
     eta=("real", "product of the relative indices so far, for Russian roulette"),
     weight=("real", "of the sample, from the pixel filter"),
+    medium=("integer", "what absorbs along the ray, see kernels/lib/medium.cl; 0: nothing does"),
     state=("integer", "PATH_ bits and depth, see kernels/lib/path_state.cl"),
     place=("integer", "which place of the film is being worked on, in the order of the tiles"),
     sample=("integer", "which sample of that pixel"),

@@ -74,6 +74,7 @@ an object. What a colour means depends on the parameter's role:
 | reflectance | the smoothest reflectance of that colour (Jakob and Hanika 2019) | - |
 | emission | D65 times such a spectrum | an illuminant |
 | index | a smooth unbounded spectrum | a glass or liquid |
+| coefficient | a smooth unbounded spectrum | - |
 """
 
 HEADINGS = {
@@ -84,6 +85,7 @@ ROLES = {
     "reflectance": "reflectance",
     "emission": "emission",
     "index": "index",
+    "coefficient": "coefficient",
     "real": "number",
     "flag": "true or false",
     "orders": "list of numbers",

@@ -155,7 +155,7 @@ def _spectrum(role: str) -> Schema:
         number["maximum"] = 1
     elif role == "emission":
         one_of.append({"enum": list(spectra.illuminants()), "description": "an illuminant"})
-    else:
+    elif role == "index":
         one_of.append({"enum": list(spectra.glasses()), "description": "a glass or liquid"})
     return {"anyOf": one_of}
 

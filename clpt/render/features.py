@@ -34,6 +34,7 @@ class Features:
     infinite: bool = False
     many_lights: bool = False  # too many to be chosen by the number that also places the point
     dispersion: bool = False
+    absorption: bool = False  # inside of a dielectric
     channel: str = ""
     spectra_size: int = 0
     spectra_step: float = 1.0

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from clpt.scene.params import ORDERS, SPECTRUM_ROLES, Kind, Param, device_params
+from clpt.scene.params import (
+    ORDERS,
+    SPECTRUM_ROLES,
+    Kind,
+    Param,
+    device_params,
+    interior_params,
+)
 
 # How many words a parameter takes in a row of `materials`, `textures` or `lamps`.
 SPECTRUM_WORDS = 5  # x y z w and where the value comes from: 0 here, > 0 texture, < 0 table
@@ -17,6 +24,11 @@ def words(param: Param) -> int:
     if param.role in SPECTRUM_ROLES:
         return SPECTRUM_WORDS
     return {"real": REAL_WORDS, "orders": ORDERS_WORDS}.get(param.role, 1)
+
+
+def row_words(cls: type[Kind]) -> int:
+    """Return the length of a kind's row."""
+    return sum(map(words, [*device_params(cls).values(), *interior_params(cls).values()]))
 
 
 def lane_type(param: Param) -> str:
@@ -105,6 +117,12 @@ def emission_text(found: frozenset[str]) -> str:
 def mixture_text(found: frozenset[str]) -> str:
     """Return `mixture_weight(scene, at, uv, lambdas)`, which reads two words of `mixtures`."""
     return _value_text("mixture_weight", Param("real", "", textured=True), found, "mixtures")
+
+
+def medium_text(found: frozenset[str]) -> str:
+    """Return `medium_absorption(scene, at, uv, lambdas)`, which reads five words of `materials`."""
+    param = Param("coefficient", "")
+    return _value_text("medium_absorption", param, found, "materials")
 
 
 def _value_text(name: str, param: Param, found: frozenset[str], table: str) -> str:

@@ -15,17 +15,19 @@ from clpt.records import SETTINGS, SHAPE
 from clpt.render import cameras, filters, lights, shapes
 from clpt.render.checks import check
 from clpt.render.features import Features
-from clpt.render.kinds import words
+from clpt.render.kinds import row_words
 from clpt.render.tables import STEP, Tables
 from clpt.scene import materials as mt
 from clpt.scene.params import device_params, params
+from clpt.spectra import Constant
 from clpt.spectra.cie import _tanh_ends as tanh_ends
 
 SHAPE_NORMALS, SHAPE_UVS, SHAPE_TWO_SIDED, SHAPE_ONE_LIGHT = 1, 2, 4, 8
 MIXTURE = 0xFF
 FEW_LIGHTS = 256  # up to which one random number chooses a light and a point on it
+CLEAR = Constant(0.0)  # absorption of what absorbs nothing
 DEEPEST = 4000  # path state has 12 bits for the depth
-LONGEST_ROW = max(sum(map(words, device_params(cls).values())) for cls in mt.LEAVES)
+LONGEST_ROW = max(row_words(cls) for cls in mt.LEAVES)
 
 
 @dataclass
@@ -73,7 +75,7 @@ class _Lowering:
         self.warnings: list[str] = []
         self.leaves = _leaf_kinds(scene)
         self.words: dict[tuple[int, str], int] = {}
-        self.uses = dict.fromkeys(("normals", "uvs", "tangents", "mixtures"), False)
+        self.uses = dict.fromkeys(("normals", "uvs", "tangents", "mixtures", "absorption"), False)
         self.triangles: list[tuple[np.ndarray, np.ndarray, int]] = []  # vertices, faces, shape
         self.n_vertices = self.n_faces = 0
 
@@ -187,6 +189,7 @@ class _Lowering:
             if getattr(getattr(material, name), "is_texture", False):
                 self.uses["uvs"] = True
         self.uses["tangents"] |= _anisotropic(material)
+        self.uses["absorption"] |= getattr(material, "absorption", CLEAR) != CLEAR
         return self.leaves.index(material.kind) << 24 | row
 
     def _mixture(
@@ -229,6 +232,7 @@ class _Lowering:
             infinite=self.lights.infinite > 0 and not self.channels,
             many_lights=len(self.lights.rows) > FEW_LIGHTS,
             dispersion=index_tables or any(_LEAVES[kind].disperses for kind in self.leaves),
+            absorption=self.uses["absorption"] and not self.channels,
             channel=self.channels[0] if self.channels else "",
             spectra_size=tables.spectra_size,
             spectra_step=STEP,

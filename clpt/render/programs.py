@@ -12,7 +12,7 @@ from clpt.records import LIGHT, SETTINGS, SHAPE, SLABS, TABLES
 from clpt.render import cameras, kinds, lights, shapes, textures
 from clpt.render.features import Features
 from clpt.scene import materials
-from clpt.scene.params import device_params
+from clpt.scene.params import device_params, interior_params
 from clpt.spectra import XYZ_TO_REC709
 
 LEAVES = {cls.kind: cls for cls in materials.LEAVES}
@@ -72,6 +72,8 @@ def _defines(features: Features) -> dict[str, str | int | float]:
         "USES_LIGHTS": int(bool(features.lights)),
         "USES_SURFACE_LIGHTS": int(bool(set(features.lights) & set(shapes.RECORDS))),
     }
+    if features.absorption:
+        made["USES_ABSORPTION"] = 1
     if features.filter == "box":
         made["FILTER_BOX"] = 1
     if features.channel:
@@ -94,6 +96,7 @@ def _shared(features: Features, layout: str) -> dict[str, str]:
         "generated/textures.cl": textures.dispatch_text(features.textures, features.texture_roles),
         "generated/lights.cl": _lights_text(features),
         "generated/mixture.cl": _mixture_text(features),
+        "generated/medium.cl": _medium_text(features),
         "generated/shapes.cl": _tangents_text(features),
         "generated/trace.cl": _trace_text(layout),
         "generated/layout.cl": (
@@ -166,6 +169,23 @@ def _mixture_text(features: Features) -> str:
     """The loader of the weights of masks and blends."""
     found = features.sources.get("mixture", {}).get("weight", frozenset({"constant"}))
     return kinds.mixture_text(found)
+
+
+def _medium_text(features: Features) -> str:
+    """What absorbs between surfaces, where something does."""
+    if not features.absorption:
+        return ""
+    found = [own.get("absorption", frozenset()) for own in features.sources.values()]
+    return kinds.medium_text(frozenset().union(*found)) + '#include "lib/medium.cl"\n'
+
+
+def _interior_text(features: Features, cls: type[materials.Material]) -> list[str]:
+    """How the medium inside of a material is named, see kernels/lib/medium.cl."""
+    if not features.absorption:
+        return []
+    first = 1 + sum(map(kinds.words, device_params(cls).values()))
+    inside = f"((row) + {first})" if interior_params(cls) else "((integer)(0))"
+    return [f"#define BSDF_INTERIOR(row) {inside}"]
 
 
 def _trace_text(layout: str) -> str:
@@ -243,6 +263,7 @@ def _bsdf_text(features: Features, kind: str) -> str:
             f"typedef {cls.__name__} Bsdf;",
             f"#define BSDF_REFLECTIVITY(m) {reflectivity}",
             *(f"#define bsdf_{verb} {kind}_{verb}" for verb in verbs),
+            *_interior_text(features, cls),
             "",
         ]
     )

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from clpt import spectra
 from clpt.records import TABLES
 from clpt.render.kinds import ORDERS_WORDS, REAL_WORDS, SPECTRUM_WORDS
-from clpt.scene.params import Kind, device_params
+from clpt.scene.params import Kind, device_params, interior_params
 from clpt.spectra import RGB, Constant, RGBIlluminant, RGBUnbounded, Spectrum
 from clpt.spectra.spectrum import Role, d65, on_grid
 
@@ -22,6 +22,7 @@ RGB_ROLES: dict[str, Role] = {
     "reflectance": "reflectance",
     "emission": "emission",
     "index": "unbounded",
+    "coefficient": "unbounded",
 }
 Words = NDArray[np.uint32]
 
@@ -109,13 +110,13 @@ class Tables:
     def spectrum_words(self, value: Spectrum | str, role: str) -> tuple[Words, str]:
         """Return the five words of a spectrum and its source: "constant" or "table".
 
-        role: "reflectance", "emission" or "index"; an index may be a glass's name.
+        role: one of SPECTRUM_ROLES in clpt.scene.params; an index may be a glass's name.
         """
         if isinstance(value, str):
             value = spectra.glass(value)
         if role == "emission" and isinstance(value, RGB):
             value = RGBIlluminant(value.r, value.g, value.b)
-        if role == "index" and isinstance(value, RGB):
+        if role in ("index", "coefficient") and isinstance(value, RGB):
             value = RGBUnbounded(value.r, value.g, value.b)
         words = np.zeros(SPECTRUM_WORDS, np.uint32)
         if not self.spectral:
@@ -132,14 +133,15 @@ class Tables:
         return words, "constant"
 
     def row(self, kind: Kind, table: str) -> int:
-        """Append the device parameters of a kind to a table; return its first word.
+        """Append what the kernels read of a kind to a table; return its first word.
 
         The same object is put in once.
         """
         key = (id(kind), table)
         if key not in self._rows:
             words: list[ArrayLike] = []
-            for name, param in device_params(type(kind)).items():
+            read = {**device_params(type(kind)), **interior_params(type(kind))}
+            for name, param in read.items():
                 value, source = self.param_words(getattr(kind, name), param.role, param.choices)
                 words.append(value)
                 self.sources[kind.kind][name].add(source)

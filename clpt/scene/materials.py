@@ -14,6 +14,7 @@ from clpt.scene.params import (
     ORDERS,
     Kind,
     choice,
+    coefficient,
     flag,
     host,
     index,
@@ -71,6 +72,7 @@ class Dielectric(Material):
     ext_ior: Any = index(1.000277, "outside index")
     specular_reflectance: Any = reflectance(1.0, "factor on reflection; 1 is physical")
     specular_transmittance: Any = reflectance(1.0, "factor on transmission; 1 is physical")
+    absorption: Any = coefficient(0.0, "of the inside: exp(-absorption distance) passes")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -100,6 +102,7 @@ class RoughDielectric(Material):
     alpha_v: Any = real(0.1, "roughness across it", low=1e-4, high=1.0, textured=True)
     specular_reflectance: Any = reflectance(1.0, "factor on reflection; 1 is physical")
     specular_transmittance: Any = reflectance(1.0, "factor on transmission; 1 is physical")
+    absorption: Any = coefficient(0.0, "of the inside: exp(-absorption distance) passes")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

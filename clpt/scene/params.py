@@ -10,6 +10,7 @@ role           accepted                               in the kernel             
 reflectance    number, (r, g, b), Spectrum, Texture   Spectrum in [0, 1]          yes
 emission       number, (r, g, b), Spectrum, Texture   Spectrum, rgb times D65     area, envmap
 index          number, name, Spectrum                 Spectrum, unbounded         no
+coefficient    number, (r, g, b), Spectrum            of the inside, in [1/m]     no
 real           number, Texture                        real                        yes
 flag           bool                                   int                         no
 choice         one of the names listed                int, the name's position    no
@@ -33,8 +34,9 @@ from clpt.errors import SceneError
 from clpt.spectra import RGB, Constant, Spectrum
 
 DEVICE_ROLES = ("reflectance", "emission", "index", "real", "flag", "choice", "orders")
-SPECTRUM_ROLES = ("reflectance", "emission", "index")
+SPECTRUM_ROLES = ("reflectance", "emission", "index", "coefficient")
 ORDERS = 8  # highest order of diffraction, see kernels/lib/diffraction.cl
+LAMBDAS = np.arange(200.0, 1201.0)  # [nm] at which a spectrum's limits are checked
 
 
 @dataclass(frozen=True)
@@ -69,6 +71,14 @@ def emission(default: Any, doc: str, unit: str, *, textured: bool = False) -> An
 def index(default: Any, doc: str) -> Any:
     """Declare a refractive index or extinction coefficient, perhaps by name, perhaps dispersive."""
     return _field(default, Param("index", doc, low=0.0))
+
+
+def coefficient(default: Any, doc: str, unit: str = "1/m") -> Any:
+    """Declare a property of the inside of a body; no member of its kind's struct.
+
+    Light meets it between surfaces: kernels/lib/medium.cl reads it from behind the kind's row.
+    """
+    return _field(default, Param("coefficient", doc, unit, low=0.0))
 
 
 def real(
@@ -145,6 +155,11 @@ def device_params(cls: type) -> dict[str, Param]:
     return {name: p for name, p in params(cls).items() if p.role in DEVICE_ROLES}
 
 
+def interior_params(cls: type) -> dict[str, Param]:
+    """Return the parameters of what is inside of a body; they follow the others in its row."""
+    return {name: p for name, p in params(cls).items() if p.role == "coefficient"}
+
+
 def _checked(value: Any, param: Param, where: str) -> Any:
     if param.role == "host":
         return value
@@ -189,7 +204,11 @@ def _orders(value: Any, param: Param, where: str) -> tuple[float, ...]:
 
 
 def _spectrum(value: Any, param: Param, where: str) -> Any:
-    if isinstance(value, Spectrum) or (isinstance(value, str) and param.role == "index"):
+    if isinstance(value, str) and param.role == "index":
+        return value
+    if isinstance(value, Spectrum):
+        if param.role == "coefficient" and value.sample(LAMBDAS).min() < 0.0:
+            raise SceneError("cannot be negative at any wavelength", where=where)
         return value
     if isinstance(value, (list, tuple, np.ndarray)) and len(value) == 3:
         return RGB(*(_number(v, param, where) for v in value))

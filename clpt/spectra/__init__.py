@@ -28,6 +28,7 @@ from clpt.spectra.spectrum import (
     Sellmeier,
     Spectrum,
     Tabulated,
+    absorption,
     on_grid,
 )
 from clpt.spectra.upsampling import unbounded, uplift
@@ -47,6 +48,7 @@ __all__ = [
     "Sellmeier",
     "Spectrum",
     "Tabulated",
+    "absorption",
     "cie_xyz",
     "glass",
     "glasses",

@@ -184,6 +184,16 @@ class Cauchy(Spectrum):
         return self.a + (self.b + self.c * inverse) * inverse
 
 
+def absorption(k: Spectrum) -> Spectrum:
+    """Absorption coefficient [1/m] where the extinction coefficient is k: 4 pi k / lambda.
+
+    Born and Wolf, Principles of Optics, 7th ed., 14.1 eq. 19. Whole nanometres, 200 to 1200.
+    """
+    lambdas = np.arange(200.0, 1201.0)
+    values = 4e9 * np.pi * k.sample(lambdas) / lambdas
+    return Tabulated(lambdas, values, "hold") if values.any() else Constant(0.0)
+
+
 @cache
 def d65() -> Tabulated:
     """CIE standard illuminant D65 with luminance 1."""

@@ -9,6 +9,11 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     integer state = load_path_state(path, at), depth = state & PATH_DEPTH;
     mask front;
     Surface s = surface_load(scene, hit, at, active, o, d, &front);
+#if USES_ABSORPTION
+    integer inside = BSDF_INTERIOR(MATERIAL_ROW(sel_i(active, load_hit_material(hit, at), (integer)(0))));
+    integer medium = medium_met(sel_i(active, load_path_medium(path, at), (integer)(0)), inside, front);
+    beta = spectrum_mul(beta, medium_transmittance(scene, medium, load_hit_t(hit, at), lambdas));
+#endif
 
     /* The light that this ray has met; the camera's ray goes on behind one that is to be hidden. */
     mask hidden = mask_of(0);
@@ -48,6 +53,10 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     real w = sel(ls.pdf < 0.0f, (real)(1.0f), mis_weight(ls.pdf, hero_pdf(m, wo, wi, ratio)));
     mask shine = next & (ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
     Spectrum value = spectrum_scale(spectrum_mul(spectrum_mul(beta, f), ls.radiance), w / sel(shine, fabs(ls.pdf), (real)(1.0f)));
+#if USES_ABSORPTION
+    integer between = medium_beyond(medium, inside, front, dot3(s.n, ls.wi) < 0.0f);
+    value = spectrum_mul(value, medium_transmittance(scene, between, ls.t, lambdas));
+#endif
     shadow_toward(shadow, at, active, shine, s, ls, value);
     state += sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
 #endif
@@ -76,6 +85,9 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     store_path_beta(path, at, next, beta);
     store_path_pdf(path, at, next, sel((bs.lobe & LOBE_DELTA) != 0, (real)(-1.0f), bs.pdf));
     store_path_eta(path, at, next, eta);
+#if USES_ABSORPTION
+    store_path_medium(path, at, next, medium_beyond(medium, inside, front, dot3(s.n, onward) < 0.0f));
+#endif
     hero_keep(path, at, next, ratio);
     mask met = active & !hidden;
     state = sel_i(next, state, state - (state & PATH_ALIVE)) + sel_i(met, (integer)(1), (integer)(0));

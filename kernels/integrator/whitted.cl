@@ -10,6 +10,11 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     integer state = load_path_state(path, at), depth = state & PATH_DEPTH;
     mask front;
     Surface s = surface_load(scene, hit, at, active, o, d, &front);
+#if USES_ABSORPTION
+    integer inside = BSDF_INTERIOR(MATERIAL_ROW(sel_i(active, load_hit_material(hit, at), (integer)(0))));
+    integer medium = medium_met(sel_i(active, load_path_medium(path, at), (integer)(0)), inside, front);
+    beta = spectrum_mul(beta, medium_transmittance(scene, medium, load_hit_t(hit, at), lambdas));
+#endif
 #if USES_SURFACE_LIGHTS
     mask lit = active & (s.light >= 0) & front;
     if (any(lit)) {
@@ -36,6 +41,10 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     Spectrum f = bsdf_eval(m, wo, to_local(frame, ls.wi));
     mask shine = active & (ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
     Spectrum value = spectrum_scale(spectrum_mul(spectrum_mul(own, f), ls.radiance), 1.0f / sel(shine, fabs(ls.pdf), (real)(1.0f)));
+#if USES_ABSORPTION
+    integer between = medium_beyond(medium, inside, front, dot3(s.n, ls.wi) < 0.0f);
+    value = spectrum_mul(value, medium_transmittance(scene, between, ls.t, lambdas));
+#endif
     shadow_toward(shadow, at, active, shine, s, ls, value);
     state += sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
 #endif
@@ -58,6 +67,9 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     store_path_d(path, at, next, onward);
     store_path_beta(path, at, next, beta);
     store_path_pdf(path, at, next, (real)(-1.0f));
+#if USES_ABSORPTION
+    store_path_medium(path, at, next, medium_beyond(medium, inside, front, dot3(s.n, onward) < 0.0f));
+#endif
     state = sel_i(next, state, state - (state & PATH_ALIVE)) + sel_i(active, (integer)(1), (integer)(0));
     store_path_state(path, at, active, state);
 }

@@ -10,6 +10,7 @@
 #include "lib/shape.cl"
 #include "lib/light.cl"
 #include "generated/lights.cl"
+#include "generated/medium.cl"
 
 kernel APART void generate(SLAB_ARGS, SCENE_ARGS, global float *film, global uint *counters, int first, int end)
 {
@@ -29,6 +30,10 @@ kernel APART void generate(SLAB_ARGS, SCENE_ARGS, global float *film, global uin
             real pdf = load_path_pdf(path, at);
             vec3 d = load_path_d(path, at);
             Spectrum arrives = infinite_gather(scene, d, pdf, lambdas);
+#if USES_ABSORPTION
+            integer medium = sel_i(sky, load_path_medium(path, at), (integer)(0));
+            arrives = spectrum_mul(arrives, medium_transmittance(scene, medium, (real)(FAR), lambdas));
+#endif
             radiance = spectrum_sel(sky, spectrum_add(radiance, spectrum_mul(load_path_beta(path, at), arrives)), radiance);
         }
 #endif
@@ -95,6 +100,9 @@ kernel APART void generate(SLAB_ARGS, SCENE_ARGS, global float *film, global uin
         store_path_radiance(path, at, go, spectrum_of(0.0f));
         store_path_pdf(path, at, go, -ray.far);
         store_path_eta(path, at, go, (real)(1.0f));
+#if USES_ABSORPTION
+        store_path_medium(path, at, go, (integer)(0));
+#endif
 #if USES_DISPERSION
         store_path_ratio(path, at, go, spectrum_of(1.0f));
 #endif

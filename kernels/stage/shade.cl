@@ -14,6 +14,7 @@
 #include "lib/microfacet.cl"
 #include "lib/bsdf.cl"
 #include "generated/bsdf.cl"
+#include "generated/medium.cl"
 #include "lib/hero.cl"
 #include "generated/integrator.cl"
 

@@ -221,6 +221,12 @@ BSDFS = {
     '<bsdf type="roughdielectric"><float name="alpha" value=".2"/></bsdf>': (
         materials.RoughDielectric(distribution="beckmann", alpha_u=0.2, alpha_v=0.2)
     ),
+    '<bsdf type="dielectric"><float name="absorption" value="3"/></bsdf>': (
+        materials.Dielectric(int_ior=1.5046, ext_ior=1.000277, absorption=3.0)
+    ),
+    '<bsdf type="roughdielectric"><rgb name="absorption" value="1,2,30"/></bsdf>': (
+        materials.RoughDielectric(distribution="beckmann", absorption=RGBUnbounded(1, 2, 30))
+    ),
     '<bsdf type="conductor"/>': materials.Conductor(eta=0.0, k=1.0),
     '<bsdf type="conductor"><string name="material" value="Au"/></bsdf>': materials.Conductor(
         eta=metal("Au")[0], k=metal("Au")[1]

@@ -139,6 +139,25 @@ def test_indices_and_metals(scene):
     assert (gold.eta, gold.k) == spectra.metal("Au")
 
 
+def test_absorption(scene, tmp_path):
+    """A coefficient of a body; of a page of optical constants it is 4 pi k / lambda."""
+
+    def coefficient(given):
+        material = {"type": "dielectric", "absorption": given}
+        return scene(shapes=[{"type": "cube", "material": material}]).shapes[0].material.absorption
+
+    assert coefficient(2) == spectra.Constant(2.0)
+    assert coefficient([1, 2, 30]) == spectra.RGBUnbounded(1, 2, 30)
+    assert coefficient({"values": [[400, 1]]}) == spectra.Tabulated((400,), (1,), "hold")
+    page = "DATA:\n - type: tabulated nk\n   data: |\n     0.4 1.5 1e-6\n     0.8 1.5 3e-6\n"
+    (tmp_path / "page.yml").write_text(page)
+    measured = coefficient({"file": "page.yml"}).sample([400.0, 800.0])
+    assert np.allclose(measured, [10.0 * np.pi, 15.0 * np.pi])
+    for wrong in (-1, [1, -1, 1], {"values": [[400, -1]]}, "bk7"):
+        with pytest.raises(SceneError):
+            coefficient(wrong)
+
+
 def test_a_texture_where_one_may_stand(scene):
     bitmap = {"type": "bitmap", "image": "t.png", "to_uv": {"scale": [2, 3, 1]}}
     material = {"type": "rough_conductor", "alpha_u": bitmap}

@@ -168,3 +168,11 @@ def test_emission_agrees_with_mitsuba_spectral():
         for wavelength in (370.0, 450.0, 555.0, 640.0, 700.0):
             si.wavelengths = [wavelength] * 4
             assert ours.sample(wavelength) == pytest.approx(node.eval(si)[0], rel=tolerance)
+
+
+def test_absorption_of_an_extinction_coefficient() -> None:
+    """Water at 550 nm, k = 1.96e-9 (Hale and Querry 1973): 0.0448 per metre."""
+    a = spectra.absorption(spectra.Constant(1.96e-9))
+    np.testing.assert_allclose(a.sample([550.0]), 0.04478, rtol=1e-3)
+    np.testing.assert_allclose(a.sample([400.0]) / a.sample([800.0]), 2.0)
+    assert spectra.absorption(spectra.Constant(0.0)) == spectra.Constant(0.0)

@@ -7,7 +7,7 @@ from typing import Any
 
 from clpt import spectra
 from clpt.errors import UnknownKindError
-from clpt.formats.mitsuba.spectra import index, ior, real, reflectance
+from clpt.formats.mitsuba.spectra import coefficient, index, ior, real, reflectance
 from clpt.formats.mitsuba.values import Context, Properties, numbers, placed
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene import materials
@@ -47,6 +47,10 @@ def _phong(props: Properties) -> Parameters:
 
 
 def _dielectric(props: Properties) -> Parameters:
+    return {**_thin_dielectric(props), "absorption": coefficient(props, "absorption")}
+
+
+def _thin_dielectric(props: Properties) -> Parameters:
     return {
         "int_ior": ior(props, "int_ior", "bk7"),
         "ext_ior": ior(props, "ext_ior", "air"),
@@ -171,7 +175,7 @@ PLUGINS: dict[str, tuple[type[Material], Callable[[Properties], Parameters]]] = 
     "diffuse": (materials.Diffuse, _diffuse),
     "phong": (materials.Phong, _phong),
     "dielectric": (materials.Dielectric, _dielectric),
-    "thindielectric": (materials.ThinDielectric, _dielectric),
+    "thindielectric": (materials.ThinDielectric, _thin_dielectric),
     "roughdielectric": (materials.RoughDielectric, _rough_dielectric),
     "conductor": (materials.Conductor, _conductor),
     "roughconductor": (materials.RoughConductor, _rough_conductor),

@@ -44,6 +44,14 @@ def index(props: Properties, name: str, default: float) -> Any:
     return value
 
 
+def coefficient(props: Properties, name: str) -> Any:
+    """Take an absorption coefficient [1/m]: a number, a colour or a spectrum; 0 if not given."""
+    value = _take(props, name, "coefficient", 0.0)
+    if isinstance(value, Texture):
+        raise props.element.error(f"{name!r} cannot be a texture")
+    return value
+
+
 def ior(props: Properties, name: str, default: str) -> Any:
     """Take a refractive index: a number or a name, without dispersion as Mitsuba has it."""
     child = props.take(name)
@@ -90,7 +98,7 @@ def _spectrum(child: Element, role: str, props: Properties) -> Any:
         raise child.error("must be a number, a colour, a spectrum or a texture")
     if child.type:
         return _plugin(child, props)
-    outside: Any = "hold" if role == "index" else "zero"
+    outside: Any = "hold" if role in ("index", "coefficient") else "zero"
     if "filename" in child.attributes:
         path = props.context.document.find_file(child, child.attributes["filename"])
         return spectra.read_table(path, outside)

@@ -53,9 +53,9 @@ def _read(cursor: Cursor, role: str, name: str) -> Any:
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return cursor.number()
     cursor.expect(dict, "a number, [r, g, b] or a spectrum")
-    outside: Any = "hold" if role == "index" else "zero"
+    outside: Any = "hold" if role in ("index", "coefficient") else "zero"
     if "file" in value:
-        return _from_file(cursor, outside, name)
+        return _from_file(cursor, role, outside, name)
     if "values" in value and "type" not in value:
         _refuse(cursor, "spectrum", ("values",))
         rows = [row.numbers(2) for row in cursor.at("values").entries()]
@@ -66,11 +66,13 @@ def _read(cursor: Cursor, role: str, name: str) -> Any:
     return _typed(cursor)
 
 
-def _from_file(cursor: Cursor, outside: Any, name: str) -> Spectrum:
+def _from_file(cursor: Cursor, role: str, outside: Any, name: str) -> Spectrum:
     _refuse(cursor, "spectrum", ("file",))
     path = find_file(cursor.at("file"))
     if path.suffix in (".yml", ".yaml"):
         eta, k = spectra.read_refractive_index(path)
+        if role == "coefficient":
+            return spectra.absorption(k)
         return k if name == "k" else eta
     return spectra.read_table(path, outside)
 
