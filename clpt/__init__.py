@@ -21,6 +21,9 @@ from clpt.formats import load
 from clpt.images import read, write
 from clpt.render.renderer import Progress, Renderer, render
 from clpt.scene import Scene
+from clpt.spectral_exr import SpectralImage
+from clpt.spectral_exr import read as read_spectral
+from clpt.spectral_exr import write as write_spectral
 
 try:
     __version__ = metadata.version("clpt")
@@ -36,11 +39,14 @@ __all__ = [
     "Renderer",
     "Scene",
     "SceneError",
+    "SpectralImage",
     "UnknownKindError",
     "UnusedParameterError",
     "__version__",
     "load",
     "read",
+    "read_spectral",
     "render",
     "write",
+    "write_spectral",
 ]

@@ -13,7 +13,7 @@ import clpt
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE, KERNELS = ROOT / "clpt", ROOT / "kernels"
 
-BASE = {"errors", "layout", "records", "transforms", "images", "spectra"}
+BASE = {"errors", "layout", "records", "transforms", "images", "spectra", "spectral_exr"}
 # What a part may import of the others; itself always.
 MAY_IMPORT = {
     **dict.fromkeys(BASE, BASE),
@@ -79,7 +79,9 @@ def test_who_imports_pyopencl(path: Path) -> None:
         assert not any(name.split(".")[0] == "pyopencl" for name in imports(path))
 
 
-@pytest.mark.parametrize("name", ["scene", "formats", "spectra", "layout", "transforms", "images"])
+@pytest.mark.parametrize(
+    "name", ["scene", "formats", "spectra", "layout", "transforms", "images", "spectral_exr"]
+)
 def test_data_does_not_need_opencl(name: str) -> None:
     """No chain of imports leads from plain data to pyopencl."""
     seen: set[str] = set()

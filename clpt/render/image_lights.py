@@ -7,17 +7,20 @@ function itself (kernels/lib/grid.cl).
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt import images, transforms
+from clpt import images, spectral_exr, transforms
 from clpt.errors import SceneError
 from clpt.layout import Record
-from clpt.render.texels import texels
+from clpt.render.texels import bands, texels
 from clpt.scene.lights import CubeMap, Envmap
+from clpt.spectra import luminance
+from clpt.spectral_exr import SpectralImage
 
 Array = NDArray[np.float32]
 
@@ -36,7 +39,15 @@ _IMAGE = {
 RECORDS: dict[str, Record] = {
     "envmap": Record("Envmap", "An image in latitude and longitude.", **_IMAGE),
     "cube_map": Record("CubeMap", "Six square images, with a border of one texel.", **_IMAGE),
+    "spectral_envmap": Record(
+        "SpectralEnvmap",
+        "An image of spectra in latitude and longitude.",
+        **_IMAGE,
+        bands=("integer", "values in a texel"),
+        number=("integer", "row in `spectra`: the number of the band by wavelength"),
+    ),
 }
+UNSEEN = 0.1  # share of the mean over bands in the weight of a texel: light of no colour counts too
 
 FACES = "+x -x +y -y +z -z"
 # Columns and rows of the faces in crosses of 4x3 and 3x4; the last one stands on its head.
@@ -47,21 +58,31 @@ _TALL = ((2, 1), (0, 1), (1, 0), (1, 2), (1, 1), (1, 3))
 def lower_image(lamp: Envmap | CubeMap, tables: Any) -> tuple[dict[str, ArrayLike], float]:
     """Put an image light's texels and grid into the tables; its members, and its mean radiance.
 
-    Raises SceneError for what is no image, or a transform that is more than a rotation.
+    Those of a spectral image have `bands`. Raises SceneError for what is no image, or a transform
+    that is more than a rotation.
     """
     where = f"{lamp.kind}.image"
     axes = _axes(lamp)
+    spectral: dict[str, ArrayLike] = {}
     if isinstance(lamp, Envmap):
-        image = _loaded(lamp.image, where) * np.float32(lamp.scale)
-        image = np.repeat(image, 2, axis=0) if len(image) == 1 else image
+        found = spectral_exr.find(lamp.image, emissive=True)
+        image = _loaded(lamp.image if found is None else found.to_rgb(), where)
+        image = _at_least_two_rows(image * np.float32(lamp.scale))
         height, width, _ = image.shape
-        corners = _latitude_weights(_brightness(image))[None]
+        bright = _brightness(image)
+        if found is not None and tables.spectral:
+            found = _scaled(found, lamp.scale, where)
+            bright = luminance(image) + UNSEEN * _brightness(found.values)
+            made, number = bands(found, tables.lambda_min, tables.lambda_max)
+            spectral = {"bands": made.shape[1], "number": tables.spectra_row(number)}
+        corners = _latitude_weights(bright)[None]
     else:
         faces = _faces(lamp.image, where) * np.float32(lamp.scale)
         height = width = faces.shape[1]
         image = _bordered(faces)
         corners = _cube_weights(_brightness(image))
-    made = texels(image.reshape(1, -1, 3), "emission", tables.spectral)
+    if not spectral:
+        made = texels(image.reshape(1, -1, 3), "emission", tables.spectral)
     marginal, conditional, total = _cumulative(corners)
     members: dict[str, ArrayLike] = {name: axes[:, i] for i, name in enumerate("xyz")}
     members |= {
@@ -72,6 +93,7 @@ def lower_image(lamp: Envmap | CubeMap, tables: Any) -> tuple[dict[str, ArrayLik
         "marginal": tables.append_floats("distributions", marginal),
         "conditional": tables.append_floats("distributions", conditional),
         "norm": 1.0 / total if total > 0.0 else 0.0,
+        **spectral,
     }
     cell = np.pi / (height - 1) * 2.0 * np.pi / width if isinstance(lamp, Envmap) else width**-2.0
     return members, total * cell / (4.0 * np.pi)
@@ -89,8 +111,23 @@ def _axes(lamp: Envmap | CubeMap) -> NDArray[np.float64]:
     return axes
 
 
+def _at_least_two_rows(values: Array) -> Array:
+    """An image (h, w, n) with a row for each pole."""
+    return np.repeat(values, 2, axis=0) if len(values) == 1 else values
+
+
+def _scaled(image: SpectralImage, scale: float, where: str) -> SpectralImage:
+    """An image of spectra as a light's texels. Raises SceneError if a value is not finite."""
+    values = _at_least_two_rows(image.values * np.float32(scale))
+    if not np.isfinite(values).all():
+        raise SceneError("has a texel that is not finite", where=where)
+    return dataclasses.replace(image, values=np.maximum(values, np.float32(0.0)))
+
+
 def _loaded(image: Any, where: str) -> Array:
     """An image as (h, w, 3) float32 without negative values. Raises SceneError."""
+    if spectral_exr.find(image, emissive=True) is not None:
+        raise SceneError("spectral images can be an envmap only", where=where)
     if image is None:
         raise SceneError("an image is needed: a path, or an array (h, w, 3)", where=where)
     values = images.read(image) if isinstance(image, (str, Path)) else np.asarray(image, np.float32)

@@ -16,7 +16,7 @@ from clpt.scene import lights
 from clpt.scene.lights import Light
 from clpt.scene.textures import Bitmap, Checkerboard
 
-INFINITE = ("constant", "envmap", "cube_map")  # a ray that leaves the scene meets these
+INFINITE = ("constant", *image_lights.RECORDS)  # a ray that leaves the scene meets these
 
 _RADIANCE = ("integer", "first word of the emission parameter in `lamps`")
 RECORDS: dict[str, Record] = {
@@ -54,6 +54,7 @@ class Sink(Protocol):
     def append_floats(self, name: str, values: ArrayLike) -> int: ...
     def emission_words(self, value: Any) -> NDArray[np.uint32]: ...
 
+    def spectra_row(self, spectrum: Any) -> int: ...
     @property
     def spectral(self) -> bool: ...
 
@@ -63,31 +64,33 @@ def blank_row() -> NDArray[np.uint32]:
 
     It is what idle lanes read; an image light's smallest size keeps them inside its tables.
     """
-    words = np.zeros(1, RECORDS["envmap"].dtype)
+    words = np.zeros(1, RECORDS["spectral_envmap"].dtype)  # the longest
     words["width"], words["height"] = 1, 2
     return words.view(np.uint32)
 
 
-def lower_lamp(lamp: Light, tables: Sink, scene_radius: float) -> tuple[int, int, float]:
-    """Put a light into the tables; its row and its emission in `lamps`, and its power [W/nm].
+def lower_lamp(lamp: Light, tables: Sink, scene_radius: float) -> tuple[str, int, int, float]:
+    """Put a light into the tables; its record, its row and emission in `lamps`, its power [W/nm].
 
     The power is an estimate, the mean of channels; scene_radius: of a sphere around the scene [m].
     Raises SceneError for a light that has no place or no direction.
     """
     if lamp.kind not in RECORDS:
         raise SceneError(f"a light of kind {lamp.kind!r} is a shape's `emission`", where="lights")
+    kind = lamp.kind
     if isinstance(lamp, (lights.Envmap, lights.CubeMap)):
         members, strength = image_lights.lower_image(lamp, tables)
+        kind = "spectral_envmap" if "bands" in members else kind
         radiance = 0
     else:
         radiance = tables.append("lamps", tables.emission_words(_emitted(lamp)))
         members = {**_members(lamp), "radiance": radiance}
         strength = brightness(_emitted(lamp))
-    words = np.zeros(1, RECORDS[lamp.kind].dtype)
+    words = np.zeros(1, RECORDS[kind].dtype)
     for name, value in members.items():
         words[name] = value
     at = tables.append("lamps", words.view(np.uint32))
-    return at, radiance, power(lamp, strength, scene_radius)
+    return kind, at, radiance, power(lamp, strength, scene_radius)
 
 
 def _emitted(lamp: Light) -> Any:
@@ -155,7 +158,7 @@ def power(lamp: Light, strength: float, scene_radius: float) -> float:
 def brightness(value: Any) -> float:
     """Return the mean over channels, and over a texture, of an emission."""
     if isinstance(value, Bitmap):
-        return float(np.maximum(pixels(value), 0.0).mean(dtype=np.float64))
+        return float(np.maximum(pixels(value, "emission"), 0.0).mean(dtype=np.float64))
     if isinstance(value, Checkerboard):
         return 0.5 * (brightness(value.color0) + brightness(value.color1))
     return float(np.mean(value.to_rgb("emission")))

@@ -96,8 +96,8 @@ def _block(count: int, kind: str, params: ArrayLike, radiance: int, shape_row: i
 
 def _lamp_block(lamp: Light, tables: Sink, scene_radius: float) -> tuple[np.ndarray, np.ndarray]:
     """The row of a light that is not on a shape, and its power."""
-    at, radiance, power = lower_lamp(lamp, tables, scene_radius)
-    return _block(1, lamp.kind, at, radiance, -1), np.array([power])
+    kind, at, radiance, power = lower_lamp(lamp, tables, scene_radius)
+    return _block(1, kind, at, radiance, -1), np.array([power])
 
 
 def _emitter_block(emitter: Emitter, tables: Sink) -> tuple[np.ndarray, np.ndarray]:
@@ -156,9 +156,14 @@ def alias_table(
 
 def virtual_files() -> dict[str, str]:
     """Return generated/light/<kind>.cl per kind: its struct, its loader and its functions."""
-    return {
+    made = {
         f"generated/light/{kind}.cl": f'{record.row_text()}#include "light/{kind}.cl"\n'
         for kind, record in RECORDS.items()
+    }
+    own = made["generated/light/spectral_envmap.cl"]  # it knows directions by those of the other
+    return {
+        **made,
+        "generated/light/spectral_envmap.cl": f'#include "generated/light/envmap.cl"\n{own}',
     }
 
 

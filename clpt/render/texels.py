@@ -1,4 +1,4 @@
-"""Images as the kernels read them: texels of colours, of spectra, or of numbers."""
+"""Images as the kernels read them: texels of colours, of spectra, of bands, or of numbers."""
 
 from __future__ import annotations
 
@@ -8,19 +8,32 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import images, spectra
+from clpt import images, spectra, spectral_exr
 from clpt.errors import SceneError
 from clpt.scene.textures import Bitmap
+from clpt.spectra import Tabulated
+from clpt.spectral_exr import SpectralImage
 
 Floats = NDArray[np.float32]
 
+FAR = 1000.0  # bands: how far beyond its ends a spectral image's bands are numbered
 
-def pixels(texture: Bitmap) -> Floats:
+
+def spectral_image(texture: Any, role: str) -> SpectralImage | None:
+    """Return a texture's image if it is a bitmap of spectra, in the role of a parameter."""
+    if not isinstance(texture, Bitmap):
+        return None
+    return spectral_exr.find(texture.image, emissive=role == "emission")
+
+
+def pixels(texture: Bitmap, role: str) -> Floats:
     """Return a bitmap's image, (h, w, 1 or 3) float32 without alpha, top row first.
 
-    Raises SceneError if it cannot be read or is no image.
+    role: "reflectance", "emission" or "real"; of spectra it chooses the colour that stands for
+    them. Raises SceneError if it cannot be read or is no image.
     """
-    image = texture.image
+    spectral = spectral_image(texture, role)
+    image = texture.image if spectral is None else spectral.to_rgb()
     if isinstance(image, (str, Path)):
         image = images.read(image, linear=not texture.raw)
     image = np.asarray(image)
@@ -50,6 +63,28 @@ def texels(image: Floats, role: str, spectral: bool) -> Floats:
     else:
         made[:, 3], made[:, :3] = spectra.unbounded(colours)
     return made
+
+
+def bands(image: SpectralImage, lo: float, hi: float) -> tuple[Floats, Tabulated]:
+    """Return what stands in `texels` for a spectral image seen from `lo` to `hi` [nm].
+
+    (h * w, n) float32 and the number of the band by wavelength: whole at the bands' wavelengths,
+    linear between them and beyond the ends. Bands outside the range but for the next are left out.
+    Raises SceneError if there are fewer than two.
+    """
+    lambdas, n = image.lambdas, len(image.lambdas)
+    if n < 2:
+        raise SceneError("a texture of spectra needs two wavelengths at least", where="image")
+    first = min(max(int(np.searchsorted(lambdas, lo, "right")) - 1, 0), n - 2)
+    end = max(min(int(np.searchsorted(lambdas, hi)) + 1, n), first + 2)
+    kept = lambdas[first:end]
+    last, ends = len(kept) - 1.0, np.array([kept[1] - kept[0], kept[-1] - kept[-2]]) * FAR
+    number = Tabulated(
+        [kept[0] - ends[0], *kept, kept[-1] + ends[1]],
+        [-FAR, *np.arange(len(kept)), last + FAR],
+    )
+    values = np.nan_to_num(image.values[..., first:end].reshape(-1, len(kept)))
+    return np.clip(values, 0.0, None if image.emissive else 1.0), number
 
 
 def _numbers(image: Floats) -> NDArray[np.float64]:

@@ -16,27 +16,26 @@ from numpy.typing import ArrayLike, NDArray
 from clpt.errors import SceneError
 from clpt.layout import Record
 from clpt.render.kinds import REAL_WORDS, SPECTRUM_WORDS
-from clpt.render.texels import pixels, texels
+from clpt.render.texels import bands, pixels, spectral_image, texels
 from clpt.scene.params import device_params, params
 from clpt.scene.textures import Bitmap, Checkerboard, Texture
-from clpt.spectra import luminance
+from clpt.spectra import Spectrum, luminance
 
 _COMMON = {
     "kind": ("integer", "position in the table of textures"),
     "to_u": ("vec3", "u of the texture from (u, v, 1) of the surface"),
     "to_v": ("vec3", "and v"),
 }
+_IMAGE = {
+    **_COMMON,
+    "width": ("integer", "[texels]"),
+    "height": ("integer", "[texels]"),
+    "first": ("integer", "of its floats in `texels`; four a texel, one for a real"),
+    "filter": ("integer", "BITMAP_FILTER_"),
+    "wrap": ("integer", "BITMAP_WRAP_"),
+}
 RECORDS: dict[str, Record] = {
-    "bitmap": Record(
-        "Bitmap",
-        "An image.",
-        **_COMMON,
-        width=("integer", "[texels]"),
-        height=("integer", "[texels]"),
-        first=("integer", "of its floats in `texels`; four a texel, one for a real"),
-        filter=("integer", "BITMAP_FILTER_"),
-        wrap=("integer", "BITMAP_WRAP_"),
-    ),
+    "bitmap": Record("Bitmap", "An image.", **_IMAGE),
     "checkerboard": Record(
         "Checkerboard",
         "Two colours.",
@@ -45,6 +44,13 @@ RECORDS: dict[str, Record] = {
         color1=("integer", "first of its five words in `textures`"),
     ),
 }
+RECORDS["spectral_bitmap"] = Record(
+    "SpectralBitmap",
+    "An image of spectra.",
+    **{**_IMAGE, "first": ("integer", "of its floats in `texels`; `bands` a texel")},
+    bands=("integer", "values in a texel"),
+    number=("integer", "row in `spectra`: the number of the band by wavelength"),
+)
 KINDS = tuple(RECORDS)
 LARGEST = 2**31 - 1  # floats in `texels` that an index reaches
 
@@ -55,8 +61,12 @@ class Sink(Protocol):
     textures: dict[Any, int]
     texture_roles: set[tuple[str, str]]
 
+    lambda_min: float
+    lambda_max: float
+
     @property
     def spectral(self) -> bool: ...
+    def spectra_row(self, spectrum: Spectrum) -> int: ...
     def size(self, name: str) -> int: ...
     def append(self, name: str, words: ArrayLike) -> int: ...
     def append_floats(self, name: str, values: ArrayLike) -> int: ...
@@ -73,9 +83,9 @@ def lower_texture(texture: Texture, role: str, tables: Sink) -> int:
     if key not in tables.textures:
         if tables.size("textures") == 0:
             _blank(tables)
-        members = MEMBERS[type(texture)](texture, role, tables)
-        tables.textures[key] = _row(texture.kind, members, tables)
-        tables.texture_roles.add((texture.kind, role))
+        kind, members = MEMBERS[type(texture)](texture, role, tables)
+        tables.textures[key] = _row(kind, members, tables)
+        tables.texture_roles.add((kind, role))
     return tables.textures[key]
 
 
@@ -97,7 +107,7 @@ def _row(kind: str, members: dict[str, Any], tables: Sink) -> int:
 
 def _blank(tables: Sink) -> None:
     first = tables.append_floats("texels", np.zeros(4))
-    _row("bitmap", {"width": 1, "height": 1, "first": first}, tables)
+    _row("spectral_bitmap", {"kind": 0, "width": 1, "height": 1, "first": first}, tables)
 
 
 def _uv(texture: Texture, down: bool) -> dict[str, Any]:
@@ -109,7 +119,7 @@ def _uv(texture: Texture, down: bool) -> dict[str, Any]:
     return {"to_u": u, "to_v": [0.0, 0.0, 1.0] - v if down else v}
 
 
-def _checkerboard(texture: Checkerboard, role: str, tables: Sink) -> dict[str, Any]:
+def _checkerboard(texture: Checkerboard, role: str, tables: Sink) -> tuple[str, dict[str, Any]]:
     members = _uv(texture, down=False)
     for name in ("color0", "color1"):
         value = getattr(texture, name)
@@ -119,25 +129,34 @@ def _checkerboard(texture: Checkerboard, role: str, tables: Sink) -> dict[str, A
             members[name] = tables.append("textures", words.view(np.uint32))
         else:
             members[name] = tables.append("textures", tables.spectrum_words(value, role)[0])
-    return members
+    return texture.kind, members
 
 
-def _bitmap(texture: Bitmap, role: str, tables: Sink) -> dict[str, Any]:
-    image = pixels(texture)
-    values = texels(image, role, tables.spectral)
+def _bitmap(texture: Bitmap, role: str, tables: Sink) -> tuple[str, dict[str, Any]]:
+    spectral = spectral_image(texture, role) if tables.spectral and role != "real" else None
+    kind, more = texture.kind, {}
+    if spectral is None:
+        image = pixels(texture, role)
+        values = texels(image, role, tables.spectral)
+    else:
+        image = spectral.values
+        values, number = bands(spectral, tables.lambda_min, tables.lambda_max)
+        kind = "spectral_bitmap"
+        more = {"bands": values.shape[1], "number": tables.spectra_row(number)}
     if tables.size("texels") + values.size > LARGEST:
         raise SceneError("all images together have too many texels", where="bitmap.image")
     choices = {name: params(Bitmap)[name].choices for name in ("filter", "wrap")}
-    return {
+    return kind, {
         **_uv(texture, down=True),
         "width": image.shape[1],
         "height": image.shape[0],
         "first": tables.append_floats("texels", values),
         **{name: names.index(getattr(texture, name)) for name, names in choices.items()},
+        **more,
     }
 
 
-MEMBERS: dict[type[Texture], Callable[..., dict[str, Any]]] = {
+MEMBERS: dict[type[Texture], Callable[..., tuple[str, dict[str, Any]]]] = {
     Bitmap: _bitmap,
     Checkerboard: _checkerboard,
 }
@@ -151,13 +170,16 @@ def dispatch_text(kinds: Iterable[str], roles: Iterable[tuple[str, str]]) -> str
     real_texture_real(scene, table, at, uv, lambdas)        the same for a real
     """
     pairs, found = set(roles), set(kinds)
-    present = [cls for cls in MEMBERS if cls.kind in found]
+    if "spectral_bitmap" in found:
+        found.add("bitmap")  # which knows what lies where
+    present = [kind for kind in KINDS if kind in found]
+    choosy = {cls.kind: cls for cls in MEMBERS}
     parts = ['#include "lib/texture.cl"'] if present else []
-    for cls in present:
-        parts += [*_choice_lines(cls), RECORDS[cls.kind].row_text()]
-        parts += [f'#include "texture/{cls.kind}.cl"']
+    for kind in present:
+        parts += _choice_lines(choosy[kind]) if kind in choosy else []
+        parts += [RECORDS[kind].row_text(), f'#include "texture/{kind}.cl"']
     for role in sorted({role for _, role in pairs}):
-        parts += _look_up(role, [cls.kind for cls in present if (cls.kind, role) in pairs])
+        parts += _look_up(role, [kind for kind in present if (kind, role) in pairs])
     return "\n".join([*parts, ""])
 
 

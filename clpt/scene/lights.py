@@ -65,7 +65,11 @@ class Envmap(Light):
     In the light's own space +y is up, the middle of the image is +z... see kernels/light/envmap.cl.
     """
 
-    image: Any = host(None, "path of an .exr or .hdr file, or an array (h, w, 3) float32")
+    image: Any = host(
+        None,
+        "path of an .exr or .hdr file, or an array (h, w, 3) float32; an .exr may hold spectra, "
+        "as clpt.SpectralImage does",
+    )
     scale: float = real(1.0, "factor on the radiance", low=0.0)
     to_world: Any = host(np.eye(4), "rotation, (4, 4)")
 

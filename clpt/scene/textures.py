@@ -30,7 +30,11 @@ class Texture(Kind):
 class Bitmap(Texture):
     """An image; v = 0 is its bottom row. A `real` parameter takes its luminance."""
 
-    image: Any = host(None, "path of an image, or an array (h, w) or (h, w, 1|3|4) float32")
+    image: Any = host(
+        None,
+        "path of an image, or an array (h, w) or (h, w, 1|3|4) float32; an .exr may hold spectra, "
+        "as clpt.SpectralImage does",
+    )
     raw: bool = host(False, "True: values as they are, without the sRGB decoding of 8-bit files")
     filter: str = choice("bilinear", "between texels", ("bilinear", "nearest"))
     wrap: str = choice("repeat", "outside [0, 1]", ("repeat", "clamp", "mirror"))

@@ -59,9 +59,9 @@ real envmap_pdf(Envmap l, Scene scene, vec3 d)
     return envmap_solid_angle_pdf(l, grid_pdf(scene, envmap_grid(l), p.row, p.column, p.at), p.sin_t);
 }
 
-LightSample envmap_sample(Envmap l, Scene scene, vec3 p, vec2 u, Wavelengths lambdas)
+/* A direction with its density, dark so far. */
+inline LightSample envmap_direction(Envmap l, GridPoint g)
 {
-    GridPoint g = grid_sample(scene, envmap_grid(l), u);
     real turn = (to_real(g.column) + 0.5f + g.at.x) / to_real(l.width);
     real half_turn = 0.5f * (to_real(g.row) + g.at.y) / to_real(l.height - 1), sin_p, cos_p, sin_t, cos_t;
     sincos_2pi(turn - floor(turn), &sin_p, &cos_p);
@@ -69,7 +69,15 @@ LightSample envmap_sample(Envmap l, Scene scene, vec3 p, vec2 u, Wavelengths lam
     LightSample s;
     s.wi = madd3(l.x, sin_p * sin_t, madd3(l.y, cos_t, scale3(l.z, -cos_p * sin_t)));
     s.t = FAR;
-    s.radiance = envmap_between(l, scene, g.row, g.column, g.at, lambdas);
+    s.radiance = spectrum_of(0.0f);
     s.pdf = envmap_solid_angle_pdf(l, g.pdf, sin_t);
+    return s;
+}
+
+LightSample envmap_sample(Envmap l, Scene scene, vec3 p, vec2 u, Wavelengths lambdas)
+{
+    GridPoint g = grid_sample(scene, envmap_grid(l), u);
+    LightSample s = envmap_direction(l, g);
+    s.radiance = envmap_between(l, scene, g.row, g.column, g.at, lambdas);
     return s;
 }

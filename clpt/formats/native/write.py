@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from clpt import spectral_exr
 from clpt.errors import SceneError
 from clpt.formats.native import spectra as json_spectra
 from clpt.formats.native.read import ARRAYS, default
@@ -109,11 +110,16 @@ class _Writer:
 
     def image(self, image: Any) -> str:
         """Return the name of an image's file, which is written if there is none."""
-        if not isinstance(image, np.ndarray):
+        spectral = isinstance(image, spectral_exr.SpectralImage)
+        if not spectral and not isinstance(image, np.ndarray):
             return os.path.relpath(image, self.path.parent)
         if id(image) not in self.files:
-            name = f"{self.path.stem}.image{len(self.files)}.npy"
-            np.save(self.path.parent / name, np.asarray(image, np.float32))
+            suffix = "exr" if spectral else "npy"
+            name = f"{self.path.stem}.image{len(self.files)}.{suffix}"
+            if spectral:
+                spectral_exr.write(self.path.parent / name, image)
+            else:
+                np.save(self.path.parent / name, np.asarray(image, np.float32))
             self.files[id(image)] = name
         return self.files[id(image)]
 

@@ -1,0 +1,33 @@
+/* An image with a spectrum in every texel, placed on uv as bitmap.cl places its colours. A reflectance
+ * goes on beyond its first and last band as it is there, light ends. */
+#include "lib/bands.cl"
+
+inline Bitmap spectral_bitmap_image(SpectralBitmap t)
+{
+    Bitmap b = {t.kind, t.to_u, t.to_v, t.width, t.height, t.first, t.filter, t.wrap};
+    return b;
+}
+
+inline Spectrum spectral_bitmap_at(SpectralBitmap t, Scene scene, vec2 uv, Spectrum place)
+{
+    Bitmap image = spectral_bitmap_image(t);
+    BitmapPlace b = bitmap_place(image, uv);
+    Spectrum sum = spectrum_of(0.0f);
+    for (int corner = 0; corner < 4; corner++) {
+        real weight;
+        integer at = t.first + t.bands * bitmap_corner(image, b, corner, &weight);
+        sum = spectrum_madd(bands_texel(scene, at, t.bands, place), weight, sum);
+    }
+    return sum;
+}
+
+Spectrum spectral_bitmap_reflectance(SpectralBitmap t, Scene scene, vec2 uv, Wavelengths lambdas)
+{
+    return spectral_bitmap_at(t, scene, uv, spectra_row(scene, t.number, lambdas));
+}
+
+Spectrum spectral_bitmap_emission(SpectralBitmap t, Scene scene, vec2 uv, Wavelengths lambdas)
+{
+    Spectrum place = spectra_row(scene, t.number, lambdas);
+    return bands_lit(spectral_bitmap_at(t, scene, uv, place), t.bands, place);
+}
