@@ -104,7 +104,7 @@ def text() -> str:
 
 def _spectra() -> list[str]:
     """What the objects and names that stand for spectra are."""
-    file = "the same from a file of two columns, or refractiveindex.info's YAML"
+    file = "the same from a file of columns, or a page of refractiveindex.info (.yml, .csv)"
     rows = [
         "| object | what it is |",
         "| --- | --- |",
@@ -118,7 +118,7 @@ def _spectra() -> list[str]:
     names = {
         "Illuminants": spectra.illuminants(),
         "Glasses and liquids": spectra.glasses(),
-        'Metals (`"metal": name` in place of `eta` and `k`)': spectra.metals(),
+        'Metals (`"metal": name` or `{"file": name}` in place of `eta` and `k`)': spectra.metals(),
     }
     told = [f"{what}: {', '.join(f'`{name}`' for name in known)}." for what, known in names.items()]
     return ["\n".join(rows) + "\n", "\n\n".join(told) + "\n"]

@@ -22,6 +22,8 @@ from clpt.scene.params import ORDERS, SPECTRUM_ROLES, Kind, Param, params
 
 Schema = dict[str, Any]
 
+INDEX_FILE = {"type": "string", "description": "columns, or a page of refractiveindex.info"}
+
 
 def _rows(width: int, item: str = "number", count: int = 0) -> Schema:
     """An array of rows of numbers."""
@@ -81,8 +83,9 @@ def _kind(cls: type[Kind]) -> Schema:
     for name, param in params(cls).items():
         properties[name] = _described(name, param, defaults[name])
     if {"eta", "k"} <= properties.keys():
-        known = {"enum": list(spectra.metals()), "description": "stands for eta and k"}
-        properties["metal"] = known
+        named: Schema = {"enum": list(spectra.metals())}
+        either = [named, _object({"file": INDEX_FILE}, ["file"])]
+        properties["metal"] = {"anyOf": either, "description": "stands for eta and k"}
     if "vertices" in properties:
         properties["file"] = {"type": "string", "description": "a mesh, in place of the arrays"}
     summary = (cls.__doc__ or "").strip().splitlines()[0]
@@ -161,23 +164,29 @@ def _spectrum(role: str) -> Schema:
 
 
 def _typed_spectra() -> Schema:
-    file = {"type": "string", "description": "two columns, or refractiveindex.info's YAML"}
     made = [
-        _object({"file": file}, ["file"]),
+        _object({"file": INDEX_FILE}, ["file"]),
         _object({"values": {**_rows(2), "description": "[nm, value]"}}, ["values"]),
     ]
     for kind, cls in SPECTRA.items():
         properties: Schema = {"type": {"const": kind}}
         needed = ["type"]
         for field in dataclasses.fields(cls):  # type: ignore[arg-type]
-            listed = "tuple" in str(field.type)
-            properties[field.name] = NUMBERS if listed else {"type": "number"}
-            if field.name == "outside":
-                properties[field.name] = {"enum": ["zero", "hold"]}
+            properties[field.name] = _spectrum_field(field.name, str(field.type))
             if field.default is dataclasses.MISSING:
                 needed.append(field.name)
         made.append(_object(properties, needed))
     return {"anyOf": made}
+
+
+def _spectrum_field(name: str, written: str) -> Schema:
+    if name == "outside":
+        return {"enum": ["zero", "hold"]}
+    if name == "name":
+        return {"enum": list(spectra.illuminants())}
+    if written == "bool":
+        return {"type": "boolean"}
+    return NUMBERS if "tuple" in written else {"type": "number"}
 
 
 def _step() -> Schema:

@@ -16,11 +16,11 @@ from clpt.spectra.cie import (
     wavelength_pdf,
     xyz_to_rgb,
 )
-from clpt.spectra.files import read_refractive_index, read_table
-from clpt.spectra.named import glass, glasses, illuminant, illuminants, metal, metals
+from clpt.spectra.emission import LED, Blackbody, Illuminant, Lines, illuminant, illuminants
+from clpt.spectra.files import read_index, read_refractive_index, read_table
+from clpt.spectra.named import glass, glasses, metal, metals
 from clpt.spectra.spectrum import (
     RGB,
-    Blackbody,
     Cauchy,
     Constant,
     RGBIlluminant,
@@ -37,12 +37,15 @@ __all__ = [
     "CIE_Y_INTEGRAL",
     "LAMBDA_MAX",
     "LAMBDA_MIN",
+    "LED",
     "REC709_TO_XYZ",
     "RGB",
     "XYZ_TO_REC709",
     "Blackbody",
     "Cauchy",
     "Constant",
+    "Illuminant",
+    "Lines",
     "RGBIlluminant",
     "RGBUnbounded",
     "Sellmeier",
@@ -58,6 +61,7 @@ __all__ = [
     "metal",
     "metals",
     "on_grid",
+    "read_index",
     "read_refractive_index",
     "read_table",
     "rgb_to_xyz",

@@ -1,20 +1,21 @@
-"""Readers of measured spectra: two-column text (.spd, CSV) and refractiveindex.info's YAML."""
+"""Readers of measured spectra: text in columns (.spd, CSV) and refractiveindex.info's pages."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import yaml
 from numpy.typing import NDArray
 
 from clpt.errors import SceneError
-from clpt.spectra.spectrum import Cauchy, Constant, Outside, Sellmeier, Spectrum, Tabulated
+from clpt.spectra.dispersion import MICROMETRE, from_formula
+from clpt.spectra.spectrum import Constant, Outside, Spectrum, Tabulated
 
-MICROMETRE = 1000.0  # [nm]
-FORMULA_POINTS = 2001  # at which a formula without a class of its own is tabulated
+PAGES = (".yml", ".yaml")
+SITE_COLUMNS = (["wl", "n"], ["wl", "k"])  # titles in refractiveindex.info's CSV, in um
 
 
 def read_table(path: str | Path, outside: Outside = "zero") -> Tabulated:
@@ -22,46 +23,101 @@ def read_table(path: str | Path, outside: Outside = "zero") -> Tabulated:
 
     `#` starts a comment; one line of column titles is allowed. Raises SceneError with the line.
     """
-    rows: list[tuple[float, float]] = []
-    titles_allowed = True
-    for number, line in enumerate(_text(path).splitlines(), 1):
+    (rows,) = _tables(path, _text(path), (2,)).values()
+    return _tabulated(path, rows, 1, outside)
+
+
+def read_index(path: str | Path, part: Literal["eta", "k"] = "eta") -> Spectrum:
+    """Read eta or k from what `read_refractive_index` takes, or the values of a two-column table.
+
+    Raises SceneError.
+    """
+    text = _text(path)
+    if not _is_page(path, text):
+        tables = _tables(path, text, (2, 3))
+        if list(tables) == [""] and len(tables[""][0]) == 2:
+            return _tabulated(path, tables[""], 1, "hold")
+    eta, k = _read_parts(path, text)
+    if part == "eta" and eta is None:
+        raise SceneError("no refractive index in this file", file=path)
+    return k if part == "k" or eta is None else eta
+
+
+def read_refractive_index(path: str | Path) -> tuple[Spectrum, Spectrum]:
+    """Read eta and k; k is 0 where it is not given. Outside of a table its end values hold.
+
+    The file is a page of refractiveindex.info's database (YAML) with a dispersion formula or tables
+    of n and k, the CSV that the site gives (columns `wl,n` and `wl,k` [um], one after the other),
+    or a table of wavelength [nm], eta and perhaps k. Raises SceneError with the line.
+    """
+    eta, k = _read_parts(path, _text(path))
+    if eta is None:
+        raise SceneError("no refractive index in this file", file=path)
+    return eta, k
+
+
+def _is_page(path: str | Path, text: str) -> bool:
+    return Path(path).suffix in PAGES or re.search("^DATA:", text, re.MULTILINE) is not None
+
+
+def _read_parts(path: str | Path, text: str) -> tuple[Spectrum | None, Spectrum]:
+    if _is_page(path, text):
+        return _page(path, text)
+    tables = _tables(path, text, (2, 3))
+    parts: dict[str, Spectrum] = {"k": Constant(0.0)}
+    for title, rows in tables.items():
+        parts[title or "n"] = _tabulated(path, rows, 1, "hold")
+        if len(rows[0]) == 3:
+            parts["k"] = _tabulated(path, rows, 2, "hold")
+    return parts.get("n"), parts["k"]
+
+
+def _tables(path: str | Path, text: str, widths: tuple[int, ...]) -> dict[str, list[list[float]]]:
+    """Rows (n, 2 or 3) in nm of the tables in a text, by title: "", or "n" and "k" from the site.
+
+    widths: how many columns a row may have. Raises SceneError with the line.
+    """
+    tables: dict[str, list[list[float]]] = {}
+    title, titles_allowed, factor = "", True, 1.0
+    for number, line in enumerate(text.splitlines(), 1):
         fields = [f for f in re.split(r"[\s,;]+", line.split("#")[0]) if f]
         if not fields:
             continue
-        try:
-            wavelength, value = (float(field) for field in fields)
-        except ValueError:
-            if titles_allowed and not any(_is_number(field) for field in fields):
-                titles_allowed = False
-                continue
-            raise SceneError(
-                f"expected a wavelength in nm and a value, found {line.strip()!r}",
-                file=path,
-                line=number,
-            ) from None
-        if rows and wavelength <= rows[-1][0]:
-            raise SceneError(
-                f"wavelengths must ascend, but {wavelength:g} follows {rows[-1][0]:g}",
-                file=path,
-                line=number,
-            )
-        rows.append((wavelength, value))
+        if 3 in widths and fields in SITE_COLUMNS and "" not in tables:
+            title, factor = fields[1], MICROMETRE
+            continue
+        if titles_allowed and not any(_is_number(field) for field in fields):
+            titles_allowed = False
+            continue
         titles_allowed = False
-    if not rows:
+        rows = tables.setdefault(title, [])
+        if not all(map(_is_number, fields)) or len(fields) not in (
+            (len(rows[0]),) if rows else widths
+        ):
+            columns = "a value" if widths == (2,) else "eta and perhaps k"
+            message = f"expected a wavelength in nm and {columns}, found {line.strip()!r}"
+            raise SceneError(message, file=path, line=number)
+        row = [float(fields[0]) * factor, *map(float, fields[1:])]
+        if rows and row[0] <= rows[-1][0]:
+            message = f"wavelengths must ascend, but {row[0]:g} follows {rows[-1][0]:g}"
+            raise SceneError(message, file=path, line=number)
+        rows.append(row)
+    if not tables:
         raise SceneError("no wavelengths in this file", file=path)
-    lambdas, values = zip(*rows, strict=True)
+    return tables
+
+
+def _tabulated(
+    path: str | Path, rows: list[list[float]], column: int, outside: Outside
+) -> Tabulated:
     try:
-        return Tabulated(lambdas, values, outside)
+        return Tabulated([row[0] for row in rows], [row[column] for row in rows], outside)
     except SceneError as error:
         raise SceneError(error.message, file=path) from None
 
 
-def read_refractive_index(path: str | Path) -> tuple[Spectrum, Spectrum]:
-    """Read eta and k from a page of refractiveindex.info's database (YAML); k is 0 where not given.
-
-    Tables hold their end values; the dispersion formulas 1 to 6 are known. Raises SceneError.
-    """
-    text = _text(path)
+def _page(path: str | Path, text: str) -> tuple[Spectrum | None, Spectrum]:
+    """Read eta, if there is one, and k from a page of the database."""
     try:
         page = yaml.safe_load(text)
     except yaml.YAMLError as error:
@@ -77,9 +133,13 @@ def read_refractive_index(path: str | Path) -> tuple[Spectrum, Spectrum]:
         kind = str(part.get("type", ""))
         try:
             if kind.startswith("formula"):
-                eta = _formula(kind.removeprefix("formula").strip(), part)
+                eta = from_formula(
+                    kind.removeprefix("formula").strip(),
+                    _numbers(part, "coefficients"),
+                    _numbers(part, "wavelength_range"),
+                )
             elif kind in ("tabulated n", "tabulated k", "tabulated nk"):
-                columns = _columns(part, 3 if kind.endswith("nk") else 2)
+                columns = _page_columns(part, 3 if kind.endswith("nk") else 2)
                 if "n" in kind.split()[1]:
                     eta = Tabulated(columns[0] * MICROMETRE, columns[1], "hold")
                 if "k" in kind.split()[1]:
@@ -89,43 +149,10 @@ def read_refractive_index(path: str | Path) -> tuple[Spectrum, Spectrum]:
         except SceneError as error:
             line = _line_of(text, error.where or kind)
             raise SceneError(error.message, file=path, line=line) from None
-    if eta is None:
-        raise SceneError("no refractive index in this file", file=path)
     return eta, k
 
 
-def _formula(name: str, part: dict[str, Any]) -> Spectrum:
-    """Dispersion formula of refractiveindex.info, by its number; wavelengths in um."""
-    if name not in ("1", "2", "3", "4", "5", "6"):
-        raise SceneError(f"dispersion formula {name!r} is not known; 1 to 6 are")
-    number, c = int(name), _numbers(part, "coefficients")
-    if number != 4 and len(c) % 2 == 0:
-        raise SceneError(f"formula {number} takes an odd number of coefficients, found {len(c)}")
-    pairs = list(zip(c[1::2], c[2::2], strict=False))
-    if number in (1, 2):
-        b = tuple(pair[0] for pair in pairs)
-        squares = tuple(pair[1] ** (3 - number) for pair in pairs)
-        return Sellmeier(b, squares, 1.0 + c[0])
-    if number == 5 and [p for _, p in pairs] in ([-2.0], [-2.0, -4.0]):
-        return Cauchy(c[0], *(b for b, _ in pairs))
-    ends = _numbers(part, "wavelength_range")
-    um = np.linspace(ends[0], ends[-1], FORMULA_POINTS)
-    if number in (3, 5):
-        total = sum((b * um**p for b, p in pairs), np.full(um.shape, c[0]))
-        index = np.sqrt(total) if number == 3 else total
-    elif number == 4:
-        c = c + [0.0] * (9 - len(c))
-        total = c[0] + c[1] * um ** c[2] / (um**2 - c[3] ** c[4])
-        total = total + c[5] * um ** c[6] / (um**2 - c[7] ** c[8])
-        rest = c[9:]
-        powers = zip(rest[::2], rest[1::2], strict=False)
-        index = np.sqrt(sum((b * um**p for b, p in powers), total))
-    else:
-        index = sum((b / (s - um**-2.0) for b, s in pairs), np.full(um.shape, 1.0 + c[0]))
-    return Tabulated(um * MICROMETRE, index, "hold")
-
-
-def _columns(part: dict[str, Any], count: int) -> NDArray[np.float64]:
+def _page_columns(part: dict[str, Any], count: int) -> NDArray[np.float64]:
     lines = str(part.get("data", "")).strip().splitlines()
     rows = [line.split() for line in lines]
     for line, row in zip(lines, rows, strict=True):

@@ -8,6 +8,7 @@ rewritten only when a checkout of refractiveindex.info's database (CC0) is given
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 
@@ -17,7 +18,11 @@ from clpt.spectra import files
 from clpt.spectra.data import ROOT
 from clpt.spectra.spectrum import Tabulated
 
-FLUORESCENT = tuple(f"F{i}" for i in range(1, 13))
+LAMPS = (
+    *(f"F{i}" for i in range(1, 13)),
+    *(f"HP{i}" for i in range(1, 6)),
+    *(f"LED-{name}" for name in ("B1", "B2", "B3", "B4", "B5", "BH1", "RGB1", "V1", "V2")),
+)
 METALS_WITHIN = (300.0, 1100.0)  # [nm]
 
 
@@ -44,7 +49,7 @@ def write_observers() -> None:
 
 
 def write_illuminants() -> None:
-    """Relative powers: A and the D series by their CIE 15 formulas, the fluorescent tables."""
+    """Relative powers: A and the D series by their CIE 15 formulas, and the tables of lamps."""
     import colour
 
     def daylight(kelvin: float) -> colour.SpectralDistribution:
@@ -57,7 +62,7 @@ def write_illuminants() -> None:
         "D50": daylight(5000.0),
         "D65": daylight(6500.0),
     }
-    tables |= {name: colour.SDS_ILLUMINANTS[name.replace("F", "FL")] for name in FLUORESCENT}
+    tables |= {name: colour.SDS_ILLUMINANTS[re.sub("^F", "FL", name)] for name in LAMPS}
     for name, table in tables.items():
         write_csv(
             ROOT / "illuminants" / f"{name}.csv",

@@ -1,4 +1,4 @@
-"""Illuminants, metals and glasses by name."""
+"""Metals and glasses by name."""
 
 from __future__ import annotations
 
@@ -8,12 +8,7 @@ from typing import Any
 
 from clpt.errors import UnknownKindError
 from clpt.spectra import data
-from clpt.spectra.spectrum import Constant, Sellmeier, Spectrum, Tabulated, with_luminance_one
-
-
-def illuminants() -> tuple[str, ...]:
-    """Names that `illuminant` knows."""
-    return (*data.names("illuminants"), "E")
+from clpt.spectra.spectrum import Constant, Sellmeier, Spectrum, Tabulated
 
 
 def metals() -> tuple[str, ...]:
@@ -24,19 +19,6 @@ def metals() -> tuple[str, ...]:
 def glasses() -> tuple[str, ...]:
     """Names that `glass` knows."""
     return tuple(_glasses())
-
-
-@cache
-def illuminant(name: str) -> Spectrum:
-    """CIE illuminant (A, D50, D65, E, F1 to F12) as emission of luminance 1.
-
-    Raises UnknownKindError.
-    """
-    if name == "E":
-        return Constant(1.0)
-    if name not in illuminants():
-        raise UnknownKindError("illuminant", name, illuminants())
-    return with_luminance_one(data.table(f"illuminants/{name}.csv"))
 
 
 @cache

@@ -23,9 +23,6 @@ Role = Literal["reflectance", "unbounded", "emission"]
 Outside = Literal["zero", "hold"]
 Samples = NDArray[np.float64]
 
-# CODATA 2018, exact: Planck [J s], light [m/s], Boltzmann [J/K].
-PLANCK, LIGHT, BOLTZMANN = 6.62607015e-34, 299792458.0, 1.380649e-23
-
 
 class Spectrum(ABC):
     """A function of the wavelength."""
@@ -90,24 +87,6 @@ class Tabulated(Spectrum):
         end = 0.0 if self.outside == "zero" else None
         lambdas = np.asarray(lambdas, np.float64)
         return np.asarray(np.interp(lambdas, self.lambdas, self.values, end, end))
-
-
-@dataclass(frozen=True)
-class Blackbody(Spectrum):
-    """Planck's law: radiance [W m^-2 sr^-1 nm^-1] of a black body at `kelvin`, times `scale`."""
-
-    kelvin: float
-    scale: float = 1.0
-
-    def __post_init__(self) -> None:
-        if not self.kelvin > 0.0:
-            raise SceneError(f"a black body's temperature must be positive, found {self.kelvin} K")
-
-    def sample(self, lambdas: ArrayLike) -> Samples:
-        metres = np.asarray(lambdas, np.float64) * 1e-9
-        exponent = PLANCK * LIGHT / (metres * BOLTZMANN * self.kelvin)
-        per_metre = 2.0 * PLANCK * LIGHT**2 / metres**5 / np.expm1(np.minimum(exponent, 700.0))
-        return self.scale * 1e-9 * per_metre
 
 
 @dataclass(frozen=True)

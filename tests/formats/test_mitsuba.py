@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from clpt import spectra
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
 from clpt.formats import load, studio
 from clpt.scene import integrators, lights, materials, textures
@@ -315,6 +316,15 @@ EMITTED = {
     '<spectrum name="radiance" type="d65"/>': RGBIlluminant(1, 1, 1),
     '<spectrum name="radiance" type="blackbody"><float name="temperature" value="3000"/></spectrum>'
     : Blackbody(3000),
+    '<spectrum name="radiance" type="blackbody"><boolean name="normalised" value="true"/>'
+    '<float name="scale" value="9"/></spectrum>': Blackbody(5000, 9, True),
+    '<spectrum name="radiance" type="illuminant"><string name="name" value="mercury"/>'
+    '<float name="scale" value="3"/></spectrum>': spectra.illuminant("mercury", 3),
+    '<spectrum name="radiance" type="lines"><string name="wavelengths" value="436, 546"/>'
+    '<string name="powers" value="1, 2"/><float name="width" value="2"/></spectrum>':
+        spectra.Lines((436, 546), (1, 2), 2),
+    '<spectrum name="radiance" type="led"><float name="peak" value="470"/></spectrum>':
+        spectra.LED(470),
     '<spectrum name="radiance" type="uniform"><float name="value" value="3"/></spectrum>':
         Constant(3),
     '<spectrum name="radiance" type="irregular"><string name="wavelengths" value="400, 700"/>'
@@ -328,6 +338,22 @@ EMITTED = {
 @pytest.mark.parametrize("xml", EMITTED)
 def test_emitted_spectra(emitter, xml):
     assert emitter(f'<emitter type="constant">{xml}</emitter>').radiance == EMITTED[xml]
+
+
+INDICES = {
+    '<spectrum name="int_ior" type="glass"><string name="name" value="sf11"/></spectrum>':
+        spectra.glass("sf11"),
+    '<spectrum name="int_ior" type="cauchy"><float name="a" value="1.5"/>'
+    '<float name="b" value="0.004"/></spectrum>': spectra.Cauchy(1.5, 0.004),
+    '<spectrum name="int_ior" type="sellmeier"><string name="b" value="1, 0.2"/>'
+    '<string name="c" value="0.01, 100"/></spectrum>': spectra.Sellmeier((1, 0.2), (0.01, 100)),
+    '<spectrum name="int_ior" filename="t.spd"/>': Tabulated((400, 700), (1, 2), "hold"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("xml", INDICES)
+def test_dispersive_indices(bsdf, xml):
+    assert bsdf(f'<bsdf type="dielectric">{xml}</bsdf>').int_ior == INDICES[xml]
 
 
 def test_textures(bsdf):
@@ -412,6 +438,8 @@ ERRORS = {
     '<bsdf type="dielectric"><string name="int_ior" value="bk8"/></bsdf>': "unknown glass",
     '<bsdf type="conductor"><string name="material" value="Xx"/></bsdf>': "unknown metal",
     '<bsdf type="null" id="a"/><bsdf type="null" id="a"/>': "already used",
+    '<emitter type="constant"><spectrum name="radiance" type="lines"><string name="wavelengths" '
+    'value="5"/><string name="powers" value="1, 2"/></spectrum></emitter>': "as many powers",
     '<shape type="obj"/>': "needs the parameter 'filename'",
     '<shape type="obj"><string name="filename" value="no.obj"/></shape>': "no file 'no.obj'",
     '<shape type="obj"><string name="filename" value="t.png"/></shape>': "not a .obj file",

@@ -116,7 +116,17 @@ SPECTRA = [
     (2, spectra.Constant(2)),
     ([1, 2, 3], spectra.RGBIlluminant(1, 2, 3)),
     ("A", spectra.illuminant("A")),
+    ({"type": "illuminant", "name": "sodium", "scale": 4}, spectra.illuminant("sodium", 4)),
     ({"type": "blackbody", "kelvin": 3000}, spectra.Blackbody(3000)),
+    (
+        {"type": "blackbody", "kelvin": 3000, "normalised": True},
+        spectra.Blackbody(3000, normalised=True),
+    ),
+    (
+        {"type": "lines", "wavelengths": [436, 546.1], "powers": [1, 2], "width": 3},
+        spectra.Lines((436, 546.1), (1, 2), 3),
+    ),
+    ({"type": "led", "peak": 470, "width": 25}, spectra.LED(470, 25)),
     ({"type": "rgb", "r": 1, "g": 0.5, "b": 0}, spectra.RGB(1, 0.5, 0)),
     ({"file": "t.spd"}, spectra.Tabulated((400, 700), (1, 2))),
     ({"values": [[400, 1], [700, 2]]}, spectra.Tabulated((400, 700), (1, 2))),
@@ -128,7 +138,7 @@ def test_spectra(scene, given, expected):
     assert scene(lights=[{"type": "constant", "radiance": given}]).lights[0].radiance == expected
 
 
-def test_indices_and_metals(scene):
+def test_indices_and_metals(scene, tmp_path):
     def material(**given):
         return scene(shapes=[{"type": "cube", "material": given}]).shapes[0].material
 
@@ -137,6 +147,14 @@ def test_indices_and_metals(scene):
     assert cauchy == spectra.Cauchy(1.5, 0.01)
     gold = material(type="rough_conductor", metal="Au", alpha_u=0.2)
     assert (gold.eta, gold.k) == spectra.metal("Au")
+    (tmp_path / "m.csv").write_text("400 0.2 3\n700 0.3 4\n")
+    measured = material(type="conductor", metal={"file": "m.csv"})
+    assert (measured.eta, measured.k) == (
+        spectra.Tabulated((400, 700), (0.2, 0.3), "hold"),
+        spectra.Tabulated((400, 700), (3, 4), "hold"),
+    )
+    apart = material(type="conductor", eta={"file": "m.csv"}, k={"file": "m.csv"})
+    assert (apart.eta, apart.k) == (measured.eta, measured.k)
 
 
 def test_absorption(scene, tmp_path):
@@ -209,6 +227,14 @@ ERRORS = [
      "lights[0].radiance", "must ascend"),
     ({"materials": {"a": {"type": "grating", "efficiencies": [1, 2]}}},
      "materials.a.efficiencies", "odd count"),
+    ({"lights": [{"type": "constant", "radiance": "D56"}]}, "lights[0].radiance", "'D50'"),
+    ({"lights": [{"type": "constant", "radiance": {"type": "illuminant", "name": "sodum"}}]},
+     "lights[0].radiance", "did you mean 'sodium'"),
+    ({"lights": [{"type": "constant", "radiance":
+      {"type": "blackbody", "kelvin": 9, "normalised": 1}}]},
+     "lights[0].radiance.normalised", "must be true or false"),
+    ({"materials": {"a": {"type": "conductor", "metal": {"name": "Au"}}}},
+     "materials.a.metal", "the key 'file' alone"),
     ({"gravity": 1}, "gravity", "a scene has no parameter 'gravity'"),
 ]  # fmt: skip
 

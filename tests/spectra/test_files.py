@@ -61,6 +61,9 @@ def formula(number, coefficients):
 N_BK7 = "0 1.03961212 0.00600069867 0.231792344 0.0200179144 1.01046945 103.560653"
 
 
+D = 0.5875618  # [um], the helium line of nd
+
+
 @pytest.mark.parametrize(
     "text, index",
     [
@@ -71,12 +74,66 @@ N_BK7 = "0 1.03961212 0.00600069867 0.231792344 0.0200179144 1.01046945 103.5606
         (formula(5, "1.5 0.004 -2"), 1.5 + 0.004 / 0.5875618**2),
         (formula(5, "1.5 0.004 -2.5"), 1.5 + 0.004 / 0.5875618**2.5),
         (formula(6, "0 0.05792105 238.0185 0.00167917 57.362"), 1.00027717),
+        (
+            formula(7, "3.4 0.16 -0.12 1e-3 2e-4 3e-5"),
+            3.4
+            + 0.16 / (D**2 - 0.028)
+            - 0.12 / (D**2 - 0.028) ** 2
+            + 1e-3 * D**2
+            + 2e-4 * D**4
+            + 3e-5 * D**6,
+        ),
+        (formula(8, "0.452505 0.09939 0.070537 -0.000150"), 2.25795),  # silver bromide
+        (
+            formula(9, "2.51527 0.0240 0.0300 0.020 1.52 0.8771"),
+            np.sqrt(
+                2.51527 + 0.024 / (D**2 - 0.03) + 0.02 * (D - 1.52) / ((D - 1.52) ** 2 + 0.8771)
+            ),
+        ),
     ],
 )
 def test_dispersion_formulas(tmp_path, text, index):
     eta, k = spectra.read_refractive_index(write(tmp_path, text))
     assert eta.sample(587.5618) == pytest.approx(index, abs=2e-5)
     assert k == spectra.Constant(0.0)
+
+
+@pytest.mark.parametrize(
+    "text, k_given",
+    [
+        ("400 1.5 2.0\n600 2.5 4.0\n", True),
+        ("nm;n;k\n400;1.5;2\n600;2.5;4\n", True),
+        # as refractiveindex.info exports it
+        ("wl,n\n0.4,1.5\n0.6,2.5\nwl,k\n0.4,2\n0.6,4\n", True),
+        ("wl,n\n0.4,1.5\n0.6,2.5\n", False),
+        ("400,1.5\n600,2.5\n", False),
+    ],
+)
+def test_columns_of_eta_and_k(tmp_path, text, k_given):
+    path = write(tmp_path, text, "metal.csv")
+    eta, k = spectra.read_refractive_index(path)
+    np.testing.assert_allclose(eta.sample([300, 500, 900]), [1.5, 2.0, 2.5])
+    np.testing.assert_allclose(k.sample([300, 500]), [2.0, 3.0] if k_given else 0.0)
+    assert spectra.read_index(path) == eta
+    # Two plain columns are the quantity that is asked for.
+    assert spectra.read_index(path, "k") == (eta if text[0] == "4" and not k_given else k)
+
+
+def test_pages_of_k_alone(tmp_path):
+    body = "    data: |\n        0.40 1e-6\n        0.60 3e-6"
+    path = write(tmp_path, page("tabulated k", body), "ink.yml")
+    assert spectra.read_index(path, "k").sample(500.0) == pytest.approx(2e-6)
+    with pytest.raises(SceneError, match="no refractive index"):
+        spectra.read_index(path)
+
+
+@pytest.mark.parametrize(
+    "text, line", [("400 1 2\n500 1\n", 2), ("400\n", 1), ("wl,n\n0.4,1.5,2\n0.5,1\n", 3)]
+)
+def test_bad_columns_tell_the_line(tmp_path, text, line):
+    with pytest.raises(SceneError, match="eta and perhaps k") as caught:
+        spectra.read_refractive_index(write(tmp_path, text, "metal.csv"))
+    assert caught.value.line == line
 
 
 def test_tabulated_pages(tmp_path):
@@ -98,7 +155,8 @@ def test_tabulated_pages(tmp_path):
     [
         ("DATA: [", 1, "not YAML"),
         ("a: 1", None, "no list DATA"),
-        (formula(9, "1 2 3"), 3, "formula '9'"),
+        (formula(10, "1 2 3"), 3, "formula '10'"),
+        (formula(8, "1 2 3 4 5"), 3, "takes 4 coefficients, not 5"),
         (formula(2, "1 2"), 3, "odd number"),
         (formula(2, "1 x 2"), 3, "expected numbers"),
         (page("tabulated nk", "    data: |\n        0.4 1.5"), 5, "expected 3 numbers"),
@@ -130,5 +188,37 @@ def test_database_pages_agree_with_the_tables(assets):
             strict=True,
         ):
             np.testing.assert_allclose(ours.sample(visible), theirs.sample(visible), rtol=1e-9)
-    diamond, _ = spectra.read_refractive_index(pages["C/Peter"])
-    np.testing.assert_allclose(spectra.glass("diamond").sample(visible), diamond.sample(visible))
+    assert spectra.read_refractive_index(pages["H2O/Hale"])[1].sample(500.0) > 0
+
+
+GLASSES = {
+    "bk7": "specs/schott/optical/N-BK7.yml",
+    "f2": "specs/schott/optical/F2.yml",
+    "n-sf11": "specs/schott/optical/N-SF11.yml",
+    "fused silica": "main/SiO2/nk/Malitson.yml",
+    "diamond": "main/C/nk/Peter.yml",
+    "calcite": "main/CaCO3/nk/Ghosh-o.yml",
+    "rutile": "main/TiO2/nk/Devore-o.yml",
+    "pmma": "organic/_C5H8O2_n_-_poly_methyl_methacrylate_/nk/Sultanova.yml",
+}
+
+
+@pytest.mark.parametrize("name", GLASSES)
+def test_named_glasses_are_those_of_the_database(assets, name):
+    page = assets / "spectral" / "refractiveindex.info" / GLASSES[name]
+    if not page.exists():
+        pytest.skip("no refractiveindex.info pages among the assets")
+    visible = np.arange(440.0, 700.0, 3.0)
+    eta, _ = spectra.read_refractive_index(page)
+    np.testing.assert_allclose(spectra.glass(name).sample(visible), eta.sample(visible), rtol=1e-6)
+
+
+def test_every_page_of_the_samples_is_read(assets):
+    folder = assets / "spectral" / "refractiveindex.info"
+    pages = sorted(folder.rglob("*.yml"))
+    if not pages:
+        pytest.skip("no refractiveindex.info pages among the assets")
+    visible = np.arange(440.0, 700.0, 20.0)
+    for page in pages:
+        eta, k = spectra.read_refractive_index(page)
+        assert (eta.sample(visible) > 0.0).all() and (k.sample(visible) >= 0.0).all(), page

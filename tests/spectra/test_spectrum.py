@@ -38,22 +38,6 @@ def test_bad_tables_are_refused(lambdas, values, message):
         spectra.Tabulated(lambdas, values)
 
 
-@pytest.mark.parametrize("kelvin", [2856.0, 5000.0, 6504.0])
-def test_blackbody_peaks_where_wien_says(kelvin):
-    lambdas = np.arange(300.0, 2000.0, 0.01)
-    peak = lambdas[np.argmax(spectra.Blackbody(kelvin).sample(lambdas))]
-    assert peak == pytest.approx(2.897771955e6 / kelvin, abs=0.02)
-
-
-def test_blackbody_integrates_to_stefan_boltzmann():
-    lambdas = np.geomspace(50.0, 1e7, 200_000)
-    radiance = np.trapezoid(spectra.Blackbody(3000.0, 2.0).sample(lambdas), lambdas)
-    assert radiance == pytest.approx(2.0 * 5.670374419e-8 * 3000.0**4 / np.pi, rel=1e-5)
-    assert spectra.Blackbody(100.0).sample(360.0) == pytest.approx(0.0, abs=1e-100)
-    with pytest.raises(SceneError):
-        spectra.Blackbody(0.0)
-
-
 def test_indices():
     bk7 = spectra.glass("bk7")
     np.testing.assert_allclose(

@@ -18,7 +18,17 @@ from clpt.formats.colour import colour
 from clpt.formats.mitsuba.values import Properties, number, numbers, placed
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene.textures import Bitmap, Checkerboard, Texture
-from clpt.spectra import Blackbody, Constant, RGBIlluminant, Spectrum, Tabulated
+from clpt.spectra import (
+    LED,
+    Blackbody,
+    Cauchy,
+    Constant,
+    Lines,
+    RGBIlluminant,
+    Sellmeier,
+    Spectrum,
+    Tabulated,
+)
 
 TOP_DOWN = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
 
@@ -53,10 +63,13 @@ def coefficient(props: Properties, name: str) -> Any:
 
 
 def ior(props: Properties, name: str, default: str) -> Any:
-    """Take a refractive index: a number or a name, without dispersion as Mitsuba has it."""
+    """Take a refractive index: a number, a name (without dispersion, as Mitsuba), or a spectrum."""
     child = props.take(name)
     if child is None:
         return spectra.glass(default, dispersion=False)
+    if child.tag == "spectrum":
+        with placed(child):
+            return _spectrum(child, "index", props, name)
     if child.tag == "string":
         with placed(child):
             return spectra.glass(child.attribute("value"), dispersion=False)
@@ -85,10 +98,10 @@ def _take(props: Properties, name: str, role: str, default: Any) -> Any:
     if target.tag == "texture":
         return texture(target, props)
     with placed(target):
-        return _spectrum(target, role, props)
+        return _spectrum(target, role, props, name)
 
 
-def _spectrum(child: Element, role: str, props: Properties) -> Any:
+def _spectrum(child: Element, role: str, props: Properties, name: str) -> Any:
     if child.tag in ("float", "integer"):
         value = number(child)
         return colour(role, [value] * 3) if role == "emission" else value
@@ -101,6 +114,8 @@ def _spectrum(child: Element, role: str, props: Properties) -> Any:
     outside: Any = "hold" if role in ("index", "coefficient") else "zero"
     if "filename" in child.attributes:
         path = props.context.document.find_file(child, child.attributes["filename"])
+        if role == "index":
+            return spectra.read_index(path, "k" if name == "k" else "eta")
         return spectra.read_table(path, outside)
     text = child.attribute("value")
     if ":" not in text:
@@ -142,7 +157,11 @@ def _uniform(props: Properties) -> Spectrum:
 
 
 def _blackbody(props: Properties) -> Spectrum:
-    return Blackbody(props.number("temperature", 5000.0), props.number("scale", 1.0))
+    return Blackbody(
+        props.number("temperature", 5000.0),
+        props.number("scale", 1.0),
+        props.flag("normalised", False),
+    )
 
 
 def _d65(props: Properties) -> Spectrum:
@@ -169,6 +188,35 @@ def _regular(props: Properties) -> Spectrum:
     return Tabulated(np.linspace(low, high, len(values)), values)
 
 
+def _illuminant(props: Properties) -> Spectrum:
+    return spectra.illuminant(props.text("name", "D65"), props.number("scale", 1.0))
+
+
+def _lines(props: Properties) -> Spectrum:
+    return Lines(
+        _list(props, "wavelengths"),
+        _list(props, "powers"),
+        props.number("width", 1.0),
+        props.number("scale", 1.0),
+    )
+
+
+def _led(props: Properties) -> Spectrum:
+    return LED(props.number("peak", 530.0), props.number("width", 20.0), props.number("scale", 1.0))
+
+
+def _glass(props: Properties) -> Spectrum:
+    return spectra.glass(props.text("name", "bk7"))
+
+
+def _sellmeier(props: Properties) -> Spectrum:
+    return Sellmeier(tuple(_list(props, "b")), tuple(_list(props, "c")), props.number("a", 1.0))
+
+
+def _cauchy(props: Properties) -> Spectrum:
+    return Cauchy(props.number("a", 1.5), props.number("b", 0.0), props.number("c", 0.0))
+
+
 def _list(props: Properties, name: str) -> list[float]:
     child = props.take(name)
     if child is None:
@@ -183,6 +231,12 @@ PLUGINS: dict[str, Callable[[Properties], Spectrum]] = {
     "srgb": _srgb,
     "irregular": _irregular,
     "regular": _regular,
+    "illuminant": _illuminant,
+    "lines": _lines,
+    "led": _led,
+    "glass": _glass,
+    "sellmeier": _sellmeier,
+    "cauchy": _cauchy,
 }
 
 

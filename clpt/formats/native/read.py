@@ -244,6 +244,11 @@ def _checked_mesh(cursor: Cursor, made: shapes.Mesh, notes: list[str]) -> shapes
 
 
 def _metal(cursor: Cursor) -> tuple[spectra.Spectrum, spectra.Spectrum]:
+    if isinstance(cursor.value, dict):
+        if list(cursor.value) != ["file"]:
+            raise cursor.error("a metal is a name, or an object with the key 'file' alone")
+        path = find_file(cursor.at("file"))
+        return placed(cursor, lambda: spectra.read_refractive_index(path))
     name = cursor.expect(str)
     if name not in spectra.metals():
         raise UnknownKindError("metal", name, spectra.metals(), **cursor.place())

@@ -19,7 +19,10 @@ from clpt.spectra import Spectrum
 SPECTRA: dict[str, type[Spectrum]] = {
     "constant": spectra.Constant,
     "tabulated": spectra.Tabulated,
+    "illuminant": spectra.Illuminant,
     "blackbody": spectra.Blackbody,
+    "lines": spectra.Lines,
+    "led": spectra.LED,
     "rgb": spectra.RGB,
     "rgb_unbounded": spectra.RGBUnbounded,
     "rgb_illuminant": spectra.RGBIlluminant,
@@ -45,8 +48,6 @@ def _read(cursor: Cursor, role: str, name: str) -> Any:
             raise UnknownKindError("glass", value, spectra.glasses(), **cursor.place())
         return value
     if isinstance(value, str) and role == "emission":
-        if value not in spectra.illuminants():
-            raise UnknownKindError("illuminant", value, spectra.illuminants(), **cursor.place())
         return spectra.illuminant(value)
     if isinstance(value, list):
         return colour(role, cursor.numbers(3))
@@ -69,11 +70,10 @@ def _read(cursor: Cursor, role: str, name: str) -> Any:
 def _from_file(cursor: Cursor, role: str, outside: Any, name: str) -> Spectrum:
     _refuse(cursor, "spectrum", ("file",))
     path = find_file(cursor.at("file"))
-    if path.suffix in (".yml", ".yaml"):
-        eta, k = spectra.read_refractive_index(path)
-        if role == "coefficient":
-            return spectra.absorption(k)
-        return k if name == "k" else eta
+    if role == "index":
+        return spectra.read_index(path, "k" if name.split("_")[-1] == "k" else "eta")
+    if role == "coefficient" and path.suffix in (".yml", ".yaml"):
+        return spectra.absorption(spectra.read_index(path, "k"))
     return spectra.read_table(path, outside)
 
 
@@ -87,6 +87,8 @@ def _typed(cursor: Cursor) -> Spectrum:
             child = cursor.at(name)
             if isinstance(child.value, list):
                 given[name] = tuple(child.numbers())
+            elif fields[name].type == "bool":
+                given[name] = child.expect(bool)
             else:
                 given[name] = child.value if isinstance(child.value, str) else child.number()
         elif fields[name].default is dataclasses.MISSING:

@@ -1,0 +1,73 @@
+"""The dispersion formulas 1 to 9 of refractiveindex.info's database; wavelengths in um.
+
+Formulas: M. N. Polyanskiy, Dispersion formulas (refractiveindex.info/database/doc).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.errors import SceneError
+from clpt.spectra.spectrum import Cauchy, Sellmeier, Spectrum, Tabulated
+
+Array = NDArray[np.float64]
+
+MICROMETRE = 1000.0  # [nm]
+POINTS = 2001  # at which a formula without a class of its own is tabulated
+HERZBERGER = 0.028  # [um^2], the fixed resonance of formula 7
+FIXED = {7: 6, 8: 4, 9: 6}  # coefficients of the formulas that are no sums of any length
+
+
+def from_formula(name: str, coefficients: list[float], ends: list[float]) -> Spectrum:
+    """Index by formula `name` with its coefficients, within `ends` [um] where it is tabulated.
+
+    Raises SceneError for an unknown formula or a number of coefficients that it does not take.
+    """
+    if name not in tuple("123456789"):
+        raise SceneError(f"dispersion formula {name!r} is not known; 1 to 9 are")
+    number, c = int(name), list(coefficients)
+    if number in FIXED:
+        if len(c) > FIXED[number]:
+            raise SceneError(f"formula {number} takes {FIXED[number]} coefficients, not {len(c)}")
+        c += [0.0] * (FIXED[number] - len(c))
+    elif number != 4 and len(c) % 2 == 0:
+        raise SceneError(f"formula {number} takes an odd number of coefficients, found {len(c)}")
+    pairs = list(zip(c[1::2], c[2::2], strict=False))
+    if number in (1, 2):
+        b = tuple(pair[0] for pair in pairs)
+        squares = tuple(pair[1] ** (3 - number) for pair in pairs)
+        return Sellmeier(b, squares, 1.0 + c[0])
+    if number == 5 and [p for _, p in pairs] in ([-2.0], [-2.0, -4.0]):
+        return Cauchy(c[0], *(b for b, _ in pairs))
+    um = np.linspace(ends[0], ends[-1], POINTS)
+    return Tabulated(um * MICROMETRE, _index(number, c, pairs, um), "hold")
+
+
+def _index(number: int, c: list[float], pairs: list[tuple[float, float]], um: Array) -> Array:
+    """Index by the formulas 3 to 9 at wavelengths [um]; zero where a square is negative."""
+    l2 = um**2
+    if number == 5:
+        return sum((b * um**p for b, p in pairs), np.full(um.shape, c[0]))
+    if number == 6:
+        return sum((b / (s - 1.0 / l2) for b, s in pairs), np.full(um.shape, 1.0 + c[0]))
+    if number == 7:
+        near = 1.0 / (l2 - HERZBERGER)
+        return c[0] + c[1] * near + c[2] * near**2 + c[3] * l2 + c[4] * l2**2 + c[5] * l2**3
+    if number == 3:
+        squared = sum((b * um**p for b, p in pairs), np.full(um.shape, c[0]))
+    elif number == 4:
+        squared = _fourth(c + [0.0] * (9 - len(c)), um)
+    elif number == 8:  # of Lorentz and Lorenz: (n^2 - 1) / (n^2 + 2)
+        share = c[0] + c[1] * l2 / (l2 - c[2]) + c[3] * l2
+        squared = (1.0 + 2.0 * share) / (1.0 - share)
+    else:
+        off = um - c[4]
+        squared = c[0] + c[1] / (l2 - c[2]) + c[3] * off / (off**2 + c[5])
+    return np.sqrt(np.maximum(squared, 0.0))
+
+
+def _fourth(c: list[float], um: Array) -> Array:
+    total = c[0] + c[1] * um ** c[2] / (um**2 - c[3] ** c[4])
+    total = total + c[5] * um ** c[6] / (um**2 - c[7] ** c[8])
+    return sum((b * um**p for b, p in zip(c[9::2], c[10::2], strict=False)), total)

@@ -1,0 +1,160 @@
+"""Lamps: what glows, what is excited, and the illuminants that go by a name."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from clpt.errors import SceneError, UnknownKindError
+from clpt.spectra import cie, data
+from clpt.spectra.spectrum import Constant, Samples, Spectrum, with_luminance_one
+
+# CODATA 2018, exact: Planck [J s], light [m/s], Boltzmann [J/K].
+PLANCK, LIGHT, BOLTZMANN = 6.62607015e-34, 299792458.0, 1.380649e-23
+
+
+@dataclass(frozen=True)
+class Blackbody(Spectrum):
+    """Planck's law at `kelvin`: radiance [W m^-2 sr^-1 nm^-1], or luminance 1 if `normalised`.
+
+    Either is multiplied by `scale`. Raises SceneError for a temperature that is not positive, or
+    so low that nothing of what it glows could be normalised.
+    """
+
+    kelvin: float
+    scale: float = 1.0
+    normalised: bool = False
+
+    def __post_init__(self) -> None:
+        if not self.kelvin > 0.0:
+            raise SceneError(f"a black body's temperature must be positive, found {self.kelvin} K")
+        if self.normalised and not _planck(cie.GRID, self.kelvin).max() > 1e-30:
+            raise SceneError(f"a black body of {self.kelvin} K is dark and cannot be normalised")
+
+    def sample(self, lambdas: ArrayLike) -> Samples:
+        values = self.scale * _planck(lambdas, self.kelvin)
+        if not self.normalised:
+            return values
+        return values / cie.spectrum_to_xyz(_planck(cie.GRID, self.kelvin))[1]
+
+
+@dataclass(frozen=True, init=False)
+class Lines(Spectrum):
+    """Spectral lines: `powers` [W m^-2 sr^-1] at `wavelengths` [nm], each a triangle `width` wide.
+
+    The width [nm] is at half the height and a whole number: samples 1 nm apart then add up to the
+    powers exactly, wherever the lines lie between them. Raises SceneError.
+    """
+
+    wavelengths: tuple[float, ...]
+    powers: tuple[float, ...]
+    width: float = 1.0
+    scale: float = 1.0
+
+    def __init__(
+        self,
+        wavelengths: Iterable[float],
+        powers: Iterable[float],
+        width: float = 1.0,
+        scale: float = 1.0,
+    ) -> None:
+        given = {"wavelengths": wavelengths, "powers": powers}
+        for name, values in given.items():
+            object.__setattr__(self, name, tuple(float(value) for value in values))
+        object.__setattr__(self, "width", float(width))
+        object.__setattr__(self, "scale", float(scale))
+        if len(self.wavelengths) != len(self.powers) or not self.powers:
+            raise SceneError(
+                f"line spectra need as many powers as wavelengths, found {len(self.powers)} and "
+                f"{len(self.wavelengths)}"
+            )
+        if not np.isfinite([*self.wavelengths, *self.powers, self.scale]).all():
+            raise SceneError("a line has a wavelength or a power that is not finite")
+        if not (self.width >= 1.0 and self.width.is_integer()):
+            raise SceneError(f"the width of lines is a whole number of nm, not {self.width:g}")
+
+    def sample(self, lambdas: ArrayLike) -> Samples:
+        off = np.abs(np.asarray(lambdas, np.float64)[..., None] - np.array(self.wavelengths))
+        shape = np.maximum(1.0 - off / self.width, 0.0) / self.width
+        return self.scale * (shape * np.array(self.powers)).sum(axis=-1)
+
+
+@dataclass(frozen=True)
+class LED(Spectrum):
+    """A coloured LED: `scale` [W m^-2 sr^-1 nm^-1] at its `peak` [nm], and its `width` [nm].
+
+    The model is (g + 2 g^5) / 3 with g = exp(-((lambda - peak) / width)^2) (Ohno 2005); at half its
+    height it is 0.92 of the nominal width wide. Raises SceneError.
+    """
+
+    peak: float
+    width: float = 20.0
+    scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not (self.peak > 0.0 and self.width > 0.0):
+            raise SceneError(f"an LED's peak and width must be positive: {self.peak}, {self.width}")
+
+    def sample(self, lambdas: ArrayLike) -> Samples:
+        g = np.exp(-(((np.asarray(lambdas, np.float64) - self.peak) / self.width) ** 2))
+        return self.scale * (g + 2.0 * g**5) / 3.0
+
+
+@dataclass(frozen=True)
+class Illuminant(Spectrum):
+    """A lamp by its name, of luminance `scale`. Raises UnknownKindError."""
+
+    name: str
+    scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        if self.name not in illuminants():
+            raise UnknownKindError("illuminant", self.name, illuminants())
+
+    def sample(self, lambdas: ArrayLike) -> Samples:
+        return self.scale * _of_luminance_one(self.name).sample(lambdas)
+
+
+def illuminants() -> tuple[str, ...]:
+    """Names that `illuminant` knows."""
+    return (*data.names("illuminants"), *_discharges(), "E")
+
+
+def illuminant(name: str, scale: float = 1.0) -> Spectrum:
+    """Emission of a named lamp with luminance `scale`.
+
+    CIE illuminants: A; D50 and D65; E; fluorescent lamps F1 to F12; HP1 and HP2 (high-pressure
+    sodium), HP3 to HP5 (metal halide); LED-B1 to LED-V2 (white LEDs). Discharges of lines only:
+    sodium (low pressure), mercury and hydrogen. Raises UnknownKindError.
+    """
+    return Constant(scale) if name == "E" else Illuminant(name, scale)
+
+
+@cache
+def _of_luminance_one(name: str) -> Spectrum:
+    if name in _discharges():
+        lines = Lines(*np.transpose(_discharges()[name]["lines"]))
+        luminance = cie.spectrum_to_xyz(lines.sample(cie.GRID))[1]
+        return Lines(lines.wavelengths, lines.powers, scale=1.0 / luminance)
+    if name == "E":
+        return Constant(1.0)
+    return with_luminance_one(data.table(f"illuminants/{name}.csv"))
+
+
+@cache
+def _discharges() -> dict[str, Any]:
+    return json.loads((data.ROOT / "discharges.json").read_text("utf-8"))
+
+
+def _planck(lambdas: ArrayLike, kelvin: float) -> Samples:
+    """Radiance [W m^-2 sr^-1 nm^-1] of a black body at wavelengths [nm]."""
+    metres = np.asarray(lambdas, np.float64) * 1e-9
+    exponent = PLANCK * LIGHT / (metres * BOLTZMANN * kelvin)
+    per_metre = 2.0 * PLANCK * LIGHT**2 / metres**5 / np.expm1(np.minimum(exponent, 700.0))
+    return 1e-9 * per_metre
