@@ -174,7 +174,7 @@ def write(
     *,
     half: bool = False,
     preview: Array | None = None,
-    metadata: Mapping[str, str | int | float] | None = None,
+    metadata: Mapping[str, Any] | None = None,
 ) -> None:
     """Write a spectral EXR file; what `read` gives back is the same to the bit unless `half`.
 

@@ -1,6 +1,6 @@
 /* An image with a spectrum in every texel, placed on uv as bitmap.cl places its colours. A reflectance
  * goes on beyond its first and last band as it is there, light ends. */
-#include "lib/bands.cl"
+#include "lib/band_texels.cl"
 
 inline Bitmap spectral_bitmap_image(SpectralBitmap t)
 {
