@@ -8,10 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import transforms
+from clpt import spectra, transforms
 from clpt.errors import SceneError
 from clpt.layout import Record
 from clpt.scene.cameras import Camera, Matrix, Orthographic, Perspective, Spherical, ThinLens
+from clpt.spectra import RGB, Constant, RGBUnbounded, Spectrum
+
+DESIGN_WAVELENGTH = 587.56  # [nm], the helium line d, at which a lens's focal length is given
 
 _TO_WORLD = ("matrix", "camera space to world, row-major")
 _NEAR = ("real", "distance of the near plane [m]")
@@ -32,6 +35,9 @@ RECORDS: dict[str, Record] = {
         **_PINHOLE,
         aperture_radius=("real", "of the lens [m]"),
         focus_distance=("real", "of the plane in focus [m]"),
+        focal_length=("real", "at the design wavelength [m]"),
+        power=("real", "index - 1 of the glass at that wavelength"),
+        glass=("integer", "row in `spectra` of a glass that disperses"),
     ),
     "orthographic": Record(
         "OrthographicCamera",
@@ -55,15 +61,30 @@ RECORDS: dict[str, Record] = {
 }
 
 
-def lower_camera(camera: Camera, width: int, height: int) -> tuple[str, NDArray[np.float32]]:
+def dispersive_glass(camera: Camera) -> Spectrum | None:
+    """Return the index of a lens's glass, or None where it is the same at all wavelengths."""
+    index = getattr(camera, "glass", Constant(1.0))
+    if isinstance(index, str):
+        index = spectra.glass(index)
+    if type(index) is RGB:
+        index = RGBUnbounded(index.r, index.g, index.b)
+    return None if isinstance(index, Constant) else index
+
+
+def lower_camera(
+    camera: Camera, width: int, height: int, glass_row: int = 0
+) -> tuple[str, NDArray[np.float32]]:
     """Return a camera's kind and the words (n,) float32 of its record.
 
-    width, height: of the film [pixels]. Raises SceneError for a matrix that cannot be used.
+    width, height: of the film [pixels]; glass_row: in `spectra`, of its `dispersive_glass`. Raises
+    SceneError for a matrix or a glass that cannot be used.
     """
     record = RECORDS[camera.kind]
     words = np.zeros((), record.dtype)
     for name, value in MEMBERS[type(camera)](camera, width, height).items():
         words[name] = value
+    if dispersive_glass(camera) is not None:
+        words["glass"] = glass_row
     return camera.kind, words.reshape(1).view(np.float32)
 
 
@@ -113,8 +134,15 @@ def _pinhole(camera: Perspective, width: int, height: int) -> dict[str, Any]:
 
 
 def _thin_lens(camera: ThinLens, width: int, height: int) -> dict[str, Any]:
-    lens = {name: getattr(camera, name) for name in ("aperture_radius", "focus_distance")}
-    return {**_pinhole(camera, width, height), **lens}
+    names = ("aperture_radius", "focus_distance", "focal_length")
+    lens = {name: getattr(camera, name) for name in names}
+    glass = dispersive_glass(camera)
+    power = 1.0 if glass is None else float(glass.sample(DESIGN_WAVELENGTH)) - 1.0
+    if power < 1e-3:
+        raise SceneError(
+            f"its index must be above 1, not {power + 1.0:.4g}", where="thin_lens.glass"
+        )
+    return {**_pinhole(camera, width, height), **lens, "power": power}
 
 
 def _orthographic(camera: Orthographic, width: int, height: int) -> dict[str, Any]:

@@ -35,6 +35,7 @@ class Features:
     many_lights: bool = False  # too many to be chosen by the number that also places the point
     dispersion: bool = False
     absorption: bool = False  # inside of a dielectric
+    glass_lens: bool = False  # of a glass that disperses
     channel: str = ""
     spectra_size: int = 0
     spectra_step: float = 1.0

@@ -99,7 +99,10 @@ class _Lowering:
             rows[emitter.shape_row]["flags"] |= SHAPE_ONE_LIGHT if whole else 0
         for row in rows:
             tables.append("shapes", row.reshape(1).view(np.uint32))
-        camera, words = cameras.lower_camera(scene.camera, scene.film.width, scene.film.height)
+        glass_row = self._lens_glass()
+        camera, words = cameras.lower_camera(
+            scene.camera, scene.film.width, scene.film.height, glass_row
+        )
         tables.append_floats("camera", words)
         ambient = getattr(scene.integrator, "ambient", 0.0)
         self.ambient = tables.append("lamps", tables.emission_words(ambient)) if ambient else 0
@@ -107,6 +110,13 @@ class _Lowering:
         arrays = tables.arrays()
         settings = self._settings(center, radius)
         return Lowered(features, settings, arrays, vertices, faces, tags, boxes, self.warnings)
+
+    def _lens_glass(self) -> int:
+        """The row in `spectra` of the glass of a lens that disperses, 0 where there is none."""
+        glass = cameras.dispersive_glass(self.scene.camera)
+        if glass and self.mode == "rgb" and not self.channels:
+            self.warnings.append("thin_lens.glass: in RGB mode all wavelengths have one focus")
+        return self.tables.spectra_row(glass) if glass and self.mode == "spectral" else 0
 
     def _shape(self, number: int, shape: Any, emitters: list) -> np.ndarray:
         """One row of `shapes`; its triangles, or its parameters, go into the tables."""
@@ -214,6 +224,7 @@ class _Lowering:
             for name, found in sources.get(kind, {}).items()
             if name in ("int_ior", "ext_ior")
         )
+        glass_lens = self.mode == "spectral" and bool(cameras.dispersive_glass(scene.camera))
         return Features(
             mode=self.mode,
             camera=camera,
@@ -231,8 +242,11 @@ class _Lowering:
             mixtures=self.uses["mixtures"],
             infinite=self.lights.infinite > 0 and not self.channels,
             many_lights=len(self.lights.rows) > FEW_LIGHTS,
-            dispersion=index_tables or any(_LEAVES[kind].disperses for kind in self.leaves),
             absorption=self.uses["absorption"] and not self.channels,
+            dispersion=index_tables
+            or glass_lens
+            or any(_LEAVES[kind].disperses for kind in self.leaves),
+            glass_lens=glass_lens,
             channel=self.channels[0] if self.channels else "",
             spectra_size=tables.spectra_size,
             spectra_step=STEP,

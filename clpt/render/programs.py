@@ -66,6 +66,7 @@ def _defines(features: Features) -> dict[str, str | int | float]:
         "USES_ANALYTIC": int(bool(features.analytic)),
         "USES_INFINITE": int(features.infinite),
         "USES_DISPERSION": int(features.dispersion and features.mode == "spectral"),
+        "CAMERA_DISPERSES": int(features.glass_lens),
         "SPECTRA_SIZE": features.spectra_size,
         "SPECTRA_STEP": f"{features.spectra_step}f",
         "FEW_LIGHTS": int(not features.many_lights),
@@ -92,7 +93,7 @@ def _shared(features: Features, layout: str) -> dict[str, str]:
         "generated/spectrum.cl": f'#include "spectrum/{features.mode}.cl"\n',
         "generated/spectrum_read.cl": f'#include "spectrum/{features.mode}_read.cl"\n',
         "generated/sampler.cl": f'#include "sampler/{features.sampler}.cl"\n',
-        "generated/camera.cl": _camera_text(features.camera),
+        "generated/camera.cl": _camera_text(features.camera, features.glass_lens),
         "generated/textures.cl": textures.dispatch_text(features.textures, features.texture_roles),
         "generated/lights.cl": _lights_text(features),
         "generated/mixture.cl": _mixture_text(features),
@@ -145,12 +146,16 @@ def scene_text() -> str:
     )
 
 
-def _camera_text(kind: str) -> str:
+def _camera_text(kind: str, glass: bool) -> str:
     record: Record = cameras.RECORDS[kind]
+    camera = f"(global const {record.name} *)(scene).camera"
+    made = f"{kind}_ray({camera}, film, lens)"
+    if glass:
+        row = f"(integer)(({camera})->glass)"
+        made = f"{kind}_glass_ray({camera}, film, lens, spectra_row(scene, {row}, lambdas).x)"
     return (
         f'{record.uniform_text()}#include "camera/{kind}.cl"\n'
-        f"#define camera_ray(scene, film, lens) "
-        f"{kind}_ray((global const {record.name} *)(scene).camera, film, lens)\n"
+        f"#define camera_ray(scene, film, lens, lambdas) {made}\n"
     )
 
 

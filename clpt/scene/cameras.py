@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from clpt.scene.params import Kind, choice, host, real
+from clpt.scene.params import Kind, choice, host, index, real
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -31,10 +31,15 @@ class Perspective(Camera):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ThinLens(Perspective):
-    """A pinhole with an aperture: what is not at the focus distance blurs."""
+    """A pinhole with an aperture: what is not at the focus distance blurs.
+
+    A `glass` that disperses gives it chromatic aberration: `focus_distance` is that at 587.56 nm.
+    """
 
     aperture_radius: float = real(0.1, "of the lens", "m", low=0.0)
     focus_distance: float = real(1.0, "of the plane in focus", "m", low=1e-6)
+    glass: Any = index(1.5, "of the lens; one that disperses focuses each wavelength elsewhere")
+    focal_length: float = real(0.05, "of the lens at 587.56 nm; matters to `glass`", "m", low=1e-6)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -90,13 +90,13 @@ kernel APART void generate(SLAB_ARGS, SCENE_ARGS, global float *film, global uin
         vec2 offset;
         filter_sample(scene, sampler_pair(sampler, (natural)(DIMENSION_FILM)), &offset, &weight);
         vec2 position = {(pixel.x + 0.5f + offset.x) / (float)settings->width, (pixel.y + 0.5f + offset.y) / (float)settings->height};
-        CameraRay ray = camera_ray(scene, position, sampler_pair(sampler, (natural)(DIMENSION_LENS)));
         lambdas = wavelengths_sample(scene, sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH)).x);
+        CameraRay ray = camera_ray(scene, position, sampler_pair(sampler, (natural)(DIMENSION_LENS)), lambdas);
         store_path_weight(path, at, go, weight);
         store_path_o(path, at, go, ray.o);
         store_path_d(path, at, go, ray.d);
         store_path_lambdas(path, at, go, lambdas);
-        store_path_beta(path, at, go, spectrum_of(1.0f));
+        store_path_beta(path, at, go, camera_start());
         store_path_radiance(path, at, go, spectrum_of(0.0f));
         store_path_pdf(path, at, go, -ray.far);
         store_path_eta(path, at, go, (real)(1.0f));
@@ -104,7 +104,7 @@ kernel APART void generate(SLAB_ARGS, SCENE_ARGS, global float *film, global uin
         store_path_medium(path, at, go, (integer)(0));
 #endif
 #if USES_DISPERSION
-        store_path_ratio(path, at, go, spectrum_of(1.0f));
+        store_path_ratio(path, at, go, camera_start());
 #endif
         store_path_state(path, at, ended, sel_i(done, (integer)(PATH_DONE), (integer)(PATH_ALIVE)));
     }

@@ -132,6 +132,15 @@ def test_thin_lens(scene):
         scene("", '<sensor type="thinlens"/>')
 
 
+def test_thin_lens_of_a_glass(scene):
+    camera = scene(
+        "",
+        '<sensor type="thinlens"><float name="aperture_radius" value="0.2"/>'
+        '<string name="glass" value="sf11"/><float name="lens_focal_length" value="0.1"/></sensor>',
+    ).camera
+    assert (camera.glass, camera.focal_length) == ("sf11", 0.1)
+
+
 FILTERS = {
     "box": integrators.Box(),
     "tent": integrators.Tent(),

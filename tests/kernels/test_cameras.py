@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from clpt import transforms
+from clpt import spectra, transforms
 from clpt.errors import SceneError
 from clpt.render import cameras
 from clpt.scene import cameras as scene
@@ -28,10 +28,13 @@ def _text(kind: str) -> dict[str, str]:
     return {"generated/camera.cl": f'{record.uniform_text()}#include "camera/{kind}.cl"\n'}
 
 
-def rays(camera, width, height, film, lens=None, lanes=8):
-    """Origins and directions (n, 3) at film positions (n, 2)."""
+def rays(camera, width, height, film, lens=None, lanes=8, index=None):
+    """Origins and directions (n, 3) at film positions (n, 2); index: of a lens's glass."""
     kind, words = cameras.lower_camera(camera, width, height)
-    defines = {"RAY": f"{kind}_ray", "RECORD": cameras.RECORDS[kind].name}
+    call = f"{kind}_ray(camera, film, lens)"
+    if index is not None:
+        call = f"{kind}_glass_ray(camera, film, lens, {index:.9f}f)"
+    defines = {"RAY(camera, film, lens)": call, "RECORD": cameras.RECORDS[kind].name}
     probe = SceneProbe(
         BODY,
         4,
@@ -208,6 +211,39 @@ def test_unit_directions_in_all_lane_widths(cls):
     for lanes in (8, 16):
         for a, b in zip(rays(camera, 40, 30, film, lens, lanes=lanes), single, strict=True):
             np.testing.assert_allclose(a, b, atol=1e-6)
+
+
+GLASSES = {"sf11": (4.0, 0.05), "bk7": (1.5, 0.085), "diamond": (30.0, 0.4)}
+
+
+@pytest.mark.parametrize("name", GLASSES)
+def test_lens_of_glass_focuses_each_wavelength_elsewhere(name):
+    """Rays of one film position and wavelength meet at the distance of the thin lens's equation.
+
+    1 / f = (n - 1) K and 1 / s + 1 / s' = 1 / f (Hecht 2017, 5.2), in float64, the film
+    at the s' that is sharp at 587.56 nm.
+    """
+    focus, length = GLASSES[name]
+    index = spectra.glass(name)
+    camera = scene.ThinLens(
+        aperture_radius=0.02, focus_distance=focus, focal_length=length, glass=name, near=0.0
+    )
+    curvatures = 1.0 / length / (index.sample(587.56) - 1.0)
+    image = 1.0 / (1.0 / length - 1.0 / focus)
+    _, lens = _samples(64)
+    film = np.tile(np.float32([[0.3, 0.8]]), (len(lens), 1))
+    _, chief = rays(scene.Perspective(near=0.0), 64, 64, film[:1])
+    chief = chief[0] / chief[0, 2]
+    for wavelength in np.linspace(390.0, 780.0, 10):
+        n = float(index.sample(wavelength))
+        expected = (n - 1.0) * curvatures - 1.0 / image  # 1 / s; below 0 beyond infinity
+        origins, directions = rays(camera, 64, 64, film, lens, index=n)
+        slopes = directions / directions[:, 2:]
+        radius2 = np.sum(origins[:, :2] ** 2, axis=1)
+        found = -np.sum((slopes - chief)[:, :2] * origins[:, :2], axis=1) / np.maximum(
+            radius2, 1e-9
+        )
+        np.testing.assert_allclose(found[radius2 > 4e-5], expected, atol=5e-5 / 0.006, rtol=1e-4)
 
 
 SINGULAR = np.diag([1.0, 0.0, 1.0, 1.0])

@@ -70,8 +70,22 @@ def _thin_lens(props: Properties, film: Film) -> cameras.Camera:
     return cameras.ThinLens(
         aperture_radius=props.number("aperture_radius", 0.0),
         focus_distance=props.number("focus_distance", pinhole["far"]),
+        **_glass(props),
         **pinhole,
     )
+
+
+def _glass(props: Properties) -> dict[str, Any]:
+    """Ours, see docs/mitsuba_plugins.md: what a lens that disperses is made of."""
+    given: dict[str, Any] = {}
+    child = props.take("glass")
+    if child is not None:
+        if child.tag != "string":
+            raise child.error("must be a <string> with the name of a glass")
+        given["glass"] = child.attribute("value")
+    if "lens_focal_length" in props.named:
+        given["focal_length"] = props.number("lens_focal_length", 0.0)
+    return given
 
 
 def _orthographic(props: Properties, _: Film) -> cameras.Camera:
