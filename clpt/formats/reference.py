@@ -89,6 +89,7 @@ ROLES = {
     "real": "number",
     "flag": "true or false",
     "orders": "list of numbers",
+    "layers": "list of [layers](#layers)",
 }
 
 
@@ -99,6 +100,8 @@ def text() -> str:
         parts += [f"## {heading}\n", *map(_kind, KINDS[category])]
         if category == "integrator":
             parts += ["## Film\n", _summary(integrators.Film), _table(integrators.Film)]
+        if category == "material":
+            parts += ["## Layers\n", _summary(materials.Layer), _table(materials.Layer)]
     return "\n".join(parts)
 
 

@@ -42,8 +42,7 @@ def schema() -> Schema:
     defs: Schema = {category: _category(category) for category in KINDS}
     defs |= {f"spectrum_{role}": _spectrum(role) for role in SPECTRUM_ROLES}
     defs |= {"spectrum": _typed_spectra(), "step": _step(), "transform": _transform()}
-    film = _kind(integrators.Film)
-    del film["properties"]["type"], film["required"]
+    film, defs["layer"] = _untyped(integrators.Film), _untyped(materials.Layer)
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "clpt scene",
@@ -98,6 +97,13 @@ def _kind(cls: type[Kind]) -> Schema:
     }
 
 
+def _untyped(cls: type[Kind]) -> Schema:
+    """An object that is always of one kind."""
+    made = _kind(cls)
+    del made["properties"]["type"], made["required"]
+    return made
+
+
 def _described(name: str, param: Param, value: Any) -> Schema:
     made = _value(name, param, value)
     doc = f"{param.doc} [{param.unit}]" if param.unit else param.doc
@@ -121,6 +127,8 @@ def _value(name: str, param: Param, value: Any) -> Schema:
         return {"anyOf": [number, _ref("texture")]} if param.textured else number
     if param.role == "orders":
         return {**NUMBERS, "minItems": 1, "maxItems": 2 * ORDERS + 1}
+    if param.role == "layers":
+        return {"type": "array", "items": _ref("layer")}
     return _host(name, value)
 
 

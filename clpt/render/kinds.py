@@ -17,13 +17,15 @@ from clpt.scene.params import (
 SPECTRUM_WORDS = 5  # x y z w and where the value comes from: 0 here, > 0 texture, < 0 table
 REAL_WORDS = 2  # the value, and 0 or 1 + the texture
 ORDERS_WORDS = 2 * ORDERS + 1
+LAYERS_WORDS = 2  # where the layers lie in the table, see clpt.render.films, and how many
 
 
 def words(param: Param) -> int:
     """Return the number of 4-byte words that a parameter takes in its row."""
     if param.role in SPECTRUM_ROLES:
         return SPECTRUM_WORDS
-    return {"real": REAL_WORDS, "orders": ORDERS_WORDS}.get(param.role, 1)
+    given = {"real": REAL_WORDS, "orders": ORDERS_WORDS, "layers": LAYERS_WORDS}
+    return given.get(param.role, 1)
 
 
 def row_words(cls: type[Kind]) -> int:
@@ -35,7 +37,8 @@ def lane_type(param: Param) -> str:
     """Return the parameter's type in a kind's struct."""
     if param.role in SPECTRUM_ROLES:
         return "Spectrum"
-    return "real" if param.role in ("real", "orders") else "integer"
+    given = {"real": "real", "orders": "real", "layers": "Layers"}
+    return given.get(param.role, "integer")
 
 
 def array_size(param: Param) -> int:
@@ -59,12 +62,12 @@ def load_text(cls: type[Kind], sources: Mapping[str, frozenset[str]], table: str
     """Return `kind_load(scene, row, uv, lambdas)`, which reads a row at the path's wavelengths.
 
     sources: per parameter, where the values in this scene come from: "constant", "table" (a
-    tabulated spectrum), "texture". Text is made only for what is there.
+    tabulated spectrum), "texture", "layers". Text is made only for what is there.
     """
     body, at = [], 0
     for name, param in device_params(cls).items():
         found = sources.get(name) or frozenset({"constant"})
-        kind = {"Spectrum": "spectrum", "real": "real", "integer": "integer"}[lane_type(param)]
+        kind = lane_type(param).lower()
         if array_size(param) > 1:
             body += [
                 f"    for (int i = 0; i < {array_size(param)}; i++)",
@@ -89,6 +92,9 @@ def _member(
     """The lines that load one member from the sources that occur."""
     if kind == "integer":
         return [f"    r.{name} = gather_i(scene.{table}, {at});"]
+    if kind == "layers":
+        made = f"layers_load(scene, {at}, uv, lambdas)" if "layers" in found else "layers_none()"
+        return [f"    r.{name} = {made};"]
     forms = {
         "constant": f"{kind}_constant(scene.{table}, {at}, lambdas)",
         "table": f"{kind}_table(scene, scene.{table}, {at}, lambdas)",
@@ -111,22 +117,21 @@ def _member(
 
 def emission_text(found: frozenset[str]) -> str:
     """Return `emission_load(scene, at, uv, lambdas)`, which reads five words of `lamps`."""
-    return _value_text("emission_load", Param("emission", "", textured=True), found, "lamps")
+    return value_text("emission_load", Param("emission", "", textured=True), found, "lamps")
 
 
 def mixture_text(found: frozenset[str]) -> str:
     """Return `mixture_weight(scene, at, uv, lambdas)`, which reads two words of `mixtures`."""
-    return _value_text("mixture_weight", Param("real", "", textured=True), found, "mixtures")
+    return value_text("mixture_weight", Param("real", "", textured=True), found, "mixtures")
 
 
 def medium_text(found: frozenset[str]) -> str:
     """Return `medium_absorption(scene, at, uv, lambdas)`, which reads five words of `materials`."""
-    param = Param("coefficient", "")
-    return _value_text("medium_absorption", param, found, "materials")
+    return value_text("medium_absorption", Param("coefficient", ""), found)
 
 
-def _value_text(name: str, param: Param, found: frozenset[str], table: str) -> str:
-    """A function that loads a single parameter."""
+def value_text(name: str, param: Param, found: frozenset[str], table: str = "materials") -> str:
+    """Return `name(scene, at, uv, lambdas)`, which loads a single parameter."""
     form = lane_type(param)
     return "\n".join(
         [

@@ -195,9 +195,10 @@ class _Lowering:
         row = self.tables.row(material, "materials")
         if row >= 1 << 24:
             raise SceneError("the scene has more than 16 million words of material parameters")
-        for name in device_params(type(material)):
-            if getattr(getattr(material, name), "is_texture", False):
-                self.uses["uvs"] = True
+        for part in (material, *getattr(material, "layers", ())):
+            for name in device_params(type(part)):
+                if getattr(getattr(part, name), "is_texture", False):
+                    self.uses["uvs"] = True
         self.uses["tangents"] |= _anisotropic(material)
         self.uses["absorption"] |= getattr(material, "absorption", CLEAR) != CLEAR
         return self.leaves.index(material.kind) << 24 | row

@@ -9,7 +9,7 @@ from __future__ import annotations
 from clpt import device
 from clpt.layout import Record
 from clpt.records import LIGHT, SETTINGS, SHAPE, SLABS, TABLES
-from clpt.render import cameras, kinds, lights, shapes, textures
+from clpt.render import cameras, films, kinds, lights, shapes, textures
 from clpt.render.features import Features
 from clpt.scene import materials
 from clpt.scene.params import device_params, interior_params
@@ -262,6 +262,7 @@ def _bsdf_text(features: Features, kind: str) -> str:
     verbs = ("sample", "eval", "pdf", "albedo", "load", *(("pdfs",) if cls.chromatic else ()))
     return "\n".join(
         [
+            films.boundary_text(cls, features.mode, features.sources),
             kinds.struct_text(cls),
             f'#include "bsdf/{kind}.cl"',
             kinds.load_text(cls, features.sources.get(kind, {}), "materials"),

@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt import spectra
 from clpt.records import TABLES
+from clpt.render.films import layers_words
 from clpt.render.kinds import ORDERS_WORDS, REAL_WORDS, SPECTRUM_WORDS
 from clpt.scene.params import Kind, device_params, interior_params
-from clpt.spectra import RGB, Constant, RGBIlluminant, RGBUnbounded, Spectrum
+from clpt.spectra import RGB, Constant, RGBIlluminant, Spectrum
 from clpt.spectra.spectrum import Role, d65, on_grid
 
 STEP = 1.0  # [nm] of the tabulated spectra
@@ -36,7 +37,8 @@ class Tables:
     """The read-only tables of a scene, by the names in clpt.records.TABLES.
 
     mode: "spectral" or "rgb"; lambda_min, lambda_max: the film's range [nm].
-    `sources` tells, per kind and parameter, where values come from: "constant", "table", "texture".
+    `sources` tells, per kind and parameter, where values come from: "constant", "table", "texture",
+    "layers".
     """
 
     def __init__(self, mode: str, lambda_min: float = 360.0, lambda_max: float = 830.0):
@@ -112,12 +114,10 @@ class Tables:
 
         role: one of SPECTRUM_ROLES in clpt.scene.params; an index may be a glass's name.
         """
-        if isinstance(value, str):
-            value = spectra.glass(value)
+        if isinstance(value, str) or role in ("index", "coefficient"):
+            value = spectra.index(value)
         if role == "emission" and isinstance(value, RGB):
             value = RGBIlluminant(value.r, value.g, value.b)
-        if role in ("index", "coefficient") and isinstance(value, RGB):
-            value = RGBUnbounded(value.r, value.g, value.b)
         words = np.zeros(SPECTRUM_WORDS, np.uint32)
         if not self.spectral:
             words[:3] = as_words(value.to_rgb(RGB_ROLES[role]))
@@ -139,16 +139,22 @@ class Tables:
         """
         key = (id(kind), table)
         if key not in self._rows:
-            words: list[ArrayLike] = []
-            read = {**device_params(type(kind)), **interior_params(type(kind))}
-            for name, param in read.items():
-                value, source = self.param_words(getattr(kind, name), param.role, param.choices)
-                words.append(value)
-                self.sources[kind.kind][name].add(source)
-            flat = np.concatenate(words) if words else np.zeros(1, np.uint32)
-            self._rows[key] = self.append(table, flat)
+            self._rows[key] = self.append(table, self.kind_words(kind))
             self._kept.append(kind)
         return self._rows[key]
+
+    def kind_words(self, kind: Kind) -> Words:
+        """Return the words of what the kernels read of a kind."""
+        words: list[Words] = []
+        read = {**device_params(type(kind)), **interior_params(type(kind))}
+        for name, param in read.items():
+            if param.role == "layers":
+                value, source = layers_words(kind, self)
+            else:
+                value, source = self.param_words(getattr(kind, name), param.role, param.choices)
+            words.append(value)
+            self.sources[kind.kind][name].add(source)
+        return np.concatenate(words) if words else np.zeros(1, np.uint32)
 
     def param_words(
         self, value: Any, role: str, choices: tuple[str, ...] = ()

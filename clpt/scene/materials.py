@@ -18,12 +18,27 @@ from clpt.scene.params import (
     flag,
     host,
     index,
+    layers,
     per_order,
     real,
     reflectance,
 )
 
 DISTRIBUTIONS = ("ggx", "beckmann")
+FILMS = "thin films on the surface, from the outside in"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Layer(Kind):
+    """A film, thin enough for the light reflected at its two faces to interfere.
+
+    Up to 100 um thick; from about 10 um on, its fringes are finer than an eye can tell.
+    """
+
+    eta: Any = index("water", "index of refraction")
+    k: Any = index(0.0, "extinction coefficient; above 0 it absorbs")
+    thickness: float = real(400.0, "where it is thickest", "nm", low=0.0, high=1e5)
+    profile: Any = real(1.0, "share of that thickness that is there", "", 0.0, 1.0, textured=True)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -73,6 +88,7 @@ class Dielectric(Material):
     specular_reflectance: Any = reflectance(1.0, "factor on reflection; 1 is physical")
     specular_transmittance: Any = reflectance(1.0, "factor on transmission; 1 is physical")
     absorption: Any = coefficient(0.0, "of the inside: exp(-absorption distance) passes")
+    layers: tuple[Layer, ...] = layers(FILMS)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -103,6 +119,7 @@ class RoughDielectric(Material):
     specular_reflectance: Any = reflectance(1.0, "factor on reflection; 1 is physical")
     specular_transmittance: Any = reflectance(1.0, "factor on transmission; 1 is physical")
     absorption: Any = coefficient(0.0, "of the inside: exp(-absorption distance) passes")
+    layers: tuple[Layer, ...] = layers(FILMS)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -114,6 +131,7 @@ class Conductor(Material):
     eta: Any = index(0.0, "index of refraction")
     k: Any = index(1.0, "extinction coefficient")
     specular_reflectance: Any = reflectance(1.0, "factor on reflection; 1 is physical")
+    layers: tuple[Layer, ...] = layers(FILMS)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -126,6 +144,7 @@ class RoughConductor(Material):
     alpha_u: Any = real(0.1, "roughness along the tangent", low=1e-4, high=1.0, textured=True)
     alpha_v: Any = real(0.1, "roughness across it", low=1e-4, high=1.0, textured=True)
     specular_reflectance: Any = reflectance(1.0, "factor on reflection; 1 is physical")
+    layers: tuple[Layer, ...] = layers(FILMS)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

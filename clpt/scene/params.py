@@ -15,6 +15,7 @@ real           number, Texture                        real                      
 flag           bool                                   int                         no
 choice         one of the names listed                int, the name's position    no
 orders         numbers of orders -n to n              real[17], of -8 to 8        no
+layers         Layers, from the outside in            Layers                      their profile
 host           whatever the lowering needs            -                           -
 =============  =====================================  ==========================  ===============
 """
@@ -33,7 +34,7 @@ import numpy as np
 from clpt.errors import SceneError
 from clpt.spectra import RGB, Constant, Spectrum
 
-DEVICE_ROLES = ("reflectance", "emission", "index", "real", "flag", "choice", "orders")
+DEVICE_ROLES = ("reflectance", "emission", "index", "real", "flag", "choice", "orders", "layers")
 SPECTRUM_ROLES = ("reflectance", "emission", "index", "coefficient")
 ORDERS = 8  # highest order of diffraction, see kernels/lib/diffraction.cl
 LAMBDAS = np.arange(200.0, 1201.0)  # [nm] at which a spectrum's limits are checked
@@ -109,6 +110,11 @@ def per_order(default: Sequence[float], doc: str) -> Any:
     return _field(tuple(default), Param("orders", doc, low=0.0))
 
 
+def layers(doc: str) -> Any:
+    """Declare the thin films on a boundary; none by default."""
+    return _field((), Param("layers", doc))
+
+
 def host(default: Any, doc: str, unit: str = "") -> Any:
     """Declare what only the host needs: geometry, matrices, nested kinds."""
     return _field(default, Param("host", doc, unit))
@@ -171,6 +177,8 @@ def _checked(value: Any, param: Param, where: str) -> Any:
         if value not in param.choices:
             raise SceneError(f"{value!r} is none of {', '.join(param.choices)}", where=where)
         return value
+    if param.role == "layers":
+        return _layers(value, where)
     if getattr(value, "is_texture", False):
         if not param.textured:
             raise SceneError("cannot be a texture", where=where)
@@ -180,6 +188,15 @@ def _checked(value: Any, param: Param, where: str) -> Any:
     if param.role == "orders":
         return _orders(value, param, where)
     return _spectrum(value, param, where)
+
+
+def _layers(value: Any, where: str) -> tuple[Kind, ...]:
+    if not isinstance(value, (list, tuple)):
+        raise SceneError(f"must be a list of layers, not {value!r}", where=where)
+    for i, entry in enumerate(value):
+        if not (isinstance(entry, Kind) and entry.kind == "layer"):
+            raise SceneError(f"must be a layer, not {entry!r}", where=f"{where}[{i}]")
+    return tuple(value)
 
 
 def _number(value: Any, param: Param, where: str) -> float:

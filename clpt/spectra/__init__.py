@@ -18,7 +18,7 @@ from clpt.spectra.cie import (
 )
 from clpt.spectra.emission import LED, Blackbody, Illuminant, Lines, illuminant, illuminants
 from clpt.spectra.files import read_index, read_refractive_index, read_table
-from clpt.spectra.named import glass, glasses, metal, metals
+from clpt.spectra.named import glass, glasses, index, metal, metals
 from clpt.spectra.spectrum import (
     RGB,
     Cauchy,
@@ -57,6 +57,7 @@ __all__ = [
     "glasses",
     "illuminant",
     "illuminants",
+    "index",
     "luminance",
     "metal",
     "metals",

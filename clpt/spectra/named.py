@@ -8,7 +8,7 @@ from typing import Any
 
 from clpt.errors import UnknownKindError
 from clpt.spectra import data
-from clpt.spectra.spectrum import Constant, Sellmeier, Spectrum, Tabulated
+from clpt.spectra.spectrum import RGB, Constant, RGBUnbounded, Sellmeier, Spectrum, Tabulated
 
 
 def metals() -> tuple[str, ...]:
@@ -50,6 +50,16 @@ def glass(name: str, dispersion: bool = True) -> Constant | Sellmeier:
     if dispersion and "b" in entry:
         return Sellmeier(entry["b"], entry["c"], entry.get("a", 1.0))
     return Constant(entry["eta"])
+
+
+def index(value: Spectrum | str) -> Spectrum:
+    """What an index or a coefficient means: a glass by its name, or a colour that may exceed 1.
+
+    Raises UnknownKindError.
+    """
+    if isinstance(value, str):
+        return glass(value)
+    return RGBUnbounded(value.r, value.g, value.b) if isinstance(value, RGB) else value
 
 
 @cache

@@ -1,21 +1,21 @@
 /* Smooth boundary of two dielectrics, both sides: mirror reflection and refraction by Snell's law,
- * chosen by the mean of Fresnel's reflectance at the path's wavelengths. Radiance that is refracted is scaled by 1 / eta^2. */
+ * chosen by the mean of the boundary's reflectance at the path's wavelengths. Radiance that is
+ * refracted is scaled by 1 / eta^2. Thin films on the boundary bend nothing: their faces are parallel. */
 #include "lib/fresnel.cl"
 
 BsdfSample dielectric_sample(Dielectric m, vec3 wo, vec3 u)
 {
     BsdfSample s = bsdf_nothing();
-    Spectrum eta = relative_index(m.int_ior, m.ext_ior), one = spectrum_of(1.0f);
+    Spectrum eta = relative_index(m.int_ior, m.ext_ior);
     Fresnel hero = fresnel_dielectric(wo.z, eta.x);
-    Spectrum f = fresnel_spectrum(wo.z, eta);
-    real p = spectrum_mean(f);
-    mask reflected = u.z < p;
+    Boundary b = dielectric_boundary(m.layers, wo.z, eta, m.ext_ior);
+    mask reflected = u.z < b.p;
     real bend = -1.0f / hero.eta;
     vec3 refracted = v3(wo.x * bend, wo.y * bend, hero.cos_t);
-    Spectrum r = spectrum_mul(m.specular_reflectance, f);
-    Spectrum t = spectrum_scale(spectrum_mul(m.specular_transmittance, spectrum_sub(one, f)), bend * bend);
+    Spectrum r = spectrum_mul(m.specular_reflectance, b.r);
+    Spectrum t = spectrum_scale(spectrum_mul(m.specular_transmittance, b.t), bend * bend);
     s.wi = sel3(reflected, reflect_z(wo), normalize3(refracted));
-    real chosen = sel(reflected, p, 1.0f - p);
+    real chosen = sel(reflected, b.p, 1.0f - b.p);
     s.weight = spectrum_scale(spectrum_sel(reflected, r, t), 1.0f / chosen);
     s.pdf = sel(reflected | (hero.cos_t != 0.0f), chosen, (real)(0.0f)); /* the hero alone may be reflected totally */
     s.eta = sel(reflected, (real)(1.0f), hero.eta);

@@ -1,6 +1,7 @@
 /* Rough metal of mirror-like microfacets, front side (Cook and Torrance 1982; Walter et al. 2007
  * eq. 20): f = F D G / (4 |cos| |cos|) [1/sr], G the product of Smith's two; normals are sampled as
- * wo sees them. One bounce between facets: the energy of further ones is lost. */
+ * wo sees them. F is that of the thin films, if facets wear some. One bounce between facets: the energy
+ * of further ones is lost. */
 #include "lib/fresnel.cl"
 #include "lib/microfacet.cl"
 
@@ -14,7 +15,7 @@ BsdfSample rough_conductor_sample(RoughConductor m, vec3 wo, vec3 u)
     real cos_h = dot3(wo, h);
     mask seen = (wo.z > 0.0f) & (s.wi.z > 0.0f) & (cos_h > 0.0f);
     real g = microfacet_g1(d, s.wi, h);
-    Spectrum f = fresnel_conductor(clamp_r(cos_h, (real)(0.0f), (real)(1.0f)), m.eta, m.k);
+    Spectrum f = conductor_boundary(m.layers, clamp_r(cos_h, (real)(0.0f), (real)(1.0f)), m.eta, m.k);
     s.weight = spectrum_scale(spectrum_mul(m.specular_reflectance, f), g);
     real pdf = microfacet_visible_pdf(d, wo, h) / max_r(4.0f * cos_h, (real)(1e-20f));
     s.pdf = sel(seen, pdf, (real)(0.0f));
@@ -28,7 +29,7 @@ Spectrum rough_conductor_eval(RoughConductor m, vec3 wo, vec3 wi)
     mask front = (wo.z > 0.0f) & (wi.z > 0.0f);
     real g = microfacet_g1(d, wo, h) * microfacet_g1(d, wi, h);
     real v = microfacet_d(d, h) * g / max_r(4.0f * wo.z, (real)(1e-20f));
-    Spectrum f = fresnel_conductor(clamp_r(dot3(wo, h), (real)(0.0f), (real)(1.0f)), m.eta, m.k);
+    Spectrum f = conductor_boundary(m.layers, clamp_r(dot3(wo, h), (real)(0.0f), (real)(1.0f)), m.eta, m.k);
     return spectrum_scale(spectrum_mul(m.specular_reflectance, f), sel(front, v, (real)(0.0f)));
 }
 
@@ -42,5 +43,5 @@ real rough_conductor_pdf(RoughConductor m, vec3 wo, vec3 wi)
 
 Spectrum rough_conductor_albedo(RoughConductor m)
 {
-    return spectrum_mul(m.specular_reflectance, fresnel_conductor((real)(1.0f), m.eta, m.k));
+    return spectrum_mul(m.specular_reflectance, conductor_boundary(m.layers, (real)(1.0f), m.eta, m.k));
 }

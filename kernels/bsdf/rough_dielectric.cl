@@ -2,7 +2,7 @@
  * reflect or refract by Fresnel's share; normals are sampled as wo sees them. Radiance that is
  * refracted is scaled by 1 / eta^2. One event at a facet: the energy of further ones is lost.
  * With a dispersive index each wavelength has its own half vector, so eval is exact at all of them;
- * directions are sampled for the hero. */
+ * directions are sampled for the hero. Thin films on the facets change the shares, not the directions. */
 #include "lib/fresnel.cl"
 #include "lib/microfacet.cl"
 
@@ -19,13 +19,13 @@ inline Spectrum rough_dielectric_index(RoughDielectric m)
 /* What a pair of directions means at one index. */
 typedef struct {
     vec3 h;        /* half vector, on the front */
-    real f;        /* Fresnel's reflectance there */
+    Boundary b;    /* what the facet reflects and lets through */
     real jacobian; /* solid angle of normals per solid angle of wi, times |cos| between h and wi */
     real scale;    /* of radiance: 1, or 1 / eta^2 */
     mask facing;   /* both directions see the facet from their own sides */
 } RoughDielectricPair;
 
-inline RoughDielectricPair rough_dielectric_pair(vec3 wo, vec3 wi, real index)
+inline RoughDielectricPair rough_dielectric_pair(RoughDielectric m, vec3 wo, vec3 wi, real index)
 {
     RoughDielectricPair p;
     mask reflected = wo.z * wi.z > 0.0f;
@@ -33,7 +33,7 @@ inline RoughDielectricPair rough_dielectric_pair(vec3 wo, vec3 wi, real index)
     vec3 h = normalize3(madd3(wi, eta, wo));
     p.h = scale3(h, sel(h.z < 0.0f, (real)(-1.0f), (real)(1.0f)));
     real o = dot3(wo, p.h), i = dot3(wi, p.h);
-    p.f = fresnel_dielectric(clamp_r(o, (real)(-1.0f), (real)(1.0f)), index).f;
+    p.b = facet_boundary(m.layers, clamp_r(o, (real)(-1.0f), (real)(1.0f)), index, m.ext_ior);
     real bent = sqr(eta) * fabs(i) / max_r(sqr(o + eta * i), (real)(1e-20f));
     p.jacobian = sel(reflected, 0.25f / max_r(fabs(o), (real)(1e-20f)), bent);
     p.scale = 1.0f / sqr(eta);
@@ -42,21 +42,21 @@ inline RoughDielectricPair rough_dielectric_pair(vec3 wo, vec3 wi, real index)
 }
 
 /* f |cos| at one index but for the colours. */
-inline real rough_dielectric_value(Microfacets d, vec3 wo, vec3 wi, real index)
+inline Spectrum rough_dielectric_value(RoughDielectric m, Microfacets d, vec3 wo, vec3 wi, real index)
 {
-    RoughDielectricPair p = rough_dielectric_pair(wo, wi, index);
-    real share = sel(wo.z * wi.z > 0.0f, p.f, (1.0f - p.f) * p.scale);
+    RoughDielectricPair p = rough_dielectric_pair(m, wo, wi, index);
+    Spectrum share = spectrum_sel(wo.z * wi.z > 0.0f, p.b.r, spectrum_scale(p.b.t, p.scale));
     real pdf = microfacet_visible_pdf(d, wo, p.h) * p.jacobian;
-    return sel(p.facing, share * pdf * microfacet_g1(d, wi, p.h), (real)(0.0f));
+    return spectrum_scale(share, sel(p.facing, pdf * microfacet_g1(d, wi, p.h), (real)(0.0f)));
 }
 
 Spectrum rough_dielectric_eval(RoughDielectric m, vec3 wo, vec3 wi)
 {
     Microfacets d = microfacets_of(m.distribution, m.alpha_u, m.alpha_v);
     Spectrum eta = rough_dielectric_index(m);
-    Spectrum v = spectrum_of(rough_dielectric_value(d, wo, wi, eta.x));
+    Spectrum v = rough_dielectric_value(m, d, wo, wi, eta.x);
     if (any(spectrum_varies(eta))) {
-#define C(c) v.c = rough_dielectric_value(d, wo, wi, eta.c);
+#define C(c) v.c = rough_dielectric_value(m, d, wo, wi, eta.c).c;
         SPECTRUM_EACH(C)
 #undef C
     }
@@ -65,10 +65,10 @@ Spectrum rough_dielectric_eval(RoughDielectric m, vec3 wo, vec3 wi)
 }
 
 /* pdf, were the hero's index this one. */
-inline real rough_dielectric_density(Microfacets d, vec3 wo, vec3 wi, real index)
+inline real rough_dielectric_density(RoughDielectric m, Microfacets d, vec3 wo, vec3 wi, real index)
 {
-    RoughDielectricPair p = rough_dielectric_pair(wo, wi, index);
-    real share = sel(wo.z * wi.z > 0.0f, p.f, 1.0f - p.f);
+    RoughDielectricPair p = rough_dielectric_pair(m, wo, wi, index);
+    real share = sel(wo.z * wi.z > 0.0f, p.b.p, 1.0f - p.b.p);
     return sel(p.facing, share * microfacet_visible_pdf(d, wo, p.h) * p.jacobian, (real)(0.0f));
 }
 
@@ -76,9 +76,9 @@ Spectrum rough_dielectric_pdfs(RoughDielectric m, vec3 wo, vec3 wi)
 {
     Microfacets d = microfacets_of(m.distribution, m.alpha_u, m.alpha_v);
     Spectrum eta = rough_dielectric_index(m);
-    Spectrum v = spectrum_of(rough_dielectric_density(d, wo, wi, eta.x));
+    Spectrum v = spectrum_of(rough_dielectric_density(m, d, wo, wi, eta.x));
     if (any(spectrum_varies(eta))) {
-#define C(c) v.c = rough_dielectric_density(d, wo, wi, eta.c);
+#define C(c) v.c = rough_dielectric_density(m, d, wo, wi, eta.c);
         SPECTRUM_EACH(C)
 #undef C
     }
@@ -88,7 +88,7 @@ Spectrum rough_dielectric_pdfs(RoughDielectric m, vec3 wo, vec3 wi)
 real rough_dielectric_pdf(RoughDielectric m, vec3 wo, vec3 wi)
 {
     Microfacets d = microfacets_of(m.distribution, m.alpha_u, m.alpha_v);
-    return rough_dielectric_density(d, wo, wi, rough_dielectric_index(m).x);
+    return rough_dielectric_density(m, d, wo, wi, rough_dielectric_index(m).x);
 }
 
 BsdfSample rough_dielectric_sample(RoughDielectric m, vec3 wo, vec3 u)
@@ -100,7 +100,7 @@ BsdfSample rough_dielectric_sample(RoughDielectric m, vec3 wo, vec3 u)
     vec3 h = microfacet_visible(d, scale3(wo, sel(wo.z < 0.0f, (real)(-1.0f), (real)(1.0f))), uv);
     real o = dot3(wo, h);
     Fresnel f = fresnel_dielectric(o, eta.x);
-    mask reflected = u.z < f.f;
+    mask reflected = u.z < facet_boundary(m.layers, o, eta.x, m.ext_ior).p;
     vec3 refracted = normalize3(sub3(scale3(h, o / f.eta + f.cos_t), scale3(wo, 1.0f / f.eta)));
     s.wi = sel3(reflected, reflect_at(wo, h), refracted);
     mask kept = reflected == (wo.z * s.wi.z > 0.0f);

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from clpt.render.kinds import array_size
+from clpt.scene.materials import Layer
 from clpt.scene.params import SPECTRUM_ROLES, Kind, Param, device_params
 from tests.kernels.harness import COMPONENTS
 
@@ -36,6 +37,7 @@ def settings(
 
     Indices of refraction are by turns near 1 and well above, in either order, as lobes refracted by
     a ratio near one are too narrow for bins. The first half of them is equal at all wavelengths.
+    Every other one has thin films, if the kind takes them, which absorb nothing.
     """
     result = []
     for i in range(count):
@@ -45,6 +47,8 @@ def settings(
             if param.role == "index":
                 turn += 1
                 drawn[name] = _draw_index(turn % 2 == 0, mode, rng, disperses)
+            elif param.role == "layers":
+                drawn[name] = _draw_layers(rng) if i % 2 else ()
             else:
                 drawn[name] = _draw(param, mode, rng)
         result.append(drawn | {k: v for k, v in fixed.items() if k in drawn})
@@ -60,6 +64,11 @@ def _draw_index(dense: bool, mode: str, rng: np.random.Generator, disperses: boo
     c = COMPONENTS[mode]
     middle = rng.uniform(1.4, 2.0) if dense else rng.uniform(1.0, 1.1)
     return np.full(c, middle) + disperses * rng.uniform(0.0, 0.03, c)
+
+
+def _draw_layers(rng: np.random.Generator) -> tuple[Layer, ...]:
+    etas, thick = rng.uniform(1.2, 2.4, 2), rng.uniform(50.0, 400.0, 2)
+    return tuple(Layer(eta=e, thickness=t) for e, t in zip(etas, thick, strict=True))
 
 
 def _draw(param: Param, mode: str, rng: np.random.Generator) -> np.ndarray:

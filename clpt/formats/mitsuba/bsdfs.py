@@ -59,8 +59,12 @@ def _thin_dielectric(props: Properties) -> Parameters:
     }
 
 
+def _coated_dielectric(props: Properties) -> Parameters:
+    return {**_dielectric(props), "layers": _layers(props)}
+
+
 def _rough_dielectric(props: Properties) -> Parameters:
-    return {**_dielectric(props), **_roughness(props)}
+    return {**_coated_dielectric(props), **_roughness(props)}
 
 
 def _metal(props: Properties) -> Parameters:
@@ -80,11 +84,37 @@ def _conductor(props: Properties) -> Parameters:
     return {
         **_metal(props),
         "specular_reflectance": reflectance(props, "specular_reflectance", 1.0),
+        "layers": _layers(props),
     }
 
 
 def _rough_conductor(props: Properties) -> Parameters:
     return {**_conductor(props), **_roughness(props)}
+
+
+def _layers(props: Properties) -> list[materials.Layer]:
+    """The nested <bsdf type="layer">, a plugin of ours, from the outside in."""
+    return [_layer(element, props.context) for element in props.objects("bsdf")]
+
+
+def _layer(element: Element, context: Context) -> materials.Layer:
+    if element.type != "layer":
+        raise element.error("only a <bsdf> of the type 'layer' can stand here")
+    props = Properties(element, context)
+    given = props.named.get("eta")
+    with placed(element):
+        if given is not None and given.tag == "string":
+            eta = spectra.glass(props.text("eta", ""))
+        else:
+            eta = index(props, "eta", spectra.glass("water"))
+        made = materials.Layer(
+            eta=eta,
+            k=index(props, "k", 0.0),
+            thickness=props.number("thickness", 400.0),
+            profile=real(props, "profile", 1.0),
+        )
+    props.finish()
+    return made
 
 
 def _distribution(props: Properties) -> str:
@@ -174,7 +204,7 @@ def _nested(props: Properties, low: int, high: int) -> list[Material]:
 PLUGINS: dict[str, tuple[type[Material], Callable[[Properties], Parameters]]] = {
     "diffuse": (materials.Diffuse, _diffuse),
     "phong": (materials.Phong, _phong),
-    "dielectric": (materials.Dielectric, _dielectric),
+    "dielectric": (materials.Dielectric, _coated_dielectric),
     "thindielectric": (materials.ThinDielectric, _thin_dielectric),
     "roughdielectric": (materials.RoughDielectric, _rough_dielectric),
     "conductor": (materials.Conductor, _conductor),

@@ -46,7 +46,7 @@ def emission(props: Properties, name: str, *, textured: bool = False) -> Any:
     return value
 
 
-def index(props: Properties, name: str, default: float) -> Any:
+def index(props: Properties, name: str, default: Any) -> Any:
     """Take an optical constant of a conductor: a number, a colour or a spectrum."""
     value = _take(props, name, "index", default)
     if isinstance(value, Texture):

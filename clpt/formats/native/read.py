@@ -137,6 +137,8 @@ class _Reader:
             return cursor.number()
         if param.role == "orders":
             return tuple(cursor.numbers())
+        if param.role == "layers":
+            return [self.make(entry, materials.Layer, ()) for entry in cursor.entries()]
         return self.special[name](cursor) if name in self.special else self.plain(cursor, value)
 
     def plain(self, cursor: Cursor, value: Any) -> Any:

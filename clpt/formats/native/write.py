@@ -87,9 +87,16 @@ class _Writer:
             return self.kind(value)
         if param.role in SPECTRUM_ROLES and not isinstance(value, (int, float, tuple)):
             return json_spectra.write(value, param.role)
+        if param.role == "layers":
+            return [self.layer(layer) for layer in value]
         if isinstance(value, np.ndarray):
             return value.tolist()
         return list(value) if isinstance(value, tuple) else value
+
+    def layer(self, layer: materials.Layer) -> dict[str, Any]:
+        given = self.kind(layer)
+        del given["type"]
+        return given
 
     def material(self, material: materials.Material) -> Any:
         """Return a material, or its name in the table of named ones."""
