@@ -7,7 +7,7 @@ import logging
 
 import click
 
-COMMANDS = ("render", "devices", "info", "kernels", "bench")
+COMMANDS = ("render", "devices", "info", "inspect", "kernels", "bench")
 
 
 class _Commands(click.Group):

@@ -1,0 +1,113 @@
+"""`clpt inspect`: the values of pixels as they stand in the file, and a plot that shows them."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from clpt import images, spectral_exr
+from clpt.__main__ import run
+from clpt.cli.plots import strip
+from clpt.spectral_exr import SpectralImage
+
+NM = np.linspace(400.0, 700.0, 7)
+VALUES = np.random.default_rng(2).random((4, 6, 7)).astype(np.float32)
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def shows(path) -> bool:
+    """Whether a plot is a picture of more than paper and ink."""
+    with Image.open(path) as image:
+        return image.width > 600 and len(image.convert("RGB").getcolors(1 << 20)) > 100
+
+
+@pytest.mark.parametrize("emissive", [False, True])
+def test_spectra(here, capsys, emissive):
+    made = SpectralImage(VALUES, NM, emissive, exposure=1.0)
+    spectral_exr.write("a.exr", made)
+    assert run(["inspect", "a.exr", "--at", "5,3", "--at", "0, 1", "--json"]) == 0
+    out, err = capsys.readouterr()
+    told = json.loads(out)
+    assert told["wavelengths"] == NM.tolist()
+    assert told["size"] == "6 x 4"
+    assert told["holds"] == ("light" if emissive else "reflectances")
+    assert [p["at"] for p in told["pixels"]] == [[5, 3], [0, 1]]
+    np.testing.assert_array_equal(told["pixels"][0]["values"], VALUES[3, 5])
+    assert err.strip() == "a.spectrum.png"
+    assert shows("a.spectrum.png")
+
+
+def test_a_table(here, capsys):
+    spectral_exr.write("a.exr", SpectralImage(VALUES, NM, True))
+    assert run(["inspect", "a.exr", "--at", "2,1", "-o", "b.svg"]) == 0
+    out = capsys.readouterr().out
+    assert "radiance [W.m^-2.sr^-1.nm^-1]" in out
+    assert "7, 400 to 700 nm" in out
+    row = next(line for line in out.splitlines() if "450 nm" in line)
+    assert f"{VALUES[1, 2, 1]:.5g}" in row
+    assert (here / "b.svg").read_text().startswith("<?xml")
+
+
+def test_without_a_pixel_it_tells_of_the_file(here, capsys):
+    spectral_exr.write("a.exr", SpectralImage(VALUES, NM))
+    assert run(["inspect", "a.exr"]) == 0
+    assert "reflectances" in capsys.readouterr().out
+    assert sorted(p.name for p in here.iterdir()) == ["a.exr"]
+
+
+@pytest.mark.parametrize("name", ["a.png", "a.exr", "a.hdr", "a.npy"])
+def test_other_images(here, capsys, name):
+    images.write(name, np.full((2, 3, 3), [0.25, 0.5, 1.0]), half=False)
+    assert run(["inspect", name, "--at", "2,1", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["channels"] == ["R", "G", "B"]
+    np.testing.assert_allclose(told["pixels"][0]["values"], [0.25, 0.5, 1.0], atol=5e-3)
+    assert shows("a.spectrum.png")
+
+
+def test_layers_and_values_that_are_not_finite(here, capsys):
+    picture = np.full((2, 3, 3), np.nan)
+    images.write("a.exr", picture, half=False, layers={"depth": np.full((2, 3), np.inf)})
+    assert run(["inspect", "a.exr", "--at", "0,0"]) == 0
+    out = capsys.readouterr().out
+    assert "depth" in out
+    assert "inf" in out
+    broken = SpectralImage(np.full((1, 1, 3), np.nan), [400.0, 500.0, 600.0])
+    spectral_exr.write("b.exr", broken)
+    assert run(["inspect", "b.exr", "--at", "0,0"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["a.exr", "--at", "6,0"], "6,0 is outside of the image of 6 x 4 pixels"),
+        (["a.exr", "--at", "0,4"], "whose last one is 5,3"),
+        (["a.exr", "--at", "1;2"], "'1;2' does not look like 120,80"),
+        (["a.exr", "--at", "0,0", "-o", "a.jpg"], "a plot is written to .png"),
+        (["a.exr", "--at", "0,0", "-o", "none/a.png"], "cannot be written"),
+        (["none.exr"], "no such image file"),
+        (["text.exr"], "not a readable image"),
+        (["text.doc"], "unknown image suffix"),
+    ],
+)
+def test_what_cannot_be_is_told(here, capsys, arguments, words):
+    spectral_exr.write("a.exr", SpectralImage(VALUES, NM))
+    for name in ("text.exr", "text.doc"):
+        (here / name).write_text("no image")
+    assert run(["inspect", *arguments]) == 2
+    assert words in capsys.readouterr().err
+
+
+def test_the_strip_is_a_rainbow():
+    """Dark at the ends of sight, blue at 450 nm, green at 530, red at 640."""
+    colours = strip(np.array([360.0, 450.0, 530.0, 640.0, 800.0]))[0].astype(int)
+    assert colours[[0, 4]].max() < 30
+    assert [int(np.argmax(c)) for c in colours[1:4]] == [2, 1, 0]
