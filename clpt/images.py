@@ -17,9 +17,10 @@ from numpy.typing import ArrayLike, NDArray
 from PIL import Image, UnidentifiedImageError
 
 from .errors import SceneError
+from .spectra.spaces import between, chromaticities
 
 Array = NDArray[np.float32]
-Metadata = Mapping[str, str | int | float]
+Metadata = Mapping[str, str | int | float | tuple[float, ...]]
 
 _HALF_MAX = 65504.0
 _PILLOW = (".png", ".jpg", ".jpeg", ".tga", ".bmp", ".webp", ".gif", ".tif", ".tiff")
@@ -60,26 +61,31 @@ def write(
     metadata: Metadata | None = None,
     exposure: float = 0.0,
     layers: Mapping[str, ArrayLike] | None = None,
+    space: str = "rec709",
 ) -> None:
     """Write a linear (h, w), (h, w, 1), (h, w, 3) or (h, w, 4) image in the format of the suffix.
 
     .exr: half or float, with attributes from `metadata` and further `layers`, name -> (h, w) as
     the channel of that name, or (h, w, 3) as its .R, .G, .B. .png: sRGB transfer, 8 bit, scaled by
     2^exposure; NaN is black there, values beyond [0, 1] are clipped. .hdr, .pfm, .npy: as it is.
+    space: of the colours, see clpt.spectra.spaces; an .exr states it by its chromaticities, a .png
+    is converted to sRGB, white to white.
 
-    Raises SceneError if the suffix is unknown, the shape does not fit or the file cannot be made.
+    Raises SceneError if the suffix or the space is unknown, the shape does not fit or the file
+    cannot be made.
     """
     path = check_output(path)
     pixels = np.asarray(image, np.float32)
     pixels = pixels[..., None] if pixels.ndim == 2 else pixels
     if pixels.ndim != 3 or pixels.shape[2] not in (1, 3, 4) or pixels.size == 0:
         _fail(path, f"cannot write an image of shape {pixels.shape}; (h, w, 1, 3 or 4) is needed")
+    stated: Metadata = {"chromaticities": chromaticities(space)} if pixels.shape[2] > 1 else {}
     try:
         suffix = path.suffix.lower()
         if suffix == ".exr":
-            _write_exr(path, pixels, half, metadata or {}, layers or {})
+            _write_exr(path, pixels, half, {**stated, **(metadata or {})}, layers or {})
         elif suffix == ".png":
-            stored = to_srgb8(pixels, exposure)
+            stored = to_srgb8(_to_rec709(pixels, space), exposure)
             Image.fromarray(stored[..., 0] if stored.shape[2] == 1 else stored).save(path)
         elif suffix == ".hdr":
             _write_hdr(path, pixels)
@@ -156,6 +162,14 @@ def to_srgb8(image: Array, exposure: float = 0.0) -> NDArray[np.uint8]:
     shown = linear_to_srgb(np.clip(colour * np.float32(2.0**exposure), 0, 1))
     values = np.concatenate([shown, np.clip(alpha, 0, 1)], axis=2)
     return np.round(values * 255).astype(np.uint8)
+
+
+def _to_rec709(pixels: Array, space: str) -> Array:
+    """Colours (h, w, 3 or 4) of a space in linear Rec. 709, white to white; alpha stays."""
+    if space == "rec709" or pixels.shape[2] == 1:
+        return pixels
+    matrix = between(space, "rec709").astype(np.float32)
+    return np.concatenate([pixels[..., :3] @ matrix.T, pixels[..., 3:]], axis=2)
 
 
 def _fail(path: Path, message: str) -> NoReturn:

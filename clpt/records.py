@@ -71,8 +71,13 @@ SETTINGS = Record(
     infinite_count=("integer", "how many of them are infinite; these come first"),
     lambda_min=("real", "[nm]"),
     lambda_max=("real", "[nm]"),
-    tanh_min=("real", "tanh of the wavelength importance at lambda_min"),
-    tanh_max=("real", "and at lambda_max"),
+    tanh_min=("real", "tanh of the wavelength importance where the sensor begins to respond"),
+    tanh_max=("real", "and where it ends"),
+    bands=("integer", "of a spectral film"),
+    density=("integer", "first word in `distributions` of the density of wavelengths"),
+    to_first=("vec3", "from a film's sums to the picture: what makes its first channel"),
+    to_second=("vec3", "its second"),
+    to_third=("vec3", "its third"),
     scene_radius=("real", "of the sphere around the scene [m]"),
     center=("vec3", "of that sphere [m]"),
 )
@@ -120,6 +125,6 @@ TABLES: dict[str, tuple[str, str]] = {
     "spectra": ("float", "tabulated spectra on the common grid"),
     "textures": ("uint", "parameters of the textures, a row each"),
     "texels": ("float", "of all bitmaps and environment maps"),
-    "distributions": ("float", "cumulative distributions of the environment maps"),
+    "distributions": ("float", "of the filter, the environment maps and the wavelengths"),
     "camera": ("float", "the camera's parameters"),
 }

@@ -8,6 +8,7 @@ from PIL import Image
 
 from clpt import images
 from clpt.errors import SceneError
+from clpt.spectra import spaces
 
 rng = np.random.default_rng(1)
 
@@ -133,6 +134,35 @@ def test_exr_metadata_and_layers(tmp_path):
     np.testing.assert_array_equal(layers["depth.Z"], depth)
     np.testing.assert_array_equal(layers["normal.G"], normal[..., 1])
     np.testing.assert_array_equal(images.read(path), image)
+
+
+@pytest.mark.parametrize("space", spaces.SPACES)
+def test_exr_states_its_space(tmp_path, space):
+    """By its chromaticities, from which colour-science makes the same matrix to XYZ."""
+    import OpenEXR
+
+    images.write(tmp_path / "a.exr", picture(), space=space)
+    with OpenEXR.File(str(tmp_path / "a.exr")) as file:
+        stated = np.reshape(file.header()["chromaticities"], (4, 2))
+    np.testing.assert_allclose(stated.ravel(), spaces.chromaticities(space), atol=1e-6)
+    colour = pytest.importorskip("colour")
+    matrix = colour.normalised_primary_matrix(stated[:3], stated[3])
+    np.testing.assert_allclose(matrix, spaces.to_xyz(space), atol=1e-4)
+
+
+@pytest.mark.parametrize("space", spaces.SPACES)
+def test_png_is_srgb_whatever_the_space(tmp_path, space):
+    """The same colours in any space make the same file; alpha stays."""
+    rgb = np.clip(picture(4) / 4, 0.05, 0.95)
+    rgb[0, 0, :3] = 1.0
+    other = rgb.copy()
+    other[..., :3] = rgb[..., :3] @ spaces.between("rec709", space).T
+    images.write(tmp_path / "a.png", rgb)
+    images.write(tmp_path / "b.png", other, space=space)
+    ours, theirs = (images.read(tmp_path / name, linear=False) for name in ("b.png", "a.png"))
+    np.testing.assert_allclose(ours, theirs, atol=1.01 / 255)
+    with pytest.raises(SceneError, match="rec709"):
+        images.write(tmp_path / "a.png", rgb, space="srgb")
 
 
 def test_exr_half_does_not_overflow(tmp_path):

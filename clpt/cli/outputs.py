@@ -13,6 +13,7 @@ from ..scene import Scene
 from ..scene.integrators import Aov
 
 AOV_FORMATS = (".exr", ".png")
+BAND_FORMATS = (".npy",)  # that hold all bands; others hold their colours
 COLUMNS = 4  # of the sheet of an aov .png
 
 
@@ -54,12 +55,20 @@ def write(
     path: Path, renderer: Renderer, facts: dict[str, str | int | float], exposure: float
 ) -> None:
     """Write the picture so far. Raises SceneError."""
-    if not renderer.channels:
-        images.write(path, renderer.image(), metadata=facts, exposure=exposure)
+    film = renderer.scene.film
+    if film.bands and path.suffix.lower() in BAND_FORMATS and not renderer.channels:
+        _write_bands(path, renderer, facts)
+    elif not renderer.channels:
+        picture = renderer.colours()
+        images.write(path, picture, metadata=facts, exposure=exposure, space=film.output_space)
     elif path.suffix.lower() == ".png":
         images.write(path, sheet(renderer.layers()), exposure=exposure)
     else:
         _write_layers(path, renderer.layers(), facts)
+
+
+def _write_bands(path: Path, renderer: Renderer, facts: dict[str, str | int | float]) -> None:
+    np.save(path, renderer.image())
 
 
 def _write_layers(

@@ -15,6 +15,8 @@ from ..formats import load
 from ..render.renderer import Renderer
 from ..scene import Scene, kinds
 from ..scene.params import Kind, params
+from ..spectra import read_sensor, spaces
+from ..spectra.sensors import OBSERVERS
 from . import outputs, report
 from .display import display
 from .exposing import expose
@@ -57,6 +59,28 @@ class Duration(click.ParamType):
         return seconds
 
 
+class SensorName(click.ParamType):
+    """An observer's name, or the file of a camera's curves."""
+
+    name = "NAME-OR-FILE"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        return value if value in OBSERVERS else read_sensor(value)
+
+
+class White(click.ParamType):
+    """none, an illuminant, a colour temperature in K such as 3200, or a chromaticity x,y."""
+
+    name = "WHITE"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        try:
+            numbers = [float(part) for part in str(value).split(",")]
+        except ValueError:
+            return value
+        return numbers[0] if len(numbers) == 1 else tuple(numbers)
+
+
 @click.command()
 @click.argument("scene", type=click.Path(path_type=Path))
 @click.option(
@@ -72,6 +96,10 @@ class Duration(click.ParamType):
 @click.option("--device", metavar="NAME-OR-INDEX", help="Where to render: see `clpt devices`.")
 @click.option("--integrator", metavar="NAME", help=f"One of {', '.join(kinds('integrator'))}.")
 @click.option("--max-depth", type=click.IntRange(-1, 4000), help="Longest path; -1: no limit.")
+@click.option("--sensor", type=SensorName(), help="cie1931, cie1964 or a file of three curves.")
+@click.option("--white-balance", type=White(), help="What becomes white: none, D65, 3200 or x,y.")
+@click.option("--output-space", type=click.Choice(spaces.SPACES), help="Of the picture's colours.")
+@click.option("--bands", type=click.IntRange(0), help="Of a spectral picture, for .npy and .exr.")
 @click.option("--exposure", type=float, default=0.0, help="Brighten .png by this many stops.")
 @click.option("-D", "defines", multiple=True, metavar="NAME=VALUE", help="Set a $name of an .xml.")
 @click.option("--verbose", is_flag=True, help="Tell of memory, trees, programs and stages.")
@@ -131,10 +159,14 @@ def changed(
     seed: int | None = None,
     integrator: str | None = None,
     max_depth: int | None = None,
+    **film: Any,
 ) -> Scene:
-    """Return the scene with what is not None in place of its own. Raises click.BadParameter."""
-    film: dict[str, Any] = {} if size is None else {"width": size[0], "height": size[1]}
-    film |= {} if mode is None else {"mode": mode}
+    """Return the scene with what is not None in place of its own, `film` in that of its film.
+
+    Raises click.BadParameter, and SceneError for a film that makes no sense.
+    """
+    film = {name: value for name, value in {"mode": mode, **film}.items() if value is not None}
+    film |= {} if size is None else {"width": size[0], "height": size[1]}
     given: dict[str, Any] = {"spp": spp, "seed": seed}
     given["film"] = dataclasses.replace(scene.film, **film)
     if integrator is not None and integrator != scene.integrator.kind:

@@ -178,6 +178,11 @@ def _host(name: str, value: Any) -> str:
         width, item = ARRAYS[name]
         return f"rows of {width} {item}s"
     special = {"image": "name of an image file", "emission": "`area` light", "back": "material"}
+    special |= {
+        "sensor": '`cie1931`, `cie1964`, `{"file": name}` or `{"curves": [three spectra]}`,'
+        " the latter two perhaps with a `matrix`",
+        "white_balance": "`none`, an illuminant, a number [K] or `[x, y]`",
+    }
     if name in special:
         return special[name]
     if isinstance(value, materials.Material):

@@ -19,6 +19,8 @@ from clpt.formats.native.read import ARRAYS, BASES, default
 from clpt.formats.native.spectra import SPECTRA
 from clpt.scene import KINDS, integrators, materials
 from clpt.scene.params import ORDERS, SPECTRUM_ROLES, Kind, Param, params
+from clpt.spectra.sensors import OBSERVERS
+from clpt.spectra.spaces import TEMPERATURES
 
 Schema = dict[str, Any]
 
@@ -140,6 +142,13 @@ def _host(name: str, value: Any) -> Schema:
         name_of_file = {"type": "string"}
         six = {"type": "array", "items": name_of_file, "minItems": 6, "maxItems": 6}
         return {"anyOf": [name_of_file, six]}
+    if name == "sensor":
+        return {"anyOf": [{"enum": list(OBSERVERS)}, _sensor()]}
+    if name == "white_balance":
+        low, high = TEMPERATURES
+        lights = {"enum": ["none", *spectra.illuminants()]}
+        kelvin = {"type": "number", "minimum": low, "maximum": high, "description": "[K]"}
+        return {"anyOf": [lights, kelvin, {**NUMBERS, "minItems": 2, "maxItems": 2}]}
     if name == "emission":
         return {"anyOf": [_ref("light"), {"type": "null"}]}
     if name == "back" or isinstance(value, materials.Material):
@@ -153,6 +162,19 @@ def _host(name: str, value: Any) -> Schema:
         return {"type": "array", "items": {"type": "string"}} if _names(value) else TRIPLE
     names = {bool: "boolean", int: "integer", float: "number", str: "string"}
     return {"type": names[type(value)]}
+
+
+def _sensor() -> Schema:
+    curve = {"anyOf": [{"type": "number"}, _ref("spectrum")]}
+    curves = {"type": "array", "items": curve, "minItems": 3, "maxItems": 3}
+    matrix = {**_rows(3, count=3), "description": "from responses to XYZ; fitted if not given"}
+    file = {"type": "string", "description": "wavelengths [nm] and three values a row"}
+    return {
+        "anyOf": [
+            _object({"file": file, "matrix": matrix}, ["file"]),
+            _object({"curves": curves, "matrix": matrix}, ["curves"]),
+        ]
+    }
 
 
 def _names(value: tuple[Any, ...]) -> bool:

@@ -8,7 +8,7 @@ from clpt.errors import SceneError
 from clpt.render import shapes
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
-from clpt.scene.integrators import Film, Filter, Integrator, Sampler
+from clpt.scene.integrators import Aov, Film, Filter, Integrator, Sampler
 from clpt.scene.lights import Area, Light
 from clpt.scene.shapes import Shape
 
@@ -30,6 +30,10 @@ def check(scene: Scene) -> None:
         _check_kind(shape, Shape, f"shapes[{i}]")
         if not isinstance(shape.emission, (Area, type(None))):
             raise SceneError("its emission must be an `area` light", where=shapes.where(shape))
+    if scene.film.mode == "rgb" and not isinstance(scene.integrator, Aov):
+        for name, plain in (("sensor", "cie1931"), ("bands", 0)):
+            if getattr(scene.film, name) != plain:
+                raise SceneError("needs the mode spectral", where=f"film.{name}")
     width, height = scene.film.width, scene.film.height
     if width * height > LARGEST:
         raise SceneError(f"{width}x{height} are more than {LARGEST >> 20} Mi pixels", where="film")

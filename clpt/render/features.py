@@ -37,6 +37,8 @@ class Features:
     absorption: bool = False  # inside of a dielectric
     glass_lens: bool = False  # of a glass that disperses
     channel: str = ""
+    bands: bool = False  # a spectral film
+    tabulated_density: bool = False  # of wavelengths
     spectra_size: int = 0
     spectra_step: float = 1.0
     sources: Sources = field(default_factory=dict)

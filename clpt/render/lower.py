@@ -14,13 +14,15 @@ from clpt.errors import SceneError
 from clpt.records import SETTINGS, SHAPE
 from clpt.render import cameras, filters, lights, shapes
 from clpt.render.checks import check
+from clpt.render.colour import output_matrix, sensor
 from clpt.render.features import Features
 from clpt.render.kinds import row_words
 from clpt.render.tables import STEP, Tables
+from clpt.render.wavelengths import Density, density
 from clpt.scene import materials as mt
 from clpt.scene.params import device_params, params
 from clpt.spectra import Constant
-from clpt.spectra.cie import _tanh_ends as tanh_ends
+from clpt.spectra.cie import tanh_ends
 
 SHAPE_NORMALS, SHAPE_UVS, SHAPE_TWO_SIDED, SHAPE_ONE_LIGHT = 1, 2, 4, 8
 MIXTURE = 0xFF
@@ -71,7 +73,11 @@ class _Lowering:
         self.scene = scene
         self.channels = getattr(scene.integrator, "channels", ())
         self.mode = "rgb" if self.channels else film.mode
-        self.tables = Tables(self.mode, film.lambda_min, film.lambda_max)
+        own = Density(film.lambda_min, film.lambda_max)
+        self.density = density(scene) if self.mode == "spectral" else own
+        self.tables = Tables(
+            self.mode, film.lambda_min, film.lambda_max, sensor(film), self.density
+        )
         self.warnings: list[str] = []
         self.leaves = _leaf_kinds(scene)
         self.words: dict[tuple[int, str], int] = {}
@@ -82,6 +88,10 @@ class _Lowering:
     def run(self) -> Lowered:
         scene, tables = self.scene, self.tables
         filters.lower_filter(scene.film.filter, tables)  # first in its table
+        self.tabulated = self.mode == "spectral" and self.density.values is not None
+        self.first_density = tables.size("distributions")
+        if self.tabulated:
+            tables.append_floats("distributions", self.density.words())
         tables.append("materials", np.zeros(LONGEST_ROW, np.uint32))  # what idle lanes read
         flat = [s for s in scene.shapes if s.kind not in shapes.ANALYTIC]
         analytic = [s for s in scene.shapes if s.kind in shapes.ANALYTIC]
@@ -249,6 +259,8 @@ class _Lowering:
             or any(_LEAVES[kind].disperses for kind in self.leaves),
             glass_lens=glass_lens,
             channel=self.channels[0] if self.channels else "",
+            bands=bool(scene.film.bands) and not self.channels,
+            tabulated_density=self.tabulated,
             spectra_size=tables.spectra_size,
             spectra_step=STEP,
             sources=sources,
@@ -275,7 +287,11 @@ class _Lowering:
         settings["first_analytic"] = len(scene.shapes) - analytic
         settings["analytic_count"] = analytic
         settings["lambda_min"], settings["lambda_max"] = film.lambda_min, film.lambda_max
-        settings["tanh_min"], settings["tanh_max"] = tanh_ends(film.lambda_min, film.lambda_max)
+        settings["tanh_min"], settings["tanh_max"] = tanh_ends(self.density.lo, self.density.hi)
+        settings["bands"] = film.bands
+        settings["density"] = self.first_density
+        matrix = np.eye(3) if self.channels else output_matrix(film, self.mode)
+        settings["to_first"], settings["to_second"], settings["to_third"] = matrix
         settings["scene_radius"], settings["center"] = radius, center
         return settings
 

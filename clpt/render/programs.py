@@ -13,7 +13,6 @@ from clpt.render import cameras, films, kinds, lights, shapes, textures
 from clpt.render.features import Features
 from clpt.scene import materials
 from clpt.scene.params import device_params, interior_params
-from clpt.spectra import XYZ_TO_REC709
 
 LEAVES = {cls.kind: cls for cls in materials.LEAVES}
 
@@ -35,6 +34,8 @@ def sources(
         "shadow": _source("shadow", shared, common, trace_lanes),
         "accumulate": _source("accumulate", shared, common, 1),
     }
+    if features.bands:
+        made["bands"] = _source("bands", shared, common, 1)
     if features.mixtures:
         made["mix"] = _source("mix", shared, common, lanes)
     if queued:
@@ -79,8 +80,8 @@ def _defines(features: Features) -> dict[str, str | int | float]:
         made["FILTER_BOX"] = 1
     if features.channel:
         made["CHANNEL"] = f"CHANNEL_{features.channel.upper()}"
-    for i, value in enumerate(XYZ_TO_REC709.ravel()):
-        made[f"XYZ_TO_REC709_{i}"] = f"{value:.9g}f"
+    if features.bands:
+        made["USES_BANDS"] = 1
     return made
 
 
@@ -91,7 +92,8 @@ def _shared(features: Features, layout: str) -> dict[str, str]:
         **lights.virtual_files(),
         "generated/scene.cl": scene_text(),
         "generated/spectrum.cl": f'#include "spectrum/{features.mode}.cl"\n',
-        "generated/spectrum_read.cl": f'#include "spectrum/{features.mode}_read.cl"\n',
+        "generated/spectrum_read.cl": _spectrum_text(features),
+        "generated/bands.cl": '#include "lib/bands.cl"\n' if features.bands else "",
         "generated/sampler.cl": f'#include "sampler/{features.sampler}.cl"\n',
         "generated/camera.cl": _camera_text(features.camera, features.glass_lens),
         "generated/textures.cl": textures.dispatch_text(features.textures, features.texture_roles),
@@ -107,6 +109,15 @@ def _shared(features: Features, layout: str) -> dict[str, str]:
         "generated/shape_traversal.cl": '#include "bvh/shapes.cl"\n' if features.analytic else "",
         "generated/integrator.cl": f'#include "integrator/{features.integrator}.cl"\n',
     }
+
+
+def _spectrum_text(features: Features) -> str:
+    """Reading spectra in a mode, and how the camera draws wavelengths."""
+    text = f'#include "spectrum/{features.mode}_read.cl"\n'
+    if features.mode == "spectral":
+        drawn = "density" if features.tabulated_density else "visible"
+        text += f'#include "spectrum/{drawn}.cl"\n'
+    return text
 
 
 def scene_text() -> str:

@@ -89,10 +89,17 @@ class Renderer:
         return True
 
     def image(self) -> Image:
-        """The picture so far: (h, w, 3) float32 linear Rec. 709; of `aov`, (h, w, channels)."""
-        if not self.channels:
-            return self.wavefronts[0].image()
-        return np.concatenate(list(self.layers().values()), axis=2)
+        """The picture so far: (h, w, 3) float32, linear in the film's output space.
+
+        Of a film with bands (h, w, bands), the mean radiance in each; of `aov` (h, w, channels).
+        """
+        if self.channels:
+            return np.concatenate(list(self.layers().values()), axis=2)
+        return self.wavefronts[0].bands() if self.scene.film.bands else self.colours()
+
+    def colours(self) -> Image:
+        """The picture so far in three colours, (h, w, 3) float32, also of a film with bands."""
+        return self.wavefronts[0].image()
 
     def layers(self) -> dict[str, Image]:
         """The values of the `aov` integrator by name, (h, w, 1 to 3) float32."""
@@ -110,7 +117,7 @@ def render(
     progress: Callable[[Progress], bool] | None = None,
     **wavefront: Any,
 ) -> Image:
-    """Render a scene: (h, w, 3) float32 linear Rec. 709 (of `aov`, all its channels).
+    """Render a scene: (h, w, 3) float32 linear Rec. 709; else see `Renderer.image`.
 
     spp: samples per pixel, the scene's own by default. Raises as `Renderer` does.
     """

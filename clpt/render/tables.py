@@ -12,8 +12,9 @@ from clpt import spectra
 from clpt.records import TABLES
 from clpt.render.films import layers_words
 from clpt.render.kinds import ORDERS_WORDS, REAL_WORDS, SPECTRUM_WORDS
+from clpt.render.wavelengths import Density
 from clpt.scene.params import Kind, device_params, interior_params
-from clpt.spectra import RGB, Constant, RGBIlluminant, Spectrum
+from clpt.spectra import RGB, Constant, RGBIlluminant, Sensor, Spectrum, observer
 from clpt.spectra.spectrum import Role, d65, on_grid
 
 STEP = 1.0  # [nm] of the tabulated spectra
@@ -36,12 +37,20 @@ def as_words(values: ArrayLike) -> Words:
 class Tables:
     """The read-only tables of a scene, by the names in clpt.records.TABLES.
 
-    mode: "spectral" or "rgb"; lambda_min, lambda_max: the film's range [nm].
+    mode: "spectral" or "rgb"; lambda_min, lambda_max: the film's range [nm]; sensor: what it
+    records with, by default cie1931; density: of its wavelengths, by default visible importance.
     `sources` tells, per kind and parameter, where values come from: "constant", "table", "texture",
     "layers".
     """
 
-    def __init__(self, mode: str, lambda_min: float = 360.0, lambda_max: float = 830.0):
+    def __init__(
+        self,
+        mode: str,
+        lambda_min: float = 360.0,
+        lambda_max: float = 830.0,
+        sensor: Sensor | None = None,
+        density: Density | None = None,
+    ):
         self.mode, self.lambda_min, self.lambda_max = mode, lambda_min, lambda_max
         self.sources: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
         self.textures: dict[tuple[int, str], int] = {}
@@ -52,7 +61,7 @@ class Tables:
         self._spectra: dict[Any, int] = {}
         self._rows: dict[tuple[int, str], int] = {}
         if mode == "spectral":
-            self._sensor()
+            self._sensor(sensor or observer("cie1931"), density or Density(lambda_min, lambda_max))
 
     @property
     def spectral(self) -> bool:
@@ -100,14 +109,21 @@ class Tables:
             self._spectra[spectrum] = self.append_floats("spectra", values) // self.spectra_size
         return self._spectra[spectrum]
 
-    def _sensor(self) -> None:
-        """Rows 0 to 3: D65, and the observer's curves over the wavelength pdf, so Y of 1 is 1."""
+    def _sensor(self, sensor: Sensor, density: Density) -> None:
+        """Rows 0 to 3: D65, and the sensor's curves, scaled so that Y of 1 is 1.
+
+        Where visible importance is the density the curves are over it, as it is smooth.
+        """
         self.spectra_row(d65())
         lambdas = self.lambda_min + STEP * np.arange(self.spectra_size)
         inside = np.minimum(lambdas, self.lambda_max)  # the last sample may lie past the end
-        pdf = spectra.wavelength_pdf(inside, self.lambda_min, self.lambda_max)
-        curves = spectra.cie_xyz(inside) / pdf[:, None] / spectra.CIE_Y_INTEGRAL
-        self.append_floats("spectra", curves.T)
+        curves = sensor.sample(inside)
+        if density.values is None:
+            pdf = density.pdf(inside)
+            curves = np.where(
+                pdf[:, None] > 0.0, curves / np.where(pdf > 0.0, pdf, 1.0)[:, None], 0
+            )
+        self.append_floats("spectra", (curves / spectra.CIE_Y_INTEGRAL).T)
 
     def spectrum_words(self, value: Spectrum | str, role: str) -> tuple[Words, str]:
         """Return the five words of a spectrum and its source: "constant" or "table".

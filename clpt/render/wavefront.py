@@ -167,8 +167,18 @@ class Wavefront:
         settings = self.lowered.settings
         self.film_bytes = 4 * FILM_WORDS * int(settings["places"]) * int(settings["planes"])
         pixels = int(settings["width"]) * int(settings["height"])
-        for name, size in (("film", self.film_bytes), ("image", 12 * pixels)):
-            self.named[name] = self.buffers.allocate(f"the {name}", size, "lower the image's size")
+        sizes = {"film": self.film_bytes, "image": 12 * pixels}
+        advice = "lower the image's size"
+        if self.lowered.features.bands:
+            bands = int(settings["bands"])
+            advice += " or the number of bands"
+            sizes["bands"] = 8 * bands * int(settings["places"]) * int(settings["planes"])
+            sizes["band_image"] = 4 * bands * pixels
+            if sizes["bands"] // 4 >= 1 << 31:  # kernels/lib/bands.cl counts words by an int
+                raise MemoryBudgetError("the bands", sizes["bands"], 1 << 33, advice)
+        for name, size in sizes.items():
+            self.named[name] = self.buffers.allocate(f"the {name}", size, advice)
+        self.band_bytes = sizes.get("bands", 0)
         self.clear()
         self._bind()
 
@@ -189,7 +199,9 @@ class Wavefront:
             self._step(f"shade_{kind}", "shade", self.lanes)
         if any(not programs.LEAVES[k].delta for k in self.lowered.features.materials):
             self._step("shadow", "shadow", self.lanes if brute else 1)
-        self.accumulate = self._bound("accumulate", "accumulate", raw=0)
+        self.accumulate = self._bound("accumulate", "accumulate")
+        if self.lowered.features.bands:
+            self.accumulate_bands = self._bound("bands", "accumulate_bands")
 
     def _bound(self, program: str, name: str, **given: Any) -> device.Bound:
         kernel = self.programs[program].kernel(name)
@@ -207,6 +219,8 @@ class Wavefront:
         """Empty the film and begin again at sample 0."""
         self.counts = Counts()
         self._fill("film", 0, 0, self.film_bytes)
+        if self.band_bytes:
+            self._fill("bands", 0, 0, self.band_bytes)
 
     def _fill(self, name: str, value: int, offset: int, size: int) -> None:
         cl.enqueue_fill_buffer(self.device.queue, self.named[name], np.uint32(value), offset, size)
@@ -261,7 +275,19 @@ class Wavefront:
             setattr(self.counts, name, getattr(self.counts, name) + n)
 
     def image(self) -> np.ndarray:
-        """The picture so far, (h, w, 3) float32 linear Rec. 709."""
-        width, height = (int(self.lowered.settings[n]) for n in ("width", "height"))
+        """The picture so far, (h, w, 3) float32 in the film's output space."""
+        width, height = self._size
         self.accumulate.enqueue(self.device.queue, (width, height))
         return self.buffers.download(self.named["image"], (height, width, 3), np.float32)
+
+    def bands(self) -> np.ndarray:
+        """The mean radiance in each band so far, (h, w, bands) float32, of a film with bands."""
+        width, height = self._size
+        self.accumulate_bands.enqueue(self.device.queue, (width, height))
+        shape = (height, width, int(self.lowered.settings["bands"]))
+        return self.buffers.download(self.named["band_image"], shape, np.float32)
+
+    @property
+    def _size(self) -> tuple[int, int]:
+        """Width and height of the film [pixels]."""
+        return int(self.lowered.settings["width"]), int(self.lowered.settings["height"])

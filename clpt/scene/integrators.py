@@ -5,8 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from clpt.errors import SceneError, UnknownKindError
 from clpt.scene.params import Kind, choice, emission, flag, host, real
+from clpt.spectra import Sensor, illuminants, spaces
+from clpt.spectra.sensors import OBSERVERS
+from clpt.spectra.spaces import TEMPERATURES
 
 CHANNELS = {  # of the aov integrator: how many values each has
     "depth": 1,
@@ -18,6 +23,9 @@ CHANNELS = {  # of the aov integrator: how many values each has
     "shape_id": 1,
     "primitive_id": 1,
 }
+
+
+MOST_BANDS = 1024
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -136,7 +144,14 @@ class BlackmanHarris(Filter):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Film(Kind):
-    """What is recorded: size, mode, wavelengths, filter."""
+    """What is recorded: size, mode, wavelengths, filter, and how light becomes colour.
+
+    With `bands` a pixel holds the mean radiance [W m^-2 sr^-1 nm^-1] of as many equal parts of the
+    range of wavelengths. `white_balance` makes that illuminant the white of `output_space`
+    (Bradford); without it colours are as the sensor tells them. A `sensor` other than cie1931 and
+    `bands` need the spectral mode. The aov integrator records values, no colours: none of this
+    changes them.
+    """
 
     width: int = host(768, "pixels")
     height: int = host(576, "pixels")
@@ -144,6 +159,17 @@ class Film(Kind):
     filter: Filter = host(Box(), "pixel filter")
     lambda_min: float = real(360.0, "shortest wavelength", "nm", 200.0, 2000.0)
     lambda_max: float = real(830.0, "longest wavelength", "nm", 200.0, 2000.0)
+    wavelengths: str = choice(
+        "auto",
+        "how they are drawn: as suits the scene, as the eye responds, or as lights and sensor do",
+        ("auto", "visible", "scene"),
+    )
+    sensor: Any = host("cie1931", "what responds: cie1931, cie1964 or a clpt.spectra.Sensor")
+    bands: int = host(0, "of a spectral picture; 0: a picture of three colours")
+    white_balance: Any = host(
+        "none", "what becomes white: none, an illuminant, a colour temperature [K], or (x, y)"
+    )
+    output_space: str = choice("rec709", "colour space of the picture", spaces.SPACES)
 
     def check(self) -> None:
         for name in ("width", "height"):
@@ -152,6 +178,37 @@ class Film(Kind):
                 raise SceneError(f"must be 1 to 65536, not {size!r}", where=f"film.{name}")
         if self.lambda_min >= self.lambda_max:
             raise SceneError("must be below lambda_max", where="film.lambda_min")
+        whole = isinstance(self.bands, int) and not isinstance(self.bands, bool)
+        if not whole or not 0 <= self.bands <= MOST_BANDS:
+            message = f"must be a whole number from 0 to {MOST_BANDS}, not {self.bands!r}"
+            raise SceneError(message, where="film.bands")
+        if self.sensor not in OBSERVERS and not isinstance(self.sensor, Sensor):
+            known = f"{', '.join(OBSERVERS)}, nor a Sensor"
+            raise SceneError(f"{self.sensor!r} is none of {known}", where="film.sensor")
+        object.__setattr__(self, "white_balance", _white_balance(self.white_balance))
+
+
+def _white_balance(given: Any) -> Any:
+    """A name, a temperature [K] or (x, y), checked. Raises SceneError."""
+    where = "film.white_balance"
+    if isinstance(given, str):
+        if given != "none" and given not in illuminants():
+            raise UnknownKindError("illuminant", given, ("none", *illuminants()), where=where)
+        return given
+    if isinstance(given, (int, float, np.number)) and not isinstance(given, bool):
+        coolest, hottest = TEMPERATURES
+        if not coolest <= given <= hottest:
+            message = f"a colour temperature is {coolest:g} to {hottest:g} K, not {given:g}"
+            raise SceneError(message, where=where)
+        return float(given)
+    try:
+        x, y = (float(value) for value in given)
+    except (TypeError, ValueError):
+        message = f"must be none, an illuminant, a temperature [K] or (x, y), not {given!r}"
+        raise SceneError(message, where=where) from None
+    if not (x >= 0.0 and y > 0.0 and x + y <= 1.0):
+        raise SceneError(f"({x:g}, {y:g}) is no chromaticity of light", where=where)
+    return x, y
 
 
 KINDS = (Path, Direct, Whitted, Aov)

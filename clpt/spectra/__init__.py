@@ -19,6 +19,7 @@ from clpt.spectra.cie import (
 from clpt.spectra.emission import LED, Blackbody, Illuminant, Lines, illuminant, illuminants
 from clpt.spectra.files import read_index, read_refractive_index, read_table
 from clpt.spectra.named import glass, glasses, index, metal, metals
+from clpt.spectra.sensors import Sensor, observer, read_sensor
 from clpt.spectra.spectrum import (
     RGB,
     Cauchy,
@@ -49,6 +50,7 @@ __all__ = [
     "RGBIlluminant",
     "RGBUnbounded",
     "Sellmeier",
+    "Sensor",
     "Spectrum",
     "Tabulated",
     "absorption",
@@ -61,9 +63,11 @@ __all__ = [
     "luminance",
     "metal",
     "metals",
+    "observer",
     "on_grid",
     "read_index",
     "read_refractive_index",
+    "read_sensor",
     "read_table",
     "rgb_to_xyz",
     "sample_wavelengths",

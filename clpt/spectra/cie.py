@@ -53,14 +53,15 @@ def _d65_white() -> NDArray[np.float64]:
     return xyz / xyz[1]
 
 
-def _primaries_to_xyz(white: NDArray[np.float64]) -> NDArray[np.float64]:
-    xy = np.array(REC709_PRIMARIES).T
+def primaries_to_xyz(primaries_xy: ArrayLike, white: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The matrix (3, 3) to XYZ from primaries (3, 2) that are (x, y), whose sum is `white` (3,)."""
+    xy = np.asarray(primaries_xy, np.float64).T
     primaries = np.vstack([xy[0] / xy[1], np.ones(3), (1.0 - xy[0] - xy[1]) / xy[1]])
     return primaries * np.linalg.solve(primaries, white)
 
 
 D65_WHITE = _d65_white()
-REC709_TO_XYZ = _primaries_to_xyz(D65_WHITE)
+REC709_TO_XYZ = primaries_to_xyz(REC709_PRIMARIES, D65_WHITE)
 XYZ_TO_REC709 = np.linalg.inv(REC709_TO_XYZ)
 for _constant in (GRID, _OBSERVER, D65_WHITE, REC709_TO_XYZ, XYZ_TO_REC709):
     _constant.setflags(write=False)
@@ -89,7 +90,7 @@ def sample_wavelengths(
     The density is sech^2(0.0072 (lambda - 538)) truncated to [lo, hi] (Radziszewski et al. 2009);
     its distribution function is a tanh, so the inverse is exact for every range.
     """
-    first, last = _tanh_ends(lo, hi)
+    first, last = tanh_ends(lo, hi)
     t = first + np.asarray(u, np.float64) * (last - first)
     lambdas = np.clip(SAMPLING_CENTRE + np.arctanh(t) / SAMPLING_SLOPE, lo, hi)
     return lambdas, SAMPLING_SLOPE * (1.0 - t * t) / (last - first)
@@ -99,14 +100,15 @@ def wavelength_pdf(
     lambdas: ArrayLike, lo: float = LAMBDA_MIN, hi: float = LAMBDA_MAX
 ) -> NDArray[np.float64]:
     """Density [1/nm] of `sample_wavelengths`; zero outside [lo, hi]."""
-    first, last = _tanh_ends(lo, hi)
+    first, last = tanh_ends(lo, hi)
     lambdas = np.asarray(lambdas, np.float64)
     t = np.tanh(SAMPLING_SLOPE * (lambdas - SAMPLING_CENTRE))
     inside = (lambdas >= lo) & (lambdas <= hi)
     return np.where(inside, SAMPLING_SLOPE * (1.0 - t * t) / (last - first), 0.0)
 
 
-def _tanh_ends(lo: float, hi: float) -> tuple[float, float]:
+def tanh_ends(lo: float, hi: float) -> tuple[float, float]:
+    """The distribution function's tanh at both ends of a range [nm]. Raises SceneError."""
     if not 0.0 < lo < hi:
         raise SceneError(f"the range of wavelengths [{lo}, {hi}] nm is empty or not positive")
     first, last = np.tanh(SAMPLING_SLOPE * (np.array([lo, hi]) - SAMPLING_CENTRE))

@@ -7,12 +7,19 @@
 #include "generated/camera.cl"
 #include "lib/filter.cl"
 #include "lib/film.cl"
+#include "generated/bands.cl"
 #include "lib/shape.cl"
 #include "lib/light.cl"
 #include "generated/lights.cl"
 #include "generated/medium.cl"
 
-kernel APART void generate(SLAB_ARGS, SCENE_ARGS, global float *film, global uint *counters, int first, int end)
+#if USES_BANDS
+#define BAND_ARGS , global float *bands
+#else
+#define BAND_ARGS
+#endif
+
+kernel APART void generate(SLAB_ARGS, SCENE_ARGS, global float *film BAND_ARGS, global uint *counters, int first, int end)
 {
     SLABS
     SCENE
@@ -50,6 +57,10 @@ kernel APART void generate(SLAB_ARGS, SCENE_ARGS, global float *film, global uin
         sum_add(&e.sum.y, &e.rest.y, value.y * weight);
         sum_add(&e.sum.z, &e.rest.z, value.z * weight);
         e.samples += 1.0f;
+#if USES_BANDS
+        integer own = divide(LANE_INDEX + (int)at, settings->per_plane);
+        bands_add(scene, bands, sane, own, place, radiance, lambdas, weight);
+#endif
         count(counters, COUNTER_SAMPLES, deposit, (integer)(1));
         count(counters, COUNTER_CLOSEST, deposit, depth + sel_i(missed, (integer)(1), (integer)(0)));
         count(counters, COUNTER_SHADOW, deposit, state >> 16);

@@ -18,6 +18,7 @@ from clpt.cli import outputs
 from clpt.cli.render import changed
 from clpt.formats import load
 from clpt.render.renderer import Renderer
+from clpt.spectra import read_sensor
 
 ROOT = Path(__file__).resolve().parents[2]
 CORNELL = str(ROOT / "scenes" / "cornell_box")
@@ -100,6 +101,27 @@ def test_aov_has_its_layers(tmp_path):
     assert images.read(picture).shape == (16, 32, 3)  # eight values, four in a row
 
 
+def test_a_film_of_bands(tmp_path):
+    """All bands where a file holds them, else the colours, in the space asked for."""
+    common = ["--size", "8x8", "--spp", "2", "--quiet", "--bands", "6", "--output-space", "xyz"]
+    targets = [tmp_path / f"out{suffix}" for suffix in (".npy", ".pfm", ".png")]
+    given = [word for path in targets for word in ("-o", str(path))]
+    assert run(["render", CORNELL, *given, *common, "--white-balance", "0.4,0.4"]) == 0
+    assert [images.read(path).shape[2] for path in targets] == [6, 3, 3]
+
+
+def test_a_sensor_and_its_white(tmp_path):
+    """What the command line says of the film is what Python says."""
+    path, curves = tmp_path / "out.npy", tmp_path / "camera.csv"
+    curves.write_text("400 0 0 1\n500 0 1 1\n600 1 1 0\n700 1 0 0\n")
+    common = ["--size", "9x8", "--spp", "2", "--quiet", "--sensor", str(curves)]
+    assert run(["render", CORNELL, "-o", str(path), *common, "--white-balance", "4500"]) == 0
+    film = {"sensor": read_sensor(curves), "white_balance": 4500.0}
+    whole = Renderer(changed(load(CORNELL), size=(9, 8), **film))
+    whole.step(2)
+    assert np.array_equal(np.load(path), whole.image())
+
+
 def test_names_of_pictures():
     assert outputs.default(Path(CORNELL)) == (Path("cornell_box.exr"), Path("cornell_box.png"))
     assert outputs.default(Path("a/scene.json"))[0] == Path("a.exr")  # though there is no such file
@@ -138,6 +160,13 @@ def test_changes_of_a_scene():
         (["-o", "no/such/folder/a.png"], "folder"),
         (["--integrator", "aov", "-o", "a.hdr"], ".exr and .png"),
         (["-D", "spp=3"], "only .xml"),
+        (["--sensor", "no.csv"], "no.csv"),
+        (["--sensor", "cie1964", "--mode", "rgb", "--quiet"], "film.sensor"),
+        (["--bands", "4", "--mode", "rgb", "--quiet"], "film.bands"),
+        (["--bands", "-3"], "--bands"),
+        (["--white-balance", "D66"], "D66"),
+        (["--white-balance", "1,1"], "chromaticity"),
+        (["--output-space", "srgb"], "rec709"),
     ],
 )
 def test_bad_input_is_one_line_before_anything_is_rendered(

@@ -14,8 +14,11 @@ from clpt.formats.mitsuba.values import Context, Properties, placed
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene import cameras, integrators
 from clpt.scene.integrators import Film, Filter, Integrator, Sampler
+from clpt.spectra import read_sensor, spaces
+from clpt.spectra.sensors import OBSERVERS
 
 FULL_FRAME = math.hypot(36.0, 24.0)  # diagonal of 35 mm film [mm], which focal_length refers to
+FILMS = ("hdrfilm", "clptfilm")
 SAMPLERS = ("independent", "stratified", "multijitter", "orthogonal", "ldsampler")
 CHANNELS = {
     "depth": "depth",
@@ -153,8 +156,8 @@ def _from_focal_length(props: Properties) -> float:
 
 
 def _film(element: Element, context: Context) -> Film:
-    if element.type != "hdrfilm":
-        raise UnknownKindError("film", element.type, ["hdrfilm"], **element.place())
+    if element.type not in FILMS:
+        raise UnknownKindError("film", element.type, FILMS, **element.place())
     props = Properties(element, context)
     # How a file is stored is decided when it is written.
     props.ignore("file_format", "pixel_format", "component_format", "sample_border", "compensate")
@@ -164,9 +167,31 @@ def _film(element: Element, context: Context) -> Film:
             width=props.integer("width", 768, 1),
             height=props.integer("height", 576, 1),
             filter=integrators.Gaussian() if child is None else _filter(child, context),
+            **(_own_film(props) if element.type == "clptfilm" else {}),
         )
     props.finish()
     return film
+
+
+def _own_film(props: Properties) -> dict[str, Any]:
+    """What only clpt's film has: see docs/mitsuba_plugins.md."""
+    given: dict[str, Any] = {"bands": props.integer("bands", 0)}
+    for name, choices in (("output_space", spaces.SPACES), ("mode", ("spectral", "rgb"))):
+        if name in props.named:
+            given[name] = props.text(name, "", choices)
+    for name in ("lambda_min", "lambda_max"):
+        if name in props.named:
+            given[name] = props.number(name, 0.0)
+    if "sensor_filename" in props.named:
+        given["sensor"] = read_sensor(props.file("sensor_filename"))
+    elif "sensor" in props.named:
+        given["sensor"] = props.text("sensor", "", tuple(OBSERVERS))
+    if (white := props.named.get("white_balance")) is not None:
+        if white.tag == "string":
+            given["white_balance"] = props.text("white_balance", "")
+        else:
+            given["white_balance"] = props.number("white_balance", 0.0)
+    return given
 
 
 def _filter(element: Element, context: Context) -> Filter:

@@ -66,6 +66,10 @@ class _Reader:
             "back": self.material,
             "emission": self.emission,
             "image": _image,
+            "sensor": json_spectra.read_sensor,
+            "white_balance": lambda c: (
+                tuple(c.numbers(2)) if isinstance(c.value, list) else c.value
+            ),
             **{name: _array_reader(*form) for name, form in ARRAYS.items()},
         }
 

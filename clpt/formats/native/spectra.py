@@ -13,8 +13,9 @@ from typing import Any
 from clpt import spectra
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
 from clpt.formats.colour import COLOURS, colour
-from clpt.formats.native.cursor import Cursor
-from clpt.spectra import Spectrum
+from clpt.formats.native.cursor import Cursor, placed
+from clpt.spectra import Sensor, Spectrum
+from clpt.spectra import read_sensor as read_sensor_file
 
 SPECTRA: dict[str, type[Spectrum]] = {
     "constant": spectra.Constant,
@@ -97,6 +98,39 @@ def _typed(cursor: Cursor) -> Spectrum:
         return cls(**given)
     except (TypeError, ValueError) as error:
         raise cursor.error(f"does not make a spectrum: {error}") from None
+
+
+def read_sensor(cursor: Cursor) -> Any:
+    """Return a film's sensor: a name, a file of its curves, or `curves` and perhaps a `matrix`."""
+    if isinstance(cursor.value, str):
+        return cursor.value
+    cursor.expect(dict, "a name or a sensor")
+    _refuse(cursor, "sensor", ("file", "curves", "matrix"))
+    if ("file" in cursor.value) == ("curves" in cursor.value):
+        raise cursor.error("a sensor has either a 'file' or 'curves'")
+    if "file" in cursor.value:
+        sensor = read_sensor_file(find_file(cursor.at("file")))
+        curves = sensor.curves
+    else:
+        entries = cursor.at("curves").entries(3)
+        red, green, blue = (_curve(read(entry, "curve", "curves")) for entry in entries)
+        curves = (red, green, blue)
+    matrix = None
+    if "matrix" in cursor.value:
+        matrix = tuple(tuple(row.numbers(3)) for row in cursor.at("matrix").entries(3))
+    return placed(cursor, lambda: Sensor(curves, matrix))
+
+
+def _curve(value: Any) -> Spectrum:
+    return value if isinstance(value, Spectrum) else spectra.Constant(value)
+
+
+def write_sensor(sensor: Sensor | str) -> Any:
+    """Return what stands for a film's sensor in JSON, such that `read_sensor` gives it back."""
+    if isinstance(sensor, str):
+        return sensor
+    written: dict[str, Any] = {"curves": [write(curve, "curve") for curve in sensor.curves]}
+    return written if sensor.matrix is None else {**written, "matrix": sensor.matrix}
 
 
 def write(spectrum: Spectrum | str, role: str) -> Any:

@@ -81,6 +81,8 @@ class _Writer:
         if name == "image":
             six = isinstance(value, (list, tuple))
             return [self.image(face) for face in value] if six else self.image(value)
+        if name == "sensor":
+            return json_spectra.write_sensor(value)
         if isinstance(value, materials.Material):
             return self.material(value)
         if isinstance(value, Kind):

@@ -1,0 +1,49 @@
+"""From what a film has gathered to the colours of its picture: one matrix, a Setting."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import spectra
+from clpt.errors import SceneError
+from clpt.scene.integrators import Film
+from clpt.spectra import Sensor, spaces
+from clpt.spectra.sensors import observer
+
+
+def sensor(film: Film) -> Sensor:
+    """The sensor of a film."""
+    return observer(film.sensor) if isinstance(film.sensor, str) else film.sensor
+
+
+def output_matrix(film: Film, mode: str) -> NDArray[np.float64]:
+    """The matrix (3, 3) from responses of the film's sensor, or linear Rec. 709 in RGB mode.
+
+    It leads over XYZ to the film's output space; in between the white balance adapts (Bradford).
+    """
+    first = sensor(film).to_xyz if mode == "spectral" else spectra.REC709_TO_XYZ
+    balance = np.eye(3)
+    if film.white_balance != "none":
+        balance = spaces.bradford(white(film), spaces.white(film.output_space))
+    whole = spaces.from_xyz(film.output_space) @ balance @ first
+    return np.round(whole, 12)  # from a space to itself is the identity, to the bit
+
+
+def white(film: Film) -> NDArray[np.float64]:
+    """XYZ (3,) of what the film's white balance makes white.
+
+    An illuminant is as the film's sensor sees it; temperatures and (x, y) are of the 1931 observer.
+    Raises SceneError for what no scaling of cone responses makes white.
+    """
+    chosen = film.white_balance
+    if isinstance(chosen, str):
+        lambdas = np.arange(film.lambda_min, film.lambda_max + 1e-6)
+        xyz = sensor(film).xyz(spectra.illuminant(chosen), lambdas)
+    else:
+        xy = spaces.xy_of_temperature(chosen) if isinstance(chosen, float) else chosen
+        xyz = spaces.xyz_of(xy)
+    if not (spaces.BRADFORD @ xyz > 0.0).all():
+        message = f"{chosen!r} is too far from white, as the sensor sees it, to become white"
+        raise SceneError(message, where="film.white_balance")
+    return xyz

@@ -1,0 +1,154 @@
+"""Sensors: what a film responds to. The CIE observers, and cameras by their sensitivities.
+
+A response is the integral of radiance times a curve, over that of the 1931 observer's y
+(CIE_Y_INTEGRAL). A matrix takes the three responses to XYZ.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from clpt.errors import SceneError, UnknownKindError
+from clpt.spectra import cie, data, upsampling
+from clpt.spectra.spectrum import Spectrum, Tabulated, d65
+
+Matrix = NDArray[np.float64]
+Rows = tuple[tuple[float, ...], ...]
+
+OBSERVERS = {f"cie{year}": year for year in cie.OBSERVERS}
+LEVELS = (0.05, 0.3, 0.6, 0.9)  # of red, green and blue in the reflectances that a fit is made to
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """Three sensitivities of any common scale, and the matrix from their responses to XYZ.
+
+    Without `matrix` it is fitted: see `fitted`. Raises SceneError for curves that are not three
+    spectra, negative somewhere or zero everywhere, and for a matrix that is not 3 by 3.
+    """
+
+    curves: tuple[Spectrum, Spectrum, Spectrum]
+    matrix: Rows | None = None
+
+    def __post_init__(self) -> None:
+        curves: Any = tuple(self.curves)
+        if len(curves) != 3 or not all(isinstance(curve, Spectrum) for curve in curves):
+            raise SceneError("a sensor has three curves, each a spectrum")
+        object.__setattr__(self, "curves", curves)
+        if self.matrix is not None:
+            object.__setattr__(self, "matrix", _rows(self.matrix))
+        elif not self.sample(cie.GRID).any(axis=0).all():
+            raise SceneError(
+                "a sensor without a matrix must respond to visible light in each curve"
+            )
+
+    def sample(self, lambdas: ArrayLike) -> Matrix:
+        """Sensitivities at `lambdas` [nm] (n,): (n, 3) float64."""
+        return np.stack([curve.sample(lambdas) for curve in self.curves], axis=-1)
+
+    @property
+    def to_xyz(self) -> Matrix:
+        """The matrix (3, 3) float64 from responses to XYZ."""
+        return fitted(self) if self.matrix is None else np.array(self.matrix)
+
+    def xyz(self, spectrum: Spectrum, lambdas: ArrayLike = cie.GRID) -> Matrix:
+        """XYZ (3,) that the sensor tells of a radiance; a sum over `lambdas` (n,), 1 nm apart."""
+        responses = spectrum.sample(lambdas) @ self.sample(lambdas) / cie.CIE_Y_INTEGRAL
+        return self.to_xyz @ responses
+
+
+@cache
+def observer(name: str) -> Sensor:
+    """The standard observer "cie1931" (2 degrees) or "cie1964" (10 degrees).
+
+    The constant spectrum 1 has Y = 1 with either. Raises UnknownKindError.
+    """
+    if name not in OBSERVERS:
+        raise UnknownKindError("sensor", name, OBSERVERS)
+    rows = data.table(f"cie{OBSERVERS[name]}.csv")
+    scale = cie.CIE_Y_INTEGRAL / rows[:, 2].sum()
+    x, y, z = (Tabulated(rows[:, 0], scale * rows[:, i]) for i in (1, 2, 3))
+    return Sensor((x, y, z), _rows(np.eye(3)))
+
+
+@cache
+def fitted(sensor: Sensor) -> Matrix:
+    """The matrix (3, 3) from responses to XYZ that fits smooth reflectances under D65 best.
+
+    Least squares over the uplifted colours (Jakob and Hanika 2019) of a grid of LEVELS in red,
+    green and blue, with the white kept exactly (Finlayson and Drew 1997). A camera sees other
+    metamers than people do, so no matrix is right for every light.
+    """
+    light = d65().sample(cie.GRID)
+    colours = np.stack(np.meshgrid(LEVELS, LEVELS, LEVELS), axis=-1).reshape(-1, 3)
+    reflected = upsampling.evaluate(upsampling.uplift(colours), cie.GRID) * light
+    seen = reflected @ sensor.sample(cie.GRID) / cie.CIE_Y_INTEGRAL
+    white = light @ sensor.sample(cie.GRID) / cie.CIE_Y_INTEGRAL
+    wanted = cie.spectrum_to_xyz(reflected)
+    # Per row m of the matrix: min |seen m - wanted|^2 with white . m = white's X, Y or Z.
+    scale = white.max()  # of the curves, which may be in any unit
+    seen, white = seen / scale, white / scale
+    normal = np.block([[seen.T @ seen, white[:, None]], [white[None, :], np.zeros((1, 1))]])
+    right = np.vstack([seen.T @ wanted, cie.spectrum_to_xyz(light)])
+    try:
+        found = np.linalg.solve(normal, right)[:3].T / scale
+    except np.linalg.LinAlgError:
+        raise SceneError("the curves of a sensor must differ; or give its matrix") from None
+    found.setflags(write=False)
+    return found
+
+
+def read_sensor(path: str | Path) -> Sensor:
+    """Read a camera's sensitivities: rows of a wavelength [nm] and three values, ascending.
+
+    Blanks, commas or semicolons separate them, `#` starts a comment, one line of column titles is
+    allowed. Raises SceneError with the line.
+    """
+    try:
+        lines = Path(path).read_text("utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise SceneError(f"cannot be read: {error}", file=path) from None
+    rows: list[list[float]] = []
+    titles_allowed = True
+    for number, line in enumerate(lines, 1):
+        fields = [f for f in re.split(r"[\s,;]+", line.split("#")[0]) if f]
+        if not fields:
+            continue
+        try:
+            row = [float(field) for field in fields]
+        except ValueError:
+            row = []
+        if len(row) != 4 or not np.isfinite(row).all():
+            if titles_allowed and not row:
+                titles_allowed = False
+                continue
+            message = f"expected a wavelength in nm and three values, found {line.strip()[:60]!r}"
+            raise SceneError(message, file=path, line=number)
+        titles_allowed = False
+        rows.append(row)
+    if not rows:
+        raise SceneError("no wavelengths in this file", file=path)
+    lambdas, *columns = zip(*rows, strict=True)
+    try:
+        red, green, blue = (Tabulated(lambdas, column) for column in columns)
+        return Sensor((red, green, blue))
+    except SceneError as error:
+        raise SceneError(error.message, file=path) from None
+
+
+def _rows(matrix: Any) -> Rows:
+    """A matrix as tuples of numbers."""
+    try:
+        values = np.asarray(matrix, np.float64)
+    except (TypeError, ValueError):
+        values = np.zeros(0)
+    if values.shape != (3, 3) or not np.isfinite(values).all():
+        raise SceneError("a sensor's matrix must be three rows of three finite numbers")
+    return tuple(tuple(row) for row in values.tolist())
