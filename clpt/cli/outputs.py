@@ -6,14 +6,16 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import __version__, images
+from .. import __version__, images, spectral_exr
 from ..errors import SceneError
 from ..render.renderer import Image, Renderer
 from ..scene import Scene
 from ..scene.integrators import Aov
+from ..spectra.spaces import chromaticities
+from ..spectral_exr import SpectralImage
 
 AOV_FORMATS = (".exr", ".png")
-BAND_FORMATS = (".npy",)  # that hold all bands; others hold their colours
+BAND_FORMATS = (".npy", ".exr")  # that hold all bands; others hold their colours
 COLUMNS = 4  # of the sheet of an aov .png
 
 
@@ -68,7 +70,14 @@ def write(
 
 
 def _write_bands(path: Path, renderer: Renderer, facts: dict[str, str | int | float]) -> None:
-    np.save(path, renderer.image())
+    """All bands: an array, or a spectral .exr that shows the film's colours."""
+    film, values = renderer.scene.film, renderer.image()
+    if path.suffix.lower() == ".npy":
+        np.save(path, values)
+        return
+    stated = {**facts, "chromaticities": chromaticities(film.output_space)}
+    picture = SpectralImage(values, film.band_centres, emissive=True)
+    spectral_exr.write(path, picture, preview=renderer.colours(), metadata=stated)
 
 
 def _write_layers(

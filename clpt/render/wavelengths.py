@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt import spectra
+from clpt import spectra, spectral_exr
 from clpt.render.colour import sensor
 from clpt.scene import Scene
 from clpt.scene.integrators import Film
@@ -116,21 +116,29 @@ def _normalised(values: Values, nodes: Values) -> Values:
 
 
 def _lights(scene: Scene) -> Iterator[Spectrum]:
-    """What the lights of a scene emit; an image stands for D65."""
+    """What the lights of a scene emit; an image of colours stands for D65."""
     sources = [*scene.lights, *(shape.emission for shape in scene.shapes), scene.integrator]
     for source in sources:
         if source is None:
             continue
         declared = params(type(source))
         if "image" in declared:
-            yield d65()
+            yield _mean(source.image)
         for name, param in declared.items():
             if param.role == "emission":
                 yield _emitted(getattr(source, name))
 
 
 def _emitted(value: Any) -> Spectrum:
-    """An emission as a spectrum; a texture stands for D65."""
+    """An emission as a spectrum, of a texture its mean."""
     if getattr(value, "is_texture", False):
-        return d65()
+        return _mean(getattr(value, "image", None))
     return RGBIlluminant(value.r, value.g, value.b) if isinstance(value, RGB) else value
+
+
+def _mean(image: Any) -> Spectrum:
+    """The mean light of an image of spectra; any other stands for D65."""
+    found = spectral_exr.find(image, emissive=True)
+    if found is None:
+        return d65()
+    return found.spectrum(np.nan_to_num(found.values.mean(axis=(0, 1), dtype=np.float64)))

@@ -171,6 +171,12 @@ class Film(Kind):
     )
     output_space: str = choice("rec709", "colour space of the picture", spaces.SPACES)
 
+    @property
+    def band_centres(self) -> np.ndarray:
+        """The wavelengths in the middle of the bands (bands,) float64 [nm]."""
+        ends = np.linspace(self.lambda_min, self.lambda_max, self.bands + 1)
+        return (ends[1:] + ends[:-1]) / 2.0
+
     def check(self) -> None:
         for name in ("width", "height"):
             size = getattr(self, name)

@@ -12,7 +12,7 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from clpt import __version__, images
+from clpt import __version__, images, spectral_exr
 from clpt.__main__ import run
 from clpt.cli import outputs
 from clpt.cli.render import changed
@@ -104,10 +104,15 @@ def test_aov_has_its_layers(tmp_path):
 def test_a_film_of_bands(tmp_path):
     """All bands where a file holds them, else the colours, in the space asked for."""
     common = ["--size", "8x8", "--spp", "2", "--quiet", "--bands", "6", "--output-space", "xyz"]
-    targets = [tmp_path / f"out{suffix}" for suffix in (".npy", ".pfm", ".png")]
+    targets = [tmp_path / f"out{suffix}" for suffix in (".npy", ".pfm", ".png", ".exr")]
     given = [word for path in targets for word in ("-o", str(path))]
     assert run(["render", CORNELL, *given, *common, "--white-balance", "0.4,0.4"]) == 0
-    assert [images.read(path).shape[2] for path in targets] == [6, 3, 3]
+    assert [images.read(path).shape[2] for path in targets] == [6, 3, 3, 3]
+    spectral = spectral_exr.read(targets[3])
+    assert spectral.emissive
+    assert np.array_equal(spectral.values, images.read(targets[0]))
+    np.testing.assert_allclose(np.diff(spectral.lambdas), 470.0 / 6.0)
+    assert np.array_equal(images.read(targets[3]), images.read(targets[1]))
 
 
 def test_a_sensor_and_its_white(tmp_path):

@@ -12,6 +12,7 @@ from clpt import spectra
 from clpt import transforms as tf
 from clpt.formats.native.write import save
 from clpt.render.lower import lower
+from clpt.render.wavelengths import density
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Orthographic
 from clpt.scene.integrators import Path as PathIntegrator
@@ -108,6 +109,21 @@ def test_surroundings_of_one_spectrum_are_a_constant_light():
     lamps = Envmap(image=sky), Constant(radiance=spectra.Tabulated(lambdas, values))
     ours, reference = (patches(exposures(chart(texture, False, lamp), 8, 16)) for lamp in lamps)
     assert_agree(ours, reference)
+
+
+def test_wavelengths_are_drawn_where_an_image_shines():
+    """As for a light of the image's mean spectrum, here a line too narrow for the eye's density."""
+    lambdas = np.array([586.0, 589.0, 592.0])
+    values = np.array([[0.0, 3.0, 0.0], [0.0, 1.0, 0.0]])
+    line = spectra.Tabulated(lambdas, [0.0, 2.0, 0.0])
+    sky = SpectralImage(np.broadcast_to(values[:, None], (2, 4, 3)), lambdas, True)
+    blank = Bitmap(image=np.ones((2, 2, 3)))
+    glow = Bitmap(image=sky)
+    scenes = [chart(blank, False, Envmap(image=sky)), chart(glow, True)]
+    expected = density(chart(blank, False, Constant(radiance=line))).values
+    assert expected is not None
+    for scene in scenes:
+        np.testing.assert_allclose(density(scene).values, expected, rtol=1e-6)
 
 
 def test_from_a_scene_file(tmp_path):
