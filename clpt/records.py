@@ -125,6 +125,6 @@ TABLES: dict[str, tuple[str, str]] = {
     "spectra": ("float", "tabulated spectra on the common grid"),
     "textures": ("uint", "parameters of the textures, a row each"),
     "texels": ("float", "of all bitmaps and environment maps"),
-    "distributions": ("float", "of the filter, the environment maps and the wavelengths"),
+    "distributions": ("float", "of filter, environment maps, wavelengths and re-radiation"),
     "camera": ("float", "the camera's parameters"),
 }

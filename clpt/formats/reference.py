@@ -17,6 +17,7 @@ import numpy as np
 
 from clpt import spectra
 from clpt.formats.native.read import ARRAYS, default
+from clpt.formats.native.reradiation import RERADIATIONS
 from clpt.formats.native.spectra import SPECTRA
 from clpt.scene import KINDS, integrators, materials
 from clpt.scene.params import Kind, Param, params
@@ -88,6 +89,7 @@ ROLES = {
     "coefficient": "coefficient",
     "real": "number",
     "flag": "true or false",
+    "reradiation": "[re-radiation](#re-radiation)",
     "orders": "list of numbers",
     "layers": "list of [layers](#layers)",
 }
@@ -124,7 +126,22 @@ def _spectra() -> list[str]:
         'Metals (`"metal": name` or `{"file": name}` in place of `eta` and `k`)': spectra.metals(),
     }
     told = [f"{what}: {', '.join(f'`{name}`' for name in known)}." for what, known in names.items()]
-    return ["\n".join(rows) + "\n", "\n\n".join(told) + "\n"]
+    return ["\n".join(rows) + "\n", "\n\n".join(told) + "\n", *_reradiations()]
+
+
+def _reradiations() -> list[str]:
+    """What the objects that stand for fluorescence are."""
+    file = "a measured BFC matrix (whose diagonal is a spectrum of the same `file`), or a table"
+    rows = ["| object | what it is |", "| --- | --- |", f'| `{{"file": "name"}}` | {file} |']
+    for name, cls in RERADIATIONS.items():
+        fields = dataclasses.fields(cls)  # type: ignore[arg-type]
+        keys = "".join(f', "{field.name}": ...' for field in fields)
+        rows.append(f'| `{{"type": "{name}"{keys}}}` | {_first_line(cls)} |')
+    return [
+        "## Re-radiation\n",
+        "See [fluorescence](spectral.md#fluorescence).\n",
+        "\n".join(rows) + "\n",
+    ]
 
 
 def _kind(cls: type[Kind]) -> str:

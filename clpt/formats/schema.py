@@ -16,6 +16,7 @@ import numpy as np
 
 from clpt import spectra
 from clpt.formats.native.read import ARRAYS, BASES, default
+from clpt.formats.native.reradiation import RERADIATIONS
 from clpt.formats.native.spectra import SPECTRA
 from clpt.scene import KINDS, integrators, materials
 from clpt.scene.params import ORDERS, SPECTRUM_ROLES, Kind, Param, params
@@ -43,6 +44,7 @@ def schema() -> Schema:
     """Return the JSON Schema (draft 2020-12) of a scene.json."""
     defs: Schema = {category: _category(category) for category in KINDS}
     defs |= {f"spectrum_{role}": _spectrum(role) for role in SPECTRUM_ROLES}
+    defs["reradiation"] = _reradiation()
     defs |= {"spectrum": _typed_spectra(), "step": _step(), "transform": _transform()}
     film, defs["layer"] = _untyped(integrators.Film), _untyped(materials.Layer)
     return {
@@ -127,6 +129,8 @@ def _value(name: str, param: Param, value: Any) -> Schema:
         limits = {"minimum": param.low, "maximum": param.high}
         number = {"type": "number", **{k: v for k, v in limits.items() if math.isfinite(v)}}
         return {"anyOf": [number, _ref("texture")]} if param.textured else number
+    if param.role == "reradiation":
+        return _ref("reradiation")
     if param.role == "orders":
         return {**NUMBERS, "minItems": 1, "maxItems": 2 * ORDERS + 1}
     if param.role == "layers":
@@ -217,6 +221,22 @@ def _spectrum_field(name: str, written: str) -> Schema:
     if written == "bool":
         return {"type": "boolean"}
     return NUMBERS if "tuple" in written else {"type": "number"}
+
+
+def _reradiation() -> Schema:
+    file = {"type": "string", "description": "a BFC matrix, or a table of values [1/nm]"}
+    kinds = [{"type": {"const": kind}} for kind in RERADIATIONS]
+    shapes = dict.fromkeys(("absorption", "emission"), _ref("spectrum_reflectance"))
+    share = {"type": "number", "minimum": 0, "maximum": 1}
+    table = {"out": NUMBERS, "into": NUMBERS, "rows": {"type": "array", "items": NUMBERS}}
+    return {
+        "anyOf": [
+            {"type": "null"},
+            _object({"file": file}, ["file"]),
+            _object({**kinds[0], **shapes, "quantum_yield": share}, ["type", *shapes]),
+            _object({**kinds[1], **table}, ["type", *table]),
+        ]
+    }
 
 
 def _step() -> Schema:

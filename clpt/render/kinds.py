@@ -13,6 +13,7 @@ from clpt.scene.params import (
     interior_params,
 )
 
+SPECTRAL = (*SPECTRUM_ROLES, "reradiation")  # roles whose values are spectra in the kernels
 # How many words a parameter takes in a row of `materials`, `textures` or `lamps`.
 SPECTRUM_WORDS = 5  # x y z w and where the value comes from: 0 here, > 0 texture, < 0 table
 REAL_WORDS = 2  # the value, and 0 or 1 + the texture
@@ -22,7 +23,7 @@ LAYERS_WORDS = 2  # where the layers lie in the table, see clpt.render.films, an
 
 def words(param: Param) -> int:
     """Return the number of 4-byte words that a parameter takes in its row."""
-    if param.role in SPECTRUM_ROLES:
+    if param.role in SPECTRAL:
         return SPECTRUM_WORDS
     given = {"real": REAL_WORDS, "orders": ORDERS_WORDS, "layers": LAYERS_WORDS}
     return given.get(param.role, 1)
@@ -35,7 +36,7 @@ def row_words(cls: type[Kind]) -> int:
 
 def lane_type(param: Param) -> str:
     """Return the parameter's type in a kind's struct."""
-    if param.role in SPECTRUM_ROLES:
+    if param.role in SPECTRAL:
         return "Spectrum"
     given = {"real": "real", "orders": "real", "layers": "Layers"}
     return given.get(param.role, "integer")

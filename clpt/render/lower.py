@@ -116,6 +116,10 @@ class _Lowering:
         tables.append_floats("camera", words)
         ambient = getattr(scene.integrator, "ambient", 0.0)
         self.ambient = tables.append("lamps", tables.emission_words(ambient)) if ambient else 0
+        if scene.film.mode == "rgb" and mt.Fluorescent.kind in self.leaves:
+            self.warnings.append(
+                "in rgb mode fluorescent paint has its colour under D65, at most white"
+            )
         features = self._features(analytic, camera)
         arrays = tables.arrays()
         settings = self._settings(center, radius)

@@ -11,6 +11,7 @@ from clpt.layout import Record
 from clpt.records import LIGHT, SETTINGS, SHAPE, SLABS, TABLES
 from clpt.render import cameras, films, kinds, lights, shapes, textures
 from clpt.render.features import Features
+from clpt.render.tables import SHIFT_STEP
 from clpt.scene import materials
 from clpt.scene.params import device_params, interior_params
 
@@ -47,7 +48,8 @@ def sources(
             "BSDF_KIND": number,
             "BSDF_DELTA": int(LEAVES[kind].delta),
             "BSDF_CHROMATIC": int(LEAVES[kind].chromatic),
-            "USES_CHOICE": int(LEAVES[kind].choosy or features.many_lights),
+            "BSDF_SHIFTS": int(_shifts(features, kind)),
+            "USES_CHOICE": int(LEAVES[kind].choosy or LEAVES[kind].shifts or features.many_lights),
             "QUEUED": int(queued),
         }
         made[f"shade_{kind}"] = _source("shade", own, defines, lanes)
@@ -68,7 +70,9 @@ def _defines(features: Features) -> dict[str, str | int | float]:
         "USES_INFINITE": int(features.infinite),
         "USES_DISPERSION": int(features.dispersion and features.mode == "spectral"),
         "CAMERA_DISPERSES": int(features.glass_lens),
+        "USES_SHIFTS": int(any(_shifts(features, kind) for kind in features.materials)),
         "SPECTRA_SIZE": features.spectra_size,
+        "SHIFT_STEP": SHIFT_STEP,
         "SPECTRA_STEP": f"{features.spectra_step}f",
         "FEW_LIGHTS": int(not features.many_lights),
         "USES_LIGHTS": int(bool(features.lights)),
@@ -266,6 +270,10 @@ def _tangents_text(features: Features) -> str:
     )
 
 
+def _shifts(features: Features, kind: str) -> bool:
+    return LEAVES[kind].shifts and features.mode == "spectral"
+
+
 def _bsdf_text(features: Features, kind: str) -> str:
     """A kind's struct, functions and loader, under the names that the integrators use."""
     cls = LEAVES[kind]
@@ -281,6 +289,20 @@ def _bsdf_text(features: Features, kind: str) -> str:
             f"#define BSDF_REFLECTIVITY(m) {reflectivity}",
             *(f"#define bsdf_{verb} {kind}_{verb}" for verb in verbs),
             *_interior_text(features, cls),
+            *(_shift_text(cls) if _shifts(features, kind) else ()),
             "",
         ]
     )
+
+
+def _shift_text(cls: type[materials.Material]) -> list[str]:
+    """`bsdf_shift`: the wavelengths by which light comes to a surface at `row`."""
+    declared = device_params(cls)
+    before = [*declared.values()][: [*declared].index("reradiation")]
+    table = f"gather_i((scene).materials, (row) + {sum(map(kinds.words, before))})"
+    own = "&(m).reflectance, &(m).reradiation, (m).amount"
+    return [
+        '#include "lib/reradiation.cl"',
+        "#define bsdf_shift(scene, row, m, lambdas, u) "
+        f"reradiation_shift(scene, {table}, {own}, lambdas, u)",
+    ]

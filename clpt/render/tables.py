@@ -14,10 +14,20 @@ from clpt.render.films import layers_words
 from clpt.render.kinds import ORDERS_WORDS, REAL_WORDS, SPECTRUM_WORDS
 from clpt.render.wavelengths import Density
 from clpt.scene.params import Kind, device_params, interior_params
-from clpt.spectra import RGB, Constant, RGBIlluminant, Sensor, Spectrum, observer
+from clpt.spectra import (
+    RGB,
+    Constant,
+    Reradiation,
+    RGBIlluminant,
+    Sensor,
+    Spectrum,
+    Tabulated,
+    observer,
+)
 from clpt.spectra.spectrum import Role, d65, on_grid
 
 STEP = 1.0  # [nm] of the tabulated spectra
+SHIFT_STEP = 5  # [nm] of re-radiation matrices
 ONE = 1e4  # sigmoid coefficient at which it is 1 in float32
 # How a spectrum is turned to rgb, by the role of the parameter (see clpt.spectra.spectrum).
 RGB_ROLES: dict[str, Role] = {
@@ -190,7 +200,34 @@ class Tables:
         if role == "orders":
             beyond = (ORDERS_WORDS - len(value)) // 2
             return as_words(np.pad(value, beyond)), "constant"
+        if role == "reradiation":
+            return self.reradiation_words(value)
         return self.spectrum_words(value, role)
+
+    def reradiation_words(self, value: Reradiation | None) -> tuple[Words, str]:
+        """Return the words of a matrix: of the sum of its rows; the first says where it lies.
+
+        In `distributions` stand the sums, then for each row its values and their running integral,
+        see kernels/lib/reradiation.cl. In RGB mode: what is given out under D65.
+        """
+        words = np.zeros(SPECTRUM_WORDS, np.uint32)
+        if not self.spectral:
+            if value is not None:
+                words[:3] = as_words(value.to_rgb(self.lambda_min, self.lambda_max))
+            return words, "constant"
+        cells = int(np.ceil((self.lambda_max - self.lambda_min) / SHIFT_STEP - 1e-9))
+        nodes = self.lambda_min + SHIFT_STEP * np.arange(cells + 1)
+        rows = np.zeros((cells + 1, cells + 1))
+        if value is not None:
+            rows = value.sample(nodes[:, None], nodes)
+        running = np.cumsum(0.5 * SHIFT_STEP * (rows[:, 1:] + rows[:, :-1]), axis=1)
+        shares = running / np.maximum(running[:, -1:], 1e-30)
+        words[0] = self.append_floats("distributions", running[:, -1])
+        self.append_floats("distributions", np.hstack([rows, shares]))
+        words[3] = as_words([1.0])[0]
+        total = Tabulated(nodes, running[:, -1], "hold")
+        words[4] = np.int32(-1 - self.spectra_row(total)).view(np.uint32)
+        return words, "table"
 
     def emission_words(self, value: Any) -> Words:
         """Return the five words that `emission_load` reads: a spectrum or a texture."""

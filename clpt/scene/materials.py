@@ -9,6 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import numpy as np
+
 from clpt.errors import SceneError
 from clpt.scene.params import (
     ORDERS,
@@ -22,10 +24,13 @@ from clpt.scene.params import (
     per_order,
     real,
     reflectance,
+    reradiation,
 )
+from clpt.spectra import Spectrum
 
 DISTRIBUTIONS = ("ggx", "beckmann")
 FILMS = "thin films on the surface, from the outside in"
+MEASURED = 0.02  # how much more light than comes may leave, by the noise of a measurement
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -49,6 +54,7 @@ class Material(Kind):
     choosy: ClassVar[bool] = False  # `sample` uses u.z
     chromatic: ClassVar[bool] = False  # the pdf differs between wavelengths: it has `pdfs`
     disperses: ClassVar[bool] = False  # whatever its parameters, directions depend on wavelength
+    shifts: ClassVar[bool] = False  # light may leave at another wavelength: it has `shift`
 
     name: str = host("", "for messages and for references in scene files")
 
@@ -212,6 +218,34 @@ class Grating(Material):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Fluorescent(Material):
+    """Lambertian paint that also gives out light at longer wavelengths than it came; front side.
+
+    In RGB mode it is diffuse, of the colour that it has under D65, at most white.
+    """
+
+    shifts = True
+
+    reflectance: Any = reflectance(0.5, "albedo of the light that keeps its wavelength")
+    reradiation: Any = reradiation(None, "what is given out at other wavelengths")
+    amount: Any = real(1.0, "factor on the re-radiation", low=0.0, high=1.0, textured=True)
+
+    def check(self) -> None:
+        if self.reradiation is None or not isinstance(self.reflectance, Spectrum):
+            return
+        amount = self.amount if isinstance(self.amount, float) else 1.0
+        into = self.reradiation.table[1]
+        total = self.reflectance.sample(into) + amount * self.reradiation.emitted(into)
+        most = int(np.argmax(total))
+        if total[most] > 1.0 + MEASURED:
+            raise SceneError(
+                f"of the light at {into[most]:g} nm, {total[most]:.3f} would leave the surface; "
+                "lower the reflectance, the yield or the amount",
+                where=f"{self.kind}.reradiation",
+            )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Null(Material):
     """No surface at all: light passes as if it were not there."""
 
@@ -254,6 +288,7 @@ LEAVES = (
     Plastic,
     RoughPlastic,
     Grating,
+    Fluorescent,
     Null,
 )
 COMPOSITES = (TwoSided, Mask, Blend)

@@ -12,6 +12,7 @@ emission       number, (r, g, b), Spectrum, Texture   Spectrum, rgb times D65   
 index          number, name, Spectrum                 Spectrum, unbounded         no
 coefficient    number, (r, g, b), Spectrum            of the inside, in [1/m]     no
 real           number, Texture                        real                        yes
+reradiation    Reradiation, None                      Spectrum, its rows' sums    no
 flag           bool                                   int                         no
 choice         one of the names listed                int, the name's position    no
 orders         numbers of orders -n to n              real[17], of -8 to 8        no
@@ -32,10 +33,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from clpt.errors import SceneError
-from clpt.spectra import RGB, Constant, Spectrum
+from clpt.spectra import RGB, Constant, Reradiation, Spectrum
 
-DEVICE_ROLES = ("reflectance", "emission", "index", "real", "flag", "choice", "orders", "layers")
 SPECTRUM_ROLES = ("reflectance", "emission", "index", "coefficient")
+DEVICE_ROLES = (
+    "reflectance", "emission", "index", "reradiation", "real", "flag", "choice", "orders", "layers",
+)  # fmt: skip
 ORDERS = 8  # highest order of diffraction, see kernels/lib/diffraction.cl
 LAMBDAS = np.arange(200.0, 1201.0)  # [nm] at which a spectrum's limits are checked
 
@@ -80,6 +83,11 @@ def coefficient(default: Any, doc: str, unit: str = "1/m") -> Any:
     Light meets it between surfaces: kernels/lib/medium.cl reads it from behind the kind's row.
     """
     return _field(default, Param("coefficient", doc, unit, low=0.0))
+
+
+def reradiation(default: Any, doc: str) -> Any:
+    """Declare a re-radiation matrix; None for no fluorescence."""
+    return _field(default, Param("reradiation", doc))
 
 
 def real(
@@ -179,6 +187,10 @@ def _checked(value: Any, param: Param, where: str) -> Any:
         return value
     if param.role == "layers":
         return _layers(value, where)
+    if param.role == "reradiation":
+        if not isinstance(value, (Reradiation, type(None))):
+            raise SceneError(f"must be a re-radiation matrix, not {value!r}", where=where)
+        return value
     if getattr(value, "is_texture", False):
         if not param.textured:
             raise SceneError("cannot be a texture", where=where)

@@ -3,6 +3,7 @@
 Wavelengths are in nm throughout. A scene holds `Spectrum` objects; `on_grid` fills device tables.
 """
 
+from clpt.spectra.bispectral import read_bispectral, read_reradiation
 from clpt.spectra.cie import (
     CIE_Y_INTEGRAL,
     LAMBDA_MAX,
@@ -19,6 +20,7 @@ from clpt.spectra.cie import (
 from clpt.spectra.emission import LED, Blackbody, Illuminant, Lines, illuminant, illuminants
 from clpt.spectra.files import read_index, read_refractive_index, read_table
 from clpt.spectra.named import glass, glasses, index, metal, metals
+from clpt.spectra.reradiation import Donaldson, Fluorophore, Reradiation
 from clpt.spectra.sensors import Sensor, observer, read_sensor
 from clpt.spectra.spectrum import (
     RGB,
@@ -45,10 +47,13 @@ __all__ = [
     "Blackbody",
     "Cauchy",
     "Constant",
+    "Donaldson",
+    "Fluorophore",
     "Illuminant",
     "Lines",
     "RGBIlluminant",
     "RGBUnbounded",
+    "Reradiation",
     "Sellmeier",
     "Sensor",
     "Spectrum",
@@ -65,8 +70,10 @@ __all__ = [
     "metals",
     "observer",
     "on_grid",
+    "read_bispectral",
     "read_index",
     "read_refractive_index",
+    "read_reradiation",
     "read_sensor",
     "read_table",
     "rgb_to_xyz",

@@ -41,7 +41,12 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
 #if USES_CHOICE
     choice = sampler_pair(sampler, dimension + DIMENSION_CHOICE);
 #endif
-    Bsdf m = bsdf_load(scene, MATERIAL_ROW(sel_i(active, load_hit_material(hit, at), (integer)(0))), s.uv, lambdas);
+    integer row = MATERIAL_ROW(sel_i(active, load_hit_material(hit, at), (integer)(0)));
+    Bsdf m = bsdf_load(scene, row, s.uv, lambdas);
+#if BSDF_SHIFTS
+    lambdas = bsdf_shift(scene, row, m, lambdas, choice.y); /* from here on, those by which light comes */
+    store_path_lambdas(path, at, active, lambdas);
+#endif
     Frame frame = surface_frame(s);
     vec3 wo = to_local(frame, neg3(d));
 

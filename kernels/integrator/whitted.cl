@@ -23,13 +23,18 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
         radiance = spectrum_sel(lit, spectrum_add(radiance, spectrum_mul(beta, le)), radiance);
     }
 #endif
-    Bsdf m = bsdf_load(scene, MATERIAL_ROW(sel_i(active, load_hit_material(hit, at), (integer)(0))), s.uv, lambdas);
+    integer row = MATERIAL_ROW(sel_i(active, load_hit_material(hit, at), (integer)(0)));
+    Bsdf m = bsdf_load(scene, row, s.uv, lambdas);
     Frame frame = surface_frame(s);
     vec3 wo = to_local(frame, neg3(d));
     Sampler sampler = sampler_start(settings->seed, as_natural(load_path_place(path, at)), as_natural(load_path_sample(path, at)));
     natural dimension = as_natural(DIMENSION_VERTEX + depth * DIMENSIONS_A_VERTEX);
     vec2 choice = sampler_pair(sampler, dimension + DIMENSION_CHOICE);
     real mirror = BSDF_REFLECTIVITY(m);
+#if BSDF_SHIFTS
+    lambdas = bsdf_shift(scene, row, m, lambdas, choice.y); /* from here on, those by which light comes */
+    store_path_lambdas(path, at, active, lambdas);
+#endif
 
 #if !BSDF_DELTA
     Spectrum own = spectrum_scale(beta, 1.0f - mirror);

@@ -48,6 +48,10 @@ kernel APART void generate(SLAB_ARGS, SCENE_ARGS, global float *film BAND_ARGS, 
         integer place = load_path_place(path, at), sample = load_path_sample(path, at);
         Exposure e = {load_path_sum(path, at), load_path_rest(path, at), load_path_samples(path, at)};
         mask deposit = ended & began;
+#if USES_SHIFTS /* the film sees the camera's wavelengths, not those by which the light came */
+        Sampler began_with = sampler_start(settings->seed, as_natural(place), as_natural(sample));
+        lambdas = wavelengths_sample(scene, sampler_pair(began_with, (natural)(DIMENSION_WAVELENGTH)).x);
+#endif
         vec3 value = film_value(scene, radiance, lambdas);
         real weight = load_path_weight(path, at);
         mask sane = deposit & (fabs(value.x) + fabs(value.y) + fabs(value.z) < 1e30f); /* false for NaN */

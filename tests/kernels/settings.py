@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from clpt.render.kinds import array_size
+from clpt.render.kinds import array_size, lane_type
 from clpt.scene.materials import Layer
-from clpt.scene.params import SPECTRUM_ROLES, Kind, Param, device_params
+from clpt.scene.params import Kind, Param, device_params
 from tests.kernels.harness import COMPONENTS
 
 
@@ -56,8 +56,9 @@ def settings(
 
 
 def white(cls: type[Kind]) -> dict[str, float]:
-    """Values for `settings` that make every reflectance one."""
-    return {k: 1.0 for k, p in device_params(cls).items() if p.role == "reflectance"}
+    """Values for `settings` that make every reflectance one, of light that keeps its wavelength."""
+    kept = {"reflectance": 1.0, "reradiation": 0.0}
+    return {k: kept[p.role] for k, p in device_params(cls).items() if p.role in kept}
 
 
 def _draw_index(dense: bool, mode: str, rng: np.random.Generator, disperses: bool) -> np.ndarray:
@@ -72,7 +73,7 @@ def _draw_layers(rng: np.random.Generator) -> tuple[Layer, ...]:
 
 
 def _draw(param: Param, mode: str, rng: np.random.Generator) -> np.ndarray:
-    if param.role in SPECTRUM_ROLES:
+    if lane_type(param) == "Spectrum":
         return rng.uniform(0.0, 1.0, COMPONENTS[mode])
     if param.role == "orders":
         return rng.uniform(0.0, 1.0, array_size(param))

@@ -17,7 +17,7 @@ from clpt.scene.cameras import Perspective
 from clpt.scene.lights import Area, Constant, Point
 from clpt.scene.params import SPECTRUM_ROLES, device_params
 from clpt.scene.shapes import Cube, Rectangle, Sphere
-from clpt.spectra import Tabulated
+from clpt.spectra import Fluorophore, Tabulated
 
 GREY = Tabulated((400.0, 700.0), (0.2, 0.8))
 
@@ -38,6 +38,8 @@ def textured(cls: type[m.Material]) -> m.Material:
     for name, param in device_params(cls).items():
         if param.textured:
             given[name] = board
+        elif param.role == "reradiation":
+            given[name] = Fluorophore(GREY, GREY, 0.1)
         elif param.role in SPECTRUM_ROLES:
             given[name] = GREY
     return cls(**given)

@@ -12,6 +12,7 @@ import numpy as np
 from clpt import spectra
 from clpt.errors import UnknownKindError, UnusedParameterError
 from clpt.formats import mesh
+from clpt.formats.native import reradiation
 from clpt.formats.native import spectra as json_spectra
 from clpt.formats.native.cursor import Cursor, parse, placed
 from clpt.formats.native.spectra import find_file, kind_name
@@ -135,6 +136,8 @@ class _Reader:
             known = {**kinds("texture"), **json_spectra.SPECTRA}
             if kind_name(cursor, "texture or spectrum", known) in kinds("texture"):
                 return self.kind(cursor, "texture")
+        if param.role == "reradiation":
+            return reradiation.read(cursor)
         if param.role in SPECTRUM_ROLES:
             return json_spectra.read(cursor, param.role, name)
         if param.role == "real":

@@ -13,6 +13,7 @@ import numpy as np
 
 from clpt import spectral_exr
 from clpt.errors import SceneError
+from clpt.formats.native import reradiation as json_reradiation
 from clpt.formats.native import spectra as json_spectra
 from clpt.formats.native.read import ARRAYS, default
 from clpt.scene import Scene, materials, shapes
@@ -87,6 +88,8 @@ class _Writer:
             return self.material(value)
         if isinstance(value, Kind):
             return self.kind(value)
+        if param.role == "reradiation":
+            return json_reradiation.write(value)
         if param.role in SPECTRUM_ROLES and not isinstance(value, (int, float, tuple)):
             return json_spectra.write(value, param.role)
         if param.role == "layers":

@@ -1,0 +1,63 @@
+"""Fluorescence in scene.json: a measured matrix from a file or in numbers, or a dye."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from clpt import spectra
+from clpt.errors import UnusedParameterError
+from clpt.formats.native import spectra as json_spectra
+from clpt.formats.native.cursor import Cursor, placed
+from clpt.formats.native.spectra import find_file, kind_name
+from clpt.spectra import Constant, Donaldson, Fluorophore, Reradiation, Spectrum
+
+RERADIATIONS: dict[str, type[Reradiation]] = {"fluorophore": Fluorophore, "donaldson": Donaldson}
+
+
+def read(cursor: Cursor) -> Reradiation | None:
+    """Return a re-radiation matrix; null is none."""
+    if cursor.value is None:
+        return None
+    if "file" in cursor.expect(dict):
+        _check(cursor, ("file",), ())
+        path = find_file(cursor.at("file"))
+        return placed(cursor, lambda: spectra.read_reradiation(path))
+    if kind_name(cursor, "re-radiation", RERADIATIONS) == "donaldson":
+        _check(cursor, ("type", "out", "into", "rows"), ("out", "into", "rows"))
+        out, into = (tuple(cursor.at(name).numbers()) for name in ("out", "into"))
+        rows = tuple(tuple(row.numbers(len(into))) for row in cursor.at("rows").entries())
+        return placed(cursor, lambda: Donaldson(out, into, rows))
+    shapes = ("absorption", "emission")
+    _check(cursor, ("type", *shapes, "quantum_yield"), shapes)
+    absorption, emission = (_spectrum(cursor.at(name), name) for name in shapes)
+    share = cursor.at("quantum_yield").number() if "quantum_yield" in cursor.value else 1.0
+    return placed(cursor, lambda: Fluorophore(absorption, emission, share))
+
+
+def _spectrum(cursor: Cursor, name: str) -> Spectrum:
+    value = json_spectra.read(cursor, "reflectance", name)
+    return Constant(value) if isinstance(value, float) else value
+
+
+def _check(cursor: Cursor, known: tuple[str, ...], needed: tuple[str, ...]) -> None:
+    for key in cursor.value:
+        if key not in known:
+            raise UnusedParameterError("re-radiation", key, known, **cursor.at(key).place())
+    for key in needed:
+        if key not in cursor.value:
+            raise cursor.error(f"needs the parameter {key!r}")
+
+
+def write(value: Reradiation | None) -> Any:
+    """Return what stands for a matrix in JSON, such that `read` gives it back."""
+    if isinstance(value, Fluorophore):
+        return {
+            "type": "fluorophore",
+            "absorption": json_spectra.write(value.absorption, "reflectance"),
+            "emission": json_spectra.write(value.emission, "reflectance"),
+            "quantum_yield": value.quantum_yield,
+        }
+    if isinstance(value, Donaldson):
+        rows = [list(row) for row in value.rows]
+        return {"type": "donaldson", "out": value.out, "into": value.into, "rows": rows}
+    return None

@@ -1,0 +1,137 @@
+"""Fluorescence: light that is taken in at one wavelength and given out at another.
+
+A re-radiation matrix Phi(out, in) [1/nm] (Donaldson 1954) is the share of the energy that arrives
+at `in` and leaves again per nm at `out`. It holds fluorescence only; what keeps its wavelength is
+an ordinary reflectance. Light is never given out at a shorter wavelength than it had (Stokes 1852).
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from clpt.errors import SceneError
+from clpt.spectra import cie
+from clpt.spectra.spectrum import Spectrum, d65
+
+Matrix = NDArray[np.float64]
+
+STEP = 5.0  # [nm] between the wavelengths at which a matrix is tabulated
+GRID = np.arange(250.0, 900.0 + STEP, STEP)  # [nm], those of a Fluorophore
+LEAST_REST = 1e-3  # share of an emission below which no light is left to be given out
+
+
+class Reradiation(ABC):
+    """A re-radiation matrix: bilinear between the wavelengths of a table, zero outside."""
+
+    @property
+    @abstractmethod
+    def table(self) -> tuple[Matrix, Matrix, Matrix]:
+        """Wavelengths out (m,) and in (n,) [nm], ascending, and Phi (m, n) [1/nm], float64."""
+
+    def sample(self, out: ArrayLike, into: ArrayLike) -> Matrix:
+        """Phi [1/nm] where light arrives at `into` and leaves at `out` [nm], broadcast together."""
+        rows, columns, values = self.table
+        out, into = np.broadcast_arrays(np.asarray(out, float), np.asarray(into, float))
+        (i, s, inside), (j, t, among) = _cells(rows, out), _cells(columns, into)
+        near = values[i, j] * (1.0 - t) + values[i, j + 1] * t
+        far = values[i + 1, j] * (1.0 - t) + values[i + 1, j + 1] * t
+        return np.where(inside & among, near * (1.0 - s) + far * s, 0.0)
+
+    def emitted(self, into: ArrayLike) -> Matrix:
+        """Share of the energy that arrives at `into` [nm] and is given out, at any wavelength."""
+        rows, columns, values = self.table
+        sums = _weights(rows) @ values
+        return np.asarray(np.interp(np.asarray(into, float), columns, sums, 0.0, 0.0))
+
+    def to_rgb(self, low: float = cie.LAMBDA_MIN, high: float = cie.LAMBDA_MAX) -> Matrix:
+        """Linear Rec.709 (3,) of what is given out under D65, of which [low, high] nm arrives.
+
+        White paper has (1, 1, 1); a bright pigment may exceed it, and lie outside of the gamut.
+        """
+        light = np.arange(low, high + 0.5)
+        arriving = d65().sample(light) * _weights(light)
+        glow = self.sample(cie.GRID[:, None], light) @ arriving
+        return cie.xyz_to_rgb(cie.spectrum_to_xyz(glow))
+
+
+@dataclass(frozen=True)
+class Donaldson(Reradiation):
+    """A measured matrix: rows [1/nm] at wavelengths `out`, a column for each wavelength `into`.
+
+    Raises SceneError where the wavelengths do not ascend, or a value is missing or below zero.
+    """
+
+    out: tuple[float, ...]
+    into: tuple[float, ...]
+    rows: tuple[tuple[float, ...], ...]
+
+    def __post_init__(self) -> None:
+        for name in ("out", "into"):
+            lambdas = getattr(self, name)
+            if len(lambdas) < 2 or not (np.diff(lambdas) > 0.0).all():
+                raise SceneError(f"the wavelengths {name!r} of a matrix must be two or more, and"
+                                 " ascend")  # fmt: skip
+        if [len(row) for row in self.rows] != [len(self.into)] * len(self.out):
+            raise SceneError(
+                f"a re-radiation matrix needs {len(self.out)} rows of {len(self.into)} values"
+            )
+        values = np.array([*self.out, *self.into, *(v for row in self.rows for v in row)])
+        if not np.isfinite(values).all() or (values < 0.0).any():
+            raise SceneError("a re-radiation matrix has a value that is negative or not finite")
+
+    @cached_property
+    def table(self) -> tuple[Matrix, Matrix, Matrix]:
+        return np.array(self.out), np.array(self.into), np.array(self.rows)
+
+
+@dataclass(frozen=True)
+class Fluorophore(Reradiation):
+    """A dye: what it absorbs, the shape of what it emits, and how many photons it gives for one.
+
+    Phi(out, in) = quantum_yield absorption(in) in emission(out) / sum of (l emission(l) dl): a
+    photon's energy falls with its wavelength, so energy is lost where `out` is longer than `in`.
+    absorption: share of the light in [0, 1]; emission: relative radiance per nm, of any scale; it
+    keeps its shape whatever excites it (Vavilov 1927; Kasha 1950), but for what would come out at
+    less than `in`, which is left out, and the rest scaled up so that the yield holds.
+    Raises SceneError for numbers outside their limits.
+    """
+
+    absorption: Spectrum
+    emission: Spectrum
+    quantum_yield: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.quantum_yield <= 1.0:
+            raise SceneError(f"a quantum yield lies in [0, 1], not {self.quantum_yield}")
+        absorbed, emitted = self.absorption.sample(GRID), self.emission.sample(GRID)
+        if not ((absorbed >= 0.0) & (absorbed <= 1.0 + 1e-9)).all():
+            raise SceneError("an absorption must lie in [0, 1]")
+        if not (emitted >= 0.0).all() or not emitted.any():
+            raise SceneError("an emission must not be negative, nor zero everywhere")
+
+    @cached_property
+    def table(self) -> tuple[Matrix, Matrix, Matrix]:
+        absorbed, emitted = self.absorption.sample(GRID), self.emission.sample(GRID)
+        stokes = np.where(GRID[:, None] > GRID, emitted[:, None], 0.0)
+        photons = (_weights(GRID) * GRID) @ stokes
+        enough = photons > LEAST_REST * ((_weights(GRID) * GRID) @ emitted)
+        scale = np.divide(GRID, photons, out=np.zeros(GRID.shape), where=enough)
+        return GRID, GRID, self.quantum_yield * absorbed * scale * stokes
+
+
+def _weights(nodes: Matrix) -> Matrix:
+    """Of the trapezoid rule."""
+    half = 0.5 * np.diff(nodes)
+    return np.append(half, 0.0) + np.append(0.0, half)
+
+
+def _cells(nodes: Matrix, at: Matrix) -> tuple[NDArray[np.intp], Matrix, NDArray[np.bool_]]:
+    """The cell between nodes in which each wavelength lies, how far along it, whether in any."""
+    cell = np.clip(np.searchsorted(nodes, at, "right") - 1, 0, len(nodes) - 2)
+    along = (at - nodes[cell]) / (nodes[cell + 1] - nodes[cell])
+    return cell, along, (at >= nodes[0]) & (at <= nodes[-1])
