@@ -78,7 +78,8 @@ def write(
     pixels = np.asarray(image, np.float32)
     pixels = pixels[..., None] if pixels.ndim == 2 else pixels
     if pixels.ndim != 3 or pixels.shape[2] not in (1, 3, 4) or pixels.size == 0:
-        _fail(path, f"cannot write an image of shape {pixels.shape}; (h, w, 1, 3 or 4) is needed")
+        advice = "(h, w, 1, 3 or 4) is needed; bands are for clpt.write_spectral"
+        _fail(path, f"cannot write an image of shape {pixels.shape}; {advice}")
     stated: Metadata = {"chromaticities": chromaticities(space)} if pixels.shape[2] > 1 else {}
     try:
         suffix = path.suffix.lower()

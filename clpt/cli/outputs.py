@@ -12,7 +12,6 @@ from ..render.renderer import Image, Renderer
 from ..scene import Scene
 from ..scene.integrators import Aov
 from ..spectra.spaces import chromaticities
-from ..spectral_exr import SpectralImage
 
 AOV_FORMATS = (".exr", ".png")
 BAND_FORMATS = (".npy", ".exr")  # that hold all bands; others hold their colours
@@ -71,13 +70,12 @@ def write(
 
 def _write_bands(path: Path, renderer: Renderer, facts: dict[str, str | int | float]) -> None:
     """All bands: an array, or a spectral .exr that shows the film's colours."""
-    film, values = renderer.scene.film, renderer.image()
     if path.suffix.lower() == ".npy":
-        np.save(path, values)
+        np.save(path, renderer.image())
         return
-    stated = {**facts, "chromaticities": chromaticities(film.output_space)}
-    picture = SpectralImage(values, film.band_centres, emissive=True)
-    spectral_exr.write(path, picture, preview=renderer.colours(), metadata=stated)
+    stated = {**facts, "chromaticities": chromaticities(renderer.scene.film.output_space)}
+    preview = renderer.colours()
+    spectral_exr.write(path, renderer.spectral_image(), preview=preview, metadata=stated)
 
 
 def _write_layers(

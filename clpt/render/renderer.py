@@ -16,6 +16,7 @@ from clpt.render.lower import lower
 from clpt.render.wavefront import Wavefront
 from clpt.scene import Scene
 from clpt.scene.integrators import CHANNELS, Aov
+from clpt.spectral_exr import SpectralImage
 
 Image = NDArray[np.float32]
 
@@ -100,6 +101,12 @@ class Renderer:
     def colours(self) -> Image:
         """The picture so far in three colours, (h, w, 3) float32, also of a film with bands."""
         return self.wavefronts[0].image()
+
+    def spectral_image(self) -> SpectralImage:
+        """The picture so far of a film with bands, at their centres. Raises SceneError without."""
+        if not self.scene.film.bands or self.channels:
+            raise SceneError("this picture has no bands; set the film's", where="film.bands")
+        return SpectralImage(self.image(), self.scene.film.band_centres, emissive=True)
 
     def layers(self) -> dict[str, Image]:
         """The values of the `aov` integrator by name, (h, w, 1 to 3) float32."""

@@ -26,7 +26,8 @@ Values = NDArray[np.float64]
 
 STEP = 1.0  # [nm] at most, between the nodes of a table
 LIGHTS, SENSOR = 0.5, 0.45  # shares of a table; the rest is even, so that nothing is left out
-WORTH = 2.0  # times that the variance must fall for a table to be taken
+WORTH = 2.2  # times that the second moment must fall for a table, which costs time, to be taken
+GUIDES = 1024  # kernels/spectrum/density.cl
 
 
 @dataclass(frozen=True)
@@ -54,16 +55,21 @@ class Density:
         return np.linspace(self.lo, self.hi, count)
 
     def words(self) -> NDArray[np.float32]:
-        """The table as kernels/spectrum/density.cl reads it: n, lo, step, n + 1 sums, n + 1 values.
+        """The table as kernels/spectrum/density.cl reads it: n, lo, step, sums, values, guide.
 
-        A sum is the share of what lies below a node.
+        A sum (n + 1) is the share of what lies below a node; the guide (GUIDES + 1) the cells in
+        which equal shares begin, so that a search begins near its end.
         """
         if self.values is None:
             raise ValueError("visible importance has no table")
         step = (self.hi - self.lo) / (len(self.values) - 1)
         cells = (self.values[1:] + self.values[:-1]) / 2.0 * step
         sums = np.concatenate([[0.0], np.cumsum(cells)])
-        return np.concatenate([[len(cells), self.lo, step], sums, self.values]).astype(np.float32)
+        sums = np.minimum(sums, 1.0).astype(np.float32)
+        shares = np.arange(GUIDES + 1) / GUIDES
+        guide = np.clip(np.searchsorted(sums, shares, "right") - 1, 0, len(cells) - 1)
+        head = [len(cells), self.lo, step]
+        return np.concatenate([head, sums, self.values, guide]).astype(np.float32)
 
 
 def density(scene: Scene) -> Density:

@@ -62,7 +62,7 @@ def primaries_to_xyz(primaries_xy: ArrayLike, white: NDArray[np.float64]) -> NDA
 
 D65_WHITE = _d65_white()
 REC709_TO_XYZ = primaries_to_xyz(REC709_PRIMARIES, D65_WHITE)
-XYZ_TO_REC709 = np.linalg.inv(REC709_TO_XYZ)
+XYZ_TO_REC709 = np.linalg.inv(REC709_TO_XYZ).astype(np.float64)
 for _constant in (GRID, _OBSERVER, D65_WHITE, REC709_TO_XYZ, XYZ_TO_REC709):
     _constant.setflags(write=False)
 

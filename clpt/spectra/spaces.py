@@ -56,7 +56,7 @@ def from_xyz(space: str) -> Matrix:
     """The matrix (3, 3) float64 from XYZ to a space. Raises UnknownKindError."""
     if space == "rec709":
         return cie.XYZ_TO_REC709
-    return np.asarray(np.linalg.inv(to_xyz(space)), np.float64)
+    return np.linalg.inv(to_xyz(space)).astype(np.float64)
 
 
 def bradford(source: ArrayLike, target: ArrayLike) -> Matrix:

@@ -1,19 +1,22 @@
 /* Wavelengths by a tabulated density, linear between nodes of equal distance (clpt/render/wavelengths.py).
  * At settings->density in `distributions`: the number of cells n, the first node and the distance
- * [nm], n + 1 cumulative shares, n + 1 densities [1/nm]. Same functions in visible.cl. */
+ * [nm], n + 1 cumulative shares, n + 1 densities [1/nm], and the cells in which the shares i / GUIDES
+ * lie, for i from 0 to GUIDES. Same functions in visible.cl. */
+#define GUIDES 1024 /* a power of two, so that u * GUIDES is exact; as in clpt/render/wavelengths.py */
 
 /* The wavelength below which a share u of the density lies [nm]. */
 inline real density_invert(Scene scene, real u)
 {
     int head = scene.settings->density, n = (int)scene.distributions[head], sums = head + 3, values = sums + n + 1;
-    integer low = (integer)(0), high = (integer)(n);
-    for (int size = n; size > 1; size = (size + 1) / 2) {
+    integer guide = max_i(min_i(to_integer(u * (float)GUIDES), (integer)(GUIDES - 1)), (integer)(0)) + (values + n + 1);
+    integer low = to_integer(gather(scene.distributions, guide));
+    integer high = to_integer(gather(scene.distributions, guide + 1)) + 1;
+    while (any((high - low) > 1)) {
         integer middle = (low + high) >> 1;
         mask below = gather(scene.distributions, middle + sums) <= u;
         low = sel_i(below, middle, low);
         high = sel_i(below, high, middle);
     }
-    low = min_i(low, (integer)(n - 1));
     real first = gather(scene.distributions, low + sums), last = gather(scene.distributions, low + (sums + 1));
     real a = gather(scene.distributions, low + values), b = gather(scene.distributions, low + (values + 1));
     real v = clamp_r((u - first) / max_r(last - first, (real)(1e-12f)), (real)(0.0f), (real)(1.0f));

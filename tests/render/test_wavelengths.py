@@ -30,12 +30,15 @@ def test_smooth_lights_need_no_table(light: str) -> None:
 
 @pytest.mark.parametrize("light", ["F11", LINE])
 def test_lines_get_a_table(light: object) -> None:
-    """Also beside a smooth light, and on a shape."""
+    """Also on a shape."""
     emission = spectra.illuminant(light) if isinstance(light, str) else light
     assert density(scene(emission)).values is not None
-    assert density(scene(1.0, emission)).values is not None
     lamp = Scene(camera=Perspective(), shapes=[Sphere(emission=lights.Area(radiance=emission))])
     assert density(lamp).values is not None
+
+
+def test_one_line_among_smooth_lights_is_enough() -> None:
+    assert density(scene(1.0, spectra.illuminant("A"), LINE)).values is not None
 
 
 def test_a_line_gets_half_of_the_samples() -> None:
