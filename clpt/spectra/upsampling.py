@@ -38,8 +38,8 @@ def shrinkage(rgb: ArrayLike) -> Array:
 
 
 def node_values() -> Array:
-    """Values of the largest component at the layers (NODES,), dense near black and white."""
-    x = _smoothstep(np.linspace(0.0, 1.0, NODES))
+    """Values of the largest component at the layers (NODES,), dense near white and near black."""
+    x = _smoothstep(np.linspace(0.0, 1.0, NODES) ** 1.1)
     return np.clip(0.3 * x + 0.7 * _smoothstep(x), EDGE, 1.0 - EDGE)
 
 
