@@ -19,7 +19,7 @@ PATH = Record(
     pdf=("real", "of d [1/sr]; below 0 if the last event was delta; at the camera, -(its far end)"),
     ratio=("spectrum", "pdf of the path at each wavelength, over the mean of the four"),
     eta=("real", "product of the relative indices so far, for Russian roulette"),
-    weight=("real", "of the sample, from the pixel filter"),
+    weight=("real", "of the sample, from the pixel filter; from a light, 1 over its first beta"),
     medium=("integer", "what absorbs along the ray, see kernels/lib/medium.cl; 0: nothing does"),
     state=("integer", "PATH_ bits and depth, see kernels/lib/path_state.cl"),
     place=("integer", "which place of the film is being worked on, in the order of the tiles"),
@@ -48,6 +48,7 @@ SHADOW = Record(
     d=("vec3", "direction, unit length"),
     t=("real", "distance to the light [m]; not above 0: no ray"),
     value=("spectrum", "radiance that arrives if nothing is in the way"),
+    pixel=("integer", "place of the film that gets it, of paths that start at lights"),
 )
 
 SETTINGS = Record(
@@ -105,7 +106,7 @@ LIGHT = Record(
     alias=("integer", "the row taken otherwise"),
     shape=("integer", "row of its shape; -1: not on a shape"),
     radiance=("integer", "first word of its emission parameter in `lamps`"),
-    spare=("integer", "keeps rows at 32 bytes"),
+    along=("integer", "1: the shape emits along its normals only"),
 )
 
 SLABS = (PATH, HIT, SHADOW)

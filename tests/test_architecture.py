@@ -31,7 +31,10 @@ MAY_INCLUDE = {
     "stage": {"lib", "generated", "bvh"},
     "integrator": {"lib", "generated"},
     "bvh": {"lib", "bvh", "generated"},
-    **{k: {"lib"} for k in ("bsdf", "light", "shape", "camera", "texture", "medium", "sampler")},
+    **{
+        k: {"lib"}
+        for k in ("bsdf", "light", "shape", "camera", "texture", "medium", "sampler", "emission")
+    },
 }
 
 
@@ -142,7 +145,16 @@ def test_kernel_files(path: Path) -> None:
     if re.search(r"\bkernel void\b", text):
         assert folder in ("stage", "bvh")
     code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
-    if folder in ("bsdf", "light", "shape", "camera", "texture", "medium", "integrator"):
+    if folder in (
+        "bsdf",
+        "light",
+        "shape",
+        "camera",
+        "texture",
+        "medium",
+        "integrator",
+        "emission",
+    ):
         assert "#pragma" not in code
     assert "double" not in re.findall(r"\w+", code)
     in_memory = re.findall(r"global\s+(?:const\s+)?(\w+)\s*\*", code)

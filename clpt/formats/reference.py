@@ -194,8 +194,10 @@ def _host(name: str, value: Any) -> str:
     if name in ARRAYS:
         width, item = ARRAYS[name]
         return f"rows of {width} {item}s"
-    special = {"image": "name of an image file", "emission": "`area` light", "back": "material"}
-    special |= {
+    special = {
+        "image": "name of an image file",
+        "emission": "`area` or `directional_area` light",
+        "back": "material",
         "sensor": '`cie1931`, `cie1964`, `{"file": name}` or `{"curves": [three spectra]}`,'
         " the latter two perhaps with a `matrix`",
         "white_balance": "`none`, an illuminant, a number [K] or `[x, y]`",

@@ -8,8 +8,8 @@ from clpt.errors import SceneError
 from clpt.render import shapes
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
-from clpt.scene.integrators import Aov, Film, Filter, Integrator, Sampler
-from clpt.scene.lights import Area, Light
+from clpt.scene.integrators import Aov, Film, Filter, Integrator, ParticleTracer, Sampler
+from clpt.scene.lights import ON_SHAPES, DirectionalArea, Light, Point
 from clpt.scene.shapes import Shape
 
 LARGEST = 1 << 26  # pixels of a film; its tiles are divided in float32, see kernels/lib/film.cl
@@ -28,8 +28,9 @@ def check(scene: Scene) -> None:
         _check_kind(light, Light, f"lights[{i}]")
     for i, shape in enumerate(scene.shapes):
         _check_kind(shape, Shape, f"shapes[{i}]")
-        if not isinstance(shape.emission, (Area, type(None))):
-            raise SceneError("its emission must be an `area` light", where=shapes.where(shape))
+        if not isinstance(shape.emission, (*ON_SHAPES, type(None))):
+            names = " or ".join(f"`{cls.kind}`" for cls in ON_SHAPES)
+            raise SceneError(f"its emission must be {names}", where=shapes.where(shape))
     if scene.film.mode == "rgb" and not isinstance(scene.integrator, Aov):
         for name, plain in (("sensor", "cie1931"), ("bands", 0)):
             if getattr(scene.film, name) != plain:
@@ -37,6 +38,35 @@ def check(scene: Scene) -> None:
     width, height = scene.film.width, scene.film.height
     if width * height > LARGEST:
         raise SceneError(f"{width}x{height} are more than {LARGEST >> 20} Mi pixels", where="film")
+    _check_light_paths(scene)
+
+
+CONNECTED = ("perspective", "thin_lens")  # cameras that particle_tracer can join a point to
+
+
+def _check_light_paths(scene: Scene) -> None:
+    """Raise SceneError for what only paths from lights can do, and for what they cannot."""
+    if not isinstance(scene.integrator, ParticleTracer):
+        for shape in scene.shapes:
+            if isinstance(shape.emission, DirectionalArea):
+                raise SceneError(
+                    f"only the integrator particle_tracer finds a directional_area light, "
+                    f"not {scene.integrator.kind}",
+                    where=shapes.where(shape),
+                )
+        return
+    if scene.camera.kind not in CONNECTED:
+        raise SceneError(
+            f"particle_tracer works with the cameras {' and '.join(CONNECTED)}, "
+            f"not {scene.camera.kind}",
+            where="camera",
+        )
+    for i, light in enumerate(scene.lights):
+        if isinstance(light, Point) and not light.falloff:
+            raise SceneError(
+                "particle_tracer needs a point light whose irradiance falls with the distance",
+                where=f"lights[{i}]",
+            )
 
 
 def _check_kind(value: Any, base: type, where: str) -> None:

@@ -32,6 +32,8 @@ class Features:
     tangents: bool = False
     mixtures: bool = False
     infinite: bool = False
+    light_paths: bool = False  # paths start at lights
+    visible_lights: bool = False  # some light is no delta light: a camera may see it
     many_lights: bool = False  # too many to be chosen by the number that also places the point
     dispersion: bool = False
     absorption: bool = False  # inside of a dielectric

@@ -17,6 +17,7 @@ from clpt.scene.lights import Light
 from clpt.scene.textures import Bitmap, Checkerboard
 
 INFINITE = ("constant", *image_lights.RECORDS)  # a ray that leaves the scene meets these
+PLACED = ("point", "spot")  # these stand somewhere; all other lamps are infinitely far away
 
 _RADIANCE = ("integer", "first word of the emission parameter in `lamps`")
 RECORDS: dict[str, Record] = {

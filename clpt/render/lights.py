@@ -16,7 +16,7 @@ from clpt.errors import SceneError
 from clpt.records import LIGHT, SHAPE
 from clpt.render import shapes
 from clpt.render.lamps import INFINITE, RECORDS, Sink, blank_row, brightness, lower_lamp
-from clpt.scene.lights import Area, Light
+from clpt.scene.lights import DirectionalArea, Light
 from clpt.scene.shapes import Shape
 
 INFINITE_SHARE = 0.5  # of the choices, where there are other lights too
@@ -43,7 +43,7 @@ class LightRows:
 
     rows: structured (n,) of LIGHT.dtype; infinite: how many of them, the first ones, are infinite;
     kinds: those that occur, for `dispatch_text`; first: per emitter, its first row; whole: per
-    emitter, whether that one row stands for all of it.
+    emitter, whether that one row stands for all of it; visible: whether one is no delta light.
     """
 
     rows: np.ndarray
@@ -51,6 +51,7 @@ class LightRows:
     kinds: tuple[str, ...]
     first: tuple[int, ...]
     whole: tuple[bool, ...]
+    visible: bool
 
 
 def light_rows(
@@ -79,6 +80,7 @@ def light_rows(
         kinds=kinds,
         first=tuple(int(i) for i in first),
         whole=tuple(_whole(emitter.shape) for emitter in emitters),
+        visible=infinite > 0 or bool(((rows["shape"] >= 0) & (rows["along"] == 0)).any()),
     )
 
 
@@ -103,13 +105,14 @@ def _lamp_block(lamp: Light, tables: Sink, scene_radius: float) -> tuple[np.ndar
 def _emitter_block(emitter: Emitter, tables: Sink) -> tuple[np.ndarray, np.ndarray]:
     """The rows of a shape that emits, and their power."""
     shape = emitter.shape
-    if not isinstance(shape.emission, Area):
-        raise SceneError("its emission must be an `area` light", where=shapes.where(shape))
-    radiance = tables.append("lamps", tables.emission_words(shape.emission.radiance))
-    strength = np.pi * brightness(shape.emission.radiance)
+    along = isinstance(shape.emission, DirectionalArea)
+    value = shape.emission.irradiance if along else shape.emission.radiance
+    radiance = tables.append("lamps", tables.emission_words(value))
+    strength = (1.0 if along else np.pi) * brightness(value)
     if _whole(shape):
         at = tables.append("geometry", shapes.row(shape))
         rows = _block(1, shape.kind, at, radiance, emitter.shape_row)
+        rows["along"] = along
         return rows, np.array([strength * shapes.area(shape)])
     if emitter.vertices is None or emitter.faces is None:
         raise SceneError("its triangles are missing", where=shapes.where(shape))
@@ -117,6 +120,7 @@ def _emitter_block(emitter: Emitter, tables: Sink) -> tuple[np.ndarray, np.ndarr
     count, words = geometry.shape
     at = tables.append("geometry", geometry) + words * np.arange(count)
     rows = _block(count, "triangle", at, radiance, emitter.shape_row)
+    rows["along"] = along
     return rows, strength * shapes.triangle_areas(emitter.vertices, emitter.faces)
 
 
@@ -196,7 +200,7 @@ def dispatch_text(kinds: Iterable[str], textured: bool = False) -> str:
     return "\n".join(parts) + "\n"
 
 
-def _case(kind: str, only: bool, body: Sequence[str]) -> list[str]:
+def case_text(kind: str, only: bool, body: Sequence[str]) -> list[str]:
     """Lines that do `body` where the light `l` is of a kind, under the mask `m`; `only`: always."""
     if only:
         rows = ["mask m = (integer)(-1);", *body]
@@ -205,7 +209,7 @@ def _case(kind: str, only: bool, body: Sequence[str]) -> list[str]:
     return [*head, *(f"            {line}" for line in body), "        }", "    }"]
 
 
-def _row_of(kind: str) -> str:
+def row_text(kind: str) -> str:
     """The kind's parameters of the light `l`; other lanes read the first row, see `blank_row`."""
     table = "lamps" if kind in RECORDS else "geometry"
     return f"{kind}_row(scene.{table}, sel_i(m, l.params, (integer)(0)))"
@@ -224,19 +228,19 @@ def _sample_text(lamps: list[str], surfaces: list[str], textured: bool) -> list[
         "    LightSample s = light_nothing();",
     ]
     for kind in lamps:
-        sampled = f"{kind}_sample({_row_of(kind)}, scene, p, u, lambdas)"
-        lines += _case(kind, only, [f"s = light_sel(m, {sampled}, s);"])
+        sampled = f"{kind}_sample({row_text(kind)}, scene, p, u, lambdas)"
+        lines += case_text(kind, only, [f"s = light_sel(m, {sampled}, s);"])
     if surfaces:
         lines.append("    ShapeSample q = shape_sample_nothing();")
     for kind in surfaces:
-        body = [f"ShapeSample r = {kind}_sample({_row_of(kind)}, p, u);"]
+        body = [f"ShapeSample r = {kind}_sample({row_text(kind)}, p, u);"]
         if kind == "triangle" and textured:
             body += [
                 "integer at = sel_i(m, l.shape, (integer)(0)) * SHAPE_ROW_WORDS;",
                 "ShapeRow shape = shape_row_row(scene.shapes, at);",
                 "r.uv = area_triangle_uv(scene, shape, sel_i(m, row, shape.light), r.uv);",
             ]
-        lines += _case(kind, only, [*body, "q = shape_sample_sel(m, r, q);"])
+        lines += case_text(kind, only, [*body, "q = shape_sample_sel(m, r, q);"])
     if surfaces:
         lines += [
             "    Spectrum le = emission_load(scene, l.radiance, q.uv, lambdas);",
@@ -253,8 +257,8 @@ def _pdf_text(surfaces: list[str]) -> list[str]:
         "    real pdf = 0.0f;",
     ]
     for kind in surfaces:
-        body = f"pdf = sel(m, {kind}_pdf({_row_of(kind)}, p, wi, t, n), pdf);"
-        lines += _case(kind, len(surfaces) == 1, [body])
+        body = f"pdf = sel(m, {kind}_pdf({row_text(kind)}, p, wi, t, n), pdf);"
+        lines += case_text(kind, len(surfaces) == 1, [body])
     return [*lines, "    return pdf * l.pmf;", "}"]
 
 
@@ -272,9 +276,9 @@ def _infinite_text(kinds: list[str]) -> list[str]:
     ]
     for kind in kinds:
         body = [
-            f"{RECORDS[kind].name} light = {_row_of(kind)};",
+            f"{RECORDS[kind].name} light = {row_text(kind)};",
             f"*radiance = spectrum_sel(m, {kind}_radiance(light, scene, d, lambdas), *radiance);",
             f"*pdf = sel(m, {kind}_pdf(light, scene, d) * l.pmf, *pdf);",
         ]
-        lines += _case(kind, len(kinds) == 1, body)
+        lines += case_text(kind, len(kinds) == 1, body)
     return [*lines, "}", '#include "lib/infinite.cl"']

@@ -72,6 +72,7 @@ class _Lowering:
         film = scene.film
         self.scene = scene
         self.channels = getattr(scene.integrator, "channels", ())
+        self.light_paths = isinstance(scene.integrator, sc.integrators.ParticleTracer)
         self.mode = "rgb" if self.channels else film.mode
         own = Density(film.lambda_min, film.lambda_max)
         self.density = density(scene) if self.mode == "spectral" else own
@@ -79,6 +80,10 @@ class _Lowering:
             self.mode, film.lambda_min, film.lambda_max, sensor(film), self.density
         )
         self.warnings: list[str] = []
+        if self.light_paths and (film.filter.kind != "box" or filters.radius(film.filter) != 0.5):
+            self.warnings.append(
+                "film.filter is passed over: particle_tracer has a box of one pixel"
+            )
         self.leaves = _leaf_kinds(scene)
         self.words: dict[tuple[int, str], int] = {}
         self.uses = dict.fromkeys(("normals", "uvs", "tangents", "mixtures", "absorption"), False)
@@ -153,7 +158,7 @@ class _Lowering:
             self.n_faces += len(faces)
         if shape.emission is not None:
             emitters.append(lights.Emitter(shape, number, *triangles))
-            if getattr(shape.emission.radiance, "is_texture", False):
+            if any(getattr(v, "is_texture", False) for v in vars(shape.emission).values()):
                 self.uses["uvs"] = True
         return row
 
@@ -256,6 +261,8 @@ class _Lowering:
             tangents=self.uses["tangents"],
             mixtures=self.uses["mixtures"],
             infinite=self.lights.infinite > 0 and not self.channels,
+            light_paths=self.light_paths,
+            visible_lights=self.lights.visible,
             many_lights=len(self.lights.rows) > FEW_LIGHTS,
             absorption=self.uses["absorption"] and not self.channels,
             dispersion=index_tables

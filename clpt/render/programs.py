@@ -9,7 +9,7 @@ from __future__ import annotations
 from clpt import device
 from clpt.layout import Record
 from clpt.records import LIGHT, SETTINGS, SHAPE, SLABS, TABLES
-from clpt.render import cameras, films, kinds, lights, shapes, textures
+from clpt.render import cameras, emission, films, kinds, lights, shapes, textures
 from clpt.render.features import Features
 from clpt.render.tables import SHIFT_STEP
 from clpt.scene import materials
@@ -29,10 +29,11 @@ def sources(
     trace_lanes = lanes if layout == "brute" else 1
     shared = _shared(features, layout)
     common = _defines(features)
+    begin, test = stages(features)
     made = {
-        "generate": _source("generate", shared, common, lanes),
+        begin: _source(begin, shared, common, lanes),
         "intersect": _source("intersect", shared, common, trace_lanes),
-        "shadow": _source("shadow", shared, common, trace_lanes),
+        test: _source(test, shared, common, trace_lanes),
         "accumulate": _source("accumulate", shared, common, 1),
     }
     if features.bands:
@@ -54,6 +55,11 @@ def sources(
         }
         made[f"shade_{kind}"] = _source("shade", own, defines, lanes)
     return made
+
+
+def stages(features: Features) -> tuple[str, str]:
+    """Return the stage that begins paths, and the one that tests what waits to be joined."""
+    return ("emit", "splat") if features.light_paths else ("generate", "shadow")
 
 
 def _source(stage: str, virtual: dict[str, str], defines: dict, lanes: int) -> device.Source:
@@ -82,6 +88,9 @@ def _defines(features: Features) -> dict[str, str | int | float]:
         made["USES_ABSORPTION"] = 1
     if features.filter == "box":
         made["FILTER_BOX"] = 1
+    if features.light_paths:
+        made["LIGHT_PATHS"] = 1
+        made["USES_VISIBLE_LIGHTS"] = int(features.visible_lights)
     if features.channel:
         made["CHANNEL"] = f"CHANNEL_{features.channel.upper()}"
     if features.bands:
@@ -100,6 +109,8 @@ def _shared(features: Features, layout: str) -> dict[str, str]:
         "generated/bands.cl": '#include "lib/bands.cl"\n' if features.bands else "",
         "generated/sampler.cl": f'#include "sampler/{features.sampler}.cl"\n',
         "generated/camera.cl": _camera_text(features.camera, features.glass_lens),
+        "generated/connect.cl": _connect_text(features.camera),
+        "generated/emission.cl": emission.dispatch_text(features.lights, _textured(features)),
         "generated/textures.cl": textures.dispatch_text(features.textures, features.texture_roles),
         "generated/lights.cl": _lights_text(features),
         "generated/mixture.cl": _mixture_text(features),
@@ -174,13 +185,30 @@ def _camera_text(kind: str, glass: bool) -> str:
     )
 
 
+def _connect_text(kind: str) -> str:
+    record: Record = cameras.RECORDS[kind]
+    return (
+        f'#include "camera/{kind}_connect.cl"\n#define camera_connect(scene, p, away, lens) '
+        f"{kind}_connect((global const {record.name} *)(scene).camera, (scene).settings, "
+        "p, away, lens)\n"
+    )
+
+
+def _textured(features: Features) -> bool:
+    """Whether some emission is a texture."""
+    return "texture" in _emissions(features)
+
+
+def _emissions(features: Features) -> frozenset[str]:
+    return features.sources.get("emission", {}).get("value", frozenset({"constant"}))
+
+
 def _lights_text(features: Features) -> str:
     """The loader of emissions, from wherever they come in this scene, and the lights' dispatch."""
-    found = features.sources.get("emission", {}).get("value", frozenset({"constant"}))
-    textured = "texture" in found
+    textured = _textured(features)
     return (
         ('#include "generated/textures.cl"\n' if textured else "")
-        + kinds.emission_text(found)
+        + kinds.emission_text(_emissions(features))
         + lights.dispatch_text(features.lights, textured)
     )
 

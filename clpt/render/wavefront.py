@@ -184,9 +184,12 @@ class Wavefront:
 
     def _bind(self) -> None:
         """Give every kernel its arguments; they are told by their names in its signature."""
-        brute = self.tree.layout == "brute"
+        brute, features = self.tree.layout == "brute", self.lowered.features
         self.steps: list[tuple[str, device.Bound, tuple[int], tuple[int] | None]] = []
-        self.generate = self._step("generate", "generate", self.lanes, first=0, end=0)
+        begin, test = programs.stages(features)
+        self.begin = self._step(begin, begin, self.lanes, first=0, end=0)
+        if features.light_paths and features.visible_lights:
+            self._step(test, test, self.lanes if brute else 1)
         self._step("intersect", "intersect", self.lanes if brute else 1)
         if "mix" in self.programs:
             self._step("mix", "mix_materials", self.lanes)
@@ -195,12 +198,12 @@ class Wavefront:
             for name, size in (("sort_count", chunks), ("sort_scan", 1), ("sort_place", chunks)):
                 bound = self._bound("sort", name)
                 self.steps.append((name, bound, (size,), None))
-        for kind in self.lowered.features.materials:
+        for kind in features.materials:
             self._step(f"shade_{kind}", "shade", self.lanes)
-        if any(not programs.LEAVES[k].delta for k in self.lowered.features.materials):
-            self._step("shadow", "shadow", self.lanes if brute else 1)
-        self.accumulate = self._bound("accumulate", "accumulate")
-        if self.lowered.features.bands:
+        if any(not programs.LEAVES[k].delta for k in features.materials):
+            self._step(test, test, self.lanes if brute else 1)
+        self.accumulate = self._bound("accumulate", "accumulate", samples=0.0)
+        if features.bands:
             self.accumulate_bands = self._bound("bands", "accumulate_bands")
 
     def _bound(self, program: str, name: str, **given: Any) -> device.Bound:
@@ -237,7 +240,7 @@ class Wavefront:
         word = next(m.word for m in PATH.members if m.name == "state")
         self._fill("path_words", FRESH, 4 * word * self.stride, 4 * self.slots)
         self._fill("counters", 0, 0, 4 * len(COUNTERS))
-        self.generate.set(first=first, end=end)
+        self.begin.set(first=first, end=end)
         finished = True
         reads: deque[tuple[np.ndarray, cl.Event]] = deque()
         last = np.zeros(len(COUNTERS), np.uint32)
@@ -257,7 +260,7 @@ class Wavefront:
             self._count(now - last)  # unsigned: right even after they wrapped around
             last = now
             if on_batch and finished and not on_batch(self.counts):
-                self.generate.set(end=first)
+                self.begin.set(end=first)
                 finished = False
             if now[0] >= self.slots:
                 break
@@ -277,6 +280,8 @@ class Wavefront:
     def image(self) -> np.ndarray:
         """The picture so far, (h, w, 3) float32 in the film's output space."""
         width, height = self._size
+        if self.lowered.features.light_paths:
+            self.accumulate.set(samples=self.counts.samples / (width * height))
         self.accumulate.enqueue(self.device.queue, (width, height))
         return self.buffers.download(self.named["image"], (height, width, 3), np.float32)
 

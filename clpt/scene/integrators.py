@@ -70,6 +70,20 @@ class Whitted(Integrator):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class ParticleTracer(Integrator):
+    """Light tracing: paths start at lights, and every vertex is joined to the camera.
+
+    Finds caustics, also of the smallest lights; what the camera would see through glass, in mirrors
+    and through masks stays black. A sample per pixel is one light path for every pixel of the film.
+    The camera must be `perspective` or `thin_lens`; the film's filter is a box of one pixel.
+    """
+
+    max_depth: int = host(8, "longest path, as of `path`; -1: no limit")
+    rr_depth: int = host(5, "depth from which Russian roulette may end a path")
+    hide_lights: bool = flag(False, "lights shine, but are not seen to shine")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Aov(Integrator):
     """Arbitrary output values of the first hit, in the channels named; a pixel holds their mean."""
 
@@ -217,6 +231,6 @@ def _white_balance(given: Any) -> Any:
     return x, y
 
 
-KINDS = (Path, Direct, Whitted, Aov)
+KINDS = (Path, Direct, Whitted, ParticleTracer, Aov)
 SAMPLERS = (Sobol, Independent)
 FILTERS = (Box, Tent, Gaussian, Mitchell, BlackmanHarris)

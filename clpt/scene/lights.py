@@ -1,4 +1,4 @@
-"""Lights. An `Area` light is a shape's `emission`; all others stand in a scene's `lights`."""
+"""Lights. Those `ON_SHAPES` are a shape's `emission`; all others stand in a scene's `lights`."""
 
 from __future__ import annotations
 
@@ -22,6 +22,18 @@ class Area(Light):
     """A surface that emits from its front side, evenly in all directions."""
 
     radiance: Any = emission(1.0, "emitted radiance", RADIANCE, textured=True)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DirectionalArea(Light):
+    """A surface that emits from its front side along its normal only: a flat one sends out a beam.
+
+    Only the `particle_tracer` finds it. The camera does not see it shine.
+    """
+
+    irradiance: Any = emission(
+        1.0, "through a surface across the beam", "W m^-2 nm^-1", textured=True
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -86,4 +98,5 @@ class CubeMap(Light):
     to_world: Any = host(np.eye(4), "rotation, (4, 4)")
 
 
-KINDS = (Area, Point, Spot, Directional, Constant, Envmap, CubeMap)
+ON_SHAPES = (Area, DirectionalArea)
+KINDS = (*ON_SHAPES, Point, Spot, Directional, Constant, Envmap, CubeMap)

@@ -3,7 +3,15 @@
 #include "lib/base.cl"
 #include "lib/film.cl"
 
-kernel void accumulate(global const Settings *settings, global const float *film, global float *image)
+#ifdef LIGHT_PATHS /* how many there were per pixel; they leave something anywhere */
+#define SAMPLES_ARG , float samples
+#define SAMPLES(own) (samples > 0.0f ? samples : 1.0f)
+#else
+#define SAMPLES_ARG
+#define SAMPLES(own) fmax(own, 1.0f)
+#endif
+
+kernel void accumulate(global const Settings *settings, global const float *film, global float *image SAMPLES_ARG)
 {
     int x = get_global_id(0), y = get_global_id(1), places = settings->places;
     if (x < settings->width && y < settings->height) {
@@ -12,7 +20,7 @@ kernel void accumulate(global const Settings *settings, global const float *film
         for (int i = 0; i < FILM_WORDS; i++) v[i] = 0.0f;
         for (int plane = 0; plane < settings->planes; plane++)
             for (int i = 0; i < FILM_WORDS; i++) v[i] += film[(plane * FILM_WORDS + i) * places + place];
-        float scale = 1.0f / fmax(v[6], 1.0f);
+        float scale = 1.0f / SAMPLES(v[6]);
         float a = (v[0] + v[3]) * scale, b = (v[1] + v[4]) * scale, c = (v[2] + v[5]) * scale;
         global float *pixel = image + 3 * ((size_t)y * settings->width + x);
         pixel[0] = settings->to_first[0] * a + settings->to_first[1] * b + settings->to_first[2] * c;

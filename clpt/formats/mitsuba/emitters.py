@@ -19,18 +19,18 @@ Parameters = dict[str, Any]
 
 def emitter(element: Element, context: Context) -> Light:
     """Make the light that an <emitter> outside of shapes describes."""
-    if element.type == "area":
+    if element.type in ON_SHAPES:
         raise element.error("an area light must stand in a <shape>")
     if element.type not in PLUGINS:
-        raise UnknownKindError("emitter", element.type, [*PLUGINS, "area"], **element.place())
+        raise UnknownKindError("emitter", element.type, [*PLUGINS, *ON_SHAPES], **element.place())
     return _make(element, context, *PLUGINS[element.type])
 
 
 def area(element: Element, context: Context) -> Light:
     """Make the light that an <emitter> inside a shape describes."""
-    if element.type != "area":
+    if element.type not in ON_SHAPES:
         raise element.error("only an area light can stand in a <shape>")
-    return _make(element, context, lights.Area, _area)
+    return _make(element, context, *ON_SHAPES[element.type])
 
 
 def _make(
@@ -49,6 +49,10 @@ def _make(
 
 def _area(props: Properties) -> Parameters:
     return {"radiance": emission(props, "radiance", textured=True)}
+
+
+def _directional_area(props: Properties) -> Parameters:
+    return {"irradiance": emission(props, "radiance", textured=True)}
 
 
 def _point(props: Properties) -> Parameters:
@@ -93,6 +97,10 @@ def _envmap(props: Properties) -> Parameters:
     }
 
 
+ON_SHAPES: dict[str, tuple[type[Light], Callable[[Properties], Parameters]]] = {
+    "area": (lights.Area, _area),
+    "directionalarea": (lights.DirectionalArea, _directional_area),
+}
 PLUGINS: dict[str, tuple[type[Light], Callable[[Properties], Parameters]]] = {
     "point": (lights.Point, _point),
     "spot": (lights.Spot, _spot),

@@ -255,6 +255,15 @@ def _direct(props: Properties) -> Integrator:
     return integrators.Direct(hide_lights=props.flag("hide_emitters", False))
 
 
+def _particle_tracer(props: Properties) -> Integrator:
+    props.ignore("samples_per_pass")
+    return integrators.ParticleTracer(
+        max_depth=props.integer("max_depth", -1, -1),
+        rr_depth=props.integer("rr_depth", 5, 1),
+        hide_lights=props.flag("hide_emitters", False),
+    )
+
+
 def _aov(props: Properties) -> Integrator:
     for nested in props.objects("integrator"):
         integrator(nested, props.context)
@@ -279,6 +288,7 @@ def _moment(props: Properties) -> Integrator:
 INTEGRATORS: dict[str, Callable[[Properties], Integrator]] = {
     "path": _path,
     "direct": _direct,
+    "ptracer": _particle_tracer,
     "aov": _aov,
     "moment": _moment,
 }

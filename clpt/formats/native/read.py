@@ -20,6 +20,7 @@ from clpt.formats.native.transforms import matrix
 from clpt.scene import Scene, cameras, integrators, kinds, lights, materials, shapes
 from clpt.scene.params import SPECTRUM_ROLES, Kind, Param, params
 
+ON_SHAPES = tuple(cls.kind for cls in lights.ON_SHAPES)
 KEYS = (
     "$schema", "name", "camera", "film", "integrator", "sampler", "materials", "shapes", "lights",
     "spp", "seed",
@@ -169,14 +170,14 @@ class _Reader:
         return tuple(cursor.numbers(len(value)))
 
     def light(self, cursor: Cursor) -> Any:
-        if kind_name(cursor, "light", kinds("light")) == "area":
+        if kind_name(cursor, "light", kinds("light")) in ON_SHAPES:
             raise cursor.error("an area light stands in a shape's 'emission'")
         return self.kind(cursor, "light")
 
     def emission(self, cursor: Cursor) -> Any:
         if cursor.value is None:
             return None
-        if kind_name(cursor, "light", kinds("light")) != "area":
+        if kind_name(cursor, "light", kinds("light")) not in ON_SHAPES:
             raise cursor.error("only an area light can stand on a shape")
         return self.kind(cursor, "light")
 

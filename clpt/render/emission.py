@@ -1,0 +1,72 @@
+"""The dispatch over all lights for paths that start at them: `light_emit`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from clpt.render import shapes
+from clpt.render.lamps import PLACED, RECORDS
+from clpt.render.lights import KINDS, case_text, row_text
+
+
+def dispatch_text(kinds: Iterable[str], textured: bool) -> str:
+    """Return `light_emit(scene, pick, u, v, lambdas)`: a ray from a light that is chosen by `pick`.
+
+    kinds: of the lights in the scene; textured: some emission is a texture. It stands behind the
+    text of clpt.render.lights.dispatch_text.
+    """
+    present = [kind for kind in KINDS if kind in set(kinds)]
+    lamps = [kind for kind in present if kind in RECORDS]
+    surfaces = [kind for kind in present if kind in shapes.RECORDS]
+    files = [kind for kind in present if kind in PLACED or kind in shapes.RECORDS]
+    lines = ['#include "lib/emission.cl"', *(f'#include "emission/{k}.cl"' for k in files)]
+    head = "LightRay light_emit(Scene scene, real pick, vec2 u, vec2 v, Wavelengths lambdas)"
+    if not present:
+        return "\n".join([*lines, f"inline {head} {{ return light_ray_nothing(); }}", ""])
+    lines += [
+        f"inline {head}",
+        "{",
+        "    integer row = light_pick(scene, &pick);",
+        "    LightRow l = light_at(scene, row);",
+        "    LightRay r = light_ray_nothing();",
+    ]
+    for kind in lamps:
+        lines += case_text(kind, len(present) == 1, [f"r = light_ray_sel(m, {_lamp(kind)}, r);"])
+    lines += _surfaces_text(surfaces, len(present) == 1, textured) if surfaces else []
+    lines += [
+        "    real share = 1.0f / max_r(l.pmf, (real)(1e-30f));",
+        "    r.power = spectrum_scale(r.power, share);",
+        "    r.seen = spectrum_scale(r.seen, share);",
+        "    return r;",
+        "}",
+    ]
+    return "\n".join([*lines, ""])
+
+
+def _lamp(kind: str) -> str:
+    """A ray from a lamp; from infinity, its direction is that of a light sample."""
+    if kind in PLACED:
+        return f"{kind}_emit({row_text(kind)}, scene, u, v, lambdas)"
+    nowhere = "v3(0.0f, 0.0f, 0.0f)"
+    sample = f"{kind}_sample({row_text(kind)}, scene, {nowhere}, u, lambdas)"
+    return f"distant_emit(scene, {sample}, v)"
+
+
+def _surfaces_text(kinds: list[str], only: bool, textured: bool) -> list[str]:
+    """A point of the shape, its emission there, and the ray from it."""
+    lines = ["    SurfacePoint q = surface_point_nothing();"]
+    for kind in kinds:
+        body = [f"SurfacePoint p = {kind}_point({row_text(kind)}, u);"]
+        if kind == "triangle" and textured:
+            body += [
+                "integer at = sel_i(m, l.shape, (integer)(0)) * SHAPE_ROW_WORDS;",
+                "ShapeRow shape = shape_row_row(scene.shapes, at);",
+                "p.uv = area_triangle_uv(scene, shape, sel_i(m, row, shape.light), p.uv);",
+            ]
+        lines += case_text(kind, only, [*body, "q = surface_point_sel(m, p, q);"])
+    return [
+        *lines,
+        "    Spectrum value = emission_load(scene, l.radiance, q.uv, lambdas);",
+        "    LightRay s = surface_emit(q, l.along != 0, value, v);",
+        "    r = light_ray_sel(l.shape >= 0, s, r);",
+    ]

@@ -1,0 +1,13 @@
+/* A point of a triangle; uv are barycentrics, which the caller turns into the mesh's. */
+SurfacePoint triangle_point(Triangle s, vec2 u)
+{
+    vec2 b = uniform_triangle(u);
+    vec3 n = cross3(s.e1, s.e2);
+    real twice = max_r(sqrt(dot3(n, n)), (real)(1e-30f));
+    SurfacePoint q;
+    q.p = madd3(s.e1, b.x, madd3(s.e2, b.y, s.v0));
+    q.n = scale3(n, s.side / twice);
+    q.uv = b;
+    q.area = 0.5f * twice;
+    return q;
+}

@@ -1,0 +1,76 @@
+/* One vertex of a path that comes from a light: it is joined to the camera, and goes on.
+ *
+ * f is asked for as radiance flows, from the light to the camera, and light that is carried takes it with
+ * the geometric cosine of the side where it leaves (Veach 1997, 5.3.2): what bsdf_sample gives for the
+ * opposite flow lacks, where light is refracted, eta^2, and where normals are smoothed, the quotient
+ * |wo . ns| |wi . n| / (|wo . n| |wi . ns|), wo being the side where the light came from. */
+#include "lib/camera.cl"
+#include "generated/camera.cl"
+#include "lib/connect.cl"
+#include "generated/connect.cl"
+#include "lib/light_path.cl"
+
+void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mask active)
+{
+    global const Settings *settings = scene.settings;
+    vec3 o = load_path_o(path, at), d = load_path_d(path, at);
+    Wavelengths lambdas = load_path_lambdas(path, at);
+    Spectrum beta = load_path_beta(path, at), ratio = hero_ratio(path, at);
+    integer state = load_path_state(path, at), depth = state & PATH_DEPTH;
+    mask front;
+    Surface s = surface_load(scene, hit, at, active, o, d, &front);
+
+    Sampler sampler = light_path_sampler(settings, load_path_place(path, at), load_path_sample(path, at));
+    natural dimension = as_natural(DIMENSION_VERTEX + depth * DIMENSIONS_A_VERTEX);
+    vec2 choice = {0.0f, 0.0f};
+#if USES_CHOICE
+    choice = sampler_pair(sampler, dimension + DIMENSION_CHOICE);
+#endif
+    Bsdf m = bsdf_load(scene, MATERIAL_ROW(sel_i(active, load_hit_material(hit, at), (integer)(0))), s.uv, lambdas);
+    Frame frame = surface_frame(s);
+    vec3 wo = to_local(frame, neg3(d));
+    real arrives = 1.0f / max_r(fabs(dot3(s.n, d)), (real)(1e-6f));
+
+#if !BSDF_DELTA
+    /* To the camera. */
+    CameraPoint c = camera_connect(scene, s.p, mask_of(0), sampler_pair(sampler, dimension + DIMENSION_LIGHT));
+    Spectrum f = bsdf_eval(m, to_local(frame, neg3(c.d)), wo);
+    mask shine = active & (c.pixel >= 0) & (spectrum_max(f) > 0.0f);
+    real turned = fabs(dot3(s.n, c.d)) * arrives * c.importance;
+    connect_camera(shadow, at, active, shine, s, c, spectrum_scale(spectrum_mul(beta, f), turned));
+    state += sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
+#endif
+
+    /* The next direction. */
+    vec2 uv = sampler_pair(sampler, dimension + DIMENSION_BSDF);
+    BsdfSample bs = hero_sample(m, wo, v3(uv.x, uv.y, choice.y), &ratio);
+    mask next = active & (bs.pdf > 0.0f) & (depth + 1 < settings->max_depth);
+    vec3 onward = normalize3(to_world(frame, bs.wi));
+    real leaves = fabs(dot3(s.n, onward)) * arrives;
+    real bent = bs.eta * bs.eta * leaves * fabs(wo.z) / max_r(fabs(bs.wi.z), (real)(1e-6f));
+    Spectrum carried = spectrum_scale(bs.weight, bent);
+#if BSDF_CHROMATIC /* eta differs between the wavelengths */
+    mask spread = next & ((bs.lobe & LOBE_DELTA) == 0);
+    Spectrum exact = spectrum_scale(bsdf_eval(m, bs.wi, wo), leaves / sel(spread, bs.pdf, (real)(1.0f)));
+    carried = spectrum_sel(spread, exact, carried);
+#endif
+    beta = spectrum_mul(beta, carried);
+
+    /* Russian roulette, on what is left of what the light gave. */
+    integer survivor = depth >= settings->rr_depth;
+    real strength = spectrum_max(beta) * load_path_weight(path, at);
+    next = next & (strength > 0.0f);
+    if (any(next & survivor)) {
+        real q = min_r(strength, (real)(0.95f));
+        vec2 u = sampler_pair(sampler, dimension + DIMENSION_ROULETTE);
+        next = next & (!survivor | (u.x < q));
+        beta = spectrum_scale(beta, sel(survivor, 1.0f / max_r(q, (real)(1e-6f)), (real)(1.0f)));
+    }
+
+    store_path_o(path, at, next, surface_offset(s, onward));
+    store_path_d(path, at, next, onward);
+    store_path_beta(path, at, next, beta);
+    hero_keep(path, at, next, ratio);
+    state = sel_i(next, state, state - (state & PATH_ALIVE)) + sel_i(active, (integer)(1), (integer)(0));
+    store_path_state(path, at, active, state);
+}

@@ -1,0 +1,26 @@
+/* Tests the rays that wait to reach the camera, and adds what they carry to the pixel that sees them. */
+#include "lib/base.cl"
+#include "lib/shape.cl"
+#include "generated/trace.cl"
+#include "bvh/apart.cl"
+#include "lib/film.cl"
+#include "lib/splat.cl"
+
+kernel APART void splat(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS, global float *film, global uint *counters)
+{
+    SLABS
+    SCENE
+    uint at = get_global_id(0) * LANES;
+    real t = load_shadow_t(shadow, at);
+    mask active = t > 0.0f;
+    if (any(active)) {
+        vec3 o = load_shadow_o(shadow, at), d = load_shadow_d(shadow, at);
+        mask open = active & !trace_occluded(TRACE, scene, o, d, t, active);
+        vec3 value = film_value(scene, load_shadow_value(shadow, at), load_path_lambdas(path, at));
+        mask sane = open & (fabs(value.x) + fabs(value.y) + fabs(value.z) < 1e30f); /* false for NaN */
+        integer plane = divide(LANE_INDEX + (int)at, settings->per_plane);
+        film_splat(settings, film, sane, plane, load_shadow_pixel(shadow, at), value);
+        count(counters, COUNTER_REJECTED, open & !sane, (integer)(1));
+        store_shadow_t(shadow, at, active, (real)(-1.0f));
+    }
+}

@@ -1,0 +1,142 @@
+"""Paths from lights and paths from the camera make the same picture.
+
+Means over blocks of pixels are compared by the spread of independent exposures; see
+tests/renders/support.py for the significance.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+from clpt import transforms as tf
+from clpt.scene import Film, Scene
+from clpt.scene import materials as m
+from clpt.scene.cameras import Camera, Perspective, ThinLens
+from clpt.scene.integrators import ParticleTracer, Path
+from clpt.scene.lights import (
+    Area,
+    Constant,
+    CubeMap,
+    Directional,
+    Envmap,
+    Light,
+    Point,
+    Spot,
+)
+from clpt.scene.shapes import Cylinder, Disk, Mesh, Rectangle, Shape, Sphere
+from tests.renders.support import assert_agree, blocks, exposures
+
+MODES = ("rgb", "spectral")
+UP = np.array([0.0, 1.0, 0.0])
+VIEW = tf.look_at([0.0, 1.2, 3.2], [0.0, 0.4, 0.0], UP)
+BLACK = m.Diffuse(reflectance=0.0)
+DOWN = tf.rotate([1, 0, 0], 90)  # turns +z to -y
+
+
+def ball(radius: float, center: tuple[float, float, float], material: m.Material) -> Mesh:
+    """A coarse ball of triangles with smooth normals."""
+    shape = trimesh.creation.icosphere(subdivisions=2, radius=radius)
+    vertices = np.asarray(shape.vertices, np.float32)
+    return Mesh(
+        vertices=vertices,
+        faces=np.asarray(shape.faces, np.uint32),
+        normals=vertices / radius,
+        to_world=tf.translate(center),
+        material=material,
+    )
+
+
+def lit_shapes(on: dict[str, float]) -> list[Shape]:
+    """A light of every shape, one in view; `on` tells their radiance."""
+
+    def light(name: str) -> dict[str, Any]:
+        v = on.get(name, 0.0)
+        return {"material": BLACK, "emission": Area(radiance=(v, 0.8 * v, 0.5 * v)), "name": name}
+
+    corners = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], np.float32)
+    faces = np.array([(0, 1, 2), (0, 2, 3)], np.uint32)
+    above = tf.translate([0.6, 1.9, 0.6]) @ DOWN
+    return [
+        Sphere(center=(0.9, 0.9, 0.3), radius=0.15, **light("sphere")),
+        Disk(to_world=tf.translate([-0.8, 1.8, 0.5]) @ DOWN @ tf.scale(0.3), **light("disk")),
+        Rectangle(to_world=above @ tf.scale([0.4, 0.2, 1.0]), **light("rectangle")),
+        Mesh(vertices=corners, faces=faces, to_world=above @ tf.translate([0, 0.6, 0]) @ tf.scale(
+            0.2), **light("mesh")),
+        Cylinder(p0=(-0.5, 1.5, 0.8), p1=(0.2, 1.7, 0.8), radius=0.05, **light("cylinder")),
+    ]  # fmt: skip
+
+
+def lamps(on: dict[str, float]) -> list[Light]:
+    """Every light off all shapes."""
+    rgb = {name: (0.6 * v, v, v) for name, v in on.items()}
+    image = np.zeros((8, 16, 3), np.float32)
+    image[1:5, 6:9] = 4.0
+    faces = [np.full((2, 2, 3), 0.2 * i, np.float32) for i in range(6)]
+    spot = tf.look_at([0.4, 1.9, 0.9], [0.1, 0.0, 0.1], UP)
+    black = (0.0, 0.0, 0.0)
+    return [
+        Point(position=(0.5, 1.7, 0.9), intensity=rgb.get("point", black)),
+        Spot(to_world=spot, intensity=rgb.get("spot", black), cutoff=30.0, beam_width=12.0),
+        Directional(direction=(0.3, -0.9, -0.4), irradiance=rgb.get("directional", black)),
+        Constant(radiance=rgb.get("constant", black)),
+        Envmap(image=image, scale=on.get("envmap", 0.0), to_world=tf.rotate([0, 1, 0], 130)),
+        CubeMap(image=faces, scale=on.get("cube_map", 0.0)),
+    ]
+
+
+LIGHTS = {
+    "sphere": 30.0, "disk": 10.0, "rectangle": 10.0, "mesh": 20.0, "cylinder": 10.0, "point": 3.0,
+    "spot": 8.0, "directional": 2.0, "constant": 1.0, "envmap": 2.0, "cube_map": 1.0,
+}  # fmt: skip
+
+
+def still_life(mode: str, on: dict[str, float], camera: Camera | None = None) -> Scene:
+    """A floor, a rough mirror behind it and two balls, in the light of those `on`."""
+    shapes: list[Shape] = [
+        Rectangle(to_world=tf.rotate([1, 0, 0], -90) @ tf.scale(1.5), material=m.Diffuse()),
+        Rectangle(
+            to_world=tf.translate([0, 0.8, -1.0]) @ tf.scale([1.5, 0.8, 1.0]),
+            material=m.RoughConductor(alpha_u=0.4, alpha_v=0.4),
+        ),
+        ball(0.4, (-0.6, 0.4, 0.2), m.Diffuse(reflectance=(0.7, 0.3, 0.2))),
+        Sphere(center=(0.35, 0.35, 0.3), radius=0.35, material=m.RoughPlastic(alpha=0.3)),
+    ]
+    return Scene(
+        camera=camera or Perspective(to_world=VIEW, fov=50, fov_axis="y", offset_x=0.05),
+        shapes=[*shapes, *lit_shapes(on)],
+        lights=lamps(on),
+        film=Film(width=16, height=12, mode=mode),
+    )
+
+
+def both(scene: Scene, spp: int, what: str, *, many: int = 1, depth: int = 4, **kw: Any) -> None:
+    """Compare the two integrators on a scene; `many`: light paths for one of the camera's."""
+    from_camera = dataclasses.replace(scene, integrator=Path(max_depth=depth))
+    from_lights = dataclasses.replace(scene, integrator=ParticleTracer(max_depth=depth))
+    reference = blocks(exposures(from_camera, 12, spp))
+    assert_agree(blocks(exposures(from_lights, 12, many * spp, **kw)), reference, what)
+
+
+@pytest.mark.parametrize("kind", LIGHTS)
+def test_every_light(kind: str) -> None:
+    """Diffuse, rough and smoothed surfaces under one kind of light."""
+    both(still_life("rgb", {kind: LIGHTS[kind]}), 16, kind)
+
+
+def test_spectral_and_all_lights_at_once() -> None:
+    both(still_life("spectral", LIGHTS), 16, "spectral")
+
+
+@pytest.mark.parametrize("depth", [1, 2, 3])
+def test_depths(depth: int) -> None:
+    both(still_life("rgb", {"sphere": 30.0, "spot": 8.0}), 16, f"depth {depth}", depth=depth)
+
+
+def test_thin_lens() -> None:
+    camera = ThinLens(to_world=VIEW, fov=50, aperture_radius=0.1, focus_distance=2.0, near=0.5)
+    both(still_life("rgb", {"rectangle": 10.0, "constant": 0.3}, camera), 16, "thin lens")
