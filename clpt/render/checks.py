@@ -6,6 +6,7 @@ from typing import Any
 
 from clpt.errors import SceneError
 from clpt.render import shapes
+from clpt.render.cameras import dispersive_glass
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
 from clpt.scene.integrators import Aov, Film, Filter, Integrator, ParticleTracer, Sampler
@@ -60,6 +61,10 @@ def _check_light_paths(scene: Scene) -> None:
             f"particle_tracer works with the cameras {' and '.join(CONNECTED)}, "
             f"not {scene.camera.kind}",
             where="camera",
+        )
+    if scene.film.mode == "spectral" and dispersive_glass(scene.camera) is not None:
+        raise SceneError(
+            "particle_tracer needs a lens whose glass does not disperse", where="camera.glass"
         )
     for i, light in enumerate(scene.lights):
         if isinstance(light, Point) and not light.falloff:

@@ -19,6 +19,11 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     integer state = load_path_state(path, at), depth = state & PATH_DEPTH;
     mask front;
     Surface s = surface_load(scene, hit, at, active, o, d, &front);
+#if USES_ABSORPTION
+    integer inside = BSDF_INTERIOR(MATERIAL_ROW(sel_i(active, load_hit_material(hit, at), (integer)(0))));
+    integer medium = medium_met(sel_i(active, load_path_medium(path, at), (integer)(0)), inside, front);
+    beta = spectrum_mul(beta, medium_transmittance(scene, medium, load_hit_t(hit, at), lambdas));
+#endif
 
     Sampler sampler = light_path_sampler(settings, load_path_place(path, at), load_path_sample(path, at));
     natural dimension = as_natural(DIMENSION_VERTEX + depth * DIMENSIONS_A_VERTEX);
@@ -37,7 +42,12 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     Spectrum f = bsdf_eval(m, to_local(frame, neg3(c.d)), wo);
     mask shine = active & (c.pixel >= 0) & (spectrum_max(f) > 0.0f);
     real turned = fabs(dot3(s.n, c.d)) * arrives * c.importance;
-    connect_camera(shadow, at, active, shine, s, c, spectrum_scale(spectrum_mul(beta, f), turned));
+    Spectrum value = spectrum_scale(spectrum_mul(beta, f), turned);
+#if USES_ABSORPTION
+    integer between = medium_beyond(medium, inside, front, dot3(s.n, c.d) > 0.0f);
+    value = spectrum_mul(value, medium_transmittance(scene, between, c.t, lambdas));
+#endif
+    connect_camera(shadow, at, active, shine, s, c, value);
     state += sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
 #endif
 
@@ -70,6 +80,9 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     store_path_o(path, at, next, surface_offset(s, onward));
     store_path_d(path, at, next, onward);
     store_path_beta(path, at, next, beta);
+#if USES_ABSORPTION
+    store_path_medium(path, at, next, medium_beyond(medium, inside, front, dot3(s.n, onward) < 0.0f));
+#endif
     hero_keep(path, at, next, ratio);
     state = sel_i(next, state, state - (state & PATH_ALIVE)) + sel_i(active, (integer)(1), (integer)(0));
     store_path_state(path, at, active, state);

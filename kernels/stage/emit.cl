@@ -64,6 +64,9 @@ kernel APART void emit(SLAB_ARGS, SCENE_ARGS, global uint *counters, int first, 
         store_path_lambdas(path, at, go, lambdas);
         store_path_beta(path, at, go, r.power);
         store_path_weight(path, at, go, 1.0f / max_r(strength, (real)(1e-30f)));
+#if USES_ABSORPTION
+        store_path_medium(path, at, go, (integer)(0));
+#endif
 #if USES_DISPERSION
         store_path_ratio(path, at, go, spectrum_of(1.0f));
 #endif

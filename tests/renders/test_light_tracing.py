@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import trimesh
 
+import clpt
 from clpt import transforms as tf
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m
@@ -23,13 +24,15 @@ from clpt.scene.lights import (
     Constant,
     CubeMap,
     Directional,
+    DirectionalArea,
     Envmap,
     Light,
     Point,
     Spot,
 )
-from clpt.scene.shapes import Cylinder, Disk, Mesh, Rectangle, Shape, Sphere
-from tests.renders.support import assert_agree, blocks, exposures
+from clpt.scene.shapes import Cube, Cylinder, Disk, Mesh, Rectangle, Shape, Sphere
+from clpt.spectra import Tabulated
+from tests.renders.support import assert_agree, assert_mean, blocks, exposures
 
 MODES = ("rgb", "spectral")
 UP = np.array([0.0, 1.0, 0.0])
@@ -138,5 +141,58 @@ def test_depths(depth: int) -> None:
 
 
 def test_thin_lens() -> None:
-    camera = ThinLens(to_world=VIEW, fov=50, aperture_radius=0.1, focus_distance=2.0, near=0.5)
-    both(still_life("rgb", {"rectangle": 10.0, "constant": 0.3}, camera), 16, "thin lens")
+    """A floor and a wall out of focus in the light of a spot."""
+    camera = ThinLens(to_world=VIEW, fov=50, aperture_radius=0.2, focus_distance=2.0, near=0.5)
+    scene = still_life("rgb", {"spot": 8.0}, camera)
+    small = dataclasses.replace(scene, shapes=[scene.shapes[0]], lights=[scene.lights[1]])
+    both(small, 32, "thin lens", depth=2)
+
+
+def beam_through(slab: m.Material | None, mode: str) -> Scene:
+    """A floor that a beam from above meets head on, perhaps through a slab of some material."""
+    lamp = Rectangle(
+        to_world=tf.translate([0, 2, 0]) @ DOWN @ tf.scale(0.5),
+        material=BLACK,
+        emission=DirectionalArea(irradiance=Tabulated((300.0, 900.0), (2.0, 2.0))),
+    )
+    shapes: list[Shape] = [
+        Rectangle(to_world=tf.rotate([1, 0, 0], -90), material=m.Diffuse(reflectance=0.5)),
+        lamp,
+    ]
+    if slab is not None:
+        plate = tf.scale([0.9, 0.1, 0.9])
+        shapes.append(Cube(to_world=tf.translate([0, 1, 0]) @ plate, material=slab))
+    return Scene(
+        camera=Perspective(to_world=tf.look_at([0, 0.5, 1.5], [0, 0, 0], UP), fov=8),
+        shapes=shapes,
+        integrator=ParticleTracer(),
+        film=Film(width=8, height=8, mode=mode),
+    )
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_beam(mode: str) -> None:
+    """A floor of albedo a under irradiance E sends out a E / pi, in every direction."""
+    white = Tabulated((300.0, 900.0), (1.0, 1.0)).to_rgb("emission")
+    assert_mean(exposures(beam_through(None, mode), 12, 128), 0.5 * 2.0 / np.pi * white, 0.02, 2e-3)
+
+
+def test_beam_through_glass_that_absorbs() -> None:
+    """What passes a slab at right angles once: (1 - f)^2 a, f being Fresnel's reflectance and a
+    what absorption leaves; the path is too short for what is reflected inside."""
+    f, a = (0.5 / 2.5) ** 2, np.exp(-3.0 * 0.2)
+    glass = m.Dielectric(int_ior=1.5, ext_ior=1.0, absorption=3.0)
+    scene = dataclasses.replace(beam_through(glass, "rgb"), integrator=ParticleTracer(max_depth=4))
+    white = Tabulated((300.0, 900.0), (1.0, 1.0)).to_rgb("emission")
+    expected = 0.5 * 2.0 / np.pi * white * (1 - f) ** 2 * a
+    assert_mean(exposures(scene, 12, 128), expected, 0.02, 2e-3)
+
+
+def test_camera_does_not_see_delta_surfaces_and_beams() -> None:
+    """Mirrors and the shapes that beams come from are black."""
+    scene = beam_through(m.Conductor(), "rgb")
+    above = Perspective(to_world=tf.look_at([0.1, 1.5, 0.0], [0, 1, 0], UP), fov=15)
+    mirror = clpt.render(dataclasses.replace(scene, camera=above), 16)
+    assert not mirror.any()
+    below = Perspective(to_world=tf.look_at([0.1, 1.2, 0.0], [0, 2, 0], UP), fov=15)
+    assert not clpt.render(dataclasses.replace(beam_through(None, "rgb"), camera=below), 16).any()
