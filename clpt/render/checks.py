@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NoReturn
 
 from clpt.errors import SceneError
 from clpt.render import shapes
@@ -11,8 +11,11 @@ from clpt.scene import Scene
 from clpt.scene.cameras import Camera
 from clpt.scene.integrators import Aov, Film, Filter, Integrator, ParticleTracer, Sampler
 from clpt.scene.lights import ON_SHAPES, DirectionalArea, Light, Point
+from clpt.scene.materials import Material
+from clpt.scene.params import params
 from clpt.scene.shapes import Shape
 
+CONNECTED = ("perspective", "thin_lens")  # cameras that particle_tracer can join a point to
 LARGEST = 1 << 26  # pixels of a film; its tiles are divided in float32, see kernels/lib/film.cl
 
 
@@ -42,36 +45,43 @@ def check(scene: Scene) -> None:
     _check_light_paths(scene)
 
 
-CONNECTED = ("perspective", "thin_lens")  # cameras that particle_tracer can join a point to
-
-
 def _check_light_paths(scene: Scene) -> None:
     """Raise SceneError for what only paths from lights can do, and for what they cannot."""
     if not isinstance(scene.integrator, ParticleTracer):
         for shape in scene.shapes:
             if isinstance(shape.emission, DirectionalArea):
                 raise SceneError(
-                    f"only the integrator particle_tracer finds a directional_area light, "
+                    "only the integrator particle_tracer finds a directional_area light, "
                     f"not {scene.integrator.kind}",
                     where=shapes.where(shape),
                 )
         return
+    spectral = scene.film.mode == "spectral"
     if scene.camera.kind not in CONNECTED:
-        raise SceneError(
-            f"particle_tracer works with the cameras {' and '.join(CONNECTED)}, "
-            f"not {scene.camera.kind}",
-            where="camera",
-        )
-    if scene.film.mode == "spectral" and dispersive_glass(scene.camera) is not None:
-        raise SceneError(
-            "particle_tracer needs a lens whose glass does not disperse", where="camera.glass"
-        )
+        names = " and ".join(CONNECTED)
+        _refuse(f"the cameras {names}, not {scene.camera.kind}", "camera")
+    if spectral and dispersive_glass(scene.camera) is not None:
+        _refuse("a lens whose glass does not disperse", "camera.glass")
+    if scene.film.bands:
+        _refuse("a film without bands", "film.bands")
     for i, light in enumerate(scene.lights):
         if isinstance(light, Point) and not light.falloff:
-            raise SceneError(
-                "particle_tracer needs a point light whose irradiance falls with the distance",
-                where=f"lights[{i}]",
-            )
+            _refuse("a point light whose irradiance falls with distance", f"lights[{i}]")
+    for shape in scene.shapes:
+        if spectral and _fluoresces(shape.material):
+            _refuse("materials that keep the wavelength", shapes.where(shape))
+
+
+def _refuse(needed: str, where: str) -> NoReturn:
+    raise SceneError(f"particle_tracer needs {needed}", where=where)
+
+
+def _fluoresces(material: Any) -> bool:
+    """Whether light may leave a material, or one inside it, at another wavelength."""
+    parts = [getattr(material, name) for name in params(type(material))]
+    return getattr(material, "shifts", False) or any(
+        _fluoresces(part) for part in parts if isinstance(part, Material)
+    )
 
 
 def _check_kind(value: Any, base: type, where: str) -> None:
