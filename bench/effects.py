@@ -22,16 +22,17 @@ from bench import machine
 from clpt import spectra
 from clpt import transforms as tf
 from clpt.scene import Film, Scene, materials
-from clpt.scene.cameras import Perspective
+from clpt.scene.cameras import Perspective, ThinLens
 from clpt.scene.integrators import Path
 from clpt.scene.lights import Area, Constant
 from clpt.scene.shapes import Rectangle, Sphere
+from clpt.scene.textures import Bitmap
 
 SIDE = 192  # pixels
 UP = np.array([0.0, 1.0, 0.0])
 
 
-def ball(material: materials.Material) -> Scene:
+def ball(material: materials.Material, lamp_spectrum: Any = (12.0, 12.0, 12.0)) -> Scene:
     """A ball of a material on a grey table under a lamp and a dim sky."""
     lamp = tf.translate([0.5, 3.0, 0.5]) @ tf.rotate([1, 0, 0], 90) @ tf.scale(0.7)
     floor = tf.translate([0, -1, 0]) @ tf.rotate([1, 0, 0], -90) @ tf.scale(4.0)
@@ -42,7 +43,7 @@ def ball(material: materials.Material) -> Scene:
             Rectangle(material=materials.Diffuse(), to_world=floor),
             Rectangle(
                 material=materials.Diffuse(reflectance=0.0),
-                emission=Area(radiance=(12.0, 12.0, 12.0)),
+                emission=Area(radiance=lamp_spectrum),
                 to_world=lamp,
             ),
         ],
@@ -57,8 +58,35 @@ def with_film(scene: Scene, **changes: Any) -> Scene:
     return dataclasses.replace(scene, film=dataclasses.replace(scene.film, **changes))
 
 
+def through_lens(glass: Any) -> Scene:
+    """The ball of grey paint seen through a lens."""
+    scene = ball(materials.Diffuse())
+    lens = ThinLens(
+        to_world=scene.camera.to_world, fov=32.0, aperture_radius=0.05, focus_distance=3.1,
+        glass=glass, focal_length=0.5,
+    )  # fmt: skip
+    return dataclasses.replace(scene, camera=lens)
+
+
+def chart(image: Any) -> Scene:
+    """The ball painted with a texture of noise."""
+    return ball(materials.Diffuse(reflectance=Bitmap(image=image)))
+
+
+SOAP = (materials.Layer(eta="water", thickness=400.0),)
+MIRROR = tuple(
+    materials.Layer(eta=n, thickness=137.5 / n) for n in (2.4, 1.46, 2.4, 1.46, 2.4, 1.46, 2.4)
+)
+DYE = spectra.Fluorophore(
+    absorption=spectra.Tabulated((380.0, 460.0, 520.0), (0.0, 0.9, 0.0)),
+    emission=spectra.Tabulated((480.0, 540.0, 640.0), (0.0, 1.0, 0.0)),
+    quantum_yield=0.9,
+)
+NOISE = np.random.default_rng(1).random((64, 64, 16), np.float32)
+BANDS = np.linspace(400.0, 700.0, 16)
 SF11 = spectra.glass("sf11")
 EVEN = float(SF11.sample(550.0))
+ETA, K = spectra.metal("Al")
 
 # name: the scene with the effect, and without
 EFFECTS: dict[str, Callable[[], tuple[Scene, Scene]]] = {
@@ -69,6 +97,43 @@ EFFECTS: dict[str, Callable[[], tuple[Scene, Scene]]] = {
     "dispersion, rough": lambda: (
         ball(materials.RoughDielectric(int_ior=SF11)),
         ball(materials.RoughDielectric(int_ior=EVEN)),
+    ),
+    "absorption": lambda: (
+        ball(materials.Dielectric(absorption=(0.2, 0.5, 1.5))),
+        ball(materials.Dielectric()),
+    ),
+    "thin film on glass": lambda: (
+        ball(materials.Dielectric(layers=SOAP)),
+        ball(materials.Dielectric()),
+    ),
+    "thin film on rough metal": lambda: (
+        ball(materials.RoughConductor(eta=ETA, k=K, layers=SOAP)),
+        ball(materials.RoughConductor(eta=ETA, k=K)),
+    ),
+    "7 films on rough metal": lambda: (
+        ball(materials.RoughConductor(eta=ETA, k=K, layers=MIRROR)),
+        ball(materials.RoughConductor(eta=ETA, k=K)),
+    ),
+    "fluorescence": lambda: (
+        ball(materials.Fluorescent(reflectance=0.1, reradiation=DYE)),
+        ball(materials.Diffuse(reflectance=0.6)),
+    ),
+    "grating": lambda: (
+        ball(materials.Grating(eta=ETA, k=K)),
+        ball(materials.Conductor(eta=ETA, k=K)),
+    ),
+    "lens of glass": lambda: (through_lens(SF11), through_lens(1.5)),
+    "sodium light": lambda: (
+        ball(materials.Diffuse(), spectra.illuminant("sodium", 12.0)),
+        ball(materials.Diffuse(), spectra.illuminant("D65", 12.0)),
+    ),
+    "spectral texture": lambda: (
+        chart(clpt.SpectralImage(NOISE, BANDS, emissive=False)),
+        chart(NOISE[:, :, :3]),
+    ),
+    "film of 32 bands": lambda: (
+        with_film(ball(materials.Diffuse()), bands=32),
+        ball(materials.Diffuse()),
     ),
 }
 
