@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from clpt import scene as sc
 from clpt.errors import SceneError
 from clpt.records import SETTINGS, SHAPE
-from clpt.render import cameras, filters, lights, shapes
+from clpt.render import cameras, filters, lights, reradiation, shapes
 from clpt.render.checks import check
 from clpt.render.colour import output_matrix, sensor
 from clpt.render.features import Features
 from clpt.render.kinds import row_words
 from clpt.render.tables import STEP, Tables
-from clpt.render.wavelengths import Density, density
+from clpt.render.wavelengths import Density, density, emissions
 from clpt.scene import materials as mt
 from clpt.scene.params import device_params, params
 from clpt.spectra import Constant
@@ -85,6 +85,9 @@ class _Lowering:
                 "film.filter is passed over: particle_tracer has a box of one pixel"
             )
         self.leaves = _leaf_kinds(scene)
+        if self.mode == "spectral" and mt.Fluorescent.kind in self.leaves:
+            nodes = reradiation.nodes(film.lambda_min, film.lambda_max)
+            self.tables.expected = reradiation.expected(emissions(scene), nodes)
         self.words: dict[tuple[int, str], int] = {}
         self.uses = dict.fromkeys(("normals", "uvs", "tangents", "mixtures", "absorption"), False)
         self.triangles: list[tuple[np.ndarray, np.ndarray, int]] = []  # vertices, faces, shape

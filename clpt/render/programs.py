@@ -11,7 +11,7 @@ from clpt.layout import Record
 from clpt.records import LIGHT, SETTINGS, SHAPE, SLABS, TABLES
 from clpt.render import cameras, emission, films, kinds, lights, shapes, textures
 from clpt.render.features import Features
-from clpt.render.tables import SHIFT_STEP
+from clpt.render.reradiation import STEP as SHIFT_STEP
 from clpt.scene import materials
 from clpt.scene.params import device_params, interior_params
 
@@ -331,6 +331,6 @@ def _shift_text(cls: type[materials.Material]) -> list[str]:
     own = "&(m).reflectance, &(m).reradiation, (m).amount"
     return [
         '#include "lib/reradiation.cl"',
-        "#define bsdf_shift(scene, row, m, lambdas, u) "
-        f"reradiation_shift(scene, {table}, {own}, lambdas, u)",
+        "#define bsdf_shift(scene, row, m, lambdas, u, depth) "
+        f"reradiation_shift(scene, {table}, {own}, lambdas, u, depth)",
     ]

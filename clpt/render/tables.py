@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt import spectra
 from clpt.records import TABLES
+from clpt.render import reradiation
 from clpt.render.films import layers_words
 from clpt.render.kinds import ORDERS_WORDS, REAL_WORDS, SPECTRUM_WORDS
 from clpt.render.wavelengths import Density
@@ -27,7 +28,6 @@ from clpt.spectra import (
 from clpt.spectra.spectrum import Role, d65, on_grid
 
 STEP = 1.0  # [nm] of the tabulated spectra
-SHIFT_STEP = 5  # [nm] of re-radiation matrices
 ONE = 1e4  # sigmoid coefficient at which it is 1 in float32
 # How a spectrum is turned to rgb, by the role of the parameter (see clpt.spectra.spectrum).
 RGB_ROLES: dict[str, Role] = {
@@ -63,6 +63,7 @@ class Tables:
     ):
         self.mode, self.lambda_min, self.lambda_max = mode, lambda_min, lambda_max
         self.sources: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
+        self.expected: NDArray[np.float64] | None = None  # light, see clpt.render.reradiation
         self.textures: dict[tuple[int, str], int] = {}
         self.texture_roles: set[tuple[str, str]] = set()  # (kind, role) that occur
         self._kept: list[Any] = []  # what `textures` and `_rows` know by identity stays alive
@@ -207,26 +208,19 @@ class Tables:
     def reradiation_words(self, value: Reradiation | None) -> tuple[Words, str]:
         """Return the words of a matrix: of the sum of its rows; the first says where it lies.
 
-        In `distributions` stand the sums, then for each row its values and their running integral,
-        see kernels/lib/reradiation.cl. In RGB mode: what is given out under D65.
+        In RGB mode: what is given out under D65.
         """
         words = np.zeros(SPECTRUM_WORDS, np.uint32)
         if not self.spectral:
             if value is not None:
                 words[:3] = as_words(value.to_rgb(self.lambda_min, self.lambda_max))
             return words, "constant"
-        cells = int(np.ceil((self.lambda_max - self.lambda_min) / SHIFT_STEP - 1e-9))
-        nodes = self.lambda_min + SHIFT_STEP * np.arange(cells + 1)
-        rows = np.zeros((cells + 1, cells + 1))
-        if value is not None:
-            rows = value.sample(nodes[:, None], nodes)
-        running = np.cumsum(0.5 * SHIFT_STEP * (rows[:, 1:] + rows[:, :-1]), axis=1)
-        shares = running / np.maximum(running[:, -1:], 1e-30)
-        words[0] = self.append_floats("distributions", running[:, -1])
-        self.append_floats("distributions", np.hstack([rows, shares]))
+        nodes = reradiation.nodes(self.lambda_min, self.lambda_max)
+        light = np.ones_like(nodes) if self.expected is None else self.expected
+        values, sums = reradiation.table(value, nodes, light)
+        words[0] = self.append_floats("distributions", values)
         words[3] = as_words([1.0])[0]
-        total = Tabulated(nodes, running[:, -1], "hold")
-        words[4] = np.int32(-1 - self.spectra_row(total)).view(np.uint32)
+        words[4] = np.int32(-1 - self.spectra_row(Tabulated(nodes, sums, "hold"))).view(np.uint32)
         return words, "table"
 
     def emission_words(self, value: Any) -> Words:

@@ -81,7 +81,7 @@ def density(scene: Scene) -> Density:
     if film.wavelengths == "visible":
         return Density(lo, hi, _normalised(visible.pdf(nodes), nodes)) if film.bands else visible
     response = np.ones_like(nodes) if film.bands else np.abs(sensor(film).sample(nodes)).sum(axis=1)
-    emitted = [light.sample(nodes) * response for light in _lights(scene)]
+    emitted = [light.sample(nodes) * response for light in emissions(scene)]
     emitted = [light for light in emitted if light.any()]
     shares = [(1.0 - LIGHTS - SENSOR, np.ones_like(nodes))]
     shares += [(SENSOR, response)] if response.any() else []
@@ -121,7 +121,7 @@ def _normalised(values: Values, nodes: Values) -> Values:
     return values / _integral(values, nodes)
 
 
-def _lights(scene: Scene) -> Iterator[Spectrum]:
+def emissions(scene: Scene) -> Iterator[Spectrum]:
     """What the lights of a scene emit; an image of colours stands for D65."""
     sources = [*scene.lights, *(shape.emission for shape in scene.shapes), scene.integrator]
     for source in sources:

@@ -44,7 +44,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     integer row = MATERIAL_ROW(sel_i(active, load_hit_material(hit, at), (integer)(0)));
     Bsdf m = bsdf_load(scene, row, s.uv, lambdas);
 #if BSDF_SHIFTS
-    lambdas = bsdf_shift(scene, row, m, lambdas, choice.y); /* from here on, those by which light comes */
+    lambdas = bsdf_shift(scene, row, m, lambdas, choice.y, depth); /* from here on, those by which light comes */
     store_path_lambdas(path, at, active, lambdas);
 #endif
     Frame frame = surface_frame(s);

@@ -32,7 +32,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     vec2 choice = sampler_pair(sampler, dimension + DIMENSION_CHOICE);
     real mirror = BSDF_REFLECTIVITY(m);
 #if BSDF_SHIFTS
-    lambdas = bsdf_shift(scene, row, m, lambdas, choice.y); /* from here on, those by which light comes */
+    lambdas = bsdf_shift(scene, row, m, lambdas, choice.y, depth); /* from here on, those by which light comes */
     store_path_lambdas(path, at, active, lambdas);
 #endif
 

@@ -92,7 +92,7 @@ def test_a_plane_is_a_matrix_product(name: str) -> None:
     at = lambdas()
     expected = seen(at, operator(at) @ LIGHTS[name].sample(at))
     images = exposures(plane(LIGHTS[name]), 32, 64)
-    within = np.abs(expected).max() * (0.06 if name == "UV" else 0.02)
+    within = np.abs(expected).max() * 0.02
     means = images.mean(axis=(0, 1, 2))
     assert np.abs(means - expected).max() < within, f"{means}, expected {expected}"
     assert agreement(images.mean(axis=(1, 2)), expected[None], 1e-3) > 1e-4
