@@ -100,6 +100,8 @@ class White(click.ParamType):
 @click.option("--white-balance", type=White(), help="What becomes white: none, D65, 3200 or x,y.")
 @click.option("--output-space", type=click.Choice(spaces.SPACES), help="Of the picture's colours.")
 @click.option("--bands", type=click.IntRange(0), help="Of a spectral picture, for .npy and .exr.")
+@click.option("--lambda-min", type=float, help="Shortest wavelength of the light [nm].")
+@click.option("--lambda-max", type=float, help="Longest one; fluorescence asks for 300 to 830.")
 @click.option("--exposure", type=float, default=0.0, help="Brighten .png by this many stops.")
 @click.option("-D", "defines", multiple=True, metavar="NAME=VALUE", help="Set a $name of an .xml.")
 @click.option("--verbose", is_flag=True, help="Tell of memory, trees, programs and stages.")

@@ -172,6 +172,7 @@ def test_changes_of_a_scene():
         (["--white-balance", "D66"], "D66"),
         (["--white-balance", "1,1"], "chromaticity"),
         (["--output-space", "srgb"], "rec709"),
+        (["--lambda-min", "900", "--quiet"], "lambda_m"),
     ],
 )
 def test_bad_input_is_one_line_before_anything_is_rendered(

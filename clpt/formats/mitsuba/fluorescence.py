@@ -1,0 +1,38 @@
+"""Our own plugin `fluorescent`: paint that glows; Mitsuba has none like it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from clpt import spectra
+from clpt.formats.mitsuba.spectra import real, reflectance
+from clpt.formats.mitsuba.values import Properties, placed
+from clpt.spectra import Constant, Spectrum
+
+
+def fluorescent(props: Properties) -> dict[str, Any]:
+    """Take the parameters of clpt.scene.materials.Fluorescent."""
+    made: dict[str, Any] = {"amount": real(props, "amount", 1.0)}
+    own = reflectance(props, "reflectance", 0.5) if "reflectance" in props.named else None
+    if "filename" in props.named:
+        child, path = props.named["filename"], props.file()
+        with placed(child):
+            made["reradiation"] = spectra.read_reradiation(path)
+            if own is None and path.suffix.lower() == ".bfc":
+                own = spectra.read_bispectral(path)[0]
+    elif "emission" in props.named:
+        absorption, emission = (_spectrum(props, name) for name in ("absorption", "emission"))
+        share = props.number("quantum_yield", 1.0)
+        made["reradiation"] = spectra.Fluorophore(absorption, emission, share)
+    else:
+        raise props.element.error("needs 'filename', or 'absorption' and 'emission'")
+    return made if own is None else {**made, "reflectance": own}
+
+
+def _spectrum(props: Properties, name: str) -> Spectrum:
+    value = reflectance(props, name, 0.5)
+    if isinstance(value, (int, float)):
+        return Constant(float(value))
+    if not isinstance(value, Spectrum):
+        raise props.element.error(f"{name!r} cannot be a texture")
+    return value
