@@ -51,7 +51,7 @@ def patches() -> tuple[dict[str, Any], list[Any]]:
 def scene() -> dict[str, Any]:
     """The whole scene, as scene.json has it."""
     colours, chart = patches()
-    look = {"origin": [0.75, 2.35, 6.3], "target": [0.0, 0.9, 0.15], "up": [0, 1, 0]}
+    look = {"origin": [0.75, 2.35, 6.3], "target": [0.05, 0.88, 0.15], "up": [0, 1, 0]}
     softbox = [
         {"scale": [1.4, 1.4, 1]},
         {"look_at": {"origin": [-3.2, 4.4, 3.6], "target": [0, 0.8, 0], "up": [0, 1, 0]}},
@@ -64,16 +64,16 @@ def scene() -> dict[str, Any]:
             "type": "thin_lens", "fov": 42, "aperture_radius": 0.05, "focus_distance": 6.35,
             "to_world": {"look_at": look},
         },
-        "film": {"width": 600, "height": 400, "filter": {"type": "blackman_harris"}},
+        "film": {"width": 540, "height": 360, "filter": {"type": "blackman_harris"}},
         "integrator": {"type": "path", "max_depth": 6},
-        "spp": 512,
-        "lights": [{"type": "constant", "radiance": daylight(0.3)}],
+        "spp": 256,
+        "lights": [{"type": "constant", "radiance": daylight(0.22)}],
         "materials": {
-            "board": {"type": "rough_plastic", "alpha": 0.25, "diffuse_reflectance": 0.03},
+            "board": {"type": "rough_plastic", "alpha": 0.35, "diffuse_reflectance": 0.03},
             "table": {
                 "type": "rough_plastic", "alpha": 0.12, "diffuse_reflectance": [0.2, 0.105, 0.055],
             },
-            "wall": {"type": "diffuse", "reflectance": [0.32, 0.34, 0.36]},
+            "wall": {"type": "diffuse", "reflectance": [0.2, 0.225, 0.25]},
             "grey": {"type": "diffuse", "reflectance": 0.18},
             "chrome": {"type": "conductor", "metal": "Cr"},
             "wood": {
@@ -93,14 +93,14 @@ def scene() -> dict[str, Any]:
             },
             {
                 "type": "rectangle", "name": "softbox", "material": "black", "to_world": softbox,
-                "emission": {"type": "area", "radiance": daylight(21)},
+                "emission": {"type": "area", "radiance": daylight(16.5)},
             },
             box("board", BOARD, LEAN, "board"),
             box("ledge", (3.2, 0.1, 0.16), [{"translate": [0, 0.05, 0.34]}], "wood"),
             {"type": "sphere", "name": "grey ball", "material": "grey", "radius": 0.44,
-             "center": [-1.98, 0.44, 0.6]},
+             "center": [-1.9, 0.44, 0.62]},
             {"type": "sphere", "name": "mirror ball", "material": "chrome", "radius": 0.44,
-             "center": [1.98, 0.44, 0.6]},
+             "center": [1.87, 0.44, 0.62]},
             *chart,
         ],
     }  # fmt: skip

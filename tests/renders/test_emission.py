@@ -1,0 +1,53 @@
+"""Lamps seen directly: their radiance through the renderer, against sums over a fine grid.
+
+The mean of independent exposures is compared at the significance of tests/renders/support.py.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from clpt import spectra
+from clpt.scene import Film, Scene
+from clpt.scene.cameras import Orthographic
+from clpt.scene.lights import Constant
+from tests.renders.support import assert_mean, exposures, with_film
+
+FINE = np.arange(360.0, 830.0, 0.05)  # [nm]
+LAMPS = {
+    "one line between two samples": spectra.Lines((546.5,), (100.0,)),
+    "a line on a sample": spectra.Lines((500.0,), (100.0,)),
+    "broad lines": spectra.Lines((450.3, 611.8), (60.0, 90.0), 6.0),
+    "sodium": spectra.illuminant("sodium"),
+    "mercury": spectra.illuminant("mercury", 3.0),
+    "HP1": spectra.illuminant("HP1"),
+    "LED-B3": spectra.illuminant("LED-B3", 0.5),
+    "an LED": spectra.LED(630.0, 18.0, 4.0),
+    "a candle": spectra.Blackbody(1900.0),
+    "daylight of luminance 2": spectra.Blackbody(6500.0, 2.0, normalised=True),
+}
+
+
+def xyz_of(lamp: spectra.Spectrum) -> np.ndarray:
+    """XYZ by a sum over FINE; the flat spectrum 1 has Y = 1."""
+    weights = spectra.cie_xyz(FINE) * lamp.sample(FINE)[:, None]
+    return weights.sum(axis=0) * (FINE[1] - FINE[0]) / spectra.CIE_Y_INTEGRAL
+
+
+@pytest.mark.parametrize("name", LAMPS)
+def test_radiance_of_lamps(name: str) -> None:
+    lamp = LAMPS[name]
+    film = Film(width=16, height=16)
+    scene = Scene(camera=Orthographic(), lights=[Constant(radiance=lamp)], film=film)
+    assert_mean(spectra.rgb_to_xyz(exposures(scene, 32, 16)), xyz_of(lamp), 0.02, 1e-3)
+
+
+def test_lamps_in_rgb_mode() -> None:
+    """In RGB mode a lamp is its colour, what lies beyond Rec. 709 cut off."""
+    lamp = LAMPS["sodium"]
+    film = Film(width=4, height=4)
+    scene = Scene(camera=Orthographic(), lights=[Constant(radiance=lamp)], film=film)
+    image = exposures(with_film(scene, mode="rgb"), 2, 1).mean(axis=(0, 1, 2))
+    expected = np.maximum(spectra.XYZ_TO_REC709 @ xyz_of(lamp), 0.0)
+    np.testing.assert_allclose(image, expected, rtol=2e-3, atol=1e-6)
