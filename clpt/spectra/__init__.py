@@ -18,7 +18,7 @@ from clpt.spectra.cie import (
     xyz_to_rgb,
 )
 from clpt.spectra.emission import LED, Blackbody, Illuminant, Lines, illuminant, illuminants
-from clpt.spectra.files import read_index, read_refractive_index, read_table
+from clpt.spectra.files import read_absorption, read_index, read_refractive_index, read_table
 from clpt.spectra.named import glass, glasses, index, metal, metals
 from clpt.spectra.reradiation import Donaldson, Fluorophore, Reradiation
 from clpt.spectra.sensors import Sensor, observer, read_sensor
@@ -70,6 +70,7 @@ __all__ = [
     "metals",
     "observer",
     "on_grid",
+    "read_absorption",
     "read_bispectral",
     "read_index",
     "read_refractive_index",

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from clpt.errors import SceneError
 from clpt.spectra.dispersion import MICROMETRE, from_formula
-from clpt.spectra.spectrum import Constant, Outside, Spectrum, Tabulated
+from clpt.spectra.spectrum import Constant, Outside, Spectrum, Tabulated, absorption
 
 PAGES = (".yml", ".yaml")
 SITE_COLUMNS = (["wl", "n"], ["wl", "k"])  # titles in refractiveindex.info's CSV, in um
@@ -33,14 +33,31 @@ def read_index(path: str | Path, part: Literal["eta", "k"] = "eta") -> Spectrum:
     Raises SceneError.
     """
     text = _text(path)
-    if not _is_page(path, text):
-        tables = _tables(path, text, (2, 3))
-        if list(tables) == [""] and len(tables[""][0]) == 2:
-            return _tabulated(path, tables[""], 1, "hold")
+    if (values := _two_columns(path, text)) is not None:
+        return values
     eta, k = _read_parts(path, text)
     if part == "eta" and eta is None:
         raise SceneError("no refractive index in this file", file=path)
     return k if part == "k" or eta is None else eta
+
+
+def read_absorption(path: str | Path) -> Spectrum:
+    """Read a coefficient [1/m]: 4 pi k / lambda of what `read_refractive_index` takes, or a table.
+
+    A table has two columns, wavelength [nm] and coefficient. Raises SceneError.
+    """
+    text = _text(path)
+    values = _two_columns(path, text)
+    return absorption(_read_parts(path, text)[1]) if values is None else values
+
+
+def _two_columns(path: str | Path, text: str) -> Tabulated | None:
+    """A plain table of wavelength and value; None where the file is of another form."""
+    if _is_page(path, text):
+        return None
+    tables = _tables(path, text, (2, 3))
+    plain = list(tables) == [""] and len(tables[""][0]) == 2
+    return _tabulated(path, tables[""], 1, "hold") if plain else None
 
 
 def read_refractive_index(path: str | Path) -> tuple[Spectrum, Spectrum]:

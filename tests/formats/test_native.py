@@ -171,6 +171,8 @@ def test_absorption(scene, tmp_path):
     (tmp_path / "page.yml").write_text(page)
     measured = coefficient({"file": "page.yml"}).sample([400.0, 800.0])
     assert np.allclose(measured, [10.0 * np.pi, 15.0 * np.pi])
+    (tmp_path / "table.csv").write_text("400 3\n500 4\n")
+    assert coefficient({"file": "table.csv"}).sample([450.0, 700.0]).tolist() == [3.5, 4.0]
     for wrong in (-1, [1, -1, 1], {"values": [[400, -1]]}, "bk7"):
         with pytest.raises(SceneError):
             coefficient(wrong)

@@ -20,7 +20,7 @@ from clpt.scene import Film, Scene
 from clpt.scene.cameras import Orthographic
 from clpt.scene.integrators import Path, Whitted
 from clpt.scene.lights import Area, Constant, Point
-from clpt.scene.materials import Dielectric, Diffuse, Null, RoughDielectric
+from clpt.scene.materials import Dielectric, Diffuse, Layer, Null, RoughDielectric
 from clpt.scene.shapes import Cube, Rectangle, Sphere
 from tests.renders.builders import BLACK, UP
 from tests.renders.support import assert_agree, assert_mean, blocks, exposures
@@ -110,10 +110,11 @@ def bowl(material: Any, mode: str, inside: list, lights: list, depth: int = 20) 
 
 
 @pytest.mark.parametrize("mode", ["rgb", "spectral"])
-def test_lamp_inside(mode: str) -> None:
-    """A lamp of radius .25 in the middle, seen through .75 m of the medium."""
+@pytest.mark.parametrize("layers", [(), (Layer(eta=1.0),)], ids=["bare", "film"])
+def test_lamp_inside(layers: tuple, mode: str) -> None:
+    """A lamp of radius .25, seen through .75 m of the medium; a film of air changes nothing."""
     lamp = Sphere(radius=0.25, material=BLACK, emission=Area(radiance=(1.0, 1.0, 1.0)))
-    scene = bowl(Dielectric(**CLEAR, absorption=2.0), mode, [lamp], [])
+    scene = bowl(Dielectric(**CLEAR, absorption=2.0, layers=layers), mode, [lamp], [])
     assert_mean(exposures(scene, 8, 64), [np.exp(-2.0 * 0.75)] * 3, 0.01, 1e-3)
 
 

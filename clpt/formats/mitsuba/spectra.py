@@ -116,6 +116,8 @@ def _spectrum(child: Element, role: str, props: Properties, name: str) -> Any:
         path = props.context.document.find_file(child, child.attributes["filename"])
         if role == "index":
             return spectra.read_index(path, "k" if name == "k" else "eta")
+        if role == "coefficient":
+            return spectra.read_absorption(path)
         return spectra.read_table(path, outside)
     text = child.attribute("value")
     if ":" not in text:

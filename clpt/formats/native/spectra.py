@@ -73,8 +73,8 @@ def _from_file(cursor: Cursor, role: str, outside: Any, name: str) -> Spectrum:
     path = find_file(cursor.at("file"))
     if role == "index":
         return spectra.read_index(path, "k" if name.split("_")[-1] == "k" else "eta")
-    if role == "coefficient" and path.suffix in (".yml", ".yaml"):
-        return spectra.absorption(spectra.read_index(path, "k"))
+    if role == "coefficient":
+        return spectra.read_absorption(path)
     if path.suffix.lower() == ".bfc":
         return spectra.read_bispectral(path)[0]
     return spectra.read_table(path, outside)
