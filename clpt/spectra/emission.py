@@ -32,8 +32,9 @@ class Blackbody(Spectrum):
     normalised: bool = False
 
     def __post_init__(self) -> None:
-        if not self.kelvin > 0.0:
+        if not 0.0 < self.kelvin < np.inf:
             raise SceneError(f"a black body's temperature must be positive, found {self.kelvin} K")
+        _check_scale(self.scale)
         if self.normalised and not _planck(cie.GRID, self.kelvin).max() > 1e-30:
             raise SceneError(f"a black body of {self.kelvin} K is dark and cannot be normalised")
 
@@ -74,8 +75,9 @@ class Lines(Spectrum):
                 f"line spectra need as many powers as wavelengths, found {len(self.powers)} and "
                 f"{len(self.wavelengths)}"
             )
-        if not np.isfinite([*self.wavelengths, *self.powers, self.scale]).all():
-            raise SceneError("a line has a wavelength or a power that is not finite")
+        if not np.isfinite([*self.wavelengths, *self.powers]).all() or min(self.powers) < 0.0:
+            raise SceneError("a line has a wavelength or a power that is not finite, or below 0")
+        _check_scale(self.scale)
         if not (self.width >= 1.0 and self.width.is_integer()):
             raise SceneError(f"the width of lines is a whole number of nm, not {self.width:g}")
 
@@ -98,8 +100,9 @@ class LED(Spectrum):
     scale: float = 1.0
 
     def __post_init__(self) -> None:
-        if not (self.peak > 0.0 and self.width > 0.0):
+        if not (0.0 < self.peak < np.inf and 0.0 < self.width < np.inf):
             raise SceneError(f"an LED's peak and width must be positive: {self.peak}, {self.width}")
+        _check_scale(self.scale)
 
     def sample(self, lambdas: ArrayLike) -> Samples:
         g = np.exp(-(((np.asarray(lambdas, np.float64) - self.peak) / self.width) ** 2))
@@ -116,6 +119,7 @@ class Illuminant(Spectrum):
     def __post_init__(self) -> None:
         if self.name not in illuminants():
             raise UnknownKindError("illuminant", self.name, illuminants())
+        _check_scale(self.scale)
 
     def sample(self, lambdas: ArrayLike) -> Samples:
         return self.scale * _of_luminance_one(self.name).sample(lambdas)
@@ -150,6 +154,11 @@ def _of_luminance_one(name: str) -> Spectrum:
 @cache
 def _discharges() -> dict[str, Any]:
     return json.loads((data.ROOT / "discharges.json").read_text("utf-8"))
+
+
+def _check_scale(scale: float) -> None:
+    if not 0.0 <= scale < np.inf:
+        raise SceneError(f"a lamp's scale cannot be {scale:g}")
 
 
 def _planck(lambdas: ArrayLike, kelvin: float) -> Samples:

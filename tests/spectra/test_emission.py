@@ -92,6 +92,8 @@ def test_lines_are_as_wide_as_they_say():
         (((500.0,), (1.0, 2.0)), "as many"),
         (((), ()), "as many"),
         (((500.0,), (np.inf,)), "finite"),
+        (((500.0,), (-1.0,)), "below 0"),
+        (((500.0,), (1.0,), 1.0, -1.0), "scale"),
         (((500.0,), (1.0,), 0.5), "whole number"),
         (((500.0,), (1.0,), 2.5), "whole number"),
         (((500.0,), (1.0,), np.nan), "whole number"),
@@ -124,6 +126,15 @@ def test_leds_follow_ohno():
     assert np.ptp(FINE[values >= 1.5]) == pytest.approx(0.92 * 25.0, abs=0.05)
     with pytest.raises(SceneError, match="positive"):
         spectra.LED(530.0, 0.0)
+
+
+@pytest.mark.parametrize("scale", [-1.0, np.inf, np.nan])
+def test_scales_that_are_none(scale):
+    for lamp in (spectra.Blackbody, spectra.LED):
+        with pytest.raises(SceneError, match="scale"):
+            lamp(3000.0, scale=scale)
+    with pytest.raises(SceneError, match="scale"):
+        spectra.Illuminant("D65", scale)
 
 
 def test_named_lamps_have_a_scale():
