@@ -21,6 +21,7 @@ PARTS = {
     "traversal": ("--layout", "wide8"),
     "building": (),
     "renders": (),
+    "spectral": (),
     "effects": (),
     "startup": (),
 }

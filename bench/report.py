@@ -103,6 +103,7 @@ def plain(rows: Sequence[Row]) -> str:
 
 TABLES: dict[str, Callable[[Sequence[Row]], str]] = {
     "renders": renders,
+    "spectral": plain,
     "effects": plain,
     "startup": startup,
     "traversal": plain,
