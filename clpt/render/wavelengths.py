@@ -7,7 +7,7 @@ the sensor and the scene's lights. All are unbiased; they differ in noise.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,8 +18,10 @@ from clpt import spectra, spectral_exr
 from clpt.render.colour import sensor
 from clpt.scene import Scene
 from clpt.scene.integrators import Film
+from clpt.scene.materials import Material
 from clpt.scene.params import params
 from clpt.spectra import RGB, RGBIlluminant, Spectrum
+from clpt.spectra.reradiation import Reradiation
 from clpt.spectra.spectrum import d65
 
 Values = NDArray[np.float64]
@@ -81,7 +83,8 @@ def density(scene: Scene) -> Density:
     if film.wavelengths == "visible":
         return Density(lo, hi, _normalised(visible.pdf(nodes), nodes)) if film.bands else visible
     response = np.ones_like(nodes) if film.bands else np.abs(sensor(film).sample(nodes)).sum(axis=1)
-    emitted = [light.sample(nodes) * response for light in emissions(scene)]
+    glow = _glow(scene, nodes)
+    emitted = [(light.sample(nodes) + glow(light)) * response for light in emissions(scene)]
     emitted = [light for light in emitted if light.any()]
     shares = [(1.0 - LIGHTS - SENSOR, np.ones_like(nodes))]
     shares += [(SENSOR, response)] if response.any() else []
@@ -119,6 +122,28 @@ def _integral(values: Values, nodes: Values) -> float:
 
 def _normalised(values: Values, nodes: Values) -> Values:
     return values / _integral(values, nodes)
+
+
+def _glow(scene: Scene, nodes: Values) -> Callable[[Spectrum], Values]:
+    """What fluorescent materials give out at nodes [nm] under a light: all of them together."""
+    film = scene.film
+    into = np.arange(film.lambda_min, film.lambda_max, STEP)
+    found = {id(m): m for shape in scene.shapes for m in _fluorescent(shape.material)}
+    whole = np.zeros((len(nodes), len(into)))
+    for matrix in found.values():
+        whole += STEP * matrix.sample(nodes[:, None], into[None, :])
+    return lambda light: whole @ light.sample(into)
+
+
+def _fluorescent(material: Any) -> Iterator[Reradiation]:
+    """What a material, and those inside it, give out at other wavelengths."""
+    declared = params(type(material)) if isinstance(material, Material) else {}
+    for name in declared:
+        value = getattr(material, name)
+        if isinstance(value, Reradiation):
+            yield value
+        elif isinstance(value, Material):
+            yield from _fluorescent(value)
 
 
 def emissions(scene: Scene) -> Iterator[Spectrum]:

@@ -10,8 +10,10 @@ from clpt.render.lower import lower
 from clpt.render.wavelengths import Density, density
 from clpt.scene import Film, Scene, lights
 from clpt.scene.cameras import Perspective
+from clpt.scene.materials import Fluorescent, TwoSided
 from clpt.scene.shapes import Sphere
 from clpt.spectra import Sensor, Tabulated
+from clpt.spectra.reradiation import Fluorophore
 
 LINE = Tabulated((588.0, 589.0, 590.0), (0.0, 1.0, 0.0))
 
@@ -73,6 +75,18 @@ def test_a_blind_sensor_is_no_crash() -> None:
     camera = Sensor((LINE, LINE, LINE), np.eye(3))
     found = density(scene(1.0, sensor=camera, lambda_max=500.0))
     assert np.isfinite(found.pdf([400.0, 499.0])).all()
+
+
+def test_what_glows_is_looked_for() -> None:
+    """Of a paint under ultraviolet light, what it gives out, not what is left of the lamp."""
+    lamp, green = spectra.LED(365.0, 15.0), spectra.LED(530.0, 20.0)
+    paint = Fluorescent(reradiation=Fluorophore(spectra.LED(370.0, 40.0), green, 0.4))
+    wide = {"lambda_min": 300.0, "wavelengths": "scene"}
+    bare, painted = scene(lamp, **wide), scene(lamp, **wide)
+    painted.shapes = [Sphere(material=TwoSided(front=paint))]
+    fine = np.linspace(500.0, 560.0, 601)
+    assert density(bare).pdf(fine).mean() * 60.0 < 0.25
+    assert density(painted).pdf(fine).mean() * 60.0 > 0.5
 
 
 @pytest.mark.parametrize(("asked", "table"), [("visible", False), ("scene", True)])
