@@ -275,6 +275,20 @@ def test_bsdfs(bsdf, xml):
     assert dataclasses.asdict(found) == dataclasses.asdict(BSDFS[xml])
 
 
+def test_absorption_from_files(bsdf, tmp_path):
+    """A table holds the coefficient itself, a page of optical constants gives 4 pi k / lambda."""
+    page = "DATA:\n - type: tabulated nk\n   data: |\n     0.4 1.5 1e-6\n     0.8 1.5 3e-6\n"
+    (tmp_path / "page.yml").write_text(page)
+    for file, expected in (
+        ("t.spd", [1.0, 2.0]),
+        ("page.yml", [10.0 * np.pi, 2.5e-6 * 4e9 / 700 * np.pi]),
+    ):
+        made = bsdf(
+            f'<bsdf type="dielectric"><spectrum name="absorption" filename="{file}"/></bsdf>'
+        )
+        assert np.allclose(made.absorption.sample([400.0, 700.0]), expected)
+
+
 def test_nested_bsdfs(bsdf):
     made = bsdf('<bsdf type="twosided"><bsdf type="null"/><bsdf type="diffuse"/></bsdf>')
     assert (made.front.kind, made.back.kind) == ("null", "diffuse")

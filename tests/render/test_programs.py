@@ -78,6 +78,21 @@ def test_text_holds_only_what_the_scene_has() -> None:
     assert "rough_conductor" not in shade
 
 
+@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+def test_only_what_absorbs_is_asked_for_a_medium(mode: str) -> None:
+    """Glass that absorbs nothing is shaded by the text that stood there before."""
+    for absorption, there in ((0.0, False), (1.0, True), (GREY, True)):
+        glass = m.Dielectric(absorption=absorption)
+        features = lowered([glass, m.RoughDielectric(), m.Diffuse()], mode).features
+        texts = programs.sources(features, "wide8", 8, queued=False)
+        for name in ("generate", "shade_dielectric", "shade_rough_dielectric", "shade_diffuse"):
+            text = texts[name].text
+            assert ("inline Spectrum medium_transmittance(" in text) == there
+            assert ("#define USES_ABSORPTION 1" in text) == there
+        assert ("inline integer medium_beyond(" in texts["shade_diffuse"].text) == there
+        device.build(device.choose(), texts["shade_rough_dielectric"])
+
+
 def test_a_material_more_does_not_change_the_others() -> None:
     one = lowered([m.Diffuse(), m.Null()], "rgb").features
     two = dataclasses.replace(one, materials=("diffuse", "null"))

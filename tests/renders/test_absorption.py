@@ -17,12 +17,12 @@ import clpt
 from clpt import spectra
 from clpt import transforms as tf
 from clpt.scene import Film, Scene
-from clpt.scene.cameras import Orthographic
-from clpt.scene.integrators import Path, Whitted
+from clpt.scene.cameras import Orthographic, Perspective
+from clpt.scene.integrators import ParticleTracer, Path, Whitted
 from clpt.scene.lights import Area, Constant, Point
 from clpt.scene.materials import Dielectric, Diffuse, Layer, Null, RoughDielectric
 from clpt.scene.shapes import Cube, Rectangle, Sphere
-from tests.renders.builders import BLACK, UP
+from tests.renders.builders import BLACK, DOWN, UP
 from tests.renders.support import assert_agree, assert_mean, blocks, exposures
 from tests.renders.test_spectral import FINE, HALF_WIDTH, band, to_rgb
 
@@ -149,6 +149,27 @@ def test_camera_inside() -> None:
     view = tf.look_at([0, 0, 0.5], [0, 0, 0], UP) @ tf.scale([0.01, 0.01, 1])
     scene.camera = Orthographic(to_world=view, near=1e-4)
     assert_mean(exposures(scene, 4, 16), [np.exp(-2.0 * 1.5)] * 3, 0.01, 1e-3)
+
+
+def test_light_traced_from_the_lamp() -> None:
+    """A dyed block between a lamp and a table: its shadow is the same from either end."""
+    lamp = tf.translate([0, 0, 2.0]) @ DOWN @ tf.scale(0.5)
+    block = tf.translate([0, 0, 1.0]) @ tf.scale([0.4, 0.4, 0.2])
+    scene = Scene(
+        camera=Perspective(to_world=tf.look_at([3, 0, 3], [0, 0, 0], UP), fov=15.0),
+        shapes=[
+            Rectangle(to_world=tf.scale(2.0), material=Diffuse(reflectance=0.8)),
+            Cube(to_world=block, material=Dielectric(int_ior=GLASS, ext_ior=1.0, absorption=DYE)),
+            Rectangle(to_world=lamp, material=BLACK, emission=Area(radiance=(4.0, 4.0, 4.0))),
+        ],
+        film=Film(width=16, height=16),
+    )
+    images = [
+        exposures(dataclasses.replace(scene, integrator=integrator), 16, 64)
+        for integrator in (Path(max_depth=8, rr_depth=100), ParticleTracer(max_depth=8))
+    ]
+    assert_agree(blocks(images[0]), blocks(images[1]), "shadow")
+    assert abs(images[0].mean() / images[1].mean() - 1.0) < 0.02
 
 
 def coloured(material: type, **changes: Any) -> Scene:
