@@ -44,21 +44,28 @@ inline vec2 grating_order(Grating m, GratingPlane g, real n, real lambda, real *
     return t;
 }
 
-/* How strong order n is, before all that leave are made to share the light. */
-inline real grating_strength(Grating m, GratingPlane g, int n, real lambda)
+/* What the grooves' shape gives order n, which leaves at a cosine. */
+inline real grating_share(Grating m, GratingPlane g, int n, mask leaves, real cosine, real lambda)
 {
-    real c;
-    grating_order(m, g, (real)((float)n), lambda, &c);
-    real waves = m.depth * (g.lag + grating_lag(g.through, m.ior.x, c)) / lambda;
+    real waves = m.depth * (g.lag + grating_lag(g.through, m.ior.x, cosine)) / lambda;
     real e = m.efficiencies[n + GRATING_ORDERS];
-    mask leaves = ((c > 0.0f) | mask_of(n == 0)) & ((float)abs(n) <= m.orders);
     mask sinusoidal = leaves & (m.profile == GRATING_SINUSOIDAL);
     mask lamellar = leaves & (m.profile == GRATING_LAMELLAR);
     mask blazed = leaves & (m.profile == GRATING_BLAZED);
     if (any(sinusoidal)) e = sel(sinusoidal, sinusoidal_share(n, waves), e);
     if (any(lamellar)) e = sel(lamellar, lamellar_share(n, waves, m.fill), e);
     if (any(blazed)) e = sel(blazed, blazed_share(n, waves), e);
-    return sel(leaves, e, (real)(0.0f));
+    return e;
+}
+
+/* How strong order n is, before all that leave are made to share the light. */
+inline real grating_strength(Grating m, GratingPlane g, int n, real lambda)
+{
+    real cosine, e = 0.0f;
+    grating_order(m, g, (real)((float)n), lambda, &cosine);
+    mask leaves = ((cosine > 0.0f) | mask_of(n == 0)) & ((float)abs(n) <= m.orders);
+    if (any(leaves)) e = sel(leaves, grating_share(m, g, n, leaves, cosine, lambda), e);
+    return e;
 }
 
 /* The share of order 0, and how strong all the others are together. */
