@@ -185,8 +185,8 @@ class RoughPlastic(Material):
 class Grating(Material):
     """A diffraction grating: every order leaves in its own direction, by wavelength.
 
-    Its grooves follow each other along the tangent (u of the surface; a disk's radius), turned by
-    `angle`. Reflective: a metal's front. Transmissive: a thin plate, both sides.
+    Its grooves follow each other along the tangent (u of the surface; a disk's radius; a mesh needs
+    uvs), turned by `angle`. Reflective: a metal's front. Transmissive: a thin plate, both sides.
     """
 
     delta = True

@@ -9,7 +9,8 @@
  * wo points to the viewer, wi to the light, both away from the surface, in the local frame whose z is
  * the shading normal, on the front's side: wo.z < 0 is a look at the back. The struct <Kind> is
  * generated from the dataclass: Spectrum for spectra, real for numbers, integer for flags and choices
- * (the choice's position). Textures and wavelengths have been resolved by the loader.
+ * (the choice's position). Textures and wavelengths have been resolved by the loader; a kind that
+ * `needs_wavelengths` has the path's as `lambdas` [nm].
  * What is sampled may depend on the hero (x) where LOBE_DISPERSE or `pdfs` tell; else a probability
  * must be symmetric in the wavelengths: take it from a spectrum_mean. lib/hero.cl relies on that.
  * Functions are pure and free of branches but for if (any(mask)); lanes that have nothing to do

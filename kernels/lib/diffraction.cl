@@ -2,20 +2,19 @@
  * `path` [nm], and an order's share is the squared Fourier coefficient of the phase that this makes
  * over one period (Goodman 2005, 4.4; Stam 1999 and Werner et al. 2017 in rendering). */
 #define GRATING_ORDERS 8     /* highest order that is followed */
-#define BESSEL_FIRST 40      /* where the recurrence starts: enough for arguments up to 24 */
-#define BESSEL_LARGEST 24.0f
+#define BESSEL_SMALL 6.0f    /* arguments for which the recurrence starts at 20, */
+#define BESSEL_LARGEST 24.0f /* and at 40 */
 #define GRATING_SINUSOIDAL 0
 #define GRATING_LAMELLAR 1
 #define GRATING_BLAZED 2
 #define GRATING_EXPLICIT 3
 
-/* Bessel's J_n(x) for x >= 0, error below 6e-6; n is the same for all lanes, x is cut at 24. Miller's
- * downward recurrence, normalised by 1 = J_0 + 2 (J_2 + J_4 + ...) (Abramowitz and Stegun 9.12). */
-inline real bessel_r(int n, real x)
+/* Bessel's J_n(x) for 0 < x, from orders well above x and n downward (Miller's recurrence), normalised
+ * by 1 = J_0 + 2 (J_2 + J_4 + ...) (Abramowitz and Stegun 9.12). */
+inline real bessel_from(int first, int n, real x)
 {
-    real slope = 2.0f / clamp_r(x, (real)(1e-5f), (real)(BESSEL_LARGEST));
-    real above = 0.0f, here = 1e-20f, sum = 0.0f, wanted = 0.0f;
-    for (int k = BESSEL_FIRST; k > 0; k--) {
+    real slope = 2.0f / x, above = 0.0f, here = 1e-20f, sum = 0.0f, wanted = 0.0f;
+    for (int k = first; k > 0; k--) {
         real below = (float)k * slope * here - above;
         real shrink = sel(fabs(below) > 1e10f, (real)(1e-20f), (real)(1.0f));
         above = here * shrink;
@@ -24,6 +23,14 @@ inline real bessel_r(int n, real x)
         sum = sum * shrink + (k == 1 ? here : (k & 1) ? 2.0f * here : (real)(0.0f));
     }
     return wanted / sel(sum == 0.0f, (real)(1.0f), sum);
+}
+/* J_n(x) for x >= 0 and n of 0 to 8, the same for all lanes; error below 6e-6; x is cut at 24. */
+inline real bessel_r(int n, real x)
+{
+    mask large = x > BESSEL_SMALL;
+    real r = bessel_from(20, n, clamp_r(x, (real)(1e-5f), (real)(BESSEL_SMALL)));
+    if (any(large)) r = sel(large, bessel_from(40, n, clamp_r(x, (real)(BESSEL_SMALL), (real)(BESSEL_LARGEST))), r);
+    return r;
 }
 
 inline real sine_turns(real x) /* sin(2 pi x) */
