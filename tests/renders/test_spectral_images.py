@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -25,6 +26,7 @@ from tests.renders.builders import BLACK, UP
 from tests.renders.support import assert_agree, exposures, with_film
 
 FINE = np.arange(360.0, 830.0, 0.5)  # [nm]
+SCENES = Path(__file__).resolve().parents[2] / "scenes"
 SIZE = {"width": 60, "height": 40}
 
 
@@ -124,6 +126,17 @@ def test_wavelengths_are_drawn_where_an_image_shines():
     assert expected is not None
     for scene in scenes:
         np.testing.assert_allclose(density(scene).values, expected, rtol=1e-6)
+
+
+def test_daylight_hides_what_an_amber_lamp_shows():
+    """The whale and the sea beside it: the same colour under D65, far from it under the LED."""
+    image = clpt.read_spectral(SCENES / "hidden_whale" / "painting.exr")
+    whale, sea = image.values[205, 260], image.values[285, 20]
+    light, lamp = (s.sample(FINE) for s in (spectra.illuminant("D65"), spectra.LED(594.0, 16.0)))
+    day = colour(np.stack([whale, sea]), image.lambdas, light, "hold")
+    night = colour(np.stack([whale, sea]), image.lambdas, lamp, "hold")
+    np.testing.assert_allclose(day[0], day[1], atol=1e-3)
+    assert night[0, 0] > 4.0 * night[1, 0]
 
 
 def test_from_a_scene_file(tmp_path):
