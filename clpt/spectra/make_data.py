@@ -76,9 +76,9 @@ def rewrite_metals(database: Path) -> None:
     """Read each metal again from the page its file names."""
     for path in sorted((ROOT / "metals").glob("*.csv")):
         notes = [line[2:] for line in path.read_text("utf-8").splitlines()[:2]]
-        page = notes[1].split("main/")[1].split(",")[0]
-        material, author = page.split("/")
-        found = sorted(database.glob(f"**/main/{material}/**/{author}"))
+        page = notes[1].split(", ")[1]
+        group, material, author = page.split("/")
+        found = sorted(database.glob(f"**/{group}/{material}/**/{author}"))
         if not found:
             print(f"{page}: not in {database}, kept as it is")
             continue
