@@ -175,7 +175,7 @@ class Wavefront:
             sizes["bands"] = 8 * bands * int(settings["places"]) * int(settings["planes"])
             sizes["band_image"] = 4 * bands * pixels
             if sizes["bands"] // 4 >= 1 << 31:  # kernels/lib/bands.cl counts words by an int
-                raise MemoryBudgetError("the bands", sizes["bands"], 1 << 33, advice)
+                raise MemoryBudgetError("the film of bands", sizes["bands"], 1 << 33, advice)
         for name, size in sizes.items():
             self.named[name] = self.buffers.allocate(f"the {name}", size, advice)
         self.band_bytes = sizes.get("bands", 0)

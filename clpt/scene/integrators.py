@@ -202,7 +202,8 @@ class Film(Kind):
         if not whole or not 0 <= self.bands <= MOST_BANDS:
             message = f"must be a whole number from 0 to {MOST_BANDS}, not {self.bands!r}"
             raise SceneError(message, where="film.bands")
-        if self.sensor not in OBSERVERS and not isinstance(self.sensor, Sensor):
+        named = isinstance(self.sensor, str) and self.sensor in OBSERVERS
+        if not named and not isinstance(self.sensor, Sensor):
             known = f"{', '.join(OBSERVERS)}, nor a Sensor"
             raise SceneError(f"{self.sensor!r} is none of {known}", where="film.sensor")
         object.__setattr__(self, "white_balance", _white_balance(self.white_balance))

@@ -80,6 +80,7 @@ def test_values_of_the_aov_integrator_stay_as_they_are() -> None:
     [
         ({"sensor": "nikon"}, r"film\.sensor.*cie1931.*Sensor"),
         ({"sensor": 3}, r"film\.sensor"),
+        ({"sensor": ["cie1931"]}, r"film\.sensor"),
         ({"bands": -1}, r"film\.bands"),
         ({"bands": 1.5}, r"film\.bands"),
         ({"bands": 5000}, r"film\.bands"),

@@ -70,6 +70,19 @@ def test_stages_build(lanes: int, queued: bool) -> None:
     device.build_all(device.choose(), texts)
 
 
+@pytest.mark.parametrize("lanes", [1, 8, 16])
+def test_stages_of_a_spectral_film_build(lanes: int) -> None:
+    """And no other film has anything of it in its text."""
+    film = Film(width=4, height=4, bands=3)
+    plain_ = lowered([m.Diffuse()], "spectral").features
+    banded = lower(Scene(camera=Perspective(), lights=[Constant()], film=film)).features
+    texts = programs.sources(banded, "brute", lanes, queued=False)
+    device.build_all(device.choose(), {name: texts[name] for name in ("generate", "bands")})
+    others = programs.sources(plain_, "brute", lanes, queued=False)
+    assert "bands" not in others and "wavelengths_weigh" in texts["generate"].text
+    assert not any("wavelengths_weigh" in source.text for source in others.values())
+
+
 def test_text_holds_only_what_the_scene_has() -> None:
     texts = programs.sources(lowered([m.Diffuse()], "rgb").features, "wide8", 8, queued=False)
     assert set(texts) == {"generate", "intersect", "shadow", "accumulate", "shade_diffuse"}

@@ -93,7 +93,17 @@ def test_bands_add_up_to_the_colour() -> None:
     np.testing.assert_allclose(summed, colours, rtol=0.01)
 
 
-def test_bands_do_not_depend_on_passes_or_lanes() -> None:
+def test_bands_do_not_depend_on_lanes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """To the bit, with the wavelengths of line spectra."""
+    device, found = clpt.device.choose(), []
+    for lanes in (1, 8, 16):
+        monkeypatch.setattr(type(device), "lanes", property(lambda _, lanes=lanes: lanes))
+        found.append(clpt.render(sky(LINES, bands=5), 4, device=device))
+    assert all(np.array_equal(image, found[0]) for image in found[1:])
+
+
+def test_bands_do_not_depend_on_passes() -> None:
+    """But for rounding, as a sum that is stored and read again; beginning anew, to the bit."""
     made = sky(LINES, bands=5)
     whole, passes = clpt.Renderer(made), clpt.Renderer(made)
     whole.step(12)
