@@ -126,26 +126,10 @@ def read(path: str | Path, *, emissive: bool | None = None) -> SpectralImage:
     lacks the part, holds a wavelength twice, or fluorescence.
     """
     path = Path(path)
-    if not path.is_file():
-        _fail(path, "no such image file")
-    try:
-        with OpenEXR.File(str(path), separate_channels=True) as file:
-            header = dict(file.header())  # a copy: closing the file empties it
-            channels = {name: channel.pixels for name, channel in file.channels().items()}
-    except Exception as error:  # the library raises its own, from RuntimeError to MemoryError
-        message = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise SceneError(f"not a readable image: {message}", file=path) from error
-    if any(_RERADIATION.fullmatch(name) for name in channels):
-        _fail(path, "holds reradiation (fluorescence) channels, which cannot be read as an image")
-    parts: dict[str, list[tuple[float, str]]] = {}
-    for name in channels:
-        if match := _CHANNEL.fullmatch(name):
-            parts.setdefault(match[1], []).append((_nanometres(path, *match.groups()[1:]), name))
-    if not parts:
-        _fail(path, "not a spectral image: no channel is named like S0.550,0nm or T.550,0nm")
+    header, channels = _contents(path)
+    parts = _parts(path, channels)
     light = "S0" in parts if emissive is None else emissive
-    warnings = _left_out(parts, light)
-    bands = sorted(parts.get("S0" if light else "T", ()))
+    bands = parts.get("S0" if light else "T", [])
     if not bands:
         _fail(path, _other_kind(light))
     for (shorter, first), (longer, second) in itertools.pairwise(bands):
@@ -162,7 +146,7 @@ def read(path: str | Path, *, emissive: bool | None = None) -> SpectralImage:
             _exposure(header.get("EV", 0.0)),
             _curve(path, header.get("cameraResponse")),
             _curve(path, header.get("lensTransmission")),
-            warnings,
+            _left_out(parts, light),
         )
     except SceneError as error:
         _fail(path, error.message)
@@ -213,6 +197,32 @@ def write(
 
 def _fail(path: Path | None, message: str) -> NoReturn:
     raise SceneError(message, file=path)
+
+
+def _contents(path: Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+    """Attributes and channels of an EXR file. Raises SceneError."""
+    if not path.is_file():
+        _fail(path, "no such image file")
+    try:
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            header = dict(file.header())  # a copy: closing the file empties it
+            return header, {name: channel.pixels for name, channel in file.channels().items()}
+    except Exception as error:  # the library raises its own, from RuntimeError to MemoryError
+        message = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise SceneError(f"not a readable image: {message}", file=path) from error
+
+
+def _parts(path: Path, names: Iterable[str]) -> dict[str, list[tuple[float, str]]]:
+    """The spectral channels by part (S0 to S3, T): wavelengths [nm], ascending, and names."""
+    parts: dict[str, list[tuple[float, str]]] = {}
+    for name in names:
+        if _RERADIATION.fullmatch(name):
+            _fail(path, f"{name} holds fluorescence, which cannot be read as an image")
+        if match := _CHANNEL.fullmatch(name):
+            parts.setdefault(match[1], []).append((_nanometres(path, *match.groups()[1:]), name))
+    if not parts:
+        _fail(path, "not a spectral image: no channel is named like S0.550,0nm or T.550,0nm")
+    return {part: sorted(bands) for part, bands in parts.items()}
 
 
 def _other_kind(emissive: bool) -> str:
