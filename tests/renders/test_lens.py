@@ -22,7 +22,7 @@ from tests.renders.support import SIGNIFICANCE, assert_agree, exposures, with_fi
 
 LENGTH, FOCUS, APERTURE = 0.05, 2.0, 0.01  # [m]
 DISTANCE, SIZE = 2.0, 0.004  # of a luminous disk [m]
-PIXELS, FOV = 48, 1.0
+PIXELS, FOV = 48, 1.6
 
 
 def scene(light: spectra.Spectrum, **lens) -> Scene:
