@@ -17,7 +17,8 @@ Values = NDArray[np.float64]
 
 def nodes(low: float, high: float) -> Values:
     """The wavelengths [nm] between which a film's matrices are linear."""
-    return low + STEP * np.arange(int(np.ceil((high - low) / STEP - 1e-9)) + 1)
+    count = int(np.ceil((high - low) / STEP - 1e-9)) + 1
+    return np.asarray(low + STEP * np.arange(count), np.float64)
 
 
 def expected(lights: Iterable[Spectrum], at: Values) -> Values:
