@@ -106,6 +106,22 @@ def test_only_what_absorbs_is_asked_for_a_medium(mode: str) -> None:
         device.build(device.choose(), texts["shade_rough_dielectric"])
 
 
+def test_only_what_fluoresces_shifts_wavelengths() -> None:
+    """A scene without such a material, and RGB mode, are shaded as if there were none."""
+    for materials, mode in (
+        ([m.Diffuse()], "spectral"),
+        ([m.Diffuse(), m.Fluorescent()], "rgb"),
+        ([m.Diffuse(), m.Fluorescent()], "spectral"),
+    ):
+        texts = programs.sources(lowered(materials, mode).features, "wide8", 8, queued=False)
+        there = len(materials) > 1 and mode == "spectral"
+        assert ("#define USES_SHIFTS 1" in texts["generate"].text) == there
+        for name, source in texts.items():
+            shifts = there and name == "shade_fluorescent"
+            assert ("inline Wavelengths reradiation_shift(" in source.text) == shifts
+            assert ("#define BSDF_SHIFTS 1" in source.text) == shifts
+
+
 def test_a_material_more_does_not_change_the_others() -> None:
     one = lowered([m.Diffuse(), m.Null()], "rgb").features
     two = dataclasses.replace(one, materials=("diffuse", "null"))
