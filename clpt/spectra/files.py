@@ -27,6 +27,15 @@ def read_table(path: str | Path, outside: Outside = "zero") -> Tabulated:
     return _tabulated(path, rows, 1, outside)
 
 
+def read_columns(path: str | Path, count: int) -> tuple[Tabulated, ...]:
+    """Read rows of a wavelength [nm] and `count` values, in the form that `read_table` takes.
+
+    Each column of values is a spectrum, zero outside. Raises SceneError with the line.
+    """
+    (rows,) = _tables(path, _text(path), (1 + count,)).values()
+    return tuple(_tabulated(path, rows, column, "zero") for column in range(1, 1 + count))
+
+
 def read_index(path: str | Path, part: Literal["eta", "k"] = "eta") -> Spectrum:
     """Read eta or k from what `read_refractive_index` takes, or the values of a two-column table.
 
@@ -90,7 +99,7 @@ def _read_parts(path: str | Path, text: str) -> tuple[Spectrum | None, Spectrum]
 
 
 def _tables(path: str | Path, text: str, widths: tuple[int, ...]) -> dict[str, list[list[float]]]:
-    """Rows (n, 2 or 3) in nm of the tables in a text, by title: "", or "n" and "k" from the site.
+    """Rows (n, widths) in nm of the tables in a text, by title: "", or "n" and "k" from the site.
 
     widths: how many columns a row may have. Raises SceneError with the line.
     """
@@ -111,7 +120,8 @@ def _tables(path: str | Path, text: str, widths: tuple[int, ...]) -> dict[str, l
         if not all(map(_is_number, fields)) or len(fields) not in (
             (len(rows[0]),) if rows else widths
         ):
-            columns = "a value" if widths == (2,) else "eta and perhaps k"
+            known = {(2,): "a value", (2, 3): "eta and perhaps k"}
+            columns = known.get(widths, f"{widths[0] - 1} values")
             message = f"expected a wavelength in nm and {columns}, found {line.strip()!r}"
             raise SceneError(message, file=path, line=number)
         row = [float(fields[0]) * factor, *map(float, fields[1:])]

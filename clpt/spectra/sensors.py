@@ -6,7 +6,6 @@ A response is the integral of radiance times a curve, over that of the 1931 obse
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -16,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt.errors import SceneError, UnknownKindError
-from clpt.spectra import cie, data, upsampling
+from clpt.spectra import cie, data, files, upsampling
 from clpt.spectra.spectrum import Spectrum, Tabulated, d65
 
 Matrix = NDArray[np.float64]
@@ -111,33 +110,8 @@ def read_sensor(path: str | Path) -> Sensor:
     Blanks, commas or semicolons separate them, `#` starts a comment, one line of column titles is
     allowed. Raises SceneError with the line.
     """
+    red, green, blue = files.read_columns(path, 3)
     try:
-        lines = Path(path).read_text("utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise SceneError(f"cannot be read: {error}", file=path) from None
-    rows: list[list[float]] = []
-    titles_allowed = True
-    for number, line in enumerate(lines, 1):
-        fields = [f for f in re.split(r"[\s,;]+", line.split("#")[0]) if f]
-        if not fields:
-            continue
-        try:
-            row = [float(field) for field in fields]
-        except ValueError:
-            row = []
-        if len(row) != 4 or not np.isfinite(row).all():
-            if titles_allowed and not row:
-                titles_allowed = False
-                continue
-            message = f"expected a wavelength in nm and three values, found {line.strip()[:60]!r}"
-            raise SceneError(message, file=path, line=number)
-        titles_allowed = False
-        rows.append(row)
-    if not rows:
-        raise SceneError("no wavelengths in this file", file=path)
-    lambdas, *columns = zip(*rows, strict=True)
-    try:
-        red, green, blue = (Tabulated(lambdas, column) for column in columns)
         return Sensor((red, green, blue))
     except SceneError as error:
         raise SceneError(error.message, file=path) from None

@@ -75,8 +75,8 @@ def test_read_sensor(tmp_path) -> None:
     [
         ("", "no wavelengths"),
         ("nm r g b\nnm r g b\n", ":2: expected a wavelength"),
-        ("400 1 1\n", ":1: expected a wavelength"),
-        ("400 1 nan 1\n", ":1: expected a wavelength"),
+        ("400 1 1\n", ":1: expected a wavelength in nm and 3 values"),
+        ("400 1 nan 1\n", "finite"),
         ("400 1 1 1\n390 1 1 1\n", "ascend"),
         ("400 1 1 1\n700 1 1 1\n", "differ"),
         ("900 1 0 0\n910 0 1 0\n920 0 0 1\n", "visible"),
