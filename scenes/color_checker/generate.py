@@ -51,7 +51,7 @@ def patches() -> tuple[dict[str, Any], list[Any]]:
 def scene() -> dict[str, Any]:
     """The whole scene, as scene.json has it."""
     colours, chart = patches()
-    look = {"origin": [0.75, 2.35, 6.3], "target": [0.05, 0.88, 0.15], "up": [0, 1, 0]}
+    look = {"origin": [0.75, 2.35, 6.3], "target": [0.0, 0.88, 0.15], "up": [0, 1, 0]}
     softbox = [
         {"scale": [1.4, 1.4, 1]},
         {"look_at": {"origin": [-3.2, 4.4, 3.6], "target": [0, 0.8, 0], "up": [0, 1, 0]}},
@@ -61,7 +61,7 @@ def scene() -> dict[str, Any]:
         "$schema": "../schema.json",
         "name": "color_checker",
         "camera": {
-            "type": "thin_lens", "fov": 42, "aperture_radius": 0.05, "focus_distance": 6.35,
+            "type": "thin_lens", "fov": 44, "aperture_radius": 0.05, "focus_distance": 6.35,
             "to_world": {"look_at": look},
         },
         "film": {"width": 540, "height": 360, "filter": {"type": "blackman_harris"}},
