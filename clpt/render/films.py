@@ -165,7 +165,7 @@ def film_shares(
     times the sine where light is; lambdas [nm]. Two arrays (angles, wavelengths) float64.
     As kernels/lib/thin_film.cl, whose sources these are.
     """
-    beta = np.minimum(tangential.real, indices[0].real * math.sqrt(1.0 - 1e-8))
+    beta = np.minimum(tangential.real, indices[0].real * math.sqrt(1.0 - 1e-12))
     q = [np.sqrt(n**2 - beta**2) for n in indices]
     q = [np.where(np.abs(along) < 1e-6, 1e-6, along) for along in q]  # not quite grazing
     r_sum, t_sum = np.zeros(q[0].shape), np.zeros(q[0].shape)

@@ -5,11 +5,11 @@ typedef struct {
     real p;        /* probability to choose reflection, symmetric in the wavelengths */
 } Boundary;
 
-/* Of what is not absorbed, the mean share that is reflected. */
+/* By the amplitudes: a film reflects little, and is there for what it reflects, often a lamp. */
 inline real reflection_probability(Spectrum r, Spectrum t)
 {
     Spectrum p;
-#define C(c) p.c = r.c / max_r(r.c + t.c, (real)(1e-20f));
+#define C(c) p.c = sqrt(r.c) / max_r(sqrt(r.c) + sqrt(t.c), (real)(1e-20f));
     SPECTRUM_EACH(C)
 #undef C
     return spectrum_mean(p);

@@ -10,7 +10,7 @@ inline Boundary dielectric_boundary(Layers layers, real cos_i, Spectrum eta, Spe
     Spectrum inside = spectrum_mul(eta, outside);
     Spectrum from = spectrum_sel(outward, inside, outside), to = spectrum_sel(outward, outside, inside);
     Boundary b = thin_film(layers, outward, cos_i, from, to, spectrum_of(0.0f));
-    b.p = reflection_probability(b.r, b.t);
+    b.p = sel(layers.count > 0, reflection_probability(b.r, b.t), spectrum_mean(b.r));
     return b;
 }
 inline Boundary facet_boundary(Layers layers, real cos_i, real eta, Spectrum outside)

@@ -51,7 +51,7 @@ inline Boundary dielectric_boundary(Layers layers, real cos_i, Spectrum eta, Spe
     Boundary b = film_look_up(layers, cos_i, eta.x);
     b.r = spectrum_sel(coated, b.r, f);
     b.t = spectrum_sel(coated, b.t, spectrum_sub(spectrum_of(1.0f), f));
-    b.p = reflection_probability(b.r, b.t);
+    b.p = sel(coated, reflection_probability(b.r, b.t), spectrum_mean(b.r));
     return b;
 }
 inline Boundary facet_boundary(Layers layers, real cos_i, real eta, Spectrum outside)
