@@ -637,3 +637,19 @@ def test_spectra_mean_what_they_mean_to_mitsuba(scene, variant, role, xml):
     found = ours.sample(LAMBDAS) if variant == "scalar_spectral" else ours.to_rgb(role)
     # Tables of the observer and of D65 at 1 nm and 5 nm differ by less than this.
     assert np.allclose(found, theirs, rtol=2e-3)
+
+
+def test_light_tracing(scene):
+    loaded = scene(
+        '<integrator type="ptracer"><boolean name="hide_emitters" value="true"/></integrator>'
+        '<shape type="disk"><emitter type="directionalarea">'
+        '<float name="radiance" value="3"/></emitter></shape>'
+    )
+    tracer = loaded.integrator
+    assert isinstance(tracer, integrators.ParticleTracer)
+    assert (tracer.max_depth, tracer.rr_depth, tracer.hide_lights) == (-1, 5, True)
+    beam = loaded.shapes[0].emission
+    assert isinstance(beam, lights.DirectionalArea)
+    assert beam.irradiance == RGBIlluminant(3, 3, 3)
+    with pytest.raises(SceneError, match="must stand in a <shape>"):
+        scene('<emitter type="directionalarea"/>')

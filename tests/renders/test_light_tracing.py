@@ -15,10 +15,12 @@ import trimesh
 
 import clpt
 from clpt import transforms as tf
+from clpt.errors import SceneError
+from clpt.render.lower import lower
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m
-from clpt.scene.cameras import Camera, Perspective, ThinLens
-from clpt.scene.integrators import ParticleTracer, Path
+from clpt.scene.cameras import Camera, Orthographic, Perspective, ThinLens
+from clpt.scene.integrators import Gaussian, ParticleTracer, Path
 from clpt.scene.lights import (
     Area,
     Constant,
@@ -196,3 +198,67 @@ def test_camera_does_not_see_delta_surfaces_and_beams() -> None:
     assert not mirror.any()
     below = Perspective(to_world=tf.look_at([0.1, 1.2, 0.0], [0, 2, 0], UP), fov=15)
     assert not clpt.render(dataclasses.replace(beam_through(None, "rgb"), camera=below), 16).any()
+
+
+def under_glass(glass: m.Material, camera: Camera, mode: str) -> Scene:
+    """A floor in the light of a disk, a ball of glass between them."""
+    lamp = tf.translate([0.1, 2.0, 0.0]) @ DOWN @ tf.scale(0.5)
+    shapes: list[Shape] = [
+        Rectangle(to_world=tf.rotate([1, 0, 0], -90) @ tf.scale(2.0), material=m.Diffuse()),
+        Sphere(center=(0, 0.7, 0), radius=0.4, material=glass),
+        Disk(to_world=lamp, material=BLACK, emission=Area(radiance=10.0)),
+    ]
+    return Scene(camera=camera, shapes=shapes, film=Film(width=16, height=12, mode=mode))
+
+
+def test_caustic_of_a_ball_of_glass() -> None:
+    """The floor under the ball, where light is found by chance from the camera."""
+    low = Perspective(to_world=tf.look_at([0.0, 0.28, 1.2], [0.0, 0.0, 0.0], UP), fov=30)
+    both(under_glass(m.Dielectric(int_ior=1.5, absorption=1.0), low, "rgb"), 64, "caustic", depth=6)
+
+
+def test_rough_glass_that_disperses() -> None:
+    """Each wavelength is refracted with its own index, by light that goes either way."""
+    view = Perspective(to_world=tf.look_at([0.0, 0.9, 2.5], [0.0, 0.6, 0.0], UP), fov=30)
+    glass = m.RoughDielectric(int_ior="sf11", alpha_u=0.4, alpha_v=0.4)
+    both(under_glass(glass, view, "spectral"), 32, "rough glass", depth=5)
+
+
+def test_stopped_early_is_as_bright() -> None:
+    """A picture counts the paths that there were, wherever the film was left."""
+    scene = dataclasses.replace(
+        beam_through(None, "rgb"), film=Film(width=256, height=256, mode="rgb")
+    )
+    whole = clpt.render(scene, 4).mean(axis=(0, 1))
+    renderer = clpt.Renderer(scene, slots=4096)
+    assert not renderer.step(4, lambda progress: progress.samples < 0.5)
+    paths = renderer.wavefronts[0].counts.samples
+    assert 0 < paths < 4 * 256 * 256
+    part = renderer.image().mean(axis=(0, 1))
+    assert np.allclose(part, whole, rtol=0.05), "100 thousand paths and more: half of a per cent"
+
+
+SQUARE = Rectangle(name="square")
+BEAM = Rectangle(emission=DirectionalArea(), name="beam")
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"camera": Orthographic()}, "camera: .*perspective and thin_lens, not orthographic"),
+        ({"camera": ThinLens(glass="sf11")}, "camera.glass: .*does not disperse"),
+        ({"lights": [Point(falloff=False)]}, r"lights\[0\]: .*falls with distance"),
+        ({"film": Film(bands=8)}, "film.bands: .*without bands"),
+        ({"integrator": Path(), "shapes": [BEAM]}, "rectangle 'beam': only .*particle_tracer"),
+    ],
+)
+def test_what_it_cannot_do_is_refused(changes: dict[str, Any], message: str) -> None:
+    given = {"camera": Perspective(), "integrator": ParticleTracer(), "shapes": [SQUARE]}
+    with pytest.raises(SceneError, match=message):
+        lower(Scene(**{**given, **changes}))
+
+
+def test_filter_that_is_passed_over() -> None:
+    film = Film(filter=Gaussian())
+    lowered = lower(Scene(camera=Perspective(), integrator=ParticleTracer(), film=film))
+    assert "film.filter" in lowered.warnings[0]

@@ -19,8 +19,8 @@ mi = pytest.importorskip("mitsuba", reason="the renderer that we compare with is
 pytestmark = pytest.mark.peers
 
 SCENES = (
-    "cornell", "delta_lights", "envmap", "glass_metal", "orthographic", "plastic", "spectra",
-    "textures", "thin_lens",
+    "cornell", "delta_lights", "envmap", "glass_metal", "light_tracing", "orthographic", "plastic",
+    "spectra", "textures", "thin_lens",
 )  # fmt: skip
 # Mitsuba's envmap is up to a quarter off its own RGB picture in spectral mode, where texels are
 # saturated; tests/renders/test_modes.py holds ours to the RGB picture instead.
