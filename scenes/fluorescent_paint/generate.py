@@ -173,16 +173,16 @@ def objects() -> list[Json]:
     ]  # fmt: skip
 
 
-def scene(name: str, lamp: Any, sky: float) -> Json:
+def scene(name: str, lamp: Any, sky: float, wavelengths: str = "auto") -> Json:
     """The room under a lamp of an emission, and an even light of D65."""
     facing = {"origin": [-1.6, 4.2, 2.6], "target": [0, 0.5, -0.8], "up": [0, 1, 0]}
-    view = {"origin": [0, 1.75, 5.9], "target": [0, 0.98, -0.6], "up": [0, 1, 0]}
+    view = {"origin": [0, 1.75, 5.9], "target": [0, 1.04, -0.6], "up": [0, 1, 0]}
     return {
         "$schema": "../schema.json",
         "name": name,
-        "camera": {"type": "perspective", "fov": 36, "to_world": {"look_at": view}},
-        "film": {"width": 540, "height": 360, "lambda_min": 300,
-                 "filter": {"type": "blackman_harris"}},
+        "camera": {"type": "perspective", "fov": 38.5, "to_world": {"look_at": view}},
+        "film": {"width": 480, "height": 320, "lambda_min": 300,
+                 "wavelengths": wavelengths, "filter": {"type": "blackman_harris"}},
         "integrator": {"type": "path", "max_depth": 8},
         "spp": 1024,
         "materials": MATERIALS,
@@ -205,7 +205,7 @@ def main() -> None:
              [412, 2], [425, 0]]  # fmt: skip
     for file, made in (
         ("scene", scene("fluorescent_paint", [9, 9, 9], 0.25)),
-        ("scene_uv", scene("fluorescent_paint_uv", {"values": black}, 0.0)),
+        ("scene_uv", scene("fluorescent_paint_uv", {"values": black}, 0.0, "scene")),
     ):
         (HERE / f"{file}.json").write_text(json.dumps(made) + "\n", "utf-8")
 

@@ -19,7 +19,7 @@ from clpt.scene import Film, Scene
 from clpt.scene.cameras import Orthographic
 from clpt.scene.integrators import Path, Whitted
 from clpt.scene.lights import Area, Constant, Directional
-from clpt.scene.materials import Diffuse, Fluorescent
+from clpt.scene.materials import Dielectric, Diffuse, Fluorescent
 from clpt.scene.shapes import Disk, Rectangle, Sphere
 from clpt.spectra import Blackbody, Fluorophore, Spectrum, Tabulated
 from tests.renders.builders import BLACK, EXPECTED, UP, facing_down, overhead
@@ -146,6 +146,19 @@ def test_a_sky_and_a_disk_share_the_weight() -> None:
     scene.shapes.append(Disk(to_world=overhead(1.5), material=BLACK, emission=Area(radiance=light)))
     at = lambdas()
     assert_mean(exposures(scene, 24, 32), seen(at, operator(at) @ light.sample(at)), 0.02, 2e-3)
+
+
+def test_one_wavelength_is_enough() -> None:
+    """Behind glass that disperses, next to nothing, a path keeps its hero alone, which shifts."""
+    means = []
+    for index in (spectra.Constant(1.50004), spectra.Cauchy(1.5, 1e-5)):
+        scene = plane(LIGHTS["D65"], lambda_min=360.0)
+        pane = Dielectric(int_ior=index, ext_ior=1.0)
+        scene.shapes.append(Rectangle(material=pane, to_world=tf.translate([0.0, 0.0, 0.02])))
+        scene = dataclasses.replace(scene, integrator=Path(max_depth=5))
+        means.append(exposures(scene, 24, 64).mean(axis=(1, 2)))
+    assert agreement(*means) > 1e-4
+    np.testing.assert_allclose(means[1].mean(axis=0), means[0].mean(axis=0), rtol=0.03, atol=0.02)
 
 
 def test_light_goes_one_way() -> None:
