@@ -15,6 +15,7 @@ import trimesh
 
 import clpt
 from clpt import transforms as tf
+from clpt.device import choose
 from clpt.errors import SceneError
 from clpt.render.lower import lower
 from clpt.scene import Film, Scene
@@ -133,8 +134,10 @@ def test_every_light(kind: str) -> None:
     both(still_life("rgb", {kind: LIGHTS[kind]}), 16, kind)
 
 
-def test_spectral_and_all_lights_at_once() -> None:
-    both(still_life("spectral", LIGHTS), 16, "spectral")
+def test_spectral_and_several_lights_at_once() -> None:
+    scene = still_life("spectral", LIGHTS)
+    some = dataclasses.replace(scene, shapes=scene.shapes[:5], lights=scene.lights[1:4:2])
+    both(some, 16, "spectral")
 
 
 @pytest.mark.parametrize("depth", [1, 2, 3])
@@ -262,3 +265,31 @@ def test_filter_that_is_passed_over() -> None:
     film = Film(filter=Gaussian())
     lowered = lower(Scene(camera=Perspective(), integrator=ParticleTracer(), film=film))
     assert "film.filter" in lowered.warnings[0]
+
+
+def test_lanes_slots_and_steps_differ_only_in_rounding() -> None:
+    """The same paths however the work is cut up; only the order of the sums is open."""
+    scene = beam_through(m.Dielectric(int_ior="sf11"), "spectral")
+    once = clpt.render(scene, 32)
+    pictures = [clpt.render(scene, 32, slots=slots) for slots in (64, 1 << 12)]
+    renderer = clpt.Renderer(scene)
+    for step in (1, 7, 24):
+        assert renderer.step(step)
+    assert renderer.wavefronts[0].counts.samples == 32 * 64
+    pictures.append(renderer.image())
+    for lanes in (1, 8, 16):
+        device = choose()
+        device.lanes = lanes
+        pictures.append(clpt.render(scene, 32, device=device))
+    for picture in pictures:
+        np.testing.assert_allclose(picture, once, rtol=1e-4, atol=1e-5)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (3, 5), (17, 9)])
+def test_sky_fills_films_of_odd_sizes(size: tuple[int, int]) -> None:
+    """A sky alone, joined to the camera: as bright everywhere as it is."""
+    film = Film(width=size[0], height=size[1], mode="rgb")
+    sky = Constant(radiance=(0.25, 0.5, 1.0))
+    scene = Scene(camera=Perspective(fov=170), lights=[sky], film=film, integrator=ParticleTracer())
+    mean = clpt.render(scene, 8192).mean(axis=(0, 1))
+    assert np.allclose(mean, [0.25, 0.5, 1.0], rtol=0.15)
