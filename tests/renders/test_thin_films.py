@@ -53,18 +53,18 @@ def test_rgb_is_close_to_spectral(name):
     """Delta E 2000 of the means over 4 x 4 pixels; of films on water, exposed as one would."""
     colour = pytest.importorskip("colour", reason="colour-science is for developers")
     labs = []
-    for mode, spp in (("spectral", 512), ("rgb", 128)):
+    for mode, spp in (("spectral", 128), ("rgb", 64)):
         rgb = np.maximum(blocks(clpt.render(strip(MATERIALS[name], mode), spp=spp)), 0.0)
         rgb = rgb * (8.0 if name in ("soap", "oil") else 1.0)
         labs.append(colour.XYZ_to_Lab(spectra.rgb_to_xyz(rgb)))
     difference = colour.delta_E(*labs, method="CIE 2000")
-    # what is left is noise, and of soap greens so deep that Rec. 709 does not have them
-    assert difference.mean() < 1.5 and difference.max() < 4.5
+    # what is left is noise, and of soap colours so deep that Rec. 709 does not have them
+    assert difference.mean() < 2.0 and difference.max() < 7.0
 
 
 @pytest.mark.parametrize("mode", ["spectral", "rgb"])
 def test_films_that_absorb_nothing_in_a_white_furnace(mode):
-    """However often light passes the walls, all of it comes through; means within 0.5 %."""
+    """However often light passes the walls, all of it comes through; means within 1 %."""
     for name in ("soap", "oil"):
-        image = clpt.render(furnace(MATERIALS[name], mode, max_depth=-1, rr_depth=1000), spp=512)
-        np.testing.assert_allclose(image.mean(axis=(0, 1)), 1.0, rtol=5e-3)
+        image = clpt.render(furnace(MATERIALS[name], mode, max_depth=-1, rr_depth=1000), spp=128)
+        np.testing.assert_allclose(image.mean(axis=(0, 1)), 1.0, rtol=1e-2)
