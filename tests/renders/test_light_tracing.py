@@ -7,6 +7,7 @@ tests/renders/support.py for the significance.
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
@@ -34,9 +35,10 @@ from clpt.scene.lights import (
     Spot,
 )
 from clpt.scene.shapes import Cube, Cylinder, Disk, Mesh, Rectangle, Shape, Sphere
-from clpt.spectra import Tabulated
-from tests.renders.support import assert_agree, assert_mean, blocks, exposures
+from clpt.spectra import Tabulated, glass
+from tests.renders.support import assert_agree, assert_mean, blocks, exposures, with_film
 
+ROOT = FilePath(__file__).parents[2]
 MODES = ("rgb", "spectral")
 UP = np.array([0.0, 1.0, 0.0])
 VIEW = tf.look_at([0.0, 1.2, 3.2], [0.0, 0.4, 0.0], UP)
@@ -293,3 +295,47 @@ def test_sky_fills_films_of_odd_sizes(size: tuple[int, int]) -> None:
     scene = Scene(camera=Perspective(fov=170), lights=[sky], film=film, integrator=ParticleTracer())
     mean = clpt.render(scene, 8192).mean(axis=(0, 1))
     assert np.allclose(mean, [0.25, 0.5, 1.0], rtol=0.15)
+
+
+def bow_radius(index: float, reflections: int) -> float:
+    """Where the edge of a bow falls on a screen a metre from the middle of a ball of 4 cm [m].
+
+    Descartes' ray: the turn 2 (i - r) + k (pi - 2 r) of one that passes the middle at b radii is
+    least where cos^2 i = (n^2 - 1) / (k (k + 2)); it leaves along a line at b radii as well.
+    """
+    k = reflections
+    i = np.arccos(np.sqrt((index**2 - 1.0) / (k * (k + 2))))
+    r = np.arcsin(np.sin(i) / index)
+    turn = 2.0 * (i - r) + k * (np.pi - 2.0 * r)  # from straight on; pi is back where it came from
+    angle = abs(turn - np.pi)
+    side = 1.0 if turn < np.pi else -1.0
+    return float(np.tan(angle) + side * 0.04 * np.sin(i) / np.cos(angle))
+
+
+def test_rainbow() -> None:
+    """Both bows are where they ought to be, and the band between them is dark."""
+    scene = with_film(clpt.load(ROOT / "scenes/rainbow"), width=240, height=150)
+    scene = dataclasses.replace(scene, lights=[])
+    image = clpt.render(scene, 24)
+    camera = np.asarray(scene.camera.to_world)
+    half = np.tan(np.radians(scene.camera.fov / 2.0))
+    x = half * (1.0 - 2.0 * (np.arange(240) + 0.5) / 240)
+    y = half * (75.0 - (np.arange(150) + 0.5)) / 120
+    film = np.stack([*np.broadcast_arrays(x[None], y[:, None]), np.ones((150, 240))], axis=-1)
+    d = film @ camera[:3, :3].T
+    met = camera[:3, 3] - d * (camera[2, 3] / d[..., 2:])
+    radius = np.hypot(met[..., 0], met[..., 1])
+    red = float(glass("water").sample(640.0))
+    first, second = bow_radius(red, 1), bow_radius(red, 2)
+    assert 0.95 < first < 0.97 and 1.14 < second < 1.16
+    seen = met[..., 1] > 0.1
+
+    def between(low: float, high: float) -> float:
+        return float(image[seen & (radius > low) & (radius < high), 0].mean())
+
+    bow, band = between(first - 0.035, first - 0.005), between(first + 0.03, second - 0.03)
+    assert band < 0.1 * bow
+    assert between(first + 0.015, first + 0.03) < 0.2 * bow, "red ends at the first edge"
+    again = between(second + 0.005, second + 0.035)
+    assert again > 10.0 * band, "and begins at the second"
+    assert between(second - 0.03, second - 0.015) < 0.2 * again
