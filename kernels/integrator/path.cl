@@ -45,7 +45,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     Bsdf m = bsdf_load(scene, row, s.uv, lambdas);
 #if BSDF_SHIFTS
     lambdas = bsdf_shift(scene, row, m, lambdas, choice.y, depth); /* from here on, those by which light comes */
-    store_path_lambdas(path, at, active, lambdas);
+    store_path_lambdas(path, at, active & !hidden, lambdas);
 #endif
     Frame frame = surface_frame(s);
     vec3 wo = to_local(frame, neg3(d));

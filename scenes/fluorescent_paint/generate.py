@@ -195,6 +195,20 @@ def scene(name: str, lamp: Any, sky: float, wavelengths: str = "auto") -> Json:
     }  # fmt: skip
 
 
+def text(made: dict) -> str:
+    """The scene as JSON, a line for each material and shape."""
+    parts = []
+    for key, value in made.items():
+        entries = json.dumps(value)
+        if key == "materials":
+            lines = (f"{json.dumps(name)}: {json.dumps(entry)}" for name, entry in value.items())
+            entries = "{\n    " + ",\n    ".join(lines) + "\n  }"
+        elif key == "shapes":
+            entries = "[\n    " + ",\n    ".join(json.dumps(entry) for entry in value) + "\n  ]"
+        parts.append(f"  {json.dumps(key)}: {entries}")
+    return "{\n" + ",\n".join(parts) + "\n}\n"
+
+
 def main() -> None:
     for name, mesh in (("knot", knot()), ("top", top())):
         mesh.export(HERE / f"{name}.ply", vertex_normal=True)
@@ -207,7 +221,7 @@ def main() -> None:
         ("scene", scene("fluorescent_paint", [9, 9, 9], 0.25)),
         ("scene_uv", scene("fluorescent_paint_uv", {"values": black}, 0.0, "scene")),
     ):
-        (HERE / f"{file}.json").write_text(json.dumps(made) + "\n", "utf-8")
+        (HERE / f"{file}.json").write_text(text(made), "utf-8")
 
 
 if __name__ == "__main__":
