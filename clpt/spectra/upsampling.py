@@ -118,6 +118,9 @@ def _look_up(rgb: Array) -> Array:
         t = (at - nodes[below]) / (nodes[below + 1] - nodes[below])
         weights.append(np.clip(t, 0.0, 1.0).astype(np.float32)[:, None])
     a, b, c = _blend(cell, weights).T.astype(np.float64) / shrinkage(rgb)
+    grey = (others[0] == 1.0) & (others[1] == 1.0)  # not left to the table's last digit
+    a[grey], b[grey] = 0.0, 0.0
+    c[grey] = (value[grey] - 0.5) / shrinkage(rgb)[grey]
     # From the unit coordinate to nm.
     a /= HALF_WIDTH**2
     b /= HALF_WIDTH
