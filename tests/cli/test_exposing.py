@@ -51,7 +51,15 @@ def test_the_limit_ends_a_pass_but_not_the_first():
 @pytest.mark.skipif(
     threading.current_thread() is not threading.main_thread(), reason="signals need it"
 )
-def test_ctrl_c_ends_the_rendering_and_a_second_one_the_program():
+@pytest.fixture
+def listening():
+    """Ctrl-C as Python starts with, though a shell ignores it in what runs in the background."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def test_ctrl_c_ends_the_rendering_and_a_second_one_the_program(listening):
     shown = []
 
     def press(progress):
