@@ -48,9 +48,6 @@ def test_the_limit_ends_a_pass_but_not_the_first():
     assert 0.3 <= time.perf_counter() - began < 1.0
 
 
-@pytest.mark.skipif(
-    threading.current_thread() is not threading.main_thread(), reason="signals need it"
-)
 @pytest.fixture
 def listening():
     """Ctrl-C as Python starts with, though a shell ignores it in what runs in the background."""
@@ -59,6 +56,9 @@ def listening():
     signal.signal(signal.SIGINT, before)
 
 
+@pytest.mark.skipif(
+    threading.current_thread() is not threading.main_thread(), reason="signals need it"
+)
 def test_ctrl_c_ends_the_rendering_and_a_second_one_the_program(listening):
     shown = []
 
