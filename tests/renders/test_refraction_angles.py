@@ -101,7 +101,7 @@ def test_prism(glass: str, apex: float, incidence: float | None) -> None:
 
 
 @pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("incidence", [None, 68.0])
+@pytest.mark.parametrize("incidence", [None, pytest.param(68.0, marks=pytest.mark.slow)])
 def test_rainbow(order: int, incidence: float | None) -> None:
     """A drop's deviation 2 (i - r) + k (pi - 2 r) for k reflections inside.
 
