@@ -23,7 +23,7 @@ SCENES = (
     "spectra", "textures", "thin_lens",
 )  # fmt: skip
 # Mitsuba's envmap is up to a quarter off its own RGB picture in spectral mode, where texels are
-# saturated; tests/renders/test_modes.py holds ours to the RGB picture instead.
+# saturated; tests/renders/test_spectral.py holds ours to the RGB picture instead.
 CASES = [(name, mode) for name in SCENES for mode in ("rgb", "spectral")]
 CASES.remove(("envmap", "spectral"))
 CASES.remove(("spectra", "rgb"))  # of black bodies Mitsuba has no colour
