@@ -1,5 +1,6 @@
 /* Where a path is: the point that a ray hit, with all that shading asks for. */
 #include "lib/surface_flags.cl"
+#include "lib/trace_hit.cl"
 
 typedef struct {
     vec3 p;       /* [m] */
@@ -21,22 +22,21 @@ inline vec2 vertex_vec2(global const float *table, integer vertex)
     return r;
 }
 
-/* The surface at a hit; `d` is the ray's direction. `front` tells which side was hit. A two-sided
+/* The surface where the ray from `o` along `d` ends. `front` tells which side was hit. A two-sided
  * back is turned round, so that the BSDF sees a front. USES_NORMALS, USES_UVS and USES_TANGENTS say
- * what the scene needs; uv_of_shape and dpdu_of_shape are generated for its analytic shapes. */
-inline Surface surface_load(Scene scene, Slab hit, At at, mask active, vec3 o, vec3 d, mask *front)
+ * what the scene needs; dpdu_of_shape is generated for its analytic shapes. */
+inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, mask *front)
 {
     Surface s;
-    ShapeRow shape = shape_row_row(scene.shapes, sel_i(active, load_hit_shape(hit, at), (integer)(0)) * SHAPE_ROW_WORDS);
-    vec3 n = load_hit_n(hit, at);
-    s.n = normalize3(sel3(active, n, v3(0.0f, 0.0f, 1.0f)));
-    s.p = madd3(d, load_hit_t(hit, at), o);
+    ShapeRow shape = shape_row_row(scene.shapes, sel_i(active, h.shape, (integer)(0)) * SHAPE_ROW_WORDS);
+    s.n = normalize3(sel3(active, h.n, v3(0.0f, 0.0f, 1.0f)));
+    s.p = madd3(d, h.t, o);
     s.ns = s.n;
-    s.uv.x = load_hit_u(hit, at);
-    s.uv.y = load_hit_v(hit, at);
+    s.uv.x = h.u;
+    s.uv.y = h.v;
     s.dpdu = v3(0.0f, 0.0f, 0.0f);
     s.light = -1;
-    integer prim = sel_i(active, load_hit_prim(hit, at), (integer)(0));
+    integer prim = sel_i(active, h.prim, (integer)(0));
     mask emits = active & (shape.light >= 0);
     if (any(emits)) {
         integer offset = sel_i((shape.flags & SHAPE_ONE_LIGHT) != 0, (integer)(0), prim - shape.prim);
@@ -82,6 +82,14 @@ inline Surface surface_load(Scene scene, Slab hit, At at, mask active, vec3 o, v
     s.n = sel3(turn, neg3(s.n), s.n);
     s.ns = sel3(turn, neg3(s.ns), s.ns);
     return s;
+}
+
+/* The same from what the intersect stage has kept. */
+inline Surface surface_load(Scene scene, Slab hit, At at, mask active, vec3 o, vec3 d, mask *front)
+{
+    TraceHit h = {load_hit_t(hit, at), load_hit_u(hit, at), load_hit_v(hit, at), load_hit_n(hit, at),
+                  load_hit_prim(hit, at), load_hit_shape(hit, at)};
+    return surface_at(scene, h, active, o, d, front);
 }
 
 /* The shading frame: s along dpdu where there is one (Mitsuba's and pbrt's convention). */

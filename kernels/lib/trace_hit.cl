@@ -1,0 +1,7 @@
+/* Where a ray ends, in lane types. */
+typedef struct {
+    real t, u, v;  /* FAR and beyond: nothing */
+    vec3 n;        /* see Hit.n in clpt/records.py */
+    integer prim;  /* -1: nothing */
+    integer shape; /* row in `shapes` */
+} TraceHit;
