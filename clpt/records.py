@@ -94,6 +94,7 @@ SHAPE = Record(
     prim=("integer", "its first primitive"),
     params=("integer", "first word of its parameters in `geometry`; analytic shapes"),
     number=("integer", "its place among the scene's shapes"),
+    attributes=("integer", "first word in `attributes` of where each lies; 0: it has none"),
 )
 
 LIGHT = Record(
@@ -117,6 +118,7 @@ TABLES: dict[str, tuple[str, str]] = {
     "normals": ("float", "x y z per vertex; zero where the shape has none"),
     "uvs": ("float", "u v per vertex"),
     "faces": ("uint", "three vertices per triangle"),
+    "attributes": ("uint", "of meshes per vertex or face, see clpt.render.attributes"),
     "shapes": ("uint", "ShapeRow per shape"),
     "geometry": ("uint", "parameters of analytic shapes, and of shapes as lights"),
     "materials": ("uint", "parameters of the leaf materials, a row each"),

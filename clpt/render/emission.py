@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from clpt.render import shapes
 from clpt.render.lamps import PLACED, RECORDS
-from clpt.render.lights import KINDS, case_text, row_text
+from clpt.render.lights import KINDS, case_text, point_text, row_text
 
 
 def dispatch_text(kinds: Iterable[str], textured: bool) -> str:
@@ -54,19 +54,18 @@ def _lamp(kind: str) -> str:
 
 def _surfaces_text(kinds: list[str], only: bool, textured: bool) -> list[str]:
     """A point of the shape, its emission there, and the ray from it."""
-    lines = ["    SurfacePoint q = surface_point_nothing();"]
+    lines = [
+        "    SurfacePoint q = surface_point_nothing();",
+        "    TexturePoint point = texture_point_nowhere();",
+    ]
     for kind in kinds:
         body = [f"SurfacePoint p = {kind}_point({row_text(kind)}, u);"]
-        if kind == "triangle" and textured:
-            body += [
-                "integer at = sel_i(m, l.shape, (integer)(0)) * SHAPE_ROW_WORDS;",
-                "ShapeRow shape = shape_row_row(scene.shapes, at);",
-                "p.uv = area_triangle_uv(scene, shape, sel_i(m, row, shape.light), p.uv);",
-            ]
+        body += point_text(kind, "p.uv") if textured else []
         lines += case_text(kind, only, [*body, "q = surface_point_sel(m, p, q);"])
     return [
         *lines,
-        "    Spectrum value = emission_load(scene, l.radiance, q.uv, lambdas);",
+        "    point.p = q.p;",
+        "    Spectrum value = emission_load(scene, l.radiance, point, lambdas);",
         "    LightRay s = surface_emit(q, l.along != 0, value, v);",
         "    r = light_ray_sel(l.shape >= 0, s, r);",
     ]

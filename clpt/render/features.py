@@ -30,6 +30,7 @@ class Features:
     normals: bool = False
     uvs: bool = False
     tangents: bool = False
+    attributes: bool = False  # some texture reads what meshes say per vertex or face
     mixtures: bool = False
     infinite: bool = False
     light_paths: bool = False  # paths start at lights

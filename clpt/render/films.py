@@ -76,18 +76,18 @@ def _waves_text(sources: dict[str, frozenset[str]]) -> str:
 typedef struct {{
     Scene scene;
     integer first, count; /* rows in `materials` */
-    vec2 uv;
+    TexturePoint point;
     Wavelengths lambdas;
 }} Layers;
-inline Layers layers_load(Scene scene, integer at, vec2 uv, Wavelengths lambdas)
+inline Layers layers_load(Scene scene, integer at, TexturePoint point, Wavelengths lambdas)
 {{
     integer first = gather_i(scene.materials, at), count = gather_i(scene.materials, at + 1);
-    Layers l = {{scene, first, count, uv, lambdas}};
+    Layers l = {{scene, first, count, point, lambdas}};
     return l;
 }}
 inline Layer layer_at(Layers l, integer i)
 {{
-    return layer_load(l.scene, l.first + i * {kinds.row_words(Layer)}, l.uv, l.lambdas);
+    return layer_load(l.scene, l.first + i * {kinds.row_words(Layer)}, l.point, l.lambdas);
 }}
 #include "lib/boundary_film.cl"
 """
@@ -102,11 +102,11 @@ typedef struct {{
     integer count, table, rows; /* layers; first number in `spectra`; how many profiles it has */
     real profile;
 }} Layers;
-inline Layers layers_load(Scene scene, integer at, vec2 uv, Wavelengths lambdas)
+inline Layers layers_load(Scene scene, integer at, TexturePoint point, Wavelengths lambdas)
 {{
     integer row = gather_i(scene.materials, at);
     Layers l = {{scene, gather_i(scene.materials, at + 1), gather_i(scene.materials, row),
-                gather_i(scene.materials, row + 1), film_profile(scene, row + 2, uv, lambdas)}};
+                gather_i(scene.materials, row + 1), film_profile(scene, row + 2, point, lambdas)}};
     return l;
 }}
 #include "lib/boundary_table.cl"

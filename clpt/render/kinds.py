@@ -60,7 +60,7 @@ def struct_text(cls: type[Kind]) -> str:
 
 
 def load_text(cls: type[Kind], sources: Mapping[str, frozenset[str]], table: str) -> str:
-    """Return `kind_load(scene, row, uv, lambdas)`, which reads a row at the path's wavelengths.
+    """Return `kind_load(scene, row, point, lambdas)`, which reads a row at the path's wavelengths.
 
     sources: per parameter, where the values in this scene come from: "constant", "table" (a
     tabulated spectrum), "texture", "layers". Text is made only for what is there.
@@ -79,7 +79,7 @@ def load_text(cls: type[Kind], sources: Mapping[str, frozenset[str]], table: str
         at += words(param)
     head = (
         f"inline {cls.__name__} {cls.kind}_load"
-        "(Scene scene, integer row, vec2 uv, Wavelengths lambdas)"
+        "(Scene scene, integer row, TexturePoint point, Wavelengths lambdas)"
     )
     if cls.needs_wavelengths:
         body.append("    r.lambdas = lambdas;")
@@ -94,12 +94,12 @@ def _member(
     if kind == "integer":
         return [f"    r.{name} = gather_i(scene.{table}, {at});"]
     if kind == "layers":
-        made = f"layers_load(scene, {at}, uv, lambdas)" if "layers" in found else "layers_none()"
+        made = f"layers_load(scene, {at}, point, lambdas)" if "layers" in found else "layers_none()"
         return [f"    r.{name} = {made};"]
     forms = {
         "constant": f"{kind}_constant(scene.{table}, {at}, lambdas)",
         "table": f"{kind}_table(scene, scene.{table}, {at}, lambdas)",
-        "texture": f"{kind}_texture_{param.role}(scene, scene.{table}, {at}, uv, lambdas)",
+        "texture": f"{kind}_texture_{param.role}(scene, scene.{table}, {at}, point, lambdas)",
     }
     present = [form for form in forms if form in found]
     lines = [f"    r.{name} = {forms[present[0]]};"]
@@ -117,26 +117,27 @@ def _member(
 
 
 def emission_text(found: frozenset[str]) -> str:
-    """Return `emission_load(scene, at, uv, lambdas)`, which reads five words of `lamps`."""
+    """Return `emission_load(scene, at, point, lambdas)`, which reads five words of `lamps`."""
     return value_text("emission_load", Param("emission", "", textured=True), found, "lamps")
 
 
 def mixture_text(found: frozenset[str]) -> str:
-    """Return `mixture_weight(scene, at, uv, lambdas)`, which reads two words of `mixtures`."""
+    """Return `mixture_weight(scene, at, point, lambdas)`, which reads two words of `mixtures`."""
     return value_text("mixture_weight", Param("real", "", textured=True), found, "mixtures")
 
 
 def medium_text(found: frozenset[str]) -> str:
-    """Return `medium_absorption(scene, at, uv, lambdas)`, which reads five words of `materials`."""
+    """Return `medium_absorption(scene, at, point, lambdas)`: five words of `materials`."""
     return value_text("medium_absorption", Param("coefficient", ""), found)
 
 
 def value_text(name: str, param: Param, found: frozenset[str], table: str = "materials") -> str:
-    """Return `name(scene, at, uv, lambdas)`, which loads a single parameter."""
+    """Return `name(scene, at, point, lambdas)`, which loads a single parameter."""
     form = lane_type(param)
     return "\n".join(
         [
-            f"inline {form} {name}(Scene scene, integer at, vec2 uv, Wavelengths lambdas)",
+            f"inline {form} {name}"
+            "(Scene scene, integer at, TexturePoint point, Wavelengths lambdas)",
             "{",
             f"    struct {{ {form} value; }} r;",
             *_member("value", param, form.lower(), "at", found, table),

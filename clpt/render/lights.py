@@ -179,7 +179,6 @@ def dispatch_text(kinds: Iterable[str], textured: bool = False) -> str:
 
     light_sample(scene, p, pick, u, lambdas)      chooses a light and a direction to it
     light_pdf(scene, row, p, wi, t, n)            of it, [1/sr], for a ray that met a shape
-    light_radiance(scene, row, uv, lambdas)       of a shape
     infinite_light(scene, row, d, lambdas, ...)   radiance and pdf of one infinite light
     infinite_gather(scene, d, pdf, lambdas)       what they all add to a path that left the scene
     """
@@ -215,6 +214,19 @@ def row_text(kind: str) -> str:
     return f"{kind}_row(scene.{table}, sel_i(m, l.params, (integer)(0)))"
 
 
+def point_text(kind: str, uv: str) -> list[str]:
+    """Lines that set `point`, what a texture sees, where the light `l` is a shape of a kind."""
+    if kind != "triangle":
+        place = "v3(0.0f, 0.0f, 0.0f)"
+        return [f"point = texture_point_sel(m, texture_point({uv}, {place}), point);"]
+    made = f"area_triangle_point(scene, shape, sel_i(m, row, shape.light), {uv})"
+    return [
+        "integer at = sel_i(m, l.shape, (integer)(0)) * SHAPE_ROW_WORDS;",
+        "ShapeRow shape = shape_row_row(scene.shapes, at);",
+        f"point = texture_point_sel(m, {made}, point);",
+    ]
+
+
 def _sample_text(lamps: list[str], surfaces: list[str], textured: bool) -> list[str]:
     only = len(lamps) + len(surfaces) == 1
     head = "LightSample light_sample(Scene scene, vec3 p, real pick, vec2 u, Wavelengths lambdas)"
@@ -231,19 +243,18 @@ def _sample_text(lamps: list[str], surfaces: list[str], textured: bool) -> list[
         sampled = f"{kind}_sample({row_text(kind)}, scene, p, u, lambdas)"
         lines += case_text(kind, only, [f"s = light_sel(m, {sampled}, s);"])
     if surfaces:
-        lines.append("    ShapeSample q = shape_sample_nothing();")
+        lines += [
+            "    ShapeSample q = shape_sample_nothing();",
+            "    TexturePoint point = texture_point_nowhere();",
+        ]
     for kind in surfaces:
         body = [f"ShapeSample r = {kind}_sample({row_text(kind)}, p, u);"]
-        if kind == "triangle" and textured:
-            body += [
-                "integer at = sel_i(m, l.shape, (integer)(0)) * SHAPE_ROW_WORDS;",
-                "ShapeRow shape = shape_row_row(scene.shapes, at);",
-                "r.uv = area_triangle_uv(scene, shape, sel_i(m, row, shape.light), r.uv);",
-            ]
+        body += point_text(kind, "r.uv") if textured else []
         lines += case_text(kind, only, [*body, "q = shape_sample_sel(m, r, q);"])
     if surfaces:
         lines += [
-            "    Spectrum le = emission_load(scene, l.radiance, q.uv, lambdas);",
+            "    point.p = madd3(q.wi, q.t, p);",
+            "    Spectrum le = emission_load(scene, l.radiance, point, lambdas);",
             "    s = light_sel(l.shape >= 0, area_sample(q, le), s);",
         ]
     return [*lines, "    return light_chosen(s, l.pmf);", "}"]

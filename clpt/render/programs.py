@@ -72,6 +72,7 @@ def _defines(features: Features) -> dict[str, str | int | float]:
         "USES_NORMALS": int(features.normals),
         "USES_UVS": int(features.uvs),
         "USES_TANGENTS": int(features.tangents),
+        "USES_ATTRIBUTES": int(features.attributes),
         "USES_ANALYTIC": int(bool(features.analytic)),
         "USES_INFINITE": int(features.infinite),
         "USES_DISPERSION": int(features.dispersion and features.mode == "spectral"),

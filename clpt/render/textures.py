@@ -165,9 +165,9 @@ MEMBERS: dict[type[Texture], Callable[..., tuple[str, dict[str, Any]]]] = {
 def dispatch_text(kinds: Iterable[str], roles: Iterable[tuple[str, str]]) -> str:
     """Return the look-ups of the (kind, role) pairs in the scene, and the loaders that call them.
 
-    texture_<role>(scene, row, uv, lambdas)                 the texture whose row is at a word
-    spectrum_texture_<role>(scene, table, at, uv, lambdas)  the one that the parameter at `at` names
-    real_texture_real(scene, table, at, uv, lambdas)        the same for a real
+    texture_<role>(scene, row, point, lambdas)                 whose row is at a word
+    spectrum_texture_<role>(scene, table, at, point, lambdas)  that the parameter at `at` names
+    real_texture_real(scene, table, at, point, lambdas)        the same for a real
     """
     pairs, found = set(roles), set(kinds)
     if "spectral_bitmap" in found:
@@ -200,14 +200,15 @@ def _look_up(role: str, kinds: list[str]) -> list[str]:
         zero = "spectrum_of(0.0f)"
     source = (REAL_WORDS if role == "real" else SPECTRUM_WORDS) - 1
     lines = [
-        f"inline {type_} texture_{role}(Scene scene, integer row, vec2 uv, Wavelengths lambdas)",
+        f"inline {type_} texture_{role}"
+        "(Scene scene, integer row, TexturePoint point, Wavelengths lambdas)",
         "{",
         "    integer kind = gather_i(scene.textures, row);",
         f"    {type_} value = {zero};",
     ]
     for kind in kinds:
         loaded = f"{kind}_row(scene.textures, sel_i(m, row, (integer)(0)))"
-        call = f"{kind}_{role}({loaded}, scene, uv{more})"
+        call = f"{kind}_{role}({loaded}, scene, point{more})"
         lines += [
             "    {",
             f"        mask m = kind == {KINDS.index(kind)};",
@@ -219,9 +220,10 @@ def _look_up(role: str, kinds: list[str]) -> list[str]:
         "    return value;",
         "}",
         f"inline {type_} {form}_texture_{role}"
-        "(Scene scene, global const uint *table, integer at, vec2 uv, Wavelengths lambdas)",
+        "(Scene scene, global const uint *table, integer at,"
+        " TexturePoint point, Wavelengths lambdas)",
         "{",
         f"    integer word = gather_i(table, at + {source}); /* 1 + the row, or no texture */",
-        f"    return texture_{role}(scene, max_i(word - 1, (integer)(0)), uv, lambdas);",
+        f"    return texture_{role}(scene, max_i(word - 1, (integer)(0)), point, lambdas);",
         "}",
     ]

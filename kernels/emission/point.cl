@@ -1,11 +1,10 @@
 /* A point that emits evenly: intensity times 4 pi [W/nm]. */
 LightRay point_emit(Point l, Scene scene, vec2 u, vec2 v, Wavelengths lambdas)
 {
-    vec2 uv = {0.0f, 0.0f};
     LightRay r = light_ray_nothing();
     r.o = l.position;
     r.d = uniform_sphere(v);
     r.n = r.d;
-    r.power = spectrum_scale(emission_load(scene, l.radiance, uv, lambdas), 4.0f * PI);
+    r.power = spectrum_scale(emission_load(scene, l.radiance, texture_point_nowhere(), lambdas), 4.0f * PI);
     return r;
 }

@@ -27,7 +27,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     v = v3(s.uv.x, s.uv.y, (real)(0.0f));
 #elif CHANNEL == CHANNEL_ALBEDO
     integer material = MATERIAL_ROW(sel_i(active, load_hit_material(hit, at), (integer)(0)));
-    Spectrum albedo = bsdf_albedo(bsdf_load(scene, material, s.uv, load_path_lambdas(path, at)));
+    Spectrum albedo = bsdf_albedo(bsdf_load(scene, material, surface_texture_point(s), load_path_lambdas(path, at)));
     v = v3(albedo.x, albedo.y, albedo.z);
 #elif CHANNEL == CHANNEL_SHAPE_ID
     v.x = to_real(shape.number);

@@ -31,7 +31,8 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
 #if USES_CHOICE
     choice = sampler_pair(sampler, dimension + DIMENSION_CHOICE);
 #endif
-    Bsdf m = bsdf_load(scene, MATERIAL_ROW(sel_i(active, load_hit_material(hit, at), (integer)(0))), s.uv, lambdas);
+    integer row = MATERIAL_ROW(sel_i(active, load_hit_material(hit, at), (integer)(0)));
+    Bsdf m = bsdf_load(scene, row, surface_texture_point(s), lambdas);
     Frame frame = surface_frame(s);
     vec3 wo = to_local(frame, neg3(d));
     real arrives = 1.0f / max_r(fabs(dot3(s.n, d)), (real)(1e-6f));

@@ -29,7 +29,8 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
         real pdf = load_path_pdf(path, at);
         real other = light_pdf(scene, light, o, d, load_hit_t(hit, at), s.n);
         real w = sel(pdf < 0.0f, (real)(1.0f), mis_weight(pdf, other));
-        Spectrum le = spectrum_scale(spectrum_mul(beta, emission_load(scene, light_at(scene, light).radiance, s.uv, lambdas)), w);
+        Spectrum le = emission_load(scene, light_at(scene, light).radiance, surface_texture_point(s), lambdas);
+        le = spectrum_scale(spectrum_mul(beta, le), w);
         store_path_radiance(path, at, lit, spectrum_add(load_path_radiance(path, at), le));
     }
 #endif
@@ -42,7 +43,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     choice = sampler_pair(sampler, dimension + DIMENSION_CHOICE);
 #endif
     integer row = MATERIAL_ROW(sel_i(active, load_hit_material(hit, at), (integer)(0)));
-    Bsdf m = bsdf_load(scene, row, s.uv, lambdas);
+    Bsdf m = bsdf_load(scene, row, surface_texture_point(s), lambdas);
 #if BSDF_SHIFTS
     lambdas = bsdf_shift(scene, row, m, lambdas, choice.y, depth); /* from here on, those by which light comes */
     store_path_lambdas(path, at, active & !hidden, lambdas);

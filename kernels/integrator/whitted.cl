@@ -19,12 +19,12 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     mask lit = active & (s.light >= 0) & front;
     if (any(lit)) {
         integer light = sel_i(lit, s.light, (integer)(0));
-        Spectrum le = emission_load(scene, light_at(scene, light).radiance, s.uv, lambdas);
+        Spectrum le = emission_load(scene, light_at(scene, light).radiance, surface_texture_point(s), lambdas);
         radiance = spectrum_sel(lit, spectrum_add(radiance, spectrum_mul(beta, le)), radiance);
     }
 #endif
     integer row = MATERIAL_ROW(sel_i(active, load_hit_material(hit, at), (integer)(0)));
-    Bsdf m = bsdf_load(scene, row, s.uv, lambdas);
+    Bsdf m = bsdf_load(scene, row, surface_texture_point(s), lambdas);
     Frame frame = surface_frame(s);
     vec3 wo = to_local(frame, neg3(d));
     Sampler sampler = sampler_start(settings->seed, as_natural(load_path_place(path, at)), as_natural(load_path_sample(path, at)));
@@ -38,7 +38,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
 
 #if !BSDF_DELTA
     Spectrum own = spectrum_scale(beta, 1.0f - mirror);
-    Spectrum ambient = emission_load(scene, (integer)(settings->ambient), s.uv, lambdas);
+    Spectrum ambient = emission_load(scene, (integer)(settings->ambient), surface_texture_point(s), lambdas);
     Spectrum everywhere = spectrum_mul(spectrum_mul(own, bsdf_albedo(m)), ambient);
     radiance = spectrum_sel(active, spectrum_add(radiance, everywhere), radiance);
 #if USES_LIGHTS

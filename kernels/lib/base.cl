@@ -11,4 +11,5 @@
 #include "lib/path_state.cl"
 #include "generated/scene.cl"
 #include "generated/spectrum_read.cl"
+#include "lib/texture_point.cl"
 #include "lib/param.cl"

@@ -9,8 +9,7 @@ inline Spectrum medium_transmittance(Scene scene, integer medium, real t, Wavele
     Spectrum r = spectrum_of(1.0f);
     mask inside = medium != 0;
     if (any(inside)) {
-        vec2 uv = {0.0f, 0.0f};
-        Spectrum a = medium_absorption(scene, max_i(medium - 1, (integer)(0)), uv, lambdas);
+        Spectrum a = medium_absorption(scene, max_i(medium - 1, (integer)(0)), texture_point_nowhere(), lambdas);
 #define C(c) r.c = sel(inside, exp_r(-a.c * t), r.c);
         SPECTRUM_EACH(C)
 #undef C

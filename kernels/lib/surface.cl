@@ -9,6 +9,10 @@ typedef struct {
     vec3 dpdu;    /* along the surface's u; not normalised, may be zero */
     vec2 uv;
     integer light; /* row in `lights`, -1: does not emit */
+#if USES_ATTRIBUTES
+    integer attributes, face; /* of triangles, see lib/texture_point.cl */
+    vec2 b;
+#endif
 } Surface;
 
 inline vec3 vertex_vec3(global const float *table, integer vertex)
@@ -37,6 +41,11 @@ inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, 
     s.dpdu = v3(0.0f, 0.0f, 0.0f);
     s.light = -1;
     integer prim = sel_i(active, h.prim, (integer)(0));
+#if USES_ATTRIBUTES
+    s.attributes = shape.attributes;
+    s.face = sel_i(active & (shape.kind == 0), prim, (integer)(0));
+    s.b = s.uv;
+#endif
     mask emits = active & (shape.light >= 0);
     if (any(emits)) {
         integer offset = sel_i((shape.flags & SHAPE_ONE_LIGHT) != 0, (integer)(0), prim - shape.prim);
@@ -90,6 +99,17 @@ inline Surface surface_load(Scene scene, Slab hit, At at, mask active, vec3 o, v
     TraceHit h = {load_hit_t(hit, at), load_hit_u(hit, at), load_hit_v(hit, at), load_hit_n(hit, at),
                   load_hit_prim(hit, at), load_hit_shape(hit, at)};
     return surface_at(scene, h, active, o, d, front);
+}
+
+inline TexturePoint surface_texture_point(Surface s)
+{
+    TexturePoint t = texture_point(s.uv, s.p);
+#if USES_ATTRIBUTES
+    t.attributes = s.attributes;
+    t.face = s.face;
+    t.b = s.b;
+#endif
+    return t;
 }
 
 /* The shading frame: s along dpdu where there is one (Mitsuba's and pbrt's convention). */

@@ -1,8 +1,8 @@
 /* The contract of a texture kind: kernels/texture/<kind>.cl has
  *
- *   Spectrum <kind>_reflectance(<Kind> t, Scene scene, vec2 uv, Wavelengths lambdas);
- *   Spectrum <kind>_emission   (<Kind> t, Scene scene, vec2 uv, Wavelengths lambdas);
- *   real     <kind>_real       (<Kind> t, Scene scene, vec2 uv);
+ *   Spectrum <kind>_reflectance(<Kind> t, Scene scene, TexturePoint point, Wavelengths lambdas);
+ *   Spectrum <kind>_emission   (<Kind> t, Scene scene, TexturePoint point, Wavelengths lambdas);
+ *   real     <kind>_real       (<Kind> t, Scene scene, TexturePoint point);
  *
  * The struct <Kind> is a Record in clpt/render/textures.py whose rows lie in `textures`; it holds the uv transform.
  */

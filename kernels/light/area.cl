@@ -10,11 +10,11 @@ inline LightSample area_sample(ShapeSample q, Spectrum radiance)
     return s;
 }
 
-/* The uv at barycentrics b of the triangle that row `row` of `lights` stands for: the mesh's, or
- * the barycentrics themselves where it has none. */
-inline vec2 area_triangle_uv(Scene scene, ShapeRow shape, integer row, vec2 b)
+/* What textures see at barycentrics b of the triangle that row `row` of `lights` stands for, but for the
+ * place in the world: the mesh's uv, or the barycentrics themselves where it has none. */
+inline TexturePoint area_triangle_point(Scene scene, ShapeRow shape, integer row, vec2 b)
 {
-    integer corner = 3 * (shape.prim + row - shape.light);
+    integer face = shape.prim + row - shape.light, corner = 3 * face;
     integer i0 = 2 * gather_i(scene.faces, corner), i1 = 2 * gather_i(scene.faces, corner + 1);
     integer i2 = 2 * gather_i(scene.faces, corner + 2);
     mask mapped = (shape.flags & SHAPE_UVS) != 0;
@@ -22,5 +22,11 @@ inline vec2 area_triangle_uv(Scene scene, ShapeRow shape, integer row, vec2 b)
     vec2 uv;
     uv.x = sel(mapped, gather(scene.uvs, i0) * b0 + gather(scene.uvs, i1) * b.x + gather(scene.uvs, i2) * b.y, b.x);
     uv.y = sel(mapped, gather(scene.uvs, i0 + 1) * b0 + gather(scene.uvs, i1 + 1) * b.x + gather(scene.uvs, i2 + 1) * b.y, b.y);
-    return uv;
+    TexturePoint t = texture_point(uv, v3(0.0f, 0.0f, 0.0f));
+#if USES_ATTRIBUTES
+    t.attributes = shape.attributes;
+    t.face = face;
+    t.b = b;
+#endif
+    return t;
 }

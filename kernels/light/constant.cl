@@ -1,8 +1,7 @@
 /* The same radiance from every direction; sampled evenly over the sphere. */
 Spectrum constant_radiance(Constant l, Scene scene, vec3 d, Wavelengths lambdas)
 {
-    vec2 uv = {0.0f, 0.0f};
-    return emission_load(scene, l.radiance, uv, lambdas);
+    return emission_load(scene, l.radiance, texture_point_nowhere(), lambdas);
 }
 
 real constant_pdf(Constant l, Scene scene, vec3 d) { return INV_4PI; }

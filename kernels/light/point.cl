@@ -3,11 +3,10 @@ LightSample point_sample(Point l, Scene scene, vec3 p, vec2 u, Wavelengths lambd
 {
     vec3 to = sub3(l.position, p);
     real t2 = max_r(dot3(to, to), (real)(1e-20f)), t = sqrt(t2);
-    vec2 uv = {0.0f, 0.0f};
     LightSample s;
     s.wi = scale3(to, 1.0f / t);
     s.t = t;
-    s.radiance = spectrum_scale(emission_load(scene, l.radiance, uv, lambdas), sel(l.falloff > 0.5f, 1.0f / t2, (real)(1.0f)));
+    s.radiance = spectrum_scale(emission_load(scene, l.radiance, texture_point_nowhere(), lambdas), sel(l.falloff > 0.5f, 1.0f / t2, (real)(1.0f)));
     s.pdf = -1.0f;
     return s;
 }

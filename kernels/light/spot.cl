@@ -4,14 +4,13 @@ LightSample spot_sample(Spot l, Scene scene, vec3 p, vec2 u, Wavelengths lambdas
 {
     vec3 to = sub3(l.position, p);
     real t2 = max_r(dot3(to, to), (real)(1e-20f)), t = sqrt(t2);
-    vec2 uv = {0.0f, 0.0f};
     LightSample s;
     s.wi = scale3(to, 1.0f / t);
     s.t = t;
     real cos_t = -dot3(s.wi, l.axis);
     real angle = atan2_r(sqrt_r(1.0f - cos_t * cos_t), cos_t);
     real edge = clamp_r((l.cutoff - angle) / max_r(l.cutoff - l.beam_width, (real)(1e-7f)), (real)(0.0f), (real)(1.0f));
-    s.radiance = spectrum_scale(emission_load(scene, l.radiance, uv, lambdas), edge / t2);
+    s.radiance = spectrum_scale(emission_load(scene, l.radiance, texture_point_nowhere(), lambdas), edge / t2);
     s.pdf = sel(edge > 0.0f, (real)(-1.0f), (real)(0.0f));
     return s;
 }

@@ -27,7 +27,7 @@ kernel void mix_materials(SLAB_ARGS, SCENE_ARGS)
         real u = sampler_pair(sampler, dimension).y;
         for (; any(open); open = open & (MATERIAL_KIND(word) == MIXTURE)) {
             integer row = sel_i(open, MATERIAL_ROW(word), (integer)(0));
-            real w = mixture_weight(scene, row, s.uv, lambdas);
+            real w = mixture_weight(scene, row, surface_texture_point(s), lambdas);
             mask second = u < w;
             /* What is left of u is as good as new. */
             u = min_r(sel(second, u / max_r(w, (real)(1e-20f)), (u - w) / max_r(1.0f - w, (real)(1e-20f))), (real)(0.9999999f));

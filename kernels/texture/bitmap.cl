@@ -26,9 +26,9 @@ inline void bitmap_axis(real x, integer size, integer wrap, mask smooth, integer
     *i1 = bitmap_wrap(to_integer(below) + 1, size, wrap);
 }
 
-inline BitmapPlace bitmap_place(Bitmap t, vec2 uv)
+inline BitmapPlace bitmap_place(Bitmap t, TexturePoint point)
 {
-    vec3 p = v3(uv.x, uv.y, (real)(1.0f));
+    vec3 p = v3(point.uv.x, point.uv.y, (real)(1.0f));
     mask smooth = t.filter == BITMAP_FILTER_BILINEAR;
     BitmapPlace b;
     bitmap_axis(dot3(t.to_u, p), t.width, t.wrap, smooth, &b.x0, &b.x1, &b.tx);
@@ -44,9 +44,9 @@ inline integer bitmap_corner(Bitmap t, BitmapPlace b, int corner, real *weight)
     return (next ? b.y1 : b.y0) * t.width + (right ? b.x1 : b.x0);
 }
 
-Spectrum bitmap_reflectance(Bitmap t, Scene scene, vec2 uv, Wavelengths lambdas)
+Spectrum bitmap_reflectance(Bitmap t, Scene scene, TexturePoint point, Wavelengths lambdas)
 {
-    BitmapPlace b = bitmap_place(t, uv);
+    BitmapPlace b = bitmap_place(t, point);
     Spectrum sum = spectrum_of(0.0f);
     for (int corner = 0; corner < 4; corner++) {
         real weight;
@@ -58,9 +58,9 @@ Spectrum bitmap_reflectance(Bitmap t, Scene scene, vec2 uv, Wavelengths lambdas)
     return sum;
 }
 
-Spectrum bitmap_emission(Bitmap t, Scene scene, vec2 uv, Wavelengths lambdas)
+Spectrum bitmap_emission(Bitmap t, Scene scene, TexturePoint point, Wavelengths lambdas)
 {
-    BitmapPlace b = bitmap_place(t, uv);
+    BitmapPlace b = bitmap_place(t, point);
     Spectrum sum = spectrum_of(0.0f);
     for (int corner = 0; corner < 4; corner++) {
         real weight;
@@ -72,9 +72,9 @@ Spectrum bitmap_emission(Bitmap t, Scene scene, vec2 uv, Wavelengths lambdas)
     return sum;
 }
 
-real bitmap_real(Bitmap t, Scene scene, vec2 uv)
+real bitmap_real(Bitmap t, Scene scene, TexturePoint point)
 {
-    BitmapPlace b = bitmap_place(t, uv);
+    BitmapPlace b = bitmap_place(t, point);
     real sum = 0.0f;
     for (int corner = 0; corner < 4; corner++) {
         real weight;

@@ -1,28 +1,28 @@
 /* Two colours, each in two of the four quarters of a unit of uv. A colour is five words: a spectrum in
  * the form that parameters have, or for a real the number in the first of them. */
-inline integer checkerboard_at(Checkerboard t, vec2 uv)
+inline integer checkerboard_at(Checkerboard t, TexturePoint point)
 {
-    vec3 p = v3(uv.x, uv.y, (real)(1.0f));
+    vec3 p = v3(point.uv.x, point.uv.y, (real)(1.0f));
     real u = dot3(t.to_u, p), v = dot3(t.to_v, p);
     mask same = (u - floor(u) > 0.5f) == (v - floor(v) > 0.5f);
     return sel_i(same, t.color0, t.color1);
 }
 
-Spectrum checkerboard_reflectance(Checkerboard t, Scene scene, vec2 uv, Wavelengths lambdas)
+Spectrum checkerboard_reflectance(Checkerboard t, Scene scene, TexturePoint point, Wavelengths lambdas)
 {
-    integer at = checkerboard_at(t, uv);
+    integer at = checkerboard_at(t, point);
     Spectrum value = spectrum_constant(scene.textures, at, lambdas);
     mask tabulated = gather_i(scene.textures, at + 4) < 0;
     if (any(tabulated)) value = spectrum_sel(tabulated, spectrum_table(scene, scene.textures, at, lambdas), value);
     return value;
 }
 
-Spectrum checkerboard_emission(Checkerboard t, Scene scene, vec2 uv, Wavelengths lambdas)
+Spectrum checkerboard_emission(Checkerboard t, Scene scene, TexturePoint point, Wavelengths lambdas)
 {
-    return checkerboard_reflectance(t, scene, uv, lambdas);
+    return checkerboard_reflectance(t, scene, point, lambdas);
 }
 
-real checkerboard_real(Checkerboard t, Scene scene, vec2 uv)
+real checkerboard_real(Checkerboard t, Scene scene, TexturePoint point)
 {
-    return gather_w(scene.textures, checkerboard_at(t, uv));
+    return gather_w(scene.textures, checkerboard_at(t, point));
 }

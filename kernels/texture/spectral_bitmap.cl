@@ -8,10 +8,10 @@ inline Bitmap spectral_bitmap_image(SpectralBitmap t)
     return b;
 }
 
-inline Spectrum spectral_bitmap_at(SpectralBitmap t, Scene scene, vec2 uv, Spectrum place)
+inline Spectrum spectral_bitmap_at(SpectralBitmap t, Scene scene, TexturePoint point, Spectrum place)
 {
     Bitmap image = spectral_bitmap_image(t);
-    BitmapPlace b = bitmap_place(image, uv);
+    BitmapPlace b = bitmap_place(image, point);
     Spectrum sum = spectrum_of(0.0f);
     for (int corner = 0; corner < 4; corner++) {
         real weight;
@@ -21,13 +21,13 @@ inline Spectrum spectral_bitmap_at(SpectralBitmap t, Scene scene, vec2 uv, Spect
     return sum;
 }
 
-Spectrum spectral_bitmap_reflectance(SpectralBitmap t, Scene scene, vec2 uv, Wavelengths lambdas)
+Spectrum spectral_bitmap_reflectance(SpectralBitmap t, Scene scene, TexturePoint point, Wavelengths lambdas)
 {
-    return spectral_bitmap_at(t, scene, uv, spectra_row(scene, t.number, lambdas));
+    return spectral_bitmap_at(t, scene, point, spectra_row(scene, t.number, lambdas));
 }
 
-Spectrum spectral_bitmap_emission(SpectralBitmap t, Scene scene, vec2 uv, Wavelengths lambdas)
+Spectrum spectral_bitmap_emission(SpectralBitmap t, Scene scene, TexturePoint point, Wavelengths lambdas)
 {
     Spectrum place = spectra_row(scene, t.number, lambdas);
-    return bands_lit(spectral_bitmap_at(t, scene, uv, place), t.bands, place);
+    return bands_lit(spectral_bitmap_at(t, scene, point, place), t.bands, place);
 }

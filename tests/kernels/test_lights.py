@@ -397,7 +397,7 @@ def test_uv_on_a_mesh():
     body = """
         ShapeRow shape = shape_row_row(scene.shapes, (integer)(SHAPE_ROW_WORDS));
         vec2 b = {x[1], x[2]};
-        vec2 uv = area_triangle_uv(scene, shape, to_integer(x[0]), b);
+        vec2 uv = area_triangle_point(scene, shape, to_integer(x[0]), b).uv;
         r[0] = uv.x; r[1] = uv.y;
     """
     given = np.array([[first, first + 1], [0.25, 0.5], [0.125, 0.25]])

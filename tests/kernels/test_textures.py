@@ -32,11 +32,16 @@ def _dispatch(roles):
 def _body(role, mode):
     """Text that looks row x[0] up at (x[1], x[2]), and how many numbers it sets."""
     components = "xyzw" if mode == "spectral" else "xyz"
-    lines = ["integer row = to_integer(x[0]);", "vec2 uv = {x[1], x[2]};", "Wavelengths lambdas;"]
+    lines = [
+        "integer row = to_integer(x[0]);",
+        "TexturePoint point = texture_point_nowhere();",
+        "point.uv.x = x[1]; point.uv.y = x[2];",
+        "Wavelengths lambdas;",
+    ]
     lines += [f"lambdas.{c} = {v}f;" for c, v in zip(components, LAMBDAS, strict=False)]
     if role == "real":
-        return " ".join([*lines, "r[0] = texture_real(scene, row, uv, lambdas);"]), 1
-    lines.append(f"Spectrum s = texture_{role}(scene, row, uv, lambdas);")
+        return " ".join([*lines, "r[0] = texture_real(scene, row, point, lambdas);"]), 1
+    lines.append(f"Spectrum s = texture_{role}(scene, row, point, lambdas);")
     lines += [f"r[{i}] = s.{c};" for i, c in enumerate(components)]
     return " ".join(lines), len(components)
 
@@ -239,11 +244,12 @@ def test_wild_coordinates_stay_inside_the_image():
 
 LOADERS = """
     integer word = to_integer(x[0]);
-    vec2 uv = {x[1], x[2]};
+    TexturePoint point = texture_point_nowhere();
+    point.uv.x = x[1]; point.uv.y = x[2];
     Wavelengths lambdas = spectrum_of(0.0f);
-    Spectrum s = spectrum_texture_reflectance(scene, scene.materials, word, uv, lambdas);
+    Spectrum s = spectrum_texture_reflectance(scene, scene.materials, word, point, lambdas);
     r[0] = s.x; r[1] = s.y; r[2] = s.z;
-    r[3] = real_texture_real(scene, scene.materials, word + 5, uv, lambdas);
+    r[3] = real_texture_real(scene, scene.materials, word + 5, point, lambdas);
 """
 
 

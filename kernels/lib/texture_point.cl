@@ -1,0 +1,44 @@
+/* What a texture may look at: every loader of parameters gets it. What a scene's textures do not ask for
+ * is never computed. USES_ATTRIBUTES: some texture reads what a mesh says per vertex or face. */
+typedef struct {
+    vec2 uv;
+    vec3 p; /* in the world [m] */
+#if USES_ATTRIBUTES
+    integer attributes; /* of the mesh: first word in `attributes` of where each of them lies; 0: it has none */
+    integer face;       /* of `faces` */
+    vec2 b;             /* barycentrics of its vertices 1 and 2 */
+#endif
+} TexturePoint;
+
+inline TexturePoint texture_point(vec2 uv, vec3 p)
+{
+    TexturePoint t;
+    t.uv = uv;
+    t.p = p;
+#if USES_ATTRIBUTES
+    t.attributes = 0;
+    t.face = 0;
+    t.b.x = 0.0f;
+    t.b.y = 0.0f;
+#endif
+    return t;
+}
+/* For what is on no surface. */
+inline TexturePoint texture_point_nowhere(void)
+{
+    vec2 uv = {0.0f, 0.0f};
+    return texture_point(uv, v3(0.0f, 0.0f, 0.0f));
+}
+inline TexturePoint texture_point_sel(mask m, TexturePoint a, TexturePoint b)
+{
+    a.uv.x = sel(m, a.uv.x, b.uv.x);
+    a.uv.y = sel(m, a.uv.y, b.uv.y);
+    a.p = sel3(m, a.p, b.p);
+#if USES_ATTRIBUTES
+    a.attributes = sel_i(m, a.attributes, b.attributes);
+    a.face = sel_i(m, a.face, b.face);
+    a.b.x = sel(m, a.b.x, b.b.x);
+    a.b.y = sel(m, a.b.y, b.b.y);
+#endif
+    return a;
+}
