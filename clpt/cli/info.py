@@ -49,16 +49,16 @@ def variables(defines: Iterable[str]) -> dict[str, str]:
 
 
 def summary(scene: Scene) -> dict[str, Any]:
-    """Return what a scene's file holds; of a bare mesh, not the studio around it.
+    """Return what a scene's file holds; not what the studio added to it.
 
     `triangles` counts those of meshes, cubes and rectangles once, `triangles_instanced` at each
     placement.
     """
-    bare = "studio" in scene.extra
-    own = scene.shapes[: -scene.extra["studio"]] if bare else scene.shapes
+    added = scene.extra.get("studio", {"camera": False, "shapes": 0, "lights": 0})
+    own = scene.shapes[: len(scene.shapes) - added["shapes"]]
     counts = {_arrays(shape): _triangles(shape) for shape in own}
     kinds = list(_nested(own))
-    lights = [] if bare else [light.kind for light in scene.lights]
+    lights = [light.kind for light in scene.lights[: len(scene.lights) - added["lights"]]]
     lights += [shape.emission.kind for shape in own if shape.emission is not None]
     bounds = [corner.tolist() for corner in studio.world_bounds(own)] if own else None
     return {
@@ -68,7 +68,7 @@ def summary(scene: Scene) -> dict[str, Any]:
         "instances": len(own) - len(counts),
         "bounds": bounds,
         "shapes": dict(Counter(shape.kind for shape in own)),
-        "cameras": [] if bare else [scene.camera.kind],
+        "cameras": scene.extra.get("cameras", [] if added["camera"] else [scene.camera.kind]),
         "lights": dict(Counter(lights)),
         "materials": _by_kind(kinds, materials.Material),
         "textures": _by_kind(kinds, textures.Texture),

@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from clpt.errors import SceneError
-from clpt.formats import mesh, mitsuba, native, studio
+from clpt.formats import gltf, mesh, mitsuba, native, studio
 from clpt.scene import Scene
 
 FORMATS: dict[str, Callable[..., Scene]] = {
     ".json": native.load,
     ".xml": mitsuba.load,
+    **dict.fromkeys(gltf.SUFFIXES, gltf.load),
     **dict.fromkeys(mesh.SUFFIXES, studio.load),
 }
 
@@ -22,16 +23,16 @@ __all__ = ["FORMATS", "load"]
 def load(path: str | Path, **variables: Any) -> Scene:
     """Read a scene or a bare mesh; a folder means the scene.json or scene.xml in it.
 
-    `variables` set the `$names` of Mitsuba's XML. Raises SceneError with the file and, where it is
-    known, the line.
+    `variables` set the `$names` of Mitsuba's XML; of glTF they choose camera, scene and
+    time. Raises SceneError with the file and, where it is known, the line.
     """
     path = _existing(Path(path))
     loader = FORMATS.get(path.suffix.lower())
     if loader is None:
         known = " ".join(FORMATS)
         raise SceneError(f"unknown format {path.suffix!r}; known: {known}", file=path)
-    if variables and loader is not mitsuba.load:
-        raise SceneError(f"only .xml has variables, so {min(variables)!r} means nothing", file=path)
+    if variables and loader not in (mitsuba.load, gltf.load):
+        raise SceneError(f"has no variables, so {min(variables)!r} means nothing", file=path)
     return loader(path, **variables)
 
 

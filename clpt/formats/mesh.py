@@ -1,15 +1,15 @@
-"""Triangle meshes from .obj, .ply, .stl, .off, .glb and .gltf files, read through trimesh.
+"""Triangle meshes from .obj, .ply, .stl and .off files, read through trimesh.
 
-Normals and texture coordinates are kept where the file has them. Nodes of a glTF scene become one
-mesh each, placed by `to_world`, and share their arrays. Of materials, base colours are taken.
+Normals and texture coordinates are kept where the file has them. Of materials, base colours are
+taken.
 """
 
 from __future__ import annotations
 
 import io
-import json
 import re
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,16 +26,7 @@ from clpt.scene.textures import Bitmap
 if TYPE_CHECKING:
     import trimesh  # imported where it is used: it takes a second, which scenes without files save
 
-SUFFIXES = (".obj", ".ply", ".stl", ".off", ".glb", ".gltf")
-# What trimesh decodes, and what changes neither shape nor base colour.
-KNOWN_EXTENSIONS = (
-    "KHR_mesh_quantization", "KHR_texture_transform", "KHR_lights_punctual", "EXT_texture_webp",
-    "FB_ngon_encoding",
-)  # fmt: skip
-# Reading on without these would misplace triangles, even where a file calls them optional.
-TRIANGLE_FAN = 6
-APPEARANCE = "KHR_materials_"  # the triangles are right without
-NEEDED_EXTENSIONS = ("EXT_mesh_gpu_instancing",)
+SUFFIXES = (".obj", ".ply", ".stl", ".off")
 DUMMIES = (None, (2, 2))  # sizes of the image in trimesh's default material
 CHUNK = 1 << 14  # triangles that are checked at a time: in float64 they take 400 bytes each
 USEMTL = re.compile(rb"(?m)^[ \t]*usemtl[^\n]*")
@@ -57,18 +48,9 @@ def read_mesh(path: Path, *, materials: bool = True) -> MeshFile:
     not finite and for faces that name vertices which are not there.
     """
     notes: list[str] = []
-    if path.suffix.lower() in (".glb", ".gltf"):
-        _check_gltf(path, notes)
     scene = _open(path, materials)
-    shared: dict[str, Mesh | None] = {}
-    meshes: list[Mesh] = []
-    for node in scene.graph.nodes_geometry:
-        to_world, key = scene.graph[node]
-        if key not in shared:
-            shared[key] = _mesh(path, key, scene.geometry[key], materials, notes)
-        mesh = shared[key]
-        if mesh is not None:
-            meshes.append(_placed(path, mesh, np.asarray(to_world, np.float64)))
+    read = [_mesh(path, key, part, materials, notes) for key, part in scene.geometry.items()]
+    meshes = [mesh for mesh in read if mesh is not None]
     if not meshes:
         raise SceneError("holds no triangles", file=path)
     return MeshFile(meshes, list(dict.fromkeys(notes)))
@@ -121,10 +103,12 @@ def checked(
     normals: NDArray[Any] | None,
     uvs: NDArray[Any] | None,
     notes: list[str],
+    attributes: Mapping[str, NDArray[Any]] | None = None,
 ) -> dict[str, Any]:
     """Return a mesh's arrays without zero-area triangles and unused vertices; notes tell what went.
 
-    Raises SceneError for indices out of range and vertices that are not finite.
+    attributes: further arrays (n, width), one row a vertex. Raises SceneError for indices out of
+    range and vertices that are not finite.
     """
     where = name or None
     if len(faces) and (faces.min() < 0 or faces.max() >= len(vertices)):
@@ -149,8 +133,10 @@ def checked(
     used = np.zeros(len(points), bool)
     used[faces.reshape(-1)] = True
     arrays: dict[str, Any] = {"vertices": points, "normals": normals, "uvs": uvs}
+    own = dict(attributes or {})
     if not used.all():
         arrays = {key: None if a is None else a[used] for key, a in arrays.items()}
+        own = {key: a[used] for key, a in own.items()}
         faces = (np.cumsum(used) - 1)[faces]
     normals, uvs = arrays["normals"], arrays["uvs"]
     if normals is not None:
@@ -158,30 +144,8 @@ def checked(
     if uvs is not None and not np.isfinite(uvs).all():
         notes.append(f"{name or 'mesh'}: left out texture coordinates that are not finite")
         arrays["uvs"] = None
-    return {**arrays, "faces": np.ascontiguousarray(faces, np.uint32)}
-
-
-def _check_gltf(path: Path, notes: list[str]) -> None:
-    """Refuse a glTF file whose geometry trimesh would get wrong; note extensions left out."""
-    try:
-        data = path.read_bytes()
-        if data[:4] == b"glTF":
-            data = data[20 : 20 + int.from_bytes(data[12:16], "little")]
-        document = json.loads(data)
-        used = [str(name) for name in document.get("extensionsUsed", [])]
-        required = [str(name) for name in document.get("extensionsRequired", [])]
-        primitives = [p for m in document.get("meshes", []) for p in m.get("primitives", [])]
-        fans = any(primitive.get("mode") == TRIANGLE_FAN for primitive in primitives)
-    except OSError as error:
-        raise SceneError(f"cannot be read: {error.strerror}", file=path) from None
-    except (ValueError, TypeError, AttributeError, RecursionError) as error:
-        raise SceneError(f"is not glTF: {str(error)[:80]}", file=path) from None
-    if fans:  # trimesh passes over them without a word
-        raise SceneError("holds triangle fans, which are not supported", file=path)
-    for name in [*required, *(name for name in NEEDED_EXTENSIONS if name in used)]:
-        if name not in KNOWN_EXTENSIONS and not name.startswith(APPEARANCE):
-            raise SceneError(f"needs the glTF extension {name}, which is not supported", file=path)
-    notes += [f"glTF extension {name} left out" for name in used if name not in KNOWN_EXTENSIONS]
+    whole = {**arrays, "faces": np.ascontiguousarray(faces, np.uint32)}
+    return whole if attributes is None else {**whole, "attributes": own}
 
 
 def _open(path: Path, materials: bool) -> trimesh.Scene:
@@ -219,22 +183,6 @@ def _mesh(path: Path, name: str, geometry: Any, materials: bool, notes: list[str
     return Mesh(name=name, material=material, **arrays)
 
 
-def _placed(path: Path, mesh: Mesh, to_world: NDArray[np.float64]) -> Mesh:
-    if np.array_equal(to_world, np.eye(4)):
-        return mesh
-    if transforms.is_singular(to_world):
-        raise SceneError("a node's transform flattens space", file=path, where=mesh.name)
-    return Mesh(
-        name=mesh.name,
-        material=mesh.material,
-        to_world=to_world,
-        vertices=mesh.vertices,
-        faces=mesh.faces,
-        normals=mesh.normals,
-        uvs=mesh.uvs,
-    )
-
-
 def _per_vertex(values: Any, vertices: NDArray[Any], width: int) -> NDArray[np.float32] | None:
     if values is None or np.shape(values) != (len(vertices), width):
         return None
@@ -268,9 +216,6 @@ def _material(visual: Any, notes: list[str]) -> Material:
             notes.append("vertex colours left out")
         return GREY
     colour, image = _base_colour(material)
-    extra = ("metallicRoughnessTexture", "normalTexture", "emissiveTexture", "occlusionTexture")
-    if any(getattr(material, name, None) is not None for name in extra):
-        notes.append("of materials, only base colours are taken")
     if image is None:
         return TwoSided(front=Diffuse(reflectance=tuple(colour), name=material.name or ""))
     texels = images.from_pillow(image.convert("RGB")) * np.asarray(colour, np.float32)
@@ -288,12 +233,7 @@ def _made_up(material: Any) -> bool:
 
 def _base_colour(material: Any) -> tuple[list[float], Any]:
     """Return linear r, g, b of a trimesh material, and its image or None."""
-    from trimesh.visual.material import PBRMaterial
-
-    if isinstance(material, PBRMaterial):
-        factor, image = material.baseColorFactor, material.baseColorTexture
-    else:
-        factor, image = getattr(material, "diffuse", None), getattr(material, "image", None)
-    if factor is None or (image is not None and not hasattr(material, "baseColorFactor")):
+    factor, image = getattr(material, "diffuse", None), getattr(material, "image", None)
+    if factor is None or image is not None:
         return [1.0, 1.0, 1.0], image
     return [float(value) / 255.0 for value in np.asarray(factor).reshape(-1)[:3]], image

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.errors import SceneError
 from clpt.formats import mesh
-from clpt.scene import Scene, integrators, lights, shapes
+from clpt.scene import Scene, cameras, integrators, lights, shapes
 from clpt.scene.cameras import Perspective
 from clpt.scene.materials import Diffuse
 from clpt.spectra import RGBIlluminant
@@ -30,21 +30,49 @@ def load(path: Path) -> Scene:
     """Read a bare mesh and put it into the studio, whatever its size and place."""
     file = mesh.read_mesh(path)
     up = Z_UP if path.suffix.lower() == ".stl" else np.eye(4)
-    low, high = world_bounds(file.meshes)
+    scene = show(file.meshes, file=path, up=up)
+    scene.warnings = file.warnings
+    return scene
+
+
+def show(
+    things: Sequence[shapes.Shape],
+    *,
+    file: Path,
+    camera: cameras.Camera | None = None,
+    given_lights: Sequence[lights.Light] = (),
+    up: transforms.Matrix = transforms.IDENTITY,
+) -> Scene:
+    """Return a scene of shapes, with the camera and the lights that are missing.
+
+    Without any light there is one all around and a key light: a square, above a ground, where the
+    camera is ours too; else one from afar, which nothing hides and no camera sees.
+    `extra["studio"]` counts what was added. Raises SceneError for shapes too large to be framed.
+    """
+    low, high = world_bounds(things) if things else (-np.ones(3), np.ones(3))
     middle, radius = (low + high) / 2.0, _radius(low, high)
     if not np.isfinite(radius):
-        raise SceneError("is too large to be framed", file=path)
-    floor, axis = middle.copy(), int(np.argmax(up[:3, 1]))
-    floor[axis] = low[axis]
-    furniture = [_ground(floor, radius, up), _key(middle, radius, up)]
+        raise SceneError("is too large to be framed", file=file)
+    furniture: list[shapes.Shape] = []
+    lit: list[lights.Light] = []
+    if not given_lights:
+        lit = [lights.Constant(radiance=RGBIlluminant(0.35, 0.35, 0.35))]
+        if camera is None:
+            floor, axis = middle.copy(), int(np.argmax(up[:3, 1]))
+            floor[axis] = low[axis]
+            furniture = [_ground(floor, radius, up), _key(middle, radius, up)]
+        else:
+            lit.append(_distant_key(up))
     return Scene(
-        camera=framing_camera(file.meshes, up),
-        shapes=[*file.meshes, *furniture],
-        lights=[lights.Constant(radiance=RGBIlluminant(0.35, 0.35, 0.35))],
+        camera=camera or framing_camera(things, up),
+        shapes=[*things, *furniture],
+        lights=[*given_lights, *lit],
         film=integrators.Film(filter=integrators.Gaussian()),
-        name=path.stem,
-        warnings=file.warnings,
-        extra={"format": path.suffix.lower()[1:], "studio": len(furniture)},
+        name=file.stem,
+        extra={
+            "format": file.suffix.lower()[1:],
+            "studio": {"camera": camera is None, "shapes": len(furniture), "lights": len(lit)},
+        },
     )
 
 
@@ -127,6 +155,13 @@ def _ground(floor: NDArray[np.float64], radius: float, up: transforms.Matrix) ->
     flat = up @ transforms.rotate([1.0, 0.0, 0.0], -90.0)
     to_world = transforms.translate(floor) @ flat @ transforms.scale(40.0 * radius)
     return shapes.Disk(to_world=to_world, material=Diffuse(reflectance=0.5), name="ground")
+
+
+def _distant_key(up: transforms.Matrix) -> lights.Light:
+    """About as bright as the square one, from the same side."""
+    return lights.Directional(
+        direction=tuple(-_direction(KEY_FROM, up)), irradiance=RGBIlluminant(4.0, 4.0, 4.0)
+    )
 
 
 def _key(middle: NDArray[np.float64], radius: float, up: transforms.Matrix) -> shapes.Shape:

@@ -42,9 +42,7 @@ class Lit:
             self.buffers = {name: self._buffer(values) for name, values in arrays.items()}
         found = self.tables.sources["emission"]["value"] or {"constant"}
         text = kinds.emission_text(frozenset(found)) + lights.dispatch_text(self.rows.kinds)
-        program = _program(
-            self.tables.mode, text, body, given.shape[0], results, self.files, lanes
-        )
+        program = _program(self.tables.mode, text, body, given.shape[0], results, self.files, lanes)
         target = cl.Buffer(dev.context, flags.WRITE_ONLY, out.nbytes)
         there = {"in": self._buffer(data), "out": target, "n": padded, **self.buffers}
         kernel = program.kernel("probe")

@@ -11,7 +11,7 @@ import numpy as np
 
 from clpt import spectra
 from clpt.errors import UnknownKindError, UnusedParameterError
-from clpt.formats import mesh
+from clpt.formats import gltf, mesh
 from clpt.formats.native import reradiation
 from clpt.formats.native import spectra as json_spectra
 from clpt.formats.native.cursor import Cursor, parse, placed
@@ -215,10 +215,14 @@ class _Reader:
                 raise cursor.at(key).error("stands in the 'file' already; give either")
         frame = self.make(cursor, shapes.Mesh, ("type", "file"))
         child = cursor.at("file")
-        loaded = placed(child, lambda: mesh.read_mesh(find_file(child)))
+        loaded = placed(child, lambda: _meshes(find_file(child)))
         self.warnings += [f"{child.value}: {note}" for note in loaded.warnings]
         dressed, several = "material" in cursor.value, len(loaded.meshes) > 1
         return [_in_frame(part, frame, dressed, several) for part in loaded.meshes]
+
+
+def _meshes(path: Path) -> mesh.MeshFile:
+    return (gltf if path.suffix.lower() in gltf.SUFFIXES else mesh).read_mesh(path)
 
 
 def _in_frame(part: shapes.Mesh, frame: shapes.Mesh, dressed: bool, several: bool) -> shapes.Mesh:
@@ -226,6 +230,7 @@ def _in_frame(part: shapes.Mesh, frame: shapes.Mesh, dressed: bool, several: boo
     return dataclasses.replace(
         frame,
         material=frame.material if dressed else part.material,
+        emission=frame.emission or (None if dressed else part.emission),
         to_world=np.asarray(frame.to_world) @ part.to_world,
         name=frame.name or (part.name if several else ""),
         vertices=part.vertices,

@@ -1,0 +1,95 @@
+"""glTF 2.0: `load(path)` returns the Scene that a .gltf or .glb file describes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from clpt.errors import SceneError
+from clpt.formats import studio
+from clpt.formats.gltf import animation, cameras, draco, lights, materials, meshes, meshopt, nodes
+from clpt.formats.gltf.document import Document
+from clpt.formats.mesh import MeshFile
+from clpt.scene import Scene
+
+SUFFIXES = (".glb", ".gltf")
+VARIABLES = ("time", "animation", "camera", "scene")
+SUPPORTED = (
+    draco.NAME, *meshopt.EXTENSIONS, "KHR_mesh_quantization", "KHR_texture_transform",
+    "EXT_texture_webp", lights.NAME, meshes.INSTANCING, *materials.EXTENSIONS,
+    "FB_ngon_encoding",  # says which triangles make a polygon: the picture is the same
+)  # fmt: skip
+APPEARANCE = "KHR_materials_"  # the shapes are right without
+
+__all__ = ["SUFFIXES", "load", "read_mesh"]
+
+
+def load(path: Path, **variables: Any) -> Scene:
+    """Read a glTF file; what it has no camera or no light for comes from the studio.
+
+    variables: `time` [s] of an animation (the first, or the `animation` of that number or name);
+    without it nodes are as they stand. `camera` and `scene` choose by number or name. Raises
+    SceneError with the JSON path of what is wrong.
+    """
+    document, graph = _open(path, variables)
+    chosen = cameras.chosen(graph, _text(variables.get("camera")))
+    shapes = meshes.shapes(graph)
+    if not shapes:
+        document.warn("holds no triangles")
+    scene = studio.show(
+        shapes,
+        camera=chosen[0] if chosen else None,
+        given_lights=lights.placed(graph),
+        file=path,
+    )
+    scene.warnings = document.notes
+    scene.extra["cameras"] = [camera.text("type") for _, camera in cameras.placed(graph)]
+    if chosen:
+        scene.film = chosen[1]
+    return scene
+
+
+def read_mesh(path: Path) -> MeshFile:
+    """Return the meshes of a file as its scene shows them. Raises SceneError if there are none."""
+    document, graph = _open(path, {})
+    found = meshes.shapes(graph)
+    if not found:
+        raise SceneError("holds no triangles", file=path)
+    return MeshFile(found, document.notes)
+
+
+def _open(path: Path, variables: dict[str, Any]) -> tuple[Document, nodes.Graph]:
+    document = Document(path)
+    _check_extensions(document)
+    unknown = sorted(set(variables) - set(VARIABLES))
+    if unknown:
+        known = ", ".join(VARIABLES)
+        raise SceneError(f"glTF has no variable {unknown[0]!r}; known: {known}", file=path)
+    pose: nodes.Pose = {}
+    if "time" in variables or "animation" in variables:
+        chosen = _text(variables.get("animation"))
+        pose = animation.pose(document, chosen, _seconds(path, variables.get("time", 0.0)))
+    return document, nodes.graph(document, _text(variables.get("scene")), pose)
+
+
+def _check_extensions(document: Document) -> None:
+    """Refuse extensions that are required and not known; note the others."""
+    required = document.root.texts("extensionsRequired")
+    for number, name in enumerate(required):
+        if name not in SUPPORTED and not name.startswith(APPEARANCE):
+            message = f"needs the extension {name}, which is not supported"
+            raise document.root.error(message, f"extensionsRequired[{number}]")
+    for name in [*document.root.texts("extensionsUsed"), *required]:
+        if name not in SUPPORTED:
+            document.warn(f"extension {name} is not supported and left out")
+
+
+def _text(value: Any) -> str | None:
+    return None if value is None else str(value)
+
+
+def _seconds(path: Path, value: Any) -> float:
+    try:
+        return float(value)
+    except ValueError:
+        raise SceneError(f"the time {value!r} is no number", file=path) from None

@@ -1,0 +1,85 @@
+"""Cameras: the first one that the scene shows, or the one that is asked for."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from clpt import transforms
+from clpt.formats.gltf.document import Element
+from clpt.formats.gltf.nodes import Graph, Matrix
+from clpt.scene.cameras import Camera, Orthographic, Perspective
+from clpt.scene.integrators import Film
+
+TURNED = np.diag([-1.0, 1.0, -1.0, 1.0])  # glTF looks along -z with +x to the right
+HEIGHT = Film().height
+FAR = 1e30  # where a file sets no far plane
+WIDEST = 16.0  # of a film's sides, one over the other
+
+
+def placed(graph: Graph) -> list[tuple[int, Element]]:
+    """Return (node, camera) of every camera that the scene shows, in order."""
+    found = [(i, graph.node(i).entry("camera", "cameras")) for i in graph.shown]
+    return [(node, camera) for node, camera in found if camera is not None]
+
+
+def chosen(graph: Graph, name: str | None) -> tuple[Camera, Film] | None:
+    """Return a camera and a film of its shape, or None where the scene shows no camera.
+
+    name: its number among those shown, its own name or its node's; the first one if None. Raises
+    SceneError if there is no such one.
+    """
+    every = placed(graph)
+    if name is None:
+        if not every:
+            return None
+        return camera(every[0][1], graph.to_world[every[0][0]])
+    for number, (node, element) in enumerate(every):
+        if name in (str(number), element.text("name", None), graph.node(node).text("name", None)):
+            return camera(element, graph.to_world[node])
+    names = ", ".join(c.text("name", str(i)) for i, (_, c) in enumerate(every)) or "none"
+    raise graph.document.root.error(f"shows no camera {name!r}; it shows: {names}")
+
+
+def camera(element: Element, node: Matrix) -> tuple[Camera, Film]:
+    """Return one camera and a film of its shape; a node's scale does not count for it."""
+    kind = element.text("type", choices=("perspective", "orthographic"))
+    lens = element.needed(kind)
+    to_world = rigid(lens, node) @ TURNED
+    if kind == "orthographic":
+        x, y = (abs(lens.number(key)) for key in ("xmag", "ymag"))
+        if not (x > 0.0 and y > 0.0):
+            raise lens.error("xmag and ymag must not be 0")
+        planes = _planes(lens, needed=True)
+        to_world = to_world @ transforms.scale([x, x, 1.0])
+        return Orthographic(to_world=to_world, **planes), film(x / y)
+    fov = math.degrees(lens.number("yfov", low=1e-5, high=math.pi - 1e-5))
+    aspect = lens.number("aspectRatio", Film().width / HEIGHT, low=1e-6)
+    planes = _planes(lens, needed=False)
+    return Perspective(to_world=to_world, fov=fov, fov_axis="y", **planes), film(aspect)
+
+
+def film(aspect: float) -> Film:
+    """Return a film of the usual height, as wide as the ratio says."""
+    aspect = min(max(aspect, 1.0 / WIDEST), WIDEST)
+    return Film(width=max(round(HEIGHT * aspect), 1), height=HEIGHT)
+
+
+def rigid(element: Element, node: Matrix) -> Matrix:
+    """Return a node's placement without its scale: the nearest rotation, and the translation."""
+    if transforms.is_singular(node):
+        raise element.error("its node's transform flattens space")
+    u, _, v = np.linalg.svd(node[:3, :3])
+    made = np.eye(4)
+    made[:3, :3] = u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v
+    made[:3, 3] = node[:3, 3]
+    return made
+
+
+def _planes(lens: Element, needed: bool) -> dict[str, float]:
+    near = lens.number("znear", low=0.0)
+    far = lens.number("zfar") if needed else lens.number("zfar", FAR)
+    if far <= near:
+        raise lens.error("must be farther than znear", "zfar")
+    return {"near": near, "far": far}

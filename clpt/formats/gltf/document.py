@@ -1,0 +1,339 @@
+"""A glTF 2.0 file: its JSON with the place of every value, and its buffers.
+
+Accessors are read by numpy straight from the buffers: of the readers in use, trimesh passes over
+skins, morph targets, lights, fans and instances, and pygltflib checks nothing of what it hands on.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import math
+import re
+from collections.abc import Callable, Iterable
+from pathlib import Path, PurePosixPath
+from typing import Any, NoReturn, TypeVar
+from urllib.parse import unquote, unquote_to_bytes
+
+from clpt.errors import SceneError
+
+T = TypeVar("T")
+REQUIRED: Any = object()
+LARGEST = 2**53  # whole numbers that JSON's readers agree upon
+JSON_CHUNK, BIN_CHUNK = 0x4E4F534A, 0x004E4942
+SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
+DATA_URI = re.compile(r"data:([^,;]*)((?:;[^,;]*)*),", re.ASCII)
+
+
+class Element:
+    """An object in the JSON, and where it stands; what is asked of it is checked."""
+
+    __slots__ = ("document", "path", "value")
+
+    def __init__(self, document: Document, path: str, value: Any):
+        self.document, self.path, self.value = document, path, value
+        if not isinstance(value, dict):
+            raise self.error(f"must be an object, not {_shown(value)}")
+
+    def __contains__(self, key: str) -> bool:
+        return key in self.value
+
+    def place(self, key: str | None = None) -> str:
+        """Return the JSON path of this element, or of what stands under `key` in it."""
+        return ".".join(part for part in (self.path, key) if part)
+
+    def error(self, message: str, key: str | None = None) -> SceneError:
+        """Return an error that names the file and the place."""
+        return SceneError(message, file=self.document.file, where=self.place(key) or None)
+
+    def warn(self, message: str, key: str | None = None) -> None:
+        """Note what had to be passed over, once for each text."""
+        self.document.warn(f"{self.place(key)}: {message}")
+
+    def integer(self, key: str, default: Any = REQUIRED, low: int = 0, high: int = LARGEST) -> int:
+        """Return a whole number in [low, high]."""
+        value = self._get(key, default)
+        if value is default:
+            return default  # type: ignore[no-any-return]
+        if isinstance(value, float) and value.is_integer():
+            value = int(value)  # JSON's 3.0
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise self.error(f"must be a whole number, not {_shown(value)}", key)
+        if not low <= value <= high:
+            raise self.error(f"{_shown(value)} is outside {low} to {high}", key)
+        return value
+
+    def number(
+        self, key: str, default: Any = REQUIRED, low: float = -math.inf, high: float = math.inf
+    ) -> float:
+        """Return a finite number in [low, high]."""
+        value = self._get(key, default)
+        return default if value is default else self._number(value, key, low, high)  # type: ignore[no-any-return]
+
+    def numbers(
+        self,
+        key: str,
+        count: int | None = None,
+        default: Any = REQUIRED,
+        low: float = -math.inf,
+        high: float = math.inf,
+    ) -> tuple[float, ...]:
+        """Return finite numbers, `count` of them where that is given."""
+        value = self._get(key, default)
+        if value is default:
+            return default  # type: ignore[no-any-return]
+        if not isinstance(value, list) or (count is not None and len(value) != count):
+            raise self.error(f"must be {count or 'a list of'} numbers, not {_shown(value)}", key)
+        return tuple(self._number(v, f"{key}[{i}]", low, high) for i, v in enumerate(value))
+
+    def text(self, key: str, default: Any = REQUIRED, choices: Iterable[str] = ()) -> str:
+        """Return a text, one of `choices` where some are given."""
+        value = self._get(key, default)
+        if value is default:
+            return default  # type: ignore[no-any-return]
+        if not isinstance(value, str):
+            raise self.error(f"must be a text, not {_shown(value)}", key)
+        if choices and value not in choices:
+            raise self.error(f"{_shown(value)} is none of {', '.join(choices)}", key)
+        return value
+
+    def flag(self, key: str, default: bool = False) -> bool:
+        """Return a yes or no."""
+        value = self._get(key, default)
+        if not isinstance(value, bool):
+            raise self.error(f"must be true or false, not {_shown(value)}", key)
+        return value
+
+    def texts(self, key: str) -> list[str]:
+        """Return a list of texts; empty where there is none."""
+        self.count(key)
+        for i, value in enumerate(self.value.get(key, [])):
+            if not isinstance(value, str):
+                raise self.error(f"must be a text, not {_shown(value)}", f"{key}[{i}]")
+        return list(self.value.get(key, []))
+
+    def child(self, key: str) -> Element | None:
+        """Return the object under a key, or None."""
+        return Element(self.document, self.place(key), self.value[key]) if key in self else None
+
+    def needed(self, key: str) -> Element:
+        """Return the object under a key that must be there."""
+        self._get(key, REQUIRED)
+        return Element(self.document, self.place(key), self.value[key])
+
+    def count(self, key: str) -> int:
+        """Return the length of the list under a key; 0 where there is none."""
+        value = self.value.get(key, [])
+        if not isinstance(value, list):
+            raise self.error(f"must be a list, not {_shown(value)}", key)
+        return len(value)
+
+    def children(self, key: str) -> list[Element]:
+        """Return the objects of the list under a key."""
+        self.count(key)
+        path = self.place(key)
+        values = self.value.get(key, [])
+        return [Element(self.document, f"{path}[{i}]", value) for i, value in enumerate(values)]
+
+    def index(self, key: str, table: str, default: Any = REQUIRED) -> int:
+        """Return a position in one of the document's lists, such as "accessors"."""
+        value = self.integer(key, default)
+        return value if value is default else self._in_table(value, key, table)
+
+    def indices(self, key: str, table: str) -> list[int]:
+        """Return a list of positions in one of the document's lists."""
+        self.count(key)
+        found = []
+        for i, value in enumerate(self.value.get(key, [])):
+            if isinstance(value, bool) or not isinstance(value, int):
+                raise self.error(f"must be a whole number, not {_shown(value)}", f"{key}[{i}]")
+            found.append(self._in_table(value, f"{key}[{i}]", table))
+        return found
+
+    def entry(self, key: str, table: str) -> Element | None:
+        """Return what a position under `key` refers to, or None where there is no such key."""
+        at = self.index(key, table, None)
+        return None if at is None else self.document.entry(table, at)
+
+    def extension(self, name: str) -> Element | None:
+        """Return an extension's object, or None."""
+        extensions = self.child("extensions")
+        return None if extensions is None else extensions.child(name)
+
+    def _get(self, key: str, default: Any) -> Any:
+        value = self.value.get(key, default)
+        if value is REQUIRED:
+            raise self.error(f"{key!r} is missing")
+        return value
+
+    def _number(self, value: Any, key: str, low: float, high: float) -> float:
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise self.error(f"must be a number, not {_shown(value)}", key)
+        if abs(value) > 1e38:  # beyond what single precision holds; JSON's 1e999 is infinity
+            raise self.error(f"{_shown(value)} is too large", key)
+        if not low <= value <= high:
+            raise self.error(f"{value:g} is outside [{low:g}, {high:g}]", key)
+        return float(value)
+
+    def _in_table(self, value: int, key: str, table: str) -> int:
+        count = self.document.root.count(table)
+        if not 0 <= value < count:
+            message = f"there is no {table}[{_shown(value)}]; the file has {count}"
+            raise self.error(message, key)
+        return value
+
+
+class Document:
+    """A parsed file: `root` is its JSON, `notes` what was passed over."""
+
+    def __init__(self, file: Path):
+        self.file = file
+        self.notes: list[str] = []
+        self.uv_sets: list[int] = []  # those that textures made since it was cleared look up
+        self._made: dict[Any, Any] = {}
+        data = _read(file)
+        text, self.chunk = _split(file, data) if data[:4] == b"glTF" else (data, None)
+        self.root = Element(self, "", _parsed(file, text))
+        self._check_version()
+
+    def warn(self, text: str) -> None:
+        """Note what had to be passed over, once for each text."""
+        if text not in self.notes:
+            self.notes.append(text)
+
+    def entry(self, table: str, index: int) -> Element:
+        """Return an object of one of the lists at the top, such as meshes[2]."""
+        return Element(self, f"{table}[{index}]", self.root.value[table][index])
+
+    def once(self, key: Any, make: Callable[[], T]) -> T:
+        """Return what `make` gave when this key was asked for first."""
+        if key not in self._made:
+            self._made[key] = make()
+        return self._made[key]  # type: ignore[no-any-return]
+
+    def buffer(self, index: int) -> bytes:
+        """Return the bytes of buffers[index], of its declared length."""
+        return self.once(("buffer", index), lambda: self._buffer(index))
+
+    def resource(self, element: Element, key: str = "uri") -> bytes:
+        """Return the bytes that a URI under `key` names: data in itself or a file beside."""
+        uri = element.text(key)
+        if uri[:5].lower() == "data:":
+            return _data(element, key, uri)
+        path = self.beside(element, key)
+        try:
+            return path.read_bytes()
+        except OSError as error:
+            message = f"{path.name!r} cannot be read: {error.strerror}"
+            raise element.error(message, key) from None
+
+    def beside(self, element: Element, key: str = "uri") -> Path:
+        """Return the file that a relative URI names. Raises SceneError for every other place."""
+        uri = element.text(key)
+        name = unquote(uri)
+        parts = PurePosixPath(name).parts
+        outside = SCHEME.match(name) or name.startswith(("/", "\\")) or ".." in parts
+        if outside or not parts:
+            message = f"{_shown(uri)} does not lie beside the file, so it is not read"
+            raise element.error(message, key)
+        path = self.file.parent.joinpath(*parts)
+        try:
+            found = path.is_file()
+        except (OSError, ValueError):  # too long, or with a zero in it
+            found = False
+        if not found:
+            raise element.error(f"there is no file {_shown(name)}", key)
+        return path
+
+    def _buffer(self, index: int) -> bytes:
+        element = self.entry("buffers", index)
+        length = element.integer("byteLength", low=1)
+        if "uri" in element:
+            data = self.resource(element)
+        elif index == 0 and self.chunk is not None:
+            data = self.chunk
+        else:
+            raise element.error("has neither a uri nor a binary chunk in the file")
+        if len(data) < length:
+            raise element.error(f"says {length} bytes, there are {len(data)}", "byteLength")
+        return data[:length] if len(data) > length else data
+
+    def _check_version(self) -> None:
+        asset = self.root.child("asset")
+        if asset is None:
+            raise self.root.error("is not glTF 2.0: it has no 'asset'")
+        for key in ("version", "minVersion"):
+            version = asset.text(key, "2.0" if key == "minVersion" else REQUIRED)
+            found = re.fullmatch(r"(\d+)\.(\d+)", version)
+            if found is None:
+                raise asset.error(f"{_shown(version)} is no version", key)
+            if int(found[1]) != 2 or (key == "minVersion" and int(found[2]) > 0):
+                raise asset.error(f"glTF {version} is not supported, only 2.0", key)
+
+
+def _read(file: Path) -> bytes:
+    try:
+        return file.read_bytes()
+    except OSError as error:
+        raise SceneError(f"cannot be read: {error.strerror}", file=file) from None
+
+
+def _parsed(file: Path, text: bytes) -> Any:
+    def refuse(constant: str) -> NoReturn:
+        raise ValueError(f"{constant} is no number")
+
+    try:
+        value = json.loads(text, parse_constant=refuse)
+    except (ValueError, RecursionError) as error:
+        reason = str(error).splitlines()[0][:80]
+        raise SceneError(f"is not glTF: {reason}", file=file) from None
+    if not isinstance(value, dict):
+        raise SceneError("is not glTF: its JSON is no object", file=file)
+    return value
+
+
+def _split(file: Path, data: bytes) -> tuple[bytes, bytes | None]:
+    """Return the JSON of a binary file, and its binary chunk or None."""
+
+    def word(at: int) -> int:
+        return int.from_bytes(data[at : at + 4], "little")
+
+    version, length = word(4), word(8)
+    if len(data) >= 8 and version != 2:
+        raise SceneError(f"is a binary glTF of version {version}, only 2 is supported", file=file)
+    if len(data) < 20 or length > len(data):
+        message = f"is cut short: {len(data)} bytes of {max(length, 20)}"
+        raise SceneError(message, file=file)
+    chunks: list[tuple[int, bytes]] = []
+    at = 12
+    while at + 8 <= length:
+        size, kind = word(at), word(at + 4)
+        if at + 8 + size > length:
+            message = f"chunk {len(chunks)} says {size} bytes, {length - at - 8} are left"
+            raise SceneError(message, file=file)
+        chunks.append((kind, data[at + 8 : at + 8 + size]))
+        at += 8 + size
+    if not chunks or chunks[0][0] != JSON_CHUNK:
+        raise SceneError("is no binary glTF: its first chunk is not JSON", file=file)
+    binary = chunks[1][1] if len(chunks) > 1 and chunks[1][0] == BIN_CHUNK else None
+    return chunks[0][1], binary
+
+
+def _data(element: Element, key: str, uri: str) -> bytes:
+    head = DATA_URI.match(uri)
+    if head is None:
+        raise element.error("is a data URI without a comma", key)
+    body = uri[head.end() :]
+    if not head[2].lower().endswith(";base64"):
+        return unquote_to_bytes(body)
+    try:
+        return base64.b64decode(unquote(body), validate=True)
+    except (binascii.Error, ValueError):
+        raise element.error("is a data URI with broken base64", key) from None
+
+
+def _shown(value: Any) -> str:
+    """A value in a message: short, on one line."""
+    text = json.dumps(value) if not isinstance(value, int) or abs(value) < 10**40 else "that"
+    return text if len(text) <= 60 else text[:56] + " ..."

@@ -1,0 +1,62 @@
+"""KHR_draco_mesh_compression, decoded by DracoPy."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from clpt.formats.gltf import accessors, primitives
+from clpt.formats.gltf.document import Element
+
+NAME = "KHR_draco_mesh_compression"
+HEADER = b"DRACO"
+
+
+def attributes(primitive: Element, compressed: Element) -> primitives.Geometry:
+    """Return the triangles and attributes of a compressed primitive.
+
+    Raises SceneError for data that Draco does not decode and for counts that differ from the
+    accessors'.
+    """
+    mesh = _decoded(compressed)
+    faces = np.asarray(mesh.faces, np.int64).reshape(-1, 3)
+    ids, declared = compressed.needed("attributes"), primitive.needed("attributes")
+    arrays = {}
+    for name in filter(primitives.wanted, declared.value):
+        accessor = declared.entry(name, "accessors")
+        if accessor is None:
+            continue
+        types = primitives.TYPES[name.partition("_")[0]]
+        if name not in ids:
+            arrays[name] = accessors.floats(accessor, types)
+            continue
+        found = mesh.get_attribute_by_unique_id(ids.integer(name, high=2**32 - 1))
+        if found is None:
+            raise ids.error("the compressed data has no such attribute", name)
+        values = np.asarray(found["data"])
+        columns = accessors.width(accessor, types)
+        if values.ndim != 2 or values.shape[1] != columns:
+            raise ids.error(f"holds {values.shape[1:]} numbers a vertex, not {columns}", name)
+        arrays[name] = primitives.attribute(name, values, accessor)
+        if not np.isfinite(arrays[name]).all():
+            raise ids.error("holds a number that is not finite", name)
+    if "POSITION" not in arrays:
+        raise ids.error("'POSITION' is missing")
+    return primitives.Geometry(faces, arrays)
+
+
+def _decoded(compressed: Element) -> Any:
+    import DracoPy  # imported where it is used: few files need it
+
+    data = bytes(accessors.view(compressed)[0])
+    if data[:5] != HEADER:
+        raise compressed.error("its data are not Draco's")
+    try:
+        mesh = DracoPy.decode(data)
+    except Exception as error:  # DracoPy raises its own kinds, of no common base
+        reason = str(error).splitlines()[0][:80] if str(error) else type(error).__name__
+        raise compressed.error(f"Draco cannot decode it: {reason}") from None
+    if getattr(mesh, "faces", None) is None:
+        raise compressed.error("Draco finds a point cloud in it, no triangles")
+    return mesh

@@ -1,0 +1,55 @@
+"""KHR_lights_punctual: directional, point and spot lights.
+
+A picture's values are photometric, as glTF's are: a light of 1 cd at a distance of 1 m gives 1 lux,
+and a white surface under 1 lux shows 1 / pi. Emission of 1 shows 1.
+"""
+
+from __future__ import annotations
+
+import math
+
+from clpt.formats.gltf.cameras import TURNED, rigid
+from clpt.formats.gltf.document import Element
+from clpt.formats.gltf.nodes import Graph
+from clpt.scene.lights import Directional, Light, Point, Spot
+from clpt.spectra import RGBIlluminant
+
+NAME = "KHR_lights_punctual"
+
+
+def placed(graph: Graph) -> list[Light]:
+    """Return the lights that the scene shows."""
+    extension = graph.document.root.extension(NAME)
+    lights = [] if extension is None else extension.children("lights")
+    found = []
+    for index in graph.shown:
+        own = graph.node(index).extension(NAME)
+        if own is None:
+            continue
+        number = own.integer("light")
+        if number >= len(lights):
+            raise own.error(f"there is no light {number}; the file has {len(lights)}", "light")
+        found.append(_light(lights[number], graph, index))
+    return found
+
+
+def _light(element: Element, graph: Graph, node: int) -> Light:
+    colour = element.numbers("color", 3, (1.0, 1.0, 1.0), low=0.0)
+    strength = element.number("intensity", 1.0, low=0.0)
+    emitted = RGBIlluminant(*(strength * value for value in colour))
+    kind = element.text("type", choices=("directional", "point", "spot"))
+    to_world = graph.to_world[node]
+    if kind == "point":
+        return Point(position=tuple(to_world[:3, 3]), intensity=emitted)
+    to_world = rigid(element, to_world) @ TURNED
+    if kind == "directional":
+        return Directional(direction=tuple(to_world[:3, 2]), irradiance=emitted)
+    cone = element.needed("spot")
+    outer = cone.number("outerConeAngle", math.pi / 4.0, low=1e-6, high=math.pi / 2.0)
+    inner = cone.number("innerConeAngle", 0.0, low=0.0, high=outer)
+    return Spot(
+        to_world=to_world,
+        intensity=emitted,
+        cutoff=math.degrees(outer),
+        beam_width=min(math.degrees(inner), 0.9999 * math.degrees(outer)),
+    )

@@ -1,0 +1,188 @@
+"""Meshes of nodes: morphed, skinned, dressed, and placed once for each node or instance."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import transforms
+from clpt.formats.gltf import materials, skins
+from clpt.formats.gltf.accessors import floats
+from clpt.formats.gltf.document import Element
+from clpt.formats.gltf.nodes import Graph, Matrix, compose
+from clpt.formats.gltf.primitives import Geometry, geometry
+from clpt.formats.mesh import checked
+from clpt.scene.lights import Area
+from clpt.scene.materials import Material
+from clpt.scene.shapes import Mesh
+
+INSTANCING = "EXT_mesh_gpu_instancing"
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A material, what it emits, and the sets of texture coordinates that it looks up."""
+
+    material: Material
+    emission: Area | None
+    uv_sets: tuple[int, ...]
+
+
+def shapes(graph: Graph) -> list[Mesh]:
+    """Return the shapes that the scene shows; nodes of one mesh share its arrays."""
+    found: list[Mesh] = []
+    for index in graph.shown:
+        node = graph.node(index)
+        mesh = node.entry("mesh", "meshes")
+        if mesh is None:
+            continue
+        weights = _weights(graph, index, node, mesh)
+        skin = node.entry("skin", "skins")
+        if skin is not None:
+            found += _parts(mesh, weights, skins.matrices(skin, graph.to_world))
+            continue
+        make = partial(_parts, mesh, weights, None)
+        parts = node.document.once(("parts", mesh.path, weights), make)
+        for to_world in _placements(node, graph.to_world[index]):
+            placed = [_placed(part, to_world, node) for part in parts]
+            found += [part for part in placed if part is not None]
+    return found
+
+
+def _weights(graph: Graph, index: int, node: Element, mesh: Element) -> tuple[float, ...]:
+    """The weights of a node's morph targets: animated, its own, or the mesh's."""
+    animated = graph.pose.get((index, "weights"))
+    if animated is not None:
+        return tuple(map(float, animated))
+    own = node.numbers("weights", None, None)
+    return own if own is not None else mesh.numbers("weights", None, ())
+
+
+def _placements(node: Element, to_world: Matrix) -> list[Matrix]:
+    """A node's placement, or those of its instances."""
+    extension = node.extension(INSTANCING)
+    if extension is None:
+        return [to_world]
+    attributes = extension.needed("attributes")
+    rows = {
+        "TRANSLATION": ("VEC3", [0.0, 0.0, 0.0]),
+        "ROTATION": ("VEC4", [0.0, 0.0, 0.0, 1.0]),
+        "SCALE": ("VEC3", [1.0, 1.0, 1.0]),
+    }
+    given = {name: attributes.entry(name, "accessors") for name in rows}
+    values = {n: floats(a, (rows[n][0],)) for n, a in given.items() if a is not None}
+    counts = {len(value) for value in values.values()}
+    if len(counts) != 1:
+        raise attributes.error("needs accessors of one length: TRANSLATION, ROTATION or SCALE")
+    count = counts.pop()
+    t, r, s = (np.asarray(values.get(n, [rows[n][1]] * count), np.float64) for n in rows)
+    length = np.linalg.norm(r, axis=1, keepdims=True)
+    if not length.all():
+        raise attributes.error("a quaternion of no length turns nowhere", "ROTATION")
+    return list(to_world @ compose(t, r / length, s))
+
+
+def _parts(
+    mesh: Element, weights: tuple[float, ...], joints: NDArray[np.float64] | None
+) -> list[Mesh]:
+    """A mesh's primitives, not yet placed; in world space where it is skinned."""
+    parts = []
+    for primitive in mesh.children("primitives"):
+        made = geometry(primitive)
+        if made is None:
+            continue
+        _morph(primitive, made, weights)
+        if joints is not None:
+            skins.apply(primitive, made, joints)
+        part = _mesh(mesh, primitive, made)
+        parts += [] if part is None else [part]
+    return parts
+
+
+def _morph(primitive: Element, made: Geometry, weights: tuple[float, ...]) -> None:
+    """Add the targets' displacements, each times its weight."""
+    for weight, target in zip(weights, made.targets, strict=False):
+        for name, change in target.items():
+            if weight != 0.0 and name in made.attributes:
+                base = made.attributes[name]
+                width = min(base.shape[1], change.shape[1])
+                moved = base.astype(np.float32)
+                moved[:, :width] += np.float32(weight) * change[:, :width]
+                made.attributes[name] = moved
+    if len(weights) > len(made.targets):
+        primitive.warn(f"{len(weights)} weights for {len(made.targets)} targets", "targets")
+
+
+def _mesh(owner: Element, primitive: Element, made: Geometry) -> Mesh | None:
+    arrays = made.attributes
+    colours = arrays.get("COLOR_0")
+    surface = _surface(primitive, colours is not None)
+    name = owner.text("name", "")
+    values = checked(
+        primitive.document.file,
+        name or primitive.path,
+        arrays["POSITION"],
+        made.faces,
+        arrays.get("NORMAL"),
+        _uvs(primitive, made, surface),
+        primitive.document.notes,
+    )
+    if not len(values["faces"]):
+        return None
+    return Mesh(name=name, material=surface.material, emission=surface.emission, **values)
+
+
+def _surface(primitive: Element, colours: bool) -> Surface:
+    """The primitive's material, made once for all that have it."""
+    document = primitive.document
+    element = primitive.entry("material", "materials")
+
+    def make() -> Surface:
+        document.uv_sets.clear()
+        material, emission = materials.material(element, colours=colours)
+        return Surface(material, emission, tuple(document.uv_sets))
+
+    return document.once(("surface", element.path if element else "", colours), make)
+
+
+def _uvs(primitive: Element, made: Geometry, surface: Surface) -> NDArray[np.float32] | None:
+    """The texture coordinates that the material looks up, v upward as clpt has it."""
+    wanted = surface.uv_sets[0] if surface.uv_sets else 0
+    if len(surface.uv_sets) > 1:
+        primitive.warn(f"textures use several TEXCOORD sets; all get TEXCOORD_{wanted}", "material")
+    found = made.attributes.get(f"TEXCOORD_{wanted}")
+    if found is None:
+        if surface.uv_sets:
+            message = f"its textures need TEXCOORD_{wanted}, which is missing"
+            primitive.warn(message, "material")
+        return None
+    return found * np.array([1, -1], np.float32) + np.array([0, 1], np.float32)
+
+
+def _colour_attributes(colours: NDArray[Any] | None) -> dict[str, NDArray[np.float32]]:
+    if colours is None:
+        return {}
+    made = {"vertex_color": np.clip(colours[:, :3], 0.0, 1.0)}
+    if colours.shape[1] == 4:
+        made["vertex_alpha"] = np.clip(colours[:, 3:], 0.0, 1.0)
+    return made
+
+
+def _placed(part: Mesh, to_world: Matrix, node: Element) -> Mesh | None:
+    if np.array_equal(to_world, np.eye(4)):
+        return part
+    if not transforms.is_singular(to_world):
+        return dataclasses.replace(part, to_world=to_world)
+    # A node may be flat, or scaled to nothing so that it does not show.
+    moved = transforms.transform_points(to_world, part.vertices).astype(np.float32)
+    corners = moved[part.faces].astype(np.float64)
+    solid = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).any(axis=1)
+    if not solid.any():
+        node.warn("not shown, since its transform leaves no area")
+        return None
+    return dataclasses.replace(part, vertices=moved, faces=part.faces[solid], normals=None)

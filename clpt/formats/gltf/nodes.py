@@ -1,0 +1,125 @@
+"""The scene graph: which nodes are shown, and where."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.formats.gltf.document import Document, Element
+
+Matrix = NDArray[np.float64]
+Pose = dict[tuple[int, str], NDArray[np.float64]]
+
+
+@dataclass
+class Graph:
+    """All nodes' placements (4, 4) in the world, and the nodes that the scene shows, in order."""
+
+    document: Document
+    to_world: list[Matrix]
+    shown: list[int]
+    pose: Pose = field(default_factory=dict)
+
+    def node(self, index: int) -> Element:
+        """Return a node."""
+        return self.document.entry("nodes", index)
+
+
+def graph(document: Document, chosen: str | None, pose: Pose) -> Graph:
+    """Place the nodes of the chosen scene, or of the default one; `pose` overrides transforms.
+
+    Without any scene all nodes are shown. Raises SceneError for a node that has two parents or is
+    its own ancestor, and for a transform that is none.
+    """
+    nodes = document.root.children("nodes")
+    children = [node.indices("children", "nodes") for node in nodes]
+    parents = _parents(document, children)
+    roots = [i for i, parent in enumerate(parents) if parent < 0]
+    order = _descendants(roots, children)
+    if len(order) < len(nodes):
+        looping = sorted(set(range(len(nodes))) - set(order))[0]
+        raise nodes[looping].error("is its own ancestor", "children")
+    placed: list[Matrix] = [np.eye(4)] * len(nodes)
+    with np.errstate(over="ignore", invalid="ignore"):
+        for i in order:
+            local = _local(nodes[i], i, pose)
+            placed[i] = local if parents[i] < 0 else placed[parents[i]] @ local
+            if not np.isfinite(placed[i]).all():
+                raise nodes[i].error("its transform is too large")
+    scene = _scene(document, chosen)
+    starts = roots if scene is None else scene.indices("nodes", "nodes")
+    if scene is not None and len(set(starts)) < len(starts):
+        raise scene.error("names a node twice", "nodes")
+    return Graph(document, placed, _descendants(starts, children), pose)
+
+
+def compose(translation: Matrix, rotation: Matrix, scale: Matrix) -> Matrix:
+    """Return matrices (..., 4, 4) T R S of (..., 3), unit quaternions xyzw (..., 4), (..., 3)."""
+    x, y, z, w = np.moveaxis(rotation, -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    made = np.zeros((*x.shape, 4, 4))
+    made[..., :3, :3] = np.stack([np.stack(row, -1) for row in rows], -2) * scale[..., None, :]
+    made[..., :3, 3] = translation
+    made[..., 3, 3] = 1.0
+    return made
+
+
+def _scene(document: Document, chosen: str | None) -> Element | None:
+    scenes = document.root.children("scenes")
+    if chosen is not None:
+        for number, scene in enumerate(scenes):
+            if chosen in (str(number), scene.text("name", None)):
+                return scene
+        names = ", ".join(s.text("name", str(i)) for i, s in enumerate(scenes)) or "none"
+        raise document.root.error(f"has no scene {chosen!r}; it has: {names}")
+    if len(scenes) > 1:
+        document.warn(f"one of its {len(scenes)} scenes is shown; -D scene=N chooses another")
+    return document.root.entry("scene", "scenes") or (scenes[0] if scenes else None)
+
+
+def _parents(document: Document, children: list[list[int]]) -> list[int]:
+    parents = [-1] * len(children)
+    for parent, own in enumerate(children):
+        for child in own:
+            if parents[child] >= 0:
+                message = f"nodes[{child}] is already a child of nodes[{parents[child]}]"
+                raise document.entry("nodes", parent).error(message, "children")
+            parents[child] = parent
+    return parents
+
+
+def _descendants(roots: list[int], children: list[list[int]]) -> list[int]:
+    """Roots and all below them, parents before children; no recursion, graphs can be deep."""
+    order, open_ = [], list(reversed(roots))
+    seen = set()
+    while open_:
+        node = open_.pop()
+        if node not in seen:
+            seen.add(node)
+            order.append(node)
+            open_ += reversed(children[node])
+    return order
+
+
+def _local(node: Element, index: int, pose: Pose) -> Matrix:
+    if "matrix" in node:
+        matrix = np.array(node.numbers("matrix", 16)).reshape(4, 4).T
+        if not np.allclose(matrix[3], [0.0, 0.0, 0.0, 1.0]):
+            raise node.error("its last row must be 0 0 0 1", "matrix")
+        return matrix
+    values = {
+        "translation": node.numbers("translation", 3, (0.0, 0.0, 0.0)),
+        "rotation": node.numbers("rotation", 4, (0.0, 0.0, 0.0, 1.0)),
+        "scale": node.numbers("scale", 3, (1.0, 1.0, 1.0)),
+    }
+    given = {path: np.asarray(pose.get((index, path), values[path])) for path in values}
+    length = np.linalg.norm(given["rotation"])
+    if length < 1e-6:
+        raise node.error("a quaternion of no length turns nowhere", "rotation")
+    return compose(given["translation"], given["rotation"] / length, given["scale"])

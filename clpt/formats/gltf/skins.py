@@ -1,0 +1,76 @@
+"""Skins: vertices that follow joints (glTF 3.7.3.3)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.formats.gltf.accessors import floats
+from clpt.formats.gltf.document import Element
+from clpt.formats.gltf.primitives import Geometry
+
+CHUNK = 1 << 16  # vertices at a time: each takes a matrix
+
+
+def matrices(skin: Element, to_world: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Return what takes vertices to the world for each joint, (joints, 4, 4)."""
+    joints = skin.indices("joints", "nodes")
+    if not joints:
+        raise skin.error("has no joints")
+    placed = np.stack([to_world[joint] for joint in joints])
+    accessor = skin.entry("inverseBindMatrices", "accessors")
+    if accessor is None:
+        return placed
+    inverse = floats(accessor, ("MAT4",)).astype(np.float64)
+    if len(inverse) < len(joints):
+        message = f"has {len(inverse)} matrices for {len(joints)} joints"
+        raise skin.error(message, "inverseBindMatrices")
+    return placed @ inverse[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
+
+
+def apply(primitive: Element, made: Geometry, joints: NDArray[np.float64]) -> None:
+    """Move a primitive's vertices and normals to where its joints take them, in the world."""
+    pairs = _influences(primitive, made, len(joints))
+    if not pairs:
+        primitive.warn("has a skin, but no JOINTS_0 and WEIGHTS_0; it stays as it is")
+        pairs = [(np.zeros((len(made.attributes["POSITION"]), 1), int), np.ones((1, 1)))]
+    normals = made.attributes.get("NORMAL")
+    positions = made.attributes["POSITION"].astype(np.float64)
+    turned = None if normals is None else normals.astype(np.float64)
+    total = sum(weights.sum(axis=1, keepdims=True) for _, weights in pairs)
+    for first in range(0, len(positions), CHUNK):
+        part = slice(first, first + CHUNK)
+        blend = np.zeros((len(positions[part]), 4, 4))
+        for which, weights in pairs:
+            share = np.broadcast_to(weights / np.where(total > 0.0, total, 1.0), which.shape)[part]
+            blend += np.einsum("nk,nkij->nij", share, joints[which[part]])
+        moved = np.einsum("nij,nj->ni", blend[:, :3, :3], positions[part])
+        positions[part] = moved + blend[:, :3, 3]
+        if turned is not None:
+            turned[part] = np.einsum("nij,nj->ni", _cofactors(blend[:, :3, :3]), turned[part])
+    made.attributes["POSITION"] = positions.astype(np.float32)
+    if turned is not None:
+        made.attributes["NORMAL"] = turned.astype(np.float32)
+
+
+def _influences(
+    primitive: Element, made: Geometry, count: int
+) -> list[tuple[NDArray[np.int64], NDArray[np.float64]]]:
+    """Joints (n, 4) and their weights (n, 4), as many pairs as the primitive has sets."""
+    pairs: list[tuple[NDArray[np.int64], NDArray[np.float64]]] = []
+    while f"JOINTS_{len(pairs)}" in made.attributes and f"WEIGHTS_{len(pairs)}" in made.attributes:
+        name = f"JOINTS_{len(pairs)}"
+        which = made.attributes[name].astype(np.int64)
+        weights = made.attributes[f"WEIGHTS_{len(pairs)}"].astype(np.float64)
+        which = np.where(weights == 0.0, 0, which)
+        if which.max() >= count:
+            message = f"joint {which.max()} is outside of the skin's {count}"
+            raise primitive.error(message, f"attributes.{name}")
+        pairs.append((which, weights))
+    return pairs
+
+
+def _cofactors(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The inverse transposes (n, 3, 3) times their determinants: what turns normals."""
+    a, b, c = np.moveaxis(matrix, 2, 0)
+    return np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=2)

@@ -1,0 +1,112 @@
+"""Textures: images of any source, samplers and KHR_texture_transform, as bitmaps."""
+
+from __future__ import annotations
+
+import io
+import math
+import warnings
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from clpt import images
+from clpt.formats.gltf import accessors
+from clpt.formats.gltf.document import Element
+from clpt.scene.textures import Bitmap
+
+FORMATS = ("PNG", "JPEG", "WEBP")
+PIXELS = 1 << 26  # of an image: 8192 x 8192, which takes 0.8 GB as floats
+WRAPS = {33071: "clamp", 33648: "mirror", 10497: "repeat"}
+NEAREST, FILTERS = 9728, (9728, 9729)
+# glTF counts v from the top of an image, clpt from its bottom, and so do the meshes it makes.
+FLIP = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
+
+
+def texture(info: Element, *, raw: bool = False, channel: str | None = None) -> Bitmap:
+    """Return the texture that a textureInfo names; `raw`: numbers, not sRGB colours.
+
+    channel: "r", "g", "b" or "a", what a real parameter takes of it. Which set of texture
+    coordinates it wants is added to `info.document.uv_sets`.
+    """
+    element = info.entry("index", "textures")
+    if element is None:
+        raise info.error("'index' is missing")
+    transform = info.extension("KHR_texture_transform")
+    uv_set = info.integer("texCoord", 0)
+    if transform is not None:
+        uv_set = transform.integer("texCoord", uv_set)
+    if uv_set not in info.document.uv_sets:
+        info.document.uv_sets.append(uv_set)
+    values: dict[str, Any] = {"raw": True, **_sampling(element)}
+    if transform is not None:
+        values["to_uv"] = FLIP @ _transform(transform) @ FLIP
+    if channel is not None:
+        values["channel"] = channel
+    return Bitmap(image=_image(element, raw), **values)
+
+
+def _image(texture: Element, raw: bool) -> NDArray[np.float32]:
+    """The pixels (h, w, 1, 3 or 4) that a texture shows; one white one where there are none."""
+    webp = texture.extension("EXT_texture_webp")
+    source = None if webp is None else webp.entry("source", "images")
+    source = source or texture.entry("source", "images")
+    if source is None:
+        reason = "its image is of a kind that is not supported" if "extensions" in texture else None
+        texture.warn(f"{reason or 'it has no image'}; white stands for it")
+        return np.ones((1, 1, 3), np.float32)
+    key = ("image", source.path, raw)
+    return source.document.once(key, lambda: _decoded(source, raw))
+
+
+def _decoded(source: Element, raw: bool) -> NDArray[np.float32]:
+    inside = "uri" not in source
+    data = bytes(accessors.view(source)[0]) if inside else source.document.resource(source)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", Image.DecompressionBombWarning)
+            with Image.open(io.BytesIO(data), formats=FORMATS) as image:
+                if image.width * image.height > PIXELS:
+                    size = f"{image.width}x{image.height}"
+                    raise source.error(f"{size} pixels are more than the {PIXELS} that are read")
+                return images.from_pillow(image, linear=not raw)
+    except (Image.DecompressionBombError, Image.DecompressionBombWarning):
+        raise source.error(f"has more than the {PIXELS} pixels that are read") from None
+    except (OSError, ValueError, SyntaxError, MemoryError, EOFError) as error:
+        reason = str(error).splitlines()[0][:80] if str(error) else type(error).__name__
+        message = f"is no readable PNG, JPEG or WebP image: {reason}"
+        raise source.error(message.replace(str(data)[:20], "")) from None
+
+
+def _sampling(texture: Element) -> dict[str, str]:
+    """Filter and wraps of a texture's sampler; mipmaps do without, see docs/gltf.md."""
+    sampler = texture.entry("sampler", "samplers")
+    if sampler is None:
+        return {"wrap": "repeat"}
+    wraps = {}
+    for key in ("wrapS", "wrapT"):
+        number = sampler.integer(key, 10497)
+        if number not in WRAPS:
+            raise sampler.error(f"{number} is no way to wrap", key)
+        wraps[key] = WRAPS[number]
+    found: dict[str, str] = {"wrap": wraps["wrapS"]}
+    if wraps["wrapT"] != wraps["wrapS"]:
+        sampler.warn("wraps u and v in different ways; both are wrapped as u")
+    if sampler.integer("magFilter", 9729) == NEAREST:
+        found["filter"] = "nearest"
+    return found
+
+
+def _transform(element: Element) -> NDArray[np.float64]:
+    """KHR_texture_transform as a 3x3 matrix on glTF's texture coordinates: T R S.
+
+    A positive rotation is counter-clockwise seen with v downward, as all viewers agree to read the
+    specification (its own listing has the sign turned round).
+    """
+    angle = element.number("rotation", 0.0)
+    c, s = math.cos(angle), math.sin(angle)
+    offset, scale = (element.numbers(k, 2, (d, d)) for k, d in (("offset", 0.0), ("scale", 1.0)))
+    turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    move = np.array([[1.0, 0.0, offset[0]], [0.0, 1.0, offset[1]], [0.0, 0.0, 1.0]])
+    return move @ turn @ np.diag([*scale, 1.0])
