@@ -53,6 +53,8 @@ def struct_text(cls: type[Kind]) -> str:
     for name, param in device_params(cls).items():
         size = f"[{array_size(param)}]" if array_size(param) > 1 else ""
         rows.append(f"    {lane_type(param)} {name}{size}; /* {param.doc} */")
+    if cls.tints:
+        rows.append("    real luminance; /* of base_color, where a tint is above 0 */")
     if cls.needs_wavelengths:
         rows.append("    Spectrum lambdas; /* the path's wavelengths [nm] */")
     rows = rows or ["    integer unused; /* no parameters */"]
@@ -81,10 +83,31 @@ def load_text(cls: type[Kind], sources: Mapping[str, frozenset[str]], table: str
         f"inline {cls.__name__} {cls.kind}_load"
         "(Scene scene, integer row, TexturePoint point, Wavelengths lambdas)"
     )
+    if cls.tints:
+        before, lines = _luminance(cls, sources, table)
+        head, body = f"{before}{head}", [*body, lines]
     if cls.needs_wavelengths:
         body.append("    r.lambdas = lambdas;")
     body = body or ["    r.unused = 0;"]
     return "\n".join([head, "{", f"    {cls.__name__} r;", *body, "    return r;", "}", ""])
+
+
+def _luminance(
+    cls: type[Kind], sources: Mapping[str, frozenset[str]], table: str
+) -> tuple[str, str]:
+    """What loads `base_color` alone, and the lines that ask it at luminance's own wavelengths."""
+    declared = device_params(cls)
+    at = sum(words(declared[name]) for name in [*declared][: [*declared].index("base_color")])
+    found = sources.get("base_color") or frozenset({"constant"})
+    tests = " | ".join(f"(r.{name} > 0.0f)" for name in cls.tints)
+    return value_text(f"{cls.kind}_colour", declared["base_color"], found, table), "\n".join(
+        [
+            "    r.luminance = 1.0f;",
+            f"    if (any({tests}))",
+            f"        r.luminance = luminance_of({cls.kind}_colour"
+            f"(scene, row + {at}, uv, luminance_lambdas()));",
+        ]
+    )
 
 
 def _member(

@@ -187,7 +187,7 @@ class _Lowering:
         """Material words of front and back, and whether the back is turned round."""
         two_sided = _any_of(shape.material, mt.TwoSided)
         name = shapes.where(shape)
-        if two_sided and any(_transmits(part) for part in _parts(shape.material)):
+        if two_sided and any(part.transmits for part in _parts(shape.material)):
             raise SceneError(
                 "a transmissive material cannot be mixed with a two-sided one", where=name
             )
@@ -221,7 +221,7 @@ class _Lowering:
             for name in device_params(type(part)):
                 if getattr(getattr(part, name), "is_texture", False):
                     self.uses["uvs"] = True
-        self.uses["tangents"] |= _anisotropic(material)
+        self.uses["tangents"] |= material.turns
         self.uses["absorption"] |= getattr(material, "absorption", CLEAR) != CLEAR
         return self.leaves.index(material.kind) << 24 | row
 
@@ -243,9 +243,9 @@ class _Lowering:
         }
         index_tables = any(
             "table" in found
-            for kind in ("dielectric", "rough_dielectric")
+            for kind in ("dielectric", "rough_dielectric", "principled")
             for name, found in sources.get(kind, {}).items()
-            if name in ("int_ior", "ext_ior")
+            if name in ("int_ior", "ext_ior", "eta")
         )
         glass_lens = self.mode == "spectral" and bool(cameras.dispersive_glass(scene.camera))
         return Features(
@@ -351,19 +351,6 @@ def _parts(material: Any) -> Iterator[Any]:
 def _any_of(material: Any, classes: Any) -> bool:
     """Whether a material or one inside it is of these classes."""
     return any(isinstance(part, classes) for part in _parts(material))
-
-
-def _transmits(material: Any) -> bool:
-    if isinstance(material, mt.Grating):
-        return material.mode == "transmissive"
-    return isinstance(material, (mt.Dielectric, mt.RoughDielectric, mt.ThinDielectric))
-
-
-def _anisotropic(material: Any) -> bool:
-    if isinstance(material, mt.Grating):
-        return True
-    u, v = (getattr(material, name, None) for name in ("alpha_u", "alpha_v"))
-    return u is not v and u != v
 
 
 def _sphere_around(vertices: np.ndarray, boxes: np.ndarray) -> tuple[np.ndarray, float]:

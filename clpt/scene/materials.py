@@ -33,6 +33,10 @@ FILMS = "thin films on the surface, from the outside in"
 MEASURED = 0.02  # how much more light than comes may leave, by the noise of a measurement
 
 
+def _share(default: float, doc: str) -> Any:
+    return real(default, doc, low=0.0, high=1.0, textured=True)
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Layer(Kind):
     """A film, thin enough for the light reflected at its two faces to interfere.
@@ -55,6 +59,17 @@ class Material(Kind):
     chromatic: ClassVar[bool] = False  # the pdf differs between wavelengths: it has `pdfs`
     disperses: ClassVar[bool] = False  # whatever its parameters, directions depend on wavelength
     shifts: ClassVar[bool] = False  # light may leave at another wavelength: it has `shift`
+
+    @property
+    def transmits(self) -> bool:
+        """Whether light goes through it."""
+        return False
+
+    @property
+    def turns(self) -> bool:
+        """Whether what it does differs between the tangent and across."""
+        u, v = (getattr(self, name, None) for name in ("alpha_u", "alpha_v"))
+        return u is not v and u != v
 
     name: str = host("", "for messages and for references in scene files")
 
@@ -96,6 +111,10 @@ class Dielectric(Material):
     absorption: Any = coefficient(0.0, "of the inside: exp(-absorption distance) passes")
     layers: tuple[Layer, ...] = layers(FILMS)
 
+    @property
+    def transmits(self) -> bool:
+        return True
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ThinDielectric(Material):
@@ -108,6 +127,10 @@ class ThinDielectric(Material):
     ext_ior: Any = index(1.000277, "index around it")
     specular_reflectance: Any = reflectance(1.0, "factor on reflection; 1 is physical")
     specular_transmittance: Any = reflectance(1.0, "factor on transmission; 1 is physical")
+
+    @property
+    def transmits(self) -> bool:
+        return True
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -126,6 +149,10 @@ class RoughDielectric(Material):
     specular_transmittance: Any = reflectance(1.0, "factor on transmission; 1 is physical")
     absorption: Any = coefficient(0.0, "of the inside: exp(-absorption distance) passes")
     layers: tuple[Layer, ...] = layers(FILMS)
+
+    @property
+    def transmits(self) -> bool:
+        return True
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -177,8 +204,87 @@ class RoughPlastic(Material):
     ext_ior: Any = index(1.000277, "index outside")
     specular_reflectance: Any = reflectance(1.0, "factor on the coat's reflection; 1 is physical")
     distribution: str = choice("ggx", "of the microfacet normals", DISTRIBUTIONS)
-    alpha: float = real(0.1, "roughness", low=1e-4, high=1.0)
+    alpha: Any = real(0.1, "roughness", low=1e-4, high=1.0, textured=True)
     nonlinear: bool = flag(False, "whether internal reflection saturates the colour")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Principled(Material):
+    """The principled model of Burley 2012 and 2015, as Mitsuba 3 defines it; front side.
+
+    Both sides where `spec_trans` is above zero. The microfacets have the square of `roughness`.
+    """
+
+    choosy = True
+    chromatic = True
+    tints = ("spec_tint", "sheen_tint")
+
+    base_color: Any = reflectance(0.5, "colour of base and metal; its root is of transmission")
+    roughness: Any = _share(0.5, "of reflection and refraction")
+    anisotropic: Any = _share(0.0, "how much it is stretched along the tangent")
+    metallic: Any = _share(0.0, "share of the metal")
+    spec_trans: Any = _share(0.0, "share of the rest that lets light through")
+    eta: Any = index(1.5, "inside index over the outside's")
+    spec_tint: Any = _share(0.0, "how much of the base's colour the dielectric reflection has")
+    sheen: Any = _share(0.0, "strength of a sheen at grazing angles")
+    sheen_tint: Any = _share(0.0, "how much of the base's colour the sheen has")
+    flatness: Any = _share(0.0, "share of the base that looks as if light came from below")
+    clearcoat: Any = _share(0.0, "strength of a second, colourless reflection")
+    clearcoat_gloss: Any = _share(0.0, "how smooth that is")
+
+    @property
+    def transmits(self) -> bool:
+        return self.spec_trans != 0.0
+
+    @property
+    def turns(self) -> bool:
+        return self.anisotropic != 0.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PrincipledThin(Material):
+    """The principled model of a thin sheet (Burley 2015), as Mitsuba 3 defines it; both sides."""
+
+    choosy = True
+    tints = ("spec_tint", "sheen_tint")
+
+    base_color: Any = reflectance(0.5, "colour of all but reflection and sheen")
+    roughness: Any = _share(0.5, "of reflection; transmission's grows with the index")
+    anisotropic: Any = _share(0.0, "how much it is stretched along the tangent")
+    spec_trans: Any = _share(0.0, "share of the slab: of reflection and clear transmission")
+    eta: Any = index(1.5, "inside index over the outside's")
+    spec_tint: Any = _share(0.0, "how much of the base's colour the reflection has")
+    sheen: Any = _share(0.0, "strength of a sheen at grazing angles")
+    sheen_tint: Any = _share(0.0, "how much of the base's colour the sheen has")
+    flatness: Any = _share(0.0, "share of the base that looks as if light came from below")
+    diff_trans: Any = real(
+        0.0, "diffuse light that goes through; 2: all of it", low=0.0, high=2.0, textured=True
+    )
+
+    @property
+    def transmits(self) -> bool:
+        return True
+
+    @property
+    def turns(self) -> bool:
+        return self.anisotropic != 0.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DiffuseTransmission(Material):
+    """A thin sheet of Lambertian scattering to both sides, as paper or a leaf.
+
+    Where the two shares add up to more than one they are scaled down to conserve energy.
+    """
+
+    choosy = True
+
+    transmittance: Any = reflectance(0.25, "share that goes through")
+    reflectance: Any = reflectance(0.25, "share that is scattered back")
+
+    @property
+    def transmits(self) -> bool:
+        return True
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -210,6 +316,14 @@ class Grating(Material):
     eta: Any = index(0.0, "index of refraction of the metal; the default is a perfect mirror")
     k: Any = index(1.0, "extinction coefficient of the metal")
     reflectance: Any = reflectance(1.0, "factor on the light of all orders; 1 is physical")
+
+    @property
+    def transmits(self) -> bool:
+        return self.mode == "transmissive"
+
+    @property
+    def turns(self) -> bool:
+        return True
 
     def check(self) -> None:
         """Raise SceneError for efficiencies of which none is above zero."""
@@ -287,6 +401,9 @@ LEAVES = (
     RoughConductor,
     Plastic,
     RoughPlastic,
+    Principled,
+    PrincipledThin,
+    DiffuseTransmission,
     Grating,
     Fluorescent,
     Null,

@@ -143,6 +143,8 @@ class Kind:
     """Base of all that can be added: its name in files and kernels follows from the class."""
 
     needs_wavelengths: ClassVar[bool] = False  # its struct in the kernels has them as `lambdas`
+    tints: ClassVar[tuple[str, ...]] = ()  # where one is above 0, its struct has the `luminance`
+    # of `base_color`; its kernel file includes lib/luminance.cl
 
     @classproperty
     def kind(cls) -> str:

@@ -252,6 +252,19 @@ BSDFS = {
         nonlinear=True
     ),
     '<bsdf type="roughplastic"/>': materials.RoughPlastic(distribution="beckmann"),
+    '<bsdf type="principled"/>': materials.Principled(),
+    '<bsdf type="principled"><rgb name="base_color" value=".1,.2,.3"/><float name="specular" '
+    'value="0"/><float name="spec_trans" value=".5"/><float name="clearcoat_gloss" value=".2"/>'
+    '<float name="diffuse_reflectance_sampling_rate" value="3"/></bsdf>': (
+        materials.Principled(
+            base_color=(0.1, 0.2, 0.3),
+            eta=2.0 / (1.0 - 0.00008**0.5) - 1.0,
+            spec_trans=0.5,
+            clearcoat_gloss=0.2,
+        )
+    ),
+    '<bsdf type="principledthin"><float name="diff_trans" value="2"/>'
+    '<float name="eta" value="1.3"/></bsdf>': materials.PrincipledThin(diff_trans=2.0, eta=1.3),
     '<bsdf type="grating"/>': materials.Grating(),
     '<bsdf type="grating"><string name="profile" value="explicit"/>'
     '<float name="period" value="900"/><string name="efficiencies" value="1, 2, 0"/>'
@@ -443,7 +456,12 @@ def test_checkerboard_of_numbers_is_mitsubas(scene):
 
 
 ERRORS = {
-    '<bsdf type="principled" id="p"/>': r":2: <bsdf type=.principled.>: unknown bsdf",
+    '<bsdf type="hair" id="p"/>': r":2: <bsdf type=.hair.>: unknown bsdf",
+    '<bsdf type="principled"><float name="eta" value="2"/><float name="specular" value="1"/>'
+    "</bsdf>":
+        "either 'eta' or 'specular'",
+    '<bsdf type="principled"><float name="specular" value="2"/></bsdf>': "from 0 to 1, not 2",
+    '<bsdf type="principled"><float name="metallic" value="2"/></bsdf>': r"outside \[0, 1\]",
     '<bsdf type="difuse"/>': "did you mean 'diffuse'",
     '<shape type="instance"/>': r":2: <shape .*unknown shape 'instance'",
     '<emitter type="sunsky"/>': "unknown emitter",
@@ -495,7 +513,7 @@ def test_errors_tell_the_place(scene, body):
 
 def test_error_types(scene):
     with pytest.raises(UnknownKindError):
-        scene('<bsdf type="principled"/>')
+        scene('<bsdf type="hair"/>')
     with pytest.raises(UnusedParameterError):
         scene('<shape type="cube"><float name="radius" value="1"/></shape>')
 
@@ -586,16 +604,14 @@ def test_the_assets_agree_with_what_mitsuba_found(assets):
     import json
 
     expected = json.loads((assets / "expected.json").read_text())["mitsuba"]
-    for name in ("cornell_box_picture/scene_picture.xml", "veach-ajar/scene.xml"):
-        made = load(assets / "mitsuba" / name)
+    others = (f"{name}/scene.xml" for name in ("veach-ajar", "tire", "ashtray"))
+    for name in ("cornell_box_picture/scene_picture.xml", *others):
+        made = load(assets / "mitsuba" / name, integrator="path")
         known = expected[f"mitsuba/{name}"]
         assert np.allclose(studio.world_bounds(made.shapes), known["bounds"], atol=1e-4)
         emitters = [shape for shape in made.shapes if isinstance(shape.emission, lights.Area)]
-        assert len(emitters) == known["emitters"]
+        assert len(emitters) + len(made.lights) == known["emitters"]
         assert [made.film.width, made.film.height] == known["film"]
-    for name in ("tire/scene.xml", "ashtray/scene.xml"):
-        with pytest.raises(UnknownKindError, match="principled"):
-            load(assets / "mitsuba" / name, integrator="path")
 
 
 def test_glass_has_mitsubas_index():

@@ -176,6 +176,8 @@ class Probe:
                 value = f"to_integer({row})" if form == "integer" else row
                 reads.append(f"    {member} = {value};")
                 at += 1
+        if self.cls.tints:
+            reads.append("    m.luminance = luminance_of(m.base_color);")
         if self.cls.needs_wavelengths:
             for i, c in enumerate(names):
                 reads.append(f"    m.lambdas.{c} = block_load(in + {at + i} * n + at);")

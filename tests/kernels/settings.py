@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
 from clpt.render.kinds import array_size, lane_type
 from clpt.scene.materials import Layer
 from clpt.scene.params import Kind, Param, device_params
 from tests.kernels.harness import COMPONENTS
+
+# limits of what the principled kinds would make lobes of that are too narrow for bins
+WIDE = {"roughness": {"low": 0.5}, "anisotropic": {"high": 0.7}, "clearcoat_gloss": {"high": 0.4}}
 
 
 def directions(rng: np.random.Generator, n: int) -> np.ndarray:
@@ -36,12 +41,14 @@ def settings(
     """Random valid parameters, by name: numbers and spectra (components,); `fixed` wins.
 
     Indices of refraction are by turns near 1 and well above, in either order, as lobes refracted by
-    a ratio near one are too narrow for bins. The first half of them is equal at all wavelengths.
-    Every other one has thin films, if the kind takes them, which absorb nothing.
+    a ratio near one are too narrow for bins; an only one is well above. The first half of them is
+    equal at all wavelengths. Every other one has thin films, if the kind takes them, which absorb
+    nothing.
     """
     result = []
+    single = sum(p.role == "index" for p in device_params(cls).values()) == 1
     for i in range(count):
-        disperses, turn = 2 * i >= count, int(rng.integers(2))
+        disperses, turn = 2 * i >= count, 1 if single else int(rng.integers(2))
         drawn = {}
         for name, param in device_params(cls).items():
             if param.role == "index":
@@ -50,7 +57,7 @@ def settings(
             elif param.role == "layers":
                 drawn[name] = _draw_layers(rng) if i % 2 else ()
             else:
-                drawn[name] = _draw(param, mode, rng)
+                drawn[name] = _draw(dataclasses.replace(param, **WIDE.get(name, {})), mode, rng)
         result.append(drawn | {k: v for k, v in fixed.items() if k in drawn})
     return result
 

@@ -8,6 +8,7 @@ from typing import Any
 from clpt import spectra
 from clpt.errors import UnknownKindError
 from clpt.formats.mitsuba.fluorescence import fluorescent
+from clpt.formats.mitsuba.principled import principled, principled_thin
 from clpt.formats.mitsuba.spectra import coefficient, index, ior, real, reflectance
 from clpt.formats.mitsuba.values import Context, Properties, numbers, placed
 from clpt.formats.mitsuba.xml import Element
@@ -212,6 +213,8 @@ PLUGINS: dict[str, tuple[type[Material], Callable[[Properties], Parameters]]] = 
     "roughconductor": (materials.RoughConductor, _rough_conductor),
     "plastic": (materials.Plastic, _plastic),
     "roughplastic": (materials.RoughPlastic, _rough_plastic),
+    "principled": (materials.Principled, principled),
+    "principledthin": (materials.PrincipledThin, principled_thin),
     "grating": (materials.Grating, _grating),
     "fluorescent": (materials.Fluorescent, fluorescent),
     "null": (materials.Null, _null),
