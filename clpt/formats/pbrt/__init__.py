@@ -1,0 +1,1 @@
+"""Scenes in PBRT version 4's format."""

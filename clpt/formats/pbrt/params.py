@@ -1,0 +1,231 @@
+"""The parameters of a directive: typed values by name, each with the place that it stands in."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.errors import SceneError
+
+SIZES = {  # how many numbers one value of a type has
+    "integer": 1, "float": 1, "blackbody": 1, "point2": 2, "vector2": 2, "point3": 3,
+    "vector3": 3, "normal": 3, "rgb": 3,
+}  # fmt: skip
+ALIASES = {"point": "point3", "vector": "vector3", "normal3": "normal"}
+TEXTS = ("string", "texture")
+TYPES = (*SIZES, *ALIASES, *TEXTS, "bool", "spectrum")
+LARGEST_INTEGER = 2**31 - 1
+
+
+@contextmanager
+def placed(place: Parameter | Parameters) -> Iterator[None]:
+    """Give errors that know no file the place of a parameter or of a directive."""
+    try:
+        yield
+    except SceneError as error:
+        if error.file is not None:
+            raise
+        where = f"{error.where}: " if error.where else ""
+        raise place.error(where + error.message) from None
+
+
+@dataclass(eq=False)
+class Parameter:
+    """One `"type name" [values]`; `values` are float64 numbers, texts, or truths."""
+
+    type: str
+    name: str
+    values: NDArray[np.float64] | list[str] | list[bool]
+    file: Path
+    line: int
+    where: str = ""
+    used: bool = False
+
+    @property
+    def place(self) -> dict[str, Any]:
+        """File, line and element, as errors take them."""
+        return {"file": self.file, "line": self.line, "where": f"{self.where}: {self.name!r}"}
+
+    def error(self, message: str) -> SceneError:
+        """Return the error that says `message` about this parameter."""
+        return SceneError(message, **self.place)
+
+    @property
+    def is_text(self) -> bool:
+        """Whether the values are strings: a file's or a spectrum's name, for instance."""
+        return isinstance(self.values, list) and all(isinstance(v, str) for v in self.values)
+
+    def text(self) -> str:
+        """Return the one string."""
+        if not self.is_text or len(self.values) != 1:
+            raise self.error("must be one string in quotes")
+        return str(self.values[0])
+
+    def texts(self) -> list[str]:
+        """Return all strings."""
+        if not self.is_text:
+            raise self.error("must be strings in quotes")
+        return [str(value) for value in self.values]
+
+    def truth(self) -> bool:
+        """Return the one true or false; older files put it in quotes."""
+        value = self.values[0] if len(self.values) == 1 else None
+        if isinstance(value, str) and value in ("true", "false"):
+            return value == "true"
+        if not isinstance(value, bool):
+            raise self.error("must be true or false")
+        return value
+
+    def numbers(self, count: int = 0) -> list[float]:
+        """Return finite numbers, `count` of them unless that is 0."""
+        values = self.array()
+        if count and len(values) != count:
+            raise self.error(f"must be {count} numbers, not {len(values)}")
+        return [float(value) for value in values]
+
+    def array(self) -> NDArray[np.float64]:
+        """Return finite numbers (n,)."""
+        if not isinstance(self.values, np.ndarray):
+            raise self.error("must be numbers")
+        if not np.isfinite(self.values).all():
+            raise self.error("must be finite numbers")
+        return self.values
+
+    def whole(self) -> NDArray[np.int64]:
+        """Return whole numbers (n,) of 32 bits."""
+        values = self.array()
+        if (np.abs(values) > LARGEST_INTEGER).any() or (values != np.floor(values)).any():
+            raise self.error("must be whole numbers of 32 bits")
+        return values.astype(np.int64)
+
+    def rows(self) -> Any:
+        """Return all values: (n,) or (n, 2) or (n, 3) as the type has it, or a list of texts."""
+        if self.type in TEXTS or self.is_text:
+            return self.texts()
+        if self.type == "bool":
+            return [bool(value) for value in self.values]
+        values = self.whole() if self.type == "integer" else self.array()
+        size = SIZES.get(self.type, 1)
+        if len(values) % size:
+            raise self.error(f"has {len(values)} numbers, which is no multiple of {size}")
+        return values if size == 1 else values.reshape(-1, size)
+
+    def placed(self) -> Any:
+        """Context in which errors without a place get this one."""
+        return placed(self)
+
+
+@dataclass(eq=False)
+class Parameters:
+    """All parameters of a directive; what nothing asked for is left in `unused`.
+
+    `label` names the directive for messages: `Shape "sphere"`. `defaults` are those that an
+    `Attribute` directive gave for the target; they count where the directive has none of that name,
+    and may stay unused.
+    """
+
+    label: str
+    file: Path
+    line: int
+    given: list[Parameter] = field(default_factory=list)
+    defaults: tuple[Parameter, ...] = ()
+
+    def __post_init__(self) -> None:
+        self._named = {parameter.name: parameter for parameter in self.defaults}
+        self._asked: set[str] = set()
+        own: set[str] = set()
+        for parameter in self.given:
+            if parameter.name in own:
+                raise parameter.error("is given twice")
+            own.add(parameter.name)
+            self._named[parameter.name] = parameter
+
+    @property
+    def place(self) -> dict[str, Any]:
+        """File, line and element, as errors take them."""
+        return {"file": self.file, "line": self.line, "where": self.label}
+
+    def error(self, message: str) -> SceneError:
+        """Return the error that says `message` about the directive."""
+        return SceneError(message, **self.place)
+
+    def placed(self) -> Any:
+        """Context in which errors without a place get this one."""
+        return placed(self)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._named
+
+    def find(self, name: str, *types: str) -> Parameter | None:
+        """Take a parameter of one of the types, or None; an integer counts as a float.
+
+        Raises SceneError where it has another type.
+        """
+        self._asked.add(name)
+        found = self._named.get(name)
+        if found is None:
+            return None
+        found.used = True
+        as_float = found.type == "integer" and "float" in types
+        if types and found.type not in types and not as_float:
+            raise found.error(f"must be of the type {' or '.join(types)}, not {found.type}")
+        return found
+
+    def one(self, name: str, type: str, default: Any) -> Any:
+        """Take one value, or `default`: a float, int, bool, str, or an array (2,) or (3,)."""
+        found = self.find(name, type)
+        if found is None:
+            return default
+        if type == "bool":
+            return found.truth()
+        if type in TEXTS:
+            return found.text()
+        size = SIZES[type]
+        if type == "integer":
+            whole = found.whole()
+            if len(whole) != 1:
+                raise found.error(f"must be one whole number, not {len(whole)}")
+            return int(whole[0])
+        values = found.numbers(size)
+        return values[0] if size == 1 else np.array(values)
+
+    def several(self, name: str, type: str) -> Any:
+        """Take all values, or None: (n,), (n, 2) or (n, 3) as the type has it, or a list of str."""
+        found = self.find(name, type)
+        return None if found is None else found.rows()
+
+    def choice(self, name: str, default: str, choices: Iterable[str]) -> str:
+        """Take a string that is one of `choices`."""
+        value = self.one(name, "string", default)
+        if value not in choices:
+            found = self._named.get(name, self)
+            raise found.error(f"{value[:40]!r} is none of {', '.join(choices)}")
+        return str(value)
+
+    def above_zero(self, name: str, default: float) -> float:
+        """Take a number that must be positive."""
+        value = float(self.one(name, "float", default))
+        if not 0.0 < value < math.inf:
+            raise self._named[name].error(f"must be positive, not {value:g}")
+        return value
+
+    def ignore(self, *names: str) -> None:
+        """Take parameters that change no picture."""
+        for name in names:
+            self.find(name)
+
+    def unused(self) -> list[Parameter]:
+        """The directive's own parameters that nothing asked for."""
+        return [parameter for parameter in self.given if not parameter.used]
+
+    @property
+    def asked(self) -> set[str]:
+        """The names that something asked for."""
+        return self._asked

@@ -1,0 +1,123 @@
+"""What a PBRT file has said so far: the graphics state, and what all of its parts share."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from clpt import transforms
+from clpt.errors import SceneError
+from clpt.formats.pbrt.params import Parameter, Parameters
+from clpt.scene.materials import Material
+
+TARGETS = ("shape", "light", "material", "medium", "texture")
+
+
+@dataclass(eq=False)
+class Definition:
+    """A texture or named material: its type, parameters and the state that it was defined in.
+
+    Textures stay definitions, since what a texture is made into depends on the parameter it serves.
+    """
+
+    kind: str
+    params: Parameters
+    state: State
+
+
+@dataclass(eq=False)
+class Shared:
+    """What is the same in all states of a file and of those that it includes."""
+
+    folder: Path
+    warnings: list[str] = field(default_factory=list)
+    textures: dict[tuple[str, str], Definition] = field(default_factory=dict)
+    materials: dict[str, Definition] = field(default_factory=dict)
+    media: dict[str, Parameters] = field(default_factory=dict)
+    systems: dict[str, transforms.Matrix] = field(default_factory=dict)
+    made: dict[Any, Any] = field(default_factory=dict)
+    make_material: Callable[..., Material] | None = None
+
+    def once(self, key: Any, place: Parameters | Parameter, make: Callable[[], Any]) -> Any:
+        """Return make(), the same object each time for a key. What needs itself is an error."""
+        if key not in self.made:
+            self.made[key] = None
+            self.made[key] = make()
+        if self.made[key] is None:
+            raise place.error("refers to itself")
+        return self.made[key]
+
+
+@dataclass(eq=False)
+class State:
+    """The graphics state at a place in a file; `copy` is what AttributeBegin keeps.
+
+    ctm: object to world. colour_space: "srgb", "rec2020", "aces2065-1" or "dci-p3".
+    material: a Material or the name of one. area_light: the parameters of an AreaLightSource.
+    """
+
+    shared: Shared
+    file_folder: Path
+    ctm: transforms.Matrix = field(default_factory=lambda: np.eye(4))
+    colour_space: str = "srgb"
+    material: Material | str | None = None
+    material_place: Parameters | None = None
+    area_light: Parameters | None = None
+    reverse: bool = False
+    inside: str = ""
+    outside: str = ""
+    defaults: dict[str, tuple[Parameter, ...]] = field(default_factory=dict)
+
+    def copy(self) -> State:
+        """A state that changes by itself; definitions are shared."""
+        return replace(self, defaults=dict(self.defaults))
+
+    def warn(self, place: Parameters | Parameter, text: str) -> None:
+        """Remember what the picture will lack, with the file and line."""
+        where = place.place["where"]
+        self.shared.warnings.append(f"{place.file.name}:{place.line}: {where}: {text}")
+
+    def file(self, name: str) -> Path:
+        """The path that a file name means: beside the scene, else beside the file that names it.
+
+        It need not exist. Raises SceneError for what can be no file's name.
+        """
+        if not name or "\0" in name or len(name) > 4096:
+            raise SceneError(f"{name[:40]!r} is no name of a file")
+        path = Path(name.replace("\\", "/"))
+        if path.is_absolute():
+            return path
+        beside = self.shared.folder / path
+        other = self.file_folder / path
+        return other if not beside.exists() and other.exists() else beside
+
+    def texture(self, values: str, name: str, place: Parameters | Parameter) -> Definition:
+        """The definition of a texture of "float" or "spectrum" values. Raises SceneError."""
+        found = self.shared.textures.get((values, name))
+        if found is None:
+            names = [known for kind, known in self.shared.textures if kind == values]
+            raise place.error(f"there is no {values} texture {name!r}{nearest(name, names)}")
+        return found
+
+    def named_material(self, name: str, place: Parameters | Parameter) -> Material:
+        """The material of a name, made once. Raises SceneError."""
+        found, make = self.shared.materials.get(name), self.shared.make_material
+        if found is None or make is None:
+            hint = nearest(name, self.shared.materials)
+            raise place.error(f"there is no material {name!r}{hint}")
+        kind, params, state = found.kind, found.params, found.state
+        made: Material = self.shared.once(
+            ("material", name), params, lambda: make(kind, params, state, name)
+        )
+        return made
+
+
+def nearest(name: str, known: Any) -> str:
+    """The end of a message about an unknown name."""
+    near = difflib.get_close_matches(name, sorted(known), n=3, cutoff=0.5)
+    return "; did you mean " + " or ".join(map(repr, near)) + "?" if near else ""
