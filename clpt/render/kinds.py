@@ -105,7 +105,7 @@ def _luminance(
             "    r.luminance = 1.0f;",
             f"    if (any({tests}))",
             f"        r.luminance = luminance_of({cls.kind}_colour"
-            f"(scene, row + {at}, uv, luminance_lambdas()));",
+            f"(scene, row + {at}, point, luminance_lambdas()));",
         ]
     )
 
