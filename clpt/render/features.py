@@ -31,7 +31,8 @@ class Features:
     uvs: bool = False
     tangents: bool = False
     attributes: bool = False  # some texture reads what meshes say per vertex or face
-    mixtures: bool = False
+    mixtures: int = 0  # how deep masks and blends nest
+    passes: bool = False  # some surface lets light through as if it were not there
     infinite: bool = False
     light_paths: bool = False  # paths start at lights
     visible_lights: bool = False  # some light is no delta light: a camera may see it

@@ -89,7 +89,8 @@ class _Lowering:
             nodes = reradiation.nodes(film.lambda_min, film.lambda_max)
             self.tables.expected = reradiation.expected(emissions(scene), nodes)
         self.words: dict[tuple[int, str], int] = {}
-        self.uses = dict.fromkeys(("normals", "uvs", "tangents", "mixtures", "absorption"), False)
+        self.uses = dict.fromkeys(("normals", "uvs", "tangents", "absorption"), False)
+        self.nested: dict[int, int] = {}  # how deep mixtures are, by their words
         self.triangles: list[tuple[np.ndarray, np.ndarray, int]] = []  # vertices, faces, shape
         self.n_vertices = self.n_faces = 0
 
@@ -230,10 +231,11 @@ class _Lowering:
     ) -> int:
         words, source = self.tables.param_words(weight, "real")
         self.tables.sources["mixture"]["weight"].add(source)
-        self.uses["mixtures"] = True
         self.uses["uvs"] |= source == "texture"
         children = [self._word(m, side, turned, inside) for m in (first, second)]
-        return MIXTURE << 24 | self.tables.append("mixtures", [*words, *children])
+        word = MIXTURE << 24 | self.tables.append("mixtures", [*words, *children])
+        self.nested[word] = 1 + max(self.nested.get(child, 0) for child in children)
+        return word
 
     def _features(self, analytic: Any, camera: str) -> Features:
         scene, tables = self.scene, self.tables
@@ -262,7 +264,8 @@ class _Lowering:
             normals=self.uses["normals"],
             uvs=self.uses["uvs"] or self.uses["tangents"] or "uv" in self.channels,
             tangents=self.uses["tangents"],
-            mixtures=self.uses["mixtures"],
+            mixtures=max(self.nested.values(), default=0),
+            passes=any(_LEAVES[kind].passes for kind in self.leaves) and not self.channels,
             infinite=self.lights.infinite > 0 and not self.channels,
             light_paths=self.light_paths,
             visible_lights=self.lights.visible,

@@ -50,6 +50,7 @@ def sources(
             "BSDF_DELTA": int(LEAVES[kind].delta),
             "BSDF_CHROMATIC": int(LEAVES[kind].chromatic),
             "BSDF_SHIFTS": int(_shifts(features, kind)),
+            "BSDF_PASSES": int(LEAVES[kind].passes and features.passes),
             "USES_CHOICE": int(LEAVES[kind].choosy or LEAVES[kind].shifts or features.many_lights),
             "QUEUED": int(queued),
         }
@@ -87,6 +88,8 @@ def _defines(features: Features) -> dict[str, str | int | float]:
     }
     if features.absorption:
         made["USES_ABSORPTION"] = 1
+    if features.passes:
+        made["USES_PASSING"] = 1
     if features.filter == "box":
         made["FILTER_BOX"] = 1
     if features.light_paths:
@@ -115,6 +118,8 @@ def _shared(features: Features, layout: str) -> dict[str, str]:
         "generated/textures.cl": textures.dispatch_text(features.textures, features.texture_roles),
         "generated/lights.cl": _lights_text(features),
         "generated/mixture.cl": _mixture_text(features),
+        "generated/open.cl": f'#include "lib/open{"_through" * features.passes}.cl"\n',
+        "generated/null_share.cl": _null_share_text(features),
         "generated/medium.cl": _medium_text(features),
         "generated/shapes.cl": _tangents_text(features),
         "generated/trace.cl": _trace_text(layout),
@@ -218,6 +223,42 @@ def _mixture_text(features: Features) -> str:
     """The loader of the weights of masks and blends."""
     found = features.sources.get("mixture", {}).get("weight", frozenset({"constant"}))
     return kinds.mixture_text(found)
+
+
+def _null_share_text(features: Features) -> str:
+    """`null_share`: how much of the light passes a surface with some material word.
+
+    A mixture's children are one level below it, since kernels cannot call themselves.
+    """
+    kinds_ = enumerate(features.materials)
+    passing = [f"(MATERIAL_KIND(word) == {i})" for i, kind in kinds_ if LEAVES[kind].passes]
+    arguments = "Scene scene, integer word, TexturePoint point, Wavelengths lambdas"
+    lines = [
+        f"inline real null_share_0({arguments})",
+        "{",
+        f"    return sel({' | '.join(passing) or 'mask_of(0)'}, (real)(1.0f), (real)(0.0f));",
+        "}",
+    ]
+    for level in range(1, features.mixtures + 1):
+        below = f"null_share_{level - 1}"
+        lines += [
+            f"inline real null_share_{level}({arguments})",
+            "{",
+            "    mask mixed = MATERIAL_KIND(word) == 0xff;",
+            f"    real share = {below}(scene, word, point, lambdas);",
+            "    if (any(mixed)) {",
+            "        integer row = sel_i(mixed, MATERIAL_ROW(word), (integer)(0));",
+            "        real w = mixture_weight(scene, row, point, lambdas);",
+            "        integer a = gather_i(scene.mixtures, row + 2);",
+            "        integer b = gather_i(scene.mixtures, row + 3);",
+            f"        real first = {below}(scene, a, point, lambdas);",
+            f"        real second = {below}(scene, b, point, lambdas);",
+            "        share = sel(mixed, first + w * (second - first), share);",
+            "    }",
+            "    return share;",
+            "}",
+        ]
+    return "\n".join([*lines, f"#define null_share null_share_{features.mixtures}", ""])
 
 
 def _medium_text(features: Features) -> str:

@@ -73,8 +73,8 @@ class Whitted(Integrator):
 class ParticleTracer(Integrator):
     """Light tracing: paths start at lights, and every vertex is joined to the camera.
 
-    Finds caustics, also of the smallest lights; what the camera would see through glass, in mirrors
-    and through masks stays black. A sample per pixel is one light path for every pixel of the film.
+    Finds caustics, also of the smallest lights; what the camera would see through glass and in
+    mirrors stays black. A sample per pixel is one light path for every pixel of the film.
     The camera must be `perspective` or `thin_lens`; the film's filter is a box of one pixel.
     """
 

@@ -59,6 +59,7 @@ class Material(Kind):
     chromatic: ClassVar[bool] = False  # the pdf differs between wavelengths: it has `pdfs`
     disperses: ClassVar[bool] = False  # whatever its parameters, directions depend on wavelength
     shifts: ClassVar[bool] = False  # light may leave at another wavelength: it has `shift`
+    passes: ClassVar[bool] = False  # light goes on as if nothing were there, to lights as well
 
     @property
     def transmits(self) -> bool:
@@ -364,6 +365,7 @@ class Null(Material):
     """No surface at all: light passes as if it were not there."""
 
     delta = True
+    passes = True
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

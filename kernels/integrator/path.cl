@@ -26,8 +26,8 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     mask lit = active & (s.light >= 0) & front & !hidden;
     if (any(lit)) {
         integer light = sel_i(lit, s.light, (integer)(0));
-        real pdf = load_path_pdf(path, at);
-        real other = light_pdf(scene, light, o, d, load_hit_t(hit, at), s.n);
+        real pdf = load_path_pdf(path, at), gone = path_gone(path, at);
+        real other = light_pdf(scene, light, madd3(d, -gone, o), d, load_hit_t(hit, at) + gone, s.n);
         real w = sel(pdf < 0.0f, (real)(1.0f), mis_weight(pdf, other));
         Spectrum le = emission_load(scene, light_at(scene, light).radiance, surface_texture_point(s), lambdas);
         le = spectrum_scale(spectrum_mul(beta, le), w);
@@ -89,7 +89,12 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     store_path_o(path, at, next, surface_offset(s, onward));
     store_path_d(path, at, next, onward);
     store_path_beta(path, at, next, beta);
+#if BSDF_PASSES /* for weighing a light that is met further on, nothing has happened */
+    store_path_gone(path, at, next, load_path_gone(path, at) + load_hit_t(hit, at));
+#else
+    path_turned(path, at, next);
     store_path_pdf(path, at, next, sel((bs.lobe & LOBE_DELTA) != 0, (real)(-1.0f), bs.pdf));
+#endif
     store_path_eta(path, at, next, eta);
 #if USES_ABSORPTION
     store_path_medium(path, at, next, medium_beyond(medium, inside, front, dot3(s.n, onward) < 0.0f));

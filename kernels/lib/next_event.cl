@@ -11,3 +11,13 @@ inline void shadow_toward(Slab shadow, At at, mask active, mask shine, Surface s
     store_shadow_t(shadow, at, active, sel(shine, sel(near, t, ls.t) * SHADOW_SHORTER, (real)(-1.0f)));
     store_shadow_value(shadow, at, shine, value);
 }
+
+/* Where a light is weighed that a ray has met, what counts is the pdf with which its direction was chosen,
+ * and from where: further back than where the ray begins if it has passed null boundaries since. */
+#if USES_PASSING
+#define path_gone(path, at) load_path_gone(path, at)
+#define path_turned(path, at, m) store_path_gone(path, at, m, (real)(0.0f))
+#else
+#define path_gone(path, at) ((real)(0.0f))
+#define path_turned(path, at, m)
+#endif

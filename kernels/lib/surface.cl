@@ -126,10 +126,15 @@ inline Frame surface_frame(Surface s)
     return f;
 }
 
-/* Where a ray toward `w` starts: off the surface by more than what rounding may have put it under. */
+/* How far off the surface a ray starts: by more than what rounding may have put it under. */
+inline real surface_step(Surface s)
+{
+    return (1.0f + max_r(max_r(fabs(s.p.x), fabs(s.p.y)), fabs(s.p.z))) * RAY_EPSILON;
+}
+
+/* Where a ray toward `w` starts. */
 inline vec3 surface_offset(Surface s, vec3 w)
 {
-    real size = 1.0f + max_r(max_r(fabs(s.p.x), fabs(s.p.y)), fabs(s.p.z));
-    real side = sel(dot3(s.n, w) < 0.0f, -size, size);
-    return madd3(s.n, side * RAY_EPSILON, s.p);
+    real step = surface_step(s);
+    return madd3(s.n, sel(dot3(s.n, w) < 0.0f, -step, step), s.p);
 }

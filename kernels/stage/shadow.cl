@@ -1,7 +1,8 @@
-/* Tests the rays that wait to reach a light, and adds what they carry where nothing is in the way. */
+/* Tests the rays that wait to reach a light, and adds what arrives of what they carry. */
 #include "lib/base.cl"
 #include "lib/shape.cl"
 #include "generated/trace.cl"
+#include "generated/open.cl"
 #include "bvh/apart.cl"
 
 kernel APART void shadow(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS)
@@ -13,9 +14,9 @@ kernel APART void shadow(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS)
     mask active = t > 0.0f;
     if (any(active)) {
         vec3 o = load_shadow_o(shadow, at), d = load_shadow_d(shadow, at);
-        mask open = active & !trace_occluded(TRACE, scene, o, d, t, active);
-        Spectrum sum = spectrum_add(load_path_radiance(path, at), load_shadow_value(shadow, at));
-        store_path_radiance(path, at, open, sum);
+        real share = trace_open(TRACE, scene, o, d, t, load_path_lambdas(path, at), active);
+        Spectrum sum = spectrum_madd(load_shadow_value(shadow, at), share, load_path_radiance(path, at));
+        store_path_radiance(path, at, active & (share > 0.0f), sum);
         store_shadow_t(shadow, at, active, (real)(-1.0f));
     }
 }

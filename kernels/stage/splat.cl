@@ -2,6 +2,7 @@
 #include "lib/base.cl"
 #include "lib/shape.cl"
 #include "generated/trace.cl"
+#include "generated/open.cl"
 #include "bvh/apart.cl"
 #include "lib/film.cl"
 #include "lib/splat.cl"
@@ -15,8 +16,10 @@ kernel APART void splat(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS, global float *film, g
     mask active = t > 0.0f;
     if (any(active)) {
         vec3 o = load_shadow_o(shadow, at), d = load_shadow_d(shadow, at);
-        mask open = active & !trace_occluded(TRACE, scene, o, d, t, active);
-        vec3 value = film_value(scene, load_shadow_value(shadow, at), load_path_lambdas(path, at));
+        Wavelengths lambdas = load_path_lambdas(path, at);
+        real share = trace_open(TRACE, scene, o, d, t, lambdas, active);
+        mask open = active & (share > 0.0f);
+        vec3 value = film_value(scene, spectrum_scale(load_shadow_value(shadow, at), share), lambdas);
         mask sane = open & (fabs(value.x) + fabs(value.y) + fabs(value.z) < 1e30f); /* false for NaN */
         integer plane = divide(LANE_INDEX + (int)at, settings->per_plane);
         film_splat(settings, film, sane, plane, load_shadow_pixel(shadow, at), value);
