@@ -108,7 +108,7 @@ LIGHT = Record(
     alias=("integer", "the row taken otherwise"),
     shape=("integer", "row of its shape; -1: not on a shape"),
     radiance=("integer", "first word of its emission parameter in `lamps`"),
-    along=("integer", "1: the shape emits along its normals only"),
+    way=("integer", "of a shape's light, see kernels/light/area.cl"),
 )
 
 SLABS = (PATH, HIT, SHADOW)

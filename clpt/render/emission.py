@@ -6,19 +6,20 @@ from collections.abc import Iterable
 
 from clpt.render import shapes
 from clpt.render.lamps import PLACED, RECORDS
-from clpt.render.lights import KINDS, case_text, point_text, row_text
+from clpt.render.lights import ALONG, BASES, BOTH, KINDS, case_text, point_text, row_text
 
 
-def dispatch_text(kinds: Iterable[str], textured: bool) -> str:
+def dispatch_text(kinds: Iterable[str], textured: bool, two_sided: bool = False) -> str:
     """Return `light_emit(scene, pick, u, v, lambdas)`: a ray from a light that is chosen by `pick`.
 
-    kinds: of the lights in the scene; textured: some emission is a texture. It stands behind the
-    text of clpt.render.lights.dispatch_text.
+    kinds: of the lights in the scene; textured: some emission is a texture; two_sided: some shape
+    emits from its back too. It stands behind the text of clpt.render.lights.dispatch_text.
     """
     present = [kind for kind in KINDS if kind in set(kinds)]
     lamps = [kind for kind in present if kind in RECORDS]
     surfaces = [kind for kind in present if kind in shapes.RECORDS]
-    files = [kind for kind in present if kind in PLACED or kind in shapes.RECORDS]
+    needed = {*present, *(BASES[kind] for kind in present if kind in BASES)}
+    files = [k for k in KINDS if k in needed and (k in PLACED or k in shapes.RECORDS)]
     lines = ['#include "lib/emission.cl"', *(f'#include "emission/{k}.cl"' for k in files)]
     head = "LightRay light_emit(Scene scene, real pick, vec2 u, vec2 v, Wavelengths lambdas)"
     if not present:
@@ -32,7 +33,8 @@ def dispatch_text(kinds: Iterable[str], textured: bool) -> str:
     ]
     for kind in lamps:
         lines += case_text(kind, len(present) == 1, [f"r = light_ray_sel(m, {_lamp(kind)}, r);"])
-    lines += _surfaces_text(surfaces, len(present) == 1, textured) if surfaces else []
+    if surfaces:
+        lines += _surfaces_text(surfaces, len(present) == 1, textured, two_sided)
     lines += [
         "    real share = 1.0f / max_r(l.pmf, (real)(1e-30f));",
         "    r.power = spectrum_scale(r.power, share);",
@@ -52,7 +54,9 @@ def _lamp(kind: str) -> str:
     return f"distant_emit(scene, {sample}, v)"
 
 
-def _surfaces_text(kinds: list[str], only: bool, textured: bool) -> list[str]:
+def _surfaces_text(
+    kinds: list[str], only: bool, textured: bool, two_sided: bool
+) -> list[str]:
     """A point of the shape, its emission there, and the ray from it."""
     lines = [
         "    SurfacePoint q = surface_point_nothing();",
@@ -62,10 +66,12 @@ def _surfaces_text(kinds: list[str], only: bool, textured: bool) -> list[str]:
         body = [f"SurfacePoint p = {kind}_point({row_text(kind)}, u);"]
         body += point_text(kind, "p.uv") if textured else []
         lines += case_text(kind, only, [*body, "q = surface_point_sel(m, p, q);"])
+    if two_sided:
+        lines.append(f"    q = surface_point_turned(q, l.way == {BOTH}, &v);")
     return [
         *lines,
         "    point.p = q.p;",
         "    Spectrum value = emission_load(scene, l.radiance, point, lambdas);",
-        "    LightRay s = surface_emit(q, l.along != 0, value, v);",
+        f"    LightRay s = surface_emit(q, l.way == {ALONG}, value, v);",
         "    r = light_ray_sel(l.shape >= 0, s, r);",
     ]

@@ -144,6 +144,11 @@ def emission_text(found: frozenset[str]) -> str:
     return value_text("emission_load", Param("emission", "", textured=True), found, "lamps")
 
 
+def factor_text(found: frozenset[str]) -> str:
+    """Return `factor_load(scene, at, point, lambdas)`, which reads five words of `lamps`."""
+    return value_text("factor_load", Param("reflectance", "", textured=True), found, "lamps")
+
+
 def mixture_text(found: frozenset[str]) -> str:
     """Return `mixture_weight(scene, at, point, lambdas)`, which reads two words of `mixtures`."""
     return value_text("mixture_weight", Param("real", "", textured=True), found, "mixtures")

@@ -10,14 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 from clpt import transforms
 from clpt.errors import SceneError
 from clpt.layout import Record
-from clpt.render import image_lights
+from clpt.render import image_lights, projected
 from clpt.render.texels import pixels
 from clpt.scene import lights
 from clpt.scene.lights import Light
 from clpt.scene.textures import Bitmap, Checkerboard
 
 INFINITE = ("constant", *image_lights.RECORDS)  # a ray that leaves the scene meets these
-PLACED = ("point", "spot")  # these stand somewhere; all other lamps are infinitely far away
+PLACED = ("point", "spot", *projected.RECORDS)  # all other lamps are infinitely far away
 
 _RADIANCE = ("integer", "first word of the emission parameter in `lamps`")
 RECORDS: dict[str, Record] = {
@@ -37,6 +37,7 @@ RECORDS: dict[str, Record] = {
         beam_width=("real", "half angle of full intensity [rad]"),
         radiance=_RADIANCE,
     ),
+    **projected.RECORDS,
     "directional": Record(
         "Directional",
         "Parallel light.",
@@ -54,6 +55,7 @@ class Sink(Protocol):
     def append(self, name: str, words: ArrayLike) -> int: ...
     def append_floats(self, name: str, values: ArrayLike) -> int: ...
     def emission_words(self, value: Any) -> NDArray[np.uint32]: ...
+    def factor_words(self, value: Any) -> NDArray[np.uint32]: ...
 
     def spectra_row(self, spectrum: Any) -> int: ...
     @property
@@ -78,14 +80,15 @@ def lower_lamp(lamp: Light, tables: Sink, scene_radius: float) -> tuple[str, int
     """
     if lamp.kind not in RECORDS:
         raise SceneError(f"a light of kind {lamp.kind!r} is a shape's `emission`", where="lights")
-    kind = lamp.kind
+    kind = projected.kind_of(lamp)
     if isinstance(lamp, (lights.Envmap, lights.CubeMap)):
         members, strength = image_lights.lower_image(lamp, tables)
         kind = "spectral_envmap" if "bands" in members else kind
         radiance = 0
     else:
         radiance = tables.append("lamps", tables.emission_words(_emitted(lamp)))
-        members = {**_members(lamp), "radiance": radiance}
+        own = projected.members(lamp, tables) if kind in projected.RECORDS else _members(lamp)
+        members = {**own, "radiance": radiance}
         strength = brightness(_emitted(lamp))
     words = np.zeros(1, RECORDS[kind].dtype)
     for name, value in members.items():
@@ -96,7 +99,10 @@ def lower_lamp(lamp: Light, tables: Sink, scene_radius: float) -> tuple[str, int
 
 def _emitted(lamp: Light) -> Any:
     """The value of a light's one emission parameter, whatever its name."""
-    names = {"point": "intensity", "spot": "intensity", "directional": "irradiance"}
+    names = {
+        "point": "intensity", "spot": "intensity", "goniometric": "intensity",
+        "directional": "irradiance", "projector": "irradiance",
+    }  # fmt: skip
     return getattr(lamp, names.get(lamp.kind, "radiance"))
 
 
@@ -148,6 +154,10 @@ def power(lamp: Light, strength: float, scene_radius: float) -> float:
     disk = np.pi * scene_radius**2
     if isinstance(lamp, lights.Point):
         return 4.0 * np.pi * strength
+    if isinstance(lamp, lights.Goniometric):
+        return 4.0 * np.pi * strength * brightness(lamp.image)
+    if isinstance(lamp, lights.Projector):
+        return projected.image_area(lamp) * strength * brightness(lamp.image)
     if isinstance(lamp, lights.Spot):
         edge = np.radians([min(lamp.beam_width, lamp.cutoff), lamp.cutoff])
         return 2.0 * np.pi * (1.0 - float(np.cos(edge).mean())) * strength

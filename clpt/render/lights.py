@@ -20,6 +20,8 @@ from clpt.scene.lights import DirectionalArea, Light
 from clpt.scene.shapes import Shape
 
 INFINITE_SHARE = 0.5  # of the choices, where there are other lights too
+FRONT, ALONG, BOTH = range(3)  # LightRow.way, see kernels/light/area.cl
+BASES = {"spectral_envmap": "envmap", "image_spot": "spot"}  # whose functions a kind uses
 KINDS = (*RECORDS, *shapes.RECORDS)  # LightRow.kind is a position in this tuple
 
 
@@ -43,7 +45,8 @@ class LightRows:
 
     rows: structured (n,) of LIGHT.dtype; infinite: how many of them, the first ones, are infinite;
     kinds: those that occur, for `dispatch_text`; first: per emitter, its first row; whole: per
-    emitter, whether that one row stands for all of it; visible: whether one is no delta light.
+    emitter, whether that one row stands for all of it; visible: whether one is no delta light;
+    two_sided: whether one shines from the back of its shape too.
     """
 
     rows: np.ndarray
@@ -52,6 +55,7 @@ class LightRows:
     first: tuple[int, ...]
     whole: tuple[bool, ...]
     visible: bool
+    two_sided: bool
 
 
 def light_rows(
@@ -80,7 +84,8 @@ def light_rows(
         kinds=kinds,
         first=tuple(int(i) for i in first),
         whole=tuple(_whole(emitter.shape) for emitter in emitters),
-        visible=infinite > 0 or bool(((rows["shape"] >= 0) & (rows["along"] == 0)).any()),
+        visible=infinite > 0 or bool(((rows["shape"] >= 0) & (rows["way"] != ALONG)).any()),
+        two_sided=bool((rows["way"] == BOTH).any()),
     )
 
 
@@ -105,14 +110,16 @@ def _lamp_block(lamp: Light, tables: Sink, scene_radius: float) -> tuple[np.ndar
 def _emitter_block(emitter: Emitter, tables: Sink) -> tuple[np.ndarray, np.ndarray]:
     """The rows of a shape that emits, and their power."""
     shape = emitter.shape
-    along = isinstance(shape.emission, DirectionalArea)
-    value = shape.emission.irradiance if along else shape.emission.radiance
+    emission = shape.emission
+    along = isinstance(emission, DirectionalArea)
+    way = ALONG if along else BOTH if emission.two_sided else FRONT
+    value = emission.irradiance if along else emission.radiance
     radiance = tables.append("lamps", tables.emission_words(value))
-    strength = (1.0 if along else np.pi) * brightness(value)
+    strength = {FRONT: np.pi, ALONG: 1.0, BOTH: 2.0 * np.pi}[way] * brightness(value)
     if _whole(shape):
         at = tables.append("geometry", shapes.row(shape))
         rows = _block(1, shape.kind, at, radiance, emitter.shape_row)
-        rows["along"] = along
+        rows["way"] = way
         return rows, np.array([strength * shapes.area(shape)])
     if emitter.vertices is None or emitter.faces is None:
         raise SceneError("its triangles are missing", where=shapes.where(shape))
@@ -120,7 +127,7 @@ def _emitter_block(emitter: Emitter, tables: Sink) -> tuple[np.ndarray, np.ndarr
     count, words = geometry.shape
     at = tables.append("geometry", geometry) + words * np.arange(count)
     rows = _block(count, "triangle", at, radiance, emitter.shape_row)
-    rows["along"] = along
+    rows["way"] = way
     return rows, strength * shapes.triangle_areas(emitter.vertices, emitter.faces)
 
 
@@ -164,21 +171,24 @@ def virtual_files() -> dict[str, str]:
         f"generated/light/{kind}.cl": f'{record.row_text()}#include "light/{kind}.cl"\n'
         for kind, record in RECORDS.items()
     }
-    own = made["generated/light/spectral_envmap.cl"]  # it knows directions by those of the other
-    return {
-        **made,
-        "generated/light/spectral_envmap.cl": f'#include "generated/light/envmap.cl"\n{own}',
-    }
+    for kind, base in BASES.items():
+        name = f"generated/light/{kind}.cl"
+        made[name] = f'#include "generated/light/{base}.cl"\n{made[name]}'
+    return made
 
 
-def dispatch_text(kinds: Iterable[str], textured: bool = False) -> str:
+def dispatch_text(
+    kinds: Iterable[str], textured: bool = False, two_sided: bool = False
+) -> str:
     """Return the functions over all lights, for the kinds in the scene (`LightRows.kinds`).
 
-    textured: some emission is a texture, so that triangles need the uv of their mesh. It includes
-    the files of `virtual_files`, here and in clpt.render.shapes.
+    textured: some emission is a texture, so that triangles need the uv of their mesh; two_sided:
+    some shape emits from its back too. It includes the files of `virtual_files`, here and in
+    clpt.render.shapes.
 
     light_sample(scene, p, pick, u, lambdas)      chooses a light and a direction to it
     light_pdf(scene, row, p, wi, t, n)            of it, [1/sr], for a ray that met a shape
+    light_shows(scene, row, front)                whether the side of a shape that was met emits
     infinite_light(scene, row, d, lambdas, ...)   radiance and pdf of one infinite light
     infinite_gather(scene, d, pdf, lambdas)       what they all add to a path that left the scene
     """
@@ -193,7 +203,8 @@ def dispatch_text(kinds: Iterable[str], textured: bool = False) -> str:
     parts = [f"#define LIGHT_ROW_WORDS {LIGHT.words}", f"#define SHAPE_ROW_WORDS {SHAPE.words}"]
     parts += [f"#define LIGHT_{kind.upper()} {KINDS.index(kind)}" for kind in present]
     parts += [f'#include "{name}"' for name in includes]
-    parts += _sample_text(lamps, surfaces, textured)
+    parts.append(_sides_text(two_sided))
+    parts += _sample_text(lamps, surfaces, textured, two_sided)
     parts += _pdf_text(surfaces)
     parts += _infinite_text([kind for kind in lamps if kind in INFINITE])
     return "\n".join(parts) + "\n"
@@ -227,7 +238,19 @@ def point_text(kind: str, uv: str) -> list[str]:
     ]
 
 
-def _sample_text(lamps: list[str], surfaces: list[str], textured: bool) -> list[str]:
+def _sides_text(two_sided: bool) -> str:
+    """Whether the side of a shape that a ray met emits; most scenes need not look at the row."""
+    if not two_sided:
+        return "#define light_shows(scene, row, front) (front)"
+    return (
+        "inline mask light_shows(Scene scene, integer row, mask front)\n{\n"
+        f"    return front | (light_at(scene, max_i(row, (integer)(0))).way == {BOTH});\n}}"
+    )
+
+
+def _sample_text(
+    lamps: list[str], surfaces: list[str], textured: bool, two_sided: bool
+) -> list[str]:
     only = len(lamps) + len(surfaces) == 1
     head = "LightSample light_sample(Scene scene, vec3 p, real pick, vec2 u, Wavelengths lambdas)"
     if not lamps and not surfaces:
@@ -251,6 +274,8 @@ def _sample_text(lamps: list[str], surfaces: list[str], textured: bool) -> list[
         body = [f"ShapeSample r = {kind}_sample({row_text(kind)}, p, u);"]
         body += point_text(kind, "r.uv") if textured else []
         lines += case_text(kind, only, [*body, "q = shape_sample_sel(m, r, q);"])
+    if two_sided:
+        lines.append(f"    q = area_turned(q, l.way == {BOTH});")
     if surfaces:
         lines += [
             "    point.p = madd3(q.wi, q.t, p);",

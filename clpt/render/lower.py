@@ -269,6 +269,7 @@ class _Lowering:
             infinite=self.lights.infinite > 0 and not self.channels,
             light_paths=self.light_paths,
             visible_lights=self.lights.visible,
+            two_sided_lights=self.lights.two_sided,
             many_lights=len(self.lights.rows) > FEW_LIGHTS,
             absorption=self.uses["absorption"] and not self.channels,
             dispersion=index_tables

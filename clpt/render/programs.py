@@ -114,7 +114,9 @@ def _shared(features: Features, layout: str) -> dict[str, str]:
         "generated/sampler.cl": f'#include "sampler/{features.sampler}.cl"\n',
         "generated/camera.cl": _camera_text(features.camera, features.glass_lens),
         "generated/connect.cl": _connect_text(features.camera),
-        "generated/emission.cl": emission.dispatch_text(features.lights, _textured(features)),
+        "generated/emission.cl": emission.dispatch_text(
+            features.lights, _textured(features), features.two_sided_lights
+        ),
         "generated/textures.cl": textures.dispatch_text(features.textures, features.texture_roles),
         "generated/lights.cl": _lights_text(features),
         "generated/mixture.cl": _mixture_text(features),
@@ -212,10 +214,12 @@ def _emissions(features: Features) -> frozenset[str]:
 def _lights_text(features: Features) -> str:
     """The loader of emissions, from wherever they come in this scene, and the lights' dispatch."""
     textured = _textured(features)
+    factors = features.sources.get("factor", {}).get("value", frozenset())
     return (
-        ('#include "generated/textures.cl"\n' if textured else "")
+        ('#include "generated/textures.cl"\n' if textured or "texture" in factors else "")
         + kinds.emission_text(_emissions(features))
-        + lights.dispatch_text(features.lights, textured)
+        + (kinds.factor_text(factors) if factors else "")
+        + lights.dispatch_text(features.lights, textured, features.two_sided_lights)
     )
 
 

@@ -228,3 +228,9 @@ class Tables:
         words, source = self.param_words(value, "emission")
         self.sources["emission"]["value"].add(source)
         return words
+
+    def factor_words(self, value: Any) -> Words:
+        """Return the five words that `factor_load` reads: a reflectance, perhaps a texture."""
+        words, source = self.param_words(value, "reflectance")
+        self.sources["factor"]["value"].add(source)
+        return words

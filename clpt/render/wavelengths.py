@@ -153,7 +153,7 @@ def emissions(scene: Scene) -> Iterator[Spectrum]:
         if source is None:
             continue
         declared = params(type(source))
-        if "image" in declared:
+        if "image" in declared and declared["image"].role == "host":
             yield _mean(source.image)
         for name, param in declared.items():
             if param.role == "emission":

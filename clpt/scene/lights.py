@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from clpt.scene.params import Kind, emission, host, real
+from clpt.errors import SceneError
+from clpt.scene.params import Kind, emission, flag, host, real, reflectance
 
 RADIANCE = "W m^-2 sr^-1 nm^-1"
 
@@ -19,9 +20,10 @@ class Light(Kind):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Area(Light):
-    """A surface that emits from its front side, evenly in all directions."""
+    """A surface that emits from its front side, or from both, evenly in all directions."""
 
     radiance: Any = emission(1.0, "emitted radiance", RADIANCE, textured=True)
+    two_sided: bool = flag(False, "True: its back emits too")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -53,6 +55,38 @@ class Spot(Light):
     intensity: Any = emission(1.0, "radiant intensity on the axis", "W sr^-1 nm^-1")
     cutoff: float = real(20.0, "half angle beyond which it is dark", "degrees", 0.0, 180.0)
     beam_width: float = real(15.0, "half angle of full intensity", "degrees", 0.0, 180.0)
+    image: Any = reflectance(
+        1.0, "what its light passes through; a texture fills the square around a cone below 90"
+    )
+
+    def check(self) -> None:
+        if getattr(self.image, "is_texture", False) and self.cutoff >= 90.0:
+            raise SceneError("an image needs a cutoff below 90 degrees", where="spot.cutoff")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Projector(Light):
+    """A point that throws an image along +z of `to_world`: a pinhole camera in reverse."""
+
+    image: Any = reflectance(1.0, "what it shows, upright along +y; a bitmap may go beyond 1")
+    irradiance: Any = emission(
+        1.0, "where the image is 1, in the middle, a metre away", "W m^-2 nm^-1"
+    )
+    fov: float = real(45.0, "angle that the image's width takes", "degrees", 1e-3, 179.0)
+    aspect: float = real(0.0, "width over height; 0: that of the image, 1 if it has none", low=0.0)
+    to_world: Any = host(np.eye(4), "placement, (4, 4), without a shear")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Goniometric(Light):
+    """A point whose intensity depends on the direction, as an image in latitude and longitude says.
+
+    Directions lie in the image as in that of an envmap.
+    """
+
+    intensity: Any = emission(1.0, "radiant intensity where the image is 1", "W sr^-1 nm^-1")
+    image: Any = reflectance(1.0, "factor by direction; a bitmap may go beyond 1")
+    to_world: Any = host(np.eye(4), "placement, (4, 4), without a shear")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -99,4 +133,6 @@ class CubeMap(Light):
 
 
 ON_SHAPES = (Area, DirectionalArea)
-KINDS = (*ON_SHAPES, Point, Spot, Directional, Constant, Envmap, CubeMap)
+KINDS = (
+    *ON_SHAPES, Point, Spot, Projector, Goniometric, Directional, Constant, Envmap, CubeMap,
+)  # fmt: skip

@@ -23,7 +23,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
         store_path_o(path, at, hidden, surface_offset(s, d));
         store_path_pdf(path, at, hidden, load_path_pdf(path, at) + load_hit_t(hit, at));
     }
-    mask lit = active & (s.light >= 0) & front & !hidden;
+    mask lit = active & (s.light >= 0) & light_shows(scene, s.light, front) & !hidden;
     if (any(lit)) {
         integer light = sel_i(lit, s.light, (integer)(0));
         real pdf = load_path_pdf(path, at), gone = path_gone(path, at);

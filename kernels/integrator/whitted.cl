@@ -16,7 +16,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     beta = spectrum_mul(beta, medium_transmittance(scene, medium, load_hit_t(hit, at), lambdas));
 #endif
 #if USES_SURFACE_LIGHTS
-    mask lit = active & (s.light >= 0) & front;
+    mask lit = active & (s.light >= 0) & light_shows(scene, s.light, front);
     if (any(lit)) {
         integer light = sel_i(lit, s.light, (integer)(0));
         Spectrum le = emission_load(scene, light_at(scene, light).radiance, surface_texture_point(s), lambdas);

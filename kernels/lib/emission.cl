@@ -65,6 +65,16 @@ inline SurfacePoint surface_point_sel(mask m, SurfacePoint a, SurfacePoint b)
     return a;
 }
 
+/* A point of a light that emits from both sides: it leaves one of them, as *v says, for the two. */
+inline SurfacePoint surface_point_turned(SurfacePoint q, mask both, vec2 *v)
+{
+    mask back = both & (v->x >= 0.5f);
+    q.n = sel3(back, neg3(q.n), q.n);
+    q.area *= sel(both, (real)(2.0f), (real)(1.0f));
+    v->x = sel(both, 2.0f * v->x - sel(back, (real)(1.0f), (real)(0.0f)), v->x);
+    return q;
+}
+
 /* From a surface: evenly in all directions of the front (a cosine density, so power = pi A L), or, where
  * `along`, along the normal only, the value being what flows through an area (power = A E). */
 inline LightRay surface_emit(SurfacePoint q, mask along, Spectrum value, vec2 v)

@@ -1,4 +1,11 @@
-/* Light from a shape: it leaves the front only, evenly in all directions. */
+/* Light from a shape: LightRow.way is 0 where it leaves the front, evenly in all directions, 1 where it
+ * leaves along the normal only (particle_tracer's), 2 where it leaves both sides. */
+inline ShapeSample area_turned(ShapeSample q, mask both)
+{
+    q.n = sel3(both & (dot3(q.n, q.wi) > 0.0f), neg3(q.n), q.n);
+    return q;
+}
+
 inline LightSample area_sample(ShapeSample q, Spectrum radiance)
 {
     mask front = dot3(q.n, q.wi) < 0.0f;

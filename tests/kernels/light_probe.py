@@ -11,7 +11,7 @@ import pyopencl as cl
 
 from clpt import device
 from clpt.records import SETTINGS, SHAPE
-from clpt.render import kinds, lights, programs, shapes
+from clpt.render import kinds, lights, programs, shapes, textures
 from clpt.render.tables import STEP, Tables
 from tests.kernels.harness import opened
 
@@ -40,15 +40,29 @@ class Lit:
         if not self.buffers:
             arrays = {**self.tables.arrays(), "settings": self._settings()}
             self.buffers = {name: self._buffer(values) for name, values in arrays.items()}
-        found = self.tables.sources["emission"]["value"] or {"constant"}
-        text = kinds.emission_text(frozenset(found)) + lights.dispatch_text(self.rows.kinds)
-        program = _program(self.tables.mode, text, body, given.shape[0], results, self.files, lanes)
+        program = _program(
+            self.tables.mode, self._text(), body, given.shape[0], results, self.files, lanes
+        )
         target = cl.Buffer(dev.context, flags.WRITE_ONLY, out.nbytes)
         there = {"in": self._buffer(data), "out": target, "n": padded, **self.buffers}
         kernel = program.kernel("probe")
         kernel.bind(**there).enqueue(dev.queue, (padded // lanes,), (1,))
         cl.enqueue_copy(dev.queue, out, target)
         return out[:, :n]
+
+    def _text(self) -> str:
+        """The lights' functions, with the look-ups of textures where there are any."""
+        tables, sources = self.tables, self.tables.sources
+        found = frozenset(sources["emission"]["value"] or {"constant"})
+        text = ""
+        if tables.texture_roles:
+            used = {kind for kind, _ in tables.texture_roles}
+            text += textures.dispatch_text(used, tables.texture_roles)
+        text += kinds.emission_text(found)
+        if sources["factor"]["value"]:
+            text += kinds.factor_text(frozenset(sources["factor"]["value"]))
+        rows = self.rows
+        return text + lights.dispatch_text(rows.kinds, "texture" in found, rows.two_sided)
 
     def _settings(self) -> np.ndarray:
         settings = np.zeros(1, SETTINGS.dtype)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy.stats import chi2
@@ -10,14 +12,27 @@ from clpt import transforms as T
 from clpt.errors import SceneError
 from clpt.render import image_lights, lights, shapes
 from clpt.render.image_lights import face_coordinates, face_directions
-from clpt.scene.lights import Area, Constant, CubeMap, Directional, Envmap, Point, Spot
+from clpt.scene.lights import (
+    Area,
+    Constant,
+    CubeMap,
+    Directional,
+    Envmap,
+    Goniometric,
+    Point,
+    Projector,
+    Spot,
+)
 from clpt.scene.shapes import Cube, Cylinder, Disk, Mesh, Rectangle, Sphere
-from clpt.scene.textures import Checkerboard
+from clpt.scene.textures import Bitmap, Checkerboard
+from clpt.spectra import Constant as Even
 from clpt.spectra import RGBIlluminant
 from tests.kernels.light_probe import LAMBDAS, lit
 
 SIGMAS = 4.5  # of the Monte Carlo estimates: a chance of 7e-6 each
 TURNED = T.rotate([1, 2, 3], 50.0)
+ABOVE = T.look_at([0.2, 0.4, 1.5], [0.1, 0, 0], [0, 1, 0])
+PICTURE = Bitmap(image=np.random.default_rng(4).random((3, 4, 3)))
 NAMES = {"rgb": "xyz", "spectral": "xyzw"}
 
 SAMPLE = """
@@ -147,13 +162,16 @@ def test_lamps_follow_their_formulas():
 
 
 def test_all_lights_together_are_their_sum():
-    """The choice among twelve kinds of rows: every pmf counts once."""
+    """The choice among fifteen kinds of rows: every pmf counts once."""
     p, n = np.zeros(3), TILTED
     lamps = [
         Point(position=(1.0, 2.0, 3.0), intensity=(3.0, 1.0, 2.0)),
         Spot(to_world=T.look_at([0, 1, 3], [0, 0, 0], [0, 1, 0]), intensity=(1.0, 5.0, 2.0)),
         Constant(radiance=(0.3, 0.2, 0.1)),
         Directional(direction=(0.1, 0.2, -1.0), irradiance=(0.5, 0.4, 1.0)),
+        Spot(to_world=ABOVE, intensity=(2.0, 1.0, 3.0), cutoff=40.0, image=PICTURE),
+        Projector(to_world=ABOVE, image=PICTURE, irradiance=3.0),
+        Goniometric(to_world=ABOVE, image=PICTURE, intensity=(1.0, 2.0, 3.0)),
         Envmap(image=np.random.default_rng(1).random((5, 6, 3)), to_world=TURNED, scale=0.3),
         CubeMap(image=np.random.default_rng(2).random((6, 4, 4, 3)), scale=0.2),
     ]
@@ -169,6 +187,45 @@ def test_all_lights_together_are_their_sum():
     spread = np.sqrt(error**2 + np.sum([e**2 for _, e in parts], axis=0))
     assert (np.abs(mean - expected) < SIGMAS * spread + 1e-4 * expected).all()
     assert (spread < 0.02 * expected).all()
+
+
+def test_a_goniometric_light_follows_its_image():
+    """Against a bilinear look-up in float64; an image above 1 keeps its values."""
+    image = np.random.default_rng(8).random((4, 6, 3)).astype(np.float32) * 5.0
+    place = T.translate([0.5, -0.2, 0.3]) @ TURNED
+    scene = lit([Goniometric(to_world=place, image=Bitmap(image=image), intensity=(1.0, 2.0, 3.0))])
+    d = directions(400, 3)
+    p = place[:3, 3:] + 2.0 * d
+    found = scene(SAMPLE, np.vstack([p, np.zeros((3, 400))]), 8)
+    x, y, z = TURNED[:3, :3].T @ d
+    column = (np.arctan2(x, -z) / (2.0 * np.pi) % 1.0) * 6 - 0.5
+    row = np.clip(np.arccos(y) / np.pi * 4 - 0.5, 0.0, 3.0)
+    i, j = np.floor(column).astype(int), np.minimum(np.floor(row).astype(int), 2)
+    a, b = (column - i)[:, None], (row - j)[:, None]
+    rows = [image[j + k, i % 6] * (1 - a) + image[j + k, (i + 1) % 6] * a for k in (0, 1)]
+    expected = (rows[0] * (1 - b) + rows[1] * b) * [1.0, 2.0, 3.0] / 4.0
+    inside = (row > 0.01) & (row < 2.99)  # beyond, a bitmap goes on with its other end
+    np.testing.assert_allclose(found[5:, inside].T, expected[inside], rtol=2e-3, atol=1e-4)
+    assert (found[4] == -1.0).all() and np.allclose(found[3], 2.0, atol=1e-5)
+
+
+def test_two_sided_emission():
+    """Above a plate and below it there is the same light; a tube is lit inside."""
+    plate = T.scale([0.5, 0.8, 1.0])
+    for cls, more in ((Rectangle, {}), (Disk, {}), (Cylinder, {"radius": 0.7})):
+        emission = Area(radiance=(1.0, 2.0, 3.0), two_sided=True)
+        one = cls(to_world=np.eye(4) if more else plate, emission=emission, **more)
+        scene = lit(emitters=[one])
+        assert scene.rows.two_sided
+        front = dataclasses.replace(one, emission=Area(radiance=(1.0, 2.0, 3.0)))
+        back = dataclasses.replace(front, flip_normals=True)
+        for p in ((0.1, 0.2, 1.2), (0.1, 0.2, -0.2)):
+            n = np.array([0.3, 0.2, -1.0 if p[2] > 0.0 else 1.0]) / np.sqrt(1.13)
+            both, error = irradiance(scene, p, n)
+            parts = [irradiance(lit(emitters=[s]), p, n, seed=5) for s in (front, back)]
+            spread = np.sqrt(error**2 + sum(e**2 for _, e in parts))
+            assert (np.abs(both - parts[0][0] - parts[1][0]) < SIGMAS * spread + 1e-6).all()
+            assert both[0] > 0.0
 
 
 # ---- pdf
@@ -297,6 +354,45 @@ def test_spot_is_mitsuba_s():
         np.testing.assert_allclose(ours[5:, i], np.array(weight).ravel(), rtol=1e-3, atol=1e-6)
         np.testing.assert_allclose(ours[:3, i], np.array(sample.d).ravel(), atol=1e-5)
     assert 50 < (ours[5] > 0.0).sum() < 290
+
+
+@pytest.mark.peers
+@pytest.mark.parametrize(
+    ("kind", "mode"), [("projector", "rgb"), ("projector", "spectral"), ("spot", "rgb")]
+)
+def test_lights_that_throw_an_image_are_mitsuba_s(kind, mode):
+    mi = pytest.importorskip("mitsuba")
+    mi.set_variant(f"scalar_{mode}")
+    image = 0.1 + 0.9 * np.random.default_rng(7).random((3, 5, 3)).astype(np.float32)
+    if mode == "spectral":  # as above
+        image = np.repeat(image[..., :1], 3, axis=2)
+    place = T.look_at([1, 2, 3], [0.1, 0.2, 0], [0, 1, 0])
+    picture = {"type": "bitmap", "bitmap": mi.Bitmap(image), "raw": mode == "rgb"}
+    if kind == "projector":
+        given = {"fov": 40.0, "scale": 2.0, "irradiance": picture}
+        # In spectral mode Mitsuba does not take an image as a multiple of D65.
+        value = Even(2.0 * np.pi) if mode == "spectral" else [2.0 * np.pi] * 3
+        ours = Projector(to_world=place, image=Bitmap(image=image), irradiance=value, fov=40.0)
+    else:
+        upright = Bitmap(image=image[::-1])
+        given = {"cutoff_angle": 25.0, "beam_width": 12.0, "texture": picture}
+        even = {"intensity": (1.0, 1.0, 1.0), "image": upright}
+        ours = Spot(to_world=place, cutoff=25.0, beam_width=12.0, **even)
+    theirs = mi.load_dict({"type": kind, "to_world": mi.ScalarTransform4f(place), **given})
+    p = np.random.default_rng(4).normal(size=(3, 300)) * [[1.2], [1.2], [0.1]]
+    found = lit([ours], mode=mode)(SAMPLE, np.vstack([p, np.zeros((3, 300))]), 8)
+    lit_points = 0
+    for i in range(300):
+        it = mi.SurfaceInteraction3f()
+        it.p = p[:, i].tolist()
+        if mode == "spectral":
+            it.wavelengths = list(LAMBDAS)
+        sample, weight = theirs.sample_direction(it, [0.5, 0.5])
+        expected = np.array(weight).ravel()[:3] * (sample.pdf > 0.0)
+        shone = found[5:, i] * (found[4, i] != 0.0)
+        np.testing.assert_allclose(shone, expected, rtol=3e-3, atol=1e-5)
+        lit_points += expected[0] > 0.0
+    assert 40 < lit_points < 290
 
 
 def sky_colour(d: np.ndarray) -> np.ndarray:

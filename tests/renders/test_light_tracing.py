@@ -30,11 +30,14 @@ from clpt.scene.lights import (
     Directional,
     DirectionalArea,
     Envmap,
+    Goniometric,
     Light,
     Point,
+    Projector,
     Spot,
 )
 from clpt.scene.shapes import Cube, Cylinder, Disk, Mesh, Rectangle, Shape, Sphere
+from clpt.scene.textures import Bitmap
 from clpt.spectra import Tabulated, glass
 from tests.renders.support import assert_agree, assert_mean, blocks, exposures, with_film
 
@@ -140,6 +143,23 @@ def test_spectral_and_several_lights_at_once() -> None:
     scene = still_life("spectral", LIGHTS)
     some = dataclasses.replace(scene, shapes=scene.shapes[:5], lights=scene.lights[1:4:2])
     both(some, 16, "spectral")
+
+
+def test_lights_that_throw_images_and_shine_from_both_sides() -> None:
+    """All in one scene, from where no one of them lights up what the others do not reach."""
+    rng = np.random.default_rng(3)
+    picture = Bitmap(image=rng.random((3, 5, 3)).astype(np.float32) ** 2)
+    plate = tf.translate([-0.7, 0.9, 0.5]) @ tf.rotate([0, 1, 0], 70) @ tf.scale(0.25)
+    scene = still_life("rgb", {})
+    shines = Area(radiance=(5.0, 4.0, 3.0), two_sided=True)
+    shapes = [*scene.shapes[:4], Rectangle(to_world=plate, material=BLACK, emission=shines)]
+    at = [tf.look_at([x, 1.8, 1.0], [x / 2, 0, 0], UP) for x in (-0.5, 0.1, 0.6)]
+    thrown: list[Light] = [
+        Projector(to_world=at[0], image=picture, irradiance=(4.0, 4.0, 4.0), fov=50.0),
+        Spot(to_world=at[1], image=picture, intensity=(9.0, 9.0, 5.0), cutoff=30.0),
+        Goniometric(to_world=at[2], image=picture, intensity=(2.0, 2.0, 3.0)),
+    ]
+    both(dataclasses.replace(scene, shapes=shapes, lights=thrown), 16, "thrown")
 
 
 @pytest.mark.parametrize("depth", [1, 2, 3])

@@ -73,13 +73,14 @@ class _Writer:
         defaults = {field.name: default(field) for field in dataclasses.fields(plain)}
         for name, param in declared.items():
             written = self.parameter(name, getattr(thing, name), param)
-            implied = None if name == "image" else self.parameter(name, defaults[name], param)
+            file = name == "image" and param.role == "host"
+            implied = None if file else self.parameter(name, defaults[name], param)
             if name == "material" or written != implied:
                 given[name] = written
         return given
 
     def parameter(self, name: str, value: Any, param: Param) -> Any:
-        if name == "image":
+        if name == "image" and param.role == "host":
             six = isinstance(value, (list, tuple))
             return [self.image(face) for face in value] if six else self.image(value)
         if name == "sensor":

@@ -1,0 +1,7 @@
+/* A spot with an image sends its rays as one without; their power follows the image too. */
+LightRay image_spot_emit(ImageSpot l, Scene scene, vec2 u, vec2 v, Wavelengths lambdas)
+{
+    LightRay r = spot_emit(image_spot_bare(l), scene, u, v, lambdas);
+    r.power = spectrum_mul(r.power, image_spot_factor(l, scene, r.d, lambdas));
+    return r;
+}

@@ -1,0 +1,13 @@
+/* A projector sends its rays through the image that stands a metre before it, evenly over the area. */
+LightRay projector_emit(Projector l, Scene scene, vec2 u, vec2 v, Wavelengths lambdas)
+{
+    real x2 = dot3(l.x, l.x), y2 = dot3(l.y, l.y);
+    vec3 across = scale3(l.x, (1.0f - 2.0f * v.x) / x2), up = scale3(l.y, (2.0f * v.y - 1.0f) / y2);
+    LightRay r = light_ray_nothing();
+    r.o = l.position;
+    r.d = normalize3(add3(l.z, add3(across, up)));
+    r.n = r.d;
+    real area = 4.0f / sqrt(x2 * y2); /* [m^2] */
+    r.power = spectrum_scale(projector_irradiance(l, scene, v, lambdas), area);
+    return r;
+}
