@@ -54,9 +54,7 @@ def _lamp(kind: str) -> str:
     return f"distant_emit(scene, {sample}, v)"
 
 
-def _surfaces_text(
-    kinds: list[str], only: bool, textured: bool, two_sided: bool
-) -> list[str]:
+def _surfaces_text(kinds: list[str], only: bool, textured: bool, two_sided: bool) -> list[str]:
     """A point of the shape, its emission there, and the ray from it."""
     lines = [
         "    SurfacePoint q = surface_point_nothing();",

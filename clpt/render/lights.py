@@ -177,9 +177,7 @@ def virtual_files() -> dict[str, str]:
     return made
 
 
-def dispatch_text(
-    kinds: Iterable[str], textured: bool = False, two_sided: bool = False
-) -> str:
+def dispatch_text(kinds: Iterable[str], textured: bool = False, two_sided: bool = False) -> str:
     """Return the functions over all lights, for the kinds in the scene (`LightRows.kinds`).
 
     textured: some emission is a texture, so that triangles need the uv of their mesh; two_sided:

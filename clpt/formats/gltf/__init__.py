@@ -7,7 +7,17 @@ from typing import Any
 
 from clpt.errors import SceneError
 from clpt.formats import studio
-from clpt.formats.gltf import animation, cameras, draco, lights, materials, meshes, meshopt, nodes
+from clpt.formats.gltf import (
+    animation,
+    cameras,
+    checks,
+    draco,
+    lights,
+    materials,
+    meshes,
+    meshopt,
+    nodes,
+)  # fmt: skip
 from clpt.formats.gltf.document import Document
 from clpt.formats.mesh import MeshFile
 from clpt.scene import Scene
@@ -61,6 +71,7 @@ def read_mesh(path: Path) -> MeshFile:
 def _open(path: Path, variables: dict[str, Any]) -> tuple[Document, nodes.Graph]:
     document = Document(path)
     _check_extensions(document)
+    checks.check(document)
     unknown = sorted(set(variables) - set(VARIABLES))
     if unknown:
         known = ", ".join(VARIABLES)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -57,20 +58,30 @@ def width(accessor: Element, types: tuple[str, ...]) -> int:
 
 def stored(accessor: Element, types: tuple[str, ...]) -> NDArray[Any]:
     """Return an accessor's values (n, width) as they are stored, sparse ones put in."""
-    columns = width(accessor, types)
-    number = accessor.integer("componentType")
-    if number not in COMPONENTS:
-        raise accessor.error(f"{number} is no component type", "componentType")
-    dtype = COMPONENTS[number]
-    count = accessor.integer("count", low=1)
+    width(accessor, types)
+    form = _form(accessor)
     sparse = accessor.child("sparse")
-    if "bufferView" in accessor:
-        values = _viewed(accessor, dtype, count, columns)
-    elif count * columns * dtype.itemsize > LARGEST:
-        raise accessor.error(f"{count} elements without data are too many", "count")
+    if form.stride:
+        data, _ = view(accessor)
+        values = form.read(data)
+    elif form.count * form.size > LARGEST:
+        raise accessor.error(f"{form.count} elements without data are too many", "count")
     else:
-        values = np.zeros((count, columns), dtype)  # type: ignore[call-overload]
+        values = np.zeros((form.count, form.columns), form.dtype)
     return values if sparse is None else _with_sparse(accessor, sparse, values)
+
+
+def check(accessor: Element) -> None:
+    """Raise SceneError for an accessor that reaches out of its buffer view, or is none."""
+    form = _form(accessor)
+    sparse = accessor.child("sparse")
+    if sparse is not None:
+        count = sparse.integer("count", low=1, high=form.count)
+        for key, size in (("indices", 1), ("values", form.size)):
+            part = sparse.needed(key)
+            length = _length(part.index("bufferView", "bufferViews"), part)
+            if part.integer("byteOffset", 0) + count * size > length:
+                raise part.error(f"{count} elements lie outside of {length} bytes")
 
 
 def view(element: Element, key: str = "bufferView") -> tuple[Any, Element]:
@@ -94,7 +105,9 @@ def _floats(accessor: Element, types: tuple[str, ...]) -> NDArray[np.float32]:
 def _view(place: Element) -> memoryview:
     compressed = meshopt.extension(place)
     if compressed is not None:
-        return memoryview(meshopt.decode(compressed, _slice(compressed)))
+        return memoryview(
+            meshopt.decode(compressed, _slice(compressed), place.integer("byteLength"))
+        )
     return _slice(place)
 
 
@@ -109,42 +122,61 @@ def _slice(place: Element) -> memoryview:
     return memoryview(buffer)[offset : offset + length]
 
 
-def _viewed(accessor: Element, dtype: np.dtype[Any], count: int, columns: int) -> NDArray[Any]:
-    data, place = view(accessor)
-    offset = accessor.integer("byteOffset", 0)
-    rows, gap = _layout(accessor.text("type"), dtype)
-    size = dtype.itemsize * columns if not gap else rows * (rows * dtype.itemsize + gap)
+def _length(view: int, owner: Element) -> int:
+    """The declared length of a buffer view."""
+    place = owner.document.entry("bufferViews", view)
+    return place.integer("byteLength", low=1)
+
+
+@dataclass(frozen=True)
+class _Form:
+    """How an accessor's elements lie in its view; `gap` follows the columns of small matrices."""
+
+    dtype: np.dtype[Any]
+    count: int
+    columns: int
+    rows: int
+    gap: int
+    offset: int
+    stride: int  # 0: it has no view
+
+    @property
+    def size(self) -> int:
+        """Bytes of an element."""
+        return (self.columns * self.dtype.itemsize // self.rows + self.gap) * self.rows
+
+    def read(self, data: memoryview) -> NDArray[Any]:
+        """Return the elements (count, columns) that lie in a view's bytes."""
+        inner, size = self.columns // self.rows, self.dtype.itemsize
+        strides = (self.stride, inner * size + self.gap, size)
+        made: NDArray[Any] = np.ndarray(
+            (self.count, self.rows, inner), self.dtype, data, self.offset, strides
+        )
+        return made.reshape(self.count, self.columns)
+
+
+def _form(accessor: Element) -> _Form:
+    type_ = accessor.text("type", choices=WIDTHS)
+    number = accessor.integer("componentType")
+    if number not in COMPONENTS:
+        raise accessor.error(f"{number} is no component type", "componentType")
+    dtype, columns = COMPONENTS[number], WIDTHS[type_]
+    count, offset = accessor.integer("count", low=1), accessor.integer("byteOffset", 0)
+    rows = int(type_[3:]) if type_.startswith("MAT") else 1
+    gap = -(rows * dtype.itemsize) % 4 if rows > 1 else 0
+    made = _Form(dtype, count, columns, rows, gap, offset, 0)
+    place = accessor.entry("bufferView", "bufferViews")
+    if place is None:
+        return made
     compressed = meshopt.extension(place)
-    stride = (compressed or place).integer("byteStride", size)
-    if stride < size:
-        raise place.error(f"{stride} bytes hold no element of {size}", "byteStride")
-    last = size - gap  # what the last element needs
-    if offset + (count - 1) * stride + last > len(data):
-        message = f"{count} elements of {stride} bytes from {offset} lie outside of {len(data)}"
+    stride = (compressed or place).integer("byteStride", made.size)
+    if stride < made.size:
+        raise place.error(f"{stride} bytes hold no element of {made.size}", "byteStride")
+    length = place.integer("byteLength", low=1)
+    if offset + (count - 1) * stride + made.size - gap > length:
+        message = f"{count} elements of {stride} bytes from {offset} lie outside of {length}"
         raise accessor.error(message, "count")
-    if gap:
-        strides = (stride, rows * dtype.itemsize + gap, dtype.itemsize)
-        shape = (count, rows, rows)
-        return _strided(data, dtype, offset, shape, strides).reshape(count, columns)
-    return _strided(data, dtype, offset, (count, columns), (stride, dtype.itemsize))
-
-
-def _strided(
-    data: memoryview,
-    dtype: np.dtype[Any],
-    offset: int,
-    shape: tuple[int, ...],
-    strides: tuple[int, ...],
-) -> NDArray[Any]:
-    return np.ndarray(shape, dtype, data, offset, strides)
-
-
-def _layout(type_: str, dtype: np.dtype[Any]) -> tuple[int, int]:
-    """Rows of a matrix, and the bytes by which its columns are padded to multiples of four."""
-    if not type_.startswith("MAT"):
-        return 1, 0
-    rows = int(type_[3:])
-    return rows, -(rows * dtype.itemsize) % 4
+    return replace(made, stride=stride)
 
 
 def _with_sparse(accessor: Element, sparse: Element, values: NDArray[Any]) -> NDArray[Any]:
@@ -165,8 +197,7 @@ def _with_sparse(accessor: Element, sparse: Element, values: NDArray[Any]) -> ND
 def _part(element: Element, dtype: np.dtype[Any], count: int, columns: int) -> NDArray[Any]:
     """The packed indices or values of a sparse accessor."""
     data, _ = view(element)
-    offset = element.integer("byteOffset", 0)
-    if offset + count * columns * dtype.itemsize > len(data):
+    offset, size = element.integer("byteOffset", 0), columns * dtype.itemsize
+    if offset + count * size > len(data):
         raise element.error(f"{count} elements from {offset} lie outside of {len(data)} bytes")
-    size = dtype.itemsize
-    return _strided(data, dtype, offset, (count, columns), (columns * size, size))
+    return _Form(dtype, count, columns, 1, 0, offset, size).read(data)

@@ -10,7 +10,7 @@ import math
 
 from clpt.formats.gltf.cameras import TURNED, rigid
 from clpt.formats.gltf.document import Element
-from clpt.formats.gltf.nodes import Graph
+from clpt.formats.gltf.nodes import Graph, Matrix
 from clpt.scene.lights import Directional, Light, Point, Spot
 from clpt.spectra import RGBIlluminant
 
@@ -29,16 +29,16 @@ def placed(graph: Graph) -> list[Light]:
         number = own.integer("light")
         if number >= len(lights):
             raise own.error(f"there is no light {number}; the file has {len(lights)}", "light")
-        found.append(_light(lights[number], graph, index))
+        found.append(light(lights[number], graph.to_world[index]))
     return found
 
 
-def _light(element: Element, graph: Graph, node: int) -> Light:
+def light(element: Element, to_world: Matrix) -> Light:
+    """Return one light, placed by its node."""
     colour = element.numbers("color", 3, (1.0, 1.0, 1.0), low=0.0)
     strength = element.number("intensity", 1.0, low=0.0)
     emitted = RGBIlluminant(*(strength * value for value in colour))
     kind = element.text("type", choices=("directional", "point", "spot"))
-    to_world = graph.to_world[node]
     if kind == "point":
         return Point(position=tuple(to_world[:3, 3]), intensity=emitted)
     to_world = rigid(element, to_world) @ TURNED

@@ -29,12 +29,14 @@ def extension(view: Element) -> Element | None:
     return next((e for e in map(view.extension, EXTENSIONS) if e is not None), None)
 
 
-def decode(element: Element, data: memoryview) -> bytes:
-    """Return the bytes of a compressed buffer view.
+def decode(element: Element, data: memoryview, length: int) -> bytes:
+    """Return the `length` bytes of a compressed buffer view.
 
     Raises SceneError for a stream that is cut short or that the extension does not allow.
     """
     count, stride = element.integer("count", low=1), element.integer("byteStride", low=1, high=256)
+    if count * stride != length:
+        raise element.error(f"{count} elements of {stride} bytes are not the view's {length}")
     mode = element.text("mode", choices=("ATTRIBUTES", "TRIANGLES", "INDICES"))
     chosen = element.text("filter", "NONE", meshopt_filters.FILTERS)
     stream = np.frombuffer(data, np.uint8)

@@ -50,6 +50,8 @@ def graph(document: Document, chosen: str | None, pose: Pose) -> Graph:
                 raise nodes[i].error("its transform is too large")
     scene = _scene(document, chosen)
     starts = roots if scene is None else scene.indices("nodes", "nodes")
+    if scene is not None and any(parents[start] >= 0 for start in starts):
+        raise scene.error("names a node that is another's child", "nodes")
     if scene is not None and len(set(starts)) < len(starts):
         raise scene.error("names a node twice", "nodes")
     return Graph(document, placed, _descendants(starts, children), pose)

@@ -68,7 +68,10 @@ CHANGES = {
     "accessors[0].componentType": (5124, "is no component type"),
     "accessors[0].type": ("VEC2", "is none of VEC3"),
     "accessors[0].byteOffset": (4, "lie outside"),
-    "bufferViews[0].byteLength": (4294967295, "lie outside of the buffer's 36"),
+    "bufferViews[0].byteLength": (
+        4294967295,
+        "bufferViews.0.: ends at byte 4294967295, its buffer has 36",
+    ),
     "bufferViews[0].byteStride": (4, "hold no element of 12"),
     "meshes[0].primitives[0].mode": (7, "outside 0 to 6"),
     "extensionsRequired": (["EXT_unheard_of"], r"extensionsRequired\[0\]: needs .*EXT_unheard_of"),
@@ -164,7 +167,7 @@ def test_the_validators_corpus(assets):
             verdicts["noticed"] += 1
         else:
             verdicts["passed" if codes else "good"] += 1
-    assert verdicts["good"] == 64 and verdicts["noticed"] >= 27
+    assert verdicts["good"] == 64 and verdicts["noticed"] >= 60
 
 
 def test_malformed_files(assets):
@@ -175,4 +178,4 @@ def test_malformed_files(assets):
         except SceneError as error:
             assert file.name in str(error) and "\n" not in str(error)
             refused.add(file.name)
-    assert len(refused) == 11 and "RecursiveNodes.gltf" in refused
+    assert len(refused) >= 11 and "RecursiveNodes.gltf" in refused

@@ -95,6 +95,8 @@ def test_broken_streams_are_refused(decode):
         with pytest.raises(SceneError, match=r"bufferViews\[1\].*cannot be decompressed"):
             decode(stream, 20)
     with pytest.raises(SceneError, match="cut short"):  # more than the stream could hold
+        decode(whole, 1 << 16)
+    with pytest.raises(SceneError, match="its buffer has 1048576"):
         decode(whole, 1 << 40)
 
 
