@@ -11,6 +11,7 @@ from clpt.spectra import RGB, RGBIlluminant, RGBUnbounded
 COLOURS: dict[str, type[Any]] = {
     "reflectance": RGB,
     "index": RGBUnbounded,
+    "factor": RGBUnbounded,
     "coefficient": RGBUnbounded,
     "emission": RGBIlluminant,
 }

@@ -75,6 +75,7 @@ an object. What a colour means depends on the parameter's role:
 | reflectance | the smoothest reflectance of that colour (Jakob and Hanika 2019) | - |
 | emission | D65 times such a spectrum | an illuminant |
 | index | a smooth unbounded spectrum | a glass or liquid |
+| factor | a smooth unbounded spectrum | - |
 | coefficient | a smooth unbounded spectrum | - |
 """
 
@@ -86,6 +87,7 @@ ROLES = {
     "reflectance": "reflectance",
     "emission": "emission",
     "index": "index",
+    "factor": "factor",
     "coefficient": "coefficient",
     "real": "number",
     "flag": "true or false",
@@ -175,7 +177,7 @@ def _table(cls: type[Kind]) -> str:
 
 def _accepts(name: str, param: Param, value: Any) -> str:
     if param.role == "choice":
-        return ", ".join(f"`{choice}`" for choice in param.choices)
+        return ", ".join([f"`{c}`" for c in param.choices] + ["none"] * param.optional)
     if param.role == "host":
         return _host(name, value)
     limits = _limits(param) if param.role == "real" else ""

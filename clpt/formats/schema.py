@@ -121,7 +121,7 @@ def _value(name: str, param: Param, value: Any) -> Schema:
     if param.role == "flag":
         return {"type": "boolean"}
     if param.role == "choice":
-        return {"enum": list(param.choices)}
+        return {"enum": [*param.choices, *((None,) if param.optional else ())]}
     if param.role in SPECTRUM_ROLES:
         made = _ref(f"spectrum_{param.role}")
         return {"anyOf": [made, _ref("texture")]} if param.textured else made
@@ -186,7 +186,7 @@ def _names(value: tuple[Any, ...]) -> bool:
 
 
 def _spectrum(role: str) -> Schema:
-    number = {"type": "number", "minimum": 0}
+    number: Schema = {"type": "number"} if role == "factor" else {"type": "number", "minimum": 0}
     one_of = [number, {**TRIPLE, "description": "linear Rec. 709"}, _ref("spectrum")]
     if role == "reflectance":
         number["maximum"] = 1

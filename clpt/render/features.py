@@ -26,6 +26,7 @@ class Features:
     lights: tuple[str, ...] = ()
     textures: tuple[str, ...] = ()
     texture_roles: tuple[tuple[str, str], ...] = ()
+    texture_depth: int = 0  # how many values their programs stack
     analytic: tuple[str, ...] = ()
     normals: bool = False
     uvs: bool = False

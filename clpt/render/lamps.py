@@ -14,7 +14,7 @@ from clpt.render import image_lights, projected
 from clpt.render.texels import pixels
 from clpt.scene import lights
 from clpt.scene.lights import Light
-from clpt.scene.textures import Bitmap, Checkerboard
+from clpt.scene.textures import Bitmap, Checkerboard, Mix, Product
 
 INFINITE = ("constant", *image_lights.RECORDS)  # a ray that leaves the scene meets these
 PLACED = ("point", "spot", *projected.RECORDS)  # all other lamps are infinitely far away
@@ -172,4 +172,9 @@ def brightness(value: Any) -> float:
         return float(np.maximum(pixels(value, "emission"), 0.0).mean(dtype=np.float64))
     if isinstance(value, Checkerboard):
         return 0.5 * (brightness(value.color0) + brightness(value.color1))
+    if isinstance(value, Product):
+        return brightness(value.first) * brightness(value.second)
+    if isinstance(value, Mix):
+        share = value.amount if isinstance(value.amount, float) else brightness(value.amount)
+        return (1.0 - share) * brightness(value.first) + share * brightness(value.second)
     return float(np.mean(value.to_rgb("emission")))

@@ -260,6 +260,7 @@ class _Lowering:
             lights=self.lights.kinds,
             textures=tuple(sorted({kind for kind, _ in tables.texture_roles})),
             texture_roles=tuple(sorted(tables.texture_roles)),
+            texture_depth=tables.texture_depth,
             analytic=tuple(k for k in shapes.ANALYTIC if any(s.kind == k for s in analytic)),
             normals=self.uses["normals"],
             uvs=self.uses["uvs"] or self.uses["tangents"] or "uv" in self.channels,

@@ -117,7 +117,9 @@ def _shared(features: Features, layout: str) -> dict[str, str]:
         "generated/emission.cl": emission.dispatch_text(
             features.lights, _textured(features), features.two_sided_lights
         ),
-        "generated/textures.cl": textures.dispatch_text(features.textures, features.texture_roles),
+        "generated/textures.cl": textures.dispatch_text(
+            features.textures, features.texture_roles, features.texture_depth
+        ),
         "generated/lights.cl": _lights_text(features),
         "generated/mixture.cl": _mixture_text(features),
         "generated/open.cl": f'#include "lib/open{"_through" * features.passes}.cl"\n',

@@ -34,6 +34,7 @@ RGB_ROLES: dict[str, Role] = {
     "reflectance": "reflectance",
     "emission": "emission",
     "index": "unbounded",
+    "factor": "unbounded",
     "coefficient": "unbounded",
 }
 Words = NDArray[np.uint32]
@@ -66,7 +67,9 @@ class Tables:
         self.expected: NDArray[np.float64] | None = None  # light, see clpt.render.reradiation
         self.textures: dict[tuple[int, str], int] = {}
         self.texture_roles: set[tuple[str, str]] = set()  # (kind, role) that occur
-        self._kept: list[Any] = []  # what `textures` and `_rows` know by identity stays alive
+        self.texture_depth = 0  # of their programs, see clpt.render.texture_programs
+        self.folded: dict[tuple[int, str], Any] = {}  # textures with their constants put together
+        self.kept: list[Any] = []  # what is known by identity here stays alive
         self._parts: dict[str, list[np.ndarray]] = {name: [] for name in TABLES}
         self._sizes: dict[str, int] = dict.fromkeys(TABLES, 0)
         self._spectra: dict[Any, int] = {}
@@ -167,7 +170,7 @@ class Tables:
         key = (id(kind), table)
         if key not in self._rows:
             self._rows[key] = self.append(table, self.kind_words(kind))
-            self._kept.append(kind)
+            self.kept.append(kind)
         return self._rows[key]
 
     def kind_words(self, kind: Kind) -> Words:
@@ -188,8 +191,15 @@ class Tables:
     ) -> tuple[Words, str]:
         """Return the words of one parameter and where its value comes from."""
         if getattr(value, "is_texture", False):
+            from clpt.render.texture_programs import folded
             from clpt.render.textures import lower_texture
 
+            key = (id(value), role)
+            if key not in self.folded:
+                self.folded[key] = folded(value, role)
+                self.kept.append(value)
+            value = self.folded[key]
+        if getattr(value, "is_texture", False):
             words = np.zeros(REAL_WORDS if role == "real" else SPECTRUM_WORDS, np.uint32)
             words[-1] = 1 + lower_texture(value, role, self)
             return words, "texture"
@@ -197,7 +207,8 @@ class Tables:
             number = choices.index(value) if choices else int(value)
             return np.array([number], np.uint32), "constant"
         if role == "real":
-            return np.array([as_words([value])[0], 0], np.uint32), "constant"
+            number = value.value if isinstance(value, Constant) else value
+            return np.array([as_words([number])[0], 0], np.uint32), "constant"
         if role == "orders":
             beyond = (ORDERS_WORDS - len(value)) // 2
             return as_words(np.pad(value, beyond)), "constant"

@@ -27,7 +27,7 @@ def spectral_image(texture: Any, role: str) -> SpectralImage | None:
 
 
 def pixels(texture: Bitmap, role: str) -> Floats:
-    """Return a bitmap's image, (h, w, 1 or 3) float32 without alpha, top row first.
+    """Return a bitmap's image, (h, w, 1 or 3) float32, top row first; for "real" (h, w, 1).
 
     role: "reflectance", "emission" or "real"; of spectra it chooses the colour that stands for
     them. Raises SceneError if it cannot be read or is no image.
@@ -43,16 +43,29 @@ def pixels(texture: Bitmap, role: str) -> Floats:
     if image.ndim != 3 or image.shape[2] not in (1, 3, 4) or image.size == 0:
         wanted = "must be (h, w) or (h, w, 1, 3 or 4) and not empty"
         raise SceneError(f"{wanted}, not {image.shape}", where="bitmap.image")
-    return np.nan_to_num(image[..., :3].astype(np.float32))
+    chosen = _channel(image, texture.channel) if role == "real" else image[..., :3]
+    return np.nan_to_num(chosen.astype(np.float32))
+
+
+def _channel(image: NDArray[Any], name: str) -> NDArray[Any]:
+    """The channel (h, w, 1) that stands for a number, of (h, w, 1, 3 or 4); a is 1 if missing."""
+    count = image.shape[2]
+    if name == "a":
+        return image[..., 3:] if count == 4 else np.ones_like(image[..., :1])
+    if count == 1:
+        return image
+    if name == "luminance":
+        return spectra.luminance(image[..., :3])[..., None]
+    return image[..., "rgb".index(name), None]
 
 
 def texels(image: Floats, role: str, spectral: bool) -> Floats:
-    """Return what stands in `texels` for an image (h, w, 1 or 3), row by row from the top.
+    """Return what stands in `texels` for an image of `pixels`, row by row from the top.
 
     (h * w, 4): rgb, or sigmoid coefficients and a factor where `spectral`; (h * w,) for "real".
     """
     if role == "real":
-        return _numbers(image).astype(np.float32).reshape(-1)
+        return image.reshape(-1)
     colours = np.broadcast_to(image, (*image.shape[:2], 3)).reshape(-1, 3)
     made = np.ones((len(colours), 4), np.float32)
     if not spectral:
@@ -85,11 +98,6 @@ def bands(image: SpectralImage, lo: float, hi: float) -> tuple[Floats, Tabulated
     )
     values = np.nan_to_num(image.values[..., first:end].reshape(-1, len(kept)))
     return np.clip(values, 0.0, None if image.emissive else 1.0), number
-
-
-def _numbers(image: Floats) -> NDArray[np.float64]:
-    """What (h, w, 1 or 3) says where a number is asked for: of a colour its luminance."""
-    return image[..., 0].astype(np.float64) if image.shape[2] == 1 else spectra.luminance(image)
 
 
 def _palette(colours: Floats) -> tuple[Floats, Any]:

@@ -17,8 +17,9 @@ from clpt.errors import SceneError
 from clpt.layout import Record
 from clpt.render.kinds import REAL_WORDS, SPECTRUM_WORDS
 from clpt.render.texels import bands, pixels, spectral_image, texels
+from clpt.render.texture_programs import is_composite, operand_text, program
 from clpt.scene.params import device_params, params
-from clpt.scene.textures import Bitmap, Checkerboard, Texture
+from clpt.scene.textures import WRAPS, Bitmap, Checkerboard, Placed, Texture
 from clpt.spectra import Spectrum, luminance
 
 _COMMON = {
@@ -32,7 +33,8 @@ _IMAGE = {
     "height": ("integer", "[texels]"),
     "first": ("integer", "of its floats in `texels`; four a texel, one for a real"),
     "filter": ("integer", "BITMAP_FILTER_"),
-    "wrap": ("integer", "BITMAP_WRAP_"),
+    "wrap_u": ("integer", "BITMAP_WRAP_"),
+    "wrap_v": ("integer", "BITMAP_WRAP_"),
 }
 RECORDS: dict[str, Record] = {
     "bitmap": Record("Bitmap", "An image.", **_IMAGE),
@@ -51,7 +53,8 @@ RECORDS["spectral_bitmap"] = Record(
     bands=("integer", "values in a texel"),
     number=("integer", "row in `spectra`: the number of the band by wavelength"),
 )
-KINDS = tuple(RECORDS)
+KINDS = (*RECORDS, "program")
+PROGRAM = KINDS.index("program")
 LARGEST = 2**31 - 1  # floats in `texels` that an index reaches
 
 
@@ -60,6 +63,8 @@ class Sink(Protocol):
 
     textures: dict[Any, int]
     texture_roles: set[tuple[str, str]]
+    texture_depth: int
+    kept: list[Any]
 
     lambda_min: float
     lambda_max: float
@@ -76,23 +81,38 @@ class Sink(Protocol):
 def lower_texture(texture: Texture, role: str, tables: Sink) -> int:
     """Put a texture in a role ("reflectance", "emission", "real") into the tables.
 
-    Returns the first word of its row in `textures`; the same texture in the same role is put in
-    once. Raises SceneError for an image or a uv transform that cannot be used.
+    A composite must be `folded`. Returns the first word of its row in `textures`; the same texture
+    in the same role is put in once. Raises SceneError for an image or a uv transform that cannot be
+    used.
     """
     key = (_identity(texture), role)
     if key not in tables.textures:
         if tables.size("textures") == 0:
             _blank(tables)
-        kind, members = MEMBERS[type(texture)](texture, role, tables)
-        tables.textures[key] = _row(kind, members, tables)
+        if is_composite(texture):
+            kind, row = "program", _program(texture, role, tables)
+        else:
+            kind, members = MEMBERS[type(texture)](texture, role, tables)
+            row = _row(kind, members, tables)
+        tables.textures[key] = row
+        tables.kept.append(texture)
         tables.texture_roles.add((kind, role))
     return tables.textures[key]
+
+
+def _program(texture: Texture, role: str, tables: Sink) -> int:
+    def lower(leaf: Texture, role: str) -> int:
+        return lower_texture(leaf, role, tables)
+
+    words, depth = program(texture, role, tables, lower)
+    tables.texture_depth = max(tables.texture_depth, depth)
+    return tables.append("textures", [PROGRAM, *words])
 
 
 def _identity(texture: Texture) -> Any:
     """What makes two textures the same: for an image file its parameters, else being one object."""
     if isinstance(texture, Bitmap) and isinstance(texture.image, (str, Path)):
-        values = (getattr(texture, name) for name in ("raw", "filter", "wrap"))
+        values = (getattr(texture, name) for name in ("raw", "filter", "wrap", "wrap_v", "channel"))
         return (str(texture.image), *values, texture.to_uv.tobytes())
     return id(texture)
 
@@ -110,7 +130,7 @@ def _blank(tables: Sink) -> None:
     _row("spectral_bitmap", {"kind": 0, "width": 1, "height": 1, "first": first}, tables)
 
 
-def _uv(texture: Texture, down: bool) -> dict[str, Any]:
+def _uv(texture: Placed, down: bool) -> dict[str, Any]:
     """The rows of `to_uv`; `down`: with v turned round, as an image's rows run."""
     matrix = np.asarray(texture.to_uv, np.float64)
     if not np.allclose(matrix[2, :2], 0.0) or np.isclose(matrix[2, 2], 0.0):
@@ -145,13 +165,15 @@ def _bitmap(texture: Bitmap, role: str, tables: Sink) -> tuple[str, dict[str, An
         more = {"bands": values.shape[1], "number": tables.spectra_row(number)}
     if tables.size("texels") + values.size > LARGEST:
         raise SceneError("all images together have too many texels", where="bitmap.image")
-    choices = {name: params(Bitmap)[name].choices for name in ("filter", "wrap")}
+    filters = params(Bitmap)["filter"].choices
     return kind, {
         **_uv(texture, down=True),
         "width": image.shape[1],
         "height": image.shape[0],
         "first": tables.append_floats("texels", values),
-        **{name: names.index(getattr(texture, name)) for name, names in choices.items()},
+        "filter": filters.index(texture.filter),
+        "wrap_u": WRAPS.index(texture.wrap),
+        "wrap_v": WRAPS.index(texture.wrap_v or texture.wrap),
         **more,
     }
 
@@ -162,8 +184,10 @@ MEMBERS: dict[type[Texture], Callable[..., tuple[str, dict[str, Any]]]] = {
 }
 
 
-def dispatch_text(kinds: Iterable[str], roles: Iterable[tuple[str, str]]) -> str:
+def dispatch_text(kinds: Iterable[str], roles: Iterable[tuple[str, str]], depth: int = 0) -> str:
     """Return the look-ups of the (kind, role) pairs in the scene, and the loaders that call them.
+
+    depth: how many values the programs stack.
 
     texture_<role>(scene, row, point, lambdas)                 whose row is at a word
     spectrum_texture_<role>(scene, table, at, point, lambdas)  that the parameter at `at` names
@@ -172,14 +196,24 @@ def dispatch_text(kinds: Iterable[str], roles: Iterable[tuple[str, str]]) -> str
     pairs, found = set(roles), set(kinds)
     if "spectral_bitmap" in found:
         found.add("bitmap")  # which knows what lies where
-    present = [kind for kind in KINDS if kind in found]
+    present = [kind for kind in RECORDS if kind in found]
     choosy = {cls.kind: cls for cls in MEMBERS}
-    parts = ['#include "lib/texture.cl"'] if present else []
+    parts = ['#include "lib/texture.cl"'] if found else []
     for kind in present:
         parts += _choice_lines(choosy[kind]) if kind in choosy else []
         parts += [RECORDS[kind].row_text(), f'#include "texture/{kind}.cl"']
-    for role in sorted({role for _, role in pairs}):
-        parts += _look_up(role, [kind for kind in present if (kind, role) in pairs])
+    leaves = {
+        role: [kind for kind in present if (kind, role) in pairs]
+        for role in sorted({role for _, role in pairs})
+    }
+    programs = [role for role in leaves if ("program", role) in pairs]
+    for role, own in leaves.items():
+        parts += _look_up(role, own, "texture_leaf" if programs else "texture")
+    if programs:
+        parts += operand_text(leaves, depth)
+    for role in leaves:
+        parts += _with_programs(role, role in programs) if programs else []
+        parts += _parameter(role)
     return "\n".join([*parts, ""])
 
 
@@ -192,15 +226,15 @@ def _choice_lines(cls: type[Texture]) -> list[str]:
     ]
 
 
-def _look_up(role: str, kinds: list[str]) -> list[str]:
+def _look_up(role: str, kinds: list[str], name: str) -> list[str]:
+    """Texts of `name`_<role>, for textures that combine nothing."""
     if role == "real":
-        form, type_, choose, zero, more = "real", "real", "sel", "0.0f", ""
+        type_, choose, zero, more = "real", "sel", "0.0f", ""
     else:
-        form, type_, choose, more = "spectrum", "Spectrum", "spectrum_sel", ", lambdas"
+        type_, choose, more = "Spectrum", "spectrum_sel", ", lambdas"
         zero = "spectrum_of(0.0f)"
-    source = (REAL_WORDS if role == "real" else SPECTRUM_WORDS) - 1
     lines = [
-        f"inline {type_} texture_{role}"
+        f"inline {type_} {name}_{role}"
         "(Scene scene, integer row, TexturePoint point, Wavelengths lambdas)",
         "{",
         "    integer kind = gather_i(scene.textures, row);",
@@ -215,10 +249,37 @@ def _look_up(role: str, kinds: list[str]) -> list[str]:
             f"        if (any(m)) value = {choose}(m, {call}, value);",
             "    }",
         ]
+    return [*lines, "    return value;", "}"]
+
+
+def _with_programs(role: str, some: bool) -> list[str]:
+    """texture_<role> for all textures, where there are programs, and `some` in this role."""
+    run = f"texture_program(scene, TEXTURE_ROLE_{role.upper()}, row, m, point, lambdas)"
+    type_, choose, made = "Spectrum", "spectrum_sel", run
+    if role == "real":
+        type_, choose, made = "real", "sel", f"{run}.x"
+    if role == "reflectance":
+        made = f"spectrum_clamped({run})"
+    lines = [
+        f"    mask m = gather_i(scene.textures, row) == {PROGRAM};",
+        f"    if (any(m)) value = {choose}(m, {made}, value);",
+    ]
     return [
-        *lines,
+        f"inline {type_} texture_{role}"
+        "(Scene scene, integer row, TexturePoint point, Wavelengths lambdas)",
+        "{",
+        f"    {type_} value = texture_leaf_{role}(scene, row, point, lambdas);",
+        *(lines if some else ()),
         "    return value;",
         "}",
+    ]
+
+
+def _parameter(role: str) -> list[str]:
+    """The texture that a parameter in a row names."""
+    form, type_ = ("real", "real") if role == "real" else ("spectrum", "Spectrum")
+    source = (REAL_WORDS if role == "real" else SPECTRUM_WORDS) - 1
+    return [
         f"inline {type_} {form}_texture_{role}"
         "(Scene scene, global const uint *table, integer at,"
         " TexturePoint point, Wavelengths lambdas)",

@@ -10,6 +10,7 @@ role           accepted                               in the kernel             
 reflectance    number, (r, g, b), Spectrum, Texture   Spectrum in [0, 1]          yes
 emission       number, (r, g, b), Spectrum, Texture   Spectrum, rgb times D65     area, envmap
 index          number, name, Spectrum                 Spectrum, unbounded         no
+factor         number, (r, g, b), Spectrum, Texture   Spectrum, unbounded         yes
 coefficient    number, (r, g, b), Spectrum            of the inside, in [1/m]     no
 real           number, Texture                        real                        yes
 reradiation    Reradiation, None                      Spectrum, its rows' sums    no
@@ -33,11 +34,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from clpt.errors import SceneError
-from clpt.spectra import RGB, Constant, Reradiation, Spectrum
+from clpt.spectra import RGB, Constant, Reradiation, RGBUnbounded, Spectrum
 
-SPECTRUM_ROLES = ("reflectance", "emission", "index", "coefficient")
+SPECTRUM_ROLES = ("reflectance", "emission", "index", "factor", "coefficient")
 DEVICE_ROLES = (
-    "reflectance", "emission", "index", "reradiation", "real", "flag", "choice", "orders", "layers",
+    "reflectance", "emission", "index", "factor", "reradiation", "real", "flag", "choice", "orders",
+    "layers",
 )  # fmt: skip
 ORDERS = 8  # highest order of diffraction, see kernels/lib/diffraction.cl
 LAMBDAS = np.arange(200.0, 1201.0)  # [nm] at which a spectrum's limits are checked
@@ -53,6 +55,7 @@ class Param:
     low: float = -math.inf
     high: float = math.inf
     choices: tuple[str, ...] = ()
+    optional: bool = False
     textured: bool = False
 
 
@@ -75,6 +78,11 @@ def emission(default: Any, doc: str, unit: str, *, textured: bool = False) -> An
 def index(default: Any, doc: str) -> Any:
     """Declare a refractive index or extinction coefficient, perhaps by name, perhaps dispersive."""
     return _field(default, Param("index", doc, low=0.0))
+
+
+def factor(default: Any, doc: str) -> Any:
+    """Declare a spectrum without limits that others are multiplied by; may be a texture."""
+    return _field(default, Param("factor", doc, textured=True))
 
 
 def coefficient(default: Any, doc: str, unit: str = "1/m") -> Any:
@@ -108,9 +116,10 @@ def flag(default: bool, doc: str) -> Any:
     return _field(default, Param("flag", doc))
 
 
-def choice(default: str, doc: str, choices: Sequence[str]) -> Any:
-    """Declare one of several names."""
-    return _field(default, Param("choice", doc, choices=tuple(choices)))
+def choice(default: str | None, doc: str, choices: Sequence[str]) -> Any:
+    """Declare one of several names, or none of them if that is the default."""
+    optional = default is None
+    return _field(default, Param("choice", doc, choices=tuple(choices), optional=optional))
 
 
 def per_order(default: Sequence[float], doc: str) -> Any:
@@ -184,7 +193,7 @@ def _checked(value: Any, param: Param, where: str) -> Any:
             raise SceneError(f"must be true or false, not {value!r}", where=where)
         return bool(value)
     if param.role == "choice":
-        if value not in param.choices:
+        if value not in param.choices and not (param.optional and value is None):
             raise SceneError(f"{value!r} is none of {', '.join(param.choices)}", where=where)
         return value
     if param.role == "layers":
@@ -242,7 +251,8 @@ def _spectrum(value: Any, param: Param, where: str) -> Any:
             raise SceneError("cannot be negative at any wavelength", where=where)
         return value
     if isinstance(value, (list, tuple, np.ndarray)) and len(value) == 3:
-        return RGB(*(_number(v, param, where) for v in value))
+        made = RGBUnbounded if param.role == "factor" else RGB
+        return made(*(_number(v, param, where) for v in value))
     if isinstance(value, (int, float, np.number)):
         return Constant(_number(value, param, where))
     raise SceneError(f"must be a number, three numbers or a spectrum, not {value!r}", where=where)

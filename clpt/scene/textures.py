@@ -8,14 +8,21 @@ from typing import Any
 import numpy as np
 
 from clpt.errors import SceneError
-from clpt.scene.params import Kind, choice, host, reflectance
+from clpt.scene.params import Kind, choice, factor, host, real, reflectance
+
+WRAPS = ("repeat", "clamp", "mirror", "zero")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Texture(Kind):
-    """Base of all textures; `to_uv` maps a surface's uv to the texture's, 3x3, homogeneous."""
+    """Base of all textures."""
 
     is_texture = True
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Placed(Texture):
+    """Base of those that lie on uv; `to_uv` maps a surface's uv to theirs, 3x3, homogeneous."""
 
     to_uv: np.ndarray = host(np.eye(3), "uv transform, (3, 3) float64")
 
@@ -27,25 +34,46 @@ class Texture(Kind):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Bitmap(Texture):
-    """An image; v = 0 is its bottom row. A `real` parameter takes its luminance."""
+class Bitmap(Placed):
+    """An image; v = 0 is its bottom row. Where a number is asked for it takes `channel`."""
 
     image: Any = host(
         None,
-        "path of an image, or an array (h, w) or (h, w, 1|3|4) float32; an .exr may hold spectra, "
-        "as clpt.SpectralImage does",
+        "path of an image, or an array (h, w) or (h, w, 1|3|4), float32, or uint8 as 8-bit files "
+        "have; an .exr may hold spectra, as clpt.SpectralImage does",
     )
     raw: bool = host(False, "True: values as they are, without the sRGB decoding of 8-bit files")
     filter: str = choice("bilinear", "between texels", ("bilinear", "nearest"))
-    wrap: str = choice("repeat", "outside [0, 1]", ("repeat", "clamp", "mirror"))
+    wrap: str = choice("repeat", "outside [0, 1]; zero: black, and no alpha", WRAPS)
+    wrap_v: str | None = choice(None, "the same for v alone; none: as `wrap`", WRAPS)
+    channel: str = choice(
+        "luminance", "what a number is taken from; a is never decoded", ("luminance", *"rgba")
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Checkerboard(Texture):
+class Checkerboard(Placed):
     """Two colours in a 2x2 pattern per unit of uv."""
 
     color0: Any = reflectance(0.4, "colour where both or neither coordinate is below a half")
     color1: Any = reflectance(0.2, "colour elsewhere")
 
 
-KINDS = (Bitmap, Checkerboard)
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Product(Texture):
+    """The product of two values; in an emission the second is a factor, not a light of its own."""
+
+    first: Any = factor(1.0, "one of them")
+    second: Any = factor(1.0, "the other")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Mix(Texture):
+    """Between two values: (1 - amount) first + amount second."""
+
+    first: Any = factor(0.0, "where the amount is 0")
+    second: Any = factor(1.0, "where it is 1")
+    amount: Any = real(0.5, "share of the second", textured=True)
+
+
+KINDS = (Bitmap, Checkerboard, Product, Mix)

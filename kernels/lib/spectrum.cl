@@ -52,6 +52,14 @@ inline Spectrum spectrum_sel(mask m, Spectrum a, Spectrum b)
 #undef C
     return r;
 }
+inline Spectrum spectrum_clamped(Spectrum a) /* to [0, 1] */
+{
+    Spectrum r;
+#define C(c) r.c = clamp_r(a.c, (real)(0.0f), (real)(1.0f));
+    SPECTRUM_EACH(C)
+#undef C
+    return r;
+}
 inline real spectrum_max(Spectrum a)
 {
     real r = max_r(max_r(a.x, a.y), a.z);

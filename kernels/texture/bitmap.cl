@@ -3,7 +3,7 @@
  * values are interpolated, not the coefficients of their spectra. */
 typedef struct {
     integer x0, x1, y0, y1; /* columns and rows of the four texels, inside the image */
-    real tx, ty;            /* how far toward the second ones */
+    real u0, u1, v0, v1;    /* their weights */
 } BitmapPlace;
 
 inline integer bitmap_wrap(integer i, integer size, integer wrap)
@@ -14,16 +14,21 @@ inline integer bitmap_wrap(integer i, integer size, integer wrap)
     return min_i(max_i(i, (integer)(0)), size - 1);
 }
 
-/* One axis. A coordinate that is huge or not a number still ends inside the image. */
-inline void bitmap_axis(real x, integer size, integer wrap, mask smooth, integer *i0, integer *i1, real *t)
+/* One axis: two places, and their weights; what lies outside weighs nothing where the wrap is zero. A
+ * coordinate that is huge or not a number still ends inside the image. */
+inline void bitmap_axis(real x, integer size, integer wrap, mask smooth, integer *i0, integer *i1, real *w0, real *w1)
 {
+    mask ends = wrap == BITMAP_WRAP_ZERO;
     real period = sel(wrap == BITMAP_WRAP_MIRROR, (real)(2.0f), (real)(1.0f)), turns = x / period;
-    x = sel(wrap == BITMAP_WRAP_CLAMP, x, (turns - floor(turns)) * period);
-    x = clamp_r(x, (real)(0.0f), period) * to_real(size) - sel(smooth, (real)(0.5f), (real)(0.0f));
-    real below = floor(x);
-    *t = sel(smooth, x - below, (real)(0.0f));
-    *i0 = bitmap_wrap(to_integer(below), size, wrap);
-    *i1 = bitmap_wrap(to_integer(below) + 1, size, wrap);
+    x = sel((wrap == BITMAP_WRAP_CLAMP) | ends, x, (turns - floor(turns)) * period);
+    x = clamp_r(x, sel(ends, (real)(-1.0f), (real)(0.0f)), sel(ends, (real)(2.0f), period));
+    x = x * to_real(size) - sel(smooth, (real)(0.5f), (real)(0.0f));
+    real below = floor(x), t = sel(smooth, x - below, (real)(0.0f));
+    integer first = to_integer(below), second = first + 1;
+    *w0 = sel(ends & ((first < 0) | (first >= size)), (real)(0.0f), 1.0f - t);
+    *w1 = sel(ends & ((second < 0) | (second >= size)), (real)(0.0f), t);
+    *i0 = bitmap_wrap(first, size, wrap);
+    *i1 = bitmap_wrap(second, size, wrap);
 }
 
 inline BitmapPlace bitmap_place(Bitmap t, TexturePoint point)
@@ -31,8 +36,8 @@ inline BitmapPlace bitmap_place(Bitmap t, TexturePoint point)
     vec3 p = v3(point.uv.x, point.uv.y, (real)(1.0f));
     mask smooth = t.filter == BITMAP_FILTER_BILINEAR;
     BitmapPlace b;
-    bitmap_axis(dot3(t.to_u, p), t.width, t.wrap, smooth, &b.x0, &b.x1, &b.tx);
-    bitmap_axis(dot3(t.to_v, p), t.height, t.wrap, smooth, &b.y0, &b.y1, &b.ty);
+    bitmap_axis(dot3(t.to_u, p), t.width, t.wrap_u, smooth, &b.x0, &b.x1, &b.u0, &b.u1);
+    bitmap_axis(dot3(t.to_v, p), t.height, t.wrap_v, smooth, &b.y0, &b.y1, &b.v0, &b.v1);
     return b;
 }
 
@@ -40,7 +45,7 @@ inline BitmapPlace bitmap_place(Bitmap t, TexturePoint point)
 inline integer bitmap_corner(Bitmap t, BitmapPlace b, int corner, real *weight)
 {
     int right = corner & 1, next = corner >> 1;
-    *weight = (right ? b.tx : 1.0f - b.tx) * (next ? b.ty : 1.0f - b.ty);
+    *weight = (right ? b.u1 : b.u0) * (next ? b.v1 : b.v0);
     return (next ? b.y1 : b.y0) * t.width + (right ? b.x1 : b.x0);
 }
 

@@ -10,11 +10,7 @@ inline integer checkerboard_at(Checkerboard t, TexturePoint point)
 
 Spectrum checkerboard_reflectance(Checkerboard t, Scene scene, TexturePoint point, Wavelengths lambdas)
 {
-    integer at = checkerboard_at(t, point);
-    Spectrum value = spectrum_constant(scene.textures, at, lambdas);
-    mask tabulated = gather_i(scene.textures, at + 4) < 0;
-    if (any(tabulated)) value = spectrum_sel(tabulated, spectrum_table(scene, scene.textures, at, lambdas), value);
-    return value;
+    return texture_constant(scene, checkerboard_at(t, point), lambdas);
 }
 
 Spectrum checkerboard_emission(Checkerboard t, Scene scene, TexturePoint point, Wavelengths lambdas)

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from clpt import spectra
+from clpt import images, spectra
 from clpt.errors import SceneError
 from clpt.render import textures
 from clpt.render.tables import Tables
+from clpt.render.texture_programs import folded
 from clpt.scene import textures as scene
 from clpt.spectra.spectrum import d65
 from clpt.spectra.upsampling import evaluate
@@ -26,7 +27,7 @@ COLOURS = np.random.default_rng(1).random((5, 7, 3)).astype(np.float32)
 
 @cache
 def _dispatch(roles):
-    return textures.dispatch_text({kind for kind, _ in roles}, roles)
+    return textures.dispatch_text({kind for kind, _ in roles}, roles, 4)
 
 
 def _body(role, mode):
@@ -49,7 +50,7 @@ def _body(role, mode):
 def look_up(made, role, uv, mode="rgb", lanes=8, rows=None):
     """Values (n, 3 or 4) or (n,) of textures in a role; rows: which of them each uv reads."""
     tables = Tables(mode)
-    words = np.array([textures.lower_texture(t, role, tables) for t in made])
+    words = np.array([tables.param_words(t, role)[0][-1] - 1 for t in made])
     which = words[np.zeros(len(uv), int) if rows is None else rows]
     body, components = _body(role, mode)
     probe = SceneProbe(
@@ -80,6 +81,10 @@ def _wrapped(i, size, wrap):
 def reference(image, uv, to_uv=PLAIN, filter="bilinear", wrap="repeat"):
     """A bitmap's values (n, c) in float64; v = 0 is the bottom of the image."""
     place = np.column_stack([uv, np.ones(len(uv))]).astype(np.float64) @ np.asarray(to_uv)[:2].T
+    if wrap == "zero":
+        image, wrap = np.pad(image, ((1, 1), (1, 1), (0, 0))), "clamp"
+        inner = np.array(image.shape[1::-1]) - 2
+        place = (place * inner + 1) / (inner + 2)
     h, w, _ = image.shape
     x, y = place[:, 0] * w, (1.0 - place[:, 1]) * h
     if filter == "nearest":
@@ -103,7 +108,7 @@ def _uvs(n=400, seed=2):
     return uv
 
 
-@pytest.mark.parametrize("wrap", ["repeat", "clamp", "mirror"])
+@pytest.mark.parametrize("wrap", ["repeat", "clamp", "mirror", "zero"])
 @pytest.mark.parametrize("filter", ["bilinear", "nearest"])
 @pytest.mark.parametrize("to_uv", [PLAIN, TURNED], ids=["plain", "turned"])
 def test_bitmap(wrap, filter, to_uv):
@@ -132,6 +137,108 @@ def test_real_is_the_luminance_of_a_colour():
     for image in (COLOURS, alpha, grey):
         found = look_up([scene.Bitmap(image=image)], "real", uv)
         np.testing.assert_allclose(found, expected, atol=1e-5)
+
+
+@pytest.mark.parametrize("channel", ["luminance", "r", "g", "b", "a"])
+def test_channels(channel, tmp_path):
+    """Of four, three and one channel; alpha is never decoded, and 1 where there is none."""
+    stored = np.random.default_rng(4).integers(0, 256, (3, 4, 4), np.uint8)
+    path = tmp_path / "rgba.png"
+    Image.fromarray(stored).save(path)
+    linear = images.read(path)
+    made = [path, linear[..., :3], linear[..., :1]]
+    number = 3 if channel == "a" else "rgb".find(channel)
+    grey = spectra.luminance(linear[..., :3])
+    one = np.ones(grey.shape)
+    expected = [
+        grey if number < 0 else linear[..., number],
+        grey if number < 0 else one if number == 3 else linear[..., number],
+        one if number == 3 else linear[..., 0],
+    ]
+    uv = _uvs(30)
+    bitmaps = [scene.Bitmap(image=image, channel=channel) for image in made]
+    rows = np.arange(30) % 3
+    found = look_up(bitmaps, "real", uv, rows=rows)
+    each = [reference(e[..., None], uv)[:, 0] for e in expected]
+    np.testing.assert_allclose(found, np.choose(rows, each), atol=1e-5)
+
+
+def test_wraps_of_either_axis():
+    bitmap = scene.Bitmap(image=COLOURS, wrap="clamp", wrap_v="repeat")
+    uv = _uvs()
+    inside = np.abs(uv[:, 0] - 0.5) < 0.4  # 7 texels: where repeating and clamping are the same
+    found = look_up([bitmap], "reflectance", uv)
+    np.testing.assert_allclose(found[inside], reference(COLOURS, uv)[inside], atol=2e-5)
+    far = [[-3.0, 0.3], [5.0, 0.3]]
+    expected = reference(COLOURS, np.array(far), wrap="clamp")
+    np.testing.assert_allclose(look_up([bitmap], "reflectance", far), expected, atol=2e-5)
+
+
+def _nested(a, b, t):
+    """Composites of two colours and a number: what to render, and the same in float64."""
+    made = [
+        scene.Product(first=a[0], second=b[0]),
+        scene.Mix(
+            first=scene.Product(first=(0.5, 1.5, 0.7), second=a[0]),
+            second=scene.Mix(first=b[0], second=0.25, amount=0.3),
+            amount=scene.Product(first=t[0], second=scene.Mix(first=t[0], amount=t[0])),
+        ),
+        scene.Product(first=scene.Product(first=2.0, second=3.0), second=a[0]),
+    ]
+    amount = t[1] * (t[1] + (1.0 - t[1]) * t[1])
+    low, high = a[1] * [0.5, 1.5, 0.7], 0.7 * b[1] + 0.3 * 0.25
+    return made, [a[1] * b[1], low + (high - low) * amount, 6.0 * a[1]]
+
+
+def test_composites_nest():
+    rng = np.random.default_rng(5)
+    arrays = [rng.random(shape).astype(np.float32) for shape in ((4, 6, 3), (3, 5, 3), (4, 4, 1))]
+    uv = _uvs(192)
+    pairs = [(scene.Bitmap(image=image), reference(image, uv)) for image in arrays]
+    made, expected = _nested(*pairs)
+    same = np.equal(*((uv % 1.0) > 0.5).T)[:, None]
+    made.append(scene.Checkerboard(color0=pairs[0][0], color1=scene.Checkerboard()))
+    expected.append(np.where(same, pairs[0][1], 0.2))
+    rows = np.arange(len(uv)) % len(made)
+    wanted = np.choose(rows[:, None], np.clip(expected, 0.0, 1.0))
+    found = [look_up(made, "reflectance", uv, rows=rows, lanes=lanes) for lanes in (1, 8, 16)]
+    off = np.abs(found[0] - wanted).max(axis=1) > 2e-6
+    assert off.mean() < 0.01  # at a border of the checkerboard rounding may choose either colour
+    for other in found[1:]:
+        np.testing.assert_array_equal(other, found[0])
+
+
+def test_composites_of_numbers_and_of_light():
+    uv = _uvs(48)
+    lamp, mask = np.float32(40.0) * COLOURS, COLOURS[:3, :2, :1]
+    colour, grey = scene.Bitmap(image=lamp), scene.Bitmap(image=mask)
+    product = scene.Product(first=3.0, second=scene.Product(first=colour, second=grey))
+    numbers = 3.0 * reference(spectra.luminance(lamp)[..., None], uv) * reference(mask, uv)
+    np.testing.assert_allclose(look_up([product], "real", uv), numbers[:, 0], rtol=1e-5)
+    scale, coefficients = spectra.unbounded(lamp)
+    light = scale[..., None] * evaluate(coefficients, LAMBDAS) * d65().sample(LAMBDAS)
+    factor = evaluate(spectra.uplift(np.repeat(mask, 3, axis=2)), LAMBDAS)
+    found = look_up([product], "emission", uv, mode="spectral")
+    wanted = 3.0 * reference(light, uv) * reference(factor, uv)
+    np.testing.assert_allclose(found, wanted, rtol=2e-3, atol=2e-4 * wanted.max())
+
+
+@pytest.mark.parametrize(
+    ("texture", "role", "expected"),
+    [
+        (scene.Product(first=0.5, second=scene.Mix(first=0.2, second=0.4)), "reflectance", 0.15),
+        (scene.Product(first=(0.2, 0.4, 0.9), second=2.0), "real", 2 * 0.39349),
+        (scene.Mix(first=0.3, second=scene.Bitmap(image=COLOURS), amount=0.0), "reflectance", 0.3),
+    ],
+)
+def test_constants_are_folded(texture, role, expected):
+    assert folded(texture, role).value == pytest.approx(expected, rel=1e-3)
+
+
+def test_folding_takes_away_what_changes_nothing():
+    bitmap = scene.Bitmap(image=COLOURS)
+    assert folded(scene.Product(first=1.0, second=bitmap), "emission") is bitmap
+    assert folded(scene.Mix(first=bitmap, second=0.4, amount=0.0), "reflectance") is bitmap
 
 
 def test_reflectance_is_clipped_and_emission_is_not():

@@ -284,17 +284,10 @@ def _bitmap(props: Properties) -> Bitmap:
 
 def _checkerboard(props: Properties) -> Checkerboard:
     return Checkerboard(
-        color0=_plain(props, "color0", 0.4),
-        color1=_plain(props, "color1", 0.2),
+        color0=reflectance(props, "color0", 0.4),
+        color1=reflectance(props, "color1", 0.2),
         to_uv=_to_uv(props),
     )
-
-
-def _plain(props: Properties, name: str, default: float) -> Any:
-    value = reflectance(props, name, default)
-    if isinstance(value, Texture):
-        raise props.element.error(f"{name!r} cannot be a texture")
-    return value
 
 
 def _to_uv(props: Properties) -> np.ndarray:
