@@ -207,8 +207,8 @@ class Tables:
             number = choices.index(value) if choices else int(value)
             return np.array([number], np.uint32), "constant"
         if role == "real":
-            number = value.value if isinstance(value, Constant) else value
-            return np.array([as_words([number])[0], 0], np.uint32), "constant"
+            plain = value.value if isinstance(value, Constant) else value
+            return np.array([as_words([plain])[0], 0], np.uint32), "constant"
         if role == "orders":
             beyond = (ORDERS_WORDS - len(value)) // 2
             return as_words(np.pad(value, beyond)), "constant"
