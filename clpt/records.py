@@ -40,6 +40,7 @@ HIT = Record(
     prim=("integer", "primitive; -1: nothing was hit"),
     shape=("integer", "row of the shape in `shapes`"),
     material=("integer", "material word of the side that was hit, see kernels/lib/surface.cl"),
+    instance=("integer", "1 + row in `instances`; 0: none"),
 )
 
 SHADOW = Record(
@@ -98,6 +99,19 @@ SHAPE = Record(
     attributes=("integer", "first word in `attributes` of where each lies; 0: it has none"),
 )
 
+INSTANCE = Record(
+    "InstanceRow",
+    "A group's triangles at a place. Their space has its origin in their middle.",
+    origin=("vec3", "that origin in the world [m]"),
+    x=("vec3", "from the world to the group, without the origin: first row of the matrix"),
+    y=("vec3", "its second row"),
+    z=("vec3", "its third row"),
+    nodes=("natural", "where the nodes of the group's tree begin, in steps of 32 bytes"),
+    leaves=("natural", "where its leaves begin, likewise"),
+    prim=("integer", "first primitive of the group"),
+    number=("integer", "its place among the scene's shapes"),
+)
+
 LIGHT = Record(
     "LightRow",
     "One light that can be chosen: a lamp, an analytic shape, or one triangle.",
@@ -121,6 +135,7 @@ TABLES: dict[str, tuple[str, str]] = {
     "faces": ("uint", "three vertices per triangle"),
     "attributes": ("uint", "of meshes per vertex or face, see clpt.render.attributes"),
     "shapes": ("uint", "ShapeRow per shape"),
+    "instances": ("uint", "InstanceRow per instance"),
     "geometry": ("uint", "parameters of analytic shapes, and of shapes as lights"),
     "materials": ("uint", "parameters of the leaf materials, a row each"),
     "mixtures": ("uint", "rules of masks and blends, see kernels/stage/sort.cl"),

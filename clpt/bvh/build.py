@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 import pyopencl as cl
@@ -17,7 +19,6 @@ from .layouts import LAYOUTS, Mesh
 
 BRUTE_LIMIT = 96  # triangles up to which brute force is faster; measured, see bench/NOTES.md
 
-_BOX_LEAF = 2  # boxes of a leaf, at most
 _LEAF = 0x80000000  # BVH_LEAF of kernels/bvh/node.cl
 _REACH = 1e12  # so that products of three coordinates stay inside a float
 
@@ -87,10 +88,43 @@ def build(
     return Bvh(layout, count, packed.buffers, stats)
 
 
-def build_boxes(device: Device, boxes: NDArray) -> Bvh:
-    """A tree over boxes, (m, 2, 3) float32 low and high corners, for kernels/bvh/shapes.cl.
+def build_parts(
+    device: Device,
+    vertices: Array,
+    faces: NDArray,
+    tags: NDArray,
+    counts: Sequence[int],
+    layout: str,
+) -> tuple[Bvh, NDArray[np.uint32]]:
+    """A tree for each run of triangles, `counts` long one after the other, in shared buffers.
 
-    Raises as `build` does.
+    Triangles count from 0 in each. Returns with the trees where each of them begins, (n, 2) uint32:
+    its nodes and its leaves, in steps of 32 bytes. The other parameters are those of `build`, which
+    raises alike.
+    """
+    start = time.perf_counter()
+    ends = np.cumsum([0, *counts])
+    trees = [
+        build(device, vertices, faces[i:j], tags[i:j], layout) for i, j in pairwise(ends.tolist())
+    ]
+    if len(trees) == 1:
+        return trees[0], np.zeros((1, 2), np.uint32)
+    sizes = np.array([[b.size for b in (t.buffers["nodes"], t.buffers["leaves"])] for t in trees])
+    begins = np.cumsum(sizes, axis=0) - sizes
+    building, buffers = Building(device), {}
+    for name, begin, whole in zip(("nodes", "leaves"), begins.T, sizes.sum(axis=0), strict=True):
+        buffers[name] = building.allocate(int(whole))
+        for tree_, at in zip(trees, begin, strict=True):
+            cl.enqueue_copy(device.queue, buffers[name], tree_.buffers[name], dst_offset=int(at))
+    device.queue.finish()
+    stats = {"trees": len(trees), "seconds": time.perf_counter() - start}
+    return Bvh(layout, sum(counts), buffers, stats), (begins // 32).astype(np.uint32)
+
+
+def build_boxes(device: Device, boxes: NDArray, leaf_size: int = 2) -> Bvh:
+    """A tree over boxes, (m, 2, 3) float32 low and high corners.
+
+    leaf_size: boxes of a leaf, at most. Raises as `build` does.
     """
     start = time.perf_counter()
     boxes = np.asarray(boxes, np.float32).reshape(-1, 2, 3)
@@ -99,7 +133,7 @@ def build_boxes(device: Device, boxes: NDArray) -> Bvh:
     indices = building.allocate(4 * n)
     if n:
         items, parts = tree.items_of_boxes(building, n, building.upload(boxes, np.float32))
-        nodes = tree.over(building, n, items, parts, _BOX_LEAF).nodes
+        nodes = tree.over(building, n, items, parts, leaf_size).nodes
         building.run_each("bvh/pack.cl", "pack_indices", n, items=items, indices=indices)
     else:  # a leaf with nothing in it
         nodes = building.upload(np.array([0, 0, 0, _LEAF, 0, 0, 0, 0]), np.uint32)

@@ -49,6 +49,7 @@ the same to an editor: begin a file with `"$schema": "../schema.json"`.
 | `integrator` | how light is followed: [integrators](#integrators) |
 | `sampler` | where random numbers come from: [samplers](#samplers) |
 | `materials` | name -> [material](#materials); shapes refer to them by name |
+| `groups` | name -> a list of shapes; an [instance](#instance) places all of them |
 | `shapes` | a list of [shapes](#shapes) |
 | `lights` | a list of [lights](#lights); area lights stand on shapes, as `emission` |
 | `spp` | samples of a pixel |
@@ -166,6 +167,9 @@ def _table(cls: type[Kind]) -> str:
     rows = ["| parameter | accepts | default | meaning |", "| --- | --- | --- | --- |"]
     if issubclass(cls, KINDS["shape"][0]):
         rows.append("| `file` | name of a mesh file | - | in place of the arrays below |")
+    if "group" in declared:
+        several = "matrices (n, 3, 4), an instance for each"
+        rows.append(f"| `file` | name of a .npy file | - | {several} |")
     for name, param in declared.items():
         unit = f" [{param.unit}]" if param.unit else ""
         shown = _shown(defaults[name])
@@ -200,6 +204,7 @@ def _host(name: str, value: Any) -> str:
         "image": "name of an image file",
         "emission": "`area` or `directional_area` light",
         "back": "material",
+        "group": "a name in `groups`",
         "sensor": '`cie1931`, `cie1964`, `{"file": name}` or `{"curves": [three spectra]}`,'
         " the latter two perhaps with a `matrix`",
         "white_balance": "`none`, an illuminant, a number [K] or `[x, y]`",

@@ -62,6 +62,11 @@ def schema() -> Schema:
             "integrator": _ref("integrator"),
             "sampler": _ref("sampler"),
             "materials": {"type": "object", "additionalProperties": _ref("material")},
+            "groups": {
+                "type": "object",
+                "additionalProperties": {"type": "array", "items": _ref("shape")},
+                "description": "shapes that instances place together",
+            },
             "shapes": {"type": "array", "items": _ref("shape")},
             "lights": {"type": "array", "items": _ref("light")},
             "spp": {"type": "integer", "minimum": 1, "description": "samples of a pixel"},
@@ -91,6 +96,9 @@ def _kind(cls: type[Kind]) -> Schema:
         properties["metal"] = {"anyOf": either, "description": "stands for eta and k"}
     if "vertices" in properties:
         properties["file"] = {"type": "string", "description": "a mesh, in place of the arrays"}
+    if "group" in properties:
+        several = "matrices (n, 3, 4) as .npy: an instance for each, before `to_world`"
+        properties["file"] = {"type": "string", "description": several}
     summary = (cls.__doc__ or "").strip().splitlines()[0]
     return {
         "type": "object",
@@ -155,6 +163,8 @@ def _host(name: str, value: Any) -> Schema:
         return {"anyOf": [lights, kelvin, {**NUMBERS, "minItems": 2, "maxItems": 2}]}
     if name == "emission":
         return {"anyOf": [_ref("light"), {"type": "null"}]}
+    if name == "group":
+        return {"type": "string"}
     if name == "back" or isinstance(value, materials.Material):
         name_in_table = {"type": "string", "description": "a name in the scene's materials"}
         return {"anyOf": [_ref("material"), name_in_table]}

@@ -7,6 +7,7 @@ from typing import Any, NoReturn
 from clpt.errors import SceneError
 from clpt.render import shapes
 from clpt.render.cameras import dispersive_glass
+from clpt.render.instancing import distinct
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
 from clpt.scene.integrators import Aov, Film, Filter, Integrator, ParticleTracer, Sampler
@@ -32,6 +33,7 @@ def check(scene: Scene) -> None:
         _check_kind(light, Light, f"lights[{i}]")
     for i, shape in enumerate(scene.shapes):
         _check_kind(shape, Shape, f"shapes[{i}]")
+    for shape in distinct(scene.shapes):
         if not isinstance(shape.emission, (*ON_SHAPES, type(None))):
             names = " or ".join(f"`{cls.kind}`" for cls in ON_SHAPES)
             raise SceneError(f"its emission must be {names}", where=shapes.where(shape))
@@ -48,7 +50,7 @@ def check(scene: Scene) -> None:
 def _check_light_paths(scene: Scene) -> None:
     """Raise SceneError for what only paths from lights can do, and for what they cannot."""
     if not isinstance(scene.integrator, ParticleTracer):
-        for shape in scene.shapes:
+        for shape in distinct(scene.shapes):
             if isinstance(shape.emission, DirectionalArea):
                 raise SceneError(
                     "only the integrator particle_tracer finds a directional_area light, "
@@ -67,7 +69,7 @@ def _check_light_paths(scene: Scene) -> None:
     for i, light in enumerate(scene.lights):
         if isinstance(light, Point) and not light.falloff:
             _refuse("a point light whose irradiance falls with distance", f"lights[{i}]")
-    for shape in scene.shapes:
+    for shape in distinct(scene.shapes):
         if spectral and _fluoresces(shape.material):
             _refuse("materials that keep the wavelength", shapes.where(shape))
 

@@ -28,6 +28,7 @@ class Features:
     texture_roles: tuple[tuple[str, str], ...] = ()
     texture_depth: int = 0  # how many values their programs stack
     analytic: tuple[str, ...] = ()
+    instances: bool = False
     normals: bool = False
     uvs: bool = False
     tangents: bool = False

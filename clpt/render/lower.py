@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -12,10 +13,11 @@ from numpy.typing import NDArray
 from clpt import scene as sc
 from clpt.errors import SceneError
 from clpt.records import SETTINGS, SHAPE
-from clpt.render import cameras, filters, lights, reradiation, shapes
+from clpt.render import cameras, filters, instancing, lights, reradiation, shapes
 from clpt.render.checks import check
 from clpt.render.colour import output_matrix, sensor
 from clpt.render.features import Features
+from clpt.render.instancing import Instances, Placed, Prototype
 from clpt.render.kinds import row_words
 from clpt.render.tables import STEP, Tables
 from clpt.render.wavelengths import Density, density, emissions
@@ -37,8 +39,10 @@ class Lowered:
     """A scene ready for the device.
 
     vertices (n, 3) float32, faces (m, 3) uint32 and tags (m,) uint32 (the shape of each triangle)
-    are what the acceleration structure is built of; boxes (k, 2, 3) float32 those of the analytic
-    shapes, which are the last rows of `shapes`. tables: every other read-only array by name.
+    are what the acceleration structures are built of, the world's before those of the groups that
+    `instances` share; boxes (k, 2, 3) float32 those of the analytic shapes, which are the last rows
+    of `shapes`. tables: every other read-only array by name; where an instance's tree begins is
+    filled in when trees are built.
     """
 
     features: Features
@@ -48,6 +52,7 @@ class Lowered:
     faces: NDArray[np.uint32]
     tags: NDArray[np.uint32]
     boxes: NDArray[np.float32]
+    instances: Instances
     warnings: list[str]
 
     @property
@@ -70,6 +75,9 @@ class _Lowering:
 
     def __init__(self, scene: sc.Scene):
         film = scene.film
+        self.warnings: list[str] = []
+        self.placed, self.prototypes = instancing.sort(scene.shapes, self.warnings)
+        scene = dataclasses.replace(scene, shapes=list(instancing.distinct(scene.shapes)))
         self.scene = scene
         self.channels = getattr(scene.integrator, "channels", ())
         self.light_paths = isinstance(scene.integrator, sc.integrators.ParticleTracer)
@@ -79,7 +87,6 @@ class _Lowering:
         self.tables = Tables(
             self.mode, film.lambda_min, film.lambda_max, sensor(film), self.density
         )
-        self.warnings: list[str] = []
         if self.light_paths and (film.filter.kind != "box" or filters.radius(film.filter) != 0.5):
             self.warnings.append(
                 "film.filter is passed over: particle_tracer has a box of one pixel"
@@ -102,13 +109,19 @@ class _Lowering:
         if self.tabulated:
             tables.append_floats("distributions", self.density.words())
         tables.append("materials", np.zeros(LONGEST_ROW, np.uint32))  # what idle lanes read
-        flat = [s for s in scene.shapes if s.kind not in shapes.ANALYTIC]
-        analytic = [s for s in scene.shapes if s.kind in shapes.ANALYTIC]
+        flat = [one for one in self.placed if one.shape.kind not in shapes.ANALYTIC]
+        analytic = [one for one in self.placed if one.shape.kind in shapes.ANALYTIC]
         emitters: list[lights.Emitter] = []
-        rows = [self._shape(i, s, emitters) for i, s in enumerate([*flat, *analytic])]
-        boxes = np.array([shapes.bounds(s) for s in analytic], np.float32).reshape(-1, 2, 3)
+        rows = [self._shape(i, one, emitters) for i, one in enumerate(flat)]
+        in_world = self.n_vertices
+        instances = instancing.joined([self._shared(p, rows) for p in self.prototypes])
+        tables.append("instances", instances.rows.view(np.uint32))
+        self.first_analytic, self.analytic_count = len(rows), len(analytic)
+        rows += [self._shape(len(rows) + i, one, emitters) for i, one in enumerate(analytic)]
+        found = [shapes.bounds(one.shape) for one in analytic]
+        boxes = np.array(found, np.float32).reshape(-1, 2, 3)
         vertices, faces, tags = self._joined()
-        center, radius = _sphere_around(vertices, boxes)
+        center, radius = _sphere_around(vertices[:in_world], boxes, instances.boxes)
         self.lights = lights.light_rows(scene.lights, emitters, tables, radius)
         tables.append("lights", self.lights.rows.view(np.uint32))
         for emitter, first, whole in zip(
@@ -129,10 +142,12 @@ class _Lowering:
             self.warnings.append(
                 "in rgb mode fluorescent paint has its colour under D65, at most white"
             )
-        features = self._features(analytic, camera)
+        features = self._features({one.shape.kind for one in analytic}, camera)
         arrays = tables.arrays()
         settings = self._settings(center, radius)
-        return Lowered(features, settings, arrays, vertices, faces, tags, boxes, self.warnings)
+        return Lowered(
+            features, settings, arrays, vertices, faces, tags, boxes, instances, self.warnings
+        )
 
     def _lens_glass(self) -> int:
         """The row in `spectra` of the glass of a lens that disperses, 0 where there is none."""
@@ -141,10 +156,26 @@ class _Lowering:
             self.warnings.append("thin_lens.glass: in RGB mode all wavelengths have one focus")
         return self.tables.spectra_row(glass) if glass and self.mode == "spectral" else 0
 
-    def _shape(self, number: int, shape: Any, emitters: list) -> np.ndarray:
+    def _shared(self, prototype: Prototype, rows: list[np.ndarray]) -> instancing.Shared:
+        """What instances share; the rows of its shapes are appended, its triangles put in once."""
+        before, first = len(self.triangles), self.n_faces
+        for shape in prototype.shapes:
+            rows.append(self._shape(len(rows), Placed(shape, 0), []))
+        own = self.triangles[before:]
+        whole, placed, boxes = instancing.place(prototype, np.concatenate([v for v, _, _ in own]))
+        ends = np.cumsum([len(v) for v, _, _ in own])[:-1]
+        self.triangles[before:] = [
+            (moved, faces, number)
+            for moved, (_, faces, number) in zip(np.split(whole, ends), own, strict=True)
+        ]
+        placed["prim"] = first
+        return instancing.Shared(placed, boxes, self.n_faces - first)
+
+    def _shape(self, number: int, one: Placed, emitters: list) -> np.ndarray:
         """One row of `shapes`; its triangles, or its parameters, go into the tables."""
+        shape: Any = one.shape
         row = np.zeros((), SHAPE.dtype)
-        row["number"] = next(i for i, s in enumerate(self.scene.shapes) if s is shape)
+        row["number"] = one.number
         row["light"] = -1
         front, back, row["flags"] = self._sides(shape)
         row["front"], row["back"] = np.array([front, back], np.uint32).view(np.int32)
@@ -237,7 +268,7 @@ class _Lowering:
         self.nested[word] = 1 + max(self.nested.get(child, 0) for child in children)
         return word
 
-    def _features(self, analytic: Any, camera: str) -> Features:
+    def _features(self, analytic: set[str], camera: str) -> Features:
         scene, tables = self.scene, self.tables
         sources = {
             kind: {name: frozenset(found) for name, found in values.items()}
@@ -261,7 +292,8 @@ class _Lowering:
             textures=tuple(sorted({kind for kind, _ in tables.texture_roles})),
             texture_roles=tuple(sorted(tables.texture_roles)),
             texture_depth=tables.texture_depth,
-            analytic=tuple(k for k in shapes.ANALYTIC if any(s.kind == k for s in analytic)),
+            analytic=tuple(kind for kind in shapes.ANALYTIC if kind in analytic),
+            instances=bool(self.prototypes),
             normals=self.uses["normals"],
             uvs=self.uses["uvs"] or self.uses["tangents"] or "uv" in self.channels,
             tangents=self.uses["tangents"],
@@ -302,9 +334,8 @@ class _Lowering:
         settings["light_count"] = len(self.lights.rows)
         settings["infinite_count"] = self.lights.infinite
         settings["ambient"] = self.ambient
-        analytic = sum(s.kind in shapes.ANALYTIC for s in scene.shapes)
-        settings["first_analytic"] = len(scene.shapes) - analytic
-        settings["analytic_count"] = analytic
+        settings["first_analytic"] = self.first_analytic
+        settings["analytic_count"] = self.analytic_count
         settings["lambda_min"], settings["lambda_max"] = film.lambda_min, film.lambda_max
         settings["tanh_min"], settings["tanh_max"] = tanh_ends(self.density.lo, self.density.hi)
         settings["bands"] = film.bands
@@ -358,10 +389,10 @@ def _any_of(material: Any, classes: Any) -> bool:
     return any(isinstance(part, classes) for part in _parts(material))
 
 
-def _sphere_around(vertices: np.ndarray, boxes: np.ndarray) -> tuple[np.ndarray, float]:
+def _sphere_around(vertices: np.ndarray, *boxes: np.ndarray) -> tuple[np.ndarray, float]:
     """The sphere around the bounding box of the whole scene; a unit one if it is empty."""
-    lows = [a.min(axis=0) for a in (vertices, boxes[:, 0]) if len(a)]
-    highs = [a.max(axis=0) for a in (vertices, boxes[:, 1]) if len(a)]
+    lows = [a.min(axis=0) for a in (vertices, *(b[:, 0] for b in boxes)) if len(a)]
+    highs = [a.max(axis=0) for a in (vertices, *(b[:, 1] for b in boxes)) if len(a)]
     if not lows:
         return np.zeros(3), 1.0
     low, high = np.min(lows, axis=0), np.max(highs, axis=0)

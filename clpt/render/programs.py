@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from clpt import device
 from clpt.layout import Record
-from clpt.records import LIGHT, SETTINGS, SHAPE, SLABS, TABLES
+from clpt.records import INSTANCE, LIGHT, SETTINGS, SHAPE, SLABS, TABLES
 from clpt.render import cameras, emission, films, kinds, lights, shapes, textures
 from clpt.render.features import Features
 from clpt.render.reradiation import STEP as SHIFT_STEP
@@ -99,6 +99,8 @@ def _defines(features: Features) -> dict[str, str | int | float]:
         made["CHANNEL"] = f"CHANNEL_{features.channel.upper()}"
     if features.bands:
         made["USES_BANDS"] = 1
+    if features.instances:
+        made["USES_INSTANCES"] = 1
     return made
 
 
@@ -130,8 +132,13 @@ def _shared(features: Features, layout: str) -> dict[str, str]:
         "generated/layout.cl": (
             f'#include "bvh/{layout}.cl"\n#define LAYOUT(verb) {layout}_##verb\n'
         ),
+        "generated/trace_args.cl": _trace_args_text(features),
         "generated/shape_tree.cl": _shape_tree_text(features),
         "generated/shape_traversal.cl": '#include "bvh/shapes.cl"\n' if features.analytic else "",
+        "generated/instances.cl": '#include "lib/instances.cl"\n' if features.instances else "",
+        "generated/instance_traversal.cl": (
+            '#include "lib/trace_instances.cl"\n' if features.instances else ""
+        ),
         "generated/integrator.cl": f'#include "integrator/{features.integrator}.cl"\n',
     }
 
@@ -148,7 +155,7 @@ def _spectrum_text(features: Features) -> str:
 def scene_text() -> str:
     """Return records, the `Scene` struct and the macros that carry it through arguments."""
     slabs = [record.slab_text() for record in SLABS]
-    rows = [record.row_text() for record in (SHAPE, LIGHT)]
+    rows = [record.row_text() for record in (SHAPE, INSTANCE, LIGHT)]
     pointers = [f"global const {element} *" for element, _ in TABLES.values()]
     members = [
         f"    {pointer}{name}; /* {doc} */"
@@ -172,6 +179,7 @@ def scene_text() -> str:
             "} Scene;",
             *rows,
             f"#define SHAPE_ROW_WORDS {SHAPE.words}",
+            f"#define INSTANCE_ROW_WORDS {INSTANCE.words}",
             f"#define LIGHT_ROW_WORDS {LIGHT.words}",
             f"#define SCENE_ARGS {', '.join(args)}",
             f"#define SCENE Scene scene = {{{', '.join([*TABLES, 'settings'])}}};",
@@ -286,6 +294,17 @@ def _interior_text(features: Features, cls: type[materials.Material]) -> list[st
 
 def _trace_text(layout: str) -> str:
     return f'#include "lib/trace_{"lanes" if layout == "brute" else "one"}.cl"\n'
+
+
+def _trace_args_text(features: Features) -> str:
+    """The buffers of all trees, as arguments and as they are passed on."""
+    trees = {"nodes": "float", "leaves": "float"}
+    if features.analytic:
+        trees |= {"shape_nodes": "float", "shape_items": "uint"}
+    if features.instances:
+        trees |= {"instance_nodes": "float", "instance_items": "uint"}
+    args = ", ".join(f"global const {element} *{name}" for name, element in trees.items())
+    return f"#define TRACE_ARGS {args}\n#define TRACE {', '.join(trees)}\n"
 
 
 def _includes(features: Features) -> list[str]:

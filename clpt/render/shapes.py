@@ -98,7 +98,7 @@ def triangles(
 
     Raises SceneError for a mesh that is empty, not finite or inconsistent, or a singular transform.
     """
-    matrix = _matrix(shape)
+    matrix = placement(shape)
     vertices, faces, normals, uvs = _local(shape)
     if not np.array_equal(matrix, transforms.IDENTITY):
         vertices = transforms.transform_points(matrix, vertices).astype(np.float32)
@@ -153,7 +153,7 @@ def row(shape: Shape) -> Words:
 
     Raises SceneError for a singular transform, or one after which it is no such shape any more.
     """
-    matrix = _matrix(shape)
+    matrix = placement(shape)
     record = RECORDS[shape.kind]
     if isinstance(shape, shapes.Sphere):
         values = _sphere(shape, matrix)
@@ -195,7 +195,7 @@ def _cylinder(shape: shapes.Cylinder, matrix: NDArray[np.float64]) -> dict[str, 
     length = np.linalg.norm(p1 - p0)
     if not length > 0.0:
         raise SceneError("p0 and p1 coincide", where=where(shape))
-    frame = np.column_stack([*_across((p1 - p0) / length), p1 - p0])
+    frame = np.column_stack([*across((p1 - p0) / length), p1 - p0])
     placed = matrix[:3, :3] @ frame
     stretch = np.linalg.norm(placed[:, 2]) / np.linalg.norm(placed[:, 0])
     axes, scale = _even_axes(placed / [1.0, 1.0, stretch], shape)
@@ -209,8 +209,8 @@ def _cylinder(shape: shapes.Cylinder, matrix: NDArray[np.float64]) -> dict[str, 
     }
 
 
-def _across(n: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Two unit axes across a unit vector (Duff et al. 2017)."""
+def across(n: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return two unit axes across a unit vector (Duff et al. 2017)."""
     sign = np.copysign(1.0, n[2])
     a = -1.0 / (sign + n[2])
     b = n[0] * n[1] * a
@@ -326,8 +326,8 @@ def _array(shape: Shape, name: str, columns: int, rows: int | None = None) -> Po
     return values
 
 
-def _matrix(shape: Shape) -> NDArray[np.float64]:
-    """The shape's transform. Raises SceneError if it is singular, or no affine 4x4 matrix."""
+def placement(shape: Shape) -> NDArray[np.float64]:
+    """Return a shape's transform. Raises SceneError if it is singular, or no affine 4x4 matrix."""
     try:
         matrix = np.asarray(shape.to_world, np.float64)
     except (TypeError, ValueError) as error:

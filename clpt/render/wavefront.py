@@ -19,7 +19,7 @@ import pyopencl as cl
 from clpt import bvh, device
 from clpt.device.buffers import Buffers
 from clpt.device.timing import Timings
-from clpt.errors import MemoryBudgetError
+from clpt.errors import MemoryBudgetError, SceneError
 from clpt.records import PATH, SLABS, TABLES
 from clpt.render import programs
 from clpt.render.lower import Lowered
@@ -74,8 +74,11 @@ class Wavefront:
         features = lowered.features
         if layout is None:
             layout = bvh.choose_layout(on, len(lowered.faces))
-            if layout == "brute" and len(lowered.boxes) > BRUTE_SHAPES:
+            many = len(lowered.boxes) > BRUTE_SHAPES or features.instances
+            if layout == "brute" and many:
                 layout = "wide8" if on.info.is_cpu else "binary"
+        elif layout == "brute" and features.instances:
+            raise SceneError("the layout brute holds no instances; choose wide8 or binary")
         self.lanes = on.lanes
         kinds = len(features.materials)
         self.queued = kinds > 1 and (not on.info.is_cpu or kinds > 4) if queued is None else queued
@@ -131,19 +134,7 @@ class Wavefront:
             array = {"vertices": lowered.vertices, "faces": lowered.faces}.get(name)
             array = lowered.tables[name] if array is None else array
             self.named[name] = give.upload(f"the table of {name}", array)
-        tags = give.upload("the shapes of the triangles", lowered.tags)
-        tree = bvh.build(
-            self.device, self.named["vertices"] if len(lowered.faces) else lowered.vertices,
-            self.named["faces"] if len(lowered.faces) else lowered.faces,
-            tags if len(lowered.faces) else lowered.tags, layout,
-        )  # fmt: skip
-        give.release(tags)
-        self.tree = tree
-        self.named.update(tree.buffers, triangles=max(tree.count, 0))
-        if lowered.features.analytic and layout != "brute":
-            shapes = bvh.build_boxes(self.device, lowered.boxes)
-            self.named["shape_nodes"] = shapes.buffers["nodes"]
-            self.named["shape_items"] = shapes.buffers["indices"]
+        self._build_trees(layout)
         for record in SLABS:
             name = f"{record.name.lower()}_words"
             advice = "lower the number of slots"
@@ -161,6 +152,28 @@ class Wavefront:
             for name in ("queue_starts", "queue_counts"):
                 self.named[name] = give.allocate(name, 4 * kinds)
             self.named.update(chunk=CHUNK, chunks=chunks, slots=self.slots)
+
+    def _build_trees(self, layout: str) -> None:
+        """Trees over triangles, analytic shapes and instances, which learn where theirs begin."""
+        lowered, instances = self.lowered, self.lowered.instances
+        vertices = self.named["vertices"] if len(lowered.faces) else lowered.vertices
+        counts = [len(lowered.faces) - sum(instances.triangles), *instances.triangles]
+        self.tree, begins = bvh.build_parts(
+            self.device, vertices, lowered.faces, lowered.tags, counts, layout
+        )
+        self.named.update(self.tree.buffers, triangles=max(self.tree.count, 0))
+        self.box_trees = {}
+        if lowered.features.analytic and layout != "brute":
+            self.box_trees["shape"] = bvh.build_boxes(self.device, lowered.boxes)
+        if lowered.features.instances:
+            rows = instances.rows.copy()
+            rows["nodes"], rows["leaves"] = begins[1 + instances.prototypes].T
+            words = rows.view(np.uint32)
+            self.named["instances"] = self.buffers.upload("the table of instances", words)
+            self.box_trees["instance"] = bvh.build_boxes(self.device, instances.boxes, 1)
+        for name, tree in self.box_trees.items():
+            self.named[f"{name}_nodes"] = tree.buffers["nodes"]
+            self.named[f"{name}_items"] = tree.buffers["indices"]
 
     def _expose_new(self) -> None:
         """A film and a picture of its own, and kernels bound to them."""

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from clpt.errors import SceneError
 from clpt.scene.materials import Diffuse
 from clpt.scene.params import Kind, host
 
@@ -64,4 +65,40 @@ class Cylinder(Shape):
     radius: float = host(1.0, "before `to_world`, which may scale it evenly", "m")
 
 
-KINDS = (Mesh, Sphere, Rectangle, Disk, Cube, Cylinder)
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Shapes that instances place together; by itself it is nowhere in the scene.
+
+    shapes: placed by their own `to_world` in the group's space; name: for messages and files.
+
+    Raises SceneError for what is no shape, and for an instance: groups do not nest.
+    """
+
+    shapes: tuple[Shape, ...] = ()
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "shapes", tuple(self.shapes))
+        for i, shape in enumerate(self.shapes):
+            if isinstance(shape, Instance) or not isinstance(shape, Shape):
+                found = "an instance" if isinstance(shape, Instance) else repr(shape)
+                where = f"group {self.name!r}.shapes[{i}]"
+                raise SceneError(f"a group holds shapes, not {found}", where=where)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Instance(Shape):
+    """A group at a place; many share its triangles. In a mirror a front stays a front."""
+
+    group: Any = host(None, "what is placed: a name in the scene's `groups`")
+    # The surfaces are those of the group's shapes.
+    material: Any = field(default=None, init=False, repr=False)
+    emission: Any = field(default=None, init=False, repr=False)
+    flip_normals: bool = field(default=False, init=False, repr=False)
+
+    def check(self) -> None:
+        if not isinstance(self.group, Group):
+            raise SceneError(f"must be a group, not {self.group!r}", where="instance.group")
+
+
+KINDS = (Mesh, Sphere, Rectangle, Disk, Cube, Cylinder, Instance)

@@ -30,7 +30,13 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     Spectrum albedo = bsdf_albedo(bsdf_load(scene, material, surface_texture_point(s), load_path_lambdas(path, at)));
     v = v3(albedo.x, albedo.y, albedo.z);
 #elif CHANNEL == CHANNEL_SHAPE_ID
-    v.x = to_real(shape.number);
+    integer number = shape.number;
+#if USES_INSTANCES
+    integer instance = sel_i(active, load_hit_instance(hit, at), (integer)(0));
+    integer placed = sel_i(instance > 0, instance - 1, (integer)(0)) * INSTANCE_ROW_WORDS;
+    number = sel_i(instance > 0, instance_row_row(scene.instances, placed).number, number);
+#endif
+    v.x = to_real(number);
 #elif CHANNEL == CHANNEL_PRIMITIVE_ID
     v.x = sel(shape.kind == 0, to_real(load_hit_prim(hit, at) - shape.prim), (real)(0.0f));
 #endif

@@ -1,6 +1,7 @@
 /* Where a path is: the point that a ray hit, with all that shading asks for. */
 #include "lib/surface_flags.cl"
 #include "lib/trace_hit.cl"
+#include "generated/instances.cl"
 
 typedef struct {
     vec3 p;       /* [m] */
@@ -46,6 +47,10 @@ inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, 
     s.face = sel_i(active & (shape.kind == 0), prim, (integer)(0));
     s.b = s.uv;
 #endif
+#if USES_INSTANCES
+    mask placed = active & (h.instance > 0);
+    InstanceFrame space = instance_frame(scene, placed, h.instance);
+#endif
     mask emits = active & (shape.light >= 0);
     if (any(emits)) {
         integer offset = sel_i((shape.flags & SHAPE_ONE_LIGHT) != 0, (integer)(0), prim - shape.prim);
@@ -63,6 +68,9 @@ inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, 
         vec3 ns = madd3(vertex_vec3(scene.normals, a), w,
                         madd3(vertex_vec3(scene.normals, b), u, scale3(vertex_vec3(scene.normals, c), v)));
         mask usable = smooth & (dot3(ns, ns) > 1e-12f);
+#if USES_INSTANCES
+        ns = sel3(placed, instance_normal(space, ns), ns);
+#endif
         s.ns = sel3(usable, normalize3(ns), s.ns);
     }
 #endif
@@ -79,6 +87,9 @@ inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, 
         real det = du1 * dv2 - dv1 * du2;
         mask regular = mapped & (fabs(det) > 1e-20f);
         s.dpdu = sel3(regular, scale3(sub3(scale3(e1, dv2), scale3(e2, dv1)), 1.0f / sel(regular, det, (real)(1.0f))), s.dpdu);
+#if USES_INSTANCES
+        s.dpdu = sel3(placed, instance_vector(space, s.dpdu), s.dpdu);
+#endif
 #endif
     }
 #endif
@@ -98,6 +109,9 @@ inline Surface surface_load(Scene scene, Slab hit, At at, mask active, vec3 o, v
 {
     TraceHit h = {load_hit_t(hit, at), load_hit_u(hit, at), load_hit_v(hit, at), load_hit_n(hit, at),
                   load_hit_prim(hit, at), load_hit_shape(hit, at)};
+#if USES_INSTANCES
+    h.instance = load_hit_instance(hit, at);
+#endif
     return surface_at(scene, h, active, o, d, front);
 }
 

@@ -4,4 +4,7 @@ typedef struct {
     vec3 n;        /* see Hit.n in clpt/records.py */
     integer prim;  /* -1: nothing */
     integer shape; /* row in `shapes` */
+#if USES_INSTANCES
+    integer instance; /* see Hit.instance in clpt/records.py */
+#endif
 } TraceHit;

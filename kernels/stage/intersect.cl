@@ -26,6 +26,9 @@ kernel APART void intersect(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS)
         store_hit_n(hit, at, active, h.n);
         store_hit_prim(hit, at, active, h.prim);
         store_hit_shape(hit, at, active, shape);
+#if USES_INSTANCES
+        store_hit_instance(hit, at, active, h.instance);
+#endif
         store_hit_material(hit, at, active, sel_i(dot3(h.n, d) < 0.0f, s.front, s.back));
     }
 }

@@ -22,8 +22,8 @@ from clpt.scene.params import SPECTRUM_ROLES, Kind, Param, params
 
 ON_SHAPES = tuple(cls.kind for cls in lights.ON_SHAPES)
 KEYS = (
-    "$schema", "name", "camera", "film", "integrator", "sampler", "materials", "shapes", "lights",
-    "spp", "seed",
+    "$schema", "name", "camera", "film", "integrator", "sampler", "materials", "groups", "shapes",
+    "lights", "spp", "seed",
 )  # fmt: skip
 # A mesh's arrays: numbers in a row, and of what type.
 ARRAYS = {
@@ -63,10 +63,12 @@ class _Reader:
     def __init__(self, root: Cursor):
         self.root = root
         self.materials: dict[str, materials.Material | None] = {}
+        self.groups: dict[str, shapes.Group | None] = {}
         self.warnings: list[str] = []
         self.special: dict[str, Callable[[Cursor], Any]] = {
             "back": self.material,
             "emission": self.emission,
+            "group": self.group,
             "image": _image,
             "sensor": json_spectra.read_sensor,
             "white_balance": lambda c: (
@@ -99,6 +101,8 @@ class _Reader:
         if "materials" in root.value:
             for _, cursor in root.at("materials").items():
                 self.material(cursor)
+        for name, cursor in root.at("groups").items() if "groups" in root.value else ():
+            self.named_group(name, cursor)
         given.setdefault("name", root.file.stem)
         with_place = root.at("spp") if "spp" in root.value else root
         return placed(
@@ -204,9 +208,46 @@ class _Reader:
             raise asked_by.error(f"the material {name!r} refers to itself")
         return self.materials[name]
 
+    def group(self, cursor: Cursor) -> shapes.Group:
+        return self.named_group(cursor.expect(str, "a group's name"), cursor)
+
+    def named_group(self, name: str, asked_by: Cursor) -> shapes.Group:
+        """Read the group of that name, once."""
+        if name not in self.groups:
+            table = self.root.value.get("groups", {})
+            if not isinstance(table, dict) or name not in table:
+                known = table if isinstance(table, dict) else ()
+                raise UnknownKindError("group name", name, known, **asked_by.place())
+            self.groups[name] = None
+            entries = self.root.at("groups").at(name).entries()
+            found = [(entry, made) for entry in entries for made in self.shape(entry)]
+            for entry, made in found:
+                if isinstance(made, shapes.Instance):
+                    raise entry.error("an instance cannot stand in a group")
+            self.groups[name] = shapes.Group(tuple(made for _, made in found), name)
+        group = self.groups[name]
+        if group is None:
+            raise asked_by.error(f"the group {name!r} holds itself")
+        return group
+
+    def instances(self, cursor: Cursor) -> list[shapes.Shape]:
+        """Read an instance, or one for each matrix of a file."""
+        if "group" not in cursor.value:
+            raise cursor.error("needs a 'group'")
+        if "file" not in cursor.value:
+            return [self.kind(cursor, "shape")]
+        first = self.make(cursor, shapes.Instance, ("type", "file"))
+        placements = _placements(cursor.at("file"))
+        return [
+            dataclasses.replace(first, to_world=np.asarray(first.to_world) @ matrix)
+            for matrix in placements
+        ]
+
     def shape(self, cursor: Cursor) -> list[shapes.Shape]:
         """Read a shape; a mesh file may hold several, with materials of their own."""
         kind = kind_name(cursor, "shape", kinds("shape"))
+        if kind == "instance":
+            return self.instances(cursor)
         if kind != "mesh" or "file" not in cursor.value:
             made = self.kind(cursor, "shape")
             return [_checked_mesh(cursor, made, self.warnings)] if kind == "mesh" else [made]
@@ -223,6 +264,21 @@ class _Reader:
 
 def _meshes(path: Path) -> mesh.MeshFile:
     return (gltf if path.suffix.lower() in gltf.SUFFIXES else mesh).read_mesh(path)
+
+
+def _placements(cursor: Cursor) -> np.ndarray:
+    """Read the matrices (n, 3, 4) of a .npy; return them as (n, 4, 4) float64."""
+    path = find_file(cursor)
+    try:
+        rows = np.load(path, mmap_mode="r")  # a wrong header claims no memory
+    except (OSError, ValueError, EOFError) as error:
+        raise cursor.error(f"is no .npy file: {error}") from None
+    good = isinstance(rows, np.ndarray) and rows.dtype.kind == "f" and rows.shape[1:] == (3, 4)
+    if not good:
+        raise cursor.error("must hold matrices, (n, 3, 4) of float")
+    matrices = np.tile(np.eye(4), (len(rows), 1, 1))
+    matrices[:, :3] = rows
+    return matrices
 
 
 def _in_frame(part: shapes.Mesh, frame: shapes.Mesh, dressed: bool, several: bool) -> shapes.Mesh:

@@ -6,6 +6,8 @@ import dataclasses
 import json
 import os
 import re
+from collections.abc import Container, Sequence
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +21,7 @@ from clpt.formats.native.read import ARRAYS, default
 from clpt.scene import Scene, materials, shapes
 from clpt.scene.params import SPECTRUM_ROLES, Kind, Param, params
 
+MANY = 16  # instances in a row, from which on their matrices are a file
 NUMBERS = re.compile(r"\[\s+([^\[\]{}\"]*?)\s+\]")
 
 
@@ -43,6 +46,8 @@ class _Writer:
         self.path = path
         self.materials: dict[str, Any] = {}
         self.names: dict[int, str] = {}
+        self.groups: dict[str, Any] = {}
+        self.group_names: dict[int, str] = {}
         self.files: dict[Any, str] = {}
 
     def scene(self, scene: Scene) -> dict[str, Any]:
@@ -57,10 +62,42 @@ class _Writer:
             "spp": scene.spp,
             "seed": scene.seed,
             "materials": self.materials,
-            "shapes": [self.kind(shape) for shape in scene.shapes],
+            "groups": self.groups,
+            "shapes": self.entries(scene.shapes),
             "lights": [self.kind(light) for light in scene.lights],
         }
+        if not self.groups:
+            del document["groups"]
         return document
+
+    def entries(self, things: Sequence[shapes.Shape]) -> list[dict[str, Any]]:
+        """Write shapes; a run of nameless instances of a group has its matrices in a file."""
+        written: list[dict[str, Any]] = []
+        for key, members in groupby(things, _run):
+            run = list(members)
+            if key is None or len(run) < MANY:
+                written += [self.kind(shape) for shape in run]
+            else:
+                written.append(self.placements(run))
+        return written
+
+    def placements(self, run: Sequence[Any]) -> dict[str, Any]:
+        """Write instances of one group, their matrices as .npy."""
+        group = self.group(run[0].group)
+        label = re.sub(r"\W+", "_", group)
+        name = f"{self.path.stem}.{label}{len(self.files)}.npy"
+        matrices = np.stack([np.asarray(one.to_world, np.float64)[:3] for one in run])
+        np.save(self.path.parent / name, matrices)
+        self.files[name] = name
+        return {"type": "instance", "group": group, "file": name}
+
+    def group(self, group: shapes.Group) -> str:
+        """Return a group's name in the table of groups, where it is written once."""
+        if id(group) not in self.group_names:
+            key = free_name(group.name or "group", self.groups)
+            self.group_names[id(group)] = key
+            self.groups[key] = [self.kind(shape) for shape in group.shapes]
+        return self.group_names[id(group)]
 
     def kind(self, thing: Kind) -> dict[str, Any]:
         """Return the object that stands for a thing; what has its default is left out."""
@@ -87,6 +124,8 @@ class _Writer:
             return json_spectra.write_sensor(value)
         if isinstance(value, materials.Material):
             return self.material(value)
+        if isinstance(value, shapes.Group):
+            return self.group(value)
         if isinstance(value, Kind):
             return self.kind(value)
         if param.role == "reradiation":
@@ -109,10 +148,7 @@ class _Writer:
         if not material.name:
             return self.kind(material)
         if id(material) not in self.names:
-            key, count = material.name, 1
-            while key in self.materials:
-                count += 1
-                key = f"{material.name} {count}"
+            key = free_name(material.name, self.materials)
             self.names[id(material)] = key
             self.materials[key] = None
             written = self.kind(material)
@@ -145,6 +181,20 @@ class _Writer:
             (self.path.parent / name).write_bytes(_ply(mesh))
             self.files[key] = name
         return self.files[key]
+
+
+def free_name(wanted: str, taken: Container[str]) -> str:
+    """Return a name, with a number behind it if it is taken."""
+    name, count = wanted, 1
+    while name in taken:
+        count += 1
+        name = f"{wanted} {count}"
+    return name
+
+
+def _run(shape: shapes.Shape) -> int | None:
+    """What instances that may share a file of matrices have in common."""
+    return id(shape.group) if isinstance(shape, shapes.Instance) and not shape.name else None
 
 
 def _on_one_line(match: re.Match) -> str:
