@@ -75,9 +75,8 @@ def _mesh(mesh: Element) -> None:
         counts = set()
         for attributes in [base, *primitive.children("targets")]:
             for name in attributes.value:
-                accessor = attributes.document.entry(
-                    "accessors", attributes.index(name, "accessors")
-                )
+                number = attributes.index(name, "accessors")
+                accessor = attributes.document.entry("accessors", number)
                 counts.add(accessor.integer("count"))
                 if primitives.wanted(name):
                     accessor.text("type", choices=primitives.TYPES[name.partition("_")[0]])

@@ -111,7 +111,7 @@ def test_indices_and_numbers_out_of_range(read, build):
         read(build().mesh([[0, 0, 0], [np.nan, 0, 0], [0, 1, 0]]))
     made = build()
     normals = made.accessor(np.zeros((2, 3)))
-    with pytest.raises(SceneError, match=r"attributes\.NORMAL: has 2 elements, POSITION has 3"):
+    with pytest.raises(SceneError, match="accessors have different counts"):
         read(made.mesh(attributes={"NORMAL": normals}))
 
 
