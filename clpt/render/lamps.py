@@ -35,6 +35,7 @@ RECORDS: dict[str, Record] = {
         axis=("vec3", "unit vector in which it shines"),
         cutoff=("real", "half angle beyond which it is dark [rad]"),
         beam_width=("real", "half angle of full intensity [rad]"),
+        smooth=("integer", "1: it falls off smoothly in the cosine; 0: linearly in the angle"),
         radiance=_RADIANCE,
     ),
     **projected.RECORDS,
@@ -119,6 +120,7 @@ def _members(lamp: Light) -> dict[str, ArrayLike]:
             "axis": _unit(matrix[:3, 2], "spot.to_world"),
             "cutoff": np.radians(lamp.cutoff),
             "beam_width": np.radians(min(lamp.beam_width, lamp.cutoff)),
+            "smooth": lights.SPOT_EDGES.index(lamp.edge),
         }
     return {}
 

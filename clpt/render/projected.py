@@ -12,7 +12,7 @@ from clpt import transforms
 from clpt.errors import SceneError
 from clpt.layout import Record
 from clpt.render.texels import pixels, spectral_image
-from clpt.scene.lights import Goniometric, Light, Projector, Spot
+from clpt.scene.lights import SPOT_EDGES, Goniometric, Light, Projector, Spot
 from clpt.scene.textures import Bitmap
 
 _PLACE = {
@@ -39,6 +39,7 @@ RECORDS: dict[str, Record] = {
         **_PLACE,
         cutoff=("real", "half angle beyond which it is dark [rad]"),
         beam_width=("real", "half angle of full intensity [rad]"),
+        smooth=("integer", "1: it falls off smoothly in the cosine; 0: linearly in the angle"),
         radiance=_RADIANCE,
         factor=_FACTOR,
     ),
@@ -76,6 +77,7 @@ def members(lamp: Light, tables: Any) -> dict[str, ArrayLike]:
         **_place(lamp.to_world, "spot.to_world", half, half),
         "cutoff": np.radians(lamp.cutoff),
         "beam_width": np.radians(min(lamp.beam_width, lamp.cutoff)),
+        "smooth": SPOT_EDGES.index(lamp.edge),
         "factor": tables.append("lamps", tables.factor_words(lamp.image)),
     }
 

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from clpt.errors import SceneError
-from clpt.scene.params import Kind, emission, flag, host, real, reflectance
+from clpt.scene.params import Kind, choice, emission, flag, host, real, reflectance
 
 RADIANCE = "W m^-2 sr^-1 nm^-1"
+SPOT_EDGES = ("linear", "smooth")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -55,6 +56,9 @@ class Spot(Light):
     intensity: Any = emission(1.0, "radiant intensity on the axis", "W sr^-1 nm^-1")
     cutoff: float = real(20.0, "half angle beyond which it is dark", "degrees", 0.0, 180.0)
     beam_width: float = real(15.0, "half angle of full intensity", "degrees", 0.0, 180.0)
+    edge: str = choice(
+        "linear", "how it falls off: linear in the angle, or smooth in its cosine", SPOT_EDGES
+    )
     image: Any = reflectance(
         1.0, "what its light passes through; a texture fills the square around a cone below 90"
     )

@@ -1,5 +1,15 @@
-/* A point that shines along `axis`: full intensity within the beam, then linear in the angle down to
- * zero at the cutoff, as Mitsuba's spot. Irradiance falls with the square of the distance. */
+/* A point that shines along `axis`: full intensity within the beam, then down to zero at the cutoff, linear
+ * in the angle as Mitsuba's spot, or smooth, by a cubic in its cosine, as pbrt's. Irradiance falls with the
+ * square of the distance. */
+inline real spot_smooth_edge(Spot l, real cos_t)
+{
+    real sin_t, full, end;
+    sincos_2pi(l.beam_width * INV_2PI, &sin_t, &full);
+    sincos_2pi(l.cutoff * INV_2PI, &sin_t, &end);
+    real x = clamp_r((cos_t - end) / max_r(full - end, (real)(1e-7f)), (real)(0.0f), (real)(1.0f));
+    return x * x * (3.0f - 2.0f * x);
+}
+
 LightSample spot_sample(Spot l, Scene scene, vec3 p, vec2 u, Wavelengths lambdas)
 {
     vec3 to = sub3(l.position, p);
@@ -10,6 +20,8 @@ LightSample spot_sample(Spot l, Scene scene, vec3 p, vec2 u, Wavelengths lambdas
     real cos_t = -dot3(s.wi, l.axis);
     real angle = atan2_r(sqrt_r(1.0f - cos_t * cos_t), cos_t);
     real edge = clamp_r((l.cutoff - angle) / max_r(l.cutoff - l.beam_width, (real)(1e-7f)), (real)(0.0f), (real)(1.0f));
+    mask smooth = l.smooth != 0;
+    if (any(smooth)) edge = sel(smooth, spot_smooth_edge(l, cos_t), edge);
     s.radiance = spectrum_scale(emission_load(scene, l.radiance, texture_point_nowhere(), lambdas), edge / t2);
     s.pdf = sel(edge > 0.0f, (real)(-1.0f), (real)(0.0f));
     return s;

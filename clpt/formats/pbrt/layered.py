@@ -1,0 +1,104 @@
+"""Diffuse bases below dielectric boundaries: coated surfaces and scattering bodies of pbrt.
+
+pbrt walks at random between the layers, and through a body; here our plastics' closed form stands
+for both. It is exact for a smooth coat whose medium does nothing, and for a body seen from afar.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from clpt import spectra
+from clpt.errors import SceneError, UnknownKindError
+from clpt.formats.pbrt import coats
+from clpt.formats.pbrt.params import Parameters
+from clpt.formats.pbrt.roughness import alphas, isotropic, rough, smooth
+from clpt.formats.pbrt.spectra import spectrum
+from clpt.formats.pbrt.state import State
+from clpt.formats.pbrt.textures import mapped, textured
+from clpt.scene import materials
+from clpt.scene.materials import Material
+from clpt.scene.textures import Texture
+
+THICKNESS = 0.01  # of pbrt's coats, in mean free paths
+
+
+def both(made: Material) -> Material:
+    return materials.TwoSided(front=made)
+
+
+def coated_diffuse(params: Parameters, state: State) -> Material:
+    eta = spectrum(params, "eta", "index", state, 1.5)
+    base = textured(params, "reflectance", "reflectance", state, 0.5)
+    thickness = coat(params, state)
+    if thickness > 0.0:
+        base = mapped(base, coats.under_coat(middle(eta), thickness))
+    return plastic(base, eta, isotropic(alphas(params, state), params, state))
+
+
+def coat(params: Parameters, state: State) -> float:
+    """Take what a coat is made of: its thickness. What scatters in it is left out, warned of."""
+    albedo = textured(params, "albedo", "reflectance", state, 0.0)
+    params.ignore("g", "maxdepth", "nsamples")
+    if isinstance(albedo, Texture) or np.any(mapped(albedo, abs)):
+        state.warn(params, "'albedo' of the coat is taken as 0: it absorbs and does not scatter")
+    thickness = textured(params, "thickness", "real", state, THICKNESS)
+    if isinstance(thickness, Texture):
+        state.warn(params, f"'thickness' cannot vary over the surface; {THICKNESS} is taken")
+        return THICKNESS
+    return thickness
+
+
+def plastic(base: Any, eta: Any, alpha: Any) -> Material:
+    given = {"diffuse_reflectance": base, "int_ior": eta, "ext_ior": 1.0, "nonlinear": True}
+    if smooth(alpha):
+        return both(materials.Plastic(**given))
+    return both(materials.RoughPlastic(alpha=rough(alpha), **given))
+
+
+def middle(eta: Any) -> float:
+    """An index at 550 nm."""
+    return float(spectra.index(eta).sample(550.0)) if not isinstance(eta, float) else eta
+
+
+def subsurface(params: Parameters, state: State) -> Material:
+    """The body's diffuse reflection under its boundary; light leaves where it came in."""
+    eta = spectrum(params, "eta", "index", state, 1.33)
+    g = params.one("g", "float", 0.0)
+    params.ignore("scale", "mfp")
+    medium = params.one("name", "string", "")
+    given = {
+        name: textured(params, name, role, state)
+        for name, role in (
+            ("sigma_a", "coefficient"), ("sigma_s", "coefficient"), ("reflectance", "reflectance"),
+        )
+    }  # fmt: skip
+    scattering, absorption = given["sigma_s"], given["sigma_a"]
+    if medium:
+        if medium not in coats.MEDIA:
+            raise UnknownKindError("medium", medium, coats.MEDIA)
+        (scattering, absorption), g = coats.MEDIA[medium], 0.0
+    elif (scattering is None) != (absorption is None):
+        raise SceneError("'sigma_a' and 'sigma_s' are given together or not at all")
+    elif scattering is None and given["reflectance"] is None:
+        scattering, absorption = coats.MEDIA["Wholemilk"]
+    if scattering is not None:
+        base = _albedo(scattering, absorption, g)
+    else:
+        base = mapped(given["reflectance"], coats.from_body_reflectance(middle(eta)))
+    state.warn(
+        params, "light leaves a 'subsurface' body where it entered: a diffuse base of its albedo"
+    )
+    return plastic(base, eta, isotropic(alphas(params, state), params, state))
+
+
+def _albedo(scattering: Any, absorption: Any, g: float) -> Any:
+    colours = []
+    for value in (scattering, absorption):
+        if isinstance(value, Texture):
+            raise SceneError("'sigma_a' and 'sigma_s' cannot be textures")
+        found = value.to_rgb("unbounded") if isinstance(value, spectra.Spectrum) else value
+        colours.append(np.broadcast_to(found, 3))
+    return tuple(float(v) for v in coats.body_albedo(*colours, g))

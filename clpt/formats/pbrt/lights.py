@@ -1,0 +1,236 @@
+"""Lights of a PBRT scene. `scale` is the luminance of each spectrum; see spectra.py.
+
+pbrt's light space has x to the right where it looks along z with y up, ours to the left: images
+that are thrown are turned round accordingly, and images around a point are resampled in world
+space, so that any transform, mirrored ones included, is right.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from clpt import images, transforms
+from clpt.errors import SceneError, UnknownKindError
+from clpt.formats.pbrt import octahedral
+from clpt.formats.pbrt.params import Parameters
+from clpt.formats.pbrt.spectra import scaled, spectrum
+from clpt.formats.pbrt.state import State
+from clpt.scene import lights
+from clpt.scene.lights import Light
+from clpt.scene.textures import Bitmap
+from clpt.spectra import RGBIlluminant, luminance
+
+WHITE = RGBIlluminant(1.0, 1.0, 1.0)
+SWAP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])  # y is up for a goniometer
+
+
+def light(kind: str, params: Parameters, state: State) -> Light:
+    """Make what a `LightSource` directive describes. Raises SceneError."""
+    if kind not in MAKERS:
+        raise UnknownKindError("light", kind, MAKERS, **params.place)
+    with params.placed():
+        return MAKERS[kind](params, state)
+
+
+def area_light(kind: str, params: Parameters, state: State, area: float = 0.0) -> lights.Area:
+    """Make what an `AreaLightSource` directive describes for one shape.
+
+    area: of the shape [m^2], which a light of a given "power" needs; of a mesh the mean of its
+    triangles, since pbrt makes each of them a light of that power. Raises SceneError.
+    """
+    if kind != "diffuse":
+        raise UnknownKindError("area light", kind, ("diffuse",), **params.place)
+    with params.placed():
+        two_sided = params.one("twosided", "bool", False)
+        file = params.one("filename", "string", "")
+        given = spectrum(params, "L", "emission", state)
+        if file and given is not None:
+            raise SceneError("give either 'L' or 'filename', not both")
+        image = _image(file, state) if file else None
+        mean = 1.0 if image is None else float(luminance(image).mean(dtype=np.float64))
+        scale = _power_scale(params, (2.0 if two_sided else 1.0) * np.pi * area * mean)
+        if image is None:
+            return lights.Area(radiance=_bright(given, scale), two_sided=two_sided)
+        shown = Bitmap(image=image * np.float32(scale), raw=True, wrap="clamp")
+        return lights.Area(radiance=shown, two_sided=two_sided)
+
+
+def _bright(given: Any, scale: float) -> Any:
+    if scale < 0.0:
+        raise SceneError(f"a light cannot be negative: scale {scale:g}")
+    return scaled(WHITE if given is None else given, scale)
+
+
+def _power_scale(params: Parameters, per_unit: float) -> float:
+    """Take the "scale" and the "power" [W] of what gives out `per_unit`: a factor for both."""
+    scale, power = params.one("scale", "float", 1.0), params.one("power", "float", -1.0)
+    if power > 0.0:
+        if not per_unit > 0.0:
+            raise SceneError("what has no area or a dark image cannot have a 'power'")
+        scale *= power / per_unit
+    return float(scale)
+
+
+def _intensity(params: Parameters, state: State, per_unit: float) -> Any:
+    return _bright(spectrum(params, "I", "emission", state), _power_scale(params, per_unit))
+
+
+def _from_to(params: Parameters, state: State) -> tuple[np.ndarray, np.ndarray]:
+    """Take where a light stands and the direction in which it shines, in world space."""
+    start = np.array(params.one("from", "point3", (0.0, 0.0, 0.0)))
+    along = np.array(params.one("to", "point3", (0.0, 0.0, 1.0))) - start
+    if not np.linalg.norm(along) > 0.0:
+        raise SceneError("'from' and 'to' must differ")
+    direction = transforms.transform_vectors(state.ctm, along / np.linalg.norm(along))
+    return transforms.transform_points(state.ctm, start), direction / np.linalg.norm(direction)
+
+
+def _point(params: Parameters, state: State) -> Light:
+    start = np.array(params.one("from", "point3", (0.0, 0.0, 0.0)))
+    return lights.Point(
+        position=tuple(transforms.transform_points(state.ctm, start).tolist()),
+        intensity=_intensity(params, state, 4.0 * np.pi),
+    )
+
+
+def _spot(params: Parameters, state: State) -> Light:
+    cone = params.one("coneangle", "float", 30.0)
+    beam = cone - params.one("conedeltaangle", "float", 5.0)
+    if not 0.0 <= beam <= cone <= 180.0:
+        raise SceneError("'conedeltaangle' must lie between 0 and 'coneangle'")
+    full, edge = np.cos(np.radians([beam, cone]))
+    start, direction = _from_to(params, state)
+    return lights.Spot(
+        to_world=_facing(start, direction),
+        intensity=_intensity(params, state, 2.0 * np.pi * (1.0 - 0.5 * (full + edge))),
+        cutoff=cone,
+        beam_width=beam,
+        edge="smooth",
+    )
+
+
+def _facing(start: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    up = np.eye(3)[np.argmin(np.abs(direction))]
+    return transforms.look_at(start, start + direction, up)
+
+
+def _distant(params: Parameters, state: State) -> Light:
+    _, direction = _from_to(params, state)
+    scale, lux = params.one("scale", "float", 1.0), params.one("illuminance", "float", -1.0)
+    irradiance = _bright(
+        spectrum(params, "L", "emission", state), scale * lux if lux > 0.0 else scale
+    )
+    return lights.Directional(direction=tuple(direction.tolist()), irradiance=irradiance)
+
+
+def _infinite(params: Parameters, state: State) -> Light:
+    scale, lux = params.one("scale", "float", 1.0), params.one("illuminance", "float", -1.0)
+    given = spectrum(params, "L", "emission", state)
+    file = params.one("filename", "string", "")
+    if params.several("portal", "point3") is not None:
+        state.warn(params, "'portal' only guides sampling in pbrt's way; all directions shine here")
+    if not file:
+        return lights.Constant(radiance=_bright(given, scale * lux / np.pi if lux > 0.0 else scale))
+    if given is not None:
+        raise SceneError("give either 'L' or 'filename', not both")
+    image = _square(file, state)
+    if lux > 0.0:
+        scale *= lux / _upward(image)
+    if scale < 0.0:
+        raise SceneError(f"a light cannot be negative: scale {scale:g}")
+    around = octahedral.lat_long(image, transforms.inverse(state.ctm)[:3, :3])
+    return lights.Envmap(image=around, scale=scale)
+
+
+def _upward(image: np.ndarray) -> float:
+    """What pbrt takes for the illuminance of a surface that faces an octahedral image's +z.
+
+    pbrt gives each pixel 2 pi / n^2 of solid angle, half of what it has; its pictures show that.
+    """
+    centres = (np.arange(len(image)) + 0.5) / len(image)
+    cosine = octahedral.to_sphere(np.stack(np.meshgrid(centres, centres), axis=-1))[..., 2]
+    found = 2.0 * np.pi * float((luminance(image) * np.maximum(cosine, 0.0)).mean())
+    if not found > 0.0:
+        raise SceneError("the upper half of the image is dark, so it has no 'illuminance'")
+    return found
+
+
+def _goniometric(params: Parameters, state: State) -> Light:
+    file = params.one("filename", "string", "")
+    image = _square(file, state).mean(axis=2, keepdims=True) if file else np.ones((2, 2, 1))
+    intensity = _intensity(params, state, 4.0 * np.pi * float(image.mean()))
+    position = transforms.transform_points(state.ctm, np.zeros(3))
+    around = octahedral.lat_long(
+        image, SWAP @ transforms.inverse(state.ctm)[:3, :3], on_poles=False
+    )
+    return lights.Goniometric(
+        intensity=intensity,
+        image=Bitmap(image=around, raw=True),
+        to_world=transforms.translate(position),
+    )
+
+
+def _projection(params: Parameters, state: State) -> Light:
+    """pbrt's intensity is the image's; ours is that over cos^3, so that a plane across shows it."""
+    file = params.one("filename", "string", "")
+    if not file:
+        raise SceneError("needs the parameter 'filename'")
+    image = _image(file, state)
+    fov = params.one("fov", "float", 90.0)
+    if not 0.0 < fov < 180.0:
+        raise SceneError(f"'fov' must lie between 0 and 180, not {fov:g}")
+    aspect = image.shape[1] / image.shape[0]
+    half = np.tan(np.radians(fov) / 2.0) * np.array([max(aspect, 1.0), max(1.0 / aspect, 1.0)])
+    x, y = (
+        (2.0 * (np.arange(count) + 0.5) / count - 1.0) * reach
+        for count, reach in zip(image.shape[1::-1], half, strict=True)
+    )
+    cosine3 = (1.0 + x[None, :] ** 2 + y[:, None] ** 2) ** -1.5
+    per_unit = 4.0 * half[0] * half[1] * float((luminance(image) * cosine3).mean())
+    shown = image * cosine3[..., None].astype(np.float32)
+    to_world = state.ctm
+    if transforms.flips_handedness(to_world):
+        to_world = to_world @ transforms.scale([-1.0, 1.0, 1.0])
+    else:
+        shown = shown[:, ::-1]
+    return lights.Projector(
+        image=Bitmap(image=np.ascontiguousarray(shown), raw=True, filter="nearest"),
+        irradiance=_bright(None, _power_scale(params, per_unit)),
+        fov=float(np.degrees(2.0 * np.arctan(half[0]))),
+        to_world=to_world,
+    )
+
+
+def _image(file: str, state: State) -> Any:
+    """The colours (h, w, 3) float32 of a light's image, none of them negative."""
+    image = images.read(state.file(file))
+    if not np.isfinite(image).all():
+        raise SceneError(f"{file!r} has values that are not finite, so it cannot be a light")
+    if image.shape[2] not in (1, 3, 4):
+        raise SceneError(f"{file!r} has {image.shape[2]} channels; a light needs R, G and B")
+    colours = np.broadcast_to(image[..., :3], (*image.shape[:2], 3))
+    return np.maximum(colours, 0.0).astype(np.float32)
+
+
+def _square(file: str, state: State) -> Any:
+    image = _image(file, state)
+    height, width, _ = image.shape
+    if height != width:
+        raise SceneError(
+            f"{file!r} has {width}x{height} pixels; pbrt-v4 takes square, equal-area octahedral "
+            "images only (imgtool makeequiarea converts one in latitude and longitude)"
+        )
+    return image
+
+
+MAKERS: dict[str, Callable[[Parameters, State], Light]] = {
+    "point": _point,
+    "spot": _spot,
+    "distant": _distant,
+    "infinite": _infinite,
+    "goniometric": _goniometric,
+    "projection": _projection,
+}

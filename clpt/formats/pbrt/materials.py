@@ -1,0 +1,169 @@
+"""Materials of a PBRT scene. Surfaces look the same from both sides, so most are `TwoSided`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from clpt.errors import SceneError, UnknownKindError
+from clpt.formats.pbrt.layered import THICKNESS, both, coat, coated_diffuse, subsurface
+from clpt.formats.pbrt.params import Parameters
+from clpt.formats.pbrt.roughness import alphas, isotropic, rough, smooth, stretched
+from clpt.formats.pbrt.spectra import named, spectrum
+from clpt.formats.pbrt.state import State
+from clpt.formats.pbrt.textures import mapped, normals, textured
+from clpt.scene import materials
+from clpt.scene.materials import Material
+from clpt.scene.textures import Product, Texture
+
+OLD = {
+    "matte": "diffuse", "plastic": "coateddiffuse", "metal": "conductor", "mirror": "conductor",
+    "glass": "dielectric", "uber": "coateddiffuse", "substrate": "coateddiffuse",
+    "translucent": "diffusetransmission", "kdsubsurface": "subsurface", "disney": "coateddiffuse",
+    "fourier": "measured",
+}  # fmt: skip
+
+
+def material(kind: str, params: Parameters, state: State, name: str = "") -> Material:
+    """Make what a `Material` or `MakeNamedMaterial` directive describes. Raises SceneError."""
+    if kind in OLD:
+        raise params.error(
+            f"{kind!r} is a material of pbrt-v3; pbrt --upgrade converts it to {OLD[kind]!r}"
+        )
+    if kind not in MAKERS:
+        raise UnknownKindError("material", kind, MAKERS, **params.place)
+    with params.placed():
+        return replace(_bumped(MAKERS[kind](params, state), params, state), name=name)
+
+
+def _bumped(made: Material, params: Parameters, state: State) -> Material:
+    """The material with the relief of its "displacement" or its "normalmap"."""
+    height = textured(params, "displacement", "real", state)
+    file = params.one("normalmap", "string", "")
+    if isinstance(height, Texture) and file:
+        raise SceneError("give either 'displacement' or 'normalmap', not both")
+    if isinstance(height, Texture):
+        return materials.BumpMap(material=made, height=height)
+    return materials.NormalMap(material=made, normals=normals(file, state)) if file else made
+
+
+def _diffuse(params: Parameters, state: State) -> Material:
+    reflectance = textured(params, "reflectance", "reflectance", state, 0.5)
+    return both(materials.Diffuse(reflectance=reflectance))
+
+
+def _diffuse_transmission(params: Parameters, state: State) -> Material:
+    scale = params.one("scale", "float", 1.0)
+    shares = {
+        name: _times(textured(params, name, "reflectance", state, 0.25), scale)
+        for name in ("reflectance", "transmittance")
+    }
+    return materials.DiffuseTransmission(**shares)
+
+
+def _times(value: Any, scale: float) -> Any:
+    if scale == 1.0:
+        return value
+    if isinstance(value, Texture) and scale < 1.0:
+        return Product(first=value, second=scale)
+    return mapped(value, lambda v: np.minimum(scale * v, 1.0))
+
+
+def _conductor(params: Parameters, state: State) -> Material:
+    alpha_u, alpha_v = alphas(params, state)
+    metal = _metal(params, state, "")
+    if smooth(alpha_u, alpha_v):
+        return both(materials.Conductor(**metal))
+    return both(materials.RoughConductor(**stretched(alpha_u, alpha_v), **metal))
+
+
+def _metal(params: Parameters, state: State, prefix: str) -> dict[str, Any]:
+    """Take eta and k, or a reflectance at normal incidence: eta = 1, k = 2 sqrt(r / (1 - r))."""
+    eta = textured(params, f"{prefix}eta", "index", state)
+    k = textured(params, f"{prefix}k", "index", state)
+    reflectance = textured(params, "reflectance", "reflectance", state)
+    if reflectance is None:
+        copper = {part: named(f"metal-Cu-{part}") for part in ("eta", "k")}
+        return {"eta": copper["eta"] if eta is None else eta, "k": copper["k"] if k is None else k}
+    if eta is not None or k is not None:
+        raise SceneError("give either 'reflectance' or 'eta' and 'k', not both")
+    return {"eta": 1.0, "k": mapped(reflectance, _extinction)}
+
+
+def _extinction(r: Any) -> Any:
+    r = np.clip(r, 0.0, 0.9999)
+    return 2.0 * np.sqrt(r / (1.0 - r))
+
+
+def _coated_conductor(params: Parameters, state: State) -> Material:
+    if (thickness := coat(params, state)) != THICKNESS:
+        state.warn(params, f"the coat's 'thickness' {thickness:g} is not taken into account")
+    outer = isotropic(alphas(params, state, "interface."), params, state)
+    alpha_u, alpha_v = alphas(params, state, "conductor.")
+    return both(
+        materials.CoatedConductor(
+            coat_ior=spectrum(params, "interface.eta", "index", state, 1.5),
+            ext_ior=1.0,
+            coat_alpha=rough(outer),
+            **stretched(alpha_u, alpha_v),
+            **_metal(params, state, "conductor."),
+        )
+    )
+
+
+def _dielectric(params: Parameters, state: State) -> Material:
+    eta = spectrum(params, "eta", "index", state, 1.5)
+    alpha_u, alpha_v = alphas(params, state)
+    if smooth(alpha_u, alpha_v):
+        return materials.Dielectric(int_ior=eta, ext_ior=1.0)
+    return materials.RoughDielectric(int_ior=eta, ext_ior=1.0, **stretched(alpha_u, alpha_v))
+
+
+def _thin_dielectric(params: Parameters, state: State) -> Material:
+    return materials.ThinDielectric(
+        int_ior=spectrum(params, "eta", "index", state, 1.5), ext_ior=1.0
+    )
+
+
+def _mix(params: Parameters, state: State) -> Material:
+    names = params.several("materials", "string") or []
+    if len(names) != 2:
+        raise SceneError(f"'materials' must be two names of materials, not {len(names)}")
+    first, second = (state.named_material(name, params) for name in names)
+    weight = textured(params, "amount", "real", state, 0.5)
+    return materials.Blend(first=first, second=second, weight=weight)
+
+
+def _interface(params: Parameters, state: State) -> Material:
+    return materials.Null()
+
+
+def _measured(params: Parameters, state: State) -> Material:
+    raise SceneError(
+        f"measured materials are not supported: {params.one('filename', 'string', '')!r}"
+    )
+
+
+def _hair(params: Parameters, state: State) -> Material:
+    raise SceneError("hair is not supported")
+
+
+MAKERS: dict[str, Callable[[Parameters, State], Material]] = {
+    "diffuse": _diffuse,
+    "diffusetransmission": _diffuse_transmission,
+    "coateddiffuse": coated_diffuse,
+    "conductor": _conductor,
+    "coatedconductor": _coated_conductor,
+    "dielectric": _dielectric,
+    "thindielectric": _thin_dielectric,
+    "subsurface": subsurface,
+    "mix": _mix,
+    "interface": _interface,
+    "": _interface,
+    "none": _interface,
+    "measured": _measured,
+    "hair": _hair,
+}

@@ -1,0 +1,169 @@
+"""Colours and spectra of a PBRT scene, and the names that pbrt gives to measured ones.
+
+pbrt divides every light by the photometric integral of its spectrum, so that all have luminance
+`scale`; a colour counts as a multiple of its colour space's illuminant. The constant spectrum 1
+has luminance 1 here too, so no further factor stands between a file and a Scene.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from clpt import spectra
+from clpt.errors import SceneError, UnknownKindError
+from clpt.formats.colour import colour
+from clpt.formats.pbrt.params import Parameter, Parameters
+from clpt.formats.pbrt.state import State
+from clpt.spectra import (
+    Blackbody,
+    Constant,
+    Illuminant,
+    RGBIlluminant,
+    Spectrum,
+    Tabulated,
+    cie,
+    spaces,
+)
+
+SPACES = {"srgb": "rec709", "rec2020": "rec2020", "dci-p3": "display_p3"}
+ACES = "aces2065-1"
+AP0 = ((0.7347, 0.2653), (0.0, 1.0), (0.0001, -0.077))  # SMPTE ST 2065-1
+SPECTRUM_TYPES = ("rgb", "spectrum", "blackbody")
+GLASSES = {  # what pbrt's tables hold, which is not always what their name says
+    "glass-BK7": "n-bk7",
+    "glass-BAF10": "n-baf10",
+    "glass-FK51A": "n-fk51a",
+    "glass-LASF9": "n-lasf9",
+    "glass-F5": "n-sf5",
+    "glass-F10": "n-sf10",
+    "glass-F11": "sf11",
+}
+
+
+def spectrum(params: Parameters, name: str, role: str, state: State, default: Any = None) -> Any:
+    """Take a number or a spectrum in the role of a parameter of ours; `default` where not given.
+
+    role: "reflectance", "index", "coefficient", "texture" (what a texture is made of), "emission",
+    which then has luminance 1, or that of its colour. Raises SceneError with the place.
+    """
+    given = params.find(name, "float", *SPECTRUM_TYPES)
+    if given is None:
+        return default
+    with given.placed():
+        return value_of(given, role, state)
+
+
+def value_of(given: Parameter, role: str, state: State) -> Any:
+    """What a parameter of a type "float" or among SPECTRUM_TYPES means in a role."""
+    if given.type == "float":
+        return given.numbers(1)[0]
+    if given.type == "rgb":
+        return _rgb(given.numbers(3), role, state)
+    if given.type == "blackbody":
+        made: Spectrum = Blackbody(given.numbers(1)[0], normalised=True)
+    elif given.is_text:
+        made = _named(given.text(), role, state)
+    else:
+        made = _pairs(given.numbers(), role)
+    return _of_luminance_one(made) if role == "emission" else made
+
+
+def to_rec709(rgb: Any, space: str, *, light: bool) -> Any:
+    """Colours (..., 3) of a space as linear Rec. 709; white stays white but for `light`."""
+    if space == ACES:
+        white = spaces.xyz_of(spaces.D60_ACES)
+        to_xyz = cie.primaries_to_xyz(AP0, white)
+        adapted = np.eye(3) if light else spaces.bradford(white, cie.D65_WHITE)
+        matrix = cie.XYZ_TO_REC709 @ adapted @ to_xyz
+    elif space in SPACES:
+        matrix = spaces.between(SPACES[space], "rec709")
+    else:
+        raise UnknownKindError("colour space", space, (*SPACES, ACES))
+    return np.asarray(rgb, np.float64) @ matrix.T if space != "srgb" else np.asarray(rgb)
+
+
+def scaled(value: Any, factor: float) -> Any:
+    """An emitted spectrum times a number."""
+    if factor == 1.0:
+        return value
+    if isinstance(value, RGBIlluminant):
+        return RGBIlluminant(*(factor * float(c) for c in (value.r, value.g, value.b)))
+    if isinstance(value, Constant):
+        return Constant(factor * value.value)
+    if isinstance(value, (Blackbody, Illuminant)):
+        return replace(value, scale=factor * value.scale)
+    if isinstance(value, Tabulated):
+        return Tabulated(value.lambdas, factor * np.array(value.values), value.outside)
+    return Tabulated(cie.GRID, factor * value.sample(cie.GRID))
+
+
+def _rgb(rgb: Any, role: str, state: State) -> Any:
+    if min(rgb) < 0.0:
+        raise SceneError("a colour cannot be negative")
+    if role == "reflectance" and max(rgb) > 1.0:
+        raise SceneError("a colour that is reflected cannot exceed 1")
+    ours = to_rec709(rgb, state.colour_space, light=role == "emission")
+    clipped = np.clip(ours, 0.0, 1.0 if role == "reflectance" else None).tolist()
+    return tuple(clipped) if role == "texture" else colour(role, clipped)
+
+
+def _pairs(values: list[float], role: str) -> Tabulated:
+    if len(values) % 2 or not values:
+        raise SceneError("a spectrum is pairs of a wavelength [nm] and a value")
+    return Tabulated(values[0::2], values[1::2], _outside(role))
+
+
+def _outside(role: str) -> Any:
+    """An index goes on as it ends; whatever is reflected or emitted is zero beyond, as in pbrt."""
+    return "hold" if role in ("index", "coefficient") else "zero"
+
+
+def _named(text: str, role: str, state: State) -> Spectrum:
+    found = named(text)
+    if found is not None:
+        return found
+    path = state.file(text)
+    if not path.is_file():
+        raise UnknownKindError("spectrum (and no file)", text, names())
+    return spectra.read_table(path, _outside(role))
+
+
+@cache
+def named(name: str) -> Spectrum | None:
+    """One of pbrt's named spectra, such as metal-Cu-eta, glass-BK7 or stdillum-D65; else None."""
+    start, _, rest = name.partition("-")
+    if start == "metal":
+        metal, _, part = rest.rpartition("-")
+        if metal in spectra.metals() and part in ("eta", "k"):
+            return spectra.metal(metal)[0 if part == "eta" else 1]
+    if name in GLASSES:
+        return spectra.glass(GLASSES[name])
+    if start == "stdillum" and rest in spectra.illuminants():
+        return spectra.illuminant(rest)
+    return _aces_d60() if name == "illum-acesD60" else None
+
+
+def names() -> list[str]:
+    """The names that `named` knows."""
+    metals = [f"metal-{name}-{part}" for name in spectra.metals() for part in ("eta", "k")]
+    lamps = [f"stdillum-{name}" for name in spectra.illuminants()]
+    return [*metals, *GLASSES, *lamps, "illum-acesD60"]
+
+
+def _aces_d60() -> Spectrum:
+    """The white of ACES from its neighbours on the daylight locus, D50 and D65."""
+    lamps = [spectra.illuminant(name).sample(cie.GRID) for name in ("D50", "D65")]
+    wanted = spaces.xyz_of(spaces.D60_ACES)
+    shares = np.linalg.lstsq(cie.spectrum_to_xyz(lamps).T, wanted, rcond=None)[0]
+    return Tabulated(cie.GRID, shares @ lamps)
+
+
+def _of_luminance_one(made: Spectrum) -> Spectrum:
+    luminance = float(cie.spectrum_to_xyz(made.sample(cie.GRID))[1])
+    if not luminance > 0.0:
+        raise SceneError("this spectrum is dark, so pbrt cannot scale it to luminance 1")
+    return scaled(made, 1.0 / luminance)

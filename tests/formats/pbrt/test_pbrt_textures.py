@@ -1,0 +1,131 @@
+"""Textures of PBRT files as textures of ours."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from clpt.errors import SceneError
+from clpt.formats.pbrt.textures import mapped, textured
+from clpt.scene.textures import Bitmap, Checkerboard, Mix, Product
+from tests.formats.pbrt.directives import define, params, state
+
+STORED = np.array([[0, 255], [128, 64]], np.uint8)
+
+
+def make(kind, values="spectrum", folder=None, **given):
+    at = state() if folder is None else state(folder)
+    define(at, values, "t", kind, **given)
+    role = "real" if values == "float" else "reflectance"
+    made = textured(params(x=("texture", "t")), "x", role, at)
+    return made, at.shared.warnings
+
+
+@pytest.fixture
+def images(tmp_path):
+    for name in ("a.png", "a.tga"):
+        Image.fromarray(np.stack([STORED] * 3, axis=-1)).save(tmp_path / name)
+    return tmp_path
+
+
+def test_constants_are_values():
+    assert make("constant", "float", value=("float", 0.3))[0] == 0.3
+    assert make("constant", value=("rgb", 0.3, 0.2, 0.1))[0] == (0.3, 0.2, 0.1)
+    assert make("scale", tex=("rgb", 0.3, 0.2, 0.1), scale=("float", 2.0))[0] == (0.6, 0.4, 0.2)
+
+
+def test_checkerboard():
+    """pbrt's first texture fills [0, 1)^2 of its uv; ours has a period of two such squares."""
+    made, warnings = make(
+        "checkerboard", tex1=("rgb", 1, 0, 0), tex2=("rgb", 0, 0, 1),
+        uscale=("float", 20), vscale=("float", 10), udelta=("float", 1),
+    )  # fmt: skip
+    assert isinstance(made, Checkerboard) and not warnings
+    assert made.color0.to_rgb() == pytest.approx([1, 0, 0])
+    own = made.to_uv @ [0.01, 0.02, 1.0]
+    assert own == pytest.approx([(20 * 0.01 + 1) / 2, 10 * 0.02 / 2, 1.0])
+
+
+def test_mix_and_scale_nest():
+    at = state()
+    define(at, "float", "amount", "checkerboard")
+    define(at, "spectrum", "mix", "mix", tex1=("rgb", 1, 0, 0), amount=("texture", "amount"))
+    define(at, "spectrum", "t", "scale", tex=("texture", "mix"), scale=("float", 0.5))
+    made = textured(params(x=("texture", "t")), "x", "reflectance", at)
+    again = textured(params(x=("texture", "t")), "x", "reflectance", at)
+    assert made is again
+    assert isinstance(made, Product) and made.second.value == 0.5
+    assert isinstance(made.first, Mix) and isinstance(made.first.amount, Checkerboard)
+
+
+def test_bilerp():
+    made, _ = make("bilerp", "float", v00=("float", 1), v10=("float", 2), v01=("float", 3))
+    assert made.image[..., 0].tolist() == [[3.0, 1.0], [1.0, 2.0]]
+    # The texels' centres lie in the corners of pbrt's square; v = 0 is the bottom row.
+    assert made.to_uv @ [0.0, 0.0, 1.0] == pytest.approx([0.25, 0.25, 1.0])
+    assert made.to_uv @ [1.0, 1.0, 1.0] == pytest.approx([0.75, 0.75, 1.0])
+    assert made.wrap == "clamp"
+
+
+def test_images(images):
+    made, warnings = make(
+        "imagemap", folder=images, filename=("string", "a.tga"), wrap=("string", "black"),
+        filter=("string", "point"), encoding=("string", "linear"),
+    )  # fmt: skip
+    assert isinstance(made, Bitmap) and not warnings
+    assert made.image == images / "a.tga" and not made.raw  # the encoding is for PNG only
+    assert (made.wrap, made.filter) == ("zero", "nearest")
+    assert make("imagemap", "float", images, filename=("string", "a.tga"))[0].channel == "r"
+
+
+def test_encodings_scale_and_invert(images):
+    def texels(**given):
+        made, _ = make("imagemap", folder=images, filename=("string", "a.png"), **given)
+        return made.image[..., 0] if isinstance(made.image, np.ndarray) else made
+
+    stored = STORED / 255.0
+    linear = np.where(stored <= 0.04045, stored / 12.92, ((stored + 0.055) / 1.055) ** 2.4)
+    assert not texels().raw and texels(encoding=("string", "linear")).raw
+    assert texels(encoding=("string", "gamma 2.2")) == pytest.approx(stored**2.2, abs=1e-6)
+    assert texels(invert=("bool", True)) == pytest.approx(1.0 - linear, abs=1e-6)
+    assert texels(scale=("float", 0.5)) == pytest.approx(0.5 * linear, abs=1e-6)
+
+
+def test_functions_of_textures(images):
+    bitmap = Bitmap(image=images / "a.png", raw=True)
+    assert mapped(bitmap, np.sqrt).image[..., 0] == pytest.approx(np.sqrt(STORED / 255.0))
+    board = Checkerboard(color0=0.25, color1=(0.25, 0.16, 0.04))
+    made = mapped(Product(first=board, second=0.5), np.sqrt)
+    assert made.first.color0.value == pytest.approx(0.5)
+    assert made.first.color1.to_rgb() == pytest.approx([0.5, 0.4, 0.2])
+    assert mapped(0.25, np.sqrt) == 0.5 and mapped((0.25, 0.0, 1.0), np.sqrt) == (0.5, 0.0, 1.0)
+
+
+def test_what_is_approximated_is_told():
+    assert "even mixture" in make("directionmix", "float")[1][0]
+    assert "'extra'" in make("mix", "float", extra=("float", 1.0))[1][0]
+
+
+@pytest.mark.parametrize(
+    "kind, given, message",
+    [
+        ("ptex", {"filename": ("string", "a.ptx")}, "Ptex.*a.ptx"),
+        ("imagemap", {"filename": ("string", "none.png")}, "none.png"),
+        ("imagemap", {}, "no name of a file"),
+        ("imagmap", {}, "imagemap"),
+        ("mix", {"tex1": ("texture", "other")}, "other"),
+        ("mix", {"tex1": ("texture", "t")}, "itself"),
+    ],
+)
+def test_what_cannot_be_made_is_told(kind, given, message):
+    with pytest.raises(SceneError, match=message) as caught:
+        make(kind, **given)
+    assert caught.value.line == 1
+
+
+def test_a_texture_of_the_other_kind_is_not_found():
+    at = state()
+    define(at, "float", "t", "constant")
+    with pytest.raises(SceneError, match="no spectrum texture 't'"):
+        textured(params(x=("texture", "t")), "x", "reflectance", at)
