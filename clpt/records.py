@@ -139,7 +139,7 @@ TABLES: dict[str, tuple[str, str]] = {
     "geometry": ("uint", "parameters of analytic shapes, and of shapes as lights"),
     "materials": ("uint", "parameters of the leaf materials, a row each"),
     "mixtures": ("uint", "rules of masks and blends, see kernels/stage/sort.cl"),
-    "lights": ("uint", "LightRow per light, infinite ones first"),
+    "lights": ("uint", "LightRow per light, infinite ones first; then a tree over many"),
     "lamps": ("uint", "parameters of the lights that are not shapes, and emissions"),
     "spectra": ("float", "tabulated spectra on the common grid"),
     "textures": ("uint", "parameters of the textures, a row each"),

@@ -39,6 +39,7 @@ class Features:
     light_paths: bool = False  # paths start at lights
     visible_lights: bool = False  # some light is no delta light: a camera may see it
     two_sided_lights: bool = False  # some shape emits from its back too
+    light_tree: bool = False  # a tree chooses among the lights
     many_lights: bool = False  # too many to be chosen by the number that also places the point
     dispersion: bool = False
     absorption: bool = False  # inside of a dielectric

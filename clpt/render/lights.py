@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt.errors import SceneError
 from clpt.records import LIGHT, SHAPE
-from clpt.render import shapes
+from clpt.render import light_bounds, light_tree, shapes
 from clpt.render.lamps import INFINITE, RECORDS, Sink, blank_row, brightness, lower_lamp
 from clpt.scene.lights import DirectionalArea, Light
 from clpt.scene.shapes import Shape
@@ -46,7 +47,8 @@ class LightRows:
     rows: structured (n,) of LIGHT.dtype; infinite: how many of them, the first ones, are infinite;
     kinds: those that occur, for `dispatch_text`; first: per emitter, its first row; whole: per
     emitter, whether that one row stands for all of it; visible: whether one is no delta light;
-    two_sided: whether one shines from the back of its shape too.
+    two_sided: whether one shines from the back of its shape too; tree: the words of the tree that
+    stand behind the rows, None where the alias table chooses.
     """
 
     rows: np.ndarray
@@ -56,14 +58,28 @@ class LightRows:
     whole: tuple[bool, ...]
     visible: bool
     two_sided: bool
+    tree: NDArray[np.uint32] | None
+
+
+class Block(NamedTuple):
+    """The rows of one lamp or emitter, their power [W/nm], and where they shine."""
+
+    rows: np.ndarray
+    power: np.ndarray
+    bounds: light_bounds.Bounds
 
 
 def light_rows(
-    lamps: Sequence[Light], emitters: Sequence[Emitter], tables: Sink, scene_radius: float
+    lamps: Sequence[Light],
+    emitters: Sequence[Emitter],
+    tables: Sink,
+    scene_radius: float,
+    tree_from: int | None = None,
 ) -> LightRows:
     """Put the parameters of all lights into the tables, and make the rows of `lights`.
 
-    scene_radius: of a sphere around the scene [m]. Raises SceneError for a light that has no place.
+    scene_radius: of a sphere around the scene [m]; tree_from: the number of rows from which a tree
+    chooses among them. Raises SceneError for a light that has no place.
     """
     if tables.append("lamps", blank_row()) != 0:
         raise ValueError("`lamps` must be empty before the lights are put in")
@@ -71,12 +87,15 @@ def light_rows(
     infinite = sum(lamp.kind in INFINITE for lamp in ordered)
     blocks = [_lamp_block(lamp, tables, scene_radius) for lamp in ordered]
     blocks += [_emitter_block(emitter, tables) for emitter in emitters]
-    sizes = [len(rows) for rows, _ in blocks]
-    first = np.cumsum([0, *sizes])[len(ordered) : -1]
-    rows = np.concatenate([np.zeros(0, LIGHT.dtype), *(rows for rows, _ in blocks)])
+    first = np.cumsum([0, *(len(block.rows) for block in blocks)])[len(ordered) : -1]
+    rows = np.concatenate([np.zeros(0, LIGHT.dtype), *(block.rows for block in blocks)])
+    tree = None
     if len(rows):
-        weights = np.concatenate([weights for _, weights in blocks])
-        rows["pmf"], rows["keep"], rows["alias"] = alias_table(_shared(weights, infinite))
+        weights = _shared(np.concatenate([block.power for block in blocks]), infinite)
+        rows["pmf"], rows["keep"], rows["alias"] = alias_table(weights)
+        if tree_from is not None and len(rows) >= tree_from:
+            bounds = light_bounds.joined([block.bounds for block in blocks])
+            tree = light_tree.build(bounds, weights / weights.sum()).words()
     kinds = tuple(KINDS[i] for i in np.unique(rows["kind"]))
     return LightRows(
         rows=rows,
@@ -86,6 +105,7 @@ def light_rows(
         whole=tuple(_whole(emitter.shape) for emitter in emitters),
         visible=infinite > 0 or bool(((rows["shape"] >= 0) & (rows["way"] != ALONG)).any()),
         two_sided=bool((rows["way"] == BOTH).any()),
+        tree=tree,
     )
 
 
@@ -101,14 +121,15 @@ def _block(count: int, kind: str, params: ArrayLike, radiance: int, shape_row: i
     return rows
 
 
-def _lamp_block(lamp: Light, tables: Sink, scene_radius: float) -> tuple[np.ndarray, np.ndarray]:
-    """The row of a light that is not on a shape, and its power."""
+def _lamp_block(lamp: Light, tables: Sink, scene_radius: float) -> Block:
+    """The row of a light that is not on a shape."""
     kind, at, radiance, power = lower_lamp(lamp, tables, scene_radius)
-    return _block(1, kind, at, radiance, -1), np.array([power])
+    row = _block(1, kind, at, radiance, -1)
+    return Block(row, np.array([power]), light_bounds.of_lamp(lamp))
 
 
-def _emitter_block(emitter: Emitter, tables: Sink) -> tuple[np.ndarray, np.ndarray]:
-    """The rows of a shape that emits, and their power."""
+def _emitter_block(emitter: Emitter, tables: Sink) -> Block:
+    """The rows of a shape that emits."""
     shape = emitter.shape
     emission = shape.emission
     along = isinstance(emission, DirectionalArea)
@@ -120,7 +141,8 @@ def _emitter_block(emitter: Emitter, tables: Sink) -> tuple[np.ndarray, np.ndarr
         at = tables.append("geometry", shapes.row(shape))
         rows = _block(1, shape.kind, at, radiance, emitter.shape_row)
         rows["way"] = way
-        return rows, np.array([strength * shapes.area(shape)])
+        bounds = light_bounds.of_shape(shape, way == BOTH)
+        return Block(rows, np.array([strength * shapes.area(shape)]), bounds)
     if emitter.vertices is None or emitter.faces is None:
         raise SceneError("its triangles are missing", where=shapes.where(shape))
     geometry = shapes.triangle_rows(emitter.vertices, emitter.faces)
@@ -128,7 +150,8 @@ def _emitter_block(emitter: Emitter, tables: Sink) -> tuple[np.ndarray, np.ndarr
     at = tables.append("geometry", geometry) + words * np.arange(count)
     rows = _block(count, "triangle", at, radiance, emitter.shape_row)
     rows["way"] = way
-    return rows, strength * shapes.triangle_areas(emitter.vertices, emitter.faces)
+    bounds = light_bounds.of_triangles(emitter.vertices, emitter.faces, way == BOTH)
+    return Block(rows, strength * shapes.triangle_areas(emitter.vertices, emitter.faces), bounds)
 
 
 def _shared(weights: np.ndarray, infinite: int) -> np.ndarray:
@@ -177,12 +200,14 @@ def virtual_files() -> dict[str, str]:
     return made
 
 
-def dispatch_text(kinds: Iterable[str], textured: bool = False, two_sided: bool = False) -> str:
+def dispatch_text(
+    kinds: Iterable[str], textured: bool = False, two_sided: bool = False, tree: bool = False
+) -> str:
     """Return the functions over all lights, for the kinds in the scene (`LightRows.kinds`).
 
     textured: some emission is a texture, so that triangles need the uv of their mesh; two_sided:
-    some shape emits from its back too. It includes the files of `virtual_files`, here and in
-    clpt.render.shapes.
+    some shape emits from its back too; tree: the rows are followed by a tree that chooses among
+    them. It includes the files of `virtual_files`, here and in clpt.render.shapes.
 
     light_sample(scene, p, pick, u, lambdas)      chooses a light and a direction to it
     light_pdf(scene, row, p, wi, t, n)            of it, [1/sr], for a ray that met a shape
@@ -201,9 +226,10 @@ def dispatch_text(kinds: Iterable[str], textured: bool = False, two_sided: bool 
     parts = [f"#define LIGHT_ROW_WORDS {LIGHT.words}", f"#define SHAPE_ROW_WORDS {SHAPE.words}"]
     parts += [f"#define LIGHT_{kind.upper()} {KINDS.index(kind)}" for kind in present]
     parts += [f'#include "{name}"' for name in includes]
+    parts += _tree_text() if tree else []
     parts.append(_sides_text(two_sided))
-    parts += _sample_text(lamps, surfaces, textured, two_sided)
-    parts += _pdf_text(surfaces)
+    parts += _sample_text(lamps, surfaces, textured, two_sided, tree)
+    parts += _pdf_text(surfaces, tree)
     parts += _infinite_text([kind for kind in lamps if kind in INFINITE])
     return "\n".join(parts) + "\n"
 
@@ -236,6 +262,18 @@ def point_text(kind: str, uv: str) -> list[str]:
     ]
 
 
+def _tree_text() -> list[str]:
+    """Nodes of the tree over lights, and how one goes down in it."""
+    node = light_tree.NODE
+    child = next(member.word for member in node.members if member.name == "child")
+    return [
+        node.row_text(),
+        f"#define LIGHT_NODE_WORDS {node.words}",
+        f"#define LIGHT_NODE_CHILD {child}",
+        '#include "lib/light_tree.cl"',
+    ]
+
+
 def _sides_text(two_sided: bool) -> str:
     """Whether the side of a shape that a ray met emits; most scenes need not look at the row."""
     if not two_sided:
@@ -247,16 +285,21 @@ def _sides_text(two_sided: bool) -> str:
 
 
 def _sample_text(
-    lamps: list[str], surfaces: list[str], textured: bool, two_sided: bool
+    lamps: list[str], surfaces: list[str], textured: bool, two_sided: bool, tree: bool
 ) -> list[str]:
     only = len(lamps) + len(surfaces) == 1
     head = "LightSample light_sample(Scene scene, vec3 p, real pick, vec2 u, Wavelengths lambdas)"
     if not lamps and not surfaces:
         return [f"inline {head} {{ return light_nothing(); }}"]
+    number = "FEW_LIGHTS ? &u.x : &pick"
+    if tree:
+        chosen = ["real pmf;", f"integer row = light_tree_pick(scene, p, {number}, &pmf);"]
+    else:
+        chosen = [f"integer row = light_pick(scene, {number});"]
     lines = [
         f"inline {head}",
         "{",
-        "    integer row = light_pick(scene, FEW_LIGHTS ? &u.x : &pick);",
+        *(f"    {line}" for line in chosen),
         "    LightRow l = light_at(scene, row);",
         "    LightSample s = light_nothing();",
     ]
@@ -280,10 +323,10 @@ def _sample_text(
             "    Spectrum le = emission_load(scene, l.radiance, point, lambdas);",
             "    s = light_sel(l.shape >= 0, area_sample(q, le), s);",
         ]
-    return [*lines, "    return light_chosen(s, l.pmf);", "}"]
+    return [*lines, f"    return light_chosen(s, {'pmf' if tree else 'l.pmf'});", "}"]
 
 
-def _pdf_text(surfaces: list[str]) -> list[str]:
+def _pdf_text(surfaces: list[str], tree: bool) -> list[str]:
     lines = [
         "inline real light_pdf(Scene scene, integer row, vec3 p, vec3 wi, real t, vec3 n)",
         "{",
@@ -293,7 +336,8 @@ def _pdf_text(surfaces: list[str]) -> list[str]:
     for kind in surfaces:
         body = f"pdf = sel(m, {kind}_pdf({row_text(kind)}, p, wi, t, n), pdf);"
         lines += case_text(kind, len(surfaces) == 1, [body])
-    return [*lines, "    return pdf * l.pmf;", "}"]
+    pmf = "light_tree_pmf(scene, row, p)" if tree else "l.pmf"
+    return [*lines, f"    return pdf * {pmf};", "}"]
 
 
 def _infinite_text(kinds: list[str]) -> list[str]:

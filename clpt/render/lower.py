@@ -29,6 +29,7 @@ from clpt.spectra.cie import tanh_ends
 SHAPE_NORMALS, SHAPE_UVS, SHAPE_TWO_SIDED, SHAPE_ONE_LIGHT = 1, 2, 4, 8
 MIXTURE = 0xFF
 FEW_LIGHTS = 256  # up to which one random number chooses a light and a point on it
+TREE_FROM = 64  # lights from which a tree chooses among them
 CLEAR = Constant(0.0)  # absorption of what absorbs nothing
 DEEPEST = 4000  # path state has 12 bits for the depth
 LONGEST_ROW = max(row_words(cls) for cls in mt.LEAVES)
@@ -122,8 +123,11 @@ class _Lowering:
         boxes = np.array(found, np.float32).reshape(-1, 2, 3)
         vertices, faces, tags = self._joined()
         center, radius = _sphere_around(vertices[:in_world], boxes, instances.boxes)
-        self.lights = lights.light_rows(scene.lights, emitters, tables, radius)
+        tree_from = None if self.light_paths else TREE_FROM
+        self.lights = lights.light_rows(scene.lights, emitters, tables, radius, tree_from)
         tables.append("lights", self.lights.rows.view(np.uint32))
+        if self.lights.tree is not None:
+            tables.append("lights", self.lights.tree)
         for emitter, first, whole in zip(
             emitters, self.lights.first, self.lights.whole, strict=True
         ):
@@ -303,6 +307,7 @@ class _Lowering:
             light_paths=self.light_paths,
             visible_lights=self.lights.visible,
             two_sided_lights=self.lights.two_sided,
+            light_tree=self.lights.tree is not None,
             many_lights=len(self.lights.rows) > FEW_LIGHTS,
             absorption=self.uses["absorption"] and not self.channels,
             dispersion=index_tables

@@ -229,7 +229,9 @@ def _lights_text(features: Features) -> str:
         ('#include "generated/textures.cl"\n' if textured or "texture" in factors else "")
         + kinds.emission_text(_emissions(features))
         + (kinds.factor_text(factors) if factors else "")
-        + lights.dispatch_text(features.lights, textured, features.two_sided_lights)
+        + lights.dispatch_text(
+            features.lights, textured, features.two_sided_lights, features.light_tree
+        )
     )
 
 

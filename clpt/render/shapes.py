@@ -161,7 +161,7 @@ def row(shape: Shape) -> Words:
         values = _cylinder(shape, matrix)
     else:
         s, t, center = matrix[:3, 0], matrix[:3, 1], matrix[:3, 3]
-        values = {"center": center, "s": s, "t": t, "n": _side(shape) * _facing(matrix)}
+        values = {"center": center, "s": s, "t": t, "n": facing(shape)}
     flat = np.concatenate([np.ravel(values[m.name]) for m in record.members])
     return flat.astype(np.float32).view(np.uint32)
 
@@ -170,9 +170,9 @@ def _side(shape: Shape) -> float:
     return -1.0 if shape.flip_normals else 1.0
 
 
-def _facing(matrix: ArrayLike) -> NDArray[np.float64]:
-    """Where local +z faces in the world, unit length."""
-    return transforms.transform_normals(matrix, [0.0, 0.0, 1.0])
+def facing(shape: Shape) -> NDArray[np.float64]:
+    """Return where the front of a rectangle or disk faces in the world, (3,) of unit length."""
+    return _side(shape) * transforms.transform_normals(placement(shape), [0.0, 0.0, 1.0])
 
 
 def _sphere(shape: shapes.Sphere, matrix: NDArray[np.float64]) -> dict[str, ArrayLike]:

@@ -62,7 +62,8 @@ class Lit:
         if sources["factor"]["value"]:
             text += kinds.factor_text(frozenset(sources["factor"]["value"]))
         rows = self.rows
-        return text + lights.dispatch_text(rows.kinds, "texture" in found, rows.two_sided)
+        tree = rows.tree is not None
+        return text + lights.dispatch_text(rows.kinds, "texture" in found, rows.two_sided, tree)
 
     def _settings(self) -> np.ndarray:
         settings = np.zeros(1, SETTINGS.dtype)
@@ -107,8 +108,10 @@ def _program(
     return device.build(opened(), device.assemble("probe.cl", virtual, defines))
 
 
-def lit(lamps=(), emitters=(), mode: str = "rgb", radius: float = 1.0, files=()) -> Lit:
-    """A scene of lamps and emissive shapes; `files` are further includes."""
+def lit(
+    lamps=(), emitters=(), mode: str = "rgb", radius: float = 1.0, files=(), tree: bool = False
+) -> Lit:
+    """A scene of lamps and emissive shapes; `files` are further includes; `tree` chooses lights."""
     tables = Tables(mode)
     made, first = [], 0
     for number, shape in enumerate(emitters):
@@ -123,11 +126,14 @@ def lit(lamps=(), emitters=(), mode: str = "rgb", radius: float = 1.0, files=())
             row["flags"] = 0 if uvs is None else 2
             first += len(faces)
         made.append((row, lights.Emitter(shape, number, vertices, faces)))
-    rows = lights.light_rows(lamps, [emitter for _, emitter in made], tables, radius)
+    emitting = [emitter for _, emitter in made]
+    rows = lights.light_rows(lamps, emitting, tables, radius, 1 if tree else None)
     for (row, _), at in zip(made, rows.first, strict=True):
         row["light"] = at
         tables.append("shapes", row.view(np.uint32))
     tables.append("lights", rows.rows.view(np.uint32))
+    if rows.tree is not None:
+        tables.append("lights", rows.tree)
     return Lit(tables, rows, tuple(files), radius)
 
 

@@ -1,0 +1,249 @@
+"""The tree over lights: its probabilities against float64, its choices against them, its bounds."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from clpt import transforms as T
+from clpt.render import light_bounds, light_tree
+from clpt.scene.lights import Area, Constant, Directional, Goniometric, Point, Projector, Spot
+from clpt.scene.shapes import Disk, Mesh, Rectangle, Sphere
+from tests.kernels.light_probe import Lit, lit
+
+SIGMAS = 4.5  # of the Monte Carlo estimates: a chance of 7e-6 each
+PMF = """
+    r[0] = light_tree_pmf(scene, to_integer(x[0]), v3(x[1], x[2], x[3]));
+"""
+PICK = """
+    real u = x[3], pmf;
+    r[0] = to_real(light_tree_pick(scene, v3(x[0], x[1], x[2]), &u, &pmf));
+    r[1] = pmf;
+    r[2] = u;
+"""
+SAMPLE = """
+    vec2 u = {x[4], x[5]};
+    LightSample s = light_sample(scene, v3(x[0], x[1], x[2]), x[3], u, lambdas);
+    r[0] = s.wi.x; r[1] = s.wi.y; r[2] = s.wi.z; r[3] = s.pdf; r[4] = s.radiance.y;
+"""
+
+
+def scattered(count: int, seed: int = 1) -> Mesh:
+    """Small triangles in a room of 4 m, facing anywhere."""
+    rng = np.random.default_rng(seed)
+    place, edges = rng.uniform(-2, 2, (count, 1, 3)), rng.normal(size=(count, 3, 3)) * 0.1
+    vertices = (place + edges).reshape(-1, 3).astype(np.float32)
+    faces = np.arange(3 * count).reshape(count, 3)
+    return Mesh(vertices=vertices, faces=faces, emission=Area(radiance=(1.0, 2.0, 3.0)))
+
+
+def mixed(tree: bool) -> Lit:
+    """Lights of all sorts; the last two rows of lamps are not placed."""
+    both = Area(radiance=(3.0, 3.0, 3.0), two_sided=True)
+    place = T.translate([0.5, 1.0, 0.2]) @ T.rotate([1, 1, 0], 70)
+    emitters = [
+        scattered(40),
+        Sphere(center=(1.0, 0.0, 1.0), radius=0.2, emission=Area(radiance=(5.0, 5.0, 5.0))),
+        Disk(to_world=place @ T.scale(0.3), emission=Area(radiance=(2.0, 2.0, 2.0))),
+        Rectangle(to_world=T.translate([-1, 1, 0]) @ T.scale(0.4), emission=both),
+    ]
+    lamps = [
+        Constant(radiance=(0.02, 0.02, 0.02)),
+        Directional(irradiance=(0.1, 0.1, 0.1)),
+        Point(position=(0.0, 0.5, 1.0), intensity=(0.3, 0.3, 0.3)),
+        Spot(to_world=place, intensity=(1.0, 1.0, 1.0), cutoff=50.0),
+        Projector(to_world=T.translate([0, 0, 2]) @ place, irradiance=(1.0, 1.0, 1.0)),
+        Goniometric(to_world=place, intensity=(0.2, 0.2, 0.2)),
+    ]
+    return lit(lamps, emitters, radius=3.0, tree=tree)
+
+
+@cache
+def scene() -> Lit:
+    return mixed(True)
+
+
+def points(count: int, seed: int = 2) -> np.ndarray:
+    return np.random.default_rng(seed).uniform(-2.5, 2.5, (3, count))
+
+
+def pmfs(there: Lit, p: np.ndarray) -> np.ndarray:
+    """Probabilities (rows, n) of all lights at points (3, n)."""
+    count = len(there.rows.rows)
+    row, at = np.meshgrid(np.arange(count), np.arange(p.shape[1]), indexing="ij")
+    given = np.vstack([row.ravel(), p[:, at.ravel()]])
+    return there(PMF, given, 1)[0].reshape(count, -1).astype(float)
+
+
+def unpacked(nodes: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Axes (k, 3), cosines of theta_o and theta_e, and the bit, as the nodes' words have them."""
+    u = (nodes["axis"] & 0xFFFF) * (2.0 / 65535.0) - 1.0
+    v = (nodes["axis"] >> 16) * (2.0 / 65535.0) - 1.0
+    z = 1.0 - np.abs(u) - np.abs(v)
+    fold = np.maximum(-z, 0.0)
+    axis = np.stack([u - np.copysign(fold, u), v - np.copysign(fold, v), z], axis=1)
+    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+    cones = nodes["cones"]
+    o = (cones & 0xFFFF) * (2.0 / 65535.0) - 1.0
+    return axis, o, ((cones >> 16) & 0x7FFF) * (2.0 / 32767.0) - 1.0, cones >> 31 != 0
+
+
+def importance(nodes: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """Of all nodes at one point, (k,) float64, with angles instead of their cosines."""
+    axis, cos_o, cos_e, both = unpacked(nodes)
+    away = p - nodes["center"].astype(float)
+    radius = nodes["radius"].astype(float)
+    d2 = np.maximum((away**2).sum(axis=1), 1e-20)
+    cosine = (axis * away).sum(axis=1) / np.sqrt(d2)
+    cosine = np.where(both, np.abs(cosine), cosine)
+    lean = np.arccos(np.clip(cosine, -1, 1)) - np.arccos(cos_o)
+    spread = np.arcsin(np.clip(radius / np.sqrt(d2), -1.0, 1.0))
+    least = np.cos(np.maximum(np.maximum(lean, 0.0) - spread, 0.0))
+    least = np.where(d2 > radius**2, least, 1.0)
+    value = nodes["power"] * np.maximum(least, 1e-3) / np.maximum(d2, radius**2)
+    value = np.where(least > cos_e - 1e-3, value, 0.0)
+    return np.where(radius < 0.0, nodes["power"], value)
+
+
+def reference(there: Lit, p: np.ndarray) -> np.ndarray:
+    """Probabilities (rows,) at one point, from the root down."""
+    count = len(there.rows.rows)
+    nodes = there.rows.tree[count:].view(light_tree.NODE.dtype)
+    value, chance = importance(nodes, p), np.zeros(len(nodes))
+    chance[0] = 1.0
+    for at in range(len(nodes)):  # children stand behind their parents
+        child = nodes["child"][at]
+        if child >= 0:
+            total = value[child] + value[child + 1]
+            share = value[child] / total if total > 0.0 else 0.5
+            chance[child], chance[child + 1] = chance[at] * share, chance[at] * (1.0 - share)
+    leaves = nodes["child"] < 0
+    found = np.zeros(count)
+    found[-1 - nodes["child"][leaves]] = chance[leaves]
+    return found
+
+
+def test_probabilities_are_those_of_the_tree():
+    p = points(60)
+    found = pmfs(scene(), p)
+    np.testing.assert_allclose(found.sum(axis=0), 1.0, atol=2e-5)
+    expected = np.stack([reference(scene(), q) for q in p.T], axis=1)
+    np.testing.assert_allclose(found, expected, rtol=2e-3, atol=2e-6)
+    # What is not placed keeps its share by power wherever p is.
+    rows = scene().rows.rows
+    for row in (0, 1):
+        np.testing.assert_allclose(found[row], rows["pmf"][row], rtol=1e-4)
+
+
+def test_choices_follow_the_probabilities():
+    """Chi-square at 1e-4 for each of four points; a choice comes with the chance of its row."""
+    n = 200_000
+    for i, p in enumerate(points(4, seed=5).T):
+        u = np.random.default_rng(i).random(n)
+        row, pmf, rest = scene()(PICK, np.vstack([np.tile(p[:, None], n), u]), 3).astype(float)
+        chances = pmfs(scene(), p[:, None])[:, 0]
+        np.testing.assert_allclose(pmf, chances[row.astype(int)], rtol=1e-5)
+        counts = np.bincount(row.astype(int), minlength=len(chances))
+        expected = chances * n
+        full = expected > 8.0
+        statistic = ((counts - expected)[full] ** 2 / expected[full]).sum()
+        lost, left = counts[~full].sum(), expected[~full].sum()
+        statistic += (lost - left) ** 2 / max(left, 8.0)
+        assert chi2.sf(statistic, full.sum()) > 1e-4
+        assert (counts[chances == 0.0] == 0).all()
+        assert abs(rest.mean() - 0.5) < SIGMAS / np.sqrt(12 * n) and rest.max() < 1.0
+
+
+def test_a_light_that_shines_on_a_point_may_be_chosen():
+    """Of every triangle and point, whichever way round, what faces the other has a chance."""
+    p = points(400, seed=9)
+    mesh = scattered(40)
+    first = scene().rows.first[0]
+    chances = pmfs(scene(), p)[first : first + 40]
+    corners = mesh.vertices[mesh.faces].astype(float)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    height = np.einsum("mk,mkn->mn", normals, p[None] - corners[:, 0, :, None])
+    assert (chances[height > 1e-9] > 0.0).all()
+    assert (chances[height < 0.0] == 0.0).mean() > 0.5  # while it does look at the cones
+
+
+def test_the_estimate_is_that_of_choosing_by_power():
+    n = 1 << 17
+    normal = np.array([0.2, -0.3, 0.9]) / np.linalg.norm([0.2, -0.3, 0.9])
+    u = np.random.default_rng(4).random((3, n))
+    p = np.array([0.2, 0.1, -0.5])
+    found = []
+    for tree in (True, False):
+        there = scene() if tree else mixed(False)
+        r = there(SAMPLE, np.vstack([np.tile(p[:, None], n), u]), 5).astype(float)
+        pdf = np.where(r[3] > 0.0, r[3], 1.0)
+        value = np.where(r[3] != 0.0, r[4] * np.maximum(normal @ r[:3], 0.0) / pdf, 0.0)
+        found.append((value.mean(), value.std() / np.sqrt(n)))
+    (ours, error), (theirs, other) = found
+    assert abs(ours - theirs) < SIGMAS * np.hypot(error, other)
+
+
+@pytest.mark.parametrize("lanes", [1, 16])
+def test_lanes_agree(lanes):
+    given = np.vstack([points(500, 3), np.random.default_rng(3).random(500)])
+    one, other = (scene()(PICK, given, 3, lanes=k) for k in (8, lanes))
+    np.testing.assert_array_equal(one, other)
+
+
+# ---- the build
+
+
+def followed(tree: light_tree.Tree) -> np.ndarray:
+    """The row that each trail leads to."""
+    at, depth = np.zeros(len(tree.trails), int), 0
+    while (tree.nodes["child"][at] >= 0).any():
+        child = tree.nodes["child"][at]
+        at = np.where(child >= 0, child + ((tree.trails >> np.uint32(depth)) & 1), at)
+        depth += 1
+        assert depth <= 32
+    return -1 - tree.nodes["child"][at]
+
+
+def triangles(vertices: np.ndarray) -> light_bounds.Bounds:
+    faces = np.arange(len(vertices)).reshape(-1, 3).astype(np.uint32)
+    return light_bounds.of_triangles(vertices.astype(np.float32), faces, False)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 1000])
+def test_every_light_is_found_by_its_trail(count):
+    bounds = triangles(np.random.default_rng(1).random((3 * count, 3)))
+    tree = light_tree.build(bounds, np.full(count, 1.0 / count))
+    assert len(tree.nodes) == 2 * count - 1
+    assert (followed(tree) == np.arange(count)).all()
+    assert tree.nodes["power"][0] == pytest.approx(1.0)
+
+
+def test_trees_stay_within_a_trail():
+    """Lights in one place, and lights each a tenth as far away as the one before."""
+    corner = np.random.default_rng(2).random((3, 3)) * 1e-3
+    same = np.tile(corner, (700, 1))
+    ever = (10.0 ** -np.arange(30.0))[:, None, None] * [1.0, 0.3, 0.2] + corner
+    for vertices in (same, np.concatenate([same, ever.reshape(-1, 3) * 1e6])):
+        bounds = triangles(vertices)
+        tree = light_tree.build(bounds, np.full(len(bounds), 1.0))
+        assert (followed(tree) == np.arange(len(bounds))).all()
+
+
+def test_nodes_hold_what_is_below_them():
+    """Boxes and cones: all that a light sends out lies inside those of every node above it."""
+    bounds = triangles(np.random.default_rng(3).normal(size=(900, 3)))
+    tree = light_tree.build(bounds, np.full(300, 1.0 / 300))
+    axis, cos_o, cos_e, _ = unpacked(tree.nodes)
+    at = np.zeros(300, int)
+    for depth in range(32):
+        center, radius = tree.nodes["center"][at], tree.nodes["radius"][at]
+        for corner in (bounds.low, bounds.high):
+            assert (np.linalg.norm(corner - center, axis=1) <= radius * (1.0 + 1e-5)).all()
+        lean = np.arccos(np.clip((axis[at] * bounds.axis).sum(axis=1), -1, 1))
+        assert (lean <= np.arccos(cos_o[at]) + 1e-9).all()
+        assert (cos_e[at] <= np.cos(bounds.theta_e)).all()
+        child = tree.nodes["child"][at]
+        at = np.where(child >= 0, child + ((tree.trails >> np.uint32(depth)) & 1), at)
