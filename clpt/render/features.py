@@ -34,6 +34,7 @@ class Features:
     tangents: bool = False
     attributes: bool = False  # some texture reads what meshes say per vertex or face
     mixtures: int = 0  # how deep masks and blends nest
+    bends: bool = False  # some material has a normal or a bump map
     passes: bool = False  # some surface lets light through as if it were not there
     infinite: bool = False
     light_paths: bool = False  # paths start at lights

@@ -14,6 +14,7 @@ from clpt import scene as sc
 from clpt.errors import SceneError
 from clpt.records import SETTINGS, SHAPE
 from clpt.render import cameras, filters, instancing, lights, reradiation, shapes
+from clpt.render.bends import Bend
 from clpt.render.checks import check
 from clpt.render.colour import output_matrix, sensor
 from clpt.render.features import Features
@@ -71,6 +72,24 @@ def lower(scene: sc.Scene) -> Lowered:
     return _Lowering(scene).run()
 
 
+@dataclass(frozen=True)
+class _Side:
+    """A side of a surface, and what stands around the material that is looked at.
+
+    turned: the material is two-sided, so that its back is turned round; inside: below a TwoSided.
+    """
+
+    front: bool
+    turned: bool
+    inside: bool = False
+    bend: Bend = Bend()
+
+    @property
+    def key(self) -> tuple[Any, ...]:
+        """What makes two the same."""
+        return self.front, self.turned, self.inside, self.bend.key
+
+
 class _Lowering:
     """The state of one `lower`."""
 
@@ -96,8 +115,9 @@ class _Lowering:
         if self.mode == "spectral" and mt.Fluorescent.kind in self.leaves:
             nodes = reradiation.nodes(film.lambda_min, film.lambda_max)
             self.tables.expected = reradiation.expected(emissions(scene), nodes)
-        self.words: dict[tuple[int, str], int] = {}
+        self.words: dict[tuple[int, tuple[Any, ...]], int] = {}
         self.uses = dict.fromkeys(("normals", "uvs", "tangents", "absorption"), False)
+        self.bent = any(_any_of(shape.material, mt.Bent) for shape in scene.shapes)
         self.nested: dict[int, int] = {}  # how deep mixtures are, by their words
         self.triangles: list[tuple[np.ndarray, np.ndarray, int]] = []  # vertices, faces, shape
         self.n_vertices = self.n_faces = 0
@@ -227,30 +247,33 @@ class _Lowering:
             raise SceneError(
                 "a transmissive material cannot be mixed with a two-sided one", where=name
             )
-        front = self._word(shape.material, "front", two_sided)
-        back = self._word(shape.material, "back", two_sided)
+        front = self._word(shape.material, _Side(front=True, turned=two_sided))
+        back = self._word(shape.material, _Side(front=False, turned=two_sided))
         return front, back, SHAPE_TWO_SIDED if two_sided else 0
 
-    def _word(self, material: Any, side: str, turned: bool, inside: bool = False) -> int:
-        """The material word of one side. `inside`: below a TwoSided."""
-        key = (id(material), f"{side}{turned}{inside}")
+    def _word(self, material: Any, side: _Side) -> int:
+        """The material word of one side."""
+        key = (id(material), side.key)
         if key not in self.words:
-            self.words[key] = self._made_word(material, side, turned, inside)
+            self.words[key] = self._made_word(material, side)
         return self.words[key]
 
-    def _made_word(self, material: Any, side: str, turned: bool, inside: bool) -> int:
+    def _made_word(self, material: Any, side: _Side) -> int:
         if isinstance(material, mt.TwoSided):
-            chosen = material.front if side == "front" or material.back is None else material.back
-            return self._word(chosen, side, turned, True)
+            chosen = material.front if side.front or material.back is None else material.back
+            return self._word(chosen, dataclasses.replace(side, inside=True))
+        if isinstance(material, mt.Bent):
+            bend = side.bend.within(material, side.inside)
+            return self._word(material.material, dataclasses.replace(side, bend=bend))
         if isinstance(material, mt.Mask):
-            return self._mixture(material.opacity, _NULL, material.material, side, turned, inside)
+            return self._mixture(material.opacity, _NULL, material.material, side)
         if isinstance(material, mt.Blend):
-            return self._mixture(
-                material.weight, material.first, material.second, side, turned, inside
-            )
-        if side == "back" and turned and not inside and not isinstance(material, mt.Null):
+            return self._mixture(material.weight, material.first, material.second, side)
+        one_sided = not side.inside and not isinstance(material, mt.Null)
+        if side.turned and not side.front and one_sided:
             material = _BLACK  # the back of a one-sided part, though the surface is turned
-        row = self.tables.row(material, "materials")
+        before = side.bend.words(self.tables) if self.bent else None
+        row = self.tables.row(material, "materials", before)
         if row >= 1 << 24:
             raise SceneError("the scene has more than 16 million words of material parameters")
         for part in (material, *getattr(material, "layers", ())):
@@ -261,13 +284,11 @@ class _Lowering:
         self.uses["absorption"] |= getattr(material, "absorption", CLEAR) != CLEAR
         return self.leaves.index(material.kind) << 24 | row
 
-    def _mixture(
-        self, weight: Any, first: Any, second: Any, side: str, turned: bool, inside: bool
-    ) -> int:
+    def _mixture(self, weight: Any, first: Any, second: Any, side: _Side) -> int:
         words, source = self.tables.param_words(weight, "real")
         self.tables.sources["mixture"]["weight"].add(source)
         self.uses["uvs"] |= source == "texture"
-        children = [self._word(m, side, turned, inside) for m in (first, second)]
+        children = [self._word(m, side) for m in (first, second)]
         word = MIXTURE << 24 | self.tables.append("mixtures", [*words, *children])
         self.nested[word] = 1 + max(self.nested.get(child, 0) for child in children)
         return word
@@ -299,9 +320,10 @@ class _Lowering:
             analytic=tuple(kind for kind in shapes.ANALYTIC if kind in analytic),
             instances=bool(self.prototypes),
             normals=self.uses["normals"],
-            uvs=self.uses["uvs"] or self.uses["tangents"] or "uv" in self.channels,
-            tangents=self.uses["tangents"],
+            uvs=self.uses["uvs"] or self.uses["tangents"] or self.bent or "uv" in self.channels,
+            tangents=self.uses["tangents"] or self.bent,
             mixtures=max(self.nested.values(), default=0),
+            bends=self.bent and not self.channels,
             passes=any(_LEAVES[kind].passes for kind in self.leaves) and not self.channels,
             infinite=self.lights.infinite > 0 and not self.channels,
             light_paths=self.light_paths,

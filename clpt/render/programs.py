@@ -9,7 +9,7 @@ from __future__ import annotations
 from clpt import device
 from clpt.layout import Record
 from clpt.records import INSTANCE, LIGHT, SETTINGS, SHAPE, SLABS, TABLES
-from clpt.render import cameras, emission, films, kinds, lights, shapes, textures
+from clpt.render import bends, cameras, emission, films, kinds, lights, shapes, textures
 from clpt.render.features import Features
 from clpt.render.reradiation import STEP as SHIFT_STEP
 from clpt.scene import materials
@@ -124,6 +124,7 @@ def _shared(features: Features, layout: str) -> dict[str, str]:
         ),
         "generated/lights.cl": _lights_text(features),
         "generated/mixture.cl": _mixture_text(features),
+        "generated/facing.cl": _facing_text(features),
         "generated/open.cl": f'#include "lib/open{"_through" * features.passes}.cl"\n',
         "generated/null_share.cl": _null_share_text(features),
         "generated/medium.cl": _medium_text(features),
@@ -241,6 +242,14 @@ def _mixture_text(features: Features) -> str:
     return kinds.mixture_text(found)
 
 
+def _facing_text(features: Features) -> str:
+    """The frame of shading; the loader of the maps that bend it, where there are some."""
+    if not features.bends:
+        return '#include "lib/facing.cl"\n'
+    found = features.sources["bend"]["value"]
+    return f'#define BEND_WORDS {bends.WORDS}\n{bends.text(found)}#include "lib/facing_bent.cl"\n'
+
+
 def _null_share_text(features: Features) -> str:
     """`null_share`: how much of the light passes a surface with some material word.
 
@@ -341,30 +350,26 @@ def _shape_tree_text(features: Features) -> str:
 
 
 def _tangents_text(features: Features) -> str:
-    """dpdu of analytic shapes, in lanes."""
+    """dpdu and dpdv of analytic shapes, in lanes."""
     if not (features.analytic and features.tangents):
         return ""
-    body = []
-    for kind in features.analytic:
-        body += [
-            "    {",
-            f"        mask m = shape.kind == {1 + shapes.ANALYTIC.index(kind)};",
-            f"        if (any(m)) r = sel3(m, {kind}_dpdu({kind}_row(scene.geometry, "
-            "sel_i(m, shape.params, (integer)(0))), p, uv), r);",
-            "    }",
-        ]
-    return "\n".join(
-        [
-            *_includes(features),
-            "inline vec3 dpdu_of_shape(Scene scene, ShapeRow shape, vec3 p, vec2 uv)",
+    lines = _includes(features)
+    for tangent in ("dpdu", "dpdv"):
+        lines += [
+            f"inline vec3 {tangent}_of_shape(Scene scene, ShapeRow shape, vec3 p, vec2 uv)",
             "{",
             "    vec3 r = v3(0.0f, 0.0f, 0.0f);",
-            *body,
-            "    return r;",
-            "}",
-            "",
         ]
-    )
+        for kind in features.analytic:
+            lines += [
+                "    {",
+                f"        mask m = shape.kind == {1 + shapes.ANALYTIC.index(kind)};",
+                f"        if (any(m)) r = sel3(m, {kind}_{tangent}({kind}_row(scene.geometry, "
+                "sel_i(m, shape.params, (integer)(0))), p, uv), r);",
+                "    }",
+            ]
+        lines += ["    return r;", "}", ""]
+    return "\n".join(lines)
 
 
 def _shifts(features: Features, kind: str) -> bool:

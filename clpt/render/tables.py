@@ -73,7 +73,7 @@ class Tables:
         self._parts: dict[str, list[np.ndarray]] = {name: [] for name in TABLES}
         self._sizes: dict[str, int] = dict.fromkeys(TABLES, 0)
         self._spectra: dict[Any, int] = {}
-        self._rows: dict[tuple[int, str], int] = {}
+        self._rows: dict[tuple[int, str, bytes], int] = {}
         if mode == "spectral":
             self._sensor(sensor or observer("cie1931"), density or Density(lambda_min, lambda_max))
 
@@ -162,13 +162,16 @@ class Tables:
             return words, "table"
         return words, "constant"
 
-    def row(self, kind: Kind, table: str) -> int:
+    def row(self, kind: Kind, table: str, before: Words | None = None) -> int:
         """Append what the kernels read of a kind to a table; return its first word.
 
-        The same object is put in once.
+        before: words that stand in front of it. The same object after the same words is put in
+        once.
         """
-        key = (id(kind), table)
+        key = (id(kind), table, b"" if before is None else before.tobytes())
         if key not in self._rows:
+            if before is not None:
+                self.append(table, before)
             self._rows[key] = self.append(table, self.kind_words(kind))
             self.kept.append(kind)
         return self._rows[key]

@@ -393,6 +393,35 @@ class Blend(Material):
     weight: Any = real(0.5, "share of the second", "", 0.0, 1.0, textured=True)
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Bent(Material):
+    """Base of the maps that bend the shading normal. Their flags and defaults are Mitsuba 3's."""
+
+    material: Any = host(Diffuse(), "what is shaded with the bent normal")
+    scale: float = real(1.0, "factor on what the map bends")
+    flip_invalid: bool = flag(True, "turn a normal round that faces away from the viewer")
+    shadowing: bool = flag(True, "soften the edge where the bent surface turns dark")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NormalMap(Bent):
+    """Takes the shading normal from an image, relative to that of the surface."""
+
+    normals: Any = host(None, "a bitmap, read raw: red, green and blue are (x, y, z) / 2 + 1/2")
+    along_v: bool = flag(False, "y of the map goes along v even where uv are mirrored, as in glTF")
+
+    def check(self) -> None:
+        if getattr(self.normals, "kind", "") != "bitmap":
+            raise SceneError(f"must be a bitmap, not {self.normals!r}", where="normal_map.normals")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BumpMap(Bent):
+    """Bends the shading normal as if the surface were raised by a height."""
+
+    height: Any = real(0.0, "what it is raised by", "m", textured=True)
+
+
 LEAVES = (
     Diffuse,
     Phong,
@@ -410,5 +439,5 @@ LEAVES = (
     Fluorescent,
     Null,
 )
-COMPOSITES = (TwoSided, Mask, Blend)
+COMPOSITES = (TwoSided, Mask, Blend, NormalMap, BumpMap)
 KINDS = LEAVES + COMPOSITES

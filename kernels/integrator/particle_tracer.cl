@@ -33,7 +33,8 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
 #endif
     integer row = MATERIAL_ROW(sel_i(active, load_hit_material(hit, at), (integer)(0)));
     Bsdf m = bsdf_load(scene, row, surface_texture_point(s), lambdas);
-    Frame frame = surface_frame(s);
+    Facing facing = facing_load(scene, row, s, d, lambdas);
+    Frame frame = facing.frame;
     vec3 wo = to_local(frame, neg3(d));
     real arrives = 1.0f / max_r(fabs(dot3(s.n, d)), (real)(1e-6f));
 
@@ -42,7 +43,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     CameraPoint c = camera_connect(scene, s.p, mask_of(0), sampler_pair(sampler, dimension + DIMENSION_LIGHT));
     Spectrum f = bsdf_eval(m, to_local(frame, neg3(c.d)), wo);
     mask shine = active & (c.pixel >= 0) & (spectrum_max(f) > 0.0f);
-    real turned = fabs(dot3(s.n, c.d)) * arrives * c.importance;
+    real turned = fabs(dot3(s.n, c.d)) * arrives * c.importance * facing_share(facing, neg3(d));
     Spectrum value = spectrum_scale(spectrum_mul(beta, f), turned);
 #if USES_ABSORPTION
     integer between = medium_beyond(medium, inside, front, dot3(s.n, c.d) > 0.0f);
@@ -65,7 +66,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     Spectrum exact = spectrum_scale(bsdf_eval(m, bs.wi, wo), leaves / sel(spread, bs.pdf, (real)(1.0f)));
     carried = spectrum_sel(spread, exact, carried);
 #endif
-    beta = spectrum_mul(beta, carried);
+    beta = spectrum_scale(spectrum_mul(beta, carried), facing_share(facing, neg3(d)));
 
     /* Russian roulette, on what is left of what the light gave. */
     integer survivor = depth >= settings->rr_depth;

@@ -48,14 +48,15 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     lambdas = bsdf_shift(scene, row, m, lambdas, choice.y, depth); /* from here on, those by which light comes */
     store_path_lambdas(path, at, active & !hidden, lambdas);
 #endif
-    Frame frame = surface_frame(s);
+    Facing facing = facing_load(scene, row, s, d, lambdas);
+    Frame frame = facing.frame;
     vec3 wo = to_local(frame, neg3(d));
 
 #if USES_LIGHTS && !BSDF_DELTA
     /* Next-event estimation. */
     LightSample ls = light_sample(scene, s.p, choice.x, sampler_pair(sampler, dimension + DIMENSION_LIGHT), lambdas);
     vec3 wi = to_local(frame, ls.wi);
-    Spectrum f = bsdf_eval(m, wo, wi);
+    Spectrum f = spectrum_scale(bsdf_eval(m, wo, wi), facing_share(facing, ls.wi));
     real w = sel(ls.pdf < 0.0f, (real)(1.0f), mis_weight(ls.pdf, hero_pdf(m, wo, wi, ratio)));
     mask shine = next & (ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
     Spectrum value = spectrum_scale(spectrum_mul(spectrum_mul(beta, f), ls.radiance), w / sel(shine, fabs(ls.pdf), (real)(1.0f)));
@@ -72,7 +73,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     BsdfSample bs = hero_sample(m, wo, v3(uv.x, uv.y, choice.y), &ratio);
     next = next & (bs.pdf > 0.0f);
     vec3 onward = normalize3(to_world(frame, bs.wi));
-    beta = spectrum_mul(beta, bs.weight);
+    beta = spectrum_scale(spectrum_mul(beta, bs.weight), facing_share(facing, onward));
     real eta = load_path_eta(path, at) * bs.eta;
 
     /* Russian roulette. */

@@ -25,7 +25,8 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
 #endif
     integer row = MATERIAL_ROW(sel_i(active, load_hit_material(hit, at), (integer)(0)));
     Bsdf m = bsdf_load(scene, row, surface_texture_point(s), lambdas);
-    Frame frame = surface_frame(s);
+    Facing facing = facing_load(scene, row, s, d, lambdas);
+    Frame frame = facing.frame;
     vec3 wo = to_local(frame, neg3(d));
     Sampler sampler = sampler_start(settings->seed, as_natural(load_path_place(path, at)), as_natural(load_path_sample(path, at)));
     natural dimension = as_natural(DIMENSION_VERTEX + depth * DIMENSIONS_A_VERTEX);
@@ -43,7 +44,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     radiance = spectrum_sel(active, spectrum_add(radiance, everywhere), radiance);
 #if USES_LIGHTS
     LightSample ls = light_sample(scene, s.p, choice.x, sampler_pair(sampler, dimension + DIMENSION_LIGHT), lambdas);
-    Spectrum f = bsdf_eval(m, wo, to_local(frame, ls.wi));
+    Spectrum f = spectrum_scale(bsdf_eval(m, wo, to_local(frame, ls.wi)), facing_share(facing, ls.wi));
     mask shine = active & (ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
     Spectrum value = spectrum_scale(spectrum_mul(spectrum_mul(own, f), ls.radiance), 1.0f / sel(shine, fabs(ls.pdf), (real)(1.0f)));
 #if USES_ABSORPTION
@@ -67,6 +68,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
 #endif
     next = next & (depth + 1 < settings->max_depth);
     vec3 onward = normalize3(to_world(frame, wi));
+    beta = spectrum_scale(beta, facing_share(facing, onward));
     store_path_radiance(path, at, active, radiance);
     store_path_o(path, at, next, surface_offset(s, onward));
     store_path_d(path, at, next, onward);

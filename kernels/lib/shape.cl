@@ -8,6 +8,7 @@
  *
  *   ShapeHit    <kind>_intersect(<Kind> s, vec3 o, vec3 d, real tmin, real tmax);    nearest hit in (tmin, tmax)
  *   vec3        <kind>_dpdu(<Kind> s, vec3 p, vec2 uv);                              tangent at a point of it
+ *   vec3        <kind>_dpdv(<Kind> s, vec3 p, vec2 uv);                              and along v
  *
  * Normals point to the front, outward for closed shapes.
  */

@@ -8,7 +8,9 @@ typedef struct {
     vec3 n;       /* geometric normal, unit length, on the side of the front */
     vec3 ns;      /* shading normal, unit length */
     vec3 dpdu;    /* along the surface's u; not normalised, may be zero */
+    vec3 dpdv;    /* and along v */
     vec2 uv;
+    mask turned;  /* the back of a two-sided surface: n and ns have been turned round */
     integer light; /* row in `lights`, -1: does not emit */
 #if USES_ATTRIBUTES
     integer attributes, face; /* of triangles, see lib/texture_point.cl */
@@ -29,7 +31,7 @@ inline vec2 vertex_vec2(global const float *table, integer vertex)
 
 /* The surface where the ray from `o` along `d` ends. `front` tells which side was hit. A two-sided
  * back is turned round, so that the BSDF sees a front. USES_NORMALS, USES_UVS and USES_TANGENTS say
- * what the scene needs; dpdu_of_shape is generated for its analytic shapes. */
+ * what the scene needs; dpdu_of_shape and dpdv_of_shape are generated for its analytic shapes. */
 inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, mask *front)
 {
     Surface s;
@@ -40,6 +42,7 @@ inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, 
     s.uv.x = h.u;
     s.uv.y = h.v;
     s.dpdu = v3(0.0f, 0.0f, 0.0f);
+    s.dpdv = v3(0.0f, 0.0f, 0.0f);
     s.light = -1;
     integer prim = sel_i(active, h.prim, (integer)(0));
 #if USES_ATTRIBUTES
@@ -86,21 +89,27 @@ inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, 
         real du1 = tb.x - ta.x, dv1 = tb.y - ta.y, du2 = tc.x - ta.x, dv2 = tc.y - ta.y;
         real det = du1 * dv2 - dv1 * du2;
         mask regular = mapped & (fabs(det) > 1e-20f);
-        s.dpdu = sel3(regular, scale3(sub3(scale3(e1, dv2), scale3(e2, dv1)), 1.0f / sel(regular, det, (real)(1.0f))), s.dpdu);
+        real inv = 1.0f / sel(regular, det, (real)(1.0f));
+        s.dpdu = sel3(regular, scale3(sub3(scale3(e1, dv2), scale3(e2, dv1)), inv), s.dpdu);
+        s.dpdv = sel3(regular, scale3(sub3(scale3(e2, du1), scale3(e1, du2)), inv), s.dpdv);
 #if USES_INSTANCES
         s.dpdu = sel3(placed, instance_vector(space, s.dpdu), s.dpdu);
+        s.dpdv = sel3(placed, instance_vector(space, s.dpdv), s.dpdv);
 #endif
 #endif
     }
 #endif
 #if USES_ANALYTIC && USES_TANGENTS
     mask analytic = active & (shape.kind != 0);
-    if (any(analytic)) s.dpdu = sel3(analytic, dpdu_of_shape(scene, shape, s.p, s.uv), s.dpdu);
+    if (any(analytic)) {
+        s.dpdu = sel3(analytic, dpdu_of_shape(scene, shape, s.p, s.uv), s.dpdu);
+        s.dpdv = sel3(analytic, dpdv_of_shape(scene, shape, s.p, s.uv), s.dpdv);
+    }
 #endif
     *front = dot3(s.n, d) < 0.0f;
-    mask turn = !*front & ((shape.flags & SHAPE_TWO_SIDED) != 0);
-    s.n = sel3(turn, neg3(s.n), s.n);
-    s.ns = sel3(turn, neg3(s.ns), s.ns);
+    s.turned = !*front & ((shape.flags & SHAPE_TWO_SIDED) != 0);
+    s.n = sel3(s.turned, neg3(s.n), s.n);
+    s.ns = sel3(s.turned, neg3(s.ns), s.ns);
     return s;
 }
 

@@ -60,3 +60,5 @@ vec3 cylinder_dpdu(Cylinder q, vec3 p, vec2 uv)
     sincos_2pi(uv.x, &s, &c);
     return add3(scale3(q.x, -around * s), scale3(q.y, around * c));
 }
+
+vec3 cylinder_dpdv(Cylinder q, vec3 p, vec2 uv) { return q.axis; }

@@ -52,3 +52,10 @@ vec3 disk_dpdu(Disk q, vec3 p, vec2 uv) /* along the radius */
     sincos_2pi(uv.y, &s, &c);
     return madd3(q.s, c, scale3(q.t, s));
 }
+
+vec3 disk_dpdv(Disk q, vec3 p, vec2 uv) /* around the centre */
+{
+    real s, c, around = 2.0f * PI * uv.x;
+    sincos_2pi(uv.y, &s, &c);
+    return add3(scale3(q.s, -around * s), scale3(q.t, around * c));
+}

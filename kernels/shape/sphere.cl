@@ -98,3 +98,12 @@ vec3 sphere_dpdu(Sphere q, vec3 p, vec2 uv)
     vec3 f = sub3(p, q.center);
     return add3(scale3(q.x, -2.0f * PI * dot3(f, q.y)), scale3(q.y, 2.0f * PI * dot3(f, q.x)));
 }
+
+/* v is the polar angle from z over pi; zero at the poles. */
+vec3 sphere_dpdv(Sphere q, vec3 p, vec2 uv)
+{
+    vec3 f = sub3(p, q.center);
+    real x = dot3(f, q.x), y = dot3(f, q.y), z = dot3(f, q.z), r2 = x * x + y * y;
+    real inv = PI / sqrt(max_r(r2, (real)(1e-20f)));
+    return madd3(q.x, x * z * inv, madd3(q.y, y * z * inv, scale3(q.z, -r2 * inv)));
+}

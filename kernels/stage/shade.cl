@@ -9,6 +9,7 @@
 #include "generated/shapes.cl"
 #include "generated/lights.cl"
 #include "lib/surface.cl"
+#include "generated/facing.cl"
 #include "lib/next_event.cl"
 #include "lib/fresnel.cl"
 #include "lib/microfacet.cl"

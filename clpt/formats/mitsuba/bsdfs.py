@@ -9,7 +9,7 @@ from clpt import spectra
 from clpt.errors import UnknownKindError
 from clpt.formats.mitsuba.fluorescence import fluorescent
 from clpt.formats.mitsuba.principled import principled, principled_thin
-from clpt.formats.mitsuba.spectra import coefficient, index, ior, real, reflectance
+from clpt.formats.mitsuba.spectra import coefficient, index, ior, real, reflectance, texture
 from clpt.formats.mitsuba.values import Context, Properties, numbers, placed
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene import materials
@@ -195,6 +195,33 @@ def _blend(props: Properties) -> Parameters:
     return {"first": first, "second": second, "weight": real(props, "weight", 0.5)}
 
 
+def _bent(props: Properties) -> Parameters:
+    return {
+        "material": _nested(props, 1, 1)[0],
+        "flip_invalid": props.flag("flip_invalid_normals", True),
+        "shadowing": props.flag("use_shadowing_function", True),
+    }
+
+
+def _normal_map(props: Properties) -> Parameters:
+    given = _bent(props)
+    child = props.take("normalmap")
+    if child is None:
+        raise props.element.error("needs the texture 'normalmap'")
+    return {**given, "normals": texture(props.context.resolve(child), props)}
+
+
+def _bump_map(props: Properties) -> Parameters:
+    given = _bent(props)
+    tags = {name: props.context.resolve(child).tag for name, child in props.named.items()}
+    named = [props.take(name) for name, tag in tags.items() if tag == "texture"]
+    found = [props.context.resolve(child) for child in named if child is not None]
+    found += props.objects("texture")
+    if len(found) != 1:
+        raise props.element.error(f"needs one texture of heights, not {len(found)}")
+    return {**given, "height": texture(found[0], props), "scale": props.number("scale", 1.0)}
+
+
 def _nested(props: Properties, low: int, high: int) -> list[Material]:
     inner = props.objects("bsdf")
     if not low <= len(inner) <= high:
@@ -221,4 +248,6 @@ PLUGINS: dict[str, tuple[type[Material], Callable[[Properties], Parameters]]] = 
     "twosided": (materials.TwoSided, _two_sided),
     "mask": (materials.Mask, _mask),
     "blendbsdf": (materials.Blend, _blend),
+    "normalmap": (materials.NormalMap, _normal_map),
+    "bumpmap": (materials.BumpMap, _bump_map),
 }
