@@ -56,16 +56,20 @@ def summary(scene: Scene) -> dict[str, Any]:
     """
     added = scene.extra.get("studio", {"camera": False, "shapes": 0, "lights": 0})
     own = scene.shapes[: len(scene.shapes) - added["shapes"]]
-    counts = {_arrays(shape): _triangles(shape) for shape in own}
-    kinds = list(_nested(own))
+    groups = {id(shape.group): shape.group for shape in own if isinstance(shape, shapes.Instance)}
+    inside = [shape for group in groups.values() for shape in group.shapes]
+    plain = [shape for shape in own if not isinstance(shape, shapes.Instance)]
+    surfaces = [*plain, *inside]
+    counts = {_arrays(shape): _triangles(shape) for shape in surfaces}
+    kinds = list(_nested(surfaces))
     lights = [light.kind for light in scene.lights[: len(scene.lights) - added["lights"]]]
-    lights += [shape.emission.kind for shape in own if shape.emission is not None]
+    lights += [shape.emission.kind for shape in surfaces if shape.emission is not None]
     bounds = [corner.tolist() for corner in studio.world_bounds(own)] if own else None
     return {
         "format": scene.extra.get("format", "python"),
         "triangles": sum(counts.values()),
-        "triangles_instanced": sum(_triangles(shape) for shape in own),
-        "instances": len(own) - len(counts),
+        "triangles_instanced": sum(_placed_triangles(own, groups)),
+        "instances": len(own) - len({_arrays(shape) for shape in plain}),
         "bounds": bounds,
         "shapes": dict(Counter(shape.kind for shape in own)),
         "cameras": scene.extra.get("cameras", [] if added["camera"] else [scene.camera.kind]),
@@ -80,6 +84,18 @@ def summary(scene: Scene) -> dict[str, Any]:
 def _arrays(shape: shapes.Shape) -> int:
     """Identity of a mesh's triangles; a shape of any other kind is its own."""
     return id(shape.faces) if isinstance(shape, shapes.Mesh) else id(shape)
+
+
+def _placed_triangles(
+    own: Iterable[shapes.Shape], groups: dict[int, shapes.Group]
+) -> Iterator[int]:
+    """Yield how many triangles each shape puts into the scene."""
+    sizes = {key: sum(map(_triangles, group.shapes)) for key, group in groups.items()}
+    for shape in own:
+        if isinstance(shape, shapes.Instance):
+            yield sizes[id(shape.group)]
+        else:
+            yield _triangles(shape)
 
 
 def _triangles(shape: shapes.Shape) -> int:

@@ -5,7 +5,7 @@ Up is +z for .stl, where printers and CAD have it, and +y for every other format
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -49,7 +49,7 @@ def show(
     camera is ours too; else one from afar, which nothing hides and no camera sees.
     `extra["studio"]` counts what was added. Raises SceneError for shapes too large to be framed.
     """
-    low, high = world_bounds(things) if things else (-np.ones(3), np.ones(3))
+    low, high = world_bounds(things)
     middle, radius = (low + high) / 2.0, _radius(low, high)
     if not np.isfinite(radius):
         raise SceneError("is too large to be framed", file=file)
@@ -80,12 +80,12 @@ def framing_camera(
     things: Sequence[shapes.Shape], up: transforms.Matrix = transforms.IDENTITY
 ) -> Perspective:
     """Return a camera from the front and above, whose shorter side all shapes together fill."""
-    low, high = world_bounds(things) if things else (-np.ones(3), np.ones(3))
+    low, high = world_bounds(things)
     middle, radius = (low + high) / 2.0, _radius(low, high)
     view = transforms.look_at(_direction(FROM, up), np.zeros(3), up[:3, 1])[:3, :3]
     distance = 1.5 * radius
-    for thing in things:
-        seen = (_outline(thing) - middle) @ view
+    for points in _outlines(things):
+        seen = (points - middle) @ view
         aside = np.abs(seen[:, :2]).max(axis=1) / np.tan(np.radians(FOV / 2.0))
         distance = max(distance, MARGIN * float(np.max(aside - seen[:, 2])))
     origin = middle + distance * _direction(FROM, up)
@@ -101,8 +101,14 @@ def framing_camera(
 def world_bounds(
     things: Sequence[shapes.Shape],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Least and largest corner (3,) of all shapes in world space."""
-    boxes = [shape_bounds(thing) for thing in things]
+    """Least and largest corner (3,) of all shapes in world space; a unit box where there are none.
+
+    Of an instance the corners of its group's box count.
+    """
+    boxes = [shape_bounds(thing) for thing in things if not isinstance(thing, shapes.Instance)]
+    boxes += [(points.min(axis=0), points.max(axis=0)) for points in _placed_boxes(things)]
+    if not boxes:
+        boxes = [(-np.ones(3), np.ones(3))]
     return np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)
 
 
@@ -125,11 +131,28 @@ def shape_bounds(thing: shapes.Shape) -> tuple[NDArray[np.float64], NDArray[np.f
     return points.min(axis=0) - reach, points.max(axis=0) + reach
 
 
-def _outline(thing: shapes.Shape) -> NDArray[np.float64]:
-    """Points (n, 3) in world space whose hull holds the shape."""
-    if isinstance(thing, shapes.Mesh):
-        return transforms.transform_points(thing.to_world, thing.vertices)
-    low, high = shape_bounds(thing)
+def _outlines(things: Sequence[shapes.Shape]) -> Iterator[NDArray[np.float64]]:
+    """Points (n, 3) in world space whose hull holds a shape, for each."""
+    for thing in things:
+        if isinstance(thing, shapes.Mesh):
+            yield transforms.transform_points(thing.to_world, thing.vertices)
+        elif not isinstance(thing, shapes.Instance):
+            yield _box_corners(*shape_bounds(thing))
+    yield from _placed_boxes(things)
+
+
+def _placed_boxes(things: Sequence[shapes.Shape]) -> Iterator[NDArray[np.float64]]:
+    """The corners (8, 3) of each instance's box, which is looked for once a group."""
+    corners: dict[int, NDArray[np.float64]] = {}
+    for thing in things:
+        if isinstance(thing, shapes.Instance) and thing.group.shapes:
+            key = id(thing.group)
+            if key not in corners:
+                corners[key] = _box_corners(*world_bounds(thing.group.shapes))
+            yield transforms.transform_points(thing.to_world, corners[key])
+
+
+def _box_corners(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
     return low + (high - low) * (_corners(shapes.Cube()) + 1.0) / 2.0
 
 

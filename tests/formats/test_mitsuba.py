@@ -463,7 +463,10 @@ ERRORS = {
     '<bsdf type="principled"><float name="specular" value="2"/></bsdf>': "from 0 to 1, not 2",
     '<bsdf type="principled"><float name="metallic" value="2"/></bsdf>': r"outside \[0, 1\]",
     '<bsdf type="difuse"/>': "did you mean 'diffuse'",
-    '<shape type="instance"/>': r":2: <shape .*unknown shape 'instance'",
+    '<shape type="heightfield"/>': r":2: <shape .*unknown shape 'heightfield'",
+    '<shape type="instance"/>': r":2: <shape .*needs a <shape type=.shapegroup.>",
+    '<shape type="shapegroup"><shape type="instance"/></shape>': r":2: <shape type=.instance.>"
+    ": cannot stand in a shapegroup",
     '<emitter type="sunsky"/>': "unknown emitter",
     '<integrator type="volpath"/>': "unknown integrator",
     '<bsdf type="diffuse"><float name="foo" value="1"/></bsdf>': "has no parameter 'foo'",

@@ -12,7 +12,7 @@ from clpt.formats.mitsuba import sensors
 from clpt.formats.mitsuba.bsdfs import bsdf
 from clpt.formats.mitsuba.emitters import emitter
 from clpt.formats.mitsuba.sensors import sensor
-from clpt.formats.mitsuba.shapes import shape
+from clpt.formats.mitsuba.shapes import shapes_of
 from clpt.formats.mitsuba.spectra import texture
 from clpt.formats.mitsuba.values import Context, Properties
 from clpt.formats.mitsuba.xml import Element, parse
@@ -30,7 +30,7 @@ def load(path: Path, **variables: object) -> Scene:
     document = parse(path, variables)
     context = Context(document)
     props = Properties(document.root, context)
-    shapes = [shape(element, context) for element in props.objects("shape")]
+    shapes = shapes_of(props.objects("shape"), context)
     lights = [emitter(element, context) for element in props.objects("emitter")]
     for element in props.objects("bsdf"):
         bsdf(element, context)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -16,15 +16,29 @@ from clpt.formats.mitsuba.values import Context, Properties, placed
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene import shapes
 from clpt.scene.materials import Diffuse
-from clpt.scene.shapes import Shape
+from clpt.scene.shapes import Group, Instance, Shape
 
 Parameters = dict[str, Any]
 
 
+def shapes_of(elements: Iterable[Element], context: Context) -> list[Shape]:
+    """Make what a scene's <shape> elements describe; a shapegroup is only looked at."""
+    made = []
+    for element in elements:
+        if element.type == "shapegroup":
+            _group(element, context)
+        elif element.type == "instance":
+            made.append(_instance(element, context))
+        else:
+            made.append(shape(element, context))
+    return made
+
+
 def shape(element: Element, context: Context) -> Shape:
-    """Make the shape that a <shape> describes."""
+    """Make the shape that a <shape> describes, which is no group and no instance."""
     if element.type not in PLUGINS:
-        raise UnknownKindError("shape", element.type, PLUGINS, **element.place())
+        known = (*PLUGINS, "shapegroup", "instance")
+        raise UnknownKindError("shape", element.type, known, **element.place())
     cls, read = PLUGINS[element.type]
     props = Properties(element, context)
     material, emitter = props.object("bsdf"), props.object("emitter")
@@ -42,6 +56,34 @@ def shape(element: Element, context: Context) -> Shape:
         made = cls(**parameters)
     props.finish()
     return made
+
+
+def _instance(element: Element, context: Context) -> Shape:
+    props = Properties(element, context)
+    found = props.object("shape")
+    if found is None or found.type != "shapegroup":
+        raise element.error('needs a <shape type="shapegroup">, or a <ref> to one')
+    name = element.attributes.get("id", "")
+    with placed(element):
+        made = Instance(group=_group(found, context), to_world=props.placement(), name=name)
+    props.finish()
+    return made
+
+
+def _group(element: Element, context: Context) -> Group:
+    """The group that an element describes, the same for every instance of it."""
+
+    def make(element: Element) -> Group:
+        props = Properties(element, context)
+        inner = props.objects("shape")
+        for child in inner:
+            if child.type in ("shapegroup", "instance"):
+                raise child.error("cannot stand in a shapegroup")
+        props.finish()
+        made = (shape(child, context) for child in inner)
+        return Group(tuple(made), element.attributes.get("id", ""))
+
+    return context.once(element, make)
 
 
 def _plain(emitter: Element | None) -> Diffuse:
