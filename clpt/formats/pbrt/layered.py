@@ -34,7 +34,9 @@ def coated_diffuse(params: Parameters, state: State) -> Material:
     base = textured(params, "reflectance", "reflectance", state, 0.5)
     thickness = coat(params, state)
     if thickness > 0.0:
-        base = mapped(base, coats.under_coat(middle(eta), thickness))
+        looks = coats.under_coat(middle(eta), thickness)
+        key = ("coat", base, middle(eta), thickness)
+        base = state.shared.once(key, params, lambda given=base: mapped(given, looks))
     return plastic(base, eta, isotropic(alphas(params, state), params, state))
 
 
@@ -95,10 +97,12 @@ def subsurface(params: Parameters, state: State) -> Material:
 
 
 def _albedo(scattering: Any, absorption: Any, g: float) -> Any:
-    colours = []
-    for value in (scattering, absorption):
-        if isinstance(value, Texture):
-            raise SceneError("'sigma_a' and 'sigma_s' cannot be textures")
-        found = value.to_rgb("unbounded") if isinstance(value, spectra.Spectrum) else value
-        colours.append(np.broadcast_to(found, 3))
-    return tuple(float(v) for v in coats.body_albedo(*colours, g))
+    albedo = coats.body_albedo(_colour(scattering), _colour(absorption), g)
+    return tuple(float(v) for v in albedo)
+
+
+def _colour(value: Any) -> Any:
+    if isinstance(value, Texture):
+        raise SceneError("'sigma_a' and 'sigma_s' cannot be textures")
+    found = value.to_rgb("unbounded") if isinstance(value, spectra.Spectrum) else value
+    return np.broadcast_to(found, 3)
