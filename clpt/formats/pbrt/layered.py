@@ -6,6 +6,7 @@ for both. It is exact for a smooth coat whose medium does nothing, and for a bod
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -36,7 +37,7 @@ def coated_diffuse(params: Parameters, state: State) -> Material:
     if thickness > 0.0:
         looks = coats.under_coat(middle(eta), thickness)
         key = ("coat", base, middle(eta), thickness)
-        base = state.shared.once(key, params, lambda given=base: mapped(given, looks))
+        base = state.shared.once(key, params, partial(mapped, base, looks))
     return plastic(base, eta, isotropic(alphas(params, state), params, state))
 
 

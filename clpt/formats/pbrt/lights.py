@@ -160,7 +160,9 @@ def _upward(image: np.ndarray) -> float:
 
 def _goniometric(params: Parameters, state: State) -> Light:
     file = params.one("filename", "string", "")
-    image: Any = _square(file, state).mean(axis=2, keepdims=True) if file else np.ones((2, 2, 1), np.float32)
+    image: Any = np.ones((2, 2, 1), np.float32)
+    if file:
+        image = _square(file, state).mean(axis=2, keepdims=True)
     intensity = _intensity(params, state, 4.0 * np.pi * float(image.mean()))
     position = transforms.transform_points(state.ctm, np.zeros(3))
     around = octahedral.lat_long(
