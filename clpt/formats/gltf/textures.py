@@ -92,7 +92,7 @@ def _sampling(texture: Element) -> dict[str, str]:
         wraps[key] = WRAPS[number]
     found: dict[str, str] = {"wrap": wraps["wrapS"]}
     if wraps["wrapT"] != wraps["wrapS"]:
-        sampler.warn("wraps u and v in different ways; both are wrapped as u")
+        found["wrap_v"] = wraps["wrapT"]
     if sampler.integer("magFilter", 9729) == NEAREST:
         found["filter"] = "nearest"
     return found

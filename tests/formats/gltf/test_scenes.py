@@ -302,10 +302,10 @@ def bitmaps(scene):
 
 def test_textures(read, build):
     image = png([[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [188, 188, 188]]])
-    sampler = {"wrapS": 33648, "wrapT": 33648, "magFilter": 9728}
+    sampler = {"wrapS": 33648, "wrapT": 33071, "magFilter": 9728}
     bitmap = bitmaps(read(textured(build, image, sampler)))[0]
     assert bitmap.image.shape == (2, 2, 3) and np.allclose(bitmap.image[1, 1], 0.503, atol=1e-3)
-    assert (bitmap.wrap, bitmap.filter) == ("mirror", "nearest")
+    assert (bitmap.wrap, bitmap.wrap_v, bitmap.filter) == ("mirror", "clamp", "nearest")
     shape = read(textured(build, image)).shapes[0]
     assert np.allclose(shape.uvs, SQUARE[:, :2])  # upright
     other = read(textured(build, image, texCoord=1)).shapes[0]
