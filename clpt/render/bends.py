@@ -59,7 +59,7 @@ class Bend:
         """Return the WORDS words, and put the textures into the tables."""
         made = np.zeros(WORDS, np.uint32)
         flags = INSIDE if self.inside else 0
-        if self.normal is not None:
+        if self.normal is not None and self.normal.normals is not None:
             flags |= NORMAL | _flags(self.normal) | (ALONG_V if self.normal.along_v else 0)
             made[1] = np.float32(self.normal.scale).view(np.uint32)
             for i, channel in enumerate("rgb"):
@@ -83,10 +83,8 @@ def _flags(outer: Map) -> int:
     return (0 if outer.flip_invalid else AS_IT_IS) | (0 if outer.shadowing else UNSHADED)
 
 
-def _channel(texture: Any, channel: str) -> Any:
+def _channel(texture: Bitmap, channel: str) -> Bitmap:
     """One coordinate of the normals, 0 to 1."""
-    if not isinstance(texture, Bitmap):
-        raise SceneError("must be a bitmap", where="normal_map.normals")
     return dataclasses.replace(texture, channel=channel, raw=True)
 
 

@@ -407,11 +407,11 @@ class Bent(Material):
 class NormalMap(Bent):
     """Takes the shading normal from an image, relative to that of the surface."""
 
-    normals: Any = host(None, "a bitmap, read raw: red, green and blue are (x, y, z) / 2 + 1/2")
+    normals: Any = host(None, "bitmap, read raw; its colours are (x, y, z) / 2 + 1/2; None: none")
     along_v: bool = flag(False, "y of the map goes along v even where uv are mirrored, as in glTF")
 
     def check(self) -> None:
-        if getattr(self.normals, "kind", "") != "bitmap":
+        if self.normals is not None and getattr(self.normals, "kind", "") != "bitmap":
             raise SceneError(f"must be a bitmap, not {self.normals!r}", where="normal_map.normals")
 
 
