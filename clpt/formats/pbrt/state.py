@@ -20,7 +20,7 @@ TARGETS = ("shape", "light", "material", "medium", "texture")
 
 @dataclass(eq=False)
 class Definition:
-    """A texture or named material: its type, parameters and the state that it was defined in.
+    """A thing of the file: its type, its parameters and the state that it was defined in.
 
     Textures stay definitions, since what a texture is made into depends on the parameter it serves.
     """
@@ -58,17 +58,17 @@ class State:
     """The graphics state at a place in a file; `copy` is what AttributeBegin keeps.
 
     ctm: object to world. colour_space: "srgb", "rec2020", "aces2065-1" or "dci-p3".
-    material: a Material or the name of one. area_light: the parameters of an AreaLightSource.
+    material: that of shapes to come, or its name; None for pbrt's grey.
     """
 
     shared: Shared
     file_folder: Path
     ctm: transforms.Matrix = field(default_factory=lambda: np.eye(4))
     colour_space: str = "srgb"
-    material: Material | str | None = None
-    material_place: Parameters | None = None
-    area_light: Parameters | None = None
+    material: Definition | str | None = None
+    area_light: Definition | None = None
     reverse: bool = False
+    active: bool = True  # whether transforms count for the start of the exposure
     inside: str = ""
     outside: str = ""
     defaults: dict[str, tuple[Parameter, ...]] = field(default_factory=dict)

@@ -1,0 +1,188 @@
+"""Film, filter, sampler and integrator of a PBRT scene."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from clpt.errors import UnknownKindError
+from clpt.formats.pbrt.params import Parameters
+from clpt.formats.pbrt.state import Definition, State
+from clpt.scene import integrators
+from clpt.scene.integrators import Film, Filter, Integrator, Sampler
+
+FILMS = ("rgb", "gbuffer", "spectral")
+SPACES = {"srgb": "rec709", "rec2020": "rec2020", "dci-p3": "display_p3"}
+RANDOM = ("independent",)
+SAMPLERS = ("halton", "sobol", "zsobol", "paddedsobol", "pmj02bn", "stratified", *RANDOM)
+STORED = ("filename", "savefp16", "diagonal")  # how a file is stored is decided when it is written
+DAYLIGHT = 6500.0  # [K], what pbrt takes a measured sensor's white to be
+
+
+def film(found: Definition | None, filter: Definition | None, exposure: float) -> Film:
+    """Make the film; `exposure` is how long the shutter is open [s]. Raises SceneError."""
+    made = _filter(filter)
+    if found is None:
+        return Film(width=1280, height=720, filter=made)
+    params, state = found.params, found.state
+    if found.kind == "image":
+        raise params.error("the film 'image' is PBRT version 3's; convert the file by --upgrade")
+    if found.kind not in FILMS:
+        raise UnknownKindError("film", found.kind, FILMS, **params.place)
+    params.ignore(*STORED)
+    if found.kind == "gbuffer":
+        params.ignore("coordinatesystem")
+    width, height = (params.one(name, "integer", n) for name, n in SIZE)
+    with params.placed():
+        made_film = Film(
+            width=width,
+            height=height,
+            filter=made,
+            **_colour(params, state, exposure),
+            **(_bands(params) if found.kind == "spectral" else {}),
+        )
+    _crop(params, state)
+    if params.one("maxcomponentvalue", "float", math.inf) < math.inf:
+        state.warn(params, "'maxcomponentvalue' is left out: bright samples are kept as they are")
+    return made_film
+
+
+SIZE = (("xresolution", 1280), ("yresolution", 720))
+
+
+def _colour(params: Parameters, state: State, exposure: float) -> dict[str, Any]:
+    """Take the sensor: what becomes white, and the factor on the picture."""
+    sensor = params.one("sensor", "string", "cie1931")
+    balance = params.one("whitebalance", "float", 0.0)
+    given: dict[str, Any] = {"exposure": exposure * params.above_zero("iso", 100.0) / 100.0}
+    if sensor != "cie1931":
+        state.warn(params, f"the sensor {sensor!r} is not known: cie1931 takes its place")
+        balance = balance or DAYLIGHT
+    if balance > 0.0:
+        given["white_balance"] = balance
+    if state.colour_space in SPACES:
+        given["output_space"] = SPACES[state.colour_space]
+    else:
+        state.warn(params, f"the picture is in Rec. 709, not in {state.colour_space}")
+    return given
+
+
+def _bands(params: Parameters) -> dict[str, Any]:
+    return {
+        "bands": params.one("nbuckets", "integer", 16),
+        "lambda_min": params.above_zero("lambdamin", 360.0),
+        "lambda_max": params.above_zero("lambdamax", 830.0),
+    }
+
+
+def _crop(params: Parameters, state: State) -> None:
+    for name in ("cropwindow", "pixelbounds"):
+        if params.several(name, "float") is not None:
+            state.warn(params, f"{name!r} is left out: the whole picture is rendered")
+
+
+def _filter(found: Definition | None) -> Filter:
+    if found is None:
+        return integrators.Gaussian()
+    if found.kind not in FILTERS:
+        raise UnknownKindError("filter", found.kind, FILTERS, **found.params.place)
+    with found.params.placed():
+        return FILTERS[found.kind](found.params, found.state)
+
+
+def _radius(params: Parameters, state: State, default: float) -> float:
+    """Take the radii [pixels], which are one here."""
+    x, y = (params.above_zero(name, default) for name in ("xradius", "yradius"))
+    if x != y:
+        state.warn(params, f"one radius of {math.sqrt(x * y):.3g} pixels takes the place of two")
+    return math.sqrt(x * y)
+
+
+def _box(params: Parameters, state: State) -> Filter:
+    return integrators.Box(radius=_radius(params, state, 0.5))
+
+
+def _triangle(params: Parameters, state: State) -> Filter:
+    return integrators.Tent(radius=_radius(params, state, 2.0))
+
+
+def _gaussian(params: Parameters, state: State) -> Filter:
+    radius, sigma = _radius(params, state, 1.5), params.above_zero("sigma", 0.5)
+    if radius < 2.0 * sigma:
+        state.warn(params, "the bell is cut off at 4 sigma, not at its radius")
+    return integrators.Gaussian(stddev=sigma)
+
+
+def _mitchell(params: Parameters, state: State) -> Filter:
+    if abs(_radius(params, state, 2.0) - 2.0) > 1e-3:
+        state.warn(params, "a radius of 2 pixels takes the place of that given")
+    b, c = params.one("B", "float", 1 / 3), params.one("C", "float", 1 / 3)
+    return integrators.Mitchell(b=b, c=c)
+
+
+def _sinc(params: Parameters, state: State) -> Filter:
+    _radius(params, state, 4.0)
+    params.ignore("tau")
+    state.warn(params, "Mitchell and Netravali's filter with B = 0, C = 1/2 takes sinc's place")
+    return integrators.Mitchell(b=0.0, c=0.5)
+
+
+FILTERS: dict[str, Callable[[Parameters, State], Filter]] = {
+    "box": _box,
+    "gaussian": _gaussian,
+    "mitchell": _mitchell,
+    "sinc": _sinc,
+    "triangle": _triangle,
+}
+
+
+def sampler(found: Definition | None) -> tuple[Sampler, int, int | None]:
+    """Return the sampler, the samples of a pixel, and the seed if it is given."""
+    if found is None:
+        return integrators.Sobol(), 16, None
+    params = found.params
+    if found.kind not in SAMPLERS:
+        raise UnknownKindError("sampler", found.kind, SAMPLERS, **params.place)
+    if found.kind == "stratified":
+        params.ignore("jitter")
+        spp = math.prod(params.one(name, "integer", 4) for name in ("xsamples", "ysamples"))
+    else:
+        spp = params.one("pixelsamples", "integer", 16)
+    params.ignore("randomization")
+    seed = params.one("seed", "integer", None)
+    if not 0 < spp < 2**31:
+        raise params.error(f"there must be at least one sample in a pixel, not {spp}")
+    made: Sampler = integrators.Independent() if found.kind in RANDOM else integrators.Sobol()
+    return made, spp, None if seed is None else seed % 2**31
+
+
+LIGHT_PATHS = ("path", "volpath", "simplepath", "simplevolpath", "randomwalk")
+OTHERS = {  # what finds the same light by other ways
+    "bdpt": ("visualizestrategies", "visualizeweights"),
+    "mlt": (
+        "bootstrapsamples", "chains", "mutationsperpixel", "largestepprobability", "sigma",
+    ),
+    "sppm": ("photonsperiteration", "radius", "seed"),
+    "lightpath": (),
+}  # fmt: skip
+IGNORED = ("regularize", "lightsampler", "rrthreshold", "samplelights", "samplebsdf")
+MOST_DEPTH = 2**31 - 2
+
+
+def integrator(found: Definition | None) -> Integrator:
+    """Make the path tracer that stands for pbrt's integrator; its depth counts one less."""
+    if found is None:
+        return integrators.Path(max_depth=6)
+    params, state = found.params, found.state
+    if found.kind in ("ao", "function"):
+        raise params.error("this integrator shows no light; use 'path'")
+    if found.kind not in (*LIGHT_PATHS, *OTHERS):
+        raise UnknownKindError("integrator", found.kind, (*LIGHT_PATHS, *OTHERS), **params.place)
+    if found.kind in OTHERS:
+        state.warn(params, "paths are traced from the camera instead: the same light, other noise")
+    params.ignore(*IGNORED, *OTHERS.get(found.kind, ()))
+    depth = params.one("maxdepth", "integer", 5)
+    if depth < 0:
+        raise params.error(f"'maxdepth' cannot be negative: {depth}")
+    return integrators.Path(max_depth=min(depth, MOST_DEPTH) + 1)

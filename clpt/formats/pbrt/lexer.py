@@ -1,0 +1,170 @@
+"""The words of a PBRT file: directives, strings, and runs of numbers, which may be long.
+
+A file is kept as bytes and looked at once. The numbers between brackets, which are nearly all of a
+large file, are read in one go.
+"""
+
+from __future__ import annotations
+
+import re
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.errors import SceneError
+from clpt.formats.packed import read_bytes
+from clpt.formats.pbrt.params import ALIASES, TYPES, Parameter
+from clpt.formats.pbrt.state import nearest
+
+BLANKS = re.compile(rb"(?:[ \t\r\n]+|#[^\n]*)*")
+WORD = re.compile(rb'"[^"\n]*"|[\[\]]|[^ \t\r\n\[\]"#]+')
+COMMENT = re.compile(rb"#[^\n]*")
+OLD_TYPES = ("color", "xyz")
+UPGRADE = "PBRT version 3's; convert the file by pbrt-v4's --upgrade"
+
+
+class Lexer:
+    """The words of one file, in order; `line` is that of the word last taken.
+
+    Raises SceneError with the file and line for whatever is no word.
+    """
+
+    def __init__(self, path: Path):
+        self.path, self.data = path, read_bytes(path)
+        self.at = 0
+        self._counted, self._line = 0, 1
+
+    @property
+    def line(self) -> int:
+        """The line of the place up to which words have been taken."""
+        self._line += self.data.count(b"\n", self._counted, self.at)
+        self._counted = self.at
+        return self._line
+
+    def error(self, message: str) -> SceneError:
+        """Return the error that says `message` about this place."""
+        return SceneError(message, file=self.path, line=self.line)
+
+    def peek(self) -> bytes:
+        """The next word, or nothing at the end of the file."""
+        self._skip()
+        found = WORD.match(self.data, self.at)
+        if found is None and self.at < len(self.data):
+            raise self.error("a string in quotes does not end on its line")
+        return found.group() if found else b""
+
+    def next(self, what: str) -> bytes:
+        """Take the next word; `what` says what is missing at the end of the file."""
+        word = self.peek()
+        if not word:
+            raise self.error(f"the file ends where {what} should follow")
+        self.at += len(word)
+        return word
+
+    def string(self, what: str) -> str:
+        """Take a string in quotes."""
+        word = self.next(what)
+        if not word.startswith(b'"'):
+            raise self.error(f"{what} must stand in quotes, not {_shown(word)}")
+        return _text(word[1:-1])
+
+    def numbers(self, count: int, what: str) -> NDArray[np.float64]:
+        """Take `count` finite numbers, which may stand in brackets."""
+        bracket = self.peek() == b"["
+        values = self._bracketed() if bracket else [self.next("a number") for _ in range(count)]
+        if not isinstance(values, np.ndarray):
+            values = np.array([self._number(word) for word in values], np.float64)
+        if len(values) != count:
+            raise self.error(f"{what} needs {count} numbers, not {len(values)}")
+        if not np.isfinite(values).all():
+            raise self.error(f"{what} needs finite numbers")
+        return values
+
+    def parameters(self, where: str) -> list[Parameter]:
+        """Take the parameters that follow a directive; `where` is its name for messages."""
+        found: list[Parameter] = []
+        while self.peek().startswith(b'"'):
+            found.append(self._parameter(where))
+        return found
+
+    def _parameter(self, where: str) -> Parameter:
+        declaration = self.string("a parameter").split()
+        line = self.line
+        if len(declaration) != 2:
+            shown = " ".join(declaration)[:60]
+            raise self.error(f'{where}: "{shown}" is not a type and a name')
+        kind, name = declaration
+        if kind in OLD_TYPES:
+            raise self.error(f"{where}: the type {kind!r} is {UPGRADE}")
+        if kind not in TYPES:
+            raise self.error(f"{where}: unknown type {kind!r} of {name!r}{nearest(kind, TYPES)}")
+        values = self._values()
+        return Parameter(ALIASES.get(kind, kind), name, values, self.path, line, where)
+
+    def _values(self) -> Any:
+        if self.peek() != b"[":
+            return self._typed([self.next("a value")])
+        values = self._bracketed()
+        return values if isinstance(values, np.ndarray) else self._typed(values)
+
+    def _bracketed(self) -> NDArray[np.float64] | list[bytes]:
+        """Take what stands in brackets: numbers in one go, anything else as words."""
+        start = self.at + 1
+        end = self.data.find(b"]", start)
+        inside = self.data[start:end] if end >= 0 else b""
+        if end >= 0 and b"#" not in inside and b'"' not in inside:
+            values = _floats(inside)
+            if values is not None:
+                self.at = end + 1
+                return values
+        self.next("[")
+        words: list[bytes] = []
+        while (word := self.next("']'")) != b"]":
+            if word == b"[":
+                raise self.error("brackets cannot stand in brackets")
+            words.append(word)
+        return words
+
+    def _typed(self, words: list[bytes]) -> Any:
+        """Words as texts, truths or numbers, whichever the first one is."""
+        if words and words[0].startswith(b'"'):
+            if not all(word.startswith(b'"') for word in words):
+                raise self.error("strings and other values are mixed")
+            return [_text(word[1:-1]) for word in words]
+        if words and all(word in (b"true", b"false") for word in words):
+            return [word == b"true" for word in words]
+        return np.array([self._number(word) for word in words], np.float64)
+
+    def _number(self, word: bytes) -> float:
+        try:
+            return float(word)
+        except ValueError:
+            raise self.error(f"expected a number, found {_shown(word)}") from None
+
+    def _skip(self) -> None:
+        found = BLANKS.match(self.data, self.at)
+        if found is not None:
+            self.at = found.end()
+
+
+def _floats(text: bytes) -> NDArray[np.float64] | None:
+    """The numbers of a text, or None where it holds anything else."""
+    if not text.strip():
+        return np.zeros(0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            return np.fromstring(text, np.float64, sep=" ")  # type: ignore[call-overload, no-any-return]
+        except (DeprecationWarning, ValueError):
+            return None
+
+
+def _text(word: bytes) -> str:
+    return word.decode("utf-8", "replace")
+
+
+def _shown(word: bytes) -> str:
+    return repr(_text(word[:40]))

@@ -1,0 +1,409 @@
+"""The directives of a PBRT file: what each changes, and the definitions that come of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from clpt import transforms
+from clpt.errors import SceneError, UnknownKindError
+from clpt.formats.pbrt.lexer import UPGRADE, Lexer
+from clpt.formats.pbrt.params import Parameters
+from clpt.formats.pbrt.state import TARGETS, Definition, Shared, State, nearest
+
+COLOUR_SPACES = ("srgb", "rec2020", "aces2065-1", "dci-p3")
+OPTIONS = ("Camera", "Film", "PixelFilter", "Sampler", "Integrator", "Accelerator")
+OLD = ("WorldEnd", "SurfaceIntegrator", "VolumeIntegrator", "Renderer", "Volume", "PixelSampler")
+DEEPEST = 32  # files that include each other
+MOST_FILES = 100_000
+MOST_BYTES = 4 << 30  # of all files together, each as often as it is included
+HARMLESS = ("rendercoordsys", "msereferenceimage", "msereferenceout", "pixelstats", "wavefront")
+
+
+@dataclass(eq=False)
+class Contents:
+    """What a file holds: definitions in the order of the file; groups and uses of them by name."""
+
+    shared: Shared
+    shapes: list[Definition] = field(default_factory=list)
+    lights: list[Definition] = field(default_factory=list)
+    objects: dict[str, list[Definition]] = field(default_factory=dict)
+    uses: list[Definition] = field(default_factory=list)
+    options: dict[str, Definition] = field(default_factory=dict)
+    seed: int | None = None
+
+
+def read(path: Path) -> Contents:
+    """Read a file and all that it includes. Raises SceneError with file and line."""
+    return _Reader(path).run()
+
+
+class _Reader:
+    """Goes through the files; `state` is the graphics state at the place it has come to."""
+
+    def __init__(self, path: Path):
+        self.path = path
+        self.contents = Contents(Shared(path.parent))
+        self.state = State(self.contents.shared, path.parent)
+        self.stack: list[tuple[str, State, str]] = []  # what began, the state before it, and where
+        self.in_world = False
+        self.object: list[Definition] | None = None
+        self.files: list[Path] = []
+        self.count = self.bytes = 0
+        self.told: set[str] = set()
+        self.lexer: Lexer
+        self.name = ""
+
+    def run(self) -> Contents:
+        self._file(self.path)
+        if self.stack:
+            what, _, place = self.stack[-1]
+            raise SceneError(f"the {what}Begin at {place} has no end", file=self.path)
+        if not self.in_world:
+            raise SceneError("has no WorldBegin, so it holds no scene", file=self.path)
+        return self.contents
+
+    def _file(self, path: Path) -> None:
+        """Go through a file, which an Include may have named."""
+        real = path.resolve()
+        if real in self.files:
+            raise self.lexer.error(f"{path.name} includes itself")
+        if len(self.files) >= DEEPEST or self.count >= MOST_FILES:
+            raise self.lexer.error(f"{path.name} is included too deep, or too many files are")
+        outer, lexer = getattr(self, "lexer", None), Lexer(path)
+        self.count, self.bytes = self.count + 1, self.bytes + len(lexer.data)
+        if self.bytes > MOST_BYTES:
+            raise lexer.error(f"its files together are larger than {MOST_BYTES >> 30} GiB")
+        self.files.append(real)
+        self.lexer, before = lexer, self.state.file_folder
+        self.state.file_folder = path.parent
+        while lexer.peek():
+            self._directive(lexer)
+        self.files.pop()
+        self.state.file_folder = before
+        if outer is not None:
+            self.lexer = outer
+
+    def _directive(self, lexer: Lexer) -> None:
+        word = lexer.next("a directive")
+        self.name = word.decode("utf-8", "replace")
+        action = DIRECTIVES.get(self.name)
+        if action is None:
+            raise self._unknown()
+        with self._placed():
+            action(self)
+
+    def _unknown(self) -> SceneError:
+        name = self.name
+        if name in OLD:
+            return self.lexer.error(f"{name} is {UPGRADE}")
+        if name[:1] in '"[]' or not name.isalpha():
+            return self.lexer.error(f"expected a directive, found {name[:40]!r}")
+        return self.lexer.error(f"unknown directive {name[:40]!r}{nearest(name, DIRECTIVES)}")
+
+    @contextmanager
+    def _placed(self) -> Iterator[None]:
+        try:
+            yield
+        except SceneError as error:
+            if error.file is not None:
+                raise
+            place = {"file": self.lexer.path, "line": self.lexer.line, "where": self.name}
+            raise SceneError(error.message, **place) from None
+
+    # What stands before and after WorldBegin
+
+    def _only(self, in_world: bool) -> None:
+        if self.in_world != in_world:
+            must = "come after" if in_world else "stand before"
+            raise SceneError(f"must {must} WorldBegin")
+
+    def world_begin(self) -> None:
+        self._only(False)
+        self.in_world, self.state.active = True, True
+        self.state.ctm = np.eye(4)
+        self.contents.shared.systems["world"] = np.eye(4)
+
+    def option(self) -> None:
+        """Camera, Film and the like."""
+        self._only(False)
+        name = self.name
+        self.contents.options[name] = self._definition(f'{name} "{{}}"')
+        if name == "Camera":
+            if transforms.is_singular(self.state.ctm):
+                raise SceneError("the camera's transform cannot be inverted")
+            self.contents.shared.systems["camera"] = transforms.inverse(self.state.ctm)
+
+    def set_option(self) -> None:
+        name = self.lexer.string("an option").split()[-1:]
+        normal = "".join(name).lower().replace("_", "").replace("-", "")
+        value = self.lexer.next("an option's value")
+        if normal == "seed":
+            try:
+                self.contents.seed = int(value) % 2**31
+            except ValueError:
+                raise SceneError("the seed must be a whole number") from None
+        elif normal not in HARMLESS and value != b"false":
+            self._warn(f"the option {''.join(name)!r} is left out")
+
+    # Scopes
+
+    def attribute_begin(self) -> None:
+        self._begin("Attribute")
+
+    def attribute_end(self) -> None:
+        self._end("Attribute")
+
+    def _begin(self, what: str) -> None:
+        self._only(True)
+        place = f"{self.lexer.path.name}:{self.lexer.line}"
+        self.stack.append((what, self.state, place))
+        self.state = self.state.copy()
+
+    def _end(self, what: str) -> None:
+        if not self.stack:
+            raise SceneError(f"no {what}Begin stands before it")
+        began, state, place = self.stack.pop()
+        if began != what:
+            raise SceneError(f"the {began}Begin at {place} must end first")
+        state.file_folder = self.state.file_folder
+        self.state = state
+
+    def object_begin(self) -> None:
+        name = self.lexer.string("a name")
+        if self.object is not None:
+            raise SceneError("objects cannot stand in objects")
+        if name in self.contents.objects:
+            raise SceneError(f"the object {name!r} is already defined")
+        self._begin("Object")
+        self.object = self.contents.objects[name] = []
+
+    def object_end(self) -> None:
+        self._end("Object")
+        self.object = None
+
+    def object_instance(self) -> None:
+        self._only(True)
+        if self.object is not None:
+            raise SceneError("cannot stand in an object")
+        name = self.lexer.string("a name")
+        params = Parameters(f'ObjectInstance "{name}"', self.lexer.path, self.lexer.line)
+        self.contents.uses.append(Definition(name, params, self.state.copy()))
+
+    def include(self) -> None:
+        self._file(self._named_file())
+
+    def import_file(self) -> None:
+        """Like an Include, but what it changes in the state stays in it."""
+        self._only(True)
+        path, before, open_scopes = self._named_file(), self.state, len(self.stack)
+        self.state = before.copy()
+        self._file(path)
+        if len(self.stack) != open_scopes:
+            raise SceneError(f"{path.name} opens or closes scopes of the file that imports it")
+        self.state = before
+
+    def _named_file(self) -> Path:
+        name = self.lexer.string("a file name")
+        path = self.state.file(name)
+        if not path.is_file():
+            raise SceneError(f"there is no file {name!r}")
+        return path
+
+    # Transforms
+
+    def _concat(self, matrix: transforms.Matrix) -> None:
+        self._place(self.state.ctm @ matrix)
+
+    def _place(self, matrix: transforms.Matrix) -> None:
+        if not np.isfinite(matrix).all():
+            raise SceneError("the transform is not finite any more")
+        if self.state.active:
+            self.state.ctm = matrix
+
+    def identity(self) -> None:
+        self._place(np.eye(4))
+
+    def translate(self) -> None:
+        self._concat(transforms.translate(self.lexer.numbers(3, "Translate")))
+
+    def scale(self) -> None:
+        self._concat(transforms.scale(self.lexer.numbers(3, "Scale")))
+
+    def rotate(self) -> None:
+        angle, *axis = self.lexer.numbers(4, "Rotate")
+        self._concat(transforms.rotate(axis, angle))
+
+    def look_at(self) -> None:
+        values = self.lexer.numbers(9, "LookAt")
+        self._concat(transforms.inverse(transforms.look_at(values[:3], values[3:6], values[6:])))
+
+    def transform(self) -> None:
+        self._place(self._matrix())
+
+    def concat_transform(self) -> None:
+        self._concat(self._matrix())
+
+    def _matrix(self) -> transforms.Matrix:
+        """Take 16 numbers, column by column."""
+        return self.lexer.numbers(16, self.name).reshape(4, 4).T.copy()
+
+    def coordinate_system(self) -> None:
+        self.contents.shared.systems[self.lexer.string("a name")] = self.state.ctm
+
+    def coord_sys_transform(self) -> None:
+        name = self.lexer.string("a name")
+        systems = self.contents.shared.systems
+        if name not in systems:
+            raise SceneError(f"there is no coordinate system {name!r}{nearest(name, systems)}")
+        self.state.ctm = systems[name]
+
+    def active_transform(self) -> None:
+        which = self.lexer.next("All, StartTime or EndTime").decode("utf-8", "replace")
+        if which not in ("All", "StartTime", "EndTime"):
+            raise SceneError(f"{which[:40]!r} is none of All, StartTime, EndTime")
+        self.state.active = which != "EndTime"
+        if which == "EndTime":
+            self._warn_once("motion is left out: all stands as when the shutter opens")
+
+    def transform_times(self) -> None:
+        self.lexer.numbers(2, "TransformTimes")
+
+    def reverse_orientation(self) -> None:
+        self.state.reverse = not self.state.reverse
+
+    # Definitions
+
+    def _definition(self, label: str, target: str = "", words: str = "a type") -> Definition:
+        kind, line = self.lexer.string(words), self.lexer.line
+        label = label.replace("{}", kind)
+        given = self.lexer.parameters(label)
+        defaults = self.state.defaults.get(target, ())
+        params = Parameters(label, self.lexer.path, line, given, defaults)
+        return Definition(kind, params, self.state.copy())
+
+    def attribute(self) -> None:
+        found = self._definition('Attribute "{}"')
+        if found.kind not in TARGETS:
+            raise UnknownKindError("target", found.kind, TARGETS)
+        before = self.state.defaults.get(found.kind, ())
+        self.state.defaults[found.kind] = (*before, *found.params.given)
+
+    def colour_space(self) -> None:
+        name = self.lexer.string("a colour space")
+        if name not in COLOUR_SPACES:
+            raise UnknownKindError("colour space", name, COLOUR_SPACES)
+        self.state.colour_space = name
+
+    def shape(self) -> None:
+        self._only(True)
+        shapes = self.contents.shapes if self.object is None else self.object
+        found = self._definition('Shape "{}"', "shape")
+        if self.object is not None and found.state.area_light is not None:
+            self._warn_once("shapes of an object emit no light in pbrt: an AreaLightSource is idle")
+            found.state.area_light = None
+        shapes.append(found)
+
+    def light_source(self) -> None:
+        self._only(True)
+        self.contents.lights.append(self._definition('LightSource "{}"', "light"))
+
+    def area_light_source(self) -> None:
+        self._only(True)
+        self.state.area_light = self._definition('AreaLightSource "{}"', "light")
+
+    def material(self) -> None:
+        self._only(True)
+        self.state.material = self._definition('Material "{}"', "material")
+
+    def make_named_material(self) -> None:
+        self._only(True)
+        found = self._definition('MakeNamedMaterial "{}"', "material", "a name")
+        name, materials = found.kind, self.contents.shared.materials
+        if name in materials:
+            raise found.params.error("is already defined")
+        kind = found.params.one("type", "string", None)
+        if kind is None:
+            raise found.params.error("needs the parameter 'string type'")
+        materials[name] = Definition(kind, found.params, found.state)
+
+    def named_material(self) -> None:
+        self._only(True)
+        self.state.material = self.lexer.string("a name")
+
+    def texture(self) -> None:
+        self._only(True)
+        name = self.lexer.string("a name")
+        values = self.lexer.string("float or spectrum")
+        if values == "color":
+            raise SceneError(f"a texture of the type color is {UPGRADE}")
+        if values not in ("float", "spectrum"):
+            raise SceneError(f"a texture has values float or spectrum, not {values[:40]!r}")
+        found = self._definition(f'Texture "{name}" "{{}}"', "texture")
+        textures = self.contents.shared.textures
+        if (values, name) in textures:
+            raise found.params.error("is already defined")
+        textures[values, name] = found
+
+    def make_named_medium(self) -> None:
+        found = self._definition('MakeNamedMedium "{}"', "medium", "a name")
+        self.contents.shared.media[found.kind] = found.params
+
+    def medium_interface(self) -> None:
+        inside = self.lexer.string("the name of a medium")
+        outside = self.lexer.string("") if self.lexer.peek().startswith(b'"') else inside
+        self.state.inside, self.state.outside = inside, outside
+        if inside or outside:
+            self._warn_once("participating media are left out")
+
+    def _warn(self, text: str) -> None:
+        place = f"{self.lexer.path.name}:{self.lexer.line}: {self.name}"
+        self.contents.shared.warnings.append(f"{place}: {text}")
+
+    def _warn_once(self, text: str) -> None:
+        if text not in self.told:
+            self.told.add(text)
+            self._warn(text)
+
+
+DIRECTIVES: dict[str, Callable[[_Reader], None]] = {
+    "ActiveTransform": _Reader.active_transform,
+    "AreaLightSource": _Reader.area_light_source,
+    "Attribute": _Reader.attribute,
+    "AttributeBegin": _Reader.attribute_begin,
+    "AttributeEnd": _Reader.attribute_end,
+    "ColorSpace": _Reader.colour_space,
+    "ConcatTransform": _Reader.concat_transform,
+    "CoordSysTransform": _Reader.coord_sys_transform,
+    "CoordinateSystem": _Reader.coordinate_system,
+    "Identity": _Reader.identity,
+    "Import": _Reader.import_file,
+    "Include": _Reader.include,
+    "LightSource": _Reader.light_source,
+    "LookAt": _Reader.look_at,
+    "MakeNamedMaterial": _Reader.make_named_material,
+    "MakeNamedMedium": _Reader.make_named_medium,
+    "Material": _Reader.material,
+    "MediumInterface": _Reader.medium_interface,
+    "NamedMaterial": _Reader.named_material,
+    "ObjectBegin": _Reader.object_begin,
+    "ObjectEnd": _Reader.object_end,
+    "ObjectInstance": _Reader.object_instance,
+    "Option": _Reader.set_option,
+    "ReverseOrientation": _Reader.reverse_orientation,
+    "Rotate": _Reader.rotate,
+    "Scale": _Reader.scale,
+    "Shape": _Reader.shape,
+    "Texture": _Reader.texture,
+    "Transform": _Reader.transform,
+    "TransformBegin": _Reader.attribute_begin,  # as pbrt-v4 treats what it calls deprecated
+    "TransformEnd": _Reader.attribute_end,
+    "TransformTimes": _Reader.transform_times,
+    "Translate": _Reader.translate,
+    "WorldBegin": _Reader.world_begin,
+    **dict.fromkeys(OPTIONS, _Reader.option),
+}

@@ -1,0 +1,280 @@
+"""Shapes of a PBRT scene, in their own space: meshes, spheres, disks, tubes and patches.
+
+The front is pbrt's: where the normals of a mesh point, else where its triangles run counter-
+clockwise, and for spheres, disks and tubes the outside, or +z, which a transform that mirrors turns
+to the other side.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import transforms
+from clpt.errors import SceneError, UnknownKindError
+from clpt.formats import mesh, ply
+from clpt.formats.pbrt import subdivision, surfaces
+from clpt.formats.pbrt.params import Parameters
+from clpt.formats.pbrt.state import Definition, State
+from clpt.scene import shapes
+from clpt.scene.shapes import Shape
+
+Parts = dict[str, Any]
+OLD = ("cone", "hyperboloid", "paraboloid", "heightfield", "nurbs")
+PATCH = 8  # pieces of a bilinear patch's sides, where it is no parallelogram
+CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])  # uv of a triangle without any, in pbrt
+DEEPEST = 10  # levels of subdivision
+
+
+@dataclass(eq=False)
+class Geometry:
+    """A kind of ours and its parameters but for material and light, and what was passed over."""
+
+    kind: type[Shape]
+    parts: Parts
+    notes: list[str] = field(default_factory=list)
+
+    def area(self) -> float:
+        """The mean area of a mesh's triangles, else the whole [m^2], in the world."""
+        if self.kind is not shapes.Mesh:
+            return surfaces.area(self.kind, self.parts)
+        points = transforms.transform_points(self.parts["to_world"], self.parts["vertices"])
+        a, b, c = (points[self.parts["faces"][:, i]] for i in range(3))
+        return float(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).mean())
+
+    def made(self, **more: Any) -> Shape:
+        """The shape, with its material and emission."""
+        return self.kind(**self.parts, **more)
+
+
+def geometry(found: Definition) -> Geometry | None:
+    """Read what a Shape directive describes; None where nothing is left. Raises SceneError."""
+    params, kind = found.params, found.kind
+    if kind in OLD:
+        raise params.error(f"the shape {kind!r} is PBRT version 3's; use a mesh")
+    if kind not in SHAPES:
+        raise UnknownKindError("shape", kind, SHAPES, **params.place)
+    with params.placed():
+        if transforms.is_singular(found.state.ctm):
+            raise SceneError("its transform flattens space")
+        made = SHAPES[kind](params, found.state)
+        if made is not None:
+            mirrored = transforms.flips_handedness(found.state.ctm)
+            turned = made.kind is not shapes.Mesh and mirrored
+            made.parts.setdefault("to_world", found.state.ctm)
+            made.parts["flip_normals"] = found.state.reverse != turned
+    return made
+
+
+def _triangles(params: Parameters, state: State) -> Geometry | None:
+    points = params.several("P", "point3")
+    if points is None:
+        raise SceneError("needs the parameter 'point3 P'")
+    faces = params.several("indices", "integer")
+    if faces is None and len(points) != 3:
+        raise SceneError("needs the parameter 'integer indices'")
+    faces = np.arange(3) if faces is None else faces
+    if len(faces) % 3:
+        raise SceneError(f"{len(faces)} indices make no triangles")
+    params.ignore("S", "faceIndices")
+    normals, uvs = _per_vertex(params, "N", "normal", points), _uvs(params, points)
+    return _mesh(points, faces.reshape(-1, 3), normals, uvs)
+
+
+def _uvs(params: Parameters, points: NDArray[Any]) -> Any:
+    name = "uv" if "uv" in params else "st"
+    return _per_vertex(params, name, "point2", points)
+
+
+def _per_vertex(params: Parameters, name: str, type: str, points: NDArray[Any]) -> Any:
+    found = params.several(name, type)
+    if found is not None and len(found) != len(points):
+        raise SceneError(f"{name!r} has {len(found)} values for {len(points)} vertices")
+    return found
+
+
+def _mesh(
+    points: NDArray[Any], faces: NDArray[Any], normals: Any, uvs: Any, notes: Any = ()
+) -> Geometry | None:
+    """A mesh whose triangles turn their front to where the normals point, if it has any."""
+    told = list(notes)
+    arrays = mesh.checked(None, "", points, faces, normals, uvs, told)
+    if not len(arrays["faces"]):
+        return None
+    for name in ("vertices", "normals", "uvs"):
+        if arrays[name] is not None:
+            arrays[name] = np.ascontiguousarray(arrays[name], np.float32)
+    if arrays["normals"] is not None:
+        arrays["faces"] = _toward_normals(arrays)
+    return Geometry(shapes.Mesh, arrays, told)
+
+
+def _toward_normals(arrays: Parts) -> NDArray[np.uint32]:
+    """The faces, turned where their normals point against their winding."""
+    faces, points, normals = arrays["faces"], arrays["vertices"], arrays["normals"]
+    a, b, c = (points[faces[:, i]] for i in range(3))
+    front = np.cross(b - a, c - a)
+    toward = normals[faces[:, 0]] + normals[faces[:, 1]] + normals[faces[:, 2]]
+    turned = np.einsum("ij,ij->i", front, toward) < 0.0
+    if not turned.any():
+        return faces
+    return np.where(turned[:, None], faces[:, ::-1], faces)
+
+
+def with_uvs(made: Geometry) -> Geometry:
+    """The geometry with pbrt's uv where it has none of its own, for textures."""
+    parts = made.parts
+    if made.kind is not shapes.Mesh:
+        return surfaces.as_mesh(made.kind, parts, made.notes)
+    if parts["uvs"] is not None:
+        return made
+    faces = parts["faces"]
+    one_each: Parts = {name: parts[name] for name in ("to_world", "flip_normals")}
+    for name in ("vertices", "normals"):
+        one_each[name] = None if parts[name] is None else parts[name][faces.reshape(-1)]
+    one_each["uvs"] = np.tile(CORNERS, (len(faces), 1)).astype(np.float32)
+    one_each["faces"] = np.arange(3 * len(faces), dtype=np.uint32).reshape(-1, 3)
+    return Geometry(shapes.Mesh, one_each, made.notes)
+
+
+def _ply(params: Parameters, state: State) -> Geometry | None:
+    name = params.one("filename", "string", "")
+    path = state.file(name)
+    if "displacement" in params:
+        params.ignore("displacement", "edgelength", "uvscale")
+        state.warn(params, "'displacement' is left out: the mesh stays as it is in its file")
+    params.ignore("edgelength")
+    if not path.is_file():
+        raise SceneError(f"there is no file {name!r}")
+    try:
+        arrays = ply.read(path)
+        return _mesh(arrays.vertices, arrays.faces, arrays.normals, arrays.uvs, arrays.notes)
+    except SceneError as error:
+        raise SceneError(f"{path.name}: {error.message}") from None
+
+
+def _loop(params: Parameters, state: State) -> Geometry | None:
+    points, faces = params.several("P", "point3"), params.several("indices", "integer")
+    if points is None or faces is None or len(faces) % 3:
+        raise SceneError("needs 'point3 P' and 'integer indices', three for every triangle")
+    levels = params.one("levels", "integer", 3)
+    params.ignore("scheme")
+    if not 0 <= levels <= DEEPEST:
+        raise SceneError(f"'levels' must be 0 to {DEEPEST}, not {levels}")
+    arrays = mesh.checked(None, "", points, faces.reshape(-1, 3), None, None, [])
+    if not len(arrays["faces"]):
+        return None
+    coarse = arrays["vertices"].astype(np.float64), arrays["faces"].astype(np.int64)
+    limit, finer, normals = subdivision.loop(*coarse, levels)
+    return _mesh(limit, finer, normals, None)
+
+
+def _patches(params: Parameters, state: State) -> Geometry | None:
+    """Bilinear patches: two triangles where they are parallelograms, else a fine grid."""
+    points, corners = params.several("P", "point3"), params.several("indices", "integer")
+    if points is None:
+        raise SceneError("needs the parameter 'point3 P'")
+    if corners is None and len(points) != 4:
+        raise SceneError("needs the parameter 'integer indices'")
+    corners = np.arange(4) if corners is None else corners
+    if len(corners) % 4 or corners.min(initial=0) < 0 or corners.max(initial=0) >= len(points):
+        raise SceneError(f"'indices' must be four a patch, each below {len(points)}")
+    if "emissionfilename" in params:
+        params.ignore("emissionfilename")
+        state.warn(params, "'emissionfilename' is left out: the patch emits evenly")
+    params.ignore("faceIndices")
+    normals, uvs = _per_vertex(params, "N", "normal", points), _uvs(params, points)
+    corners = corners.reshape(-1, 4)
+    bent = np.abs(points[corners] @ np.eye(3)).max(initial=1.0) * 1e-5
+    twist = points[corners[:, 0]] - points[corners[:, 1]] - points[corners[:, 2]]
+    plain = bool((np.abs(twist + points[corners[:, 3]]) <= bent).all())
+    u, v, faces = surfaces.grid(*([1, 1] if plain else [PATCH, PATCH]))
+    return _mesh(*_over_patches(u, v, faces, corners, (points, normals, uvs), plain))
+
+
+def _over_patches(
+    u: Any, v: Any, faces: Any, corners: Any, arrays: tuple[Any, Any, Any], plain: bool
+) -> tuple[Any, Any, Any, Any]:
+    """Points, faces, normals and uvs of a grid laid over every patch."""
+    weights = np.stack([(1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v], axis=1)
+    points, normals, uvs = arrays
+    laid = weights @ points[corners]
+    if normals is not None:
+        normals = (weights @ normals[corners]).reshape(-1, 3)
+    elif not plain:
+        along = np.stack([v - 1, 1 - v, -v, v], axis=1) @ points[corners]
+        across = np.stack([u - 1, -u, 1 - u, u], axis=1) @ points[corners]
+        normals = np.cross(along, across).reshape(-1, 3)
+    own = np.stack([u, v], axis=1)
+    over = np.tile(own, (len(corners), 1)) if uvs is None else weights @ uvs[corners]
+    starts = len(u) * np.arange(len(corners))[:, None, None]
+    return laid.reshape(-1, 3), (faces + starts).reshape(-1, 3), normals, over.reshape(-1, 2)
+
+
+def _sphere(params: Parameters, state: State) -> Geometry | None:
+    radius, turn = params.above_zero("radius", 1.0), surfaces.phi_max(params)
+    z = sorted(np.clip([params.one(n, "float", d) for n, d in _ends(radius)], -radius, radius))
+    whole = z[0] <= -radius and z[1] >= radius and turn == 360.0
+    if whole and surfaces.is_even(state.ctm, 3):
+        parts = {"radius": radius, "to_world": state.ctm @ surfaces.UPWARD}
+        return Geometry(shapes.Sphere, parts)
+    if z[0] == z[1]:
+        return None
+    low, high = (math.acos(max(-1.0, min(1.0, end / radius))) for end in z)
+    return _meshed(surfaces.sphere_mesh(radius, low, high, turn))
+
+
+def _ends(radius: float) -> tuple[tuple[str, float], tuple[str, float]]:
+    return ("zmin", -radius), ("zmax", radius)
+
+
+def _meshed(parts: Parts) -> Geometry:
+    """A curved surface as triangles, which turn with a transform that mirrors as it does."""
+    return Geometry(shapes.Mesh, parts)
+
+
+def _disk(params: Parameters, state: State) -> Geometry | None:
+    radius, turn = params.above_zero("radius", 1.0), surfaces.phi_max(params)
+    height, inner = params.one("height", "float", 0.0), params.one("innerradius", "float", 0.0)
+    if inner == 0.0 and turn == 360.0:
+        placed = transforms.translate([0.0, 0.0, height]) @ transforms.scale([radius, radius, 1.0])
+        return Geometry(shapes.Disk, {"to_world": state.ctm @ placed})
+    if not 0.0 <= inner < radius:
+        raise SceneError(f"'innerradius' must be below the radius, not {inner:g}")
+    return _meshed(surfaces.disk_mesh(radius, inner, height, turn))
+
+
+def _cylinder(params: Parameters, state: State) -> Geometry | None:
+    radius, turn = params.above_zero("radius", 1.0), surfaces.phi_max(params)
+    low, high = sorted((params.one("zmin", "float", -1.0), params.one("zmax", "float", 1.0)))
+    if low == high:
+        return None
+    if turn == 360.0 and surfaces.is_even(state.ctm, 2):
+        ends = {"p0": (0.0, 0.0, low), "p1": (0.0, 0.0, high)}
+        return Geometry(shapes.Cylinder, {"radius": radius, **ends, "to_world": state.ctm})
+    return _meshed(surfaces.cylinder_mesh(radius, low, high, turn))
+
+
+def _curve(params: Parameters, state: State) -> Geometry | None:
+    params.ignore(
+        "P", "basis", "degree", "N", "type", "width", "width0", "width1", "splitdepth",
+    )  # fmt: skip
+    state.warn(params, "curves are not supported: left out")
+    return None
+
+
+SHAPES: dict[str, Callable[[Parameters, State], Geometry | None]] = {
+    "bilinearmesh": _patches,
+    "curve": _curve,
+    "cylinder": _cylinder,
+    "disk": _disk,
+    "loopsubdiv": _loop,
+    "plymesh": _ply,
+    "sphere": _sphere,
+    "trianglemesh": _triangles,
+}

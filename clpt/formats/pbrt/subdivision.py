@@ -1,0 +1,169 @@
+"""Loop subdivision (Loop 1987) of triangle meshes, with vertices and normals of the limit surface.
+
+Rules and limit masks of Hoppe et al. 1994: inside a mesh by valence, along a border as the cubic
+B-spline that it is.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.errors import SceneError
+
+MOST_TRIANGLES = 1 << 26
+Points = NDArray[np.float64]
+Faces = NDArray[np.int64]
+
+
+def loop(points: Points, faces: Faces, levels: int) -> tuple[Points, Faces, Points]:
+    """Subdivide `levels` times; return limit points (n, 3), faces (m, 3) and limit normals (n, 3).
+
+    Raises SceneError for a mesh in which an edge has more than two triangles, or that gets too big.
+    """
+    if len(faces) * 4**levels > MOST_TRIANGLES:
+        raise SceneError(f"{levels} levels make more than {MOST_TRIANGLES} triangles; take fewer")
+    for _ in range(levels):
+        points, faces = _finer(points, faces)
+    edges = _Edges(faces, len(points))
+    return _limit(points, edges), faces, _normals(points, faces, edges)
+
+
+class _Edges:
+    """The edges of a mesh: their ends (e, 2), the vertices across, and which are borders."""
+
+    def __init__(self, faces: Faces, count: int):
+        halves = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+        across = np.concatenate([faces[:, 2], faces[:, 0], faces[:, 1]])
+        low, high = halves.min(axis=1), halves.max(axis=1)
+        keys, inverse, uses = np.unique(low * count + high, return_inverse=True, return_counts=True)
+        if (uses > 2).any():
+            raise SceneError("an edge has more than two triangles, so nothing smooth goes through")
+        self.of_halves = inverse.reshape(
+            3, -1
+        )  # the edge from each corner of a triangle to the next
+        self.ends = np.stack([keys // count, keys % count], axis=1)
+        self.border = uses == 1
+        order = np.argsort(inverse, kind="stable")
+        first = np.searchsorted(inverse[order], np.arange(len(keys)))
+        last = first + uses - 1
+        self.across = np.stack([across[order[first]], across[order[last]]], axis=1)
+        self.count = count
+        a, b = self.ends.T
+        self.valence = np.bincount(a, minlength=count) + np.bincount(b, minlength=count)
+        self.on_border = np.zeros(count, bool)
+        self.on_border[self.ends[self.border].reshape(-1)] = True
+
+    def ring(self, points: Points, borders: bool = False) -> Points:
+        """The sum of each vertex's neighbours, or of those along the border."""
+        ends = self.ends[self.border] if borders else self.ends
+        total = np.zeros((self.count, points.shape[1]))
+        for one, other in ((0, 1), (1, 0)):
+            for axis in range(points.shape[1]):
+                weights = points[ends[:, other], axis]
+                total[:, axis] += np.bincount(ends[:, one], weights, self.count)
+        return total
+
+
+def _beta(valence: Any) -> Any:
+    """The weight of a neighbour, 3/16 for three of them, else 3/(8 n) (Warren 1995)."""
+    return np.where(valence == 3, 3.0 / 16.0, 3.0 / (8.0 * np.maximum(valence, 1)))
+
+
+def _finer(points: Points, faces: Faces) -> tuple[Points, Faces]:
+    edges = _Edges(faces, len(points))
+    beta = _beta(edges.valence)[:, None]
+    inside = (1.0 - edges.valence[:, None] * beta) * points + beta * edges.ring(points)
+    border = 0.75 * points + 0.125 * edges.ring(points, borders=True)
+    even = np.where(edges.on_border[:, None], border, inside)
+    ends = points[edges.ends].sum(axis=1)
+    odd = np.where(
+        edges.border[:, None], 0.5 * ends, 0.375 * ends + 0.125 * points[edges.across].sum(axis=1)
+    )
+    a, b, c = faces.T
+    ab, bc, ca = edges.of_halves + len(points)
+    four = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+    finer = np.stack([np.stack(corners, axis=1) for corners in four], axis=1)
+    return np.concatenate([even, odd]), finer.reshape(-1, 3)
+
+
+def _limit(points: Points, edges: _Edges) -> Points:
+    """Where vertices come to lie in the limit."""
+    gamma = 1.0 / (edges.valence + 3.0 / (8.0 * _beta(edges.valence)))
+    gamma = gamma[:, None]
+    inside = (1.0 - edges.valence[:, None] * gamma) * points + gamma * edges.ring(points)
+    border = 0.6 * points + 0.2 * edges.ring(points, borders=True)
+    return np.where(edges.on_border[:, None], border, inside)
+
+
+def _normals(points: Points, faces: Faces, edges: _Edges) -> Points:
+    """Limit normals: the product of two tangents from the ring around each vertex."""
+    start, onward = _rings(faces, edges)
+    s, t = np.zeros_like(points), np.zeros_like(points)
+    at, vertex = start, np.arange(len(points))
+    for place in range(int(edges.valence.max(initial=0))):
+        across, along = _tangent_weights(edges, place)
+        s += across[:, None] * points[at]
+        t += along[:, None] * points[at]
+        at = onward(vertex, at)
+    own = np.select(
+        [edges.valence == 2, edges.valence == 3, edges.valence == 4], [-2.0, -1.0, -2.0]
+    )
+    s += np.where(edges.on_border, own, 0.0)[:, None] * points
+    normals, flat = np.cross(s, t), _flat_normals(points, faces)
+    weak = np.linalg.norm(normals, axis=1) < 1e-12
+    normals[weak] = flat[weak]
+    normals[np.einsum("ij,ij->i", normals, flat) < 0.0] *= -1.0
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    return normals / np.where(length > 0.0, length, 1.0)
+
+
+def _rings(faces: Faces, edges: _Edges) -> tuple[NDArray[np.int64], Any]:
+    """A neighbour (n,) that each vertex's ring begins with, and how to go on from one to the next."""
+    vertex = faces.reshape(-1)
+    after, before = np.roll(faces, -1, axis=1).reshape(-1), np.roll(faces, 1, axis=1).reshape(-1)
+    keys = vertex * edges.count + after
+    order = np.argsort(keys)
+    keys, targets = keys[order], before[order]
+
+    def onward(vertex: Any, neighbour: Any) -> Any:
+        key = vertex * edges.count + neighbour
+        found = np.minimum(np.searchsorted(keys, key), len(keys) - 1)
+        return np.where(keys[found] == key, targets[found], neighbour)
+
+    start = np.zeros(edges.count, np.int64)
+    start[vertex] = after
+    first = ~np.isin(vertex * edges.count + after, vertex * edges.count + before)
+    start[vertex[first]] = after[first]
+    return start, onward
+
+
+def _tangent_weights(edges: _Edges, place: int) -> tuple[Points, Points]:
+    """Weights (n,) of the neighbour at a place in its vertex's ring, for two tangents."""
+    n = edges.valence
+    angle = 2.0 * np.pi * place / np.maximum(n, 1)
+    step = np.pi / np.maximum(n - 1, 1)
+    end = (place == 0) | (place == n - 1)
+    general = np.where(end, -np.sin(step), (2.0 - 2.0 * np.cos(step)) * np.sin(place * step))
+    four = np.where(end, -1.0, 2.0)
+    three = np.where(place == 1, 1.0, 0.0)
+    across = np.select([n == 2, n == 3, n == 4], [np.ones(len(n)), three, four], general)
+    along = np.where(place == 0, -1.0, 0.0) + np.where(place == n - 1, 1.0, 0.0)
+    there = place < n
+    return (
+        np.where(there, np.where(edges.on_border, across, np.cos(angle)), 0.0),
+        np.where(there, np.where(edges.on_border, along, np.sin(angle)), 0.0),
+    )
+
+
+def _flat_normals(points: Points, faces: Faces) -> Points:
+    """The sum of the normals of the triangles around each vertex, weighted by area."""
+    a, b, c = (points[faces[:, i]] for i in range(3))
+    flat = np.cross(b - a, c - a)
+    total = np.zeros_like(points)
+    for corner in range(3):
+        for axis in range(3):
+            total[:, axis] += np.bincount(faces[:, corner], flat[:, axis], len(points))
+    return total

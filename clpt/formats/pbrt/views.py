@@ -1,0 +1,126 @@
+"""What stands before WorldBegin: camera, film, filter, sampler and integrator.
+
+pbrt's camera space has x to the right of the picture, ours to the left; `Scale -1 1 1` in a file
+mirrors the picture, as it does in pbrt.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from clpt import transforms
+from clpt.errors import UnknownKindError
+from clpt.formats.pbrt.params import Parameters
+from clpt.formats.pbrt.state import Definition, State
+from clpt.scene import cameras
+from clpt.scene.integrators import Film
+
+TO_RIGHT = np.diag([-1.0, 1.0, 1.0, 1.0])
+FARTHEST = 1e30  # pbrt cuts nothing off
+# pbrt's directions for a map in latitude and longitude, in our camera space.
+ROUND = np.array([[0.0, 0, -1, 0], [0, 1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
+
+
+def camera(found: Definition, film: Film) -> cameras.Camera:
+    """Make the camera that a Camera directive describes. Raises SceneError."""
+    if found.kind not in CAMERAS:
+        raise UnknownKindError("camera", found.kind, CAMERAS, **found.params.place)
+    params, state = found.params, found.state
+    exposure_time(params)
+    with params.placed():
+        return CAMERAS[found.kind](params, state, film)
+
+
+def exposure_time(params: Parameters) -> float:
+    """Take the time [s] for which the shutter is open; what moves meanwhile is left out."""
+    time = params.one("shutterclose", "float", 1.0) - params.one("shutteropen", "float", 0.0)
+    if not time > 0.0:
+        raise params.error("the shutter does not open: 'shutterclose' must be above 'shutteropen'")
+    return float(time)
+
+
+def _window(params: Parameters, film: Film) -> tuple[float, float, float, float]:
+    """Take the part of the plane at distance 1 (of a fov of 90) seen: its centre, width, height."""
+    frame = params.above_zero("frameaspectratio", film.width / film.height)
+    x, y = (frame, 1.0) if frame > 1.0 else (1.0, 1.0 / frame)
+    given = params.several("screenwindow", "float")
+    left, right, low, high = (-x, x, -y, y) if given is None else _four(params, given)
+    if not (left < right and low < high):
+        raise params.error("'screenwindow' must be left, right, bottom, top, in this order")
+    return (left + right) / 2.0, (low + high) / 2.0, right - left, high - low
+
+
+def _four(params: Parameters, values: Any) -> tuple[float, ...]:
+    if len(values) != 4:
+        raise params.error(f"'screenwindow' must be 4 numbers, not {len(values)}")
+    return tuple(float(value) for value in values)
+
+
+def _perspective(params: Parameters, state: State, film: Film) -> cameras.Camera:
+    fov = params.one("fov", "float", 90.0)
+    if not 0.0 < fov < 180.0:
+        raise params.error(f"the field of view must lie between 0 and 180, not {fov:g}")
+    x, y, width, height = _window(params, film)
+    across = width * math.tan(math.radians(fov) / 2.0)
+    stretch = height / width * film.width / film.height
+    to_world, size = _without_scale(transforms.inverse(state.ctm))
+    given: dict[str, Any] = {
+        "to_world": to_world @ TO_RIGHT @ np.diag([1.0, stretch, 1.0, 1.0]),
+        "fov": math.degrees(2.0 * math.atan(across / 2.0)),
+        "offset_x": x / width,
+        "offset_y": -y / height,
+        "near": 0.0,
+        "far": FARTHEST,
+    }
+    radius = params.one("lensradius", "float", 0.0) * size
+    distance = params.above_zero("focaldistance", 1e6) * size
+    if radius <= 0.0:
+        return cameras.Perspective(**given)
+    return cameras.ThinLens(aperture_radius=radius, focus_distance=distance, **given)
+
+
+def _without_scale(matrix: transforms.Matrix) -> tuple[transforms.Matrix, float]:
+    """A camera's placement without the size that it has in all directions, and that size."""
+    size = float(np.cbrt(abs(np.linalg.det(matrix[:3, :3]))))
+    if abs(size - 1.0) < 1e-4:
+        return matrix, 1.0
+    smaller = matrix.copy()
+    smaller[:3, :3] /= size
+    return smaller, size
+
+
+def _orthographic(params: Parameters, state: State, film: Film) -> cameras.Camera:
+    if params.one("lensradius", "float", 0.0) > 0.0:
+        state.warn(params, "parallel rays have no aperture here: 'lensradius' is left out")
+    params.ignore("focaldistance")
+    x, y, width, height = _window(params, film)
+    size = [width / 2.0, height / 2.0 * film.width / film.height, 1.0]
+    window = transforms.translate([x, y, 0.0]) @ transforms.scale(size)
+    to_world = transforms.inverse(state.ctm) @ window @ TO_RIGHT
+    return cameras.Orthographic(to_world=to_world, near=0.0, far=FARTHEST)
+
+
+def _spherical(params: Parameters, state: State, film: Film) -> cameras.Camera:
+    mappings = ("equalarea", "equirectangular")
+    if params.choice("mapping", "equalarea", mappings) == "equalarea":
+        state.warn(params, "'equalarea' is not supported: the picture is equirectangular")
+    _window(params, film)
+    params.ignore("lensradius", "focaldistance")
+    to_world, _ = _without_scale(transforms.inverse(state.ctm))
+    return cameras.Spherical(to_world=to_world @ ROUND)
+
+
+def _realistic(params: Parameters, state: State, film: Film) -> cameras.Camera:
+    raise params.error("lenses traced surface by surface are not supported; use 'perspective'")
+
+
+CAMERAS: dict[str, Callable[[Parameters, State, Film], cameras.Camera]] = {
+    "perspective": _perspective,
+    "orthographic": _orthographic,
+    "spherical": _spherical,
+    "realistic": _realistic,
+}
