@@ -7,27 +7,32 @@ from pathlib import Path
 from typing import Any
 
 from clpt.errors import SceneError
-from clpt.formats import gltf, mesh, mitsuba, native, studio
+from clpt.formats import gltf, mesh, mitsuba, native, pbrt, studio
 from clpt.scene import Scene
 
 FORMATS: dict[str, Callable[..., Scene]] = {
     ".json": native.load,
     ".xml": mitsuba.load,
+    ".pbrt": pbrt.load,
+    ".pbrt.gz": pbrt.load,
     **dict.fromkeys(gltf.SUFFIXES, gltf.load),
     **dict.fromkeys(mesh.SUFFIXES, studio.load),
 }
+
+IN_FOLDERS = ("scene.json", "scene.xml", "scene.pbrt", "scene-v4.pbrt")
 
 __all__ = ["FORMATS", "load"]
 
 
 def load(path: str | Path, **variables: Any) -> Scene:
-    """Read a scene or a bare mesh; a folder means the scene.json or scene.xml in it.
+    """Read a scene or a bare mesh; a folder means the scene.json, .xml or .pbrt in it.
 
     `variables` set the `$names` of Mitsuba's XML; of glTF they choose camera, scene and
     time. Raises SceneError with the file and, where it is known, the line.
     """
     path = _existing(Path(path))
-    loader = FORMATS.get(path.suffix.lower())
+    name = path.name.lower()
+    loader = next((load for suffix, load in FORMATS.items() if name.endswith(suffix)), None)
     if loader is None:
         known = " ".join(FORMATS)
         raise SceneError(f"unknown format {path.suffix!r}; known: {known}", file=path)
@@ -39,10 +44,10 @@ def load(path: str | Path, **variables: Any) -> Scene:
 def _existing(path: Path) -> Path:
     try:
         if path.is_dir():
-            inside = [path / name for name in ("scene.json", "scene.xml")]
+            inside = [path / name for name in IN_FOLDERS]
             found = next((file for file in inside if file.is_file()), None)
             if found is None:
-                raise SceneError("this folder holds no scene.json and no scene.xml", file=path)
+                raise SceneError(f"this folder holds none of {', '.join(IN_FOLDERS)}", file=path)
             return found
         if path.is_file():
             return path

@@ -21,13 +21,14 @@ def output_matrix(film: Film, mode: str) -> NDArray[np.float64]:
     """The matrix (3, 3) from responses of the film's sensor, or linear Rec. 709 in RGB mode.
 
     It leads over XYZ to the film's output space; in between the white balance adapts (Bradford).
+    The film's exposure is in it.
     """
     first = sensor(film).to_xyz if mode == "spectral" else spectra.REC709_TO_XYZ
     balance = np.eye(3)
     if film.white_balance != "none":
         balance = spaces.bradford(white(film), spaces.white(film.output_space))
     whole = spaces.from_xyz(film.output_space) @ balance @ first
-    return np.round(whole, 12)  # from a space to itself is the identity, to the bit
+    return film.exposure * np.round(whole, 12)  # from a space to itself is the identity, to the bit
 
 
 def white(film: Film) -> NDArray[np.float64]:

@@ -96,7 +96,10 @@ class Renderer:
         """
         if self.channels:
             return np.concatenate(list(self.layers().values()), axis=2)
-        return self.wavefronts[0].bands() if self.scene.film.bands else self.colours()
+        film = self.scene.film
+        if film.bands:
+            return self.wavefronts[0].bands() * np.float32(film.exposure)
+        return self.colours()
 
     def colours(self) -> Image:
         """The picture so far in three colours, (h, w, 3) float32, also of a film with bands."""

@@ -184,6 +184,7 @@ class Film(Kind):
         "none", "what becomes white: none, an illuminant, a colour temperature [K], or (x, y)"
     )
     output_space: str = choice("rec709", "colour space of the picture", spaces.SPACES)
+    exposure: float = real(1.0, "factor on the picture, of bands too", low=0.0)
 
     @property
     def band_centres(self) -> np.ndarray:

@@ -1,1 +1,54 @@
-"""Scenes in PBRT version 4's format."""
+"""Scenes in PBRT version 4's format.
+
+What is not supported is an error or a warning that names the file, the line and the directive.
+docs/pbrt.md tells what is read and how.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from clpt.formats.pbrt import assembly, films, reader, views
+from clpt.formats.pbrt.assembly import Progress
+from clpt.formats.pbrt.params import Parameters
+from clpt.formats.pbrt.state import Definition, State
+from clpt.scene import Scene
+
+__all__ = ["load"]
+
+
+def load(path: Path, progress: Progress | None = None) -> Scene:
+    """Read a .pbrt file, packed by gzip or not.
+
+    progress: is called with how much is done, from 0 to 1, and what. Raises SceneError with file,
+    line and directive for anything broken or not supported.
+    """
+    contents = reader.read(path)
+    shared = contents.shared
+    shared.make_material = assembly.named
+    options = contents.options
+    seen = options.get("Camera") or _default_camera(path, contents)
+    exposure = views.exposure_time(seen.params)
+    film = films.film(options.get("Film"), options.get("PixelFilter"), exposure)
+    sampler, spp, seed = films.sampler(options.get("Sampler"))
+    scene = Scene(
+        camera=views.camera(seen, film),
+        shapes=assembly.shapes(contents, progress),
+        lights=assembly.lights(contents),
+        integrator=films.integrator(options.get("Integrator")),
+        sampler=sampler,
+        film=film,
+        spp=spp,
+        seed=contents.seed or 0 if seed is None else seed,
+        name=path.name.partition(".pbrt")[0],
+        extra={"format": "pbrt"},
+    )
+    assembly.remaining(contents)
+    assembly.report([found for name, found in options.items() if name != "Accelerator"])
+    scene.warnings = assembly.folded(shared.warnings)
+    return scene
+
+
+def _default_camera(path: Path, contents: reader.Contents) -> Definition:
+    state = State(contents.shared, path.parent)
+    return Definition("perspective", Parameters('Camera "perspective"', path, 1), state)

@@ -112,8 +112,8 @@ class _Reader:
         except SceneError as error:
             if error.file is not None:
                 raise
-            place = {"file": self.lexer.path, "line": self.lexer.line, "where": self.name}
-            raise SceneError(error.message, **place) from None
+            file, line = self.lexer.path, self.lexer.line
+            raise SceneError(error.message, file=file, line=line, where=self.name) from None
 
     # What stands before and after WorldBegin
 

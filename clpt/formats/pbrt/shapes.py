@@ -25,6 +25,7 @@ from clpt.scene import shapes
 from clpt.scene.shapes import Shape
 
 Parts = dict[str, Any]
+QUADRICS = ("cylinder", "disk", "sphere")
 OLD = ("cone", "hyperboloid", "paraboloid", "heightfield", "nurbs")
 PATCH = 8  # pieces of a bilinear patch's sides, where it is no parallelogram
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])  # uv of a triangle without any, in pbrt
@@ -64,8 +65,7 @@ def geometry(found: Definition) -> Geometry | None:
             raise SceneError("its transform flattens space")
         made = SHAPES[kind](params, found.state)
         if made is not None:
-            mirrored = transforms.flips_handedness(found.state.ctm)
-            turned = made.kind is not shapes.Mesh and mirrored
+            turned = kind in QUADRICS and transforms.flips_handedness(found.state.ctm)
             made.parts.setdefault("to_world", found.state.ctm)
             made.parts["flip_normals"] = found.state.reverse != turned
     return made
@@ -127,19 +127,22 @@ def _toward_normals(arrays: Parts) -> NDArray[np.uint32]:
 
 
 def with_uvs(made: Geometry) -> Geometry:
-    """The geometry with pbrt's uv where it has none of its own, for textures."""
-    parts = made.parts
-    if made.kind is not shapes.Mesh:
-        return surfaces.as_mesh(made.kind, parts, made.notes)
-    if parts["uvs"] is not None:
+    """The geometry with pbrt's uv where it has others or none, for textures."""
+    parts = dict(made.parts)
+    if made.kind is shapes.Disk:
+        return Geometry(shapes.Mesh, parts | surfaces.disk_mesh(1.0, 0.0, 0.0, 360.0), made.notes)
+    if made.kind is shapes.Cylinder:
+        ends = parts.pop("p0")[2], parts.pop("p1")[2]
+        tube = surfaces.cylinder_mesh(parts.pop("radius"), *ends, 360.0)
+        return Geometry(shapes.Mesh, parts | tube, made.notes)
+    if made.kind is not shapes.Mesh or parts["uvs"] is not None:
         return made
     faces = parts["faces"]
-    one_each: Parts = {name: parts[name] for name in ("to_world", "flip_normals")}
     for name in ("vertices", "normals"):
-        one_each[name] = None if parts[name] is None else parts[name][faces.reshape(-1)]
-    one_each["uvs"] = np.tile(CORNERS, (len(faces), 1)).astype(np.float32)
-    one_each["faces"] = np.arange(3 * len(faces), dtype=np.uint32).reshape(-1, 3)
-    return Geometry(shapes.Mesh, one_each, made.notes)
+        parts[name] = None if parts[name] is None else parts[name][faces.reshape(-1)]
+    parts["uvs"] = np.tile(CORNERS, (len(faces), 1)).astype(np.float32)
+    parts["faces"] = np.arange(3 * len(faces), dtype=np.uint32).reshape(-1, 3)
+    return Geometry(shapes.Mesh, parts, made.notes)
 
 
 def _ply(params: Parameters, state: State) -> Geometry | None:
@@ -226,16 +229,11 @@ def _sphere(params: Parameters, state: State) -> Geometry | None:
     if z[0] == z[1]:
         return None
     low, high = (math.acos(max(-1.0, min(1.0, end / radius))) for end in z)
-    return _meshed(surfaces.sphere_mesh(radius, low, high, turn))
+    return Geometry(shapes.Mesh, surfaces.sphere_mesh(radius, low, high, turn))
 
 
 def _ends(radius: float) -> tuple[tuple[str, float], tuple[str, float]]:
     return ("zmin", -radius), ("zmax", radius)
-
-
-def _meshed(parts: Parts) -> Geometry:
-    """A curved surface as triangles, which turn with a transform that mirrors as it does."""
-    return Geometry(shapes.Mesh, parts)
 
 
 def _disk(params: Parameters, state: State) -> Geometry | None:
@@ -246,7 +244,7 @@ def _disk(params: Parameters, state: State) -> Geometry | None:
         return Geometry(shapes.Disk, {"to_world": state.ctm @ placed})
     if not 0.0 <= inner < radius:
         raise SceneError(f"'innerradius' must be below the radius, not {inner:g}")
-    return _meshed(surfaces.disk_mesh(radius, inner, height, turn))
+    return Geometry(shapes.Mesh, surfaces.disk_mesh(radius, inner, height, turn))
 
 
 def _cylinder(params: Parameters, state: State) -> Geometry | None:
@@ -257,7 +255,7 @@ def _cylinder(params: Parameters, state: State) -> Geometry | None:
     if turn == 360.0 and surfaces.is_even(state.ctm, 2):
         ends = {"p0": (0.0, 0.0, low), "p1": (0.0, 0.0, high)}
         return Geometry(shapes.Cylinder, {"radius": radius, **ends, "to_world": state.ctm})
-    return _meshed(surfaces.cylinder_mesh(radius, low, high, turn))
+    return Geometry(shapes.Mesh, surfaces.cylinder_mesh(radius, low, high, turn))
 
 
 def _curve(params: Parameters, state: State) -> Geometry | None:

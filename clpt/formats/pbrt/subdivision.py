@@ -41,9 +41,7 @@ class _Edges:
         keys, inverse, uses = np.unique(low * count + high, return_inverse=True, return_counts=True)
         if (uses > 2).any():
             raise SceneError("an edge has more than two triangles, so nothing smooth goes through")
-        self.of_halves = inverse.reshape(
-            3, -1
-        )  # the edge from each corner of a triangle to the next
+        self.of_halves = inverse.reshape(3, -1)  # from each corner to the next
         self.ends = np.stack([keys // count, keys % count], axis=1)
         self.border = uses == 1
         order = np.argsort(inverse, kind="stable")
@@ -121,7 +119,7 @@ def _normals(points: Points, faces: Faces, edges: _Edges) -> Points:
 
 
 def _rings(faces: Faces, edges: _Edges) -> tuple[NDArray[np.int64], Any]:
-    """A neighbour (n,) that each vertex's ring begins with, and how to go on from one to the next."""
+    """A neighbour (n,) that each vertex's ring begins with, and how to go on from there."""
     vertex = faces.reshape(-1)
     after, before = np.roll(faces, -1, axis=1).reshape(-1), np.roll(faces, 1, axis=1).reshape(-1)
     keys = vertex * edges.count + after

@@ -32,7 +32,7 @@ def phi_max(params: Parameters) -> float:
 
 
 def is_even(matrix: transforms.Matrix, axes: int) -> bool:
-    """Whether the first `axes` axes stay orthogonal and of one length, and the others orthogonal."""
+    """Whether the axes stay orthogonal, the first `axes` of them of one length."""
     turned = matrix[:3, :3]
     squares = turned.T @ turned
     scale = squares[0, 0]
