@@ -64,8 +64,9 @@ def struct_text(cls: type[Kind]) -> str:
 def load_text(cls: type[Kind], sources: Mapping[str, frozenset[str]], table: str) -> str:
     """Return `kind_load(scene, row, point, lambdas)`, which reads a row at the path's wavelengths.
 
-    sources: per parameter, where the values in this scene come from: "constant", "table" (a
-    tabulated spectrum), "texture", "layers". Text is made only for what is there.
+    sources: per parameter, where the values in this scene come from: "none" (0 leaves a lobe out),
+    "constant", "table" (a tabulated spectrum), "texture", "layers". Text is made only for what is
+    there.
     """
     body, at = [], 0
     for name, param in device_params(cls).items():
@@ -119,6 +120,9 @@ def _member(
     if kind == "layers":
         made = f"layers_load(scene, {at}, point, lambdas)" if "layers" in found else "layers_none()"
         return [f"    r.{name} = {made};"]
+    if found == {"none"}:
+        return [f"    r.{name} = {'spectrum_of(0.0f)' if kind == 'spectrum' else '(real)(0.0f)'};"]
+    found = found if "none" not in found else found - {"none"} | {"constant"}
     forms = {
         "constant": f"{kind}_constant(scene.{table}, {at}, lambdas)",
         "table": f"{kind}_table(scene, scene.{table}, {at}, lambdas)",

@@ -301,9 +301,9 @@ class _Lowering:
         }
         index_tables = any(
             "table" in found
-            for kind in ("dielectric", "rough_dielectric", "principled")
+            for kind in ("dielectric", "rough_dielectric", "principled", "gltf_surface")
             for name, found in sources.get(kind, {}).items()
-            if name in ("int_ior", "ext_ior", "eta")
+            if name in ("int_ior", "ext_ior", "eta", "ior")
         )
         glass_lens = self.mode == "spectral" and bool(cameras.dispersive_glass(scene.camera))
         return Features(

@@ -300,6 +300,11 @@ def _interior_text(features: Features, cls: type[materials.Material]) -> list[st
         return []
     first = 1 + sum(map(kinds.words, device_params(cls).values()))
     inside = f"((row) + {first})" if interior_params(cls) else "((integer)(0))"
+    if interior_params(cls) and "thin" in device_params(cls):  # a sheet has no inside
+        before = [*device_params(cls)].index("thin")
+        at = sum(map(kinds.words, [*device_params(cls).values()][:before]))
+        thin = f"gather_i(scene.materials, (row) + {at}) != 0"
+        inside = f"sel_i({thin}, (integer)(0), {inside})"
     return [f"#define BSDF_INTERIOR(row) {inside}"]
 
 

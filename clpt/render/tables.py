@@ -28,6 +28,7 @@ from clpt.spectra import (
 from clpt.spectra.spectrum import Role, d65, on_grid
 
 STEP = 1.0  # [nm] of the tabulated spectra
+BLACK = (Constant(0.0), RGB(0.0, 0.0, 0.0))
 ONE = 1e4  # sigmoid coefficient at which it is 1 in float32
 # How a spectrum is turned to rgb, by the role of the parameter (see clpt.spectra.spectrum).
 RGB_ROLES: dict[str, Role] = {
@@ -50,8 +51,8 @@ class Tables:
 
     mode: "spectral" or "rgb"; lambda_min, lambda_max: the film's range [nm]; sensor: what it
     records with, by default cie1931; density: of its wavelengths, by default visible importance.
-    `sources` tells, per kind and parameter, where values come from: "constant", "table", "texture",
-    "layers".
+    `sources` tells, per kind and parameter, where values come from: "none" (a lobe's share is 0),
+    "constant", "table", "texture", "layers".
     """
 
     def __init__(
@@ -185,6 +186,8 @@ class Tables:
                 value, source = layers_words(kind, self)
             else:
                 value, source = self.param_words(getattr(kind, name), param.role, param.choices)
+                if param.lobe and getattr(kind, name) in (0.0, *BLACK):
+                    source = "none"
             words.append(value)
             self.sources[kind.kind][name].add(source)
         return np.concatenate(words) if words else np.zeros(1, np.uint32)

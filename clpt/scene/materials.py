@@ -33,8 +33,8 @@ FILMS = "thin films on the surface, from the outside in"
 MEASURED = 0.02  # how much more light than comes may leave, by the noise of a measurement
 
 
-def _share(default: float, doc: str) -> Any:
-    return real(default, doc, low=0.0, high=1.0, textured=True)
+def _share(default: float, doc: str, *, lobe: bool = False) -> Any:
+    return real(default, doc, low=0.0, high=1.0, textured=True, lobe=lobe)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -289,6 +289,52 @@ class DiffuseTransmission(Material):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class GltfSurface(Material):
+    """glTF 2.0's material with its extensions, see docs/gltf.md; front side.
+
+    Both sides where light goes through; `thin`: a sheet, both sides of which are alike. The
+    microfacets have the square of a `roughness`, at least 0.001.
+    """
+
+    choosy = True
+    chromatic = True
+    needs_wavelengths = True
+
+    base_color: Any = reflectance(1.0, "colour of base, metal, and of what is let through")
+    metallic: Any = _share(0.0, "share of the metal", lobe=True)
+    roughness: Any = _share(1.0, "of reflection and of what is let through")
+    ior: Any = index(1.5, "index of the dielectric; 0: it reflects all but for `specular_color`")
+    specular: Any = _share(1.0, "strength of the dielectric's reflection")
+    specular_color: Any = reflectance(1.0, "factor on it at normal incidence")
+    anisotropy: Any = _share(0.0, "how much rougher the tangent's direction is", lobe=True)
+    anisotropy_rotation: Any = real(
+        0.0, "from the tangent to that direction", "degrees", -360.0, 360.0, textured=True
+    )
+    clearcoat: Any = _share(0.0, "strength of a coat of index 1.5 over all", lobe=True)
+    clearcoat_roughness: Any = _share(0.0, "its roughness")
+    sheen_color: Any = reflectance(0.0, "colour of fibres under the coat", lobe=True)
+    sheen_roughness: Any = _share(0.5, "how much fibres lean; at least 0.25")
+    transmission: Any = _share(0.0, "share of what enters the base that is let through", lobe=True)
+    thin: bool = flag(False, "whether light goes straight through, as there is no volume")
+    absorption: Any = coefficient(0.0, "of the inside: exp(-absorption distance) passes")
+    diffuse_transmission: Any = _share(
+        0.0, "share of what is scattered that goes through", lobe=True
+    )
+    diffuse_transmission_color: Any = reflectance(1.0, "its colour")
+    iridescence: Any = _share(0.0, "strength of a thin film on the facets", lobe=True)
+    iridescence_ior: float = real(1.3, "index of that film", low=1.0, high=5.0)
+    iridescence_thickness: Any = real(400.0, "its thickness", "nm", 0.0, 1e5, textured=True)
+
+    @property
+    def transmits(self) -> bool:
+        return self.transmission != 0.0 or self.diffuse_transmission != 0.0
+
+    @property
+    def turns(self) -> bool:
+        return self.anisotropy != 0.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Grating(Material):
     """A diffraction grating: every order leaves in its own direction, by wavelength.
 
@@ -435,6 +481,7 @@ LEAVES = (
     Principled,
     PrincipledThin,
     DiffuseTransmission,
+    GltfSurface,
     Grating,
     Fluorescent,
     Null,

@@ -57,6 +57,7 @@ class Param:
     choices: tuple[str, ...] = ()
     optional: bool = False
     textured: bool = False
+    lobe: bool = False  # 0 leaves a lobe out: kernels are made without it where all have 0
 
 
 def _field(default: Any, param: Param) -> Any:
@@ -65,9 +66,9 @@ def _field(default: Any, param: Param) -> Any:
     return field(default=default, metadata={"param": param})
 
 
-def reflectance(default: Any, doc: str) -> Any:
-    """Declare a spectrum in [0, 1]; may be a texture."""
-    return _field(default, Param("reflectance", doc, low=0.0, high=1.0, textured=True))
+def reflectance(default: Any, doc: str, *, lobe: bool = False) -> Any:
+    """Declare a spectrum in [0, 1]; may be a texture. `lobe`: see `Param`."""
+    return _field(default, Param("reflectance", doc, low=0.0, high=1.0, textured=True, lobe=lobe))
 
 
 def emission(default: Any, doc: str, unit: str, *, textured: bool = False) -> Any:
@@ -106,9 +107,10 @@ def real(
     high: float = math.inf,
     *,
     textured: bool = False,
+    lobe: bool = False,
 ) -> Any:
-    """Declare a number with its limits; may be a texture where `textured`."""
-    return _field(default, Param("real", doc, unit, low, high, textured=textured))
+    """Declare a number with its limits; may be a texture where `textured`. `lobe`: see `Param`."""
+    return _field(default, Param("real", doc, unit, low, high, textured=textured, lobe=lobe))
 
 
 def flag(default: bool, doc: str) -> Any:

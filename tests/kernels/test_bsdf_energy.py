@@ -113,13 +113,17 @@ def test_reciprocity(cls, mode):
         wo, wi = directions(rng, 3000), directions(rng, 3000)
         keep = (np.abs(wo[:, 2]) > 0.02) & (np.abs(wi[:, 2]) > 0.02)
         wo, wi = wo[keep], wi[keep]
+        if not params.get("thin", 1):  # what is scattered to the inside takes it for a vacuum
+            params = params | {"diffuse_transmission": 0.0}
         there = probe(params, wo, wi, wo)["eval"] / np.abs(wi[:, 2:])
         back = probe(params, wi, wo, wi)["eval"] / np.abs(wo[:, 2:])
         if cls is m.PrincipledThin:  # facets that light is to pass are cut off by wi, not by wo
             same = wo[:, 2] * wi[:, 2] > 0.0
             there, back = there[same], back[same]
         elif cls.chromatic:  # f / index^2 on the side of wo is what is reciprocal
-            inside = params["eta"] if "eta" in params else params["int_ior"] / params["ext_ior"]
+            inside = next(params[k] for k in ("int_ior", "eta", "ior") if k in params)
+            inside = inside / params.get("ext_ior", 1.0)
+            inside = np.ones_like(inside) if params.get("thin", 0) else inside
             inside = np.full_like(inside, inside.mean()) if mode == "rgb" else inside
             there = np.where(wo[:, 2:] < 0.0, there / inside**2, there)
             back = np.where(wi[:, 2:] < 0.0, back / inside**2, back)
