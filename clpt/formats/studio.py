@@ -20,6 +20,7 @@ from clpt.scene.materials import Diffuse
 from clpt.spectra import RGBIlluminant
 
 FOV = 35.0
+EXACT = 1 << 25  # points of instances to place; of more, boxes are
 MARGIN = 1.05
 FROM = (0.4, 0.35, 1.0)  # the camera, seen from the middle of the scene, +y up
 KEY_FROM = (-0.8, 1.3, 0.7)  # the key light, likewise
@@ -103,10 +104,10 @@ def world_bounds(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Least and largest corner (3,) of all shapes in world space; a unit box where there are none.
 
-    Of an instance the corners of its group's box count.
+    Of very many instances the corners of their groups' boxes count.
     """
     boxes = [shape_bounds(thing) for thing in things if not isinstance(thing, shapes.Instance)]
-    boxes += [(points.min(axis=0), points.max(axis=0)) for points in _placed_boxes(things)]
+    boxes += [(points.min(axis=0), points.max(axis=0)) for points in _placed_points(things)]
     if not boxes:
         boxes = [(-np.ones(3), np.ones(3))]
     return np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)
@@ -138,18 +139,21 @@ def _outlines(things: Sequence[shapes.Shape]) -> Iterator[NDArray[np.float64]]:
             yield transforms.transform_points(thing.to_world, thing.vertices)
         elif not isinstance(thing, shapes.Instance):
             yield _box_corners(*shape_bounds(thing))
-    yield from _placed_boxes(things)
+    yield from _placed_points(things)
 
 
-def _placed_boxes(things: Sequence[shapes.Shape]) -> Iterator[NDArray[np.float64]]:
-    """The corners (8, 3) of each instance's box, which is looked for once a group."""
-    corners: dict[int, NDArray[np.float64]] = {}
-    for thing in things:
-        if isinstance(thing, shapes.Instance) and thing.group.shapes:
+def _placed_points(things: Sequence[shapes.Shape]) -> Iterator[NDArray[np.float64]]:
+    """Points (n, 3) around each instance: its group's, or the corners of a large one's box."""
+    found: dict[int, NDArray[np.float64]] = {}
+    placed = [thing for thing in things if isinstance(thing, shapes.Instance)]
+    for thing in placed:
+        if thing.group.shapes:
             key = id(thing.group)
-            if key not in corners:
-                corners[key] = _box_corners(*world_bounds(thing.group.shapes))
-            yield transforms.transform_points(thing.to_world, corners[key])
+            if key not in found:
+                points = np.concatenate(list(_outlines(thing.group.shapes)))
+                box = _box_corners(points.min(axis=0), points.max(axis=0))
+                found[key] = points if len(points) * len(placed) <= EXACT else box
+            yield transforms.transform_points(thing.to_world, found[key])
 
 
 def _box_corners(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:

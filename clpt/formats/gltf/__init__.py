@@ -21,6 +21,7 @@ from clpt.formats.gltf import (
 from clpt.formats.gltf.document import Document
 from clpt.formats.mesh import MeshFile
 from clpt.scene import Scene
+from clpt.scene.shapes import Mesh
 
 SUFFIXES = (".glb", ".gltf")
 VARIABLES = ("time", "animation", "camera", "scene")
@@ -62,10 +63,10 @@ def load(path: Path, **variables: Any) -> Scene:
 def read_mesh(path: Path) -> MeshFile:
     """Return the meshes of a file as its scene shows them. Raises SceneError if there are none."""
     document, graph = _open(path, {})
-    found = meshes.shapes(graph)
+    found = meshes.shapes(graph, instances=False)
     if not found:
         raise SceneError("holds no triangles", file=path)
-    return MeshFile(found, document.notes)
+    return MeshFile([part for part in found if isinstance(part, Mesh)], document.notes)
 
 
 def _open(path: Path, variables: dict[str, Any]) -> tuple[Document, nodes.Graph]:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -19,9 +18,10 @@ from clpt.formats.gltf.primitives import Geometry, geometry
 from clpt.formats.mesh import checked
 from clpt.scene.lights import Area
 from clpt.scene.materials import Material
-from clpt.scene.shapes import Mesh
+from clpt.scene.shapes import Group, Instance, Mesh, Shape
 
 INSTANCING = "EXT_mesh_gpu_instancing"
+INSTANCED = 20_000  # triangles that copies would add; fewer are met sooner as copies
 
 
 @dataclass(frozen=True)
@@ -33,9 +33,21 @@ class Surface:
     uv_sets: tuple[int, ...]
 
 
-def shapes(graph: Graph) -> list[Mesh]:
-    """Return the shapes that the scene shows; nodes of one mesh share its arrays."""
-    found: list[Mesh] = []
+@dataclass
+class Posed:
+    """A mesh's primitives in one pose, and the nodes and places where they are shown."""
+
+    parts: list[Mesh]
+    places: list[tuple[Element, Matrix]] = field(default_factory=list)
+
+
+def shapes(graph: Graph, *, instances: bool = True) -> list[Shape]:
+    """Return the shapes that the scene shows, a mesh's copies beside each other.
+
+    Many copies of many triangles are instances of a group, where these are asked for; others are
+    meshes that share their arrays.
+    """
+    posed: dict[Any, Posed] = {}
     for index in graph.shown:
         node = graph.node(index)
         mesh = node.entry("mesh", "meshes")
@@ -43,14 +55,29 @@ def shapes(graph: Graph) -> list[Mesh]:
             continue
         weights = _weights(graph, index, node, mesh)
         skin = node.entry("skin", "skins")
-        if skin is not None:
-            found += _parts(mesh, weights, skins.matrices(skin, graph.to_world))
-            continue
-        make = partial(_parts, mesh, weights, None)
-        parts = node.document.once(("parts", mesh.path, weights), make)
-        for to_world in _placements(node, graph.to_world[index]):
-            placed = [_placed(part, to_world, node) for part in parts]
-            found += [part for part in placed if part is not None]
+        key = (mesh.path, weights) if skin is None else index
+        if key not in posed:
+            joints = None if skin is None else skins.matrices(skin, graph.to_world)
+            posed[key] = Posed(_parts(mesh, weights, joints))
+        own = np.eye(4) if skin is not None else graph.to_world[index]
+        posed[key].places += [(node, matrix) for matrix in _placements(node, own)]
+    return [shape for one in posed.values() for shape in _copies(one, instances)]
+
+
+def _copies(posed: Posed, instances: bool) -> list[Shape]:
+    """The shapes that show a mesh at all its places."""
+    triangles = sum(len(part.faces) for part in posed.parts)
+    if not instances or triangles * (len(posed.places) - 1) < INSTANCED:
+        placed = [_placed(part, *place) for place in posed.places for part in posed.parts]
+        return [part for part in placed if part is not None]
+    group = Group(tuple(posed.parts), posed.parts[0].name)
+    found: list[Shape] = []
+    for node, to_world in posed.places:
+        if transforms.is_singular(to_world):
+            flat = [_placed(part, node, to_world) for part in posed.parts]
+            found += [part for part in flat if part is not None]
+        else:
+            found.append(Instance(group=group, to_world=to_world))
     return found
 
 
@@ -173,7 +200,7 @@ def _colour_attributes(colours: NDArray[Any] | None) -> dict[str, NDArray[np.flo
     return made
 
 
-def _placed(part: Mesh, to_world: Matrix, node: Element) -> Mesh | None:
+def _placed(part: Mesh, node: Element, to_world: Matrix) -> Mesh | None:
     if np.array_equal(to_world, np.eye(4)):
         return part
     if not transforms.is_singular(to_world):

@@ -7,7 +7,7 @@ import json
 import numpy as np
 
 from clpt.cli.info import summary
-from clpt.formats import load
+from clpt.formats import gltf, load, studio
 
 # Where expected.json has bounds before sparse values and morph targets; Fox there is without skin.
 KNOWN = {
@@ -27,6 +27,14 @@ def test_triangles_and_bounds(assets):
             continue
         atol = 1e-5 + 2e-5 * np.abs(bounds).max()
         assert np.allclose(found["bounds"], bounds, atol=atol), name
+
+
+def test_many_copies_are_instances(assets):
+    file = assets / "gltf" / "derived-gpu-instancing" / "suzanne_instances.glb"
+    placed = load(file).shapes
+    assert len(placed) == 27 and len({id(shape.group) for shape in placed}) == 1
+    copies = gltf.read_mesh(file).meshes
+    assert np.allclose(studio.world_bounds(placed), studio.world_bounds(copies), atol=1e-5)
 
 
 def test_cameras_and_lights(assets):
