@@ -21,12 +21,13 @@ from clpt import images, transforms
 from clpt.errors import SceneError
 from clpt.scene.materials import Diffuse, Material, TwoSided
 from clpt.scene.shapes import Mesh
-from clpt.scene.textures import Bitmap
+from clpt.scene.textures import Bitmap, MeshAttribute
 
 if TYPE_CHECKING:
     import trimesh  # imported where it is used: it takes a second, which scenes without files save
 
 SUFFIXES = (".obj", ".ply", ".stl", ".off")
+COLOURS = ("vertex_color", "face_color")  # attributes that show where no material is named
 DUMMIES = (None, (2, 2))  # sizes of the image in trimesh's default material
 CHUNK = 1 << 14  # triangles that are checked at a time: in float64 they take 400 bytes each
 USEMTL = re.compile(rb"(?m)^[ \t]*usemtl[^\n]*")
@@ -64,6 +65,8 @@ def join(meshes: list[Mesh]) -> Mesh:
     starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])])
     faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=True)]
     whole: dict[str, Any] = {"normals": None, "uvs": None}
+    shared = set(first.attributes).intersection(*(mesh.attributes for mesh in meshes))
+    whole["attributes"] = {k: np.concatenate([m.attributes[k] for m in meshes]) for k in shared}
     if all(mesh.normals is not None for mesh in meshes):
         turned = [transforms.transform_normals(m.to_world, m.normals) for m in meshes]
         whole["normals"] = np.concatenate(turned).astype(np.float32)
@@ -107,8 +110,8 @@ def checked(
 ) -> dict[str, Any]:
     """Return a mesh's arrays without zero-area triangles and unused vertices; notes tell what went.
 
-    attributes: further arrays (n, width), one row a vertex. Raises SceneError for indices out of
-    range and vertices that are not finite.
+    attributes: further arrays (n, width), one row a vertex, or a face where face_ begins the
+    name. Raises SceneError for indices out of range and vertices that are not finite.
     """
     where = name or None
     if len(faces) and (faces.min() < 0 or faces.max() >= len(vertices)):
@@ -133,10 +136,10 @@ def checked(
     used = np.zeros(len(points), bool)
     used[faces.reshape(-1)] = True
     arrays: dict[str, Any] = {"vertices": points, "normals": normals, "uvs": uvs}
-    own = dict(attributes or {})
+    own = {k: a[solid] if k.startswith("face_") else a for k, a in (attributes or {}).items()}
     if not used.all():
         arrays = {key: None if a is None else a[used] for key, a in arrays.items()}
-        own = {key: a[used] for key, a in own.items()}
+        own = {k: a if k.startswith("face_") else a[used] for k, a in own.items()}
         faces = (np.cumsum(used) - 1)[faces]
     normals, uvs = arrays["normals"], arrays["uvs"]
     if normals is not None:
@@ -176,11 +179,51 @@ def _mesh(path: Path, name: str, geometry: Any, materials: bool, notes: list[str
     # Asking for `vertex_normals` would compute them; the file's own wait in the cache.
     normals = _per_vertex(geometry._cache.cache.get("vertex_normals"), vertices, 3)
     uvs = _per_vertex(getattr(geometry.visual, "uv", None), vertices, 2)
-    arrays = checked(path, name, vertices, faces, normals, uvs, notes)
+    own = _attributes(geometry.metadata.get("_ply_raw", {}), len(vertices), len(faces), notes)
+    arrays = checked(path, name, vertices, faces, normals, uvs, notes, own)
     if not len(arrays["faces"]):
         return None
-    material = _material(geometry.visual, notes) if materials else GREY
+    material = _material(geometry.visual, own, notes) if materials else GREY
     return Mesh(name=name, material=material, **arrays)
+
+
+def _attributes(
+    raw: Any, vertices: int, faces: int, notes: list[str]
+) -> dict[str, NDArray[np.float32]]:
+    """Colours and other numbers of a PLY file per vertex and face, by the names that Mitsuba has.
+
+    r, g, b or red, green, blue are vertex_color or face_color, bytes decoded from sRGB; x_0, x_1,
+    x_2 or x_r, x_g, x_b are vertex_x.
+    """
+    found: dict[str, NDArray[np.float32]] = {}
+    for element, count in (("vertex", vertices), ("face", faces)):
+        columns = {
+            name: np.asarray(raw[element]["data"][name]).reshape(-1)
+            for name, form in raw.get(element, {}).get("properties", {}).items()
+            if "," not in form  # a list
+        }
+        for name, parts in _grouped(columns).items():
+            values = np.column_stack(parts)
+            if len(values) != count:
+                notes.append(f"{element}_{name} left out: the file's polygons are no triangles")
+            elif values.shape[1] in (1, 3):
+                scaled = values.dtype == np.uint8
+                linear = images.srgb_to_linear(values / np.float32(255.0)) if scaled else values
+                found[f"{element}_{name}"] = linear.astype(np.float32)
+    return found
+
+
+def _grouped(columns: dict[str, NDArray[Any]]) -> dict[str, list[NDArray[Any]]]:
+    """Columns of one attribute by its name."""
+    groups: dict[str, list[NDArray[Any]]] = {}
+    for name, values in columns.items():
+        head, _, tail = name.rpartition("_")
+        letter = {"red": "r", "green": "g", "blue": "b"}.get(name, name)
+        if letter in ("r", "g", "b"):
+            groups.setdefault("color", []).append(values)
+        elif head and tail in (*"rgbxyz", *"012"):
+            groups.setdefault(head, []).append(values)
+    return groups
 
 
 def _per_vertex(values: Any, vertices: NDArray[Any], width: int) -> NDArray[np.float32] | None:
@@ -209,9 +252,12 @@ def _unit(vectors: NDArray[Any]) -> NDArray[Any]:
     return vectors / np.where(length > 0.0, length, 1.0)
 
 
-def _material(visual: Any, notes: list[str]) -> Material:
+def _material(visual: Any, attributes: Mapping[str, Any], notes: list[str]) -> Material:
     material = getattr(visual, "material", None)
     if material is None or _made_up(material):
+        for name in COLOURS:
+            if name in attributes:
+                return TwoSided(front=Diffuse(reflectance=MeshAttribute(name=name), name=name))
         if getattr(visual, "kind", None) in ("vertex", "face"):
             notes.append("vertex colours left out")
         return GREY

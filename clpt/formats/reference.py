@@ -202,6 +202,7 @@ def _host(name: str, value: Any) -> str:
         return f"rows of {width} {item}s"
     special = {
         "image": "name of an image file",
+        "attributes": "object of rows of 1 or 3 numbers by name",
         "emission": "`area` or `directional_area` light",
         "back": "material",
         "group": "a name in `groups`",

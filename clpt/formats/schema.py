@@ -20,6 +20,7 @@ from clpt.formats.native.reradiation import RERADIATIONS
 from clpt.formats.native.spectra import SPECTRA
 from clpt.scene import KINDS, integrators, materials
 from clpt.scene.params import ORDERS, SPECTRUM_ROLES, Kind, Param, params
+from clpt.scene.textures import ATTRIBUTES
 from clpt.spectra.sensors import OBSERVERS
 from clpt.spectra.spaces import TEMPERATURES
 
@@ -150,6 +151,10 @@ def _host(name: str, value: Any) -> Schema:
     """What only the host needs, by its name or by the type of its default."""
     if name in ARRAYS:
         return _rows(*ARRAYS[name])
+    if name == "attributes":
+        rows = {"anyOf": [_rows(1), _rows(3)]}
+        begins = {"pattern": f"^({'|'.join(ATTRIBUTES)})"}
+        return {"type": "object", "propertyNames": begins, "additionalProperties": rows}
     if name == "image":
         name_of_file = {"type": "string"}
         six = {"type": "array", "items": name_of_file, "minItems": 6, "maxItems": 6}

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from clpt import scene as sc
 from clpt.errors import SceneError
 from clpt.records import SETTINGS, SHAPE
-from clpt.render import cameras, filters, instancing, lights, reradiation, shapes
+from clpt.render import attributes, cameras, filters, instancing, lights, reradiation, shapes
 from clpt.render.bends import Bend
 from clpt.render.checks import check
 from clpt.render.colour import output_matrix, sensor
@@ -120,6 +120,7 @@ class _Lowering:
         self.bent = any(_any_of(shape.material, mt.Bent) for shape in scene.shapes)
         self.nested: dict[int, int] = {}  # how deep mixtures are, by their words
         self.triangles: list[tuple[np.ndarray, np.ndarray, int]] = []  # vertices, faces, shape
+        self.placed: list[attributes.Placed] = []
         self.n_vertices = self.n_faces = 0
 
     def run(self) -> Lowered:
@@ -153,6 +154,7 @@ class _Lowering:
         ):
             rows[emitter.shape_row]["light"] = first
             rows[emitter.shape_row]["flags"] |= SHAPE_ONE_LIGHT if whole else 0
+        attributes.lower_attributes(self.placed, tables)
         for row in rows:
             tables.append("shapes", row.reshape(1).view(np.uint32))
         glass_row = self._lens_glass()
@@ -204,6 +206,7 @@ class _Lowering:
         front, back, row["flags"] = self._sides(shape)
         row["front"], row["back"] = np.array([front, back], np.uint32).view(np.int32)
         triangles: tuple[Any, Any] = (None, None)
+        self.placed.append((row, shape, self.n_vertices, self.n_faces))
         if shape.kind in shapes.ANALYTIC:
             row["kind"] = 1 + shapes.ANALYTIC.index(shape.kind)
             row["params"] = self.tables.append("geometry", shapes.row(shape))
@@ -317,6 +320,7 @@ class _Lowering:
             textures=tuple(sorted({kind for kind, _ in tables.texture_roles})),
             texture_roles=tuple(sorted(tables.texture_roles)),
             texture_depth=tables.texture_depth,
+            attributes=bool(tables.attributes),
             analytic=tuple(kind for kind in shapes.ANALYTIC if kind in analytic),
             instances=bool(self.prototypes),
             normals=self.uses["normals"],

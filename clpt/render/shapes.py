@@ -98,6 +98,35 @@ def triangles(
 
     Raises SceneError for a mesh that is empty, not finite or inconsistent, or a singular transform.
     """
+    vertices, faces, normals, uvs = _in_world(shape)
+    solid = _solid(shape, vertices, faces)
+    if not solid.all() and warnings is not None:
+        count = int(len(solid) - solid.sum())
+        warnings.append(f"{where(shape)}: {count} of {len(solid)} triangles have no area, left out")
+    faces = faces if solid.all() else faces[solid]
+    return vertices, np.ascontiguousarray(faces), normals, uvs
+
+
+def attribute(shape: Shape, name: str) -> Points:
+    """Return an attribute of a mesh, (n, 1 or 3) float32 per vertex, or per face of `triangles`.
+
+    Raises SceneError for one that has another shape, or values that are not finite.
+    """
+    vertices, faces, _, _ = _in_world(shape)
+    per_face = name.startswith("face_")
+    count = len(faces) if per_face else len(vertices)
+    values = np.asarray(shape.attributes[name], np.float32)  # type: ignore[attr-defined]
+    values = values[:, None] if values.ndim == 1 else values
+    if values.shape not in ((count, 1), (count, 3)):
+        message = f"attribute {name!r} must be ({count}, 1 or 3), found {values.shape}"
+        raise SceneError(message, where=where(shape))
+    if not np.isfinite(values).all():
+        raise SceneError(f"attribute {name!r} is not finite", where=where(shape))
+    return values[_solid(shape, vertices, faces)] if per_face else values
+
+
+def _in_world(shape: Shape) -> tuple[Points, Faces, Points | None, Points | None]:
+    """Vertices, faces, normals and uvs after the transform."""
     matrix = placement(shape)
     vertices, faces, normals, uvs = _local(shape)
     if not np.array_equal(matrix, transforms.IDENTITY):
@@ -110,24 +139,15 @@ def triangles(
         normals = -normals
     if transforms.flips_handedness(matrix) != shape.flip_normals:
         faces = faces[:, ::-1]
-    faces = _without_slivers(shape, vertices, faces, warnings)
-    return vertices, np.ascontiguousarray(faces), normals, uvs
+    return vertices, faces, normals, uvs
 
 
-def _without_slivers(
-    shape: Shape, vertices: Points, faces: Faces, warnings: list[str] | None
-) -> Faces:
-    """The faces whose cross product is not zero in float32."""
-    twice = np.linalg.norm(_crosses(vertices, faces), axis=1)
-    good = twice > 0.0
-    if good.all():
-        return faces
-    if not good.any():
+def _solid(shape: Shape, vertices: Points, faces: Faces) -> NDArray[np.bool_]:
+    """Which faces have a cross product that is not zero in float32."""
+    solid = np.linalg.norm(_crosses(vertices, faces), axis=1) > 0.0
+    if not solid.any():
         raise SceneError("none of its triangles has an area", where=where(shape))
-    if warnings is not None:
-        count = int(len(good) - good.sum())
-        warnings.append(f"{where(shape)}: {count} of {len(good)} triangles have no area, left out")
-    return faces[good]
+    return solid
 
 
 def _crosses(vertices: Points, faces: Faces) -> Points:

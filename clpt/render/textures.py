@@ -15,11 +15,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt.errors import SceneError
 from clpt.layout import Record
+from clpt.render.attributes import per_face
 from clpt.render.kinds import REAL_WORDS, SPECTRUM_WORDS
 from clpt.render.texels import bands, pixels, spectral_image, texels
 from clpt.render.texture_programs import is_composite, operand_text, program
 from clpt.scene.params import device_params, params
-from clpt.scene.textures import WRAPS, Bitmap, Checkerboard, Placed, Texture
+from clpt.scene.textures import WRAPS, Bitmap, Checkerboard, MeshAttribute, Placed, Texture
 from clpt.spectra import Spectrum, luminance
 
 _COMMON = {
@@ -46,6 +47,13 @@ RECORDS: dict[str, Record] = {
         color1=("integer", "first of its five words in `textures`"),
     ),
 }
+RECORDS["mesh_attribute"] = Record(
+    "MeshAttribute",
+    "Values per vertex or face.",
+    kind=_COMMON["kind"],
+    number=("integer", "its place in the directories of `attributes`"),
+    per_face=("integer", "1: a value for each face; 0: for each vertex"),
+)
 RECORDS["spectral_bitmap"] = Record(
     "SpectralBitmap",
     "An image of spectra.",
@@ -64,6 +72,7 @@ class Sink(Protocol):
     textures: dict[Any, int]
     texture_roles: set[tuple[str, str]]
     texture_depth: int
+    attributes: dict[tuple[str, str], int]
     kept: list[Any]
 
     lambda_min: float
@@ -178,9 +187,15 @@ def _bitmap(texture: Bitmap, role: str, tables: Sink) -> tuple[str, dict[str, An
     }
 
 
+def _mesh_attribute(texture: MeshAttribute, role: str, tables: Sink) -> tuple[str, dict[str, Any]]:
+    number = tables.attributes.setdefault((texture.name, role), len(tables.attributes))
+    return texture.kind, {"number": number, "per_face": per_face(texture.name)}
+
+
 MEMBERS: dict[type[Texture], Callable[..., tuple[str, dict[str, Any]]]] = {
     Bitmap: _bitmap,
     Checkerboard: _checkerboard,
+    MeshAttribute: _mesh_attribute,
 }
 
 

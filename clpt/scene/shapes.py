@@ -31,6 +31,9 @@ class Mesh(Shape):
     faces: Any = host(None, "(m, 3) uint32")
     normals: Any = host(None, "(n, 3) float32 per vertex, or None for flat shading")
     uvs: Any = host(None, "(n, 2) float32 per vertex, or None")
+    attributes: Any = host(
+        {}, "name -> (n, 1 or 3) float32; one row a vertex or a face, as vertex_ or face_ begins it"
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from clpt.errors import SceneError
-from clpt.scene.params import Kind, choice, factor, host, real, reflectance
+from clpt.scene.params import Kind, choice, factor, host, params, real, reflectance
 
+ATTRIBUTES = ("vertex_", "face_")  # how the names of what meshes have begin
 WRAPS = ("repeat", "clamp", "mirror", "zero")
 
 
@@ -76,4 +78,28 @@ class Mix(Texture):
     amount: Any = real(0.5, "share of the second", textured=True)
 
 
-KINDS = (Bitmap, Checkerboard, Product, Mix)
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MeshAttribute(Texture):
+    """What a mesh says per vertex or face: its `attributes` of that name."""
+
+    name: str = host("vertex_color", "begins with vertex_ or face_")
+
+    def check(self) -> None:
+        if not str(self.name).startswith(ATTRIBUTES):
+            message = f"must begin with {' or '.join(ATTRIBUTES)}, not {self.name!r}"
+            raise SceneError(message, where=f"{self.kind}.name")
+
+
+KINDS = (Bitmap, Checkerboard, Product, Mix, MeshAttribute)
+
+
+def textures_in(value: Any) -> Iterator[Texture]:
+    """Yield the textures that a kind's parameters hold, and those in what these hold, and so on."""
+    if isinstance(value, (list, tuple)):
+        for entry in value:
+            yield from textures_in(entry)
+    elif isinstance(value, Kind):
+        if isinstance(value, Texture):
+            yield value
+        for name in params(type(value)):
+            yield from textures_in(getattr(value, name))

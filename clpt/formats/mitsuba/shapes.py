@@ -150,7 +150,13 @@ def _mesh(props: Properties, suffix: str, *, flip_v: bool) -> Parameters:
         normals = transforms.transform_normals(to_world, whole.normals).astype(np.float32)
         if transforms.flips_handedness(to_world):
             faces = faces[:, ::-1].copy()  # the file's normals tell the front, not the winding
-    return {"vertices": vertices, "faces": faces, "normals": normals, "uvs": uvs}
+    return {
+        "vertices": vertices,
+        "faces": faces,
+        "normals": normals,
+        "uvs": uvs,
+        "attributes": whole.attributes,
+    }
 
 
 PLUGINS: dict[str, tuple[type[Shape], Callable[[Properties], Parameters]]] = {

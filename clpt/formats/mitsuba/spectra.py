@@ -17,7 +17,7 @@ from clpt.errors import UnknownKindError
 from clpt.formats.colour import colour
 from clpt.formats.mitsuba.values import Properties, number, numbers, placed
 from clpt.formats.mitsuba.xml import Element
-from clpt.scene.textures import Bitmap, Checkerboard, Texture
+from clpt.scene.textures import ATTRIBUTES, Bitmap, Checkerboard, MeshAttribute, Product, Texture
 from clpt.spectra import (
     LED,
     Blackbody,
@@ -261,6 +261,7 @@ def _texture(element: Element, outer: Properties) -> Texture:
     makers: dict[str, Callable[[Properties], Any]] = {
         "bitmap": _bitmap,
         "checkerboard": _checkerboard,
+        "mesh_attribute": _mesh_attribute,
     }
     if element.type not in makers:
         raise UnknownKindError("texture", element.type, makers, **element.place())
@@ -288,6 +289,15 @@ def _checkerboard(props: Properties) -> Checkerboard:
         color1=reflectance(props, "color1", 0.2),
         to_uv=_to_uv(props),
     )
+
+
+def _mesh_attribute(props: Properties) -> Texture:
+    name, scale = props.text("name", ""), props.number("scale", 1.0)
+    if not name.startswith(ATTRIBUTES):
+        message = f"'name' must begin with {' or '.join(ATTRIBUTES)}, not {name!r}"
+        raise props.element.error(message)
+    made = MeshAttribute(name=name)
+    return made if scale == 1.0 else Product(first=made, second=scale)
 
 
 def _to_uv(props: Properties) -> np.ndarray:

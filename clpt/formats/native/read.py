@@ -19,6 +19,7 @@ from clpt.formats.native.spectra import find_file, kind_name
 from clpt.formats.native.transforms import matrix
 from clpt.scene import Scene, cameras, integrators, kinds, lights, materials, shapes
 from clpt.scene.params import SPECTRUM_ROLES, Kind, Param, params
+from clpt.scene.textures import ATTRIBUTES
 
 ON_SHAPES = tuple(cls.kind for cls in lights.ON_SHAPES)
 KEYS = (
@@ -74,6 +75,7 @@ class _Reader:
             "white_balance": lambda c: (
                 tuple(c.numbers(2)) if isinstance(c.value, list) else c.value
             ),
+            "attributes": _attributes,
             **{name: _array_reader(*form) for name, form in ARRAYS.items()},
         }
 
@@ -293,6 +295,7 @@ def _in_frame(part: shapes.Mesh, frame: shapes.Mesh, dressed: bool, several: boo
         faces=part.faces,
         normals=part.normals,
         uvs=part.uvs,
+        attributes=part.attributes,
     )
 
 
@@ -304,10 +307,16 @@ def _checked_mesh(cursor: Cursor, made: shapes.Mesh, notes: list[str]) -> shapes
         values = getattr(made, name)
         if values is not None and len(values) != len(made.vertices):
             raise cursor.at(name).error(f"must be one for each of {len(made.vertices)} vertices")
+    for name, values in made.attributes.items():
+        count = len(made.faces if name.startswith("face_") else made.vertices)
+        if len(values) != count:
+            raise cursor.at("attributes").at(name).error(f"must be {count} rows")
     faces = made.faces.astype(np.int64)
     arrays = placed(
         cursor,
-        lambda: mesh.checked(None, "", made.vertices, faces, made.normals, made.uvs, notes),
+        lambda: mesh.checked(
+            None, "", made.vertices, faces, made.normals, made.uvs, notes, made.attributes
+        ),
     )
     if not len(arrays["faces"]):
         raise cursor.error("holds no triangles")
@@ -330,6 +339,18 @@ def _image(cursor: Cursor) -> Any:
     if isinstance(cursor.value, list):
         return [find_file(entry) for entry in cursor.entries(6)]
     return find_file(cursor)
+
+
+def _attributes(cursor: Cursor) -> dict[str, np.ndarray]:
+    """Rows of 1 or 3 numbers by their attribute's name."""
+    found = {}
+    for name, child in cursor.items():
+        if not name.startswith(ATTRIBUTES):
+            raise child.error(f"the name must begin with {' or '.join(ATTRIBUTES)}")
+        rows = child.expect(list)
+        wide = len(rows[0]) if rows and isinstance(rows[0], list) else 3
+        found[name] = _array(child, 1 if wide == 1 else 3, np.float32)
+    return {name: values for name, values in found.items() if values is not None}
 
 
 def _array_reader(width: int, item: str) -> Callable[[Cursor], np.ndarray | None]:

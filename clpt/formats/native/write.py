@@ -106,7 +106,8 @@ class _Writer:
         declared = params(plain)
         if isinstance(thing, shapes.Mesh):
             given["file"] = self.mesh(thing)
-            declared = {name: p for name, p in declared.items() if name not in ARRAYS}
+            in_file = (*ARRAYS, "attributes")
+            declared = {name: p for name, p in declared.items() if name not in in_file}
         defaults = {field.name: default(field) for field in dataclasses.fields(plain)}
         for name, param in declared.items():
             written = self.parameter(name, getattr(thing, name), param)
@@ -202,15 +203,31 @@ def _on_one_line(match: re.Match) -> str:
 
 
 def _ply(mesh: shapes.Mesh) -> bytes:
-    import trimesh  # takes a second
-
-    visual = None if mesh.uvs is None else trimesh.visual.TextureVisuals(uv=mesh.uvs)
-    whole = trimesh.Trimesh(
-        vertices=mesh.vertices,
-        faces=np.asarray(mesh.faces, np.int64),
-        vertex_normals=mesh.normals,
-        visual=visual,
-        process=False,
-    )
-    written = trimesh.exchange.ply.export_ply(whole, vertex_normal=mesh.normals is not None)
-    return bytes(written)
+    """The arrays of a mesh as a binary PLY file, attributes by the names that Mitsuba has."""
+    normals, uvs = mesh.normals, mesh.uvs
+    vertex: list[Any] = [("x", "y", "z", mesh.vertices)]
+    vertex += [] if normals is None else [("nx", "ny", "nz", normals)]
+    vertex += [] if uvs is None else [("s", "t", uvs)]
+    face: list[Any] = []
+    for name, values in mesh.attributes.items():
+        element, _, rest = name.partition("_")
+        values = np.asarray(values).reshape(len(values), -1)
+        names = [f"{rest}_{i}" for i in range(values.shape[1])]
+        names = list("rgb") if rest == "color" and len(names) == 3 else names
+        (face if element == "face" else vertex).append((*names, values))
+    count = np.full((len(mesh.faces), 1), 3, np.uint8)
+    corners = np.ascontiguousarray(mesh.faces, "<i4").view(np.uint8).reshape(len(mesh.faces), -1)
+    columns = [np.ascontiguousarray(v, "<f4").view(np.uint8) for *_, v in face]
+    head = [
+        "ply",
+        "format binary_little_endian 1.0",
+        f"element vertex {len(mesh.vertices)}",
+        *(f"property float {name}" for *names, _ in vertex for name in names),
+        f"element face {len(mesh.faces)}",
+        "property list uchar int vertex_indices",
+        *(f"property float {name}" for *names, _ in face for name in names),
+        "end_header\n",
+    ]
+    points = np.concatenate([np.asarray(v, "<f4") for *_, v in vertex], axis=1)
+    triangles = np.concatenate([count, corners, *columns], axis=1)
+    return "\n".join(head).encode() + points.tobytes() + triangles.tobytes()

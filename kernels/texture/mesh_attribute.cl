@@ -1,0 +1,47 @@
+/* Values that a mesh has per vertex or face, linear between the vertices of a triangle. Spectra are
+ * interpolated as evaluated, not by their coefficients, as bitmap.cl does between texels. Where a shape
+ * has no such values the entry of its table is zero, and every index ends at its first word. */
+inline integer mesh_attribute_at(MeshAttribute t, Scene scene, TexturePoint point, int corner, real *weight)
+{
+    integer entry = point.attributes + 2 * t.number, first = gather_i(scene.attributes, entry);
+    integer vertex = gather_i(scene.faces, 3 * point.face + corner);
+    *weight = corner == 0 ? 1.0f - point.b.x - point.b.y : corner == 1 ? point.b.x : point.b.y;
+    return first + gather_i(scene.attributes, entry + 1) * sel_i(t.per_face != 0, point.face, vertex);
+}
+
+Spectrum mesh_attribute_reflectance(MeshAttribute t, Scene scene, TexturePoint point, Wavelengths lambdas)
+{
+    Spectrum sum = spectrum_of(0.0f);
+    for (int corner = 0; corner < 3; corner++) {
+        real weight;
+        integer at = mesh_attribute_at(t, scene, point, corner, &weight);
+        Spectrum value = spectrum_texel(gather_w(scene.attributes, at), gather_w(scene.attributes, at + 1),
+                                        gather_w(scene.attributes, at + 2), gather_w(scene.attributes, at + 3), lambdas);
+        sum = spectrum_madd(value, weight, sum);
+    }
+    return sum;
+}
+
+Spectrum mesh_attribute_emission(MeshAttribute t, Scene scene, TexturePoint point, Wavelengths lambdas)
+{
+    Spectrum sum = spectrum_of(0.0f);
+    for (int corner = 0; corner < 3; corner++) {
+        real weight;
+        integer at = mesh_attribute_at(t, scene, point, corner, &weight);
+        Spectrum value = spectrum_light_texel(scene, gather_w(scene.attributes, at), gather_w(scene.attributes, at + 1),
+                                              gather_w(scene.attributes, at + 2), gather_w(scene.attributes, at + 3), lambdas);
+        sum = spectrum_madd(value, weight, sum);
+    }
+    return sum;
+}
+
+real mesh_attribute_real(MeshAttribute t, Scene scene, TexturePoint point)
+{
+    real sum = 0.0f;
+    for (int corner = 0; corner < 3; corner++) {
+        real weight;
+        integer at = mesh_attribute_at(t, scene, point, corner, &weight);
+        sum += weight * gather_w(scene.attributes, at);
+    }
+    return sum;
+}
