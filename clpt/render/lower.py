@@ -120,7 +120,7 @@ class _Lowering:
         self.bent = any(_any_of(shape.material, mt.Bent) for shape in scene.shapes)
         self.nested: dict[int, int] = {}  # how deep mixtures are, by their words
         self.triangles: list[tuple[np.ndarray, np.ndarray, int]] = []  # vertices, faces, shape
-        self.placed: list[attributes.Placed] = []
+        self.owners: list[attributes.Placed] = []
         self.n_vertices = self.n_faces = 0
 
     def run(self) -> Lowered:
@@ -154,7 +154,7 @@ class _Lowering:
         ):
             rows[emitter.shape_row]["light"] = first
             rows[emitter.shape_row]["flags"] |= SHAPE_ONE_LIGHT if whole else 0
-        attributes.lower_attributes(self.placed, tables)
+        attributes.lower_attributes(self.owners, tables)
         for row in rows:
             tables.append("shapes", row.reshape(1).view(np.uint32))
         glass_row = self._lens_glass()
@@ -206,7 +206,7 @@ class _Lowering:
         front, back, row["flags"] = self._sides(shape)
         row["front"], row["back"] = np.array([front, back], np.uint32).view(np.int32)
         triangles: tuple[Any, Any] = (None, None)
-        self.placed.append((row, shape, self.n_vertices, self.n_faces))
+        self.owners.append((row, shape, self.n_vertices, self.n_faces))
         if shape.kind in shapes.ANALYTIC:
             row["kind"] = 1 + shapes.ANALYTIC.index(shape.kind)
             row["params"] = self.tables.append("geometry", shapes.row(shape))
