@@ -210,6 +210,26 @@ class RoughPlastic(Material):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class CoatedConductor(Material):
+    """A rough metal under a rough, clear dielectric coat; front side.
+
+    Closed form: see docs/materials.md for how far it is from a random walk between the two.
+    """
+
+    choosy = True
+
+    coat_ior: Any = index(1.5046, "index of the coat")
+    ext_ior: Any = index(1.000277, "index outside")
+    coat_alpha: Any = real(0.01, "roughness of the coat", low=1e-4, high=1.0, textured=True)
+    eta: Any = index(0.0, "index of refraction of the metal; the default is a perfect mirror")
+    k: Any = index(1.0, "extinction coefficient of the metal")
+    distribution: str = choice("ggx", "of both their microfacet normals", DISTRIBUTIONS)
+    alpha_u: Any = real(0.1, "the metal's roughness along the tangent", "", 1e-4, 1.0, textured=True)
+    alpha_v: Any = real(0.1, "the metal's roughness across it", "", 1e-4, 1.0, textured=True)
+    specular_reflectance: Any = reflectance(1.0, "factor on the metal's reflection; 1 is physical")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Principled(Material):
     """The principled model of Burley 2012 and 2015, as Mitsuba 3 defines it; front side.
 
@@ -478,6 +498,7 @@ LEAVES = (
     RoughConductor,
     Plastic,
     RoughPlastic,
+    CoatedConductor,
     Principled,
     PrincipledThin,
     DiffuseTransmission,

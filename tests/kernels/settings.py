@@ -48,14 +48,15 @@ def settings(
     """Random valid parameters, by name: numbers and spectra (components,); `fixed` wins.
 
     Indices of refraction are by turns near 1 and well above, in either order, as lobes refracted by
-    a ratio near one are too narrow for bins; an only one is well above. The first half of them is
-    equal at all wavelengths. Every other one has thin films, if the kind takes them, which absorb
-    nothing.
+    a ratio near one are too narrow for bins; an only one and that of a coat are well above. The
+    first half of them is equal at all wavelengths. Every other one has thin films, if the kind
+    takes them, which absorb nothing.
     """
     result = []
-    single = sum(p.role == "index" for p in device_params(cls).values()) == 1
+    indices = [k for k, p in device_params(cls).items() if p.role == "index"]
+    dense_first = len(indices) == 1 or "coat_ior" in indices
     for i in range(count):
-        disperses, turn = 2 * i >= count, 1 if single else int(rng.integers(2))
+        disperses, turn = 2 * i >= count, 1 if dense_first else int(rng.integers(2))
         drawn = {}
         for name, param in device_params(cls).items():
             if param.role == "index":

@@ -1,0 +1,171 @@
+/* A rough metal under a rough, clear dielectric coat; front side. On top the coat's microfacets (Walter
+ * et al. 2007 eq. 20), below them the metal's, met by directions refracted at the smooth boundary:
+ * f = T(wo) T(wi) f_metal(wo', wi') / eta^2 [1/sr], exact where the coat is smooth. A rough coat turns
+ * light by (1 - 1/eta) times its slopes: their variance, times that squared and a factor of 2.5, fitted
+ * to random walks (tests/kernels/test_coated.py), is added to the metal's. What the coat throws back
+ * inside is summed as a geometric series: along the mirror direction as between smooth boundaries, or,
+ * the rougher the metal, as a diffuse light like plastic's. A coat that disperses bends light by the
+ * mean of the indices. */
+#include "lib/fresnel.cl"
+#include "lib/microfacet.cl"
+#include "lib/rough_coat.cl"
+
+typedef struct {
+    Microfacets coat, metal;
+    Spectrum eta;      /* of the coat over what is outside */
+    real bend;         /* their mean */
+    real lost;         /* share of a bounce off the metal that the coat throws back */
+    Spectrum again;    /* what comes of that, as a diffuse albedo below the coat */
+    real between;      /* share of it that stays in the mirror direction instead */
+} CoatedMetal;
+
+/* Index and extinction of the metal over the coat's index. */
+inline Spectrum coated_conductor_fresnel(CoatedConductor m, real cos_i)
+{
+    Spectrum eta = spectrum_div(m.eta, m.coat_ior), k = spectrum_div(m.k, m.coat_ior);
+    return spectrum_mul(m.specular_reflectance, fresnel_conductor(cos_i, eta, k));
+}
+
+/* How light within the coat, of cosine cos_i, fares at facets that reflect all: what leaves them, and
+ * how much of that the coat throws back. Nodes as for the coat's transmittance. */
+inline vec2 coated_conductor_bounce(Microfacets d, real alpha, real cos_i, real eta)
+{
+    real sin_i = sqrt_r(1.0f - cos_i * cos_i), seen = 1e-20f;
+    vec2 sum = {0.0f, 0.0f};
+    d.alpha_u = d.alpha_v = alpha;
+    for (int i = 0; i < 3; ++i) {
+        real radius = sel(d.beckmann, (real)(coat_radius_beckmann[i]), (real)(coat_radius_ggx[i])) * alpha;
+        real cos_h = 1.0f / sqrt(1.0f + radius * radius), lean = sin_i * radius;
+        for (int j = 0; j < 4; ++j) {
+            real area = max_r(cos_i + lean * coat_azimuth[j], (real)(0.0f));
+            real z = min_r(2.0f * area * cos_h * cos_h - cos_i, (real)(1.0f));
+            vec3 out = v3(sqrt_r(1.0f - z * z), (real)(0.0f), max_r(z, (real)(0.0f)));
+            area *= coat_weight[i];
+            real g1 = area * microfacet_g1(d, out, v3((real)(0.0f), (real)(0.0f), (real)(1.0f)));
+            sum.x += g1;
+            sum.y += g1 * fresnel_dielectric(-out.z, eta).f;
+            seen += area;
+        }
+    }
+    sum.x /= seen;
+    sum.y /= seen;
+    return sum;
+}
+
+inline CoatedMetal coated_metal_of(CoatedConductor m)
+{
+    CoatedMetal c;
+    c.eta = relative_index(m.coat_ior, m.ext_ior);
+    c.bend = spectrum_mean(c.eta);
+    c.coat = microfacets_of(m.distribution, m.coat_alpha, m.coat_alpha);
+    real spread = 2.5f * sqr((1.0f - 1.0f / c.bend) * m.coat_alpha);
+    real u = sqrt_r(sqr(m.alpha_u) + spread), v = sqrt_r(sqr(m.alpha_v) + spread);
+    c.metal = microfacets_of(m.distribution, u, v);
+    vec2 bounce = coated_conductor_bounce(c.metal, sqrt_r(u * v), (real)(0.77f), c.bend);
+    c.lost = bounce.y / max_r(bounce.x, (real)(1e-20f));
+    c.between = 0.04f / (0.04f + u * v);
+    Spectrum f = coated_conductor_fresnel(m, (real)(0.8f));
+    real inside = coat_inside_reflectance(c.coat, c.bend);
+#define C(x_)                                                                   \
+    c.again.x_ = (1.0f - c.between) * f.x_ * bounce.y * f.x_ * bounce.x         \
+               / (1.0f - min_r(inside * f.x_ * bounce.x, (real)(0.999f)));
+    SPECTRUM_EACH(C)
+#undef C
+    return c;
+}
+
+/* w within the coat. */
+inline vec3 coated_metal_refracted(CoatedMetal c, vec3 w)
+{
+    real inv = 1.0f / c.bend, x = w.x * inv, y = w.y * inv;
+    return v3(x, y, sqrt_r(1.0f - x * x - y * y));
+}
+
+/* Probabilities of the coat's reflection and of the metal's lobe; the rest is diffuse. */
+inline vec2 coated_conductor_lobes(CoatedConductor m, CoatedMetal c, real t)
+{
+    real metal = t * (1.0f - c.lost) * spectrum_mean(coated_conductor_fresnel(m, (real)(1.0f)));
+    real diffuse = t * spectrum_mean(c.again), total = max_r(1.0f - t + metal + diffuse, (real)(1e-20f));
+    vec2 p = {(1.0f - t) / total, metal / total};
+    return p;
+}
+
+/* Density of wi for the metal's lobe. */
+inline real coated_conductor_lobe(CoatedMetal c, vec3 inner_o, vec3 inner_i, vec3 h, real cos_i)
+{
+    real inner = microfacet_visible_pdf(c.metal, inner_o, h) / max_r(4.0f * dot3(inner_o, h), (real)(1e-20f));
+    mask reached = inner_i.z > 1e-4f;
+    return sel(reached, inner * cos_i / (sqr(c.bend) * max_r(inner_i.z, (real)(1e-4f))), (real)(0.0f));
+}
+
+/* eval and pdf, given T(wo). */
+inline Spectrum coated_conductor_value(CoatedConductor m, CoatedMetal c, vec3 wo, vec3 wi, Spectrum t_wo)
+{
+    vec3 h = normalize3(add3(wo, wi));
+    real g = microfacet_g1(c.coat, wo, h) * microfacet_g1(c.coat, wi, h);
+    real coat = microfacet_d(c.coat, h) * g / max_r(4.0f * wo.z, (real)(1e-20f));
+    Spectrum f = fresnel_spectrum(clamp_r(dot3(wo, h), (real)(0.0f), (real)(1.0f)), c.eta);
+    Spectrum t = spectrum_mul(t_wo, coat_transmittance_spectrum(c.coat, fabs(wi.z), c.eta));
+
+    vec3 inner_o = coated_metal_refracted(c, wo), inner_i = coated_metal_refracted(c, wi);
+    vec3 inner_h = normalize3(add3(inner_o, inner_i));
+    real cos_h = clamp_r(dot3(inner_o, inner_h), (real)(0.0f), (real)(1.0f));
+    real lobe = coated_conductor_lobe(c, inner_o, inner_i, inner_h, wi.z) * microfacet_g1(c.metal, inner_i, inner_h);
+    Spectrum metal = coated_conductor_fresnel(m, cos_h), r;
+    real thrown = fresnel_dielectric(-cos_h, c.bend).f, diffuse = wi.z * INV_PI / sqr(c.bend);
+#define C(x_)                                                                                     \
+    real CAT(echo_, x_) = thrown * metal.x_;                                                      \
+    CAT(echo_, x_) = 1.0f + c.between * CAT(echo_, x_) / max_r(1.0f - CAT(echo_, x_), (real)(1e-3f)); \
+    r.x_ = coat * f.x_ + t.x_ * (lobe * metal.x_ * CAT(echo_, x_) + diffuse * c.again.x_);
+    SPECTRUM_EACH(C)
+#undef C
+    return spectrum_sel((wo.z > 0.0f) & (wi.z > 0.0f), r, spectrum_of(0.0f));
+}
+inline real coated_conductor_density(CoatedConductor m, CoatedMetal c, vec3 wo, vec3 wi, real t_wo)
+{
+    vec3 h = normalize3(add3(wo, wi));
+    vec3 inner_o = coated_metal_refracted(c, wo), inner_i = coated_metal_refracted(c, wi);
+    vec2 p = coated_conductor_lobes(m, c, t_wo);
+    real coat = microfacet_visible_pdf(c.coat, wo, h) / max_r(4.0f * dot3(wo, h), (real)(1e-20f));
+    real metal = coated_conductor_lobe(c, inner_o, inner_i, normalize3(add3(inner_o, inner_i)), wi.z);
+    real pdf = p.x * coat + p.y * metal + max_r(1.0f - p.x - p.y, (real)(0.0f)) * cosine_hemisphere_pdf(wi.z);
+    return sel((wo.z > 0.0f) & (wi.z > 0.0f), pdf, (real)(0.0f));
+}
+
+Spectrum coated_conductor_eval(CoatedConductor m, vec3 wo, vec3 wi)
+{
+    CoatedMetal c = coated_metal_of(m);
+    return coated_conductor_value(m, c, wo, wi, coat_transmittance_spectrum(c.coat, fabs(wo.z), c.eta));
+}
+
+real coated_conductor_pdf(CoatedConductor m, vec3 wo, vec3 wi)
+{
+    CoatedMetal c = coated_metal_of(m);
+    Spectrum t = coat_transmittance_spectrum(c.coat, fabs(wo.z), c.eta);
+    return coated_conductor_density(m, c, wo, wi, spectrum_mean(t));
+}
+
+BsdfSample coated_conductor_sample(CoatedConductor m, vec3 wo, vec3 u)
+{
+    BsdfSample s = bsdf_nothing();
+    CoatedMetal c = coated_metal_of(m);
+    Spectrum t = coat_transmittance_spectrum(c.coat, fabs(wo.z), c.eta);
+    real t_mean = spectrum_mean(t);
+    vec2 uv = {u.x, u.y}, p = coated_conductor_lobes(m, c, t_mean);
+    mask coat = u.z < p.x, metal = !coat & (u.z < p.x + p.y), kept = wo.z > 0.0f;
+    vec3 from = sel3(coat, wo, coated_metal_refracted(c, wo));
+    Microfacets d = c.metal;
+    d.alpha_u = sel(coat, c.coat.alpha_u, d.alpha_u);
+    d.alpha_v = sel(coat, c.coat.alpha_v, d.alpha_v);
+    s.wi = reflect_at(from, microfacet_visible(d, from, uv));
+    real x = s.wi.x * c.bend, y = s.wi.y * c.bend, z2 = 1.0f - x * x - y * y;
+    kept = kept & (!metal | ((s.wi.z > 0.0f) & (z2 > 0.0f)));
+    s.wi = sel3(metal, normalize3(v3(x, y, sqrt_r(z2))), s.wi);
+    s.wi = sel3(coat | metal, s.wi, cosine_hemisphere(uv));
+    s.pdf = sel(kept, coated_conductor_density(m, c, wo, s.wi, t_mean), (real)(0.0f));
+    Spectrum f = coated_conductor_value(m, c, wo, s.wi, t);
+    s.weight = spectrum_scale(f, sel(s.pdf > 0.0f, 1.0f / s.pdf, (real)(0.0f)));
+    return s;
+}
+
+Spectrum coated_conductor_albedo(CoatedConductor m) { return coated_conductor_fresnel(m, (real)(1.0f)); }
