@@ -224,7 +224,7 @@ class CoatedConductor(Material):
     eta: Any = index(0.0, "index of refraction of the metal; the default is a perfect mirror")
     k: Any = index(1.0, "extinction coefficient of the metal")
     distribution: str = choice("ggx", "of both their microfacet normals", DISTRIBUTIONS)
-    alpha_u: Any = real(0.1, "the metal's roughness along the tangent", "", 1e-4, 1.0, textured=True)
+    alpha_u: Any = real(0.1, "the metal's roughness along tangents", "", 1e-4, 1.0, textured=True)
     alpha_v: Any = real(0.1, "the metal's roughness across it", "", 1e-4, 1.0, textured=True)
     specular_reflectance: Any = reflectance(1.0, "factor on the metal's reflection; 1 is physical")
 
