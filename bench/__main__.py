@@ -23,6 +23,7 @@ PARTS = {
     "renders": (),
     "spectral": (),
     "effects": (),
+    "lights": (),
     "startup": (),
 }
 

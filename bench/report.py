@@ -105,6 +105,7 @@ TABLES: dict[str, Callable[[Sequence[Row]], str]] = {
     "renders": renders,
     "spectral": plain,
     "effects": plain,
+    "lights": plain,
     "startup": startup,
     "traversal": plain,
     "building": plain,

@@ -203,13 +203,13 @@ def _costs(own: Bounds, power: Floats, key: NDArray[np.int64], k: int) -> Floats
     cones[present] = around(Cones.of(own[sort]), starts)
     sums = np.bincount(key, power, k * BINS).reshape(shape)
     number = np.bincount(key, minlength=k * BINS).reshape(shape)
-    low, high = low.reshape(*shape, 3), high.reshape(*shape, 3)
+    boxes = low.reshape(*shape, 3), high.reshape(*shape, 3)
     total = np.zeros((k, BINS - 1))
     empty = np.zeros((k, BINS - 1), bool)
     for step in (1, -1):
         span = slice(None, None, step)
-        lows = np.minimum.accumulate(low[:, span], axis=1)
-        highs = np.maximum.accumulate(high[:, span], axis=1)
+        lows = np.minimum.accumulate(boxes[0][:, span], axis=1)
+        highs = np.maximum.accumulate(boxes[1][:, span], axis=1)
         reach = np.maximum(highs - lows, 0.0)
         area = (reach * np.roll(reach, 1, axis=2)).sum(axis=2) + 1e-6 * reach.max(axis=2) ** 2
         counts = np.cumsum(number[:, span], axis=1)

@@ -17,6 +17,7 @@ from clpt.errors import SceneError
 from clpt.records import LIGHT, SHAPE
 from clpt.render import light_bounds, light_tree, shapes
 from clpt.render.lamps import INFINITE, RECORDS, Sink, blank_row, brightness, lower_lamp
+from clpt.render.triangle_means import triangle_means
 from clpt.scene.lights import DirectionalArea, Light
 from clpt.scene.shapes import Shape
 
@@ -30,14 +31,15 @@ KINDS = (*RECORDS, *shapes.RECORDS)  # LightRow.kind is a position in this tuple
 class Emitter:
     """A shape with an `emission`.
 
-    shape_row: its row in `shapes`; vertices, faces: its triangles as `shapes.triangles` gave them,
-    needed for a mesh and a cube.
+    shape_row: its row in `shapes`; vertices, faces, uvs: its triangles as `shapes.triangles` gave
+    them, needed for a mesh and a cube.
     """
 
     shape: Shape
     shape_row: int
     vertices: shapes.Points | None = None
     faces: shapes.Faces | None = None
+    uvs: shapes.Points | None = None
 
 
 @dataclass(frozen=True)
@@ -136,13 +138,13 @@ def _emitter_block(emitter: Emitter, tables: Sink) -> Block:
     way = ALONG if along else BOTH if emission.two_sided else FRONT
     value = emission.irradiance if along else emission.radiance
     radiance = tables.append("lamps", tables.emission_words(value))
-    strength = {FRONT: np.pi, ALONG: 1.0, BOTH: 2.0 * np.pi}[way] * brightness(value)
+    strength = {FRONT: np.pi, ALONG: 1.0, BOTH: 2.0 * np.pi}[way]
     if _whole(shape):
         at = tables.append("geometry", shapes.row(shape))
         rows = _block(1, shape.kind, at, radiance, emitter.shape_row)
         rows["way"] = way
         bounds = light_bounds.of_shape(shape, way == BOTH)
-        return Block(rows, np.array([strength * shapes.area(shape)]), bounds)
+        return Block(rows, np.array([strength * shapes.area(shape) * brightness(value)]), bounds)
     if emitter.vertices is None or emitter.faces is None:
         raise SceneError("its triangles are missing", where=shapes.where(shape))
     geometry = shapes.triangle_rows(emitter.vertices, emitter.faces)
@@ -151,7 +153,9 @@ def _emitter_block(emitter: Emitter, tables: Sink) -> Block:
     rows = _block(count, "triangle", at, radiance, emitter.shape_row)
     rows["way"] = way
     bounds = light_bounds.of_triangles(emitter.vertices, emitter.faces, way == BOTH)
-    return Block(rows, strength * shapes.triangle_areas(emitter.vertices, emitter.faces), bounds)
+    bright = triangle_means(value, emitter.uvs, emitter.faces)
+    areas = shapes.triangle_areas(emitter.vertices, emitter.faces)
+    return Block(rows, strength * areas * bright, bounds)
 
 
 def _shared(weights: np.ndarray, infinite: int) -> np.ndarray:

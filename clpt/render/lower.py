@@ -30,7 +30,7 @@ from clpt.spectra.cie import tanh_ends
 SHAPE_NORMALS, SHAPE_UVS, SHAPE_TWO_SIDED, SHAPE_ONE_LIGHT = 1, 2, 4, 8
 MIXTURE = 0xFF
 FEW_LIGHTS = 256  # up to which one random number chooses a light and a point on it
-TREE_FROM = 64  # lights from which a tree chooses among them
+TREE_FROM = 16  # lights from which a tree chooses among them, see bench/lights.py
 CLEAR = Constant(0.0)  # absorption of what absorbs nothing
 DEEPEST = 4000  # path state has 12 bits for the depth
 LONGEST_ROW = max(row_words(cls) for cls in mt.LEAVES)
@@ -205,14 +205,14 @@ class _Lowering:
         row["light"] = -1
         front, back, row["flags"] = self._sides(shape)
         row["front"], row["back"] = np.array([front, back], np.uint32).view(np.int32)
-        triangles: tuple[Any, Any] = (None, None)
+        triangles: tuple[Any, Any, Any] = (None, None, None)
         self.owners.append((row, shape, self.n_vertices, self.n_faces))
         if shape.kind in shapes.ANALYTIC:
             row["kind"] = 1 + shapes.ANALYTIC.index(shape.kind)
             row["params"] = self.tables.append("geometry", shapes.row(shape))
         else:
             vertices, faces, normals, uvs = shapes.triangles(shape, self.warnings)
-            triangles = vertices, faces
+            triangles = vertices, faces, uvs
             row["prim"] = self.n_faces
             row["flags"] |= self._attributes(vertices, normals, uvs)
             self.triangles.append((vertices, faces + np.uint32(self.n_vertices), number))

@@ -117,7 +117,7 @@ def lit(
     for number, shape in enumerate(emitters):
         row = np.zeros(1, SHAPE.dtype)
         row["prim"] = first
-        vertices = faces = None
+        vertices = faces = uvs = None
         if shape.kind not in shapes.ANALYTIC:
             vertices, faces, _, uvs = shapes.triangles(shape)
             base = tables.size("uvs") // 2
@@ -125,7 +125,7 @@ def lit(
             tables.append_floats("uvs", np.zeros((len(vertices), 2)) if uvs is None else uvs)
             row["flags"] = 0 if uvs is None else 2
             first += len(faces)
-        made.append((row, lights.Emitter(shape, number, vertices, faces)))
+        made.append((row, lights.Emitter(shape, number, vertices, faces, uvs)))
     emitting = [emitter for _, emitter in made]
     rows = lights.light_rows(lamps, emitting, tables, radius, 1 if tree else None)
     for (row, _), at in zip(made, rows.first, strict=True):
