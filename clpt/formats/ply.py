@@ -48,12 +48,16 @@ class Element:
 
 @dataclass
 class Triangles:
-    """vertices (n, 3), faces (m, 3) int64, normals (n, 3) or None, uvs (n, 2) or None."""
+    """vertices (n, 3), faces (m, 3) int64, normals (n, 3) or None, uvs (n, 2) or None.
+
+    columns: further numbers of each "vertex" and "face" by name; a polygon's are one for its fan.
+    """
 
     vertices: NDArray[np.float32]
     faces: NDArray[np.int64]
-    normals: NDArray[np.float32] | None = None
-    uvs: NDArray[np.float32] | None = None
+    normals: NDArray[np.float32] | None
+    uvs: NDArray[np.float32] | None
+    columns: dict[str, dict[str, NDArray[Any]]]
     notes: list[str] = field(default_factory=list)
 
 
@@ -66,7 +70,7 @@ def read(path: Path) -> Triangles:
             return _triangles(_ascii(data, elements, start))
         return _triangles(_binary(data, elements, start, order))
     except SceneError as error:
-        raise SceneError(f"is not readable as PLY: {error.message}", file=path) from None
+        raise SceneError(f"cannot be read as a .ply mesh: {error.message}", file=path) from None
 
 
 def _header(data: bytes) -> tuple[str, list[Element], int]:
@@ -229,20 +233,25 @@ def _ascii_rows(words: NDArray[np.float64], element: Element) -> tuple[dict[str,
 def _triangles(tables: dict[str, dict[str, Any]]) -> Triangles:
     vertex, face = tables.get("vertex"), tables.get("face")
     if vertex is None or not all(name in vertex for name in "xyz"):
-        raise SceneError("it has no vertices")
+        raise SceneError("it holds no triangles")
     corners = next((face[name] for name in CORNERS if name in face), None) if face else None
     if corners is None:
-        raise SceneError("it has no faces")
-    notes = ["vertex colours left out"] if "red" in vertex else []
-    if face and "texcoord" in face:
-        notes.append("texture coordinates of faces left out")
+        raise SceneError("it holds no triangles")
     uvs = next((pair for pair in UVS if all(name in vertex for name in pair)), None)
+    normals = NORMAL if all(name in vertex for name in NORMAL) else None
+    tables = {"vertex": vertex, "face": face or {}}
+    known = {*"xyz", *(normals or ()), *(uvs or ())}
+    columns = {
+        table: {k: v for k, v in values.items() if k not in known and isinstance(v, np.ndarray)}
+        for table, values in tables.items()
+    }
     return Triangles(
         vertices=_columns(vertex, "xyz"),
         faces=_fans(*corners),
-        normals=_columns(vertex, NORMAL) if all(name in vertex for name in NORMAL) else None,
+        normals=None if normals is None else _columns(vertex, normals),
         uvs=None if uvs is None else _columns(vertex, uvs),
-        notes=notes,
+        columns=columns,
+        notes=["texture coordinates of faces left out"] if "texcoord" in tables["face"] else [],
     )
 
 

@@ -141,7 +141,7 @@ def test_load_refuses_what_is_not_there(tmp_path):
     for name, message in {
         "no.obj": "no such file",
         "\0": "no such file|cannot be read",
-        "": "no scene.json",
+        "": "none of scene.json",
     }.items():
         with pytest.raises(SceneError, match=message):
             load(f"{tmp_path}/{name}")
