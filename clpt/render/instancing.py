@@ -130,8 +130,9 @@ def _matrices(instances: Sequence[Shape]) -> Matrices:
         found = np.stack([np.asarray(one.to_world, np.float64) for one in instances])
         affine = found.shape[1:] == (4, 4) and (found[:, 3] == transforms.IDENTITY[3]).all()
         linear = found[:, :3, :3]
-        lengths = np.linalg.norm(linear, axis=1)
-        volume = np.abs(np.linalg.det(linear)) / lengths.prod(axis=1)
+        with np.errstate(all="ignore"):
+            lengths = np.linalg.norm(linear, axis=1)
+            volume = np.abs(np.linalg.det(linear)) / lengths.prod(axis=1)
         if affine and np.isfinite(found).all() and (volume >= transforms.SINGULAR_BELOW).all():
             return found
     except (TypeError, ValueError, IndexError):
@@ -202,9 +203,11 @@ def _boxes(points: shapes.Points, linear: Matrices, rows: NDArray[Any]) -> NDArr
     """A box (2, 3) around points under each matrix, a little larger than what rays meet."""
     boxes = np.empty((len(rows), 2, 3))
     step = max(1, POINTS // len(points))
+    columns = np.ascontiguousarray(points.T, np.float64)
     for i in range(0, len(rows), step):
-        moved = points @ linear[i : i + step].transpose(0, 2, 1)
-        boxes[i : i + step, 0], boxes[i : i + step, 1] = moved.min(axis=1), moved.max(axis=1)
+        for axis in range(3):
+            moved = linear[i : i + step, axis] @ columns
+            boxes[i : i + step, :, axis] = np.stack([moved.min(axis=1), moved.max(axis=1)], axis=1)
     origin = rows["origin"].astype(np.float64)[:, None]
     pad = ROUNDING * (np.abs(boxes).max(axis=(1, 2)) + np.abs(origin).max(axis=(1, 2)))
     boxes += origin

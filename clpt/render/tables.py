@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,12 @@ RGB_ROLES: dict[str, Role] = {
     "coefficient": "unbounded",
 }
 Words = NDArray[np.uint32]
+
+
+@lru_cache(maxsize=1 << 16)
+def _uplifted(value: RGB) -> tuple[float, ...]:
+    """The coefficients of a colour; scenes of many materials have few."""
+    return tuple(spectra.uplift(value.to_rgb()).tolist())
 
 
 def as_words(values: ArrayLike) -> Words:
@@ -157,7 +164,7 @@ class Tables:
         if isinstance(value, Constant):
             words[:4] = as_words([0.0, 0.0, ONE, value.value])
         elif type(value) is RGB:
-            words[:4] = as_words([*spectra.uplift(value.to_rgb()), 1.0])
+            words[:4] = as_words([*_uplifted(value), 1.0])
         else:
             words[3] = as_words([1.0])[0]
             words[4] = np.int32(-1 - self.spectra_row(value)).view(np.uint32)

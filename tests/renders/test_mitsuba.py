@@ -19,8 +19,8 @@ mi = pytest.importorskip("mitsuba", reason="the renderer that we compare with is
 pytestmark = pytest.mark.peers
 
 SCENES = (
-    "cornell", "delta_lights", "envmap", "glass_metal", "light_tracing", "orthographic", "plastic",
-    "spectra", "textures", "thin_lens",
+    "cornell", "delta_lights", "envmap", "glass_metal", "instances", "light_tracing",
+    "orthographic", "plastic", "spectra", "textures", "thin_lens",
 )  # fmt: skip
 # Mitsuba's envmap is up to a quarter off its own RGB picture in spectral mode, where texels are
 # saturated; tests/renders/test_spectral.py holds ours to the RGB picture instead.
@@ -28,7 +28,7 @@ CASES = [(name, mode) for name in SCENES for mode in ("rgb", "spectral")]
 CASES.remove(("envmap", "spectral"))
 CASES.remove(("spectra", "rgb"))  # of black bodies Mitsuba has no colour
 # The rest is left to the sweep of many samples.
-LEFT = [("plastic", "rgb"), ("textures", "rgb"), ("orthographic", "rgb")]
+LEFT = [("instances", "spectral"), ("plastic", "rgb"), ("textures", "rgb"), ("orthographic", "rgb")]
 QUICK = [case for case in CASES if case not in LEFT]
 MEAN_WITHIN = 0.015  # relative; at a quick test's number of samples most of it is noise
 COLOURS = 2e-3  # relative; the steps of the two programs' colour tables differ
