@@ -119,7 +119,7 @@ def _by_kind(things: Iterable[Kind], base: type[Kind]) -> dict[str, int]:
 
 def _film(scene: Scene) -> dict[str, Any]:
     film = scene.film
-    size = {"width": film.width, "height": film.height}
+    size = dict(zip(("width", "height"), film.size, strict=True))
     return {**size, "mode": film.mode, "filter": film.filter.kind}
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +39,7 @@ def checked(paths: tuple[Path, ...], scene: Scene) -> list[Path]:
 def metadata(renderer: Renderer, scene: Path, seconds: float) -> dict[str, str | int | float]:
     """What an .exr tells about how it was made. spp is the mean over all pixels."""
     plan = renderer.scene
-    pixels = plan.film.width * plan.film.height * len(renderer.wavefronts)
+    pixels = math.prod(plan.film.size) * len(renderer.wavefronts)
     return {
         "software": f"clpt {__version__}",
         "scene": str(scene),

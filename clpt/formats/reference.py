@@ -205,6 +205,8 @@ def _host(name: str, value: Any) -> str:
         "attributes": "object of rows of 1 or 3 numbers by name",
         "emission": "`area` or `directional_area` light",
         "back": "material",
+        "crop": "four whole numbers",
+        "map": "`bitmap` texture",
         "group": "a name in `groups`",
         "sensor": '`cie1931`, `cie1964`, `{"file": name}` or `{"curves": [three spectra]}`,'
         " the latter two perhaps with a `matrix`",

@@ -168,6 +168,11 @@ def _host(name: str, value: Any) -> Schema:
         return {"anyOf": [lights, kelvin, {**NUMBERS, "minItems": 2, "maxItems": 2}]}
     if name == "emission":
         return {"anyOf": [_ref("light"), {"type": "null"}]}
+    if name == "crop":
+        whole = {"type": "integer", "minimum": 0}
+        return {"type": "array", "items": whole, "minItems": 4, "maxItems": 4}
+    if name == "map":
+        return _ref("texture")
     if name == "group":
         return {"type": "string"}
     if name == "back" or isinstance(value, materials.Material):

@@ -59,11 +59,11 @@ class Bend:
         """Return the WORDS words, and put the textures into the tables."""
         made = np.zeros(WORDS, np.uint32)
         flags = INSIDE if self.inside else 0
-        if self.normal is not None and self.normal.normals is not None:
+        if self.normal is not None and self.normal.map is not None:
             flags |= NORMAL | _flags(self.normal) | (ALONG_V if self.normal.along_v else 0)
             made[1] = np.float32(self.normal.scale).view(np.uint32)
             for i, channel in enumerate("rgb"):
-                image = _channel(self.normal.normals, channel)
+                image = _channel(self.normal.map, channel)
                 made[3 + 2 * i : 5 + 2 * i] = _real(image, tables)
         if self.bump is not None:
             flags |= HEIGHT | _flags(self.bump)

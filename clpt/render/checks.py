@@ -41,7 +41,7 @@ def check(scene: Scene) -> None:
         for name, plain in (("sensor", "cie1931"), ("bands", 0)):
             if getattr(scene.film, name) != plain:
                 raise SceneError("needs the mode spectral", where=f"film.{name}")
-    width, height = scene.film.width, scene.film.height
+    width, height = scene.film.size
     if width * height > LARGEST:
         raise SceneError(f"{width}x{height} are more than {LARGEST >> 20} Mi pixels", where="film")
     _check_light_paths(scene)

@@ -9,13 +9,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt.errors import SceneError
-from clpt.scene.integrators import BlackmanHarris, Box, Filter, Gaussian, Mitchell, Tent
+from clpt.scene.integrators import (
+    BlackmanHarris,
+    Box,
+    Filter,
+    Gaussian,
+    Lanczos,
+    Mitchell,
+    Tent,
+)
 
 Values = NDArray[np.float64]
 
 CELLS = 1024  # of equal probability, on one side
 STEPS = 1 << 16  # in which a filter is integrated
-CUT = 4.0  # standard deviations at which a Gaussian ends
+CUT = 4.0  # standard deviations at which a Gaussian ends that has no radius
 
 
 class Sink(Protocol):
@@ -35,10 +43,8 @@ def lower_filter(chosen: Filter, tables: Sink) -> None:
 
 def radius(chosen: Filter) -> float:
     """Return the half width of a filter [pixels]."""
-    if isinstance(chosen, Gaussian):
+    if isinstance(chosen, Gaussian) and chosen.radius == 0.0:
         return CUT * chosen.stddev
-    if isinstance(chosen, Mitchell):
-        return 2.0
     return float(chosen.radius)  # type: ignore[attr-defined]
 
 
@@ -78,15 +84,21 @@ def _tent(chosen: Tent, x: Values) -> Values:
 
 def _gaussian(chosen: Gaussian, x: Values) -> Values:
     """Lowered by its value at the radius, so that it ends at zero."""
-    return np.exp(-0.5 * (x / chosen.stddev) ** 2) - np.exp(-0.5 * CUT**2)
+    end = radius(chosen) / chosen.stddev
+    return np.exp(-0.5 * (x / chosen.stddev) ** 2) - np.exp(-0.5 * end**2)
 
 
 def _mitchell(chosen: Mitchell, x: Values) -> Values:
     """Mitchell and Netravali 1988 eq. 8."""
-    b, c = chosen.b, chosen.c
+    b, c, x = chosen.b, chosen.c, x * (2.0 / chosen.radius)
     near = (12 - 9 * b - 6 * c) * x**3 + (-18 + 12 * b + 6 * c) * x**2 + (6 - 2 * b)
     far = (-b - 6 * c) * x**3 + (6 * b + 30 * c) * x**2 + (-12 * b - 48 * c) * x + (8 * b + 24 * c)
     return np.where(x < 1.0, near, far) / 6.0
+
+
+def _lanczos(chosen: Lanczos, x: Values) -> Values:
+    """Windowed by the main lobe of a sinc `lobes` wide (Duchon 1979)."""
+    return np.sinc(x) * np.sinc(x / chosen.lobes)
 
 
 def _blackman_harris(chosen: BlackmanHarris, x: Values) -> Values:
@@ -100,5 +112,6 @@ FUNCTIONS: dict[type[Filter], Callable[..., Values]] = {
     Tent: _tent,
     Gaussian: _gaussian,
     Mitchell: _mitchell,
+    Lanczos: _lanczos,
     BlackmanHarris: _blackman_harris,
 }

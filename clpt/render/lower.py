@@ -353,9 +353,12 @@ class _Lowering:
         scene, film = self.scene, self.scene.film
         integrator = scene.integrator
         settings = np.zeros((), SETTINGS.dtype)
-        settings["width"], settings["height"] = film.width, film.height
-        settings["tiles_x"] = -(-film.width // 4)
-        settings["places"] = 16 * settings["tiles_x"] * -(-film.height // 4)
+        width, height = film.size
+        settings["width"], settings["height"] = width, height
+        settings["crop_x"], settings["crop_y"] = (0, 0) if film.crop is None else film.crop[:2]
+        settings["film_width"], settings["film_height"] = film.width, film.height
+        settings["tiles_x"] = -(-width // 4)
+        settings["places"] = 16 * settings["tiles_x"] * -(-height // 4)
         settings["seed"] = scene.seed % 2**32
         depth: int = {"direct": 2, "aov": 1}.get(integrator.kind, 0)
         depth = depth or getattr(integrator, "max_depth", -1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import time
 from collections.abc import Callable
 from typing import Any
@@ -78,7 +79,7 @@ class Renderer:
         def tell(_: Any) -> bool:
             counts = [w.counts for w in self.wavefronts]
             paths = sum(c.samples for c in counts)
-            pixels = self.scene.film.width * self.scene.film.height * len(counts)
+            pixels = math.prod(self.scene.film.size) * len(counts)
             seconds = time.perf_counter() - start
             rays = sum(c.rays for c in counts)
             return progress is None or progress(Progress(paths / pixels, end, paths, rays, seconds))

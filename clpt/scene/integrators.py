@@ -136,17 +136,27 @@ class Tent(Filter):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Gaussian(Filter):
-    """A bell, cut off at four standard deviations."""
+    """A bell, lowered so that it ends at zero."""
 
     stddev: float = real(0.5, "standard deviation", "pixels", 0.01, 4.0)
+    radius: float = real(0.0, "half width; 0: four standard deviations", "pixels", 0.0, 16.0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Mitchell(Filter):
-    """Mitchell and Netravali 1988, with negative lobes; radius 2."""
+    """Mitchell and Netravali 1988, with negative lobes."""
 
     b: float = real(1 / 3, "blur")
     c: float = real(1 / 3, "ringing")
+    radius: float = real(2.0, "half width", "pixels", 0.01, 16.0)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Lanczos(Filter):
+    """The sinc function under a window, the middle of a wider one; with negative lobes."""
+
+    radius: float = real(3.0, "half width", "pixels", 0.01, 16.0)
+    lobes: float = real(3.0, "where the window would end", "pixels", 0.01, 16.0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -169,6 +179,9 @@ class Film(Kind):
 
     width: int = host(768, "pixels")
     height: int = host(576, "pixels")
+    crop: Any = host(
+        None, "part that is rendered: (x, y, width, height), from the upper left", "pixels"
+    )
     mode: str = choice("spectral", "what light is made of", ("spectral", "rgb"))
     filter: Filter = host(Box(), "pixel filter")
     lambda_min: float = real(360.0, "shortest wavelength", "nm", 200.0, 2000.0)
@@ -187,6 +200,11 @@ class Film(Kind):
     exposure: float = real(1.0, "factor on the picture, of bands too", low=0.0)
 
     @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the picture [pixels]."""
+        return (self.width, self.height) if self.crop is None else self.crop[2:]
+
+    @property
     def band_centres(self) -> np.ndarray:
         """The wavelengths in the middle of the bands (bands,) float64 [nm]."""
         ends = np.linspace(self.lambda_min, self.lambda_max, self.bands + 1)
@@ -197,6 +215,8 @@ class Film(Kind):
             size = getattr(self, name)
             if isinstance(size, bool) or not isinstance(size, int) or not 1 <= size <= 65536:
                 raise SceneError(f"must be 1 to 65536, not {size!r}", where=f"film.{name}")
+        if self.crop is not None:
+            object.__setattr__(self, "crop", self._checked_crop())
         if self.lambda_min >= self.lambda_max:
             raise SceneError("must be below lambda_max", where="film.lambda_min")
         whole = isinstance(self.bands, int) and not isinstance(self.bands, bool)
@@ -208,6 +228,18 @@ class Film(Kind):
             known = f"{', '.join(OBSERVERS)}, nor a Sensor"
             raise SceneError(f"{self.sensor!r} is none of {known}", where="film.sensor")
         object.__setattr__(self, "white_balance", _white_balance(self.white_balance))
+
+    def _checked_crop(self) -> tuple[int, int, int, int]:
+        """The crop as whole numbers. Raises SceneError where it does not lie in the film."""
+        given = tuple(self.crop)
+        if len(given) != 4 or any(isinstance(n, bool) or not isinstance(n, int) for n in given):
+            raise SceneError(f"must be four whole numbers, not {self.crop!r}", where="film.crop")
+        x, y, width, height = given
+        fits = min(x, y) >= 0 and x + width <= self.width and y + height <= self.height
+        if not fits or min(width, height) < 1:
+            film = f"{self.width}x{self.height}"
+            raise SceneError(f"{given} does not lie in the film of {film}", where="film.crop")
+        return x, y, width, height
 
 
 def _white_balance(given: Any) -> Any:
@@ -235,4 +267,4 @@ def _white_balance(given: Any) -> Any:
 
 KINDS = (Path, Direct, Whitted, ParticleTracer, Aov)
 SAMPLERS = (Sobol, Independent)
-FILTERS = (Box, Tent, Gaussian, Mitchell, BlackmanHarris)
+FILTERS = (Box, Tent, Gaussian, Mitchell, Lanczos, BlackmanHarris)

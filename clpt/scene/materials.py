@@ -473,12 +473,12 @@ class Bent(Material):
 class NormalMap(Bent):
     """Takes the shading normal from an image, relative to that of the surface."""
 
-    normals: Any = host(None, "bitmap, read raw; its colours are (x, y, z) / 2 + 1/2; None: none")
+    map: Any = host(None, "bitmap, read raw; its colours are (x, y, z) / 2 + 1/2; None: none")
     along_v: bool = flag(False, "y of the map goes along v even where uv are mirrored, as in glTF")
 
     def check(self) -> None:
-        if self.normals is not None and getattr(self.normals, "kind", "") != "bitmap":
-            raise SceneError(f"must be a bitmap, not {self.normals!r}", where="normal_map.normals")
+        if self.map is not None and getattr(self.map, "kind", "") != "bitmap":
+            raise SceneError(f"must be a bitmap, not {self.map!r}", where="normal_map.map")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

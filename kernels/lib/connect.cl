@@ -7,7 +7,7 @@
  * that comes from area dA at distance t, under the angle theta to the camera's axis, that is the
  * integral of L importance |cos| dA over the number of pixels: importance = 1 / (film t^2 cos^3 theta), as
  * dA |cos| / t^2 is a solid angle, 1 / cos^3 turns it into an area of the plane at distance 1, and
- * `film` is what the film covers there (Pharr et al. 2023, 5.4 on We; for a point at infinity t = 1).
+ * `film` is what the picture covers there (Pharr et al. 2023, 5.4 on We; for a point at infinity t = 1).
  */
 #include "lib/warp.cl"
 
@@ -30,12 +30,14 @@ inline CameraPoint camera_nowhere(void)
     return c;
 }
 
-/* The place of the film at a position in [0, 1), x and y; -1 outside. */
+/* The place at a position of the whole film in [0, 1), x and y; -1 outside of the picture. */
 inline integer film_place(global const Settings *settings, real x, real y)
 {
-    mask inside = (x >= 0.0f) & (x < 1.0f) & (y >= 0.0f) & (y < 1.0f);
-    integer i = min_i(to_integer(sel(inside, x, (real)(0.0f)) * (float)settings->width), (integer)(settings->width - 1));
-    integer j = min_i(to_integer(sel(inside, y, (real)(0.0f)) * (float)settings->height), (integer)(settings->height - 1));
+    x = x * (float)settings->film_width - (float)settings->crop_x;
+    y = y * (float)settings->film_height - (float)settings->crop_y;
+    mask inside = (x >= 0.0f) & (x < (float)settings->width) & (y >= 0.0f) & (y < (float)settings->height);
+    integer i = min_i(to_integer(sel(inside, x, (real)(0.0f))), (integer)(settings->width - 1));
+    integer j = min_i(to_integer(sel(inside, y, (real)(0.0f))), (integer)(settings->height - 1));
     integer place = ((j >> 2) * settings->tiles_x + (i >> 2)) * 16 + (j & 3) * 4 + (i & 3);
     return sel_i(inside, place, (integer)(-1));
 }
@@ -59,6 +61,8 @@ inline CameraPoint pinhole_connect(global const Settings *settings, global const
     c.d = normalize3(matrix_vector(m, d.x, d.y, d.z));
     c.t = sel(away, (real)(FAR), length * (1.0f - start));
     c.pixel = sel_i(seen, film_place(settings, x, y), (integer)(-1));
-    c.importance = length / (z * z * z * (extent[0] * extent[1]));
+    float cropped = ((float)settings->film_width * (float)settings->film_height) /
+                    ((float)settings->width * (float)settings->height);
+    c.importance = length * cropped / (z * z * z * (extent[0] * extent[1]));
     return c;
 }

@@ -13,6 +13,14 @@ inline vec2 place_pixel(global const Settings *settings, integer place)
     return p;
 }
 
+/* A point of the whole film, 0 to 1: `offset` [pixels] from the centre of a pixel of the picture. */
+inline vec2 film_position(global const Settings *settings, vec2 pixel, vec2 offset)
+{
+    vec2 p = {(pixel.x + (settings->crop_x + 0.5f) + offset.x) / (float)settings->film_width,
+              (pixel.y + (settings->crop_y + 0.5f) + offset.y) / (float)settings->film_height};
+    return p;
+}
+
 /* `place`, or the first one after it in steps of `step` whose pixel lies inside the film. */
 inline integer place_inside(global const Settings *settings, integer place)
 {

@@ -104,7 +104,7 @@ kernel APART void generate(SLAB_ARGS, SCENE_ARGS, global float *film BAND_ARGS, 
         Sampler sampler = sampler_start(settings->seed, as_natural(place), as_natural(sample));
         vec2 offset;
         filter_sample(scene, sampler_pair(sampler, (natural)(DIMENSION_FILM)), &offset, &weight);
-        vec2 position = {(pixel.x + 0.5f + offset.x) / (float)settings->width, (pixel.y + 0.5f + offset.y) / (float)settings->height};
+        vec2 position = film_position(settings, pixel, offset);
         lambdas = wavelengths_sample(scene, sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH)).x);
         CameraRay ray = camera_ray(scene, position, sampler_pair(sampler, (natural)(DIMENSION_LENS)), lambdas);
         store_path_weight(path, at, go, weight);

@@ -35,8 +35,9 @@ def film(folder: Path, **given: object) -> Film:
         Film(sensor=CAMERA, white_balance=3200.0),
         Film(sensor=Sensor((RAMP, RAMP, RAMP)), white_balance=(0.31, 0.33)),
         Film(white_balance="D65"),
+        Film(width=40, height=30, crop=(8, 4, 24, 16)),
     ],
-    ids=["default", "names", "camera", "fitted", "white"],
+    ids=["default", "names", "camera", "fitted", "white", "crop"],
 )
 def test_saved_and_loaded(made: Film, tmp_path: Path) -> None:
     native.save(Scene(camera=Perspective(), film=made), tmp_path / "scene.json")

@@ -30,7 +30,7 @@ def tilted(x: float, y: float, **more: object) -> m.NormalMap:
     """A normal map that is the same everywhere; x and y of a unit normal."""
     n = np.array([x, y, np.sqrt(1.0 - x * x - y * y)])
     image = np.tile(np.float32(n / 2 + 0.5), (2, 2, 1))
-    return m.NormalMap(material=WHITE, normals=Bitmap(image=image, raw=True), **more)
+    return m.NormalMap(material=WHITE, map=Bitmap(image=image, raw=True), **more)
 
 
 def ramp(du: float, dv: float) -> m.BumpMap:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from clpt import transforms as tf
 from clpt.render.filters import FUNCTIONS
 from clpt.scene import Film, Scene, cameras
 from clpt.scene.integrators import (
+    Aov,
     BlackmanHarris,
     Box,
     Filter,
@@ -115,3 +118,21 @@ def test_an_edge(pixel_filter: Filter) -> None:
     integral = np.cumsum(values) / values.sum()
     centres = np.arange(12) + 0.5 - 6.0  # the rectangle lies on the right
     np.testing.assert_allclose(profile, np.interp(centres, x, integral), atol=4e-3)
+
+
+def test_a_crop_is_a_part_of_the_whole() -> None:
+    """Positions seen through the middle of pixels."""
+    ground = Rectangle(to_world=tf.scale(10.0))
+    view = tf.look_at([1, 2, 5], [0, 0, 0], [0, 1, 0])
+    whole = Film(width=24, height=16, filter=Box(radius=0.01), mode="rgb")
+    scene = Scene(
+        camera=cameras.Perspective(to_world=view, fov=40.0, offset_x=0.1),
+        shapes=[ground],
+        integrator=Aov(channels=("position",)),
+        film=whole,
+    )
+    x, y, width, height = crop = (5, 2, 14, 9)
+    part = dataclasses.replace(scene, film=dataclasses.replace(whole, crop=crop))
+    seen = clpt.render(scene, 4)[y : y + height, x : x + width]
+    assert clpt.render(part, 4).shape == (height, width, 3)
+    np.testing.assert_allclose(clpt.render(part, 4), seen, atol=5e-3)

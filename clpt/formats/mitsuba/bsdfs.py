@@ -208,7 +208,7 @@ def _normal_map(props: Properties) -> Parameters:
     child = props.take("normalmap")
     if child is None:
         raise props.element.error("needs the texture 'normalmap'")
-    return {**given, "normals": texture(props.context.resolve(child), props)}
+    return {**given, "map": texture(props.context.resolve(child), props)}
 
 
 def _bump_map(props: Properties) -> Parameters:

@@ -162,10 +162,12 @@ def _film(element: Element, context: Context) -> Film:
     # How a file is stored is decided when it is written.
     props.ignore("file_format", "pixel_format", "component_format", "sample_border", "compensate")
     child = props.object("rfilter")
+    width, height = props.integer("width", 768, 1), props.integer("height", 576, 1)
     with placed(element):
         film = Film(
-            width=props.integer("width", 768, 1),
-            height=props.integer("height", 576, 1),
+            width=width,
+            height=height,
+            crop=_crop(props, width, height),
             filter=integrators.Gaussian() if child is None else _filter(child, context),
             **(_own_film(props) if element.type == "clptfilm" else {}),
         )
@@ -204,6 +206,7 @@ def _filter(element: Element, context: Context) -> Filter:
             b=props.number("b", 1 / 3), c=props.number("c", 1 / 3)
         ),
         "catmullrom": lambda: integrators.Mitchell(b=0.0, c=0.5),
+        "lanczos": lambda: _lanczos(float(props.integer("lobes", 3, 1))),
     }
     if element.type not in makers:
         raise UnknownKindError("rfilter", element.type, makers, **element.place())
@@ -211,6 +214,18 @@ def _filter(element: Element, context: Context) -> Filter:
         made = makers[element.type]()
     props.finish()
     return made
+
+
+def _lanczos(lobes: float) -> Filter:
+    return integrators.Lanczos(radius=lobes, lobes=lobes)
+
+
+def _crop(props: Properties, width: int, height: int) -> tuple[int, int, int, int] | None:
+    names = ("crop_offset_x", "crop_offset_y", "crop_width", "crop_height")
+    if not any(name in props.named for name in names):
+        return None
+    x, y = (props.integer(name, 0) for name in names[:2])
+    return x, y, props.integer(names[2], width - x, 1), props.integer(names[3], height - y, 1)
 
 
 def _sampler(element: Element | None, context: Context) -> tuple[Sampler, int, int]:

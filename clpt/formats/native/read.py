@@ -68,6 +68,8 @@ class _Reader:
         self.warnings: list[str] = []
         self.special: dict[str, Callable[[Cursor], Any]] = {
             "back": self.material,
+            "crop": lambda c: tuple(entry.integer() for entry in c.entries()),
+            "map": lambda c: self.kind(c, "texture"),
             "emission": self.emission,
             "group": self.group,
             "image": _image,

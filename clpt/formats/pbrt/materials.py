@@ -47,7 +47,7 @@ def _bumped(made: Material, params: Parameters, state: State) -> Material:
         raise SceneError("give either 'displacement' or 'normalmap', not both")
     if isinstance(height, Texture):
         return materials.BumpMap(material=made, height=height)
-    return materials.NormalMap(material=made, normals=normals(file, state)) if file else made
+    return materials.NormalMap(material=made, map=normals(file, state)) if file else made
 
 
 def _diffuse(params: Parameters, state: State) -> Material:
