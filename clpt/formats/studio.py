@@ -21,6 +21,7 @@ from clpt.spectra import RGBIlluminant
 
 FOV = 35.0
 EXACT = 1 << 25  # points of instances to place; of more, boxes are
+CHUNK = 1 << 18  # of them at a time
 MARGIN = 1.05
 FROM = (0.4, 0.35, 1.0)  # the camera, seen from the middle of the scene, +y up
 KEY_FROM = (-0.8, 1.3, 0.7)  # the key light, likewise
@@ -143,17 +144,20 @@ def _outlines(things: Sequence[shapes.Shape]) -> Iterator[NDArray[np.float64]]:
 
 
 def _placed_points(things: Sequence[shapes.Shape]) -> Iterator[NDArray[np.float64]]:
-    """Points (n, 3) around each instance: its group's, or the corners of a large one's box."""
-    found: dict[int, NDArray[np.float64]] = {}
-    placed = [thing for thing in things if isinstance(thing, shapes.Instance)]
-    for thing in placed:
-        if thing.group.shapes:
-            key = id(thing.group)
-            if key not in found:
-                points = np.concatenate(list(_outlines(thing.group.shapes)))
-                box = _box_corners(points.min(axis=0), points.max(axis=0))
-                found[key] = points if len(points) * len(placed) <= EXACT else box
-            yield transforms.transform_points(thing.to_world, found[key])
+    """Points (n, 3) around instances: those of groups, or the corners of boxes for very many."""
+    placed: dict[int, list[shapes.Instance]] = {}
+    for thing in things:
+        if isinstance(thing, shapes.Instance) and thing.group.shapes:
+            placed.setdefault(id(thing.group), []).append(thing)
+    for own in placed.values():
+        matrices = np.stack([np.asarray(thing.to_world, np.float64)[:3] for thing in own])
+        points = np.concatenate(list(_outlines(own[0].group.shapes)))
+        if len(points) * len(matrices) > EXACT:
+            points = _box_corners(points.min(axis=0), points.max(axis=0))
+        step = max(CHUNK // len(points), 1)
+        for first in range(0, len(matrices), step):
+            part = matrices[first : first + step]
+            yield (points @ part[:, :, :3].transpose(0, 2, 1) + part[:, None, :, 3]).reshape(-1, 3)
 
 
 def _box_corners(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -56,7 +57,8 @@ def load(path: Path, **variables: Any) -> Scene:
     scene.warnings = document.notes
     scene.extra["cameras"] = [camera.text("type") for _, camera in cameras.placed(graph)]
     if chosen:
-        scene.film = chosen[1]
+        width, height = chosen[1]
+        scene.film = dataclasses.replace(scene.film, width=width, height=height)
     return scene
 
 

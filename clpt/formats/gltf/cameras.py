@@ -12,6 +12,7 @@ from clpt.formats.gltf.nodes import Graph, Matrix
 from clpt.scene.cameras import Camera, Orthographic, Perspective
 from clpt.scene.integrators import Film
 
+Size = tuple[int, int]
 TURNED = np.diag([-1.0, 1.0, -1.0, 1.0])  # glTF looks along -z with +x to the right
 HEIGHT = Film().height
 FAR = 1e30  # where a file sets no far plane
@@ -24,8 +25,8 @@ def placed(graph: Graph) -> list[tuple[int, Element]]:
     return [(node, camera) for node, camera in found if camera is not None]
 
 
-def chosen(graph: Graph, name: str | None) -> tuple[Camera, Film] | None:
-    """Return a camera and a film of its shape, or None where the scene shows no camera.
+def chosen(graph: Graph, name: str | None) -> tuple[Camera, Size] | None:
+    """Return a camera and the size of a film of its shape, or None where the scene shows no camera.
 
     name: its number among those shown, its own name or its node's; the first one if None. Raises
     SceneError if there is no such one.
@@ -42,8 +43,8 @@ def chosen(graph: Graph, name: str | None) -> tuple[Camera, Film] | None:
     raise graph.document.root.error(f"shows no camera {name!r}; it shows: {names}")
 
 
-def camera(element: Element, node: Matrix) -> tuple[Camera, Film]:
-    """Return one camera and a film of its shape; a node's scale does not count for it."""
+def camera(element: Element, node: Matrix) -> tuple[Camera, Size]:
+    """Return one camera and the size of a film of its shape; a node's scale does not count for it."""
     kind = element.text("type", choices=("perspective", "orthographic"))
     lens = element.needed(kind)
     to_world = rigid(lens, node) @ TURNED
@@ -53,17 +54,17 @@ def camera(element: Element, node: Matrix) -> tuple[Camera, Film]:
             raise lens.error("xmag and ymag must not be 0")
         planes = _planes(lens, needed=True)
         to_world = to_world @ transforms.scale([x, x, 1.0])
-        return Orthographic(to_world=to_world, **planes), film(x / y)
+        return Orthographic(to_world=to_world, **planes), size(x / y)
     fov = math.degrees(lens.number("yfov", low=1e-5, high=math.pi - 1e-5))
     aspect = lens.number("aspectRatio", Film().width / HEIGHT, low=1e-6)
     planes = _planes(lens, needed=False)
-    return Perspective(to_world=to_world, fov=fov, fov_axis="y", **planes), film(aspect)
+    return Perspective(to_world=to_world, fov=fov, fov_axis="y", **planes), size(aspect)
 
 
-def film(aspect: float) -> Film:
-    """Return a film of the usual height, as wide as the ratio says."""
+def size(aspect: float) -> Size:
+    """Return the width and height of a film of the usual height, as wide as the ratio says."""
     aspect = min(max(aspect, 1.0 / WIDEST), WIDEST)
-    return Film(width=max(round(HEIGHT * aspect), 1), height=HEIGHT)
+    return max(round(HEIGHT * aspect), 1), HEIGHT
 
 
 def rigid(element: Element, node: Matrix) -> Matrix:

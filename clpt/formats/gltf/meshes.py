@@ -72,13 +72,21 @@ def _copies(posed: Posed, instances: bool) -> list[Shape]:
         return [part for part in placed if part is not None]
     group = Group(tuple(posed.parts), posed.parts[0].name)
     found: list[Shape] = []
-    for node, to_world in posed.places:
-        if transforms.is_singular(to_world):
-            flat = [_placed(part, node, to_world) for part in posed.parts]
-            found += [part for part in flat if part is not None]
+    flat = _singular(np.stack([to_world for _, to_world in posed.places]))
+    for (node, to_world), is_flat in zip(posed.places, flat.tolist(), strict=True):
+        if is_flat:
+            placed = [_placed(part, node, to_world) for part in posed.parts]
+            found += [part for part in placed if part is not None]
         else:
             found.append(Instance(group=group, to_world=to_world))
     return found
+
+
+def _singular(matrices: Matrix) -> NDArray[np.bool_]:
+    """Which of affine matrices (n, 4, 4) flatten space, see `transforms.is_singular`."""
+    lengths = np.linalg.norm(matrices[:, :3, :3], axis=1, keepdims=True)
+    unit = matrices[:, :3, :3] / np.where(lengths > 0.0, lengths, 1.0)
+    return np.abs(np.linalg.det(unit)) < transforms.SINGULAR_BELOW
 
 
 def _weights(graph: Graph, index: int, node: Element, mesh: Element) -> tuple[float, ...]:

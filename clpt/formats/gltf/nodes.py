@@ -10,15 +10,21 @@ from numpy.typing import NDArray
 from clpt.formats.gltf.document import Document, Element
 
 Matrix = NDArray[np.float64]
+# What a node that does not say has: together ten numbers.
+TRS: dict[str, tuple[float, ...]] = {
+    "translation": (0.0, 0.0, 0.0),
+    "rotation": (0.0, 0.0, 0.0, 1.0),
+    "scale": (1.0, 1.0, 1.0),
+}
 Pose = dict[tuple[int, str], NDArray[np.float64]]
 
 
 @dataclass
 class Graph:
-    """All nodes' placements (4, 4) in the world, and the nodes that the scene shows, in order."""
+    """All nodes' places (n, 4, 4) in the world, and the nodes that the scene shows, in order."""
 
     document: Document
-    to_world: list[Matrix]
+    to_world: Matrix
     shown: list[int]
     pose: Pose = field(default_factory=dict)
 
@@ -41,13 +47,14 @@ def graph(document: Document, chosen: str | None, pose: Pose) -> Graph:
     if len(order) < len(nodes):
         looping = sorted(set(range(len(nodes))) - set(order))[0]
         raise nodes[looping].error("is its own ancestor", "children")
-    placed: list[Matrix] = [np.eye(4)] * len(nodes)
+    placed = _locals(nodes, pose)
     with np.errstate(over="ignore", invalid="ignore"):
         for i in order:
-            local = _local(nodes[i], i, pose)
-            placed[i] = local if parents[i] < 0 else placed[parents[i]] @ local
-            if not np.isfinite(placed[i]).all():
-                raise nodes[i].error("its transform is too large")
+            if parents[i] >= 0:
+                placed[i] = placed[parents[i]] @ placed[i]
+    finite = np.isfinite(placed).all(axis=(1, 2))
+    if not finite.all():
+        raise nodes[int(np.argmin(finite))].error("its transform is too large")
     scene = _scene(document, chosen)
     starts = roots if scene is None else scene.indices("nodes", "nodes")
     if scene is not None and any(parents[start] >= 0 for start in starts):
@@ -109,19 +116,25 @@ def _descendants(roots: list[int], children: list[list[int]]) -> list[int]:
     return order
 
 
-def _local(node: Element, index: int, pose: Pose) -> Matrix:
-    if "matrix" in node:
-        matrix = np.array(node.numbers("matrix", 16)).reshape(4, 4).T
-        if not np.allclose(matrix[3], [0.0, 0.0, 0.0, 1.0]):
-            raise node.error("its last row must be 0 0 0 1", "matrix")
-        return matrix
-    values = {
-        "translation": node.numbers("translation", 3, (0.0, 0.0, 0.0)),
-        "rotation": node.numbers("rotation", 4, (0.0, 0.0, 0.0, 1.0)),
-        "scale": node.numbers("scale", 3, (1.0, 1.0, 1.0)),
-    }
-    given = {path: np.asarray(pose.get((index, path), values[path])) for path in values}
-    length = np.linalg.norm(given["rotation"])
-    if length < 1e-6:
-        raise node.error("a quaternion of no length turns nowhere", "rotation")
-    return compose(given["translation"], given["rotation"] / length, given["scale"])
+def _locals(nodes: list[Element], pose: Pose) -> Matrix:
+    """The nodes' own transforms (n, 4, 4), those of `pose` where it has any."""
+    values = np.zeros((len(nodes), 10))
+    for i, node in enumerate(nodes):
+        values[i] = [
+            value for path in TRS for value in node.numbers(path, len(TRS[path]), TRS[path])
+        ]
+    for (i, path), value in pose.items():
+        if path in TRS:
+            first = list(TRS).index(path)
+            values[i, (0, 3, 7)[first] : (3, 7, 10)[first]] = value
+    length = np.linalg.norm(values[:, 3:7], axis=1, keepdims=True)
+    if (length < 1e-6).any():
+        nowhere = nodes[int(np.argmin(length))]
+        raise nowhere.error("a quaternion of no length turns nowhere", "rotation")
+    made = compose(values[:, :3], values[:, 3:7] / length, values[:, 7:])
+    for i, node in enumerate(nodes):
+        if "matrix" in node:
+            made[i] = np.array(node.numbers("matrix", 16)).reshape(4, 4).T
+            if not np.allclose(made[i, 3], [0.0, 0.0, 0.0, 1.0]):
+                raise node.error("its last row must be 0 0 0 1", "matrix")
+    return made

@@ -12,12 +12,12 @@ from clpt.formats.gltf.primitives import Geometry
 CHUNK = 1 << 16  # vertices at a time: each takes a matrix
 
 
-def matrices(skin: Element, to_world: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+def matrices(skin: Element, to_world: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return what takes vertices to the world for each joint, (joints, 4, 4)."""
     joints = skin.indices("joints", "nodes")
     if not joints:
         raise skin.error("has no joints")
-    placed = np.stack([to_world[joint] for joint in joints])
+    placed = to_world[joints]
     accessor = skin.entry("inverseBindMatrices", "accessors")
     if accessor is None:
         return placed
