@@ -22,7 +22,13 @@ FLAT_TRIANGLES = {shapes.Rectangle: 2, shapes.Cube: 12}
 
 @click.command()
 @click.argument("scene", type=click.Path(path_type=Path))
-@click.option("-D", "defines", multiple=True, metavar="NAME=VALUE", help="Set a $name of an .xml.")
+@click.option(
+    "-D",
+    "defines",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Of an .xml a $name, of glTF camera, scene, time.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Write JSON instead of a table.")
 def info(scene: Path, defines: tuple[str, ...], as_json: bool) -> None:
     """Tell what the file or folder SCENE holds, without rendering it."""

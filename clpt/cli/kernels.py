@@ -29,7 +29,13 @@ from .info import variables
     help="Acceleration structure of the triangles.",
 )  # fmt: skip
 @click.option("--queued", is_flag=True, help="Shade along queues that are sorted by material.")
-@click.option("-D", "defines", multiple=True, metavar="NAME=VALUE", help="Set a $name of an .xml.")
+@click.option(
+    "-D",
+    "defines",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Of an .xml a $name, of glTF camera, scene, time.",
+)
 def kernels(
     scene: Path, folder: Path, lanes: str, layout: str, queued: bool, defines: tuple[str, ...]
 ) -> None:

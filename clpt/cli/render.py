@@ -103,7 +103,13 @@ class White(click.ParamType):
 @click.option("--lambda-min", type=float, help="Shortest wavelength of the light [nm].")
 @click.option("--lambda-max", type=float, help="Longest one; fluorescence asks for 300 to 830.")
 @click.option("--exposure", type=float, default=0.0, help="Brighten .png by this many stops.")
-@click.option("-D", "defines", multiple=True, metavar="NAME=VALUE", help="Set a $name of an .xml.")
+@click.option(
+    "-D",
+    "defines",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Of an .xml a $name, of glTF camera, scene, time.",
+)
 @click.option("--verbose", is_flag=True, help="Tell of memory, trees, programs and stages.")
 @click.option("--quiet", is_flag=True, help="Show no progress and no warnings.")
 def render(

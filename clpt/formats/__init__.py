@@ -37,7 +37,9 @@ def load(path: str | Path, **variables: Any) -> Scene:
         known = " ".join(FORMATS)
         raise SceneError(f"unknown format {path.suffix!r}; known: {known}", file=path)
     if variables and loader not in (mitsuba.load, gltf.load):
-        raise SceneError(f"has no variables, so {min(variables)!r} means nothing", file=path)
+        raise SceneError(
+            f"only .xml and glTF have variables, so {min(variables)!r} means nothing", file=path
+        )
     return loader(path, **variables)
 
 

@@ -44,7 +44,7 @@ def chosen(graph: Graph, name: str | None) -> tuple[Camera, Size] | None:
 
 
 def camera(element: Element, node: Matrix) -> tuple[Camera, Size]:
-    """Return one camera and the size of a film of its shape; a node's scale does not count for it."""
+    """Return one camera and the size of its film; a node's scale does not count."""
     kind = element.text("type", choices=("perspective", "orthographic"))
     lens = element.needed(kind)
     to_world = rigid(lens, node) @ TURNED

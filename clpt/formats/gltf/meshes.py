@@ -166,6 +166,7 @@ def _mesh(owner: Element, primitive: Element, made: Geometry) -> Mesh | None:
         arrays.get("NORMAL"),
         _uvs(primitive, made, surface),
         primitive.document.notes,
+        _colour_attributes(colours),
     )
     if not len(values["faces"]):
         return None
