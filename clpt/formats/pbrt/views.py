@@ -20,7 +20,7 @@ from clpt.scene import cameras
 from clpt.scene.integrators import Film
 
 TO_RIGHT = np.diag([-1.0, 1.0, 1.0, 1.0])
-FARTHEST = 1e30  # pbrt cuts nothing off
+FARTHEST = 1e20  # [m], pbrt cuts nothing off; below the FAR of rays that meet nothing
 # pbrt's directions for a map in latitude and longitude, in our camera space.
 ROUND = np.array([[0.0, 0, -1, 0], [0, 1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
 
