@@ -1,0 +1,247 @@
+"""How a glTF material reflects and lets light through: its extensions as one GltfSurface.
+
+The meaning of every parameter, and the formulas' sources, are in docs/gltf.md.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+
+from clpt.formats.gltf.document import Element
+from clpt.formats.gltf.textures import texture
+from clpt.scene.materials import GltfSurface
+from clpt.scene.textures import Bitmap, MeshAttribute, Mix, Product
+from clpt.spectra import Cauchy, RGBUnbounded
+
+CLEARCOAT = "KHR_materials_clearcoat"
+DIFFUSE_TRANSMISSION = "KHR_materials_diffuse_transmission"
+GLOSSINESS = "KHR_materials_pbrSpecularGlossiness"
+NORMAL = "clearcoatNormalTexture"
+WHITE = (1.0, 1.0, 1.0)
+DARKEST = 1e-4  # attenuation colour: what is black after a distance is clear before it
+DENSEST = 1e6  # [1/m]
+LEAST_ABBE = 1.0  # of any glass is above 9
+
+
+def surface(element: Element, colours: bool) -> GltfSurface:
+    """Return what a material's surface does; `colours`: times those of the vertices."""
+    glossy = element.extension(GLOSSINESS)
+    values = _rough(element) if glossy is None else _glossy(glossy)
+    if colours:
+        values["base_color"] = Product(first=MeshAttribute(), second=values["base_color"])
+    for name, read in EXTENSIONS.items():
+        extension = element.extension(name)
+        if extension is not None:
+            values |= read(extension)
+    _body(element, values)
+    _specular_color(element, values)
+    return GltfSurface(name=element.text("name", ""), **values)
+
+
+def base(element: Element) -> tuple[Element | None, str, str]:
+    """Return the object that holds the base colour and its alpha, and its two keys there."""
+    glossy = element.extension(GLOSSINESS)
+    if glossy is not None:
+        return glossy, "diffuseFactor", "diffuseTexture"
+    return element.child("pbrMetallicRoughness"), "baseColorFactor", "baseColorTexture"
+
+
+def base_color(element: Element) -> Any:
+    """Return the base colour, without its alpha."""
+    owner, factor, info = base(element)
+    return WHITE if owner is None else colour(owner, factor, info, WHITE, 4)
+
+
+def colour(
+    owner: Element, factor: str, info: str, default: tuple[float, ...], count: int = 3
+) -> Any:
+    """Return a factor, times the texture where there is one; of four numbers the first three."""
+    given = owner.numbers(factor, count, (*default, 1.0)[:count], low=0.0)[:3]
+    child = owner.child(info)
+    if child is None:
+        return given
+    image = texture(child)
+    return image if given == WHITE else Product(first=image, second=unbounded(given))
+
+
+def number(owner: Element, factor: str, info: str, channel: str, default: float) -> Any:
+    """Return a factor in [0, 1], times a texture's channel where there is one."""
+    given = owner.number(factor, default, low=0.0, high=1.0)
+    child = owner.child(info)
+    if child is None:
+        return given
+    image = texture(child, raw=True, channel=channel)
+    return image if given == 1.0 else Product(first=image, second=given)
+
+
+def unbounded(given: tuple[float, ...]) -> Any:
+    """Return a colour as a factor that may exceed one."""
+    return RGBUnbounded(*given) if max(given) > 1.0 else given
+
+
+def _rough(element: Element) -> dict[str, Any]:
+    """The core material; each of its factors is one where it is not given."""
+    owner = element.child("pbrMetallicRoughness")
+    if owner is None:
+        return {"base_color": WHITE, "metallic": 1.0, "roughness": 1.0}
+    return {
+        "base_color": base_color(element),
+        "metallic": number(owner, "metallicFactor", "metallicRoughnessTexture", "b", 1.0),
+        "roughness": number(owner, "roughnessFactor", "metallicRoughnessTexture", "g", 1.0),
+    }
+
+
+def _glossy(owner: Element) -> dict[str, Any]:
+    """Diffuse, specular and glossiness: a dielectric of index 0, whose F0 is specular_color."""
+    gloss = number(owner, "glossinessFactor", "specularGlossinessTexture", "a", 1.0)
+    rough = 1.0 - gloss if isinstance(gloss, float) else Mix(first=1.0, second=0.0, amount=gloss)
+    return {
+        "base_color": colour(owner, "diffuseFactor", "diffuseTexture", WHITE, 4),
+        "specular_color": colour(owner, "specularFactor", "specularGlossinessTexture", WHITE),
+        "roughness": rough,
+        "ior": 0.0,
+    }
+
+
+def _specular(owner: Element) -> dict[str, Any]:
+    return {
+        "specular": number(owner, "specularFactor", "specularTexture", "a", 1.0),
+        "specular_color": colour(owner, "specularColorFactor", "specularColorTexture", WHITE),
+    }
+
+
+def _ior(owner: Element) -> dict[str, Any]:
+    index = owner.number("ior", 1.5, low=0.0)
+    if 0.0 < index < 1.0:
+        raise owner.error(f"{index:g} is neither 0 nor at least 1", "ior")
+    return {"ior": index}
+
+
+def _clearcoat(owner: Element) -> dict[str, Any]:
+    if NORMAL in owner:
+        owner.warn("the coat has the base's normals", NORMAL)
+    return {
+        "clearcoat": number(owner, "clearcoatFactor", "clearcoatTexture", "r", 0.0),
+        "clearcoat_roughness": number(
+            owner, "clearcoatRoughnessFactor", "clearcoatRoughnessTexture", "g", 0.0
+        ),
+    }
+
+
+def _sheen(owner: Element) -> dict[str, Any]:
+    return {
+        "sheen_color": colour(owner, "sheenColorFactor", "sheenColorTexture", (0.0, 0.0, 0.0)),
+        "sheen_roughness": number(
+            owner, "sheenRoughnessFactor", "sheenRoughnessTexture", "a", 0.0
+        ),
+    }
+
+
+def _transmission(owner: Element) -> dict[str, Any]:
+    return {"transmission": number(owner, "transmissionFactor", "transmissionTexture", "r", 0.0)}
+
+
+def _diffuse_transmission(owner: Element) -> dict[str, Any]:
+    kind = "diffuseTransmission"
+    return {
+        "diffuse_transmission": number(owner, f"{kind}Factor", f"{kind}Texture", "a", 0.0),
+        "diffuse_transmission_color": colour(
+            owner, f"{kind}ColorFactor", f"{kind}ColorTexture", WHITE
+        ),
+    }
+
+
+def _iridescence(owner: Element) -> dict[str, Any]:
+    ends = {"Minimum": 100.0, "Maximum": 400.0}
+    low, high = (
+        owner.number(f"iridescenceThickness{name}", default, low=0.0, high=1e5)
+        for name, default in ends.items()
+    )
+    info = owner.child("iridescenceThicknessTexture")
+    thickness: Any = high
+    if info is not None and low != high:
+        share = texture(info, raw=True, channel="g")
+        thickness = Mix(first=low, second=high, amount=share)
+    return {
+        "iridescence": number(owner, "iridescenceFactor", "iridescenceTexture", "r", 0.0),
+        "iridescence_ior": owner.number("iridescenceIor", 1.3, low=1.0, high=5.0),
+        "iridescence_thickness": thickness,
+    }
+
+
+def _anisotropy(owner: Element) -> dict[str, Any]:
+    turn = math.remainder(math.degrees(owner.number("anisotropyRotation", 0.0)), 180.0)
+    values: dict[str, Any] = {
+        "anisotropy": number(owner, "anisotropyStrength", "anisotropyTexture", "b", 0.0),
+        "anisotropy_rotation": turn,
+    }
+    info = owner.child("anisotropyTexture")
+    if info is not None:
+        values["anisotropy_rotation"] = _directions(texture(info, raw=True), turn)
+    return values
+
+
+def _directions(image: Bitmap, turn: float) -> Any:
+    """The angles [degrees] of directions in an image's red and green; not interpolated."""
+    pixels = np.asarray(image.image)
+    scale = 255.0 if pixels.dtype == np.uint8 else 1.0
+    if pixels.ndim < 3 or pixels.shape[2] < 2:
+        return turn
+    x, y = (2.0 * pixels[..., i] / scale - 1.0 for i in range(2))
+    angles = (np.degrees(np.arctan2(y, x)) + turn).astype(np.float32)
+    return dataclasses.replace(image, image=angles, filter="nearest")
+
+
+EXTENSIONS = {
+    CLEARCOAT: _clearcoat,
+    DIFFUSE_TRANSMISSION: _diffuse_transmission,
+    "KHR_materials_anisotropy": _anisotropy,
+    "KHR_materials_ior": _ior,
+    "KHR_materials_iridescence": _iridescence,
+    "KHR_materials_sheen": _sheen,
+    "KHR_materials_specular": _specular,
+    "KHR_materials_transmission": _transmission,
+}
+
+
+def _body(element: Element, values: dict[str, Any]) -> None:
+    """Sheet or body: a volume of some thickness makes it one, which absorbs and disperses."""
+    lets_through = any(values.get(k, 0.0) != 0.0 for k in ("transmission", "diffuse_transmission"))
+    volume = element.extension("KHR_materials_volume")
+    thin = volume is None or volume.number("thicknessFactor", 0.0, low=0.0) == 0.0
+    values["thin"] = lets_through and thin
+    if volume is None or thin or not lets_through:
+        return
+    distance = volume.number("attenuationDistance", math.inf, low=0.0)
+    if distance == 0.0:
+        raise volume.error("must be above 0", "attenuationDistance")
+    left = volume.numbers("attenuationColor", 3, WHITE, low=0.0, high=1.0)
+    a = tuple(min(-math.log(max(v, DARKEST)) / distance, DENSEST) for v in left)
+    if max(a) > 0.0:
+        values["absorption"] = a[0] if a[0] == a[1] == a[2] else RGBUnbounded(*a)
+    dispersion = element.extension("KHR_materials_dispersion")
+    strength = 0.0 if dispersion is None else dispersion.number("dispersion", 0.0, low=0.0)
+    ior = values.get("ior", 1.5)
+    if strength > 0.0 and ior > 1.0:
+        spread = (ior - 1.0) / max(20.0 / strength, LEAST_ABBE)
+        values["ior"] = Cauchy(ior - 1.5168 * spread, 0.523655 * spread)
+
+
+def _specular_color(element: Element, values: dict[str, Any]) -> None:
+    """Factors above one go into the index, where nothing is bent by it."""
+    given = values.get("specular_color")
+    if not isinstance(given, tuple) or max(given) <= 1.0:
+        return
+    ior = values.get("ior", 1.5)
+    if isinstance(ior, float) and (values["thin"] or not values.get("transmission", 0.0)):
+        f0 = min(((ior - 1.0) / (ior + 1.0)) ** 2 * max(given), 1.0)
+        root = math.sqrt(f0)
+        values["ior"] = 0.0 if f0 == 1.0 else (1.0 + root) / (1.0 - root)
+    else:
+        element.warn("specularColorFactor above 1 is cut off where light is refracted")
+    most = max(given) if values.get("ior") != 0.0 else 1.0
+    values["specular_color"] = tuple(min(v / most, 1.0) for v in given)
