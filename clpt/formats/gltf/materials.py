@@ -84,9 +84,8 @@ def _emission(element: Element, both: bool) -> Area | None:
     info = element.child("emissiveTexture")
     if info is not None:
         image = texture(info)
-        if radiance != surface.WHITE:
-            image = Product(first=image, second=surface.unbounded(radiance))
-        radiance = image
+        plain = radiance == surface.WHITE
+        radiance = image if plain else Product(first=image, second=surface.unbounded(radiance))
     return Area(radiance=radiance, two_sided=both)
 
 

@@ -170,6 +170,7 @@ def _mesh(owner: Element, primitive: Element, made: Geometry) -> Mesh | None:
     )
     if not len(values["faces"]):
         return None
+    values["attributes"] = _colour_attributes(colours)
     return Mesh(name=name, material=surface.material, emission=surface.emission, **values)
 
 
@@ -201,12 +202,12 @@ def _uvs(primitive: Element, made: Geometry, surface: Surface) -> NDArray[np.flo
 
 
 def _colour_attributes(colours: NDArray[Any] | None) -> dict[str, NDArray[np.float32]]:
+    """What the material asks of the vertices: their colours, and alpha, which is 1 by default."""
     if colours is None:
         return {}
-    made = {"vertex_color": np.clip(colours[:, :3], 0.0, 1.0)}
-    if colours.shape[1] == 4:
-        made["vertex_alpha"] = np.clip(colours[:, 3:], 0.0, 1.0)
-    return made
+    rgba = np.ones((len(colours), 4), np.float32)
+    rgba[:, : colours.shape[1]] = np.clip(colours, 0.0, 1.0)
+    return {"vertex_color": rgba[:, :3], "vertex_alpha": rgba[:, 3:]}
 
 
 def _placed(part: Mesh, node: Element, to_world: Matrix) -> Mesh | None:

@@ -135,9 +135,7 @@ def _clearcoat(owner: Element) -> dict[str, Any]:
 def _sheen(owner: Element) -> dict[str, Any]:
     return {
         "sheen_color": colour(owner, "sheenColorFactor", "sheenColorTexture", (0.0, 0.0, 0.0)),
-        "sheen_roughness": number(
-            owner, "sheenRoughnessFactor", "sheenRoughnessTexture", "a", 0.0
-        ),
+        "sheen_roughness": number(owner, "sheenRoughnessFactor", "sheenRoughnessTexture", "a", 0.0),
     }
 
 
