@@ -12,8 +12,8 @@ LARGEST = 1 << 30  # bytes of a file, unpacked
 CHUNK = 1 << 22
 
 
-def read_bytes(path: Path, largest: int = LARGEST) -> bytes:
-    """Read a file, unpacked if it is gzip's; at most `largest` bytes. Raises SceneError."""
+def read_bytes(path: Path) -> bytes:
+    """Read a file, unpacked if it is gzip's; at most LARGEST bytes. Raises SceneError."""
     try:
         with path.open("rb") as file:
             packed = file.read(2) == b"\x1f\x8b"
@@ -22,8 +22,8 @@ def read_bytes(path: Path, largest: int = LARGEST) -> bytes:
             while part := stream.read(CHUNK):
                 parts.append(part)
                 size += len(part)
-                if size > largest:
-                    message = f"is larger than {largest >> 20} MiB"
+                if size > LARGEST:
+                    message = f"is larger than {LARGEST >> 20} MiB"
                     raise SceneError(message + (" when unpacked" if packed else ""), file=path)
         return b"".join(parts)
     except (OSError, EOFError, ValueError, zlib.error) as error:

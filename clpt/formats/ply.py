@@ -231,28 +231,29 @@ def _ascii_rows(words: NDArray[np.float64], element: Element) -> tuple[dict[str,
 
 
 def _triangles(tables: dict[str, dict[str, Any]]) -> Triangles:
-    vertex, face = tables.get("vertex"), tables.get("face")
-    if vertex is None or not all(name in vertex for name in "xyz"):
+    vertex, face = _plain(tables.get("vertex", {})), tables.get("face", {})
+    if not all(name in vertex for name in "xyz"):
         raise SceneError("it holds no triangles")
-    corners = next((face[name] for name in CORNERS if name in face), None) if face else None
-    if corners is None:
+    corners = next((face[name] for name in CORNERS if name in face), None)
+    if not isinstance(corners, tuple):
         raise SceneError("it holds no triangles")
     uvs = next((pair for pair in UVS if all(name in vertex for name in pair)), None)
     normals = NORMAL if all(name in vertex for name in NORMAL) else None
-    tables = {"vertex": vertex, "face": face or {}}
     known = {*"xyz", *(normals or ()), *(uvs or ())}
-    columns = {
-        table: {k: v for k, v in values.items() if k not in known and isinstance(v, np.ndarray)}
-        for table, values in tables.items()
-    }
+    further = {name: values for name, values in vertex.items() if name not in known}
     return Triangles(
         vertices=_columns(vertex, "xyz"),
         faces=_fans(*corners),
         normals=None if normals is None else _columns(vertex, normals),
         uvs=None if uvs is None else _columns(vertex, uvs),
-        columns=columns,
-        notes=["texture coordinates of faces left out"] if "texcoord" in tables["face"] else [],
+        columns={"vertex": further, "face": _plain(face)},
+        notes=["texture coordinates of faces left out"] if "texcoord" in face else [],
     )
+
+
+def _plain(table: dict[str, Any]) -> dict[str, NDArray[Any]]:
+    """The columns that are no lists."""
+    return {name: values for name, values in table.items() if isinstance(values, np.ndarray)}
 
 
 def _columns(table: dict[str, Any], names: Any) -> NDArray[np.float32]:

@@ -168,5 +168,5 @@ def folded(warnings: Sequence[str]) -> list[str]:
         said = warning.partition(": ")[2]
         first.setdefault(said, warning)
         count[said] = count.get(said, 0) + 1
-    more = {said: f" (and {n - 1} times more)" if n > 1 else "" for said, n in count.items()}
+    more = {said: f" (in {n} places)" if n > 1 else "" for said, n in count.items()}
     return [text + more[said] for said, text in first.items()]

@@ -92,7 +92,7 @@ def _limit(points: Points, edges: _Edges) -> Points:
     gamma = 1.0 / (edges.valence + 3.0 / (8.0 * _beta(edges.valence)))
     gamma = gamma[:, None]
     inside = (1.0 - edges.valence[:, None] * gamma) * points + gamma * edges.ring(points)
-    border = 0.6 * points + 0.2 * edges.ring(points, borders=True)
+    border = (4.0 * points + edges.ring(points, borders=True)) / 6.0
     return np.where(edges.on_border[:, None], border, inside)
 
 

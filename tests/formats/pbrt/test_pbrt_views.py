@@ -1,0 +1,176 @@
+"""Cameras, films, samplers and integrators of PBRT files."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from clpt import transforms
+from clpt.errors import SceneError
+from clpt.formats import load
+from clpt.scene import cameras, integrators
+
+LOOK = "LookAt 1 2 3 4 4 9 0.1 1 0\n"
+
+
+@pytest.fixture
+def scene(tmp_path):
+    def of(text):
+        path = tmp_path / "a.pbrt"
+        path.write_text(f'{text}\nWorldBegin\nShape "sphere"')
+        return load(path)
+
+    return of
+
+
+def ours(scene, x, y):
+    """Origin and direction through a place on the film, as kernels/camera has them."""
+    camera, film = scene.camera, scene.film
+    aspect = film.height / film.width
+    if isinstance(camera, cameras.Orthographic):
+        local = np.array([1.0 - 2.0 * x, (1.0 - 2.0 * y) * aspect, 0.0])
+        origin = transforms.transform_points(camera.to_world, local)
+        d = transforms.transform_vectors(camera.to_world, [0.0, 0.0, 1.0])
+    elif isinstance(camera, cameras.Spherical):
+        phi, theta = 2 * np.pi * (0.5 - x), np.pi * y
+        d = [np.sin(theta) * np.sin(phi), np.cos(theta), np.sin(theta) * np.cos(phi)]
+        d, origin = transforms.transform_vectors(camera.to_world, d), camera.to_world[:3, 3]
+    else:
+        wide = 2 * np.tan(np.radians(camera.fov) / 2)
+        local = [(0.5 - x - camera.offset_x) * wide, (0.5 - y - camera.offset_y) * wide * aspect, 1]
+        d, origin = transforms.transform_vectors(camera.to_world, local), camera.to_world[:3, 3]
+    return origin, d / np.linalg.norm(d)
+
+
+def theirs(to_camera, x, y, window, fov=None):
+    """The same of pbrt: the film's x and y run over the window, camera space has x to the right."""
+    left, right, low, high = window
+    at = np.array([left + x * (right - left), high + y * (low - high), 0.0])
+    back = np.linalg.inv(to_camera)
+    if fov is None:
+        d = transforms.transform_vectors(back, [0.0, 0.0, 1.0])
+        return transforms.transform_points(back, at), d / np.linalg.norm(d)
+    scale = np.tan(np.radians(fov) / 2)
+    d = transforms.transform_vectors(back, [at[0] * scale, at[1] * scale, 1.0])
+    return back[:3, 3], d / np.linalg.norm(d)
+
+
+def to_camera(*steps):
+    whole = np.eye(4)
+    for step in steps:
+        whole = whole @ step
+    return whole
+
+
+VIEW = np.linalg.inv(transforms.look_at([1, 2, 3], [4, 4, 9], [0.1, 1, 0]))
+MIRROR, SMALL = transforms.scale([-1, 1, 1]), transforms.scale([0.1, 0.1, 0.1])
+CAMERAS = [
+    ("", '"float fov" 50', (VIEW,), (-2, 2, -1, 1), 50),
+    ("Scale -1 1 1\n", '"float fov" 50', (MIRROR, VIEW), (-2, 2, -1, 1), 50),
+    ("Scale .1 .1 .1\n", '"float fov" 50', (SMALL, VIEW), (-2, 2, -1, 1), 50),
+    ("", '"float frameaspectratio" 0.5', (VIEW,), (-1, 1, -2, 2), 90),
+    ("", '"float fov" 30 "float screenwindow" [-.5 1 -1 .2]', (VIEW,), (-0.5, 1, -1, 0.2), 30),
+]
+
+
+@pytest.mark.parametrize(("before", "given", "steps", "window", "fov"), CAMERAS)
+def test_pinholes(scene, before, given, steps, window, fov):
+    film = 'Film "rgb" "integer xresolution" 64 "integer yresolution" 32\n'
+    made = scene(f'{film}{before}{LOOK}Camera "perspective" {given}')
+    for x, y in ((0.1, 0.2), (0.9, 0.3), (0.4, 0.8)):
+        found, expected = ours(made, x, y), theirs(to_camera(*steps), x, y, window, fov)
+        assert np.concatenate(found) == pytest.approx(np.concatenate(expected), abs=1e-6)
+
+
+@pytest.mark.parametrize("before", ["", "Scale -1 1 1\n"])
+def test_orthographic(scene, before):
+    film = 'Film "rgb" "integer xresolution" 20 "integer yresolution" 40\n'
+    steps = (MIRROR, VIEW) if before else (VIEW,)
+    made = scene(f'{film}{before}{LOOK}Camera "orthographic" "float screenwindow" [-1 3 -2 2]')
+    for x, y in ((0.1, 0.2), (0.9, 0.3)):
+        found, expected = ours(made, x, y), theirs(to_camera(*steps), x, y, (-1, 3, -2, 2))
+        assert np.concatenate(found) == pytest.approx(np.concatenate(expected), abs=1e-6)
+
+
+def test_spherical(scene):
+    made = scene(f'{LOOK}Camera "spherical" "string mapping" "equirectangular"')
+    for x, y in ((0.1, 0.2), (0.6, 0.3)):
+        phi, theta = 2 * np.pi * x, np.pi * y
+        d = [np.sin(theta) * np.cos(phi), np.cos(theta), np.sin(theta) * np.sin(phi)]
+        expected = transforms.transform_vectors(np.linalg.inv(VIEW), d)
+        assert ours(made, x, y)[1] == pytest.approx(expected, abs=1e-6)
+
+
+def test_lenses_have_the_size_of_their_camera(scene):
+    made = scene(
+        'Scale 10 10 10\nCamera "perspective" "float lensradius" 0.5 "float focaldistance" 30'
+    ).camera
+    assert isinstance(made, cameras.ThinLens)
+    assert (made.aperture_radius, made.focus_distance) == pytest.approx((0.05, 3.0))
+
+
+def test_exposure(scene):
+    """pbrt's imaging ratio: time times iso / 100."""
+    made = scene(
+        'Camera "perspective" "float shutteropen" 1 "float shutterclose" 1.25\n'
+        'Film "rgb" "float iso" 200 "string sensor" "cie1931" "float whitebalance" 5000'
+    )
+    assert made.film.exposure == pytest.approx(0.5)
+    assert made.film.white_balance == 5000.0
+    plain = scene("").film
+    assert (plain.exposure, plain.white_balance, plain.width, plain.height) == (
+        1,
+        "none",
+        1280,
+        720,
+    )
+    measured = scene('Film "rgb" "string sensor" "canon_eos_100d"')
+    assert measured.film.white_balance == 6500.0
+    assert any("canon_eos_100d" in text for text in measured.warnings)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ('"box" "float xradius" 1 "float yradius" 1', integrators.Box(radius=1.0)),
+        ('"triangle"', integrators.Tent(radius=2.0)),
+        ('"gaussian" "float sigma" 0.4', integrators.Gaussian(stddev=0.4)),
+        ('"mitchell"', integrators.Mitchell()),
+        ('"sinc"', integrators.Mitchell(b=0.0, c=0.5)),
+    ],
+)
+def test_filters(scene, text, expected):
+    made = scene(f"PixelFilter {text}").film.filter
+    assert type(made) is type(expected) and vars(made) == vars(expected)
+
+
+def test_samplers_and_integrators(scene):
+    made = scene('Sampler "stratified" "integer xsamples" 3 "integer ysamples" 5\nOption "seed" 7')
+    assert (made.spp, made.seed, type(made.sampler)) == (15, 7, integrators.Sobol)
+    made = scene('Sampler "independent" "integer pixelsamples" 9\nIntegrator "bdpt"')
+    assert (made.spp, type(made.sampler)) == (9, integrators.Independent)
+    assert made.integrator.max_depth == 6
+    assert any("bdpt" in text for text in made.warnings)
+    assert scene('Integrator "volpath" "integer maxdepth" 65').integrator.max_depth == 66
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('Camera "realistic"', "'perspective'"),
+        ('Camera "perspective" "float fov" 180', "between 0 and 180"),
+        ('Camera "perspective" "float shutterclose" 0', "does not open"),
+        ('Camera "fisheye"', "unknown camera"),
+        ('Film "image"', "version 3"),
+        ('Film "rgb" "integer xresolution" 0', "must be 1 to 65536"),
+        ('PixelFilter "boks"', "did you mean 'box'"),
+        ('Sampler "random"', "unknown sampler"),
+        ('Integrator "ao"', "use 'path'"),
+        ('Integrator "path" "integer maxdepth" 1.5', "whole numbers"),
+        ("Scale 0 0 0\nCamera \"perspective\"", "cannot be inverted"),
+    ],
+)  # fmt: skip
+def test_broken_ones_say_where(scene, text, message):
+    with pytest.raises(SceneError, match=message) as caught:
+        scene(text)
+    assert "a.pbrt:" in str(caught.value)
