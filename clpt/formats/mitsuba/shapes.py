@@ -10,6 +10,7 @@ import numpy as np
 from clpt import transforms
 from clpt.errors import SceneError, UnknownKindError
 from clpt.formats import mesh
+from clpt.formats.mitsuba import serialized
 from clpt.formats.mitsuba.bsdfs import bsdf
 from clpt.formats.mitsuba.emitters import area
 from clpt.formats.mitsuba.values import Context, Properties, placed
@@ -125,6 +126,10 @@ def _ply(props: Properties) -> Parameters:
     return _mesh(props, ".ply", flip_v=props.flag("flip_tex_coords", False))
 
 
+def _serialized(props: Properties) -> Parameters:
+    return _mesh(props, ".serialized", flip_v=False)
+
+
 def _mesh(props: Properties, suffix: str, *, flip_v: bool) -> Parameters:
     """Read a mesh into world space, where Mitsuba makes the normals that the file lacks."""
     path = props.file()
@@ -133,12 +138,16 @@ def _mesh(props: Properties, suffix: str, *, flip_v: bool) -> Parameters:
     if path.suffix.lower() != suffix:
         raise props.element.error(f"{path.name!r} is not a {suffix} file")
     try:
-        loaded = mesh.read_mesh(path, materials=False)
+        if suffix == ".serialized":
+            whole, own_flat, notes = serialized.read(path, props.integer("shape_index", 0))
+            flat |= own_flat
+        else:
+            loaded = mesh.read_mesh(path, materials=False)
+            whole, notes = mesh.join(loaded.meshes), loaded.warnings
     except SceneError as error:
         raise props.element.error(f"{path.name}: {error.message}") from None
-    for note in loaded.warnings:
+    for note in notes:
         props.context.warn(props.element, f"{path.name}: {note}")
-    whole = mesh.join(loaded.meshes)
     vertices = transforms.transform_points(to_world, whole.vertices).astype(np.float32)
     uvs = whole.uvs
     if uvs is not None and flip_v:
@@ -162,6 +171,7 @@ def _mesh(props: Properties, suffix: str, *, flip_v: bool) -> Parameters:
 PLUGINS: dict[str, tuple[type[Shape], Callable[[Properties], Parameters]]] = {
     "obj": (shapes.Mesh, _obj),
     "ply": (shapes.Mesh, _ply),
+    "serialized": (shapes.Mesh, _serialized),
     "sphere": (shapes.Sphere, _sphere),
     "rectangle": (shapes.Rectangle, _placed_only),
     "disk": (shapes.Disk, _placed_only),
