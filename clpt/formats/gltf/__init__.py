@@ -31,7 +31,7 @@ SUPPORTED = (
     "EXT_texture_webp", lights.NAME, meshes.INSTANCING, *materials.EXTENSIONS,
     "FB_ngon_encoding",  # says which triangles make a polygon: the picture is the same
 )  # fmt: skip
-APPEARANCE = "KHR_materials_"  # the shapes are right without
+VARIANTS = "KHR_materials_variants"
 
 __all__ = ["SUFFIXES", "load", "read_mesh"]
 
@@ -90,11 +90,13 @@ def _check_extensions(document: Document) -> None:
     """Refuse extensions that are required and not known; note the others."""
     required = document.root.texts("extensionsRequired")
     for number, name in enumerate(required):
-        if name not in SUPPORTED and not name.startswith(APPEARANCE):
+        if name not in (*SUPPORTED, VARIANTS):
             message = f"needs the extension {name}, which is not supported"
             raise document.root.error(message, f"extensionsRequired[{number}]")
     for name in [*document.root.texts("extensionsUsed"), *required]:
-        if name not in SUPPORTED:
+        if name == VARIANTS:
+            document.warn("of its variants of materials the default one is shown")
+        elif name not in SUPPORTED:
             document.warn(f"extension {name} is not supported and left out")
 
 

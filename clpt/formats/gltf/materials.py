@@ -70,7 +70,7 @@ def _bent(element: Element, inner: Material) -> Material:
     if coat is not None and surface.NORMAL not in coat:
         coat.warn("the coat has the base's normals, which a map bends")
     scale = info.number("scale", 1.0)
-    return NormalMap(material=inner, normals=texture(info, raw=True), scale=scale, along_v=True)
+    return NormalMap(material=inner, map=texture(info, raw=True), scale=scale, along_v=True)
 
 
 def _emission(element: Element, both: bool) -> Area | None:

@@ -170,7 +170,6 @@ def _mesh(owner: Element, primitive: Element, made: Geometry) -> Mesh | None:
     )
     if not len(values["faces"]):
         return None
-    values["attributes"] = _colour_attributes(colours)
     return Mesh(name=name, material=surface.material, emission=surface.emission, **values)
 
 
