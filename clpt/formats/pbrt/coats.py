@@ -51,13 +51,19 @@ def under_coat(ior: float, thickness: float) -> Callable[[Values], Values]:
     """
     fresnel, passes = turned_back(ior), np.exp(-thickness / COSINES)
     inside, damped = float(EVEN @ fresnel), float(EVEN @ (fresnel * passes**2))
-    through = float(EVEN @ ((1.0 - fresnel) * passes)) / max(1.0 - inside, 1e-9)
+    twice = let_through(ior, thickness) ** 2
 
     def looks(r: Values) -> Values:
-        seen = through**2 * r / (1.0 - damped * r)
+        seen = twice * r / (1.0 - damped * r)
         return seen / (1.0 + inside * seen)
 
     return looks
+
+
+def let_through(ior: float, thickness: float) -> float:
+    """The share of even light, refracted into a coat, that arrives at its other side."""
+    refracted = EVEN * (1.0 - turned_back(ior))
+    return float(refracted @ np.exp(-thickness / COSINES) / max(refracted.sum(), 1e-9))
 
 
 def from_body_reflectance(ior: float) -> Callable[[Values], Values]:

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from clpt.errors import SceneError, UnknownKindError
-from clpt.formats.pbrt.layered import THICKNESS, both, coat, coated_diffuse, subsurface
+from clpt.formats.pbrt import coats
+from clpt.formats.pbrt.layered import both, coat, coated_diffuse, middle, subsurface
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.roughness import alphas, isotropic, rough, smooth, stretched
 from clpt.formats.pbrt.spectra import named, spectrum
@@ -19,6 +20,10 @@ from clpt.scene import materials
 from clpt.scene.materials import Material
 from clpt.scene.textures import Product, Texture
 
+PLAIN: dict[str, Any] = {
+    "flip_invalid": False,
+    "shadowing": False,
+}  # pbrt uses a bent normal as it comes
 OLD = {
     "matte": "diffuse", "plastic": "coateddiffuse", "metal": "conductor", "mirror": "conductor",
     "glass": "dielectric", "uber": "coateddiffuse", "substrate": "coateddiffuse",
@@ -46,8 +51,10 @@ def _bumped(made: Material, params: Parameters, state: State) -> Material:
     if isinstance(height, Texture) and file:
         raise SceneError("give either 'displacement' or 'normalmap', not both")
     if isinstance(height, Texture):
-        return materials.BumpMap(material=made, height=height)
-    return materials.NormalMap(material=made, map=normals(file, state)) if file else made
+        return materials.BumpMap(material=made, height=height, **PLAIN)
+    if file:
+        return materials.NormalMap(material=made, map=normals(file, state), **PLAIN)
+    return made
 
 
 def _diffuse(params: Parameters, state: State) -> Material:
@@ -99,15 +106,15 @@ def _extinction(r: Any) -> Any:
 
 
 def _coated_conductor(params: Parameters, state: State) -> Material:
-    if (thickness := coat(params, state)) != THICKNESS:
-        state.warn(params, f"the coat's 'thickness' {thickness:g} is not taken into account")
+    ior = spectrum(params, "interface.eta", "index", state, 1.5)
     outer = isotropic(alphas(params, state, "interface."), params, state)
     alpha_u, alpha_v = alphas(params, state, "conductor.")
     return both(
         materials.CoatedConductor(
-            coat_ior=spectrum(params, "interface.eta", "index", state, 1.5),
+            coat_ior=ior,
             ext_ior=1.0,
             coat_alpha=rough(outer),
+            specular_reflectance=coats.let_through(middle(ior), coat(params, state)) ** 2,
             **stretched(alpha_u, alpha_v),
             **_metal(params, state, "conductor."),
         )
