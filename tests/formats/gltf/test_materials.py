@@ -1,0 +1,211 @@
+"""Materials of glTF documents and what becomes of them; nothing is rendered."""
+
+from __future__ import annotations
+
+import base64
+import io
+import math
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from clpt.errors import SceneError
+from clpt.scene.materials import Diffuse, GltfSurface, Mask, NormalMap, Null, TwoSided
+from clpt.scene.textures import Bitmap, MeshAttribute, Mix, Product
+
+PIXEL = np.array([[[255, 128, 64, 192], [0, 255, 32, 96]]], np.uint8)
+
+
+def _uri(pixels):
+    stream = io.BytesIO()
+    Image.fromarray(pixels).save(stream, "PNG")
+    return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode()
+
+
+@pytest.fixture
+def shape(read, build):
+    """The shape of a document with this material, `colours` of its vertices; and the notes."""
+
+    def of(material, colours=None):
+        top = {"images": [{"uri": _uri(PIXEL)}], "textures": [{"source": 0}]}
+        document = build(materials=[material], **top)
+        attributes = {"TEXCOORD_0": document.accessor([(0, 0), (1, 0), (0, 1)])}
+        if colours is not None:
+            attributes["COLOR_0"] = document.accessor(colours)
+        scene = read(document.mesh(material=0, attributes=attributes))
+        return scene.shapes[0], scene.warnings
+
+    return of
+
+
+def _extension(name, **values):
+    return {"extensions": {f"KHR_materials_{name}": values}}
+
+
+def _front(shape_and_notes):
+    return shape_and_notes[0].material.front
+
+
+def test_core_and_its_defaults(shape):
+    found = shape({"name": "red", "pbrMetallicRoughness": {"baseColorFactor": [1, 0.5, 0, 1]}})
+    surface = _front(found)
+    assert isinstance(surface, GltfSurface) and surface.name == "red"
+    assert (surface.metallic, surface.roughness, surface.ior.value) == (1.0, 1.0, 1.5)
+    np.testing.assert_allclose(surface.base_color.to_rgb(), [1, 0.5, 0])
+    assert isinstance(found[0].material.back, Null)  # glTF culls what is not doubleSided
+    assert shape({"doubleSided": True})[0].material.back is None
+
+
+def test_textures_and_factors(shape):
+    surface = _front(
+        shape(
+            {
+                "pbrMetallicRoughness": {
+                    "baseColorFactor": [0.5, 1, 1, 1],
+                    "baseColorTexture": {"index": 0},
+                    "metallicFactor": 0.5,
+                    "metallicRoughnessTexture": {"index": 0},
+                },
+                "normalTexture": {"index": 0, "scale": 0.25},
+            }
+        )
+    )
+    assert isinstance(surface, NormalMap) and surface.scale == 0.25 and surface.along_v
+    assert isinstance(surface.map, Bitmap)
+    inner = surface.material
+    assert isinstance(inner.base_color, Product) and isinstance(inner.metallic, Product)
+    assert isinstance(inner.roughness, Bitmap) and inner.roughness.channel == "g"
+    assert inner.metallic.first.channel == "b"
+
+
+def test_sheet_and_body(shape):
+    through = {"KHR_materials_transmission": {"transmissionFactor": 1}}
+    sheet = shape({"extensions": through})[0].material
+    assert isinstance(sheet, GltfSurface) and sheet.thin and sheet.transmits
+    volume = {
+        "thicknessFactor": 2,
+        "attenuationDistance": 0.5,
+        "attenuationColor": [1, math.exp(-1), math.exp(-2)],
+    }
+    body = {
+        **through,
+        "KHR_materials_volume": volume,
+        "KHR_materials_ior": {"ior": 1.6},
+        "KHR_materials_dispersion": {"dispersion": 0.5},
+    }
+    made = shape({"extensions": body})[0].material
+    assert not made.thin
+    np.testing.assert_allclose(made.absorption.to_rgb("unbounded"), [0, 2, 4], atol=1e-12)
+    lines = np.array([587.6, 486.1, 656.3])  # [nm]; of the Abbe number, here 40
+    d, f, c = made.ior.sample(lines)
+    assert d == pytest.approx(1.6, abs=1e-4)
+    assert (d - 1.0) / (f - c) == pytest.approx(40.0, rel=2e-3)
+    volume["thicknessFactor"] = 0  # thin-walled
+    assert shape({"extensions": body})[0].material.thin
+
+
+def test_layers(shape):
+    made = _front(
+        shape(
+            {
+                "extensions": {
+                    "KHR_materials_clearcoat": {"clearcoatFactor": 0.5},
+                    "KHR_materials_sheen": {
+                        "sheenColorFactor": [0.1, 0.2, 0.3],
+                        "sheenRoughnessFactor": 0.4,
+                    },
+                    "KHR_materials_anisotropy": {
+                        "anisotropyStrength": 0.6,
+                        "anisotropyRotation": math.pi / 6,
+                    },
+                    "KHR_materials_iridescence": {
+                        "iridescenceFactor": 1,
+                        "iridescenceThicknessTexture": {"index": 0},
+                    },
+                }
+            }
+        )
+    )
+    assert (made.clearcoat, made.clearcoat_roughness, made.sheen_roughness) == (0.5, 0.0, 0.4)
+    assert made.anisotropy == 0.6 and made.anisotropy_rotation == pytest.approx(30.0)
+    thickness = made.iridescence_thickness
+    assert isinstance(thickness, Mix) and thickness.amount.channel == "g"
+    assert (thickness.first.value, thickness.second.value) == (100.0, 400.0)
+
+
+def test_directions_of_anisotropy(shape):
+    given = _extension("anisotropy", anisotropyStrength=1, anisotropyTexture={"index": 0})
+    angles = _front(shape(given)).anisotropy_rotation
+    assert angles.filter == "nearest"
+    expected = np.degrees(np.arctan2([128 / 127.5 - 1, 1.0], [1.0, -1.0]))
+    np.testing.assert_allclose(angles.image, [expected], atol=1e-3)
+
+
+def test_specular(shape):
+    strong = _front(shape(_extension("specular", specularColorFactor=[2, 1, 0])))
+    f0 = ((strong.ior.value - 1) / (strong.ior.value + 1)) ** 2
+    np.testing.assert_allclose(f0 * strong.specular_color.to_rgb(), [0.08, 0.04, 0.0], atol=1e-9)
+    glossy = _front(
+        shape(
+            _extension(
+                "pbrSpecularGlossiness",
+                diffuseFactor=[0.1, 0.2, 0.3, 1],
+                specularFactor=[0.4, 0.5, 0.6],
+                glossinessFactor=0.75,
+            )
+        )
+    )
+    assert (glossy.ior.value, glossy.roughness, glossy.metallic) == (0.0, 0.25, 0.0)
+    np.testing.assert_allclose(glossy.specular_color.to_rgb(), [0.4, 0.5, 0.6])
+
+
+def test_alpha(shape):
+    textured = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}
+    cut = _front(shape({**textured, "alphaMode": "MASK", "alphaCutoff": 0.5}))
+    assert isinstance(cut, Mask) and cut.opacity.image.tolist() == [[1.0, 0.0]]
+    blended = _front(shape({**textured, "alphaMode": "BLEND"}))
+    assert blended.opacity.channel == "a"
+    assert isinstance(_front(shape(textured)), GltfSurface)
+    faint = {"pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.25]}, "alphaMode": "BLEND"}
+    assert _front(shape(faint)).opacity == 0.25
+
+
+def test_colours_of_vertices(shape):
+    found = shape({"alphaMode": "BLEND"}, colours=[(1, 0, 0), (0, 1, 0), (0, 0, 1)])
+    surface = _front(found).material
+    assert isinstance(surface.base_color.first, MeshAttribute)
+    assert found[0].attributes["vertex_color"].tolist() == [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    assert found[0].attributes["vertex_alpha"].tolist() == [[1], [1], [1]]
+
+
+def test_emission(shape):
+    strong = _extension("emissive_strength", emissiveStrength=3)
+    lamp = shape({"emissiveFactor": [1, 0.5, 0], "doubleSided": True, **strong})[0].emission
+    np.testing.assert_allclose(lamp.radiance.to_rgb("emission"), [3.0, 1.5, 0.0])
+    assert lamp.two_sided
+    assert shape({"emissiveFactor": [0, 0, 0]})[0].emission is None
+    plain = {"pbrMetallicRoughness": {"baseColorFactor": [0.2, 0.4, 0.6, 1]}}
+    unlit = shape({**plain, **_extension("unlit")})[0]
+    assert isinstance(unlit.material, TwoSided) and isinstance(unlit.material.front, Diffuse)
+    np.testing.assert_allclose(unlit.emission.radiance.to_rgb("emission"), [0.2, 0.4, 0.6])
+
+
+@pytest.mark.parametrize(
+    ("material", "place"),
+    [
+        ({"pbrMetallicRoughness": {"roughnessFactor": 2}}, "roughnessFactor"),
+        (_extension("ior", ior=0.5), "KHR_materials_ior.ior"),
+        (_extension("clearcoat", clearcoatTexture={"index": 7}), "clearcoatTexture.index"),
+        ({"alphaMode": "CUT"}, "alphaMode"),
+        (_extension("sheen", sheenColorFactor=[1, 2]), "sheenColorFactor"),
+    ],
+)
+def test_refused(shape, material, place):
+    with pytest.raises(SceneError, match=place):
+        shape(material)
+
+
+def test_what_is_passed_over_is_told(shape):
+    coat = _extension("clearcoat", clearcoatNormalTexture={"index": 0})
+    assert any("clearcoatNormalTexture" in note for note in shape(coat)[1])
