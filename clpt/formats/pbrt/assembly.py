@@ -70,6 +70,8 @@ def _shape(found: Definition, read: Geometry | None) -> Shape | None:
     opacity = textured(given, "alpha", "real", state, 1.0)
     _report(given, state)
     if read is None:
+        if found.kind != "curve":  # which has been told
+            state.warn(given, "left out, since it has no area")
         return None
     for note in read.notes:
         state.warn(given, note)
