@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 import OpenEXR
@@ -26,6 +27,35 @@ _HALF_MAX = 65504.0
 _PILLOW = (".png", ".jpg", ".jpeg", ".tga", ".bmp", ".webp", ".gif", ".tif", ".tiff")
 
 
+@dataclass(frozen=True)
+class Stored:
+    """An image as its file has it: (h, w, c) uint8, or float32 where it has not 8 bits.
+
+    encoded: its colours, but not alpha, went through the sRGB transfer.
+    """
+
+    values: NDArray[Any]
+    encoded: bool
+
+    def decoded(self, linear: bool = True) -> Array:
+        """(h, w, c) float32; linear: with the sRGB transfer taken back, if there is one."""
+        curved = self.encoded and linear
+        if self.values.dtype != np.uint8:
+            return _without_transfer(self.values) if curved else self.values
+        scale = np.arange(256, dtype=np.float32) / np.float32(255.0)
+        if not curved:
+            return scale[self.values]
+        made = srgb_to_linear(scale)[self.values]
+        if self.values.shape[2] == 4:
+            made[..., 3] = scale[self.values[..., 3]]
+        return made
+
+
+def _without_transfer(values: Array) -> Array:
+    colours = srgb_to_linear(values[..., :3])
+    return np.concatenate([colours, values[..., 3:]], axis=2)
+
+
 def read(path: str | Path, *, linear: bool = True) -> Array:
     """An image file as (h, w, c) float32, c being 1, 3 or 4 (other counts for layered EXR and npy).
 
@@ -35,6 +65,11 @@ def read(path: str | Path, *, linear: bool = True) -> Array:
 
     Raises SceneError if there is no such file, its suffix is unknown, or it is not an image.
     """
+    return read_stored(path).decoded(linear)
+
+
+def read_stored(path: str | Path) -> Stored:
+    """An image file as it is stored; raises as `read` does."""
     path = Path(path)
     reader = READERS.get(path.suffix.lower())
     if reader is None:
@@ -42,13 +77,14 @@ def read(path: str | Path, *, linear: bool = True) -> Array:
     if not path.is_file():
         _fail(path, "no such image file")
     try:
-        image = reader(path, linear)
+        made: Any = reader(path)
     except SceneError:
         raise
     except Exception as error:  # the libraries raise their own, from struct.error to RuntimeError
         message = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise SceneError(f"not a readable image: {message}", file=path) from error
-    if image.size == 0:
+    image = made if isinstance(made, Stored) else Stored(made, encoded=False)
+    if image.values.size == 0:
         _fail(path, "the image has no pixels")
     return image
 
@@ -98,6 +134,11 @@ def write(
         raise SceneError(f"cannot be written: {error}", file=path) from error
 
 
+def write_stored(path: Path, values: NDArray[np.uint8]) -> None:
+    """Write (h, w) or (h, w, 1, 3 or 4) as the bytes of a .png."""
+    Image.fromarray(values[..., 0] if values.shape[-1] == 1 else values).save(path)
+
+
 def check_output(path: str | Path) -> Path:
     """The path, if `write` knows its suffix and its folder exists. Raises SceneError otherwise."""
     path = Path(path)
@@ -123,24 +164,20 @@ def read_layers(path: str | Path) -> dict[str, Array]:
 
 def from_pillow(image: Image.Image, *, linear: bool = True) -> Array:
     """A Pillow image as (h, w, 1, 3 or 4) float32; `linear` as in `read`."""
-    if image.mode in ("F", "I", "I;16", "I;16B", "I;16L"):
-        values = np.asarray(image, np.float32)[..., None]
-        if image.mode == "F":
-            return values
-        values = values / np.float32(65535.0)
-        return srgb_to_linear(values) if linear else values
+    return _from_pillow(image).decoded(linear)
+
+
+def _from_pillow(image: Image.Image) -> Stored:
+    if image.mode == "F":
+        return Stored(np.asarray(image, np.float32)[..., None], encoded=False)
+    if image.mode in ("I", "I;16", "I;16B", "I;16L"):
+        values = np.asarray(image, np.float32)[..., None] / np.float32(65535.0)
+        return Stored(values, encoded=True)
     if image.mode not in ("L", "RGB", "RGBA"):
         transparent = "A" in image.mode or "a" in image.mode or "transparency" in image.info
         image = image.convert("RGBA" if transparent else "L" if image.mode == "1" else "RGB")
-    stored = np.asarray(image)
-    stored = stored[..., None] if stored.ndim == 2 else stored
-    scale = np.arange(256, dtype=np.float32) / np.float32(255.0)
-    if not linear:
-        return scale[stored]
-    values = srgb_to_linear(scale)[stored]
-    if stored.shape[2] == 4:
-        values[..., 3] = scale[stored[..., 3]]
-    return values
+    values = np.asarray(image)
+    return Stored(values[..., None] if values.ndim == 2 else values, encoded=True)
 
 
 def srgb_to_linear(x: Array) -> Array:
@@ -177,15 +214,15 @@ def _fail(path: Path, message: str) -> NoReturn:
     raise SceneError(message, file=path)
 
 
-def _read_pillow(path: Path, linear: bool) -> Array:
+def _read_pillow(path: Path) -> Stored:
     try:
         with Image.open(path) as image:
-            return from_pillow(image, linear=linear)
+            return _from_pillow(image)
     except UnidentifiedImageError:
         _fail(path, "not an image")
 
 
-def _read_exr(path: Path, linear: bool) -> Array:
+def _read_exr(path: Path) -> Array:
     channels = read_layers(path)
     if {"RY", "BY"} & channels.keys():
         _fail(path, "luminance and chroma channels (Y, RY, BY) are not supported; save it as RGB")
@@ -223,14 +260,14 @@ def _write_exr(
     OpenEXR.File({**dict(metadata), **header}, channels).write(str(path))
 
 
-def _read_npy(path: Path, linear: bool) -> Array:
+def _read_npy(path: Path) -> Array:
     array = np.load(path, allow_pickle=False)
     if array.ndim not in (2, 3) or array.dtype.kind not in "fiu":
         _fail(path, f"not an image: an array of {array.dtype}, shape {array.shape}")
     return np.asarray(array if array.ndim == 3 else array[..., None], np.float32)
 
 
-def _read_pfm(path: Path, linear: bool) -> Array:
+def _read_pfm(path: Path) -> Array:
     data = path.read_bytes()
     header = re.match(rb"(P[Ff])\s+(\d+)\s+(\d+)\s+([-+.\deE]+)\s", data)
     if header is None:
@@ -251,7 +288,7 @@ def _write_pfm(path: Path, pixels: Array) -> None:
     path.write_bytes(head.encode() + pixels[::-1].astype("<f4").tobytes())
 
 
-def _read_hdr(path: Path, linear: bool) -> Array:
+def _read_hdr(path: Path) -> Array:
     """Radiance RGBE, flat or run-length coded, rows from the top (Ward 1991)."""
     data = path.read_bytes()
     size = re.search(rb"\n\n-Y (\d+) \+X (\d+)\n", data)

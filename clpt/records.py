@@ -147,7 +147,8 @@ TABLES: dict[str, tuple[str, str]] = {
     "lamps": ("uint", "parameters of the lights that are not shapes, and emissions"),
     "spectra": ("float", "tabulated spectra on the common grid"),
     "textures": ("uint", "parameters of the textures, a row each"),
-    "texels": ("float", "of all bitmaps and environment maps"),
+    "images": ("uint", "texels of bitmaps, see clpt.render.bitmaps"),
+    "texels": ("float", "of environment maps, and of bitmaps of spectra"),
     "distributions": ("float", "of filter, environment maps, wavelengths and re-radiation"),
     "camera": ("float", "the camera's parameters"),
 }

@@ -68,6 +68,18 @@ class SensorName(click.ParamType):
         return value if value in OBSERVERS else read_sensor(value)
 
 
+class Bytes(click.ParamType):
+    """A number of bytes, such as 500M or 2G."""
+
+    name = "SIZE"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        match = re.fullmatch(r"(\d+(?:\.\d+)?)\s*([KMGT]?)i?B?", str(value).strip(), re.IGNORECASE)
+        if match is None:
+            self.fail(f"{value!r} is no size in memory; write 500M or 2G", param, ctx)
+        return int(float(match[1]) * 1024 ** " KMGT".index(match[2].upper() or " "))
+
+
 class White(click.ParamType):
     """none, an illuminant, a colour temperature in K such as 3200, or a chromaticity x,y."""
 
@@ -110,6 +122,10 @@ class White(click.ParamType):
     metavar="NAME=VALUE",
     help="Of an .xml a $name, of glTF camera, scene, time.",
 )
+@click.option(
+    "--texture-budget", type=Bytes(), metavar="SIZE",
+    help="Memory for images, such as 500M; larger ones are halved.  [default: half the free]",
+)  # fmt: skip
 @click.option("--verbose", is_flag=True, help="Tell of memory, trees, programs and stages.")
 @click.option("--quiet", is_flag=True, help="Show no progress and no warnings.")
 def render(
@@ -119,6 +135,7 @@ def render(
     device: str | None,
     exposure: float,
     defines: tuple[str, ...],
+    texture_budget: int | None,
     verbose: bool,
     quiet: bool,
     **changes: Any,
@@ -136,7 +153,7 @@ def render(
     on = dev.choose(device, profiling=verbose)
     with shown.phase(f"building kernels for {on.info.name}"):
         began = time.perf_counter()
-        renderer = Renderer(plan, on)
+        renderer = Renderer(plan, on, texture_budget=texture_budget)
         built = time.perf_counter() - began
     for warning in [*plan.warnings, *renderer.warnings]:
         shown.note(f"clpt: warning: {warning}")

@@ -63,13 +63,13 @@ class Lowered:
         return sum(a.nbytes for a in (*self.tables.values(), self.vertices, self.faces, self.tags))
 
 
-def lower(scene: sc.Scene) -> Lowered:
+def lower(scene: sc.Scene, texture_budget: int | None = None) -> Lowered:
     """Lower a scene; of the `aov` integrator, for its first channel.
 
     Raises SceneError where the scene makes no sense: it names the shape, light or material.
     """
     check(scene)
-    return _Lowering(scene).run()
+    return _Lowering(scene, texture_budget).run()
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class _Side:
 class _Lowering:
     """The state of one `lower`."""
 
-    def __init__(self, scene: sc.Scene):
+    def __init__(self, scene: sc.Scene, texture_budget: int | None = None):
         film = scene.film
         self.warnings: list[str] = []
         self.placed, self.prototypes = instancing.sort(scene.shapes, self.warnings)
@@ -105,7 +105,12 @@ class _Lowering:
         own = Density(film.lambda_min, film.lambda_max)
         self.density = density(scene) if self.mode == "spectral" else own
         self.tables = Tables(
-            self.mode, film.lambda_min, film.lambda_max, sensor(film), self.density
+            self.mode,
+            film.lambda_min,
+            film.lambda_max,
+            sensor(film),
+            self.density,
+            texture_budget,
         )
         if self.light_paths and (film.filter.kind != "box" or filters.radius(film.filter) != 0.5):
             self.warnings.append(
@@ -168,6 +173,7 @@ class _Lowering:
             self.warnings.append(
                 "in rgb mode fluorescent paint has its colour under D65, at most white"
             )
+        self.warnings += tables.finish()
         features = self._features({one.shape.kind for one in analytic}, camera)
         arrays = tables.arrays()
         settings = self._settings(center, radius)

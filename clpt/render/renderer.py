@@ -20,6 +20,7 @@ from clpt.scene.integrators import CHANNELS, Aov
 from clpt.spectral_exr import SpectralImage
 
 Image = NDArray[np.float32]
+TEXTURE_SHARE = 0.5  # of a device's free memory, for bitmaps
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,7 +42,8 @@ class Renderer:
     """Renders a scene; its picture can be asked for at any time.
 
     device: where to render, a name or index (see clpt.device.choose), or a clpt.device.Device.
-    The other parameters are those of clpt.render.wavefront.Wavefront.
+    texture_budget: [bytes] that bitmaps may take, larger ones are halved; by default half of what
+    the device has free. The other parameters are those of clpt.render.wavefront.Wavefront.
 
     Raises SceneError for a scene that makes no sense, DeviceError, MemoryBudgetError.
     """
@@ -52,6 +54,7 @@ class Renderer:
         device: dev.Device | str | int | None = None,
         *,
         profiling: bool = False,
+        texture_budget: int | None = None,
         **wavefront: Any,
     ):
         self.scene = scene
@@ -61,7 +64,8 @@ class Renderer:
         self.channels: tuple[str, ...] = ()
         if isinstance(scene.integrator, Aov):
             self.channels = scene.integrator.channels
-        first = Wavefront(device, lower(scene), **wavefront)
+        budget = _texture_budget(device) if texture_budget is None else texture_budget
+        first = Wavefront(device, lower(scene, budget), **wavefront)
         self.wavefronts = [first, *(first.sibling(channel) for channel in self.channels[1:])]
         self.warnings = list(self.wavefronts[0].lowered.warnings)
         self.samples = 0
@@ -118,6 +122,11 @@ class Renderer:
             name: wavefront.image()[:, :, : CHANNELS[name]]
             for name, wavefront in zip(self.channels, self.wavefronts, strict=True)
         }
+
+
+def _texture_budget(device: dev.Device) -> int:
+    """Half of a device's free memory, in one buffer."""
+    return min(int(TEXTURE_SHARE * device.free_memory()), device.info.max_alloc)
 
 
 def render(

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from clpt import spectra
 from clpt.records import TABLES
 from clpt.render import reradiation
+from clpt.render.bitmaps import Images
 from clpt.render.films import layers_words
 from clpt.render.kinds import ORDERS_WORDS, REAL_WORDS, SPECTRUM_WORDS
 from clpt.render.wavelengths import Density
@@ -58,6 +59,7 @@ class Tables:
 
     mode: "spectral" or "rgb"; lambda_min, lambda_max: the film's range [nm]; sensor: what it
     records with, by default cie1931; density: of its wavelengths, by default visible importance.
+    texture_budget: [bytes] for images, None for any number.
     `sources` tells, per kind and parameter, where values come from: "none" (a lobe's share is 0),
     "constant", "table", "texture", "layers".
     """
@@ -69,10 +71,12 @@ class Tables:
         lambda_max: float = 830.0,
         sensor: Sensor | None = None,
         density: Density | None = None,
+        texture_budget: int | None = None,
     ):
         self.mode, self.lambda_min, self.lambda_max = mode, lambda_min, lambda_max
         self.sources: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
         self.expected: NDArray[np.float64] | None = None  # light, see clpt.render.reradiation
+        self.images = Images(mode == "spectral", texture_budget)
         self.textures: dict[tuple[int, str], int] = {}
         self.texture_roles: set[tuple[str, str]] = set()  # (kind, role) that occur
         self.attributes: dict[tuple[str, str], int] = {}  # (name, role) -> its place in directories
@@ -114,6 +118,12 @@ class Tables:
     def size(self, name: str) -> int:
         """Return how many elements a table has so far."""
         return self._sizes[name]
+
+    def finish(self) -> list[str]:
+        """Put in what waits until all of it is known: images. Returns warnings."""
+        from clpt.render.textures import KINDS
+
+        return self.images.finish(self, KINDS)
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return every table as one array; an empty one has a single zero, for OpenCL's sake."""

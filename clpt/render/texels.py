@@ -43,11 +43,11 @@ def pixels(texture: Bitmap, role: str) -> Floats:
     if image.ndim != 3 or image.shape[2] not in (1, 3, 4) or image.size == 0:
         wanted = "must be (h, w) or (h, w, 1, 3 or 4) and not empty"
         raise SceneError(f"{wanted}, not {image.shape}", where="bitmap.image")
-    chosen = _channel(image, texture.channel) if role == "real" else image[..., :3]
+    chosen = channel(image, texture.channel) if role == "real" else image[..., :3]
     return np.nan_to_num(chosen.astype(np.float32))
 
 
-def _channel(image: NDArray[Any], name: str) -> NDArray[Any]:
+def channel(image: NDArray[Any], name: str) -> NDArray[Any]:
     """The channel (h, w, 1) that stands for a number, of (h, w, 1, 3 or 4); a is 1 if missing."""
     count = image.shape[2]
     if name == "a":

@@ -7,7 +7,6 @@ role, so that lanes which look up nothing have something to read.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -16,8 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 from clpt.errors import SceneError
 from clpt.layout import Record
 from clpt.render.attributes import per_face
+from clpt.render.bitmaps import Images, identity
 from clpt.render.kinds import REAL_WORDS, SPECTRUM_WORDS
-from clpt.render.texels import bands, pixels, spectral_image, texels
+from clpt.render.texels import bands, spectral_image
 from clpt.render.texture_programs import is_composite, operand_text, program
 from clpt.scene.params import device_params, params
 from clpt.scene.textures import WRAPS, Bitmap, Checkerboard, MeshAttribute, Placed, Texture
@@ -32,13 +32,15 @@ _IMAGE = {
     **_COMMON,
     "width": ("integer", "[texels]"),
     "height": ("integer", "[texels]"),
-    "first": ("integer", "of its floats in `texels`; four a texel, one for a real"),
+    "first": ("integer", "of its words in `images`"),
     "filter": ("integer", "BITMAP_FILTER_"),
     "wrap_u": ("integer", "BITMAP_WRAP_"),
     "wrap_v": ("integer", "BITMAP_WRAP_"),
+    "decode": ("integer", "of 256 words in `images`: what bytes mean"),
 }
 RECORDS: dict[str, Record] = {
-    "bitmap": Record("Bitmap", "An image.", **_IMAGE),
+    "bitmap": Record("Bitmap", "An image of floats.", **_IMAGE),
+    "packed_bitmap": Record("PackedBitmap", "An image of bytes.", **_IMAGE),
     "checkerboard": Record(
         "Checkerboard",
         "Two colours.",
@@ -74,6 +76,7 @@ class Sink(Protocol):
     texture_depth: int
     attributes: dict[tuple[str, str], int]
     kept: list[Any]
+    images: Images
 
     lambda_min: float
     lambda_max: float
@@ -100,12 +103,15 @@ def lower_texture(texture: Texture, role: str, tables: Sink) -> int:
             _blank(tables)
         if is_composite(texture):
             kind, row = "program", _program(texture, role, tables)
+            tables.texture_roles.add((kind, role))
+        elif isinstance(texture, Bitmap):
+            row = _bitmap(texture, role, tables)
         else:
             kind, members = MEMBERS[type(texture)](texture, role, tables)
-            row = _row(kind, members, tables)
+            row, _ = _row(kind, members, tables)
+            tables.texture_roles.add((kind, role))
         tables.textures[key] = row
         tables.kept.append(texture)
-        tables.texture_roles.add((kind, role))
     return tables.textures[key]
 
 
@@ -119,24 +125,26 @@ def _program(texture: Texture, role: str, tables: Sink) -> int:
 
 
 def _identity(texture: Texture) -> Any:
-    """What makes two textures the same: for an image file its parameters, else being one object."""
-    if isinstance(texture, Bitmap) and isinstance(texture.image, (str, Path)):
+    """What makes two textures the same: of bitmaps their parameters, else being one object."""
+    if isinstance(texture, Bitmap):
         values = (getattr(texture, name) for name in ("raw", "filter", "wrap", "wrap_v", "channel"))
-        return (str(texture.image), *values, texture.to_uv.tobytes())
+        return (identity(texture), *values, texture.to_uv.tobytes())
     return id(texture)
 
 
-def _row(kind: str, members: dict[str, Any], tables: Sink) -> int:
+def _row(kind: str, members: dict[str, Any], tables: Sink) -> tuple[int, np.ndarray]:
+    """Append a row; its first word, and the row itself, which may still be written to."""
     words = np.zeros(1, RECORDS[kind].dtype)
     words["kind"] = KINDS.index(kind)
     for name, value in members.items():
         words[name] = value
-    return tables.append("textures", words.view(np.uint32))
+    return tables.append("textures", words.view(np.uint32)), words
 
 
 def _blank(tables: Sink) -> None:
-    first = tables.append_floats("texels", np.zeros(4))
-    _row("spectral_bitmap", {"kind": 0, "width": 1, "height": 1, "first": first}, tables)
+    tables.append_floats("texels", np.zeros(2))
+    tables.append("images", np.zeros(4, np.uint32))
+    _row("spectral_bitmap", {"kind": 0, "width": 1, "height": 1}, tables)
 
 
 def _uv(texture: Placed, down: bool) -> dict[str, Any]:
@@ -161,30 +169,32 @@ def _checkerboard(texture: Checkerboard, role: str, tables: Sink) -> tuple[str, 
     return texture.kind, members
 
 
-def _bitmap(texture: Bitmap, role: str, tables: Sink) -> tuple[str, dict[str, Any]]:
-    spectral = spectral_image(texture, role) if tables.spectral and role != "real" else None
-    kind, more = texture.kind, {}
-    if spectral is None:
-        image = pixels(texture, role)
-        values = texels(image, role, tables.spectral)
-    else:
-        image = spectral.values
-        values, number = bands(spectral, tables.lambda_min, tables.lambda_max)
-        kind = "spectral_bitmap"
-        more = {"bands": values.shape[1], "number": tables.spectra_row(number)}
-    if tables.size("texels") + values.size > LARGEST:
-        raise SceneError("all images together have too many texels", where="bitmap.image")
+def _bitmap(texture: Bitmap, role: str, tables: Sink) -> int:
+    """Append a bitmap's row; unless it is one of spectra, its image comes when all are known."""
     filters = params(Bitmap)["filter"].choices
-    return kind, {
+    members = {
         **_uv(texture, down=True),
-        "width": image.shape[1],
-        "height": image.shape[0],
-        "first": tables.append_floats("texels", values),
         "filter": filters.index(texture.filter),
         "wrap_u": WRAPS.index(texture.wrap),
         "wrap_v": WRAPS.index(texture.wrap_v or texture.wrap),
-        **more,
     }
+    spectral = spectral_image(texture, role) if tables.spectral and role != "real" else None
+    if spectral is None:
+        at, row = _row("bitmap", members, tables)
+        tables.images.add(texture, role, row)
+        return at
+    values, number = bands(spectral, tables.lambda_min, tables.lambda_max)
+    if tables.size("texels") + values.size > LARGEST:
+        raise SceneError("all images together have too many texels", where="bitmap.image")
+    tables.texture_roles.add(("spectral_bitmap", role))
+    more = {
+        "width": spectral.values.shape[1],
+        "height": spectral.values.shape[0],
+        "first": tables.append_floats("texels", values),
+        "bands": values.shape[1],
+        "number": tables.spectra_row(number),
+    }
+    return _row("spectral_bitmap", {**members, **more}, tables)[0]
 
 
 def _mesh_attribute(texture: MeshAttribute, role: str, tables: Sink) -> tuple[str, dict[str, Any]]:
@@ -193,7 +203,6 @@ def _mesh_attribute(texture: MeshAttribute, role: str, tables: Sink) -> tuple[st
 
 
 MEMBERS: dict[type[Texture], Callable[..., tuple[str, dict[str, Any]]]] = {
-    Bitmap: _bitmap,
     Checkerboard: _checkerboard,
     MeshAttribute: _mesh_attribute,
 }
@@ -209,10 +218,11 @@ def dispatch_text(kinds: Iterable[str], roles: Iterable[tuple[str, str]], depth:
     real_texture_real(scene, table, at, point, lambdas)        the same for a real
     """
     pairs, found = set(roles), set(kinds)
-    if "spectral_bitmap" in found:
+    if found & {"spectral_bitmap", "packed_bitmap"}:
         found.add("bitmap")  # which knows what lies where
     present = [kind for kind in RECORDS if kind in found]
-    choosy = {cls.kind: cls for cls in MEMBERS}
+    kinds_of: tuple[type[Texture], ...] = (Bitmap, *MEMBERS)
+    choosy = {cls.kind: cls for cls in kinds_of}
     parts = ['#include "lib/texture.cl"'] if found else []
     for kind in present:
         parts += _choice_lines(choosy[kind]) if kind in choosy else []

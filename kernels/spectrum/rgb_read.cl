@@ -24,6 +24,24 @@ inline Spectrum spectrum_light_texel(Scene scene, real x, real y, real z, real w
     Spectrum r = {x, y, z};
     return r;
 }
+/* The same for a texel of three floats in a table. */
+inline Spectrum spectrum_texel_at(global const uint *table, integer at, Wavelengths lambdas)
+{
+    Spectrum r = {gather_w(table, at), gather_w(table, at + 1), gather_w(table, at + 2)};
+    return r;
+}
+inline Spectrum spectrum_light_texel_at(Scene scene, global const uint *table, integer at, Wavelengths lambdas)
+{
+    return spectrum_texel_at(table, at, lambdas);
+}
+/* And for a texel that takes a word: a byte a channel, whose meaning stands in 256 words from `decode`. */
+inline Spectrum spectrum_packed_texel(global const uint *table, integer first, integer index, integer decode, Wavelengths lambdas)
+{
+    integer word = gather_i(table, first + index);
+    Spectrum r = {gather_w(table, decode + (word & 255)), gather_w(table, decode + ((word >> 8) & 255)),
+                  gather_w(table, decode + ((word >> 16) & 255))};
+    return r;
+}
 inline Wavelengths wavelengths_sample(Scene scene, real u)
 {
     return spectrum_of(0.0f);

@@ -54,3 +54,30 @@ inline Spectrum spectrum_light_texel(Scene scene, real x, real y, real z, real w
 {
     return spectrum_mul(sigmoid_spectrum(x, y, z, w, lambdas), spectra_row(scene, (integer)(0), lambdas));
 }
+/* The same for a texel of four floats in a table. */
+inline Spectrum spectrum_texel_at(global const uint *table, integer at, Wavelengths lambdas)
+{
+    return spectrum_constant(table, at, lambdas);
+}
+inline Spectrum spectrum_light_texel_at(Scene scene, global const uint *table, integer at, Wavelengths lambdas)
+{
+    return spectrum_mul(spectrum_constant(table, at, lambdas), spectra_row(scene, (integer)(0), lambdas));
+}
+/* And for a texel of two words: a sigmoid's argument at 400, 550 and 700 nm, as floats of 21 bits, two in
+ * the words' upper bits, the third in what is left. In between it is the parabola through them. */
+inline Spectrum spectrum_packed_texel(global const uint *table, integer first, integer index, integer decode, Wavelengths lambdas)
+{
+    integer at = first + 2 * index, p = gather_i(table, at), q = gather_i(table, at + 1);
+    real a = as_real(p & ~0x7ff), b = as_real(q & ~0x7ff);
+    real c = as_real(((p & 0x7ff) << 21) | ((q & 0x3ff) << 11));
+    Spectrum r;
+#define C(c_)                                                                                        \
+    {                                                                                                \
+        real u = (lambdas.c_ - 400.0f) * (1.0f / 150.0f), v = u - 1.0f, w = u - 2.0f;                 \
+        real x = 0.5f * (a * v * w + c * u * v) - b * u * w;                                         \
+        r.c_ = 0.5f + 0.5f * x / sqrt(1.0f + x * x);                                                 \
+    }
+    SPECTRUM_EACH(C)
+#undef C
+    return r;
+}

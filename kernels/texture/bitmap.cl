@@ -55,9 +55,8 @@ Spectrum bitmap_reflectance(Bitmap t, Scene scene, TexturePoint point, Wavelengt
     Spectrum sum = spectrum_of(0.0f);
     for (int corner = 0; corner < 4; corner++) {
         real weight;
-        integer at = t.first + 4 * bitmap_corner(t, b, corner, &weight);
-        Spectrum texel = spectrum_texel(gather(scene.texels, at), gather(scene.texels, at + 1),
-                                        gather(scene.texels, at + 2), gather(scene.texels, at + 3), lambdas);
+        integer at = t.first + SPECTRUM_SIZE * bitmap_corner(t, b, corner, &weight);
+        Spectrum texel = spectrum_texel_at(scene.images, at, lambdas);
         sum = spectrum_madd(texel, weight, sum);
     }
     return sum;
@@ -69,9 +68,8 @@ Spectrum bitmap_emission(Bitmap t, Scene scene, TexturePoint point, Wavelengths 
     Spectrum sum = spectrum_of(0.0f);
     for (int corner = 0; corner < 4; corner++) {
         real weight;
-        integer at = t.first + 4 * bitmap_corner(t, b, corner, &weight);
-        Spectrum texel = spectrum_light_texel(scene, gather(scene.texels, at), gather(scene.texels, at + 1),
-                                              gather(scene.texels, at + 2), gather(scene.texels, at + 3), lambdas);
+        integer at = t.first + SPECTRUM_SIZE * bitmap_corner(t, b, corner, &weight);
+        Spectrum texel = spectrum_light_texel_at(scene, scene.images, at, lambdas);
         sum = spectrum_madd(texel, weight, sum);
     }
     return sum;
@@ -84,7 +82,7 @@ real bitmap_real(Bitmap t, Scene scene, TexturePoint point)
     for (int corner = 0; corner < 4; corner++) {
         real weight;
         integer at = t.first + bitmap_corner(t, b, corner, &weight);
-        sum += weight * gather(scene.texels, at);
+        sum += weight * gather_w(scene.images, at);
     }
     return sum;
 }

@@ -4,7 +4,7 @@
 
 inline Bitmap spectral_bitmap_image(SpectralBitmap t)
 {
-    Bitmap b = {t.kind, t.to_u, t.to_v, t.width, t.height, t.first, t.filter, t.wrap_u, t.wrap_v};
+    Bitmap b = {t.kind, t.to_u, t.to_v, t.width, t.height, t.first, t.filter, t.wrap_u, t.wrap_v, t.decode};
     return b;
 }
 

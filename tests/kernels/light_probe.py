@@ -132,6 +132,7 @@ def lit(
         row["light"] = at
         tables.append("shapes", row.view(np.uint32))
     tables.append("lights", rows.rows.view(np.uint32))
+    tables.finish()
     if rows.tree is not None:
         tables.append("lights", rows.tree)
     return Lit(tables, rows, tuple(files), radius)

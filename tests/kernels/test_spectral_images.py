@@ -112,6 +112,7 @@ def test_only_the_bands_of_the_film_s_range_are_kept():
 def test_scenes_without_spectral_images_do_not_hold_their_text():
     tables = Tables("spectral")
     lower_texture(scene.Bitmap(image=np.zeros((2, 2, 3))), "reflectance", tables)
+    tables.finish()
     text = dispatch_text({kind for kind, _ in tables.texture_roles}, tables.texture_roles)
     assert "pectral" not in text.replace("spectrum", "")
     assert "bands" not in text

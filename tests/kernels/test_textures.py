@@ -11,9 +11,12 @@ from PIL import Image
 from clpt import images, spectra
 from clpt.errors import SceneError
 from clpt.render import textures
+from clpt.render.bitmaps import NODES, pack
 from clpt.render.tables import Tables
+from clpt.render.texels import texels
 from clpt.render.texture_programs import folded
 from clpt.scene import textures as scene
+from clpt.spectra import cie
 from clpt.spectra.spectrum import d65
 from clpt.spectra.upsampling import evaluate
 from tests.kernels.scene_harness import SceneProbe
@@ -51,6 +54,7 @@ def look_up(made, role, uv, mode="rgb", lanes=8, rows=None):
     """Values (n, 3 or 4) or (n,) of textures in a role; rows: which of them each uv reads."""
     tables = Tables(mode)
     words = np.array([tables.param_words(t, role)[0][-1] - 1 for t in made])
+    tables.finish()
     which = words[np.zeros(len(uv), int) if rows is None else rows]
     body, components = _body(role, mode)
     probe = SceneProbe(
@@ -262,10 +266,66 @@ def test_spectral_bitmap_interpolates_values(role):
     np.testing.assert_allclose(found, reference(values, uv), rtol=2e-3, atol=2e-4 * values.max())
 
 
+BYTES = np.random.default_rng(6).integers(0, 256, (6, 5, 4), np.uint8)
+
+
+@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+@pytest.mark.parametrize("raw", [False, True])
+def test_bytes_mean_what_floats_mean(mode, raw):
+    """Packed colours: in RGB mode exactly, as spectra of 21 bits a node to 1/200."""
+    linear = images.Stored(BYTES, encoded=not raw).decoded()
+    uv = _uvs(100)
+    made = [scene.Bitmap(image=BYTES, raw=raw), scene.Bitmap(image=linear)]
+    exact = [look_up([b], "reflectance", uv, mode=mode) for b in made]
+    np.testing.assert_allclose(*exact, atol=0.0 if mode == "rgb" else 5e-3)
+    assert np.abs(exact[0] - exact[1]).mean() < 1e-4
+    for channel in ("luminance", "g", "a"):
+        pair = [scene.Bitmap(image=b.image, raw=b.raw, channel=channel) for b in made]
+        numbers = [look_up([b], "real", uv, mode=mode) for b in pair]
+        np.testing.assert_allclose(*numbers, atol=1e-6)
+
+
+def test_packed_spectra_show_the_same_colours():
+    """Colours under D65 differ by less than 0.02 of CIE 2000, which no eye sees."""
+    colour = pytest.importorskip("colour")
+    rng = np.random.default_rng(8)
+    rgb = np.concatenate([rng.integers(0, 256, (3000, 3)), rng.choice([0, 1, 128, 255], (500, 3))])
+    coefficients = spectra.uplift(images.srgb_to_linear((rgb / 255.0).astype(np.float32)))
+    p, q = pack(coefficients).T
+    upper = np.uint32(0xFFFFF800)
+    third = (p & np.uint32(0x7FF)) << np.uint32(21) | (q & np.uint32(0x3FF)) << np.uint32(11)
+    nodes = [w.astype(np.uint32).view(np.float32) for w in (p & upper, q & upper, third)]
+    lambdas = np.arange(360.0, 831.0, 5.0)
+    basis = np.linalg.solve(np.vander(NODES).T, np.vander(lambdas, 3).T)
+    x = np.stack(nodes, axis=1).astype(np.float64) @ basis
+    weights = cie.cie_xyz(lambdas) * d65().sample(lambdas)[:, None]
+    weights /= weights[:, 1].sum()
+    white = colour.XYZ_to_xy(weights.sum(axis=0))
+    seen = (0.5 + 0.5 * x / np.sqrt(1.0 + x**2), evaluate(coefficients, lambdas))
+    labs = [colour.XYZ_to_Lab(values @ weights, white) for values in seen]
+    assert colour.delta_E(*labs, method="CIE 2000").max() < 0.02
+
+
+def test_a_budget_halves_the_largest():
+    """Means of linear light, odd edges repeated; each image that shrinks is told of."""
+    large, small = BYTES[:, :, :3], COLOURS[:2, :2]
+    tables = Tables("rgb", texture_budget=100)
+    for image in (large, small):
+        textures.lower_texture(scene.Bitmap(image=image), "reflectance", tables)
+    notes = tables.finish()
+    assert len(notes) == 1
+    assert "5 x 6 texels made 3 x 3" in notes[0]
+    decoded = np.pad(images.Stored(large, True).decoded(), ((0, 0), (0, 1), (0, 0)), "edge")
+    means = decoded.reshape(3, 2, 3, 2, 3).mean(axis=(1, 3))
+    words = tables.arrays()["images"][4 + 256 :][:9].reshape(3, 3)
+    shown = np.stack([words & 255, words >> 8 & 255, words >> 16 & 255], axis=2)
+    np.testing.assert_allclose(shown, images.linear_to_srgb(means) * 255.0, atol=0.51)
+
+
 def test_eight_bit_images_share_their_colours():
     """The short cut for images of few levels gives what uplifting every texel gives."""
     levels = np.round(np.random.default_rng(3).random((40, 50, 3)) * 255) / 255
-    made = textures.texels(levels.astype(np.float32), "reflectance", True)
+    made = texels(levels.astype(np.float32), "reflectance", True)
     np.testing.assert_array_equal(
         made[:, :3], spectra.uplift(levels.astype(np.float32).reshape(-1, 3))
     )
@@ -371,6 +431,7 @@ def test_parameters_that_are_textures():
         *tables.param_words(colour, "real")[0],
     ]
     tables.append("materials", words)
+    tables.finish()
     probe = SceneProbe(
         LOADERS,
         3,
@@ -391,17 +452,18 @@ def test_a_texture_is_put_in_once(tmp_path):
     tables = Tables("rgb")
     board, file = scene.Checkerboard(), scene.Bitmap(image=path)
     first = [textures.lower_texture(t, "reflectance", tables) for t in (board, file)]
-    sizes = tables.size("textures"), tables.size("texels")
+    sizes = tables.size("textures")
     again = [
         textures.lower_texture(t, "reflectance", tables)
         for t in (board, scene.Bitmap(image=str(path)))
     ]
     assert first == again
-    assert sizes == (tables.size("textures"), tables.size("texels"))
+    assert sizes == tables.size("textures")
     assert textures.lower_texture(file, "real", tables) not in first
+    tables.finish()
     assert tables.texture_roles == {
         ("checkerboard", "reflectance"),
-        ("bitmap", "reflectance"),
+        ("packed_bitmap", "reflectance"),
         ("bitmap", "real"),
     }
 
@@ -415,7 +477,7 @@ def test_no_textures_no_text():
     [
         (scene.Bitmap(), "path or an array"),
         (scene.Bitmap(image="no/such.png"), "no/such.png"),
-        (scene.Bitmap(image=np.zeros((2, 2, 3), np.uint8)), "floats"),
+        (scene.Bitmap(image=np.zeros((2, 2, 3), np.int16)), "floats"),
         (scene.Bitmap(image=np.zeros((2, 2, 2))), r"\(2, 2, 2\)"),
         (scene.Bitmap(image=np.zeros((0, 2, 3))), "not empty"),
         (scene.Bitmap(image=COLOURS, to_uv=np.diag([1.0, 1.0, 0.0])), "bitmap.to_uv"),
@@ -423,7 +485,9 @@ def test_no_textures_no_text():
 )
 def test_unusable_textures(texture, part):
     with pytest.raises(SceneError, match=part):
-        textures.lower_texture(texture, "reflectance", Tables("rgb"))
+        tables = Tables("rgb")
+        textures.lower_texture(texture, "reflectance", tables)
+        tables.finish()
 
 
 def test_texels_that_are_not_finite_are_black():

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from clpt import spectral_exr
+from clpt import images, spectral_exr
 from clpt.errors import SceneError
 from clpt.formats.native import reradiation as json_reradiation
 from clpt.formats.native import spectra as json_spectra
@@ -164,10 +164,13 @@ class _Writer:
         if not spectral and not isinstance(image, np.ndarray):
             return os.path.relpath(image, self.path.parent)
         if id(image) not in self.files:
-            suffix = "exr" if spectral else "npy"
+            bytes_ = not spectral and image.dtype == np.uint8
+            suffix = "exr" if spectral else "png" if bytes_ else "npy"
             name = f"{self.path.stem}.image{len(self.files)}.{suffix}"
             if spectral:
                 spectral_exr.write(self.path.parent / name, image)
+            elif bytes_:
+                images.write_stored(self.path.parent / name, image)
             else:
                 np.save(self.path.parent / name, np.asarray(image, np.float32))
             self.files[id(image)] = name

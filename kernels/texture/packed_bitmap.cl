@@ -1,0 +1,42 @@
+/* An image of 8 bits a channel, placed as bitmap.cl places it, in fewer bytes: a number takes one, a colour
+ * four, or eight as a spectrum (spectrum_packed_texel). `decode` is the first of 256 values that bytes mean. */
+inline Bitmap packed_bitmap_image(PackedBitmap t)
+{
+    Bitmap b = {t.kind, t.to_u, t.to_v, t.width, t.height, t.first, t.filter, t.wrap_u, t.wrap_v, t.decode};
+    return b;
+}
+
+Spectrum packed_bitmap_reflectance(PackedBitmap t, Scene scene, TexturePoint point, Wavelengths lambdas)
+{
+    Bitmap image = packed_bitmap_image(t);
+    BitmapPlace b = bitmap_place(image, point);
+    Spectrum sum = spectrum_of(0.0f);
+    for (int corner = 0; corner < 4; corner++) {
+        real weight;
+        integer index = bitmap_corner(image, b, corner, &weight);
+        Spectrum texel = spectrum_packed_texel(scene.images, t.first, index, t.decode, lambdas);
+        sum = spectrum_madd(texel, weight, sum);
+    }
+    return sum;
+}
+
+/* In RGB mode alone: light has no packed spectra. */
+Spectrum packed_bitmap_emission(PackedBitmap t, Scene scene, TexturePoint point, Wavelengths lambdas)
+{
+    return packed_bitmap_reflectance(t, scene, point, lambdas);
+}
+
+real packed_bitmap_real(PackedBitmap t, Scene scene, TexturePoint point)
+{
+    Bitmap image = packed_bitmap_image(t);
+    BitmapPlace b = bitmap_place(image, point);
+    real sum = 0.0f;
+    for (int corner = 0; corner < 4; corner++) {
+        real weight;
+        integer index = bitmap_corner(image, b, corner, &weight);
+        integer word = gather_i(scene.images, t.first + (index >> 2));
+        integer byte = (word >> ((index & 3) << 3)) & 255;
+        sum += weight * gather_w(scene.images, t.decode + byte);
+    }
+    return sum;
+}
