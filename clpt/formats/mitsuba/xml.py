@@ -177,7 +177,8 @@ class _Expander:
         def value(match: re.Match) -> str:
             name = match[1] or match[2]
             if name not in self.values:
-                raise element.error(f"the variable ${name} is not defined")
+                hint = f"give it by -D {name}=VALUE"
+                raise element.error(f"the variable ${name} is not defined; {hint}")
             self.used.add(name)
             return self.values[name]
 
