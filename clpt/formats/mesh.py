@@ -111,9 +111,10 @@ def checked(
     notes: list[str],
     attributes: Mapping[str, NDArray[Any]] | None = None,
 ) -> dict[str, Any]:
-    """Return a mesh's arrays without zero-area triangles and unused vertices; notes tell what went.
+    """Return a mesh's arrays without unused vertices; notes tell what else went.
 
-    attributes: further arrays (n, width), one row a vertex, or a face where face_ begins the
+    Triangles without an area stay, as lowering leaves them out; where there are no others, none is
+    left. attributes: further arrays (n, width), one row a vertex, or a face where face_ begins the
     name. Raises SceneError for indices out of range and vertices that are not finite.
     """
     where = name or None
@@ -123,7 +124,7 @@ def checked(
         raise SceneError(message, file=path, where=where)
     with np.errstate(over="ignore", invalid="ignore"):
         points = np.ascontiguousarray(vertices, np.float32)
-        solid = np.ones(len(faces), bool)
+        solid = False
         for first in range(0, len(faces), CHUNK):
             corners = points[faces[first : first + CHUNK]].astype(np.float64)
             finite = np.isfinite(corners).all(axis=(1, 2))
@@ -132,14 +133,14 @@ def checked(
                 message = f"triangle {bad} has a vertex that is not a finite number"
                 raise SceneError(message, file=path, where=where)
             sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-            solid[first : first + CHUNK] = sides.any(axis=1)
-    if not solid.all():
-        notes.append(f"{name or 'mesh'}: left out {int((~solid).sum())} triangles without area")
-        faces = faces[solid]
+            solid = solid or bool(sides.any())
+    if len(faces) and not solid:
+        notes.append(f"{name or 'mesh'}: left out, since none of its triangles has an area")
+        faces, attributes = faces[:0], _none_of_faces(attributes)
     used = np.zeros(len(points), bool)
     used[faces.reshape(-1)] = True
     arrays: dict[str, Any] = {"vertices": points, "normals": normals, "uvs": uvs}
-    own = {k: a[solid] if k.startswith("face_") else a for k, a in (attributes or {}).items()}
+    own = dict(attributes or {})
     if not used.all():
         arrays = {key: None if a is None else a[used] for key, a in arrays.items()}
         own = {k: a if k.startswith("face_") else a[used] for k, a in own.items()}
@@ -152,6 +153,13 @@ def checked(
         arrays["uvs"] = None
     whole = {**arrays, "faces": np.ascontiguousarray(faces, np.uint32)}
     return whole if attributes is None else {**whole, "attributes": own}
+
+
+def _none_of_faces(attributes: Mapping[str, NDArray[Any]] | None) -> dict[str, NDArray[Any]] | None:
+    """Attributes of a mesh whose faces have all gone."""
+    if attributes is None:
+        return None
+    return {k: a[:0] if k.startswith("face_") else a for k, a in attributes.items()}
 
 
 def _open(path: Path, materials: bool) -> trimesh.Scene:
