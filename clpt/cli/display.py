@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -13,6 +13,7 @@ import click
 from ..render.renderer import Progress
 
 EVERY = 5.0  # seconds between lines
+PATIENCE = 1.0  # seconds of reading a scene before there is a bar
 REFRESH = 0.1  # seconds between changes of the bar
 
 
@@ -34,6 +35,11 @@ class Display:
     def phase(self, text: str) -> Iterator[None]:
         """Say what is being done meanwhile."""
         yield
+
+    @contextmanager
+    def loading(self, name: str) -> Iterator[Callable[[float, str], None]]:
+        """What tells how much of the scene `name` is read, if that takes long."""
+        yield lambda fraction, what: None
 
     @contextmanager
     def rendering(self) -> Iterator[None]:
@@ -68,6 +74,18 @@ class Lines(Display):
         self.note(f"{text} ...")
         yield
 
+    @contextmanager
+    def loading(self, name: str) -> Iterator[Callable[[float, str], None]]:
+        last = time.perf_counter()
+
+        def tell(fraction: float, what: str) -> None:
+            nonlocal last
+            if time.perf_counter() - last >= EVERY:
+                last = time.perf_counter()
+                self.note(f"reading {name}: {what}")
+
+        yield tell
+
     def show(self, progress: Progress) -> None:
         if self.due(progress, EVERY):
             numbers = figures(progress, self.fraction(progress))
@@ -90,6 +108,25 @@ class Bar(Lines):
     def phase(self, text: str) -> Iterator[None]:
         with self.console.status(text):
             yield
+
+    @contextmanager
+    def loading(self, name: str) -> Iterator[Callable[[float, str], None]]:
+        from rich.progress import BarColumn, TextColumn
+        from rich.progress import Progress as RichProgress
+
+        columns = TextColumn(f"reading {name}"), BarColumn(24), TextColumn("{task.description}")
+        bar = RichProgress(*columns, console=self.console, transient=True)
+        task, began = bar.add_task("", total=1.0), time.perf_counter()
+
+        def tell(fraction: float, what: str) -> None:
+            if time.perf_counter() - began >= PATIENCE:
+                bar.start()
+                bar.update(task, completed=fraction, description=what)
+
+        try:
+            yield tell
+        finally:
+            bar.stop()
 
     @contextmanager
     def rendering(self) -> Iterator[None]:

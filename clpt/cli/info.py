@@ -45,7 +45,7 @@ def info(scene: Path, defines: tuple[str, ...], as_json: bool) -> None:
     console.print(table)
 
 
-def variables(defines: Iterable[str]) -> dict[str, str]:
+def variables(defines: Iterable[str]) -> dict[str, Any]:
     """Return NAME=VALUE options as a dictionary. Raises click.BadParameter."""
     pairs = [define.partition("=") for define in defines]
     wrong = next((name for name, equals, _ in pairs if not (name and equals)), None)

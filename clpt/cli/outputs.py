@@ -22,7 +22,8 @@ COLUMNS = 4  # of the sheet of an aov .png
 def default(scene: Path) -> tuple[Path, ...]:
     """Where to write a scene's picture if nobody says: in the current folder, by its name."""
     path = scene.resolve()
-    name = path.parent.name if path.stem == "scene" else path.stem
+    stem = path.name.removesuffix(".gz").rpartition(".")[0] or path.name
+    name = path.parent.name if stem == "scene" else stem
     return Path(f"{name}.exr"), Path(f"{name}.png")
 
 

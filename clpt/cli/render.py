@@ -147,7 +147,8 @@ def render(
     exit status is 130.
     """
     shown = display(quiet, limit)
-    plan = changed(load(scene, **variables(defines)), **changes)
+    with shown.loading(scene.name) as tell:
+        plan = changed(load(scene, progress=tell, **variables(defines)), **changes)
     spp = changes["spp"] if limit is not None else plan.spp
     targets = outputs.checked(paths or outputs.default(scene), plan)
     on = dev.choose(device, profiling=verbose)

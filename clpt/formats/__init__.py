@@ -24,11 +24,14 @@ IN_FOLDERS = ("scene.json", "scene.xml", "scene.pbrt", "scene-v4.pbrt")
 __all__ = ["FORMATS", "load"]
 
 
-def load(path: str | Path, **variables: Any) -> Scene:
+def load(
+    path: str | Path, *, progress: Callable[[float, str], None] | None = None, **variables: Any
+) -> Scene:
     """Read a scene or a bare mesh; a folder means the scene.json, .xml or .pbrt in it.
 
     `variables` set the `$names` of Mitsuba's XML; of glTF they choose camera, scene and
-    time. Raises SceneError with the file and, where it is known, the line.
+    time. `progress` is called with how much is read, from 0 to 1, and what, while files of many
+    shapes are. Raises SceneError with the file and, where it is known, the line.
     """
     path = _existing(Path(path))
     name = path.name.lower()
@@ -40,6 +43,8 @@ def load(path: str | Path, **variables: Any) -> Scene:
         raise SceneError(
             f"only .xml and glTF have variables, so {min(variables)!r} means nothing", file=path
         )
+    if loader is pbrt.load:
+        return pbrt.load(path, progress)
     return loader(path, **variables)
 
 

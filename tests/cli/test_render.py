@@ -131,6 +131,7 @@ def test_names_of_pictures():
     assert outputs.default(Path(CORNELL)) == (Path("cornell_box.exr"), Path("cornell_box.png"))
     assert outputs.default(Path("a/scene.json"))[0] == Path("a.exr")  # though there is no such file
     assert outputs.default(ROOT / "tests" / "scenes" / "bowl.obj")[1] == Path("bowl.png")
+    assert outputs.default(Path("a/b.pbrt.gz"))[0] == Path("b.exr")
 
 
 def test_the_picture_goes_to_the_current_folder(tmp_path, monkeypatch):

@@ -202,3 +202,11 @@ def test_formats(write, tmp_path):
     write(text)
     assert load(tmp_path).film.width == 7
     assert load(write(gzip.compress(text.encode()), "other.pbrt.gz")).film.height == 5
+
+
+def test_progress(write):
+    told = []
+    path = write("WorldBegin\n" + 'Shape "sphere"\n' * 4)
+    load(path, progress=lambda fraction, what: told.append((fraction, what)))
+    assert [fraction for fraction, _ in told] == [0.25, 0.5, 0.75, 1.0]
+    assert told[1][1] == "2 of 4 shapes"
