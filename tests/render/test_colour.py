@@ -105,3 +105,9 @@ def test_what_cannot_become_white_is_refused() -> None:
         blind = Sensor((CURVES[0],) * 3, np.zeros((3, 3)))
         with pytest.raises(SceneError, match=r"film\.white_balance.*white"):
             output_matrix(Film(sensor=blind, **given), "spectral")
+
+
+@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+def test_exposure_is_a_factor_on_the_picture(mode):
+    plain, bright = output_matrix(Film(), mode), output_matrix(Film(exposure=2.5), mode)
+    assert bright == pytest.approx(2.5 * plain, rel=1e-12)
