@@ -47,6 +47,7 @@ RECORDS: dict[str, Record] = {
         number=("integer", "row in `spectra`: the number of the band by wavelength"),
     ),
 }
+ROWS = 256  # of an image that are worked on at a time
 UNSEEN = 0.1  # share of the mean over bands in the weight of a texel: light of no colour counts too
 
 FACES = "+x -x +y -y +z -z"
@@ -75,7 +76,7 @@ def lower_image(lamp: Envmap | CubeMap, tables: Any) -> tuple[dict[str, ArrayLik
             bright = luminance(image) + UNSEEN * _brightness(found.values)
             made, number = bands(found, tables.lambda_min, tables.lambda_max)
             spectral = {"bands": made.shape[1], "number": tables.spectra_row(number)}
-        corners = _latitude_weights(bright)[None]
+        corners: NDArray[Any] = _latitude_weights(bright)[None]
     else:
         faces = _faces(lamp.image, where) * np.float32(lamp.scale)
         height = width = faces.shape[1]
@@ -199,20 +200,25 @@ def _bordered(faces: Array) -> Array:
     return faces[face, row, column]
 
 
-def _brightness(image: Array) -> NDArray[np.float64]:
-    return image.mean(axis=-1, dtype=np.float64)
+def _brightness(image: Array) -> Array:
+    """The mean over the last axis; a product is many times faster than a sum over few."""
+    count = image.shape[-1]
+    return image @ np.full(count, 1.0 / count, np.float32)
 
 
-def _latitude_weights(bright: NDArray[np.float64]) -> NDArray[np.float64]:
+def _latitude_weights(bright: Array) -> Array:
     """Weights (h, w + 1) at the texels' centres; the first column comes again at the end."""
-    height = len(bright)
+    height, width = bright.shape
     rows = np.arange(height, dtype=np.float64)
     rows[0], rows[-1] = 0.25, height - 1.25  # the poles have no area, but light comes from there
-    weights = bright * np.sin(np.pi * rows / (height - 1))[:, None]
-    return np.concatenate([weights, weights[:, :1]], axis=1)
+    weights = np.empty((height, width + 1), np.float32)
+    sines = np.sin(np.pi * rows / (height - 1)).astype(np.float32)
+    np.multiply(bright, sines[:, None], out=weights[:, :width])
+    weights[:, width] = weights[:, 0]
+    return weights
 
 
-def _cube_weights(bright: NDArray[np.float64]) -> NDArray[np.float64]:
+def _cube_weights(bright: Array) -> NDArray[np.float64]:
     """Weights (6, 2n + 1, 2n + 1) at the texels' edges and centres, of bordered faces."""
     n = bright.shape[1] - 2
     wide = np.empty((6, 2 * n + 1, n + 2))
@@ -223,17 +229,21 @@ def _cube_weights(bright: NDArray[np.float64]) -> NDArray[np.float64]:
     return weights * (1.0 + at[None, :] ** 2 + at[:, None] ** 2) ** -1.5
 
 
-def _cumulative(
-    corners: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+def _cumulative(corners: NDArray[Any]) -> tuple[NDArray[np.float64], Array, float]:
     """Sums over rows and within rows, each up to 1, of the cells of grids (k, r + 1, c + 1)."""
-    cells = 0.25 * (
-        corners[:, 1:, 1:] + corners[:, :-1, 1:] + corners[:, 1:, :-1] + corners[:, :-1, :-1]
-    )
-    sums = np.cumsum(cells.reshape(-1, cells.shape[2]), axis=1)
-    rows = np.cumsum(sums[:, -1])
-    total = float(rows[-1])
-    conditional = sums / np.where(sums[:, -1:] > 0.0, sums[:, -1:], 1.0)
-    marginal = rows / (total if total > 0.0 else 1.0)
-    conditional[:, -1] = marginal[-1] = 1.0
-    return marginal, conditional, total
+    grids, rows, columns = corners.shape[0], corners.shape[1] - 1, corners.shape[2] - 1
+    conditional = np.empty((grids, rows, columns), np.float32)
+    sums = np.empty((grids, rows))
+    for grid, own, total in zip(corners, conditional, sums, strict=True):
+        for first in range(0, rows, ROWS):
+            part = grid[first : first + ROWS + 1]
+            wide = part[1:].astype(np.float64) + part[:-1]
+            cells = np.cumsum(0.25 * (wide[:, 1:] + wide[:, :-1]), axis=1)
+            total[first : first + ROWS] = cells[:, -1]
+            cells /= np.where(cells[:, -1:] > 0.0, cells[:, -1:], 1.0)
+            own[first : first + ROWS] = cells
+    marginal = np.cumsum(sums)
+    whole = float(marginal[-1])
+    marginal /= whole if whole > 0.0 else 1.0
+    conditional[..., -1] = marginal[-1] = 1.0
+    return marginal, conditional.reshape(-1, columns), whole

@@ -69,7 +69,7 @@ def texels(image: Floats, role: str, spectral: bool) -> Floats:
     colours = np.broadcast_to(image, (*image.shape[:2], 3)).reshape(-1, 3)
     made = np.ones((len(colours), 4), np.float32)
     if not spectral:
-        made[:, :3] = np.clip(colours, 0.0, 1.0 if role == "reflectance" else None)
+        np.clip(colours, 0.0, 1.0 if role == "reflectance" else None, out=made[:, :3])
     elif role == "reflectance":
         distinct, which = _palette(np.clip(colours, 0.0, 1.0))
         made[:, :3] = spectra.uplift(distinct)[which]

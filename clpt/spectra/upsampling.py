@@ -9,6 +9,9 @@ up to black and white, and linear for greys, so that these are flat to rounding.
 
 from __future__ import annotations
 
+import itertools
+import os
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 
 import numpy as np
@@ -33,7 +36,8 @@ def to_unit(lambdas: ArrayLike) -> Array:
 
 def shrinkage(rgb: ArrayLike) -> Array:
     """sqrt(m (1 - m)) for the mean m of the components (..., 3); a grey has x = (m - 1/2) / it."""
-    mean = np.clip(np.mean(np.asarray(rgb, np.float64), axis=-1), DARKEST, 1.0 - DARKEST)
+    r, g, b = np.moveaxis(np.asarray(rgb, np.float64), -1, 0)
+    mean = np.clip((r + g + b) / 3.0, DARKEST, 1.0 - DARKEST)
     return np.sqrt(mean * (1.0 - mean))
 
 
@@ -73,10 +77,23 @@ def unbounded(rgb: ArrayLike) -> tuple[NDArray[np.float32], NDArray[np.float32]]
 
     The spectrum is the scale times the reflectance, as in Mitsuba 3; negative components are 0.
     """
-    colours = np.maximum(np.nan_to_num(np.asarray(rgb, np.float64)), 0.0)
-    scale = 2.0 * colours.max(axis=-1)
-    divisor = np.where(scale > 0.0, scale, 1.0)[..., None]
-    return scale.astype(np.float32), uplift(colours / divisor)
+    colours = np.asarray(rgb)
+    flat = colours.reshape(-1, 3)
+    scale = np.empty(len(flat), np.float32)
+    coefficients = np.empty(flat.shape, np.float32)
+
+    def fill(start: int) -> None:
+        part = slice(start, start + CHUNK)
+        own = np.maximum(np.nan_to_num(flat[part].astype(np.float64)), 0.0)
+        largest = 2.0 * own.max(axis=1)
+        own /= np.where(largest > 0.0, largest, 1.0)[:, None]
+        coefficients[part] = _look_up(own, half=True)
+        scale[part] = largest
+
+    starts = range(0, len(flat), CHUNK)
+    with ThreadPoolExecutor(min(os.cpu_count() or 1, len(starts)) or 1) as pool:
+        list(pool.map(fill, starts))
+    return scale.reshape(colours.shape[:-1]), coefficients.reshape(colours.shape)
 
 
 def evaluate(coefficients: ArrayLike, lambdas: ArrayLike) -> Array:
@@ -100,8 +117,20 @@ def _smoothstep(x: Array) -> Array:
     return x * x * (3.0 - 2.0 * x)
 
 
-def _look_up(rgb: Array) -> Array:
-    largest = np.argmax(rgb, axis=1)
+@cache
+def _half_table() -> NDArray[np.float32]:
+    """The table where the largest component is a half, as in colours that `unbounded` looks up."""
+    nodes, table = node_values(), _table().reshape(3, NODES, -1, 3)
+    below = int(np.searchsorted(nodes, 0.5, "right")) - 1
+    t = np.float32((0.5 - nodes[below]) / (nodes[below + 1] - nodes[below]))
+    low, high = table[:, below], table[:, below + 1]
+    return np.ascontiguousarray((low + t * (high - low)).reshape(-1, 3))
+
+
+def _look_up(rgb: Array, *, half: bool = False) -> Array:
+    """Coefficients (n, 3) of colours (n, 3); `half`: the largest component of each is 1/2 or 0."""
+    r, g, b = rgb.T
+    largest = np.where((b > r) & (b > g), 2, (g > r).astype(np.int64))
     rows = np.arange(len(rgb))
     value = rgb[rows, largest]
     divisor = np.where(value > 0.0, value, 1.0)
@@ -110,27 +139,30 @@ def _look_up(rgb: Array) -> Array:
     for ratio in others:
         ratio[black] = 1.0
     cell, weights = largest, []
-    for nodes, at in zip(
-        (node_values(), node_ratios(), node_ratios()), (value, *others), strict=True
-    ):
+    axes = [(node_values(), value)] * (not half) + [(node_ratios(), ratio) for ratio in others]
+    for nodes, at in axes:
         below = np.clip(np.searchsorted(nodes, at, "right") - 1, 0, NODES - 2)
         cell = cell * NODES + below
         t = (at - nodes[below]) / (nodes[below + 1] - nodes[below])
         weights.append(np.clip(t, 0.0, 1.0).astype(np.float32)[:, None])
-    a, b, c = _blend(cell, weights).T.astype(np.float64) / shrinkage(rgb)
+    shrunk = shrinkage(rgb)
+    found = _blend(_half_table() if half else _table(), cell, weights)
+    a, b, c = found.T.astype(np.float64) / shrunk
     grey = (others[0] == 1.0) & (others[1] == 1.0)  # not left to the table's last digit
     a[grey], b[grey] = 0.0, 0.0
-    c[grey] = (value[grey] - 0.5) / shrinkage(rgb)[grey]
+    c[grey] = (value[grey] - 0.5) / shrunk[grey]
     # From the unit coordinate to nm.
     a /= HALF_WIDTH**2
     b /= HALF_WIDTH
     return np.column_stack([a, b - 2.0 * CENTRE * a, c + (a * CENTRE - b) * CENTRE])
 
 
-def _blend(cell: NDArray[np.int64], weights: list[NDArray[np.float32]]) -> NDArray[np.float32]:
-    """Trilinear table entries (n, 3): halve the corners axis by axis, the last axis first."""
-    table, offsets = _table(), (0, NODES * NODES)
-    corners = [table[cell + z + y + x] for z in offsets for y in (0, NODES) for x in (0, 1)]
+def _blend(
+    table: NDArray[np.float32], cell: NDArray[np.int64], weights: list[NDArray[np.float32]]
+) -> NDArray[np.float32]:
+    """Table entries (n, 3), linear along each axis: corners are halved by the last axis first."""
+    steps = [(0, NODES**axis) for axis in reversed(range(len(weights)))]
+    corners = [table[cell + sum(corner)] for corner in itertools.product(*steps)]
     for weight in reversed(weights):
         pairs = zip(corners[::2], corners[1::2], strict=True)
         corners = [low + weight * (high - low) for low, high in pairs]
