@@ -24,6 +24,7 @@ PARTS = {
     "spectral": (),
     "effects": (),
     "lights": (),
+    "instancing": (),
     "startup": (),
 }
 

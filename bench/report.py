@@ -106,6 +106,7 @@ TABLES: dict[str, Callable[[Sequence[Row]], str]] = {
     "spectral": plain,
     "effects": plain,
     "lights": plain,
+    "instancing": plain,
     "startup": startup,
     "traversal": plain,
     "building": plain,

@@ -147,19 +147,19 @@ def render(
     exit status is 130.
     """
     shown = display(quiet, limit)
+    began = time.perf_counter()
     with shown.loading(scene.name) as tell:
         plan = changed(load(scene, progress=tell, **variables(defines)), **changes)
+    loading = time.perf_counter() - began
     spp = changes["spp"] if limit is not None else plan.spp
     targets = outputs.checked(paths or outputs.default(scene), plan)
     on = dev.choose(device, profiling=verbose)
     with shown.phase(f"building kernels for {on.info.name}"):
-        began = time.perf_counter()
         renderer = Renderer(plan, on, texture_budget=texture_budget)
-        built = time.perf_counter() - began
     for warning in [*plan.warnings, *renderer.warnings]:
         shown.note(f"clpt: warning: {warning}")
     if verbose:
-        report.before(renderer, built)
+        report.before(renderer, loading)
     began = time.perf_counter()
     with shown.rendering():
         finished = expose(renderer, spp, limit, shown.show)

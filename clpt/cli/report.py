@@ -7,28 +7,36 @@ import click
 from ..render.renderer import Renderer
 
 
-def before(renderer: Renderer, seconds: float) -> None:
-    """Tell what the scene became: triangles, tables, tree, programs. seconds: all of it took."""
-    first = renderer.wavefronts[0]
-    lowered, tree, builds = first.lowered, first.tree, renderer.device.builds
+def before(renderer: Renderer, loading: float) -> None:
+    """Tell what the scene became and what that took; `loading` is what its file did [s]."""
+    first, facts = renderer.wavefronts[0], renderer.facts
     _line("device", renderer.device.info.label)
-    analytic = len(lowered.boxes)
-    shapes = f", {analytic:,} shapes as they are" if analytic else ""
-    _line("geometry", f"{len(lowered.faces):,} triangles{shapes}")
-    took = tree.stats.get("seconds", 0.0)
-    _line("tree", f"{tree.layout}, {_bytes(tree.bytes)}, built in {took:.2f} s")
-    tables = {**lowered.tables, "vertices": lowered.vertices, "faces": lowered.faces}
-    for name, table in sorted(tables.items(), key=lambda item: -item[1].nbytes):
-        if table.size > 1:  # of what a scene does not have, a word stands there
-            _line(f"table {name}", _bytes(table.nbytes))
+    parts = [f"{facts.triangles:,} triangles"]
+    if facts.instances:
+        seen = f"{facts.triangles_instanced:,} triangles seen"
+        parts += [f"{facts.instances:,} instances", seen]
+    if facts.analytic:
+        parts.append(f"{facts.analytic:,} shapes as they are")
+    _line("geometry", ", ".join(parts))
+    _line("lights", f"{facts.lights:,}")
+    for name, size in facts.trees.items():
+        layout = f"{first.tree.layout}, " if name == "triangles" else ""
+        _line(f"tree {name}", layout + _bytes(size))
+    for name, size in sorted(facts.tables.items(), key=lambda item: -item[1]):
+        _line(f"table {name}", _bytes(size))
     _line("paths", f"{first.slots:,} in flight, {first.lanes} to a work-item")
-    _line("device memory", _bytes(sum(w.buffers.used for w in renderer.wavefronts)))
-    _line("programs", f"{builds.programs}, {builds.seconds:.2f} s over all threads")
-    _line("ready", f"in {seconds:.2f} s")
+    _line("device memory", _bytes(facts.memory))
+    _line("programs", f"{facts.programs}")
+    _line("seconds to load", f"{loading:.2f}")
+    for name in ("lower", "trees", "programs", "ready"):
+        _line(
+            f"seconds {'until ' if name == 'ready' else 'for '}{name}", f"{facts.seconds[name]:.2f}"
+        )
 
 
 def after(renderer: Renderer) -> None:
-    """Tell how long each stage took."""
+    """Tell how long the first sample and each stage took."""
+    _line("seconds until a sample", f"{renderer.facts.seconds.get('first_sample', 0.0):.2f}")
     for wavefront in renderer.wavefronts:
         timings = wavefront.timings.collect()
         whole = sum(timing.seconds for timing in timings.values())

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from clpt import device as dev
 from clpt.errors import SceneError
+from clpt.render.facts import Facts, gather
 from clpt.render.lower import lower
 from clpt.render.wavefront import Wavefront
 from clpt.scene import Scene
@@ -64,12 +65,16 @@ class Renderer:
         self.channels: tuple[str, ...] = ()
         if isinstance(scene.integrator, Aov):
             self.channels = scene.integrator.channels
+        self._start, self._built = time.perf_counter(), device.builds.programs
         budget = _texture_budget(device) if texture_budget is None else texture_budget
-        first = Wavefront(device, lower(scene, budget), **wavefront)
+        lowered = lower(scene, budget)
+        self._seconds = {"lower": time.perf_counter() - self._start}
+        first = Wavefront(device, lowered, **wavefront)
         self.wavefronts = [first, *(first.sibling(channel) for channel in self.channels[1:])]
+        self._built = device.builds.programs - self._built
+        self._seconds |= {**first.seconds, "ready": time.perf_counter() - self._start}
         self.warnings = list(self.wavefronts[0].lowered.warnings)
         self.samples = 0
-        self._began: float | None = None
 
     def step(self, samples: int, progress: Callable[[Progress], bool] | None = None) -> bool:
         """Add samples to every pixel; `samples` in all are kept in `self.samples`.
@@ -83,6 +88,8 @@ class Renderer:
         def tell(_: Any) -> bool:
             counts = [w.counts for w in self.wavefronts]
             paths = sum(c.samples for c in counts)
+            if paths:
+                self._seconds.setdefault("first_sample", time.perf_counter() - self._start)
             pixels = math.prod(self.scene.film.size) * len(counts)
             seconds = time.perf_counter() - start
             rays = sum(c.rays for c in counts)
@@ -93,6 +100,11 @@ class Renderer:
                 return False
         self.samples = end
         return True
+
+    @property
+    def facts(self) -> Facts:
+        """What the render took so far: numbers of things, bytes by table and tree, seconds."""
+        return gather(self.wavefronts, self._built, dict(self._seconds))
 
     def image(self) -> Image:
         """The picture so far: (h, w, 3) float32, linear in the film's output space.

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -83,7 +84,9 @@ class Wavefront:
         kinds = len(features.materials)
         self.queued = kinds > 1 and (not on.info.is_cpu or kinds > 4) if queued is None else queued
         texts = programs.sources(features, layout, self.lanes, queued=self.queued)
+        start = time.perf_counter()
         self.programs = device.build_all(on, texts)
+        self.seconds = {"programs": time.perf_counter() - start}
         self._place_slots(slots or (CPU_SLOTS if on.info.is_cpu else GPU_SLOTS))
         self._allocate(layout)
         self._expose_new()
@@ -155,6 +158,7 @@ class Wavefront:
 
     def _build_trees(self, layout: str) -> None:
         """Trees over triangles, analytic shapes and instances, which learn where theirs begin."""
+        start = time.perf_counter()
         lowered, instances = self.lowered, self.lowered.instances
         vertices = self.named["vertices"] if len(lowered.faces) else lowered.vertices
         counts = [len(lowered.faces) - sum(instances.triangles), *instances.triangles]
@@ -174,6 +178,7 @@ class Wavefront:
         for name, tree in self.box_trees.items():
             self.named[f"{name}_nodes"] = tree.buffers["nodes"]
             self.named[f"{name}_items"] = tree.buffers["indices"]
+        self.seconds["trees"] = time.perf_counter() - start
 
     def _expose_new(self) -> None:
         """A film and a picture of its own, and kernels bound to them."""

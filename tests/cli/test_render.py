@@ -86,7 +86,9 @@ def test_verbose_tells_of_tables_and_stages(tmp_path, capsys):
     arguments = ["-o", str(path), "--size", "8x8", "--spp", "1", "--verbose"]
     assert run(["render", CORNELL, *arguments]) == 0
     told = capsys.readouterr().err
-    for words in ("36 triangles", "tree", "table vertices", "programs", "stage shade_diffuse"):
+    expected = ("36 triangles", "tree triangles", "table vertices", "programs", "seconds to load",
+                "seconds until ready", "seconds until a sample", "stage shade_diffuse")  # fmt: skip
+    for words in expected:
         assert words in told
 
 
