@@ -164,10 +164,11 @@ def read_layers(path: str | Path) -> dict[str, Array]:
 
 def from_pillow(image: Image.Image, *, linear: bool = True) -> Array:
     """A Pillow image as (h, w, 1, 3 or 4) float32; `linear` as in `read`."""
-    return _from_pillow(image).decoded(linear)
+    return stored_from_pillow(image).decoded(linear)
 
 
-def _from_pillow(image: Image.Image) -> Stored:
+def stored_from_pillow(image: Image.Image) -> Stored:
+    """A Pillow image as it is stored, (h, w, 1, 3 or 4)."""
     if image.mode == "F":
         return Stored(np.asarray(image, np.float32)[..., None], encoded=False)
     if image.mode in ("I", "I;16", "I;16B", "I;16L"):
@@ -217,7 +218,7 @@ def _fail(path: Path, message: str) -> NoReturn:
 def _read_pillow(path: Path) -> Stored:
     try:
         with Image.open(path) as image:
-            return _from_pillow(image)
+            return stored_from_pillow(image)
     except UnidentifiedImageError:
         _fail(path, "not an image")
 

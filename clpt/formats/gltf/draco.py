@@ -11,6 +11,8 @@ from clpt.formats.gltf.document import Element
 
 NAME = "KHR_draco_mesh_compression"
 HEADER = b"DRACO"
+EDGEBREAKER, METADATA = 1, 0x8000
+LARGEST, RATIO = 1 << 22, 256  # triangles that are believed in, and those for each byte
 
 
 def attributes(primitive: Element, compressed: Element) -> primitives.Geometry:
@@ -52,6 +54,9 @@ def _decoded(compressed: Element) -> Any:
     data = bytes(accessors.view(compressed)[0])
     if data[:5] != HEADER:
         raise compressed.error("its data are not Draco's")
+    faces = _claimed_faces(data)
+    if faces > max(LARGEST, RATIO * len(data)):
+        raise compressed.error(f"{len(data)} bytes cannot hold {faces} triangles")
     try:
         mesh = DracoPy.decode(data)
     except Exception as error:  # DracoPy raises its own kinds, of no common base
@@ -60,3 +65,17 @@ def _decoded(compressed: Element) -> Any:
     if getattr(mesh, "faces", None) is None:
         raise compressed.error("Draco finds a point cloud in it, no triangles")
     return mesh
+
+
+def _claimed_faces(data: bytes) -> int:
+    """What a mesh's header says before memory is taken for it (Draco bitstream 2.2, section 3)."""
+    if len(data) < 12 or data[8] != EDGEBREAKER or int.from_bytes(data[9:11], "little") & METADATA:
+        return 0
+    values, value, shift = [], 0, 0
+    for byte in data[12:24]:
+        value |= (byte & 127) << shift
+        shift += 7
+        if byte < 128:
+            values.append(value)
+            value = shift = 0
+    return values[1] if len(values) > 1 else 0

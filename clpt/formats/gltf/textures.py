@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import io
 import math
+import os
 import warnings
+from concurrent.futures import Future, ThreadPoolExecutor
+from threading import Lock
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
+from PIL import Image, UnidentifiedImageError
 
 from clpt import images
 from clpt.formats.gltf import accessors
-from clpt.formats.gltf.document import Element
+from clpt.formats.gltf.document import Document, Element
 from clpt.scene.textures import Bitmap
 
 FORMATS = ("PNG", "JPEG", "WEBP")
-PIXELS = 1 << 26  # of an image: 8192 x 8192, which takes 0.8 GB as floats
+PIXELS = 1 << 26  # of an image: 8192 x 8192
+TOGETHER = 1 << 30  # of all images: 3 GB of colours
 WRAPS = {33071: "clamp", 33648: "mirror", 10497: "repeat"}
 NEAREST, FILTERS = 9728, (9728, 9729)
 # glTF counts v from the top of an image, clpt from its bottom, and so do the meshes it makes.
@@ -39,44 +43,74 @@ def texture(info: Element, *, raw: bool = False, channel: str | None = None) -> 
         uv_set = transform.integer("texCoord", uv_set)
     if uv_set not in info.document.uv_sets:
         info.document.uv_sets.append(uv_set)
-    values: dict[str, Any] = {"raw": True, **_sampling(element)}
+    image = _image(element, raw)
+    values: dict[str, Any] = {"raw": raw or image.dtype != np.uint8, **_sampling(element)}
     if transform is not None:
         values["to_uv"] = FLIP @ _transform(transform) @ FLIP
     if channel is not None:
         values["channel"] = channel
-    return Bitmap(image=_image(element, raw), **values)
+    return Bitmap(image=image, **values)
 
 
-def _image(texture: Element, raw: bool) -> NDArray[np.float32]:
-    """The pixels (h, w, 1, 3 or 4) that a texture shows; one white one where there are none."""
+def _source(texture: Element) -> Element | None:
+    """The image of a texture, WebP before its fallback."""
     webp = texture.extension("EXT_texture_webp")
     source = None if webp is None else webp.entry("source", "images")
-    source = source or texture.entry("source", "images")
+    return source or texture.entry("source", "images")
+
+
+def _image(texture: Element, raw: bool) -> NDArray[Any]:
+    """The pixels (h, w, 1, 3 or 4) that a texture shows; one white one where there are none."""
+    source = _source(texture)
     if source is None:
         reason = "its image is of a kind that is not supported" if "extensions" in texture else None
         texture.warn(f"{reason or 'it has no image'}; white stands for it")
-        return np.ones((1, 1, 3), np.float32)
-    key = ("image", source.path, raw)
-    return source.document.once(key, lambda: _decoded(source, raw))
+        return np.full((1, 1, 3), 255, np.uint8)
+    document = texture.document
+    stored = document.once("images", lambda: _all(document))[source.path].result()
+    return stored.values if stored.values.dtype == np.uint8 else stored.decoded(not raw)
 
 
-def _decoded(source: Element, raw: bool) -> NDArray[np.float32]:
+def _all(document: Document) -> dict[str, Future[images.Stored]]:
+    """The images of all textures, decoded side by side; one that fails does where it is used."""
+    sources = [_source(texture) for texture in document.root.children("textures")]
+    distinct = {source.path: source for source in sources if source is not None}
+    budget = _Budget()
+    with warnings.catch_warnings(), ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+        return {path: pool.submit(_decoded, one, budget) for path, one in distinct.items()}
+
+
+class _Budget:
+    """How many pixels the images of a file may still have."""
+
+    def __init__(self) -> None:
+        self.left, self.lock = TOGETHER, Lock()
+
+    def spend(self, source: Element, width: int, height: int) -> None:
+        """Take an image's pixels out of it. Raises SceneError if that is too much."""
+        if width * height > PIXELS:
+            raise source.error(f"has {width}x{height} pixels, more than the {PIXELS} that are read")
+        with self.lock:
+            self.left -= width * height
+            if self.left < 0:
+                raise source.error(f"is one too many: images may have {TOGETHER} pixels together")
+
+
+def _decoded(source: Element, budget: _Budget) -> images.Stored:
     inside = "uri" not in source
     data = bytes(accessors.view(source)[0]) if inside else source.document.resource(source)
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", Image.DecompressionBombWarning)
-            with Image.open(io.BytesIO(data), formats=FORMATS) as image:
-                if image.width * image.height > PIXELS:
-                    size = f"{image.width}x{image.height}"
-                    raise source.error(f"{size} pixels are more than the {PIXELS} that are read")
-                return images.from_pillow(image, linear=not raw)
-    except (Image.DecompressionBombError, Image.DecompressionBombWarning):
+        with Image.open(io.BytesIO(data), formats=FORMATS) as image:
+            budget.spend(source, image.width, image.height)
+            return images.stored_from_pillow(image)
+    except Image.DecompressionBombError:
         raise source.error(f"has more than the {PIXELS} pixels that are read") from None
+    except UnidentifiedImageError:
+        raise source.error("is no PNG, JPEG or WebP image") from None
     except (OSError, ValueError, SyntaxError, MemoryError, EOFError) as error:
         reason = str(error).splitlines()[0][:80] if str(error) else type(error).__name__
-        message = f"is no readable PNG, JPEG or WebP image: {reason}"
-        raise source.error(message.replace(str(data)[:20], "")) from None
+        raise source.error(f"is a broken image: {reason}") from None
 
 
 def _sampling(texture: Element) -> dict[str, str]:
