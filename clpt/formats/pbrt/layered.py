@@ -14,11 +14,12 @@ import numpy as np
 from clpt import spectra
 from clpt.errors import SceneError, UnknownKindError
 from clpt.formats.pbrt import coats
+from clpt.formats.pbrt.mapped import mapped
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.roughness import alphas, isotropic, rough, smooth
 from clpt.formats.pbrt.spectra import spectrum
 from clpt.formats.pbrt.state import State
-from clpt.formats.pbrt.textures import mapped, textured
+from clpt.formats.pbrt.textures import textured
 from clpt.scene import materials
 from clpt.scene.materials import Material
 from clpt.scene.textures import Texture

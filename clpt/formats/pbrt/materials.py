@@ -11,11 +11,12 @@ import numpy as np
 from clpt.errors import SceneError, UnknownKindError
 from clpt.formats.pbrt import coats
 from clpt.formats.pbrt.layered import both, coat, coated_diffuse, middle, subsurface
+from clpt.formats.pbrt.mapped import mapped
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.roughness import alphas, isotropic, rough, smooth, stretched
 from clpt.formats.pbrt.spectra import named, spectrum
 from clpt.formats.pbrt.state import State
-from clpt.formats.pbrt.textures import mapped, normals, textured
+from clpt.formats.pbrt.textures import normals, textured
 from clpt.scene import materials
 from clpt.scene.materials import Material
 from clpt.scene.textures import Product, Texture

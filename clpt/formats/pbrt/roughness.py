@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from clpt.errors import SceneError
+from clpt.formats.pbrt.mapped import mapped
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.state import State
-from clpt.formats.pbrt.textures import mapped, textured
+from clpt.formats.pbrt.textures import textured
 from clpt.scene.textures import Texture
 
 SMOOTH = 1e-3  # alpha below which pbrt takes a surface for smooth

@@ -9,18 +9,17 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from clpt import images
 from clpt.errors import SceneError, UnknownKindError
+from clpt.formats.pbrt.mapped import mapped
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.spectra import SPECTRUM_TYPES, spectrum, value_of
 from clpt.formats.pbrt.state import Definition, State
 from clpt.scene.textures import Bitmap, Checkerboard, Mix, Product, Texture
-from clpt.spectra import RGB, Constant, RGBUnbounded, Spectrum, Tabulated, cie
+from clpt.spectra import Spectrum
 
 WRAPS = {"repeat": "repeat", "black": "zero", "clamp": "clamp", "octahedralsphere": "clamp"}
 FILTERS = {"point": "nearest", **dict.fromkeys(("bilinear", "trilinear", "ewa"), "bilinear")}
@@ -53,44 +52,9 @@ def _texture(form: str, found: Definition) -> Any:
     return made
 
 
-def mapped(value: Any, function: Callable[[Any], Any]) -> Any:
-    """A function of what a parameter has been given: of a number, a colour, a spectrum, a texture.
-
-    Of a mixture it is taken at both ends, of a product of both factors, which is right for powers.
-    """
-    if isinstance(value, tuple):
-        return tuple(float(function(v)) for v in value)
-    if isinstance(value, (RGB, RGBUnbounded)):
-        return type(value)(*(float(function(v)) for v in (value.r, value.g, value.b)))
-    if isinstance(value, Constant):
-        return Constant(float(function(value.value)))
-    if isinstance(value, Spectrum):
-        return Tabulated(cie.GRID, function(value.sample(cie.GRID)), "hold")
-    if isinstance(value, Bitmap):
-        return replace(value, image=function(_pixels(value)).astype(np.float32), raw=True)
-    if isinstance(value, Texture):
-        ends = {name: mapped(getattr(value, name), function) for name in ENDS[type(value)]}
-        return replace(value, **ends)
-    return float(function(value))
-
-
-ENDS: dict[type[Texture], tuple[str, ...]] = {
-    Checkerboard: ("color0", "color1"),
-    Mix: ("first", "second"),
-    Product: ("first", "second"),
-}
-
-
 def normals(file: str, state: State) -> Bitmap:
     """The image of a normal map, whose colours are read as they are."""
     return Bitmap(image=state.file(file), raw=True)
-
-
-def _pixels(bitmap: Bitmap) -> Any:
-    image = bitmap.image
-    if isinstance(image, (str, Path)):
-        image = images.read(image, linear=not bitmap.raw)
-    return np.asarray(image, np.float32)
 
 
 def _argument(form: str, params: Parameters, name: str, state: State, default: float) -> Any:
@@ -150,7 +114,11 @@ def _bilerp(form: str, params: Parameters, state: State) -> Any:
 
 def _checkerboard(form: str, params: Parameters, state: State) -> Any:
     if params.one("dimension", "integer", 2) != 2:
-        raise SceneError("a checkerboard in three dimensions is not supported")
+        state.warn(params, "a checkerboard in three dimensions is taken as an even mixture")
+        ends = [
+            _argument(form, params, name, state, v) for name, v in (("tex1", 1.0), ("tex2", 0.0))
+        ]
+        return Mix(first=ends[0], second=ends[1], amount=0.5)
     halved = np.diag([0.5, 0.5, 1.0])
     return Checkerboard(
         color0=_argument(form, params, "tex1", state, 1.0),
@@ -195,6 +163,35 @@ def _decoded(bitmap: Bitmap, encoding: str) -> Bitmap:
     return mapped(bitmap, lambda v: v ** float(gamma[1]))
 
 
+def _dots(form: str, params: Parameters, state: State) -> Any:
+    """Half of the unit cells have a dot of radius 0.35 somewhere within."""
+    params.ignore("mapping", "uscale", "vscale", "udelta", "vdelta", "v1", "v2")
+    state.warn(params, "dots are taken as the even mixture that they make from afar")
+    inside = _argument(form, params, "inside", state, 1.0)
+    outside = _argument(form, params, "outside", state, 0.0)
+    return Mix(first=outside, second=inside, amount=0.5 * np.pi * 0.35**2)
+
+
+def _noise(form: str, params: Parameters, state: State) -> float:
+    """Noise and wind go up and down around 0."""
+    params.ignore("octaves", "roughness")
+    state.warn(params, "noise is not supported: its mean, 0, is taken")
+    return 0.0
+
+
+def _wrinkled(form: str, params: Parameters, state: State) -> float:
+    octaves, omega = params.one("octaves", "integer", 8), params.one("roughness", "float", 0.5)
+    mean = 0.2 * sum(omega**i for i in range(min(max(octaves, 0), 64)))
+    state.warn(params, f"noise is not supported: its mean, {mean:.2g}, is taken")
+    return float(mean)
+
+
+def _marble(form: str, params: Parameters, state: State) -> Any:
+    params.ignore("octaves", "roughness", "scale", "variation")
+    state.warn(params, "marble is not supported: its light grey is taken")
+    return 0.85 if form == "float" else (0.85, 0.85, 0.88)
+
+
 def _ptex(form: str, params: Parameters, state: State) -> Any:
     raise params.error(f"Ptex textures are not supported: {params.one('filename', 'string', '')!r}")
 
@@ -218,5 +215,10 @@ MAKERS: dict[str, Callable[[str, Parameters, State], Any]] = {
     "bilerp": _bilerp,
     "checkerboard": _checkerboard,
     "imagemap": _imagemap,
+    "dots": _dots,
+    "fbm": _noise,
+    "windy": _noise,
+    "wrinkled": _wrinkled,
+    "marble": _marble,
     "ptex": _ptex,
 }

@@ -7,7 +7,8 @@ import pytest
 from PIL import Image
 
 from clpt.errors import SceneError
-from clpt.formats.pbrt.textures import mapped, textured
+from clpt.formats.pbrt.mapped import mapped
+from clpt.formats.pbrt.textures import textured
 from clpt.scene.textures import Bitmap, Checkerboard, Mix, Product
 from tests.formats.pbrt.directives import define, params, state
 
@@ -104,6 +105,13 @@ def test_functions_of_textures(images):
 
 def test_what_is_approximated_is_told():
     assert "even mixture" in make("directionmix", "float")[1][0]
+    for kind, mean in (("fbm", 0.0), ("windy", 0.0), ("wrinkled", 0.2 * (2 - 2**-7))):
+        made, warnings = make(kind, "float")
+        assert made == pytest.approx(mean) and "mean" in warnings[0]
+    solid, warnings = make("checkerboard", dimension=("integer", 3), tex1=("rgb", 1, 0, 0))
+    assert isinstance(solid, Mix) and solid.amount == 0.5 and "three dimensions" in warnings[0]
+    dots, warnings = make("dots", "float", inside=("float", 0.3))
+    assert dots.second.value == 0.3 and "dots" in warnings[0]
     assert "'extra'" in make("mix", "float", extra=("float", 1.0))[1][0]
 
 
