@@ -7,6 +7,7 @@ and that also within a bound.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ pytestmark = pytest.mark.peers
 
 SCENES = (
     "cornell", "delta_lights", "envmap", "glass_metal", "instances", "light_tracing",
-    "orthographic", "plastic", "spectra", "textures", "thin_lens",
+    "orthographic", "plastic", "principled", "spectra", "textures", "thin_lens",
 )  # fmt: skip
 # Mitsuba's envmap is up to a quarter off its own RGB picture in spectral mode, where texels are
 # saturated; tests/renders/test_spectral.py holds ours to the RGB picture instead.
@@ -28,7 +29,8 @@ CASES = [(name, mode) for name in SCENES for mode in ("rgb", "spectral")]
 CASES.remove(("envmap", "spectral"))
 CASES.remove(("spectra", "rgb"))  # of black bodies Mitsuba has no colour
 # The rest is left to the sweep of many samples.
-LEFT = [("instances", "spectral"), ("plastic", "rgb"), ("textures", "rgb"), ("orthographic", "rgb")]
+LEFT = [(name, "rgb") for name in ("plastic", "textures", "orthographic")]
+LEFT += [(name, "spectral") for name in ("instances", "principled")]
 QUICK = [case for case in CASES if case not in LEFT]
 MEAN_WITHIN = 0.015  # relative; at a quick test's number of samples most of it is noise
 COLOURS = 2e-3  # relative; the steps of the two programs' colour tables differ
@@ -71,3 +73,30 @@ def test_depths(scenes: Path, depth: int) -> None:
     reference = mitsuba_exposures(path, "rgb", 16, 4, max_depth=depth)
     scene = with_path(with_film(clpt.load(path), mode="rgb"), max_depth=depth)
     assert_agree(blocks(exposures(scene, 32, 4)), blocks(reference), allowed=COLOURS)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+@pytest.mark.parametrize("name", ["tire", "ashtray"])
+def test_principled_scenes_of_others(assets: Path, tmp_path: Path, name: str, mode: str) -> None:
+    """Every mesh flat: Mitsuba lights by a lamp's smooth normals, and sees backs by them."""
+    if (name, mode) == ("ashtray", "spectral"):
+        pytest.skip("Mitsuba refuses its `raw` texture of three channels as a number")
+    source, path = assets / "mitsuba" / name, tmp_path / "scene.xml"
+    text = source.joinpath("scene.xml").read_text("utf-8")
+    text = text.replace("</film>", '<rfilter type="box"/></film>')
+    text = re.sub(r'<boolean name="face_normals" value="true"/>', "", text)
+    text = text.replace(
+        '<shape type="ply">', '<shape type="ply"><boolean name="face_normals" value="true"/>'
+    )
+    path.write_text(text.replace('value="65"', 'value="4"'), "utf-8")
+    for folder in ("meshes", "textures"):
+        (tmp_path / folder).symlink_to(source / folder)
+    size = {"resx": "64", "resy": "64", "integrator": "path"}
+    mi.set_variant(f"scalar_{mode}")
+    scene = mi.load_file(str(path), **size)
+    images = [np.array(mi.render(scene, spp=16, seed=seed))[:, :, :3] for seed in range(24)]
+    ours = exposures(with_film(clpt.load(path, **size), mode=mode), 48, 16)
+    assert_agree(blocks(ours, 16), blocks(images, 16), f"blocks of {name}, {mode}", 0.01)
+    ratio = ours.mean() / np.mean(images)
+    assert abs(ratio - 1.0) < 0.015, f"mean radiance is {ratio:.4f} of Mitsuba's"
