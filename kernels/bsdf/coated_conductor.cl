@@ -4,8 +4,8 @@
  * light by (1 - 1/eta) times its slopes: their variance, times that squared and a factor of 2.5, fitted
  * to random walks (tests/kernels/test_coated.py), is added to the metal's. What the coat throws back
  * inside is summed as a geometric series: along the mirror direction as between smooth boundaries, or,
- * the rougher the metal, as a diffuse light like plastic's. A coat that disperses bends light by the
- * mean of the indices. */
+ * the rougher the metal, as a diffuse light like plastic's. Of a coat that disperses, only the reflection
+ * does; what it bends and lets through is by the mean index. */
 #include "lib/fresnel.cl"
 #include "lib/microfacet.cl"
 #include "lib/rough_coat.cl"
@@ -99,13 +99,13 @@ inline real coated_conductor_lobe(CoatedMetal c, vec3 inner_o, vec3 inner_i, vec
 }
 
 /* eval and pdf, given T(wo). */
-inline Spectrum coated_conductor_value(CoatedConductor m, CoatedMetal c, vec3 wo, vec3 wi, Spectrum t_wo)
+inline Spectrum coated_conductor_value(CoatedConductor m, CoatedMetal c, vec3 wo, vec3 wi, real t_wo)
 {
     vec3 h = normalize3(add3(wo, wi));
     real g = microfacet_g1(c.coat, wo, h) * microfacet_g1(c.coat, wi, h);
     real coat = microfacet_d(c.coat, h) * g / max_r(4.0f * wo.z, (real)(1e-20f));
     Spectrum f = fresnel_spectrum(clamp_r(dot3(wo, h), (real)(0.0f), (real)(1.0f)), c.eta);
-    Spectrum t = spectrum_mul(t_wo, coat_transmittance_spectrum(c.coat, fabs(wi.z), c.eta));
+    real t = t_wo * coat_transmittance(c.coat, fabs(wi.z), c.bend);
 
     vec3 inner_o = coated_metal_refracted(c, wo), inner_i = coated_metal_refracted(c, wi);
     vec3 inner_h = normalize3(add3(inner_o, inner_i));
@@ -116,7 +116,7 @@ inline Spectrum coated_conductor_value(CoatedConductor m, CoatedMetal c, vec3 wo
 #define C(x_)                                                                                     \
     real CAT(echo_, x_) = thrown * metal.x_;                                                      \
     CAT(echo_, x_) = 1.0f + c.between * CAT(echo_, x_) / max_r(1.0f - CAT(echo_, x_), (real)(1e-3f)); \
-    r.x_ = coat * f.x_ + t.x_ * (lobe * metal.x_ * CAT(echo_, x_) + diffuse * c.again.x_);
+    r.x_ = coat * f.x_ + t * (lobe * metal.x_ * CAT(echo_, x_) + diffuse * c.again.x_);
     SPECTRUM_EACH(C)
 #undef C
     return spectrum_sel((wo.z > 0.0f) & (wi.z > 0.0f), r, spectrum_of(0.0f));
@@ -135,23 +135,21 @@ inline real coated_conductor_density(CoatedConductor m, CoatedMetal c, vec3 wo, 
 Spectrum coated_conductor_eval(CoatedConductor m, vec3 wo, vec3 wi)
 {
     CoatedMetal c = coated_metal_of(m);
-    return coated_conductor_value(m, c, wo, wi, coat_transmittance_spectrum(c.coat, fabs(wo.z), c.eta));
+    return coated_conductor_value(m, c, wo, wi, coat_transmittance(c.coat, fabs(wo.z), c.bend));
 }
 
 real coated_conductor_pdf(CoatedConductor m, vec3 wo, vec3 wi)
 {
     CoatedMetal c = coated_metal_of(m);
-    Spectrum t = coat_transmittance_spectrum(c.coat, fabs(wo.z), c.eta);
-    return coated_conductor_density(m, c, wo, wi, spectrum_mean(t));
+    return coated_conductor_density(m, c, wo, wi, coat_transmittance(c.coat, fabs(wo.z), c.bend));
 }
 
 BsdfSample coated_conductor_sample(CoatedConductor m, vec3 wo, vec3 u)
 {
     BsdfSample s = bsdf_nothing();
     CoatedMetal c = coated_metal_of(m);
-    Spectrum t = coat_transmittance_spectrum(c.coat, fabs(wo.z), c.eta);
-    real t_mean = spectrum_mean(t);
-    vec2 uv = {u.x, u.y}, p = coated_conductor_lobes(m, c, t_mean);
+    real t = coat_transmittance(c.coat, fabs(wo.z), c.bend);
+    vec2 uv = {u.x, u.y}, p = coated_conductor_lobes(m, c, t);
     mask coat = u.z < p.x, metal = !coat & (u.z < p.x + p.y), kept = wo.z > 0.0f;
     vec3 from = sel3(coat, wo, coated_metal_refracted(c, wo));
     Microfacets d = c.metal;
@@ -162,7 +160,7 @@ BsdfSample coated_conductor_sample(CoatedConductor m, vec3 wo, vec3 u)
     kept = kept & (!metal | ((s.wi.z > 0.0f) & (z2 > 0.0f)));
     s.wi = sel3(metal, normalize3(v3(x, y, sqrt_r(z2))), s.wi);
     s.wi = sel3(coat | metal, s.wi, cosine_hemisphere(uv));
-    s.pdf = sel(kept, coated_conductor_density(m, c, wo, s.wi, t_mean), (real)(0.0f));
+    s.pdf = sel(kept, coated_conductor_density(m, c, wo, s.wi, t), (real)(0.0f));
     Spectrum f = coated_conductor_value(m, c, wo, s.wi, t);
     s.weight = spectrum_scale(f, sel(s.pdf > 0.0f, 1.0f / s.pdf, (real)(0.0f)));
     return s;

@@ -21,7 +21,7 @@ pytestmark = pytest.mark.peers
 
 SCENES = (
     "cornell", "delta_lights", "envmap", "glass_metal", "instances", "light_tracing",
-    "orthographic", "plastic", "principled", "spectra", "textures", "thin_lens",
+    "orthographic", "plastic", "principled", "principled_thin", "spectra", "textures", "thin_lens",
 )  # fmt: skip
 # Mitsuba's envmap is up to a quarter off its own RGB picture in spectral mode, where texels are
 # saturated; tests/renders/test_spectral.py holds ours to the RGB picture instead.
@@ -29,8 +29,8 @@ CASES = [(name, mode) for name in SCENES for mode in ("rgb", "spectral")]
 CASES.remove(("envmap", "spectral"))
 CASES.remove(("spectra", "rgb"))  # of black bodies Mitsuba has no colour
 # The rest is left to the sweep of many samples.
-LEFT = [(name, "rgb") for name in ("plastic", "textures", "orthographic")]
-LEFT += [(name, "spectral") for name in ("instances", "principled")]
+LEFT = [(name, "rgb") for name in ("plastic", "textures", "orthographic", "principled_thin")]
+LEFT += [(name, "spectral") for name in ("instances", "principled", "principled_thin")]
 QUICK = [case for case in CASES if case not in LEFT]
 MEAN_WITHIN = 0.015  # relative; at a quick test's number of samples most of it is noise
 COLOURS = 2e-3  # relative; the steps of the two programs' colour tables differ
