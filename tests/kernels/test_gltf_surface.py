@@ -19,7 +19,7 @@ PLAIN = GltfSurface()
 def _params(**given):
     """A plain white dielectric of roughness one but for what is given; for `Probe`, in RGB."""
     values = {}
-    for name, param in device_params(GltfSurface).items():
+    for name in device_params(GltfSurface):
         value = given.get(name, getattr(PLAIN, name))
         values[name] = np.asarray(value if np.ndim(value) else getattr(value, "value", value))
     return values
