@@ -26,6 +26,7 @@ class Features:
     lights: tuple[str, ...] = ()
     textures: tuple[str, ...] = ()
     texture_roles: tuple[tuple[str, str], ...] = ()
+    texture_mappings: bool = False  # some texture makes uv of the place
     texture_depth: int = 0  # how many values their programs stack
     analytic: tuple[str, ...] = ()
     instances: bool = False

@@ -14,7 +14,7 @@ from clpt.render import image_lights, projected
 from clpt.render.texels import pixels
 from clpt.scene import lights
 from clpt.scene.lights import Light
-from clpt.scene.textures import Bitmap, Checkerboard, MeshAttribute, Mix, Product
+from clpt.scene.textures import Bitmap, Checkerboard, Dots, MeshAttribute, Mix, Product, Solid
 
 INFINITE = ("constant", *image_lights.RECORDS)  # a ray that leaves the scene meets these
 PLACED = ("point", "spot", *projected.RECORDS)  # all other lamps are infinitely far away
@@ -174,8 +174,8 @@ def brightness(value: Any) -> float:
         return float(np.maximum(pixels(value, "emission"), 0.0).mean(dtype=np.float64))
     if isinstance(value, Checkerboard):
         return 0.5 * (brightness(value.color0) + brightness(value.color1))
-    if isinstance(value, MeshAttribute):
-        return 1.0  # whatever the meshes have: it only shares out samples
+    if isinstance(value, (MeshAttribute, Solid, Dots)):
+        return 0.5  # whatever it is: this only shares out samples
     if isinstance(value, Product):
         return brightness(value.first) * brightness(value.second)
     if isinstance(value, Mix):

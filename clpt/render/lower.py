@@ -326,6 +326,7 @@ class _Lowering:
             textures=tuple(sorted({kind for kind, _ in tables.texture_roles})),
             texture_roles=tuple(sorted(tables.texture_roles)),
             texture_depth=tables.texture_depth,
+            texture_mappings=tables.texture_mappings,
             attributes=bool(tables.attributes),
             analytic=tuple(kind for kind in shapes.ANALYTIC if kind in analytic),
             instances=bool(self.prototypes),

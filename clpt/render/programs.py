@@ -120,7 +120,10 @@ def _shared(features: Features, layout: str) -> dict[str, str]:
             features.lights, _textured(features), features.two_sided_lights
         ),
         "generated/textures.cl": textures.dispatch_text(
-            features.textures, features.texture_roles, features.texture_depth
+            features.textures,
+            features.texture_roles,
+            features.texture_depth,
+            features.texture_mappings,
         ),
         "generated/lights.cl": _lights_text(features),
         "generated/mixture.cl": _mixture_text(features),

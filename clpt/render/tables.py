@@ -80,6 +80,7 @@ class Tables:
         self.textures: dict[tuple[int, str], int] = {}
         self.texture_roles: set[tuple[str, str]] = set()  # (kind, role) that occur
         self.attributes: dict[tuple[str, str], int] = {}  # (name, role) -> its place in directories
+        self.texture_mappings = False  # some texture makes uv of the place
         self.texture_depth = 0  # of their programs, see clpt.render.texture_programs
         self.folded: dict[tuple[int, str], Any] = {}  # textures with their constants put together
         self.kept: list[Any] = []  # what is known by identity here stays alive

@@ -14,19 +14,44 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt.errors import SceneError
 from clpt.layout import Record
+from clpt.render import noise
 from clpt.render.attributes import per_face
 from clpt.render.bitmaps import Images, identity
 from clpt.render.kinds import REAL_WORDS, SPECTRUM_WORDS
 from clpt.render.texels import bands, spectral_image
 from clpt.render.texture_programs import is_composite, operand_text, program
 from clpt.scene.params import device_params, params
-from clpt.scene.textures import WRAPS, Bitmap, Checkerboard, MeshAttribute, Placed, Texture
-from clpt.spectra import Spectrum, luminance
+from clpt.scene.textures import (
+    MAPPINGS,
+    PATTERNS,
+    WRAPS,
+    Bitmap,
+    Checkerboard,
+    Checkers,
+    Dots,
+    Marble,
+    MeshAttribute,
+    Noise,
+    Placed,
+    Solid,
+    Texture,
+)
+from clpt.spectra import RGB, Spectrum, luminance
 
 _COMMON = {
     "kind": ("integer", "position in the table of textures"),
     "to_u": ("vec3", "u of the texture from (u, v, 1) of the surface"),
     "to_v": ("vec3", "and v"),
+    "mapping": ("integer", "MAPPING_"),
+    "place": ("integer", "first of twelve words in `textures`: from the world to the mapping"),
+}
+_SOLID = {
+    "kind": _COMMON["kind"],
+    "place": ("integer", "first of twelve words in `textures`: from the world to the texture"),
+}
+_OCTAVES = {
+    "octaves": ("integer", "how many"),
+    "roughness": ("real", "how strong each is beside the one before"),
 }
 _IMAGE = {
     **_COMMON,
@@ -49,6 +74,20 @@ RECORDS: dict[str, Record] = {
         color1=("integer", "first of its five words in `textures`"),
     ),
 }
+RECORDS["dots"] = Record("Dots", "Round dots.", **_COMMON)
+RECORDS["checkers"] = Record("Checkers", "Cubes.", **_SOLID)
+RECORDS["noise"] = Record(
+    "Noise", "Octaves of noise.", **_SOLID, pattern=("integer", "NOISE_PATTERN_"), **_OCTAVES
+)
+RECORDS["marble"] = Record(
+    "Marble",
+    "Marble.",
+    **_SOLID,
+    **_OCTAVES,
+    scale=("real", "how fine it is"),
+    variation=("real", "how much the veins are disturbed"),
+    colours=("integer", "first of five words of each of nine in `textures`"),
+)
 RECORDS["mesh_attribute"] = Record(
     "MeshAttribute",
     "Values per vertex or face.",
@@ -74,6 +113,7 @@ class Sink(Protocol):
     textures: dict[Any, int]
     texture_roles: set[tuple[str, str]]
     texture_depth: int
+    texture_mappings: bool
     attributes: dict[tuple[str, str], int]
     kept: list[Any]
     images: Images
@@ -128,7 +168,8 @@ def _identity(texture: Texture) -> Any:
     """What makes two textures the same: of bitmaps their parameters, else being one object."""
     if isinstance(texture, Bitmap):
         values = (getattr(texture, name) for name in ("raw", "filter", "wrap", "wrap_v", "channel"))
-        return (identity(texture), *values, texture.to_uv.tobytes())
+        placed = (texture.to_uv.tobytes(), texture.mapping, texture.to_texture.tobytes())
+        return (identity(texture), *values, *placed)
     return id(texture)
 
 
@@ -145,19 +186,32 @@ def _blank(tables: Sink) -> None:
     tables.append_floats("texels", np.zeros(2))
     tables.append("images", np.zeros(4, np.uint32))
     _row("spectral_bitmap", {"kind": 0, "width": 1, "height": 1}, tables)
+    tables.append("textures", noise.PERMUTATION)
 
 
-def _uv(texture: Placed, down: bool) -> dict[str, Any]:
-    """The rows of `to_uv`; `down`: with v turned round, as an image's rows run."""
+def _uv(texture: Placed, tables: Sink, down: bool = False) -> dict[str, Any]:
+    """The members of `_COMMON`; `down`: with v turned round, as an image's rows run."""
     matrix = np.asarray(texture.to_uv, np.float64)
     if not np.allclose(matrix[2, :2], 0.0) or np.isclose(matrix[2, 2], 0.0):
         raise SceneError("its last row must be 0 0 1", where=f"{texture.kind}.to_uv")
     u, v = matrix[:2] / matrix[2, 2]
-    return {"to_u": u, "to_v": [0.0, 0.0, 1.0] - v if down else v}
+    members = {"to_u": u, "to_v": [0.0, 0.0, 1.0] - v if down else v}
+    if texture.mapping == "uv":
+        return members
+    tables.texture_mappings = True
+    return {**members, "mapping": MAPPINGS.index(texture.mapping), "place": _place(texture, tables)}
+
+
+def _place(texture: Placed | Solid, tables: Sink) -> int:
+    """Append the rows of `to_texture`. Raises SceneError for a projection."""
+    if not np.allclose(texture.to_texture[3], [0.0, 0.0, 0.0, 1.0]):
+        raise SceneError("its last row must be 0 0 0 1", where=f"{texture.kind}.to_texture")
+    rows = texture.to_texture[:3].astype(np.float32)
+    return tables.append("textures", np.ascontiguousarray(rows).view(np.uint32))
 
 
 def _checkerboard(texture: Checkerboard, role: str, tables: Sink) -> tuple[str, dict[str, Any]]:
-    members = _uv(texture, down=False)
+    members = _uv(texture, tables)
     for name in ("color0", "color1"):
         value = getattr(texture, name)
         if role == "real":
@@ -173,7 +227,7 @@ def _bitmap(texture: Bitmap, role: str, tables: Sink) -> int:
     """Append a bitmap's row; unless it is one of spectra, its image comes when all are known."""
     filters = params(Bitmap)["filter"].choices
     members = {
-        **_uv(texture, down=True),
+        **_uv(texture, tables, down=True),
         "filter": filters.index(texture.filter),
         "wrap_u": WRAPS.index(texture.wrap),
         "wrap_v": WRAPS.index(texture.wrap_v or texture.wrap),
@@ -202,28 +256,73 @@ def _mesh_attribute(texture: MeshAttribute, role: str, tables: Sink) -> tuple[st
     return texture.kind, {"number": number, "per_face": per_face(texture.name)}
 
 
+def _dots(texture: Dots, role: str, tables: Sink) -> tuple[str, dict[str, Any]]:
+    return texture.kind, _uv(texture, tables)
+
+
+def _checkers(texture: Checkers, role: str, tables: Sink) -> tuple[str, dict[str, Any]]:
+    return texture.kind, {"place": _place(texture, tables)}
+
+
+def _noise(texture: Noise, role: str, tables: Sink) -> tuple[str, dict[str, Any]]:
+    return texture.kind, {
+        "place": _place(texture, tables),
+        "pattern": PATTERNS.index(texture.pattern),
+        "octaves": texture.octaves,
+        "roughness": texture.roughness,
+    }
+
+
+def _marble(texture: Marble, role: str, tables: Sink) -> tuple[str, dict[str, Any]]:
+    if role == "real":
+        words = np.zeros((len(noise.MARBLE), SPECTRUM_WORDS), np.float32)
+        words[:, 0] = luminance(noise.MARBLE)
+    else:
+        made = [tables.spectrum_words(RGB(*rgb), "reflectance")[0] for rgb in noise.MARBLE]
+        words = np.array(made).view(np.float32)
+    return texture.kind, {
+        "place": _place(texture, tables),
+        "colours": tables.append("textures", words.view(np.uint32)),
+        **{n: getattr(texture, n) for n in ("octaves", "roughness", "scale", "variation")},
+    }
+
+
 MEMBERS: dict[type[Texture], Callable[..., tuple[str, dict[str, Any]]]] = {
     Checkerboard: _checkerboard,
     MeshAttribute: _mesh_attribute,
+    Dots: _dots,
+    Checkers: _checkers,
+    Noise: _noise,
+    Marble: _marble,
 }
 
 
-def dispatch_text(kinds: Iterable[str], roles: Iterable[tuple[str, str]], depth: int = 0) -> str:
+def dispatch_text(
+    kinds: Iterable[str],
+    roles: Iterable[tuple[str, str]],
+    depth: int = 0,
+    mappings: bool = False,
+) -> str:
     """Return the look-ups of the (kind, role) pairs in the scene, and the loaders that call them.
 
-    depth: how many values the programs stack.
+    depth: how many values the programs stack; mappings: some texture makes its own uv.
 
     texture_<role>(scene, row, point, lambdas)                 whose row is at a word
     spectrum_texture_<role>(scene, table, at, point, lambdas)  that the parameter at `at` names
     real_texture_real(scene, table, at, point, lambdas)        the same for a real
     """
     pairs, found = set(roles), set(kinds)
+    lines = [f"#define MAPPING_{name.upper()} {i}" for i, name in enumerate(MAPPINGS)]
+    lines += [
+        f"#define USES_MAPPINGS {int(mappings)}",
+        f"#define TEXTURE_PERMUTATION {RECORDS['spectral_bitmap'].words}",
+    ]
     if found & {"spectral_bitmap", "packed_bitmap"}:
         found.add("bitmap")  # which knows what lies where
     present = [kind for kind in RECORDS if kind in found]
     kinds_of: tuple[type[Texture], ...] = (Bitmap, *MEMBERS)
     choosy = {cls.kind: cls for cls in kinds_of}
-    parts = ['#include "lib/texture.cl"'] if found else []
+    parts = [*lines, '#include "lib/texture.cl"'] if found else []
     for kind in present:
         parts += _choice_lines(choosy[kind]) if kind in choosy else []
         parts += [RECORDS[kind].row_text(), f'#include "texture/{kind}.cl"']

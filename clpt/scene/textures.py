@@ -12,6 +12,9 @@ from clpt.errors import SceneError
 from clpt.scene.params import Kind, choice, factor, host, params, real, reflectance
 
 ATTRIBUTES = ("vertex_", "face_")  # how the names of what meshes have begin
+PATTERNS = ("fbm", "wrinkled", "windy")
+MOST_OCTAVES = 32
+MAPPINGS = ("uv", "planar", "spherical", "cylindrical")
 WRAPS = ("repeat", "clamp", "mirror", "zero")
 
 
@@ -24,15 +27,25 @@ class Texture(Kind):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Placed(Texture):
-    """Base of those that lie on uv; `to_uv` maps a surface's uv to theirs, 3x3, homogeneous."""
+    """Base of those that lie on uv: a surface's own, or such as a mapping makes of its place."""
 
     to_uv: np.ndarray = host(np.eye(3), "uv transform, (3, 3) float64")
+    mapping: str = choice("uv", "where u and v come from before it", MAPPINGS)
+    to_texture: np.ndarray = host(np.eye(4), "from the world to the mapping's space, (4, 4)")
 
     def check(self) -> None:
-        matrix = np.asarray(self.to_uv, dtype=np.float64)
-        if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
-            raise SceneError("must be a finite 3x3 matrix", where=f"{self.kind}.to_uv")
-        object.__setattr__(self, "to_uv", matrix)
+        _matrix(self, "to_uv", 3)
+        _matrix(self, "to_texture", 4)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Solid(Texture):
+    """Base of those that fill space."""
+
+    to_texture: np.ndarray = host(np.eye(4), "from the world to the texture's space, (4, 4)")
+
+    def check(self) -> None:
+        _matrix(self, "to_texture", 4)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -90,7 +103,61 @@ class MeshAttribute(Texture):
             raise SceneError(message, where=f"{self.kind}.name")
 
 
-KINDS = (Bitmap, Checkerboard, Product, Mix, MeshAttribute)
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Dots(Placed):
+    """1 within round dots, 0 elsewhere: half of the cells of uv around whole numbers have one."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Checkers(Solid):
+    """0 and 1 by turns in cubes of unit size."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Noise(Solid):
+    """A number that varies in space, from Perlin's noise, as pbrt's textures of these names."""
+
+    pattern: str = choice(
+        "fbm", "fbm: octaves; wrinkled: their absolute values; windy: waves, six octaves", PATTERNS
+    )
+    octaves: int = host(8, "how many, each 1.99 times as fine as the one before")
+    roughness: float = host(0.5, "how strong each is beside the one before")
+
+    def check(self) -> None:
+        super().check()
+        _octaves(self)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Marble(Solid):
+    """Marble with veins along y, as pbrt's."""
+
+    octaves: int = host(8, "of the noise that disturbs the veins")
+    roughness: float = host(0.5, "how strong each octave is beside the one before")
+    scale: float = host(1.0, "how fine the pattern is")
+    variation: float = host(0.2, "how much the veins are disturbed")
+
+    def check(self) -> None:
+        super().check()
+        _octaves(self)
+
+
+KINDS = (Bitmap, Checkerboard, Product, Mix, MeshAttribute, Dots, Checkers, Noise, Marble)
+
+
+def _matrix(texture: Texture, name: str, size: int) -> None:
+    """Make a texture's matrix float64. Raises SceneError for one of another form."""
+    matrix = np.asarray(getattr(texture, name), dtype=np.float64)
+    if matrix.shape != (size, size) or not np.isfinite(matrix).all():
+        raise SceneError(f"must be a finite {size}x{size} matrix", where=f"{texture.kind}.{name}")
+    object.__setattr__(texture, name, matrix)
+
+
+def _octaves(texture: Any) -> None:
+    """Raises SceneError for so many octaves that float32 ends before."""
+    if not 0 < texture.octaves <= MOST_OCTAVES:
+        message = f"must be 1 to {MOST_OCTAVES}, not {texture.octaves}"
+        raise SceneError(message, where=f"{texture.kind}.octaves")
 
 
 def textures_in(value: Any) -> Iterator[Texture]:

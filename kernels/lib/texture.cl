@@ -16,3 +16,34 @@ inline Spectrum texture_constant(Scene scene, integer at, Wavelengths lambdas)
     if (any(tabulated)) value = spectrum_sel(tabulated, spectrum_table(scene, scene.textures, at, lambdas), value);
     return value;
 }
+
+/* A place of the world in a texture's space; `place`: the first of twelve words, three rows of a matrix. */
+inline vec3 texture_place(Scene scene, integer place, vec3 p)
+{
+    real r[3];
+    for (int i = 0; i < 3; i++) {
+        integer at = place + 4 * i;
+        vec3 row = v3(gather_w(scene.textures, at), gather_w(scene.textures, at + 1), gather_w(scene.textures, at + 2));
+        r[i] = dot3(row, p) + gather_w(scene.textures, at + 3);
+    }
+    return v3(r[0], r[1], r[2]);
+}
+
+/* u, v and 1: of the surface, or of a place in a texture's space by one of the mappings that pbrt has.
+ * USES_MAPPINGS: some texture asks for one of these. */
+inline vec3 texture_uv(Scene scene, integer mapping, integer place, TexturePoint point)
+{
+    vec3 uv = v3(point.uv.x, point.uv.y, (real)(1.0f));
+#if USES_MAPPINGS
+    mask mapped = mapping != MAPPING_UV;
+    if (any(mapped)) {
+        vec3 p = texture_place(scene, place, point.p);
+        real turn = atan2_r(p.y, p.x) * INV_2PI, theta = atan2_r(sqrt(p.x * p.x + p.y * p.y), p.z) * INV_PI;
+        mask round = mapping == MAPPING_SPHERICAL, tube = mapping == MAPPING_CYLINDRICAL;
+        real u = sel(round, theta, sel(tube, turn + 0.5f, p.x));
+        real v = sel(round, sel(turn < 0.0f, turn + 1.0f, turn), sel(tube, p.z, p.y));
+        uv = v3(sel(mapped, u, uv.x), sel(mapped, v, uv.y), uv.z);
+    }
+#endif
+    return uv;
+}

@@ -42,6 +42,8 @@ inline Spectrum spectrum_packed_texel(global const uint *table, integer first, i
                   gather_w(table, decode + ((word >> 16) & 255))};
     return r;
 }
+/* Light of a grey: as bright in all channels. */
+inline Spectrum spectrum_grey_light(Scene scene, real value, Wavelengths lambdas) { return spectrum_of(value); }
 inline Wavelengths wavelengths_sample(Scene scene, real u)
 {
     return spectrum_of(0.0f);

@@ -63,6 +63,11 @@ inline Spectrum spectrum_light_texel_at(Scene scene, global const uint *table, i
 {
     return spectrum_mul(spectrum_constant(table, at, lambdas), spectra_row(scene, (integer)(0), lambdas));
 }
+/* Light of a grey: D65. */
+inline Spectrum spectrum_grey_light(Scene scene, real value, Wavelengths lambdas)
+{
+    return spectrum_scale(spectra_row(scene, (integer)(0), lambdas), value);
+}
 /* And for a texel of two words: a sigmoid's argument at 400, 550 and 700 nm, as floats of 21 bits, two in
  * the words' upper bits, the third in what is left. In between it is the parabola through them. */
 inline Spectrum spectrum_packed_texel(global const uint *table, integer first, integer index, integer decode, Wavelengths lambdas)

@@ -31,9 +31,9 @@ inline void bitmap_axis(real x, integer size, integer wrap, mask smooth, integer
     *i1 = bitmap_wrap(second, size, wrap);
 }
 
-inline BitmapPlace bitmap_place(Bitmap t, TexturePoint point)
+inline BitmapPlace bitmap_place(Bitmap t, Scene scene, TexturePoint point)
 {
-    vec3 p = v3(point.uv.x, point.uv.y, (real)(1.0f));
+    vec3 p = texture_uv(scene, t.mapping, t.place, point);
     mask smooth = t.filter == BITMAP_FILTER_BILINEAR;
     BitmapPlace b;
     bitmap_axis(dot3(t.to_u, p), t.width, t.wrap_u, smooth, &b.x0, &b.x1, &b.u0, &b.u1);
@@ -51,7 +51,7 @@ inline integer bitmap_corner(Bitmap t, BitmapPlace b, int corner, real *weight)
 
 Spectrum bitmap_reflectance(Bitmap t, Scene scene, TexturePoint point, Wavelengths lambdas)
 {
-    BitmapPlace b = bitmap_place(t, point);
+    BitmapPlace b = bitmap_place(t, scene, point);
     Spectrum sum = spectrum_of(0.0f);
     for (int corner = 0; corner < 4; corner++) {
         real weight;
@@ -64,7 +64,7 @@ Spectrum bitmap_reflectance(Bitmap t, Scene scene, TexturePoint point, Wavelengt
 
 Spectrum bitmap_emission(Bitmap t, Scene scene, TexturePoint point, Wavelengths lambdas)
 {
-    BitmapPlace b = bitmap_place(t, point);
+    BitmapPlace b = bitmap_place(t, scene, point);
     Spectrum sum = spectrum_of(0.0f);
     for (int corner = 0; corner < 4; corner++) {
         real weight;
@@ -77,7 +77,7 @@ Spectrum bitmap_emission(Bitmap t, Scene scene, TexturePoint point, Wavelengths 
 
 real bitmap_real(Bitmap t, Scene scene, TexturePoint point)
 {
-    BitmapPlace b = bitmap_place(t, point);
+    BitmapPlace b = bitmap_place(t, scene, point);
     real sum = 0.0f;
     for (int corner = 0; corner < 4; corner++) {
         real weight;

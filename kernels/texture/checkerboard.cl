@@ -1,8 +1,8 @@
 /* Two colours, each in two of the four quarters of a unit of uv. A colour is five words: a spectrum in
  * the form that parameters have, or for a real the number in the first of them. */
-inline integer checkerboard_at(Checkerboard t, TexturePoint point)
+inline integer checkerboard_at(Checkerboard t, Scene scene, TexturePoint point)
 {
-    vec3 p = v3(point.uv.x, point.uv.y, (real)(1.0f));
+    vec3 p = texture_uv(scene, t.mapping, t.place, point);
     real u = dot3(t.to_u, p), v = dot3(t.to_v, p);
     mask same = (u - floor(u) > 0.5f) == (v - floor(v) > 0.5f);
     return sel_i(same, t.color0, t.color1);
@@ -10,7 +10,7 @@ inline integer checkerboard_at(Checkerboard t, TexturePoint point)
 
 Spectrum checkerboard_reflectance(Checkerboard t, Scene scene, TexturePoint point, Wavelengths lambdas)
 {
-    return texture_constant(scene, checkerboard_at(t, point), lambdas);
+    return texture_constant(scene, checkerboard_at(t, scene, point), lambdas);
 }
 
 Spectrum checkerboard_emission(Checkerboard t, Scene scene, TexturePoint point, Wavelengths lambdas)
@@ -20,5 +20,5 @@ Spectrum checkerboard_emission(Checkerboard t, Scene scene, TexturePoint point, 
 
 real checkerboard_real(Checkerboard t, Scene scene, TexturePoint point)
 {
-    return gather_w(scene.textures, checkerboard_at(t, point));
+    return gather_w(scene.textures, checkerboard_at(t, scene, point));
 }

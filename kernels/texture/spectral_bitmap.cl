@@ -4,14 +4,14 @@
 
 inline Bitmap spectral_bitmap_image(SpectralBitmap t)
 {
-    Bitmap b = {t.kind, t.to_u, t.to_v, t.width, t.height, t.first, t.filter, t.wrap_u, t.wrap_v, t.decode};
+    Bitmap b = {t.kind, t.to_u, t.to_v, t.mapping, t.place, t.width, t.height, t.first, t.filter, t.wrap_u, t.wrap_v, t.decode};
     return b;
 }
 
 inline Spectrum spectral_bitmap_at(SpectralBitmap t, Scene scene, TexturePoint point, Spectrum place)
 {
     Bitmap image = spectral_bitmap_image(t);
-    BitmapPlace b = bitmap_place(image, point);
+    BitmapPlace b = bitmap_place(image, scene, point);
     Spectrum sum = spectrum_of(0.0f);
     for (int corner = 0; corner < 4; corner++) {
         real weight;
