@@ -98,7 +98,17 @@ def _metal(params: Parameters, state: State, prefix: str) -> dict[str, Any]:
         return {"eta": copper["eta"] if eta is None else eta, "k": copper["k"] if k is None else k}
     if eta is not None or k is not None:
         raise SceneError("give either 'reflectance' or 'eta' and 'k', not both")
-    return {"eta": 1.0, "k": mapped(reflectance, _extinction)}
+    if not isinstance(reflectance, Texture):
+        return {"eta": 1.0, "k": mapped(reflectance, _extinction)}
+    state.warn(params, "a metal's textured 'reflectance' does not rise at grazing angles")
+    return {"specular_reflectance": reflectance}
+
+
+def _damped(metal: dict[str, Any], ior: float, thickness: float) -> dict[str, Any]:
+    """A metal under a coat that absorbs, which is a factor on its reflection."""
+    twice = coats.let_through(ior, thickness) ** 2
+    own = metal.get("specular_reflectance", 1.0)
+    return {**metal, "specular_reflectance": _times(own, twice)}
 
 
 def _extinction(r: Any) -> Any:
@@ -115,9 +125,8 @@ def _coated_conductor(params: Parameters, state: State) -> Material:
             coat_ior=ior,
             ext_ior=1.0,
             coat_alpha=rough(outer),
-            specular_reflectance=coats.let_through(middle(ior), coat(params, state)) ** 2,
             **stretched(alpha_u, alpha_v),
-            **_metal(params, state, "conductor."),
+            **_damped(_metal(params, state, "conductor."), middle(ior), coat(params, state)),
         )
     )
 

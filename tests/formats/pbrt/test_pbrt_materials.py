@@ -80,6 +80,18 @@ def test_reflectance_of_a_metal_at_normal_incidence():
     assert ((eta - 1) ** 2 + k**2) / ((eta + 1) ** 2 + k**2) == pytest.approx([0.9, 0.5, 0.1])
 
 
+def test_textured_metals():
+    at = state()
+    define(at, "spectrum", "t", "checkerboard")
+    made = make("conductor", at, reflectance=("texture", "t"))
+    assert isinstance(made.specular_reflectance, Checkerboard)
+    assert constant(made.eta) == 0.0 and "grazing" in at.shared.warnings[0]
+    coated = make("coatedconductor", at, reflectance=("texture", "t"))
+    assert isinstance(coated.specular_reflectance, Product)
+    with pytest.raises(SceneError, match="k: cannot be a texture"):
+        make("conductor", at, k=("texture", "t"))
+
+
 def test_coated_conductor():
     made = make(
         "coatedconductor", conductor__eta=("spectrum", "metal-Ag-eta"),
