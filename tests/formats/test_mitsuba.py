@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from clpt import spectra
+from clpt import images, spectra
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
 from clpt.formats import load, studio
 from clpt.scene import integrators, lights, materials, textures
@@ -342,6 +342,38 @@ def test_lights(scene):
     assert made.shapes[0].emission.radiance == RGBIlluminant(2, 2, 2)
 
 
+def test_lights_with_images(scene, scenes):
+    file = f'<string name="filename" value="{scenes / "tiles.png"}"/>'
+    picture = '<texture name="{}" type="bitmap">' + file + "</texture>"
+    made = scene(
+        '<emitter type="projector"><float name="fov" value="40"/><float name="scale" value="2"/>'
+        + picture.format("irradiance") + "</emitter>"
+        '<emitter type="projector"><float name="fov" value="40"/>'
+        '<string name="fov_axis" value="y"/>'
+        + picture.format("irradiance") + "</emitter>"
+        '<emitter type="projector"><float name="fov" value="40"/>'
+        '<rgb name="irradiance" value="1 2 3"/></emitter>'
+        '<emitter type="spot">' + picture.format("texture") + "</emitter>"
+    )  # fmt: skip
+    across, up, plain, spot = made.lights
+    assert (across.irradiance.r, across.fov) == (pytest.approx(2 * np.pi), pytest.approx(40))
+    assert np.array_equal(across.image.to_uv, np.eye(3))  # upright as it is
+    height, width = images.read(up.image.image).shape[:2]
+    tan = np.tan(np.radians(20)) * width / height
+    assert up.fov == pytest.approx(np.degrees(2 * np.arctan(tan)))
+    assert plain.irradiance.b == pytest.approx(3 * np.pi)
+    assert spot.image.image.name == "tiles.png"
+
+
+def test_area_lights_by_reference(scene):
+    made = scene(
+        '<emitter type="area" id="a"><rgb name="radiance" value="2"/></emitter>'
+        '<shape type="disk"><ref id="a"/></shape><shape type="sphere"><ref id="a"/></shape>'
+    )
+    assert made.lights == []
+    assert [s.emission.radiance for s in made.shapes] == [RGBIlluminant(2, 2, 2)] * 2
+
+
 EMITTED = {
     '<float name="radiance" value="2"/>': RGBIlluminant(2, 2, 2),
     '<rgb name="radiance" value="1 2 3"/>': RGBIlluminant(1, 2, 3),
@@ -493,6 +525,9 @@ ERRORS = {
     '<shape type="cube"><transform name="to_world"><skew/></transform></shape>': "<skew>: is no",
     '<shape type="cube"><emitter type="point"/></shape>': "only an area light",
     '<emitter type="area"/>': "must stand in a <shape>",
+    '<emitter type="projector"/>': "field of view",
+    '<emitter type="projector"><float name="fov" value="9"/><spectrum name="irradiance" value="2"/>'
+    "</emitter>": "a texture or a colour",
     '<emitter type="constant"><rgb name="radiance" value="-1"/></emitter>': "negative",
     '<integrator type="path"><integer name="max_depth" value="1.5"/></integrator>': "whole number",
     '<integrator type="path"><boolean name="hide_emitters" value="1"/></integrator>': "true or",

@@ -31,7 +31,8 @@ def load(path: Path, **variables: object) -> Scene:
     context = Context(document)
     props = Properties(document.root, context)
     shapes = shapes_of(props.objects("shape"), context)
-    lights = [emitter(element, context) for element in props.objects("emitter")]
+    found = [emitter(element, context) for element in props.objects("emitter")]
+    lights = [light for light in found if light is not None]
     for element in props.objects("bsdf"):
         bsdf(element, context)
     for element in _textures(props):

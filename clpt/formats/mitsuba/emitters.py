@@ -3,24 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from clpt import images
 from clpt.errors import UnknownKindError
-from clpt.formats.mitsuba.spectra import emission
+from clpt.formats.mitsuba.spectra import TOP_DOWN, emission, reflectance
 from clpt.formats.mitsuba.values import Context, Properties, placed
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene import lights
 from clpt.scene.lights import Light
+from clpt.scene.textures import Bitmap, Placed, Texture
+from clpt.spectra import RGBIlluminant
 
 Parameters = dict[str, Any]
 
 
-def emitter(element: Element, context: Context) -> Light:
-    """Make the light that an <emitter> outside of shapes describes."""
+def emitter(element: Element, context: Context) -> Light | None:
+    """Make the light that an <emitter> outside of shapes describes; None: shapes refer to it."""
     if element.type in ON_SHAPES:
-        raise element.error("an area light must stand in a <shape>")
+        if "id" in element.attributes:
+            return None
+        raise element.error("an area light must stand in a <shape>, or have an id for references")
     if element.type not in PLUGINS:
         raise UnknownKindError("emitter", element.type, [*PLUGINS, *ON_SHAPES], **element.place())
     return _make(element, context, *PLUGINS[element.type])
@@ -72,7 +79,41 @@ def _spot(props: Properties) -> Parameters:
         "intensity": emission(props, "intensity"),
         "cutoff": cutoff,
         "beam_width": beam,
+        "image": reflectance(props, "texture", 1.0),
     }
+
+
+def _projector(props: Properties) -> Parameters:
+    """Mitsuba's irradiance is taken times pi; an image lies there with its top row at v = 0."""
+    axis = props.text("fov_axis", "x", ("x", "y", "diagonal", "smaller", "larger"))
+    fov, scale = props.number("fov", 0.0), props.number("scale", 1.0)
+    if not 0.0 < fov < 179.0:
+        raise props.element.error("the field of view 'fov' must lie between 0 and 179")
+    if scale < 0.0:
+        raise props.element.error("'scale' cannot be negative")
+    shown = emission(props, "irradiance", textured=True)
+    wide = 1.0 if axis == "x" else _aspect(shown)
+    if isinstance(shown, Placed):
+        shown = replace(shown, to_uv=shown.to_uv @ TOP_DOWN)
+    light: Parameters = {"irradiance": (scale * np.pi,) * 3, "image": shown}
+    if isinstance(shown, RGBIlluminant):
+        light = {"irradiance": tuple(scale * np.pi * v for v in (shown.r, shown.g, shown.b))}
+    elif not isinstance(shown, Texture):
+        raise props.element.error("'irradiance' must be a texture or a colour")
+    share = {"y": wide, "diagonal": wide / np.hypot(wide, 1.0), "smaller": max(wide, 1.0)}
+    share["larger"] = min(wide, 1.0)
+    half = np.tan(np.radians(fov) / 2.0) * share.get(axis, 1.0)
+    angle = float(np.degrees(2.0 * np.arctan(half)))
+    return {**light, "fov": angle, "to_world": props.placement()}
+
+
+def _aspect(image: Any) -> float:
+    """Width over height of an image; 1 for what is none."""
+    if not isinstance(image, Bitmap):
+        return 1.0
+    values = images.read(image.image) if isinstance(image.image, (str, Path)) else image.image
+    height, width = np.shape(values)[:2]
+    return width / height
 
 
 def _directional(props: Properties) -> Parameters:
@@ -104,6 +145,7 @@ ON_SHAPES: dict[str, tuple[type[Light], Callable[[Properties], Parameters]]] = {
 PLUGINS: dict[str, tuple[type[Light], Callable[[Properties], Parameters]]] = {
     "point": (lights.Point, _point),
     "spot": (lights.Spot, _spot),
+    "projector": (lights.Projector, _projector),
     "directional": (lights.Directional, _directional),
     "constant": (lights.Constant, _constant),
     "envmap": (lights.Envmap, _envmap),
