@@ -38,8 +38,11 @@ def pixels(texture: Bitmap, role: str) -> Floats:
         image = images.read(image, linear=not texture.raw)
     image = np.asarray(image)
     image = image[..., None] if image.ndim == 2 else image
+    if image.dtype == np.uint8 and image.ndim == 3:
+        image = images.Stored(image, encoded=True).decoded(not texture.raw)
     if image.dtype.kind != "f":
-        raise SceneError("must be a path or an array of floats", where="bitmap.image")
+        wanted = "must be a path or an array of floats or of bytes"
+        raise SceneError(wanted, where="bitmap.image")
     if image.ndim != 3 or image.shape[2] not in (1, 3, 4) or image.size == 0:
         wanted = "must be (h, w) or (h, w, 1, 3 or 4) and not empty"
         raise SceneError(f"{wanted}, not {image.shape}", where="bitmap.image")
