@@ -17,10 +17,14 @@ SHARED := -n auto --maxprocesses 8
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 OFFLINE := "make: pip could not install clpt; the lines above tell why (is there a network?)"
 
-.PHONY: help demo test test-all bench lint clean
+# scene files that others made: see bench/assets.py
+ASSETS ?= ../shared/assets
+
+.PHONY: help demo test test-all bench assets-report lint clean
 help:
 	@echo "make demo      render a scene to demo.exr and demo.png"
 	@echo "make test      the tests;  make test-all  the slow ones too"
+	@echo "make assets-report  which of the scenes in ASSETS=$(ASSETS) render, and how fast"
 	@echo "make bench     measure;  make lint  ruff and mypy;  make clean  remove .venv"
 
 demo: $(VENV)/.run
@@ -34,6 +38,9 @@ test-all: $(VENV)/.dev
 
 bench: $(VENV)/.dev
 	$(BIN)/python -m bench
+
+assets-report: $(VENV)/.dev
+	$(BIN)/python -m bench.assets $(ASSETS)
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
