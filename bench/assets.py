@@ -29,13 +29,12 @@ SCENES = (".gltf", ".glb", ".pbrt", ".xml", ".obj", ".ply", ".stl", ".off")
 PATIENCE = 180.0  # seconds for a file, kernels compiled included
 SIZE = 64  # of the picture [pixels]
 BOUNDS = 1e-3  # share of the scene's size by which bounds may differ
-VARIABLES = {"integrator": "path"}  # what some files leave to the command line
 
 Row = dict[str, Any]
 
 
 def files(folder: Path, expected: Row) -> Iterator[Path]:
-    """Yield the files that stand for a scene: of .pbrt those that others counted, not their parts."""
+    """Yield the files that stand for a scene: of PBRT's those that others counted, no parts."""
     for path in sorted(folder.rglob("*")):
         name = path.relative_to(folder).as_posix()
         part = path.suffix in (".pbrt", ".ply") and name.startswith("pbrt/")
@@ -56,7 +55,7 @@ def examine(path: Path, film: int) -> Row:
         except clpt.SceneError as error:
             if "is not defined" not in str(error):
                 raise
-            scene = clpt.load(path, **VARIABLES)
+            scene = clpt.load(path, integrator="path")
         row: Row = {"load": time.perf_counter() - start, **summary(scene)}
         size = dataclasses.replace(scene.film, width=film, height=film, crop=None)
         renderer = clpt.Renderer(dataclasses.replace(scene, film=size))
@@ -71,7 +70,7 @@ def examine(path: Path, film: int) -> Row:
 
 
 def verdict(row: Row, expected: Row) -> Row:
-    """Return what the file says beside what others counted in it: triangles, and whether bounds fit."""
+    """Return what others counted in the file: triangles, and by how much bounds differ."""
     counted = expected.get("triangles", expected.get("mesh_triangles"))
     if "ply_triangles" in expected:
         counted = expected["ply_triangles"] + expected["inline_triangles"]
@@ -120,13 +119,14 @@ def page(rows: list[Row]) -> str:
     wrong = [r for r in shown if r["expected"] not in (None, r["triangles"])]
     far = [r for r in shown if r.get("bounds_differ", 0.0) > BOUNDS]
     about = machine.circumstances()
+    counts = sum(r["expected"] is not None for r in shown)
+    bounds_known = sum("bounds_differ" in r for r in shown)
     lines = [
         "# Scenes of others\n",
         f"Made by `make assets-report` at {about['commit']} on {about['processor']}, "
-        f"{about['date'][:10]}. {len(rows)} files: {len(shown)} render, {len(refused)} are refused, "
-        f"{len(failed)} fail. Of {sum(r['expected'] is not None for r in shown)} counts of triangles "
-        f"that others made {len(wrong)} differ, of {sum('bounds_differ' in r for r in shown)} bounds "
-        f"{len(far)}.\n",
+        f"{str(about['date'])[:10]}. {len(rows)} files: {len(shown)} render, {len(refused)} are "
+        f"refused, {len(failed)} fail. Of {counts} counts of triangles that others made "
+        f"{len(wrong)} differ, of {bounds_known} bounds {len(far)}.\n",
         "Seconds to load; to build trees; to build programs, over all threads (0: they were in the "
         "cache); from the start to the first picture, 64x64 with one sample per pixel.\n",
         "| file | triangles | expected | bounds | load | trees | programs | picture | warnings |",
