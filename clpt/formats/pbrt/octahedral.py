@@ -16,7 +16,7 @@ Array = NDArray[np.float32]
 Points = NDArray[Any]
 
 TALLEST = 4096  # [rows] of an image in latitude and longitude that is made
-STRATA = 2  # lookups across a pixel, in each direction
+DENSE = 1024  # [rows] up to which a pixel takes two lookups in each direction, beyond it one
 CHUNK = 2**21  # directions that are looked up at once
 PEAK = 8.0  # times the mean radiance, from which a texel counts as a source of light of its own
 PARTS = 4  # points across a peak's texel
@@ -67,9 +67,10 @@ def lat_long(image: Array, from_world: ArrayLike, *, on_poles: bool = True) -> A
     theta = (np.arange(height) + off) * np.pi / (height - 1 + 2 * off)
     low = np.minimum(image, np.float32(PEAK * image.mean(dtype=np.float64)))
     made = np.empty((height, 2 * height, image.shape[2]), np.float32)
-    step = max(CHUNK // (2 * height * STRATA**2), 1)
+    strata = 2 if height <= DENSE else 1
+    step = max(CHUNK // (2 * height * strata**2), 1)
     for first in range(0, height, step):
-        made[first : first + step] = _gathered(low, matrix, theta, first, step)
+        made[first : first + step] = _gathered(low, matrix, theta, first, step, strata)
     peaks = np.argwhere((image > low).any(axis=2))
     if len(peaks):
         light = image[tuple(peaks.T)] - low[tuple(peaks.T)]
@@ -77,10 +78,12 @@ def lat_long(image: Array, from_world: ArrayLike, *, on_poles: bool = True) -> A
     return made
 
 
-def _gathered(image: Array, from_world: Points, theta: Points, first: int, count: int) -> Points:
-    """Rows of the result from `first` on, each pixel the mean of STRATA^2 texels in its cell."""
+def _gathered(
+    image: Array, from_world: Points, theta: Points, first: int, count: int, strata: int
+) -> Points:
+    """Rows of the result from `first` on, each pixel the mean of strata^2 texels in its cell."""
     size, width, channels = len(image), 2 * len(theta), image.shape[2]
-    within = (np.arange(STRATA) + 0.5) / STRATA - 0.5
+    within = (np.arange(strata) + 0.5) / strata - 0.5
     t = (theta[first : first + count, None] + within * (theta[1] - theta[0])).ravel()
     p = ((np.arange(width)[:, None] + 0.5 + within) * (2.0 * np.pi / width)).ravel()
     t, p = np.clip(t, 0.0, np.pi)[:, None], p[None, :]
@@ -90,7 +93,7 @@ def _gathered(image: Array, from_world: Points, theta: Points, first: int, count
     at = np.minimum((to_square(d / np.linalg.norm(d, axis=-1, keepdims=True)) * size), size - 1)
     at = at[..., 1].astype(np.intp) * size + at[..., 0].astype(np.intp)
     texels = image.reshape(-1, channels)[at]
-    cells = texels.reshape(-1, STRATA, width, STRATA, channels)
+    cells = texels.reshape(-1, strata, width, strata, channels)
     return cells.mean(axis=(1, 3), dtype=np.float64)
 
 
