@@ -6,6 +6,8 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from clpt.errors import UnknownKindError
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.state import Definition, State
@@ -17,6 +19,7 @@ SPACES = {"srgb": "rec709", "rec2020": "rec2020", "dci-p3": "display_p3"}
 RANDOM = ("independent",)
 SAMPLERS = ("halton", "sobol", "zsobol", "paddedsobol", "pmj02bn", "stratified", *RANDOM)
 STORED = ("filename", "savefp16", "diagonal")  # how a file is stored is decided when it is written
+SIZE = (("xresolution", 1280), ("yresolution", 720))
 DAYLIGHT = 6500.0  # [K], what pbrt takes a measured sensor's white to be
 
 
@@ -39,16 +42,13 @@ def film(found: Definition | None, filter: Definition | None, exposure: float) -
             width=width,
             height=height,
             filter=made,
+            crop=_crop(params, width, height),
             **_colour(params, state, exposure),
             **(_bands(params) if found.kind == "spectral" else {}),
         )
-    _crop(params, state)
     if params.one("maxcomponentvalue", "float", math.inf) < math.inf:
         state.warn(params, "'maxcomponentvalue' is left out: bright samples are kept as they are")
     return made_film
-
-
-SIZE = (("xresolution", 1280), ("yresolution", 720))
 
 
 def _colour(params: Parameters, state: State, exposure: float) -> dict[str, Any]:
@@ -76,10 +76,25 @@ def _bands(params: Parameters) -> dict[str, Any]:
     }
 
 
-def _crop(params: Parameters, state: State) -> None:
-    for name in ("cropwindow", "pixelbounds"):
-        if params.several(name, "float") is not None:
-            state.warn(params, f"{name!r} is left out: the whole picture is rendered")
+def _crop(params: Parameters, width: int, height: int) -> tuple[int, int, int, int] | None:
+    """Take the part of the film that is rendered: x, y, width and height, or None for all of it.
+
+    A `cropwindow` counts before `pixelbounds`; both give left, right, top, bottom.
+    """
+    bounds, window = params.several("pixelbounds", "integer"), params.several("cropwindow", "float")
+    for name, found in (("pixelbounds", bounds), ("cropwindow", window)):
+        if found is not None and len(found) != 4:
+            raise params.error(f"{name!r} must be 4 numbers, not {len(found)}")
+    if window is not None:
+        x, y = np.sort(np.clip(window[:2], 0, 1)), np.sort(np.clip(window[2:], 0, 1))
+        x, y = np.ceil(width * x), np.ceil(height * y)
+    elif bounds is not None:
+        x, y = np.clip(bounds[:2], 0, width), np.clip(bounds[2:], 0, height)
+    else:
+        return None
+    if not (x[0] < x[1] and y[0] < y[1]):
+        raise params.error("no pixel is left of the film by its crop window or pixel bounds")
+    return int(x[0]), int(y[0]), int(x[1] - x[0]), int(y[1] - y[0])
 
 
 def _filter(found: Definition | None) -> Filter:

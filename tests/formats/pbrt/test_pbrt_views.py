@@ -132,6 +132,21 @@ def test_exposure(scene):
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
+        ('"float cropwindow" [.25 .5 0 .501]', (25, 0, 25, 26)),
+        ('"integer pixelbounds" [10 30 -5 20]', (10, 0, 20, 20)),
+        ("", None),
+    ],
+)
+def test_crops(scene, text, expected):
+    size = '"integer xresolution" 100 "integer yresolution" 50'
+    assert scene(f'Film "rgb" {size} {text}').film.crop == expected
+    with pytest.raises(SceneError, match="no pixel is left"):
+        scene(f'Film "rgb" {size} "float cropwindow" [.5 .5 0 1]')
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
         ('"box" "float xradius" 1 "float yradius" 1', integrators.Box(radius=1.0)),
         ('"triangle"', integrators.Tent(radius=2.0)),
         ('"gaussian" "float sigma" 0.4', integrators.Gaussian(stddev=0.4)),
