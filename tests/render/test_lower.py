@@ -110,3 +110,14 @@ def test_what_is_no_material_is_refused() -> None:
     glass = m.Blend(first=m.TwoSided(), second=m.Dielectric())
     with pytest.raises(clpt.SceneError, match="rectangle 'door': a transmissive"):
         lower(scene(Rectangle(material=glass, name="door")))
+
+
+def test_principled_is_what_its_parameters_say() -> None:
+    """Two-sided while it is opaque; with tangents where it is stretched."""
+    opaque = lower(scene(Rectangle(material=m.TwoSided(front=m.Principled())))).features
+    assert not opaque.tangents and not opaque.dispersion
+    for stretched in (m.Principled(anisotropic=0.5), m.PrincipledThin(anisotropic=0.5)):
+        assert lower(scene(Rectangle(material=stretched))).features.tangents
+    for passes in (m.Principled(spec_trans=0.1), m.PrincipledThin(), m.DiffuseTransmission()):
+        with pytest.raises(clpt.SceneError, match="a transmissive"):
+            lower(scene(Rectangle(material=m.TwoSided(front=passes))))

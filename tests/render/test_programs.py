@@ -145,6 +145,6 @@ def test_structs_of_every_kind(category: str) -> None:
 
 def test_index_by_name_is_a_spectrum() -> None:
     """A glass's name is looked up where the scene is lowered."""
-    features = lowered([m.Dielectric(int_ior="bk7")], "spectral").features
-    assert features.dispersion
+    for glass in (m.Dielectric(int_ior="bk7"), m.Principled(eta="bk7", spec_trans=1.0)):
+        assert lowered([glass], "spectral").features.dispersion
     assert spectra.glass("bk7")
