@@ -17,7 +17,8 @@ from clpt.spectra import RGB, Constant, RGBUnbounded, Spectrum, Tabulated, cie
 def mapped(value: Any, function: Callable[[Any], Any]) -> Any:
     """A function of what a parameter has been given: of a number, a colour, a spectrum, a texture.
 
-    Of a mixture it is taken at both ends, of a product of both factors, which is right for powers.
+    Of a mixture and of a pattern of numbers it is taken at both ends, of a product of both factors,
+    which is right for powers.
     """
     if isinstance(value, tuple):
         return tuple(float(function(v)) for v in value)
@@ -29,6 +30,8 @@ def mapped(value: Any, function: Callable[[Any], Any]) -> Any:
         return Tabulated(cie.GRID, function(value.sample(cie.GRID)), "hold")
     if isinstance(value, Bitmap):
         return replace(value, image=function(_pixels(value)).astype(np.float32), raw=True)
+    if isinstance(value, Texture) and type(value) not in ENDS:  # patterns between 0 and 1
+        return Mix(first=float(function(0.0)), second=float(function(1.0)), amount=value)
     if isinstance(value, Texture):
         ends = {name: mapped(getattr(value, name), function) for name in ENDS[type(value)]}
         return replace(value, **ends)

@@ -13,14 +13,28 @@ from typing import Any
 
 import numpy as np
 
+from clpt import transforms
 from clpt.errors import SceneError, UnknownKindError
 from clpt.formats.pbrt.mapped import mapped
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.spectra import SPECTRUM_TYPES, spectrum, value_of
 from clpt.formats.pbrt.state import Definition, State
-from clpt.scene.textures import Bitmap, Checkerboard, Mix, Product, Texture
+from clpt.scene.textures import (
+    MAPPINGS,
+    MOST_OCTAVES,
+    Bitmap,
+    Checkerboard,
+    Checkers,
+    Dots,
+    Marble,
+    Mix,
+    Noise,
+    Product,
+    Texture,
+)
 from clpt.spectra import Spectrum
 
+IDENTITY_UV = np.eye(3)
 WRAPS = {"repeat": "repeat", "black": "zero", "clamp": "clamp", "octahedralsphere": "clamp"}
 FILTERS = {"point": "nearest", **dict.fromkeys(("bilinear", "trilinear", "ewa"), "bilinear")}
 
@@ -108,22 +122,22 @@ def _bilerp(form: str, params: Parameters, state: State) -> Any:
         image=np.array([top, bottom], np.float32),
         raw=True,
         wrap="clamp",
-        to_uv=centres @ _to_uv(params, state),
+        **_placed(params, state, centres),
     )
 
 
 def _checkerboard(form: str, params: Parameters, state: State) -> Any:
     if params.one("dimension", "integer", 2) != 2:
-        state.warn(params, "a checkerboard in three dimensions is taken as an even mixture")
-        ends = [
-            _argument(form, params, name, state, v) for name, v in (("tex1", 1.0), ("tex2", 0.0))
-        ]
-        return Mix(first=ends[0], second=ends[1], amount=0.5)
+        return Mix(
+            first=_argument(form, params, "tex1", state, 1.0),
+            second=_argument(form, params, "tex2", state, 0.0),
+            amount=Checkers(to_texture=transforms.inverse(state.ctm)),
+        )
     halved = np.diag([0.5, 0.5, 1.0])
     return Checkerboard(
         color0=_argument(form, params, "tex1", state, 1.0),
         color1=_argument(form, params, "tex2", state, 0.0),
-        to_uv=halved @ _to_uv(params, state),
+        **_placed(params, state, halved),
     )
 
 
@@ -140,7 +154,7 @@ def _imagemap(form: str, params: Parameters, state: State) -> Any:
         filter=FILTERS[params.choice("filter", "bilinear", FILTERS)],
         wrap=WRAPS[wrap],
         channel="r" if form == "float" else "luminance",
-        to_uv=_to_uv(params, state),
+        **_placed(params, state),
     )
     encoding = params.one("encoding", "string", "sRGB")
     if file.suffix.lower() == ".png":  # of other files pbrt passes over the encoding
@@ -164,47 +178,61 @@ def _decoded(bitmap: Bitmap, encoding: str) -> Bitmap:
 
 
 def _dots(form: str, params: Parameters, state: State) -> Any:
-    """Half of the unit cells have a dot of radius 0.35 somewhere within."""
-    params.ignore("mapping", "uscale", "vscale", "udelta", "vdelta", "v1", "v2")
-    state.warn(params, "dots are taken as the even mixture that they make from afar")
-    inside = _argument(form, params, "inside", state, 1.0)
-    outside = _argument(form, params, "outside", state, 0.0)
-    return Mix(first=outside, second=inside, amount=0.5 * np.pi * 0.35**2)
+    return Mix(
+        first=_argument(form, params, "outside", state, 0.0),
+        second=_argument(form, params, "inside", state, 1.0),
+        amount=Dots(**_placed(params, state)),
+    )
 
 
-def _noise(form: str, params: Parameters, state: State) -> float:
-    """Noise and wind go up and down around 0."""
-    params.ignore("octaves", "roughness")
-    state.warn(params, "noise is not supported: its mean, 0, is taken")
-    return 0.0
+def _noise(form: str, params: Parameters, state: State) -> Noise:
+    return Noise(pattern="fbm", **_octaves(params), to_texture=transforms.inverse(state.ctm))
 
 
-def _wrinkled(form: str, params: Parameters, state: State) -> float:
-    octaves, omega = params.one("octaves", "integer", 8), params.one("roughness", "float", 0.5)
-    mean = 0.2 * sum(omega**i for i in range(min(max(octaves, 0), 64)))
-    state.warn(params, f"noise is not supported: its mean, {mean:.2g}, is taken")
-    return float(mean)
+def _wrinkled(form: str, params: Parameters, state: State) -> Noise:
+    return Noise(pattern="wrinkled", **_octaves(params), to_texture=transforms.inverse(state.ctm))
 
 
-def _marble(form: str, params: Parameters, state: State) -> Any:
-    params.ignore("octaves", "roughness", "scale", "variation")
-    state.warn(params, "marble is not supported: its light grey is taken")
-    return 0.85 if form == "float" else (0.85, 0.85, 0.88)
+def _windy(form: str, params: Parameters, state: State) -> Noise:
+    return Noise(pattern="windy", to_texture=transforms.inverse(state.ctm))
+
+
+def _marble(form: str, params: Parameters, state: State) -> Marble:
+    return Marble(
+        **_octaves(params),
+        scale=params.one("scale", "float", 1.0),
+        variation=params.one("variation", "float", 0.2),
+        to_texture=transforms.inverse(state.ctm),
+    )
+
+
+def _octaves(params: Parameters) -> dict[str, Any]:
+    octaves = params.one("octaves", "integer", 8)
+    return {
+        "octaves": min(max(octaves, 1), MOST_OCTAVES),
+        "roughness": params.one("roughness", "float", 0.5),
+    }
 
 
 def _ptex(form: str, params: Parameters, state: State) -> Any:
     raise params.error(f"Ptex textures are not supported: {params.one('filename', 'string', '')!r}")
 
 
-def _to_uv(params: Parameters, state: State) -> np.ndarray:
-    mapping = params.choice("mapping", "uv", ("uv", "spherical", "cylindrical", "planar"))
-    offsets = [params.one(name, "float", 0.0) for name in ("udelta", "vdelta")]
+def _placed(params: Parameters, state: State, before: Any = IDENTITY_UV) -> dict[str, Any]:
+    """Where a texture on uv gets them; `before`: what is done to pbrt's uv, (3, 3)."""
+    mapping = params.choice("mapping", "uv", MAPPINGS)
+    to_uv, place = np.eye(3), np.eye(4)
+    if mapping in ("uv", "planar"):
+        to_uv[:2, 2] = [params.one(name, "float", 0.0) for name in ("udelta", "vdelta")]
+    if mapping == "uv":
+        scales = [params.one(name, "float", 1.0) for name in ("uscale", "vscale")]
+        to_uv[0, 0], to_uv[1, 1] = scales
+        return {"to_uv": before @ to_uv}
     if mapping == "planar":
-        params.ignore("v1", "v2")
-    if mapping != "uv":
-        state.warn(params, f"the mapping {mapping!r} is not supported, the surface's uv are taken")
-    scales = [params.one(name, "float", 1.0) for name in ("uscale", "vscale")]
-    return np.array([[scales[0], 0.0, offsets[0]], [0.0, scales[1], offsets[1]], [0.0, 0.0, 1.0]])
+        place[0, :3] = params.one("v1", "vector3", (1.0, 0.0, 0.0))
+        place[1, :3] = params.one("v2", "vector3", (0.0, 1.0, 0.0))
+    to_texture = place @ transforms.inverse(state.ctm)
+    return {"to_uv": before @ to_uv, "mapping": mapping, "to_texture": to_texture}
 
 
 MAKERS: dict[str, Callable[[str, Parameters, State], Any]] = {
@@ -217,7 +245,7 @@ MAKERS: dict[str, Callable[[str, Parameters, State], Any]] = {
     "imagemap": _imagemap,
     "dots": _dots,
     "fbm": _noise,
-    "windy": _noise,
+    "windy": _windy,
     "wrinkled": _wrinkled,
     "marble": _marble,
     "ptex": _ptex,

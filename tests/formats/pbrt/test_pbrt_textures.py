@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from clpt import transforms
 from clpt.errors import SceneError
 from clpt.formats.pbrt.mapped import mapped
 from clpt.formats.pbrt.textures import textured
-from clpt.scene.textures import Bitmap, Checkerboard, Mix, Product
+from clpt.scene.textures import Bitmap, Checkerboard, Checkers, Dots, Mix, Noise, Product
 from tests.formats.pbrt.directives import define, params, state
 
 STORED = np.array([[0, 255], [128, 64]], np.uint8)
@@ -103,15 +104,42 @@ def test_functions_of_textures(images):
     assert mapped(0.25, np.sqrt) == 0.5 and mapped((0.25, 0.0, 1.0), np.sqrt) == (0.5, 0.0, 1.0)
 
 
+def test_patterns_are_placed_by_the_texture_space():
+    """Where the transform was when the texture was named, not where the shape is."""
+    at = state()
+    at.ctm = transforms.translate([1.0, 2.0, 3.0]) @ transforms.scale([2.0, 2.0, 2.0])
+    given = {"octaves": ("integer", 3), "roughness": ("float", 0.7)}
+    define(at, "float", "t", "wrinkled", **given)
+    made = textured(params(x=("texture", "t")), "x", "real", at)
+    assert (made.pattern, made.octaves, made.roughness) == ("wrinkled", 3, 0.7)
+    assert made.to_texture @ [3.0, 2.0, 3.0, 1.0] == pytest.approx([1.0, 0.0, 0.0, 1.0])
+    assert not at.shared.warnings
+    for kind in ("fbm", "windy"):
+        assert make(kind, "float")[0].pattern == kind
+    assert make("marble", scale=("float", 4.0))[0].scale == 4.0
+    solid, warnings = make("checkerboard", dimension=("integer", 3), tex1=("rgb", 1, 0, 0))
+    assert isinstance(solid.amount, Checkers) and not warnings
+    dots, warnings = make("dots", "float", inside=("float", 0.3))
+    assert dots.second.value == 0.3 and isinstance(dots.amount, Dots) and not warnings
+
+
+def test_mappings():
+    made, warnings = make("dots", "float", mapping=("string", "cylindrical"))
+    assert made.amount.mapping == "cylindrical" and not warnings
+    v1, v2 = ("vector3", 0, 0, 2), ("vector3", 0, 3, 0)
+    given = {"mapping": ("string", "planar"), "v1": v1, "v2": v2, "udelta": ("float", 0.5)}
+    board = make("checkerboard", **given)[0]
+    place = board.to_texture @ [1.0, 1.0, 1.0, 1.0]
+    assert board.to_uv @ [*place[:2], 1.0] == pytest.approx([(2 + 0.5) / 2, 1.5, 1.0])
+
+
+def test_functions_of_patterns_run_between_their_ends():
+    made = mapped(Noise(), lambda v: 1.0 - v / 2.0)
+    assert (made.first.value, made.second.value) == (1.0, 0.5) and isinstance(made.amount, Noise)
+
+
 def test_what_is_approximated_is_told():
     assert "even mixture" in make("directionmix", "float")[1][0]
-    for kind, mean in (("fbm", 0.0), ("windy", 0.0), ("wrinkled", 0.2 * (2 - 2**-7))):
-        made, warnings = make(kind, "float")
-        assert made == pytest.approx(mean) and "mean" in warnings[0]
-    solid, warnings = make("checkerboard", dimension=("integer", 3), tex1=("rgb", 1, 0, 0))
-    assert isinstance(solid, Mix) and solid.amount == 0.5 and "three dimensions" in warnings[0]
-    dots, warnings = make("dots", "float", inside=("float", 0.3))
-    assert dots.second.value == 0.3 and "dots" in warnings[0]
     assert "'extra'" in make("mix", "float", extra=("float", 1.0))[1][0]
 
 
