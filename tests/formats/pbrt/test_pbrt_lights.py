@@ -10,6 +10,8 @@ from clpt.errors import SceneError
 from clpt.formats.pbrt import octahedral
 from clpt.formats.pbrt.lights import area_light, light
 from tests.formats.pbrt.directives import params, state
+from tests.kernels.light_probe import lit
+from tests.kernels.test_lights import INFINITE, SAMPLE
 
 TURNED = transforms.translate([1.0, 2.0, 3.0]) @ transforms.rotate([1.0, 1.0, 0.0], 50.0)
 MIRRORED = TURNED @ transforms.scale([-2.0, 2.0, 2.0])
@@ -150,3 +152,68 @@ def test_area_lights(folder):
 def test_what_is_no_light_is_told(folder, kind, given, message):
     with pytest.raises(SceneError, match=message):
         make(kind, None, folder, **given)
+
+
+def smooth(d):
+    """Something of each direction (..., 3), between 0 and 1: (..., 3)."""
+    x, y, z = np.moveaxis(d, -1, 0)
+    return np.stack([0.5 + 0.4 * x, 0.5 + 0.4 * y, 0.5 + 0.3 * z + 0.1 * x * y], axis=-1)
+
+
+def around(count=64):
+    """Directions (count, 3) over the sphere, none of them along an axis."""
+    d = np.random.default_rng(7).normal(size=(count, 3))
+    return d / np.linalg.norm(d, axis=1, keepdims=True)
+
+
+def octahedral_file(folder):
+    centres = (np.arange(128) + 0.5) / 128
+    image = smooth(octahedral.to_sphere(np.stack(np.meshgrid(centres, centres), axis=-1)))
+    images.write(folder / "smooth.pfm", image)
+    return {"filename": ("string", "smooth.pfm"), "scale": ("float", 2)}
+
+
+def intensities(made, ctm, d):
+    """What a light at the origin of `ctm` sends in directions (n, 3) of the world: (n, 3)."""
+    points = ctm[:3, 3] + 2.0 * d
+    given = np.vstack([points.T, np.zeros((3, len(d)))])
+    found = lit([made], radius=10.0)(SAMPLE, given, 8)
+    return (np.where(found[4] != 0.0, found[5:], 0.0) * 4.0).T
+
+
+@pytest.mark.parametrize("ctm", [TURNED, MIRRORED], ids=["turned", "mirrored"])
+class TestKernels:
+    """What the kernels make of our lights, against pbrt's formulas in its light's own space."""
+
+    def test_infinite(self, tmp_path, ctm):
+        made = make("infinite", ctm, tmp_path, **octahedral_file(tmp_path))
+        d = around()
+        own = d @ np.linalg.inv(ctm[:3, :3]).T
+        found = lit([made])(INFINITE, d.T, 4)[:3].T
+        wanted = 2.0 * smooth(own / np.linalg.norm(own, axis=1, keepdims=True))
+        np.testing.assert_allclose(found, wanted, atol=0.03)
+
+    def test_goniometric(self, tmp_path, ctm):
+        made = make("goniometric", ctm, tmp_path, **octahedral_file(tmp_path))
+        d = around()
+        own = (d @ np.linalg.inv(ctm[:3, :3]).T)[:, [0, 2, 1]]
+        wanted = 2.0 * smooth(own / np.linalg.norm(own, axis=1, keepdims=True)).mean(axis=1)
+        np.testing.assert_allclose(intensities(made, ctm, d)[:, 1], wanted, atol=0.03)
+
+    def test_projection(self, tmp_path, ctm):
+        """An image of 2 to 1 whose red grows to the right and whose green grows downward."""
+        v, u = np.meshgrid(
+            (np.arange(128) + 0.5) / 128, (np.arange(256) + 0.5) / 256, indexing="ij"
+        )
+        images.write(tmp_path / "ramp.pfm", np.stack([u, v, 0.5 + 0.0 * u], axis=-1))
+        given = {"filename": ("string", "ramp.pfm"), "fov": ("float", 60)}
+        made = make("projection", ctm, tmp_path, **given)
+        rng = np.random.default_rng(8)
+        u, v = rng.uniform(-0.1, 1.1, (2, 200))
+        reach = np.tan(np.radians(30.0))
+        own = np.stack([(2 * u - 1) * 2 * reach, (1 - 2 * v) * reach, np.ones(200)], axis=-1)
+        d = own @ ctm[:3, :3].T
+        found = intensities(made, ctm, d / np.linalg.norm(d, axis=1, keepdims=True))
+        inside = ((u > 0) & (u < 1) & (v > 0) & (v < 1))[:, None]
+        wanted = np.where(inside, np.stack([u, v, np.full(200, 0.5)], axis=-1), 0.0)
+        np.testing.assert_allclose(found, wanted, atol=0.01)
