@@ -2,39 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from clpt import transforms
 from clpt.errors import SceneError, UnknownKindError
-from clpt.formats.pbrt.lexer import UPGRADE, Lexer
+from clpt.formats.pbrt.files import Contents
+from clpt.formats.pbrt.lexer import UPGRADE
 from clpt.formats.pbrt.params import Parameters
-from clpt.formats.pbrt.state import TARGETS, Definition, Shared, State, nearest
+from clpt.formats.pbrt.placing import Placing
+from clpt.formats.pbrt.state import TARGETS, Definition, State, nearest
 
 COLOUR_SPACES = ("srgb", "rec2020", "aces2065-1", "dci-p3")
 OPTIONS = ("Camera", "Film", "PixelFilter", "Sampler", "Integrator", "Accelerator")
 OLD = ("WorldEnd", "SurfaceIntegrator", "VolumeIntegrator", "Renderer", "Volume", "PixelSampler")
-DEEPEST = 32  # files that include each other
-MOST_FILES = 100_000
-MOST_BYTES = 4 << 30  # of all files together, each as often as it is included
 HARMLESS = ("rendercoordsys", "msereferenceimage", "msereferenceout", "pixelstats", "wavefront")
-
-
-@dataclass(eq=False)
-class Contents:
-    """What a file holds: definitions in the order of the file; groups and uses of them by name."""
-
-    shared: Shared
-    shapes: list[Definition] = field(default_factory=list)
-    lights: list[Definition] = field(default_factory=list)
-    objects: dict[str, list[Definition]] = field(default_factory=dict)
-    uses: list[Definition] = field(default_factory=list)
-    options: dict[str, Definition] = field(default_factory=dict)
-    seed: int | None = None
 
 
 def read(path: Path) -> Contents:
@@ -42,24 +26,17 @@ def read(path: Path) -> Contents:
     return _Reader(path).run()
 
 
-class _Reader:
-    """Goes through the files; `state` is the graphics state at the place it has come to."""
+class _Reader(Placing):
+    """What each directive does but for transforms."""
 
     def __init__(self, path: Path):
-        self.path = path
-        self.contents = Contents(Shared(path.parent))
-        self.state = State(self.contents.shared, path.parent)
+        super().__init__(path)
         self.stack: list[tuple[str, State, str]] = []  # what began, the state before it, and where
         self.in_world = False
         self.object: list[Definition] | None = None
-        self.files: list[Path] = []
-        self.count = self.bytes = 0
-        self.told: set[str] = set()
-        self.lexer: Lexer
-        self.name = ""
 
     def run(self) -> Contents:
-        self._file(self.path)
+        self.go_through(self.path)
         if self.stack:
             what, _, place = self.stack[-1]
             raise SceneError(f"the {what}Begin at {place} has no end", file=self.path)
@@ -67,34 +44,13 @@ class _Reader:
             raise SceneError("has no WorldBegin, so it holds no scene", file=self.path)
         return self.contents
 
-    def _file(self, path: Path) -> None:
-        """Go through a file, which an Include may have named."""
-        real = path.resolve()
-        if real in self.files:
-            raise self.lexer.error(f"{path.name} includes itself")
-        if len(self.files) >= DEEPEST or self.count >= MOST_FILES:
-            raise self.lexer.error(f"{path.name} is included too deep, or too many files are")
-        outer, lexer = getattr(self, "lexer", None), Lexer(path)
-        self.count, self.bytes = self.count + 1, self.bytes + len(lexer.data)
-        if self.bytes > MOST_BYTES:
-            raise lexer.error(f"its files together are larger than {MOST_BYTES >> 30} GiB")
-        self.files.append(real)
-        self.lexer, before = lexer, self.state.file_folder
-        self.state.file_folder = path.parent
-        while lexer.peek():
-            self._directive(lexer)
-        self.files.pop()
-        self.state.file_folder = before
-        if outer is not None:
-            self.lexer = outer
-
-    def _directive(self, lexer: Lexer) -> None:
-        word = lexer.next("a directive")
-        self.name = word.decode("utf-8", "replace")
+    def directive(self) -> None:
+        """Take the next directive and do what it says."""
+        self.name = self.lexer.next("a directive").decode("utf-8", "replace")
         action = DIRECTIVES.get(self.name)
         if action is None:
             raise self._unknown()
-        with self._placed():
+        with self.placed():
             action(self)
 
     def _unknown(self) -> SceneError:
@@ -105,32 +61,23 @@ class _Reader:
             return self.lexer.error(f"expected a directive, found {name[:40]!r}")
         return self.lexer.error(f"unknown directive {name[:40]!r}{nearest(name, DIRECTIVES)}")
 
-    @contextmanager
-    def _placed(self) -> Iterator[None]:
-        try:
-            yield
-        except SceneError as error:
-            if error.file is not None:
-                raise
-            file, line = self.lexer.path, self.lexer.line
-            raise SceneError(error.message, file=file, line=line, where=self.name) from None
-
     # What stands before and after WorldBegin
 
-    def _only(self, in_world: bool) -> None:
+    def only(self, in_world: bool) -> None:
+        """Refuse a directive that belongs to the other part of the file."""
         if self.in_world != in_world:
             must = "come after" if in_world else "stand before"
             raise SceneError(f"must {must} WorldBegin")
 
     def world_begin(self) -> None:
-        self._only(False)
+        self.only(False)
         self.in_world, self.state.active = True, True
         self.state.ctm = np.eye(4)
         self.contents.shared.systems["world"] = np.eye(4)
 
     def option(self) -> None:
         """Camera, Film and the like."""
-        self._only(False)
+        self.only(False)
         name = self.name
         self.contents.options[name] = self._definition(f'{name} "{{}}"')
         if name == "Camera":
@@ -148,7 +95,7 @@ class _Reader:
             except ValueError:
                 raise SceneError("the seed must be a whole number") from None
         elif normal not in HARMLESS and value != b"false":
-            self._warn(f"the option {''.join(name)!r} is left out")
+            self.warn(f"the option {''.join(name)!r} is left out")
 
     # Scopes
 
@@ -159,7 +106,7 @@ class _Reader:
         self._end("Attribute")
 
     def _begin(self, what: str) -> None:
-        self._only(True)
+        self.only(True)
         place = f"{self.lexer.path.name}:{self.lexer.line}"
         self.stack.append((what, self.state, place))
         self.state = self.state.copy()
@@ -187,7 +134,7 @@ class _Reader:
         self.object = None
 
     def object_instance(self) -> None:
-        self._only(True)
+        self.only(True)
         if self.object is not None:
             raise SceneError("cannot stand in an object")
         name = self.lexer.string("a name")
@@ -195,14 +142,14 @@ class _Reader:
         self.contents.uses.append(Definition(name, params, self.state.copy()))
 
     def include(self) -> None:
-        self._file(self._named_file())
+        self.go_through(self._named_file())
 
     def import_file(self) -> None:
         """Like an Include, but what it changes in the state stays in it."""
-        self._only(True)
+        self.only(True)
         path, before, open_scopes = self._named_file(), self.state, len(self.stack)
         self.state = before.copy()
-        self._file(path)
+        self.go_through(path)
         if len(self.stack) != open_scopes:
             raise SceneError(f"{path.name} opens or closes scopes of the file that imports it")
         self.state = before
@@ -213,65 +160,6 @@ class _Reader:
         if not path.is_file():
             raise SceneError(f"there is no file {name!r}")
         return path
-
-    # Transforms
-
-    def _concat(self, matrix: transforms.Matrix) -> None:
-        self._place(self.state.ctm @ matrix)
-
-    def _place(self, matrix: transforms.Matrix) -> None:
-        if not np.isfinite(matrix).all():
-            raise SceneError("the transform is not finite any more")
-        if self.state.active:
-            self.state.ctm = matrix
-
-    def identity(self) -> None:
-        self._place(np.eye(4))
-
-    def translate(self) -> None:
-        self._concat(transforms.translate(self.lexer.numbers(3, "Translate")))
-
-    def scale(self) -> None:
-        self._concat(transforms.scale(self.lexer.numbers(3, "Scale")))
-
-    def rotate(self) -> None:
-        angle, *axis = self.lexer.numbers(4, "Rotate")
-        self._concat(transforms.rotate(axis, angle))
-
-    def look_at(self) -> None:
-        values = self.lexer.numbers(9, "LookAt")
-        self._concat(transforms.inverse(transforms.look_at(values[:3], values[3:6], values[6:])))
-
-    def transform(self) -> None:
-        self._place(self._matrix())
-
-    def concat_transform(self) -> None:
-        self._concat(self._matrix())
-
-    def _matrix(self) -> transforms.Matrix:
-        """Take 16 numbers, column by column."""
-        return self.lexer.numbers(16, self.name).reshape(4, 4).T.copy()
-
-    def coordinate_system(self) -> None:
-        self.contents.shared.systems[self.lexer.string("a name")] = self.state.ctm
-
-    def coord_sys_transform(self) -> None:
-        name = self.lexer.string("a name")
-        systems = self.contents.shared.systems
-        if name not in systems:
-            raise SceneError(f"there is no coordinate system {name!r}{nearest(name, systems)}")
-        self.state.ctm = systems[name]
-
-    def active_transform(self) -> None:
-        which = self.lexer.next("All, StartTime or EndTime").decode("utf-8", "replace")
-        if which not in ("All", "StartTime", "EndTime"):
-            raise SceneError(f"{which[:40]!r} is none of All, StartTime, EndTime")
-        self.state.active = which != "EndTime"
-        if which == "EndTime":
-            self._warn_once("motion is left out: all stands as when the shutter opens")
-
-    def transform_times(self) -> None:
-        self.lexer.numbers(2, "TransformTimes")
 
     def reverse_orientation(self) -> None:
         self.state.reverse = not self.state.reverse
@@ -300,28 +188,28 @@ class _Reader:
         self.state.colour_space = name
 
     def shape(self) -> None:
-        self._only(True)
+        self.only(True)
         shapes = self.contents.shapes if self.object is None else self.object
         found = self._definition('Shape "{}"', "shape")
         if self.object is not None and found.state.area_light is not None:
-            self._warn_once("shapes of an object emit no light in pbrt: an AreaLightSource is idle")
+            self.warn_once("shapes of an object emit no light in pbrt: an AreaLightSource is idle")
             found.state.area_light = None
         shapes.append(found)
 
     def light_source(self) -> None:
-        self._only(True)
+        self.only(True)
         self.contents.lights.append(self._definition('LightSource "{}"', "light"))
 
     def area_light_source(self) -> None:
-        self._only(True)
+        self.only(True)
         self.state.area_light = self._definition('AreaLightSource "{}"', "light")
 
     def material(self) -> None:
-        self._only(True)
+        self.only(True)
         self.state.material = self._definition('Material "{}"', "material")
 
     def make_named_material(self) -> None:
-        self._only(True)
+        self.only(True)
         found = self._definition('MakeNamedMaterial "{}"', "material", "a name")
         name, materials = found.kind, self.contents.shared.materials
         if name in materials:
@@ -332,11 +220,11 @@ class _Reader:
         materials[name] = Definition(kind, found.params, found.state)
 
     def named_material(self) -> None:
-        self._only(True)
+        self.only(True)
         self.state.material = self.lexer.string("a name")
 
     def texture(self) -> None:
-        self._only(True)
+        self.only(True)
         name = self.lexer.string("a name")
         values = self.lexer.string("float or spectrum")
         if values == "color":
@@ -358,16 +246,7 @@ class _Reader:
         outside = self.lexer.string("") if self.lexer.peek().startswith(b'"') else inside
         self.state.inside, self.state.outside = inside, outside
         if inside or outside:
-            self._warn_once("participating media are left out")
-
-    def _warn(self, text: str) -> None:
-        place = f"{self.lexer.path.name}:{self.lexer.line}: {self.name}"
-        self.contents.shared.warnings.append(f"{place}: {text}")
-
-    def _warn_once(self, text: str) -> None:
-        if text not in self.told:
-            self.told.add(text)
-            self._warn(text)
+            self.warn_once("participating media are left out")
 
 
 DIRECTIVES: dict[str, Callable[[_Reader], None]] = {

@@ -11,7 +11,7 @@ import pytest
 from clpt import transforms
 from clpt.errors import SceneError
 from clpt.formats import load
-from clpt.formats.pbrt import reader
+from clpt.formats.pbrt import files, reader
 from clpt.formats.pbrt.lexer import Lexer
 
 QUAD = '"point3 P" [0 0 0 1 0 0 1 1 0 0 1 0] "integer indices" [0 1 2 0 2 3]'
@@ -188,7 +188,7 @@ def test_gzip_bombs_and_doubling_includes_end(write, monkeypatch):
     bomb = write(gzip.compress(b" " * (2 << 20)), "bomb.pbrt.gz")
     with pytest.raises(SceneError, match="larger than"):
         load(bomb)
-    monkeypatch.setattr(reader, "MOST_FILES", 100)
+    monkeypatch.setattr(files, "MOST_FILES", 100)
     for i in range(12):
         write(f'Include "{i + 1}.pbrt"\n' * 2, f"{i}.pbrt")
     write("", "12.pbrt")

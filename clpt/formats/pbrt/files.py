@@ -1,0 +1,91 @@
+"""Going through a PBRT file and those that it includes, within limits."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from clpt.errors import SceneError
+from clpt.formats.pbrt.lexer import Lexer
+from clpt.formats.pbrt.state import Definition, Shared, State
+
+DEEPEST = 32  # files that include each other
+MOST_FILES = 100_000
+MOST_BYTES = 4 << 30  # of all files together, each as often as it is included
+
+
+@dataclass(eq=False)
+class Contents:
+    """What a file holds: definitions in the order of the file; groups and uses of them by name."""
+
+    shared: Shared
+    shapes: list[Definition] = field(default_factory=list)
+    lights: list[Definition] = field(default_factory=list)
+    objects: dict[str, list[Definition]] = field(default_factory=dict)
+    uses: list[Definition] = field(default_factory=list)
+    options: dict[str, Definition] = field(default_factory=dict)
+    seed: int | None = None
+
+
+class Files(ABC):
+    """Goes through the files; `state` is the graphics state at the place it has come to."""
+
+    def __init__(self, path: Path):
+        self.path = path
+        self.contents = Contents(Shared(path.parent))
+        self.state = State(self.contents.shared, path.parent)
+        self.files: list[Path] = []
+        self.count = self.bytes = 0
+        self.told: set[str] = set()
+        self.lexer: Lexer
+        self.name = ""
+
+    @abstractmethod
+    def directive(self) -> None:
+        """Take the next directive and do what it says."""
+
+    def go_through(self, path: Path) -> None:
+        """Go through a file, which an Include may have named."""
+        real = path.resolve()
+        if real in self.files:
+            raise self.lexer.error(f"{path.name} includes itself")
+        if len(self.files) >= DEEPEST or self.count >= MOST_FILES:
+            raise self.lexer.error(f"{path.name} is included too deep, or too many files are")
+        outer, lexer = getattr(self, "lexer", None), Lexer(path)
+        self.count, self.bytes = self.count + 1, self.bytes + len(lexer.data)
+        if self.bytes > MOST_BYTES:
+            raise lexer.error(f"its files together are larger than {MOST_BYTES >> 30} GiB")
+        self.files.append(real)
+        self.lexer, before = lexer, self.state.file_folder
+        self.state.file_folder = path.parent
+        while lexer.peek():
+            self.directive()
+        self.files.pop()
+        self.state.file_folder = before
+        if outer is not None:
+            self.lexer = outer
+
+    @contextmanager
+    def placed(self) -> Iterator[None]:
+        """Give errors that know no file the place of the directive."""
+        try:
+            yield
+        except SceneError as error:
+            if error.file is not None:
+                raise
+            file, line = self.lexer.path, self.lexer.line
+            raise SceneError(error.message, file=file, line=line, where=self.name) from None
+
+    def warn(self, text: str) -> None:
+        """Remember what the picture will lack, with this place."""
+        place = f"{self.lexer.path.name}:{self.lexer.line}: {self.name}"
+        self.contents.shared.warnings.append(f"{place}: {text}")
+
+    def warn_once(self, text: str) -> None:
+        """The same, for the first time that it is said."""
+        if text not in self.told:
+            self.told.add(text)
+            self.warn(text)

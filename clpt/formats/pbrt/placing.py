@@ -1,0 +1,71 @@
+"""Transforms and coordinate systems of a PBRT file: what they make of the current transform."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from clpt import transforms
+from clpt.errors import SceneError
+from clpt.formats.pbrt.files import Files
+from clpt.formats.pbrt.state import nearest
+
+
+class Placing(Files):
+    """The directives that change `state.ctm`."""
+
+    def _concat(self, matrix: transforms.Matrix) -> None:
+        self._place(self.state.ctm @ matrix)
+
+    def _place(self, matrix: transforms.Matrix) -> None:
+        if not np.isfinite(matrix).all():
+            raise SceneError("the transform is not finite any more")
+        if self.state.active:
+            self.state.ctm = matrix
+
+    def identity(self) -> None:
+        self._place(np.eye(4))
+
+    def translate(self) -> None:
+        self._concat(transforms.translate(self.lexer.numbers(3, "Translate")))
+
+    def scale(self) -> None:
+        self._concat(transforms.scale(self.lexer.numbers(3, "Scale")))
+
+    def rotate(self) -> None:
+        angle, *axis = self.lexer.numbers(4, "Rotate")
+        self._concat(transforms.rotate(axis, angle))
+
+    def look_at(self) -> None:
+        values = self.lexer.numbers(9, "LookAt")
+        self._concat(transforms.inverse(transforms.look_at(values[:3], values[3:6], values[6:])))
+
+    def transform(self) -> None:
+        self._place(self._matrix())
+
+    def concat_transform(self) -> None:
+        self._concat(self._matrix())
+
+    def _matrix(self) -> transforms.Matrix:
+        """Take 16 numbers, column by column."""
+        return self.lexer.numbers(16, self.name).reshape(4, 4).T.copy()
+
+    def coordinate_system(self) -> None:
+        self.contents.shared.systems[self.lexer.string("a name")] = self.state.ctm
+
+    def coord_sys_transform(self) -> None:
+        name = self.lexer.string("a name")
+        systems = self.contents.shared.systems
+        if name not in systems:
+            raise SceneError(f"there is no coordinate system {name!r}{nearest(name, systems)}")
+        self.state.ctm = systems[name]
+
+    def active_transform(self) -> None:
+        which = self.lexer.next("All, StartTime or EndTime").decode("utf-8", "replace")
+        if which not in ("All", "StartTime", "EndTime"):
+            raise SceneError(f"{which[:40]!r} is none of All, StartTime, EndTime")
+        self.state.active = which != "EndTime"
+        if which == "EndTime":
+            self.warn_once("motion is left out: all stands as when the shutter opens")
+
+    def transform_times(self) -> None:
+        self.lexer.numbers(2, "TransformTimes")
