@@ -56,6 +56,9 @@ def material(element: Element | None, *, colours: bool = False) -> tuple[Materia
     opacity = _opacity(element, colours)
     if opacity is not None:
         inner = Mask(material=inner, opacity=opacity)
+        if emission is not None:  # what is not there does not shine
+            radiance = Product(first=emission.radiance, second=opacity)
+            emission = dataclasses.replace(emission, radiance=radiance)
     if leaf.transmits:
         return inner, emission
     return TwoSided(front=inner, back=None if both else ONE_SIDE), emission
@@ -97,7 +100,7 @@ def _opacity(element: Element, colours: bool) -> Any:
     owner, key, image_key = surface.base(element)
     factor = 1.0 if owner is None else owner.numbers(key, 4, (1.0,) * 4, 0.0, 1.0)[3]
     info = None if owner is None else owner.child(image_key)
-    image = None if info is None else texture(info, raw=True, channel="a")
+    image = None if info is None else _alpha(texture(info, raw=True))
     if mode == "MASK":
         cutoff = element.number("alphaCutoff", 0.5, low=0.0)
         if colours:
@@ -113,11 +116,16 @@ def _opacity(element: Element, colours: bool) -> Any:
     return None if isinstance(opacity, float) and opacity == 1.0 else opacity
 
 
-def _cut(image: Bitmap, cutoff: float) -> Any:
-    """An image that is 1 where the alpha of a texel reaches the cutoff, else 0."""
+def _alpha(image: Bitmap) -> Bitmap | None:
+    """The alpha of an image as an image of its own; None where it has none."""
     pixels = np.asarray(image.image)
     if pixels.ndim < 3 or pixels.shape[2] < 4:
-        return None if cutoff <= 1.0 else 0.0
-    alpha = pixels[..., 3] / (255.0 if pixels.dtype == np.uint8 else 1.0)
-    cut = (alpha >= cutoff - 1e-6).astype(np.float32)
-    return dataclasses.replace(image, image=cut, channel="luminance")
+        return None
+    return dataclasses.replace(image, image=np.ascontiguousarray(pixels[..., 3]))
+
+
+def _cut(alpha: Bitmap, cutoff: float) -> Bitmap:
+    """An image that is 1 where the alpha of a texel reaches the cutoff, else 0."""
+    pixels = np.asarray(alpha.image)
+    shares = pixels / 255.0 if pixels.dtype == np.uint8 else pixels
+    return dataclasses.replace(alpha, image=(shares >= cutoff - 1e-6).astype(np.float32))

@@ -165,7 +165,7 @@ def test_alpha(shape):
     cut = _front(shape({**textured, "alphaMode": "MASK", "alphaCutoff": 0.5}))
     assert isinstance(cut, Mask) and cut.opacity.image.tolist() == [[1.0, 0.0]]
     blended = _front(shape({**textured, "alphaMode": "BLEND"}))
-    assert blended.opacity.channel == "a"
+    np.testing.assert_allclose(np.ravel(blended.opacity.image) / 255.0, [192 / 255, 96 / 255])
     assert isinstance(_front(shape(textured)), GltfSurface)
     faint = {"pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.25]}, "alphaMode": "BLEND"}
     assert _front(shape(faint)).opacity == 0.25
@@ -189,6 +189,8 @@ def test_emission(shape):
     unlit = shape({**plain, **_extension("unlit")})[0]
     assert isinstance(unlit.material, TwoSided) and isinstance(unlit.material.front, Diffuse)
     np.testing.assert_allclose(unlit.emission.radiance.to_rgb("emission"), [0.2, 0.4, 0.6])
+    gone = shape({**plain, **_extension("unlit"), "alphaMode": "MASK", "alphaCutoff": 2.0})[0]
+    assert gone.emission.radiance.second.value == gone.material.front.opacity == 0.0
 
 
 @pytest.mark.parametrize(
