@@ -66,15 +66,21 @@ def scene(shapes: list[Shape], center: float = 0.0, size: float = 1.0) -> Scene:
 def test_values_are_those_of_copies(layout: str) -> None:
     """Position, normals, uv and numbers, with few exceptions at edges."""
     mesh, matrices = bumpy(), spread(30, 3)
-    placed: list[Shape] = [Instance(group=Group((mesh,)), to_world=m) for m in matrices]
+    group = Group((mesh,))
+    placed: list[Shape] = [Instance(group=group, to_world=m) for m in matrices]
     copies: list[Shape] = [dataclasses.replace(mesh, to_world=m @ mesh.to_world) for m in matrices]
     ball = Sphere(radius=0.4)
-    ours, expected = (
-        clpt.render(scene([*shapes, ball]), 1, layout=layout) for shapes in (placed, copies)
-    )
+    renderers = [clpt.Renderer(scene([*s, ball]), layout=layout) for s in (placed, copies)]
+    assert all(renderer.step(1) for renderer in renderers)
+    ours, expected = (renderer.image() for renderer in renderers)
     assert len(np.unique(expected[..., 8])) > 20  # nearly all are seen
     off = np.abs(ours - expected) > 1e-4 * (1.0 + np.abs(expected))
     assert off.any(axis=2).sum() <= 3
+    told, other = (renderer.facts for renderer in renderers)
+    assert (told.instances, other.instances) == (32, 2)
+    assert told.triangles == 192 + 1 and other.triangles == told.triangles_instanced - 1
+    assert told.trees["triangles"] < other.trees["triangles"] / 10
+    assert told.seconds["first_sample"] > told.seconds["ready"] > told.seconds["trees"] > 0.0
 
 
 @pytest.mark.parametrize(
