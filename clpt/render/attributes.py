@@ -17,7 +17,7 @@ from clpt.errors import SceneError
 from clpt.render import shapes
 from clpt.render.texels import texels
 from clpt.scene.shapes import Shape
-from clpt.scene.textures import MeshAttribute, textures_in
+from clpt.scene.textures import SECOND_UV, MeshAttribute, textures_in
 
 if TYPE_CHECKING:
     from clpt.render.tables import Tables
@@ -58,7 +58,12 @@ def per_face(name: str) -> bool:
 def _names(shape: Shape) -> set[str]:
     """The attributes that a shape's material and emission read."""
     kinds = (shape.material, shape.emission)
-    names = {t.name for kind in kinds for t in textures_in(kind) if isinstance(t, MeshAttribute)}
+    names: set[str] = set()
+    for texture in (t for kind in kinds for t in textures_in(kind)):
+        if isinstance(texture, MeshAttribute):
+            names.add(texture.name)
+        elif getattr(texture, "mapping", "") == "uv1":
+            names |= set(SECOND_UV)
     missing = sorted(names - set(getattr(shape, "attributes", ())))
     if missing:
         known = ", ".join(getattr(shape, "attributes", ())) or "none"

@@ -24,6 +24,7 @@ from clpt.scene.params import device_params, params
 from clpt.scene.textures import (
     MAPPINGS,
     PATTERNS,
+    SECOND_UV,
     WRAPS,
     Bitmap,
     Checkerboard,
@@ -199,7 +200,16 @@ def _uv(texture: Placed, tables: Sink, down: bool = False) -> dict[str, Any]:
     if texture.mapping == "uv":
         return members
     tables.texture_mappings = True
-    return {**members, "mapping": MAPPINGS.index(texture.mapping), "place": _place(texture, tables)}
+    place = _second_uv(tables) if texture.mapping == "uv1" else _place(texture, tables)
+    return {**members, "mapping": MAPPINGS.index(texture.mapping), "place": place}
+
+
+def _second_uv(tables: Sink) -> int:
+    """Append where a mesh's second set of uv stands, in as many words as a place in the world."""
+    words = np.zeros(12, np.uint32)
+    for i, name in enumerate(SECOND_UV):
+        words[i] = tables.attributes.setdefault((name, "real"), len(tables.attributes))
+    return tables.append("textures", words)
 
 
 def _place(texture: Placed | Solid, tables: Sink) -> int:

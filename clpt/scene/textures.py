@@ -14,7 +14,8 @@ from clpt.scene.params import Kind, choice, factor, host, params, real, reflecta
 ATTRIBUTES = ("vertex_", "face_")  # how the names of what meshes have begin
 PATTERNS = ("fbm", "wrinkled", "windy")
 MOST_OCTAVES = 32
-MAPPINGS = ("uv", "planar", "spherical", "cylindrical")
+MAPPINGS = ("uv", "planar", "spherical", "cylindrical", "uv1")
+SECOND_UV = ("vertex_u1", "vertex_v1")  # the attributes of a mesh that the mapping uv1 takes
 WRAPS = ("repeat", "clamp", "mirror", "zero")
 
 
@@ -30,7 +31,9 @@ class Placed(Texture):
     """Base of those that lie on uv: a surface's own, or such as a mapping makes of its place."""
 
     to_uv: np.ndarray = host(np.eye(3), "uv transform, (3, 3) float64")
-    mapping: str = choice("uv", "where u and v come from before it", MAPPINGS)
+    mapping: str = choice(
+        "uv", "where u and v come from; uv1: attributes vertex_u1, vertex_v1", MAPPINGS
+    )
     to_texture: np.ndarray = host(np.eye(4), "from the world to the mapping's space, (4, 4)")
 
     def check(self) -> None:

@@ -29,7 +29,23 @@ inline vec3 texture_place(Scene scene, integer place, vec3 p)
     return v3(r[0], r[1], r[2]);
 }
 
-/* u, v and 1: of the surface, or of a place in a texture's space by one of the mappings that pbrt has.
+#if USES_ATTRIBUTES
+/* A number that a mesh has per vertex, linear over a triangle; `number`: its place in directories. */
+inline real texture_vertex_number(Scene scene, TexturePoint point, integer number)
+{
+    integer entry = point.attributes + 2 * number;
+    integer first = gather_i(scene.attributes, entry), words = gather_i(scene.attributes, entry + 1);
+    real sum = 0.0f;
+    for (int corner = 0; corner < 3; corner++) {
+        integer vertex = gather_i(scene.faces, 3 * point.face + corner);
+        real weight = corner == 0 ? 1.0f - point.b.x - point.b.y : corner == 1 ? point.b.x : point.b.y;
+        sum += weight * gather_w(scene.attributes, first + words * vertex);
+    }
+    return sum;
+}
+#endif
+
+/* u, v and 1: of the surface, or of a place in a texture's space by one of the mappings that pbrt has, or a mesh's second set.
  * USES_MAPPINGS: some texture asks for one of these. */
 inline vec3 texture_uv(Scene scene, integer mapping, integer place, TexturePoint point)
 {
@@ -43,6 +59,16 @@ inline vec3 texture_uv(Scene scene, integer mapping, integer place, TexturePoint
         real u = sel(round, theta, sel(tube, turn + 0.5f, p.x));
         real v = sel(round, sel(turn < 0.0f, turn + 1.0f, turn), sel(tube, p.z, p.y));
         uv = v3(sel(mapped, u, uv.x), sel(mapped, v, uv.y), uv.z);
+#if USES_ATTRIBUTES
+        mask second = mapping == MAPPING_UV1;
+        if (any(second)) {
+            integer at = sel_i(second, place, (integer)(0));
+            integer first = sel_i(second, gather_i(scene.textures, at), (integer)(0));
+            integer next = sel_i(second, gather_i(scene.textures, at + 1), (integer)(0));
+            uv.x = sel(second, texture_vertex_number(scene, point, first), uv.x);
+            uv.y = sel(second, texture_vertex_number(scene, point, next), uv.y);
+        }
+#endif
     }
 #endif
     return uv;

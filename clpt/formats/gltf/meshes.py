@@ -19,7 +19,9 @@ from clpt.formats.mesh import checked
 from clpt.scene.lights import Area
 from clpt.scene.materials import Material
 from clpt.scene.shapes import Group, Instance, Mesh, Shape
+from clpt.scene.textures import SECOND_UV
 
+FLIPPED = np.array([1, -1], np.float32)
 INSTANCING = "EXT_mesh_gpu_instancing"
 INSTANCED = 20_000  # triangles that copies would add; fewer are met sooner as copies
 
@@ -157,6 +159,7 @@ def _mesh(owner: Element, primitive: Element, made: Geometry) -> Mesh | None:
     arrays = made.attributes
     colours = arrays.get("COLOR_0")
     surface = _surface(primitive, colours is not None)
+    uvs, second = _uvs(primitive, made, surface)
     name = owner.text("name", "")
     values = checked(
         primitive.document.file,
@@ -164,9 +167,9 @@ def _mesh(owner: Element, primitive: Element, made: Geometry) -> Mesh | None:
         arrays["POSITION"],
         made.faces,
         arrays.get("NORMAL"),
-        _uvs(primitive, made, surface),
+        uvs,
         primitive.document.notes,
-        _colour_attributes(colours),
+        _attributes(colours, second, surface, len(arrays["POSITION"])),
     )
     if not len(values["faces"]):
         return None
@@ -186,24 +189,35 @@ def _surface(primitive: Element, colours: bool) -> Surface:
     return document.once(("surface", element.path if element else "", colours), make)
 
 
-def _uvs(primitive: Element, made: Geometry, surface: Surface) -> NDArray[np.float32] | None:
-    """The texture coordinates that the material looks up, v upward as clpt has it."""
-    wanted = surface.uv_sets[0] if surface.uv_sets else 0
+def _uvs(primitive: Element, made: Geometry, surface: Surface) -> list[NDArray[np.float32] | None]:
+    """The two sets of texture coordinates that the material looks up, v upward as clpt has it."""
+    wanted = surface.uv_sets or (0,)
+    if len(wanted) > 2:
+        message = f"textures use more than two TEXCOORD sets; TEXCOORD_{wanted[0]} stands for them"
+        primitive.warn(message, "material")
+    found: list[NDArray[np.float32] | None] = []
+    for number in wanted[:2]:
+        uvs = made.attributes.get(f"TEXCOORD_{number}")
+        if uvs is None and surface.uv_sets:
+            primitive.warn(f"its textures need TEXCOORD_{number}, which is missing", "material")
+        upward = None if uvs is None else uvs * FLIPPED + np.array([0, 1], np.float32)
+        found.append(upward)
+    return [*found, None][:2]
+
+
+def _attributes(
+    colours: NDArray[Any] | None, second: NDArray[np.float32] | None, surface: Surface, count: int
+) -> dict[str, NDArray[np.float32]]:
+    """What the material asks of the vertices: colours, alpha, and a second set of uv."""
+    made = {} if colours is None else _colour_attributes(colours)
     if len(surface.uv_sets) > 1:
-        primitive.warn(f"textures use several TEXCOORD sets; all get TEXCOORD_{wanted}", "material")
-    found = made.attributes.get(f"TEXCOORD_{wanted}")
-    if found is None:
-        if surface.uv_sets:
-            message = f"its textures need TEXCOORD_{wanted}, which is missing"
-            primitive.warn(message, "material")
-        return None
-    return found * np.array([1, -1], np.float32) + np.array([0, 1], np.float32)
+        uvs = np.zeros((count, 2), np.float32) if second is None else second
+        made |= dict(zip(SECOND_UV, (uvs[:, :1], uvs[:, 1:]), strict=True))
+    return made
 
 
-def _colour_attributes(colours: NDArray[Any] | None) -> dict[str, NDArray[np.float32]]:
-    """What the material asks of the vertices: their colours, and alpha, which is 1 by default."""
-    if colours is None:
-        return {}
+def _colour_attributes(colours: NDArray[Any]) -> dict[str, NDArray[np.float32]]:
+    """Colours of vertices, and their alpha, which is 1 by default."""
     rgba = np.ones((len(colours), 4), np.float32)
     rgba[:, : colours.shape[1]] = np.clip(colours, 0.0, 1.0)
     return {"vertex_color": rgba[:, :3], "vertex_alpha": rgba[:, 3:]}

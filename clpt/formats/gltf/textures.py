@@ -32,7 +32,8 @@ def texture(info: Element, *, raw: bool = False, channel: str | None = None) -> 
     """Return the texture that a textureInfo names; `raw`: numbers, not sRGB colours.
 
     channel: "r", "g", "b" or "a", what a real parameter takes of it. Which set of texture
-    coordinates it wants is added to `info.document.uv_sets`.
+    coordinates it wants is added to `info.document.uv_sets`: the first two there are a mesh's uvs
+    and its second ones.
     """
     element = info.entry("index", "textures")
     if element is None:
@@ -41,14 +42,17 @@ def texture(info: Element, *, raw: bool = False, channel: str | None = None) -> 
     uv_set = info.integer("texCoord", 0)
     if transform is not None:
         uv_set = transform.integer("texCoord", uv_set)
-    if uv_set not in info.document.uv_sets:
-        info.document.uv_sets.append(uv_set)
+    sets = info.document.uv_sets
+    if uv_set not in sets:
+        sets.append(uv_set)
     image = _image(element, raw)
     values: dict[str, Any] = {"raw": raw or image.dtype != np.uint8, **_sampling(element)}
     if transform is not None:
         values["to_uv"] = FLIP @ _transform(transform) @ FLIP
     if channel is not None:
         values["channel"] = channel
+    if sets.index(uv_set) == 1:
+        values["mapping"] = "uv1"
     return Bitmap(image=image, **values)
 
 

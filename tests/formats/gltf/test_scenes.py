@@ -335,3 +335,17 @@ def test_images_that_cannot_be(read, build):
     }.items():
         with pytest.raises(SceneError, match=message):
             read(textured(build, data))
+
+
+def test_a_second_set_of_texture_coordinates(read, build):
+    """Textures that look at two sets: the first is the mesh's uvs, the second its attributes."""
+    made = textured(build, png(np.zeros((2, 2, 3))), texCoord=1)
+    made.json["materials"][0]["emissiveTexture"] = {"index": 0}
+    made.json["materials"][0]["emissiveFactor"] = [1, 1, 1]
+    scene = read(made)
+    shape = scene.shapes[0]
+    assert np.allclose(shape.uvs, [[0, 1], [2, -1], [2, 1], [0, -1]])
+    second = np.concatenate([shape.attributes["vertex_u1"], shape.attributes["vertex_v1"]], axis=1)
+    assert np.allclose(second, SQUARE[:, :2])
+    assert {bitmap.mapping for bitmap in bitmaps(scene)} == {"uv", "uv1"}
+    assert not scene.warnings
