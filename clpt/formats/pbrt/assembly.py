@@ -79,6 +79,8 @@ def _shape(found: Definition, read: Geometry | None) -> Shape | None:
     emission = _emission(state, read)
     if not isinstance(opacity, float) or opacity < 1.0:
         surface = Mask(material=surface, opacity=opacity)
+        if emission is not None:
+            state.warn(given, "'alpha' hides its surface, but not its light")
     if _has_texture(surface) or _has_texture(emission):
         read = with_uvs(read)
     with given.placed():

@@ -90,11 +90,11 @@ class State:
         if not name or "\0" in name or len(name) > 4096:
             raise SceneError(f"{name[:40]!r} is no name of a file")
         path = Path(name.replace("\\", "/"))
-        if path.is_absolute():
-            return path
-        beside = self.shared.folder / path
-        other = self.file_folder / path
-        return other if not beside.exists() and other.exists() else beside
+        beside, other = self.shared.folder / path, self.file_folder / path
+        try:
+            return other if not beside.exists() and other.exists() else beside
+        except OSError as error:
+            raise SceneError(f"{name[:40]!r}: {error.strerror}") from None
 
     def texture(self, values: str, name: str, place: Parameters | Parameter) -> Definition:
         """The definition of a texture of "float" or "spectrum" values. Raises SceneError."""

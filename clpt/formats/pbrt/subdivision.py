@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from clpt.errors import SceneError
 
-MOST_TRIANGLES = 1 << 26
+MOST_TRIANGLES = 1 << 23
 Points = NDArray[np.float64]
 Faces = NDArray[np.int64]
 

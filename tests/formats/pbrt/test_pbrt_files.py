@@ -156,6 +156,7 @@ def test_files_in_files(write):
         ("ObjectInstance \"a\"\nShpae \"sphere\"", "3: unknown directive 'Shpae'.*'Shape'"),
         ("Include \"scene.pbrt\"", "includes itself"),
         ("Include \"none.pbrt\"", "no file 'none.pbrt'"),
+        (f"Include \"{'x' * 300}\"", "(?i)file name too long"),
         ("Camera \"perspective\"", "before WorldBegin"),
         ("WorldEnd", "WorldEnd is PBRT version 3's"),
         ("Texture \"a\" \"color\" \"constant\"", "version 3"),
