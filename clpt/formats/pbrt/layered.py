@@ -38,7 +38,7 @@ def coated_diffuse(params: Parameters, state: State) -> Material:
     if thickness > 0.0:
         looks = coats.under_coat(middle(eta), thickness)
         key = ("coat", base, middle(eta), thickness)
-        base = state.shared.once(key, params, partial(mapped, base, looks))
+        base = state.shared.once(key, params, partial(mapped, base, looks, bytes_stay=True))
     return plastic(base, eta, isotropic(alphas(params, state), params, state))
 
 
@@ -91,7 +91,8 @@ def subsurface(params: Parameters, state: State) -> Material:
     if scattering is not None:
         base = _albedo(scattering, absorption, g)
     else:
-        base = mapped(given["reflectance"], coats.from_body_reflectance(middle(eta)))
+        looks = coats.from_body_reflectance(middle(eta))
+        base = mapped(given["reflectance"], looks, bytes_stay=True)
     state.warn(
         params, "light leaves a 'subsurface' body where it entered: a diffuse base of its albedo"
     )

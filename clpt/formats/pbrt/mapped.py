@@ -14,11 +14,12 @@ from clpt.scene.textures import Bitmap, Checkerboard, Mix, Product, Texture
 from clpt.spectra import RGB, Constant, RGBUnbounded, Spectrum, Tabulated, cie
 
 
-def mapped(value: Any, function: Callable[[Any], Any]) -> Any:
+def mapped(value: Any, function: Callable[[Any], Any], *, bytes_stay: bool = False) -> Any:
     """A function of what a parameter has been given: of a number, a colour, a spectrum, a texture.
 
     Of a mixture and of a pattern of numbers it is taken at both ends, of a product of both factors,
-    which is right for powers.
+    which is right for powers. bytes_stay: images of 8 bits in sRGB remain such, a quarter as large
+    as floats; the function must not leave [0, 1].
     """
     if isinstance(value, tuple):
         return tuple(float(function(v)) for v in value)
@@ -29,12 +30,13 @@ def mapped(value: Any, function: Callable[[Any], Any]) -> Any:
     if isinstance(value, Spectrum):
         return Tabulated(cie.GRID, function(value.sample(cie.GRID)), "hold")
     if isinstance(value, Bitmap):
-        return replace(value, image=function(_pixels(value)).astype(np.float32), raw=True)
+        return _bitmap(value, function, bytes_stay)
     if isinstance(value, Texture) and type(value) not in ENDS:  # patterns between 0 and 1
         return Mix(first=float(function(0.0)), second=float(function(1.0)), amount=value)
     if isinstance(value, Texture):
-        ends = {name: mapped(getattr(value, name), function) for name in ENDS[type(value)]}
-        return replace(value, **ends)
+        names = ENDS[type(value)]
+        ends = [mapped(getattr(value, name), function, bytes_stay=bytes_stay) for name in names]
+        return replace(value, **dict(zip(names, ends, strict=True)))
     return float(function(value))
 
 
@@ -45,8 +47,17 @@ ENDS: dict[type[Texture], tuple[str, ...]] = {
 }
 
 
-def _pixels(bitmap: Bitmap) -> Any:
+def _bitmap(bitmap: Bitmap, function: Callable[[Any], Any], bytes_stay: bool) -> Bitmap:
     image = bitmap.image
     if isinstance(image, (str, Path)):
-        image = images.read(image, linear=not bitmap.raw)
-    return np.asarray(image, np.float32)
+        stored = images.read_stored(image)
+    else:
+        values = np.asarray(image)
+        stored = images.Stored(values, encoded=values.dtype == np.uint8)
+    values = stored.values
+    if bytes_stay and values.dtype == np.uint8 and stored.encoded and not bitmap.raw:
+        levels = images.srgb_to_linear(np.arange(256, dtype=np.float32) / np.float32(255.0))
+        codes = images.linear_to_srgb(function(levels).astype(np.float32))
+        return replace(bitmap, image=np.round(255.0 * codes).astype(np.uint8)[values[..., :3]])
+    made = function(stored.decoded(linear=not bitmap.raw))
+    return replace(bitmap, image=made.astype(np.float32), raw=True)

@@ -31,6 +31,11 @@ def images(tmp_path):
     return tmp_path
 
 
+def srgb(x):
+    """The transfer of sRGB taken back (IEC 61966-2-1)."""
+    return np.where(x <= 0.04045, x / 12.92, ((x + 0.055) / 1.055) ** 2.4)
+
+
 def test_constants_are_values():
     assert make("constant", "float", value=("float", 0.3))[0] == 0.3
     assert make("constant", value=("rgb", 0.3, 0.2, 0.1))[0] == (0.3, 0.2, 0.1)
@@ -87,7 +92,7 @@ def test_encodings_scale_and_invert(images):
         return made.image[..., 0] if isinstance(made.image, np.ndarray) else made
 
     stored = STORED / 255.0
-    linear = np.where(stored <= 0.04045, stored / 12.92, ((stored + 0.055) / 1.055) ** 2.4)
+    linear = srgb(stored)
     assert not texels().raw and texels(encoding=("string", "linear")).raw
     assert texels(encoding=("string", "gamma 2.2")) == pytest.approx(stored**2.2, abs=1e-6)
     assert texels(invert=("bool", True)) == pytest.approx(1.0 - linear, abs=1e-6)
@@ -97,6 +102,10 @@ def test_encodings_scale_and_invert(images):
 def test_functions_of_textures(images):
     bitmap = Bitmap(image=images / "a.png", raw=True)
     assert mapped(bitmap, np.sqrt).image[..., 0] == pytest.approx(np.sqrt(STORED / 255.0))
+    coded = mapped(Bitmap(image=images / "a.png"), lambda v: 0.9 * v, bytes_stay=True)
+    assert coded.image.dtype == np.uint8 and coded.image.shape == (2, 2, 3) and not coded.raw
+    levels = [srgb(image / 255.0) for image in (coded.image[..., 0], STORED)]
+    assert levels[0] == pytest.approx(0.9 * levels[1], abs=5e-3)
     board = Checkerboard(color0=0.25, color1=(0.25, 0.16, 0.04))
     made = mapped(Product(first=board, second=0.5), np.sqrt)
     assert made.first.color0.value == pytest.approx(0.5)
