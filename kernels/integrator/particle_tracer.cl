@@ -13,17 +13,11 @@
 void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mask active)
 {
     global const Settings *settings = scene.settings;
-    vec3 o = load_path_o(path, at), d = load_path_d(path, at);
-    Wavelengths lambdas = load_path_lambdas(path, at);
-    Spectrum beta = load_path_beta(path, at), ratio = hero_ratio(path, at);
-    integer state = load_path_state(path, at), depth = state & PATH_DEPTH;
-    mask front;
-    Surface s = surface_load(scene, hit, at, active, o, d, &front);
-#if USES_ABSORPTION
-    integer inside = BSDF_INTERIOR(MATERIAL_ROW(sel_i(active, load_hit_material(hit, at), (integer)(0))));
-    integer medium = medium_met(sel_i(active, load_path_medium(path, at), (integer)(0)), inside, front);
-    beta = spectrum_mul(beta, medium_transmittance(scene, medium, load_hit_t(hit, at), lambdas));
-#endif
+    Vertex v = vertex_load(scene, path, hit, at, active);
+    Surface s = v.s;
+    Wavelengths lambdas = v.lambdas;
+    Spectrum beta = v.beta, ratio = hero_ratio(path, at);
+    integer state = v.state, depth = v.depth;
 
     Sampler sampler = light_path_sampler(settings, load_path_place(path, at), load_path_sample(path, at));
     natural dimension = as_natural(DIMENSION_VERTEX + depth * DIMENSIONS_A_VERTEX);
@@ -31,24 +25,20 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
 #if USES_CHOICE
     choice = sampler_pair(sampler, dimension + DIMENSION_CHOICE);
 #endif
-    integer row = MATERIAL_ROW(sel_i(active, load_hit_material(hit, at), (integer)(0)));
-    Bsdf m = bsdf_load(scene, row, surface_texture_point(s), lambdas);
-    Facing facing = facing_load(scene, row, s, d, lambdas);
+    Bsdf m = bsdf_load(scene, v.row, surface_texture_point(s), lambdas);
+    Facing facing = facing_load(scene, v.row, s, v.d, lambdas);
     Frame frame = facing.frame;
-    vec3 wo = to_local(frame, neg3(d));
-    real arrives = 1.0f / max_r(fabs(dot3(s.n, d)), (real)(1e-6f));
+    vec3 wo = to_local(frame, neg3(v.d));
+    real arrives = 1.0f / max_r(fabs(dot3(s.n, v.d)), (real)(1e-6f));
 
 #if !BSDF_DELTA
     /* To the camera. */
     CameraPoint c = camera_connect(scene, s.p, mask_of(0), sampler_pair(sampler, dimension + DIMENSION_LIGHT));
     Spectrum f = bsdf_eval(m, to_local(frame, neg3(c.d)), wo);
     mask shine = active & (c.pixel >= 0) & (spectrum_max(f) > 0.0f);
-    real turned = fabs(dot3(s.n, c.d)) * arrives * c.importance * facing_share(facing, neg3(d));
+    real turned = fabs(dot3(s.n, c.d)) * arrives * c.importance * facing_share(facing, neg3(v.d));
     Spectrum value = spectrum_scale(spectrum_mul(beta, f), turned);
-#if USES_ABSORPTION
-    integer between = medium_beyond(medium, inside, front, dot3(s.n, c.d) > 0.0f);
-    value = spectrum_mul(value, medium_transmittance(scene, between, c.t, lambdas));
-#endif
+    value = vertex_beyond(scene, v, neg3(c.d), c.t, lambdas, value);
     connect_camera(shadow, at, active, shine, s, c, value);
     state += sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
 #endif
@@ -66,7 +56,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     Spectrum exact = spectrum_scale(bsdf_eval(m, bs.wi, wo), leaves / sel(spread, bs.pdf, (real)(1.0f)));
     carried = spectrum_sel(spread, exact, carried);
 #endif
-    beta = spectrum_scale(spectrum_mul(beta, carried), facing_share(facing, neg3(d)));
+    beta = spectrum_scale(spectrum_mul(beta, carried), facing_share(facing, neg3(v.d)));
 
     /* Russian roulette, on what is left of what the light gave. */
     integer survivor = depth >= settings->rr_depth;
@@ -79,12 +69,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
         beta = spectrum_scale(beta, sel(survivor, 1.0f / max_r(q, (real)(1e-6f)), (real)(1.0f)));
     }
 
-    store_path_o(path, at, next, surface_offset(s, onward));
-    store_path_d(path, at, next, onward);
-    store_path_beta(path, at, next, beta);
-#if USES_ABSORPTION
-    store_path_medium(path, at, next, medium_beyond(medium, inside, front, dot3(s.n, onward) < 0.0f));
-#endif
+    vertex_leave(path, at, next, v, onward, beta);
     hero_keep(path, at, next, ratio);
     state = sel_i(next, state, state - (state & PATH_ALIVE)) + sel_i(active, (integer)(1), (integer)(0));
     store_path_state(path, at, active, state);

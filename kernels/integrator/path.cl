@@ -3,31 +3,25 @@
 void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mask active)
 {
     global const Settings *settings = scene.settings;
-    vec3 o = load_path_o(path, at), d = load_path_d(path, at);
-    Wavelengths lambdas = load_path_lambdas(path, at);
-    Spectrum beta = load_path_beta(path, at), ratio = hero_ratio(path, at);
-    integer state = load_path_state(path, at), depth = state & PATH_DEPTH;
-    mask front;
-    Surface s = surface_load(scene, hit, at, active, o, d, &front);
-#if USES_ABSORPTION
-    integer inside = BSDF_INTERIOR(MATERIAL_ROW(sel_i(active, load_hit_material(hit, at), (integer)(0))));
-    integer medium = medium_met(sel_i(active, load_path_medium(path, at), (integer)(0)), inside, front);
-    beta = spectrum_mul(beta, medium_transmittance(scene, medium, load_hit_t(hit, at), lambdas));
-#endif
+    Vertex v = vertex_load(scene, path, hit, at, active);
+    Surface s = v.s;
+    Wavelengths lambdas = v.lambdas;
+    Spectrum beta = v.beta, ratio = hero_ratio(path, at);
+    integer state = v.state, depth = v.depth;
 
     /* The light that this ray has met; the camera's ray goes on behind one that is to be hidden. */
     mask hidden = mask_of(0);
 #if USES_SURFACE_LIGHTS
     hidden = active & (s.light >= 0) & (depth == 0) & mask_of(settings->hide_lights != 0);
     if (any(hidden)) {
-        store_path_o(path, at, hidden, surface_offset(s, d));
-        store_path_pdf(path, at, hidden, load_path_pdf(path, at) + load_hit_t(hit, at));
+        store_path_o(path, at, hidden, surface_offset(s, v.d));
+        store_path_pdf(path, at, hidden, load_path_pdf(path, at) + v.t);
     }
-    mask lit = active & (s.light >= 0) & light_shows(scene, s.light, front) & !hidden;
+    mask lit = active & (s.light >= 0) & light_shows(scene, s.light, v.front) & !hidden;
     if (any(lit)) {
         integer light = sel_i(lit, s.light, (integer)(0));
         real pdf = load_path_pdf(path, at), gone = path_gone(path, at);
-        real other = light_pdf(scene, light, madd3(d, -gone, o), d, load_hit_t(hit, at) + gone, s.n);
+        real other = light_pdf(scene, light, madd3(v.d, -gone, v.o), v.d, v.t + gone, s.n);
         real w = sel(pdf < 0.0f, (real)(1.0f), mis_weight(pdf, other));
         Spectrum le = emission_load(scene, light_at(scene, light).radiance, surface_texture_point(s), lambdas);
         le = spectrum_scale(spectrum_mul(beta, le), w);
@@ -42,15 +36,14 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
 #if USES_CHOICE
     choice = sampler_pair(sampler, dimension + DIMENSION_CHOICE);
 #endif
-    integer row = MATERIAL_ROW(sel_i(active, load_hit_material(hit, at), (integer)(0)));
-    Bsdf m = bsdf_load(scene, row, surface_texture_point(s), lambdas);
+    Bsdf m = bsdf_load(scene, v.row, surface_texture_point(s), lambdas);
 #if BSDF_SHIFTS
-    lambdas = bsdf_shift(scene, row, m, lambdas, choice.y, depth); /* from here on, those by which light comes */
+    lambdas = bsdf_shift(scene, v.row, m, lambdas, choice.y, depth); /* from here on, those by which light comes */
     store_path_lambdas(path, at, active & !hidden, lambdas);
 #endif
-    Facing facing = facing_load(scene, row, s, d, lambdas);
+    Facing facing = facing_load(scene, v.row, s, v.d, lambdas);
     Frame frame = facing.frame;
-    vec3 wo = to_local(frame, neg3(d));
+    vec3 wo = to_local(frame, neg3(v.d));
 
 #if USES_LIGHTS && !BSDF_DELTA
     /* Next-event estimation. */
@@ -60,10 +53,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     real w = sel(ls.pdf < 0.0f, (real)(1.0f), mis_weight(ls.pdf, hero_pdf(m, wo, wi, ratio)));
     mask shine = next & (ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
     Spectrum value = spectrum_scale(spectrum_mul(spectrum_mul(beta, f), ls.radiance), w / sel(shine, fabs(ls.pdf), (real)(1.0f)));
-#if USES_ABSORPTION
-    integer between = medium_beyond(medium, inside, front, dot3(s.n, ls.wi) < 0.0f);
-    value = spectrum_mul(value, medium_transmittance(scene, between, ls.t, lambdas));
-#endif
+    value = vertex_beyond(scene, v, ls.wi, ls.t, lambdas, value);
     shadow_toward(shadow, at, active, shine, s, ls, value);
     state += sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
 #endif
@@ -87,19 +77,14 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
         beta = spectrum_scale(beta, sel(survivor, 1.0f / max_r(q, (real)(1e-6f)), (real)(1.0f)));
     }
 
-    store_path_o(path, at, next, surface_offset(s, onward));
-    store_path_d(path, at, next, onward);
-    store_path_beta(path, at, next, beta);
+    vertex_leave(path, at, next, v, onward, beta);
 #if BSDF_PASSES /* for weighing a light that is met further on, nothing has happened */
-    store_path_gone(path, at, next, load_path_gone(path, at) + load_hit_t(hit, at));
+    store_path_gone(path, at, next, load_path_gone(path, at) + v.t);
 #else
     path_turned(path, at, next);
     store_path_pdf(path, at, next, sel((bs.lobe & LOBE_DELTA) != 0, (real)(-1.0f), bs.pdf));
 #endif
     store_path_eta(path, at, next, eta);
-#if USES_ABSORPTION
-    store_path_medium(path, at, next, medium_beyond(medium, inside, front, dot3(s.n, onward) < 0.0f));
-#endif
     hero_keep(path, at, next, ratio);
     mask met = active & !hidden;
     state = sel_i(next, state, state - (state & PATH_ALIVE)) + sel_i(met, (integer)(1), (integer)(0));

@@ -4,36 +4,29 @@
 void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mask active)
 {
     global const Settings *settings = scene.settings;
-    vec3 o = load_path_o(path, at), d = load_path_d(path, at);
-    Wavelengths lambdas = load_path_lambdas(path, at);
-    Spectrum beta = load_path_beta(path, at), radiance = load_path_radiance(path, at);
-    integer state = load_path_state(path, at), depth = state & PATH_DEPTH;
-    mask front;
-    Surface s = surface_load(scene, hit, at, active, o, d, &front);
-#if USES_ABSORPTION
-    integer inside = BSDF_INTERIOR(MATERIAL_ROW(sel_i(active, load_hit_material(hit, at), (integer)(0))));
-    integer medium = medium_met(sel_i(active, load_path_medium(path, at), (integer)(0)), inside, front);
-    beta = spectrum_mul(beta, medium_transmittance(scene, medium, load_hit_t(hit, at), lambdas));
-#endif
+    Vertex v = vertex_load(scene, path, hit, at, active);
+    Surface s = v.s;
+    Wavelengths lambdas = v.lambdas;
+    Spectrum beta = v.beta, radiance = load_path_radiance(path, at);
+    integer state = v.state, depth = v.depth;
 #if USES_SURFACE_LIGHTS
-    mask lit = active & (s.light >= 0) & light_shows(scene, s.light, front);
+    mask lit = active & (s.light >= 0) & light_shows(scene, s.light, v.front);
     if (any(lit)) {
         integer light = sel_i(lit, s.light, (integer)(0));
         Spectrum le = emission_load(scene, light_at(scene, light).radiance, surface_texture_point(s), lambdas);
         radiance = spectrum_sel(lit, spectrum_add(radiance, spectrum_mul(beta, le)), radiance);
     }
 #endif
-    integer row = MATERIAL_ROW(sel_i(active, load_hit_material(hit, at), (integer)(0)));
-    Bsdf m = bsdf_load(scene, row, surface_texture_point(s), lambdas);
-    Facing facing = facing_load(scene, row, s, d, lambdas);
+    Bsdf m = bsdf_load(scene, v.row, surface_texture_point(s), lambdas);
+    Facing facing = facing_load(scene, v.row, s, v.d, lambdas);
     Frame frame = facing.frame;
-    vec3 wo = to_local(frame, neg3(d));
+    vec3 wo = to_local(frame, neg3(v.d));
     Sampler sampler = sampler_start(settings->seed, as_natural(load_path_place(path, at)), as_natural(load_path_sample(path, at)));
     natural dimension = as_natural(DIMENSION_VERTEX + depth * DIMENSIONS_A_VERTEX);
     vec2 choice = sampler_pair(sampler, dimension + DIMENSION_CHOICE);
     real mirror = BSDF_REFLECTIVITY(m);
 #if BSDF_SHIFTS
-    lambdas = bsdf_shift(scene, row, m, lambdas, choice.y, depth); /* from here on, those by which light comes */
+    lambdas = bsdf_shift(scene, v.row, m, lambdas, choice.y, depth); /* from here on, those by which light comes */
     store_path_lambdas(path, at, active, lambdas);
 #endif
 
@@ -47,10 +40,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     Spectrum f = spectrum_scale(bsdf_eval(m, wo, to_local(frame, ls.wi)), facing_share(facing, ls.wi));
     mask shine = active & (ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
     Spectrum value = spectrum_scale(spectrum_mul(spectrum_mul(own, f), ls.radiance), 1.0f / sel(shine, fabs(ls.pdf), (real)(1.0f)));
-#if USES_ABSORPTION
-    integer between = medium_beyond(medium, inside, front, dot3(s.n, ls.wi) < 0.0f);
-    value = spectrum_mul(value, medium_transmittance(scene, between, ls.t, lambdas));
-#endif
+    value = vertex_beyond(scene, v, ls.wi, ls.t, lambdas, value);
     shadow_toward(shadow, at, active, shine, s, ls, value);
     state += sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
 #endif
@@ -70,13 +60,8 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     vec3 onward = normalize3(to_world(frame, wi));
     beta = spectrum_scale(beta, facing_share(facing, onward));
     store_path_radiance(path, at, active, radiance);
-    store_path_o(path, at, next, surface_offset(s, onward));
-    store_path_d(path, at, next, onward);
-    store_path_beta(path, at, next, beta);
+    vertex_leave(path, at, next, v, onward, beta);
     store_path_pdf(path, at, next, (real)(-1.0f));
-#if USES_ABSORPTION
-    store_path_medium(path, at, next, medium_beyond(medium, inside, front, dot3(s.n, onward) < 0.0f));
-#endif
     state = sel_i(next, state, state - (state & PATH_ALIVE)) + sel_i(active, (integer)(1), (integer)(0));
     store_path_state(path, at, active, state);
 }

@@ -16,6 +16,7 @@
 #include "lib/bsdf.cl"
 #include "generated/bsdf.cl"
 #include "generated/medium.cl"
+#include "lib/vertex.cl"
 #include "lib/hero.cl"
 #include "generated/integrator.cl"
 
