@@ -13,7 +13,7 @@ from clpt.formats.mesh import read_mesh
 from clpt.formats.native import load, save
 from clpt.render.lower import lower
 from clpt.scene import Scene, cameras, integrators, materials, shapes
-from clpt.scene.textures import MeshAttribute, Mix, Product, textures_in
+from clpt.scene.textures import Bitmap, MeshAttribute, Mix, Product, textures_in
 from clpt.spectra import luminance
 
 RNG = np.random.default_rng(7)
@@ -66,6 +66,20 @@ def test_albedo_is_that_of_the_vertices_and_faces():
         image = clpt.render(_scene(behind, _mesh(material)), spp=1).reshape(-1, 6)
         colours, greys = _expected(image[:, 3:])
         np.testing.assert_allclose(image[:, :3], of(colours, greys), atol=2e-5)
+
+
+def test_a_second_set_of_uv_is_as_good_as_the_first():
+    """The mapping uv1 finds on the attributes what uv finds on the same numbers as uvs."""
+    uv = RNG.random((5, 2)).astype(np.float32)
+    image = RNG.random((4, 4, 3)).astype(np.float32)
+    second = {"vertex_u1": uv[:, :1], "vertex_v1": uv[:, 1:]}
+    pictures = []
+    for mapping, uvs in (("uv", uv), ("uv1", np.zeros_like(uv))):
+        texture = Bitmap(image=image, mapping=mapping, raw=True)
+        mesh = _mesh(materials.Diffuse(reflectance=texture), **second)
+        pictures.append(clpt.render(_scene(dataclasses.replace(mesh, uvs=uvs)), spp=1))
+    np.testing.assert_allclose(pictures[1], pictures[0], atol=2e-5)
+    assert pictures[0][..., :3].std() > 0.05
 
 
 def _shift(z):
