@@ -32,6 +32,7 @@ from clpt.spectra import (
 SPACES = {"srgb": "rec709", "rec2020": "rec2020", "dci-p3": "display_p3"}
 ACES = "aces2065-1"
 AP0 = ((0.7347, 0.2653), (0.0, 1.0), (0.0001, -0.077))  # SMPTE ST 2065-1
+CUT = 1e-3  # by how much a colour may be changed without a warning
 SPECTRUM_TYPES = ("rgb", "spectrum", "blackbody")
 GLASSES = {  # what pbrt's tables hold, which is not always what their name says
     "glass-BK7": "n-bk7",
@@ -62,7 +63,7 @@ def value_of(given: Parameter, role: str, state: State) -> Any:
     if given.type == "float":
         return given.numbers(1)[0]
     if given.type == "rgb":
-        return _rgb(given.numbers(3), role, state)
+        return _rgb(given, role, state)
     if given.type == "blackbody":
         made: Spectrum = Blackbody(given.numbers(1)[0], normalised=True)
     elif given.is_text:
@@ -101,14 +102,18 @@ def scaled(value: Any, factor: float) -> Any:
     return Tabulated(cie.GRID, factor * value.sample(cie.GRID))
 
 
-def _rgb(rgb: Any, role: str, state: State) -> Any:
+def _rgb(given: Parameter, role: str, state: State) -> Any:
+    rgb = given.numbers(3)
     if min(rgb) < 0.0:
         raise SceneError("a colour cannot be negative")
     if role == "reflectance" and max(rgb) > 1.0:
         raise SceneError("a colour that is reflected cannot exceed 1")
     ours = to_rec709(rgb, state.colour_space, light=role == "emission")
-    clipped = np.clip(ours, 0.0, 1.0 if role == "reflectance" else None).tolist()
-    return tuple(clipped) if role == "texture" else colour(role, clipped)
+    clipped = np.clip(ours, 0.0, 1.0 if role == "reflectance" else None)
+    if np.abs(clipped - ours).max() > CUT:
+        state.warn(given, "this colour lies outside Rec. 709, and what exceeds that is cut off")
+    made = tuple(clipped.tolist())
+    return made if role == "texture" else colour(role, made)
 
 
 def _pairs(values: list[float], role: str) -> Tabulated:

@@ -40,6 +40,15 @@ def test_colour_spaces(space, theirs):
     assert to_rec709([1, 1, 1], space, light=False) == pytest.approx([1, 1, 1], abs=1e-6)
 
 
+def test_colours_beyond_rec709_are_told():
+    at = state()
+    at.colour_space = "rec2020"
+    dull = spectrum(params(x=("rgb", 0.5, 0.4, 0.4)), "x", "reflectance", at)
+    assert not at.shared.warnings and dull == pytest.approx((0.57, 0.39, 0.4), abs=0.02)
+    green = spectrum(params(x=("rgb", 0.0, 0.9, 0.0)), "x", "reflectance", at)
+    assert green[0] == 0.0 and "Rec. 709" in at.shared.warnings[0]
+
+
 def test_lights_have_luminance_one(tmp_path):
     (tmp_path / "lamp.spd").write_text("400 3\n500 7\n600 2\n")
     for value in (
