@@ -44,6 +44,13 @@ def layers_words(material: Kind, tables: Tables) -> tuple[NDArray[np.uint32], st
     layers: tuple[Layer, ...] = material.layers  # type: ignore[attr-defined]
     if not layers:
         return np.zeros(kinds.LAYERS_WORDS, np.uint32), "constant"
+    for name in ("eta", "k"):
+        if getattr(getattr(material, name, None), "is_texture", False) and not tables.spectral:
+            raise SceneError(
+                "below layers it cannot be a texture in RGB mode; give a spectrum, or render in "
+                'the mode "spectral"',
+                where=f"{material.kind}.{name}",
+            )
     if tables.spectral:
         rows = np.concatenate([tables.kind_words(layer) for layer in layers])
     else:

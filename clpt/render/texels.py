@@ -29,8 +29,8 @@ def spectral_image(texture: Any, role: str) -> SpectralImage | None:
 def pixels(texture: Bitmap, role: str) -> Floats:
     """Return a bitmap's image, (h, w, 1 or 3) float32, top row first; for "real" (h, w, 1).
 
-    role: "reflectance", "emission" or "real"; of spectra it chooses the colour that stands for
-    them. Raises SceneError if it cannot be read or is no image.
+    role: "reflectance", "emission", "index" or "real"; of spectra it chooses the colour that stands
+    for them. Raises SceneError if it cannot be read or is no image.
     """
     spectral = spectral_image(texture, role)
     image = texture.image if spectral is None else spectral.to_rgb()

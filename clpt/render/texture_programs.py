@@ -20,7 +20,7 @@ from clpt.spectra import RGB, Constant, RGBUnbounded
 OPERANDS = ("top", "own", "factor", "real", "constant", "number")
 OPERATIONS = {"push": 0, "multiply": 8, "mix": 16}
 END = 32
-ROLES = ("reflectance", "emission", "real")
+ROLES = ("reflectance", "emission", "index", "real")
 
 Code = list[tuple[int, int]]
 Words = NDArray[np.uint32]
@@ -141,7 +141,7 @@ class _Writer:
 
     def _words(self, value: Any, role: str) -> Words:
         """A colour or spectrum as five words; colours may exceed one."""
-        if role == "reflectance" and type(value) in (RGB, RGBUnbounded):
+        if role in ("reflectance", "index") and type(value) in (RGB, RGBUnbounded):
             rgb = (value.r, value.g, value.b)
             words = np.zeros(SPECTRUM_WORDS, np.float32)
             if self.tables.spectral:

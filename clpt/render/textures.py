@@ -132,7 +132,7 @@ class Sink(Protocol):
 
 
 def lower_texture(texture: Texture, role: str, tables: Sink) -> int:
-    """Put a texture in a role ("reflectance", "emission", "real") into the tables.
+    """Put a texture in a role ("reflectance", "emission", "index", "real") into the tables.
 
     A composite must be `folded`. Returns the first word of its row in `textures`; the same texture
     in the same role is put in once. Raises SceneError for an image or a uv transform that cannot be
@@ -367,6 +367,7 @@ def _look_up(role: str, kinds: list[str], name: str) -> list[str]:
     else:
         type_, choose, more = "Spectrum", "spectrum_sel", ", lambdas"
         zero = "spectrum_of(0.0f)"
+    verb = "reflectance" if role == "index" else role  # the same look-up, of other numbers
     lines = [
         f"inline {type_} {name}_{role}"
         "(Scene scene, integer row, TexturePoint point, Wavelengths lambdas)",
@@ -376,7 +377,7 @@ def _look_up(role: str, kinds: list[str], name: str) -> list[str]:
     ]
     for kind in kinds:
         loaded = f"{kind}_row(scene.textures, sel_i(m, row, (integer)(0)))"
-        call = f"{kind}_{role}({loaded}, scene, point{more})"
+        call = f"{kind}_{verb}({loaded}, scene, point{more})"
         lines += [
             "    {",
             f"        mask m = kind == {KINDS.index(kind)};",

@@ -162,8 +162,8 @@ class Conductor(Material):
 
     delta = True
 
-    eta: Any = index(0.0, "index of refraction")
-    k: Any = index(1.0, "extinction coefficient")
+    eta: Any = index(0.0, "index of refraction", textured=True)
+    k: Any = index(1.0, "extinction coefficient", textured=True)
     specular_reflectance: Any = reflectance(1.0, "factor on reflection; 1 is physical")
     layers: tuple[Layer, ...] = layers(FILMS)
 
@@ -172,8 +172,8 @@ class Conductor(Material):
 class RoughConductor(Material):
     """A rough metal of microfacets (Cook and Torrance; Heitz 2018 visible normals); front side."""
 
-    eta: Any = index(0.0, "index of refraction")
-    k: Any = index(1.0, "extinction coefficient")
+    eta: Any = index(0.0, "index of refraction", textured=True)
+    k: Any = index(1.0, "extinction coefficient", textured=True)
     distribution: str = choice("ggx", "of the microfacet normals", DISTRIBUTIONS)
     alpha_u: Any = real(0.1, "roughness along the tangent", low=1e-4, high=1.0, textured=True)
     alpha_v: Any = real(0.1, "roughness across it", low=1e-4, high=1.0, textured=True)
@@ -221,8 +221,10 @@ class CoatedConductor(Material):
     coat_ior: Any = index(1.5046, "index of the coat")
     ext_ior: Any = index(1.000277, "index outside")
     coat_alpha: Any = real(0.01, "roughness of the coat", low=1e-4, high=1.0, textured=True)
-    eta: Any = index(0.0, "index of refraction of the metal; the default is a perfect mirror")
-    k: Any = index(1.0, "extinction coefficient of the metal")
+    eta: Any = index(
+        0.0, "index of refraction of the metal; the default is a perfect mirror", textured=True
+    )
+    k: Any = index(1.0, "extinction coefficient of the metal", textured=True)
     distribution: str = choice("ggx", "of both their microfacet normals", DISTRIBUTIONS)
     alpha_u: Any = real(0.1, "the metal's roughness along tangents", "", 1e-4, 1.0, textured=True)
     alpha_v: Any = real(0.1, "the metal's roughness across it", "", 1e-4, 1.0, textured=True)
@@ -380,8 +382,10 @@ class Grating(Material):
     orders: float = real(float(ORDERS), "highest order that is followed", low=0.0, high=ORDERS)
     efficiencies: Any = per_order((1.0, 1.0, 1.0), "how strong orders -n to n are, explicitly")
     ior: Any = index(1.5, "index of a transmissive plate")
-    eta: Any = index(0.0, "index of refraction of the metal; the default is a perfect mirror")
-    k: Any = index(1.0, "extinction coefficient of the metal")
+    eta: Any = index(
+        0.0, "index of refraction of the metal; the default is a perfect mirror", textured=True
+    )
+    k: Any = index(1.0, "extinction coefficient of the metal", textured=True)
     reflectance: Any = reflectance(1.0, "factor on the light of all orders; 1 is physical")
 
     @property

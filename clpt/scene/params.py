@@ -9,7 +9,7 @@ role           accepted                               in the kernel             
 =============  =====================================  ==========================  ===============
 reflectance    number, (r, g, b), Spectrum, Texture   Spectrum in [0, 1]          yes
 emission       number, (r, g, b), Spectrum, Texture   Spectrum, rgb times D65     area, envmap
-index          number, name, Spectrum                 Spectrum, unbounded         no
+index          number, name, Spectrum, Texture        Spectrum, unbounded         conductors
 factor         number, (r, g, b), Spectrum, Texture   Spectrum, unbounded         yes
 coefficient    number, (r, g, b), Spectrum            of the inside, in [1/m]     no
 real           number, Texture                        real                        yes
@@ -76,9 +76,9 @@ def emission(default: Any, doc: str, unit: str, *, textured: bool = False) -> An
     return _field(default, Param("emission", doc, unit, low=0.0, textured=textured))
 
 
-def index(default: Any, doc: str) -> Any:
+def index(default: Any, doc: str, *, textured: bool = False) -> Any:
     """Declare a refractive index or extinction coefficient, perhaps by name, perhaps dispersive."""
-    return _field(default, Param("index", doc, low=0.0))
+    return _field(default, Param("index", doc, low=0.0, textured=textured))
 
 
 def factor(default: Any, doc: str) -> Any:

@@ -53,7 +53,11 @@ class Solid(Texture):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Bitmap(Placed):
-    """An image; v = 0 is its bottom row. Where a number is asked for it takes `channel`."""
+    """An image; v = 0 is its bottom row. Where a number is asked for it takes `channel`.
+
+    It has no smaller copies: what lies within a pixel is averaged by its samples, without the blur
+    of MIP maps. With few samples a pixel, fine textures far away are noisy.
+    """
 
     image: Any = host(
         None,

@@ -212,6 +212,26 @@ def test_composites_nest():
         np.testing.assert_array_equal(other, found[0])
 
 
+@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+def test_indices_are_not_bounded(mode):
+    """Metals whose eta or k are images, and mixtures of two of them."""
+    image, uv = 4.0 * COLOURS, _uvs(60)
+    between = scene.Mix(first=(3.0, 0.2, 1.0), second=2.5, amount=scene.Checkerboard(color0=0.25))
+    made, rows = [scene.Bitmap(image=image), between], np.arange(60) % 2
+    if mode == "rgb":
+        values, first = image, np.array([3.0, 0.2, 1.0])
+    else:
+        scale, coefficients = spectra.unbounded(image)
+        values = scale[..., None] * evaluate(coefficients, LAMBDAS)
+        first = spectra.RGBUnbounded(3.0, 0.2, 1.0).sample(LAMBDAS)
+    same = np.equal(*((uv % 1.0) > 0.5).T)
+    amount = np.where(same, 0.25, 0.2)[:, None]
+    expected = np.choose(rows[:, None], [reference(values, uv), first + (2.5 - first) * amount])
+    found = look_up(made, "index", uv, mode=mode, rows=rows)
+    off = np.abs(found - expected).max(axis=1) > (2e-2 if mode == "spectral" else 2e-5)
+    assert off.mean() < 0.04  # at a border of the checkerboard rounding may choose either
+
+
 def test_composites_of_numbers_and_of_light():
     uv = _uvs(48)
     lamp, mask = np.float32(40.0) * COLOURS, COLOURS[:3, :2, :1]

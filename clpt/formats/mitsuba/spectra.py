@@ -47,11 +47,8 @@ def emission(props: Properties, name: str, *, textured: bool = False) -> Any:
 
 
 def index(props: Properties, name: str, default: Any) -> Any:
-    """Take an optical constant of a conductor: a number, a colour or a spectrum."""
-    value = _take(props, name, "index", default)
-    if isinstance(value, Texture):
-        raise props.element.error(f"{name!r} cannot be a texture")
-    return value
+    """Take an optical constant of a conductor: a number, a colour, a spectrum or a texture."""
+    return _take(props, name, "index", default)
 
 
 def coefficient(props: Properties, name: str) -> Any:
