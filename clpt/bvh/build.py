@@ -70,12 +70,18 @@ def build(
     Raises SceneError for vertices that are not finite or beyond 1e12 and for indices out of range,
     MemoryBudgetError if the device has too little memory.
     """
+    return _build(Building(device), vertices, faces, tags, layout)
+
+
+def _build(
+    building: Building, vertices: Array, faces: Array, tags: Array | None, layout: str | None
+) -> Bvh:
     start = time.perf_counter()
-    count = _check(vertices, faces, tags)
+    count, device = _check(vertices, faces, tags), building.device
     if count == 0:  # one triangle that is a point: nothing hits it
         vertices, faces, tags = np.zeros((1, 3)), np.zeros((1, 3)), None
     layout = layout or choose_layout(device, count)
-    n, building = max(count, 1), Building(device)
+    n = max(count, 1)
     mesh = Mesh(
         n,
         building.upload(vertices, np.float32),
@@ -103,15 +109,15 @@ def build_parts(
     raises alike.
     """
     start = time.perf_counter()
-    ends = np.cumsum([0, *counts])
-    trees = [
-        build(device, vertices, faces[i:j], tags[i:j], layout) for i, j in pairwise(ends.tolist())
-    ]
+    trees, building = [], Building(device)
+    for i, j in pairwise(np.cumsum([0, *counts]).tolist()):
+        building = Building(device, building)
+        trees.append(_build(building, vertices, faces[i:j], tags[i:j], layout))
     if len(trees) == 1:
         return trees[0], np.zeros((1, 2), np.uint32)
     sizes = np.array([[b.size for b in (t.buffers["nodes"], t.buffers["leaves"])] for t in trees])
     begins = np.cumsum(sizes, axis=0) - sizes
-    building, buffers = Building(device), {}
+    buffers = {}
     for name, begin, whole in zip(("nodes", "leaves"), begins.T, sizes.sum(axis=0), strict=True):
         buffers[name] = building.allocate(int(whole))
         for tree_, at in zip(trees, begin, strict=True):

@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 import pyopencl as cl
 from numpy.typing import DTypeLike, NDArray
 
-from ..device import Buffers, Device, Program, assemble
+from ..device import Bound, Buffers, Device, Program, assemble
 from ..device import build as build_program
 
 Array: TypeAlias = NDArray | cl.Buffer
@@ -19,11 +19,16 @@ _programs: weakref.WeakKeyDictionary[Device, dict[str, Program]] = weakref.WeakK
 
 
 class Building:
-    """What the steps of a build share. Programs are compiled once for each device."""
+    """What the steps of a build share. Programs are compiled once for each device.
 
-    def __init__(self, device: Device):
+    former: a build that is over, whose kernels are taken on; to make them again takes longer than
+    a small tree.
+    """
+
+    def __init__(self, device: Device, former: Building | None = None):
         self.device = device
         self.buffers = Buffers(device)
+        self._kernels: dict[tuple[str, str], Bound] = former._kernels if former else {}
 
     def run(self, root: str, kernel: str, n: int, **arguments: Any) -> None:
         """Enqueue n work-items of a kernel of the program at `root`, each by itself."""
@@ -51,5 +56,9 @@ class Building:
         programs = _programs.setdefault(self.device, {})
         if root not in programs:
             programs[root] = build_program(self.device, assemble(root))
-        bound = programs[root].kernel(kernel).bind(**arguments)
+        bound = self._kernels.get((root, kernel))
+        if bound is None:
+            bound = self._kernels[root, kernel] = programs[root].kernel(kernel).bind(**arguments)
+        else:
+            bound.set(**arguments)
         bound.enqueue(self.device.queue, (-(-n // group) * group,), (group,))
