@@ -272,6 +272,21 @@ def test_samples_follow_the_pdf(name):
     np.testing.assert_allclose(again[:3], r[5:], rtol=3e-3, atol=1e-4 * r[5:].max())
 
 
+def test_black_and_even_images():
+    """Nothing is not a number; what is even is chosen evenly."""
+    looked = directions(64, 3)
+    looked = looked[:, np.abs(looked[1]) < 0.95]
+    for radiance in (0.0, 1.0):
+        scene = lit([Envmap(image=np.full((32, 64, 3), radiance))])
+        found = scene(INFINITE, looked, 4)
+        r = samples(scene, (0.0, 0.0, 0.0), 200)
+        assert np.isfinite(found).all() and np.isfinite(r).all()
+        np.testing.assert_allclose(found[:3], radiance, rtol=1e-5)
+        np.testing.assert_allclose(r[5:], radiance, rtol=1e-5)
+        if radiance:
+            np.testing.assert_allclose(found[3], 0.25 / np.pi, rtol=0.01)
+
+
 @pytest.mark.parametrize("name", ["envmap", "cube_map"])
 def test_images_are_chosen_by_what_they_send(name):
     """The estimate of the whole sphere's mean hardly varies: radiance over pdf is nearly even."""
