@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import time
 
 import numpy as np
+import pytest
+import trimesh
 
 from clpt.cli.info import summary
 from clpt.formats import gltf, load, studio
@@ -42,3 +45,12 @@ def test_cameras_and_lights(assets):
     assert found["cameras"] == ["perspective", "orthographic"]
     assert found["lights"] == {"area": 1, "directional": 1, "point": 1, "spot": 1}
     assert (found["film"]["width"], found["film"]["height"]) == (768, 576)
+
+
+@pytest.mark.slow
+def test_a_million_triangles_take_seconds(tmp_path):
+    ball = trimesh.creation.icosphere(subdivisions=8)
+    (tmp_path / "ball.glb").write_bytes(trimesh.exchange.gltf.export_glb(ball.scene()))
+    start = time.perf_counter()
+    assert len(load(tmp_path / "ball.glb").shapes[0].faces) == 1_310_720
+    assert time.perf_counter() - start < 20.0
