@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -151,7 +151,32 @@ def _mix(params: Parameters, state: State) -> Material:
         raise SceneError(f"'materials' must be two names of materials, not {len(names)}")
     first, second = (state.named_material(name, params) for name in names)
     weight = textured(params, "amount", "real", state, 0.5)
-    return materials.Blend(first=first, second=second, weight=weight)
+    made = materials.Blend(first=first, second=second, weight=weight)
+    kinds = list(_parts(made))
+    if any(part.transmits for part in kinds) and materials.TwoSided in map(type, kinds):
+        state.warn(params, "beside what lets light through, the rest is black from behind")
+        return _one_sided(made)
+    return made
+
+
+def _parts(made: Material) -> Iterator[Material]:
+    """A material and all that it is composed of."""
+    yield made
+    for name in ("front", "material", "first", "second"):
+        if isinstance(part := getattr(made, name, None), Material):
+            yield from _parts(part)
+
+
+def _one_sided(made: Material) -> Material:
+    """The material with the fronts alone of what is given to both sides."""
+    if isinstance(made, materials.TwoSided):
+        return _one_sided(made.front)
+    inner: dict[str, Any] = {
+        name: _one_sided(part)
+        for name in ("material", "first", "second")
+        if isinstance(part := getattr(made, name, None), Material)
+    }
+    return replace(made, **inner) if inner else made
 
 
 def _interface(params: Parameters, state: State) -> Material:

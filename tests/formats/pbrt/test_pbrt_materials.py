@@ -192,6 +192,10 @@ def test_mixtures_nest():
     assert made.first.weight == 0.25  # of the glass, which is the second
     assert isinstance(made.first.second, materials.Dielectric)
     assert made.first.first is made.second
+    assert isinstance(made.second, materials.Diffuse) and "behind" in at.shared.warnings[0]
+    at.shared.materials["grey"] = Definition("diffuse", params(), at)
+    opaque = make("mix", at, materials=("string", "grey", "red"))
+    assert isinstance(opaque.first, TwoSided)
 
 
 def test_relief():
