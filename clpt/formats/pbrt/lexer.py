@@ -19,9 +19,7 @@ from clpt.formats.packed import read_bytes
 from clpt.formats.pbrt.params import ALIASES, TYPES, Parameter
 from clpt.formats.pbrt.state import nearest
 
-BLANKS = re.compile(rb"(?:[ \t\r\n]+|#[^\n]*)*")
-WORD = re.compile(rb'"[^"\n]*"|[\[\]]|[^ \t\r\n\[\]"#]+')
-COMMENT = re.compile(rb"#[^\n]*")
+WORD = re.compile(rb'(?:[ \t\r\n]+|#[^\n]*)*("[^"\n]*"|[\[\]]|[^ \t\r\n\[\]"#]+)?')
 OLD_TYPES = ("color", "xyz")
 UPGRADE = "PBRT version 3's; convert the file by pbrt-v4's --upgrade"
 
@@ -34,7 +32,8 @@ class Lexer:
 
     def __init__(self, path: Path):
         self.path, self.data = path, read_bytes(path)
-        self.at = 0
+        self.at = 0  # behind the blanks before a word that has been looked at
+        self._ahead: bytes | None = None
         self._counted, self._line = 0, 1
 
     @property
@@ -50,18 +49,21 @@ class Lexer:
 
     def peek(self) -> bytes:
         """The next word, or nothing at the end of the file."""
-        self._skip()
-        found = WORD.match(self.data, self.at)
-        if found is None and self.at < len(self.data):
-            raise self.error("a string in quotes does not end on its line")
-        return found.group() if found else b""
+        if self._ahead is None:
+            found = WORD.match(self.data, self.at)
+            word = found.group(1) if found else None
+            self.at = (found.end() if found else self.at) - len(word or b"")
+            if word is None and self.at < len(self.data):
+                raise self.error("a string in quotes does not end on its line")
+            self._ahead = word or b""
+        return self._ahead
 
     def next(self, what: str) -> bytes:
         """Take the next word; `what` says what is missing at the end of the file."""
         word = self.peek()
         if not word:
             raise self.error(f"the file ends where {what} should follow")
-        self.at += len(word)
+        self.at, self._ahead = self.at + len(word), None
         return word
 
     def string(self, what: str) -> str:
@@ -118,7 +120,7 @@ class Lexer:
         if end >= 0 and b"#" not in inside and b'"' not in inside:
             values = _floats(inside)
             if values is not None:
-                self.at = end + 1
+                self.at, self._ahead = end + 1, None
                 return values
         self.next("[")
         words: list[bytes] = []
@@ -143,11 +145,6 @@ class Lexer:
             return float(word)
         except ValueError:
             raise self.error(f"expected a number, found {_shown(word)}") from None
-
-    def _skip(self) -> None:
-        found = BLANKS.match(self.data, self.at)
-        if found is not None:
-            self.at = found.end()
 
 
 def _floats(text: bytes) -> NDArray[np.float64] | None:

@@ -179,7 +179,8 @@ class _Reader(Placing):
         if found.kind not in TARGETS:
             raise UnknownKindError("target", found.kind, TARGETS)
         before = self.state.defaults.get(found.kind, ())
-        self.state.defaults[found.kind] = (*before, *found.params.given)
+        added = {found.kind: (*before, *found.params.given)}
+        self.state.defaults = self.state.defaults | added
 
     def colour_space(self) -> None:
         name = self.lexer.string("a colour space")

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from copy import copy
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -75,7 +76,7 @@ class State:
 
     def copy(self) -> State:
         """A state that changes by itself; definitions are shared."""
-        return replace(self, defaults=dict(self.defaults))
+        return copy(self)
 
     def warn(self, place: Parameters | Parameter, text: str) -> None:
         """Remember what the picture will lack, with the file and line."""
