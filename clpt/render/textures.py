@@ -184,7 +184,7 @@ def _row(kind: str, members: dict[str, Any], tables: Sink) -> tuple[int, np.ndar
 
 
 def _blank(tables: Sink) -> None:
-    tables.append_floats("texels", np.zeros(2))
+    tables.append_floats("texels", np.zeros(4))
     tables.append("images", np.zeros(4, np.uint32))
     _row("spectral_bitmap", {"kind": 0, "width": 1, "height": 1}, tables)
     tables.append("textures", noise.PERMUTATION)
