@@ -123,7 +123,7 @@ def test_files_keep_them(tmp_path):
     np.testing.assert_array_equal(
         mesh.attributes["vertex_color"], COLOURS[:4]
     )  # the fifth is unused
-    np.testing.assert_array_equal(mesh.attributes["face_grey"], GREYS[[0, 2]])
+    np.testing.assert_array_equal(mesh.attributes["face_grey"], GREYS)
     file = next(tmp_path.glob("*.ply"))
     shown = read_mesh(file).meshes[0].material
     assert [t.name for t in textures_in(shown)] == ["vertex_color"]
