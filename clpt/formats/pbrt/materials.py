@@ -98,17 +98,12 @@ def _metal(params: Parameters, state: State, prefix: str) -> dict[str, Any]:
         return {"eta": copper["eta"] if eta is None else eta, "k": copper["k"] if k is None else k}
     if eta is not None or k is not None:
         raise SceneError("give either 'reflectance' or 'eta' and 'k', not both")
-    if not isinstance(reflectance, Texture):
-        return {"eta": 1.0, "k": mapped(reflectance, _extinction)}
-    state.warn(params, "a metal's textured 'reflectance' does not rise at grazing angles")
-    return {"specular_reflectance": reflectance}
+    return {"eta": 1.0, "k": mapped(reflectance, _extinction)}
 
 
 def _damped(metal: dict[str, Any], ior: float, thickness: float) -> dict[str, Any]:
     """A metal under a coat that absorbs, which is a factor on its reflection."""
-    twice = coats.let_through(ior, thickness) ** 2
-    own = metal.get("specular_reflectance", 1.0)
-    return {**metal, "specular_reflectance": _times(own, twice)}
+    return {**metal, "specular_reflectance": coats.let_through(ior, thickness) ** 2}
 
 
 def _extinction(r: Any) -> Any:
