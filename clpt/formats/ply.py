@@ -208,7 +208,7 @@ def _ascii_rows(words: NDArray[np.float64], element: Element) -> tuple[dict[str,
         if len(words) < width * element.count:
             raise short
         rows = words[: width * element.count].reshape(-1, width)
-        return {c.name: rows[:, i] for i, c in enumerate(element.properties)}, rows.size
+        return {c.name: _typed(rows[:, i], c) for i, c in enumerate(element.properties)}, rows.size
     found: dict[str, Any] = {c.name: ([], []) for c in element.properties if c.length}
     at = 0
     for _ in range(element.count):
@@ -228,6 +228,13 @@ def _ascii_rows(words: NDArray[np.float64], element: Element) -> tuple[dict[str,
     none = [np.zeros(0)]
     joined = {k: (np.array(n, np.int64), np.concatenate(v or none)) for k, (n, v) in found.items()}
     return joined, at
+
+
+def _typed(values: NDArray[np.float64], column: Property) -> NDArray[Any]:
+    """Bytes as such: as colours they mean other values than floats."""
+    if column.type != "u1":
+        return values
+    return np.clip(np.nan_to_num(values), 0, 255).astype(np.uint8)
 
 
 def _triangles(tables: dict[str, dict[str, Any]]) -> Triangles:
