@@ -86,6 +86,15 @@ def join(meshes: list[Mesh]) -> Mesh:
     )
 
 
+def has_area(mesh: Mesh) -> bool:
+    """Whether one of its triangles has an area."""
+    for first in range(0, len(mesh.faces), CHUNK):
+        corners = mesh.vertices[mesh.faces[first : first + CHUNK]].astype(np.float64)
+        if np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).any():
+            return True
+    return False
+
+
 def smooth_normals(vertices: NDArray[Any], faces: NDArray[Any]) -> NDArray[np.float32]:
     """Vertex normals (n, 3): those of the faces, weighted by angle (Thuermer, Wuethrich 1998)."""
     corners = vertices[faces].astype(np.float64)
@@ -113,9 +122,10 @@ def checked(
 ) -> dict[str, Any]:
     """Return a mesh's arrays without unused vertices; notes tell what else went.
 
-    Triangles without an area stay, as lowering leaves them out; where there are no others, none is
-    left. attributes: further arrays (n, width), one row a vertex, or a face where face_ begins the
-    name. Raises SceneError for indices out of range and vertices that are not finite.
+    Triangles without an area stay: lowering leaves them out. attributes: further arrays (n, width),
+    one row a vertex, or a face where face_ begins the name.
+
+    Raises SceneError for indices out of range and vertices that are not finite.
     """
     where = name or None
     if len(faces) and (faces.min() < 0 or faces.max() >= len(vertices)):
@@ -124,19 +134,10 @@ def checked(
         raise SceneError(message, file=path, where=where)
     with np.errstate(over="ignore", invalid="ignore"):
         points = np.ascontiguousarray(vertices, np.float32)
-        solid = False
-        for first in range(0, len(faces), CHUNK):
-            corners = points[faces[first : first + CHUNK]].astype(np.float64)
-            finite = np.isfinite(corners).all(axis=(1, 2))
-            if not finite.all():
-                bad = first + int(np.argmin(finite))
-                message = f"triangle {bad} has a vertex that is not a finite number"
-                raise SceneError(message, file=path, where=where)
-            sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-            solid = solid or bool(sides.any())
-    if len(faces) and not solid:
-        notes.append(f"{name or 'mesh'}: left out, since none of its triangles has an area")
-        faces, attributes = faces[:0], _none_of_faces(attributes)
+        finite = np.isfinite(points).all(axis=1)
+        if not finite.all() and not (good := finite[faces].all(axis=1)).all():
+            message = f"triangle {int(np.argmin(good))} has a vertex that is not a finite number"
+            raise SceneError(message, file=path, where=where)
     used = np.zeros(len(points), bool)
     used[faces.reshape(-1)] = True
     arrays: dict[str, Any] = {"vertices": points, "normals": normals, "uvs": uvs}
@@ -153,13 +154,6 @@ def checked(
         arrays["uvs"] = None
     whole = {**arrays, "faces": np.ascontiguousarray(faces, np.uint32)}
     return whole if attributes is None else {**whole, "attributes": own}
-
-
-def _none_of_faces(attributes: Mapping[str, NDArray[Any]] | None) -> dict[str, NDArray[Any]] | None:
-    """Attributes of a mesh whose faces have all gone."""
-    if attributes is None:
-        return None
-    return {k: a[:0] if k.startswith("face_") else a for k, a in attributes.items()}
 
 
 def _open(path: Path, materials: bool) -> trimesh.Scene:

@@ -31,6 +31,8 @@ Z_UP = transforms.rotate([1.0, 0.0, 0.0], 90.0)
 def load(path: Path) -> Scene:
     """Read a bare mesh and put it into the studio, whatever its size and place."""
     file = mesh.read_mesh(path)
+    if not any(mesh.has_area(part) for part in file.meshes):
+        raise SceneError("none of its triangles has an area", file=path)
     up = Z_UP if path.suffix.lower() == ".stl" else np.eye(4)
     scene = show(file.meshes, file=path, up=up)
     scene.warnings = file.warnings

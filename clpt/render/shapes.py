@@ -99,10 +99,11 @@ def triangles(
     Raises SceneError for a mesh that is empty, not finite or inconsistent, or a singular transform.
     """
     vertices, faces, normals, uvs = _in_world(shape)
-    solid = _solid(shape, vertices, faces)
+    solid = _solid(vertices, faces)
     if not solid.all() and warnings is not None:
         count = int(len(solid) - solid.sum())
-        warnings.append(f"{where(shape)}: {count} of {len(solid)} triangles have no area, left out")
+        of = f"{count} of {len(solid)} triangles" if solid.any() else "all triangles"
+        warnings.append(f"{where(shape)}: {of} have no area, left out")
     faces = faces if solid.all() else faces[solid]
     return vertices, np.ascontiguousarray(faces), normals, uvs
 
@@ -122,7 +123,7 @@ def attribute(shape: Shape, name: str) -> Points:
         raise SceneError(message, where=where(shape))
     if not np.isfinite(values).all():
         raise SceneError(f"attribute {name!r} is not finite", where=where(shape))
-    return values[_solid(shape, vertices, faces)] if per_face else values
+    return values[_solid(vertices, faces)] if per_face else values
 
 
 def _in_world(shape: Shape) -> tuple[Points, Faces, Points | None, Points | None]:
@@ -142,12 +143,9 @@ def _in_world(shape: Shape) -> tuple[Points, Faces, Points | None, Points | None
     return vertices, faces, normals, uvs
 
 
-def _solid(shape: Shape, vertices: Points, faces: Faces) -> NDArray[np.bool_]:
+def _solid(vertices: Points, faces: Faces) -> NDArray[np.bool_]:
     """Which faces have a cross product that is not zero in float32."""
-    solid = np.linalg.norm(_crosses(vertices, faces), axis=1) > 0.0
-    if not solid.any():
-        raise SceneError("none of its triangles has an area", where=where(shape))
-    return solid
+    return np.linalg.norm(_crosses(vertices, faces), axis=1) > 0.0
 
 
 def _crosses(vertices: Points, faces: Faces) -> Points:
