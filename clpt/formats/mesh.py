@@ -135,9 +135,10 @@ def checked(
     with np.errstate(over="ignore", invalid="ignore"):
         points = np.ascontiguousarray(vertices, np.float32)
         finite = np.isfinite(points).all(axis=1)
-        if not finite.all() and not (good := finite[faces].all(axis=1)).all():
-            message = f"triangle {int(np.argmin(good))} has a vertex that is not a finite number"
-            raise SceneError(message, file=path, where=where)
+    good = np.take(finite, faces.reshape(-1)).reshape(-1, 3).all(axis=1)
+    if not good.all():
+        message = f"triangle {int(np.argmin(good))} has a vertex that is not a finite number"
+        raise SceneError(message, file=path, where=where)
     used = np.zeros(len(points), bool)
     used[faces.reshape(-1)] = True
     arrays: dict[str, Any] = {"vertices": points, "normals": normals, "uvs": uvs}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from clpt.scene.textures import Bitmap
 WORDS = 11
 INSIDE, ALONG_V, AS_IT_IS, UNSHADED, NORMAL, HEIGHT = (1 << i for i in range(6))
 
-Map = NormalMap | BumpMap
+Map: TypeAlias = NormalMap | BumpMap
 Words = NDArray[np.uint32]
 
 
@@ -43,12 +43,13 @@ class Bend:
 
     def within(self, outer: Map, inside: bool) -> Bend:
         """Return this with one more map. Raises SceneError for a second one of its kind."""
-        name = "normal" if isinstance(outer, NormalMap) else "bump"
-        if getattr(self, name) is not None:
+        if (self.normal if isinstance(outer, NormalMap) else self.bump) is not None:
             raise SceneError(f"a {outer.kind} inside of a {outer.kind} is not supported")
         if (self.normal or self.bump) and self.inside != inside:
             raise SceneError("of two maps, one cannot stand inside and one around a two_sided")
-        return dataclasses.replace(self, **{name: outer, "inside": inside})
+        if isinstance(outer, NormalMap):
+            return dataclasses.replace(self, normal=outer, inside=inside)
+        return dataclasses.replace(self, bump=outer, inside=inside)
 
     @property
     def key(self) -> tuple[int, int, bool]:

@@ -271,7 +271,7 @@ class _Lowering:
         if isinstance(material, mt.TwoSided):
             chosen = material.front if side.front or material.back is None else material.back
             return self._word(chosen, dataclasses.replace(side, inside=True))
-        if isinstance(material, mt.Bent):
+        if isinstance(material, (mt.NormalMap, mt.BumpMap)):
             bend = side.bend.within(material, side.inside)
             return self._word(material.material, dataclasses.replace(side, bend=bend))
         if isinstance(material, mt.Mask):

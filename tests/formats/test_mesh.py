@@ -116,7 +116,6 @@ def test_zero_area_triangles_stay_and_unused_vertices_go(read):
 BAD = {
     "empty.obj": ("", "no triangles|cannot be read"),
     "points.obj": (OBJ, "no triangles"),
-    "flat.obj": (OBJ + "f 1 1 1\n", "no triangles"),
     "index.obj": (OBJ + "f 1 2 9\n", "cannot be read|outside"),
     "nan.ply": (ply(rows="0 0 0\nnan 0 0\n0 1 0"), "not a finite number"),
     "inf.ply": (ply(rows="0 0 0\n1e39 0 0\n0 1 0"), "not a finite number"),
@@ -135,6 +134,12 @@ def test_bad_files_are_one_line(read, name):
     with pytest.raises(SceneError, match=message) as caught:
         read(name, content)
     assert name in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_a_mesh_without_area_is_refused(tmp_path):
+    (tmp_path / "flat.obj").write_text(OBJ + "f 1 1 1\n")
+    with pytest.raises(SceneError, match=r"flat\.obj: none of its triangles has an area"):
+        load(tmp_path / "flat.obj")
 
 
 def test_load_refuses_what_is_not_there(tmp_path):

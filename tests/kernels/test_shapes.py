@@ -108,7 +108,7 @@ def test_samples_follow_the_pdf(name, p):
     mean = wi.mean(axis=1)
     whole = np.linalg.norm(mean) < 0.8
     axis = np.array([0.0, 0.0, 1.0]) if whole else mean / np.linalg.norm(mean)
-    s, t = rs._across(axis)
+    s, t = rs.across(axis)
     frame = np.stack([axis, s, t])
     local = frame @ wi
     z, phi = local[2], np.arctan2(local[1], local[0])
