@@ -23,6 +23,7 @@ FOV = 35.0
 EXACT = 1 << 25  # points of instances to place; of more, boxes are
 CHUNK = 1 << 18  # of them at a time
 MARGIN = 1.05
+BELOW = 1e-3  # radii from what is shown to the ground, so that flat things do not lie in it
 FROM = (0.4, 0.35, 1.0)  # the camera, seen from the middle of the scene, +y up
 KEY_FROM = (-0.8, 1.3, 0.7)  # the key light, likewise
 Z_UP = transforms.rotate([1.0, 0.0, 0.0], 90.0)
@@ -63,7 +64,7 @@ def show(
         lit = [lights.Constant(radiance=RGBIlluminant(0.35, 0.35, 0.35))]
         if camera is None:
             floor, axis = middle.copy(), int(np.argmax(up[:3, 1]))
-            floor[axis] = low[axis]
+            floor[axis] = low[axis] - BELOW * radius
             furniture = [_ground(floor, radius, up), _key(middle, radius, up)]
         else:
             lit.append(_distant_key(up))

@@ -125,6 +125,7 @@ class _Lowering:
         self.bent = any(_any_of(shape.material, mt.Bent) for shape in scene.shapes)
         self.nested: dict[int, int] = {}  # how deep mixtures are, by their words
         self.triangles: list[tuple[np.ndarray, np.ndarray, int]] = []  # vertices, faces, shape
+        self.flat: list[shapes.Flat] = []
         self.owners: list[attributes.Placed] = []
         self.n_vertices = self.n_faces = 0
 
@@ -173,7 +174,7 @@ class _Lowering:
             self.warnings.append(
                 "in rgb mode fluorescent paint has its colour under D65, at most white"
             )
-        self.warnings += tables.finish()
+        self.warnings += [*shapes.told(self.flat), *tables.finish()]
         features = self._features({one.shape.kind for one in analytic}, camera)
         arrays = tables.arrays()
         settings = self._settings(center, radius)
@@ -217,7 +218,7 @@ class _Lowering:
             row["kind"] = 1 + shapes.ANALYTIC.index(shape.kind)
             row["params"] = self.tables.append("geometry", shapes.row(shape))
         else:
-            vertices, faces, normals, uvs = shapes.triangles(shape, self.warnings)
+            vertices, faces, normals, uvs = shapes.triangles(shape, self.flat)
             triangles = vertices, faces, uvs
             row["prim"] = self.n_faces
             row["flags"] |= self._attributes(vertices, normals, uvs)

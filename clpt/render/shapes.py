@@ -5,6 +5,9 @@ A rectangle is both: rays meet its two triangles, light is sampled on it as a wh
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -82,30 +85,50 @@ def virtual_files() -> dict[str, str]:
     }
 
 
+@dataclass(frozen=True)
+class Flat:
+    """How many of a shape's triangles have no area."""
+
+    where: str
+    count: int
+    of: int
+
+
 def where(shape: Shape) -> str:
     """Return how a message names the shape."""
     return f"{shape.kind} {shape.name!r}" if shape.name else shape.kind
 
 
 def triangles(
-    shape: Shape, warnings: list[str] | None = None
+    shape: Shape, flat: list[Flat] | None = None
 ) -> tuple[Points, Faces, Points | None, Points | None]:
     """Return a rectangle, cube or mesh in world space: vertices, faces, normals and uvs.
 
     vertices (n, 3) float32 [m], faces (m, 3) uint32 counter-clockwise seen from the front, normals
-    (n, 3) float32 or None, uvs (n, 2) float32 or None. Triangles without an area are left out; a
-    line about them is appended to `warnings`.
+    (n, 3) float32 or None, uvs (n, 2) float32 or None. Triangles without an area are left out, and
+    counted in `flat`.
 
     Raises SceneError for a mesh that is empty, not finite or inconsistent, or a singular transform.
     """
     vertices, faces, normals, uvs = _in_world(shape)
     solid = _solid(vertices, faces)
-    if not solid.all() and warnings is not None:
-        count = int(len(solid) - solid.sum())
-        of = f"{count} of {len(solid)} triangles" if solid.any() else "all triangles"
-        warnings.append(f"{where(shape)}: {of} have no area, left out")
+    if not solid.all() and flat is not None:
+        flat.append(Flat(where(shape), int(len(solid) - solid.sum()), len(solid)))
     faces = faces if solid.all() else faces[solid]
     return vertices, np.ascontiguousarray(faces), normals, uvs
+
+
+def told(flat: Sequence[Flat]) -> list[str]:
+    """Return one warning about the triangles that were left out, or none."""
+    if not flat:
+        return []
+    head = flat[0]
+    of = "all" if head.count == head.of else f"{head.count} of {head.of}"
+    first = f"{head.where}: {of} triangles have no area, left out"
+    if len(flat) == 1:
+        return [first]
+    total = sum(one.count for one in flat)
+    return [f"{first}; with those of {len(flat) - 1} more shapes {total:,} in all"]
 
 
 def attribute(shape: Shape, name: str) -> Points:
