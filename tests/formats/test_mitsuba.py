@@ -173,8 +173,13 @@ def test_integrators(scene):
     assert moment.integrator.kind == "path"
     assert "second moments" in moment.warnings[0]
     aovs = '<string name="aovs" value="d:depth, n:sh_normal"/>'
-    made = scene(f'<integrator type="aov">{aovs}<integrator type="path"/></integrator>')
-    assert made.integrator.channels == ("depth", "shading_normal")
+    made = scene(f'<integrator type="aov">{aovs}</integrator>')
+    assert made.integrator.channels == ("depth", "shading_normal") and not made.warnings
+    made = scene(f'<integrator type="aov">{aovs}<integrator type="direct"/></integrator>')
+    assert made.integrator.kind == "direct"
+    assert "left out: d:depth, n:sh_normal" in made.warnings[0]
+    for name in ("volpath", "volpathmis"):
+        assert scene(f'<integrator type="{name}"/>').integrator.kind == "path"
 
 
 def test_shapes(scene):
@@ -499,8 +504,9 @@ ERRORS = {
     '<shape type="instance"/>': r":2: <shape .*needs a <shape type=.shapegroup.>",
     '<shape type="shapegroup"><shape type="instance"/></shape>': r":2: <shape type=.instance.>"
     ": cannot stand in a shapegroup",
-    '<emitter type="sunsky"/>': "unknown emitter",
-    '<integrator type="volpath"/>': "unknown integrator",
+    '<emitter type="sky"/>': "unknown emitter",
+    '<emitter type="sunsky"/>': "<emitter type=.sunsky.>: is a plugin of Mitsuba that is not supp",
+    '<integrator type="bdpt"/>': "unknown integrator",
     '<bsdf type="diffuse"><float name="foo" value="1"/></bsdf>': "has no parameter 'foo'",
     '<bsdf type="diffuse"><float name="reflectance" value="x"/></bsdf>': "must be numbers",
     '<bsdf type="diffuse"><float name="reflectance" value="nan"/></bsdf>': "must be finite",
@@ -525,7 +531,7 @@ ERRORS = {
     '<shape type="cube"><transform name="to_world"><skew/></transform></shape>': "<skew>: is no",
     '<shape type="cube"><emitter type="point"/></shape>': "only an area light",
     '<emitter type="area"/>': "must stand in a <shape>",
-    '<emitter type="projector"/>': "field of view",
+    '<emitter type="projector"><float name="fov" value="0"/></emitter>': "field of view",
     '<emitter type="projector"><float name="fov" value="9"/><spectrum name="irradiance" value="2"/>'
     "</emitter>": "a texture or a colour",
     '<emitter type="constant"><rgb name="radiance" value="-1"/></emitter>': "negative",
@@ -533,7 +539,18 @@ ERRORS = {
     '<integrator type="path"><boolean name="hide_emitters" value="1"/></integrator>': "true or",
     '<integrator type="path"><integer name="rr_depth" value="1"/>'
     '<integer name="rr_depth" value="2"/></integrator>': "given twice",
-    '<medium type="homogeneous"/>': "<medium type=.homogeneous.>: is not supported",
+    '<shape type="cube"><medium type="homogeneous" name="interior"/></shape>':
+        "<medium type=.homogeneous.>: is not supported",
+    '<medium type="homogeneous" id="m"/><shape type="cube"><ref name="interior" id="m"/></shape>':
+        "<ref name=.interior.>: is not supported",
+    '<alias id="no" as="a"/>': "no object with the id 'no'",
+    '<bsdf type="null" id="a"/><alias id="a" as="a"/>': "already used",
+    '<shape type="cube"><bsdf type="normalmap"><texture type="checkerboard" name="normalmap"/>'
+    '<bsdf type="diffuse"/></bsdf></shape>': "must be a texture of the type 'bitmap'",
+    '<bsdf type="diffuse"><texture type="volume" name="reflectance"><volume type="gridvolume" '
+    'name="volume"/></texture></bsdf>': "<volume type=.gridvolume.>: only a <volume>",
+    '<bsdf type="roughconductor"><spectrum name="alpha" value="400:0, 500:0.1"/></bsdf>':
+        "must be a number or a texture",
     '<float value="1"/>': "needs the attribute 'name'",
     "<scene>": "broken XML: no element found",
     "text": "stray text",
@@ -595,7 +612,9 @@ def test_shapes_and_film_agree_with_mitsuba(path):
 
 
 def _boxes(scene):
-    return [np.concatenate(studio.shape_bounds(shape)).round(4).tolist() for shape in scene.shapes]
+    return [
+        np.concatenate(studio.world_bounds([shape])).round(4).tolist() for shape in scene.shapes
+    ]
 
 
 def _boxes_of(scene):

@@ -21,6 +21,9 @@ from clpt.scene import Scene, integrators
 
 __all__ = ["load"]
 
+# What may stand in the scene itself for others to refer to; by itself it shows nothing.
+REFERENCED = ("spectrum", "volume", "film", "sampler", "rfilter", "medium", "phase")
+
 
 def load(path: Path, **variables: object) -> Scene:
     """Read a Mitsuba scene; `variables` stand for its `$names`.
@@ -37,6 +40,8 @@ def load(path: Path, **variables: object) -> Scene:
         bsdf(element, context)
     for element in _textures(props):
         texture(element, props)
+    for tag in REFERENCED:
+        props.objects(tag)
     integrator = props.object("integrator")
     seen = _first_sensor(props, context)
     props.finish()

@@ -6,15 +6,15 @@ from collections.abc import Callable
 from typing import Any
 
 from clpt import spectra
-from clpt.errors import UnknownKindError
 from clpt.formats.mitsuba.fluorescence import fluorescent
 from clpt.formats.mitsuba.principled import principled, principled_thin
 from clpt.formats.mitsuba.spectra import coefficient, index, ior, real, reflectance, texture
-from clpt.formats.mitsuba.values import Context, Properties, numbers, placed
+from clpt.formats.mitsuba.values import Context, Properties, numbers, placed, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene import materials
 from clpt.scene.materials import Material
 from clpt.scene.params import params
+from clpt.scene.textures import Bitmap, Texture
 
 Parameters = dict[str, Any]
 SMOOTHEST = 1e-4  # Mitsuba's own floor of a roughness
@@ -27,7 +27,7 @@ def bsdf(element: Element, context: Context) -> Material:
 
 def _bsdf(element: Element, context: Context) -> Material:
     if element.type not in PLUGINS:
-        raise UnknownKindError("bsdf", element.type, PLUGINS, **element.place())
+        raise unknown(element, PLUGINS)
     cls, read = PLUGINS[element.type]
     props = Properties(element, context)
     with placed(element):
@@ -37,7 +37,9 @@ def _bsdf(element: Element, context: Context) -> Material:
 
 
 def _diffuse(props: Properties) -> Parameters:
-    return {"reflectance": reflectance(props, "reflectance", 0.5)}
+    old = "diffuse_reflectance"  # Mitsuba 0.6's name
+    name = old if old in props.named else "reflectance"
+    return {"reflectance": reflectance(props, name, 0.5)}
 
 
 def _phong(props: Properties) -> Parameters:
@@ -185,14 +187,19 @@ def _two_sided(props: Properties) -> Parameters:
 
 
 def _mask(props: Properties) -> Parameters:
-    return {"material": _nested(props, 1, 1)[0], "opacity": real(props, "opacity", 0.5)}
+    return {"material": _nested(props, 1, 1)[0], "opacity": _share(props, "opacity")}
 
 
 def _blend(props: Properties) -> Parameters:
     if "weight" not in props.named:
         raise props.element.error("needs the parameter 'weight'")
     first, second = _nested(props, 2, 2)
-    return {"first": first, "second": second, "weight": real(props, "weight", 0.5)}
+    return {"first": first, "second": second, "weight": _share(props, "weight")}
+
+
+def _share(props: Properties, name: str) -> Any:
+    value = real(props, name, 0.5)
+    return value if isinstance(value, Texture) else min(max(value, 0.0), 1.0)
 
 
 def _bent(props: Properties) -> Parameters:
@@ -208,7 +215,10 @@ def _normal_map(props: Properties) -> Parameters:
     child = props.take("normalmap")
     if child is None:
         raise props.element.error("needs the texture 'normalmap'")
-    return {**given, "map": texture(props.context.resolve(child), props)}
+    made = texture(props.context.resolve(child), props)
+    if not isinstance(made, Bitmap):
+        raise child.error("must be a texture of the type 'bitmap'")
+    return {**given, "map": made}
 
 
 def _bump_map(props: Properties) -> Parameters:

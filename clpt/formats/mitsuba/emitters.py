@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from clpt import images
-from clpt.errors import UnknownKindError
+from clpt.formats.mitsuba.sensors import from_focal_length
 from clpt.formats.mitsuba.spectra import TOP_DOWN, emission, reflectance
-from clpt.formats.mitsuba.values import Context, Properties, placed
+from clpt.formats.mitsuba.values import Context, Properties, placed, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene import lights
 from clpt.scene.lights import Light
@@ -29,7 +29,7 @@ def emitter(element: Element, context: Context) -> Light | None:
             return None
         raise element.error("an area light must stand in a <shape>, or have an id for references")
     if element.type not in PLUGINS:
-        raise UnknownKindError("emitter", element.type, [*PLUGINS, *ON_SHAPES], **element.place())
+        raise unknown(element, [*PLUGINS, *ON_SHAPES])
     return _make(element, context, *PLUGINS[element.type])
 
 
@@ -85,8 +85,12 @@ def _spot(props: Properties) -> Parameters:
 
 def _projector(props: Properties) -> Parameters:
     """Mitsuba's irradiance is taken times pi; an image lies there with its top row at v = 0."""
-    axis = props.text("fov_axis", "x", ("x", "y", "diagonal", "smaller", "larger"))
-    fov, scale = props.number("fov", 0.0), props.number("scale", 1.0)
+    if "fov" in props.named:
+        axis = props.text("fov_axis", "x", ("x", "y", "diagonal", "smaller", "larger"))
+        fov = props.number("fov", 0.0)
+    else:
+        fov, axis = from_focal_length(props), "diagonal"
+    scale = props.number("scale", 1.0)
     if not 0.0 < fov < 179.0:
         raise props.element.error("the field of view 'fov' must lie between 0 and 179")
     if scale < 0.0:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from clpt.errors import UnknownKindError
-from clpt.formats.mitsuba.values import Context, Properties, placed
+from clpt.formats.mitsuba.values import Context, Properties, placed, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene import cameras, integrators
 from clpt.scene.integrators import Film, Filter, Integrator, Sampler
@@ -46,11 +46,13 @@ class Sensor:
 def sensor(element: Element, context: Context) -> Sensor:
     """Make the camera, film and sampler that a <sensor> describes."""
     if element.type not in CAMERAS:
-        raise UnknownKindError("sensor", element.type, CAMERAS, **element.place())
+        raise unknown(element, CAMERAS)
     props = Properties(element, context)
     film = default_film() if (child := props.object("film")) is None else _film(child, context)
     sampler, spp, seed = _sampler(props.object("sampler"), context)
     props.ignore("shutter_open", "shutter_close")
+    if element.type != "thinlens":
+        props.ignore("focus_distance")
     with placed(element):
         camera = CAMERAS[element.type](props, film)
     props.finish()
@@ -135,7 +137,7 @@ def _field_of_view(props: Properties, film: Film) -> tuple[float, str]:
         props.ignore("focal_length")
         fov = props.number("fov", 0.0)
     else:
-        fov, axis = _from_focal_length(props), "diagonal"
+        fov, axis = from_focal_length(props), "diagonal"
     if not 0.0 < fov < 180.0:
         raise props.element.error(f"the field of view must lie between 0 and 180, not {fov:g}")
     if axis == "diagonal":
@@ -144,7 +146,8 @@ def _field_of_view(props: Properties, film: Film) -> tuple[float, str]:
     return fov, axis
 
 
-def _from_focal_length(props: Properties) -> float:
+def from_focal_length(props: Properties) -> float:
+    """Take a focal length of 35 mm film, and return the angle along its diagonal [degrees]."""
     text = props.text("focal_length", "50mm")
     try:
         length = float(text.removesuffix("mm"))
@@ -157,10 +160,11 @@ def _from_focal_length(props: Properties) -> float:
 
 def _film(element: Element, context: Context) -> Film:
     if element.type not in FILMS:
-        raise UnknownKindError("film", element.type, FILMS, **element.place())
+        raise unknown(element, FILMS)
     props = Properties(element, context)
     # How a file is stored is decided when it is written.
     props.ignore("file_format", "pixel_format", "component_format", "sample_border", "compensate")
+    props.ignore("banner")
     child = props.object("rfilter")
     width, height = props.integer("width", 768, 1), props.integer("height", 576, 1)
     with placed(element):
@@ -209,7 +213,7 @@ def _filter(element: Element, context: Context) -> Filter:
         "lanczos": lambda: _lanczos(float(props.integer("lobes", 3, 1))),
     }
     if element.type not in makers:
-        raise UnknownKindError("rfilter", element.type, makers, **element.place())
+        raise unknown(element, makers)
     with placed(element):
         made = makers[element.type]()
     props.finish()
@@ -233,10 +237,10 @@ def _sampler(element: Element | None, context: Context) -> tuple[Sampler, int, i
     if element is None:
         return integrators.Independent(), 4, 0
     if element.type not in SAMPLERS:
-        raise UnknownKindError("sampler", element.type, SAMPLERS, **element.place())
+        raise unknown(element, SAMPLERS)
     props = Properties(element, context)
     spp, seed = props.integer("sample_count", 4, 1), props.integer("seed", 0)
-    props.ignore("jitter")
+    props.ignore("jitter", "strength")
     props.finish()
     independent = element.type == "independent"
     return integrators.Independent() if independent else integrators.Sobol(), spp, seed
@@ -245,8 +249,9 @@ def _sampler(element: Element | None, context: Context) -> tuple[Sampler, int, i
 def integrator(element: Element, context: Context) -> Integrator:
     """Make the integrator that an <integrator> describes."""
     if element.type not in INTEGRATORS:
-        raise UnknownKindError("integrator", element.type, INTEGRATORS, **element.place())
+        raise unknown(element, INTEGRATORS)
     props = Properties(element, context)
+    props.ignore("block_size", "samples_per_pass", "timeout")
     with placed(element):
         made = INTEGRATORS[element.type](props)
     props.finish()
@@ -271,7 +276,6 @@ def _direct(props: Properties) -> Integrator:
 
 
 def _particle_tracer(props: Properties) -> Integrator:
-    props.ignore("samples_per_pass")
     return integrators.ParticleTracer(
         max_depth=props.integer("max_depth", -1, -1),
         rr_depth=props.integer("rr_depth", 5, 1),
@@ -279,12 +283,22 @@ def _particle_tracer(props: Properties) -> Integrator:
     )
 
 
+def _volume_path(props: Properties) -> Integrator:
+    """Without media, which are refused where they are used, this is the path integrator."""
+    props.ignore("use_spectral_mis")
+    return _path(props)
+
+
 def _aov(props: Properties) -> Integrator:
-    for nested in props.objects("integrator"):
-        integrator(nested, props.context)
-        props.context.warn(nested, "only the values around it are rendered")
+    """What is nested makes the picture, as in Mitsuba; without it the values are rendered."""
+    nested = props.object("integrator")
+    names = props.text("aovs", "")
+    if nested is not None:
+        if names.strip():
+            props.context.warn(props.element, f"its values are left out: {names[:80]}")
+        return integrator(nested, props.context)
     channels = []
-    for entry in props.text("aovs", "").split(","):
+    for entry in names.split(","):
         kind = entry.strip().rpartition(":")[2]
         if kind not in CHANNELS:
             raise UnknownKindError("aov", kind, CHANNELS, **props.element.place())
@@ -306,4 +320,6 @@ INTEGRATORS: dict[str, Callable[[Properties], Integrator]] = {
     "ptracer": _particle_tracer,
     "aov": _aov,
     "moment": _moment,
+    "volpath": _volume_path,
+    "volpathmis": _volume_path,
 }

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from clpt import transforms
-from clpt.errors import SceneError, UnknownKindError
+from clpt.errors import SceneError
 from clpt.formats import mesh
 from clpt.formats.mitsuba import serialized
 from clpt.formats.mitsuba.bsdfs import bsdf
 from clpt.formats.mitsuba.emitters import area
-from clpt.formats.mitsuba.values import Context, Properties, placed
+from clpt.formats.mitsuba.values import Context, Properties, placed, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene import shapes
 from clpt.scene.materials import Diffuse
@@ -23,13 +23,20 @@ Parameters = dict[str, Any]
 
 
 def shapes_of(elements: Iterable[Element], context: Context) -> list[Shape]:
-    """Make what a scene's <shape> elements describe; a shapegroup is only looked at."""
-    made = []
+    """Make what a scene's <shape> elements describe; a shapegroup is only looked at.
+
+    What stands in a <shape type="merge"> is as if it stood beside it.
+    """
+    made: list[Shape] = []
     for element in elements:
         if element.type == "shapegroup":
             _group(element, context)
         elif element.type == "instance":
             made.append(_instance(element, context))
+        elif element.type == "merge":
+            props = Properties(element, context)
+            made += shapes_of(props.objects("shape"), context)
+            props.finish()
         else:
             made.append(shape(element, context))
     return made
@@ -38,10 +45,10 @@ def shapes_of(elements: Iterable[Element], context: Context) -> list[Shape]:
 def shape(element: Element, context: Context) -> Shape:
     """Make the shape that a <shape> describes, which is no group and no instance."""
     if element.type not in PLUGINS:
-        known = (*PLUGINS, "shapegroup", "instance")
-        raise UnknownKindError("shape", element.type, known, **element.place())
+        raise unknown(element, (*PLUGINS, "shapegroup", "instance", "merge"))
     cls, read = PLUGINS[element.type]
     props = Properties(element, context)
+    props.ignore("silhouette_sampling_weight")
     material, emitter = props.object("bsdf"), props.object("emitter")
     parameters: Parameters = {
         "material": _plain(emitter) if material is None else bsdf(material, context),

@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 
 from clpt import spectra
-from clpt.errors import UnknownKindError
 from clpt.formats.colour import colour
-from clpt.formats.mitsuba.values import Properties, number, numbers, placed
+from clpt.formats.mitsuba.values import Context, Properties, number, numbers, placed, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene.textures import ATTRIBUTES, Bitmap, Checkerboard, MeshAttribute, Product, Texture
 from clpt.spectra import (
@@ -25,11 +24,13 @@ from clpt.spectra import (
     Constant,
     Lines,
     RGBIlluminant,
+    RGBUnbounded,
     Sellmeier,
     Spectrum,
     Tabulated,
 )
 
+LUMINANCE = (0.212671, 0.715160, 0.072169)  # of Rec. 709: what Mitsuba makes one number of
 TOP_DOWN = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
 
 
@@ -79,9 +80,14 @@ def real(props: Properties, name: str, default: float) -> float | Texture:
     if child is None:
         return default
     target = props.context.resolve(child)
-    if target.tag != "texture":
-        return number(target)
-    made = texture(target, props)
+    with placed(target):
+        made = _made(target, "factor", props, name)
+    if isinstance(made, Constant):
+        return made.value
+    if isinstance(made, RGBUnbounded):
+        return float(np.dot(LUMINANCE, (made.r, made.g, made.b)))
+    if not isinstance(made, (float, Texture)):
+        raise target.error("must be a number or a texture")
     if isinstance(made, Checkerboard):  # whose colours Mitsuba swaps where it asks for a number
         return replace(made, color0=made.color1, color1=made.color0)
     return made
@@ -92,10 +98,32 @@ def _take(props: Properties, name: str, role: str, default: Any) -> Any:
     if child is None:
         return default
     target = props.context.resolve(child)
-    if target.tag == "texture":
-        return texture(target, props)
     with placed(target):
-        return _spectrum(target, role, props, name)
+        return _made(target, role, props, name)
+
+
+def _made(element: Element, role: str, props: Properties, name: str) -> Any:
+    """Make a colour, a spectrum or a texture; to Mitsuba's plugins the last two are one kind."""
+    if element.type == "volume":
+        return _volume(element, role, props.context)
+    if element.type in TEXTURES or (element.tag == "texture" and element.type not in PLUGINS):
+        return texture(element, props)
+    return _spectrum(element, role, props, name)
+
+
+def _volume(element: Element, role: str, context: Context) -> Any:
+    """Make what a volume holds that is the same everywhere."""
+    outer = Properties(element, context)
+    child = outer.take("volume")
+    outer.finish()
+    volume = element if child is None else context.resolve(child)
+    if volume.type != "constvolume":
+        raise volume.error("only a <volume> of the type 'constvolume' is supported")
+    props = Properties(volume, context)
+    props.placement()
+    value = _take(props, "value", role, 1.0)
+    props.finish()
+    return value
 
 
 def _spectrum(child: Element, role: str, props: Properties, name: str) -> Any:
@@ -104,10 +132,10 @@ def _spectrum(child: Element, role: str, props: Properties, name: str) -> Any:
         return colour(role, [value] * 3) if role == "emission" else value
     if child.tag in ("rgb", "srgb"):
         return colour(role, _colour(child))
-    if child.tag != "spectrum":
+    if child.tag not in ("spectrum", "texture"):
         raise child.error("must be a number, a colour, a spectrum or a texture")
     if child.type:
-        return _plugin(child, props)
+        return _plugin(child, role, props)
     outside: Any = "hold" if role in ("index", "coefficient") else "zero"
     if "filename" in child.attributes:
         path = props.context.document.find_file(child, child.attributes["filename"])
@@ -171,10 +199,14 @@ def _d65(props: Properties) -> Spectrum:
 
 
 def _srgb(props: Properties) -> Spectrum:
+    return RGBUnbounded(*_needed_colour(props))
+
+
+def _needed_colour(props: Properties) -> list[float]:
     child = props.take("color")
     if child is None:
         raise props.element.error("needs the parameter 'color'")
-    return colour("index", _colour(child))
+    return _colour(child)
 
 
 def _irregular(props: Properties) -> Spectrum:
@@ -239,11 +271,12 @@ PLUGINS: dict[str, Callable[[Properties], Spectrum]] = {
 }
 
 
-def _plugin(child: Element, outer: Properties) -> Spectrum:
+def _plugin(child: Element, role: str, outer: Properties) -> Any:
     if child.type not in PLUGINS:
-        raise UnknownKindError("spectrum", child.type, PLUGINS, **child.place())
+        raise unknown(child, PLUGINS)
     props = Properties(child, outer.context)
-    made = PLUGINS[child.type](props)
+    bounded = child.type == "srgb" and role == "reflectance"
+    made = tuple(_needed_colour(props)) if bounded else PLUGINS[child.type](props)
     props.finish()
     return made
 
@@ -254,16 +287,11 @@ def texture(element: Element, outer: Properties) -> Texture:
 
 
 def _texture(element: Element, outer: Properties) -> Texture:
+    if element.type not in TEXTURES:
+        raise unknown(element, TEXTURES)
     props = Properties(element, outer.context)
-    makers: dict[str, Callable[[Properties], Any]] = {
-        "bitmap": _bitmap,
-        "checkerboard": _checkerboard,
-        "mesh_attribute": _mesh_attribute,
-    }
-    if element.type not in makers:
-        raise UnknownKindError("texture", element.type, makers, **element.place())
     with placed(element):
-        made = makers[element.type](props)
+        made = TEXTURES[element.type](props)
     props.finish()
     return made
 
@@ -299,5 +327,19 @@ def _mesh_attribute(props: Properties) -> Texture:
 
 def _to_uv(props: Properties) -> np.ndarray:
     """Take a uv transform, (3, 3): what the 4x4 matrix does to (u, v, 0, 1)."""
-    matrix = props.matrix("to_uv")
-    return matrix[np.ix_([0, 1, 3], [0, 1, 3])]
+    if "to_uv" in props.named:
+        matrix = props.matrix("to_uv")
+        return matrix[np.ix_([0, 1, 3], [0, 1, 3])]
+    # Mitsuba 0.6's, in the order in which Mitsuba 3 reads these.
+    offsets = [props.number(name, 0.0) for name in ("uoffset", "voffset")]
+    scales = [props.number(name, 1.0) for name in ("uscale", "vscale")]
+    uv = np.eye(3)
+    uv[:2, 2], uv[0, 0], uv[1, 1] = np.multiply(scales, offsets), *scales
+    return uv
+
+
+TEXTURES: dict[str, Callable[[Properties], Any]] = {
+    "bitmap": _bitmap,
+    "checkerboard": _checkerboard,
+    "mesh_attribute": _mesh_attribute,
+}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from clpt import transforms
-from clpt.errors import SceneError, UnusedParameterError
+from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
 from clpt.formats.mitsuba.xml import Document, Element
 
 VALUES = {
@@ -21,7 +21,13 @@ VALUES = {
 }  # fmt: skip
 OBJECTS = {
     "integrator", "sensor", "sampler", "film", "rfilter", "bsdf", "texture", "emitter", "shape",
-    "ref",
+    "volume", "medium", "phase", "ref",
+}  # fmt: skip
+UNSUPPORTED = {
+    "measured", "measured_polarized", "polarizer", "retarder", "circular", "pplastic",
+    "sdfgrid", "ellipsoids", "ellipsoidsmesh", "sunsky", "timed_sunsky",
+    "distant", "irradiancemeter", "radiancemeter", "batch", "specfilm",
+    "depth", "stokes", "rawconstant",
 }  # fmt: skip
 SEPARATOR = re.compile(r"[\s,]+")
 LARGEST_INTEGER = 2**31 - 1
@@ -48,15 +54,18 @@ class Context:
         self.ids: dict[str, Element] = {}
         self._made: dict[int, Any] = {}
         for element in document.root.walk():
-            name = element.attributes.get("id")
-            if name is not None and element.tag not in ("ref", "alias"):
+            name = element.attributes.get("as" if element.tag == "alias" else "id")
+            if name is not None and element.tag != "ref":
                 if name in self.ids:
                     raise element.error(f"the id {name!r} is already used in this scene")
-                self.ids[name] = element
+                self.ids[name] = self.resolve(element)
 
     def resolve(self, element: Element) -> Element:
-        """Follow a <ref> to the object that it names; anything else is returned as it is."""
-        if element.tag != "ref":
+        """Follow a <ref> to the object that it names; anything else is returned as it is.
+
+        An <alias> names one too, which stands before it.
+        """
+        if element.tag not in ("ref", "alias"):
             return element
         name = element.attribute("id")
         if name not in self.ids:
@@ -87,13 +96,15 @@ class Properties:
         self.nested: list[Element] = []
         self.asked: list[str] = []
         for child in element.children:
+            if child.tag == "alias":
+                continue
             if child.tag not in VALUES and child.tag not in OBJECTS:
                 raise child.error("is not supported")
-            if not child.name and child.tag in VALUES:
+            if not child.name and child.tag in VALUES and not child.type:
                 raise child.error("needs the attribute 'name'")
             if child.name in self.named:
                 raise child.error(f"{child.name!r} is given twice")
-            if child.name and (child.tag in VALUES or child.tag in ("texture", "ref")):
+            if child.name and (child.tag in VALUES or child.tag in ("texture", "volume", "ref")):
                 self.named[child.name] = child
             else:
                 self.nested.append(child)
@@ -157,7 +168,10 @@ class Properties:
             return default
         self._expect(child, "string")
         value = child.attribute("value")
-        if choices and value not in choices:
+        if not choices:
+            return value
+        value = value.lower()
+        if value not in choices:
             raise child.error(f"{value[:40]!r} is none of {', '.join(choices)}")
         return value
 
@@ -207,7 +221,10 @@ class Properties:
 
     def finish(self) -> None:
         """Raise UnusedParameterError or SceneError for what nothing asked for."""
-        label = f"{self.element.tag} {self.element.type!r}"
+        label = f"{self.element.tag} {self.element.type!r}".replace(" ''", "")
+        for child in (*self.named.values(), *self.nested):
+            if self.context.resolve(child).tag in ("medium", "phase"):
+                raise child.error("is not supported: clpt has no participating media")
         for name, child in self.named.items():
             raise UnusedParameterError(label, name, set(self.asked), **child.place())
         for child in self.nested:
@@ -217,6 +234,13 @@ class Properties:
     def _expect(self, child: Element, tag: str) -> None:
         if child.tag != tag:
             raise child.error(f"must be a <{tag}>")
+
+
+def unknown(element: Element, known: Iterable[str]) -> SceneError:
+    """Return the error for a plugin that is none of the `known` ones."""
+    if element.type in UNSUPPORTED:
+        return element.error("is a plugin of Mitsuba that is not supported")
+    return UnknownKindError(element.tag, element.type, known, **element.place())
 
 
 def number(child: Element) -> float:
@@ -230,7 +254,7 @@ def numbers(child: Element, attribute: str, count: int = 0) -> list[float]:
     """Return the finite numbers in an attribute, `count` of them unless that is 0."""
     text = child.attribute(attribute)
     try:
-        values = [float(part) for part in SEPARATOR.split(text.strip())]
+        values = [float(part) for part in SEPARATOR.split(text) if part]
     except ValueError:
         raise child.error(f"{attribute} must be numbers, not {text[:40]!r}") from None
     if not all(math.isfinite(value) for value in values):
@@ -267,8 +291,8 @@ def transform(element: Element) -> transforms.Matrix:
 
 def _look_at(step: Element) -> transforms.Matrix:
     origin, target = numbers(step, "origin", 3), numbers(step, "target", 3)
-    if "up" in step.attributes:
-        return transforms.look_at(origin, target, numbers(step, "up", 3))
+    if "up" in step.attributes and any(above := numbers(step, "up", 3)):
+        return transforms.look_at(origin, target, above)
     x, y, z = np.subtract(target, origin) / max(math.dist(target, origin), 1e-30)
     sign = math.copysign(1.0, z)  # any direction across will do: that of Duff et al. 2017
     up = [1.0 - x * x / (1.0 + abs(z)), -x * y / (1.0 + abs(z)), -sign * x]

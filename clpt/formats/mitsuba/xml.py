@@ -17,7 +17,7 @@ from clpt.errors import SceneError
 
 MAX_NESTING = 64
 MAX_INCLUDES = 16
-VARIABLE = re.compile(r"\$(?:\{(\w+)\}|(\w+))")
+VARIABLE = re.compile(r"\\\$|\$(?:\{(\w+)\}|(\w*))")
 # Before Mitsuba 2, names were written in camel case.
 HUMP = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
 RENAMED = {"lookAt": "lookat"}
@@ -35,8 +35,8 @@ class Element:
 
     @property
     def type(self) -> str:
-        """The plugin's name, or ""."""
-        return self.attributes.get("type", "")
+        """The plugin's name in lower case, or ""; some files write it with a capital."""
+        return self.attributes.get("type", "").lower()
 
     @property
     def name(self) -> str:
@@ -71,13 +71,16 @@ class Element:
 
 @dataclass
 class Document:
-    """An expanded scene file: its root, and the folders in which file names are looked up."""
+    """An expanded scene file: its root, and the folders of file names: the scene's, its <path>s."""
 
     root: Element
     folders: list[Path]
 
     def find_file(self, element: Element, name: str) -> Path:
-        """Resolve a file name that `element` gives. Raises SceneError where there is none."""
+        """Resolve a file name that `element` gives: <path>s come first, the last one before all.
+
+        Raises SceneError where there is no such file.
+        """
         return _find(element, name, self.folders)
 
 
@@ -101,7 +104,7 @@ def parse(path: Path, variables: Mapping[str, object]) -> Document:
 
 
 def _find(element: Element, name: str, folders: list[Path]) -> Path:
-    for folder in [element.file.parent, *folders]:
+    for folder in [*folders[:0:-1], element.file.parent, folders[0]]:
         candidate = folder / name
         try:
             if candidate.is_file():
@@ -175,14 +178,22 @@ class _Expander:
 
     def substitute(self, element: Element, text: str) -> str:
         def value(match: re.Match) -> str:
-            name = match[1] or match[2]
+            if match[0] == "\\$":
+                return "$"
+            name = match[1] or self.prefix(match[2])
             if name not in self.values:
+                name = match[1] or match[2]
                 hint = f"give it by -D {name}=VALUE"
                 raise element.error(f"the variable ${name} is not defined; {hint}")
             self.used.add(name)
-            return self.values[name]
+            return self.values[name] + ("" if match[1] else match[2][len(name) :])
 
         return VARIABLE.sub(value, text) if "$" in text else text
+
+    def prefix(self, word: str) -> str:
+        """The longest variable that a word begins with, as Mitsuba finds them; or ""."""
+        ends = range(len(word), 0, -1)
+        return next((word[:end] for end in ends if word[:end] in self.values), "")
 
     def define(self, element: Element) -> None:
         name = element.attribute("name")
@@ -204,6 +215,8 @@ class _Expander:
         path = _find(element, element.attribute("filename"), self.folders)
         root = _read(path)
         holder = root if root.tag == "scene" else Element("", {}, path, 0, [root])
+        if holder is not root and "name" in element.attributes:
+            root.attributes["name"] = element.attributes["name"]
         self.expand(holder, depth)
         return holder.children
 

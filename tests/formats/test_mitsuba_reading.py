@@ -1,0 +1,191 @@
+"""Mitsuba's XML as Mitsuba reads it: variables, paths, references, old names, what may stand where.
+
+What is expected here is what Mitsuba 3.9.1 made of the same lines.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from clpt import images
+from clpt.formats import load
+from clpt.spectra import RGB, Constant
+
+
+@pytest.fixture
+def read(tmp_path):
+    """Load what stands inside <scene>."""
+
+    def of(body: str, **variables):
+        path = tmp_path / "scene.xml"
+        sensor = "" if "<sensor" in body else '<sensor type="perspective"/>'
+        path.write_text(f'<scene version="3.0.0">{body}{sensor}</scene>', "utf-8")
+        return load(path, **variables)
+
+    return of
+
+
+@pytest.fixture
+def material(read):
+    def of(bsdf: str, before: str = ""):
+        return read(f'{before}<shape type="cube">{bsdf}</shape>').shapes[0].material
+
+    return of
+
+
+def diffuse(inner: str) -> str:
+    return f'<bsdf type="diffuse">{inner}</bsdf>'
+
+
+def number(tag: str, name: str, value: object) -> str:
+    return f'<{tag} name="{name}" value="{value}"/>'
+
+
+def test_the_longest_variable_is_meant(read):
+    defaults = '<default name="r" value="2"/><default name="rad" value="3"/>'
+    for text, radius in (("$r", 2), ("$rad", 3), ("$r5", 25), ("${r}4", 24), ("$rad$r", 32)):
+        made = read(f'{defaults}<shape type="sphere">{number("float", "radius", text)}</shape>')
+        assert made.shapes[0].radius == radius
+    made = read(rf'{defaults}<shape type="cube" id="\$r"/>')
+    assert made.shapes[0].name == "$r"
+
+
+def test_paths_stand_before_the_scenes_folder(read, tmp_path):
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+    places = [tmp_path, tmp_path / "a", tmp_path / "b"]
+    for place in places:
+        images.write(place / "x.pfm", np.zeros((1, 1, 3), np.float32))
+    shape = '<shape type="cube"><bsdf type="diffuse"><texture type="bitmap" name="reflectance">'
+    shape += '<string name="filename" value="x.pfm"/></texture></bsdf></shape>'
+    for count in range(3):
+        paths = "".join(f'<path value="{name}"/>' for name in ("a", "b")[:count])
+        image = read(paths + shape).shapes[0].material.reflectance.image
+        assert image.parent == places[count]
+
+
+def test_include_of_one_object_takes_the_name(read, tmp_path):
+    (tmp_path / "r.xml").write_text(
+        '<texture version="3.0.0" type="checkerboard"><float name="color0" value="0.7"/></texture>'
+    )
+    made = read(
+        '<shape type="cube"><bsdf type="diffuse"><include name="reflectance" filename="r.xml"/>'
+        "</bsdf></shape>"
+    )
+    assert made.shapes[0].material.reflectance.color0 == Constant(0.7)
+
+
+def test_alias(read):
+    made = read(
+        '<bsdf type="plastic" id="a"/><alias id="a" as="b"/><alias id="b" as="c"/>'
+        '<shape type="cube"><ref id="b"/></shape><shape type="cube"><ref id="c"/></shape>'
+    )
+    first, second = made.shapes
+    assert first.material.kind == "plastic" and first.material is second.material
+
+
+def test_what_others_refer_to_may_stand_in_the_scene(read):
+    made = read(
+        '<film type="hdrfilm" id="f"><integer name="width" value="9"/><ref id="r"/></film>'
+        '<sampler type="independent" id="s"><integer name="sample_count" value="7"/></sampler>'
+        '<rfilter type="tent" id="r"/><medium type="homogeneous" id="m"/><phase type="hg"/>'
+        '<spectrum type="uniform" id="u"><float name="value" value="0.3"/></spectrum>'
+        '<shape type="cube"><bsdf type="diffuse"><ref name="reflectance" id="u"/></bsdf></shape>'
+        '<sensor type="perspective"><ref id="f"/><ref id="s"/></sensor>'
+    )
+    assert (made.film.width, made.film.filter.kind, made.spp) == (9, "tent", 7)
+    assert made.shapes[0].material.reflectance == Constant(0.3)
+
+
+def test_old_and_capital_names(read):
+    made = read(
+        '<sensor type="Perspective"><film type="hdrfilm"><boolean name="banner" value="false"/>'
+        '</film><sampler type="independent"><integer name="sampleCount" value="3"/></sampler>'
+        '</sensor><shape type="Sphere"><bsdf type="diffuse"><texture type="checkerboard" '
+        'name="diffuseReflectance"><float name="uscale" value="3"/><float name="voffset" '
+        'value="0.5"/><float name="vscale" value="4"/></texture></bsdf></shape>'
+        '<shape type="rectangle"><bsdf type="roughplastic"><string name="distribution" '
+        'value="GGX"/><float name="intIOR" value="1.4"/></bsdf></shape>'
+    )
+    assert made.spp == 3
+    # As Mitsuba 3.9 upgrades them: the offset comes before the scale.
+    uv = made.shapes[0].material.reflectance.to_uv
+    assert np.allclose(uv, [[3, 0, 0], [0, 4, 2], [0, 0, 1]])
+    assert made.shapes[1].material.distribution == "ggx"
+
+
+def test_plugins_of_spectra_and_of_textures_are_one_kind(material):
+    inner = number("float", "value", 0.4)
+    for tag in ("spectrum", "texture"):
+        made = material(diffuse(f'<{tag} type="uniform" name="reflectance">{inner}</{tag}>'))
+        assert made.reflectance == Constant(0.4)
+        text = f'<{tag} type="checkerboard" name="reflectance"/>'
+        assert material(diffuse(text)).reflectance.kind == "checkerboard"
+        colour = number("rgb", "color", "0.1 0.2 0.3")
+        made = material(diffuse(f'<{tag} type="srgb" name="reflectance">{colour}</{tag}>'))
+        assert made.reflectance == RGB(0.1, 0.2, 0.3)
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [
+        (number("float", "value", 0.3), Constant(0.3)),
+        (number("rgb", "value", "0.1, 0.2, 0.3"), RGB(0.1, 0.2, 0.3)),
+    ],
+)
+def test_constant_volumes(material, value, expected):
+    volume = f'<volume type="constvolume" name="volume">{value}</volume>'
+    made = material(diffuse(f'<texture type="volume" name="reflectance">{volume}</texture>'))
+    assert made.reflectance == expected
+
+
+def test_colours_where_numbers_are_asked_for(material):
+    made = material(f'<bsdf type="roughconductor">{number("rgb", "alpha", "0.1 0.2 0.5")}</bsdf>')
+    assert made.alpha_u == pytest.approx(0.2126 * 0.1 + 0.7152 * 0.2 + 0.0722 * 0.5, rel=1e-3)
+    made = material(f'<bsdf type="roughconductor">{number("spectrum", "alpha", 0.3)}</bsdf>')
+    assert made.alpha_u == 0.3
+
+
+def test_shares_are_clamped(material):
+    for given, share in ((2, 1.0), (-1, 0.0)):
+        opacity = number("float", "opacity", given)
+        made = material(f'<bsdf type="mask"><bsdf type="diffuse"/>{opacity}</bsdf>')
+        assert made.opacity == share
+
+
+def test_commas_at_the_end(material):
+    made = material(diffuse(number("rgb", "reflectance", " 0.1, 0.2,0.3, ")))
+    assert made.reflectance == RGB(0.1, 0.2, 0.3)
+
+
+def test_look_at_with_up_of_no_length(read):
+    step = '<lookat origin="0 2 0" target="0 0 0" up="0 0 0"/>'
+    transform = f'<transform name="to_world">{step}</transform>'
+    made = read(f'<sensor type="perspective">{transform}</sensor><shape type="cube"/>')
+    assert np.allclose(made.camera.to_world[:3, 2], [0, -1, 0])
+
+
+def test_projector_of_a_focal_length(read):
+    shown = number("rgb", "irradiance", 2)
+    light = read(f'<emitter type="projector">{shown}</emitter>').lights[0]
+    # 50 mm of 35 mm film, along the diagonal of a square.
+    half = np.hypot(36, 24) / 100 / np.sqrt(2)
+    assert light.fov == pytest.approx(2 * np.degrees(np.arctan(half)))
+    assert light.irradiance.r == pytest.approx(2 * np.pi)
+
+
+def test_merged_shapes(read):
+    made = read('<shape type="merge"><shape type="cube"/><shape type="sphere"/></shape>')
+    assert [shape.kind for shape in made.shapes] == ["cube", "sphere"]
+
+
+def test_what_changes_no_picture_is_passed_over(read):
+    made = read(
+        '<integrator type="path"><integer name="samples_per_pass" value="4"/>'
+        '<float name="timeout" value="1"/><integer name="block_size" value="8"/></integrator>'
+        '<sensor type="orthographic"><float name="focus_distance" value="3"/>'
+        '<sampler type="orthogonal"><integer name="strength" value="2"/></sampler></sensor>'
+        '<shape type="disk"><float name="silhouette_sampling_weight" value="1"/></shape>'
+    )
+    assert not made.warnings
