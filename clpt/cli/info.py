@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ..formats import load, studio
+from ..render.shapes import triangles
 from ..scene import Scene, materials, shapes, textures
 from ..scene.params import Kind
 
@@ -107,6 +108,8 @@ def _placed_triangles(
 def _triangles(shape: shapes.Shape) -> int:
     if isinstance(shape, shapes.Mesh):
         return len(shape.faces)
+    if isinstance(shape, shapes.Curves):
+        return len(triangles(shape)[1])
     return FLAT_TRIANGLES.get(type(shape), 0)
 
 

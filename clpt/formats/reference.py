@@ -167,6 +167,9 @@ def _table(cls: type[Kind]) -> str:
     rows = ["| parameter | accepts | default | meaning |", "| --- | --- | --- | --- |"]
     if issubclass(cls, KINDS["shape"][0]):
         rows.append("| `file` | name of a mesh file | - | in place of the arrays below |")
+    if "points" in declared:
+        rows_of = "lines of x y z radius, blank ones between strands"
+        rows.append(f"| `file` | name of a text file | - | {rows_of}, in place of both below |")
     if "group" in declared:
         several = "matrices (n, 3, 4), an instance for each"
         rows.append(f"| `file` | name of a .npy file | - | {several} |")
@@ -207,6 +210,8 @@ def _host(name: str, value: Any) -> str:
         "back": "material",
         "crop": "four whole numbers",
         "map": "`bitmap` texture",
+        "points": "rows of 4 numbers",
+        "lengths": "whole numbers",
         "group": "a name in `groups`",
         "sensor": '`cie1931`, `cie1964`, `{"file": name}` or `{"curves": [three spectra]}`,'
         " the latter two perhaps with a `matrix`",

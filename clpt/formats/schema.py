@@ -97,6 +97,9 @@ def _kind(cls: type[Kind]) -> Schema:
         properties["metal"] = {"anyOf": either, "description": "stands for eta and k"}
     if "vertices" in properties:
         properties["file"] = {"type": "string", "description": "a mesh, in place of the arrays"}
+    if "points" in properties:
+        rows = "lines of x y z radius, blank ones between strands, in place of points and lengths"
+        properties["file"] = {"type": "string", "description": rows}
     if "group" in properties:
         several = "matrices (n, 3, 4) as .npy: an instance for each, before `to_world`"
         properties["file"] = {"type": "string", "description": several}
@@ -151,6 +154,10 @@ def _host(name: str, value: Any) -> Schema:
     """What only the host needs, by its name or by the type of its default."""
     if name in ARRAYS:
         return _rows(*ARRAYS[name])
+    if name == "points":
+        return _rows(4)
+    if name == "lengths":
+        return {"type": "array", "items": {"type": "integer", "minimum": 2}}
     if name == "attributes":
         rows = {"anyOf": [_rows(1), _rows(3)]}
         begins = {"pattern": f"^({'|'.join(ATTRIBUTES)})"}

@@ -131,6 +131,10 @@ def shape_bounds(thing: shapes.Shape) -> tuple[NDArray[np.float64], NDArray[np.f
         axis = np.subtract(thing.p1, thing.p0) / np.linalg.norm(np.subtract(thing.p1, thing.p0))
         # A circle about the axis reaches r |row x axis| along each row of the matrix.
         reach = thing.radius * np.linalg.norm(np.cross(linear, axis), axis=1)
+    elif isinstance(thing, shapes.Curves):
+        given = np.asarray(thing.points, np.float64)
+        points = transforms.transform_points(matrix, given[:, :3])
+        reach = given[:, 3].max() * np.linalg.norm(linear, axis=1)
     else:
         points, reach = transforms.transform_points(matrix, _corners(thing)), np.zeros(3)
     return points.min(axis=0) - reach, points.max(axis=0) + reach

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from clpt import transforms
 from clpt.errors import SceneError
 from clpt.layout import Record
+from clpt.render.tubes import tubes
 from clpt.scene import shapes
 from clpt.scene.shapes import Shape
 
@@ -102,7 +103,7 @@ def where(shape: Shape) -> str:
 def triangles(
     shape: Shape, flat: list[Flat] | None = None
 ) -> tuple[Points, Faces, Points | None, Points | None]:
-    """Return a rectangle, cube or mesh in world space: vertices, faces, normals and uvs.
+    """Return a rectangle, cube, mesh or curves in world space: vertices, faces, normals and uvs.
 
     vertices (n, 3) float32 [m], faces (m, 3) uint32 counter-clockwise seen from the front, normals
     (n, 3) float32 or None, uvs (n, 2) float32 or None. Triangles without an area are left out, and
@@ -112,7 +113,8 @@ def triangles(
     """
     vertices, faces, normals, uvs = _in_world(shape)
     solid = _solid(vertices, faces)
-    if not solid.all() and flat is not None:
+    told = not isinstance(shape, shapes.Curves)  # a tube may shrink to a line
+    if told and not solid.all() and flat is not None:
         flat.append(Flat(where(shape), int(len(solid) - solid.sum()), len(solid)))
     faces = faces if solid.all() else faces[solid]
     return vertices, np.ascontiguousarray(faces), normals, uvs
@@ -316,6 +318,8 @@ def _local(shape: Shape) -> tuple[Points, Faces, Points | None, Points | None]:
     """Vertices, faces, normals and uvs before the transform."""
     if isinstance(shape, shapes.Mesh):
         return _mesh(shape)
+    if isinstance(shape, shapes.Curves):
+        return tubes(shape, where(shape))
     if shape.kind == "rectangle":
         square = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], np.float32)
         halves = np.array([(0, 1, 2), (0, 2, 3)], np.uint32)

@@ -1,4 +1,4 @@
-"""Shapes: where surfaces are. A rectangle and a cube are lowered to triangles; so is a mesh."""
+"""Shapes: where surfaces are. All but spheres, disks and cylinders are lowered to triangles."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ import numpy as np
 
 from clpt.errors import SceneError
 from clpt.scene.materials import Diffuse
-from clpt.scene.params import Kind, host
+from clpt.scene.params import Kind, choice, host
+
+BASES = ("linear", "bspline", "bezier")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -68,6 +70,19 @@ class Cylinder(Shape):
     radius: float = host(1.0, "before `to_world`, which may scale it evenly", "m")
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Curves(Shape):
+    """Strands of a round cross-section, as hair; lowered to tubes of triangles, open at the ends.
+
+    u runs around, v along, from 0 to 1 over all pieces of all strands, as in Mitsuba. A B-spline is
+    uniform and cubic; a Bezier strand has 4, 7, 10, ... points. `to_world` scales radii too.
+    """
+
+    points: Any = host(None, "(n, 4) of all strands: x y z and the radius", "m")
+    lengths: Any = host((), "points of each strand, in their order; empty: all are of one")
+    basis: str = choice("bspline", "what the points mean", BASES)
+
+
 @dataclass(frozen=True, eq=False)
 class Group:
     """Shapes that instances place together; by itself it is nowhere in the scene.
@@ -104,4 +119,4 @@ class Instance(Shape):
             raise SceneError(f"must be a group, not {self.group!r}", where="instance.group")
 
 
-KINDS = (Mesh, Sphere, Rectangle, Disk, Cube, Cylinder, Instance)
+KINDS = (Mesh, Sphere, Rectangle, Disk, Cube, Cylinder, Curves, Instance)

@@ -9,7 +9,7 @@ import numpy as np
 
 from clpt import transforms
 from clpt.errors import SceneError
-from clpt.formats import mesh
+from clpt.formats import mesh, strands
 from clpt.formats.mitsuba import serialized
 from clpt.formats.mitsuba.bsdfs import bsdf
 from clpt.formats.mitsuba.emitters import area
@@ -175,6 +175,27 @@ def _mesh(props: Properties, suffix: str, *, flip_v: bool) -> Parameters:
     }
 
 
+def _bspline_curve(props: Properties) -> Parameters:
+    return {"basis": "bspline", **_curves(props)}
+
+
+def _linear_curve(props: Properties) -> Parameters:
+    return {"basis": "linear", **_curves(props)}
+
+
+def _curves(props: Properties) -> Parameters:
+    """Read strands; `to_world` moves their points and, as in Mitsuba, leaves their radii."""
+    path, to_world = props.file(), props.placement()
+    try:
+        given = strands.read(path)
+    except SceneError as error:
+        line = f":{error.line}" if error.line else ""
+        raise props.element.error(f"{path.name}{line}: {error.message}") from None
+    points = given["points"]
+    points[:, :3] = transforms.transform_points(to_world, points[:, :3])
+    return given
+
+
 PLUGINS: dict[str, tuple[type[Shape], Callable[[Properties], Parameters]]] = {
     "obj": (shapes.Mesh, _obj),
     "ply": (shapes.Mesh, _ply),
@@ -184,4 +205,6 @@ PLUGINS: dict[str, tuple[type[Shape], Callable[[Properties], Parameters]]] = {
     "disk": (shapes.Disk, _placed_only),
     "cube": (shapes.Cube, _placed_only),
     "cylinder": (shapes.Cylinder, _cylinder),
+    "bsplinecurve": (shapes.Curves, _bspline_curve),
+    "linearcurve": (shapes.Curves, _linear_curve),
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from clpt import spectra
 from clpt.errors import UnknownKindError, UnusedParameterError
-from clpt.formats import gltf, mesh
+from clpt.formats import gltf, mesh, strands
 from clpt.formats.native import reradiation
 from clpt.formats.native import spectra as json_spectra
 from clpt.formats.native.cursor import Cursor, parse, placed
@@ -78,6 +78,8 @@ class _Reader:
                 tuple(c.numbers(2)) if isinstance(c.value, list) else c.value
             ),
             "attributes": _attributes,
+            "points": _array_reader(4, "number"),
+            "lengths": lambda c: tuple(entry.integer() for entry in c.entries()),
             **{name: _array_reader(*form) for name, form in ARRAYS.items()},
         }
 
@@ -247,23 +249,37 @@ class _Reader:
             for matrix in placements
         ]
 
+    def curves(self, cursor: Cursor) -> shapes.Shape:
+        """Read curves whose points are in a file."""
+        _only_in_file(cursor, ("points", "lengths"))
+        made = self.make(cursor, shapes.Curves, ("type", "file"))
+        child = cursor.at("file")
+        return dataclasses.replace(made, **placed(child, lambda: strands.read(find_file(child))))
+
     def shape(self, cursor: Cursor) -> list[shapes.Shape]:
         """Read a shape; a mesh file may hold several, with materials of their own."""
         kind = kind_name(cursor, "shape", kinds("shape"))
         if kind == "instance":
             return self.instances(cursor)
+        if kind == "curves" and "file" in cursor.value:
+            return [self.curves(cursor)]
         if kind != "mesh" or "file" not in cursor.value:
             made = self.kind(cursor, "shape")
             return [_checked_mesh(cursor, made, self.warnings)] if kind == "mesh" else [made]
-        for key in ARRAYS:
-            if key in cursor.value:
-                raise cursor.at(key).error("stands in the 'file' already; give either")
+        _only_in_file(cursor, ARRAYS)
         frame = self.make(cursor, shapes.Mesh, ("type", "file"))
         child = cursor.at("file")
         loaded = placed(child, lambda: _meshes(find_file(child)))
         self.warnings += [f"{child.value}: {note}" for note in loaded.warnings]
         dressed, several = "material" in cursor.value, len(loaded.meshes) > 1
         return [_in_frame(part, frame, dressed, several) for part in loaded.meshes]
+
+
+def _only_in_file(cursor: Cursor, keys: Iterable[str]) -> None:
+    """Raise SceneError where an entry with a file has its arrays too."""
+    for key in keys:
+        if key in cursor.value:
+            raise cursor.at(key).error("stands in the 'file' already; give either")
 
 
 def _meshes(path: Path) -> mesh.MeshFile:

@@ -15,6 +15,7 @@ import numpy as np
 
 from clpt import images, spectral_exr
 from clpt.errors import SceneError
+from clpt.formats import strands
 from clpt.formats.native import reradiation as json_reradiation
 from clpt.formats.native import spectra as json_spectra
 from clpt.formats.native.read import ARRAYS, default
@@ -104,10 +105,12 @@ class _Writer:
         given: dict[str, Any] = {"type": thing.kind}
         plain = type(thing)
         declared = params(plain)
+        in_file: tuple[str, ...] = ()
         if isinstance(thing, shapes.Mesh):
-            given["file"] = self.mesh(thing)
-            in_file = (*ARRAYS, "attributes")
-            declared = {name: p for name, p in declared.items() if name not in in_file}
+            given["file"], in_file = self.mesh(thing), (*ARRAYS, "attributes")
+        if isinstance(thing, shapes.Curves):
+            given["file"], in_file = self.curves(thing), ("points", "lengths")
+        declared = {name: p for name, p in declared.items() if name not in in_file}
         defaults = {field.name: default(field) for field in dataclasses.fields(plain)}
         for name, param in declared.items():
             written = self.parameter(name, getattr(thing, name), param)
@@ -175,6 +178,16 @@ class _Writer:
                 np.save(self.path.parent / name, np.asarray(image, np.float32))
             self.files[id(image)] = name
         return self.files[id(image)]
+
+    def curves(self, curves: shapes.Curves) -> str:
+        """Write strands, unless another shape shares them; return the file's name."""
+        key = id(curves.points), id(curves.lengths)
+        if key not in self.files:
+            label = re.sub(r"\W+", "_", curves.name) or "curves"
+            name = f"{self.path.stem}.{label}{len(self.files)}.txt"
+            strands.write(self.path.parent / name, curves.points, curves.lengths)
+            self.files[key] = name
+        return self.files[key]
 
     def mesh(self, mesh: shapes.Mesh) -> str:
         """Write a mesh's arrays, unless another shape shares them; return the file's name."""

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+from clpt.formats.pbrt.curves import joined
 from clpt.formats.pbrt.lights import area_light, light
 from clpt.formats.pbrt.materials import material
 from clpt.formats.pbrt.params import Parameters
@@ -17,7 +18,7 @@ from clpt.formats.pbrt.textures import textured
 from clpt.scene.lights import Light
 from clpt.scene.materials import Diffuse, Mask, Material, TwoSided
 from clpt.scene.params import Kind, params
-from clpt.scene.shapes import Group, Instance, Shape
+from clpt.scene.shapes import Curves, Group, Instance, Shape
 
 Progress = Callable[[float, str], None]
 GREY = TwoSided(front=Diffuse(reflectance=0.5))
@@ -30,11 +31,11 @@ def shapes(contents: Contents, progress: Progress | None) -> list[Shape]:
     flat = [found for part in parts for found in part]
     made = dict(zip(map(id, flat), _all(flat, progress), strict=True))
     groups = {
-        name: Group(shapes=tuple(_present(made, found)), name=name)
+        name: Group(shapes=tuple(joined(_present(made, found))), name=name)
         for name, found in contents.objects.items()
         if name in used
     }
-    whole = list(_present(made, contents.shapes))
+    whole = list(joined(_present(made, contents.shapes)))
     for use in contents.uses:
         if use.kind not in groups:
             hint = nearest(use.kind, contents.objects)
@@ -70,8 +71,7 @@ def _shape(found: Definition, read: Geometry | None) -> Shape | None:
     opacity = textured(given, "alpha", "real", state, 1.0)
     _report(given, state)
     if read is None:
-        if found.kind != "curve":  # which has been told
-            state.warn(given, "left out, since it has no area")
+        state.warn(given, "left out, since it has no area")
         return None
     for note in read.notes:
         state.warn(given, note)
@@ -82,6 +82,8 @@ def _shape(found: Definition, read: Geometry | None) -> Shape | None:
         if emission is not None:
             state.warn(given, "'alpha' hides its surface, but not its light")
     if _has_texture(surface) or _has_texture(emission):
+        if read.kind is Curves:
+            state.warn(given, "textures run around and along curves, not along and across")
         read = with_uvs(read)
     with given.placed():
         return read.made(material=surface, emission=emission)

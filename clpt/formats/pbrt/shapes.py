@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.errors import SceneError, UnknownKindError
 from clpt.formats import mesh, ply
-from clpt.formats.pbrt import subdivision, surfaces
+from clpt.formats.pbrt import curves, subdivision, surfaces
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.state import Definition, State
 from clpt.scene import shapes
@@ -42,6 +42,8 @@ class Geometry:
 
     def area(self) -> float:
         """The mean area of a mesh's triangles, else the whole [m^2], in the world."""
+        if self.kind is shapes.Curves:
+            raise SceneError("a curve's light cannot have a 'power'; give its 'scale'")
         if self.kind is not shapes.Mesh:
             return surfaces.area(self.kind, self.parts)
         points = transforms.transform_points(self.parts["to_world"], self.parts["vertices"])
@@ -67,7 +69,8 @@ def geometry(found: Definition) -> Geometry | None:
         if made is not None:
             turned = kind in QUADRICS and transforms.flips_handedness(found.state.ctm)
             made.parts.setdefault("to_world", found.state.ctm)
-            made.parts["flip_normals"] = found.state.reverse != turned
+            reverse = found.state.reverse and kind != "curve"  # a tube is seen from outside
+            made.parts["flip_normals"] = reverse != turned
     return made
 
 
@@ -259,11 +262,10 @@ def _cylinder(params: Parameters, state: State) -> Geometry | None:
 
 
 def _curve(params: Parameters, state: State) -> Geometry | None:
-    params.ignore(
-        "P", "basis", "degree", "N", "type", "width", "width0", "width1", "splitdepth",
-    )  # fmt: skip
-    state.warn(params, "curves are not supported: left out")
-    return None
+    kind, parts = curves.curve(params)
+    if kind is None:
+        return _mesh(parts["points"], parts["faces"], parts["normals"], parts["uvs"])
+    return Geometry(kind, parts)
 
 
 SHAPES: dict[str, Callable[[Parameters, State], Geometry | None]] = {

@@ -1,0 +1,125 @@
+"""Curves of a PBRT scene: round ones as `Curves`, many as one, ribbons as strips of a mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from itertools import groupby, pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.errors import SceneError
+from clpt.formats.pbrt.params import Parameters
+from clpt.scene.shapes import Curves, Shape
+
+Parts = dict[str, Any]
+TYPES = ("flat", "ribbon", "cylinder")
+PIECES = 16  # of a ribbon, for each cubic
+
+
+def curve(params: Parameters) -> tuple[type[Shape] | None, Parts]:
+    """Read a curve: the kind that it becomes, None for a ribbon's mesh, and its parts.
+
+    Raises SceneError.
+    """
+    kind = params.choice("type", "flat", TYPES)
+    bezier = _bezier(params)
+    both = params.one("width", "float", 1.0)
+    ends = [params.one(name, "float", both) for name in ("width0", "width1")]
+    if min(ends) < 0.0 or max(ends) <= 0.0:
+        raise SceneError("the widths must be positive")
+    normals = params.several("N", "normal")
+    params.ignore("splitdepth")
+    share = np.linspace(0.0, 1.0, len(bezier))[:, None]
+    widths = ends[0] + (ends[1] - ends[0]) * share
+    if kind == "ribbon":
+        return None, _ribbon(bezier, widths, normals)
+    points = np.hstack([bezier, 0.5 * widths]).astype(np.float32)
+    return Curves, {"points": points, "lengths": (len(points),), "basis": "bezier"}
+
+
+def _bezier(params: Parameters) -> NDArray[np.float64]:
+    """The points (3 n + 1, 3) of the curve's cubics in Bezier form."""
+    points, degree = params.several("P", "point3"), params.one("degree", "integer", 3)
+    basis = params.choice("basis", "bezier", ("bezier", "bspline"))
+    if degree not in (2, 3):
+        raise SceneError(f"'degree' must be 2 or 3, not {degree}")
+    if points is None:
+        raise SceneError("needs the parameter 'point3 P'")
+    step = degree if basis == "bezier" else 1
+    if len(points) <= degree or (len(points) - degree - 1) % step:
+        more = f" and {step} for each piece more" if step > 1 else " or more"
+        raise SceneError(f"'P' needs {degree + 1} points{more}, not {len(points)}")
+    at = np.arange(0, len(points) - degree, step)
+    spans = np.asarray(points, np.float64)[at[:, None] + np.arange(degree + 1)]
+    if degree == 2:
+        a, b, c = (spans[:, i] for i in range(3))
+        if basis == "bspline":
+            a, c = 0.5 * (a + b), 0.5 * (b + c)
+        spans = np.stack([a, (a + 2.0 * b) / 3.0, (2.0 * b + c) / 3.0, c], axis=1)
+    elif basis == "bspline":
+        a, b, c, d = (spans[:, i] for i in range(4))
+        ends = [(a + 4.0 * b + c) / 6.0, (b + 4.0 * c + d) / 6.0]
+        spans = np.stack([ends[0], (2.0 * b + c) / 3.0, (b + 2.0 * c) / 3.0, ends[1]], axis=1)
+    return np.concatenate([spans[:, :3].reshape(-1, 3), spans[-1:, 3]])
+
+
+def _ribbon(bezier: NDArray[Any], widths: NDArray[Any], normals: Any) -> Parts:
+    """A strip across whose middle the curve runs, turned as the normals at the ends of pieces."""
+    count = len(bezier) // 3
+    if normals is None or len(normals) != count + 1:
+        found = 0 if normals is None else len(normals)
+        raise SceneError(f"a ribbon of {count} pieces needs {count + 1} normals 'N', not {found}")
+    u = np.linspace(0.0, count, PIECES * count + 1)
+    piece = np.minimum(u.astype(np.int64), count - 1)
+    t = (u - piece)[:, None]
+    points = [bezier[3 * piece + i] for i in range(4)]
+    while len(points) > 2:
+        points = [a + (b - a) * t for a, b in pairwise(points)]
+    center, along = points[0] + (points[1] - points[0]) * t, _unit(points[1] - points[0])
+    ends = _unit(np.asarray(normals, np.float64))
+    first, second = ends[piece], ends[piece + 1]
+    angle = np.arccos(np.clip(np.einsum("ij,ij->i", first, second), -1.0, 1.0))[:, None]
+    flat = np.sin(angle) < 1e-6
+    sine = np.where(flat, 1.0, np.sin(angle))
+    low = np.where(flat, 1.0 - t, np.sin((1.0 - t) * angle) / sine)
+    high = np.where(flat, t, np.sin(t * angle) / sine)
+    across = _unit(np.cross(low * first + high * second, along))
+    width = np.interp(u, np.linspace(0.0, count, len(widths)), widths[:, 0])[:, None]
+    sides = np.stack([center - 0.5 * width * across, center + 0.5 * width * across], axis=1)
+    a = 2 * np.arange(len(u) - 1)[:, None]
+    uvs = np.stack(np.broadcast_arrays((u / count)[:, None], [0.0, 1.0]), axis=-1)
+    return {
+        "points": sides.reshape(-1, 3),
+        "faces": (a[:, :, None] + [[0, 2, 3], [0, 3, 1]]).reshape(-1, 3),
+        "normals": np.repeat(np.cross(along, across), 2, axis=0),
+        "uvs": uvs.reshape(-1, 2),
+    }
+
+
+def _unit(v: NDArray[Any]) -> NDArray[Any]:
+    return v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-30)
+
+
+def joined(things: Iterable[Shape]) -> Iterator[Shape]:
+    """The shapes, neighbouring curves that share all but their points as one."""
+    for key, run in groupby(things, _shared):
+        several = list(run)
+        if key is None or len(several) == 1:
+            yield from several
+        else:
+            curves = [one for one in several if isinstance(one, Curves)]
+            points = np.concatenate([one.points for one in curves])
+            yield replace(
+                curves[0], points=points, lengths=tuple(n for one in curves for n in one.lengths)
+            )
+
+
+def _shared(shape: Shape) -> tuple[Any, ...] | None:
+    """What curves that may be one have in common."""
+    if not isinstance(shape, Curves):
+        return None
+    placed = np.asarray(shape.to_world).tobytes()
+    return id(shape.material), id(shape.emission), shape.flip_normals, placed

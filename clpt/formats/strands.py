@@ -1,0 +1,61 @@
+"""Files of curves, as Mitsuba's: x y z and the radius on a line, a blank line between strands."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from clpt.errors import SceneError
+
+LARGEST = 1 << 30  # [bytes] of a file
+
+
+def read(path: Path) -> dict[str, Any]:
+    """Return `points` (n, 4) float32 and `lengths` (k,) int64, as `Curves` takes them.
+
+    Raises SceneError with the line for what is no row of four numbers, and for an empty file.
+    """
+    try:
+        if path.stat().st_size > LARGEST:
+            raise SceneError(f"is larger than {LARGEST >> 30} GiB", file=path)
+        rows = [line.split() for line in path.read_bytes().split(b"\n")]
+    except OSError as error:
+        raise SceneError(f"cannot be read: {error.strerror}", file=path) from None
+    columns = np.array([len(row) for row in rows])
+    short = (columns > 0) & (columns < 4)
+    if short.any():
+        line = 1 + int(np.argmax(short))
+        raise SceneError("needs x, y, z and a radius", file=path, line=line)
+    given = columns > 0
+    if not given.any():
+        raise SceneError("has no points", file=path)
+    words = [word for row in rows for word in row[:4]]
+    try:
+        points = np.array(words).astype(np.float64).reshape(-1, 4)
+    except ValueError:
+        raise SceneError("is not all numbers", file=path, line=_wrong(rows)) from None
+    starts = np.flatnonzero(given & ~np.r_[False, given[:-1]])
+    ends = np.flatnonzero(given & ~np.r_[given[1:], False])
+    with np.errstate(over="ignore"):  # what is not finite is told later
+        return {"points": points.astype(np.float32), "lengths": ends - starts + 1}
+
+
+def write(path: Path, points: Any, lengths: Any) -> None:
+    """Write strands such that `read` gives the same float32 back."""
+    rows = [" ".join(f"{x:.9g}" for x in row) for row in np.asarray(points, np.float32).tolist()]
+    ends = np.cumsum(lengths if len(lengths) else [len(rows)])
+    strands = ["\n".join(rows[a:b]) for a, b in zip([0, *ends], ends, strict=False)]
+    path.write_text("\n\n".join(strands) + "\n", "ascii")
+
+
+def _wrong(rows: list[list[bytes]]) -> int:
+    """The first line with a word among its first four that is no number."""
+    for line, row in enumerate(rows, 1):
+        for word in row[:4]:
+            try:
+                float(word)
+            except ValueError:
+                return line
+    return len(rows)
