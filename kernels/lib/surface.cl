@@ -10,7 +10,7 @@ typedef struct {
     vec3 dpdu;    /* along the surface's u; not normalised, may be zero */
     vec3 dpdv;    /* and along v */
     vec2 uv;
-    mask turned;  /* the back of a two-sided surface: n and ns have been turned round */
+    mask turned;  /* the back of a two-sided surface: ns has been turned round */
     integer light; /* row in `lights`, -1: does not emit */
 #if USES_ATTRIBUTES
     integer attributes, face; /* of triangles, see lib/texture_point.cl */
@@ -107,8 +107,11 @@ inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, 
     }
 #endif
     *front = dot3(s.n, d) < 0.0f;
-    s.turned = !*front & ((shape.flags & SHAPE_TWO_SIDED) != 0);
-    s.n = sel3(s.turned, neg3(s.n), s.n);
+    /* Each normal is turned to the viewer by itself: where they disagree, as at the silhouette of a coarse
+     * mesh, a BSDF that saw its back would be black. */
+    mask both = (shape.flags & SHAPE_TWO_SIDED) != 0;
+    s.turned = both & (dot3(s.ns, d) > 0.0f);
+    s.n = sel3(both & !*front, neg3(s.n), s.n);
     s.ns = sel3(s.turned, neg3(s.ns), s.ns);
     return s;
 }
