@@ -30,6 +30,7 @@ class Display:
     def __init__(self, limit: float | None = None):
         self.limit = limit
         self.last = time.perf_counter()
+        self.since: tuple[float, float] | None = None
 
     @contextmanager
     def phase(self, text: str) -> Iterator[None]:
@@ -65,6 +66,15 @@ class Display:
         done = progress.samples / progress.total if progress.total else 0.0
         return min(1.0, max(done, progress.seconds / self.limit if self.limit else 0.0))
 
+    def figures(self, progress: Progress) -> dict[str, str]:
+        """What is shown; how long is left as from the first sight of `progress`.
+
+        Before that many devices make their kernels ready, which takes longer than what follows.
+        """
+        fraction = self.fraction(progress)
+        self.since = self.since or (progress.seconds, fraction)
+        return figures(progress, fraction, self.since)
+
 
 class Lines(Display):
     """A line for every phase and every few seconds."""
@@ -87,9 +97,9 @@ class Lines(Display):
         yield tell
 
     def show(self, progress: Progress) -> None:
+        numbers = self.figures(progress)
         if self.due(progress, EVERY):
-            numbers = figures(progress, self.fraction(progress))
-            self.note("  ".join(numbers.values()))
+            self.note("  ".join(numbers.values()).rstrip())
 
     def note(self, text: str) -> None:
         click.echo(text, err=True)
@@ -142,10 +152,9 @@ class Bar(Lines):
             yield
 
     def show(self, progress: Progress) -> None:
+        fields: dict[str, Any] = self.figures(progress)
         if self.due(progress, REFRESH):
-            fraction = self.fraction(progress)
-            fields: dict[str, Any] = figures(progress, fraction)
-            self._bar.update(self._task, completed=fraction, **fields)
+            self._bar.update(self._task, completed=self.fraction(progress), **fields)
             self._bar.refresh()
 
     def note(self, text: str) -> None:
@@ -155,10 +164,16 @@ class Bar(Lines):
 FIGURES = ("samples", "speed", "rays", "elapsed", "left")
 
 
-def figures(progress: Progress, fraction: float) -> dict[str, str]:
-    """What is shown, by the names in FIGURES."""
-    seconds = max(progress.seconds, 1e-9)
-    left = f"{clock(seconds * (1.0 / fraction - 1.0))} left" if fraction > 0.0 else ""
+def figures(
+    progress: Progress, fraction: float, since: tuple[float, float] = (0.0, 0.0)
+) -> dict[str, str]:
+    """What is shown, by the names in FIGURES.
+
+    fraction: of the render that is done; since: the seconds and the fraction to tell from how
+    fast it goes.
+    """
+    seconds, done = max(progress.seconds, 1e-9), fraction - since[1]
+    left = f"{clock((seconds - since[0]) * (1.0 - fraction) / done)} left" if done > 0.0 else ""
     samples = int(progress.samples)
     return {
         "samples": f"{samples}/{progress.total} spp" if progress.total else f"{samples} spp",

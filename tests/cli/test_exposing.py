@@ -96,6 +96,18 @@ def test_figures():
     assert clock(59.6) == "1:00" and clock(3661) == "1:01:01"
 
 
+def test_what_is_left_does_not_count_how_long_the_first_sample_took(monkeypatch, capsys):
+    now = [0.0]
+    monkeypatch.setattr(time, "perf_counter", lambda: now[0])
+    lines = Lines()
+    for samples, second in ((1, 20.0), (5, 21.0), (11, 26.0)):
+        now[0] = second
+        lines.show(Progress(samples, 101, 10**6, 10**6, second))
+    first, last = capsys.readouterr().err.splitlines()
+    assert first.endswith("0:20")  # nothing is known yet
+    assert "0:54 left" in last  # 90 samples, at ten in six seconds
+
+
 def test_lines_come_now_and_then(monkeypatch, capsys):
     now = [100.0]
     monkeypatch.setattr(time, "perf_counter", lambda: now[0])
@@ -114,6 +126,7 @@ def test_a_terminal_gets_a_bar():
     with bar.phase("building kernels"):
         pass
     with bar.rendering():
+        bar.show(Progress(1.0, 64, 31_250, 100_000, 1.5))
         bar.show(Progress(64.0, 64, 2_000_000, 9_000_000, 2.0))
     bar.note("a warning with [brackets]")
     told = bar.console.file.getvalue()
