@@ -52,6 +52,8 @@ def variables(defines: Iterable[str]) -> dict[str, Any]:
     wrong = next((name for name, equals, _ in pairs if not (name and equals)), None)
     if wrong is not None:
         raise click.BadParameter(f"{wrong!r} does not look like NAME=VALUE", param_hint="-D")
+    if any(name == "progress" for name, _, _ in pairs):
+        raise click.BadParameter("no variable can be called progress", param_hint="-D")
     return {name: value for name, _, value in pairs}
 
 

@@ -25,7 +25,7 @@ __all__ = ["FORMATS", "load"]
 
 
 def load(
-    path: str | Path, *, progress: Callable[[float, str], None] | None = None, **variables: Any
+    path: str | Path, /, *, progress: Callable[[float, str], None] | None = None, **variables: Any
 ) -> Scene:
     """Read a scene or a bare mesh; a folder means the scene.json, .xml or .pbrt in it.
 

@@ -36,7 +36,7 @@ VARIANTS = "KHR_materials_variants"
 __all__ = ["SUFFIXES", "load", "read_mesh"]
 
 
-def load(path: Path, **variables: Any) -> Scene:
+def load(path: Path, /, **variables: Any) -> Scene:
     """Read a glTF file; what it has no camera or no light for comes from the studio.
 
     variables: `time` [s] of an animation (the first, or the `animation` of that number or name);

@@ -25,7 +25,7 @@ __all__ = ["load"]
 REFERENCED = ("spectrum", "volume", "film", "sampler", "rfilter", "medium", "phase")
 
 
-def load(path: Path, **variables: object) -> Scene:
+def load(path: Path, /, **variables: object) -> Scene:
     """Read a Mitsuba scene; `variables` stand for its `$names`.
 
     Raises SceneError with file, line and element for anything broken or not supported.

@@ -123,24 +123,18 @@ def _triangle(params: Parameters, state: State) -> Filter:
 
 
 def _gaussian(params: Parameters, state: State) -> Filter:
-    radius, sigma = _radius(params, state, 1.5), params.above_zero("sigma", 0.5)
-    if radius < 2.0 * sigma:
-        state.warn(params, "the bell is cut off at 4 sigma, not at its radius")
-    return integrators.Gaussian(stddev=sigma)
+    radius = _radius(params, state, 1.5)
+    return integrators.Gaussian(stddev=params.above_zero("sigma", 0.5), radius=radius)
 
 
 def _mitchell(params: Parameters, state: State) -> Filter:
-    if abs(_radius(params, state, 2.0) - 2.0) > 1e-3:
-        state.warn(params, "a radius of 2 pixels takes the place of that given")
     b, c = params.one("B", "float", 1 / 3), params.one("C", "float", 1 / 3)
-    return integrators.Mitchell(b=b, c=c)
+    return integrators.Mitchell(b=b, c=c, radius=_radius(params, state, 2.0))
 
 
 def _sinc(params: Parameters, state: State) -> Filter:
-    _radius(params, state, 4.0)
-    params.ignore("tau")
-    state.warn(params, "Mitchell and Netravali's filter with B = 0, C = 1/2 takes sinc's place")
-    return integrators.Mitchell(b=0.0, c=0.5)
+    radius = _radius(params, state, 4.0)
+    return integrators.Lanczos(radius=radius, lobes=params.above_zero("tau", 3.0))
 
 
 FILTERS: dict[str, Callable[[Parameters, State], Filter]] = {

@@ -149,9 +149,10 @@ def test_crops(scene, text, expected):
     [
         ('"box" "float xradius" 1 "float yradius" 1', integrators.Box(radius=1.0)),
         ('"triangle"', integrators.Tent(radius=2.0)),
-        ('"gaussian" "float sigma" 0.4', integrators.Gaussian(stddev=0.4)),
+        ('"gaussian" "float sigma" 0.4', integrators.Gaussian(stddev=0.4, radius=1.5)),
         ('"mitchell"', integrators.Mitchell()),
-        ('"sinc"', integrators.Mitchell(b=0.0, c=0.5)),
+        ('"sinc" "float tau" 2.5', integrators.Lanczos(radius=4.0, lobes=2.5)),
+        ('"mitchell" "float xradius" 3 "float yradius" 3', integrators.Mitchell(radius=3.0)),
     ],
 )
 def test_filters(scene, text, expected):
