@@ -19,7 +19,9 @@ FORMATS: dict[str, Callable[..., Scene]] = {
     **dict.fromkeys(mesh.SUFFIXES, studio.load),
 }
 
-IN_FOLDERS = ("scene.json", "scene.xml", "scene.pbrt", "scene-v4.pbrt")
+IN_FOLDERS = ("scene.json", "scene.xml", "scene.pbrt", "scene-v4.pbrt")  # the first of these, or
+SCENES = (".xml", ".pbrt", ".pbrt.gz", *gltf.SUFFIXES)  # what is called as the folder, or alone
+NAMED = 8  # scenes of a folder that a message names
 
 __all__ = ["FORMATS", "load"]
 
@@ -27,7 +29,7 @@ __all__ = ["FORMATS", "load"]
 def load(
     path: str | Path, /, *, progress: Callable[[float, str], None] | None = None, **variables: Any
 ) -> Scene:
-    """Read a scene or a bare mesh; a folder means the scene.json, .xml or .pbrt in it.
+    """Read a scene or a bare mesh; a folder means the scene in it (see IN_FOLDERS).
 
     `variables` set the `$names` of Mitsuba's XML; of glTF they choose camera, scene and
     time. `progress` is called with how much is read, from 0 to 1, and what, while files of many
@@ -51,13 +53,24 @@ def load(
 def _existing(path: Path) -> Path:
     try:
         if path.is_dir():
-            inside = [path / name for name in IN_FOLDERS]
-            found = next((file for file in inside if file.is_file()), None)
-            if found is None:
-                raise SceneError(f"this folder holds none of {', '.join(IN_FOLDERS)}", file=path)
-            return found
+            return _inside(path)
         if path.is_file():
             return path
     except (OSError, ValueError) as error:
         raise SceneError(f"cannot be read: {error}", file=path) from None
     raise SceneError("there is no such file", file=path)
+
+
+def _inside(folder: Path) -> Path:
+    """The scene that a folder holds: scene.*, one called as the folder, or its only one."""
+    found = sorted(file for file in folder.iterdir() if file.name.lower().endswith(SCENES))
+    own = [file for file in found if file.name.split(".")[0] == folder.resolve().name]
+    named = [folder / name for name in IN_FOLDERS if (folder / name).is_file()]
+    for files in (named[:1], own, found):
+        if len(files) == 1:
+            return files[0]
+    if not found:
+        raise SceneError(f"this folder holds no scene.json and no {' '.join(SCENES)}", file=folder)
+    names = ", ".join(file.name for file in found[:NAMED])
+    more = f" and {len(found) - NAMED} more" if len(found) > NAMED else ""
+    raise SceneError(f"this folder holds several scenes, name one: {names}{more}", file=folder)
