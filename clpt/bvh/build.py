@@ -13,13 +13,11 @@ from numpy.typing import NDArray
 
 from ..device import Device
 from ..errors import SceneError
-from . import tree
 from .building import Array, Building
-from .layouts import LAYOUTS, Mesh
+from .layouts import BOX_LAYOUTS, LAYOUTS, Mesh
 
 BRUTE_LIMIT = 96  # triangles up to which brute force is faster; measured, see bench/NOTES.md
 
-_LEAF = 0x80000000  # BVH_LEAF of kernels/bvh/node.cl
 _REACH = 1e12  # so that products of three coordinates stay inside a float
 
 
@@ -127,25 +125,19 @@ def build_parts(
     return Bvh(layout, sum(counts), buffers, stats), (begins // 32).astype(np.uint32)
 
 
-def build_boxes(device: Device, boxes: NDArray, leaf_size: int = 2) -> Bvh:
+def build_boxes(device: Device, boxes: NDArray, layout: str = "shapes") -> Bvh:
     """A tree over boxes, (m, 2, 3) float32 low and high corners.
 
-    leaf_size: boxes of a leaf, at most. Raises as `build` does.
+    layout: a key of BOX_LAYOUTS. Leaves of "shapes" hold up to two boxes; those of "binary" and
+    "wide8" one, and their nodes are as in the layout of that name. Raises as `build` does.
     """
     start = time.perf_counter()
     boxes = np.asarray(boxes, np.float32).reshape(-1, 2, 3)
     _check_reach(boxes, "a shape's box")
-    n, building = len(boxes), Building(device)
-    indices = building.allocate(4 * n)
-    if n:
-        items, parts = tree.items_of_boxes(building, n, building.upload(boxes, np.float32))
-        nodes = tree.over(building, n, items, parts, leaf_size).nodes
-        building.run_each("bvh/pack.cl", "pack_indices", n, items=items, indices=indices)
-    else:  # a leaf with nothing in it
-        nodes = building.upload(np.array([0, 0, 0, _LEAF, 0, 0, 0, 0]), np.uint32)
+    building, n = Building(device), len(boxes)
+    packed = BOX_LAYOUTS[layout](building, n, building.upload(boxes, np.float32))
     device.queue.finish()
-    buffers = {"nodes": nodes, "indices": indices}
-    return Bvh("shapes", n, buffers, {"seconds": time.perf_counter() - start})
+    return Bvh(layout, n, packed.buffers, {"seconds": time.perf_counter() - start})
 
 
 def _check(vertices: Array, faces: Array, tags: Array | None) -> int:

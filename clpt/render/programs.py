@@ -141,7 +141,9 @@ def _shared(features: Features, layout: str) -> dict[str, str]:
         "generated/shape_traversal.cl": '#include "bvh/shapes.cl"\n' if features.analytic else "",
         "generated/instances.cl": '#include "lib/instances.cl"\n' if features.instances else "",
         "generated/instance_traversal.cl": (
-            '#include "lib/trace_instances.cl"\n' if features.instances else ""
+            f'#include "lib/instances_{layout}.cl"\n#include "lib/trace_instances.cl"\n'
+            if features.instances
+            else ""
         ),
         "generated/integrator.cl": f'#include "integrator/{features.integrator}.cl"\n',
     }
@@ -319,9 +321,9 @@ def _trace_args_text(features: Features) -> str:
     """The buffers of all trees, as arguments and as they are passed on."""
     trees = {"nodes": "float", "leaves": "float"}
     if features.analytic:
-        trees |= {"shape_nodes": "float", "shape_items": "uint"}
+        trees |= {"shape_nodes": "float", "shape_indices": "uint"}
     if features.instances:
-        trees |= {"instance_nodes": "float", "instance_items": "uint"}
+        trees["instance_nodes"] = "float"
     args = ", ".join(f"global const {element} *{name}" for name, element in trees.items())
     return f"#define TRACE_ARGS {args}\n#define TRACE {', '.join(trees)}\n"
 

@@ -170,14 +170,15 @@ class Wavefront:
         if lowered.features.analytic and layout != "brute":
             self.box_trees["shape"] = bvh.build_boxes(self.device, lowered.boxes)
         if lowered.features.instances:
-            rows = instances.rows.copy()
-            rows["nodes"], rows["leaves"] = begins[1 + instances.prototypes].T
+            self.box_trees["instance"] = bvh.build_boxes(self.device, instances.boxes, layout)
+            indices = self.box_trees["instance"].buffers.pop("indices")
+            order = self.buffers.download(indices, (len(instances.rows),), np.uint32)
+            rows = instances.rows[order]  # as the leaves, so that neighbours are near each other
+            rows["nodes"], rows["leaves"] = begins[1 + instances.prototypes[order]].T
             words = rows.view(np.uint32)
             self.named["instances"] = self.buffers.upload("the table of instances", words)
-            self.box_trees["instance"] = bvh.build_boxes(self.device, instances.boxes, 1)
         for name, tree in self.box_trees.items():
-            self.named[f"{name}_nodes"] = tree.buffers["nodes"]
-            self.named[f"{name}_items"] = tree.buffers["indices"]
+            self.named |= {f"{name}_{part}": buffer for part, buffer in tree.buffers.items()}
         self.seconds["trees"] = time.perf_counter() - start
 
     def _expose_new(self) -> None:

@@ -241,3 +241,13 @@ kernel APART void collapse_blocks(global const float8 *restrict nodes,
         row[80] = as_float(k < n ? tags[prim] : 0u);
     }
 }
+
+/* The items of leaves that hold one each, by their indices. */
+kernel APART void collapse_indices(global const float8 *restrict nodes,
+                                   global const float8 *restrict items,
+                                   global const uint *restrict leaf_roots, uint count,
+                                   global uint *restrict indices)
+{
+    uint b = get_global_id(0);
+    if (b < count) indices[b] = item_index(items[node_link(nodes[leaf_roots[b]])]);
+}

@@ -82,45 +82,56 @@ inline TriHit wide8_hit(global const float *leaves, uint slot, float t, const Wi
     return hit;
 }
 
+/* From a node down to the nearest leaf, or to a node of which no child is met; what it comes to is
+ * returned. The other children are left waiting in descending order: entry distance, as bits, above the
+ * word, so that both are compared at once. */
+inline uint wide8_descend(global const float *nodes, const Wide8Ray *r, float t, uint at, ulong *waiting,
+                          uint *waits)
+{
+    uint n = *waits;
+    while (!(at & BVH_LEAF)) {
+        union { float8 v; uint at[8]; } entry;
+        global const float *node = nodes + (ulong)at * 64;
+        global const uint *words = (global const uint *)(node + 48);
+        Mask8 m = wide8_boxes(node, r, t, &entry.v);
+        if (!m) break;
+        uint i = mask8_first(m);
+        at = words[i];
+        m &= m - 1;
+        if (!m) continue; /* one child */
+        ulong near = (ulong)entry.at[i] << 32 | at;
+        uint base = n;
+        do { /* the nearest goes on */
+            i = mask8_first(m);
+            m &= m - 1;
+            ulong c = (ulong)entry.at[i] << 32 | words[i];
+            ulong far = max(near, c);
+            near = min(near, c);
+            uint k = n++;
+            for (; k > base && waiting[k - 1] < far; k--) waiting[k] = waiting[k - 1];
+            waiting[k] = far;
+        } while (m);
+        at = (uint)near;
+    }
+    *waits = n;
+    return at;
+}
+
 inline TriHit wide8_closest(global const float *nodes, global const float *leaves, float ox, float oy,
                             float oz, float dx, float dy, float dz, float tmin, float tmax)
 {
     if (!ray_finite(ox, oy, oz, dx, dy, dz)) return tri_miss(tmax);
     Wide8Ray r = wide8_ray(ox, oy, oz, dx, dy, dz, tmin);
-    ulong waiting[WIDE8_STACK]; /* entry distance, as bits, above the word: compared at once */
+    ulong waiting[WIDE8_STACK];
     uint n = 0, at = 0, best = BVH_MISS;
     float t = tmax;
     for (;;) {
-        union { float8 v; uint at[8]; } entry;
-        Mask8 m;
-        while (!(at & BVH_LEAF)) {
-            global const float *node = nodes + (ulong)at * 64;
-            global const uint *words = (global const uint *)(node + 48);
-            m = wide8_boxes(node, &r, t, &entry.v);
-            if (!m) break;
-            uint i = mask8_first(m);
-            at = words[i];
-            m &= m - 1;
-            if (!m) continue; /* one child */
-            ulong near = (ulong)entry.at[i] << 32 | at;
-            uint base = n;
-            do { /* the nearest goes on, the others wait in descending order */
-                i = mask8_first(m);
-                m &= m - 1;
-                ulong c = (ulong)entry.at[i] << 32 | words[i];
-                ulong far = max(near, c);
-                near = min(near, c);
-                uint k = n++;
-                for (; k > base && waiting[k - 1] < far; k--) waiting[k] = waiting[k - 1];
-                waiting[k] = far;
-            } while (m);
-            at = (uint)near;
-        }
+        at = wide8_descend(nodes, &r, t, at, waiting, &n);
         if (at & BVH_LEAF) {
             uint block = at & ~BVH_LEAF;
             union { float8 v; float at[8]; } q;
             float8 det;
-            m = wide8_triangles(leaves + (ulong)block * 88, &r, t, &q.v, &det);
+            Mask8 m = wide8_triangles(leaves + (ulong)block * 88, &r, t, &q.v, &det);
             if (m) q.v /= det;
             for (; m; m &= m - 1) {
                 uint i = mask8_first(m);

@@ -12,10 +12,10 @@ inline TraceHit trace_closest(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real far,
     TriHit t = LAYOUT(closest)(nodes, leaves, o.x, o.y, o.z, d.x, d.y, d.z, 0.0f, far);
     TraceHit h = {t.t, t.u, t.v, {t.nx, t.ny, t.nz}, as_int(t.prim), as_int(t.tag)};
 #if USES_INSTANCES
-    instances_closest(nodes, leaves, INSTANCES, scene, o, d, t, &h);
+    instances_closest(nodes, leaves, instance_nodes, scene, o, d, t, &h);
 #endif
 #if USES_ANALYTIC
-    uint shape = shapes_closest(shape_nodes, shape_items, scene, o.x, o.y, o.z, d.x, d.y, d.z, 0.0f, &h.t);
+    uint shape = shapes_closest(shape_nodes, shape_indices, scene, o.x, o.y, o.z, d.x, d.y, d.z, 0.0f, &h.t);
     if (shape != BVH_MISS) {
         h.prim = as_int(shape);
         h.shape = scene.settings->first_analytic + h.prim;
@@ -34,10 +34,10 @@ inline mask trace_occluded(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real t, mask
 {
     if (LAYOUT(occluded)(nodes, leaves, o.x, o.y, o.z, d.x, d.y, d.z, 0.0f, t)) return 1;
 #if USES_INSTANCES
-    if (instances_occluded(nodes, leaves, INSTANCES, scene, o, d, t)) return 1;
+    if (instances_occluded(nodes, leaves, instance_nodes, scene, o, d, t)) return 1;
 #endif
 #if USES_ANALYTIC
-    return shapes_occluded(shape_nodes, shape_items, scene, o.x, o.y, o.z, d.x, d.y, d.z, 0.0f, t);
+    return shapes_occluded(shape_nodes, shape_indices, scene, o.x, o.y, o.z, d.x, d.y, d.z, 0.0f, t);
 #else
     return 0;
 #endif

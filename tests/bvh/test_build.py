@@ -177,3 +177,32 @@ def test_layouts_are_chosen_by_size_and_device(device):
     sphere = trimesh.creation.icosphere(2)
     built = bvh.build(device, sphere.vertices, sphere.faces)
     assert built.layout == bvh.choose_layout(device, len(sphere.faces))
+
+
+@pytest.mark.parametrize("count", [1, 2, 9, 300])
+def test_wide_tree_over_boxes(device, count):
+    """Each box is in a leaf of its own, inside of all that stands above it."""
+    rng = np.random.default_rng(count)
+    low = rng.random((count, 3)).astype(np.float32)
+    boxes = np.stack([low, low + 0.3 * rng.random((count, 3)).astype(np.float32)], 1)
+    tree = bvh.build_boxes(device, boxes, "wide8")
+    indices, nodes = (read(device, tree.buffers[name], np.uint32) for name in ("indices", "nodes"))
+    indices = indices[:count]
+    assert sorted(indices) == list(range(count))
+    nodes = nodes.view(np.float32).reshape(-1, 8, 8)
+    met, waiting = [], [(0, np.full(3, -np.inf), np.full(3, np.inf))]
+    while waiting:
+        at, above, below = waiting.pop()
+        for slot in range(8):
+            low, high = nodes[at, [0, 2, 4], slot], nodes[at, [1, 3, 5], slot]
+            if (low > high).any():
+                continue
+            assert (low >= above).all() and (high <= below).all()
+            word = int(nodes[at, 6, slot : slot + 1].view(np.uint32)[0])
+            if word < LEAF:
+                waiting.append((word, low, high))
+                continue
+            box = boxes[indices[word - LEAF]]
+            assert (low <= box[0]).all() and (high >= box[1]).all()
+            met.append(word - LEAF)
+    assert sorted(met) == list(range(count))
