@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from clpt import images
+from clpt.errors import SceneError
 from clpt.formats import load
 from clpt.spectra import RGB, Constant
 
@@ -189,3 +190,67 @@ def test_what_changes_no_picture_is_passed_over(read):
         '<shape type="disk"><float name="silhouette_sampling_weight" value="1"/></shape>'
     )
     assert not made.warnings
+
+
+def _doubled(tag: str, first: str, between: str, names: tuple[str, str], count: int) -> str:
+    """Objects that each hold the one before twice."""
+    made = [f'<{tag} type="{first}" id="d0"/>']
+    for i in range(1, count):
+        refs = "".join(f'<ref{name} id="d{i - 1}"/>' for name in names)
+        made.append(f'<{tag} type="{between}" id="d{i}">{refs}</{tag}>')
+    return "".join(made)
+
+
+BOMBS = {
+    "variables": (
+        '<default name="v0" value="xxxxxxxx"/>'
+        + "".join(f'<default name="v{i}" value="$v{i - 1}$v{i - 1}"/>' for i in range(1, 60)),
+        "longer than 16777216 characters",
+    ),
+    "materials": (
+        _doubled("bsdf", "diffuse", "twosided", ("", ""), 40),
+        "more than 1000 parts",
+    ),
+    "checkerboards": (
+        _doubled(
+            "texture", "checkerboard", "checkerboard", (' name="color0"', ' name="color1"'), 40
+        ),
+        "more than 1000 parts",
+    ),
+    "a chain of references": (
+        '<shape type="cube"><ref id="d99"/></shape>'
+        + "".join(
+            f'<bsdf type="twosided" id="d{i}"><ref id="d{i - 1}"/></bsdf>' for i in range(99, 0, -1)
+        )
+        + '<bsdf type="diffuse" id="d0"/>',
+        "nested deeper than 64 objects",
+    ),
+    "an integrator in itself": (
+        '<integrator type="moment" id="m"><ref id="m"/></integrator>',
+        "refers to itself",
+    ),
+    "a merge of itself": ('<shape type="merge" id="m"><ref id="m"/></shape>', "cannot stand in a"),
+    "a volume of itself": (
+        '<volume type="constvolume" id="c"><texture type="volume" name="value"><ref name="volume" '
+        'id="c"/></texture></volume><shape type="cube"><bsdf type="diffuse"><texture type="volume" '
+        'name="reflectance"><ref name="volume" id="c"/></texture></bsdf></shape>',
+        "unknown texture 'volume'",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BOMBS)
+def test_bombs_end_at_once(read, name):
+    body, message = BOMBS[name]
+    with pytest.raises(SceneError, match=message):
+        read(body)
+
+
+def test_includes_are_counted(read, tmp_path):
+    for i in range(12):
+        (tmp_path / f"i{i}.xml").write_text(
+            '<scene version="3.0.0">' + f'<include filename="i{i + 1}.xml"/>' * 8 + "</scene>"
+        )
+    (tmp_path / "i12.xml").write_text('<scene version="3.0.0"/>')
+    with pytest.raises(SceneError, match="more than 4096 files"):
+        read('<include filename="i0.xml"/>')

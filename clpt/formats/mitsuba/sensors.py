@@ -248,6 +248,10 @@ def _sampler(element: Element | None, context: Context) -> tuple[Sampler, int, i
 
 def integrator(element: Element, context: Context) -> Integrator:
     """Make the integrator that an <integrator> describes."""
+    return context.once(element, lambda _: _integrator(element, context))
+
+
+def _integrator(element: Element, context: Context) -> Integrator:
     if element.type not in INTEGRATORS:
         raise unknown(element, INTEGRATORS)
     props = Properties(element, context)

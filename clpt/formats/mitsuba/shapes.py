@@ -34,12 +34,20 @@ def shapes_of(elements: Iterable[Element], context: Context) -> list[Shape]:
         elif element.type == "instance":
             made.append(_instance(element, context))
         elif element.type == "merge":
-            props = Properties(element, context)
-            made += shapes_of(props.objects("shape"), context)
-            props.finish()
+            made += shapes_of(_merged(element, context), context)
         else:
             made.append(shape(element, context))
     return made
+
+
+def _merged(element: Element, context: Context) -> list[Element]:
+    props = Properties(element, context)
+    inner = props.objects("shape")
+    props.finish()
+    for child in inner:
+        if child.type in ("merge", "shapegroup"):
+            raise child.error('cannot stand in a <shape type="merge">')
+    return inner
 
 
 def shape(element: Element, context: Context) -> Shape:

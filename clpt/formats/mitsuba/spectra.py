@@ -121,9 +121,9 @@ def _volume(element: Element, role: str, context: Context) -> Any:
         raise volume.error("only a <volume> of the type 'constvolume' is supported")
     props = Properties(volume, context)
     props.placement()
-    value = _take(props, "value", role, 1.0)
+    value = props.take("value")
     props.finish()
-    return value
+    return 1.0 if value is None else _spectrum(context.resolve(value), role, props, "value")
 
 
 def _spectrum(child: Element, role: str, props: Properties, name: str) -> Any:

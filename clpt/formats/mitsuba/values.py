@@ -13,7 +13,7 @@ import numpy as np
 
 from clpt import transforms
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
-from clpt.formats.mitsuba.xml import Document, Element
+from clpt.formats.mitsuba.xml import MAX_NESTING, Document, Element
 
 VALUES = {
     "integer", "float", "string", "boolean", "vector", "point", "rgb", "srgb", "spectrum",
@@ -31,6 +31,7 @@ UNSUPPORTED = {
 }  # fmt: skip
 SEPARATOR = re.compile(r"[\s,]+")
 LARGEST_INTEGER = 2**31 - 1
+MAX_PARTS = 1000  # of one material or texture
 
 
 @contextmanager
@@ -53,6 +54,8 @@ class Context:
         self.warnings: list[str] = []
         self.ids: dict[str, Element] = {}
         self._made: dict[int, Any] = {}
+        self._sizes: dict[int, int] = {}  # of what is made: its parts, counted at every use
+        self._open = [0]  # likewise of what is being made, from the outside in
         for element in document.root.walk():
             name = element.attributes.get("as" if element.tag == "alias" else "id")
             if name is not None and element.tag != "ref":
@@ -73,13 +76,23 @@ class Context:
         return self.ids[name]
 
     def once(self, element: Element, make: Any) -> Any:
-        """Return make(element), the same object for every reference to the element."""
+        """Return make(element), the same object for every reference to the element.
+
+        Raises SceneError where it refers to itself, or to what is nested too deep or too often.
+        """
         key = id(element)
         if key not in self._made:
             self._made[key] = None
+            self._open.append(1)
+            if len(self._open) > MAX_NESTING:
+                raise element.error(f"nested deeper than {MAX_NESTING} objects, by references")
             self._made[key] = make(element)
+            self._sizes[key] = self._open.pop()
+            if element.tag != "shape" and self._sizes[key] > MAX_PARTS:
+                raise element.error(f"has more than {MAX_PARTS} parts, by references")
         if self._made[key] is None:
             raise element.error("refers to itself")
+        self._open[-1] += self._sizes[key]
         return self._made[key]
 
     def warn(self, element: Element, message: str) -> None:
@@ -119,9 +132,15 @@ class Properties:
         for name, child in list(self.named.items()):
             if child.tag == "ref" and self.context.resolve(child).tag == tag:
                 self.nested.append(self.named.pop(name))
-        found = [child for child in self.nested if self.context.resolve(child).tag == tag]
-        self.nested = [child for child in self.nested if child not in found]
-        return [self.context.resolve(child) for child in found]
+        found, rest = [], []
+        for child in self.nested:
+            target = self.context.resolve(child)
+            if target.tag == tag:
+                found.append(target)
+            else:
+                rest.append(child)
+        self.nested = rest
+        return found
 
     def object(self, tag: str) -> Element | None:
         """Take the one nested object of a tag, or None."""

@@ -16,14 +16,16 @@ from xml.parsers import expat
 from clpt.errors import SceneError
 
 MAX_NESTING = 64
-MAX_INCLUDES = 16
+MAX_INCLUDES = 16  # of files inside each other
+MAX_FILES = 4096  # that are read for one scene
+MAX_TEXT = 1 << 24  # characters of an attribute after its variables
 VARIABLE = re.compile(r"\\\$|\$(?:\{(\w+)\}|(\w*))")
 # Before Mitsuba 2, names were written in camel case.
 HUMP = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
 RENAMED = {"lookAt": "lookat"}
 
 
-@dataclass
+@dataclass(eq=False)
 class Element:
     """One XML element: tag, attributes, children, and where it stands."""
 
@@ -160,6 +162,7 @@ class _Expander:
         self.values = dict(self.given)
         self.used: set[str] = set()
         self.folders = [path.parent]
+        self.files = 1
 
     def expand(self, element: Element, includes: int) -> None:
         kept: list[Element] = []
@@ -188,7 +191,12 @@ class _Expander:
             self.used.add(name)
             return self.values[name] + ("" if match[1] else match[2][len(name) :])
 
-        return VARIABLE.sub(value, text) if "$" in text else text
+        if "$" not in text:
+            return text
+        size = len(text) + sum(len(value(match)) for match in VARIABLE.finditer(text))
+        if size > MAX_TEXT:
+            raise element.error(f"is longer than {MAX_TEXT} characters with its variables")
+        return VARIABLE.sub(value, text)
 
     def prefix(self, word: str) -> str:
         """The longest variable that a word begins with, as Mitsuba finds them; or ""."""
@@ -212,6 +220,9 @@ class _Expander:
     def include(self, element: Element, depth: int) -> list[Element]:
         if depth > MAX_INCLUDES:
             raise element.error(f"more than {MAX_INCLUDES} files include each other")
+        self.files += 1
+        if self.files > MAX_FILES:
+            raise element.error(f"more than {MAX_FILES} files are included")
         path = _find(element, element.attribute("filename"), self.folders)
         root = _read(path)
         holder = root if root.tag == "scene" else Element("", {}, path, 0, [root])
