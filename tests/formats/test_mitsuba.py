@@ -529,6 +529,10 @@ ERRORS = {
     '<shape type="cube"><transform name="to_world"><scale value="0"/></transform></shape>':
         "cannot be inverted",
     '<shape type="cube"><transform name="to_world"><skew/></transform></shape>': "<skew>: is no",
+    '<shape type="sphere"><transform name="to_world"><scale x="2"/></transform></shape>':
+        "<transform name=.to_world.>: it stretches or shears the sphere",
+    '<shape type="cylinder"><transform name="to_world"><scale x="2"/></transform></shape>':
+        "<transform name=.to_world.>: it stretches or shears the cylinder",
     '<shape type="cube"><emitter type="point"/></shape>': "only an area light",
     '<emitter type="area"/>': "must stand in a <shape>",
     '<emitter type="projector"><float name="fov" value="0"/></emitter>': "field of view",

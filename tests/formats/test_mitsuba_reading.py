@@ -254,3 +254,20 @@ def test_includes_are_counted(read, tmp_path):
     (tmp_path / "i12.xml").write_text('<scene version="3.0.0"/>')
     with pytest.raises(SceneError, match="more than 4096 files"):
         read('<include filename="i0.xml"/>')
+
+
+def test_round_shapes_may_be_scaled_turned_mirrored_and_a_cylinder_lengthened(read):
+    turned = '<rotate x="1" angle="30"/><rotate y="1" angle="50"/><scale value="-3"/>'
+    place = f'<transform name="to_world">{turned}</transform>'
+    longer = f'<transform name="to_world"><scale z="4"/>{turned}</transform>'
+    ends = number("point", "p1", "1 1 0")
+    along = (
+        f'<transform name="to_world"><rotate z="1" angle="-45"/><scale x="4"/>{turned}</transform>'
+    )
+    made = read(
+        f'<shape type="sphere">{place}</shape><shape type="cylinder">{longer}</shape>'
+        f'<shape type="cylinder">{ends}{along}</shape>'
+    )
+    assert len(made.shapes) == 3
+    with pytest.raises(SceneError, match="stretches or shears"):
+        read(f'<shape type="cylinder">{ends}{longer}</shape>')

@@ -102,3 +102,22 @@ def test_principled_scenes_of_others(assets: Path, tmp_path: Path, name: str, mo
     assert_agree(blocks(ours, 16), blocks(images, 16), f"blocks of {name}, {mode}", 0.01)
     ratio = ours.mean() / np.mean(images)
     assert abs(ratio - 1.0) < 0.015, f"mean radiance is {ratio:.4f} of Mitsuba's"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+def test_a_room_lit_through_a_door(assets: Path, tmp_path: Path, mode: str) -> None:
+    """383 thousand triangles; most of the light arrives after several reflections."""
+    source, path = assets / "mitsuba" / "veach-ajar", tmp_path / "scene.xml"
+    text = source.joinpath("scene.xml").read_text("utf-8")
+    path.write_text(text.replace('type="tent"', 'type="box"'), "utf-8")
+    for folder in filter(Path.is_dir, source.iterdir()):
+        (tmp_path / folder.name).symlink_to(folder)
+    size = {"resx": "54", "resy": "27"}
+    mi.set_variant(f"scalar_{mode}")
+    scene = mi.load_file(str(path), **size)
+    images = [np.array(mi.render(scene, spp=64, seed=seed))[:, :, :3] for seed in range(12)]
+    ours = exposures(with_film(clpt.load(path, **size), mode=mode), 16, 32)
+    assert_agree(blocks(ours, 9), blocks(images, 9), f"blocks of veach-ajar, {mode}", 0.01)
+    means = [np.mean(a, axis=(1, 2), keepdims=True) for a in (ours, images)]
+    assert_agree(*means, f"mean of veach-ajar, {mode}", 0.01)

@@ -20,6 +20,7 @@ from clpt.scene.materials import Diffuse
 from clpt.scene.shapes import Group, Instance, Shape
 
 Parameters = dict[str, Any]
+UNEVEN = 1e-3  # relative; how far a transform may stretch what is round
 
 
 def shapes_of(elements: Iterable[Element], context: Context) -> list[Shape]:
@@ -115,7 +116,7 @@ def _sphere(props: Properties) -> Parameters:
     return {
         "center": props.vector("center", (0.0, 0.0, 0.0)),
         "radius": _radius(props),
-        "to_world": props.placement(),
+        "to_world": _round(props, (0.0, 0.0, 0.0)),
     }
 
 
@@ -123,7 +124,25 @@ def _cylinder(props: Properties) -> Parameters:
     p0, p1 = props.vector("p0", (0.0, 0.0, 0.0)), props.vector("p1", (0.0, 0.0, 1.0))
     if p0 == p1:
         raise props.element.error("p0 and p1 are the same point")
-    return {"p0": p0, "p1": p1, "radius": _radius(props), "to_world": props.placement()}
+    to_world = _round(props, np.subtract(p1, p0))
+    return {"p0": p0, "p1": p1, "radius": _radius(props), "to_world": to_world}
+
+
+def _round(props: Properties, axis: Any) -> transforms.Matrix:
+    """Take a transform under which what is round about an axis, or about a point, remains so.
+
+    Mitsuba warns of any other, and then renders something round.
+    """
+    child = props.named.get("to_world")
+    to_world = props.placement()
+    products = to_world[:3, :3].T @ to_world[:3, :3]
+    along = np.outer(axis, axis) / max(np.dot(axis, axis), 1e-300)
+    length = np.sum(along * products)
+    even = (np.trace(products) - length) / (3.0 - np.trace(along))
+    uneven = products - even * np.eye(3) - (length - even * np.trace(along)) * along
+    if child is not None and np.abs(uneven).max() > UNEVEN * np.trace(products):
+        raise child.error(f"it stretches or shears the {props.element.type}; use a mesh for that")
+    return to_world
 
 
 def _radius(props: Properties) -> float:
