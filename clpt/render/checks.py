@@ -70,19 +70,21 @@ def _check_light_paths(scene: Scene) -> None:
         if isinstance(light, Point) and not light.falloff:
             _refuse("a point light whose irradiance falls with distance", f"lights[{i}]")
     for shape in distinct(scene.shapes):
-        if spectral and _fluoresces(shape.material):
+        if spectral and _has(shape.material, "shifts"):
             _refuse("materials that keep the wavelength", shapes.where(shape))
+        if _has(shape.material, "hollow"):
+            _refuse("materials that are reciprocal, which hair is not", shapes.where(shape))
 
 
 def _refuse(needed: str, where: str) -> NoReturn:
     raise SceneError(f"particle_tracer needs {needed}", where=where)
 
 
-def _fluoresces(material: Any) -> bool:
-    """Whether light may leave a material, or one inside it, at another wavelength."""
+def _has(material: Any, trait: str) -> bool:
+    """Whether a material, or one inside it, has a trait of its class."""
     parts = [getattr(material, name) for name in params(type(material))]
-    return getattr(material, "shifts", False) or any(
-        _fluoresces(part) for part in parts if isinstance(part, Material)
+    return getattr(material, trait, False) or any(
+        _has(part, trait) for part in parts if isinstance(part, Material)
     )
 
 

@@ -282,6 +282,8 @@ class _Lowering:
         one_sided = not side.inside and not isinstance(material, mt.Null)
         if side.turned and not side.front and one_sided:
             material = _BLACK  # the back of a one-sided part, though the surface is turned
+        if material.hollow and not side.front:
+            material = _NULL
         before = side.bend.words(self.tables) if self.bent else None
         row = self.tables.row(material, "materials", before)
         if row >= 1 << 24:
@@ -401,7 +403,7 @@ def _leaf_kinds(scene: sc.Scene) -> tuple[str, ...]:
             getattr(material, n) for n, p in params(type(material)).items() if p.role == "host"
         ]
         children = [c for c in children if isinstance(c, mt.Material)]
-        if isinstance(material, mt.Mask):
+        if isinstance(material, mt.Mask) or material.hollow:
             found.add(mt.Null)
         if not isinstance(material, mt.COMPOSITES):
             found.add(type(material))

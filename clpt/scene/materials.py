@@ -17,6 +17,7 @@ from clpt.scene.params import (
     Kind,
     choice,
     coefficient,
+    factor,
     flag,
     host,
     index,
@@ -31,6 +32,15 @@ from clpt.spectra import Spectrum
 DISTRIBUTIONS = ("ggx", "beckmann")
 FILMS = "thin films on the surface, from the outside in"
 MEASURED = 0.02  # how much more light than comes may leave, by the noise of a measurement
+
+
+def pigment(eumelanin: float, pheomelanin: float) -> tuple[float, ...]:
+    """Return the absorption of hair with concentrations of its two pigments, as linear rgb.
+
+    Per radius of the fibre (d'Eon et al. 2011, as in Chiang et al. 2016).
+    """
+    dark, red = (0.419, 0.697, 1.37), (0.187, 0.4, 1.05)
+    return tuple(eumelanin * a + pheomelanin * b for a, b in zip(dark, red, strict=True))
 
 
 def _share(default: float, doc: str, *, lobe: bool = False) -> Any:
@@ -60,6 +70,7 @@ class Material(Kind):
     disperses: ClassVar[bool] = False  # whatever its parameters, directions depend on wavelength
     shifts: ClassVar[bool] = False  # light may leave at another wavelength: it has `shift`
     passes: ClassVar[bool] = False  # light goes on as if nothing were there, to lights as well
+    hollow: ClassVar[bool] = False  # its back is not there
 
     @property
     def transmits(self) -> bool:
@@ -431,6 +442,33 @@ class Fluorescent(Material):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Hair(Material):
+    """A fibre that light goes through (Chiang et al. 2016), as Mitsuba 3 and pbrt 4 have it.
+
+    For `curves`, whose v runs along: all that a fibre does to light happens where it enters, and
+    its far side is passed as if it were not there. There is no thickness: `sigma_a` is absorbed
+    within a fibre's radius. What is let through is not reciprocal.
+    """
+
+    choosy = True
+    hollow = True
+
+    sigma_a: Any = factor(pigment(1.3, 0.2), "absorption, per radius of the fibre")
+    longitudinal_roughness: Any = _share(0.3, "of the angle along the fibre")
+    azimuthal_roughness: Any = _share(0.3, "of the angle around it")
+    scale_tilt: float = real(2.0, "of the scales against the fibre", "degrees", -45.0, 45.0)
+    eta: float = real(1.55, "index of the fibre over that outside", "", 1.001, 5.0)
+
+    @property
+    def transmits(self) -> bool:
+        return True
+
+    @property
+    def turns(self) -> bool:
+        return True
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Null(Material):
     """No surface at all: light passes as if it were not there."""
 
@@ -509,6 +547,7 @@ LEAVES = (
     GltfSurface,
     Grating,
     Fluorescent,
+    Hair,
     Null,
 )
 COMPOSITES = (TwoSided, Mask, Blend, NormalMap, BumpMap)

@@ -493,7 +493,7 @@ def test_checkerboard_of_numbers_is_mitsubas(scene):
 
 
 ERRORS = {
-    '<bsdf type="hair" id="p"/>': r":2: <bsdf type=.hair.>: unknown bsdf",
+    '<bsdf type="hare" id="p"/>': r":2: <bsdf type=.hare.>: unknown bsdf",
     '<bsdf type="principled"><float name="eta" value="2"/><float name="specular" value="1"/>'
     "</bsdf>":
         "either 'eta' or 'specular'",
@@ -572,7 +572,7 @@ def test_errors_tell_the_place(scene, body):
 
 def test_error_types(scene):
     with pytest.raises(UnknownKindError):
-        scene('<bsdf type="hair"/>')
+        scene('<bsdf type="hare"/>')
     with pytest.raises(UnusedParameterError):
         scene('<shape type="cube"><float name="radius" value="1"/></shape>')
 
@@ -734,3 +734,19 @@ def test_light_tracing(scene):
     assert beam.irradiance == RGBIlluminant(3, 3, 3)
     with pytest.raises(SceneError, match="must stand in a <shape>"):
         scene('<emitter type="directionalarea"/>')
+
+
+def test_hair(bsdf):
+    plain = bsdf('<bsdf type="hair"/>')
+    assert plain.eta == pytest.approx(1.55 / 1.000277)
+    assert (plain.scale_tilt, plain.longitudinal_roughness) == (2.0, 0.3)
+    rgb = [plain.sigma_a.r, plain.sigma_a.g, plain.sigma_a.b]
+    np.testing.assert_allclose(rgb, [0.5821, 0.9861, 1.991])
+    given = bsdf(
+        '<bsdf type="hair"><rgb name="sigma_a" value="1, 2, 3"/><float name="scale" value="2"/>'
+        '<float name="int_ior" value="1.6"/><float name="ext_ior" value="1"/></bsdf>'
+    )
+    assert given.sigma_a == RGBUnbounded(2.0, 4.0, 6.0) and given.eta == 1.6
+    with pytest.raises(SceneError, match="not both"):
+        bsdf('<bsdf type="hair"><float name="sigma_a" value="1"/>'
+             '<float name="eumelanin" value="1"/></bsdf>')  # fmt: skip

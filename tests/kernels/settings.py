@@ -11,13 +11,15 @@ from clpt.scene.materials import Layer
 from clpt.scene.params import Kind, Param, device_params
 from tests.kernels.harness import COMPONENTS
 
-# limits of what the principled kinds and glTF's would make lobes of that are too narrow for bins
+# limits of what principled kinds, glTF's and hair would make too narrow lobes of for bins
 WIDE = {
     "roughness": {"low": 0.5},
     "anisotropic": {"high": 0.7},
     "anisotropy": {"high": 0.8},
     "clearcoat_gloss": {"high": 0.4},
     "clearcoat_roughness": {"low": 0.5},
+    "longitudinal_roughness": {"low": 0.3},
+    "azimuthal_roughness": {"low": 0.3},
     "iridescence_thickness": {"low": 200.0, "high": 600.0},
 }
 

@@ -78,6 +78,7 @@ LOSSLESS = {
         {"int_ior": 1.5, "ext_ior": 1.0, "alpha_u": 2e-3, "alpha_v": 2e-3},
         (1.0, 30.0, 60.0, 135.0, 178.0),
     ),
+    m.Hair: ({"sigma_a": 0.0}, ANGLES),
     # the diffuse Fresnel reflectance is a fit, off by 0.1%
     m.Plastic: ({"int_ior": 1.5, "ext_ior": 1.0, "nonlinear": 0}, (1.0, 30.0, 60.0, 80.0)),
 }
@@ -108,6 +109,8 @@ def test_delta_lobes_keep_energy(cls, mode):
 @kinds
 @modes
 def test_reciprocity(cls, mode):
+    if cls is m.Hair:
+        pytest.skip("where light meets a fibre is told by wo alone")
     rng, probe = np.random.default_rng(14), Probe(cls, mode)
     for params in settings(cls, mode, rng, 4):
         wo, wi = directions(rng, 3000), directions(rng, 3000)

@@ -7,6 +7,7 @@ from typing import Any
 
 from clpt import spectra
 from clpt.formats.mitsuba.fluorescence import fluorescent
+from clpt.formats.mitsuba.hair import hair
 from clpt.formats.mitsuba.principled import principled, principled_thin
 from clpt.formats.mitsuba.spectra import coefficient, index, ior, real, reflectance, texture
 from clpt.formats.mitsuba.values import Context, Properties, numbers, placed, unknown
@@ -254,6 +255,7 @@ PLUGINS: dict[str, tuple[type[Material], Callable[[Properties], Parameters]]] = 
     "principledthin": (materials.PrincipledThin, principled_thin),
     "grating": (materials.Grating, _grating),
     "fluorescent": (materials.Fluorescent, fluorescent),
+    "hair": (materials.Hair, hair),
     "null": (materials.Null, _null),
     "twosided": (materials.TwoSided, _two_sided),
     "mask": (materials.Mask, _mask),

@@ -52,6 +52,11 @@ def index(props: Properties, name: str, default: Any) -> Any:
     return _take(props, name, "index", default)
 
 
+def factor(props: Properties, name: str, default: Any) -> Any:
+    """Take a spectrum without limits: a number, a colour, a spectrum or a texture."""
+    return _take(props, name, "factor", default)
+
+
 def coefficient(props: Properties, name: str) -> Any:
     """Take an absorption coefficient [1/m]: a number, a colour or a spectrum; 0 if not given."""
     value = _take(props, name, "coefficient", 0.0)

@@ -10,6 +10,7 @@ import numpy as np
 
 from clpt.errors import SceneError, UnknownKindError
 from clpt.formats.pbrt import coats
+from clpt.formats.pbrt.hair import hair
 from clpt.formats.pbrt.layered import both, coat, coated_diffuse, middle, subsurface
 from clpt.formats.pbrt.mapped import mapped
 from clpt.formats.pbrt.params import Parameters
@@ -184,10 +185,6 @@ def _measured(params: Parameters, state: State) -> Material:
     )
 
 
-def _hair(params: Parameters, state: State) -> Material:
-    raise SceneError("hair is not supported")
-
-
 MAKERS: dict[str, Callable[[Parameters, State], Material]] = {
     "diffuse": _diffuse,
     "diffusetransmission": _diffuse_transmission,
@@ -202,5 +199,5 @@ MAKERS: dict[str, Callable[[Parameters, State], Material]] = {
     "": _interface,
     "none": _interface,
     "measured": _measured,
-    "hair": _hair,
+    "hair": hair,
 }

@@ -30,7 +30,7 @@ def constant(spectrum):
 def test_defaults():
     """Every kind that stands by itself is made without parameters, seen from both sides."""
     one_sided = {"diffuse", "coateddiffuse", "conductor", "coatedconductor", "subsurface"}
-    for kind in MAKERS.keys() - {"mix", "measured", "hair"}:
+    for kind in MAKERS.keys() - {"mix", "measured"}:
         made = material(kind, params(), state(), "label")
         assert isinstance(made, TwoSided) == (kind in one_sided), kind
         assert made.name == "label"
@@ -223,3 +223,15 @@ def test_what_is_no_material_is_told(kind, given, message):
     with pytest.raises(SceneError, match=message) as caught:
         make(kind, **given)
     assert caught.value.line == 1
+
+
+def test_hair():
+    brown = make("hair")
+    red = make("hair", eumelanin=("float", 1.0), pheomelanin=("float", 2.0), alpha=("float", 3.0))
+    assert brown.sigma_a.g == pytest.approx(1.3 * 0.697) and brown.eta == 1.55
+    assert red.sigma_a.b == pytest.approx(1.37 + 2.1) and red.scale_tilt == 3.0
+    grey = make("hair", reflectance=("rgb", 0.5, 0.5, 0.5), beta_n=("float", 0.3))
+    fit = 5.969 - 0.0645 + 0.22788 - 0.28971 + 0.0451494 + 0.00059535
+    assert grey.sigma_a.g == pytest.approx((np.log(0.5) / fit) ** 2)
+    with pytest.raises(SceneError, match="one of"):
+        make("hair", sigma_a=("float", 0.5), eumelanin=("float", 1.0))
