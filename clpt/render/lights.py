@@ -21,6 +21,7 @@ from clpt.render.triangle_means import triangle_means
 from clpt.scene.lights import DirectionalArea, Light
 from clpt.scene.shapes import Shape
 
+APART = 6  # triangles that a light at a place of its own counts as, where a tree is thought of
 INFINITE_SHARE = 0.5  # of the choices, where there are other lights too
 FRONT, ALONG, BOTH = range(3)  # LightRow.way, see kernels/light/area.cl
 BASES = {"spectral_envmap": "envmap", "image_spot": "spot"}  # whose functions a kind uses
@@ -81,7 +82,8 @@ def light_rows(
     """Put the parameters of all lights into the tables, and make the rows of `lights`.
 
     scene_radius: of a sphere around the scene [m]; tree_from: the number of rows from which a tree
-    chooses among them. Raises SceneError for a light that has no place.
+    chooses among them, or 1 / APART of it of lights at places. Raises SceneError for a light that
+    has no place.
     """
     if tables.append("lamps", blank_row()) != 0:
         raise ValueError("`lamps` must be empty before the lights are put in")
@@ -95,7 +97,8 @@ def light_rows(
     if len(rows):
         weights = _shared(np.concatenate([block.power for block in blocks]), infinite)
         rows["pmf"], rows["keep"], rows["alias"] = alias_table(weights)
-        if tree_from is not None and len(rows) >= tree_from:
+        apart = sum(bool(block.bounds.placed.any()) for block in blocks)
+        if tree_from is not None and max(len(rows), APART * apart) >= tree_from:
             bounds = light_bounds.joined([block.bounds for block in blocks])
             tree = light_tree.build(bounds, weights / weights.sum()).words()
     kinds = tuple(KINDS[i] for i in np.unique(rows["kind"]))

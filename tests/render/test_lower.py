@@ -12,7 +12,7 @@ from clpt.scene import Film, Scene
 from clpt.scene import materials as m
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Direct, Path
-from clpt.scene.lights import Area, Constant
+from clpt.scene.lights import Area, Constant, Directional, Point
 from clpt.scene.shapes import Cube, Mesh, Rectangle, Shape, Sphere
 
 CORNERS = np.eye(3, dtype=np.float32)
@@ -121,3 +121,17 @@ def test_principled_is_what_its_parameters_say() -> None:
     for passes in (m.Principled(spec_trans=0.1), m.PrincipledThin(), m.DiffuseTransmission()):
         with pytest.raises(clpt.SceneError, match="a transmissive"):
             lower(scene(Rectangle(material=m.TwoSided(front=passes))))
+
+
+def test_few_lights_are_chosen_from_a_tree_where_they_stand_apart() -> None:
+    points = [Point(position=(float(i), 0.0, 1.0)) for i in range(3)]
+    far = [Constant(), Directional(direction=(0.0, 0.0, -1.0))]
+    cube = Cube(emission=Area())  # twelve rows, one as good as another
+
+    def tree(*shapes: Shape, lights: list) -> bool:
+        return lower(scene(*shapes, lights=lights)).features.light_tree
+
+    assert tree(lights=points) and tree(lights=far + points)
+    assert not tree(lights=points[:2]) and not tree(lights=far + points[:2])
+    assert not tree(cube, lights=points[:1])
+    assert tree(cube, lights=points[:2])
