@@ -93,6 +93,9 @@ def test_pbrt_curves_are_one(pbrt):
     (curves,) = scene.shapes
     assert curves.basis == "bezier" and curves.lengths == (4, 4) and not scene.warnings
     np.testing.assert_allclose(curves.points[4:, 3], [0.1, 0.25 / 3, 0.2 / 3, 0.05], rtol=1e-6)
+    flat = P.replace("cylinder", "flat")
+    assert "shaded as a round one" in pbrt(flat).warnings[0]
+    assert not pbrt(flat, before='Material "hair"').warnings
     turned = pbrt(P, before="ReverseOrientation").shapes[0]
     assert not turned.flip_normals
 

@@ -265,7 +265,12 @@ def _curve(params: Parameters, state: State) -> Geometry | None:
     kind, parts = curves.curve(params)
     if kind is None:
         return _mesh(parts["points"], parts["faces"], parts["normals"], parts["uvs"])
-    return Geometry(kind, parts)
+    named = state.material
+    found = state.shared.materials.get(named) if isinstance(named, str) else named
+    flat = params.one("type", "string", "flat") == "flat"
+    if not flat or (found is not None and found.kind == "hair"):  # which makes no difference
+        return Geometry(kind, parts)
+    return Geometry(kind, parts, ["a flat curve is shaded as a round one"])
 
 
 SHAPES: dict[str, Callable[[Parameters, State], Geometry | None]] = {
