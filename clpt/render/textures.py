@@ -367,7 +367,8 @@ def _look_up(role: str, kinds: list[str], name: str) -> list[str]:
     else:
         type_, choose, more = "Spectrum", "spectrum_sel", ", lambdas"
         zero = "spectrum_of(0.0f)"
-    verb = "reflectance" if role == "index" else role  # the same look-up, of other numbers
+    # Indices and factors are the same look-up, of other numbers.
+    verb = "reflectance" if role in ("index", "factor") else role
     lines = [
         f"inline {type_} {name}_{role}"
         "(Scene scene, integer row, TexturePoint point, Wavelengths lambdas)",

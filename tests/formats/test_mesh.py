@@ -146,7 +146,7 @@ def test_load_refuses_what_is_not_there(tmp_path):
     for name, message in {
         "no.obj": "no such file",
         "\0": "no such file|cannot be read",
-        "": "none of scene.json",
+        "": "no scene.json",
     }.items():
         with pytest.raises(SceneError, match=message):
             load(f"{tmp_path}/{name}")
@@ -170,7 +170,9 @@ def test_the_studio_frames_any_mesh(tmp_path, size, suffix, up):
     assert camera.near < seen[:, 2].min() and seen[:, 2].max() < camera.far
     assert camera.to_world[up, 3] > offset[up]
     ground = made.shapes[1]
-    assert np.allclose(ground.to_world[up, 3], made.shapes[0].vertices[:, up].min(), rtol=1e-4)
+    assert np.allclose(
+        ground.to_world[up, 3], made.shapes[0].vertices[:, up].min(), atol=5e-3 * size
+    )
     normal = transforms.transform_normals(ground.to_world, [0, 0, 1])
     assert np.allclose(normal, np.eye(3)[up], atol=1e-6)
 

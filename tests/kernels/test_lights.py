@@ -466,6 +466,7 @@ def test_faces_and_directions_are_inverse():
     np.testing.assert_allclose(b2, np.tile(b, (6, 1)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", NAMES)
 def test_lanes_agree(mode):
     scene = lit(list(skies().values()), [FORMULAS["sphere"][0], FORMULAS["triangle"][0]], mode)

@@ -380,6 +380,7 @@ def test_checkerboard_real_and_emission():
     np.testing.assert_allclose(found[0], 0.25, rtol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["rgb", "spectral"])
 def test_neighbouring_lanes_read_different_textures(mode):
     made = [

@@ -83,6 +83,7 @@ def test_plate(integrator: str, degrees: float, centre: float) -> None:
         assert_agree(images[:, None, None], expected[None, None, None], allowed=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", [0.0, 60.0])
 def test_plate_in_rgb(degrees: float) -> None:
     """In RGB mode each component of the coefficient absorbs its own."""
@@ -109,6 +110,7 @@ def bowl(material: Any, mode: str, inside: list, lights: list, depth: int = 20) 
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["rgb", "spectral"])
 @pytest.mark.parametrize("layers", [(), (Layer(eta=1.0),)], ids=["bare", "film"])
 def test_lamp_inside(layers: tuple, mode: str) -> None:
@@ -151,6 +153,7 @@ def test_camera_inside() -> None:
     assert_mean(exposures(scene, 4, 16), [np.exp(-2.0 * 1.5)] * 3, 0.01, 1e-3)
 
 
+@pytest.mark.slow
 def test_light_traced_from_the_lamp() -> None:
     """A dyed block between a lamp and a table: its shadow is the same from either end."""
     lamp = tf.translate([0, 0, 2.0]) @ DOWN @ tf.scale(0.5)
@@ -198,8 +201,8 @@ def coloured(material: type, **changes: Any) -> Scene:
     )
 
 
-@pytest.mark.parametrize("mode", ["rgb", "spectral"])
-@pytest.mark.parametrize("integrator", ["path", "whitted"])
+@pytest.mark.parametrize("mode", [pytest.param("rgb", marks=pytest.mark.slow), "spectral"])
+@pytest.mark.parametrize("integrator", ["path", pytest.param("whitted", marks=pytest.mark.slow)])
 def test_no_absorption_changes_no_bit(integrator: str, mode: str) -> None:
     """A coefficient of 0, with the code that reads it and without, gives the same picture."""
     zero = spectra.Tabulated((400.0, 700.0), (0.0, 0.0))

@@ -53,7 +53,10 @@ def test_split_into_steps_with_few_and_many_slots(scenes: Path, slots: int) -> N
     assert np.array_equal(renderer.image(), clpt.render(scene, SPP, slots=slots))
 
 
-@pytest.mark.parametrize(("name", "mode"), [("plastic", "spectral"), ("glass_metal", "rgb")])
+@pytest.mark.parametrize(
+    ("name", "mode"),
+    [pytest.param("plastic", "spectral", marks=pytest.mark.slow), ("glass_metal", "rgb")],
+)
 def test_queued_shading_changes_nothing(scenes: Path, name: str, mode: str) -> None:
     """Sorted queues and masked blocks shade the same paths with the same numbers.
 

@@ -122,6 +122,7 @@ def test_a_furnace_is_a_power_series(depth: int) -> None:
     assert_mean(images, expected, 0.03, 2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["disk", "directional"])
 @pytest.mark.parametrize("integrator", [Path(max_depth=2), Whitted(max_depth=1, ambient=0.0)])
 def test_lights_that_are_sampled(kind: str, integrator: object) -> None:
@@ -139,6 +140,7 @@ def test_lights_that_are_sampled(kind: str, integrator: object) -> None:
     assert_mean(exposures(scene, 24, 32), expected, 0.03, 2e-3)
 
 
+@pytest.mark.slow
 def test_a_sky_and_a_disk_share_the_weight() -> None:
     """The disk hides a part of the sky; what both give together has no seam."""
     light = LIGHTS["D65"]
@@ -148,6 +150,7 @@ def test_a_sky_and_a_disk_share_the_weight() -> None:
     assert_mean(exposures(scene, 24, 32), seen(at, operator(at) @ light.sample(at)), 0.02, 2e-3)
 
 
+@pytest.mark.slow
 def test_one_wavelength_is_enough() -> None:
     """Behind glass that disperses, next to nothing, a path keeps its hero alone, which shifts."""
     means = []
@@ -172,6 +175,7 @@ def test_light_goes_one_way() -> None:
         assert brighter > 3.0 if centre == 520.0 else brighter == pytest.approx(1.0, abs=0.03)
 
 
+@pytest.mark.slow
 def test_a_wider_range_lets_ultraviolet_in() -> None:
     """The same paint in the same light glows more where the film counts light from 300 nm on."""
     brightness = []
@@ -218,6 +222,7 @@ def test_rgb_has_the_colour_under_d65() -> None:
     assert clpt.render(glaring, 256).mean(axis=(0, 1)).max() <= bright.max() + 1e-3
 
 
+@pytest.mark.slow
 def test_the_picture_does_not_depend_on_lanes() -> None:
     scene = inside(6)
     images = []

@@ -38,7 +38,11 @@ def from_above(material, shape, wavelength: float) -> Scene:
     )
 
 
-@pytest.mark.parametrize("shape", [Rectangle, Disk], ids=["rectangle", "disk"])
+@pytest.mark.parametrize(
+    "shape",
+    [Rectangle, pytest.param(Disk, marks=pytest.mark.slow)],
+    ids=["rectangle", "disk"],
+)
 def test_where_a_lamps_first_order_appears(shape):
     """At x = +-H tan(asin(lambda / d)), along the tangent of a rectangle, all around on a disk."""
     made = from_above(Grating(period=PERIOD), shape, 550.0)

@@ -59,7 +59,14 @@ def ball(
 KINDS = [k for k in materials.LEAVES if "int_ior" in {f.name for f in dataclasses.fields(k)}]
 
 
-@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.kind)
+@pytest.mark.parametrize(
+    "kind",
+    [
+        pytest.param(kind, marks=() if kind is materials.RoughDielectric else pytest.mark.slow)
+        for kind in KINDS
+    ],
+    ids=lambda kind: kind.kind,
+)
 def test_a_step_in_the_index_is_two_indices(kind: type[materials.Material]) -> None:
     """The picture is the sum of those of two bands of light, each with its constant index.
 

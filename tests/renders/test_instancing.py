@@ -83,6 +83,7 @@ def test_values_are_those_of_copies(layout: str) -> None:
     assert told.seconds["first_sample"] > told.seconds["ready"] > told.seconds["trees"] > 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("center", "size"), [(0.0, 1e-4), pytest.param(0.0, 3e4, marks=pytest.mark.slow), (2e3, 1.0)]
 )

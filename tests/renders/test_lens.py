@@ -77,6 +77,7 @@ def test_glass_that_does_not_disperse_changes_no_bit():
     assert not lower(flat).features.dispersion
 
 
+@pytest.mark.slow
 def test_an_even_sky_keeps_its_brightness():
     sky = Constant(radiance=spectra.Constant(1.0))
     film = Film(width=16, height=16)

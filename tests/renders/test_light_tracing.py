@@ -139,12 +139,14 @@ def test_every_light(kind: str) -> None:
     both(still_life("rgb", {kind: LIGHTS[kind]}), 16, kind)
 
 
+@pytest.mark.slow
 def test_spectral_and_several_lights_at_once() -> None:
     scene = still_life("spectral", LIGHTS)
     some = dataclasses.replace(scene, shapes=scene.shapes[:5], lights=scene.lights[1:4:2])
     both(some, 16, "spectral")
 
 
+@pytest.mark.slow
 def test_lights_that_throw_images_and_shine_from_both_sides() -> None:
     """All in one scene, from where no one of them lights up what the others do not reach."""
     rng = np.random.default_rng(3)
@@ -167,6 +169,7 @@ def test_depths(depth: int) -> None:
     both(still_life("rgb", {"sphere": 30.0, "spot": 8.0}), 16, f"depth {depth}", depth=depth)
 
 
+@pytest.mark.slow
 def test_thin_lens() -> None:
     """A floor and a wall out of focus in the light of a spot."""
     camera = ThinLens(to_world=VIEW, fov=50, aperture_radius=0.2, focus_distance=2.0, near=0.5)
@@ -197,6 +200,7 @@ def beam_through(slab: m.Material | None, mode: str) -> Scene:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 def test_beam(mode: str) -> None:
     """A floor of albedo a under irradiance E sends out a E / pi, in every direction."""
@@ -236,12 +240,14 @@ def under_glass(glass: m.Material, camera: Camera, mode: str) -> Scene:
     return Scene(camera=camera, shapes=shapes, film=Film(width=16, height=12, mode=mode))
 
 
+@pytest.mark.slow
 def test_caustic_of_a_ball_of_glass() -> None:
     """The floor under the ball, where light is found by chance from the camera."""
     low = Perspective(to_world=tf.look_at([0.0, 0.28, 1.2], [0.0, 0.0, 0.0], UP), fov=30)
     both(under_glass(m.Dielectric(int_ior=1.5, absorption=1.0), low, "rgb"), 64, "caustic", depth=6)
 
 
+@pytest.mark.slow
 def test_rough_glass_that_disperses() -> None:
     """Each wavelength is refracted with its own index, by light that goes either way."""
     view = Perspective(to_world=tf.look_at([0.0, 0.9, 2.5], [0.0, 0.6, 0.0], UP), fov=30)
@@ -289,6 +295,7 @@ def test_filter_that_is_passed_over() -> None:
     assert "film.filter" in lowered.warnings[0]
 
 
+@pytest.mark.slow
 def test_lanes_slots_and_steps_differ_only_in_rounding() -> None:
     """The same paths however the work is cut up; only the order of the sums is open."""
     scene = beam_through(m.Dielectric(int_ior="sf11"), "spectral")

@@ -33,6 +33,7 @@ CASES.remove(("spectra", "rgb"))  # of black bodies Mitsuba has no colour
 # The rest is left to the sweep of many samples.
 LEFT = [(name, "rgb") for name in ("plastic", "textures", "orthographic", "principled_thin")]
 LEFT += [(name, "spectral") for name in ("instances", "principled", "principled_thin")]
+LEFT += [(name, "spectral") for name in ("glass_metal", "thin_lens", "light_tracing")]
 QUICK = [case for case in CASES if case not in LEFT]
 MEAN_WITHIN = 0.015  # relative; at a quick test's number of samples most of it is noise
 METAL = '<string name="material" value="Al"/>'

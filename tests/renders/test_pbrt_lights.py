@@ -45,6 +45,7 @@ def octahedral_directions(size: int) -> np.ndarray:
     )
 
 
+@pytest.mark.slow
 def test_every_light_that_both_have(scenes: Path, tmp_path: Path) -> None:
     shutil.copy(scenes / "pbrt" / "lights.pbrt", tmp_path)
     images.write(tmp_path / "octahedral.pfm", radiance(octahedral_directions(128)))

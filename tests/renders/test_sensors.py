@@ -93,6 +93,7 @@ def test_bands_add_up_to_the_colour() -> None:
     np.testing.assert_allclose(summed, colours, rtol=0.01)
 
 
+@pytest.mark.slow
 def test_bands_do_not_depend_on_lanes(monkeypatch: pytest.MonkeyPatch) -> None:
     """To the bit, with the wavelengths of line spectra."""
     device, found = clpt.device.choose(), []

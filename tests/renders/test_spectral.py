@@ -63,6 +63,7 @@ def strip(sampler: object) -> Scene:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spp", [1, 3, 16])
 @pytest.mark.parametrize("sampler", [Sobol(), Independent()], ids=lambda s: s.kind)
 def test_no_ripple(sampler: object, spp: int) -> None:
@@ -98,6 +99,7 @@ def test_bands_outside_of_the_range_are_dark(outside: float) -> None:
     assert np.abs(exposures(scene, 2, 64)).max() < 1e-3 * np.abs(to_rgb(np.ones(len(FINE)))).max()
 
 
+@pytest.mark.slow
 def test_spectral_sky_has_its_colours(scenes: Path) -> None:
     """Seen directly, colours of an image that were uplifted come back."""
     scene = with_path(clpt.load(scenes / "envmap.xml"), max_depth=1)

@@ -89,6 +89,7 @@ def test_macbeth_s_chart_in_rgb_mode(macbeth):
     assert_agree(found, np.clip(expected, 0.0, 1.0)[None], allowed=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["spectral", "rgb"])
 def test_a_chart_that_glows(mode):
     """Narrow bands at uneven wavelengths, dark beyond the ends."""
@@ -103,6 +104,7 @@ def test_a_chart_that_glows(mode):
         assert_agree(found, expected[None], allowed=5e-3)
 
 
+@pytest.mark.slow
 def test_surroundings_of_one_spectrum_are_a_constant_light():
     lambdas = np.linspace(360.0, 830.0, 48)
     values = spectra.illuminant("A").sample(lambdas)

@@ -48,7 +48,9 @@ def strip(material, mode):
     )
 
 
-@pytest.mark.parametrize("name", MATERIALS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=() if n == "soap" else pytest.mark.slow) for n in MATERIALS]
+)
 def test_rgb_is_close_to_spectral(name):
     """Delta E 2000 of the means over 4 x 4 pixels; of films on water, exposed as one would."""
     colour = pytest.importorskip("colour", reason="colour-science is for developers")
@@ -62,7 +64,7 @@ def test_rgb_is_close_to_spectral(name):
     assert difference.mean() < 2.0 and difference.max() < 7.0
 
 
-@pytest.mark.parametrize("mode", ["spectral", "rgb"])
+@pytest.mark.parametrize("mode", ["spectral", pytest.param("rgb", marks=pytest.mark.slow)])
 def test_films_that_absorb_nothing_in_a_white_furnace(mode):
     """However often light passes the walls, all of it comes through; means within 1 %."""
     for name in ("soap", "oil"):
