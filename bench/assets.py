@@ -57,6 +57,8 @@ def examine(path: Path, film: int) -> Row:
                 raise
             scene = clpt.load(path, integrator="path")
         row: Row = {"load": time.perf_counter() - start, **summary(scene)}
+        if not film:
+            return {**row, "seconds": row["load"]}
         size = dataclasses.replace(scene.film, width=film, height=film, crop=None)
         renderer = clpt.Renderer(dataclasses.replace(scene, film=size))
         renderer.step(1)
@@ -82,7 +84,7 @@ def verdict(row: Row, expected: Row) -> Row:
     return made
 
 
-def run(folder: Path, names: tuple[str, ...]) -> list[Row]:
+def run(folder: Path, names: tuple[str, ...], film: int = SIZE) -> list[Row]:
     """Examine all files one after the other; a file that kills or stalls its process is told of."""
     kinds = json.loads((folder / "expected.json").read_text("utf-8"))
     expected = {k: v for kind in kinds.values() if isinstance(kind, dict) for k, v in kind.items()}
@@ -91,7 +93,7 @@ def run(folder: Path, names: tuple[str, ...]) -> list[Row]:
     for path in track(found, description="files"):
         name = path.relative_to(folder).as_posix()
         try:
-            row = pool.submit(examine, path, SIZE).result(PATIENCE)
+            row = pool.submit(examine, path, film).result(PATIENCE)
         except (TimeoutError, BrokenProcessPool) as error:
             stalled = isinstance(error, TimeoutError)
             row = {"failed": f"took over {PATIENCE:g} s" if stalled else "killed its process"}
@@ -121,10 +123,11 @@ def page(rows: list[Row]) -> str:
     about = machine.circumstances()
     counts = sum(r["expected"] is not None for r in shown)
     bounds_known = sum("bounds_differ" in r for r in shown)
+    done = "render" if any("finite" in r for r in shown) else "are read (none was rendered)"
     lines = [
         "# Scenes of others\n",
         f"Made by `make assets-report` at {about['commit']} on {about['processor']}, "
-        f"{str(about['date'])[:10]}. {len(rows)} files: {len(shown)} render, {len(refused)} are "
+        f"{str(about['date'])[:10]}. {len(rows)} files: {len(shown)} {done}, {len(refused)} are "
         f"refused, {len(failed)} fail. Of {counts} counts of triangles that others made "
         f"{len(wrong)} differ, of {bounds_known} bounds {len(far)}.\n",
         "Seconds to load; to build trees; to build programs, over all threads (0: they were in the "
@@ -160,8 +163,9 @@ def _cell(text: str) -> str:
 @click.command(help=__doc__)
 @click.argument("folder", type=click.Path(path_type=Path, file_okay=False, exists=True))
 @click.argument("names", nargs=-1)
-def main(folder: Path, names: tuple[str, ...]) -> None:
-    rows = run(folder.resolve(), names)
+@click.option("--read-only", is_flag=True, help="Read the files, and render none.")
+def main(folder: Path, names: tuple[str, ...], read_only: bool) -> None:
+    rows = run(folder.resolve(), names, 0 if read_only else SIZE)
     target = RESULTS / "assets.jsonl"
     if names:
         print(page(rows))
