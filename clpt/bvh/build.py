@@ -87,7 +87,7 @@ def _build(
         building.upload(np.zeros(n) if tags is None else tags, np.uint32),
     )
     packed = LAYOUTS[layout](building, mesh)
-    device.queue.finish()
+    building.stream.wait()
     stats = {**packed.stats, "seconds": time.perf_counter() - start}
     return Bvh(layout, count, packed.buffers, stats)
 
@@ -119,8 +119,8 @@ def build_parts(
     for name, begin, whole in zip(("nodes", "leaves"), begins.T, sizes.sum(axis=0), strict=True):
         buffers[name] = building.allocate(int(whole))
         for tree_, at in zip(trees, begin, strict=True):
-            cl.enqueue_copy(device.queue, buffers[name], tree_.buffers[name], dst_offset=int(at))
-    device.queue.finish()
+            building.stream.copy(buffers[name], tree_.buffers[name], dst_offset=int(at))
+    building.stream.wait()
     stats = {"trees": len(trees), "seconds": time.perf_counter() - start}
     return Bvh(layout, sum(counts), buffers, stats), (begins // 32).astype(np.uint32)
 
@@ -136,7 +136,7 @@ def build_boxes(device: Device, boxes: NDArray, layout: str = "shapes") -> Bvh:
     _check_reach(boxes, "a shape's box")
     building, n = Building(device), len(boxes)
     packed = BOX_LAYOUTS[layout](building, n, building.upload(boxes, np.float32))
-    device.queue.finish()
+    building.stream.wait()
     return Bvh(layout, n, packed.buffers, {"seconds": time.perf_counter() - start})
 
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import weakref
 from typing import Any, TypeAlias
 
+import numpy as np
 import pyopencl as cl
 from numpy.typing import DTypeLike, NDArray
 
-from ..device import Bound, Buffers, Device, Program, assemble
+from ..device import Bound, Buffers, Device, Program, Stream, assemble
 from ..device import build as build_program
 
 Array: TypeAlias = NDArray | cl.Buffer
@@ -28,6 +29,7 @@ class Building:
     def __init__(self, device: Device, former: Building | None = None):
         self.device = device
         self.buffers = Buffers(device)
+        self.stream = former.stream if former else Stream(device.queue)
         self._kernels: dict[tuple[str, str], Bound] = former._kernels if former else {}
 
     def run(self, root: str, kernel: str, n: int, **arguments: Any) -> None:
@@ -50,7 +52,7 @@ class Building:
 
     def read(self, buffer: cl.Buffer, n: int, dtype: DTypeLike) -> NDArray:
         """The first n values of a buffer."""
-        return self.buffers.download(buffer, (n,), dtype)
+        return self.stream.read(buffer, np.empty(n, dtype))
 
     def _enqueue(self, root: str, kernel: str, n: int, group: int, arguments: dict) -> None:
         programs = _programs.setdefault(self.device, {})
@@ -61,4 +63,4 @@ class Building:
             bound = self._kernels[root, kernel] = programs[root].kernel(kernel).bind(**arguments)
         else:
             bound.set(**arguments)
-        bound.enqueue(self.device.queue, (-(-n // group) * group,), (group,))
+        self.stream.run(bound, (-(-n // group) * group,), (group,))

@@ -4,6 +4,7 @@ from .buffers import Buffers
 from .context import Device, DeviceInfo, choose, devices
 from .program import Argument, Bound, Kernel, Program, build, build_all
 from .source import Source, assemble
+from .stream import Events, Stream
 from .timing import Timing, Timings
 
 __all__ = [
@@ -12,9 +13,11 @@ __all__ = [
     "Buffers",
     "Device",
     "DeviceInfo",
+    "Events",
     "Kernel",
     "Program",
     "Source",
+    "Stream",
     "Timing",
     "Timings",
     "assemble",

@@ -70,6 +70,7 @@ class Wavefront:
     ):
         self.device, self.lowered = on, lowered
         self.counts = Counts()
+        self.stream = device.Stream(on.queue)
         self.timings = Timings(on.queue)
         self.buffers = Buffers(on)
         features = lowered.features
@@ -142,9 +143,7 @@ class Wavefront:
             name = f"{record.name.lower()}_words"
             advice = "lower the number of slots"
             self.named[name] = give.allocate(name, 4 * record.words * self.stride, advice)
-            cl.enqueue_fill_buffer(
-                self.device.queue, self.named[name], np.uint32(0), 0, 4 * record.words * self.stride
-            )
+            self.stream.fill(self.named[name], 0, 0, 4 * record.words * self.stride)
         self.named["counters"] = give.allocate("the counters", 4 * len(COUNTERS))
         self.named["settings"] = give.upload("the settings", settings.reshape(1).view(np.uint32))
         if self.queued:
@@ -245,7 +244,7 @@ class Wavefront:
             self._fill("bands", 0, 0, self.band_bytes)
 
     def _fill(self, name: str, value: int, offset: int, size: int) -> None:
-        cl.enqueue_fill_buffer(self.device.queue, self.named[name], np.uint32(value), offset, size)
+        self.stream.fill(self.named[name], value, offset, size)
 
     def expose(
         self, first: int, end: int, on_batch: Callable[[Counts], bool] | None = None
@@ -267,10 +266,8 @@ class Wavefront:
             for _ in range(BATCH):
                 self._iterate()
             host = np.zeros(len(COUNTERS), np.uint32)
-            event = cl.enqueue_copy(
-                self.device.queue, host, self.named["counters"], is_blocking=False
-            )
-            self.device.queue.flush()
+            event = self.stream.read_later(self.named["counters"], host)
+            self.stream.flush()
             reads.append((host, event))
             if len(reads) < 2:
                 continue
@@ -290,7 +287,7 @@ class Wavefront:
     def _iterate(self) -> None:
         """One bounce of every path."""
         for name, bound, size, local in self.steps:
-            self.timings.add(name, bound.enqueue(self.device.queue, size, local))
+            self.timings.add(name, self.stream.run(bound, size, local))
 
     def _count(self, new: np.ndarray) -> None:
         for name, n in zip(COUNTERS[1:], new[1:].tolist(), strict=True):
@@ -301,15 +298,15 @@ class Wavefront:
         width, height = self._size
         if self.lowered.features.light_paths:
             self.accumulate.set(samples=self.counts.samples / (width * height))
-        self.accumulate.enqueue(self.device.queue, (width, height))
-        return self.buffers.download(self.named["image"], (height, width, 3), np.float32)
+        self.stream.run(self.accumulate, (width, height))
+        return self.stream.read(self.named["image"], np.empty((height, width, 3), np.float32))
 
     def bands(self) -> np.ndarray:
         """The mean radiance in each band so far, (h, w, bands) float32, of a film with bands."""
         width, height = self._size
-        self.accumulate_bands.enqueue(self.device.queue, (width, height))
+        self.stream.run(self.accumulate_bands, (width, height))
         shape = (height, width, int(self.lowered.settings["bands"]))
-        return self.buffers.download(self.named["band_image"], shape, np.float32)
+        return self.stream.read(self.named["band_image"], np.empty(shape, np.float32))
 
     @property
     def _size(self) -> tuple[int, int]:

@@ -1,0 +1,98 @@
+"""Commands on a queue, one after the other, whatever order the queue itself keeps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+import pyopencl as cl
+
+from .program import Bound
+
+Events = Iterable[cl.Event] | None  # as `wait_for` takes them
+
+
+class Stream:
+    """Commands of one owner on a queue: each begins when the one before it has ended.
+
+    On an in-order queue that costs nothing; on an out-of-order one each command waits for the event
+    of the last. It only enqueues: no command of it waits on the host but `read` and `wait`, and
+    nothing calls clFinish, so what others have on the queue is left alone.
+
+    queue: the caller's; last: the event of the last command, None before the first.
+    """
+
+    def __init__(self, queue: cl.CommandQueue):
+        self.queue = queue
+        out_of_order = cl.command_queue_properties.OUT_OF_ORDER_EXEC_MODE_ENABLE
+        self.ordered = not queue.properties & out_of_order
+        self.last: cl.Event | None = None
+        self._before: list[cl.Event] = []
+
+    def after(self, events: Events) -> None:
+        """Let the next command wait for events of others too."""
+        self._before += events or ()
+
+    def run(
+        self, bound: Bound, global_size: Sequence[int], local_size: Sequence[int] | None = None
+    ) -> cl.Event:
+        """Enqueue a kernel. Raises DeviceError if the driver refuses it."""
+        return self._note(bound.enqueue(self.queue, global_size, local_size, self._waits()))
+
+    def fill(self, buffer: cl.Buffer, word: int, offset: int, nbytes: int) -> cl.Event:
+        """Enqueue that a range of a buffer becomes one repeated word."""
+        value = np.uint32(word)
+        waits = self._waits()
+        return self._note(
+            cl.enqueue_fill_buffer(self.queue, buffer, value, offset, nbytes, wait_for=waits)
+        )
+
+    def copy(self, target: cl.Buffer, source: cl.Buffer, **places: int) -> cl.Event:
+        """Enqueue a copy on the device; places as of `pyopencl.enqueue_copy`."""
+        waits = self._waits()
+        return self._note(cl.enqueue_copy(self.queue, target, source, wait_for=waits, **places))
+
+    def write(self, target: cl.Buffer, source: np.ndarray, offset: int = 0) -> cl.Event:
+        """Enqueue that an array goes to a buffer, from a copy of it: it may change at once."""
+        kept = np.array(source)  # the event keeps it alive
+        return self._note(
+            cl.enqueue_copy(
+                self.queue, target, kept, dst_offset=offset, is_blocking=False,
+                wait_for=self._waits(),
+            )
+        )  # fmt: skip
+
+    def read(self, source: cl.Buffer, into: np.ndarray, offset: int = 0) -> np.ndarray:
+        """A buffer's content; waits for it."""
+        if into.nbytes:
+            self.read_later(source, into, offset).wait()
+        return into
+
+    def read_later(self, source: cl.Buffer, into: np.ndarray, offset: int = 0) -> cl.Event:
+        """Enqueue that an array is filled from a buffer; it is whole when the event is."""
+        return self._note(
+            cl.enqueue_copy(
+                self.queue, into, source, src_offset=offset, is_blocking=False,
+                wait_for=self._waits(),
+            )
+        )  # fmt: skip
+
+    def wait(self) -> None:
+        """Wait until the last command has ended."""
+        if self.last is not None:
+            self.last.wait()
+
+    def flush(self) -> None:
+        """Hand what was enqueued to the device."""
+        self.queue.flush()
+
+    def _waits(self) -> list[cl.Event] | None:
+        waits, self._before = self._before, []
+        if not self.ordered and self.last is not None:
+            waits = [*waits, self.last]
+        return waits or None
+
+    def _note(self, event: Any) -> cl.Event:
+        self.last = event
+        return event
