@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
-import weakref
+import functools
 from typing import Any, TypeAlias
 
 import numpy as np
 import pyopencl as cl
 from numpy.typing import DTypeLike, NDArray
 
-from ..device import Bound, Buffers, Device, Program, Stream, assemble
+from ..device import Bound, Buffers, Device, Source, Stream, assemble
 from ..device import build as build_program
 
 Array: TypeAlias = NDArray | cl.Buffer
 
 _GROUP = 8  # work-items of a group where each has one triangle or node
 _RAISED = "use fewer triangles, or a device with more memory"
-_programs: weakref.WeakKeyDictionary[Device, dict[str, Program]] = weakref.WeakKeyDictionary()
+
+
+@functools.cache
+def _source(root: str) -> Source:
+    return assemble(root)
 
 
 class Building:
-    """What the steps of a build share. Programs are compiled once for each device.
+    """What the steps of a build share. Programs are compiled once in a context.
 
     former: a build that is over, whose kernels are taken on; to make them again takes longer than
     a small tree.
@@ -29,7 +33,7 @@ class Building:
     def __init__(self, device: Device, former: Building | None = None):
         self.device = device
         self.buffers = Buffers(device)
-        self.stream = former.stream if former else Stream(device.queue)
+        self.stream: Stream = former.stream if former else Stream(device.queue)
         self._kernels: dict[tuple[str, str], Bound] = former._kernels if former else {}
 
     def run(self, root: str, kernel: str, n: int, **arguments: Any) -> None:
@@ -55,12 +59,10 @@ class Building:
         return self.stream.read(buffer, np.empty(n, dtype))
 
     def _enqueue(self, root: str, kernel: str, n: int, group: int, arguments: dict) -> None:
-        programs = _programs.setdefault(self.device, {})
-        if root not in programs:
-            programs[root] = build_program(self.device, assemble(root))
         bound = self._kernels.get((root, kernel))
         if bound is None:
-            bound = self._kernels[root, kernel] = programs[root].kernel(kernel).bind(**arguments)
+            program = build_program(self.device, _source(root))
+            bound = self._kernels[root, kernel] = program.kernel(kernel).bind(**arguments)
         else:
             bound.set(**arguments)
         self.stream.run(bound, (-(-n // group) * group,), (group,))

@@ -13,7 +13,7 @@ import numpy as np
 import pyopencl as cl
 
 from ..errors import DeviceError
-from . import memory, runtimes
+from . import kept, memory, runtimes
 
 log = logging.getLogger(__name__)
 
@@ -100,6 +100,7 @@ class Device:
     def __init__(self, context: cl.Context, queue: cl.CommandQueue, info: DeviceInfo):
         self.context, self.queue, self.info = context, queue, info
         self.builds = Builds()
+        self.kept = kept.of(queue)
 
     @classmethod
     def open(cls, info: DeviceInfo, *, profiling: bool = False) -> Device:

@@ -7,6 +7,7 @@ import json
 import logging
 import os
 import re
+import threading
 import time
 import warnings
 from collections.abc import Mapping, Sequence
@@ -24,9 +25,6 @@ from .context import Device
 from .source import Source
 
 log = logging.getLogger(__name__)
-
-# a driver's remarks on a program that did build go to the log, not to the terminal
-warnings.filterwarnings("ignore", category=cl.CompilerWarning)
 
 OPTIONS = ("-cl-std=CL1.2", "-cl-kernel-arg-info", "-w")
 
@@ -74,6 +72,32 @@ class Argument:
 
 
 Signatures = Mapping[str, tuple[Argument, ...]]
+
+
+class _Remarks:
+    """While any thread is inside, PyOpenCL does not warn of a driver's remarks: they are logged."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._inside = 0
+        self._filters = warnings.catch_warnings()
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if self._inside == 0:
+                self._filters = warnings.catch_warnings()
+                self._filters.__enter__()
+                warnings.simplefilter("ignore", cl.CompilerWarning)
+            self._inside += 1
+
+    def __exit__(self, *error: object) -> None:
+        with self._lock:
+            self._inside -= 1
+            if self._inside == 0:
+                self._filters.__exit__(None, None, None)
+
+
+_REMARKS = _Remarks()
 
 
 class Program:
@@ -163,25 +187,35 @@ class Bound:
 
 
 def build(device: Device, source: Source, options: Sequence[str] = ()) -> Program:
-    """Compile a program, or take it from the cache.
+    """Compile a program for the device, or take it from where it was kept.
 
-    The driver's own cache is relied on where it has one (PoCL, NVIDIA); for the others the binary
-    is kept in the user's cache folder.
+    What was built in the context before is taken again. Else the driver's own cache is relied on
+    where it has one (PoCL, NVIDIA); for the others the binary is kept in the user's cache folder.
+    Of a context with several devices only this one gets it.
 
     Raises KernelBuildError with our file and line, the log, and where the text was kept.
     """
     flags = [*OPTIONS, *options]
     if _is_oclgrind(device):  # it cannot interpret all that its compiler's optimiser makes
         flags += ["-cl-opt-disable", "-DNOT_INLINED"]
+    entry = _entry(device, source, flags)
+    key = (device.info.cl_device.int_ptr, entry)  # devices of one context may be alike
+    program = device.kept.find(key)
+    if program is not None:
+        return program
     start = time.perf_counter()
-    entry = None if has_src_build_cache(device.info.cl_device) else _entry(device, source, flags)
-    program = _from_cache(device, source, flags, entry) if entry else None
-    if program is None:
-        program = _from_source(device, source, flags)
-        if entry:
-            binary = program.cl_program.get_info(cl.program_info.BINARIES)[0]
-            cache.store(entry, _encode(program.signatures), binary)
-    device.builds.add(time.perf_counter() - start)
+    own = not has_src_build_cache(device.info.cl_device)
+    with _REMARKS:
+        program = _from_cache(device, source, flags, entry) if own else None
+        if program is None:
+            program = _from_source(device, source, flags)
+            if own:
+                binaries = program.cl_program.get_info(cl.program_info.BINARIES)
+                cache.store(entry, _encode(program.signatures), next(filter(None, binaries)))
+    seconds = time.perf_counter() - start
+    device.builds.add(seconds)
+    log.debug("%s is built in %.2f s", source.name, seconds)
+    device.kept.keep(key, program)
     return program
 
 
@@ -203,7 +237,9 @@ def _is_oclgrind(device: Device) -> bool:
 def _from_source(device: Device, source: Source, flags: list[str]) -> Program:
     try:
         # cache_dir=False: PyOpenCL's own cache would lose the names of the arguments
-        built = cl.Program(device.context, source.text).build(flags, cache_dir=False)
+        built = cl.Program(device.context, source.text).build(
+            flags, [device.info.cl_device], cache_dir=False
+        )
     except cl.Error as error:
         raise _build_error(source, str(error)) from error
     remarks = built.get_build_info(device.info.cl_device, cl.program_build_info.LOG).strip()
@@ -226,7 +262,8 @@ def _from_cache(device: Device, source: Source, flags: list[str], entry: str) ->
     if kept is None:
         return None
     try:
-        loaded = cl.Program(device.context, [device.info.cl_device], [kept[1]]).build(flags)
+        here = [device.info.cl_device]
+        loaded = cl.Program(device.context, here, [kept[1]]).build(flags, here)
         return Program(source.name, loaded, _decode(kept[0]))
     except (cl.Error, TypeError, ValueError) as error:
         log.debug("%s is built again: %s", source.name, error)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
+import weakref
+
 import numpy as np
 import pyopencl as cl
 import pytest
 
-from clpt.device import Buffers, assemble, build, build_all, cache, program
+from clpt.device import Buffers, Device, assemble, build, build_all, cache, program
 from clpt.errors import KernelBuildError
 
 TEXT = """
@@ -134,15 +137,49 @@ def test_our_cache(device, cache_folder, monkeypatch):
     built = []
     monkeypatch.setattr(program, "_from_source", lambda *a: built.append(1) or from_source(*a))
 
-    cold = build(device, source())
-    warm = build(device, source())
+    cold = build(Device.open(device.info), source())
+    warm = build(Device.open(device.info), source())
     assert len(built) == 1
     assert warm.signatures == cold.signatures
 
     (entry,) = (cache_folder / "programs").iterdir()
     entry.write_bytes(entry.read_bytes()[:-1])
-    build(device, source())
+    build(Device.open(device.info), source())
     assert len(built) == 2
 
-    build(device, source(), ["-DX=1"])
+    build(Device.open(device.info), source(), ["-DX=1"])
     assert len(built) == 3
+
+
+def test_a_context_keeps_its_programs(device):
+    """Whoever has a queue there finds them; with the last queue they go, and the context."""
+    context = cl.Context([device.info.cl_device])
+    queue = cl.CommandQueue(context)
+    first = Device.adopt(queue)
+    built = build(first, source())
+    assert build(Device.adopt(queue), source()) is built
+    assert build(Device.adopt(cl.CommandQueue(context)), source()) is built
+    assert build(Device.open(device.info), source()) is not built
+    assert build(first, source(), ["-DX=1"]) is not built
+    assert first.builds.programs == 2
+    gone = weakref.ref(built)
+    del first, queue, built
+    assert gone() is None
+
+
+def test_remarks_of_a_driver_are_no_warnings(device, monkeypatch):
+    """PyOpenCL would warn of them; whoever uses clpt has their own filters back afterwards."""
+    from_source = program._from_source
+
+    def remarking(*a):
+        warnings.warn("remark", cl.CompilerWarning, stacklevel=1)
+        return from_source(*a)
+
+    monkeypatch.setattr(program, "_from_source", remarking)
+    opened = Device.open(device.info)
+    with warnings.catch_warnings(record=True) as seen:
+        warnings.simplefilter("always")
+        before = list(warnings.filters)
+        build_all(opened, {name: source(TEXT + f"/* {name} */") for name in "abc"})
+        assert not seen
+        assert warnings.filters == before
