@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -183,9 +184,19 @@ def stored_from_pillow(image: Image.Image) -> Stored:
 
 def srgb_to_linear(x: Array) -> Array:
     """The sRGB transfer decoded (IEC 61966-2-1)."""
-    return np.where(x <= 0.04045, x / 12.92, ((np.maximum(x, 0) + 0.055) / 1.055) ** 2.4).astype(
-        np.float32
-    )
+    return _srgb_decoded(x).astype(np.float32)
+
+
+def _srgb_decoded(x: NDArray[Any]) -> NDArray[Any]:
+    return np.where(x <= 0.04045, x / 12.92, ((np.maximum(x, 0) + 0.055) / 1.055) ** 2.4)
+
+
+@cache
+def srgb8_steps() -> Array:
+    """The least linear value whose 8-bit sRGB code is 1, 2, ... 255: (255,) float32, rising."""
+    exact = _srgb_decoded((np.arange(255) + 0.5) / 255.0)
+    steps = exact.astype(np.float32)
+    return np.where(steps < exact, np.nextafter(steps, np.float32(1.0)), steps)
 
 
 def linear_to_srgb(x: Array) -> Array:
@@ -198,9 +209,9 @@ def to_srgb8(image: Array, exposure: float = 0.0) -> NDArray[np.uint8]:
     """Linear (h, w, c) as 8-bit sRGB, scaled by 2^exposure; NaN becomes black, infinity white."""
     finite = np.nan_to_num(image, nan=0.0, posinf=np.inf, neginf=0.0)
     colour, alpha = finite[..., :3], finite[..., 3:]
-    shown = linear_to_srgb(np.clip(colour * np.float32(2.0**exposure), 0, 1))
-    values = np.concatenate([shown, np.clip(alpha, 0, 1)], axis=2)
-    return np.round(values * 255).astype(np.uint8)
+    codes = np.searchsorted(srgb8_steps(), colour * np.float32(2.0**exposure), side="right")
+    stored = np.round(np.clip(alpha, 0, 1) * 255)
+    return np.concatenate([codes, stored], axis=2).astype(np.uint8)
 
 
 def _to_rec709(pixels: Array, space: str) -> Array:

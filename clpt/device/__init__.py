@@ -1,5 +1,6 @@
 """How to run: choosing a device, building programs, buffers and timing. Knows no scenes."""
 
+from .array import DeviceArray
 from .buffers import Buffers
 from .context import Device, DeviceInfo, choose, devices
 from .program import Argument, Bound, Kernel, Program, build, build_all
@@ -12,6 +13,7 @@ __all__ = [
     "Bound",
     "Buffers",
     "Device",
+    "DeviceArray",
     "DeviceInfo",
     "Events",
     "Kernel",

@@ -1,0 +1,72 @@
+"""Arrays on a device that numpy and other libraries of arrays can take."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pyopencl as cl
+from numpy.typing import DTypeLike, NDArray
+from pyopencl.array import Array
+
+from . import dlpack
+
+
+class DeviceArray(Array):
+    """A `pyopencl.array.Array` with `__array__` and DLPack.
+
+    `numpy.asarray(array)` waits for the array's events and copies to the host. `__dlpack__` serves
+    numpy.from_dlpack, torch.from_dlpack, jax.dlpack.from_dlpack: where the device is a CPU, they
+    get host memory, a copy as of now unless they ask for none; elsewhere OpenCL's memory, or a copy
+    on the host if they ask for the CPU, as numpy.from_dlpack(array, device="cpu") does.
+    """
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
+        """A copy on the host; waits. Raises ValueError if no copy may be made."""
+        if copy is False:
+            raise ValueError("an array on an OpenCL device becomes one of numpy only by a copy")
+        host = self.get()
+        return host if dtype is None else host.astype(dtype, copy=False)
+
+    def __dlpack_device__(self) -> tuple[int, int]:
+        """DLPack's type of the device, 1 for a CPU or 4 for OpenCL, and its number."""
+        if self.queue.device.type & cl.device_type.CPU:
+            return dlpack.CPU, 0
+        return self._opencl_device
+
+    def __dlpack__(
+        self,
+        *,
+        stream: Any = None,
+        max_version: tuple[int, int] | None = None,
+        dl_device: tuple[int, int] | None = None,
+        copy: bool | None = None,
+    ) -> Any:
+        """A DLPack capsule; waits until the array is valid.
+
+        dl_device: (1, 0), host memory; (4, number), the cl_mem itself, on a CPU too; None: as
+        `__dlpack_device__` tells. copy: False gives the memory itself. On a CPU it is mapped until
+        the consumer lets go of it, and OpenCL forbids that the device writes to it meanwhile.
+
+        Raises BufferError for another device, or if what is asked for needs a copy, or none.
+        """
+        wanted = tuple(dl_device or self.__dlpack_device__())
+        if wanted == (dlpack.CPU, 0):
+            host = self._mapped() if copy is False else self.get()
+            versions: dict[str, Any] = {} if max_version is None else {"max_version": max_version}
+            return host.__dlpack__(**versions)
+        if wanted != self._opencl_device:
+            raise BufferError(
+                f"DLPack's device of the array is {self._opencl_device}, not {wanted}"
+            )
+        owner = self.copy() if copy else self
+        cl.wait_for_events(owner.events)
+        return dlpack.opencl_capsule(owner, wanted[1])
+
+    @property
+    def _opencl_device(self) -> tuple[int, int]:
+        return dlpack.OPENCL, self.context.devices.index(self.queue.device)
+
+    def _mapped(self) -> NDArray[Any]:
+        if not self.queue.device.type & cl.device_type.CPU:
+            raise BufferError("memory of this OpenCL device becomes the host's only by a copy")
+        return self.map_to_host()

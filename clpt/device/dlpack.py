@@ -1,0 +1,72 @@
+"""DLPack's form of OpenCL memory: its capsule, made by hand, as no library makes it of a buffer.
+
+The structures are those of dlpack.h 0.8, whose data pointer is the cl_mem handle for OpenCL.
+"""
+
+from __future__ import annotations
+
+import ctypes as c
+from typing import Any
+
+import numpy as np
+
+CPU, OPENCL = 1, 4  # DLDeviceType
+_NAME = b"dltensor"  # until a consumer renames it
+_CODES = {"i": 0, "u": 1, "f": 2}  # DLDataTypeCode
+_Deleter = c.CFUNCTYPE(None, c.c_void_p)
+_Destructor = c.PYFUNCTYPE(None, c.c_void_p)
+
+
+class _Tensor(c.Structure):
+    _fields_ = (
+        ("data", c.c_void_p), ("device_type", c.c_int32), ("device_id", c.c_int32),
+        ("ndim", c.c_int32), ("code", c.c_uint8), ("bits", c.c_uint8), ("lanes", c.c_uint16),
+        ("shape", c.POINTER(c.c_int64)), ("strides", c.POINTER(c.c_int64)),
+        ("byte_offset", c.c_uint64),
+    )  # fmt: skip
+
+
+class _Managed(c.Structure):
+    _fields_ = (("tensor", _Tensor), ("manager", c.c_void_p), ("deleter", _Deleter))
+
+
+_kept: dict[int, tuple[Any, ...]] = {}  # by the structure's address: what lives as long as it
+
+_new = c.pythonapi.PyCapsule_New
+_new.restype, _new.argtypes = c.py_object, (c.c_void_p, c.c_char_p, _Destructor)
+_valid = c.pythonapi.PyCapsule_IsValid
+_valid.restype, _valid.argtypes = c.c_int, (c.c_void_p, c.c_char_p)
+_pointer = c.pythonapi.PyCapsule_GetPointer
+_pointer.restype, _pointer.argtypes = c.c_void_p, (c.c_void_p, c.c_char_p)
+
+
+@_Deleter
+def _delete(managed: int) -> None:
+    _kept.pop(managed, None)
+
+
+@_Destructor
+def _destroy(capsule: int) -> None:
+    """Of a capsule that nobody took; who takes one renames it and calls its deleter later."""
+    if _valid(capsule, _NAME):
+        _delete(_pointer(capsule, _NAME))
+
+
+def opencl_capsule(array: Any, device: int) -> Any:
+    """A capsule of a `pyopencl.array.Array`, which lives until the capsule's consumer ends."""
+    dtype, ndim = np.dtype(array.dtype), array.ndim
+    if dtype.kind not in _CODES:
+        raise BufferError(f"DLPack is not given arrays of {dtype}")
+    sizes = (c.c_int64 * ndim)(*array.shape)
+    steps = (c.c_int64 * ndim)(*(stride // dtype.itemsize for stride in array.strides))
+    managed = _Managed(
+        _Tensor(
+            array.base_data.int_ptr, OPENCL, device, ndim,
+            _CODES[dtype.kind], 8 * dtype.itemsize, 1, sizes, steps, array.offset,
+        ),
+        None,
+        _delete,
+    )  # fmt: skip
+    address = c.addressof(managed)
+    _kept[address] = managed, sizes, steps, array.base_data
+    return _new(address, _NAME, _destroy)

@@ -1,0 +1,159 @@
+"""From a film to a picture for a screen, on the device: exposure, tone curve, sRGB transfer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pyopencl as cl
+from pyopencl.array import Array
+
+from clpt import device
+from clpt.device import DeviceArray
+from clpt.errors import DeviceError, UnknownKindError
+from clpt.images import srgb8_steps
+from clpt.spectra.spaces import between
+
+TONES = ("none", "reinhard", "aces")  # kernels/stage/resolve.cl
+BYTES, FLOATS = np.dtype(np.uint8), np.dtype(np.float32)
+_ORDERS = (cl.channel_order.RGBA, cl.channel_order.BGRA)
+_IMAGE_TYPES: dict[Any, np.dtype] = {
+    cl.channel_type.UNORM_INT8: BYTES,
+    cl.channel_type.HALF_FLOAT: FLOATS,
+    cl.channel_type.FLOAT: FLOATS,
+}
+
+
+@dataclass(frozen=True)
+class _Target:
+    """Where a picture goes. memory: an Array, or an image or buffer of OpenCL; at [elements]."""
+
+    memory: Any
+    dtype: np.dtype
+    data: cl.MemoryObject
+    at: int = 0
+
+    @property
+    def is_image(self) -> bool:
+        return self.data.type == cl.mem_object_type.IMAGE2D
+
+    @property
+    def kernel(self) -> str:
+        name = "byte" if self.dtype == BYTES else "float"
+        return f"resolve_{name}_image" if self.is_image else f"resolve_{name}s"
+
+
+class Resolve:
+    """Makes pictures of films on one device, whose commands go through the given stream.
+
+    space: of the films' colours, see clpt.spectra.spaces. Raises KernelBuildError.
+    """
+
+    def __init__(self, on: device.Device, stream: device.Stream, space: str = "rec709"):
+        self.device, self.stream = on, stream
+        self.program = device.build(on, device.assemble("stage/resolve.cl"))
+        steps = device.Buffers(on).upload("the sRGB transfer", srgb8_steps())
+        rows = between(space, "rec709")
+        self.named: dict[str, Any] = {"steps": steps, "converted": int(space != "rec709")}
+        for name, row in zip(("red", "green", "blue"), rows, strict=True):
+            self.named[name] = (*row, 0.0)
+
+    def __call__(
+        self,
+        film: Array,
+        into: Array | cl.MemoryObject | None = None,
+        *,
+        dtype: Any = None,
+        exposure: float = 0.0,
+        tone: str = "none",
+        srgb: bool | None = None,
+        flip: bool = False,
+        wait_for: device.Events = None,
+    ) -> Array | cl.Event:
+        """Enqueue that a film (h, w, 4) float32 becomes a picture; see `Renderer.resolve`."""
+        if tone not in TONES:
+            raise UnknownKindError("tone curve", tone, TONES)
+        target = self._target(film, into, dtype)
+        named = {
+            **self.named,
+            "film": film.base_data,
+            "scale": 2.0**exposure,
+            "tone": TONES.index(tone),
+            "encoded": int(target.dtype == BYTES if srgb is None else srgb),
+            "flip": int(flip),
+            "into": target.data,
+        }
+        if not target.is_image:
+            named["at"] = target.at
+        bound = self.program.kernel(target.kernel).bind(**named)
+        self.stream.after(wait_for)
+        if isinstance(target.memory, Array):
+            self.stream.after(target.memory.events)
+        event = self.stream.run(bound, (film.shape[1], film.shape[0]))
+        if not isinstance(target.memory, Array):
+            return event
+        target.memory.events[:] = [event]  # it came after those that were there
+        return target.memory
+
+    def _target(self, film: Array, into: Any, dtype: Any) -> _Target:
+        """Where to, checked. Raises DeviceError, telling what would fit."""
+        asked = None if dtype is None else np.dtype(dtype)
+        if asked is not None and asked not in (BYTES, FLOATS):
+            raise DeviceError(f"a picture is of uint8 or float32, not {asked}")
+        context = self.device.context
+        if into is None:
+            array = DeviceArray(context, film.shape, asked or BYTES)
+            into = array.with_queue(self.stream.queue)
+        if isinstance(into, Array):
+            target = _Target(into, into.dtype, into.base_data, into.offset // into.dtype.itemsize)
+            _check_array(into, film.shape)
+        elif isinstance(into, cl.MemoryObject) and into.type == cl.mem_object_type.BUFFER:
+            target = _buffer_target(self.stream.queue, into, film.shape, asked or BYTES)
+        elif isinstance(into, cl.MemoryObject) and into.type == cl.mem_object_type.IMAGE2D:
+            target = _Target(into, _image_dtype(into, film.shape), into)
+            if target.kernel not in self.program.signatures:
+                raise DeviceError(f"{self.device.info.label} has no images; give a buffer")
+        else:
+            kinds = "an Array, a Buffer or a 2D Image of PyOpenCL"
+            raise DeviceError(f"a picture goes into {kinds}, not {type(into).__name__}")
+        if target.data.context != context:
+            raise DeviceError(
+                "what the picture goes into is in another OpenCL context than the renderer; create "
+                "it in that of the renderer's queue, or give the renderer your queue"
+            )
+        if asked is not None and asked != target.dtype:
+            raise DeviceError(f"a picture of {asked} was asked for, into what holds {target.dtype}")
+        return target
+
+
+def _check_array(into: Array, shape: tuple[int, ...]) -> None:
+    if into.shape != shape or into.dtype not in (BYTES, FLOATS) or not into.flags.c_contiguous:
+        order = "" if into.flags.c_contiguous else ", not contiguous"
+        raise DeviceError(
+            f"the picture needs an array of shape {shape}, uint8 or float32, rows in a row; "
+            f"this one has {into.shape} {into.dtype}{order}"
+        )
+
+
+def _buffer_target(
+    queue: cl.CommandQueue, into: cl.MemoryObject, shape: tuple[int, ...], dtype: np.dtype
+) -> _Target:
+    needed = int(np.prod(shape)) * dtype.itemsize
+    if into.size < needed:
+        raise DeviceError(
+            f"a picture of {shape} {dtype} needs {needed} bytes, the buffer has {into.size}"
+        )
+    return _Target(DeviceArray(queue, shape, dtype, data=into), dtype, into)
+
+
+def _image_dtype(into: Any, shape: tuple[int, ...]) -> np.dtype:
+    """What is written to an image."""
+    size, form = (into.height, into.width), into.format
+    dtype = _IMAGE_TYPES.get(form.channel_data_type)
+    if size != shape[:2] or dtype is None or form.channel_order not in _ORDERS:
+        raise DeviceError(
+            f"the picture needs an image {shape[1]} wide and {shape[0]} high, RGBA or BGRA, of "
+            f"UNORM_INT8, HALF_FLOAT or FLOAT; this one is {size[1]} by {size[0]}, {form}"
+        )
+    return dtype

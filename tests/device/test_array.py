@@ -1,0 +1,101 @@
+"""Arrays that numpy and other libraries take: copies, DLPack, and what they keep alive."""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+
+import numpy as np
+import pyopencl as cl
+import pytest
+
+from clpt import device
+from clpt.device import DeviceArray, dlpack
+
+VALUES = np.arange(24, dtype=np.float32).reshape(2, 3, 4)
+
+
+@pytest.fixture(scope="module")
+def opened():
+    return device.choose()
+
+
+@pytest.fixture
+def array(opened):
+    made = DeviceArray(opened.queue, VALUES.shape, np.float32)
+    made.set(VALUES)
+    return made
+
+
+def taken(capsule):
+    """The structure in a capsule, which is renamed as its consumer has to."""
+    address = dlpack._pointer(id(capsule), b"dltensor")
+    rename = ctypes.pythonapi.PyCapsule_SetName
+    rename.argtypes = (ctypes.py_object, ctypes.c_char_p)
+    rename(capsule, b"used_dltensor")
+    return dlpack._Managed.from_address(address)
+
+
+def test_numpy_gets_a_copy(array):
+    host = np.asarray(array)
+    np.testing.assert_array_equal(host, VALUES)
+    assert np.asarray(array, np.float64).dtype == np.float64
+    host[:] = 0.0
+    np.testing.assert_array_equal(array.get(), VALUES)
+    with pytest.raises(ValueError, match="by a copy"):
+        array.__array__(copy=False)
+
+
+def test_arithmetic_stays_on_the_device(array):
+    for made in (array * 2, 2 * array, np.float32(2) * array):
+        assert isinstance(made, DeviceArray)
+        np.testing.assert_array_equal(made.get(), 2 * VALUES)
+
+
+def test_dlpack_of_a_cpu_is_numpys(array, opened):
+    if not opened.info.is_cpu:
+        pytest.skip("the device is no CPU")
+    assert array.__dlpack_device__() == (1, 0)
+    snapshot = np.from_dlpack(array)
+    np.testing.assert_array_equal(snapshot, VALUES)
+    np.testing.assert_array_equal(np.from_dlpack(array, device="cpu"), VALUES)
+    mapped = np.from_dlpack(array, copy=False)
+    mapped[0, 0, 0] = 7.0
+    del mapped
+    gc.collect()  # what was mapped is given back
+    assert array.get()[0, 0, 0] == 7.0
+    assert snapshot[0, 0, 0] == 0.0
+
+
+def test_dlpack_of_opencl_memory(array, opened):
+    """The capsule tells the cl_mem, and keeps it alive until its consumer calls the deleter."""
+    on = (dlpack.OPENCL, opened.context.devices.index(opened.queue.device))
+    capsule = array.__dlpack__(dl_device=on)
+    managed = taken(capsule)
+    tensor, address = managed.tensor, ctypes.addressof(managed)
+    assert (tensor.device_type, tensor.device_id) == on
+    assert (tensor.code, tensor.bits, tensor.lanes, tensor.byte_offset) == (2, 32, 1, 0)
+    assert tensor.shape[: tensor.ndim] == [2, 3, 4]
+    assert tensor.strides[: tensor.ndim] == [12, 4, 1]
+    del array, capsule
+    gc.collect()
+    assert address in dlpack._kept
+    buffer = cl.Buffer.from_int_ptr(tensor.data, True)
+    host = np.empty_like(VALUES)
+    cl.enqueue_copy(opened.queue, host, buffer)
+    np.testing.assert_array_equal(host, VALUES)
+    managed.deleter(address)
+    assert address not in dlpack._kept
+
+
+def test_a_capsule_that_nobody_takes_keeps_nothing(array):
+    before = len(dlpack._kept)
+    capsule = array.__dlpack__(dl_device=array._opencl_device, copy=True)
+    assert len(dlpack._kept) == before + 1
+    del capsule
+    assert len(dlpack._kept) == before
+
+
+def test_dlpack_refuses_other_devices(array):
+    with pytest.raises(BufferError, match=r"DLPack's device.*\(2, 0\)"):
+        array.__dlpack__(dl_device=(2, 0))
