@@ -4,7 +4,7 @@ from .array import DeviceArray
 from .buffers import Buffers
 from .context import Device, DeviceInfo, choose, devices
 from .program import Argument, Bound, Kernel, Program, build, build_all
-from .source import Source, assemble
+from .source import Part, Source, Virtual, assemble, kernels_folder
 from .stream import Events, Stream
 from .timing import Timing, Timings
 
@@ -17,14 +17,17 @@ __all__ = [
     "DeviceInfo",
     "Events",
     "Kernel",
+    "Part",
     "Program",
     "Source",
     "Stream",
     "Timing",
     "Timings",
+    "Virtual",
     "assemble",
     "build",
     "build_all",
     "choose",
     "devices",
+    "kernels_folder",
 ]

@@ -20,12 +20,24 @@ class Source:
     """A whole program as text.
 
     name: the root it was assembled from; text: what the compiler gets; files: every file and
-    virtual file that went in, in order.
+    virtual file that went in, in order, as errors name them.
     """
 
     name: str
     text: str
     files: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Part:
+    """A virtual file that stands elsewhere: errors name that file, and its lines from `line`."""
+
+    text: str
+    file: str
+    line: int = 1
+
+
+Virtual = Mapping[str, str | Part]
 
 
 def kernels_folder() -> Path:
@@ -37,13 +49,14 @@ def kernels_folder() -> Path:
 
 def assemble(
     root: str,
-    virtual: Mapping[str, str] | None = None,
+    virtual: Virtual | None = None,
     defines: Mapping[str, str | int | float] | None = None,
 ) -> Source:
     """The text of `root` with its includes in place, each file once.
 
     root: a path under the kernels folder ("stage/shade.cl") or the name of a virtual file.
-    virtual: name -> generated text, includable by that name; it wins over a file of that name.
+    virtual: name -> generated text, or a Part, includable by that name; it wins over a file of that
+    name.
     defines: written as `#define` lines at the top.
 
     Every part is announced by `#line`, so that a compiler names our file and line. Includes are
@@ -60,19 +73,21 @@ def assemble(
 class _Assembly:
     """The state of one `assemble`: rows written so far and the files they came from."""
 
-    def __init__(self, root: str, virtual: Mapping[str, str], folder: Path):
+    def __init__(self, root: str, virtual: Virtual, folder: Path):
         self.root, self.virtual, self.folder = root, virtual, folder
         self.rows: list[str] = []
         self.files: list[str] = []
+        self.names: set[str] = set()
 
     def add(self, name: str, includer: str | None, line: int) -> None:
         """Append the file `name` and, in place of its includes, the files that it names."""
-        label = name if name in self.virtual else f"kernels/{name}"
-        text = self._read(name, includer, line)
-        self.files.append(name)
-        self.rows.append(f'#line 1 "{label}"')
+        part = self._read(name, includer, line)
+        label = part.file
+        self.names.add(name)
+        self.files.append(label.removeprefix("kernels/"))
+        self.rows.append(f'#line {part.line} "{label}"')
         depth = 0
-        for number, row in enumerate(text.splitlines(), start=1):
+        for number, row in enumerate(part.text.splitlines(), start=part.line):
             depth += bool(_OPEN_IF.match(row)) - bool(_CLOSE_IF.match(row))
             include = _INCLUDE.match(row)
             if include is None:
@@ -84,19 +99,20 @@ class _Assembly:
                     f'#include "{include[1]}" stands inside an #if; every file is put in once, '
                     "so it needs no include guard",
                 )
-            elif include[1] in self.files:
+            elif include[1] in self.names:
                 self.rows.append("")
             else:
                 self.add(include[1], label, number)
                 self.rows.append(f'#line {number + 1} "{label}"')
 
-    def _read(self, name: str, includer: str | None, line: int) -> str:
+    def _read(self, name: str, includer: str | None, line: int) -> Part:
         if name in self.virtual:
-            return self.virtual[name]
+            given = self.virtual[name]
+            return given if isinstance(given, Part) else Part(given, name)
         path = (self.folder / name).resolve()
         if not path.is_relative_to(self.folder.resolve()) or not path.is_file():
             self._fail(includer, line, f"no file {name!r} in {self.folder} and no generated one")
-        return path.read_text(encoding="utf-8")
+        return Part(path.read_text(encoding="utf-8"), f"kernels/{name}")
 
     def _fail(self, file: str | None, line: int, message: str) -> NoReturn:
         raise KernelBuildError(self.root, file, line or None, f"error: {message}", None)

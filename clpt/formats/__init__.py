@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
 from clpt.errors import SceneError
 from clpt.formats import gltf, mesh, mitsuba, native, pbrt, studio
 from clpt.scene import Scene
+from clpt.scene.materials import Material
 
 FORMATS: dict[str, Callable[..., Scene]] = {
     ".json": native.load,
@@ -27,13 +28,19 @@ __all__ = ["FORMATS", "load"]
 
 
 def load(
-    path: str | Path, /, *, progress: Callable[[float, str], None] | None = None, **variables: Any
+    path: str | Path,
+    /,
+    *,
+    kinds: Iterable[type[Material]] = (),
+    progress: Callable[[float, str], None] | None = None,
+    **variables: Any,
 ) -> Scene:
     """Read a scene or a bare mesh; a folder means the scene in it (see IN_FOLDERS).
 
-    `variables` set the `$names` of Mitsuba's XML; of glTF they choose camera, scene and
-    time. `progress` is called with how much is read, from 0 to 1, and what, while files of many
-    shapes are. Raises SceneError with the file and, where it is known, the line.
+    `kinds` are materials that are not clpt's own, of which a scene.json may speak. `variables` set
+    the `$names` of Mitsuba's XML; of glTF they choose camera, scene and time. `progress` is
+    called with how much is read, from 0 to 1, and what, while files of many shapes are. Raises
+    SceneError with the file and, where it is known, the line.
     """
     path = _existing(Path(path))
     name = path.name.lower()
@@ -45,6 +52,10 @@ def load(
         raise SceneError(
             f"only .xml and glTF have variables, so {min(variables)!r} means nothing", file=path
         )
+    if kinds and loader is not native.load:
+        raise SceneError("only a scene.json can have kinds that are not clpt's own", file=path)
+    if loader is native.load:
+        return native.load(path, kinds)
     if loader is pbrt.load:
         return pbrt.load(path, progress)
     return loader(path, **variables)

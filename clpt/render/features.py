@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from clpt.scene.materials import Material
+
 Sources = dict[str, dict[str, frozenset[str]]]
 
 
@@ -11,7 +13,7 @@ Sources = dict[str, dict[str, frozenset[str]]]
 class Features:
     """What occurs in a scene.
 
-    materials: leaf kinds in their order, a material word's upper bits count in it;
+    leaves: classes of leaf materials in their order, a material word's upper bits count in it;
     lights: device kinds of lights (see clpt.render.lights); textures, texture_roles: kinds and
     (kind, role) pairs; analytic: kinds of shapes that rays meet as they are; sources: see
     clpt.render.tables.
@@ -22,7 +24,7 @@ class Features:
     sampler: str
     filter: str
     integrator: str
-    materials: tuple[str, ...]
+    leaves: tuple[type[Material], ...]
     lights: tuple[str, ...] = ()
     textures: tuple[str, ...] = ()
     texture_roles: tuple[tuple[str, str], ...] = ()
@@ -52,3 +54,8 @@ class Features:
     spectra_size: int = 0
     spectra_step: float = 1.0
     sources: Sources = field(default_factory=dict)
+
+    @property
+    def materials(self) -> tuple[str, ...]:
+        """Names of the leaf materials, in their order."""
+        return tuple(cls.kind for cls in self.leaves)

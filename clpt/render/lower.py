@@ -13,7 +13,16 @@ from numpy.typing import NDArray
 from clpt import scene as sc
 from clpt.errors import SceneError
 from clpt.records import SETTINGS, SHAPE
-from clpt.render import attributes, cameras, filters, instancing, lights, reradiation, shapes
+from clpt.render import (
+    attributes,
+    cameras,
+    filters,
+    instancing,
+    lights,
+    outside,
+    reradiation,
+    shapes,
+)
 from clpt.render.bends import Bend
 from clpt.render.checks import check
 from clpt.render.colour import output_matrix, sensor
@@ -33,7 +42,6 @@ FEW_LIGHTS = 256  # up to which one random number chooses a light and a point on
 TREE_FROM = 16  # lights from which a tree chooses among them, see bench/lights.py
 CLEAR = Constant(0.0)  # absorption of what absorbs nothing
 DEEPEST = 4000  # path state has 12 bits for the depth
-LONGEST_ROW = max(row_words(cls) for cls in mt.LEAVES)
 
 
 @dataclass
@@ -117,7 +125,7 @@ class _Lowering:
                 "film.filter is passed over: particle_tracer has a box of one pixel"
             )
         self.leaves = _leaf_kinds(scene)
-        if self.mode == "spectral" and mt.Fluorescent.kind in self.leaves:
+        if self.mode == "spectral" and mt.Fluorescent in self.leaves:
             nodes = reradiation.nodes(film.lambda_min, film.lambda_max)
             self.tables.expected = reradiation.expected(emissions(scene), nodes)
         self.words: dict[tuple[int, tuple[Any, ...]], int] = {}
@@ -136,7 +144,8 @@ class _Lowering:
         self.first_density = tables.size("distributions")
         if self.tabulated:
             tables.append_floats("distributions", self.density.words())
-        tables.append("materials", np.zeros(LONGEST_ROW, np.uint32))  # what idle lanes read
+        longest = max(map(row_words, (*mt.LEAVES, *self.leaves)))
+        tables.append("materials", np.zeros(longest, np.uint32))  # what idle lanes read
         flat = [one for one in self.placed if one.shape.kind not in shapes.ANALYTIC]
         analytic = [one for one in self.placed if one.shape.kind in shapes.ANALYTIC]
         emitters: list[lights.Emitter] = []
@@ -170,7 +179,7 @@ class _Lowering:
         tables.append_floats("camera", words)
         ambient = getattr(scene.integrator, "ambient", 0.0)
         self.ambient = tables.append("lamps", tables.emission_words(ambient)) if ambient else 0
-        if scene.film.mode == "rgb" and mt.Fluorescent.kind in self.leaves:
+        if scene.film.mode == "rgb" and mt.Fluorescent in self.leaves:
             self.warnings.append(
                 "in rgb mode fluorescent paint has its colour under D65, at most white"
             )
@@ -294,7 +303,7 @@ class _Lowering:
                     self.uses["uvs"] = True
         self.uses["tangents"] |= material.turns
         self.uses["absorption"] |= getattr(material, "absorption", CLEAR) != CLEAR
-        return self.leaves.index(material.kind) << 24 | row
+        return self.leaves.index(type(material)) << 24 | row
 
     def _mixture(self, weight: Any, first: Any, second: Any, side: _Side) -> int:
         words, source = self.tables.param_words(weight, "real")
@@ -324,7 +333,7 @@ class _Lowering:
             sampler=scene.sampler.kind,
             filter=scene.film.filter.kind,
             integrator={"direct": "path"}.get(scene.integrator.kind, scene.integrator.kind),
-            materials=self.leaves,
+            leaves=self.leaves,
             lights=self.lights.kinds,
             textures=tuple(sorted({kind for kind, _ in tables.texture_roles})),
             texture_roles=tuple(sorted(tables.texture_roles)),
@@ -338,7 +347,7 @@ class _Lowering:
             tangents=self.uses["tangents"] or self.bent,
             mixtures=max(self.nested.values(), default=0),
             bends=self.bent and not self.channels,
-            passes=any(_LEAVES[kind].passes for kind in self.leaves) and not self.channels,
+            passes=any(cls.passes for cls in self.leaves) and not self.channels,
             infinite=self.lights.infinite > 0 and not self.channels,
             light_paths=self.light_paths,
             visible_lights=self.lights.visible,
@@ -346,9 +355,7 @@ class _Lowering:
             light_tree=self.lights.tree is not None,
             many_lights=len(self.lights.rows) > FEW_LIGHTS,
             absorption=self.uses["absorption"] and not self.channels,
-            dispersion=index_tables
-            or glass_lens
-            or any(_LEAVES[kind].disperses for kind in self.leaves),
+            dispersion=index_tables or glass_lens or any(cls.disperses for cls in self.leaves),
             glass_lens=glass_lens,
             channel=self.channels[0] if self.channels else "",
             bands=bool(scene.film.bands) and not self.channels,
@@ -391,32 +398,32 @@ class _Lowering:
 
 
 _NULL, _BLACK = mt.Null(), mt.Diffuse(reflectance=0.0)
-_LEAVES = {cls.kind: cls for cls in mt.LEAVES}
 
 
-def _leaf_kinds(scene: sc.Scene) -> tuple[str, ...]:
-    """The leaf kinds of a scene, in the order of the table of kinds."""
-    found: set[type] = set()
+def _leaf_kinds(scene: sc.Scene) -> tuple[type[mt.Material], ...]:
+    """The leaf kinds of a scene, in the order of their table; those from outside follow."""
+    found: dict[type[mt.Material], str] = {}
 
-    def walk(material: Any, turned: bool) -> None:
+    def walk(material: Any, where: str) -> None:
         children = [
             getattr(material, n) for n, p in params(type(material)).items() if p.role == "host"
         ]
         children = [c for c in children if isinstance(c, mt.Material)]
         if isinstance(material, mt.Mask) or material.hollow:
-            found.add(mt.Null)
+            found.setdefault(mt.Null, where)
         if not isinstance(material, mt.COMPOSITES):
-            found.add(type(material))
+            found.setdefault(type(material), where)
         for child in children:
-            walk(child, turned)
+            walk(child, where)
 
     for shape in scene.shapes:
         if not isinstance(shape.material, mt.Material):
             raise SceneError(f"{shape.material!r} is not a material", where=shapes.where(shape))
-        walk(shape.material, False)
+        where = shapes.where(shape)
+        walk(shape.material, where)
         if _any_of(shape.material, mt.TwoSided) and not isinstance(shape.material, mt.TwoSided):
-            found.add(mt.Diffuse)  # the black back of a part that is not two-sided
-    return tuple(cls.kind for cls in mt.LEAVES if cls in found) or (mt.Diffuse.kind,)
+            found.setdefault(mt.Diffuse, where)  # the black back of a part that is not two-sided
+    return outside.ordered(found) or (mt.Diffuse,)
 
 
 def _parts(material: Any) -> Iterator[Any]:

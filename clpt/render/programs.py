@@ -9,13 +9,21 @@ from __future__ import annotations
 from clpt import device
 from clpt.layout import Record
 from clpt.records import INSTANCE, LIGHT, SETTINGS, SHAPE, SLABS, TABLES
-from clpt.render import bends, cameras, emission, films, kinds, lights, shapes, textures
+from clpt.render import (
+    bends,
+    cameras,
+    emission,
+    films,
+    kinds,
+    lights,
+    outside,
+    shapes,
+    textures,
+)
 from clpt.render.features import Features
 from clpt.render.reradiation import STEP as SHIFT_STEP
 from clpt.scene import materials
 from clpt.scene.params import device_params, interior_params
-
-LEAVES = {cls.kind: cls for cls in materials.LEAVES}
 
 
 def sources(
@@ -42,19 +50,24 @@ def sources(
         made["mix"] = _source("mix", shared, common, lanes)
     if queued:
         made["sort"] = _source("sort", shared, common, 1)
-    for number, kind in enumerate(features.materials):
-        own = {**shared, "generated/bsdf.cl": _bsdf_text(features, kind)}
+    for number, cls in enumerate(features.leaves):
+        own: dict[str, str | device.Part] = {
+            **shared,
+            "generated/bsdf.cl": _bsdf_text(features, cls),
+        }
+        if cls.source is not None:
+            own[f"bsdf/{cls.kind}.cl"] = outside.text(cls)
         defines = {
             **common,
             "BSDF_KIND": number,
-            "BSDF_DELTA": int(LEAVES[kind].delta),
-            "BSDF_CHROMATIC": int(LEAVES[kind].chromatic),
-            "BSDF_SHIFTS": int(_shifts(features, kind)),
-            "BSDF_PASSES": int(LEAVES[kind].passes and features.passes),
-            "USES_CHOICE": int(LEAVES[kind].choosy or LEAVES[kind].shifts or features.many_lights),
+            "BSDF_DELTA": int(cls.delta),
+            "BSDF_CHROMATIC": int(cls.chromatic),
+            "BSDF_SHIFTS": int(_shifts(features, cls)),
+            "BSDF_PASSES": int(cls.passes and features.passes),
+            "USES_CHOICE": int(cls.choosy or cls.shifts or features.many_lights),
             "QUEUED": int(queued),
         }
-        made[f"shade_{kind}"] = _source("shade", own, defines, lanes)
+        made[f"shade_{cls.kind}"] = _source("shade", own, defines, lanes)
     return made
 
 
@@ -63,7 +76,7 @@ def stages(features: Features) -> tuple[str, str]:
     return ("emit", "splat") if features.light_paths else ("generate", "shadow")
 
 
-def _source(stage: str, virtual: dict[str, str], defines: dict, lanes: int) -> device.Source:
+def _source(stage: str, virtual: device.Virtual, defines: dict, lanes: int) -> device.Source:
     return device.assemble(f"stage/{stage}.cl", virtual, {"LANES": lanes, "QUEUED": 0, **defines})
 
 
@@ -78,7 +91,7 @@ def _defines(features: Features) -> dict[str, str | int | float]:
         "USES_INFINITE": int(features.infinite),
         "USES_DISPERSION": int(features.dispersion and features.mode == "spectral"),
         "CAMERA_DISPERSES": int(features.glass_lens),
-        "USES_SHIFTS": int(any(_shifts(features, kind) for kind in features.materials)),
+        "USES_SHIFTS": int(any(_shifts(features, cls) for cls in features.leaves)),
         "SPECTRA_SIZE": features.spectra_size,
         "SHIFT_STEP": SHIFT_STEP,
         "SPECTRA_STEP": f"{features.spectra_step}f",
@@ -260,8 +273,8 @@ def _null_share_text(features: Features) -> str:
 
     A mixture's children are one level below it, since kernels cannot call themselves.
     """
-    kinds_ = enumerate(features.materials)
-    passing = [f"(MATERIAL_KIND(word) == {i})" for i, kind in kinds_ if LEAVES[kind].passes]
+    leaves = enumerate(features.leaves)
+    passing = [f"(MATERIAL_KIND(word) == {i})" for i, cls in leaves if cls.passes]
     arguments = "Scene scene, integer word, TexturePoint point, Wavelengths lambdas"
     lines = [
         f"inline real null_share_0({arguments})",
@@ -382,13 +395,13 @@ def _tangents_text(features: Features) -> str:
     return "\n".join(lines)
 
 
-def _shifts(features: Features, kind: str) -> bool:
-    return LEAVES[kind].shifts and features.mode == "spectral"
+def _shifts(features: Features, cls: type[materials.Material]) -> bool:
+    return cls.shifts and features.mode == "spectral"
 
 
-def _bsdf_text(features: Features, kind: str) -> str:
+def _bsdf_text(features: Features, cls: type[materials.Material]) -> str:
     """A kind's struct, functions and loader, under the names that the integrators use."""
-    cls = LEAVES[kind]
+    kind = cls.kind
     reflectivity = "(m).reflectivity" if "reflectivity" in device_params(cls) else "(real)(0.0f)"
     verbs = ("sample", "eval", "pdf", "albedo", "load", *(("pdfs",) if cls.chromatic else ()))
     return "\n".join(
@@ -401,7 +414,7 @@ def _bsdf_text(features: Features, kind: str) -> str:
             f"#define BSDF_REFLECTIVITY(m) {reflectivity}",
             *(f"#define bsdf_{verb} {kind}_{verb}" for verb in verbs),
             *_interior_text(features, cls),
-            *(_shift_text(cls) if _shifts(features, kind) else ()),
+            *(_shift_text(cls) if _shifts(features, cls) else ()),
             "",
         ]
     )

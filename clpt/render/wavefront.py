@@ -218,7 +218,7 @@ class Wavefront:
                 self.steps.append((name, bound, (size,), None))
         for kind in features.materials:
             self._step(f"shade_{kind}", "shade", self.lanes)
-        if any(not programs.LEAVES[k].delta for k in features.materials):
+        if any(not cls.delta for cls in features.leaves):
             self._step(test, test, self.lanes if brute else 1)
         self.accumulate = self._bound("accumulate", "accumulate", samples=0.0)
         if features.bands:

@@ -7,6 +7,7 @@ none: lowering turns it into rules by which a hit chooses its leaf.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -62,8 +63,13 @@ class Layer(Kind):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Material(Kind):
-    """Base of all materials."""
+    """Base of all materials.
 
+    A kind from outside of clpt is a leaf with a `source`: its OpenCL text, or the path of its file,
+    from the folder of the module that defines the class.
+    """
+
+    source: ClassVar[str | Path | None] = None
     delta: ClassVar[bool] = False  # every lobe is one: a light cannot be sampled through it
     choosy: ClassVar[bool] = False  # `sample` uses u.z
     chromatic: ClassVar[bool] = False  # the pdf differs between wavelengths: it has `pdfs`

@@ -124,7 +124,7 @@ def test_only_what_fluoresces_shifts_wavelengths() -> None:
 
 def test_a_material_more_does_not_change_the_others() -> None:
     one = lowered([m.Diffuse(), m.Null()], "rgb").features
-    two = dataclasses.replace(one, materials=("diffuse", "null"))
+    two = dataclasses.replace(one, leaves=(m.Diffuse, m.Null))
     texts = programs.sources(one, "wide8", 8, queued=False)
     again = programs.sources(two, "wide8", 8, queued=False)
     assert {name: s.text for name, s in texts.items()} == {

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from clpt import spectra
-from clpt.errors import UnknownKindError, UnusedParameterError
+from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
 from clpt.formats import gltf, mesh, strands
 from clpt.formats.native import reradiation
 from clpt.formats.native import spectra as json_spectra
@@ -44,12 +44,13 @@ BASES: dict[str, type[Kind]] = {
 }
 
 
-def load(path: Path) -> Scene:
+def load(path: Path, outside: Iterable[type[materials.Material]] = ()) -> Scene:
     """Read a scene.json.
 
-    Raises SceneError, UnknownKindError and UnusedParameterError with file, line and place.
+    outside: material kinds that are not clpt's own. Raises SceneError, UnknownKindError and
+    UnusedParameterError with file, line and place.
     """
-    return _Reader(parse(path)).scene()
+    return _Reader(parse(path), outside).scene()
 
 
 def default(field: dataclasses.Field) -> Any:
@@ -61,8 +62,13 @@ def default(field: dataclasses.Field) -> Any:
 class _Reader:
     """Reads one file; keeps the materials by name so that they are shared."""
 
-    def __init__(self, root: Cursor):
+    def __init__(self, root: Cursor, outside: Iterable[type[materials.Material]]):
         self.root = root
+        self.outside: dict[str, type[Kind]] = {}
+        for cls in outside:
+            if cls.kind in {**kinds("material"), **self.outside}:
+                raise SceneError(f"there are two kinds of materials {cls.kind!r}; rename yours")
+            self.outside[cls.kind] = cls
         self.materials: dict[str, materials.Material | None] = {}
         self.groups: dict[str, shapes.Group | None] = {}
         self.warnings: list[str] = []
@@ -119,6 +125,8 @@ class _Reader:
     def kind(self, cursor: Cursor, category: str) -> Any:
         """Read an object of one of a category's kinds."""
         table = kinds(category)
+        if category == "material":
+            table |= self.outside
         return self.make(cursor, table[kind_name(cursor, category, table)], ("type",))
 
     def make(self, cursor: Cursor, cls: type[Kind], more: tuple[str, ...]) -> Any:

@@ -1,0 +1,149 @@
+"""Material kinds that the package does not know: as good as its own, and faults are told."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import json
+import pickle
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import clpt
+from clpt import device
+from clpt.formats import native
+from clpt.render import outside, programs
+from clpt.render.lower import lower
+from clpt.scene import Film, Scene, cameras, lights, shapes, textures
+from clpt.scene import materials as m
+from clpt.scene.params import reflectance
+
+DIFFUSE = (device.kernels_folder() / "bsdf" / "diffuse.cl").read_text(encoding="utf-8")
+FLAWED = """
+#include "lib/microfacet.cl"
+BsdfSample flawed_sample(Flawed m, vec3 wo, vec3 u) { return nonsense; }
+"""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Paint(m.Material):
+    """What Diffuse is, under another name."""
+
+    reflectance: Any = reflectance(0.5, "albedo")
+    source = DIFFUSE.replace("diffuse_", "paint_").replace("(Diffuse ", "(Paint ")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Flawed(m.Material):
+    """Its text does not compile."""
+
+    source = FLAWED
+
+
+def scene(cls: type[m.Material], mode: str = "rgb") -> Scene:
+    """A lit corner with a material of this class bare, and with every composite around it."""
+    board = textures.Checkerboard(color0=0.9, color1=(0.2, 0.3, 0.7))
+    bare, figured = cls(reflectance=(0.8, 0.4, 0.2)), cls(reflectance=board)
+    dressed = m.Blend(
+        first=m.TwoSided(front=figured),
+        second=m.TwoSided(front=m.Mask(material=bare, opacity=0.5)),
+        weight=board,
+    )
+    floor = shapes.Rectangle(material=m.BumpMap(material=bare, height=board))
+    return Scene(
+        camera=cameras.Perspective(
+            to_world=clpt.transforms.look_at([0, -3, 2], [0, 0, 0.3], [0, 0, 1])
+        ),
+        shapes=[floor, shapes.Sphere(center=(0, 0, 0.5), radius=0.5, material=dressed)],
+        lights=[lights.Constant()],
+        film=Film(width=16, height=16, mode=mode),
+    )
+
+
+def test_it_renders_as_one_of_ours() -> None:
+    """With textures, and within two-sided, mask, blend and bump map: the same picture."""
+    ours, theirs = (clpt.render(scene(cls), spp=4) for cls in (m.Diffuse, Paint))
+    assert ours.max() > 0.1
+    np.testing.assert_allclose(theirs, ours, rtol=1e-5, atol=1e-6)
+
+
+def test_its_text_is_that_of_ours_in_both_modes() -> None:
+    for mode in ("rgb", "spectral"):
+        made = [
+            programs.sources(lower(scene(cls, mode)).features, "wide8", 8, queued=False)
+            for cls in (m.Diffuse, Paint)
+        ]
+        ours, theirs = made[0]["shade_diffuse"].text, made[1]["shade_paint"].text
+        assert "spectrum_texture_reflectance(" in theirs
+        assert theirs.count("\n") == pytest.approx(ours.count("\n"), abs=3)
+
+
+def test_a_fault_names_the_line_in_the_users_file() -> None:
+    broken = dataclasses.replace(scene(m.Diffuse), shapes=[shapes.Sphere(material=Flawed())])
+    with pytest.raises(clpt.KernelBuildError) as raised:
+        clpt.render(broken, spp=1)
+    lines = Path(__file__).read_text(encoding="utf-8").splitlines()
+    assert Path(raised.value.file) == Path(__file__)
+    assert "nonsense" in lines[raised.value.line - 1]
+
+
+def test_a_file_is_found_beside_the_class(tmp_path: Path) -> None:
+    """And text that stands nowhere is told by the name of its class."""
+    kind = type("Filed", (m.Material,), {"source": Path("test_outside.py")})
+    assert outside.text(kind).text == inspect.getsource(inspect.getmodule(Paint))
+    assert Path(outside.text(kind).file).samefile(__file__)
+    assert outside.text(Paint).file == "test_outside.py:source"
+    nowhere = type("Nowhere", (Paint,), {"source": "int x() {}", "__module__": "nowhere"})
+    assert outside.text(nowhere).file == "Nowhere.source"
+    for source in (tmp_path / "none.cl", "velvet.cl"):
+        with pytest.raises(clpt.SceneError, match=r"cannot be read|pathlib"):
+            outside.text(type("Gone", (m.Material,), {"source": source}))
+
+
+@pytest.mark.parametrize(
+    ("name", "source", "fault"),
+    [
+        ("Plain", None, "has no `source`"),
+        ("Diffuse", "int x() {}", "clpt has 'Diffuse'|clpt has 'diffuse'"),
+        ("Mask", "int x() {}", "clpt has 'mask'"),
+        ("Mixture", "int x() {}", "clpt has 'mixture'"),
+        ("Surface", "int x() {}", "clpt has 'Surface'"),
+        ("Hero", "int x() {}", "clpt has 'hero_"),
+        ("Path", "int x() {}", "clpt has 'Path'|clpt has 'path'"),
+        ("Äther", "int x() {}", "no name in OpenCL"),
+    ],
+)
+def test_names_that_cannot_be(name: str, source: str | None, fault: str) -> None:
+    cls = type(name, (m.Material,), {"source": source})
+    with pytest.raises(clpt.SceneError, match=fault):
+        lower(Scene(camera=cameras.Perspective(), shapes=[shapes.Cube(material=cls(), name="box")]))
+
+
+def test_two_of_one_name_are_refused_in_one_scene() -> None:
+    other = type("Paint", (Paint,), {"source": Paint.source})
+    both = [shapes.Cube(material=Paint()), shapes.Cube(material=other())]
+    with pytest.raises(clpt.SceneError, match="two classes are called 'Paint'"):
+        lower(Scene(camera=cameras.Perspective(), shapes=both))
+    for one in both:  # in scenes of their own they are fine
+        lower(Scene(camera=cameras.Perspective(), shapes=[one]))
+
+
+def test_scenes_are_written_read_and_pickled(tmp_path: Path) -> None:
+    path = tmp_path / "scene.json"
+    native.save(scene(Paint), path)
+    again = clpt.load(path, kinds=[Paint])
+    shape = next(one for one in again.shapes if isinstance(one.material, m.BumpMap))
+    assert isinstance(shape.material.material, Paint)
+    assert json.loads(path.read_text())["shapes"]
+    assert isinstance(pickle.loads(pickle.dumps(again)).shapes[0].material.material, Paint)
+    with pytest.raises(clpt.UnknownKindError, match="paint"):
+        clpt.load(path)
+    with pytest.raises(clpt.SceneError, match="two kinds of materials 'paint'"):
+        clpt.load(path, kinds=[Paint, Paint])
+    path.with_suffix(".xml").write_text("<scene/>")
+    with pytest.raises(clpt.SceneError, match=r"only a scene\.json"):
+        clpt.load(path.with_suffix(".xml"), kinds=[Paint])
