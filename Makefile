@@ -20,11 +20,12 @@ OFFLINE := "make: pip could not install clpt; the lines above tell why (is there
 # scene files that others made: see bench/assets.py
 ASSETS ?= ../shared/assets
 
-.PHONY: help demo test test-all bench assets-report lint clean
+.PHONY: help demo test test-all bench assets-report lint docs clean
 help:
 	@echo "make demo      render a scene to demo.exr and demo.png"
 	@echo "make test      the tests;  make test-all  the slow ones too"
 	@echo "make assets-report  which of the scenes in ASSETS=$(ASSETS) render, and how fast"
+	@echo "make docs      the documentation as a site, in site/"
 	@echo "make bench     measure;  make lint  ruff and mypy;  make clean  remove .venv"
 
 demo: $(VENV)/.run
@@ -45,6 +46,10 @@ assets-report: $(VENV)/.dev
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+
+docs: $(VENV)/.docs
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build
+	@echo "make: see site/index.html"
 
 clean:
 	rm -rf $(VENV)
@@ -71,6 +76,10 @@ $(VENV)/.dev: pyproject.toml | $(BIN)/python
 			$(PIP) --editable '.[dev]'; } \
 		|| { echo $(OFFLINE) >&2; exit 1; }
 	@$(MAKE) --no-print-directory $(VENV)/.opencl
+	@touch $@
+
+$(VENV)/.docs: $(VENV)/.run
+	@$(PIP) --editable '.[docs]' || { echo $(OFFLINE) >&2; exit 1; }
 	@touch $@
 
 # a device that runs a kernel; else PoCL by apt-get; else Intel's CPU runtime by pip

@@ -1,0 +1,118 @@
+"""Docstrings as the site shows them: an extension of griffe, which reads the sources.
+
+Ours are sentences. Names of parameters that begin a paragraph or follow a semicolon become code,
+errors become links, and a kind gets the table of its parameters, from their declarations.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import math
+import re
+from typing import Any
+
+import griffe
+import numpy as np
+
+from clpt import errors
+from clpt.scene.params import Kind, Param, params
+
+ERRORS = [
+    name
+    for name, value in vars(errors).items()
+    if isinstance(value, type) and issubclass(value, errors.ClptError)
+]
+SESSION = re.compile(r"^>>> .*(?:\n.+)*", re.M)
+ROLES = {
+    "reflectance": "reflectance, spectrum in 0 to 1",
+    "emission": "emitted spectrum",
+    "index": "refractive index",
+    "factor": "spectrum",
+    "coefficient": "spectrum",
+    "real": "number",
+    "flag": "`bool`",
+    "reradiation": "`spectra.Reradiation`",
+    "orders": "numbers",
+    "layers": "`Layer`s",
+}
+
+
+class Sentences(griffe.Extension):
+    """Marks up docstrings while the sources are read."""
+
+    def on_function(self, *, func: griffe.Function, **_: Any) -> None:
+        """Names of its parameters, in its docstring."""
+        _mark(func, {parameter.name for parameter in func.parameters})
+
+    def on_class_members(self, *, cls: griffe.Class, **_: Any) -> None:
+        """Names of fields and of what the constructor takes; a kind's parameters as a table."""
+        names = {name for name, member in cls.members.items() if member.is_attribute}
+        if (init := cls.members.get("__init__")) is not None and init.is_function:
+            names |= {parameter.name for parameter in init.parameters}
+        _mark(cls, names)
+        if cls.module.path.startswith("clpt.scene."):
+            kind = getattr(importlib.import_module(cls.module.path), cls.name)
+            if issubclass(kind, Kind):
+                _tabulate(cls, kind)
+
+
+def _mark(thing: griffe.Object, names: set[str]) -> None:
+    """Rewrite a docstring in place."""
+    if thing.docstring is None:
+        return
+    text = thing.docstring.value
+    if names:
+        some = "|".join(sorted(map(re.escape, names), key=len, reverse=True))
+        several = rf"(?:{some})(?:(?:, | and )(?:{some}))*"
+        listed = re.compile(rf"(^|\n|[;.] )({several})(?= \[[^\]]*\]:|:)")
+        text = listed.sub(lambda m: m[1] + re.sub(rf"\b({some})\b", r"`\1`", m[2]), text)
+    text = re.sub(r"(?<![\w`])(clpt(?:\.\w+)+)(?!\w|`)", r"`\1`", text)
+    text = re.sub(rf"(?<![\w`.])({'|'.join(ERRORS)})\b", r"[`\1`][clpt.errors.\1]", text)
+    text = re.sub(r"<(\w+)>", r"\\<\1>", text)
+    thing.docstring.value = SESSION.sub(lambda m: f"```pycon\n{m[0]}\n```", text)
+
+
+def _tabulate(cls: griffe.Class, kind: type[Kind]) -> None:
+    """Add the table of parameters, and let the signature show defaults, not declarations."""
+    declared = params(kind)
+    rows = ["| parameter | accepts | default | meaning |", "| --- | --- | --- | --- |"]
+    for field in dataclasses.fields(kind):
+        if (param := declared.get(field.name)) is None:
+            continue
+        default = _default(field)
+        unit = f" [{param.unit}]" if param.unit else ""
+        rows.append(
+            f"| `{field.name}` | {_accepts(param, field)} | `{default}` | {param.doc}{unit} |"
+        )
+        if (member := cls.members.get(field.name)) is not None and member.is_attribute:
+            member.value = default
+    if cls.docstring is None or len(rows) == 2:
+        return
+    table = "\n".join(rows)
+    cls.docstring.value = f"{cls.docstring.value}\n\n{table}\n"
+
+
+def _default(field: dataclasses.Field[Any]) -> str:
+    if field.default_factory is not dataclasses.MISSING:
+        value = field.default_factory()
+    else:
+        value = field.default
+    if isinstance(value, np.ndarray):
+        return "identity" if value.ndim == 2 and value.shape[0] == value.shape[1] else "[]"
+    if isinstance(value, Kind):
+        return f"{type(value).__name__}()"
+    return f"{value:.6g}" if isinstance(value, float) else repr(value)
+
+
+def _accepts(param: Param, field: dataclasses.Field[Any]) -> str:
+    if param.role == "host":
+        return "" if field.type == "Any" else f"`{field.type}`".replace("|", "\\|")
+    if param.role == "choice":
+        return ", ".join([f"`{c!r}`" for c in param.choices] + ["`None`"] * param.optional)
+    limits = ""
+    if param.role == "real" and math.isfinite(param.low):
+        limits = f" from {param.low:g}" + (
+            f" to {param.high:g}" if math.isfinite(param.high) else ""
+        )
+    return ROLES[param.role] + limits + (" or texture" if param.textured else "")

@@ -1,0 +1,116 @@
+"""Pages of the site that do not lie in docs/: a hook of MkDocs.
+
+What stands elsewhere in the repository (README, CONTRIBUTING, ...) becomes a page with its links
+led to the site's; the API reference is a page for each public module; the command line tells of
+itself.
+"""
+
+from __future__ import annotations
+
+import importlib
+import posixpath
+import re
+from pathlib import Path
+
+import click
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+from mkdocs.structure.pages import Page
+
+import clpt
+from clpt import errors
+from clpt.cli import cli
+
+ROOT = Path(__file__).resolve().parents[2]
+ELSEWHERE = {
+    "README.md": "index.md",
+    "CONTRIBUTING.md": "contributing.md",
+    "CHANGELOG.md": "changelog.md",
+    "kernels/README.md": "kernels.md",
+    "bench/results/README.md": "figures.md",
+    "bench/NOTES.md": "notes.md",
+}
+MODULES = {
+    "clpt.scene": "scene",
+    **{
+        f"clpt.scene.{category}": category
+        for category in ("cameras", "shapes", "materials", "textures", "lights", "integrators")
+    },
+    "clpt.spectra": "spectra",
+    "clpt.transforms": "transforms",
+    "clpt.device": "device",
+    "clpt.bvh": "bvh",
+}
+LINK = re.compile(r"(!?)\[((?:`[^`]*`|[^\]\[])*)\]\((?!\w+:)([^)#\s]*)(#[^)\s]*)?\)")
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Add the pages and the pictures that they show."""
+    for source, page in ELSEWHERE.items():
+        files.append(File.generated(config, page, abs_src_path=str(ROOT / source)))
+    files.append(File.generated(config, "api/clpt.md", content=names_of_clpt()))
+    for module, page in MODULES.items():
+        text = f"# `{module}`\n\n::: {module}\n"
+        files.append(File.generated(config, f"api/{page}.md", content=text))
+    files.append(File.generated(config, "command_line.md", content=command_line()))
+    for picture in sorted(ROOT.glob("scenes/*/picture*.png")):
+        name = picture.relative_to(ROOT).as_posix()
+        files.append(File.generated(config, name, abs_src_path=str(picture)))
+    return files
+
+
+def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Lead links to where their targets are on the site; those to source files become text."""
+    own = page.file.src_uri
+    origin = next((source for source, name in ELSEWHERE.items() if name == own), f"docs/{own}")
+
+    def led(match: re.Match[str]) -> str:
+        picture, text, target, anchor = match.groups("")
+        if not target:
+            return match[0]
+        path = posixpath.normpath(posixpath.join(posixpath.dirname(origin), target))
+        there = ELSEWHERE.get(path, path.removeprefix("docs/"))
+        if files.get_file_from_path(there) is None:
+            if not (ROOT / path).exists():
+                return match[0]  # a dead link: MkDocs complains
+            return text
+        relative = posixpath.relpath(there, posixpath.dirname(own) or ".")
+        return f"{picture}[{text}]({relative}{anchor})"
+
+    return LINK.sub(led, markdown)
+
+
+def names_of_clpt() -> str:
+    """Everything in `clpt.__all__`, by the module it is from: the renderer first, errors last."""
+    groups: dict[str, list[str]] = {}
+    for name in clpt.__all__:
+        if not name.startswith("_"):
+            groups.setdefault(getattr(clpt, name).__module__, []).append(name)
+    last = {"clpt.render.renderer": -1, errors.__name__: 1}
+    parts = ["# `clpt`"]
+    for module in sorted(groups, key=lambda module: (last.get(module, 0), module)):
+        told = (importlib.import_module(module).__doc__ or "").split("\n\n")[0]
+        parts.append(f"## {re.split('[:;]', told.rstrip('.'))[0]}")
+        for name in groups[module]:
+            own = f"{module}.{getattr(clpt, name).__name__}"
+            options = {"show_root_heading": True, "heading_level": 3, "heading": name}
+            parts.append(
+                f"[`{name}`][{own}]" if module in MODULES else f"::: {own}\n    options: {options}"
+            )
+    return "\n\n".join(parts)
+
+
+def command_line() -> str:
+    """What `clpt --help` says, of every command."""
+    context = click.Context(cli, info_name="clpt", terminal_width=90, max_content_width=90)
+    parts = ["# Command line", _help(cli, context)]
+    for name in cli.list_commands(context):
+        command = cli.get_command(context, name)
+        if command is not None:
+            parts += [f"## clpt {name}", _help(command, click.Context(command, context, name))]
+    return "\n\n".join(parts)
+
+
+def _help(command: click.Command, context: click.Context) -> str:
+    context.terminal_width = 90
+    return f"```text\n{command.get_help(context)}\n```"
