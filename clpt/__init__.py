@@ -19,6 +19,7 @@ from clpt.errors import (
 )
 from clpt.formats import load
 from clpt.images import read, write
+from clpt.render.library import kernel_source
 from clpt.render.renderer import Progress, Renderer, render
 from clpt.scene import Scene
 from clpt.spectral_exr import SpectralImage
@@ -43,6 +44,7 @@ __all__ = [
     "UnknownKindError",
     "UnusedParameterError",
     "__version__",
+    "kernel_source",
     "load",
     "read",
     "read_spectral",

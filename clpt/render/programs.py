@@ -20,7 +20,7 @@ from clpt.render import (
     shapes,
     textures,
 )
-from clpt.render.features import Features
+from clpt.render.features import Features, Sources
 from clpt.render.reradiation import STEP as SHIFT_STEP
 from clpt.scene import materials
 from clpt.scene.params import device_params, interior_params
@@ -146,9 +146,7 @@ def _shared(features: Features, layout: str) -> dict[str, str]:
         "generated/medium.cl": _medium_text(features),
         "generated/shapes.cl": _tangents_text(features),
         "generated/trace.cl": _trace_text(layout),
-        "generated/layout.cl": (
-            f'#include "bvh/{layout}.cl"\n#define LAYOUT(verb) {layout}_##verb\n'
-        ),
+        "generated/layout.cl": layout_text(layout),
         "generated/trace_args.cl": _trace_args_text(features),
         "generated/shape_tree.cl": _shape_tree_text(features),
         "generated/shape_traversal.cl": '#include "bvh/shapes.cl"\n' if features.analytic else "",
@@ -160,6 +158,11 @@ def _shared(features: Features, layout: str) -> dict[str, str]:
         ),
         "generated/integrator.cl": f'#include "integrator/{features.integrator}.cl"\n',
     }
+
+
+def layout_text(layout: str) -> str:
+    """Return the traversal of a layout, whose verbs are then LAYOUT(closest), LAYOUT(occluded)."""
+    return f'#include "bvh/{layout}.cl"\n#define LAYOUT(verb) {layout}_##verb\n'
 
 
 def _spectrum_text(features: Features) -> str:
@@ -399,6 +402,12 @@ def _shifts(features: Features, cls: type[materials.Material]) -> bool:
     return cls.shifts and features.mode == "spectral"
 
 
+def functions_text(cls: type[materials.Material], mode: str, sources: Sources) -> str:
+    """Return a kind's struct and functions, with what its boundary needs."""
+    boundary = films.boundary_text(cls, mode, sources)
+    return f'{boundary}{kinds.struct_text(cls)}#include "bsdf/{cls.kind}.cl"\n'
+
+
 def _bsdf_text(features: Features, cls: type[materials.Material]) -> str:
     """A kind's struct, functions and loader, under the names that the integrators use."""
     kind = cls.kind
@@ -406,9 +415,7 @@ def _bsdf_text(features: Features, cls: type[materials.Material]) -> str:
     verbs = ("sample", "eval", "pdf", "albedo", "load", *(("pdfs",) if cls.chromatic else ()))
     return "\n".join(
         [
-            films.boundary_text(cls, features.mode, features.sources),
-            kinds.struct_text(cls),
-            f'#include "bsdf/{kind}.cl"',
+            functions_text(cls, features.mode, features.sources),
             kinds.load_text(cls, features.sources.get(kind, {}), "materials"),
             f"typedef {cls.__name__} Bsdf;",
             f"#define BSDF_REFLECTIVITY(m) {reflectivity}",
