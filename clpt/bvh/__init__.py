@@ -1,6 +1,18 @@
 """Acceleration structures: triangles and boxes to nodes, built on the device."""
 
 from .build import Bvh, build, build_boxes, build_parts, choose_layout
+from .building import Building
 from .layouts import LAYOUTS
+from .refit import refit, refit_boxes
 
-__all__ = ["LAYOUTS", "Bvh", "build", "build_boxes", "build_parts", "choose_layout"]
+__all__ = [
+    "LAYOUTS",
+    "Building",
+    "Bvh",
+    "build",
+    "build_boxes",
+    "build_parts",
+    "choose_layout",
+    "refit",
+    "refit_boxes",
+]

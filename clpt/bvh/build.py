@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..device import Device
 from ..errors import SceneError
 from .building import Array, Building
-from .layouts import BOX_LAYOUTS, LAYOUTS, Mesh
+from .layouts import BOX_LAYOUTS, LAYOUTS, Mesh, Part
 
 BRUTE_LIMIT = 96  # triangles up to which brute force is faster; measured, see bench/NOTES.md
 
@@ -26,19 +26,22 @@ class Bvh:
     """An acceleration structure on a device.
 
     layout: the name of its traversal in kernels/bvh; count: triangles or boxes; buffers: by the
-    names of that traversal's arguments; stats: seconds, and for wide8 nodes, leaves, depth and cost
-    (nodes and blocks that a random line through the scene is tested against).
+    names of that traversal's arguments; parts: the trees in them, as `refit` asks for them; stats:
+    seconds, and for wide8 nodes, leaves, depth and cost (nodes and blocks that a random line
+    through the scene is tested against).
     """
 
     layout: str
     count: int
     buffers: dict[str, cl.Buffer]
+    parts: tuple[Part, ...]
     stats: dict[str, float] = field(default_factory=dict)
 
     @property
     def bytes(self) -> int:
-        """Device memory of the buffers."""
-        return sum(buffer.size for buffer in self.buffers.values())
+        """Device memory that it holds."""
+        ranges = [part.ranges.size for part in self.parts if part.ranges is not None]
+        return sum(buffer.size for buffer in self.buffers.values()) + sum(ranges)
 
 
 def choose_layout(device: Device, n_triangles: int) -> str:
@@ -89,7 +92,8 @@ def _build(
     packed = LAYOUTS[layout](building, mesh)
     building.stream.wait()
     stats = {**packed.stats, "seconds": time.perf_counter() - start}
-    return Bvh(layout, count, packed.buffers, stats)
+    part = replace(packed.part, count=count)
+    return Bvh(layout, count, packed.buffers, (part,), stats)
 
 
 def build_parts(
@@ -122,7 +126,13 @@ def build_parts(
             building.stream.copy(buffers[name], tree_.buffers[name], dst_offset=int(at))
     building.stream.wait()
     stats = {"trees": len(trees), "seconds": time.perf_counter() - start}
-    return Bvh(layout, sum(counts), buffers, stats), (begins // 32).astype(np.uint32)
+    begins //= 32
+    firsts = np.cumsum([0, *counts]).tolist()
+    parts = tuple(
+        replace(tree_.parts[0], nodes=nodes, leaves=leaves, first=first)
+        for tree_, (nodes, leaves), first in zip(trees, begins.tolist(), firsts, strict=False)
+    )
+    return Bvh(layout, sum(counts), buffers, parts, stats), begins.astype(np.uint32)
 
 
 def build_boxes(device: Device, boxes: NDArray, layout: str = "shapes") -> Bvh:
@@ -137,7 +147,8 @@ def build_boxes(device: Device, boxes: NDArray, layout: str = "shapes") -> Bvh:
     building, n = Building(device), len(boxes)
     packed = BOX_LAYOUTS[layout](building, n, building.upload(boxes, np.float32))
     building.stream.wait()
-    return Bvh(layout, n, packed.buffers, {"seconds": time.perf_counter() - start})
+    stats = {"seconds": time.perf_counter() - start}
+    return Bvh(layout, n, packed.buffers, (packed.part,), stats)
 
 
 def _check(vertices: Array, faces: Array, tags: Array | None) -> int:

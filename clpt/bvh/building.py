@@ -27,13 +27,15 @@ class Building:
     """What the steps of a build share. Programs are compiled once in a context.
 
     former: a build that is over, whose kernels are taken on; to make them again takes longer than
-    a small tree.
+    a small tree. stream: what everything is enqueued on, one of its own by default.
     """
 
-    def __init__(self, device: Device, former: Building | None = None):
+    def __init__(
+        self, device: Device, former: Building | None = None, stream: Stream | None = None
+    ):
         self.device = device
         self.buffers = Buffers(device)
-        self.stream: Stream = former.stream if former else Stream(device.queue)
+        self.stream: Stream = stream or (former.stream if former else Stream(device.queue))
         self._kernels: dict[tuple[str, str], Bound] = former._kernels if former else {}
 
     def run(self, root: str, kernel: str, n: int, **arguments: Any) -> None:

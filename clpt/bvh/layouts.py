@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 import pyopencl as cl
@@ -15,7 +16,7 @@ from .building import Building
 _COLLAPSE = "bvh/collapse.cl"
 _BINARY_LEAF = 4  # triangles of a leaf, at most
 _BLOCK = 8
-_LEAF = 0x80000000  # BVH_LEAF of kernels/bvh/node.cl
+_LEAF, _DEEPEST = 0x80000000, 48  # BVH_LEAF and BVH_DEPTH of kernels/bvh/node.cl
 
 
 @dataclass(frozen=True)
@@ -29,25 +30,39 @@ class Mesh:
 
 
 @dataclass(frozen=True)
+class Part:
+    """One tree in buffers that several may share, as refitting asks for it.
+
+    reach: the largest coordinate that it was built with; steps: (begin, count) of what a kernel
+    takes at once, from the leaves up: wide nodes, or ranges in the heap `ranges` of a binary tree;
+    count: triangles or boxes; nodes, leaves: where its own begin, in steps of 32 bytes; first: its
+    first triangle.
+    """
+
+    count: int
+    reach: float = 0.0
+    steps: tuple[tuple[int, int], ...] = ()
+    ranges: cl.Buffer | None = None
+    nodes: int = 0
+    leaves: int = 0
+    first: int = 0
+
+
+@dataclass(frozen=True)
 class Packed:
-    """Buffers by the names of the traversal's arguments, and figures about them."""
+    """Buffers by the names of the traversal's arguments, what refitting needs, and figures."""
 
     buffers: dict[str, cl.Buffer]
-    stats: dict[str, float]
+    part: Part
+    stats: dict[str, float] = field(default_factory=dict)
 
 
 def brute(building: Building, mesh: Mesh) -> Packed:
-    """Records of the triangles, on the host: so few are not worth compiling a kernel for."""
-    size = mesh.vertices.size // 12
-    vertices = building.read(mesh.vertices, 3 * size, np.float32).reshape(size, 3)
-    faces = building.read(mesh.faces, 3 * mesh.count, np.uint32).reshape(-1, 3)
-    v0, v1, v2 = vertices[faces].transpose(1, 0, 2)
-    edges = [v1 - v0, v2 - v0]
-    words = np.zeros((mesh.count, 4), np.uint32)
-    words[:, 0] = np.arange(mesh.count)
-    words[:, 1] = building.read(mesh.tags, mesh.count, np.uint32)
-    records = np.concatenate([v0, *edges, np.cross(*edges), words.view(np.float32)], 1)
-    return Packed({"tris": building.upload(records, np.float32)}, {})
+    """Records of the triangles."""
+    records = building.allocate(64 * mesh.count)
+    source = {"vertices": mesh.vertices, "faces": mesh.faces, "tags": mesh.tags}
+    building.run_each("bvh/pack.cl", "pack_brute", mesh.count, records=records, **source)
+    return Packed({"tris": records}, Part(mesh.count))
 
 
 def binary(building: Building, mesh: Mesh) -> Packed:
@@ -57,7 +72,7 @@ def binary(building: Building, mesh: Mesh) -> Packed:
     source = {"vertices": mesh.vertices, "faces": mesh.faces, "tags": mesh.tags}
     packing = {"items": built.items, "records": records}
     building.run_each("bvh/pack.cl", "pack_triangles", mesh.count, **packing, **source)
-    return Packed({"nodes": built.nodes, "leaves": records}, {})
+    return Packed({"nodes": built.nodes, "leaves": records}, _binary_part(building, built))
 
 
 def wide8(building: Building, mesh: Mesh) -> Packed:
@@ -68,7 +83,7 @@ def wide8(building: Building, mesh: Mesh) -> Packed:
     source = {"vertices": mesh.vertices, "faces": mesh.faces, "tags": mesh.tags}
     leaves = {"nodes": built.nodes, "items": built.items, "leaf_roots": wide.leaf_roots}
     building.run_each(_COLLAPSE, "collapse_blocks", wide.leaves, blocks=blocks, **leaves, **source)
-    return Packed({"nodes": wide.nodes, "leaves": blocks}, wide.stats)
+    return Packed({"nodes": wide.nodes, "leaves": blocks}, wide.part, wide.stats)
 
 
 def binary_boxes(building: Building, count: int, boxes: cl.Buffer, leaf_size: int = 1) -> Packed:
@@ -76,11 +91,11 @@ def binary_boxes(building: Building, count: int, boxes: cl.Buffer, leaf_size: in
     indices = building.allocate(4 * count)
     if count:
         items, parts = tree.items_of_boxes(building, count, boxes)
-        nodes = tree.over(building, count, items, parts, leaf_size).nodes
+        built = tree.over(building, count, items, parts, leaf_size)
         building.run_each("bvh/pack.cl", "pack_indices", count, items=items, indices=indices)
-    else:  # a leaf with nothing in it
-        nodes = building.upload(np.array([0, 0, 0, _LEAF, 0, 0, 0, 0]), np.uint32)
-    return Packed({"nodes": nodes, "indices": indices}, {})
+        return Packed({"nodes": built.nodes, "indices": indices}, _binary_part(building, built))
+    nodes = building.upload(np.array([0, 0, 0, _LEAF, 0, 0, 0, 0]), np.uint32)  # nothing in it
+    return Packed({"nodes": nodes, "indices": indices}, Part(0))
 
 
 def wide8_boxes(building: Building, count: int, boxes: cl.Buffer) -> Packed:
@@ -91,16 +106,17 @@ def wide8_boxes(building: Building, count: int, boxes: cl.Buffer) -> Packed:
     indices = building.allocate(4 * count)
     leaves = {"nodes": built.nodes, "items": items, "leaf_roots": wide.leaf_roots}
     building.run_each(_COLLAPSE, "collapse_indices", count, indices=indices, **leaves)
-    return Packed({"nodes": wide.nodes, "indices": indices}, wide.stats)
+    return Packed({"nodes": wide.nodes, "indices": indices}, wide.part, wide.stats)
 
 
 @dataclass(frozen=True)
 class _Wide:
-    """8-wide nodes, the binary nodes that their leaves were, the number of those, and figures."""
+    """8-wide nodes, the binary nodes that their leaves were, and the number of those."""
 
     nodes: cl.Buffer
     leaf_roots: cl.Buffer
     leaves: int
+    part: Part
     stats: dict[str, float]
 
 
@@ -116,17 +132,19 @@ def _collapse(building: Building, n: int, built: tree.Tree) -> _Wide:
         building.run(_COLLAPSE, "collapse_level", 1 << level, begin=begin, **parts)
 
     numbers = {"roots": building.allocate(4 * n), "firsts": building.allocate(8 * n)}
-    leaf_roots, totals = building.allocate(4 * n), building.allocate(16)
+    leaf_roots, totals = building.allocate(4 * n), building.allocate(4 * (4 + _DEEPEST))
     places = {"leaf_roots": leaf_roots, "totals": totals, **numbers}
     building.run(_COLLAPSE, "collapse_number", 1, nodes=built.nodes, costs=costs, **places)
-    words = building.read(totals, 4, np.uint32)
-    n_nodes, n_leaves, depth = (int(word) for word in words[:3])
+    words = building.read(totals, 4 + _DEEPEST, np.uint32)
+    n_nodes, n_leaves, levels = words[:3].tolist()
+    starts = [*words[4 : 4 + levels].tolist(), n_nodes]
+    steps = tuple((begin, end - begin) for begin, end in pairwise(starts))[::-1]
 
     wide = building.allocate(256 * n_nodes)
     building.run_each(_COLLAPSE, "collapse_nodes", n_nodes, wide=wide, **numbers, **below)
     cost = float(words[3:].view(np.float32)[0])
-    stats = {"nodes": n_nodes, "leaves": n_leaves, "depth": depth, "cost": cost}
-    return _Wide(wide, leaf_roots, n_leaves, stats)
+    stats = {"nodes": n_nodes, "leaves": n_leaves, "depth": levels - 1, "cost": cost}
+    return _Wide(wide, leaf_roots, n_leaves, Part(n, built.reach(building), steps), stats)
 
 
 LAYOUTS: dict[str, Callable[[Building, Mesh], Packed]] = {
@@ -139,6 +157,12 @@ BOX_LAYOUTS: dict[str, Callable[[Building, int, cl.Buffer], Packed]] = {
     "binary": binary_boxes,
     "wide8": wide8_boxes,
 }
+
+
+def _binary_part(building: Building, built: tree.Tree) -> Part:
+    """Its subtrees at once, then level by level what stands above them."""
+    steps = tuple(((1 << level) - 1, 1 << level) for level in reversed(range(built.levels + 1)))
+    return Part(built.count, built.reach(building), steps, built.ranges)
 
 
 def _binary_tree(building: Building, mesh: Mesh, leaf_size: int) -> tree.Tree:

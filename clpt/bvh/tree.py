@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
 import pyopencl as cl
 
 from .building import Building
@@ -19,13 +20,20 @@ class Tree:
     """A binary tree over items.
 
     items: count float8; nodes: 2 count float8; ranges: a heap of the top `levels` levels and, below
-    them, of the subtrees.
+    them, of the subtrees; extents: of those ranges.
     """
 
+    count: int
     items: cl.Buffer
     nodes: cl.Buffer
     ranges: cl.Buffer
+    extents: cl.Buffer
     levels: int
+
+    def reach(self, building: Building) -> float:
+        """The largest coordinate of all items; waits for it."""
+        bounds = building.read(self.extents, 8, np.float32)
+        return float(np.abs(bounds[[0, 1, 2, 4, 5, 6]]).max())
 
 
 def items_of_triangles(
@@ -67,4 +75,4 @@ def over(
     for level in range(levels):
         building.run(_BUILD, "build_level", 1 << level, begin=(1 << level) - 1, **shared)
     building.run(_BUILD, "build_subtree", 1 << levels, begin=(1 << levels) - 1, **shared)
-    return Tree(items, nodes, ranges, levels)
+    return Tree(count, items, nodes, ranges, extents, levels)

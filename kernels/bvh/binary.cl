@@ -1,5 +1,5 @@
 /* Traversal of the binary tree that build.cl makes, one ray a work-item: the readable reference, and
- * the layout for GPUs. `leaves` holds the triangle records of pack.cl.
+ * the layout for GPUs. `leaves` holds the triangle records of leaves.cl.
  */
 #include "bvh/triangle.cl"
 

@@ -25,15 +25,9 @@ inline float build_reach(float8 scene)
     return fmax(reach.x, fmax(reach.y, reach.z));
 }
 
-/* Nodes are larger than what they hold by an ulp or two, and a trifle where a coordinate is 0: rays in
- * the very plane of a side, whose direction has no component across it, are inside. */
 inline float8 build_node(float8 bounds, float reach, uint link, uint count)
 {
-    float4 lo = bounds.lo - fabs(bounds.lo) * 0x1p-22f - reach * 0x1p-40f;
-    float4 hi = -bounds.hi + fabs(bounds.hi) * 0x1p-22f + reach * 0x1p-40f;
-    lo.w = as_float(link);
-    hi.w = as_float(count);
-    return (float8)(lo, hi);
+    return node_make(node_pad(bounds, reach), link, count);
 }
 
 /* Small ranges are cut with fewer bins: there they cost more than they find. */

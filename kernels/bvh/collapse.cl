@@ -6,16 +6,15 @@
  * triangles at most, is a block; testing one costs the same however few they are.
  *
  * Wide nodes are 8 rows of float8: low x, high x, low y, high y, low z, high z of the children,
- * their words, and a spare one; a child's word is its wide node, or its block with BVH_LEAF set.
- * Blocks are 11 rows: v0, v1, v2 (x, y, z each), prim, tag.
+ * their words, and 1 where there is a child; its word is its wide node, or its block with BVH_LEAF set.
  */
 #include "bvh/hit.cl"
 #include "bvh/items.cl"
+#include "bvh/leaves.cl"
 #include "bvh/node.cl"
 
 #define COLLAPSE_NODE_COST 1.0f
 #define COLLAPSE_BLOCK_COST 1.0f
-#define WIDE_STACK (8 * BVH_DEPTH)
 
 /* The chance that a random line through the node's box meets a triangle in it: area of one side over
  * a quarter of the box's surface times one half (Cauchy); dependence among them is neglected. */
@@ -130,36 +129,35 @@ inline uint collapse_children(global const float8 *nodes, global const float8 *c
     }
 }
 
-/* Numbers the wide nodes and blocks: a node's child nodes, and its blocks, have neighbouring numbers.
- * roots, leaf_roots: the binary node of each; firsts: a node's first child node and first block.
- * totals: nodes, blocks, depth, and as a float the tree's cost for a line that meets its box. */
+/* Numbers the wide nodes and blocks, level by level: a node's child nodes, and its blocks, have
+ * neighbouring numbers. roots, leaf_roots: the binary node of each; firsts: a node's first child node
+ * and first block. totals: nodes, blocks, levels, as a float the tree's cost for a line that meets its
+ * box, and the first node of each level. */
 kernel APART void collapse_number(global const float8 *restrict nodes,
                                   global const float8 *restrict costs, global uint *restrict roots,
                                   global uint2 *restrict firsts, global uint *restrict leaf_roots,
                                   global uint *restrict totals)
 {
-    uint waiting[WIDE_STACK], depths[WIDE_STACK], children[8];
+    uint children[8], n_nodes = 1, n_blocks = 0, levels = 0, below = 0;
     float area = node_half_area(nodes[0]);
-    uint n = 1, n_nodes = 1, n_blocks = 0, deepest = 0;
-    waiting[0] = roots[0] = depths[0] = 0;
-    while (n) {
-        uint at = waiting[--n], depth = depths[n];
+    roots[0] = 0;
+    for (uint at = 0; at < n_nodes; at++) {
+        if (at == below) {
+            totals[4 + levels++] = at;
+            below = n_nodes;
+        }
         uint found = collapse_children(nodes, costs, roots[at], children);
         firsts[at] = (uint2)(n_nodes, n_blocks);
-        deepest = max(deepest, depth);
         for (uint i = 0; i < found; i++) {
-            if (node_is_leaf(nodes[children[i]])) {
+            if (node_is_leaf(nodes[children[i]]))
                 leaf_roots[n_blocks++] = children[i];
-            } else {
-                waiting[n] = n_nodes;
-                depths[n++] = depth + 1;
+            else
                 roots[n_nodes++] = children[i];
-            }
         }
     }
     totals[0] = n_nodes;
     totals[1] = n_blocks;
-    totals[2] = deepest;
+    totals[2] = levels;
     totals[3] = as_uint(area > 0.0f ? ((global const float *)costs)[0] / area : 0.0f);
 }
 
@@ -211,11 +209,11 @@ kernel APART void collapse_nodes(global const float8 *restrict nodes,
         row[32] = node.s2;
         row[40] = node.s6;
         row[48] = as_float(k < found ? words[k] : BVH_LEAF);
-        row[56] = 0.0f;
+        row[56] = k < found ? 1.0f : 0.0f;
     }
 }
 
-/* Writes one block; slots beyond its triangles hold a point, which nothing hits. */
+/* Writes one block. */
 kernel APART void collapse_blocks(global const float8 *restrict nodes,
                                   global const float8 *restrict items,
                                   global const uint *restrict leaf_roots, uint count,
@@ -227,19 +225,14 @@ kernel APART void collapse_blocks(global const float8 *restrict nodes,
     if (b >= count) return;
     float8 node = nodes[leaf_roots[b]];
     uint first = node_link(node), n = node_count(node);
-    global float *row = blocks + (ulong)b * 88;
-    for (uint k = 0; k < 8; k++, row++) {
+    global float *block = blocks + (ulong)b * 88;
+    global uint *words = (global uint *)block + 72;
+    for (uint k = 0; k < 8; k++) {
         uint prim = k < n ? item_index(items[first + k]) : BVH_MISS;
-        for (uint corner = 0; corner < 3; corner++) {
-            float3 v = (float3)(0.0f);
-            if (k < n) v = vload3(faces[3 * prim + corner], vertices);
-            row[24 * corner] = v.x;
-            row[24 * corner + 8] = v.y;
-            row[24 * corner + 16] = v.z;
-        }
-        row[72] = as_float(prim);
-        row[80] = as_float(k < n ? tags[prim] : 0u);
+        words[k] = prim;
+        words[8 + k] = k < n ? tags[prim] : 0u;
     }
+    leaf_store_block(block, vertices, faces);
 }
 
 /* The items of leaves that hold one each, by their indices. */

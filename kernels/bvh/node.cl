@@ -10,6 +10,23 @@ inline uint node_link(float8 node) { return as_uint(node.s3) & ~BVH_LEAF; }
 inline int node_is_leaf(float8 node) { return as_uint(node.s3) >= BVH_LEAF; }
 inline uint node_count(float8 node) { return as_uint(node.s7); }
 
+/* Boxes of nodes are larger than what they hold by an ulp or two, and a trifle where a coordinate is 0:
+ * rays in the very plane of a side, whose direction has no component across it, are inside. bounds: low
+ * corner and negated high corner; reach: the largest coordinate of the scene. Order is kept: of two boxes
+ * the one inside the other stays so, and the union of larger boxes is the larger union. */
+inline float8 node_pad(float8 bounds, float reach)
+{
+    return bounds - fabs(bounds) * 0x1p-22f - reach * 0x1p-40f;
+}
+
+inline float8 node_make(float8 padded, uint link, uint count)
+{
+    float8 node = (float8)(padded.lo, -padded.hi);
+    node.s3 = as_float(link);
+    node.s7 = as_float(count);
+    return node;
+}
+
 inline float node_half_area(float8 node)
 {
     float4 e = node.hi - node.lo;

@@ -1,10 +1,7 @@
-/* From triangles and boxes to items, and from items to what traversals read.
- *
- * binary.cl's triangle records are 16 floats, in the order of the items: v0, v1, v2,
- * n = cross(v1 - v0, v2 - v0), prim, tag, two unused.
- */
+/* From triangles and boxes to items, and from items to what traversals read; leaves.cl has the forms. */
 #include "bvh/apart.cl"
 #include "bvh/items.cl"
+#include "bvh/leaves.cl"
 
 /* One work-item takes `run` neighbours and leaves the bounds of all of them in `extents`. */
 kernel APART void items_of_triangles(global const float *restrict vertices,
@@ -48,14 +45,25 @@ kernel APART void pack_triangles(global const float8 *restrict items, uint count
     uint i = get_global_id(0);
     if (i >= count) return;
     uint prim = item_index(items[i]);
-    float4 v0 = (float4)(vload3(faces[3 * prim], vertices), 0.0f);
-    float4 v1 = (float4)(vload3(faces[3 * prim + 1], vertices), 0.0f);
-    float4 v2 = (float4)(vload3(faces[3 * prim + 2], vertices), 0.0f);
-    float4 n = cross(v1 - v0, v2 - v0);
-    vstore4((float4)(v0.xyz, v1.x), 4 * i, records);
-    vstore4((float4)(v1.yz, v2.xy), 4 * i + 1, records);
-    vstore4((float4)(v2.z, n.xyz), 4 * i + 2, records);
-    vstore4((float4)(as_float(prim), as_float(tags[prim]), 0.0f, 0.0f), 4 * i + 3, records);
+    float4 corners[3];
+    global float *record = records + (ulong)i * 16;
+    leaf_corners(vertices, faces, prim, corners);
+    leaf_store_record(record, corners);
+    vstore4((float4)(as_float(prim), as_float(tags[prim]), 0.0f, 0.0f), 3, record);
+}
+
+/* The records of brute.cl, in the caller's order. */
+kernel APART void pack_brute(global const float *restrict vertices, global const uint *restrict faces,
+                             global const uint *restrict tags, uint count,
+                             global float *restrict records)
+{
+    uint prim = get_global_id(0);
+    if (prim >= count) return;
+    float4 corners[3];
+    global float *record = records + (ulong)prim * 16;
+    leaf_corners(vertices, faces, prim, corners);
+    leaf_store_brute(record, corners);
+    vstore4((float4)(as_float(prim), as_float(tags[prim]), 0.0f, 0.0f), 3, record);
 }
 
 /* The items' indices alone, for trees over shapes that the caller keeps. */

@@ -1,0 +1,80 @@
+"""Refitting: triangles or boxes that move under a tree whose nodes and leaves stay.
+
+Kernels go from the leaves up, a level at a time: no work-item waits for another. A tree that was
+refitted is right whatever became of its triangles, but the farther they went from where it was
+built, the more boxes overlap and the slower rays get; then build anew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import pyopencl as cl
+
+from .build import Bvh
+from .building import Building
+from .layouts import Part
+
+_ROOT = "bvh/refit.cl"
+_NO_TRIANGLES = {"vertices": None, "faces": None, "leaves": None}
+_NO_BOXES = {"boxes": None, "indices": None}
+
+
+def refit(
+    building: Building,
+    tree: Bvh,
+    vertices: cl.Buffer,
+    faces: cl.Buffer,
+    parts: Iterable[int] | None = None,
+) -> cl.Event | None:
+    """Enqueue that a tree over triangles, in place, follows its vertices.
+
+    building: says where it runs; vertices: (n, 3) float32; faces: (m, 3) uint32, those that the
+    tree was built of; parts: which trees of `build_parts` have moved, all by default. Returns the
+    event of the last kernel.
+
+    Nothing is read or waited for. A triangle with a corner that is not finite, or beyond 1e12, is
+    met by no ray until it has better ones.
+    """
+    numbers = range(len(tree.parts)) if parts is None else parts
+    if tree.layout == "brute":
+        if tree.count:
+            records = {"records": tree.buffers["tris"]}
+            source = {"vertices": vertices, "faces": faces}
+            building.run_each(_ROOT, "refit_brute", tree.count, **records, **source)
+        return building.stream.last
+    triangles = {"vertices": vertices, "faces": faces, "leaves": tree.buffers["leaves"]}
+    for number in numbers:
+        _refit(building, tree, tree.parts[number], {**triangles, **_NO_BOXES})
+    return building.stream.last
+
+
+def refit_boxes(building: Building, tree: Bvh, boxes: cl.Buffer) -> cl.Event | None:
+    """Enqueue that a tree over boxes, in place, follows them.
+
+    boxes: (m, 2, 3) float32 low and high corners, in the order in which the tree was given them. A
+    box that is inside out or not finite is met by no ray. For the rest see `refit`.
+    """
+    boxed = {"boxes": boxes, "indices": tree.buffers["indices"]}
+    _refit(building, tree, tree.parts[0], {**boxed, **_NO_TRIANGLES})
+    return building.stream.last
+
+
+def _refit(building: Building, tree: Bvh, part: Part, source: dict) -> None:
+    """Enqueue the steps of one tree."""
+    if not part.count:
+        return
+    common = {
+        "nodes": tree.buffers["nodes"],
+        "nodes_begin": part.nodes,
+        "leaves_begin": part.leaves,
+        "faces_begin": part.first,
+        "reach": part.reach,
+        **source,
+    }
+    for i, (begin, count) in enumerate(part.steps):
+        if part.ranges is None:
+            building.run_each(_ROOT, "refit_wide8", count, begin=begin, **common)
+        else:
+            kernel = "refit_level" if i else "refit_subtree"
+            building.run(_ROOT, kernel, count, begin=begin, ranges=part.ranges, **common)

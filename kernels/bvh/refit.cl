@@ -1,0 +1,175 @@
+/* Trees fitted to triangles or boxes that have moved: nodes and leaves stay what they are, their boxes are
+ * found again from the leaves up.
+ *
+ * Boxes come out as the builder makes them, so that a tree whose triangles did not move is the same to
+ * the bit. What is not finite, or beyond what trees hold, is left out: nothing hits it. A box with
+ * nothing in it is inside out, but in a binary node a point beyond everything, for traversals of those
+ * sort the planes of a box.
+ */
+#include "bvh/hit.cl"
+#include "bvh/items.cl"
+#include "bvh/leaves.cl"
+#include "bvh/node.cl"
+
+#define REFIT_NOTHING ((float8)(FLT_MAX))
+
+/* What the leaves hold: triangles, or where `boxes` is not null, boxes by their `indices`. */
+typedef struct {
+    global float *leaves;
+    global const float *vertices, *boxes;
+    global const uint *faces, *indices;
+    float reach; /* the largest coordinate when the tree was built */
+} Refit;
+
+inline float8 refit_pad(float8 bounds, float reach)
+{
+    float8 far = fabs(bounds);
+    float4 own = fmax(far.lo, far.hi);
+    return node_pad(bounds, fmax(reach, fmax(own.x, fmax(own.y, own.z))));
+}
+
+inline float8 refit_triangle(const float4 v[3])
+{
+    return (float8)(fmin(v[0], fmin(v[1], v[2])), -fmax(v[0], fmax(v[1], v[2])));
+}
+
+inline float8 refit_box(Refit tree, uint item)
+{
+    uint at = 2 * tree.indices[item];
+    float4 lo = (float4)(vload3(at, tree.boxes), 0.0f), hi = (float4)(vload3(at + 1, tree.boxes), 0.0f);
+    int4 sound = (lo <= hi) & (fabs(lo) < LEAF_REACH) & (fabs(hi) < LEAF_REACH);
+    return all(sound) ? (float8)(lo, -hi) : REFIT_NOTHING;
+}
+
+/* The bounds of items first .. first + count - 1 of a binary tree, whose records are written. */
+inline float8 refit_records(Refit tree, uint first, uint count)
+{
+    float8 bounds = REFIT_NOTHING;
+    for (uint i = first; i < first + count; i++) {
+        if (tree.boxes) {
+            bounds = item_union(bounds, refit_box(tree, i));
+            continue;
+        }
+        float4 corners[3];
+        global float *record = tree.leaves + (ulong)i * 16;
+        int sound = leaf_corners(tree.vertices, tree.faces, as_uint(record[12]), corners);
+        leaf_store_record(record, corners);
+        if (sound) bounds = item_union(bounds, refit_triangle(corners));
+    }
+    return bounds;
+}
+
+/* The bounds of a block, which is written. */
+inline float8 refit_block(Refit tree, uint block)
+{
+    if (tree.boxes) return refit_box(tree, block);
+    return leaf_store_block(tree.leaves + (ulong)block * 88, tree.vertices, tree.faces);
+}
+
+/* A binary node's bounds, which are padded. */
+inline float8 refit_bounds(float8 node)
+{
+    return node.s0 < FLT_MAX ? (float8)(node.lo, -node.hi) : REFIT_NOTHING;
+}
+
+inline void refit_node(global float8 *nodes, Refit tree, uint at)
+{
+    float8 node = nodes[at], bounds;
+    uint link = node_link(node);
+    if (node_is_leaf(node)) {
+        bounds = refit_records(tree, link, node_count(node));
+        if (bounds.s0 < FLT_MAX) bounds = refit_pad(bounds, tree.reach);
+    } else {
+        bounds = item_union(refit_bounds(nodes[link]), refit_bounds(nodes[link + 1]));
+    }
+    if (bounds.s0 == FLT_MAX) bounds.hi = (float4)(-FLT_MAX);
+    nodes[at] = node_make(bounds, as_uint(node.s3), as_uint(node.s7));
+}
+
+/* Where a tree's nodes and leaves begin in their buffers is told in steps of 32 bytes, where its faces do
+ * in triangles. */
+inline Refit refit_tree(global float *leaves, uint leaves_begin, global const float *vertices,
+                        global const uint *faces, uint faces_begin, global const uint *indices,
+                        global const float *boxes, float reach)
+{
+    Refit tree = {leaves + (ulong)leaves_begin * 8, vertices, boxes, faces + (ulong)faces_begin * 3,
+                  indices, reach};
+    return tree;
+}
+
+#define REFIT_ARGS                                                                                     \
+    global float *leaves, uint leaves_begin, global const float *restrict vertices,                    \
+        global const uint *restrict faces, uint faces_begin, global const uint *restrict indices,      \
+        global const float *restrict boxes, float reach
+#define REFIT refit_tree(leaves, leaves_begin, vertices, faces, faces_begin, indices, boxes, reach)
+
+/* Below the ranges that build_subtree was given, children before parents. */
+kernel APART void refit_subtree(global float8 *nodes, uint nodes_begin, global const Range *restrict ranges,
+                                uint begin, REFIT_ARGS)
+{
+    Refit tree = REFIT;
+    Range r = ranges[begin + get_global_id(0)];
+    uint waiting[2 * BVH_DEPTH + 2]; /* node; with BVH_LEAF set once its children wait above it */
+    int n = 0;
+    nodes += nodes_begin;
+    if (r.count) waiting[n++] = r.node;
+    while (n) {
+        uint at = waiting[n - 1];
+        float8 node = nodes[at & ~BVH_LEAF];
+        if (at & BVH_LEAF || node_is_leaf(node)) {
+            refit_node(nodes, tree, at & ~BVH_LEAF);
+            n--;
+        } else {
+            waiting[n - 1] |= BVH_LEAF;
+            waiting[n++] = node_link(node) + 1;
+            waiting[n++] = node_link(node);
+        }
+    }
+}
+
+/* One level of the heap of ranges; those below it are done. */
+kernel APART void refit_level(global float8 *nodes, uint nodes_begin, global const Range *restrict ranges,
+                              uint begin, REFIT_ARGS)
+{
+    Range r = ranges[begin + get_global_id(0)];
+    if (r.count) refit_node(nodes + nodes_begin, REFIT, r.node);
+}
+
+/* Wide nodes from `begin` on, a level; those below it are done. */
+kernel APART void refit_wide8(global float8 *nodes, uint nodes_begin, uint begin, uint count, REFIT_ARGS)
+{
+    if (get_global_id(0) >= count) return;
+    Refit tree = REFIT;
+    nodes += nodes_begin;
+    global float *row = (global float *)(nodes + (ulong)(begin + get_global_id(0)) * 8);
+    for (uint k = 0; k < 8; k++, row++) {
+        if (row[56] == 0.0f) continue;
+        uint word = as_uint(row[48]);
+        float8 bounds;
+        if (word & BVH_LEAF) {
+            bounds = refit_block(tree, word & ~BVH_LEAF);
+            if (bounds.s0 < FLT_MAX) bounds = refit_pad(bounds, tree.reach);
+        } else {
+            global const float8 *child = nodes + (ulong)word * 8;
+            bounds.lo = (float4)(leaf_least(child[0]), leaf_least(child[2]), leaf_least(child[4]), 0.0f);
+            bounds.hi = (float4)(leaf_least(-child[1]), leaf_least(-child[3]), leaf_least(-child[5]), 0.0f);
+        }
+        row[0] = bounds.s0;
+        row[8] = -bounds.s4;
+        row[16] = bounds.s1;
+        row[24] = -bounds.s5;
+        row[32] = bounds.s2;
+        row[40] = -bounds.s6;
+    }
+}
+
+/* The records of brute.cl; prim and tag stay. */
+kernel APART void refit_brute(global float *restrict records, global const float *restrict vertices,
+                              global const uint *restrict faces, uint count)
+{
+    uint prim = get_global_id(0);
+    if (prim >= count) return;
+    float4 corners[3];
+    leaf_corners(vertices, faces, prim, corners);
+    leaf_store_brute(records + (ulong)prim * 16, corners);
+}
