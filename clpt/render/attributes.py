@@ -45,7 +45,9 @@ def lower_attributes(placed: Iterable[Placed], tables: Tables) -> None:
             if name in names:
                 words = 1 if role == "real" else COLOUR_WORDS
                 first = first_face if per_face(name) else first_vertex
-                at = tables.append("attributes", _words(shape, name, role, tables.spectral))
+                given = (shape, name, role, tables.spectral)
+                own = (*shapes.geometry(shape), *given[1:])
+                at = tables.append("attributes", tables.memo(_words, *given, by=own))
                 directory[number] = at - words * first, words
         row["attributes"] = tables.append("attributes", directory.view(np.uint32))
 

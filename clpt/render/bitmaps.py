@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from clpt import images, spectra
 from clpt.errors import SceneError
 from clpt.images import Stored
+from clpt.render.memo import Memo
 from clpt.render.texels import channel, spectral_image, texels
 from clpt.scene.textures import Bitmap
 
@@ -43,13 +44,12 @@ class _Image:
 class Images:
     """The images of a scene, each in the roles that it has; `finish` puts them into the tables.
 
-    budget: [bytes] that they may take, None for any number.
+    budget: [bytes] that they may take, None for any number; memo: of what is decoded and packed.
     """
 
-    def __init__(self, spectral: bool, budget: int | None = None):
-        self.spectral, self.budget = spectral, budget
+    def __init__(self, spectral: bool, budget: int | None = None, memo: Memo | None = None):
+        self.spectral, self.budget, self.memo = spectral, budget, memo or Memo()
         self._wanted: dict[Any, _Image] = {}
-        self._files: dict[str, Future[Stored]] = {}
         self._decoding: dict[bool, int] = {}
         self._spectra: dict[bool, _Spectra] = defaultdict(_Spectra)
 
@@ -75,7 +75,9 @@ class Images:
         for image in wanted:
             stored = image.stored.result()
             packed = _packs(stored, image, self.spectral)
-            words, (height, width) = self._words(stored, image)
+            texture, halvings = image.texture, image.halvings
+            by = (named(texture), texture.raw, image.role, texture.channel, halvings, self.spectral)
+            words, (height, width) = self.memo(Images._words, self, stored, image, by=by)
             kind = "packed_bitmap" if packed else "bitmap"
             if tables.size("images") + words.size > LARGEST:
                 raise SceneError("all images together have too many texels", where="bitmap.image")
@@ -116,9 +118,7 @@ class Images:
     def _read(self, image: Any) -> Future[Stored]:
         """An image, or the promise of a file's, of which each is decoded once."""
         if isinstance(image, (str, Path)):
-            if str(image) not in self._files:
-                self._files[str(image)] = _pool().submit(images.read_stored, image)
-            return self._files[str(image)]
+            return self.memo(_read_later, str(image))
         made: Future[Stored] = Future()
         made.set_result(_array(image))
         return made
@@ -146,10 +146,19 @@ class Images:
         return [_note(image) for image in wanted if image.halvings]
 
 
+def named(texture: Bitmap) -> Any:
+    """A texture's image; of a file its name."""
+    return str(texture.image) if isinstance(texture.image, (str, Path)) else texture.image
+
+
 def identity(texture: Bitmap) -> Any:
     """What makes two images the same: the file's name, or being one object."""
-    image = texture.image
-    return str(image) if isinstance(image, (str, Path)) else id(image)
+    image = named(texture)
+    return image if isinstance(image, str) else id(image)
+
+
+def _read_later(file: str) -> Future[Stored]:
+    return _pool().submit(images.read_stored, file)
 
 
 @cache

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,7 +19,7 @@ from clpt.errors import SceneError
 from clpt.layout import Record
 from clpt.render.texels import bands, texels
 from clpt.scene.lights import CubeMap, Envmap
-from clpt.spectra import luminance
+from clpt.spectra import Tabulated, luminance
 from clpt.spectral_exr import SpectralImage
 
 Array = NDArray[np.float32]
@@ -56,48 +56,78 @@ _WIDE = ((2, 1), (0, 1), (1, 0), (1, 2), (1, 1), (3, 1))
 _TALL = ((2, 1), (0, 1), (1, 0), (1, 2), (1, 1), (1, 3))
 
 
+class _Content(NamedTuple):
+    """What an image light is made of: texels, and cells to choose among by their mean weights.
+
+    bands, number: of texels that are spectra: how many values they have, which one by wavelength.
+    """
+
+    width: int
+    height: int
+    texels: Array
+    corners: NDArray[Any]
+    marginal: NDArray[np.float64]
+    conditional: Array
+    total: float
+    bands: int = 0
+    number: Tabulated | None = None
+
+
 def lower_image(lamp: Envmap | CubeMap, tables: Any) -> tuple[dict[str, ArrayLike], float]:
     """Put an image light's texels and grid into the tables; its members, and its mean radiance.
 
     Those of a spectral image have `bands`. Raises SceneError for what is no image, or a transform
     that is more than a rotation.
     """
-    where = f"{lamp.kind}.image"
     axes = _axes(lamp)
-    spectral: dict[str, ArrayLike] = {}
+    made: _Content
     if isinstance(lamp, Envmap):
-        found = spectral_exr.find(lamp.image, emissive=True)
-        image = _loaded(lamp.image if found is None else found.to_rgb(), where)
-        image = _at_least_two_rows(image * np.float32(lamp.scale))
-        height, width, _ = image.shape
-        bright = _brightness(image)
-        if found is not None and tables.spectral:
-            found = _scaled(found, lamp.scale, where)
-            bright = luminance(image) + UNSEEN * _brightness(found.values)
-            made, number = bands(found, tables.lambda_min, tables.lambda_max)
-            spectral = {"bands": made.shape[1], "number": tables.spectra_row(number)}
-        corners: NDArray[Any] = _latitude_weights(bright)[None]
+        ends = tables.lambda_min, tables.lambda_max
+        made = tables.memo(_sphere, lamp.image, lamp.scale, tables.spectral, *ends)
+        cell = np.pi / (made.height - 1) * 2.0 * np.pi / made.width
     else:
-        faces = _faces(lamp.image, where) * np.float32(lamp.scale)
-        height = width = faces.shape[1]
-        image = _bordered(faces)
-        corners = _cube_weights(_brightness(image))
-    if not spectral:
-        made = texels(image.reshape(1, -1, 3), "emission", tables.spectral)
-    marginal, conditional, total = _cumulative(corners)
+        made = tables.memo(_cube, lamp.image, lamp.scale, tables.spectral)
+        cell = made.width**-2.0
     members: dict[str, ArrayLike] = {name: axes[:, i] for i, name in enumerate("xyz")}
     members |= {
-        "width": width,
-        "height": height,
-        "texels": tables.append_floats("texels", made),
-        "corners": tables.append_floats("distributions", corners),
-        "marginal": tables.append_floats("distributions", marginal),
-        "conditional": tables.append_floats("distributions", conditional),
-        "norm": 1.0 / total if total > 0.0 else 0.0,
-        **spectral,
+        "width": made.width,
+        "height": made.height,
+        "texels": tables.append_floats("texels", made.texels),
+        "corners": tables.append_floats("distributions", made.corners),
+        "marginal": tables.append_floats("distributions", made.marginal),
+        "conditional": tables.append_floats("distributions", made.conditional),
+        "norm": 1.0 / made.total if made.total > 0.0 else 0.0,
     }
-    cell = np.pi / (height - 1) * 2.0 * np.pi / width if isinstance(lamp, Envmap) else width**-2.0
-    return members, total * cell / (4.0 * np.pi)
+    if made.number is not None:
+        members |= {"bands": made.bands, "number": tables.spectra_row(made.number)}
+    return members, made.total * cell / (4.0 * np.pi)
+
+
+def _sphere(given: Any, scale: float, spectral: bool, lo: float, hi: float) -> _Content:
+    """An image in latitude and longitude, its spectra from lo to hi [nm]."""
+    where = "envmap.image"
+    found = spectral_exr.find(given, emissive=True)
+    image = _loaded(given if found is None else found.to_rgb(), where)
+    image = _at_least_two_rows(image * np.float32(scale))
+    height, width, _ = image.shape
+    if found is None or not spectral:
+        corners = _latitude_weights(_brightness(image))[None]
+        values = texels(image.reshape(1, -1, 3), "emission", spectral)
+        return _Content(width, height, values, corners, *_cumulative(corners))
+    found = _scaled(found, scale, where)
+    corners = _latitude_weights(luminance(image) + UNSEEN * _brightness(found.values))[None]
+    values, number = bands(found, lo, hi)
+    cells = _cumulative(corners)
+    return _Content(width, height, values, corners, *cells, values.shape[1], number)
+
+
+def _cube(given: Any, scale: float, spectral: bool) -> _Content:
+    """The faces of a cube, with their borders."""
+    faces = _faces(given, "cube_map.image") * np.float32(scale)
+    image, size = _bordered(faces), faces.shape[1]
+    corners = _cube_weights(_brightness(image))
+    values = texels(image.reshape(1, -1, 3), "emission", spectral)
+    return _Content(size, size, values, corners, *_cumulative(corners))
 
 
 def _axes(lamp: Envmap | CubeMap) -> NDArray[np.float64]:

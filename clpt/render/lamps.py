@@ -11,6 +11,7 @@ from clpt import transforms
 from clpt.errors import SceneError
 from clpt.layout import Record
 from clpt.render import image_lights, projected
+from clpt.render.memo import Memo
 from clpt.render.texels import pixels
 from clpt.scene import lights
 from clpt.scene.lights import Light
@@ -52,6 +53,8 @@ RECORDS: dict[str, Record] = {
 
 class Sink(Protocol):
     """What is needed of clpt.render.tables.Tables."""
+
+    memo: Memo
 
     def append(self, name: str, words: ArrayLike) -> int: ...
     def append_floats(self, name: str, values: ArrayLike) -> int: ...

@@ -17,6 +17,7 @@ from clpt.errors import SceneError
 from clpt.records import LIGHT, SHAPE
 from clpt.render import light_bounds, light_tree, shapes
 from clpt.render.lamps import INFINITE, RECORDS, Sink, blank_row, brightness, lower_lamp
+from clpt.render.memo import content
 from clpt.render.triangle_means import triangle_means
 from clpt.scene.lights import DirectionalArea, Light
 from clpt.scene.shapes import Shape
@@ -96,11 +97,13 @@ def light_rows(
     tree = None
     if len(rows):
         weights = _shared(np.concatenate([block.power for block in blocks]), infinite)
-        rows["pmf"], rows["keep"], rows["alias"] = alias_table(weights)
+        same = content(weights)
+        rows["pmf"], rows["keep"], rows["alias"] = tables.memo(alias_table, weights, by=(same,))
         apart = sum(bool(block.bounds.placed.any()) for block in blocks)
         if tree_from is not None and max(len(rows), APART * apart) >= tree_from:
             bounds = light_bounds.joined([block.bounds for block in blocks])
-            tree = light_tree.build(bounds, weights / weights.sum()).words()
+            by = same, content(*vars(bounds).values())
+            tree = tables.memo(_tree_words, bounds, weights / weights.sum(), by=by)
     kinds = tuple(KINDS[i] for i in np.unique(rows["kind"]))
     return LightRows(
         rows=rows,
@@ -112,6 +115,10 @@ def light_rows(
         two_sided=bool((rows["way"] == BOTH).any()),
         tree=tree,
     )
+
+
+def _tree_words(bounds: light_bounds.Bounds, pmf: np.ndarray) -> NDArray[np.uint32]:
+    return light_tree.build(bounds, pmf).words()
 
 
 def _whole(shape: Shape) -> bool:
@@ -150,14 +157,15 @@ def _emitter_block(emitter: Emitter, tables: Sink) -> Block:
         return Block(rows, np.array([strength * shapes.area(shape) * brightness(value)]), bounds)
     if emitter.vertices is None or emitter.faces is None:
         raise SceneError("its triangles are missing", where=shapes.where(shape))
-    geometry = shapes.triangle_rows(emitter.vertices, emitter.faces)
+    memo, corners = tables.memo, (emitter.vertices, emitter.faces)
+    geometry = memo(shapes.triangle_rows, *corners)
     count, words = geometry.shape
     at = tables.append("geometry", geometry) + words * np.arange(count)
     rows = _block(count, "triangle", at, radiance, emitter.shape_row)
     rows["way"] = way
-    bounds = light_bounds.of_triangles(emitter.vertices, emitter.faces, way == BOTH)
-    bright = triangle_means(value, emitter.uvs, emitter.faces)
-    areas = shapes.triangle_areas(emitter.vertices, emitter.faces)
+    bounds = memo(light_bounds.of_triangles, *corners, way == BOTH)
+    bright = memo(triangle_means, value, emitter.uvs, emitter.faces)
+    areas = memo(shapes.triangle_areas, *corners)
     return Block(rows, strength * areas * bright, bounds)
 
 

@@ -29,6 +29,7 @@ from clpt.render.colour import output_matrix, sensor
 from clpt.render.features import Features
 from clpt.render.instancing import Instances, Placed, Prototype
 from clpt.render.kinds import row_words
+from clpt.render.memo import Memo
 from clpt.render.tables import STEP, Tables
 from clpt.render.wavelengths import Density, density, emissions
 from clpt.scene import materials as mt
@@ -52,7 +53,8 @@ class Lowered:
     are what the acceleration structures are built of, the world's before those of the groups that
     `instances` share; boxes (k, 2, 3) float32 those of the analytic shapes, which are the last rows
     of `shapes`. tables: every other read-only array by name; where an instance's tree begins is
-    filled in when trees are built.
+    filled in when trees are built. encoder: what made the tables, for values that are edited; None
+    once it is of no use; memo: what the next lowering need not make again.
     """
 
     features: Features
@@ -64,6 +66,13 @@ class Lowered:
     boxes: NDArray[np.float32]
     instances: Instances
     warnings: list[str]
+    encoder: Tables | None
+    memo: Memo
+
+    def table(self, name: str) -> np.ndarray:
+        """A table by its name in clpt.records.TABLES."""
+        own = {"vertices": self.vertices, "faces": self.faces}
+        return own[name] if name in own else self.tables[name]
 
     @property
     def bytes(self) -> int:
@@ -71,13 +80,18 @@ class Lowered:
         return sum(a.nbytes for a in (*self.tables.values(), self.vertices, self.faces, self.tags))
 
 
-def lower(scene: sc.Scene, texture_budget: int | None = None) -> Lowered:
+def lower(
+    scene: sc.Scene, texture_budget: int | None = None, former: Lowered | None = None
+) -> Lowered:
     """Lower a scene; of the `aov` integrator, for its first channel.
+
+    former: of a scene that has much in common with this one; it only saves time. Arrays, lights and
+    images that are the same objects as then are taken to hold the same.
 
     Raises SceneError where the scene makes no sense: it names the shape, light or material.
     """
     check(scene)
-    return _Lowering(scene, texture_budget).run()
+    return _Lowering(scene, texture_budget, Memo(former.memo if former else None)).run()
 
 
 @dataclass(frozen=True)
@@ -101,8 +115,9 @@ class _Side:
 class _Lowering:
     """The state of one `lower`."""
 
-    def __init__(self, scene: sc.Scene, texture_budget: int | None = None):
+    def __init__(self, scene: sc.Scene, texture_budget: int | None, memo: Memo):
         film = scene.film
+        self.memo = memo
         self.warnings: list[str] = []
         self.placed, self.prototypes = instancing.sort(scene.shapes, self.warnings)
         scene = dataclasses.replace(scene, shapes=list(instancing.distinct(scene.shapes)))
@@ -119,6 +134,7 @@ class _Lowering:
             sensor(film),
             self.density,
             texture_budget,
+            memo,
         )
         if self.light_paths and (film.filter.kind != "box" or filters.radius(film.filter) != 0.5):
             self.warnings.append(
@@ -187,9 +203,11 @@ class _Lowering:
         features = self._features({one.shape.kind for one in analytic}, camera)
         arrays = tables.arrays()
         settings = self._settings(center, radius)
+        self.memo.settle()
         return Lowered(
-            features, settings, arrays, vertices, faces, tags, boxes, instances, self.warnings
-        )
+            features, settings, arrays, vertices, faces, tags, boxes, instances, self.warnings,
+            tables, self.memo,
+        )  # fmt: skip
 
     def _lens_glass(self) -> int:
         """The row in `spectra` of the glass of a lens that disperses, 0 where there is none."""
@@ -227,7 +245,9 @@ class _Lowering:
             row["kind"] = 1 + shapes.ANALYTIC.index(shape.kind)
             row["params"] = self.tables.append("geometry", shapes.row(shape))
         else:
-            vertices, faces, normals, uvs = shapes.triangles(shape, self.flat)
+            made = self.memo(shapes.counted, shape, by=shapes.geometry(shape))
+            vertices, faces, normals, uvs, flat = made
+            self.flat += flat
             triangles = vertices, faces, uvs
             row["prim"] = self.n_faces
             row["flags"] |= self._attributes(vertices, normals, uvs)

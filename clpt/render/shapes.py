@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -118,6 +119,20 @@ def triangles(
         flat.append(Flat(where(shape), int(len(solid) - solid.sum()), len(solid)))
     faces = faces if solid.all() else faces[solid]
     return vertices, np.ascontiguousarray(faces), normals, uvs
+
+
+def counted(
+    shape: Shape,
+) -> tuple[Points, Faces, Points | None, Points | None, tuple[Flat, ...]]:
+    """Return what `triangles` does, and whether it left some out."""
+    flat: list[Flat] = []
+    return *triangles(shape, flat), tuple(flat)
+
+
+def geometry(shape: Shape) -> tuple[Any, ...]:
+    """Return all that the triangles of a shape follow from: its fields but for the surface."""
+    own = (value for name, value in vars(shape).items() if name not in ("material", "emission"))
+    return type(shape), *own
 
 
 def told(flat: Sequence[Flat]) -> list[str]:

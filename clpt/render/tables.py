@@ -15,6 +15,7 @@ from clpt.render import reradiation
 from clpt.render.bitmaps import Images
 from clpt.render.films import layers_words
 from clpt.render.kinds import ORDERS_WORDS, REAL_WORDS, SPECTRUM_WORDS
+from clpt.render.memo import Memo
 from clpt.render.wavelengths import Density
 from clpt.scene.params import Kind, device_params, interior_params
 from clpt.spectra import (
@@ -59,7 +60,7 @@ class Tables:
 
     mode: "spectral" or "rgb"; lambda_min, lambda_max: the film's range [nm]; sensor: what it
     records with, by default cie1931; density: of its wavelengths, by default visible importance.
-    texture_budget: [bytes] for images, None for any number.
+    texture_budget: [bytes] for images, None for any number; memo: of costly pieces.
     `sources` tells, per kind and parameter, where values come from: "none" (a lobe's share is 0),
     "constant", "table", "texture", "layers".
     """
@@ -72,11 +73,13 @@ class Tables:
         sensor: Sensor | None = None,
         density: Density | None = None,
         texture_budget: int | None = None,
+        memo: Memo | None = None,
     ):
+        self.memo = memo or Memo()
         self.mode, self.lambda_min, self.lambda_max = mode, lambda_min, lambda_max
         self.sources: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
         self.expected: NDArray[np.float64] | None = None  # light, see clpt.render.reradiation
-        self.images = Images(mode == "spectral", texture_budget)
+        self.images = Images(mode == "spectral", texture_budget, self.memo)
         self.textures: dict[tuple[int, str], int] = {}
         self.texture_roles: set[tuple[str, str]] = set()  # (kind, role) that occur
         self.attributes: dict[tuple[str, str], int] = {}  # (name, role) -> its place in directories
@@ -87,7 +90,7 @@ class Tables:
         self._parts: dict[str, list[np.ndarray]] = {name: [] for name in TABLES}
         self._sizes: dict[str, int] = dict.fromkeys(TABLES, 0)
         self._spectra: dict[Any, int] = {}
-        self._rows: dict[tuple[int, str, bytes], int] = {}
+        self._rows: dict[tuple[int, str, bytes], tuple[int, Kind]] = {}
         if mode == "spectral":
             self._sensor(sensor or observer("cie1931"), density or Density(lambda_min, lambda_max))
 
@@ -127,13 +130,14 @@ class Tables:
         return self.images.finish(self, KINDS)
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """Return every table as one array; an empty one has a single zero, for OpenCL's sake."""
+        """Give out every table as one array; an empty one has a single zero, for OpenCL's sake."""
         made = {}
         for name, (element, _) in TABLES.items():
             dtype = np.float32 if element == "float" else np.uint32
             parts = self._parts[name]
             joined = parts[0] if len(parts) == 1 else np.concatenate([*parts, np.zeros(0, dtype)])
             made[name] = joined if joined.size else np.zeros(1, dtype)
+        self._parts = {name: [] for name in TABLES}
         return made
 
     def spectra_row(self, spectrum: Spectrum) -> int:
@@ -192,9 +196,31 @@ class Tables:
         if key not in self._rows:
             if before is not None:
                 self.append(table, before)
-            self._rows[key] = self.append(table, self.kind_words(kind))
-            self.kept.append(kind)
-        return self._rows[key]
+            self._rows[key] = self.append(table, self.kind_words(kind)), kind
+        return self._rows[key][0]
+
+    def replaced(self, old: Kind, new: Kind, table: str) -> list[tuple[int, Words]] | None:
+        """Put a kind in the rows of another whose values differ, after `arrays`.
+
+        Returns first words of the rows and what stands there now; None, with nothing changed but
+        what is then of no use, where more than values differs: the tables must be made anew.
+        """
+        owned = [key for key in self._rows if key[:2] == (id(old), table)]
+        known = any(key[:2] == (id(new), table) for key in self._rows)
+        if known or not owned:
+            return None
+        sizes, sources, found = dict(self._sizes), self.sources, []
+        for kind in (old, new):
+            self.sources = defaultdict(lambda: defaultdict(set))
+            words = self.kind_words(kind)
+            found.append(self.sources)
+        self.sources = sources
+        if found[0] != found[1] or sizes != self._sizes:
+            return None
+        rows = [self._rows.pop(key)[0] for key in owned]
+        for key, row in zip(owned, rows, strict=True):
+            self._rows[(id(new), *key[1:])] = row, new
+        return [(row, words) for row in rows]
 
     def kind_words(self, kind: Kind) -> Words:
         """Return the words of what the kernels read of a kind."""
