@@ -61,7 +61,7 @@ def examine(path: Path, film: int) -> Row:
             return {**row, "seconds": row["load"]}
         size = dataclasses.replace(scene.film, width=film, height=film, crop=None)
         renderer = clpt.Renderer(dataclasses.replace(scene, film=size))
-        renderer.step(1)
+        renderer.run(1)
         row["warnings"] = [*row["warnings"], *renderer.warnings]
         row["finite"] = bool(np.isfinite(renderer.image()).all())
         row |= {f"seconds_{name}": value for name, value in renderer.facts.seconds.items()}

@@ -153,7 +153,7 @@ def compare(name: str, spp: int, rounds: int) -> dict[str, object]:
         for renderer, taken, spent in zip(renderers, images, seconds, strict=True):
             renderer.wavefronts[0].clear()
             start = time.perf_counter()
-            renderer.step(spp)
+            renderer.run(spp)
             image = renderer.image()
             if number > 0:  # the first one warms up
                 taken.append(image)

@@ -104,10 +104,10 @@ def placed(group: Group, matrices: list[np.ndarray]) -> list[Shape]:
 def measure(name: str, things: list[Shape], side: float = 50.0) -> dict[str, object]:
     """Render twice; rays are counted the second time."""
     renderer = clpt.Renderer(scene(things, side))
-    renderer.step(SPP)
+    renderer.run(SPP)
     before = renderer.wavefronts[0].counts.rays
     start = time.process_time()
-    renderer.step(SPP)
+    renderer.run(SPP)
     rays = (renderer.wavefronts[0].counts.rays - before) / (time.process_time() - start)
     facts = renderer.facts
     return {

@@ -98,7 +98,7 @@ def compare(count: int, spp: int, rounds: int) -> dict[str, object]:
         for one, taken, spent in zip(both, images, seconds, strict=True):
             one.wavefronts[0].clear()
             start = time.perf_counter()
-            one.step(spp)
+            one.run(spp)
             image = one.image()
             if number > 0:  # the first one warms up
                 taken.append(image)

@@ -84,14 +84,14 @@ class Clpt:
         for wavefront in self.renderer.wavefronts:
             wavefront.clear()
         self.renderer.samples = number * spp
-        self.renderer.step(spp)
+        self.renderer.run(spp)
         return self.renderer.image()
 
     def stages(self, spp: int) -> dict[str, Any]:
         import clpt
 
         renderer = clpt.Renderer(self.scene, profiling=True)
-        renderer.step(spp)
+        renderer.run(spp)
         (wavefront,) = renderer.wavefronts
         timings = wavefront.timings.collect()
         return {

@@ -167,7 +167,7 @@ DEFINED: dict[str, Callable[[], Scene]] = {
 def test_defined_pictures(name: str) -> None:
     """Odd, but a picture: finite, not negative, and dark where no light is."""
     renderer = clpt.Renderer(DEFINED[name]())
-    renderer.step(4)
+    renderer.run(4)
     image = renderer.image()
     assert image.shape == (5, 6, 3)
     assert np.isfinite(image).all() and image.min() >= 0.0

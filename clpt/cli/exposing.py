@@ -37,7 +37,7 @@ def expose(
 
     size, end = 1, began
     with _interrupts() as interrupted:
-        while renderer.step(size, tell):
+        while renderer.run(size, tell):
             start, end = end, time.perf_counter()
             seconds_left = math.inf if limit is None else began + limit - end
             samples_left = math.inf if spp is None else spp - renderer.samples

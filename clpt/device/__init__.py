@@ -3,7 +3,7 @@
 from .array import DeviceArray
 from .buffers import Buffers
 from .context import Device, DeviceInfo, choose, devices
-from .program import Argument, Bound, Kernel, Program, build, build_all
+from .program import Argument, Bound, Kernel, Program, build, build_all, link
 from .source import Part, Source, Virtual, assemble, kernels_folder
 from .stream import Events, Stream
 from .timing import Timing, Timings
@@ -30,4 +30,5 @@ __all__ = [
     "choose",
     "devices",
     "kernels_folder",
+    "link",
 ]

@@ -10,7 +10,7 @@ import re
 import threading
 import time
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import astuple, dataclass
 from typing import Any
@@ -195,9 +195,7 @@ def build(device: Device, source: Source, options: Sequence[str] = ()) -> Progra
 
     Raises KernelBuildError with our file and line, the log, and where the text was kept.
     """
-    flags = [*OPTIONS, *options]
-    if _is_oclgrind(device):  # it cannot interpret all that its compiler's optimiser makes
-        flags += ["-cl-opt-disable", "-DNOT_INLINED"]
+    flags = _flags(device, options)
     entry = _entry(device, source, flags)
     key = (device.info.cl_device.int_ptr, entry)  # devices of one context may be alike
     program = device.kept.find(key)
@@ -210,13 +208,64 @@ def build(device: Device, source: Source, options: Sequence[str] = ()) -> Progra
         if program is None:
             program = _from_source(device, source, flags)
             if own:
-                binaries = program.cl_program.get_info(cl.program_info.BINARIES)
-                cache.store(entry, _encode(program.signatures), next(filter(None, binaries)))
+                cache.store(entry, _encode(program.signatures), _binary(program))
     seconds = time.perf_counter() - start
     device.builds.add(seconds)
     log.debug("%s is built in %.2f s", source.name, seconds)
     device.kept.keep(key, program)
     return program
+
+
+def link(
+    device: Device, sources: Mapping[str, Source], main: str, signatures: Signatures
+) -> Program:
+    """Compile programs each by itself and link them; the kernels are those of the one named `main`.
+
+    signatures: of its kernels, which linked ones do not tell. What comes of it is kept in the
+    user's cache folder, since drivers keep the parts at best. Raises KernelBuildError as `build`
+    does, and where the parts do not fit together.
+    """
+    flags = _flags(device, ())
+    files = dict.fromkeys(file for source in sources.values() for file in source.files)
+    text = "\n".join(source.text for source in sources.values())
+    whole = Source(sources[main].name, text, tuple(files))
+    entry = _entry(device, whole, flags)
+    key = (device.info.cl_device.int_ptr, entry)
+    program = device.kept.find(key)
+    if program is not None:
+        return program
+    start = time.perf_counter()
+    with _REMARKS:
+        program = _from_cache(device, whole, flags, entry)
+        if program is None:
+            linked = _linked(device, sources.values(), whole, flags)
+            program = Program(whole.name, linked, signatures)
+            if not _is_oclgrind(device):  # it has no compiled form
+                cache.store(entry, _encode(program.signatures), _binary(program))
+                program = _from_cache(device, whole, flags, entry) or program
+    seconds = time.perf_counter() - start
+    device.builds.add(seconds)
+    log.debug("%s is linked in %.2f s", whole.name, seconds)
+    device.kept.keep(key, program)
+    return program
+
+
+def _linked(
+    device: Device, sources: Iterable[Source], whole: Source, flags: list[str]
+) -> cl.Program:
+    parts, only = [], [device.info.cl_device]
+    for source in sources:
+        part = cl.Program(device.context, source.text)
+        try:
+            part.compile(flags, only)
+        except cl.Error as error:
+            told = part.get_build_info(only[0], cl.program_build_info.LOG)
+            raise _build_error(source, f"{error}\n{told}") from error
+        parts.append(part)
+    try:
+        return cl.link_program(device.context, parts, [], only)
+    except cl.Error as error:
+        raise _build_error(whole, str(error)) from error
 
 
 def build_all(
@@ -228,6 +277,18 @@ def build_all(
     with ThreadPoolExecutor(max_workers=max(1, min(len(sources), threads))) as pool:
         futures = {name: pool.submit(build, device, s, options) for name, s in sources.items()}
         return {name: future.result() for name, future in futures.items()}
+
+
+def _flags(device: Device, options: Sequence[str]) -> list[str]:
+    """The compiler's options."""
+    # Oclgrind cannot interpret all that its compiler's optimiser makes.
+    plain = ["-cl-opt-disable", "-DNOT_INLINED"] if _is_oclgrind(device) else []
+    return [*OPTIONS, *options, *plain]
+
+
+def _binary(program: Program) -> bytes:
+    """What the driver compiled, for the one device of the context that it was built for."""
+    return next(filter(None, program.cl_program.get_info(cl.program_info.BINARIES)))
 
 
 def _is_oclgrind(device: Device) -> bool:

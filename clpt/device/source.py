@@ -12,6 +12,11 @@ from ..errors import KernelBuildError
 
 _INCLUDE = re.compile(r'\s*#\s*include\s+"([^"]+)"\s*(?://.*|/\*.*\*/\s*)?$')
 _OPEN_IF = re.compile(r"\s*#\s*if")
+_FUNCTION = re.compile(  # at the beginning of a line: type, name, and a first argument or "void"
+    r"^(?!static\b|kernel\b|typedef\b|return\b|else\b|void loop_)"
+    r"[A-Za-z_]\w*(?: \w+)* \*?\w+\((?=[A-Za-z_])",
+    re.MULTILINE,
+)
 _CLOSE_IF = re.compile(r"\s*#\s*endif")
 
 
@@ -26,6 +31,16 @@ class Source:
     name: str
     text: str
     files: tuple[str, ...]
+
+    def with_private(self, defines: Mapping[str, str] | None = None) -> Source:
+        """The same with functions that other programs do not see, to be linked with them.
+
+        Those whose line begins with their type become static; kernels, and what a macro names, do
+        not. defines: more `#define` lines at the top.
+        """
+        head = [f"#define {name} {value}" for name, value in (defines or {}).items()]
+        text = _FUNCTION.sub(r"static \g<0>", self.text)
+        return Source(self.name, "\n".join([*head, text]), self.files)
 
 
 @dataclass(frozen=True)

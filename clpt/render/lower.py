@@ -53,8 +53,9 @@ class Lowered:
     are what the acceleration structures are built of, the world's before those of the groups that
     `instances` share; boxes (k, 2, 3) float32 those of the analytic shapes, which are the last rows
     of `shapes`. tables: every other read-only array by name; where an instance's tree begins is
-    filled in when trees are built. encoder: what made the tables, for values that are edited; None
-    once it is of no use; memo: what the next lowering need not make again.
+    filled in when trees are built. glass_row: of the camera, see `lower_camera`. encoder: what made
+    the tables, for values that are edited; None once it is of no use; memo: what the next lowering
+    need not make again.
     """
 
     features: Features
@@ -65,6 +66,7 @@ class Lowered:
     tags: NDArray[np.uint32]
     boxes: NDArray[np.float32]
     instances: Instances
+    glass_row: int
     warnings: list[str]
     encoder: Tables | None
     memo: Memo
@@ -205,8 +207,8 @@ class _Lowering:
         settings = self._settings(center, radius)
         self.memo.settle()
         return Lowered(
-            features, settings, arrays, vertices, faces, tags, boxes, instances, self.warnings,
-            tables, self.memo,
+            features, settings, arrays, vertices, faces, tags, boxes, instances, glass_row,
+            self.warnings, tables, self.memo,
         )  # fmt: skip
 
     def _lens_glass(self) -> int:

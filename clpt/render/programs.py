@@ -6,6 +6,8 @@ material in a scene rebuilds nothing else.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from clpt import device
 from clpt.layout import Record
 from clpt.records import INSTANCE, LIGHT, SETTINGS, SHAPE, SLABS, TABLES
@@ -69,6 +71,68 @@ def sources(
         }
         made[f"shade_{cls.kind}"] = _source("shade", own, defines, lanes)
     return made
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A stage of a bounce: its program, its kernel there, how many slots a work-item serves."""
+
+    program: str
+    kernel: str
+    lanes: int
+
+
+def order(features: Features, layout: str, lanes: int) -> list[Stage]:
+    """Return the stages of a bounce in their order, but for sorting."""
+    trace_lanes = lanes if layout == "brute" else 1
+    begin, test = stages(features)
+    made = [Stage(begin, begin, lanes)]
+    if features.light_paths and features.visible_lights:
+        made.append(Stage(test, test, trace_lanes))
+    made.append(Stage("intersect", "intersect", trace_lanes))
+    if features.mixtures:
+        made.append(Stage("mix", "mix_materials", lanes))
+    made += [Stage(f"shade_{kind}", "shade", lanes) for kind in features.materials]
+    if any(not cls.delta for cls in features.leaves):
+        made.append(Stage(test, test, trace_lanes))
+    return made
+
+
+def loop_sources(features: Features, layout: str, lanes: int) -> dict[str, device.Source]:
+    """Return the texts that are linked to the loop of all stages on the device, by name.
+
+    "loop" holds the kernel; the others are the stages as functions, see kernels/lib/stage.cl.
+    """
+    made = sources(features, layout, lanes, queued=False)
+    bounce = order(features, layout, lanes)
+    names = dict.fromkeys(stage.program for stage in bounce)
+    parts = {name: made[name].with_private({"PART": f"loop_{name}"}) for name in names}
+    shared = {**_shared(features, layout), "generated/loop.cl": _loop_text(features, bounce)}
+    loop = _source("loop", shared, _defines(features), lanes)
+    return {**parts, "loop": loop.with_private()}
+
+
+def _loop_text(features: Features, bounce: list[Stage]) -> str:
+    """What loop.cl calls: `loop_begin`, and `loop_bounce`, all other stages in their order."""
+    begin, test = stages(features)
+    extra = {begin: ["BEGIN"], "intersect": ["TRACE"], test: ["JOIN"]}
+    groups = {s.program: ["SLAB", "SCENE", *extra.get(s.program, ())] for s in bounce}
+    lines = [
+        f"void loop_{name}({', '.join(f'{group}_ARGS' for group in own)}, uint at);"
+        for name, own in groups.items()
+    ]
+    lines += [
+        f"#define loop_begin loop_{begin}",
+        "inline void loop_bounce(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS, BEGIN_ARGS, uint at)",
+        "{",
+    ]
+    for stage in bounce[1:]:
+        times = "LANES" if stage.lanes == 1 else "1"
+        passed = ", ".join(f"{group}_PASSED" for group in groups[stage.program])
+        lines.append(
+            f"    for (uint i = 0; i < {times}; i++) loop_{stage.program}({passed}, at + i);"
+        )
+    return "\n".join([*lines, "}", ""])
 
 
 def stages(features: Features) -> tuple[str, str]:
@@ -147,7 +211,16 @@ def _shared(features: Features, layout: str) -> dict[str, str]:
         "generated/shapes.cl": _tangents_text(features),
         "generated/trace.cl": _trace_text(layout),
         "generated/layout.cl": layout_text(layout),
-        "generated/trace_args.cl": _trace_args_text(features),
+        "generated/trace_args.cl": "\n".join(
+            [*_args_text("TRACE", _trace_args(features, layout)), "#define TRACE TRACE_PASSED", ""]
+        ),
+        "generated/stage_args.cl": "\n".join(
+            [
+                *_args_text("BEGIN", _begin_args(features)),
+                *_args_text("JOIN", _join_args(features, layout)),
+                "",
+            ]
+        ),
         "generated/shape_tree.cl": _shape_tree_text(features),
         "generated/shape_traversal.cl": '#include "bvh/shapes.cl"\n' if features.analytic else "",
         "generated/instances.cl": '#include "lib/instances.cl"\n' if features.instances else "",
@@ -178,18 +251,13 @@ def scene_text() -> str:
     """Return records, the `Scene` struct and the macros that carry it through arguments."""
     slabs = [record.slab_text() for record in SLABS]
     rows = [record.row_text() for record in (SHAPE, INSTANCE, LIGHT)]
-    pointers = [f"global const {element} *" for element, _ in TABLES.values()]
     members = [
-        f"    {pointer}{name}; /* {doc} */"
-        for pointer, (name, (_, doc)) in zip(pointers, TABLES.items(), strict=True)
+        f"    global const {element} *{name}; /* {doc} */"
+        for name, (element, doc) in TABLES.items()
     ]
-    args = [f"{pointer}restrict {name}" for pointer, name in zip(pointers, TABLES, strict=True)]
-    args.append("global const Settings *restrict settings")
-    words = [f"{record.name.lower()}_words" for record in SLABS]
-    slab_args = [f"global float *restrict {name}" for name in words]
     slab_sets = [
         f"{record.name.lower()} = {{{name}, stride}}"
-        for record, name in zip(SLABS, words, strict=True)
+        for record, name in zip(SLABS, _SLAB_ARGS, strict=False)
     ]
     return "\n".join(
         [
@@ -203,9 +271,9 @@ def scene_text() -> str:
             f"#define SHAPE_ROW_WORDS {SHAPE.words}",
             f"#define INSTANCE_ROW_WORDS {INSTANCE.words}",
             f"#define LIGHT_ROW_WORDS {LIGHT.words}",
-            f"#define SCENE_ARGS {', '.join(args)}",
-            f"#define SCENE Scene scene = {{{', '.join([*TABLES, 'settings'])}}};",
-            f"#define SLAB_ARGS {', '.join([*slab_args, 'uint stride'])}",
+            *_args_text("SCENE", _SCENE_ARGS),
+            "#define SCENE Scene scene = {SCENE_PASSED};",
+            *_args_text("SLAB", _SLAB_ARGS),
             f"#define SLABS Slab {', '.join(slab_sets)};",
             "",
         ]
@@ -333,15 +401,55 @@ def _trace_text(layout: str) -> str:
     return f'#include "lib/trace_{"lanes" if layout == "brute" else "one"}.cl"\n'
 
 
-def _trace_args_text(features: Features) -> str:
-    """The buffers of all trees, as arguments and as they are passed on."""
-    trees = {"nodes": "float", "leaves": "float"}
+def _args_text(name: str, args: dict[str, str]) -> list[str]:
+    """Macros with arguments as they are declared, and as they are passed on."""
+    declared = ", ".join(f"{type_}{own}" for own, type_ in args.items())
+    return [f"#define {name}_ARGS {declared}", f"#define {name}_PASSED {', '.join(args)}"]
+
+
+_SLAB_ARGS = {f"{record.name.lower()}_words": "global float *restrict " for record in SLABS}
+_SLAB_ARGS["stride"] = "uint "
+_SCENE_ARGS = {n: f"global const {element} *restrict " for n, (element, _) in TABLES.items()}
+_SCENE_ARGS["settings"] = "global const Settings *restrict "
+
+
+def _trace_args(features: Features, layout: str) -> dict[str, str]:
+    """The buffers of all trees, in which rays are traced."""
+    if layout == "brute":
+        return {"tris": "global const float *", "triangles": "uint "}
+    trees = dict.fromkeys(("nodes", "leaves"), "global const float *")
     if features.analytic:
-        trees |= {"shape_nodes": "float", "shape_indices": "uint"}
+        trees |= {"shape_nodes": "global const float *", "shape_indices": "global const uint *"}
     if features.instances:
-        trees["instance_nodes"] = "float"
-    args = ", ".join(f"global const {element} *{name}" for name, element in trees.items())
-    return f"#define TRACE_ARGS {args}\n#define TRACE {', '.join(trees)}\n"
+        trees["instance_nodes"] = "global const float *"
+    return trees
+
+
+def _begin_args(features: Features) -> dict[str, str]:
+    """What the stage takes that begins paths."""
+    film = ["film", "bands"] if features.bands else ["film"]
+    counters = {"counters": "global uint *"}
+    return {**dict.fromkeys(film, "global float *"), **counters, "first": "int ", "end": "int "}
+
+
+def _join_args(features: Features, layout: str) -> dict[str, str]:
+    """What the stage takes that tests whether paths can be joined to a light, or the camera."""
+    own = _begin_args(features) if features.light_paths else {}
+    there = {name: type_ for name, type_ in own.items() if name in ("film", "counters")}
+    return {**_trace_args(features, layout), **there}
+
+
+def loop_arguments(features: Features, layout: str) -> tuple[device.Argument, ...]:
+    """Return what the kernel of stage/loop.cl takes: linked kernels do not tell it themselves."""
+    args = {**_SLAB_ARGS, **_SCENE_ARGS, **_trace_args(features, layout), **_begin_args(features)}
+    return tuple(
+        device.Argument(
+            name,
+            "*" if "*" in type_ else type_.strip(),
+            "global" if type_.startswith("global") else "private",
+        )
+        for name, type_ in args.items()
+    )
 
 
 def _includes(features: Features) -> list[str]:

@@ -9,14 +9,17 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import pyopencl as cl
+import pyopencl.array as cl_array
 from numpy.typing import NDArray
 
 from clpt import device as dev
-from clpt.errors import SceneError
+from clpt.errors import DeviceError, SceneError
 from clpt.render.facts import Facts, gather
 from clpt.render.lower import lower
 from clpt.render.wavefront import Wavefront
 from clpt.scene import Scene
+from clpt.scene.cameras import Camera
 from clpt.scene.integrators import CHANNELS, Aov
 from clpt.spectral_exr import SpectralImage
 
@@ -43,6 +46,9 @@ class Renderer:
     """Renders a scene; its picture can be asked for at any time.
 
     device: where to render, a name or index (see clpt.device.choose), or a clpt.device.Device.
+    queue: the caller's, instead; all buffers and programs are then made in its context, all
+    commands go there, and nothing else is made or changed. progress: called when a step has ended,
+    in a thread of the driver.
     texture_budget: [bytes] that bitmaps may take, larger ones are halved; by default half of what
     the device has free. The other parameters are those of clpt.render.wavefront.Wavefront.
 
@@ -54,12 +60,18 @@ class Renderer:
         scene: Scene,
         device: dev.Device | str | int | None = None,
         *,
+        queue: cl.CommandQueue | None = None,
+        progress: Callable[[Progress], Any] | None = None,
         profiling: bool = False,
         texture_budget: int | None = None,
         **wavefront: Any,
     ):
         self.scene = scene
-        if not isinstance(device, dev.Device):
+        if queue is not None:
+            if device is not None:
+                raise DeviceError("give a device or a queue; a queue has its device")
+            device = dev.Device.adopt(queue)
+        elif not isinstance(device, dev.Device):
             device = dev.choose(device, profiling=profiling)
         self.device = device
         self.channels: tuple[str, ...] = ()
@@ -71,19 +83,58 @@ class Renderer:
         self._seconds = {"lower": time.perf_counter() - self._start}
         first = Wavefront(device, lowered, **wavefront)
         self.wavefronts = [first, *(first.sibling(channel) for channel in self.channels[1:])]
+        if queue is None:
+            for front in self.wavefronts:
+                _ = front.stages  # so that the first samples come at once
+        else:
+            for front in self.wavefronts:
+                _ = front.loop
         self._built = device.builds.programs - self._built
         self._seconds |= {**first.seconds, "ready": time.perf_counter() - self._start}
         self.warnings = list(self.wavefronts[0].lowered.warnings)
         self.samples = 0
+        self._progress = progress
 
-    def step(self, samples: int, progress: Callable[[Progress], bool] | None = None) -> bool:
-        """Add samples to every pixel; `samples` in all are kept in `self.samples`.
+    def step(self, samples: int = 1, wait_for: dev.Events = None) -> cl.Event:
+        """Enqueue that every pixel gets `samples` more; `self.samples` tells how many it then has.
 
-        progress: called every few milliseconds to seconds; if it returns False the step stops soon.
-        Returns whether the step ran to its end.
+        Nothing is waited for or read: when the event that is returned has ended, `film` holds the
+        picture. wait_for: events of the caller that come first. On an in-order queue whatever the
+        caller enqueues next finds the picture.
+
+        Raises SceneError for a number that is none, DeviceError if the driver refuses.
+        """
+        first, end = self.samples, self.samples + _whole(samples)
+        stream = self.wavefronts[0].stream
+        stream.after(wait_for)
+        for wavefront in self.wavefronts:
+            wavefront.enqueue(first, end)
+        self.samples = end
+        stream.flush()
+        event = stream.last
+        if self._progress is not None:
+            self._tell_later(event, self._progress)
+        return event
+
+    def _tell_later(self, event: cl.Event, told: Callable[[Progress], Any]) -> None:
+        """Tell the caller how far the picture is, once the event has ended."""
+        samples = self.samples
+        pixels = math.prod(self.scene.film.size) * len(self.wavefronts)
+
+        def tell(_: int) -> None:
+            seconds = time.perf_counter() - self._start
+            told(Progress(samples, samples, samples * pixels, 0, seconds))
+
+        event.set_callback(cl.command_execution_status.COMPLETE, tell)
+
+    def run(self, samples: int, progress: Callable[[Progress], bool] | None = None) -> bool:
+        """Add samples to every pixel and wait; `samples` in all are kept in `self.samples`.
+
+        progress: called every few milliseconds to seconds; if it returns False the run stops soon.
+        Returns whether it came to its end.
         """
         start = time.perf_counter()
-        first, end = self.samples, self.samples + samples
+        first, end = self.samples, self.samples + _whole(samples)
 
         def tell(_: Any) -> bool:
             counts = [w.counts for w in self.wavefronts]
@@ -100,6 +151,41 @@ class Renderer:
                 return False
         self.samples = end
         return True
+
+    def reset(self, wait_for: dev.Events = None) -> cl.Event:
+        """Enqueue that the film is emptied; the next sample is number 0 again."""
+        stream = self.wavefronts[0].stream
+        stream.after(wait_for)
+        for wavefront in self.wavefronts:
+            wavefront.clear()
+        self.samples = 0
+        return stream.last
+
+    def update(self, *, camera: Camera | None = None, wait_for: dev.Events = None) -> cl.Event:
+        """Enqueue that the scene changes, and begin again at sample 0.
+
+        camera: another one of the same kind. It costs one small write: nothing is built.
+        """
+        front = self.wavefronts[0]
+        front.stream.after(wait_for)
+        if camera is not None:
+            self.scene = dataclasses.replace(self.scene, camera=camera)
+            front.move_camera(camera, self.scene.film)
+        return self.reset()
+
+    @property
+    def film(self) -> cl_array.Array:
+        """The picture so far on the device, (h, w, 4) float32, valid when the last event has ended.
+
+        Red, green and blue, linear in the film's output space; last, how many samples the pixel
+        has. Always the same memory, on the renderer's queue. Of `aov`, the first channel.
+        """
+        return self.wavefronts[0].film
+
+    @property
+    def films(self) -> dict[str, cl_array.Array]:
+        """The values of the `aov` integrator by name, as `film` has them."""
+        return {n: w.film for n, w in zip(self.channels, self.wavefronts, strict=True)}
 
     @property
     def facts(self) -> Facts:
@@ -136,6 +222,13 @@ class Renderer:
         }
 
 
+def _whole(samples: int) -> int:
+    """A number of samples. Raises SceneError for one that is none."""
+    if isinstance(samples, bool) or not isinstance(samples, (int, np.integer)) or samples < 1:
+        raise SceneError(f"samples per pixel must be a whole number above zero, not {samples!r}")
+    return int(samples)
+
+
 def _texture_budget(device: dev.Device) -> int:
     """Half of a device's free memory, in one buffer."""
     return min(int(TEXTURE_SHARE * device.free_memory()), device.info.max_alloc)
@@ -153,9 +246,7 @@ def render(
 
     spp: samples per pixel, the scene's own by default. Raises as `Renderer` does.
     """
-    spp = scene.spp if spp is None else spp
-    if isinstance(spp, bool) or not isinstance(spp, (int, np.integer)) or spp < 1:
-        raise SceneError(f"samples per pixel must be a whole number above zero, not {spp!r}")
+    spp = _whole(scene.spp if spp is None else spp)
     renderer = Renderer(scene, device, **wavefront)
-    renderer.step(int(spp), progress)
+    renderer.run(spp, progress)
     return renderer.image()

@@ -12,10 +12,12 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import pyopencl as cl
+import pyopencl.array as cl_array
 
 from clpt import bvh, device
 from clpt.device.buffers import Buffers
@@ -23,7 +25,10 @@ from clpt.device.timing import Timings
 from clpt.errors import MemoryBudgetError, SceneError
 from clpt.records import PATH, SLABS, TABLES
 from clpt.render import programs
+from clpt.render.cameras import lower_camera
 from clpt.render.lower import Lowered
+from clpt.scene.cameras import Camera
+from clpt.scene.integrators import Film
 
 FILM_WORDS = 7  # kernels/lib/film.cl
 FRESH = 0x2000  # kernels/lib/path_state.cl
@@ -33,6 +38,7 @@ GROUP = 64  # slots are a multiple of it, and it is the local size of one-lane k
 BATCH = 8  # iterations that are enqueued before counters are asked for
 CPU_SLOTS, GPU_SLOTS = 1 << 14, 1 << 20
 BRUTE_SHAPES = 32  # analytic shapes up to which all of them are tried
+SORT = ("sort_count", "sort_scan", "sort_place")
 CHUNK = 256  # slots that a work-item of the sort counts
 
 
@@ -48,6 +54,16 @@ class Counts:
     @property
     def rays(self) -> int:
         return self.closest + self.shadow
+
+
+@dataclass(frozen=True)
+class _Step:
+    """A kernel of a bounce with its arguments, work-items, and those of a group."""
+
+    name: str
+    bound: device.Bound
+    size: tuple[int]
+    group: tuple[int] | None
 
 
 class Wavefront:
@@ -84,10 +100,8 @@ class Wavefront:
         self.lanes = on.lanes
         kinds = len(features.materials)
         self.queued = kinds > 1 and (not on.info.is_cpu or kinds > 4) if queued is None else queued
-        texts = programs.sources(features, layout, self.lanes, queued=self.queued)
-        start = time.perf_counter()
-        self.programs = device.build_all(on, texts)
-        self.seconds = {"programs": time.perf_counter() - start}
+        self.programs: dict[str, device.Program] = {}
+        self.seconds = {"programs": 0.0}
         self._place_slots(slots or (CPU_SLOTS if on.info.is_cpu else GPU_SLOTS))
         self._allocate(layout)
         self._expose_new()
@@ -101,10 +115,10 @@ class Wavefront:
         features = dataclasses.replace(self.lowered.features, channel=channel)
         other.lowered = dataclasses.replace(self.lowered, features=features)
         other.named = dict(self.named)
-        texts = programs.sources(features, self.tree.layout, self.lanes, queued=self.queued)
-        other.programs = self.programs | device.build_all(
-            self.device, {n: text for n, text in texts.items() if n.startswith("shade_")}
-        )
+        shared = {n: program for n, program in self.programs.items() if not n.startswith("shade_")}
+        other.programs = shared
+        for made in ("stages", "loop"):
+            other.__dict__.pop(made, None)
         other._expose_new()
         return other
 
@@ -185,7 +199,7 @@ class Wavefront:
         settings = self.lowered.settings
         self.film_bytes = 4 * FILM_WORDS * int(settings["places"]) * int(settings["planes"])
         pixels = int(settings["width"]) * int(settings["height"])
-        sizes = {"film": self.film_bytes, "image": 12 * pixels}
+        sizes = {"film": self.film_bytes, "image": 16 * pixels}
         advice = "lower the image's size"
         if self.lowered.features.bands:
             bands = int(settings["bands"])
@@ -197,71 +211,106 @@ class Wavefront:
         for name, size in sizes.items():
             self.named[name] = self.buffers.allocate(f"the {name}", size, advice)
         self.band_bytes = sizes.get("bands", 0)
-        self.clear()
-        self._bind()
-
-    def _bind(self) -> None:
-        """Give every kernel its arguments; they are told by their names in its signature."""
-        brute, features = self.tree.layout == "brute", self.lowered.features
-        self.steps: list[tuple[str, device.Bound, tuple[int], tuple[int] | None]] = []
-        begin, test = programs.stages(features)
-        self.begin = self._step(begin, begin, self.lanes, first=0, end=0)
-        if features.light_paths and features.visible_lights:
-            self._step(test, test, self.lanes if brute else 1)
-        self._step("intersect", "intersect", self.lanes if brute else 1)
-        if "mix" in self.programs:
-            self._step("mix", "mix_materials", self.lanes)
-        if self.queued:
-            chunks = -(-self.slots // CHUNK)
-            for name, size in (("sort_count", chunks), ("sort_scan", 1), ("sort_place", chunks)):
-                bound = self._bound("sort", name)
-                self.steps.append((name, bound, (size,), None))
-        for kind in features.materials:
-            self._step(f"shade_{kind}", "shade", self.lanes)
-        if any(not cls.delta for cls in features.leaves):
-            self._step(test, test, self.lanes if brute else 1)
+        self._build("accumulate", *(["bands"] if self.band_bytes else []))
         self.accumulate = self._bound("accumulate", "accumulate", samples=0.0)
-        if features.bands:
+        if self.band_bytes:
             self.accumulate_bands = self._bound("bands", "accumulate_bands")
+        self.clear()
+
+    def _build(self, *wanted: str) -> None:
+        """Build the programs of these names that are not there yet; all, if none is named."""
+        start = time.perf_counter()
+        features, layout = self.lowered.features, self.tree.layout
+        texts = programs.sources(features, layout, self.lanes, queued=self.queued)
+        missing = {n: texts[n] for n in wanted or texts if n not in self.programs}
+        self.programs |= device.build_all(self.device, missing)
+        self.seconds["programs"] += time.perf_counter() - start
+
+    @cached_property
+    def stages(self) -> list[_Step]:
+        """The kernels of a bounce in their order, for a host that enqueues bounce after bounce."""
+        self._build()
+        made: list[_Step] = []
+        chunks = -(-self.slots // CHUNK)
+        for stage in programs.order(self.lowered.features, self.tree.layout, self.lanes):
+            if self.queued and stage.kernel == "shade" and made[-1].bound.kernel.name != "shade":
+                for name, size in (
+                    ("sort_count", chunks),
+                    ("sort_scan", 1),
+                    ("sort_place", chunks),
+                ):
+                    made.append(_Step(name, self._bound("sort", name), (size,), None))
+            given = {"first": 0, "end": 0} if not made else {}
+            bound = self._bound(stage.program, stage.kernel, **given)
+            made.append(_Step(stage.program, bound, *self._sizes(stage.lanes)))
+        return made
+
+    @cached_property
+    def loop(self) -> device.Bound:
+        """The kernel of the bounce loop on the device, for a host that does not wait."""
+        start = time.perf_counter()
+        features, layout = self.lowered.features, self.tree.layout
+        texts = programs.loop_sources(features, layout, self.lanes)
+        signatures = {"loop": programs.loop_arguments(features, layout)}
+        kernel = device.link(self.device, texts, "loop", signatures).kernel("loop")
+        self.seconds["programs"] += time.perf_counter() - start
+        return self._bind(kernel, first=0, end=0)
 
     def _bound(self, program: str, name: str, **given: Any) -> device.Bound:
-        kernel = self.programs[program].kernel(name)
+        return self._bind(self.programs[program].kernel(name), **given)
+
+    def _bind(self, kernel: device.Kernel, **given: Any) -> device.Bound:
+        """A kernel with its arguments, which are told by their names in its signature."""
         named = {**self.named, **given}
         return kernel.bind(**{a.name: named[a.name] for a in kernel.arguments})
 
-    def _step(self, program: str, name: str, lanes: int, **given: Any) -> device.Bound:
-        """Append a stage to the loop; a work-item serves `lanes` slots."""
-        bound = self._bound(program, name, **given)
-        local = (GROUP // lanes,) if lanes > 1 else (GROUP,)
-        self.steps.append((program, bound, (self.slots // lanes,), local))
-        return bound
+    def _sizes(self, lanes: int) -> tuple[tuple[int], tuple[int]]:
+        """How many work-items serve all slots, `lanes` each, and how many of them are a group."""
+        return (self.slots // lanes,), (GROUP // lanes,) if lanes > 1 else (GROUP,)
 
     def clear(self) -> None:
         """Empty the film and begin again at sample 0."""
-        self.counts = Counts()
+        self.counts, self._seen = Counts(), np.zeros(len(COUNTERS), np.uint32)
+        self.exposed = 0.0  # paths per pixel
+        self._fill("counters", 0, 0, 4 * len(COUNTERS))
         self._fill("film", 0, 0, self.film_bytes)
+        self._fill("image", 0, 0, self.named["image"].size)
         if self.band_bytes:
             self._fill("bands", 0, 0, self.band_bytes)
 
     def _fill(self, name: str, value: int, offset: int, size: int) -> None:
         self.stream.fill(self.named[name], value, offset, size)
 
+    def move_camera(self, camera: Camera, film: Film) -> None:
+        """Enqueue that the camera is another of its kind. Raises SceneError if it is not."""
+        kind, words = lower_camera(camera, film.width, film.height, self.lowered.glass_row)
+        if kind != self.lowered.features.camera:
+            raise SceneError(f"the camera was {self.lowered.features.camera}, not {kind}")
+        self.stream.write(self.named["camera"], words)
+
+    def enqueue(self, first: int, end: int) -> None:
+        """Enqueue that samples first to end - 1 of every pixel are added; nothing is waited for."""
+        self._rewind()
+        self.loop.set(first=first, end=end)
+        size, group = self._sizes(self.lanes)
+        self.timings.add("loop", self.stream.run(self.loop, size, group))
+        self.exposed += end - first
+        self._accumulate()
+
     def expose(
         self, first: int, end: int, on_batch: Callable[[Counts], bool] | None = None
     ) -> bool:
-        """Add samples first to end - 1 of every pixel to the film.
+        """Add samples first to end - 1 of every pixel to the film, and wait.
 
         on_batch is called every few iterations with the counts; if it returns False, every path is
         brought to its end and the exposure stops: a valid film, whose pixels differ in their number
         of samples. Returns whether it ran to its end.
         """
-        word = next(m.word for m in PATH.members if m.name == "state")
-        self._fill("path_words", FRESH, 4 * word * self.stride, 4 * self.slots)
-        self._fill("counters", 0, 0, 4 * len(COUNTERS))
-        self.begin.set(first=first, end=end)
-        finished = True
+        begin = self.stages[0].bound
+        self._rewind()
+        begin.set(first=first, end=end)
+        before, finished = self.counts.samples, True
         reads: deque[tuple[np.ndarray, cl.Event]] = deque()
-        last = np.zeros(len(COUNTERS), np.uint32)
         while True:
             for _ in range(BATCH):
                 self._iterate()
@@ -273,33 +322,60 @@ class Wavefront:
                 continue
             now, event = reads.popleft()
             event.wait()
-            self._count(now - last)  # unsigned: right even after they wrapped around
-            last = now
+            self._count(now)
             if on_batch and finished and not on_batch(self.counts):
-                self.begin.set(end=first)
+                begin.set(end=first)
                 finished = False
             if now[0] >= self.slots:
                 break
         for _, event in reads:
             event.wait()
+        width, height = self._size
+        new = (self.counts.samples - before) / (width * height)
+        self.exposed += end - first if finished else new
+        self._accumulate()
         return finished
+
+    def _rewind(self) -> None:
+        """Let every slot begin its list again."""
+        word = next(m.word for m in PATH.members if m.name == "state")
+        self._fill("path_words", FRESH, 4 * word * self.stride, 4 * self.slots)
+        self._fill("counters", 0, 0, 4)
 
     def _iterate(self) -> None:
         """One bounce of every path."""
-        for name, bound, size, local in self.steps:
-            self.timings.add(name, self.stream.run(bound, size, local))
+        for step in self.stages:
+            self.timings.add(step.name, self.stream.run(step.bound, step.size, step.group))
 
-    def _count(self, new: np.ndarray) -> None:
+    def _count(self, now: np.ndarray) -> None:
+        """Add what the counters have gained since they were read last."""
+        new = now - self._seen  # unsigned: right even after they wrapped around
+        self._seen = now
         for name, n in zip(COUNTERS[1:], new[1:].tolist(), strict=True):
             setattr(self.counts, name, getattr(self.counts, name) + n)
 
-    def image(self) -> np.ndarray:
-        """The picture so far, (h, w, 3) float32 in the film's output space."""
-        width, height = self._size
+    def count(self) -> Counts:
+        """The counts of all that was enqueued; waits for it."""
+        self._count(self.stream.read(self.named["counters"], np.empty(len(COUNTERS), np.uint32)))
+        return self.counts
+
+    def _accumulate(self) -> None:
         if self.lowered.features.light_paths:
-            self.accumulate.set(samples=self.counts.samples / (width * height))
-        self.stream.run(self.accumulate, (width, height))
-        return self.stream.read(self.named["image"], np.empty((height, width, 3), np.float32))
+            self.accumulate.set(samples=self.exposed)
+        self.stream.run(self.accumulate, self._size)
+
+    @cached_property
+    def film(self) -> cl_array.Array:
+        """The picture so far, (h, w, 4) float32 in the film's output space; last, samples."""
+        width, height = self._size
+        shape = (height, width, 4)
+        return cl_array.Array(self.device.queue, shape, np.float32, data=self.named["image"])
+
+    def image(self) -> np.ndarray:
+        """The picture so far, (h, w, 3) float32 in the film's output space; waits for it."""
+        width, height = self._size
+        whole = self.stream.read(self.named["image"], np.empty((height, width, 4), np.float32))
+        return np.ascontiguousarray(whole[:, :, :3])
 
     def bands(self) -> np.ndarray:
         """The mean radiance in each band so far, (h, w, bands) float32, of a film with bands."""

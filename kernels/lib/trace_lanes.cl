@@ -2,8 +2,7 @@
 #include "lib/trace.cl"
 #include "bvh/brute.cl"
 #include "generated/shape_tree.cl"
-#define TRACE_ARGS global const float *tris, uint triangles
-#define TRACE tris, triangles
+#include "generated/trace_args.cl"
 
 inline TraceHit trace_closest(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real far, mask active)
 {

@@ -1,14 +1,14 @@
 /* Sums the planes of the film into a picture, pixel by pixel, and takes it to the output space by the
- * matrix in the settings. Planes are added in a fixed order, so a picture does not depend on timing. */
+ * matrix in the settings; the fourth value of a pixel is its number of samples. Planes are added in a fixed order, so a picture does not depend on timing. */
 #include "lib/base.cl"
 #include "lib/film.cl"
 
 #ifdef LIGHT_PATHS /* how many there were per pixel; they leave something anywhere */
 #define SAMPLES_ARG , float samples
-#define SAMPLES(own) (samples > 0.0f ? samples : 1.0f)
+#define SAMPLES(own) samples
 #else
 #define SAMPLES_ARG
-#define SAMPLES(own) fmax(own, 1.0f)
+#define SAMPLES(own) own
 #endif
 
 kernel void accumulate(global const Settings *settings, global const float *film, global float *image SAMPLES_ARG)
@@ -20,11 +20,12 @@ kernel void accumulate(global const Settings *settings, global const float *film
         for (int i = 0; i < FILM_WORDS; i++) v[i] = 0.0f;
         for (int plane = 0; plane < settings->planes; plane++)
             for (int i = 0; i < FILM_WORDS; i++) v[i] += film[(plane * FILM_WORDS + i) * places + place];
-        float scale = 1.0f / SAMPLES(v[6]);
+        float scale = SAMPLES(v[6]) > 0.0f ? 1.0f / SAMPLES(v[6]) : 1.0f;
         float a = (v[0] + v[3]) * scale, b = (v[1] + v[4]) * scale, c = (v[2] + v[5]) * scale;
-        global float *pixel = image + 3 * ((size_t)y * settings->width + x);
+        global float *pixel = image + 4 * ((size_t)y * settings->width + x);
         pixel[0] = settings->to_first[0] * a + settings->to_first[1] * b + settings->to_first[2] * c;
         pixel[1] = settings->to_second[0] * a + settings->to_second[1] * b + settings->to_second[2] * c;
         pixel[2] = settings->to_third[0] * a + settings->to_third[1] * b + settings->to_third[2] * c;
+        pixel[3] = SAMPLES(v[6]);
     }
 }

@@ -2,7 +2,7 @@
  * generate.cl. A slot walks the places of the film as there, but they only count paths: what a path
  * leaves on the film is added where the camera sees it, by splat.cl. */
 #include "lib/base.cl"
-#include "bvh/apart.cl"
+#include "lib/stage.cl"
 #include "generated/sampler.cl"
 #include "lib/camera.cl"
 #include "generated/camera.cl"
@@ -18,11 +18,11 @@
 #include "lib/next_event.cl"
 #include "lib/light_path.cl"
 
-kernel APART void emit(SLAB_ARGS, SCENE_ARGS, global uint *counters, int first, int end)
+STAGE(emit)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
 {
     SLABS
     SCENE
-    uint at = get_global_id(0) * LANES;
+    STAGE_AT
     integer state = load_path_state(path, at), depth = state & PATH_DEPTH;
     mask began = (state & PATH_FRESH) == 0;
     mask missed = began & ((state & PATH_ALIVE) != 0) & (load_hit_prim(hit, at) < 0);

@@ -1,7 +1,7 @@
 /* Ends what is finished and begins what comes next: a path that missed gathers the light from
  * infinity, a path that ended is put on the film, and its slot starts the next sample of its list. */
 #include "lib/base.cl"
-#include "bvh/apart.cl"
+#include "lib/stage.cl"
 #include "generated/sampler.cl"
 #include "lib/camera.cl"
 #include "generated/camera.cl"
@@ -13,17 +13,11 @@
 #include "generated/lights.cl"
 #include "generated/medium.cl"
 
-#if USES_BANDS
-#define BAND_ARGS , global float *bands
-#else
-#define BAND_ARGS
-#endif
-
-kernel APART void generate(SLAB_ARGS, SCENE_ARGS, global float *film BAND_ARGS, global uint *counters, int first, int end)
+STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
 {
     SLABS
     SCENE
-    uint at = get_global_id(0) * LANES;
+    STAGE_AT
     integer state = load_path_state(path, at), depth = state & PATH_DEPTH;
     mask began = (state & PATH_FRESH) == 0;
     mask missed = began & ((state & PATH_ALIVE) != 0) & (load_hit_prim(hit, at) < 0);

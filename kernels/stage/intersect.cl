@@ -5,13 +5,13 @@
 #include "lib/shape.cl"
 #include "lib/surface_flags.cl"
 #include "generated/trace.cl"
-#include "bvh/apart.cl"
+#include "lib/stage.cl"
 
-kernel APART void intersect(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS)
+STAGE(intersect)(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS STAGE_AT_ARG)
 {
     SLABS
     SCENE
-    uint at = get_global_id(0) * LANES;
+    STAGE_AT
     integer state = load_path_state(path, at);
     mask active = (state & PATH_ALIVE) != 0;
     if (any(active)) {

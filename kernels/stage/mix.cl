@@ -2,6 +2,7 @@
  * follows shades one material. A row of `mixtures`: the weight (a number and 1 + its texture), and the
  * material words taken where a random number is above and below it; these may be mixtures again. */
 #include "lib/base.cl"
+#include "lib/stage.cl"
 #include "generated/sampler.cl"
 #include "lib/shape.cl"
 #include "generated/textures.cl"
@@ -11,11 +12,11 @@
 
 #define MIXTURE 0xff /* the kind in a mixture's material word */
 
-kernel void mix_materials(SLAB_ARGS, SCENE_ARGS)
+STAGE(mix_materials)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
 {
     SLABS
     SCENE
-    uint at = get_global_id(0) * LANES;
+    STAGE_AT
     integer state = load_path_state(path, at), word = load_hit_material(hit, at);
     mask active = ((state & PATH_ALIVE) != 0) & (load_hit_prim(hit, at) >= 0), open = active & (MATERIAL_KIND(word) == MIXTURE);
     if (any(open)) {

@@ -1,7 +1,7 @@
 /* Shades the paths that met one kind of material. Built once per kind, so it holds no switch: as
  * dense blocks that mask out other kinds, or, where QUEUED, along the sorted queue. */
 #include "lib/base.cl"
-#include "bvh/apart.cl"
+#include "lib/stage.cl"
 #include "generated/sampler.cl"
 #include "lib/shape.cl"
 #include "lib/light.cl"
@@ -26,7 +26,7 @@
 #define QUEUE_ARGS
 #endif
 
-kernel APART void shade(SLAB_ARGS, SCENE_ARGS QUEUE_ARGS)
+STAGE(shade)(SLAB_ARGS, SCENE_ARGS QUEUE_ARGS STAGE_AT_ARG)
 {
     SLABS
     SCENE
@@ -37,7 +37,7 @@ kernel APART void shade(SLAB_ARGS, SCENE_ARGS QUEUE_ARGS)
         At at = gather_i(queue, (int)queue_starts[BSDF_KIND] + min_i(i, (integer)((int)count - 1)));
         mask active = i < (int)count;
 #else
-    At at = get_global_id(0) * LANES;
+    STAGE_AT
     mask active = ((load_path_state(path, at) & PATH_ALIVE) != 0) & (load_hit_prim(hit, at) >= 0);
 #if BSDF_COUNT > 1
     active = active & (MATERIAL_KIND(load_hit_material(hit, at)) == BSDF_KIND);

@@ -3,13 +3,13 @@
 #include "lib/shape.cl"
 #include "generated/trace.cl"
 #include "generated/open.cl"
-#include "bvh/apart.cl"
+#include "lib/stage.cl"
 
-kernel APART void shadow(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS)
+STAGE(shadow)(SLAB_ARGS, SCENE_ARGS, JOIN_ARGS STAGE_AT_ARG)
 {
     SLABS
     SCENE
-    uint at = get_global_id(0) * LANES;
+    STAGE_AT
     real t = load_shadow_t(shadow, at);
     mask active = t > 0.0f;
     if (any(active)) {

@@ -45,7 +45,7 @@ def test_passes_add_up_to_one_step(tmp_path):
     common = ["--size", "17x9", "--spp", "21", "--mode", "rgb", "--quiet"]
     assert run(["render", CORNELL, "-o", str(path), *common]) == 0
     whole = Renderer(changed(load(CORNELL), size=(17, 9), mode="rgb"))
-    whole.step(21)
+    whole.run(21)
     assert np.array_equal(np.load(path), whole.image())
 
 
@@ -125,7 +125,7 @@ def test_a_sensor_and_its_white(tmp_path):
     assert run(["render", CORNELL, "-o", str(path), *common, "--white-balance", "4500"]) == 0
     film = {"sensor": read_sensor(curves), "white_balance": 4500.0}
     whole = Renderer(changed(load(CORNELL), size=(9, 8), **film))
-    whole.step(2)
+    whole.run(2)
     assert np.array_equal(np.load(path), whole.image())
 
 

@@ -33,7 +33,7 @@ def test_repeat(scenes: Path, once: np.ndarray) -> None:
 def test_split_into_steps(scenes: Path, once: np.ndarray, steps: tuple[int, ...]) -> None:
     renderer = clpt.Renderer(cornell(scenes))
     for step in steps:
-        assert renderer.step(step)
+        assert renderer.run(step)
     assert np.array_equal(renderer.image(), once)
 
 
@@ -49,7 +49,7 @@ def test_split_into_steps_with_few_and_many_slots(scenes: Path, slots: int) -> N
     scene = cornell(scenes, width=30, height=22)
     renderer = clpt.Renderer(scene, slots=slots)
     for step in (1, 7, 8):
-        renderer.step(step)
+        renderer.run(step)
     assert np.array_equal(renderer.image(), clpt.render(scene, SPP, slots=slots))
 
 
@@ -87,7 +87,7 @@ def test_odd_sizes(size: tuple[int, int]) -> None:
     film = clpt.scene.Film(width=width, height=height, mode="rgb")
     scene = clpt.Scene(camera=clpt.scene.cameras.Perspective(), lights=[sky], film=film)
     renderer = clpt.Renderer(scene)
-    renderer.step(3)
+    renderer.run(3)
     image = renderer.image()
     assert image.shape == (height, width, 3)
     np.testing.assert_allclose(image, np.broadcast_to([0.25, 0.5, 1.0], image.shape), rtol=1e-6)
@@ -105,7 +105,7 @@ def test_seeds_differ(scenes: Path, once: np.ndarray) -> None:
 def test_a_stopped_step_leaves_a_valid_picture(scenes: Path) -> None:
     """Pixels then differ in their number of samples, but each is an average."""
     renderer = clpt.Renderer(cornell(scenes, width=20, height=20), slots=64)
-    assert not renderer.step(4096, lambda progress: progress.samples < 8)
+    assert not renderer.run(4096, lambda progress: progress.samples < 8)
     image = renderer.image()
     assert np.isfinite(image).all() and image.min() >= 0.0 and image.mean() > 0.01
     assert renderer.wavefronts[0].counts.samples < 4096 * 400

@@ -71,7 +71,7 @@ def test_values_are_those_of_copies(layout: str) -> None:
     copies: list[Shape] = [dataclasses.replace(mesh, to_world=m @ mesh.to_world) for m in matrices]
     ball = Sphere(radius=0.4)
     renderers = [clpt.Renderer(scene([*s, ball]), layout=layout) for s in (placed, copies)]
-    assert all(renderer.step(1) for renderer in renderers)
+    assert all(renderer.run(1) for renderer in renderers)
     ours, expected = (renderer.image() for renderer in renderers)
     assert len(np.unique(expected[..., 8])) > 20  # nearly all are seen
     off = np.abs(ours - expected) > 1e-4 * (1.0 + np.abs(expected))

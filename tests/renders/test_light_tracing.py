@@ -262,7 +262,7 @@ def test_stopped_early_is_as_bright() -> None:
     )
     whole = clpt.render(scene, 4).mean(axis=(0, 1))
     renderer = clpt.Renderer(scene, slots=4096)
-    assert not renderer.step(4, lambda progress: progress.samples < 0.5)
+    assert not renderer.run(4, lambda progress: progress.samples < 0.5)
     paths = renderer.wavefronts[0].counts.samples
     assert 0 < paths < 4 * 256 * 256
     part = renderer.image().mean(axis=(0, 1))
@@ -303,7 +303,7 @@ def test_lanes_slots_and_steps_differ_only_in_rounding() -> None:
     pictures = [clpt.render(scene, 32, slots=slots) for slots in (64, 1 << 12)]
     renderer = clpt.Renderer(scene)
     for step in (1, 7, 24):
-        assert renderer.step(step)
+        assert renderer.run(step)
     assert renderer.wavefronts[0].counts.samples == 32 * 64
     pictures.append(renderer.image())
     for lanes in (1, 8, 16):

@@ -84,7 +84,7 @@ def test_bands_are_the_means_of_the_light(light: Tabulated, drawn: str) -> None:
 def test_bands_add_up_to_the_colour() -> None:
     """Bands of 2 nm, weighted by the observer, are the colour of the film beside them."""
     renderer = clpt.Renderer(sky(COLOUR, bands=235, output_space="xyz"))
-    renderer.step(64)
+    renderer.run(64)
     image, colours = renderer.image(), renderer.colours()
     assert image.shape == (8, 8, 235) and image.dtype == np.float32
     assert colours.shape == (8, 8, 3)
@@ -107,14 +107,14 @@ def test_bands_do_not_depend_on_passes() -> None:
     """But for rounding, as a sum that is stored and read again; beginning anew, to the bit."""
     made = sky(LINES, bands=5)
     whole, passes = clpt.Renderer(made), clpt.Renderer(made)
-    whole.step(12)
+    whole.run(12)
     for samples in (1, 4, 7):
-        passes.step(samples)
+        passes.run(samples)
     np.testing.assert_allclose(passes.image(), whole.image(), rtol=1e-6, atol=1e-9)
     for wavefront in passes.wavefronts:
         wavefront.clear()
     passes.samples = 0
-    passes.step(12)
+    passes.run(12)
     assert np.array_equal(passes.image(), whole.image())
 
 
@@ -128,7 +128,7 @@ def test_a_wide_range_changes_no_colour(film: dict) -> None:
     for i in range(16):
         renderer.wavefronts[0].clear()
         renderer.samples = 64 * i  # independent samples of one sequence
-        renderer.step(64)
+        renderer.run(64)
         found.append(renderer.colours())
     assert_mean(found, narrow, 0.05, 2e-3)
 

@@ -167,7 +167,7 @@ def test_from_a_scene_file(tmp_path):
     features = renderer.wavefronts[0].lowered.features
     assert features.textures == ("spectral_bitmap",)
     assert features.lights == ("spectral_envmap",)
-    renderer.step(1)
+    renderer.run(1)
     assert renderer.image().min() > -0.5
     assert renderer.image().max() > 0.1
 
