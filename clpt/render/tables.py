@@ -219,7 +219,7 @@ class Tables:
             return None
         rows = [self._rows.pop(key)[0] for key in owned]
         for key, row in zip(owned, rows, strict=True):
-            self._rows[(id(new), *key[1:])] = row, new
+            self._rows[id(new), key[1], key[2]] = row, new
         return [(row, words) for row in rows]
 
     def kind_words(self, kind: Kind) -> Words:

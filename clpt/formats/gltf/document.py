@@ -55,7 +55,7 @@ class Element:
         """Return a whole number in [low, high]."""
         value = self._get(key, default)
         if value is default:
-            return default  # type: ignore[no-any-return]
+            return default
         if isinstance(value, float) and value.is_integer():
             value = int(value)  # JSON's 3.0
         if isinstance(value, bool) or not isinstance(value, int):
@@ -69,7 +69,7 @@ class Element:
     ) -> float:
         """Return a finite number in [low, high]."""
         value = self._get(key, default)
-        return default if value is default else self._number(value, key, low, high)  # type: ignore[no-any-return]
+        return default if value is default else self._number(value, key, low, high)
 
     def numbers(
         self,
@@ -82,7 +82,7 @@ class Element:
         """Return finite numbers, `count` of them where that is given."""
         value = self._get(key, default)
         if value is default:
-            return default  # type: ignore[no-any-return]
+            return default
         if not isinstance(value, list) or (count is not None and len(value) != count):
             raise self.error(f"must be {count or 'a list of'} numbers, not {_shown(value)}", key)
         return tuple(self._number(v, f"{key}[{i}]", low, high) for i, v in enumerate(value))
@@ -91,7 +91,7 @@ class Element:
         """Return a text, one of `choices` where some are given."""
         value = self._get(key, default)
         if value is default:
-            return default  # type: ignore[no-any-return]
+            return default
         if not isinstance(value, str):
             raise self.error(f"must be a text, not {_shown(value)}", key)
         if choices and value not in choices:
@@ -210,7 +210,7 @@ class Document:
         """Return what `make` gave when this key was asked for first."""
         if key not in self._made:
             self._made[key] = make()
-        return self._made[key]  # type: ignore[no-any-return]
+        return self._made[key]
 
     def buffer(self, index: int) -> bytes:
         """Return the bytes of buffers[index], of its declared length."""

@@ -53,7 +53,7 @@ def load(path: Path, outside: Iterable[type[materials.Material]] = ()) -> Scene:
     return _Reader(parse(path), outside).scene()
 
 
-def default(field: dataclasses.Field) -> Any:
+def default(field: dataclasses.Field[Any]) -> Any:
     """Return the default of a dataclass's field."""
     made = field.default_factory
     return field.default if made is dataclasses.MISSING else made()
@@ -97,7 +97,7 @@ class _Reader:
         if "camera" not in root.value:
             raise root.error("needs a 'camera'")
         given: dict[str, Any] = {}
-        for key, read in {
+        readers: dict[str, Callable[[Cursor], Any]] = {
             "camera": lambda c: self.kind(c, "camera"),
             "film": lambda c: self.make(c, integrators.Film, ()),
             "integrator": lambda c: self.kind(c, "integrator"),
@@ -107,7 +107,8 @@ class _Reader:
             "spp": Cursor.integer,
             "seed": Cursor.integer,
             "name": lambda c: c.expect(str),
-        }.items():
+        }
+        for key, read in readers.items():
             if key in root.value:
                 given[key] = read(root.at(key))
         if "materials" in root.value:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from clpt.formats.pbrt import assembly, films, reader, views
 from clpt.formats.pbrt.assembly import Progress
+from clpt.formats.pbrt.files import Contents
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.state import Definition, State
 from clpt.scene import Scene
@@ -49,6 +50,6 @@ def load(path: Path, progress: Progress | None = None) -> Scene:
     return scene
 
 
-def _default_camera(path: Path, contents: reader.Contents) -> Definition:
+def _default_camera(path: Path, contents: Contents) -> Definition:
     state = State(contents.shared, path.parent)
     return Definition("perspective", Parameters('Camera "perspective"', path, 1), state)

@@ -8,10 +8,10 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 from clpt.formats.pbrt.curves import joined
+from clpt.formats.pbrt.files import Contents
 from clpt.formats.pbrt.lights import area_light, light
 from clpt.formats.pbrt.materials import material
 from clpt.formats.pbrt.params import Parameters
-from clpt.formats.pbrt.reader import Contents
 from clpt.formats.pbrt.shapes import Geometry, geometry, with_uvs
 from clpt.formats.pbrt.state import Definition, State, nearest
 from clpt.formats.pbrt.textures import textured

@@ -154,7 +154,7 @@ def _floats(text: bytes) -> NDArray[np.float64] | None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
-            return np.fromstring(text, np.float64, sep=" ")  # type: ignore[call-overload, no-any-return]
+            return np.fromstring(text, np.float64, sep=" ")
         except (DeprecationWarning, ValueError):
             return None
 
