@@ -61,7 +61,7 @@ def summary(scene: Scene) -> dict[str, Any]:
     """Return what a scene's file holds; not what the studio added to it.
 
     `triangles` counts those of meshes, cubes and rectangles once, `triangles_instanced` at each
-    placement.
+    placement; `spheres` those that are many in one shape.
     """
     added = scene.extra.get("studio", {"camera": False, "shapes": 0, "lights": 0})
     own = scene.shapes[: len(scene.shapes) - added["shapes"]]
@@ -78,6 +78,7 @@ def summary(scene: Scene) -> dict[str, Any]:
         "format": scene.extra.get("format", "python"),
         "triangles": sum(counts.values()),
         "triangles_instanced": sum(_placed_triangles(own, groups)),
+        "spheres": sum(len(s.centers) for s in surfaces if isinstance(s, shapes.Spheres)),
         "instances": len(own) - len({_arrays(shape) for shape in plain}),
         "bounds": bounds,
         "shapes": dict(Counter(shape.kind for shape in own)),

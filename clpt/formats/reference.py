@@ -170,6 +170,9 @@ def _table(cls: type[Kind]) -> str:
     if "points" in declared:
         rows_of = "lines of x y z radius, blank ones between strands"
         rows.append(f"| `file` | name of a text file | - | {rows_of}, in place of both below |")
+    if "centers" in declared:
+        arrays = "arrays of these names, and attributes by theirs"
+        rows.append(f"| `file` | name of a .npz file | - | {arrays}, in place of all three |")
     if "group" in declared:
         several = "matrices (n, 3, 4), an instance for each"
         rows.append(f"| `file` | name of a .npy file | - | {several} |")
@@ -211,6 +214,8 @@ def _host(name: str, value: Any) -> str:
         "crop": "four whole numbers",
         "map": "`bitmap` texture",
         "points": "rows of 4 numbers",
+        "centers": "rows of 3 numbers",
+        "radii": "number, or a list of them",
         "lengths": "whole numbers",
         "group": "a name in `groups`",
         "sensor": '`cie1931`, `cie1964`, `{"file": name}` or `{"curves": [three spectra]}`,'

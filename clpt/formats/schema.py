@@ -100,6 +100,9 @@ def _kind(cls: type[Kind]) -> Schema:
     if "points" in properties:
         rows = "lines of x y z radius, blank ones between strands, in place of points and lengths"
         properties["file"] = {"type": "string", "description": rows}
+    if "centers" in properties:
+        arrays = "centers, radii and attributes by their names as .npz, in place of those"
+        properties["file"] = {"type": "string", "description": arrays}
     if "group" in properties:
         several = "matrices (n, 3, 4) as .npy: an instance for each, before `to_world`"
         properties["file"] = {"type": "string", "description": several}
@@ -156,6 +159,10 @@ def _host(name: str, value: Any) -> Schema:
         return _rows(*ARRAYS[name])
     if name == "points":
         return _rows(4)
+    if name == "centers":
+        return _rows(3)
+    if name == "radii":
+        return {"anyOf": [{"type": "number"}, NUMBERS]}
     if name == "lengths":
         return {"type": "array", "items": {"type": "integer", "minimum": 2}}
     if name == "attributes":

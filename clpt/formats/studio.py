@@ -124,6 +124,9 @@ def shape_bounds(thing: shapes.Shape) -> tuple[NDArray[np.float64], NDArray[np.f
     if isinstance(thing, shapes.Sphere):
         points = transforms.transform_points(matrix, [thing.center])
         reach = thing.radius * np.linalg.norm(linear, axis=1)
+    elif isinstance(thing, shapes.Spheres):
+        points = transforms.transform_points(matrix, thing.centers)
+        reach = np.max(thing.radii) * np.linalg.norm(linear, axis=1)
     elif isinstance(thing, shapes.Disk):
         points, reach = matrix[None, :3, 3], np.linalg.norm(linear[:, :2], axis=1)
     elif isinstance(thing, shapes.Cylinder):

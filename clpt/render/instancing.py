@@ -98,7 +98,8 @@ def sort(things: Sequence[Shape], warnings: list[str]) -> tuple[list[Placed], li
     """Return the shapes that are lowered as they are, and those that are shared.
 
     A sphere or tube that an instance stretches becomes a mesh; a line about it goes to `warnings`.
-    Raises SceneError for an instance whose transform is singular or a projection.
+    Raises SceneError for an instance whose transform is singular, a projection, or stretches many
+    spheres.
     """
     placed: list[Placed] = []
     prototypes: list[Prototype] = []
@@ -158,6 +159,8 @@ def _analytic(
     if not stretched.any():
         return copies
     count = int(stretched.sum())
+    if shape.kind in shapes.ONE_OF:
+        shapes.row(next(copy.shape for copy, bad in zip(copies, stretched, strict=True) if bad))
     warnings.append(
         f"{shapes.where(shape)}: {count} of {len(copies)} instances stretch it; "
         "they are met as triangles"

@@ -90,6 +90,17 @@ def of_triangles(vertices: shapes.Points, faces: shapes.Faces, two_sided: bool) 
     )
 
 
+def of_balls(balls: NDArray[np.float32]) -> Bounds:
+    """Return the bounds (n) of spheres (n, 4): centre and radius."""
+    center, radius = balls[:, :3].astype(np.float64), balls[:, 3:].astype(np.float64)
+    count = len(balls)
+    return Bounds(
+        center - radius, center + radius, np.tile([0.0, 0.0, 1.0], (count, 1)),
+        np.full(count, np.pi), np.full(count, np.pi / 2.0), np.full(count, False),
+        np.full(count, True),
+    )  # fmt: skip
+
+
 def _one(
     low: Floats,
     axis: ArrayLike = (0.0, 0.0, 1.0),

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt.errors import SceneError
 from clpt.records import LIGHT, SHAPE
-from clpt.render import light_bounds, light_tree, shapes
+from clpt.render import light_bounds, light_tree, shapes, spheres
 from clpt.render.lamps import INFINITE, RECORDS, Sink, blank_row, brightness, lower_lamp
 from clpt.render.memo import content
 from clpt.render.triangle_means import triangle_means
@@ -34,7 +34,7 @@ class Emitter:
     """A shape with an `emission`.
 
     shape_row: its row in `shapes`; vertices, faces, uvs: its triangles as `shapes.triangles` gave
-    them, needed for a mesh and a cube.
+    them, needed for a mesh and a cube; of `spheres`, vertices are their balls.
     """
 
     shape: Shape
@@ -155,6 +155,8 @@ def _emitter_block(emitter: Emitter, tables: Sink) -> Block:
         rows["way"] = way
         bounds = light_bounds.of_shape(shape, way == BOTH)
         return Block(rows, np.array([strength * shapes.area(shape) * brightness(value)]), bounds)
+    if shape.kind in shapes.ONE_OF:
+        return _balls_block(emitter, tables, way, radiance, strength * brightness(value))
     if emitter.vertices is None or emitter.faces is None:
         raise SceneError("its triangles are missing", where=shapes.where(shape))
     memo, corners = tables.memo, (emitter.vertices, emitter.faces)
@@ -167,6 +169,18 @@ def _emitter_block(emitter: Emitter, tables: Sink) -> Block:
     bright = memo(triangle_means, value, emitter.uvs, emitter.faces)
     areas = memo(shapes.triangle_areas, *corners)
     return Block(rows, strength * areas * bright, bounds)
+
+
+def _balls_block(emitter: Emitter, tables: Sink, way: int, radiance: int, strength: float) -> Block:
+    """A row for each of many spheres; strength: what a square metre of them emits."""
+    placed: Any = emitter.vertices
+    geometry = spheres.rows(emitter.shape, placed)
+    count, words = geometry.shape
+    at = tables.append("geometry", geometry) + words * np.arange(count)
+    rows = _block(count, "sphere", at, radiance, emitter.shape_row)
+    rows["way"] = way
+    areas = 4.0 * np.pi * placed[:, 3].astype(np.float64) ** 2
+    return Block(rows, strength * areas, light_bounds.of_balls(placed))
 
 
 def _shared(weights: np.ndarray, infinite: int) -> np.ndarray:
@@ -266,10 +280,10 @@ def row_text(kind: str) -> str:
 
 def point_text(kind: str, uv: str) -> list[str]:
     """Lines that set `point`, what a texture sees, where the light `l` is a shape of a kind."""
-    if kind != "triangle":
+    if kind not in ("triangle", "sphere"):
         place = "v3(0.0f, 0.0f, 0.0f)"
         return [f"point = texture_point_sel(m, texture_point({uv}, {place}), point);"]
-    made = f"area_triangle_point(scene, shape, sel_i(m, row, shape.light), {uv})"
+    made = f"area_{kind}_point(scene, shape, sel_i(m, row, shape.light), {uv})"
     return [
         "integer at = sel_i(m, l.shape, (integer)(0)) * SHAPE_ROW_WORDS;",
         "ShapeRow shape = shape_row_row(scene.shapes, at);",

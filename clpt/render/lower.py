@@ -22,6 +22,7 @@ from clpt.render import (
     outside,
     reradiation,
     shapes,
+    spheres,
 )
 from clpt.render.bends import Bend
 from clpt.render.checks import check
@@ -37,7 +38,7 @@ from clpt.scene.params import device_params, params
 from clpt.spectra import Constant
 from clpt.spectra.cie import tanh_ends
 
-SHAPE_NORMALS, SHAPE_UVS, SHAPE_TWO_SIDED, SHAPE_ONE_LIGHT = 1, 2, 4, 8
+SHAPE_NORMALS, SHAPE_UVS, SHAPE_TWO_SIDED, SHAPE_ONE_LIGHT, SHAPE_MANY = 1, 2, 4, 8, 16
 MIXTURE = 0xFF
 FEW_LIGHTS = 256  # up to which one random number chooses a light and a point on it
 TREE_FROM = 16  # lights from which a tree chooses among them, see bench/lights.py
@@ -153,7 +154,8 @@ class _Lowering:
         self.triangles: list[tuple[np.ndarray, np.ndarray, int]] = []  # vertices, faces, shape
         self.flat: list[shapes.Flat] = []
         self.owners: list[attributes.Placed] = []
-        self.n_vertices = self.n_faces = 0
+        self.balls: list[spheres.Balls] = []
+        self.n_vertices = self.n_faces = self.n_spheres = 0
 
     def run(self) -> Lowered:
         scene, tables = self.scene, self.tables
@@ -166,15 +168,20 @@ class _Lowering:
         tables.append("materials", np.zeros(longest, np.uint32))  # what idle lanes read
         flat = [one for one in self.placed if one.shape.kind not in shapes.ANALYTIC]
         analytic = [one for one in self.placed if one.shape.kind in shapes.ANALYTIC]
+        analytic.sort(key=lambda one: one.shape.kind in shapes.ONE_OF)
+        many = [one.shape for one in analytic if one.shape.kind in shapes.ONE_OF]
         emitters: list[lights.Emitter] = []
         rows = [self._shape(i, one, emitters) for i, one in enumerate(flat)]
         in_world = self.n_vertices
         instances = instancing.joined([self._shared(p, rows) for p in self.prototypes])
         tables.append("instances", instances.rows.view(np.uint32))
-        self.first_analytic, self.analytic_count = len(rows), len(analytic)
+        self.first_analytic, self.single_count = len(rows), len(analytic) - len(many)
         rows += [self._shape(len(rows) + i, one, emitters) for i, one in enumerate(analytic)]
-        found = [shapes.bounds(one.shape) for one in analytic]
+        self.shape_count = len(rows)
+        found = [shapes.bounds(one.shape) for one in analytic[: self.single_count]]
         boxes = np.array(found, np.float32).reshape(-1, 2, 3)
+        boxes = np.concatenate([boxes, spheres.boxes(self.balls)])
+        self.analytic_count = len(boxes)
         vertices, faces, tags = self._joined()
         center, radius = _sphere_around(vertices[:in_world], boxes, instances.boxes)
         tree_from = None if self.light_paths else TREE_FROM
@@ -242,11 +249,19 @@ class _Lowering:
         front, back, row["flags"] = self._sides(shape)
         row["front"], row["back"] = np.array([front, back], np.uint32).view(np.int32)
         triangles: tuple[Any, Any, Any] = (None, None, None)
-        self.owners.append((row, shape, self.n_vertices, self.n_faces))
+        first = self.n_spheres if shape.kind in shapes.ONE_OF else self.n_vertices
+        self.owners.append((row, shape, first, self.n_faces))
         if shape.kind in shapes.ANALYTIC:
             row["kind"] = 1 + shapes.ANALYTIC.index(shape.kind)
             row["params"] = self.tables.append("geometry", shapes.row(shape))
-        else:
+        if shape.kind in shapes.ONE_OF:
+            row["prim"] = self.single_count + self.n_spheres
+            row["flags"] |= SHAPE_MANY
+            self.balls.append(self.memo(spheres.balls, shape, by=shapes.geometry(shape)))
+            self.n_spheres += len(self.balls[-1])
+            self.tables.append_floats("spheres", self.balls[-1])
+            triangles = self.balls[-1], None, None
+        elif shape.kind not in shapes.ANALYTIC:
             made = self.memo(shapes.counted, shape, by=shapes.geometry(shape))
             vertices, faces, normals, uvs, flat = made
             self.flat += flat
@@ -409,6 +424,7 @@ class _Lowering:
         settings["ambient"] = self.ambient
         settings["first_analytic"] = self.first_analytic
         settings["analytic_count"] = self.analytic_count
+        settings["single_count"], settings["shape_count"] = self.single_count, self.shape_count
         settings["lambda_min"], settings["lambda_max"] = film.lambda_min, film.lambda_max
         settings["tanh_min"], settings["tanh_max"] = tanh_ends(self.density.lo, self.density.hi)
         settings["bands"] = film.bands

@@ -269,6 +269,7 @@ def scene_text() -> str:
             "} Scene;",
             *rows,
             f"#define SHAPE_ROW_WORDS {SHAPE.words}",
+            f"#define SHAPE_ROW_PRIM {next(m.word for m in SHAPE.members if m.name == 'prim')}",
             f"#define INSTANCE_ROW_WORDS {INSTANCE.words}",
             f"#define LIGHT_ROW_WORDS {LIGHT.words}",
             *_args_text("SCENE", _SCENE_ARGS),
@@ -463,13 +464,17 @@ def _shape_tree_text(features: Features) -> str:
     word = {member.name: member.word for member in SHAPE.members}
     cases = [
         f"    if (kind == {1 + shapes.ANALYTIC.index(kind)})\n"
-        f"        return {kind}_intersect({kind}_row(scene.geometry, params), o, d, tmin, tmax);"
+        f"        return {shapes.ONE_OF.get(kind, kind)}_intersect({_shape_text(kind, 'params')}, "
+        "o, d, tmin, tmax);"
         for kind in features.analytic
     ]
+    rows = "many" if set(features.analytic) & set(shapes.ONE_OF) else "single"
     return "\n".join(
         [
             *_includes(features),
-            "inline ShapeHit shape_hit(Scene scene, int row, vec3 o, vec3 d, real tmin, real tmax)",
+            f'#include "lib/shape_rows_{rows}.cl"',
+            "inline ShapeHit shape_hit(Scene scene, int prim, int row, vec3 o, vec3 d, real tmin, "
+            "real tmax)",
             "{",
             "    global const uint *shape = scene.shapes + row * SHAPE_ROW_WORDS;",
             f"    int kind = (int)shape[{word['kind']}];",
@@ -483,6 +488,13 @@ def _shape_tree_text(features: Features) -> str:
     )
 
 
+def _shape_text(kind: str, params: str, active: str = "mask_of(1)") -> str:
+    """The parameters of primitive `prim`, which lie at `params` or, of many in one, beside it."""
+    if kind in shapes.ONE_OF:
+        return f"{kind}_one(scene, {params}, prim, {active})"
+    return f"{kind}_row(scene.geometry, {params})"
+
+
 def _tangents_text(features: Features) -> str:
     """dpdu and dpdv of analytic shapes, in lanes."""
     if not (features.analytic and features.tangents):
@@ -490,7 +502,8 @@ def _tangents_text(features: Features) -> str:
     lines = _includes(features)
     for tangent in ("dpdu", "dpdv"):
         lines += [
-            f"inline vec3 {tangent}_of_shape(Scene scene, ShapeRow shape, vec3 p, vec2 uv)",
+            f"inline vec3 {tangent}_of_shape(Scene scene, ShapeRow shape, integer prim, vec3 p, "
+            "vec2 uv)",
             "{",
             "    vec3 r = v3(0.0f, 0.0f, 0.0f);",
         ]
@@ -498,8 +511,9 @@ def _tangents_text(features: Features) -> str:
             lines += [
                 "    {",
                 f"        mask m = shape.kind == {1 + shapes.ANALYTIC.index(kind)};",
-                f"        if (any(m)) r = sel3(m, {kind}_{tangent}({kind}_row(scene.geometry, "
-                "sel_i(m, shape.params, (integer)(0))), p, uv), r);",
+                "        integer params = sel_i(m, shape.params, (integer)(0));",
+                f"        if (any(m)) r = sel3(m, {shapes.ONE_OF.get(kind, kind)}_{tangent}("
+                f"{_shape_text(kind, 'params', 'm')}, p, uv), r);",
                 "    }",
             ]
         lines += ["    return r;", "}", ""]

@@ -23,7 +23,8 @@ Points = NDArray[np.float32]
 Faces = NDArray[np.uint32]
 Words = NDArray[np.uint32]
 
-ANALYTIC = ("sphere", "disk", "cylinder")  # rays meet these as they are
+ANALYTIC = ("sphere", "disk", "cylinder", "spheres")  # rays meet these as they are
+ONE_OF = {"spheres": "sphere"}  # kinds of many: what each of them is
 UNEVEN = 1e-5  # relative difference of lengths or cosine of axes from which a sphere is none
 PADDING = 1e-6  # of the size of an analytic shape, for what float32 rounds in its kernel
 
@@ -81,9 +82,11 @@ _CORNER_FACES = ((0, 1, 2), (3, 0, 2))
 
 def virtual_files() -> dict[str, str]:
     """Return generated/shape/<kind>.cl per kind: its struct, its loader and its functions."""
+    made = {kind: record.row_text() for kind, record in RECORDS.items()}
+    made |= {kind: f'#include "generated/shape/{one}.cl"\n' for kind, one in ONE_OF.items()}
     return {
-        f"generated/shape/{kind}.cl": f'{record.row_text()}#include "shape/{kind}.cl"\n'
-        for kind, record in RECORDS.items()
+        f"generated/shape/{kind}.cl": f'{text}#include "shape/{kind}.cl"\n'
+        for kind, text in made.items()
     }
 
 
@@ -153,9 +156,15 @@ def attribute(shape: Shape, name: str) -> Points:
 
     Raises SceneError for one that has another shape, or values that are not finite.
     """
-    vertices, faces, _, _ = _in_world(shape)
     per_face = name.startswith("face_")
-    count = len(faces) if per_face else len(vertices)
+    if shape.kind in ONE_OF:
+        count = len(shape.centers)  # type: ignore[attr-defined]
+        if per_face:
+            message = f"attribute {name!r}: spheres have no faces, its name must begin with vertex_"
+            raise SceneError(message, where=where(shape))
+    else:
+        vertices, faces, _, _ = _in_world(shape)
+        count = len(faces) if per_face else len(vertices)
     values = np.asarray(shape.attributes[name], np.float32)  # type: ignore[attr-defined]
     values = values[:, None] if values.ndim == 1 else values
     if values.shape not in ((count, 1), (count, 3)):
@@ -209,12 +218,17 @@ def triangle_rows(vertices: Points, faces: Faces) -> Words:
 def row(shape: Shape) -> Words:
     """Return the words of a rectangle, sphere, disk or cylinder in `geometry`, placed.
 
+    Of spheres, those of one around the origin with radius 1 before `to_world`.
+
     Raises SceneError for a singular transform, or one after which it is no such shape any more.
     """
     matrix = placement(shape)
-    record = RECORDS[shape.kind]
+    record = RECORDS[ONE_OF.get(shape.kind, shape.kind)]
     if isinstance(shape, shapes.Sphere):
-        values = _sphere(shape, matrix)
+        radius = _positive(shape.radius, "radius", shape)
+        values = _sphere(shape, matrix, _three(shape.center, "center", shape), radius)
+    elif isinstance(shape, shapes.Spheres):
+        values = _sphere(shape, matrix, np.zeros(3), 1.0)
     elif isinstance(shape, shapes.Cylinder):
         values = _cylinder(shape, matrix)
     else:
@@ -222,6 +236,11 @@ def row(shape: Shape) -> Words:
         values = {"center": center, "s": s, "t": t, "n": facing(shape)}
     flat = np.concatenate([np.ravel(values[m.name]) for m in record.members])
     return flat.astype(np.float32).view(np.uint32)
+
+
+def member(kind: str, name: str) -> int:
+    """Return the place of a member in a kind's row, in words."""
+    return next(m.word for m in RECORDS[kind].members if m.name == name)
 
 
 def _side(shape: Shape) -> float:
@@ -233,9 +252,9 @@ def facing(shape: Shape) -> NDArray[np.float64]:
     return _side(shape) * transforms.transform_normals(placement(shape), [0.0, 0.0, 1.0])
 
 
-def _sphere(shape: shapes.Sphere, matrix: NDArray[np.float64]) -> dict[str, ArrayLike]:
-    radius = _positive(shape.radius, "radius", shape)
-    center = _three(shape.center, "center", shape)
+def _sphere(
+    shape: Shape, matrix: NDArray[np.float64], center: NDArray[np.float64], radius: float
+) -> dict[str, ArrayLike]:
     axes, scale = _even_axes(matrix[:3, :3], shape)
     return {
         "center": transforms.transform_points(matrix, center),

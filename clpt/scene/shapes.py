@@ -47,6 +47,18 @@ class Sphere(Shape):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Spheres(Shape):
+    """Many spheres in one shape, as particles; each is met as a `sphere` is.
+
+    A `mesh_attribute` texture reads the attributes: the first row is the first sphere's.
+    """
+
+    centers: Any = host(None, "(n, 3) float32, before `to_world`", "m")
+    radii: Any = host(1.0, "(n,), or one of all, before `to_world`, which may scale evenly", "m")
+    attributes: Any = host({}, "name that begins with vertex_ -> (n, 1 or 3) float32, per sphere")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Rectangle(Shape):
     """The square [-1, 1]^2 in the plane z = 0, facing +z; uv run from 0 to 1."""
 
@@ -119,4 +131,4 @@ class Instance(Shape):
             raise SceneError(f"must be a group, not {self.group!r}", where="instance.group")
 
 
-KINDS = (Mesh, Sphere, Rectangle, Disk, Cube, Cylinder, Curves, Instance)
+KINDS = (Mesh, Sphere, Spheres, Rectangle, Disk, Cube, Cylinder, Curves, Instance)

@@ -48,6 +48,10 @@ inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, 
 #if USES_ATTRIBUTES
     s.attributes = shape.attributes;
     s.face = sel_i(active & (shape.kind == 0), prim, (integer)(0));
+#if USES_ANALYTIC
+    mask many = active & ((shape.flags & SHAPE_MANY) != 0);
+    s.face = sel_i(many, texture_face_of_sphere(prim - scene.settings->single_count), s.face);
+#endif
     s.b = s.uv;
 #endif
 #if USES_INSTANCES
@@ -102,8 +106,8 @@ inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, 
 #if USES_ANALYTIC && USES_TANGENTS
     mask analytic = active & (shape.kind != 0);
     if (any(analytic)) {
-        s.dpdu = sel3(analytic, dpdu_of_shape(scene, shape, s.p, s.uv), s.dpdu);
-        s.dpdv = sel3(analytic, dpdv_of_shape(scene, shape, s.p, s.uv), s.dpdv);
+        s.dpdu = sel3(analytic, dpdu_of_shape(scene, shape, prim, s.p, s.uv), s.dpdu);
+        s.dpdv = sel3(analytic, dpdv_of_shape(scene, shape, prim, s.p, s.uv), s.dpdv);
     }
 #endif
     *front = dot3(s.n, d) < 0.0f;

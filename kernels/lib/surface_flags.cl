@@ -3,6 +3,7 @@
 #define SHAPE_UVS 2       /* its vertices have uv */
 #define SHAPE_ONE_LIGHT 8  /* all of its primitives are one row of `lights` */
 #define SHAPE_TWO_SIDED 4  /* the back is shaded as if it were a front */
+#define SHAPE_MANY 16      /* a primitive is one of its spheres; attributes are per sphere */
 
 #define RAY_EPSILON 5e-5f /* of the size of the coordinates */
 #define SHADOW_SHORTER 0.9998f /* a shadow ray ends just before its light */

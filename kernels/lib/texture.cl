@@ -37,7 +37,7 @@ inline real texture_vertex_number(Scene scene, TexturePoint point, integer numbe
     integer first = gather_i(scene.attributes, entry), words = gather_i(scene.attributes, entry + 1);
     real sum = 0.0f;
     for (int corner = 0; corner < 3; corner++) {
-        integer vertex = gather_i(scene.faces, 3 * point.face + corner);
+        integer vertex = texture_corner(scene, point, corner);
         real weight = corner == 0 ? 1.0f - point.b.x - point.b.y : corner == 1 ? point.b.x : point.b.y;
         sum += weight * gather_w(scene.attributes, first + words * vertex);
     }

@@ -5,10 +5,23 @@ typedef struct {
     vec3 p; /* in the world [m] */
 #if USES_ATTRIBUTES
     integer attributes; /* of the mesh: first word in `attributes` of where each of them lies; 0: it has none */
-    integer face;       /* of `faces` */
+    integer face;       /* of `faces`; below 0: of a sphere, see texture_face_of_sphere */
     vec2 b;             /* barycentrics of its vertices 1 and 2 */
 #endif
 } TexturePoint;
+
+#if USES_ATTRIBUTES
+/* `face` for row `sphere` of `spheres`, whose attributes are the same all over it. */
+inline integer texture_face_of_sphere(integer sphere) { return -1 - sphere; }
+
+/* Which row of an attribute holds for a corner of a face; there, a sphere stands for its three corners. */
+inline integer texture_corner(Scene scene, TexturePoint point, int corner)
+{
+    mask ball = point.face < 0;
+    integer vertex = gather_i(scene.faces, sel_i(ball, (integer)(0), 3 * point.face + corner));
+    return sel_i(ball, -1 - point.face, vertex);
+}
+#endif
 
 inline TexturePoint texture_point(vec2 uv, vec3 p)
 {

@@ -10,8 +10,8 @@ inline TraceHit trace_closest(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real far,
     TraceHit h = {b.t, b.u, b.v, b.n, as_integer(b.prim), as_integer(b.tag)};
 #if USES_ANALYTIC
     for (int i = 0; i < scene.settings->analytic_count; i++) {
-        int row = scene.settings->first_analytic + i;
-        ShapeHit s = shape_hit(scene, row, o, d, (real)(0.0f), h.t);
+        int row = shape_row_of(scene, i);
+        ShapeHit s = shape_hit(scene, i, row, o, d, (real)(0.0f), h.t);
         mask nearer = active & (s.t < h.t);
         h.t = sel(nearer, s.t, h.t);
         h.u = sel(nearer, s.uv.x, h.u);
@@ -28,7 +28,7 @@ inline mask trace_occluded(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real t, mask
     mask met = brute_occluded(tris, triangles, o, d, (real)(0.0f), t, active);
 #if USES_ANALYTIC
     for (int i = 0; i < scene.settings->analytic_count && any(active & !met); i++) {
-        ShapeHit s = shape_hit(scene, scene.settings->first_analytic + i, o, d, (real)(0.0f), t);
+        ShapeHit s = shape_hit(scene, i, shape_row_like(scene, i), o, d, (real)(0.0f), t);
         met = met | (active & (s.t < t));
     }
 #endif

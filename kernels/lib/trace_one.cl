@@ -18,8 +18,8 @@ inline TraceHit trace_closest(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real far,
     uint shape = shapes_closest(shape_nodes, shape_indices, scene, o.x, o.y, o.z, d.x, d.y, d.z, 0.0f, &h.t);
     if (shape != BVH_MISS) {
         h.prim = as_int(shape);
-        h.shape = scene.settings->first_analytic + h.prim;
-        ShapeHit s = shape_hit(scene, h.shape, o, d, 0.0f, FAR);
+        h.shape = shape_row_of(scene, h.prim);
+        ShapeHit s = shape_hit(scene, h.prim, h.shape, o, d, 0.0f, FAR);
         h.n = s.n;
         h.u = s.uv.x;
         h.v = s.uv.y;

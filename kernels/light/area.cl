@@ -17,6 +17,19 @@ inline LightSample area_sample(ShapeSample q, Spectrum radiance)
     return s;
 }
 
+/* What textures see at uv of the sphere that row `row` of `lights` stands for, but for the place in the
+ * world. */
+inline TexturePoint area_sphere_point(Scene scene, ShapeRow shape, integer row, vec2 uv)
+{
+    TexturePoint t = texture_point(uv, v3(0.0f, 0.0f, 0.0f));
+#if USES_ATTRIBUTES
+    mask many = (shape.flags & SHAPE_MANY) != 0;
+    t.attributes = shape.attributes;
+    t.face = sel_i(many, texture_face_of_sphere(shape.prim + row - shape.light - scene.settings->single_count), (integer)(0));
+#endif
+    return t;
+}
+
 /* What textures see at barycentrics b of the triangle that row `row` of `lights` stands for, but for the
  * place in the world: the mesh's uv, or the barycentrics themselves where it has none. */
 inline TexturePoint area_triangle_point(Scene scene, ShapeRow shape, integer row, vec2 b)

@@ -1,12 +1,12 @@
-/* Values that a mesh has per vertex or face, linear between the vertices of a triangle. Spectra are
+/* Values that a mesh has per vertex or face, linear between the vertices of a triangle, and spheres for each. Spectra are
  * interpolated as evaluated, not by their coefficients, as bitmap.cl does between texels. Where a shape
  * has no such values the entry of its table is zero, and every index ends at its first word. */
 inline integer mesh_attribute_at(MeshAttribute t, Scene scene, TexturePoint point, int corner, real *weight)
 {
     integer entry = point.attributes + 2 * t.number, first = gather_i(scene.attributes, entry);
-    integer vertex = gather_i(scene.faces, 3 * point.face + corner);
+    integer vertex = texture_corner(scene, point, corner);
     *weight = corner == 0 ? 1.0f - point.b.x - point.b.y : corner == 1 ? point.b.x : point.b.y;
-    return first + gather_i(scene.attributes, entry + 1) * sel_i(t.per_face != 0, point.face, vertex);
+    return first + gather_i(scene.attributes, entry + 1) * sel_i((t.per_face != 0) & (point.face >= 0), point.face, vertex);
 }
 
 Spectrum mesh_attribute_reflectance(MeshAttribute t, Scene scene, TexturePoint point, Wavelengths lambdas)

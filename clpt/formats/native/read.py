@@ -11,7 +11,7 @@ import numpy as np
 
 from clpt import spectra
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
-from clpt.formats import gltf, mesh, strands
+from clpt.formats import gltf, mesh, particles, strands
 from clpt.formats.native import reradiation
 from clpt.formats.native import spectra as json_spectra
 from clpt.formats.native.cursor import Cursor, parse, placed
@@ -32,6 +32,11 @@ ARRAYS = {
     "faces": (3, "integer"),
     "normals": (3, "number"),
     "uvs": (2, "number"),
+}
+# Shapes whose arrays may stand in a file: what is there, and who reads it.
+IN_FILES: dict[type[shapes.Shape], tuple[tuple[str, ...], Callable[[Path], dict[str, Any]]]] = {
+    shapes.Curves: (("points", "lengths"), strands.read),
+    shapes.Spheres: (("centers", "radii", "attributes"), particles.read),
 }
 BASES: dict[str, type[Kind]] = {
     "material": materials.Material,
@@ -85,6 +90,8 @@ class _Reader:
             ),
             "attributes": _attributes,
             "points": _array_reader(4, "number"),
+            "centers": _array_reader(3, "number"),
+            "radii": lambda c: c.numbers() if isinstance(c.value, list) else c.number(),
             "lengths": lambda c: tuple(entry.integer() for entry in c.entries()),
             **{name: _array_reader(*form) for name, form in ARRAYS.items()},
         }
@@ -258,20 +265,22 @@ class _Reader:
             for matrix in placements
         ]
 
-    def curves(self, cursor: Cursor) -> shapes.Shape:
-        """Read curves whose points are in a file."""
-        _only_in_file(cursor, ("points", "lengths"))
-        made = self.make(cursor, shapes.Curves, ("type", "file"))
+    def in_file(self, cursor: Cursor, cls: type[shapes.Shape]) -> shapes.Shape:
+        """Read a shape whose arrays are in a file."""
+        arrays, read = IN_FILES[cls]
+        _only_in_file(cursor, arrays)
+        made = self.make(cursor, cls, ("type", "file"))
         child = cursor.at("file")
-        return dataclasses.replace(made, **placed(child, lambda: strands.read(find_file(child))))
+        return dataclasses.replace(made, **placed(child, lambda: read(find_file(child))))
 
     def shape(self, cursor: Cursor) -> list[shapes.Shape]:
         """Read a shape; a mesh file may hold several, with materials of their own."""
         kind = kind_name(cursor, "shape", kinds("shape"))
         if kind == "instance":
             return self.instances(cursor)
-        if kind == "curves" and "file" in cursor.value:
-            return [self.curves(cursor)]
+        cls = kinds("shape")[kind]
+        if cls in IN_FILES and "file" in cursor.value:
+            return [self.in_file(cursor, cls)]
         if kind != "mesh" or "file" not in cursor.value:
             made = self.kind(cursor, "shape")
             return [_checked_mesh(cursor, made, self.warnings)] if kind == "mesh" else [made]

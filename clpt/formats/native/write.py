@@ -15,7 +15,7 @@ import numpy as np
 
 from clpt import images, spectral_exr
 from clpt.errors import SceneError
-from clpt.formats import strands
+from clpt.formats import particles, strands
 from clpt.formats.native import reradiation as json_reradiation
 from clpt.formats.native import spectra as json_spectra
 from clpt.formats.native.read import ARRAYS, default
@@ -110,6 +110,8 @@ class _Writer:
             given["file"], in_file = self.mesh(thing), (*ARRAYS, "attributes")
         if isinstance(thing, shapes.Curves):
             given["file"], in_file = self.curves(thing), ("points", "lengths")
+        if isinstance(thing, shapes.Spheres):
+            given["file"], in_file = self.spheres(thing), ("centers", "radii", "attributes")
         declared = {name: p for name, p in declared.items() if name not in in_file}
         defaults = {field.name: default(field) for field in dataclasses.fields(plain)}
         for name, param in declared.items():
@@ -188,6 +190,14 @@ class _Writer:
             strands.write(self.path.parent / name, curves.points, curves.lengths)
             self.files[key] = name
         return self.files[key]
+
+    def spheres(self, spheres: shapes.Spheres) -> str:
+        """Write centres, radii and attributes; return the file's name."""
+        label = re.sub(r"\W+", "_", spheres.name) or "spheres"
+        name = f"{self.path.stem}.{label}{len(self.files)}.npz"
+        particles.write(self.path.parent / name, spheres)
+        self.files[name] = name
+        return name
 
     def mesh(self, mesh: shapes.Mesh) -> str:
         """Write a mesh's arrays, unless another shape shares them; return the file's name."""

@@ -1,0 +1,12 @@
+/* Many spheres in one shape: the row at `params` of `geometry` says how all of them are turned, `spheres`
+ * has the centre and the radius of each. Where one is has the functions of kernels/shape/sphere.cl. */
+
+/* The sphere that is primitive `prim`, where `active`; elsewhere the first. */
+inline Sphere spheres_one(Scene scene, integer params, integer prim, mask active)
+{
+    Sphere q = sphere_row(scene.geometry, params);
+    integer at = 4 * sel_i(active, prim - scene.settings->single_count, (integer)(0));
+    q.center = v3(gather(scene.spheres, at), gather(scene.spheres, at + 1), gather(scene.spheres, at + 2));
+    q.radius = gather(scene.spheres, at + 3);
+    return q;
+}
