@@ -10,8 +10,8 @@ import pytest
 
 from clpt.scene import materials as m
 from clpt.scene.params import device_params
+from clpt.testing.settings import directions, pairs
 from tests.kernels.harness import Probe
-from tests.kernels.settings import directions, pairs
 
 mi = pytest.importorskip("mitsuba", reason="the renderer that we compare with is not installed")
 pytestmark = pytest.mark.peers

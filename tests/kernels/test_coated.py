@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from clpt.scene import materials as m
+from clpt.testing.settings import tilted
 from tests.kernels.harness import Probe
-from tests.kernels.settings import tilted
 
 ANGLES = (1.0, 30.0, 60.0, 75.0)
 WALKS, BOUNCES, INDEX = 30_000, 40, 1.5

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from clpt.scene import materials
-from tests.kernels.harness import COMPONENTS, Probe
-from tests.kernels.settings import directions, settings
+from clpt.testing.probe import COMPONENTS
+from clpt.testing.settings import directions, settings
+from tests.kernels.harness import Probe
 
 GUIDE = Path(__file__).resolve().parents[2] / "CONTRIBUTING.md"
 
@@ -25,7 +26,8 @@ def test_the_example_is_a_material(mode):
     scope = dict(vars(materials))
     exec(compile(example("python"), str(GUIDE), "exec", dont_inherit=True), scope)
     cls, rng = scope["Translucent"], np.random.default_rng(21)
-    probe = Probe(cls, mode, source=example("c"))
+    cls.source = example("c")
+    probe = Probe(cls, mode)
     for params in settings(cls, mode, rng, 3):
         for wo in directions(rng, 3):
             wi = directions(rng, 20_000)

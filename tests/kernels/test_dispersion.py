@@ -11,8 +11,8 @@ import pytest
 
 from clpt import spectra
 from clpt.scene import materials as m
+from clpt.testing.settings import tilted
 from tests.kernels.harness import Probe
-from tests.kernels.settings import tilted
 
 LAMBDAS = np.array(
     [[400.0, 500.0, 600.0, 700.0], [450.0, 550.0, 650.0, 425.0], [700.0, 430.0, 520.0, 610.0]]

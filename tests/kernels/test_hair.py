@@ -7,8 +7,8 @@ import pytest
 from scipy.special import i0e
 
 from clpt.scene.materials import Hair
+from clpt.testing.settings import pairs
 from tests.kernels.harness import Probe, map_text, run
-from tests.kernels.settings import pairs
 
 SETTINGS = (
     {"sigma_a": [0.2, 0.5, 0.9], "longitudinal_roughness": 0.3, "azimuthal_roughness": 0.3,
@@ -23,7 +23,7 @@ SETTINGS = (
 def test_bessel():
     x = np.concatenate([np.linspace(0.0, 20.0, 4001), np.logspace(1, 5, 2000)]).astype(np.float32)
     text = map_text("r[0] = bessel_i0_scaled(x[0]);", 1, 1, files=("lib/bessel.cl",))
-    made = run(text, "probe", 16, x[None], 1)[0]
+    made = run(text, 16, x[None], 1)[0]
     np.testing.assert_allclose(made, i0e(x.astype(float)), rtol=6e-7)
 
 

@@ -16,12 +16,12 @@ VALUE = "Spectrum s = {x[0], x[1], x[2], x[3]}; r[0] = luminance_of(s);"
 def luminances(values: np.ndarray) -> np.ndarray:
     """Luminance (n,) of reflectances (n, 4) at the kernels' own wavelengths."""
     text = map_text(VALUE, 4, 1, "spectral", FILES)
-    return run(text, "probe", 8, values.T.astype(np.float32), 1)[0]
+    return run(text, 8, values.T.astype(np.float32), 1)[0]
 
 
 def nodes() -> np.ndarray:
     """Those wavelengths, (4,) [nm]."""
-    return run(map_text(NODES, 1, 4, "spectral", FILES), "probe", 8, np.zeros((1, 1)), 4)[:, 0]
+    return run(map_text(NODES, 1, 4, "spectral", FILES), 8, np.zeros((1, 1)), 4)[:, 0]
 
 
 def test_polynomials_of_the_seventh_degree_are_exact():
@@ -41,5 +41,5 @@ def test_colours_have_the_luminance_of_their_rgb():
 
 def test_rgb_has_rec_709s():
     text = map_text("Spectrum s = {x[0], x[1], x[2]}; r[0] = luminance_of(s);", 3, 1, "rgb", FILES)
-    made = run(text, "probe", 8, np.eye(3, dtype=np.float32), 1)[0]
+    made = run(text, 8, np.eye(3, dtype=np.float32), 1)[0]
     np.testing.assert_allclose(made, [0.2126, 0.7152, 0.0722], rtol=1e-6)

@@ -15,7 +15,7 @@ NAMES = ("ggx", "beckmann")
 def call(body, results, *arguments):
     given = np.stack(np.broadcast_arrays(*map(np.atleast_1d, arguments))).astype(np.float32)
     text = map_text(body, len(given), results, files=FILES)
-    return run(text, "probe", 16, given, results).astype(float)
+    return run(text, 16, given, results).astype(float)
 
 
 def dielectric(cos_i, eta):

@@ -13,8 +13,9 @@ import pytest
 
 from clpt import spectra
 from clpt.scene import materials as m
-from tests.kernels.harness import Probe, root_text, run
-from tests.kernels.settings import directions, settings
+from clpt.testing.probe import root_text
+from clpt.testing.settings import directions, settings
+from tests.kernels.harness import Probe, run
 
 ANGLES = np.arange(0.0, 89.5)
 LAMBDAS = np.arange(360.0, 830.5, 5.0)
@@ -137,7 +138,7 @@ def _measured(name, side=1.0, lanes=16):
     for index, thickness in stack:
         film = index(WAVES) + 0j
         rows += [film.real, film.imag, np.full(len(WAVES), thickness)]
-    r_metal, r, t = run(_text(len(stack)), "probe", lanes, np.array(rows, np.float32), 3)
+    r_metal, r, t = run(_text(len(stack)), lanes, np.array(rows, np.float32), 3)
     return (r_metal, None) if base.imag.any() else (r, t)
 
 

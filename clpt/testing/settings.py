@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 
 from clpt.render.kinds import array_size, lane_type
 from clpt.scene.materials import Layer
 from clpt.scene.params import Kind, Param, device_params
-from tests.kernels.harness import COMPONENTS
+from clpt.testing.probe import COMPONENTS
 
 # limits of what principled kinds, glTF's and hair would make too narrow lobes of for bins
-WIDE = {
+WIDE: dict[str, dict[str, Any]] = {
     "roughness": {"low": 0.5},
     "anisotropic": {"high": 0.7},
     "anisotropy": {"high": 0.8},
@@ -45,8 +46,8 @@ def tilted(degrees: float, azimuth: float = 0.7) -> np.ndarray:
 
 
 def settings(
-    cls: type[Kind], mode: str, rng: np.random.Generator, count: int, /, **fixed: object
-) -> list[dict[str, np.ndarray]]:
+    cls: type[Kind], mode: str, rng: np.random.Generator, count: int, /, **fixed: Any
+) -> list[dict[str, Any]]:
     """Random valid parameters, by name: numbers and spectra (components,); `fixed` wins.
 
     Indices of refraction are by turns near 1 and well above, in either order, as lobes refracted by
@@ -59,7 +60,7 @@ def settings(
     dense_first = len(indices) == 1 or "coat_ior" in indices
     for i in range(count):
         disperses, turn = 2 * i >= count, 1 if dense_first else int(rng.integers(2))
-        drawn = {}
+        drawn: dict[str, Any] = {}
         for name, param in device_params(cls).items():
             if param.role == "index":
                 turn += 1

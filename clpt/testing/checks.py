@@ -1,0 +1,251 @@
+"""What the functions of every material keep. Each check raises AssertionError, and tells where."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.scene.params import device_params
+from clpt.testing.probe import Probe
+from clpt.testing.settings import directions, pairs, settings, tilted
+
+TRANSMIT, DELTA = 2, 4  # kernels/lib/bsdf.cl
+SAMPLES, THETA, PHI, FINE = 60_000, 16, 24, 12
+ANGLES = (25.0, 75.0, 140.0)  # of wo to the normal [degrees]
+ALL_ANGLES = (1.0, 30.0, 60.0, 80.0, 88.0, 100.0, 135.0, 178.0)
+LIT = 8192  # samples of an albedo
+
+Params = Mapping[str, Any]
+Random = np.random.Generator
+
+
+def samples_follow_the_pdf(probe: Probe, params: Params, rng: Random, significance: float) -> None:
+    """Chi-square tests of `sample` against `pdf` over the sphere, at each of ANGLES.
+
+    significance: the chance that one of them fails where all is right.
+    """
+    grid, solid = _fine_grid()
+    for angle in ANGLES:
+        wo = tilted(angle)[None]
+        density = probe(params, wo, grid, grid)["pdf"]
+        expected = _in_bins(density.astype(float) * solid)
+        sampled = probe(params, wo, wo, rng.random((SAMPLES, 3)))
+        spread = (sampled["sampled_pdf"] > 0.0) & (sampled["lobe"] & DELTA == 0)
+        counts = np.bincount(_bin_of(sampled["wi"][spread]), minlength=THETA * PHI)
+        total = expected.sum()
+        _hold(total < 1.005, f"pdf integrates to {total:.4f} at {angle} degrees, {params}")
+        rest = max(0.0, 1.0 - total)
+        p = _p_value(np.append(counts, SAMPLES - spread.sum()), SAMPLES * np.append(expected, rest))
+        _hold(
+            p > significance,
+            f"sample does not follow pdf: p = {p:.1e} at {angle} degrees, {params}",
+        )
+
+
+def weight_is_eval_over_pdf(probe: Probe, params: Params, rng: Random) -> None:
+    """What `sample` says of its direction is what `pdf` and `eval` say."""
+    wo, _ = pairs(rng, 2000)
+    r = probe(params, wo, wo, rng.random((len(wo), 3)))
+    spread = (r["sampled_pdf"] > 1e-3) & (r["lobe"] & DELTA == 0)
+    r = {k: v[spread] for k, v in r.items()}
+    _close(r["sampled_pdf"], r["pdf_again"], f"sample's pdf is not pdf, {params}", rtol=2e-3)
+    product = r["weight"] * r["sampled_pdf"][:, None]
+    _close(product, r["eval_again"], f"weight is not eval / pdf, {params}", rtol=3e-3, atol=1e-5)
+
+
+def lobes_are_told_truly(
+    probe: Probe, params: Params, rng: Random, *, hero_alone: bool = False
+) -> None:
+    """Sides, unit lengths and signs; where the pdf is 0 nothing is reflected.
+
+    hero_alone: the pdf is that of one wavelength, others may go where it cannot.
+    """
+    wo, wi = pairs(rng, 2000)
+    r = probe(params, wo, wi, rng.random((len(wo), 3)))
+    made = r["sampled_pdf"] > 0.0
+    crossed = (wo[:, 2] * r["wi"][:, 2] < 0.0)[made]
+    told = (r["lobe"][made] & TRANSMIT) != 0
+    _hold(np.array_equal(crossed, told), f"LOBE_TRANSMIT is not where wi crosses, {params}")
+    _hold(np.all(r["eta"][made][~crossed] == 1.0), f"eta of a reflection is not 1, {params}")
+    delta = made & (r["lobe"] & DELTA != 0)
+    _hold(np.all(r["sampled_pdf"][delta] <= 1.0), f"a delta lobe's pdf is above 1, {params}")
+    lengths = np.linalg.norm(r["wi"][made], axis=1)
+    _close(lengths, np.ones_like(lengths), f"wi is not of unit length, {params}", atol=1e-5)
+    for name in ("eval", "pdf"):
+        _hold(np.all(r[name] >= 0.0), f"{name} is negative, {params}")
+    if not hero_alone:
+        dark = r["eval"][r["pdf"] == 0.0] < 1e-6
+        _hold(np.all(dark), f"eval is above 0 where pdf is 0, {params}")
+
+
+def lanes_agree(wide: Probe, narrow: Probe, params: Params, rng: Random) -> None:
+    """Two widths give the same numbers."""
+    wo, wi = pairs(rng, 500)
+    u = rng.random((len(wo), 3))
+    made, again = (probe(params, wo, wi, u) for probe in (wide, narrow))
+    for name, value in made.items():
+        where = f"{name} differs between {wide.lanes} and {narrow.lanes} lanes, {params}"
+        _close(again[name], value, where, rtol=2e-5, atol=2e-6)
+
+
+def albedos(
+    probe: Probe, params: Params, rng: Random, angles: Sequence[float] = ALL_ANGLES
+) -> tuple[NDArray, NDArray]:
+    """Share of energy that leaves, for light that comes in at each angle, and its standard error.
+
+    (angles, components) each, after the change of radiance by refraction has been undone.
+    """
+    u = np.stack(np.meshgrid(*[(np.arange(64) + 0.5) / 64, (np.arange(128) + 0.5) / 128]), -1)
+    u = np.concatenate([u.reshape(-1, 2), rng.permutation(LIT)[:, None] / LIT], axis=1)
+    means, errors = [], []
+    for angle in angles:
+        r = probe(params, tilted(angle)[None], tilted(angle)[None], u)
+        made = (r["sampled_pdf"] > 0.0) * r["eta"] ** 2
+        energy = np.where(made[:, None] > 0.0, r["weight"] * made[:, None], 0.0)
+        means.append(energy.mean(axis=0))
+        errors.append(energy.std(axis=0) / np.sqrt(LIT))
+    return np.array(means), np.array(errors)
+
+
+def energy_is_not_made(probe: Probe, params: Params, rng: Random, tolerance: float = 2e-3) -> None:
+    """No more light leaves than comes, by more than a tolerance and four standard errors.
+
+    Indices are taken to be the same at all wavelengths, as else only the hero's are probabilities.
+    """
+    ends = {k: np.full_like(v, np.mean(v)) for k, v in params.items() if k.endswith("_ior")}
+    params = {**params, **ends} if "int_ior" in params else params
+    mean, error = albedos(probe, params, rng)
+    excess = np.max(mean - 1.0 - 4.0 * error)
+    angle = ALL_ANGLES[int(np.argmax((mean - 4.0 * error).max(axis=1)))]
+    _hold(excess < tolerance, f"{excess:.4f} too much energy at {angle} degrees, {params}")
+
+
+def delta_lobes_keep_energy(probe: Probe, params: Params, rng: Random) -> None:
+    """No mirror-like lobe makes light."""
+    wo = directions(rng, 1000)
+    r = probe(params, wo, wo, rng.random((1000, 3)))
+    delta = (r["sampled_pdf"] > 0.0) & (r["lobe"] & DELTA != 0)
+    energy = r["weight"] * (r["eta"] ** 2 * r["sampled_pdf"])[:, None]
+    _hold(np.all(energy[delta] <= 1.0 + 1e-5), f"a delta lobe makes energy, {params}")
+
+
+def is_reciprocal(probe: Probe, params: Params, rng: Random) -> None:
+    """f is the same with wo and wi exchanged."""
+    wo, wi = clear_pairs(rng)
+    there, back = both_ways(probe, params, wo, wi)
+    _close(there, back, f"f(wo, wi) is not f(wi, wo), {params}", rtol=5e-3, atol=1e-4)
+
+
+def clear_pairs(rng: Random) -> tuple[NDArray, NDArray]:
+    """Pairs of uniform directions (n, 3) that are not grazing."""
+    wo, wi = directions(rng, 3000), directions(rng, 3000)
+    keep = (np.abs(wo[:, 2]) > 0.02) & (np.abs(wi[:, 2]) > 0.02)
+    return wo[keep], wi[keep]
+
+
+def both_ways(probe: Probe, params: Params, wo: NDArray, wi: NDArray) -> tuple[NDArray, NDArray]:
+    """f(wo, wi) and f(wi, wo), (n, components) each [1/sr]."""
+    there = probe(params, wo, wi, wo)["eval"] / np.abs(wi[:, 2:])
+    return there, probe(params, wi, wo, wi)["eval"] / np.abs(wo[:, 2:])
+
+
+def extremes_are_finite(probe: Probe, rng: Random, **fixed: Any) -> None:
+    """No NaN at grazing directions, at the ends of each parameter, at random numbers 0 and near 1.
+
+    fixed: parameters that are not drawn.
+    """
+    edge = [0.0, 0.5, 1.0 - 2.0**-24]
+    u = np.stack(np.meshgrid(edge, edge, edge), -1).reshape(-1, 3)
+    w = _extreme_directions()
+    broad = np.broadcast_arrays(w[:, None, None], w[:, None], u)
+    wo, wi, us = (a.reshape(-1, 3) for a in broad)
+    for ends in _limits(probe.cls):
+        (params,) = settings(probe.cls, probe.mode, rng, 1, **{**ends, **fixed})
+        r = probe(params, wo, wi, us)
+        for name in ("eval", "pdf", "sampled_pdf", "albedo"):
+            good = np.isfinite(r[name]) & (r[name] >= 0.0)
+            _hold(np.all(good), f"{name} is not finite or negative, {params}")
+        made = r["sampled_pdf"] > 0.0
+        for name in ("wi", "weight", "eta"):
+            _hold(np.all(np.isfinite(r[name][made])), f"{name} is not finite, {params}")
+        _hold(np.all(r["weight"][made] >= 0.0), f"weight is negative, {params}")
+
+
+def _limits(cls: type) -> list[dict[str, Any]]:
+    """Parameters at the ends of what they may be, one by one and some together."""
+    limits: list[dict[str, Any]] = [{}]
+    declared = device_params(cls)
+    for name, param in declared.items():
+        if param.role == "real":
+            limits += [{name: max(param.low, -1e5)}, {name: min(param.high, 1e5)}]
+        if param.role == "index":
+            limits += [{name: 1.0}, {name: 0.0 if not name.endswith("ior") else 1.7}]
+        if param.role == "choice":
+            limits += [{name: i} for i in range(len(param.choices))]
+    least = {k: max(p.low, -1e5) for k, p in declared.items() if p.role == "real"}
+    flat = {k: 1.0 for k in declared if k.endswith("ior")}
+    return [*limits, least, flat, least | flat, least | {"distribution": 1}]
+
+
+def _extreme_directions() -> NDArray:
+    z = np.array([1.0, 1.0 - 1e-7, 0.5, 1e-3, 1e-5, 1e-8, 0.0])
+    z = np.concatenate([z, -z])
+    r = np.sqrt(1.0 - z * z)
+    return np.concatenate([np.stack([r * c, r * s, z], 1) for c, s in ((1.0, 0.0), (-0.6, 0.8))])
+
+
+def _fine_grid() -> tuple[NDArray, NDArray]:
+    """Midpoints (n, 3) of FINE x FINE cells in every bin of theta and phi; their solid angles."""
+    theta = (np.arange(THETA * FINE) + 0.5) / (THETA * FINE) * np.pi
+    phi = (np.arange(PHI * FINE) + 0.5) / (PHI * FINE) * 2.0 * np.pi
+    t, p = (a.ravel() for a in np.meshgrid(theta, phi, indexing="ij"))
+    w = np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], axis=1)
+    return w, np.sin(t) * np.pi / (THETA * FINE) * 2.0 * np.pi / (PHI * FINE)
+
+
+def _in_bins(values: NDArray) -> NDArray:
+    """Sums (THETA * PHI,) of values on the fine grid."""
+    return values.reshape(THETA, FINE, PHI, FINE).sum(axis=(1, 3)).ravel()
+
+
+def _bin_of(w: NDArray) -> NDArray:
+    t = np.arccos(np.clip(w[:, 2], -1.0, 1.0)) / np.pi * THETA
+    p = (np.arctan2(w[:, 1], w[:, 0]) / (2.0 * np.pi)) % 1.0 * PHI
+    return np.minimum(t.astype(int), THETA - 1) * PHI + np.minimum(p.astype(int), PHI - 1)
+
+
+def _p_value(observed: NDArray, expected: NDArray) -> float:
+    """Chi-square with bins of few expected samples put together."""
+    order = np.argsort(expected)
+    o, e = observed[order], expected[order]
+    few = int(np.searchsorted(np.cumsum(e), 10.0)) + 1
+    few = max(few, int(np.searchsorted(e, 5.0)))
+    o, e = np.append(o[few:], o[:few].sum()), np.append(e[few:], e[:few].sum())
+    if len(o) < 2:
+        return 1.0
+    return chi_square_tail(float(np.sum((o - e) ** 2 / np.maximum(e, 1e-9))), len(o) - 1)
+
+
+def chi_square_tail(x: float, degrees: int) -> float:
+    """The chance of a chi-square above x (Abramowitz and Stegun 26.4.4 and 26.4.5)."""
+    if x <= 0.0:
+        return 1.0
+    half, odd = 0.5 * x, degrees % 2
+    orders = np.arange(0.5 * odd, 0.5 * degrees)
+    terms = [math.exp(n * math.log(half) - half - math.lgamma(n + 1.0)) for n in orders]
+    return min(1.0, math.fsum(terms) + (math.erfc(math.sqrt(half)) if odd else 0.0))
+
+
+def _hold(held: Any, message: str) -> None:
+    if not held:
+        raise AssertionError(message)
+
+
+def _close(
+    found: NDArray, expected: NDArray, message: str, rtol: float = 0.0, atol: float = 0.0
+) -> None:
+    np.testing.assert_allclose(found, expected, rtol=rtol, atol=atol, err_msg=message)

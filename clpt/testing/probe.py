@@ -1,0 +1,197 @@
+"""The functions of a material kind, called on arrays through a small program around them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import device
+from clpt.render import outside
+from clpt.render.films import COSINES, film_colours
+from clpt.render.kinds import array_size, lane_type, struct_text
+from clpt.render.library import BSDF
+from clpt.scene.materials import Layer, Material
+from clpt.scene.params import Param, device_params
+
+COMPONENTS = {"rgb": 3, "spectral": 4}
+LAMBDAS = (532.0, 590.0, 655.0, 441.0)  # [nm], of kinds that ask for them, and of layers
+NOTHING = np.zeros(0)
+RESULTS = ("wi", "weight", "sampled_pdf", "eta", "lobe", "eval", "pdf", "eval_again", "pdf_again")
+
+
+def root_text(mode: str, files: tuple[str, ...] = ()) -> str:
+    """The includes of shading code in a mode ("rgb" or "spectral"), then of `files`."""
+    text = "\n".join(f'#include "{name}"' for name in (*BSDF, *files)) + "\n"
+    return text.replace("generated/spectrum.cl", f"spectrum/{mode}.cl")
+
+
+def run(
+    on: device.Device,
+    virtual: device.Virtual,
+    lanes: int,
+    given: NDArray,
+    rows: int,
+    table: NDArray = NOTHING,
+) -> NDArray[np.float32]:
+    """Run `kernel void probe(global const float *in, global float *out, uint n)` of "probe.cl".
+
+    given: (k, n) float32, streams of `in`; table: what follows them there; virtual: the program's
+    files. Returns (rows, n) float32. n is padded to whole lane blocks.
+    """
+    source = device.assemble("probe.cl", virtual, {"LANES": lanes})
+    program = device.build(on, source)
+    n = given.shape[1]
+    padded = -(-n // 16) * 16
+    data = np.empty((given.shape[0], padded), np.float32)
+    data[:, :n], data[:, n:] = given, given[:, -1:]
+    out = np.empty((rows, padded), np.float32)
+    data = np.concatenate([data.ravel(), np.asarray(table, np.float32).ravel()])
+    give, stream = device.Buffers(on), device.Stream(on.queue)
+    memory = {"in": give.upload("arguments", data), "out": give.allocate("results", out.nbytes)}
+    stream.run(program.kernel("probe").bind(**memory, n=padded), (padded // lanes,), (1,))
+    return stream.read(memory["out"], out)[:, :n]
+
+
+class Probe:
+    """The functions of one material kind in one mode, as functions of arrays.
+
+    on: the device that they run on, by default a context of their own on what `clpt.device.choose`
+    finds.
+    """
+
+    def __init__(
+        self, cls: type[Material], mode: str, lanes: int = 16, on: device.Device | None = None
+    ):
+        self.cls, self.mode, self.lanes = cls, mode, lanes
+        self.components = COMPONENTS[mode]
+        self.on = device.choose() if on is None else on
+
+    def __call__(
+        self, params: Mapping[str, Any], wo: NDArray, wi: NDArray, u: NDArray
+    ) -> dict[str, NDArray]:
+        """Sample at u, evaluate at wi and at the sampled direction.
+
+        params: by name, a number or (components,) for a spectrum, or (n,) and (n, components), and
+        a list of `layers` of constant index, none by default;
+        wo, wi, u: (n, 3). Returns the entries of RESULTS, `albedo` beside them: (n,), (n, 3)
+        for `wi`, (n, components) for spectra; float32.
+        """
+        n = max(len(wo), len(wi), len(u))
+        columns = [np.broadcast_to(a, (n, 3)) for a in (wo, wi, u)]
+        layers = params.get("layers", ())
+        for name, param in self._streamed():
+            wide = self.components if lane_type(param) == "Spectrum" else array_size(param)
+            value = np.asarray(params[name], float)
+            value = value[:, None] if wide == 1 and value.ndim == 1 else value
+            columns.append(np.broadcast_to(value, (n, wide)))
+        if self.cls.needs_wavelengths:
+            value = params.get("lambdas", LAMBDAS[: self.components])
+            columns.append(np.broadcast_to(np.asarray(value, float), (n, self.components)))
+        given = np.concatenate(columns, axis=1).T.astype(np.float32)
+        c = self.components
+        virtual: dict[str, str | device.Part] = {"probe.cl": self._text(len(layers), len(given))}
+        if self.cls.source is not None:
+            virtual[f"bsdf/{self.cls.kind}.cl"] = outside.text(self.cls)
+        table = self._table(params, layers)
+        out = run(self.on, virtual, self.lanes, given, 8 + 4 * c, table).T
+        parts = np.split(out, np.cumsum([3, c, 1, 1, 1, c, 1, c, 1]), axis=1)
+        named = dict(zip((*RESULTS, "albedo"), parts, strict=True))
+        named["lobe"] = named["lobe"].astype(int)
+        return {k: v[:, 0] if v.shape[1] == 1 else v for k, v in named.items()}
+
+    def _streamed(self) -> list[tuple[str, Param]]:
+        return [(k, p) for k, p in device_params(self.cls).items() if p.role != "layers"]
+
+    def _table(self, params: Mapping[str, Any], layers: Sequence[Layer]) -> NDArray:
+        """What stands in `in` after the streams: the layers, or in RGB mode their colours."""
+        if not layers:
+            return NOTHING
+        if self.mode == "spectral":
+            films = [[e.eta.value, e.k.value, e.thickness, e.profile] for e in layers]
+            return np.array(films, np.float32)
+        indices = {
+            k: np.asarray(params[k], float) for k, p in self._streamed() if p.role == "index"
+        }
+        if "int_ior" in indices:  # in RGB mode light is refracted by the mean ratio
+            indices = {"int_ior": indices["int_ior"] / indices["ext_ior"], "ext_ior": np.ones(1)}
+        constant = {k: float(v.mean()) for k, v in indices.items()}
+        return film_colours(self.cls(**constant, layers=layers))  # type: ignore[arg-type, call-arg]
+
+    def _layers_text(self, count: int, rows: int) -> list[str]:
+        """Layers that stand in `in` after its rows, and setting m.layers."""
+        if "layers" not in device_params(self.cls):
+            return ["", ""]
+        if not count:
+            return ['#include "lib/boundary_bare.cl"', "    m.layers = layers_none();"]
+        if self.mode == "spectral":
+            lambdas = ", ".join(f"(real)({v}f)" for v in LAMBDAS)
+            return [
+                struct_text(Layer) + "typedef struct { global const float *at; integer count;"
+                " Spectrum lambdas; } Layers;\n"
+                "inline Layer layer_at(Layers l, integer i)\n{\n    i *= 4;\n"
+                "    Layer r = {spectrum_of(gather(l.at, i)), spectrum_of(gather(l.at, i + 1)),\n"
+                "               gather(l.at, i + 2), gather(l.at, i + 3)};\n    return r;\n}\n"
+                '#include "lib/boundary_film.cl"',
+                f"    Layers layers = {{in + {rows} * n, {count}, {{{lambdas}}}}};\n"
+                "    m.layers = layers;",
+            ]
+        return [
+            "typedef struct { global const float *spectra; } Tables;\n"
+            "typedef struct { Tables scene; integer count, table, rows; real profile; } Layers;\n"
+            f'#define FILM_COSINES {COSINES}\n#include "lib/boundary_table.cl"',
+            f"    Layers layers = {{{{in + {rows} * n}}, {count}, 0, 1, 1.0f}};\n"
+            "    m.layers = layers;",
+        ]
+
+    def _text(self, layers: int, rows: int) -> str:
+        boundary, film = self._layers_text(layers, rows)
+        kind, names = self.cls.kind, "xyzw"[: self.components]
+        at, reads = 9, []
+        for name, param in self._streamed():
+            form = lane_type(param)
+            members = [f"m.{name}.{c}" for c in names] if form == "Spectrum" else [f"m.{name}"]
+            if (size := array_size(param)) > 1:
+                members = [f"m.{name}[{i}]" for i in range(size)]
+            for member in members:
+                row = f"block_load(in + {at} * n + at)"
+                value = f"to_integer({row})" if form == "integer" else row
+                reads.append(f"    {member} = {value};")
+                at += 1
+        if self.cls.tints:
+            reads.append("    m.luminance = luminance_of(m.base_color);")
+        if self.cls.needs_wavelengths:
+            for i, c in enumerate(names):
+                reads.append(f"    m.lambdas.{c} = block_load(in + {at + i} * n + at);")
+        spectra = {name: [f"{name}.{c}" for c in names] for name in ("f", "again", "albedo")}
+        weight = [f"s.weight.{c}" for c in names]
+        results = ["s.wi.x", "s.wi.y", "s.wi.z", *weight, "s.pdf", "s.eta", "to_real(s.lobe)"]
+        results += [*spectra["f"], "pdf", *spectra["again"], "pdf_again", *spectra["albedo"]]
+        writes = [f"    block_store(out + {i} * n + at, {r});" for i, r in enumerate(results)]
+        vectors = ", ".join(
+            f"{v} = v3({', '.join(f'block_load(in + {3 * i + j} * n + at)' for j in range(3))})"
+            for i, v in enumerate(("wo", "wi", "u"))
+        )
+        return "\n".join(
+            [
+                root_text(self.mode) + boundary,
+                struct_text(self.cls),
+                f'#include "bsdf/{kind}.cl"',
+                "kernel void probe(global const float *in, global float *out, uint n)",
+                "{",
+                "    uint at = get_global_id(0) * LANES;",
+                f"    vec3 {vectors};",
+                f"    {self.cls.__name__} m;",
+                *reads,
+                film,
+                f"    BsdfSample s = {kind}_sample(m, wo, u);",
+                f"    Spectrum f = {kind}_eval(m, wo, wi), again = {kind}_eval(m, wo, s.wi);",
+                f"    real pdf = {kind}_pdf(m, wo, wi), pdf_again = {kind}_pdf(m, wo, s.wi);",
+                f"    Spectrum albedo = {kind}_albedo(m);",
+                *writes,
+                "}",
+                "",
+            ]
+        )

@@ -1,0 +1,81 @@
+"""A good material passes the checks that authors have, and each fault is found and named."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+
+import clpt
+from clpt import device, testing
+from clpt.scene import materials, textures
+from clpt.scene.params import real, reflectance
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Chalk(materials.Material):
+    """Lambertian reflection that a power of the cosines dims; `dust` takes some of it away."""
+
+    colour: Any = reflectance(0.5, "albedo")
+    dust: Any = real(0.5, "how dark the edges are", low=0.0, high=4.0, textured=True)
+
+    source = """
+    real chalk_pdf(Chalk m, vec3 wo, vec3 wi)
+    {
+        return sel(wo.z > 0.0f, cosine_hemisphere_pdf(wi.z), (real)(0.0f));
+    }
+    Spectrum chalk_eval(Chalk m, vec3 wo, vec3 wi)
+    {
+        real edge = pow_r(max_r(wo.z, (real)(0.0f)) * max_r(wi.z, (real)(0.0f)), m.dust);
+        return spectrum_scale(m.colour, edge * chalk_pdf(m, wo, wi));
+    }
+    BsdfSample chalk_sample(Chalk m, vec3 wo, vec3 u)
+    {
+        BsdfSample s = bsdf_nothing();
+        vec2 uv = {u.x, u.y};
+        s.wi = cosine_hemisphere(uv);
+        s.pdf = chalk_pdf(m, wo, s.wi);
+        s.weight = spectrum_scale(m.colour, pow_r(max_r(wo.z, (real)(0.0f)) * s.wi.z, m.dust));
+        return s;
+    }
+    Spectrum chalk_albedo(Chalk m) { return m.colour; }
+    """
+
+
+@pytest.fixture(scope="module")
+def on() -> device.Device:
+    return device.choose()
+
+
+def test_a_good_one_passes(on: device.Device) -> None:
+    testing.check_material(Chalk, device=on, modes=("spectral",))
+    mine = Chalk(colour=(0.9, 0.2, 0.1), dust=textures.Checkerboard())
+    testing.check_material(mine, device=on, modes=("rgb",))
+
+
+FAULTS = {
+    "weight is not eval": ("s.wi.z, m.dust)", "s.wi.z, m.dust + 0.1f)"),
+    "sample's pdf is not pdf": ("s.pdf = ", "s.pdf = 1.1f * "),
+    "sample does not follow pdf": ("{u.x, u.y}", "{u.x * u.x, u.y}"),
+    r"pdf integrates to 1\.5": ("wo.z > 0.0f, cosine", "wo.z > 0.0f, 1.5f * cosine"),
+    "LOBE_TRANSMIT is not": ("s.weight = ", "s.wi.z = -s.wi.z; s.weight = "),
+    "wi is not of unit length": ("s.pdf = ", "s.wi.x = 0.0f; s.pdf = "),
+    "eval is above 0 where pdf is 0": ("real edge =", "if (1) return m.colour; real edge ="),
+    "too much energy": ("spectrum_scale(m.colour, ", "spectrum_scale(m.colour, 2.0f * "),
+    r"f\(wo, wi\) is not f\(wi, wo\)": ("max_r(wo.z, (real)(0.0f)) * ", ""),
+    "eval is not finite": ("real edge =", "real edge = 0.0f / wo.z +"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_is_named(fault: str, on: device.Device) -> None:
+    cls = type("Chalk", (Chalk,), {"source": Chalk.source.replace(*FAULTS[fault])})
+    with pytest.raises(AssertionError, match=fault):
+        testing.check_material(cls(dust=0.5), device=on, modes=("rgb",))
+
+
+def test_what_is_no_kind_is_refused() -> None:
+    bare = type("Bare", (materials.Material,), {})
+    with pytest.raises(clpt.SceneError, match="no `source`"):
+        testing.check_material(bare)
