@@ -60,6 +60,11 @@ def check(cls: type[Material], where: str | None = None) -> None:
             f"the material class {cls.__name__!r} cannot have this name: clpt has {taken[0]!r}",
             where=where,
         )
+    if cls.__eq__ is not Material.__eq__:
+        raise SceneError(
+            f"declare {cls.__name__!r} with eq=False: materials are told apart by identity",
+            where=where,
+        )
     if not cls.__name__.isascii():
         raise SceneError(f"{cls.__name__!r} is no name in OpenCL: use a to z", where=where)
 

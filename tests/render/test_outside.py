@@ -123,6 +123,12 @@ def test_names_that_cannot_be(name: str, source: str | None, fault: str) -> None
         lower(Scene(camera=cameras.Perspective(), shapes=[shapes.Cube(material=cls(), name="box")]))
 
 
+def test_materials_are_told_apart_by_identity() -> None:
+    equal = dataclass(frozen=True, kw_only=True)(type("Equal", (Paint,), {}))
+    with pytest.raises(clpt.SceneError, match="eq=False"):
+        outside.check(equal)
+
+
 def test_two_of_one_name_are_refused_in_one_scene() -> None:
     other = type("Paint", (Paint,), {"source": Paint.source})
     both = [shapes.Cube(material=Paint()), shapes.Cube(material=other())]
