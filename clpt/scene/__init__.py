@@ -10,6 +10,19 @@ from clpt.scene import cameras, integrators, lights, materials, shapes, textures
 from clpt.scene.integrators import Film, Path, Sobol
 from clpt.scene.params import Kind
 
+__all__ = [
+    "KINDS",
+    "Film",
+    "Scene",
+    "cameras",
+    "integrators",
+    "kinds",
+    "lights",
+    "materials",
+    "shapes",
+    "textures",
+]
+
 KINDS: dict[str, tuple[type[Kind], ...]] = {
     "material": materials.KINDS,
     "light": lights.KINDS,
@@ -29,7 +42,15 @@ def kinds(category: str) -> dict[str, type[Kind]]:
 
 @dataclass
 class Scene:
-    """A whole scene; `warnings` tells what a loader had to pass over."""
+    """A whole scene.
+
+    shapes, lights: what there is; lights that are surfaces are a shape's `emission`. integrator:
+    how light is followed; sampler: where its random numbers come from; film: size, mode, filter and
+    colours of the picture. spp: samples of a pixel, for `clpt.render`; seed: of the random numbers.
+    warnings: what a loader had to pass over; extra: what else it found, for people.
+
+    Raises SceneError for `spp` that is no whole number above zero.
+    """
 
     camera: cameras.Camera
     shapes: list[shapes.Shape] = field(default_factory=list)

@@ -27,6 +27,7 @@ ELSEWHERE = {
     "CONTRIBUTING.md": "contributing.md",
     "CHANGELOG.md": "changelog.md",
     "kernels/README.md": "kernels.md",
+    "examples/README.md": "examples.md",
     "bench/results/README.md": "figures.md",
     "bench/NOTES.md": "notes.md",
 }

@@ -1,0 +1,33 @@
+"""Every example runs, is short enough to be read at once, and leaves a picture."""
+
+from __future__ import annotations
+
+import runpy
+import sys
+from pathlib import Path
+
+import pytest
+
+import clpt
+
+FOLDER = Path(__file__).resolve().parents[1] / "examples"
+EXAMPLES = sorted(FOLDER.glob("*.py"))
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+def test_it_writes_a_picture(
+    example: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
+):
+    monkeypatch.setattr(sys, "argv", [str(example), str(tmp_path)])
+    runpy.run_path(str(example), run_name="__main__")
+    picture = clpt.read(tmp_path / f"{example.stem}.png")
+    assert picture.shape[0] >= 100 and picture.shape[1] >= 100
+    assert 0.02 < picture.mean() < 0.98 and picture.std() > 0.02  # neither black, white nor flat
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+def test_it_can_be_read_at_once(example: Path):
+    lines = example.read_text("utf-8").splitlines()
+    assert len(lines) < 80
+    assert lines[0].startswith('"""')
+    assert f"`{example.name}`" in (FOLDER / "README.md").read_text("utf-8")
