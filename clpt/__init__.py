@@ -19,6 +19,7 @@ from clpt.errors import (
 )
 from clpt.formats import load
 from clpt.images import read, write
+from clpt.rays import Accel, Hits
 from clpt.render.library import kernel_source
 from clpt.render.renderer import Progress, Renderer, render
 from clpt.scene import Scene
@@ -32,8 +33,10 @@ except metadata.PackageNotFoundError:  # a checkout that is not installed
     __version__ = "0.0.0"
 
 __all__ = [
+    "Accel",
     "ClptError",
     "DeviceError",
+    "Hits",
     "KernelBuildError",
     "MemoryBudgetError",
     "Progress",

@@ -20,10 +20,11 @@ MAY_IMPORT = {
     "scene": BASE,
     "device": BASE,
     "bvh": BASE | {"device"},
+    "rays": BASE | {"device", "bvh"},
     "render": BASE | {"scene", "device", "bvh"},
     "formats": BASE | {"scene"},
 }
-OPENCL = {"device", "bvh", "render"}  # only these import pyopencl
+OPENCL = {"device", "bvh", "rays", "render"}  # only these import pyopencl
 # kernels/<folder>: the folders that its files may include; generated text stands between them.
 MAY_INCLUDE = {
     "lib": {"lib", "generated", "bvh"},

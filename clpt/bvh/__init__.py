@@ -1,6 +1,6 @@
 """Acceleration structures: triangles and boxes to nodes, built on the device."""
 
-from .build import Bvh, build, build_boxes, build_parts, choose_layout
+from .build import Bvh, build, build_boxes, build_parts, choose_layout, choose_tree
 from .building import Building
 from .layouts import LAYOUTS
 from .refit import refit, refit_boxes
@@ -13,6 +13,7 @@ __all__ = [
     "build_boxes",
     "build_parts",
     "choose_layout",
+    "choose_tree",
     "refit",
     "refit_boxes",
 ]

@@ -63,6 +63,10 @@ class Stream:
             )
         )  # fmt: skip
 
+    def mark(self) -> cl.Event:
+        """Enqueue nothing, after what `after` was told of: an event of all before."""
+        return self._note(cl.enqueue_marker(self.queue, wait_for=self._waits()))
+
     def read(self, source: cl.Buffer, into: np.ndarray, offset: int = 0) -> np.ndarray:
         """A buffer's content; waits for it."""
         if into.nbytes:

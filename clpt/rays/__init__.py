@@ -1,0 +1,6 @@
+"""Ray queries on an application's own queue: what rays meet among triangles."""
+
+from .accel import Accel
+from .queries import Hits
+
+__all__ = ["Accel", "Hits"]

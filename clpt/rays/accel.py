@@ -1,0 +1,101 @@
+"""An acceleration structure over an application's triangles."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pyopencl as cl
+
+from .. import bvh
+from ..device import Events
+from ..errors import SceneError
+from .arrays import Given, held, on_device
+from .batch import lent
+from .queries import Queries
+
+
+class Accel(Queries):
+    """Triangles that rays can be sent at, on the caller's queue and in its context.
+
+    vertices: (n, 3) float32; faces: (m, 3) uint32 or int32. Arrays of numpy are copied; a PyOpenCL
+    array or buffer is read where it lies, by the constructor, which waits until that is done, and
+    is not copied: faces on the device must stay as they are for as long as `update` is called. What
+    is on the device is not checked: a face that names no vertex reads outside of its buffer.
+    layout: "wide8" or "binary"; by default what is quickest on the device. wait_for: events that
+    the arrays wait for; those that PyOpenCL arrays know are waited for anyhow.
+
+    Raises SceneError for arrays of wrong shapes or types, for vertices that are not finite or
+    beyond 1e12 and for indices out of range; MemoryBudgetError.
+    """
+
+    def __init__(
+        self,
+        queue: cl.CommandQueue,
+        vertices: Given,
+        faces: Given,
+        *,
+        layout: str | None = None,
+        wait_for: Events = None,
+    ):
+        super().__init__(queue, layout)
+        for event in wait_for or ():
+            event.wait()
+        points, self.vertices = self._laid("vertices", vertices, np.float32)
+        corners, _ = self._laid("faces", faces, np.uint32, np.int32)
+        self._stream.wait()
+        self.tree = bvh.build(self.device, points, corners, layout=self.layout)
+        self._trees = self.tree.buffers
+        self._faces = self._upload(corners, np.uint32)
+        self._refitting = bvh.Building(self.device, stream=self._stream)
+
+    def update(self, vertices: Given, *, wait_for: Events = None) -> cl.Event:
+        """Enqueue that the triangles move: as many vertices as before, elsewhere; the faces stay.
+
+        Where they went far rays get slower; then make a new one. A triangle with a vertex that is
+        not finite is met by no ray until it has a better one. Leave arrays on the device alone
+        until the event. Raises SceneError for other numbers or types, DeviceError when closed.
+        """
+        with self._lock:
+            self._opened()
+            self._stream.after(wait_for)
+            points, count = self._laid("vertices", vertices, np.float32)
+            if count != self.vertices:
+                raise SceneError(f"there were {self.vertices}, now {count}", where="vertices")
+            if not self.tree.count:
+                return self._stream.mark()
+            points = self._upload(points, np.float32)
+            event = bvh.refit(self._refitting, self.tree, points, self._faces)
+            return event or self._stream.mark()
+
+    def _laid(self, name: str, given: Given, *kinds: type) -> tuple[Any, int]:
+        """A numpy array (n, 3), or a buffer with nothing but such an array; and n.
+
+        The next command waits for what the array does.
+        """
+        if not on_device(given):
+            array = np.asarray(given)
+            if array.size == 0:
+                return np.zeros((0, 3), kinds[0]), 0
+            if array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in "fiu":
+                wanted = f"(n, 3) {np.dtype(kinds[0])}"
+                found = f"{array.shape} {array.dtype}"
+                raise SceneError(f"{wanted} is wanted, not {found}", where=name)
+            return array, len(array)
+        found = held(self.queue.context, name, given, 3, *kinds)
+        if not found.rows:
+            return np.zeros((0, 3), kinds[0]), 0
+        self._stream.after(found.events)
+        plain = isinstance(found.buffer, cl.Buffer) and not found.begin
+        if plain and found.buffer.size == 12 * found.rows:
+            return found.buffer, found.rows
+        whole = cl.Buffer(self.queue.context, cl.mem_flags.READ_WRITE, 12 * found.rows)
+        places = {"src_offset": 4 * found.begin, "byte_count": 12 * found.rows}
+        self._stream.copy(whole, found.buffer, **places)
+        return whole, found.rows
+
+    def _upload(self, array: Any, kind: type) -> Any:
+        """The array on the device, at once; None for no values. What is there is taken as it is."""
+        if not isinstance(array, np.ndarray):
+            return array
+        return lent(self.queue.context, np.ascontiguousarray(array, kind), False).buffer

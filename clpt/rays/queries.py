@@ -1,0 +1,195 @@
+"""Asking a tree: rays in, hits out, on the host or on the device."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+import pyopencl as cl
+from pyopencl.array import Array
+
+from ..bvh import choose_tree
+from ..device import Bound, Device, Events, Program, Stream, assemble, build
+from ..errors import DeviceError, SceneError
+from . import batch
+from .arrays import Given
+
+_GROUP = 64  # rays of a work-group
+_HITS: batch.Made = {
+    "t": (0, np.float32),
+    "primitive": (0, np.int32),
+    "barycentrics": (2, np.float32),
+}
+_TREES = ("wide8", "binary")
+_LENT = ("origins", "directions", "t_mins", "t_maxs")
+_Self = TypeVar("_Self", bound="Queries")
+
+
+@dataclass(frozen=True)
+class Hits:
+    """What rays meet first, in numpy or PyOpenCL arrays as the rays were.
+
+    t: (n,) float32 in units of the direction, inf where nothing is met; primitive: (n,) int32 row
+    of `faces`, -1 where nothing is met; barycentrics: (n, 2) float32 of the face's second and third
+    vertex; instance: (n,) int32, which one, or -1, and None where there are no instances; event:
+    after which they are valid.
+    """
+
+    t: Any
+    primitive: Any
+    barycentrics: Any
+    instance: Any
+    event: cl.Event
+
+
+class Queries:
+    """What an acceleration structure can be asked.
+
+    Every method may be called from any thread; calls on one object run one after the other.
+    """
+
+    instanced = False
+
+    def __init__(self, queue: cl.CommandQueue, layout: str | None):
+        self.queue = queue
+        self.device = Device.adopt(queue)
+        self.layout = choose_tree(self.device) if layout is None else layout
+        if self.layout not in _TREES:
+            raise SceneError(f"{layout!r} is none of {', '.join(_TREES)}", where="layout")
+        self._stream = Stream(queue)
+        self._lock = threading.RLock()
+        self._kernels: dict[str, Bound] = {}
+        self._trees: dict[str, cl.Buffer] | None = {}
+
+    def intersect(
+        self,
+        origins: Given,
+        directions: Given,
+        t_min: Given = 0.0,
+        t_max: Given = math.inf,
+        *,
+        out: Hits | None = None,
+        wait_for: Events = None,
+    ) -> Hits:
+        """What each ray meets first, at t_min < t < t_max but for a rounding.
+
+        origins, directions: (n, 3) float32, directions of any length; t_min, t_max: numbers or (n,)
+        float32. If origins or directions are on the device, so are the hits, and all is only
+        enqueued: leave the arrays alone until the event. Otherwise it waits, and hits are numpy's.
+        A single vector of the host stands for all rays. Rays that are not finite or have no
+        direction meet nothing. out: hits of as many rays on the device, to be written again.
+
+        Raises SceneError for arrays of wrong shapes or types, DeviceError when closed.
+        """
+        made = {**_HITS, "instance": (0, np.int32)} if self.instanced else _HITS
+        before = {} if out is None else vars(out)
+        rays = batch.rays(self.queue.context, origins, directions, t_min, t_max)
+        found, event = self._run("query_closest", rays, made, before, wait_for)
+        return Hits(**{"instance": None, **found}, event=event)
+
+    def occluded(
+        self,
+        origins: Given,
+        directions: Given,
+        t_min: Given = 0.0,
+        t_max: Given = math.inf,
+        *,
+        out: Array | None = None,
+        wait_for: Events = None,
+    ) -> Any:
+        """Whether each ray meets anything at t_min < t < t_max: (n,) uint8, 1 or 0.
+
+        Quicker than `intersect`, otherwise like it; an array on the device is valid when the last
+        of its `events` is. out: such an array to be written again.
+        """
+        before = {} if out is None else {"met": out}
+        rays = batch.rays(self.queue.context, origins, directions, t_min, t_max)
+        found, _ = self._run("query_occluded", rays, {"met": (0, np.uint8)}, before, wait_for)
+        return found["met"]
+
+    def close(self) -> None:
+        """Give the device's memory back; arrays of the caller are left alone."""
+        with self._lock:
+            for buffer in (self._trees or {}).values():
+                buffer.release()
+            self._trees = None
+            self._kernels.clear()
+
+    def __enter__(self: _Self) -> _Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _opened(self) -> dict[str, cl.Buffer]:
+        if self._trees is None:
+            raise DeviceError(f"this {type(self).__name__} is closed; make a new one")
+        return self._trees
+
+    def _run(
+        self,
+        name: str,
+        rays: batch.Rays,
+        made: batch.Made,
+        out: Mapping[str, Any],
+        wait_for: Events,
+    ) -> tuple[Mapping[str, Any], cl.Event]:
+        """Enqueue a kernel, on the host wait for it; what it wrote, and its event."""
+        arrays: Mapping[str, Any]
+        with self._lock:
+            trees = self._opened()
+            if not rays.waits:
+                arrays, places = batch.results(self.queue, rays.count, made, out)
+                event = self._enqueue(name, trees, rays, places, wait_for)
+                for array in arrays.values():
+                    array.events[:] = [event]  # which has waited for those before
+                return arrays, event
+            arrays, places = batch.host_results(self.queue.context, rays.count, made)
+            event = self._enqueue(name, trees, rays, places, wait_for)
+            for key, array in arrays.items():
+                if rays.count:  # onto itself: it comes back from where the device has a copy
+                    event = self._stream.read_later(places[key].buffer, array)
+            event.wait()
+            if rays.count:  # the kernel lets go of the caller's memory
+                self._kernels[name].set(**dict.fromkeys([*_LENT, *made]))
+        return arrays, event
+
+    def _enqueue(
+        self,
+        name: str,
+        trees: Mapping[str, cl.Buffer],
+        rays: batch.Rays,
+        places: Mapping[str, batch.Held],
+        wait_for: Events,
+    ) -> cl.Event:
+        parts = [*rays.held, *places.values()]
+        self._stream.after([*(wait_for or ()), *(e for part in parts for e in part.events)])
+        if not rays.count:
+            return self._stream.mark()
+        arguments = {
+            **trees,
+            **rays.named,
+            **{key: place.buffer for key, place in places.items()},
+            "count": rays.count,
+            "begins": batch.begins(parts),
+        }
+        bound = self._kernels.get(name)
+        if bound is None:
+            bound = self._kernels[name] = self._program().kernel(name).bind(**arguments)
+        else:
+            bound.set(**arguments)
+        return self._stream.run(bound, (-(-rays.count // _GROUP) * _GROUP,), (_GROUP,))
+
+    def _program(self) -> Program:
+        """The kernels of the layout."""
+        texts = {
+            "generated/layout.cl": (
+                f'#include "bvh/{self.layout}.cl"\n#define LAYOUT(verb) {self.layout}_##verb\n'
+            ),
+            "generated/instance_traversal.cl": "",
+        }
+        return build(self.device, assemble("bvh/query.cl", texts, {"USES_INSTANCES": 0}))
