@@ -39,11 +39,10 @@ class Accel(Queries):
         wait_for: Events = None,
     ):
         super().__init__(queue, layout)
-        for event in wait_for or ():
-            event.wait()
+        self._stream.after(wait_for)
         points, self.vertices = self._laid("vertices", vertices, np.float32)
         corners, _ = self._laid("faces", faces, np.uint32, np.int32)
-        self._stream.wait()
+        self._stream.mark().wait()  # the build has another stream
         self.tree = bvh.build(self.device, points, corners, layout=self.layout)
         self._trees = self.tree.buffers
         self._faces = self._upload(corners, np.uint32)
@@ -79,8 +78,8 @@ class Accel(Queries):
                 return np.zeros((0, 3), kinds[0]), 0
             if array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in "fiu":
                 wanted = f"(n, 3) {np.dtype(kinds[0])}"
-                found = f"{array.shape} {array.dtype}"
-                raise SceneError(f"{wanted} is wanted, not {found}", where=name)
+                there = f"{array.shape} {array.dtype}"
+                raise SceneError(f"{wanted} is wanted, not {there}", where=name)
             return array, len(array)
         found = held(self.queue.context, name, given, 3, *kinds)
         if not found.rows:

@@ -108,7 +108,7 @@ def host_results(
     context: cl.Context, count: int, made: Made
 ) -> tuple[dict[str, NDArray[Any]], dict[str, Held]]:
     """The same on the host, for a kernel that is waited for."""
-    arrays = {
+    arrays: dict[str, NDArray[Any]] = {
         name: np.empty((count, columns) if columns else count, kind)
         for name, (columns, kind) in made.items()
     }

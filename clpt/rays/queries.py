@@ -16,7 +16,7 @@ from ..bvh import choose_tree
 from ..device import Bound, Device, Events, Program, Stream, assemble, build
 from ..errors import DeviceError, SceneError
 from . import batch
-from .arrays import Given
+from .arrays import Given, Held
 
 _GROUP = 64  # rays of a work-group
 _HITS: batch.Made = {
@@ -163,7 +163,7 @@ class Queries:
         name: str,
         trees: Mapping[str, cl.Buffer],
         rays: batch.Rays,
-        places: Mapping[str, batch.Held],
+        places: Mapping[str, Held],
         wait_for: Events,
     ) -> cl.Event:
         parts = [*rays.held, *places.values()]

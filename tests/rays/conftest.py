@@ -32,7 +32,7 @@ def soup() -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.fixture(scope="session")
 def rays() -> tuple[np.ndarray, np.ndarray]:
-    """origins and directions (1000, 3) float32 through the unit cube, directions of many lengths."""
+    """origins and directions (1000, 3) float32 through a cube, directions of many lengths."""
     rng = np.random.default_rng(6)
     o = (0.5 + rng.normal(size=(1000, 3))).astype(np.float32)
     d = rng.random((1000, 3)) - o

@@ -149,7 +149,7 @@ def test_what_is_refused(queue, soup, rays):
     ):
         with pytest.raises(clpt.SceneError, match=told):
             clpt.Accel(queue, *arguments)
-    with pytest.raises(clpt.SceneError, match="layout.*brute"):
+    with pytest.raises(clpt.SceneError, match=r"layout: .*brute"):
         clpt.Accel(queue, vertices, faces, layout="brute")
     accel, there = clpt.Accel(queue, vertices, faces), to_device(queue, d)
     for arguments, told in (
