@@ -6,6 +6,7 @@
 >>> clpt.write("out.exr", image)
 """
 
+import logging
 from importlib import metadata
 
 from clpt.errors import (
@@ -26,6 +27,8 @@ from clpt.scene import Scene
 from clpt.spectral_exr import SpectralImage
 from clpt.spectral_exr import read as read_spectral
 from clpt.spectral_exr import write as write_spectral
+
+logging.getLogger("clpt").addHandler(logging.NullHandler())  # quiet until the program asks
 
 try:
     __version__ = metadata.version("clpt")

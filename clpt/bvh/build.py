@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -15,6 +16,8 @@ from ..device import Device
 from ..errors import SceneError
 from .building import Array, Building
 from .layouts import BOX_LAYOUTS, LAYOUTS, Mesh, Part
+
+log = logging.getLogger(__name__)
 
 BRUTE_LIMIT = 96  # triangles up to which brute force is faster; measured, see bench/NOTES.md
 
@@ -97,6 +100,7 @@ def _build(
     packed = LAYOUTS[layout](building, mesh)
     building.stream.wait()
     stats = {**packed.stats, "seconds": time.perf_counter() - start}
+    log.info("%s tree over %d triangles in %.3f s", layout, count, stats["seconds"])
     part = replace(packed.part, count=count)
     return Bvh(layout, count, packed.buffers, (part,), stats)
 

@@ -114,7 +114,9 @@ class Device:
     @classmethod
     def adopt(cls, queue: cl.CommandQueue) -> Device:
         """The device of a caller's queue, with the caller's context."""
-        return cls(queue.context, queue, _info(-1, queue.device))
+        info = _info(-1, queue.device)
+        log.info("%s: the device of the queue that was given", info.label)
+        return cls(queue.context, queue, info)
 
     @cached_property
     def lanes(self) -> int:
@@ -143,7 +145,9 @@ def choose(which: str | int | None = None, *, profiling: bool = False) -> Device
 
     Raises DeviceError, telling what there is, if none matches or none works.
     """
-    return Device.open(selection(which).info, profiling=profiling)
+    choice = selection(which)
+    log.info("%s: %s", choice.info.label, choice.reason)
+    return Device.open(choice.info, profiling=profiling)
 
 
 def selection(which: str | int | None = None) -> Choice:

@@ -277,10 +277,14 @@ def build_all(
 ) -> dict[str, Program]:
     """Build several programs at once, each in a thread of its own. Raises as `build` does."""
     # Oclgrind's compiler is not safe in threads.
+    start, before = time.perf_counter(), device.builds.programs
     threads = 1 if _is_oclgrind(device) else os.cpu_count() or 1
     with ThreadPoolExecutor(max_workers=max(1, min(len(sources), threads))) as pool:
         futures = {name: pool.submit(build, device, s, options) for name, s in sources.items()}
-        return {name: future.result() for name, future in futures.items()}
+        programs = {name: future.result() for name, future in futures.items()}
+    seconds, built = time.perf_counter() - start, device.builds.programs - before
+    log.info("%d programs in %.2f s, %d of them built", len(programs), seconds, built)
+    return programs
 
 
 def _flags(device: Device, options: Sequence[str]) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -29,6 +30,7 @@ class Stream:
         self.ordered = not queue.properties & out_of_order
         self.last: cl.Event | None = None
         self._before: list[cl.Event] = []
+        self._copies: deque[cl.Event] = deque()  # from and to the host, that may not be over
 
     def after(self, events: Events) -> None:
         """Let the next command wait for events of others too."""
@@ -56,7 +58,7 @@ class Stream:
     def write(self, target: cl.Buffer, source: np.ndarray, offset: int = 0) -> cl.Event:
         """Enqueue that an array goes to a buffer, from a copy of it: it may change at once."""
         kept = np.array(source)  # the event keeps it alive
-        return self._note(
+        return self._keep(
             cl.enqueue_copy(
                 self.queue, target, kept, dst_offset=offset, is_blocking=False,
                 wait_for=self._waits(),
@@ -75,7 +77,7 @@ class Stream:
 
     def read_later(self, source: cl.Buffer, into: np.ndarray, offset: int = 0) -> cl.Event:
         """Enqueue that an array is filled from a buffer; it is whole when the event is."""
-        return self._note(
+        return self._keep(
             cl.enqueue_copy(
                 self.queue, into, source, src_offset=offset, is_blocking=False,
                 wait_for=self._waits(),
@@ -96,6 +98,17 @@ class Stream:
         if not self.ordered and self.last is not None:
             waits = [*waits, self.last]
         return waits or None
+
+    def _keep(self, event: cl.Event) -> cl.Event:
+        """Note an event of a copy, and refer to it until it is over.
+
+        PyOpenCL's would wait when nobody refers to it any more, and no other thread would run.
+        """
+        done = cl.command_execution_status.COMPLETE
+        while self._copies and self._copies[0].command_execution_status <= done:
+            self._copies.popleft()
+        self._copies.append(event)
+        return self._note(event)
 
     def _note(self, event: Any) -> cl.Event:
         self.last = event
