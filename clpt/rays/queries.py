@@ -111,6 +111,15 @@ class Queries:
         found, _ = self._run("query_occluded", rays, {"met": (0, np.uint8)}, before, wait_for)
         return found["met"]
 
+    @property
+    def buffers(self) -> dict[str, cl.Buffer]:
+        """The trees, by the names of BVH_ARGS in `clpt.kernel_source("bvh")`, for own kernels.
+
+        They stay the same when the triangles move. Raises DeviceError when closed.
+        """
+        with self._lock:
+            return dict(self._opened())
+
     def close(self) -> None:
         """Give the device's memory back; arrays of the caller are left alone."""
         with self._lock:

@@ -41,6 +41,7 @@ MODULES = {
     "clpt.transforms": "transforms",
     "clpt.device": "device",
     "clpt.bvh": "bvh",
+    "clpt.testing": "testing",
 }
 LINK = re.compile(r"(!?)\[((?:`[^`]*`|[^\]\[])*)\]\((?!\w+:)([^)#\s]*)(#[^)\s]*)?\)")
 
