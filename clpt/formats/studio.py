@@ -125,8 +125,10 @@ def shape_bounds(thing: shapes.Shape) -> tuple[NDArray[np.float64], NDArray[np.f
         points = transforms.transform_points(matrix, [thing.center])
         reach = thing.radius * np.linalg.norm(linear, axis=1)
     elif isinstance(thing, shapes.Spheres):
-        points = transforms.transform_points(matrix, thing.centers)
-        reach = np.max(thing.radii) * np.linalg.norm(linear, axis=1)
+        given = np.asarray(thing.centers, np.float64)
+        points = transforms.transform_points(matrix, given[:, :3])
+        radius = np.max(given[:, 3] if given.shape[1] == 4 else thing.radii)
+        reach = radius * np.linalg.norm(linear, axis=1)
     elif isinstance(thing, shapes.Disk):
         points, reach = matrix[None, :3, 3], np.linalg.norm(linear[:, :2], axis=1)
     elif isinstance(thing, shapes.Cylinder):

@@ -16,3 +16,10 @@ def on_device(values: Any) -> bool:
 def on_host(values: Any) -> Any:
     """Return values in host memory; of an array on a device a copy, for which it waits."""
     return values.get() if isinstance(values, cl_array.Array) else values
+
+
+def another(values: Any) -> Any:
+    """Return another object for the same memory on a device: what it holds may be other now."""
+    if isinstance(values, cl_array.Array):
+        return values.view()
+    return cl.Buffer.from_int_ptr(values.int_ptr)

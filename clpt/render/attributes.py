@@ -26,8 +26,10 @@ COLOUR_WORDS = 4
 Placed = tuple[np.ndarray, Shape, int, int]  # a row of `shapes`, its shape, first vertex and face
 
 
-def lower_attributes(placed: Iterable[Placed], tables: Tables) -> None:
+def lower_attributes(placed: Iterable[Placed], tables: Tables, single_count: int = 0) -> None:
     """Put what the textures of shapes ask of them into the tables, and its place into their rows.
+
+    single_count: see clpt.records.SETTINGS.
 
     Raises SceneError for a shape that lacks what its material or light asks for.
     """
@@ -45,6 +47,8 @@ def lower_attributes(placed: Iterable[Placed], tables: Tables) -> None:
             if name in names:
                 words = 1 if role == "real" else COLOUR_WORDS
                 first = first_face if per_face(name) else first_vertex
+                if shape.kind in shapes.ONE_OF:
+                    first = int(row["prim"]) - single_count
                 given = (shape, name, role, tables.spectral)
                 own = (*shapes.geometry(shape), *given[1:])
                 at = tables.append("attributes", tables.memo(_words, *given, by=own))

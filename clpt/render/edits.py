@@ -11,12 +11,12 @@ import numpy as np
 
 from clpt.errors import SceneError
 from clpt.render import shapes
-from clpt.render.arrays import on_device, on_host
+from clpt.render.arrays import another, on_device, on_host
 from clpt.render.instancing import distinct
 from clpt.scene import Scene
 from clpt.scene.materials import Material
 from clpt.scene.params import params
-from clpt.scene.shapes import Group, Instance, Mesh, Shape
+from clpt.scene.shapes import Group, Instance, Mesh, Shape, Spheres
 
 ShapeKey: TypeAlias = Shape | str | int
 MaterialKey: TypeAlias = Material | ShapeKey
@@ -68,11 +68,11 @@ def edited(
         edit.change(edit.shape(key, "transforms"), "to_world", np.array(on_host(matrix), float))
     for key, points in (vertices or {}).items():
         shape = edit.shape(key, "vertices")
-        if not isinstance(shape, Mesh):
+        if not isinstance(shape, (Mesh, Spheres)):
             raise SceneError(f"a {shape.kind} has none", where=f"vertices[{key!r}]")
         # another object: an array that is the same one would be taken to hold the same
-        new = points if on_device(points) else np.asarray(points).view()
-        edit.change(shape, "vertices", new)
+        new = another(points) if on_device(points) else np.asarray(points).view()
+        edit.change(shape, "vertices" if isinstance(shape, Mesh) else "centers", new)
     made = [edit.made(shape) for shape in scene.shapes]
     swaps = {at: (old, new) for at, (old, new) in edit.done.items() if old is not new}
     return dataclasses.replace(scene, shapes=made), swaps

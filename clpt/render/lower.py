@@ -194,7 +194,7 @@ class _Lowering:
         ):
             rows[emitter.shape_row]["light"] = first
             rows[emitter.shape_row]["flags"] |= SHAPE_ONE_LIGHT if whole else 0
-        attributes.lower_attributes(self.owners, tables)
+        attributes.lower_attributes(self.owners, tables, self.single_count)
         for row in rows:
             tables.append("shapes", row.reshape(1).view(np.uint32))
         glass_row = self._lens_glass()
@@ -249,8 +249,7 @@ class _Lowering:
         front, back, row["flags"] = self._sides(shape)
         row["front"], row["back"] = np.array([front, back], np.uint32).view(np.int32)
         triangles: tuple[Any, Any, Any] = (None, None, None)
-        first = self.n_spheres if shape.kind in shapes.ONE_OF else self.n_vertices
-        self.owners.append((row, shape, first, self.n_faces))
+        self.owners.append((row, shape, self.n_vertices, self.n_faces))
         if shape.kind in shapes.ANALYTIC:
             row["kind"] = 1 + shapes.ANALYTIC.index(shape.kind)
             row["params"] = self.tables.append("geometry", shapes.row(shape))

@@ -30,10 +30,11 @@ def balls(shape: Spheres) -> Balls:
     scale = float(common(shape).view(np.float32)[shapes.member("sphere", "radius")])
     matrix = shapes.placement(shape)
     centers = _numbers(shape, "centers")
-    if centers.ndim != 2 or centers.shape[1] != 3 or not len(centers):
-        message = f"centers must be (n, 3), n at least one, found {centers.shape}"
+    if centers.ndim != 2 or centers.shape[1] not in (3, 4) or not len(centers):
+        message = f"centers must be (n, 3) or (n, 4), n at least one, found {centers.shape}"
         raise SceneError(message, where=shapes.where(shape))
-    radii = _numbers(shape, "radii")
+    radii = centers[:, 3] if centers.shape[1] == 4 else _numbers(shape, "radii")
+    centers = centers[:, :3]
     if radii.shape not in ((), (len(centers),)):
         message = f"radii must be one number or ({len(centers)},), found {radii.shape}"
         raise SceneError(message, where=shapes.where(shape))

@@ -53,8 +53,8 @@ class Spheres(Shape):
     A `mesh_attribute` texture reads the attributes: the first row is the first sphere's.
     """
 
-    centers: Any = host(None, "(n, 3) float32, before `to_world`", "m")
-    radii: Any = host(1.0, "(n,), or one of all, before `to_world`, which may scale evenly", "m")
+    centers: Any = host(None, "(n, 3) float32 before `to_world`; (n, 4): with the radii", "m")
+    radii: Any = host(1.0, "(n,), or one of all; `to_world` may scale them, evenly", "m")
     attributes: Any = host({}, "name that begins with vertex_ -> (n, 1 or 3) float32, per sphere")
 
 

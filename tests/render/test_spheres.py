@@ -85,6 +85,9 @@ def test_arrays_of_a_device_are_as_good() -> None:
     radii = cl_array.to_device(queue, np.asarray(MANY.radii))
     other = shapes.Spheres(centers=given, radii=radii, to_world=PLACE)
     np.testing.assert_array_equal(spheres.balls(other), spheres.balls(MANY))
+    four = np.column_stack([MANY.centers, MANY.radii])
+    other = shapes.Spheres(centers=cl_array.to_device(queue, four), to_world=PLACE)
+    np.testing.assert_array_equal(spheres.balls(other), spheres.balls(MANY))
 
 
 def test_boxes_hold_the_spheres() -> None:
@@ -137,7 +140,7 @@ def test_files_keep_them(tmp_path) -> None:
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({}, "centers must be (n, 3)"),
+        ({}, "centers must be (n, 3) or (n, 4)"),
         ({"centers": np.zeros((0, 3))}, "n at least one"),
         ({"centers": np.zeros((4, 2))}, "found (4, 2)"),
         ({"centers": np.zeros((4, 3)), "radii": np.ones(3)}, "or (4,), found (3,)"),
