@@ -50,7 +50,8 @@ def lower_attributes(placed: Iterable[Placed], tables: Tables, single_count: int
                 if shape.kind in shapes.ONE_OF:
                     first = int(row["prim"]) - single_count
                 given = (shape, name, role, tables.spectral)
-                own = (*shapes.geometry(shape), *given[1:])
+                value = getattr(shape, "attributes", {})[name]
+                own = (*shapes.geometry(shape), value, *given[1:])
                 at = tables.append("attributes", tables.memo(_words, *given, by=own))
                 directory[number] = at - words * first, words
         row["attributes"] = tables.append("attributes", directory.view(np.uint32))

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from clpt import images, spectra
 from clpt.errors import SceneError
 from clpt.images import Stored
+from clpt.render.arrays import on_host
 from clpt.render.memo import Memo
 from clpt.render.texels import channel, spectral_image, texels
 from clpt.scene.textures import Bitmap
@@ -167,7 +168,7 @@ def _pool() -> ThreadPoolExecutor:
 
 
 def _array(image: Any) -> Stored:
-    values = np.asarray(image)
+    values = np.asarray(on_host(image))
     values = values[..., None] if values.ndim == 2 else values
     if values.dtype != np.uint8 and values.dtype.kind != "f":
         wanted = "must be a path or an array of floats or of bytes"

@@ -8,15 +8,16 @@ from typing import Any, TypeAlias
 from weakref import WeakKeyDictionary
 
 import numpy as np
+import pyopencl as cl
 
 from clpt.errors import SceneError
 from clpt.render import shapes
-from clpt.render.arrays import another, on_device, on_host
+from clpt.render.arrays import on_device, on_host, readable
 from clpt.render.instancing import distinct
 from clpt.scene import Scene
 from clpt.scene.materials import Material
 from clpt.scene.params import params
-from clpt.scene.shapes import Group, Instance, Mesh, Shape, Spheres
+from clpt.scene.shapes import Group, Instance, Shape
 
 ShapeKey: TypeAlias = Shape | str | int
 MaterialKey: TypeAlias = Material | ShapeKey
@@ -68,14 +69,39 @@ def edited(
         edit.change(edit.shape(key, "transforms"), "to_world", np.array(on_host(matrix), float))
     for key, points in (vertices or {}).items():
         shape = edit.shape(key, "vertices")
-        if not isinstance(shape, (Mesh, Spheres)):
+        field = next((name for name in ("vertices", "centers") if hasattr(shape, name)), None)
+        if field is None:
             raise SceneError(f"a {shape.kind} has none", where=f"vertices[{key!r}]")
         # another object: an array that is the same one would be taken to hold the same
-        new = another(points) if on_device(points) else np.asarray(points).view()
-        edit.change(shape, "vertices" if isinstance(shape, Mesh) else "centers", new)
-    made = [edit.made(shape) for shape in scene.shapes]
+        new = points if on_device(points) else np.asarray(points).view()
+        edit.change(shape, field, new)
+    made = edit.scene_made()
     swaps = {at: (old, new) for at, (old, new) in edit.done.items() if old is not new}
-    return dataclasses.replace(scene, shapes=made), swaps
+    return made, swaps
+
+
+def followed(former: Scene, scene: Scene) -> dict[int, tuple[Any, Any]]:
+    """Return which shapes took the place of one that is gone, see `Names.replace`.
+
+    They stand at the same place in a list of the same length.
+    """
+    if len(former.shapes) != len(scene.shapes):
+        return {}
+    present = {id(shape) for shape in scene.shapes}
+    pairs = zip(former.shapes, scene.shapes, strict=True)
+    return {id(old): (old, new) for old, new in pairs if id(old) not in present}
+
+
+def adopted(scene: Scene, queue: cl.CommandQueue) -> Scene:
+    """Return a scene that can be lowered: what its shapes have in device memory can be read.
+
+    Raises SceneError for memory of another context, or a buffer of the wrong size.
+    """
+    edit = _Edit(scene, Names())
+    for shape in edit.shapes.values():
+        for name, values in readable(shape, queue, shapes.where(shape)).items():
+            edit.change(shape, name, values)
+    return edit.scene_made() if edit.changes else scene
 
 
 class _Edit:
@@ -129,6 +155,11 @@ class _Edit:
             fields = {n: value for n, value in fields.items() if value is not getattr(thing, n)}
             self.swap(thing, dataclasses.replace(thing, **fields) if fields else thing)
         return self.done[id(thing)][1]
+
+    def scene_made(self) -> Scene:
+        """The scene afterwards."""
+        made = [self.made(shape) for shape in self.scene.shapes]
+        return dataclasses.replace(self.scene, shapes=made)
 
     def swap(self, old: Any, new: Any) -> None:
         """Put one object in the place of another, wherever that stands."""

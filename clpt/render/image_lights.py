@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from clpt import images, spectral_exr, transforms
 from clpt.errors import SceneError
 from clpt.layout import Record
+from clpt.render.arrays import on_host
 from clpt.render.texels import bands, texels
 from clpt.scene.lights import CubeMap, Envmap
 from clpt.spectra import Tabulated, luminance
@@ -161,7 +162,8 @@ def _loaded(image: Any, where: str) -> Array:
         raise SceneError("spectral images can be an envmap only", where=where)
     if image is None:
         raise SceneError("an image is needed: a path, or an array (h, w, 3)", where=where)
-    values = images.read(image) if isinstance(image, (str, Path)) else np.asarray(image, np.float32)
+    named = isinstance(image, (str, Path))
+    values = images.read(image) if named else np.asarray(on_host(image), np.float32)
     if values.ndim == 2:
         values = values[..., None]
     if values.ndim != 3 or values.shape[2] not in (1, 3, 4) or 0 in values.shape:

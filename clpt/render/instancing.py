@@ -18,6 +18,7 @@ from clpt import transforms
 from clpt.errors import SceneError
 from clpt.records import INSTANCE
 from clpt.render import shapes
+from clpt.render.arrays import on_host
 from clpt.render.tessellate import keeps_its_kind, tessellate
 from clpt.scene.shapes import Group, Instance, Shape
 
@@ -128,7 +129,7 @@ def sort(things: Sequence[Shape], warnings: list[str]) -> tuple[list[Placed], li
 def _matrices(instances: Sequence[Shape]) -> Matrices:
     """The transforms of instances, (k, 4, 4), checked all at once."""
     try:
-        found = np.stack([np.asarray(one.to_world, np.float64) for one in instances])
+        found = np.stack([np.asarray(on_host(one.to_world), np.float64) for one in instances])
         affine = found.shape[1:] == (4, 4) and (found[:, 3] == transforms.IDENTITY[3]).all()
         linear = found[:, :3, :3]
         with np.errstate(all="ignore"):

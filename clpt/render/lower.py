@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import scene as sc
+from clpt import transforms
 from clpt.errors import SceneError
 from clpt.records import SETTINGS, SHAPE
 from clpt.render import (
@@ -24,6 +25,7 @@ from clpt.render import (
     shapes,
     spheres,
 )
+from clpt.render.arrays import is_table
 from clpt.render.bends import Bend
 from clpt.render.checks import check
 from clpt.render.colour import output_matrix, sensor
@@ -35,6 +37,7 @@ from clpt.render.tables import STEP, Tables
 from clpt.render.wavelengths import Density, density, emissions
 from clpt.scene import materials as mt
 from clpt.scene.params import device_params, params
+from clpt.scene.shapes import Mesh, Shape
 from clpt.spectra import Constant
 from clpt.spectra.cie import tanh_ends
 
@@ -54,9 +57,9 @@ class Lowered:
     are what the acceleration structures are built of, the world's before those of the groups that
     `instances` share; boxes (k, 2, 3) float32 those of the analytic shapes, which are the last rows
     of `shapes`. tables: every other read-only array by name; where an instance's tree begins is
-    filled in when trees are built. glass_row: of the camera, see `lower_camera`. encoder: what made
-    the tables, for values that are edited; None once it is of no use; memo: what the next lowering
-    need not make again.
+    filled in when trees are built. lent: those that are the caller's buffers. glass_row: of the
+    camera, see `lower_camera`. encoder: what made the tables, for values that are edited; None once
+    it is of no use; memo: what the next lowering need not make again.
     """
 
     features: Features
@@ -67,6 +70,7 @@ class Lowered:
     tags: NDArray[np.uint32]
     boxes: NDArray[np.float32]
     instances: Instances
+    lent: dict[str, Any]
     glass_row: int
     warnings: list[str]
     encoder: Tables | None
@@ -214,9 +218,21 @@ class _Lowering:
         settings = self._settings(center, radius)
         self.memo.settle()
         return Lowered(
-            features, settings, arrays, vertices, faces, tags, boxes, instances, glass_row,
-            self.warnings, tables, self.memo,
+            features, settings, arrays, vertices, faces, tags, boxes, instances,
+            self._lent(len(faces)), glass_row, self.warnings, tables, self.memo,
         )  # fmt: skip
+
+    def _lent(self, count: int) -> dict[str, Any]:
+        """Buffers of a mesh that alone has triangles, which are tables as they are."""
+        meshes: list[Shape] = [s for _, s, _, _ in self.owners if s.kind not in shapes.ANALYTIC]
+        if len(meshes) != 1 or self.prototypes or not isinstance(meshes[0], Mesh):
+            return {}
+        mesh = meshes[0]
+        turned = transforms.flips_handedness(shapes.placement(mesh)) != mesh.flip_normals
+        wanted = {"uvs": (mesh.uvs, "f")}
+        if not turned and len(mesh.faces) == count:  # no triangle was left out
+            wanted["faces"] = mesh.faces, "iu"
+        return {name: v.data for name, (v, kind) in wanted.items() if is_table(v, kind)}
 
     def _lens_glass(self) -> int:
         """The row in `spectra` of the glass of a lens that disperses, 0 where there is none."""

@@ -8,6 +8,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from clpt.render.arrays import on_device
+
 Made = TypeVar("Made")
 _BY_VALUE = (str, bytes, int, float, bool, type(None), type)
 
@@ -32,7 +34,7 @@ class Memo:
         by: what it follows from, where that is not all of what is given.
         """
         by = given if by is None else by
-        key = make, *(g if isinstance(g, _BY_VALUE) else (id(g),) for g in by)
+        key = make, *map(_mark, by)
         if key not in self._made:
             # what is known by identity stays alive, so that no other object gets its id
             self._made[key] = self._former.get(key) or (make(*given), by)
@@ -41,6 +43,13 @@ class Memo:
     def settle(self) -> None:
         """Forget what was not asked for."""
         self._former = {}
+
+
+def _mark(given: Any) -> Any:
+    """What a thing is known by; device memory by nothing: kernels may have written there."""
+    if isinstance(given, _BY_VALUE):
+        return given
+    return object() if on_device(given) else (id(given),)
 
 
 def content(*arrays: np.ndarray) -> bytes:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -15,12 +15,15 @@ from numpy.typing import NDArray
 
 from clpt import device as dev
 from clpt.errors import DeviceError, SceneError
+from clpt.render import updates
+from clpt.render.edits import MaterialKey, Names, ShapeKey, adopted, edited, followed
 from clpt.render.facts import Facts, gather
 from clpt.render.lower import lower
 from clpt.render.wavefront import Wavefront
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
 from clpt.scene.integrators import CHANNELS, Aov
+from clpt.scene.materials import Material
 from clpt.spectral_exr import SpectralImage
 
 Image = NDArray[np.float32]
@@ -78,8 +81,10 @@ class Renderer:
         if isinstance(scene.integrator, Aov):
             self.channels = scene.integrator.channels
         self._start, self._built = time.perf_counter(), device.builds.programs
-        budget = _texture_budget(device) if texture_budget is None else texture_budget
-        lowered = lower(scene, budget)
+        if texture_budget is None:
+            texture_budget = _texture_budget(device)
+        self._texture_budget, self._names = texture_budget, Names()
+        lowered = lower(adopted(scene, device.queue), texture_budget)
         self._seconds = {"lower": time.perf_counter() - self._start}
         first = Wavefront(device, lowered, **wavefront)
         self.wavefronts = [first, *(first.sibling(channel) for channel in self.channels[1:])]
@@ -161,17 +166,57 @@ class Renderer:
         self.samples = 0
         return stream.last
 
-    def update(self, *, camera: Camera | None = None, wait_for: dev.Events = None) -> cl.Event:
-        """Enqueue that the scene changes, and begin again at sample 0.
+    def update(
+        self,
+        *,
+        camera: Camera | None = None,
+        materials: Mapping[MaterialKey, Material] | None = None,
+        transforms: Mapping[ShapeKey, Any] | None = None,
+        vertices: Mapping[ShapeKey, Any] | None = None,
+        scene: Scene | None = None,
+        wait_for: dev.Events = None,
+    ) -> cl.Event:
+        """Bring what changed to the device, and begin again at sample 0.
 
-        camera: another one of the same kind. It costs one small write: nothing is built.
+        camera: another one; of the same kind it takes one small write. materials: by what they
+        stand for, a material of the scene or a shape's key; where only values differ a few words
+        are written. transforms: (4, 4) by shape; vertices: (n, 3) float32 by shape. The key of a
+        shape is the shape, its name, or its place in `scene.shapes`; shapes and materials that were
+        given at first go on to name what took their place. scene: another scene of the same film,
+        for whatever else; what its shapes and lights share with the present one, the same arrays
+        and images, is not looked at again.
+
+        What the device needs is found by lowering again: tables are written where they differ,
+        trees built where triangles do, kernels built where others are needed. `self.scene` is then
+        the new scene, and the picture will be that of a new renderer.
+
+        Raises SceneError for what is not in the scene, or makes no sense in it, and for a film of
+        another size; nothing has changed then.
         """
         front = self.wavefronts[0]
         front.stream.after(wait_for)
+        new = self.scene if scene is None else scene
+        swaps = {} if scene is None else followed(self.scene, new)
+        if materials or transforms or vertices:
+            new, more = edited(new, self._names, materials, transforms, vertices)
+            swaps |= more
         if camera is not None:
-            self.scene = dataclasses.replace(self.scene, camera=camera)
-            front.move_camera(camera, self.scene.film)
+            new = dataclasses.replace(new, camera=camera)
+        values = scene is None and not transforms and not vertices
+        if not (values and updates.rewrite(self.wavefronts, self.scene, new)):
+            self._lower_again(new)
+        self.scene = new
+        self._names.replace(swaps)
         return self.reset()
+
+    def _lower_again(self, scene: Scene) -> None:
+        """Lower a scene and let it take the place of the one on the device."""
+        if getattr(scene.integrator, "channels", ()) != self.channels:
+            raise SceneError("other channels need a new Renderer", where="integrator.channels")
+        front = self.wavefronts[0]
+        lowered = lower(adopted(scene, front.stream.queue), self._texture_budget, front.lowered)
+        updates.take(self.wavefronts, lowered)
+        self.warnings = list(lowered.warnings)
 
     @property
     def film(self) -> cl_array.Array:

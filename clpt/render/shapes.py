@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from clpt import transforms
 from clpt.errors import SceneError
 from clpt.layout import Record
+from clpt.render.arrays import on_host
 from clpt.render.tubes import tubes
 from clpt.scene import shapes
 from clpt.scene.shapes import Shape
@@ -165,7 +166,8 @@ def attribute(shape: Shape, name: str) -> Points:
     else:
         vertices, faces, _, _ = _in_world(shape)
         count = len(faces) if per_face else len(vertices)
-    values = np.asarray(shape.attributes[name], np.float32)  # type: ignore[attr-defined]
+    given: Any = shape.attributes[name]  # type: ignore[attr-defined]
+    values = np.asarray(on_host(given), np.float32)
     values = values[:, None] if values.ndim == 1 else values
     if values.shape not in ((count, 1), (count, 3)):
         message = f"attribute {name!r} must be ({count}, 1 or 3), found {values.shape}"
@@ -368,7 +370,7 @@ def _mesh(shape: shapes.Mesh) -> tuple[Points, Faces, Points | None, Points | No
     if shape.vertices is None or shape.faces is None:
         raise SceneError("a mesh needs vertices and faces", where=where(shape))
     vertices = _array(shape, "vertices", 3)
-    faces = np.asarray(shape.faces)
+    faces = np.asarray(on_host(shape.faces))
     if faces.size == 0 or len(vertices) == 0:
         raise SceneError("the mesh is empty: it has no triangle", where=where(shape))
     if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iu":
@@ -388,7 +390,7 @@ def _mesh(shape: shapes.Mesh) -> tuple[Points, Faces, Points | None, Points | No
 def _array(shape: Shape, name: str, columns: int, rows: int | None = None) -> Points:
     """A mesh's array as float32. Raises SceneError for a wrong shape or values not finite."""
     try:
-        values = np.asarray(getattr(shape, name), np.float32)
+        values = np.asarray(on_host(getattr(shape, name)), np.float32)
     except (TypeError, ValueError) as error:
         raise SceneError(f"{name} are not numbers: {error}", where=where(shape)) from error
     wanted = f"({'n' if rows is None else rows}, {columns})"
@@ -408,7 +410,7 @@ def _array(shape: Shape, name: str, columns: int, rows: int | None = None) -> Po
 def placement(shape: Shape) -> NDArray[np.float64]:
     """Return a shape's transform. Raises SceneError if it is singular, or no affine 4x4 matrix."""
     try:
-        matrix = np.asarray(shape.to_world, np.float64)
+        matrix = np.asarray(on_host(shape.to_world), np.float64)
     except (TypeError, ValueError) as error:
         raise SceneError(f"to_world is not a matrix: {error}", where=where(shape)) from error
     if matrix.shape != (4, 4):

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from clpt import images, spectra, spectral_exr
 from clpt.errors import SceneError
+from clpt.render.arrays import on_host
 from clpt.scene.textures import Bitmap
 from clpt.spectra import Tabulated
 from clpt.spectral_exr import SpectralImage
@@ -36,7 +37,7 @@ def pixels(texture: Bitmap, role: str) -> Floats:
     image = texture.image if spectral is None else spectral.to_rgb()
     if isinstance(image, (str, Path)):
         image = images.read(image, linear=not texture.raw)
-    image = np.asarray(image)
+    image = np.asarray(on_host(image))
     image = image[..., None] if image.ndim == 2 else image
     if image.dtype == np.uint8 and image.ndim == 3:
         image = images.Stored(image, encoded=True).decoded(not texture.raw)

@@ -25,10 +25,7 @@ from clpt.device.timing import Timings
 from clpt.errors import MemoryBudgetError, SceneError
 from clpt.records import PATH, SLABS, TABLES
 from clpt.render import programs
-from clpt.render.cameras import lower_camera
 from clpt.render.lower import Lowered
-from clpt.scene.cameras import Camera
-from clpt.scene.integrators import Film
 
 FILM_WORDS = 7  # kernels/lib/film.cl
 FRESH = 0x2000  # kernels/lib/path_state.cl
@@ -89,7 +86,22 @@ class Wavefront:
         self.stream = device.Stream(on.queue)
         self.timings = Timings(on.queue)
         self.buffers = Buffers(on)
-        features = lowered.features
+        self._wanted = layout, queued
+        layout, self.queued = self.suited(lowered)
+        self.lanes = on.lanes
+        self.programs: dict[str, device.Program] = {}
+        self.seconds = {"programs": 0.0}
+        self._place_slots(slots or (CPU_SLOTS if on.info.is_cpu else GPU_SLOTS))
+        self._allocate(layout)
+        self._expose_new()
+
+    def suited(self, lowered: Lowered) -> tuple[str, bool]:
+        """The layout for a scene and whether shading is sorted: as asked, or as suits the device.
+
+        Raises SceneError for a layout that cannot hold the scene.
+        """
+        layout, queued = self._wanted
+        features, on = lowered.features, self.device
         if layout is None:
             layout = bvh.choose_layout(on, len(lowered.faces))
             many = len(lowered.boxes) > BRUTE_SHAPES or features.instances
@@ -97,14 +109,10 @@ class Wavefront:
                 layout = "wide8" if on.info.is_cpu else "binary"
         elif layout == "brute" and features.instances:
             raise SceneError("the layout brute holds no instances; choose wide8 or binary")
-        self.lanes = on.lanes
         kinds = len(features.materials)
-        self.queued = kinds > 1 and (not on.info.is_cpu or kinds > 4) if queued is None else queued
-        self.programs: dict[str, device.Program] = {}
-        self.seconds = {"programs": 0.0}
-        self._place_slots(slots or (CPU_SLOTS if on.info.is_cpu else GPU_SLOTS))
-        self._allocate(layout)
-        self._expose_new()
+        if queued is None:
+            queued = kinds > 1 and (not on.info.is_cpu or kinds > 4)
+        return layout, queued
 
     def sibling(self, channel: str) -> Wavefront:
         """Another film of the same scene, for another channel of the `aov` integrator.
@@ -149,10 +157,11 @@ class Wavefront:
         settings = lowered.settings
         self.named: dict[str, Any] = {"stride": self.stride}
         for name in TABLES:
-            array = {"vertices": lowered.vertices, "faces": lowered.faces}.get(name)
-            array = lowered.tables[name] if array is None else array
-            self.named[name] = give.upload(f"the table of {name}", array)
-        self._build_trees(layout)
+            self.named[name] = lowered.lent.get(name) or give.upload(
+                f"the table of {name}", lowered.table(name)
+            )
+        self.build_triangles(layout)
+        self.build_boxes()
         for record in SLABS:
             name = f"{record.name.lower()}_words"
             advice = "lower the number of slots"
@@ -160,8 +169,12 @@ class Wavefront:
             self.stream.fill(self.named[name], 0, 0, 4 * record.words * self.stride)
         self.named["counters"] = give.allocate("the counters", 4 * len(COUNTERS))
         self.named["settings"] = give.upload("the settings", settings.reshape(1).view(np.uint32))
+        self.allocate_queue()
+
+    def allocate_queue(self) -> None:
+        """What sorting by material works on, where there is sorting."""
         if self.queued:
-            kinds = len(lowered.features.materials)
+            give, kinds = self.buffers, len(self.lowered.features.materials)
             chunks = -(-self.slots // CHUNK)
             self.named["queue"] = give.allocate("the queue", 4 * self.slots)
             self.named["counts"] = give.allocate("the sort", 4 * chunks * kinds)
@@ -169,16 +182,24 @@ class Wavefront:
                 self.named[name] = give.allocate(name, 4 * kinds)
             self.named.update(chunk=CHUNK, chunks=chunks, slots=self.slots)
 
-    def _build_trees(self, layout: str) -> None:
-        """Trees over triangles, analytic shapes and instances, which learn where theirs begin."""
+    def build_triangles(self, layout: str) -> None:
+        """The trees over triangles, of the world and of every group."""
         start = time.perf_counter()
         lowered, instances = self.lowered, self.lowered.instances
         vertices = self.named["vertices"] if len(lowered.faces) else lowered.vertices
         counts = [len(lowered.faces) - sum(instances.triangles), *instances.triangles]
-        self.tree, begins = bvh.build_parts(
+        for name in ("tris", "nodes", "leaves"):  # of the tree before
+            self.named.pop(name, None)
+        self.tree, self._begins = bvh.build_parts(
             self.device, vertices, lowered.faces, lowered.tags, counts, layout
         )
         self.named.update(self.tree.buffers, triangles=max(self.tree.count, 0))
+        self.seconds["trees"] = time.perf_counter() - start
+
+    def build_boxes(self) -> None:
+        """Trees over analytic shapes and instances, which learn where their triangles begin."""
+        start = time.perf_counter()
+        lowered, instances, layout = self.lowered, self.lowered.instances, self.tree.layout
         self.box_trees = {}
         if lowered.features.analytic and layout != "brute":
             self.box_trees["shape"] = bvh.build_boxes(self.device, lowered.boxes)
@@ -187,12 +208,12 @@ class Wavefront:
             indices = self.box_trees["instance"].buffers.pop("indices")
             order = self.buffers.download(indices, (len(instances.rows),), np.uint32)
             rows = instances.rows[order]  # as the leaves, so that neighbours are near each other
-            rows["nodes"], rows["leaves"] = begins[1 + instances.prototypes[order]].T
+            rows["nodes"], rows["leaves"] = self._begins[1 + instances.prototypes[order]].T
             words = rows.view(np.uint32)
             self.named["instances"] = self.buffers.upload("the table of instances", words)
         for name, tree in self.box_trees.items():
             self.named |= {f"{name}_{part}": buffer for part, buffer in tree.buffers.items()}
-        self.seconds["trees"] = time.perf_counter() - start
+        self.seconds["trees"] += time.perf_counter() - start
 
     def _expose_new(self) -> None:
         """A film and a picture of its own, and kernels bound to them."""
@@ -211,11 +232,26 @@ class Wavefront:
         for name, size in sizes.items():
             self.named[name] = self.buffers.allocate(f"the {name}", size, advice)
         self.band_bytes = sizes.get("bands", 0)
+        self._bind_film()
+        self.clear()
+
+    def _bind_film(self) -> None:
+        """The kernels that make a picture of the film."""
         self._build("accumulate", *(["bands"] if self.band_bytes else []))
         self.accumulate = self._bound("accumulate", "accumulate", samples=0.0)
         if self.band_bytes:
             self.accumulate_bands = self._bound("bands", "accumulate_bands")
-        self.clear()
+
+    def bind_again(self, rebuilt: bool) -> None:
+        """Give all kernels the buffers of `named` once more; rebuilt: other programs have them."""
+        made = {name: vars(self).pop(name) for name in ("stages", "loop") if name in vars(self)}
+        if rebuilt:
+            self.programs = {}
+        elif "loop" in made:
+            self.loop = self._bind(made["loop"].kernel, first=0, end=0)
+        self._bind_film()
+        for name in made:
+            getattr(self, name)
 
     def _build(self, *wanted: str) -> None:
         """Build the programs of these names that are not there yet; all, if none is named."""
@@ -280,13 +316,6 @@ class Wavefront:
 
     def _fill(self, name: str, value: int, offset: int, size: int) -> None:
         self.stream.fill(self.named[name], value, offset, size)
-
-    def move_camera(self, camera: Camera, film: Film) -> None:
-        """Enqueue that the camera is another of its kind. Raises SceneError if it is not."""
-        kind, words = lower_camera(camera, film.width, film.height, self.lowered.glass_row)
-        if kind != self.lowered.features.camera:
-            raise SceneError(f"the camera was {self.lowered.features.camera}, not {kind}")
-        self.stream.write(self.named["camera"], words)
 
     def enqueue(self, first: int, end: int) -> None:
         """Enqueue that samples first to end - 1 of every pixel are added; nothing is waited for."""
