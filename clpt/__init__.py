@@ -20,7 +20,7 @@ from clpt.errors import (
 )
 from clpt.formats import load
 from clpt.images import read, write
-from clpt.rays import Accel, Hits
+from clpt.rays import Accel, AllHits, Hits
 from clpt.render.library import kernel_source
 from clpt.render.renderer import Progress, Renderer, render
 from clpt.scene import Scene
@@ -37,6 +37,7 @@ except metadata.PackageNotFoundError:  # a checkout that is not installed
 
 __all__ = [
     "Accel",
+    "AllHits",
     "ClptError",
     "DeviceError",
     "Hits",

@@ -1,6 +1,6 @@
 """Ray queries on an application's own queue: what rays meet among triangles."""
 
 from .accel import Accel
-from .queries import Hits
+from .queries import AllHits, Hits
 
-__all__ = ["Accel", "Hits"]
+__all__ = ["Accel", "AllHits", "Hits"]

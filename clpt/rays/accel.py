@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 import pyopencl as cl
+from numpy.typing import NDArray
 
 from .. import bvh
 from ..device import Events
 from ..errors import SceneError
+from . import batch
 from .arrays import Given, held, on_device
-from .batch import lent
-from .queries import Queries
+from .queries import AllHits, Queries
 
 
 class Accel(Queries):
@@ -67,6 +69,45 @@ class Accel(Queries):
             event = bvh.refit(self._refitting, self.tree, points, self._faces)
             return event or self._stream.mark()
 
+    def intersect_all(
+        self,
+        origins: Given,
+        directions: Given,
+        t_min: Given = 0.0,
+        t_max: Given = math.inf,
+        *,
+        wait_for: Events = None,
+    ) -> AllHits:
+        """All that each ray meets at t_min < t < t_max, by ray and then by distance.
+
+        Each triangle is met once at most; a ray through an edge meets both triangles there. It
+        waits, since the number of hits is not known before; the rays are as for `intersect`.
+        """
+        rays = batch.rays(self.queue.context, origins, directions, t_min, t_max)
+        with self._lock:
+            self._opened()
+            self._stream.after(wait_for)
+            counts = np.zeros(rays.count, np.uint32)
+            self._fill("query_count", rays, {"counts": counts})
+            ends = np.cumsum(counts, dtype=np.uint64)
+            total = int(ends[-1]) if rays.count else 0
+            found: dict[str, NDArray[Any]] = {
+                "t": np.empty(total, np.float32),
+                "primitive": np.empty(total, np.int32),
+                "barycentrics": np.empty((total, 2), np.float32),
+            }
+            if total:
+                self._fill("query_every", rays, {"firsts": ends - counts, **found})
+        ray = np.repeat(np.arange(rays.count), counts)
+        order = np.lexsort((found["t"], ray))
+        return AllHits(ray=ray[order], **{name: array[order] for name, array in found.items()})
+
+    def _fill(self, kernel: str, rays: batch.Rays, arrays: dict[str, NDArray[Any]]) -> None:
+        """Run a kernel on arrays of the host."""
+        context = self.queue.context
+        places = {name: batch.lent(context, array, True) for name, array in arrays.items()}
+        self._wait(kernel, rays, arrays, places)
+
     def _laid(self, name: str, given: Given, *kinds: type) -> tuple[Any, int]:
         """A numpy array (n, 3), or a buffer with nothing but such an array; and n.
 
@@ -97,4 +138,4 @@ class Accel(Queries):
         """The array on the device, at once; None for no values. What is there is taken as it is."""
         if not isinstance(array, np.ndarray):
             return array
-        return lent(self.queue.context, np.ascontiguousarray(array, kind), False).buffer
+        return batch.lent(self.queue.context, np.ascontiguousarray(array, kind), False).buffer

@@ -116,5 +116,5 @@ def host_results(
 
 
 def begins(parts: Sequence[Held]) -> tuple[int, ...]:
-    """The kernels' `begins`."""
+    """The kernels' `begins`: where eight arrays begin, those that are not there at 0."""
     return (*(part.begin for part in parts), *[0] * (8 - len(parts)))

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 import pyopencl as cl
+from numpy.typing import NDArray
 from pyopencl.array import Array
 
 from ..bvh import choose_tree
@@ -25,6 +26,12 @@ _HITS: batch.Made = {
     "barycentrics": (2, np.float32),
 }
 _TREES = ("wide8", "binary")
+_PROGRAMS = {  # of a kernel: the program that has it, and what it includes of a layout
+    "query_closest": ("bvh/query.cl", ""),
+    "query_occluded": ("bvh/query.cl", ""),
+    "query_count": ("bvh/query_every.cl", "_every"),
+    "query_every": ("bvh/query_every.cl", "_every"),
+}
 _LENT = ("origins", "directions", "t_mins", "t_maxs")
 _Self = TypeVar("_Self", bound="Queries")
 
@@ -44,6 +51,20 @@ class Hits:
     barycentrics: Any
     instance: Any
     event: cl.Event
+
+
+@dataclass(frozen=True)
+class AllHits:
+    """All that rays meet, by ray and then by distance, in numpy arrays.
+
+    ray: (k,) int64, which one; t: (k,) float32; primitive: (k,) int32; barycentrics: (k, 2)
+    float32, see `Hits`.
+    """
+
+    ray: NDArray[np.int64]
+    t: NDArray[np.float32]
+    primitive: NDArray[np.int32]
+    barycentrics: NDArray[np.float32]
 
 
 class Queries:
@@ -148,39 +169,44 @@ class Queries:
         wait_for: Events,
     ) -> tuple[Mapping[str, Any], cl.Event]:
         """Enqueue a kernel, on the host wait for it; what it wrote, and its event."""
-        arrays: Mapping[str, Any]
         with self._lock:
-            trees = self._opened()
-            if not rays.waits:
-                arrays, places = batch.results(self.queue, rays.count, made, out)
-                event = self._enqueue(name, trees, rays, places, wait_for)
-                for array in arrays.values():
-                    array.events[:] = [event]  # which has waited for those before
-                return arrays, event
-            arrays, places = batch.host_results(self.queue.context, rays.count, made)
-            event = self._enqueue(name, trees, rays, places, wait_for)
-            for key, array in arrays.items():
-                if rays.count:  # onto itself: it comes back from where the device has a copy
-                    event = self._stream.read_later(places[key].buffer, array)
-            event.wait()
-            if rays.count:  # the kernel lets go of the caller's memory
-                self._kernels[name].set(**dict.fromkeys([*_LENT, *made]))
-        return arrays, event
+            self._opened()
+            if rays.waits:
+                self._stream.after(wait_for)
+                arrays, places = batch.host_results(self.queue.context, rays.count, made)
+                return arrays, self._wait(name, rays, arrays, places)
+            there, places = batch.results(self.queue, rays.count, made, out)
+            self._stream.after(wait_for)
+            event = self._enqueue(name, rays, places)
+            for array in there.values():
+                array.events[:] = [event]  # which has waited for those before
+            return there, event
 
-    def _enqueue(
+    def _wait(
         self,
         name: str,
-        trees: Mapping[str, cl.Buffer],
         rays: batch.Rays,
+        arrays: Mapping[str, NDArray[Any]],
         places: Mapping[str, Held],
-        wait_for: Events,
     ) -> cl.Event:
+        """Run a kernel that writes arrays of the host."""
+        event = self._enqueue(name, rays, places)
+        for key, array in arrays.items():
+            if array.size:  # onto itself: it comes back from where the device has a copy
+                event = self._stream.read_later(places[key].buffer, array)
+        event.wait()
+        if rays.count:  # the kernel lets go of the host's memory
+            self._kernels[name].set(**dict.fromkeys([*_LENT, *places]))
+        return event
+
+    def _enqueue(self, name: str, rays: batch.Rays, places: Mapping[str, Held]) -> cl.Event:
+        """Enqueue a kernel for every ray, after what its arrays wait for."""
         parts = [*rays.held, *places.values()]
-        self._stream.after([*(wait_for or ()), *(e for part in parts for e in part.events)])
+        self._stream.after([event for part in parts for event in part.events])
         if not rays.count:
             return self._stream.mark()
         arguments = {
-            **trees,
+            **self._opened(),
             **rays.named,
             **{key: place.buffer for key, place in places.items()},
             "count": rays.count,
@@ -188,17 +214,17 @@ class Queries:
         }
         bound = self._kernels.get(name)
         if bound is None:
-            bound = self._kernels[name] = self._program().kernel(name).bind(**arguments)
+            bound = self._kernels[name] = self._program(name).kernel(name).bind(**arguments)
         else:
             bound.set(**arguments)
         return self._stream.run(bound, (-(-rays.count // _GROUP) * _GROUP,), (_GROUP,))
 
-    def _program(self) -> Program:
-        """The kernels of the layout."""
+    def _program(self, kernel: str) -> Program:
+        """The program of a kernel, for the layout."""
+        root, what = _PROGRAMS[kernel]
+        include = f'#include "bvh/{self.layout}{what}.cl"'
         texts = {
-            "generated/layout.cl": (
-                f'#include "bvh/{self.layout}.cl"\n#define LAYOUT(verb) {self.layout}_##verb\n'
-            ),
+            "generated/layout.cl": f"{include}\n#define LAYOUT(verb) {self.layout}_##verb\n",
             "generated/instance_traversal.cl": "",
         }
-        return build(self.device, assemble("bvh/query.cl", texts, {"USES_INSTANCES": 0}))
+        return build(self.device, assemble(root, texts, {"USES_INSTANCES": 0}))

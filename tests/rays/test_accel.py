@@ -181,3 +181,33 @@ def test_threads(accel, rays):
     for thread in threads:
         thread.join()
     assert all((t == expected).all() for each in found.values() for t in each)
+
+
+@pytest.mark.parametrize("layout", ["wide8", "binary"])
+def test_all_hits(queue, soup, rays, reference, layout):
+    """None is lost, none comes twice, and they are in order."""
+    t, _ = reference(*soup, *rays)
+    expected = {(i, j) for i, j in zip(*np.nonzero(np.isfinite(t)), strict=True)}
+    o, d = rays
+    hits = clpt.Accel(queue, *soup, layout=layout).intersect_all(to_device(queue, o), d)
+    found = set(zip(hits.ray, hits.primitive, strict=True))
+    assert len(found) == len(hits.ray)
+    assert len(expected) > 2000
+    assert len(found ^ expected) < 0.005 * len(expected)
+    np.testing.assert_allclose(
+        *np.array(
+            [
+                (hit, t[i, j])
+                for hit, i, j in zip(hits.t, hits.ray, hits.primitive, strict=True)
+                if (i, j) in expected
+            ]
+        ).T,
+        rtol=1e-4,
+    )
+    assert ((np.diff(hits.ray) > 0) | ((np.diff(hits.ray) == 0) & (np.diff(hits.t) >= 0))).all()
+
+
+def test_all_hits_of_none(accel, rays):
+    o, d = rays
+    assert len(accel.intersect_all(o[:0], d[:0]).t) == 0
+    assert len(accel.intersect_all(o, d, t_max=0.0).t) == 0
