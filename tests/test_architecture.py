@@ -21,6 +21,7 @@ MAY_IMPORT = {
     "device": BASE,
     "bvh": BASE | {"device"},
     "rays": BASE | {"device", "bvh"},
+    "trimesh_ray": BASE | {"device", "rays"},
     "render": BASE | {"scene", "device", "bvh"},
     "formats": BASE | {"scene"},
 }
