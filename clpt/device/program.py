@@ -88,6 +88,8 @@ class _Remarks:
                 self._filters = warnings.catch_warnings()
                 self._filters.__enter__()
                 warnings.simplefilter("ignore", cl.CompilerWarning)
+                # of `compile`, whose results clpt keeps itself
+                warnings.filterwarnings("ignore", "Pre-build attribute access", UserWarning)
             self._inside += 1
 
     def __exit__(self, *error: object) -> None:
