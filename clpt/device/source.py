@@ -35,11 +35,12 @@ class Source:
     def with_private(self, defines: Mapping[str, str] | None = None) -> Source:
         """The same with functions that other programs do not see, to be linked with them.
 
-        Those whose line begins with their type become static; kernels, and what a macro names, do
-        not. defines: more `#define` lines at the top.
+        Those whose line begins with their type become static, as constants do; kernels, and what a
+        macro names, do not. defines: more `#define` lines at the top.
         """
         head = [f"#define {name} {value}" for name, value in (defines or {}).items()]
         text = _FUNCTION.sub(r"static \g<0>", self.text)
+        text = re.sub(r"^constant\b", "static constant", text, flags=re.MULTILINE)
         return Source(self.name, "\n".join([*head, text]), self.files)
 
 

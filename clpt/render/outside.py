@@ -11,6 +11,7 @@ import sys
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
+from textwrap import dedent
 
 from clpt import device
 from clpt.errors import SceneError
@@ -87,18 +88,17 @@ def text(cls: type[Material]) -> device.Part:
         raise SceneError(
             f"{cls.__name__}.source is {given!r}, which is no OpenCL; a file is a pathlib.Path"
         )
-    return _located(given, Path(module)) if module else device.Part(given, f"{cls.__name__}.source")
+    file, line = _place(given, Path(module)) if module else (f"{cls.__name__}.source", 1)
+    return device.Part(dedent(given), file, line)  # functions begin at the beginnings of lines
 
 
-def _located(given: str, module: Path) -> device.Part:
-    """A text that stands in a Python file, if it does so as it is."""
+def _place(given: str, module: Path) -> tuple[str, int]:
+    """The file and line where a text stands, if it stands in the Python file as it is."""
     try:
         before, found, _ = module.read_text(encoding="utf-8").partition(given)
     except (OSError, UnicodeDecodeError):
         found = ""
-    if not found:
-        return device.Part(given, f"{module.name}:source")
-    return device.Part(given, module.as_posix(), before.count("\n") + 1)
+    return (module.as_posix(), before.count("\n") + 1) if found else (f"{module.name}:source", 1)
 
 
 @cache

@@ -91,6 +91,21 @@ def test_a_fault_names_the_line_in_the_users_file() -> None:
     assert "nonsense" in lines[raised.value.line - 1]
 
 
+def test_its_functions_and_constants_are_its_own() -> None:
+    """Where stages are linked to one program two kinds may have helpers of one name."""
+    helped = """
+        constant float table[2] = {0.5f, 1.0f};
+        real helper(real x)
+        {
+            return x * table[0];
+        }
+    """
+    text = device.Source("own", outside.text(type("Own", (Paint,), {"source": helped})).text, ())
+    private = text.with_private().text
+    assert "\nstatic constant float table[2]" in private
+    assert "\nstatic real helper(real x)" in private and "static return" not in private
+
+
 def test_a_file_is_found_beside_the_class(tmp_path: Path) -> None:
     """And text that stands nowhere is told by the name of its class."""
     kind = type("Filed", (m.Material,), {"source": Path("test_outside.py")})
