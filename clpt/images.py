@@ -10,6 +10,7 @@ import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cache
+from io import BytesIO
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -123,8 +124,7 @@ def write(
         if suffix == ".exr":
             _write_exr(path, pixels, half, {**stated, **(metadata or {})}, layers or {})
         elif suffix == ".png":
-            stored = to_srgb8(_to_rec709(pixels, space), exposure)
-            Image.fromarray(stored[..., 0] if stored.shape[2] == 1 else stored).save(path)
+            write_stored(path, to_srgb8(_to_rec709(pixels, space), exposure))
         elif suffix == ".hdr":
             _write_hdr(path, pixels)
         elif suffix == ".pfm":
@@ -137,7 +137,15 @@ def write(
 
 def write_stored(path: Path, values: NDArray[np.uint8]) -> None:
     """Write (h, w) or (h, w, 1, 3 or 4) as the bytes of a .png."""
-    Image.fromarray(values[..., 0] if values.shape[-1] == 1 else values).save(path)
+    path.write_bytes(png(values))
+
+
+def png(values: NDArray[np.uint8]) -> bytes:
+    """A .png file of (h, w) or (h, w, 1, 3 or 4), stored as they are."""
+    file = BytesIO()
+    grey = values.ndim == 3 and values.shape[2] == 1
+    Image.fromarray(values[..., 0] if grey else values).save(file, "png")
+    return file.getvalue()
 
 
 def check_output(path: str | Path) -> Path:

@@ -10,13 +10,13 @@ import numpy as np
 from .. import __version__, images, spectral_exr
 from ..errors import SceneError
 from ..render.renderer import Image, Renderer
+from ..render.views import sheet
 from ..scene import Scene
 from ..scene.integrators import Aov
 from ..spectra.spaces import chromaticities
 
 AOV_FORMATS = (".exr", ".png")
 BAND_FORMATS = (".npy", ".exr")  # that hold all bands; others hold their colours
-COLUMNS = 4  # of the sheet of an aov .png
 
 
 def default(scene: Path) -> tuple[Path, ...]:
@@ -94,28 +94,3 @@ def _write_layers(
         else:
             named[name] = layer
     images.write(path, picture, half=False, metadata=facts, layers=named)
-
-
-def sheet(layers: dict[str, Image]) -> Image:
-    """All layers side by side as people can see them, (h, w, 3) float32."""
-    shown = [viewable(name, layer) for name, layer in layers.items()]
-    columns = min(COLUMNS, len(shown))
-    shown += [np.zeros_like(shown[0])] * (-len(shown) % columns)
-    rows = [np.hstack(shown[at : at + columns]) for at in range(0, len(shown), columns)]
-    return np.vstack(rows)
-
-
-def viewable(name: str, layer: Image) -> Image:
-    """Values (h, w, 1 to 3) as colours in [0, 1], (h, w, 3) float32."""
-    if name == "albedo":
-        return layer
-    if name.endswith("_normal"):
-        return layer * np.float32(0.5) + np.float32(0.5)
-    if name == "depth":  # the nearest is white, what is twice as far half as bright
-        near = np.min(layer, where=layer > 0, initial=np.inf)
-        return np.repeat(np.divide(near, layer, where=layer > 0, out=np.zeros_like(layer)), 3, 2)
-    if name.endswith("_id"):  # neighbours in number differ in hue
-        turns = layer * np.float32(0.618034) + np.arange(3, dtype=np.float32) / np.float32(3.0)
-        return (0.5 + 0.5 * np.cos(2 * np.pi * turns)).astype(np.float32)
-    cells = np.mod(layer, np.float32(1.0))  # positions and uv: one run of colours a unit
-    return np.pad(cells, ((0, 0), (0, 0), (0, 3 - cells.shape[2])))
