@@ -1,6 +1,6 @@
 """How to run: choosing a device, building programs, buffers and timing. Knows no scenes."""
 
-from .array import DeviceArray
+from .array import DeviceArray, supersede
 from .buffers import Buffers
 from .context import Device, DeviceInfo, choose, devices
 from .program import Argument, Bound, Kernel, Program, build, build_all, link
@@ -31,4 +31,5 @@ __all__ = [
     "devices",
     "kernels_folder",
     "link",
+    "supersede",
 ]

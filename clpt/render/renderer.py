@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 import time
 from collections.abc import Callable, Mapping
@@ -11,14 +12,17 @@ from typing import Any
 import numpy as np
 import pyopencl as cl
 import pyopencl.array as cl_array
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from clpt import device as dev
-from clpt.errors import DeviceError, SceneError
+from clpt import images
+from clpt.errors import DeviceError, SceneError, UnknownKindError
 from clpt.render import updates
 from clpt.render.edits import MaterialKey, Names, ShapeKey, adopted, edited, followed
 from clpt.render.facts import Facts, gather
 from clpt.render.lower import lower
+from clpt.render.resolve import Resolve
+from clpt.render.views import sheet
 from clpt.render.wavefront import Wavefront
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
@@ -219,18 +223,67 @@ class Renderer:
         self.warnings = list(lowered.warnings)
 
     @property
-    def film(self) -> cl_array.Array:
-        """The picture so far on the device, (h, w, 4) float32, valid when the last event has ended.
+    def film(self) -> dev.DeviceArray:
+        """The picture so far on the device, (h, w, 4) float32, valid when its `events` have ended.
 
         Red, green and blue, linear in the film's output space; last, how many samples the pixel
-        has. Always the same memory, on the renderer's queue. Of `aov`, the first channel.
+        has. Always the same memory, on the renderer's queue; steps wait for those of its `events`
+        that readers add, as its `get_async` does. Of `aov`, the first channel.
         """
         return self.wavefronts[0].film
 
     @property
-    def films(self) -> dict[str, cl_array.Array]:
+    def films(self) -> dict[str, dev.DeviceArray]:
         """The values of the `aov` integrator by name, as `film` has them."""
         return {n: w.film for n, w in zip(self.channels, self.wavefronts, strict=True)}
+
+    def resolve(
+        self,
+        into: cl_array.Array | cl.MemoryObject | None = None,
+        *,
+        channel: str | None = None,
+        dtype: DTypeLike | None = None,
+        exposure: float = 0.0,
+        tone: str = "none",
+        srgb: bool | None = None,
+        flip: bool = False,
+        wait_for: dev.Events = None,
+    ) -> Any:
+        """Enqueue a picture (h, w, 4) for a screen, opaque, from the film as it then is.
+
+        into: the caller's Array or Buffer, or 2D Image of 8-bit or float RGBA, as OpenGL shares
+        them; None makes an Array. dtype: uint8 (the default, the bytes of a .png) or float32.
+        exposure [stops]; tone: none, reinhard or aces; srgb: whether the sRGB transfer is applied,
+        by default to uint8 only; colours become Rec. 709. flip: the first row is the lowest.
+        channel: of the `aov` integrator, by default its first; values stay as they are.
+
+        Returns the Array, whose `events` hold the event of the picture; for an Image the event.
+        Raises DeviceError if the picture does not fit, UnknownKindError for names.
+        """
+        if channel is not None and channel not in self.channels:
+            raise UnknownKindError("channel", channel, self.channels)
+        return self._resolve(
+            self.films[channel] if channel else self.film, into, dtype=dtype, exposure=exposure,
+            tone=tone, srgb=srgb, flip=flip, wait_for=wait_for,
+            space="rec709" if self.channels else self.scene.film.output_space,
+        )  # fmt: skip
+
+    @functools.cached_property
+    def _resolve(self) -> Resolve:
+        return Resolve(self.device, self.wavefronts[0].stream)
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
+        """`image()`, for numpy.asarray(renderer): a copy, which waits."""
+        if copy is False:
+            raise ValueError("a picture on a device becomes an array of numpy only by a copy")
+        image = self.image()
+        return image if dtype is None else image.astype(dtype, copy=False)
+
+    def _repr_png_(self) -> bytes:
+        """What a notebook shows of a renderer: its picture so far; waits."""
+        if self.channels:
+            return images.png(images.to_srgb8(sheet(self.layers())))
+        return images.png(self.resolve().get()[..., :3])
 
     @property
     def facts(self) -> Facts:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -47,17 +48,13 @@ class _Target:
 class Resolve:
     """Makes pictures of films on one device, whose commands go through the given stream.
 
-    space: of the films' colours, see clpt.spectra.spaces. Raises KernelBuildError.
+    Raises KernelBuildError.
     """
 
-    def __init__(self, on: device.Device, stream: device.Stream, space: str = "rec709"):
+    def __init__(self, on: device.Device, stream: device.Stream):
         self.device, self.stream = on, stream
         self.program = device.build(on, device.assemble("stage/resolve.cl"))
-        steps = device.Buffers(on).upload("the sRGB transfer", srgb8_steps())
-        rows = between(space, "rec709")
-        self.named: dict[str, Any] = {"steps": steps, "converted": int(space != "rec709")}
-        for name, row in zip(("red", "green", "blue"), rows, strict=True):
-            self.named[name] = (*row, 0.0)
+        self.steps = device.Buffers(on).upload("the sRGB transfer", srgb8_steps())
 
     def __call__(
         self,
@@ -69,15 +66,20 @@ class Resolve:
         tone: str = "none",
         srgb: bool | None = None,
         flip: bool = False,
+        space: str = "rec709",
         wait_for: device.Events = None,
     ) -> Array | cl.Event:
-        """Enqueue that a film (h, w, 4) float32 becomes a picture; see `Renderer.resolve`."""
+        """Enqueue that a film (h, w, 4) float32 becomes a picture; see `Renderer.resolve`.
+
+        space: of the film's colours, see clpt.spectra.spaces.
+        """
         if tone not in TONES:
             raise UnknownKindError("tone curve", tone, TONES)
         target = self._target(film, into, dtype)
         named = {
-            **self.named,
+            **_to_rec709(space),
             "film": film.base_data,
+            "steps": self.steps,
             "scale": 2.0**exposure,
             "tone": TONES.index(tone),
             "encoded": int(target.dtype == BYTES if srgb is None else srgb),
@@ -93,7 +95,7 @@ class Resolve:
         event = self.stream.run(bound, (film.shape[1], film.shape[0]))
         if not isinstance(target.memory, Array):
             return event
-        target.memory.events[:] = [event]  # it came after those that were there
+        device.supersede(target.memory, event)
         return target.memory
 
     def _target(self, film: Array, into: Any, dtype: Any) -> _Target:
@@ -125,6 +127,13 @@ class Resolve:
         if asked is not None and asked != target.dtype:
             raise DeviceError(f"a picture of {asked} was asked for, into what holds {target.dtype}")
         return target
+
+
+@cache
+def _to_rec709(space: str) -> dict[str, Any]:
+    """The kernels' arguments that take colours of a space to Rec. 709."""
+    rows = zip(("red", "green", "blue"), between(space, "rec709"), strict=True)
+    return {"converted": int(space != "rec709")} | {name: (*row, 0.0) for name, row in rows}
 
 
 def _check_array(into: Array, shape: tuple[int, ...]) -> None:

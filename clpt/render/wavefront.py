@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 import pyopencl as cl
-import pyopencl.array as cl_array
 
 from clpt import bvh, device
 from clpt.device.buffers import Buffers
@@ -232,6 +231,8 @@ class Wavefront:
         for name, size in sizes.items():
             self.named[name] = self.buffers.allocate(f"the {name}", size, advice)
         self.band_bytes = sizes.get("bands", 0)
+        shape, image = (*self._size[::-1], 4), self.named["image"]
+        self.film = device.DeviceArray(self.device.queue, shape, np.float32, data=image)
         self._bind_film()
         self.clear()
 
@@ -310,7 +311,9 @@ class Wavefront:
         self.exposed = 0.0  # paths per pixel
         self._fill("counters", 0, 0, 4 * len(COUNTERS))
         self._fill("film", 0, 0, self.film_bytes)
-        self._fill("image", 0, 0, self.named["image"].size)
+        self.stream.after(self.film.events)
+        event = self.stream.fill(self.named["image"], 0, 0, self.named["image"].size)
+        device.supersede(self.film, event)
         if self.band_bytes:
             self._fill("bands", 0, 0, self.band_bytes)
 
@@ -391,14 +394,8 @@ class Wavefront:
     def _accumulate(self) -> None:
         if self.lowered.features.light_paths:
             self.accumulate.set(samples=self.exposed)
-        self.stream.run(self.accumulate, self._size)
-
-    @cached_property
-    def film(self) -> cl_array.Array:
-        """The picture so far, (h, w, 4) float32 in the film's output space; last, samples."""
-        width, height = self._size
-        shape = (height, width, 4)
-        return cl_array.Array(self.device.queue, shape, np.float32, data=self.named["image"])
+        self.stream.after(self.film.events)  # of who reads it
+        device.supersede(self.film, self.stream.run(self.accumulate, self._size))
 
     def image(self) -> np.ndarray:
         """The picture so far, (h, w, 3) float32 in the film's output space; waits for it."""

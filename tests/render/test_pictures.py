@@ -1,0 +1,100 @@
+"""A renderer's picture in other hands: resolved on the device, as an array, in a notebook."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+import pyopencl as cl
+import pytest
+from PIL import Image
+
+import clpt
+from clpt import images
+from clpt.errors import UnknownKindError
+from clpt.render.views import sheet
+from clpt.scene import Film, Scene, cameras, shapes
+from clpt.scene.integrators import Aov
+from tests.renders.support import with_film
+
+SAMPLES = 4
+
+
+@pytest.fixture(scope="module")
+def scene(scenes):
+    return with_film(clpt.load(scenes / "cornell.xml"), mode="rgb", width=32, height=24)
+
+
+@pytest.fixture(scope="module")
+def renderer(scene):
+    context = cl.Context([clpt.device.choose().info.cl_device])
+    mode = cl.command_queue_properties.OUT_OF_ORDER_EXEC_MODE_ENABLE
+    made = clpt.Renderer(scene, queue=cl.CommandQueue(context, properties=mode))
+    made.step(SAMPLES)
+    return made
+
+
+def test_film_is_the_picture_and_its_samples(renderer):
+    film = np.asarray(renderer.film)
+    np.testing.assert_array_equal(film[..., :3], renderer.image())
+    assert (film[..., 3] == SAMPLES).all()
+    np.testing.assert_array_equal(np.from_dlpack(renderer.film, device="cpu"), film)
+
+
+def test_a_renderer_is_an_array(renderer):
+    np.testing.assert_array_equal(np.asarray(renderer), renderer.image())
+    assert np.asarray(renderer, np.float64).dtype == np.float64
+
+
+def test_resolved_is_the_png(renderer, tmp_path):
+    images.write(tmp_path / "a.png", renderer.image(), exposure=1.0)
+    with Image.open(tmp_path / "a.png") as png:
+        written = np.asarray(png)
+    np.testing.assert_array_equal(renderer.resolve(exposure=1.0).get()[..., :3], written)
+
+
+def test_a_notebook_shows_it(renderer):
+    with Image.open(io.BytesIO(renderer._repr_png_())) as png:
+        np.testing.assert_array_equal(np.asarray(png), images.to_srgb8(renderer.image()))
+
+
+def test_readers_of_the_film_come_before_the_next_step(renderer):
+    """On a queue without order: what was asked for before a step is the picture before it."""
+    before = renderer.film.get()
+    gate = cl.UserEvent(renderer.film.context)
+    early = np.empty_like(before)
+    renderer.film.add_event(
+        cl.enqueue_copy(
+            renderer.film.queue, early, renderer.film.data, wait_for=[gate], is_blocking=False
+        )
+    )
+    renderer.step(SAMPLES)
+    late = renderer.resolve(dtype=np.float32)
+    gate.set_status(cl.command_execution_status.COMPLETE)
+    assert (late.get()[..., :3] != before[..., :3]).any()
+    np.testing.assert_array_equal(early, before)
+    assert (renderer.film.get()[..., 3] == 2 * SAMPLES).all()
+    renderer.reset()
+    assert not renderer.film.get().any()
+
+
+def test_aov_resolves_by_channel():
+    plan = Scene(
+        camera=cameras.Perspective(),
+        shapes=[shapes.Sphere(center=(0.0, 0.0, 4.0))],
+        integrator=Aov(channels=("depth", "albedo")),
+        film=Film(width=16, height=8, mode="rgb"),
+    )
+    renderer = clpt.Renderer(plan)
+    renderer.run(1)
+    layers = renderer.layers()
+    for name, layer in layers.items():
+        values = renderer.resolve(channel=name, dtype=np.float32).get()
+        np.testing.assert_array_equal(values[..., : layer.shape[2]], layer)
+        film = np.asarray(renderer.films[name])
+        np.testing.assert_array_equal(film[..., : layer.shape[2]], layer)
+    assert renderer.film is renderer.films["depth"]
+    with pytest.raises(UnknownKindError, match=r"'uv'.*albedo"):
+        renderer.resolve(channel="uv")
+    with Image.open(io.BytesIO(renderer._repr_png_())) as png:
+        np.testing.assert_array_equal(np.asarray(png), images.to_srgb8(sheet(layers)))
