@@ -85,8 +85,9 @@ def test_aov_resolves_by_channel():
         integrator=Aov(channels=("depth", "albedo")),
         film=Film(width=16, height=8, mode="rgb"),
     )
-    renderer = clpt.Renderer(plan)
-    renderer.run(1)
+    opened = clpt.device.choose()
+    renderer = clpt.Renderer(plan, queue=opened.queue)
+    renderer.step(1)
     layers = renderer.layers()
     for name, layer in layers.items():
         values = renderer.resolve(channel=name, dtype=np.float32).get()
