@@ -25,6 +25,7 @@ PARTS = {
     "effects": (),
     "lights": (),
     "instancing": (),
+    "embedding": (),
     "startup": (),
 }
 

@@ -107,6 +107,7 @@ TABLES: dict[str, Callable[[Sequence[Row]], str]] = {
     "effects": plain,
     "lights": plain,
     "instancing": plain,
+    "embedding": plain,
     "startup": startup,
     "traversal": plain,
     "building": plain,
