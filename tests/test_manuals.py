@@ -72,3 +72,12 @@ def test_a_material_of_ones_own(program, tmp_path: Path) -> None:
     middle = image[12:20, 12:20].mean(axis=(0, 1))
     # as bright as the sky where it faces the viewer, times its colour
     np.testing.assert_allclose(middle, [0.9, 0.8, 0.1], rtol=0.05)
+
+
+def test_a_scene_that_changes(program) -> None:
+    made = program("device_data.md")
+    image, renderer = made["renderer"].image(), made["renderer"]
+    assert renderer.samples == 4
+    again = clpt.Renderer(renderer.scene, queue=made["queue"])
+    again.step(4)
+    np.testing.assert_allclose(image, again.image(), atol=1e-5)

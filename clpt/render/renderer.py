@@ -197,8 +197,8 @@ class Renderer:
         Raises SceneError for what is not in the scene, or makes no sense in it, and for a film of
         another size; nothing has changed then.
         """
-        front = self.wavefronts[0]
-        front.stream.after(wait_for)
+        front, events = self.wavefronts[0], list(wait_for or ())
+        front.stream.after(events)
         new = self.scene if scene is None else scene
         swaps = {} if scene is None else followed(self.scene, new)
         if materials or transforms or vertices:
@@ -208,6 +208,8 @@ class Renderer:
             new = dataclasses.replace(new, camera=camera)
         values = scene is None and not transforms and not vertices
         if not (values and updates.rewrite(self.wavefronts, self.scene, new)):
+            for event in events:
+                event.wait()  # arrays on the device may be read
             self._lower_again(new)
         self.scene = new
         self._names.replace(swaps)
