@@ -103,23 +103,20 @@ _REMARKS = _Remarks()
 
 
 class Program:
-    """A built program; its kernels are kept, one object each.
+    """A built program.
 
     signatures: kernel name -> what it takes.
     """
 
     def __init__(self, name: str, cl_program: cl.Program, signatures: Signatures):
         self.name, self.cl_program, self.signatures = name, cl_program, signatures
-        self._kernels: dict[str, Kernel] = {}
 
     def kernel(self, name: str) -> Kernel:
         """The kernel of that name. Raises KeyError, telling which there are."""
-        if name not in self._kernels:
-            if name not in self.signatures:
-                known = ", ".join(sorted(self.signatures)) or "no kernel"
-                raise KeyError(f"program {self.name!r} has no kernel {name!r}; it has {known}")
-            self._kernels[name] = Kernel(self, name)
-        return self._kernels[name]
+        if name not in self.signatures:
+            known = ", ".join(sorted(self.signatures)) or "no kernel"
+            raise KeyError(f"program {self.name!r} has no kernel {name!r}; it has {known}")
+        return Kernel(self, name)
 
 
 class Kernel:

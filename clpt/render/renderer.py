@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import logging
 import math
+import threading
 import time
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -22,6 +24,7 @@ from clpt.render.edits import MaterialKey, Names, ShapeKey, adopted, edited, fol
 from clpt.render.facts import Facts, gather
 from clpt.render.lower import lower
 from clpt.render.resolve import Resolve
+from clpt.render.turns import Turns, alone
 from clpt.render.views import sheet
 from clpt.render.wavefront import Wavefront
 from clpt.scene import Scene
@@ -29,6 +32,8 @@ from clpt.scene.cameras import Camera
 from clpt.scene.integrators import CHANNELS, Aov
 from clpt.scene.materials import Material
 from clpt.spectral_exr import SpectralImage
+
+log = logging.getLogger(__name__)
 
 Image = NDArray[np.float32]
 TEXTURE_SHARE = 0.5  # of a device's free memory, for bitmaps
@@ -49,7 +54,7 @@ class Progress:
     seconds: float
 
 
-class Renderer:
+class Renderer(Turns):
     """Renders a scene; its picture can be asked for at any time.
 
     device: where to render, a name or index (see clpt.device.choose), or a clpt.device.Device.
@@ -58,6 +63,9 @@ class Renderer:
     in a thread of the driver.
     texture_budget: [bytes] that bitmaps may take, larger ones are halved; by default half of what
     the device has free. The other parameters are those of clpt.render.wavefront.Wavefront.
+
+    It may be used from several threads: one method runs at a time. With `with`, `close`, or when it
+    is dropped, it gives the device's memory back.
 
     Raises SceneError for a scene that makes no sense, DeviceError, MemoryBudgetError.
     """
@@ -73,6 +81,8 @@ class Renderer:
         texture_budget: int | None = None,
         **wavefront: Any,
     ):
+        super().__init__()
+        self._stop = threading.Event()
         self.scene = scene
         if queue is not None:
             if device is not None:
@@ -103,7 +113,9 @@ class Renderer:
         self.warnings = list(self.wavefronts[0].lowered.warnings)
         self.samples = 0
         self._progress = progress
+        log.info("ready in %.2f s", self._seconds["ready"])
 
+    @alone
     def step(self, samples: int = 1, wait_for: dev.Events = None) -> cl.Event:
         """Enqueue that every pixel gets `samples` more; `self.samples` tells how many it then has.
 
@@ -126,24 +138,34 @@ class Renderer:
         return event
 
     def _tell_later(self, event: cl.Event, told: Callable[[Progress], Any]) -> None:
-        """Tell the caller how far the picture is, once the event has ended."""
-        samples = self.samples
+        """Tell the caller how far the picture is, once the event has ended.
+
+        What the caller then raises is logged: in a thread of the driver nobody could catch it.
+        """
+        samples, start = self.samples, self._start
         pixels = math.prod(self.scene.film.size) * len(self.wavefronts)
 
         def tell(_: int) -> None:
-            seconds = time.perf_counter() - self._start
-            told(Progress(samples, samples, samples * pixels, 0, seconds))
+            seconds = time.perf_counter() - start
+            try:
+                told(Progress(samples, samples, samples * pixels, 0, seconds))
+            except Exception:
+                log.exception("the progress callback failed at %d samples", samples)
 
         event.set_callback(cl.command_execution_status.COMPLETE, tell)
 
+    @alone
     def run(self, samples: int, progress: Callable[[Progress], bool] | None = None) -> bool:
         """Add samples to every pixel and wait; `samples` in all are kept in `self.samples`.
 
-        progress: called every few milliseconds to seconds; if it returns False the run stops soon.
-        Returns whether it came to its end.
+        progress: called every few milliseconds to seconds; if it returns False the run stops soon,
+        as after `cancel`. Returns whether it came to its end. What progress raises, or Ctrl+C in
+        it, is raised when the paths in flight have ended: the film is whole then too.
         """
         start = time.perf_counter()
         first, end = self.samples, self.samples + _whole(samples)
+        raised: list[BaseException] = []
+        self._stop.clear()
 
         def tell(_: Any) -> bool:
             counts = [w.counts for w in self.wavefronts]
@@ -153,14 +175,30 @@ class Renderer:
             pixels = math.prod(self.scene.film.size) * len(counts)
             seconds = time.perf_counter() - start
             rays = sum(c.rays for c in counts)
-            return progress is None or progress(Progress(paths / pixels, end, paths, rays, seconds))
+            if self._stop.is_set() or progress is None:
+                return not self._stop.is_set()
+            try:
+                return progress(Progress(paths / pixels, end, paths, rays, seconds))
+            except BaseException as error:
+                raised.append(error)
+                return False
 
         for wavefront in self.wavefronts:
             if not wavefront.expose(first, end, tell):
+                if raised:
+                    raise raised.pop()
                 return False
         self.samples = end
         return True
 
+    def cancel(self) -> None:
+        """Let the `run` of another thread stop soon; it then returns False. A step is not stopped.
+
+        It may be called from anywhere, also from a signal's handler, and waits for nothing.
+        """
+        self._stop.set()
+
+    @alone
     def reset(self, wait_for: dev.Events = None) -> cl.Event:
         """Enqueue that the film is emptied; the next sample is number 0 again."""
         stream = self.wavefronts[0].stream
@@ -168,8 +206,27 @@ class Renderer:
         for wavefront in self.wavefronts:
             wavefront.clear()
         self.samples = 0
+        stream.flush()
         return stream.last
 
+    def close(self) -> None:
+        """Give the device's memory back; the renderer is of no use afterwards.
+
+        It waits for a `run` of another thread, not for what was enqueued. An array that the caller
+        still holds, such as `film`, keeps its memory. Dropping a renderer does the same.
+        """
+        with self._turn:
+            self._closed = True
+            self.wavefronts = []
+            self.__dict__.pop("_resolve", None)
+
+    def __enter__(self) -> Renderer:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+    @alone
     def update(
         self,
         *,
@@ -225,6 +282,7 @@ class Renderer:
         self.warnings = list(lowered.warnings)
 
     @property
+    @alone
     def film(self) -> dev.DeviceArray:
         """The picture so far on the device, (h, w, 4) float32, valid when its `events` have ended.
 
@@ -235,10 +293,12 @@ class Renderer:
         return self.wavefronts[0].film
 
     @property
+    @alone
     def films(self) -> dict[str, dev.DeviceArray]:
         """The values of the `aov` integrator by name, as `film` has them."""
         return {n: w.film for n, w in zip(self.channels, self.wavefronts, strict=True)}
 
+    @alone
     def resolve(
         self,
         into: cl_array.Array | cl.MemoryObject | None = None,
@@ -288,10 +348,12 @@ class Renderer:
         return images.png(self.resolve().get()[..., :3])
 
     @property
+    @alone
     def facts(self) -> Facts:
         """What the render took so far: numbers of things, bytes by table and tree, seconds."""
         return gather(self.wavefronts, self._built, dict(self._seconds))
 
+    @alone
     def image(self) -> Image:
         """The picture so far: (h, w, 3) float32, linear in the film's output space.
 
@@ -304,6 +366,7 @@ class Renderer:
             return self.wavefronts[0].bands() * np.float32(film.exposure)
         return self.colours()
 
+    @alone
     def colours(self) -> Image:
         """The picture so far in three colours, (h, w, 3) float32, also of a film with bands."""
         return self.wavefronts[0].image()
@@ -314,6 +377,7 @@ class Renderer:
             raise SceneError("this picture has no bands; set the film's", where="film.bands")
         return SpectralImage(self.image(), self.scene.film.band_centres, emissive=True)
 
+    @alone
     def layers(self) -> dict[str, Image]:
         """The values of the `aov` integrator by name, (h, w, 1 to 3) float32."""
         return {
