@@ -43,7 +43,7 @@ class Buffers:
     def upload(
         self, what: str, array: ArrayLike, dtype: DTypeLike | None = None, advice: str = _ADVICE
     ) -> cl.Buffer:
-        """A read-only copy of an array, C-contiguous; an empty one becomes a small buffer of zeros.
+        """A copy of an array, C-contiguous; an empty one becomes a small buffer of zeros.
 
         Raises MemoryBudgetError if it does not fit.
         """
@@ -72,7 +72,7 @@ class Buffers:
             raise MemoryBudgetError(what, nbytes, self.available, advice)
         access = cl.mem_flags.READ_WRITE
         if host is not None:
-            access = cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR
+            access |= cl.mem_flags.COPY_HOST_PTR
         try:
             buffer = cl.Buffer(
                 self.device.context, access, size=0 if host is not None else nbytes, hostbuf=host

@@ -42,6 +42,13 @@ def is_table(values: Any, kind: str) -> bool:
     )
 
 
+def another(values: Any) -> Any:
+    """Return another object for the same memory on a device: what it holds may be other now."""
+    if isinstance(values, cl_array.Array):
+        return values.view()
+    return cl.Buffer.from_int_ptr(values.int_ptr)
+
+
 def shaped(values: Any, name: str, queue: cl.CommandQueue, where: str) -> Any:
     """Return what `on_host` can read: a buffer as an array of a shape's COLUMNS, on the queue.
 

@@ -12,12 +12,12 @@ import pyopencl as cl
 
 from clpt.errors import SceneError
 from clpt.render import shapes
-from clpt.render.arrays import on_device, on_host, readable
+from clpt.render.arrays import another, on_device, readable
 from clpt.render.instancing import distinct
 from clpt.scene import Scene
 from clpt.scene.materials import Material
 from clpt.scene.params import params
-from clpt.scene.shapes import Group, Instance, Shape
+from clpt.scene.shapes import SMOOTH, Group, Instance, Shape
 
 ShapeKey: TypeAlias = Shape | str | int
 MaterialKey: TypeAlias = Material | ShapeKey
@@ -66,15 +66,18 @@ def edited(
         else:
             edit.change(edit.shape(key, "materials"), "material", material)
     for key, matrix in (transforms or {}).items():
-        edit.change(edit.shape(key, "transforms"), "to_world", np.array(on_host(matrix), float))
+        given = matrix if on_device(matrix) else np.array(matrix, float)
+        edit.change(edit.shape(key, "transforms"), "to_world", given)
     for key, points in (vertices or {}).items():
         shape = edit.shape(key, "vertices")
         field = next((name for name in ("vertices", "centers") if hasattr(shape, name)), None)
         if field is None:
             raise SceneError(f"a {shape.kind} has none", where=f"vertices[{key!r}]")
         # another object: an array that is the same one would be taken to hold the same
-        new = points if on_device(points) else np.asarray(points).view()
+        new = another(points) if on_device(points) else np.asarray(points).view()
         edit.change(shape, field, new)
+        if getattr(shape, "normals", None) is not None:  # the former vertices' are of no use
+            edit.change(shape, "normals", SMOOTH)
     made = edit.scene_made()
     swaps = {at: (old, new) for at, (old, new) in edit.done.items() if old is not new}
     return made, swaps

@@ -23,7 +23,7 @@ from clpt.render.tessellate import keeps_its_kind, tessellate
 from clpt.scene.shapes import Group, Instance, Shape
 
 Matrices = NDArray[np.floating]
-CELLS = 16  # columns along a side, see `_outline`
+CELLS = 16  # columns along a side, see `outline`
 ROUNDING = 4e-6  # of its coordinates, by which a box is larger than what float32 makes of it
 POINTS = 1 << 20  # that are transformed at once
 
@@ -52,12 +52,14 @@ class Prototype:
 class Shared:
     """A prototype as the device has it.
 
-    rows: (k,) of INSTANCE.dtype; boxes: (k, 2, 3) float32 in the world; triangles: their number.
+    rows: (k,) of INSTANCE.dtype; boxes: (k, 2, 3) float32 in the world; triangles: their number;
+    middle: (3,) of the group's box, where its triangles have their origin.
     """
 
     rows: NDArray[Any]
     boxes: NDArray[np.float32]
     triangles: int
+    middle: NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -65,13 +67,14 @@ class Instances:
     """All instances of a scene.
 
     rows: (k,) of INSTANCE.dtype; boxes: (k, 2, 3) float32; prototypes: (k,), what each places;
-    triangles: of each prototype.
+    triangles, middles: of each prototype.
     """
 
     rows: NDArray[Any]
     boxes: NDArray[np.float32]
     prototypes: NDArray[np.intp]
     triangles: tuple[int, ...]
+    middles: tuple[NDArray[np.float64], ...]
 
 
 def joined(parts: Sequence[Shared]) -> Instances:
@@ -81,6 +84,7 @@ def joined(parts: Sequence[Shared]) -> Instances:
         np.concatenate([np.zeros((0, 2, 3), np.float32), *(part.boxes for part in parts)]),
         np.repeat(np.arange(len(parts)), [len(part.rows) for part in parts]),
         tuple(part.triangles for part in parts),
+        tuple(part.middle for part in parts),
     )
 
 
@@ -111,7 +115,7 @@ def sort(things: Sequence[Shape], warnings: list[str]) -> tuple[list[Placed], li
         else:
             placed.append(Placed(thing, number))
     for group, numbers in groups.values():
-        to_world = _matrices([things[number] for number in numbers])
+        to_world = matrices([things[number] for number in numbers])
         shared = []
         for shape in group.shapes:
             whole = Prototype((shape,), to_world, np.array(numbers, np.int32))
@@ -126,8 +130,8 @@ def sort(things: Sequence[Shape], warnings: list[str]) -> tuple[list[Placed], li
     return placed, prototypes
 
 
-def _matrices(instances: Sequence[Shape]) -> Matrices:
-    """The transforms of instances, (k, 4, 4), checked all at once."""
+def matrices(instances: Sequence[Shape]) -> Matrices:
+    """Return the transforms of instances, (k, 4, 4), checked all at once. Raises as `sort` does."""
     try:
         found = np.stack([np.asarray(on_host(one.to_world), np.float64) for one in instances])
         affine = found.shape[1:] == (4, 4) and (found[:, 3] == transforms.IDENTITY[3]).all()
@@ -175,32 +179,37 @@ def _analytic(
     return kept
 
 
-def place(
-    prototype: Prototype, vertices: shapes.Points
-) -> tuple[shapes.Points, NDArray[Any], NDArray[np.float32]]:
-    """Return vertices about the middle of their box, a row of INSTANCE and a box per instance.
-
-    vertices: (n, 3) float32 in the group's space; boxes: (k, 2, 3) float32 in the world. Of the
-    rows, nodes, leaves and prim are 0. Raises SceneError where float32 does not reach.
-    """
+def centred(vertices: shapes.Points) -> tuple[shapes.Points, NDArray[np.float64]]:
+    """Return vertices (n, 3) float32 about the middle of their box, and that (3,)."""
     middle = ((vertices.min(axis=0) + vertices.max(axis=0)) * np.float32(0.5)).astype(np.float64)
-    vertices = (vertices - middle).astype(np.float32)
-    linear = prototype.to_world[:, :3, :3]
+    return (vertices - middle).astype(np.float32), middle
+
+
+def place(
+    to_world: Matrices, numbers: NDArray[np.int32], outline_: shapes.Points, middle: Matrices
+) -> tuple[NDArray[Any], NDArray[np.float32]]:
+    """Return a row of INSTANCE and a box (2, 3) float32 in the world per instance.
+
+    to_world, numbers: as of a Prototype; outline_, middle: of its vertices, see `outline` and
+    `centred`. Of the rows, nodes, leaves and prim are 0. Raises SceneError where float32 does not
+    reach.
+    """
+    linear = to_world[:, :3, :3]
     rows = np.zeros(len(linear), INSTANCE.dtype)
-    rows["number"] = prototype.numbers
-    rows["origin"] = linear @ middle + prototype.to_world[:, :3, 3]
+    rows["number"] = numbers
+    rows["origin"] = linear @ middle + to_world[:, :3, 3]
     with np.errstate(all="ignore"):  # looked at below
         to_local = np.linalg.inv(linear).astype(np.float32)
         for i, name in enumerate("xyz"):
             rows[name] = to_local[:, i]
         seen = to_local.astype(np.float64)  # what rays are turned by
         seen[~(np.abs(np.linalg.det(seen)) > 0.0)] = np.nan
-        boxes = _boxes(_outline(vertices), np.linalg.inv(seen), rows)
+        boxes = _boxes(outline_, np.linalg.inv(seen), rows)
     wrong = ~np.isfinite(boxes).all(axis=(1, 2))
     if wrong.any():
-        where = f"shapes[{prototype.numbers[np.argmax(wrong)]}]"
+        where = f"shapes[{numbers[np.argmax(wrong)]}]"
         raise SceneError("its transform moves a group out of float32", where=where)
-    return vertices, rows, boxes
+    return rows, boxes
 
 
 def _boxes(points: shapes.Points, linear: Matrices, rows: NDArray[Any]) -> NDArray[np.float32]:
@@ -220,8 +229,8 @@ def _boxes(points: shapes.Points, linear: Matrices, rows: NDArray[Any]) -> NDArr
     return boxes.astype(np.float32)
 
 
-def _outline(vertices: shapes.Points) -> shapes.Points:
-    """Points (p, 3) whose hull holds the vertices and is little larger, p at most 8 CELLS^2.
+def outline(vertices: shapes.Points) -> shapes.Points:
+    """Return points (p, 3) whose hull holds the vertices and is little larger, p at most 8 CELLS^2.
 
     They are the corners of a box around the vertices in each column of a grid.
     """

@@ -57,9 +57,10 @@ class Lowered:
     are what the acceleration structures are built of, the world's before those of the groups that
     `instances` share; boxes (k, 2, 3) float32 those of the analytic shapes, which are the last rows
     of `shapes`. tables: every other read-only array by name; where an instance's tree begins is
-    filled in when trees are built. lent: those that are the caller's buffers. glass_row: of the
-    camera, see `lower_camera`. encoder: what made the tables, for values that are edited; None once
-    it is of no use; memo: what the next lowering need not make again.
+    filled in when trees are built. lent: those that are the caller's buffers. owners: of each row
+    of `shapes`. glass_row: of the camera, see `lower_camera`. encoder: what made the tables, for
+    values that are edited; None once it is of no use; memo: what the next lowering need not make
+    again.
     """
 
     features: Features
@@ -71,6 +72,7 @@ class Lowered:
     boxes: NDArray[np.float32]
     instances: Instances
     lent: dict[str, Any]
+    owners: list[attributes.Placed]
     glass_row: int
     warnings: list[str]
     encoder: Tables | None
@@ -219,7 +221,7 @@ class _Lowering:
         self.memo.settle()
         return Lowered(
             features, settings, arrays, vertices, faces, tags, boxes, instances,
-            self._lent(len(faces)), glass_row, self.warnings, tables, self.memo,
+            self._lent(len(faces)), self.owners, glass_row, self.warnings, tables, self.memo,
         )  # fmt: skip
 
     def _lent(self, count: int) -> dict[str, Any]:
@@ -247,14 +249,16 @@ class _Lowering:
         for shape in prototype.shapes:
             rows.append(self._shape(len(rows), Placed(shape, 0), []))
         own = self.triangles[before:]
-        whole, placed, boxes = instancing.place(prototype, np.concatenate([v for v, _, _ in own]))
+        whole, middle = instancing.centred(np.concatenate([v for v, _, _ in own]))
+        outline = instancing.outline(whole)
+        placed, boxes = instancing.place(prototype.to_world, prototype.numbers, outline, middle)
         ends = np.cumsum([len(v) for v, _, _ in own])[:-1]
         self.triangles[before:] = [
             (moved, faces, number)
             for moved, (_, faces, number) in zip(np.split(whole, ends), own, strict=True)
         ]
         placed["prim"] = first
-        return instancing.Shared(placed, boxes, self.n_faces - first)
+        return instancing.Shared(placed, boxes, self.n_faces - first, middle)
 
     def _shape(self, number: int, one: Placed, emitters: list) -> np.ndarray:
         """One row of `shapes`; its triangles, or its parameters, go into the tables."""

@@ -23,6 +23,7 @@ from clpt.render import updates
 from clpt.render.edits import MaterialKey, Names, ShapeKey, adopted, edited, followed
 from clpt.render.facts import Facts, gather
 from clpt.render.lower import lower
+from clpt.render.moving import Moving
 from clpt.render.resolve import Resolve
 from clpt.render.turns import Turns, alone
 from clpt.render.views import sheet
@@ -113,6 +114,7 @@ class Renderer(Turns):
         self.warnings = list(self.wavefronts[0].lowered.warnings)
         self.samples = 0
         self._progress = progress
+        self._moving: Moving | None = None
         log.info("ready in %.2f s", self._seconds["ready"])
 
     @alone
@@ -217,7 +219,7 @@ class Renderer(Turns):
         """
         with self._turn:
             self._closed = True
-            self.wavefronts = []
+            self.wavefronts, self._moving = [], None
             self.__dict__.pop("_resolve", None)
 
     def __enter__(self) -> Renderer:
@@ -241,21 +243,29 @@ class Renderer(Turns):
 
         camera: another one; of the same kind it takes one small write. materials: by what they
         stand for, a material of the scene or a shape's key; where only values differ a few words
-        are written. transforms: (4, 4) by shape; vertices: (n, 3) float32 by shape. The key of a
-        shape is the shape, its name, or its place in `scene.shapes`; shapes and materials that were
-        given at first go on to name what took their place. scene: another scene of the same film,
-        for whatever else; what its shapes and lights share with the present one, the same arrays
-        and images, is not looked at again.
+        are written. transforms: (4, 4) by shape; vertices: (n, 3) float32 by shape, of numpy or on
+        the device. The key of a shape is the shape, its name, or its place in `scene.shapes`;
+        shapes and materials that were given at first go on to name what took their place. scene:
+        another scene of the same film, for whatever else; what its shapes and lights share with the
+        present one, the same arrays and images, is not looked at again.
 
-        What the device needs is found by lowering again: tables are written where they differ,
-        trees built where triangles do, kernels built where others are needed. `self.scene` is then
-        the new scene, and the picture will be that of a new renderer.
+        What only moves does so on the device, where trees are fitted to it, see
+        clpt.render.moving; nothing is waited for. Else what the device needs is found by lowering
+        again: tables are written where they differ, trees built where triangles do, kernels built
+        where others are needed. `self.scene` is then the new scene, and the picture will be that of
+        a new renderer.
 
         Raises SceneError for what is not in the scene, or makes no sense in it, and for a film of
         another size; nothing has changed then.
         """
         front, events = self.wavefronts[0], list(wait_for or ())
         front.stream.after(events)
+        moves = scene is None and bool(transforms or vertices)
+        if moves and self._move(transforms or {}, vertices or {}):
+            transforms = vertices = None
+            event = self.reset()  # whatever becomes of the rest
+            if materials is None and camera is None:
+                return event
         new = self.scene if scene is None else scene
         swaps = {} if scene is None else followed(self.scene, new)
         if materials or transforms or vertices:
@@ -271,6 +281,18 @@ class Renderer(Turns):
         self.scene = new
         self._names.replace(swaps)
         return self.reset()
+
+    def _move(self, transforms: Mapping[ShapeKey, Any], vertices: Mapping[ShapeKey, Any]) -> bool:
+        """Move shapes where they are; whether that could be done."""
+        front = self.wavefronts[0]
+        if self._moving is None or self._moving.lowered is not front.lowered:
+            self._moving = Moving(front, self.scene)
+        moved, swaps = edited(self.scene, self._names, None, transforms, vertices)
+        if not self._moving.move(self.scene, swaps):
+            return False
+        self.scene = moved
+        self._names.replace(swaps)
+        return True
 
     def _lower_again(self, scene: Scene) -> None:
         """Lower a scene and let it take the place of the one on the device."""

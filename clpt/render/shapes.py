@@ -180,7 +180,7 @@ def attribute(shape: Shape, name: str) -> Points:
 def _in_world(shape: Shape) -> tuple[Points, Faces, Points | None, Points | None]:
     """Vertices, faces, normals and uvs after the transform."""
     matrix = placement(shape)
-    vertices, faces, normals, uvs = _local(shape)
+    vertices, faces, normals, uvs = local(shape)
     if not np.array_equal(matrix, transforms.IDENTITY):
         vertices = transforms.transform_points(matrix, vertices).astype(np.float32)
         if not np.isfinite(vertices).all():
@@ -350,8 +350,8 @@ def _members(shape: Shape) -> dict[str, NDArray[np.float64]]:
     return {m.name: np.asarray(values[m.name], np.float64) for m in record.members}
 
 
-def _local(shape: Shape) -> tuple[Points, Faces, Points | None, Points | None]:
-    """Vertices, faces, normals and uvs before the transform."""
+def local(shape: Shape) -> tuple[Points, Faces, Points | None, Points | None]:
+    """Return vertices, faces, normals and uvs before the transform; raises as `triangles` does."""
     if isinstance(shape, shapes.Mesh):
         return _mesh(shape)
     if isinstance(shape, shapes.Curves):
@@ -382,9 +382,36 @@ def _mesh(shape: shapes.Mesh) -> tuple[Points, Faces, Points | None, Points | No
         raise SceneError(
             f"a face names vertex {wrong}, there are {len(vertices)}", where=where(shape)
         )
-    normals = None if shape.normals is None else _array(shape, "normals", 3, len(vertices))
+    normals = _normals(shape, vertices, faces)
     uvs = None if shape.uvs is None else _array(shape, "uvs", 2, len(vertices))
     return vertices, faces.astype(np.uint32), normals, uvs
+
+
+def _normals(shape: shapes.Mesh, vertices: Points, faces: NDArray[Any]) -> Points | None:
+    """A mesh's normals as they were given, or the means of its triangles' by their areas."""
+    if not smooth(shape):
+        return None if shape.normals is None else _array(shape, "normals", 3, len(vertices))
+    sums = np.zeros((len(vertices), 3))
+    crosses = _crosses(vertices.astype(np.float64), faces)
+    for axis in range(3):
+        for corner in faces.T:
+            sums[:, axis] += np.bincount(corner, crosses[:, axis], len(vertices))
+    lengths = np.linalg.norm(sums, axis=1, keepdims=True)
+    return (sums / np.where(lengths > 0.0, lengths, 1.0)).astype(np.float32)
+
+
+def points(shape: Shape) -> Points:
+    """Return a mesh's vertices before the transform, (n, 3) float32.
+
+    Raises SceneError for a wrong shape or values that are not finite.
+    """
+    return _array(shape, "vertices", 3)
+
+
+def smooth(shape: Shape) -> bool:
+    """Return whether a shape's normals follow from its triangles."""
+    normals = getattr(shape, "normals", None)
+    return isinstance(normals, str) and normals == shapes.SMOOTH
 
 
 def _array(shape: Shape, name: str, columns: int, rows: int | None = None) -> Points:

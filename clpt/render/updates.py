@@ -157,6 +157,8 @@ def _write_tables(front: Wavefront, former: Lowered) -> None:
             front.named[name] = lent
         elif name in former.lent or old.nbytes != new.nbytes:
             front.named[name] = front.buffers.upload(f"the table of {name}", new)
+        elif name in front.moved:
+            front.stream.write(front.named[name], new)
         else:
             _write(front, name, old, new)
     _write(front, "settings", former.settings.reshape(1), front.lowered.settings.reshape(1))
@@ -201,7 +203,10 @@ def _build_trees(front: Wavefront, former: Lowered, layout: str) -> None:
         _same(getattr(former, name), getattr(lowered, name))
         for name in ("vertices", "faces", "tags")
     )
+    triangles |= "vertices" in front.moved
     boxes = triangles or not _same(former.boxes, lowered.boxes)
+    boxes |= bool(front.moved)
+    front.moved.clear()
     boxes |= not all(
         _same(getattr(old, name), getattr(new, name)) for name in ("rows", "boxes", "prototypes")
     )

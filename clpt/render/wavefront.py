@@ -82,6 +82,7 @@ class Wavefront:
     ):
         self.device, self.lowered = on, lowered
         self.counts = Counts()
+        self.moved: set[str] = set()  # tables that hold something else than `lowered`
         self.stream = device.Stream(on.queue)
         self.timings = Timings(on.queue)
         self.buffers = Buffers(on)
@@ -204,12 +205,13 @@ class Wavefront:
             self.box_trees["shape"] = bvh.build_boxes(self.device, lowered.boxes)
         if lowered.features.instances:
             self.box_trees["instance"] = bvh.build_boxes(self.device, instances.boxes, layout)
-            indices = self.box_trees["instance"].buffers.pop("indices")
+            indices = self.box_trees["instance"].buffers["indices"]
             order = self.buffers.download(indices, (len(instances.rows),), np.uint32)
             rows = instances.rows[order]  # as the leaves, so that neighbours are near each other
             rows["nodes"], rows["leaves"] = self._begins[1 + instances.prototypes[order]].T
             words = rows.view(np.uint32)
             self.named["instances"] = self.buffers.upload("the table of instances", words)
+            self.instances, self.instance_order = rows, order
         for name, tree in self.box_trees.items():
             self.named |= {f"{name}_{part}": buffer for part, buffer in tree.buffers.items()}
         self.seconds["trees"] += time.perf_counter() - start

@@ -11,6 +11,7 @@ from clpt.errors import SceneError
 from clpt.scene.materials import Diffuse
 from clpt.scene.params import Kind, choice, host
 
+SMOOTH = "smooth"  # normals of a mesh: the means of the triangles around a vertex, by their areas
 BASES = ("linear", "bspline", "bezier")
 
 
@@ -31,7 +32,7 @@ class Mesh(Shape):
 
     vertices: Any = host(None, "(n, 3) float32", "m")
     faces: Any = host(None, "(m, 3) uint32")
-    normals: Any = host(None, "(n, 3) float32 per vertex, or None for flat shading")
+    normals: Any = host(None, "(n, 3) float32 per vertex; None: flat; 'smooth': from the triangles")
     uvs: Any = host(None, "(n, 2) float32 per vertex, or None")
     attributes: Any = host(
         {}, "name -> (n, 1 or 3) float32; one row a vertex or a face, as vertex_ or face_ begins it"

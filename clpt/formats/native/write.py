@@ -16,6 +16,7 @@ import numpy as np
 from clpt import images, spectral_exr
 from clpt.errors import SceneError
 from clpt.formats import particles, strands
+from clpt.formats.mesh import smooth_normals
 from clpt.formats.native import reradiation as json_reradiation
 from clpt.formats.native import spectra as json_spectra
 from clpt.formats.native.read import ARRAYS, default
@@ -231,6 +232,8 @@ def _on_one_line(match: re.Match) -> str:
 def _ply(mesh: shapes.Mesh) -> bytes:
     """The arrays of a mesh as a binary PLY file, attributes by the names that Mitsuba has."""
     normals, uvs = mesh.normals, mesh.uvs
+    if isinstance(normals, str):
+        normals = smooth_normals(np.asarray(mesh.vertices), np.asarray(mesh.faces))
     vertex: list[Any] = [("x", "y", "z", mesh.vertices)]
     vertex += [] if normals is None else [("nx", "ny", "nz", normals)]
     vertex += [] if uvs is None else [("s", "t", uvs)]

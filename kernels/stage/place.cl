@@ -1,0 +1,60 @@
+/* Shapes that move: their vertices and normals are written anew into the scene's tables.
+ *
+ * A matrix is 16 floats, row after row, that take a shape's own space to the world; `begin` is the first
+ * element of a thing in its buffer. Vertices `first` to first + count - 1 of the table are the shape's.
+ */
+inline float3 place_row(global const float *matrix, uint row) { return vload3(0, matrix + 4 * row); }
+
+inline float3 place_unit(float3 n)
+{
+    float length = sqrt(dot(n, n));
+    return length > 0.0f ? n / length : (float3)(0.0f);
+}
+
+kernel void place_vertices(global const float *restrict source, uint source_begin,
+                           global const float *restrict matrix, uint matrix_begin, uint first, uint count,
+                           global float *restrict vertices)
+{
+    uint i = get_global_id(0);
+    if (i >= count) return;
+    matrix += matrix_begin;
+    float3 p = vload3(i, source + source_begin), moved;
+    moved.x = dot(place_row(matrix, 0), p) + matrix[3];
+    moved.y = dot(place_row(matrix, 1), p) + matrix[7];
+    moved.z = dot(place_row(matrix, 2), p) + matrix[11];
+    vstore3(moved, first + i, vertices);
+}
+
+/* By the inverse transpose, which is the matrix of cofactors over the determinant. side: -1 where the
+ * shape's normals are flipped, else 1. */
+kernel void place_normals(global const float *restrict source, uint source_begin,
+                          global const float *restrict matrix, uint matrix_begin, float side, uint first,
+                          uint count, global float *restrict normals)
+{
+    uint i = get_global_id(0);
+    if (i >= count) return;
+    matrix += matrix_begin;
+    float3 x = place_row(matrix, 0), y = place_row(matrix, 1), z = place_row(matrix, 2);
+    float3 n = vload3(i, source + source_begin), cofactors = cross(y, z), turned;
+    turned.x = dot(cofactors, n);
+    turned.y = dot(cross(z, x), n);
+    turned.z = dot(cross(x, y), n);
+    vstore3(place_unit(turned) * copysign(side, side * dot(x, cofactors)), first + i, normals);
+}
+
+/* The mean of the triangles around a vertex, by their areas. `around` holds them for one vertex after the
+ * other, each vertex's from offsets[i] to offsets[i + 1]. */
+kernel void smooth_normals(global const float *restrict vertices, global const uint *restrict faces,
+                           global const uint *restrict offsets, global const uint *restrict around,
+                           uint first, uint count, global float *restrict normals)
+{
+    uint i = get_global_id(0);
+    if (i >= count) return;
+    float3 sum = (float3)(0.0f);
+    for (uint k = offsets[i]; k < offsets[i + 1]; k++) {
+        uint face = 3 * around[k];
+        float3 v0 = vload3(faces[face], vertices);
+        sum += cross(vload3(faces[face + 1], vertices) - v0, vload3(faces[face + 2], vertices) - v0);
+    }
+    vstore3(place_unit(sum), first + i, normals);
+}

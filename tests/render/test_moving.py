@@ -1,0 +1,138 @@
+"""Shapes that move on the device: the picture is that of a new renderer of the same scene."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pyopencl.array as cl_array
+import pytest
+import trimesh
+
+from clpt import device as dev
+from clpt import transforms as tf
+from clpt.errors import SceneError
+from clpt.render.moving import Moving
+from clpt.render.renderer import Renderer
+from clpt.scene import Scene
+from clpt.scene import materials as m
+from clpt.scene.cameras import Perspective
+from clpt.scene.integrators import Film, ParticleTracer
+from clpt.scene.lights import Area, Constant
+from clpt.scene.shapes import Cube, Group, Instance, Mesh, Rectangle
+
+BALL = trimesh.creation.icosphere(2)
+VERTICES = BALL.vertices.astype(np.float32)
+NORMALS = BALL.vertex_normals.astype(np.float32)
+RED = m.Diffuse(reflectance=(0.8, 0.2, 0.1))
+SPP = 4
+
+
+def scene(**more: Any) -> Scene:
+    """A smooth ball, a cube, two instances of a slab under a lamp."""
+    slab = Group((Cube(to_world=tf.scale([0.5, 0.1, 0.5])), Cube(to_world=tf.scale(0.2))))
+    return Scene(
+        camera=Perspective(to_world=tf.look_at([0, 1, 6], [0, 0, 0], [0, 1, 0])),
+        film=Film(width=32, height=24, mode="rgb"),
+        lights=[Constant(radiance=0.3)],
+        shapes=[
+            Mesh(name="ball", vertices=VERTICES, faces=BALL.faces, normals=NORMALS, material=RED),
+            Cube(name="cube", to_world=tf.translate([2, -1, 0]) @ tf.scale(0.5)),
+            Rectangle(
+                name="lamp",
+                to_world=tf.translate([0, 5, 2]) @ tf.rotate([1, 0, 0], 90),
+                emission=Area(radiance=12.0),
+            ),
+            Instance(name="left", group=slab, to_world=tf.translate([-2, 1, 0])),
+            Instance(name="right", group=slab, to_world=tf.translate([2, 1, 0])),
+        ],
+        **more,
+    )
+
+
+@pytest.fixture(scope="module")
+def device() -> dev.Device:
+    return dev.choose()
+
+
+@pytest.fixture(scope="module", params=["wide8", "binary"])
+def renderer(device: dev.Device, request: pytest.FixtureRequest) -> Renderer:
+    return Renderer(scene(), device, layout=request.param)
+
+
+def picture(renderer: Renderer) -> np.ndarray:
+    renderer.reset()
+    renderer.run(SPP)
+    return renderer.image()
+
+
+def bent(amount: float) -> np.ndarray:
+    shape = VERTICES * (1 + amount * np.sin(5 * VERTICES[:, :1])) * [1, 1 + amount, 1]
+    return shape.astype(np.float32)
+
+
+def host(shape: Mesh) -> np.ndarray:
+    matrix = shape.to_world
+    return matrix.get() if isinstance(matrix, cl_array.Array) else matrix
+
+
+def fresh(renderer: Renderer, **points: np.ndarray) -> np.ndarray:
+    """What a new renderer makes of the scene, with vertices on the device as they are given."""
+    shapes = [
+        dataclasses.replace(s, to_world=host(s), vertices=points.get(s.name, VERTICES))
+        if isinstance(s, Mesh)
+        else s
+        for s in renderer.scene.shapes
+    ]
+    new = dataclasses.replace(renderer.scene, shapes=shapes)
+    return picture(Renderer(new, renderer.device, layout=renderer.wavefronts[0].tree.layout))
+
+
+def test_what_moved_is_seen_where_a_new_renderer_has_it(renderer: Renderer) -> None:
+    queue = renderer.device.queue
+    first = picture(renderer)
+    squeeze = tf.translate([0.3, 0, 0]) @ tf.rotate([1, 1, 0], 30) @ tf.scale([1, 0.5, 1.2])
+    renderer.update(transforms={"ball": squeeze})
+    np.testing.assert_allclose(picture(renderer), fresh(renderer), atol=1e-3)
+
+    points = cl_array.to_device(queue, bent(0.1))
+    turn = tf.translate([1, -1, 1]) @ tf.rotate([0, 1, 1], 30) @ tf.scale([0.5, 0.7, 0.4])
+    up = tf.translate([-1, 1.5, 1]) @ tf.rotate([1, 0, 0], 70)
+    back = cl_array.to_device(queue, np.eye(4, dtype=np.float32))
+    renderer.update(vertices={"ball": points}, transforms={"ball": back, "cube": turn, "left": up})
+    moved = picture(renderer)
+    assert np.abs(moved - first).max() > 0.05
+    np.testing.assert_allclose(moved, fresh(renderer, ball=bent(0.1)), atol=1e-3)
+
+    points.set(bent(0.4))  # the same array, with other content; and it is placed now
+    renderer.update(vertices={"ball": points.base_data}, transforms={"ball": squeeze})
+    np.testing.assert_allclose(picture(renderer), fresh(renderer, ball=bent(0.4)), atol=1e-3)
+
+
+def test_a_mesh_that_explodes_is_not_seen_and_comes_back(renderer: Renderer) -> None:
+    renderer.update(vertices={0: VERTICES})
+    before = picture(renderer)
+    renderer.update(vertices={0: cl_array.to_device(renderer.device.queue, VERTICES * np.nan)})
+    gone = picture(renderer)
+    assert np.isfinite(gone).all() and np.abs(gone - before).max() > 0.05
+    renderer.update(vertices={0: VERTICES})
+    np.testing.assert_allclose(picture(renderer), before, atol=1e-4)
+
+
+def test_what_cannot_be_is_told(renderer: Renderer) -> None:
+    queue = renderer.device.queue
+    short = cl_array.to_device(queue, np.zeros((len(VERTICES), 2), np.float32))
+    before = picture(renderer)
+    for vertices in (short, short.astype(np.float64)):
+        with pytest.raises(SceneError, match="ball"):
+            renderer.update(vertices={"ball": vertices})
+    with pytest.raises(SceneError, match="singular"):
+        renderer.update(transforms={"cube": np.zeros((4, 4))})
+    np.testing.assert_array_equal(picture(renderer), before)
+
+
+def test_light_from_lights_is_not_moved_in_place(device: dev.Device) -> None:
+    traced = Renderer(scene(integrator=ParticleTracer()), device)
+    moving = Moving(traced.wavefronts[0], traced.scene)
+    assert not moving.move(traced.scene, {})
