@@ -20,6 +20,7 @@ from bench import machine, report
 PARTS = {
     "traversal": ("--layout", "wide8"),
     "building": (),
+    "queries": (),
     "renders": (),
     "spectral": (),
     "effects": (),
