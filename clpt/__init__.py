@@ -20,7 +20,7 @@ from clpt.errors import (
 )
 from clpt.formats import load
 from clpt.images import read, write
-from clpt.rays import Accel, AllHits, Hits
+from clpt.rays import Accel, AllHits, Hits, InstancedAccel
 from clpt.render.library import kernel_source
 from clpt.render.renderer import Progress, Renderer, render
 from clpt.scene import Scene
@@ -41,6 +41,7 @@ __all__ = [
     "ClptError",
     "DeviceError",
     "Hits",
+    "InstancedAccel",
     "KernelBuildError",
     "MemoryBudgetError",
     "Progress",

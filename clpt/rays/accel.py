@@ -27,6 +27,8 @@ class Accel(Queries):
     layout: "wide8" or "binary"; by default what is quickest on the device. wait_for: events that
     the arrays wait for; those that PyOpenCL arrays know are waited for anyhow.
 
+    moved: the event of the last update, None before the first.
+
     Raises SceneError for arrays of wrong shapes or types, for vertices that are not finite or
     beyond 1e12 and for indices out of range; MemoryBudgetError.
     """
@@ -49,6 +51,7 @@ class Accel(Queries):
         self._trees = self.tree.buffers
         self._faces = self._upload(corners, np.uint32)
         self._refitting = bvh.Building(self.device, stream=self._stream)
+        self.moved: cl.Event | None = None
 
     def update(self, vertices: Given, *, wait_for: Events = None) -> cl.Event:
         """Enqueue that the triangles move: as many vertices as before, elsewhere; the faces stay.
@@ -66,8 +69,9 @@ class Accel(Queries):
             if not self.tree.count:
                 return self._stream.mark()
             points = self._upload(points, np.float32)
-            event = bvh.refit(self._refitting, self.tree, points, self._faces)
-            return event or self._stream.mark()
+            bvh.refit(self._refitting, self.tree, points, self._faces)
+            self.moved = self._stream.mark()
+            return self.moved
 
     def intersect_all(
         self,

@@ -16,6 +16,7 @@ from pyopencl.array import Array
 from ..bvh import choose_tree
 from ..device import Bound, Device, Events, Program, Stream, assemble, build
 from ..errors import DeviceError, SceneError
+from ..records import INSTANCE
 from . import batch
 from .arrays import Given, Held
 
@@ -31,6 +32,7 @@ _PROGRAMS = {  # of a kernel: the program that has it, and what it includes of a
     "query_occluded": ("bvh/query.cl", ""),
     "query_count": ("bvh/query_every.cl", "_every"),
     "query_every": ("bvh/query_every.cl", "_every"),
+    "place_instances": ("bvh/place.cl", ""),
 }
 _LENT = ("origins", "directions", "t_mins", "t_maxs")
 _Self = TypeVar("_Self", bound="Queries")
@@ -212,12 +214,17 @@ class Queries:
             "count": rays.count,
             "begins": batch.begins(parts),
         }
+        bound = self._bind(name, arguments)
+        return self._stream.run(bound, (-(-rays.count // _GROUP) * _GROUP,), (_GROUP,))
+
+    def _bind(self, name: str, arguments: Mapping[str, Any]) -> Bound:
+        """A kernel with its arguments; the same one each time."""
         bound = self._kernels.get(name)
         if bound is None:
             bound = self._kernels[name] = self._program(name).kernel(name).bind(**arguments)
         else:
             bound.set(**arguments)
-        return self._stream.run(bound, (-(-rays.count // _GROUP) * _GROUP,), (_GROUP,))
+        return bound
 
     def _program(self, kernel: str) -> Program:
         """The program of a kernel, for the layout."""
@@ -225,6 +232,15 @@ class Queries:
         include = f'#include "bvh/{self.layout}{what}.cl"'
         texts = {
             "generated/layout.cl": f"{include}\n#define LAYOUT(verb) {self.layout}_##verb\n",
-            "generated/instance_traversal.cl": "",
+            "generated/instance_traversal.cl": self._instances_text(),
         }
-        return build(self.device, assemble(root, texts, {"USES_INSTANCES": 0}))
+        defines = {
+            "USES_INSTANCES": int(self.instanced),
+            "INSTANCE_ROW_WORDS": INSTANCE.words,
+            "LANES": 1,
+        }
+        return build(self.device, assemble(root, texts, defines))
+
+    def _instances_text(self) -> str:
+        """What traversal of instances includes."""
+        return ""

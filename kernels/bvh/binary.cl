@@ -3,6 +3,14 @@
  */
 #include "bvh/triangle.cl"
 
+/* The corners of the box around everything. */
+inline void binary_bounds(global const float *nodes, float3 *low, float3 *high)
+{
+    float8 root = *(global const float8 *)nodes;
+    *low = root.s012;
+    *high = root.s456;
+}
+
 /* The nearest hit, or with `first_only` any. */
 inline TriHit binary_trace(global const float *nodes, global const float *leaves, Ray ray, float tmax,
                            int first_only)

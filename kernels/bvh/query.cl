@@ -7,6 +7,21 @@
 #define TREE_ARGS global const float *nodes, global const float *leaves, \
                   global const float *instance_nodes, global const uint *instances
 #define HIT_ARGS global float *t, global int *primitive, global float *barycentrics, global int *instance
+#define QUERY_INSTANCES(hit, first_only)                                                                 \
+    query_instances(nodes, leaves, instance_nodes, instances, QUERY_ONE, hit, first_only)
+
+/* The row of the instance that is met first, with `first_only` of any; BVH_MISS if there is none. */
+inline uint query_instances(global const float *nodes, global const float *leaves,
+                            global const float *instance_nodes, global const uint *instances, float ox,
+                            float oy, float oz, float dx, float dy, float dz, float from, float to,
+                            TriHit *hit, int first_only)
+{
+    Scene scene = {instances};
+    *hit = tri_miss(to);
+    if (!ray_finite(ox, oy, oz, dx, dy, dz)) return BVH_MISS;
+    return instances_trace(nodes, leaves, instance_nodes, scene, v3(ox, oy, oz), v3(dx, dy, dz), from, hit,
+                           first_only);
+}
 #else
 #define TREE_ARGS global const float *nodes, global const float *leaves
 #define HIT_ARGS global float *t, global int *primitive, global float *barycentrics
@@ -17,14 +32,13 @@ kernel APART void query_closest(TREE_ARGS, RAY_ARGS, HIT_ARGS)
     size_t i = get_global_id(0);
     if (i >= count) return;
     QUERY_RAY(i)
-    TriHit hit = tri_miss(to);
 #if USES_INSTANCES
-    Scene scene = {instances};
-    uint row = instances_first(nodes, leaves, instance_nodes, scene, o, d, from, &hit, 0);
+    TriHit hit;
+    uint row = QUERY_INSTANCES(&hit, 0);
     instance[begins.s7 + i] =
         row == BVH_MISS ? -1 : instance_row_row(instances, (int)row * INSTANCE_ROW_WORDS).number;
 #else
-    hit = LAYOUT(closest)(nodes, leaves, QUERY_ONE);
+    TriHit hit = LAYOUT(closest)(nodes, leaves, QUERY_ONE);
 #endif
     t[begins.s4 + i] = hit.prim == BVH_MISS ? INFINITY : hit.t;
     primitive[begins.s5 + i] = as_int(hit.prim);
@@ -38,9 +52,8 @@ kernel APART void query_occluded(TREE_ARGS, RAY_ARGS, global uchar *met)
     if (i >= count) return;
     QUERY_RAY(i)
 #if USES_INSTANCES
-    Scene scene = {instances};
-    TriHit hit = tri_miss(to);
-    met[begins.s4 + i] = instances_first(nodes, leaves, instance_nodes, scene, o, d, from, &hit, 1) != BVH_MISS;
+    TriHit hit;
+    met[begins.s4 + i] = QUERY_INSTANCES(&hit, 1) != BVH_MISS;
 #else
     met[begins.s4 + i] = LAYOUT(occluded)(nodes, leaves, QUERY_ONE) != 0;
 #endif

@@ -28,6 +28,17 @@ inline Wide8Ray wide8_ray(float ox, float oy, float oz, float dx, float dy, floa
     return r;
 }
 
+/* The corners of the box around everything; children that are not there are inside out. */
+inline void wide8_bounds(global const float *nodes, float3 *low, float3 *high)
+{
+    *low = (float3)(INFINITY);
+    *high = (float3)(-INFINITY);
+    for (uint i = 0; i < 8; i++) {
+        *low = fmin(*low, (float3)(nodes[i], nodes[16 + i], nodes[32 + i]));
+        *high = fmax(*high, (float3)(nodes[8 + i], nodes[24 + i], nodes[40 + i]));
+    }
+}
+
 /* The children whose box the ray meets between tmin and t, and where it enters each. */
 inline Mask8 wide8_boxes(global const float *node, const Wide8Ray *r, float t, float8 *entry)
 {

@@ -1,13 +1,13 @@
 /* The binary tree over instances; a leaf is one of them, and its item is the instance's row. */
 #include "lib/instance_meet.cl"
 
-/* The row of the nearest instance that is met before hit->t, with `first_only` of any, and the hit as
- * `instance_meet` leaves it; BVH_MISS if there is none. */
+/* The row of the nearest instance that is met between tmin and hit->t, with `first_only` of any, and the
+ * hit as `instance_meet` leaves it; BVH_MISS if there is none. */
 inline uint instances_trace(global const float *nodes, global const float *leaves,
-                            global const float *instance_nodes, Scene scene, vec3 o, vec3 d, TriHit *hit,
-                            int first_only)
+                            global const float *instance_nodes, Scene scene, vec3 o, vec3 d, float tmin,
+                            TriHit *hit, int first_only)
 {
-    Ray ray = ray_make(o.x, o.y, o.z, d.x, d.y, d.z, 0.0f);
+    Ray ray = ray_make(o.x, o.y, o.z, d.x, d.y, d.z, tmin);
     global const float8 *tree = (global const float8 *)instance_nodes;
     uint waiting[BVH_DEPTH];
     float entries[BVH_DEPTH];
@@ -31,7 +31,8 @@ inline uint instances_trace(global const float *nodes, global const float *leave
             }
             continue;
         }
-        if (entry < INFINITY && instance_meet(nodes, leaves, scene, node_link(node), o, d, hit, first_only)) {
+        if (entry < INFINITY &&
+            instance_meet(nodes, leaves, scene, node_link(node), o, d, tmin, hit, first_only)) {
             found = node_link(node);
             if (first_only) return found;
         }

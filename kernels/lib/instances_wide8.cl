@@ -1,18 +1,18 @@
 /* The 8-wide tree over instances; a leaf's word is, but for BVH_LEAF, the row of an instance. */
 #include "lib/instance_meet.cl"
 
-/* The row of the nearest instance that is met before hit->t, with `first_only` of any, and the hit as
- * `instance_meet` leaves it; BVH_MISS if there is none. */
+/* The row of the nearest instance that is met between tmin and hit->t, with `first_only` of any, and the
+ * hit as `instance_meet` leaves it; BVH_MISS if there is none. */
 inline uint instances_trace(global const float *nodes, global const float *leaves,
-                            global const float *instance_nodes, Scene scene, vec3 o, vec3 d, TriHit *hit,
-                            int first_only)
+                            global const float *instance_nodes, Scene scene, vec3 o, vec3 d, float tmin,
+                            TriHit *hit, int first_only)
 {
-    Wide8Ray ray = wide8_ray(o.x, o.y, o.z, d.x, d.y, d.z, 0.0f);
+    Wide8Ray ray = wide8_ray(o.x, o.y, o.z, d.x, d.y, d.z, tmin);
     ulong waiting[WIDE8_STACK];
     uint n = 0, at = 0, found = BVH_MISS;
     for (;;) {
         at = wide8_descend(instance_nodes, &ray, hit->t, at, waiting, &n);
-        if (at & BVH_LEAF && instance_meet(nodes, leaves, scene, at & ~BVH_LEAF, o, d, hit, first_only)) {
+        if (at & BVH_LEAF && instance_meet(nodes, leaves, scene, at & ~BVH_LEAF, o, d, tmin, hit, first_only)) {
             found = at & ~BVH_LEAF;
             if (first_only) return found;
         }

@@ -6,7 +6,7 @@ inline void instances_closest(global const float *nodes, global const float *lea
                               TraceHit *h)
 {
     if (!ray_finite(o.x, o.y, o.z, d.x, d.y, d.z)) return;
-    uint at = instances_trace(nodes, leaves, instance_nodes, scene, o, d, &tri, 0);
+    uint at = instances_trace(nodes, leaves, instance_nodes, scene, o, d, 0.0f, &tri, 0);
     if (at == BVH_MISS) return;
     h->t = tri.t;
     h->u = tri.u;
@@ -22,5 +22,5 @@ inline int instances_occluded(global const float *nodes, global const float *lea
 {
     if (!ray_finite(o.x, o.y, o.z, d.x, d.y, d.z)) return 0;
     TriHit tri = tri_miss(t);
-    return instances_trace(nodes, leaves, instance_nodes, scene, o, d, &tri, 1) != BVH_MISS;
+    return instances_trace(nodes, leaves, instance_nodes, scene, o, d, 0.0f, &tri, 1) != BVH_MISS;
 }
