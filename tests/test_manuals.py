@@ -63,6 +63,7 @@ def test_the_entry_points_are_there() -> None:
         assert "kernel void" not in text
 
 
+@pytest.mark.slow
 def test_a_material_of_ones_own(program, tmp_path: Path) -> None:
     (source,) = blocks("custom_materials.md", "c")
     (tmp_path / "retroreflector.cl").write_text(source, "utf-8")
