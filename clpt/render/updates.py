@@ -16,7 +16,7 @@ from clpt.render import programs
 from clpt.render.cameras import dispersive_glass, lower_camera
 from clpt.render.instancing import distinct
 from clpt.render.lower import CLEAR, Lowered
-from clpt.render.wavefront import Wavefront
+from clpt.render.wavefront import QUEUE, Wavefront
 from clpt.scene import Scene
 from clpt.scene.materials import COMPOSITES, Material
 from clpt.scene.params import params
@@ -128,7 +128,7 @@ def take(fronts: Sequence[Wavefront], lowered: Lowered) -> None:
     known = dict(first.named)
     _write_tables(first, former)
     _build_trees(first, former, layout)
-    if queued:
+    if anew:
         first.allocate_queue()
     moved = {name: now for name, now in first.named.items() if known.get(name) is not now}
     own = ("film", "image", "bands", "band_image")
@@ -142,7 +142,7 @@ def take(fronts: Sequence[Wavefront], lowered: Lowered) -> None:
         if anew or moved:
             front.bind_again(rebuilt=anew)
     for name in moved:
-        if name in TABLES and name in known and name not in former.lent:
+        if name in (*TABLES, *QUEUE) and name in known and name not in former.lent:
             first.buffers.release(known[name])
 
 

@@ -34,6 +34,7 @@ GROUP = 64  # slots are a multiple of it, and it is the local size of one-lane k
 BATCH = 8  # iterations that are enqueued before counters are asked for
 CPU_SLOTS, GPU_SLOTS = 1 << 14, 1 << 20
 BRUTE_SHAPES = 32  # analytic shapes up to which all of them are tried
+QUEUE = ("queue", "counts", "queue_starts", "queue_counts")
 SORT = ("sort_count", "sort_scan", "sort_place")
 CHUNK = 256  # slots that a work-item of the sort counts
 
@@ -176,10 +177,9 @@ class Wavefront:
         if self.queued:
             give, kinds = self.buffers, len(self.lowered.features.materials)
             chunks = -(-self.slots // CHUNK)
-            self.named["queue"] = give.allocate("the queue", 4 * self.slots)
-            self.named["counts"] = give.allocate("the sort", 4 * chunks * kinds)
-            for name in ("queue_starts", "queue_counts"):
-                self.named[name] = give.allocate(name, 4 * kinds)
+            sizes = self.slots, chunks * kinds, kinds, kinds
+            for name, words in zip(QUEUE, sizes, strict=True):
+                self.named[name] = give.allocate("the sort", 4 * words)
             self.named.update(chunk=CHUNK, chunks=chunks, slots=self.slots)
 
     def build_triangles(self, layout: str) -> None:

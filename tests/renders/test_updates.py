@@ -52,10 +52,13 @@ POINT = Point(position=(-1, 2, 1), intensity=3.0)
 
 
 def scene(**more: Any) -> Scene:
-    given: dict[str, Any] = {"shapes": [FLOOR, WALL, BALL, LAMP], "lights": [POINT]}
-    film = Film(width=20, height=16, mode="rgb")
-    given |= {"integrator": Path(max_depth=4), **more}
-    return Scene(camera=CAMERA, film=film, **given)
+    given = {
+        "shapes": [FLOOR, WALL, BALL, LAMP],
+        "lights": [POINT],
+        "film": Film(width=20, height=16, mode="rgb"),
+        "integrator": Path(max_depth=4),
+    }
+    return Scene(camera=CAMERA, **{**given, **more})
 
 
 def changed(now: Scene, place: int, **fields: Any) -> Scene:
@@ -196,6 +199,34 @@ def test_arrays_of_another_context(renderer: clpt.Renderer) -> None:
     floor = dataclasses.replace(FLOOR, vertices=cl_array.to_device(other.queue, CORNERS))
     with pytest.raises(SceneError, match="mesh 'floor': vertices lie in another OpenCL context"):
         renderer.update(scene=scene(shapes=[floor]))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+def test_values_and_sources(mode: str) -> None:
+    """Of more kinds than are shaded in place; edits of values and of where values come from."""
+    kinds = [RED, METAL, m.Plastic(), m.Conductor(), m.Phong(), m.RoughPlastic()]
+    balls = [
+        Sphere(material=kind, center=(i % 3 - 1, i // 3 + 0.3, 0), radius=0.4)
+        for i, kind in enumerate(kinds)
+    ]
+    film = Film(width=20, height=16, mode=mode)
+    own = clpt.Renderer(scene(shapes=[FLOOR, LAMP, *balls], film=film), device.choose())
+    used = own.wavefronts[0].buffers.used
+    for old, new in (
+        (RED, m.Diffuse(reflectance=(0.9, 0.8, 0.1))),
+        (kinds[2], m.Plastic(diffuse_reflectance=(0.1, 0.2, 0.3), int_ior=1.7)),
+        (kinds[3], m.Conductor(eta=clpt.spectra.metal("Au")[0], k=clpt.spectra.metal("Au")[1])),
+        (RED, m.Diffuse(reflectance=clpt.spectra.Tabulated([400, 700], [0.1, 0.9]))),
+        (METAL, m.RoughConductor(alpha_u=0.3, alpha_v=0.1)),
+        (METAL, m.TwoSided(front=m.Diffuse(reflectance=0.2))),
+        (RED, m.Diffuse(reflectance=0.5)),
+    ):
+        own.update(materials={old: new})
+        check(own)
+    own.update(scene=scene(shapes=[FLOOR, LAMP, *balls], film=film))
+    check(own)
+    assert own.wavefronts[0].buffers.used == used
 
 
 @pytest.mark.slow
