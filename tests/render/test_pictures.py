@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import re
+from pathlib import Path
 
 import numpy as np
 import pyopencl as cl
@@ -17,6 +19,7 @@ from clpt.scene import Film, Scene, cameras, shapes
 from clpt.scene.integrators import Aov
 from tests.renders.support import with_film
 
+ROOT = Path(__file__).resolve().parents[2]
 SAMPLES = 4
 
 
@@ -99,3 +102,16 @@ def test_aov_resolves_by_channel():
         renderer.resolve(channel="uv")
     with Image.open(io.BytesIO(renderer._repr_png_())) as png:
         np.testing.assert_array_equal(np.asarray(png), images.to_srgb8(sheet(layers)))
+
+
+def test_the_page_tells_what_works(renderer):
+    """The lines of docs/interop.md, but those that need OpenGL or Jupyter, which begin so."""
+    page = (ROOT / "docs" / "interop.md").read_text("utf-8")
+    blocks = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    names = {"renderer": renderer, "queue": renderer.film.queue}
+    mine = [block for block in blocks if not block.startswith("# ")]
+    assert len(mine) == len(blocks) - 2 > 4
+    for block in mine:
+        exec(block, names)
+    np.testing.assert_array_equal(names["pixels"], names["mine"].get())
+    assert names["samples"].min() == names["later"][..., 3].min() + 4

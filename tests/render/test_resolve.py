@@ -6,6 +6,7 @@ import numpy as np
 import pyopencl as cl
 import pytest
 from pyopencl.array import Array
+from pyopencl.tools import get_gl_sharing_context_properties
 
 from clpt import device, images
 from clpt.device import DeviceArray
@@ -172,3 +173,33 @@ def test_events_are_honoured_out_of_order(opened, film):
     gate.set_status(done)
     event.wait()
     np.testing.assert_array_equal(host[..., :3], images.to_srgb8(LINEAR))
+
+
+def test_into_a_texture_of_opengl(opened):
+    """What OpenGL reads back of its own texture is what the host would have written."""
+    if not cl.have_gl():
+        pytest.skip("PyOpenCL is built without OpenGL")
+    if "cl_khr_gl_sharing" not in opened.info.cl_device.extensions:
+        pytest.skip("the device does not share with OpenGL")
+    glfw, gl = pytest.importorskip("glfw"), pytest.importorskip("OpenGL.GL")
+    if not glfw.init():
+        pytest.skip("there is no display")
+    glfw.window_hint(glfw.VISIBLE, False)
+    glfw.make_context_current(glfw.create_window(W, H, "clpt", None, None))
+    platform = (cl.context_properties.PLATFORM, opened.info.cl_device.platform)
+    shared = [platform, *get_gl_sharing_context_properties()]
+    queue = cl.CommandQueue(cl.Context([opened.info.cl_device], properties=shared))
+    name = gl.glGenTextures(1)
+    gl.glBindTexture(gl.GL_TEXTURE_2D, name)
+    kind = gl.GL_RGBA, gl.GL_UNSIGNED_BYTE
+    gl.glTexImage2D(gl.GL_TEXTURE_2D, 0, gl.GL_RGBA8, W, H, 0, *kind, None)
+    gl.glFinish()
+    flags = cl.mem_flags.WRITE_ONLY
+    texture = cl.GLTexture(queue.context, flags, gl.GL_TEXTURE_2D, 0, int(name), 2)
+    made = DeviceArray(queue, (H, W, 4), np.float32)
+    made.set(np.concatenate([LINEAR, np.ones((H, W, 1), np.float32)], axis=2))
+    ours = cl.enqueue_acquire_gl_objects(queue, [texture])
+    done = Resolve(device.Device.adopt(queue), device.Stream(queue))(made, texture, wait_for=[ours])
+    cl.enqueue_release_gl_objects(queue, [texture], wait_for=[done]).wait()
+    back = np.frombuffer(gl.glGetTexImage(gl.GL_TEXTURE_2D, 0, *kind), np.uint8)
+    np.testing.assert_array_equal(back.reshape(H, W, 4)[..., :3], images.to_srgb8(LINEAR))
