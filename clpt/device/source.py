@@ -14,9 +14,10 @@ _INCLUDE = re.compile(r'\s*#\s*include\s+"([^"]+)"\s*(?://.*|/\*.*\*/\s*)?$')
 _OPEN_IF = re.compile(r"\s*#\s*if")
 _FUNCTION = re.compile(  # at the beginning of a line: type, name, and a first argument or "void"
     r"^(?!static\b|kernel\b|typedef\b|return\b|else\b|void loop_)"
-    r"[A-Za-z_]\w*(?: \w+)* \*?\w+\((?=[A-Za-z_])",
+    r"[A-Za-z_]\w*(?: \w+)* \*?(?P<name>\w+)\((?=[A-Za-z_])",
     re.MULTILINE,
 )
+_CONSTANT = re.compile(r"^constant\b[^;=\[]*?(?P<name>\w+)\s*(?=[=\[])", re.MULTILINE)
 _CLOSE_IF = re.compile(r"\s*#\s*endif")
 
 
@@ -32,15 +33,21 @@ class Source:
     text: str
     files: tuple[str, ...]
 
-    def with_private(self, defines: Mapping[str, str] | None = None) -> Source:
-        """The same with functions that other programs do not see, to be linked with them.
+    def with_private(self, prefix: str, defines: Mapping[str, str] | None = None) -> Source:
+        """The same with functions and constants that other programs do not see, to be linked.
 
-        Those whose line begins with their type become static, as constants do; kernels, and what a
-        macro names, do not. defines: more `#define` lines at the top.
+        Those whose line begins with their type become static, and get names of their own by the
+        prefix, for some linkers heed nothing but names; kernels, and what a macro names, do not.
+        defines: more `#define` lines at the top.
         """
-        head = [f"#define {name} {value}" for name, value in (defines or {}).items()]
-        text = _FUNCTION.sub(r"static \g<0>", self.text)
-        text = re.sub(r"^constant\b", "static constant", text, flags=re.MULTILINE)
+        private = (_FUNCTION, _CONSTANT)
+        found = (match for pattern in private for match in pattern.finditer(self.text))
+        names = dict.fromkeys(match["name"] for match in found)
+        renamed = {name: f"{prefix}_{name}" for name in names}
+        head = [f"#define {name} {value}" for name, value in {**(defines or {}), **renamed}.items()]
+        text = self.text
+        for pattern in private:
+            text = pattern.sub(r"static \g<0>", text)
         return Source(self.name, "\n".join([*head, text]), self.files)
 
 

@@ -106,10 +106,10 @@ def loop_sources(features: Features, layout: str, lanes: int) -> dict[str, devic
     made = sources(features, layout, lanes, queued=False)
     bounce = order(features, layout, lanes)
     names = dict.fromkeys(stage.program for stage in bounce)
-    parts = {name: made[name].with_private({"PART": f"loop_{name}"}) for name in names}
+    parts = {name: made[name].with_private(name, {"PART": f"loop_{name}"}) for name in names}
     shared = {**_shared(features, layout), "generated/loop.cl": _loop_text(features, bounce)}
     loop = _source("loop", shared, _defines(features), lanes)
-    return {**parts, "loop": loop.with_private()}
+    return {**parts, "loop": loop.with_private("loop")}
 
 
 def _loop_text(features: Features, bounce: list[Stage]) -> str:

@@ -8,26 +8,38 @@ inline Spectrum spectrum_of(real v)
 #undef C
     return r;
 }
-#define BINARY(name, op)                            \
-    inline Spectrum name(Spectrum a, Spectrum b)    \
-    {                                               \
-        Spectrum r;                                 \
-        SPECTRUM_EACH(op)                           \
-        return r;                                   \
-    }
+inline Spectrum spectrum_add(Spectrum a, Spectrum b)
+{
+    Spectrum r;
 #define C(c) r.c = a.c + b.c;
-BINARY(spectrum_add, C)
+    SPECTRUM_EACH(C)
 #undef C
+    return r;
+}
+inline Spectrum spectrum_sub(Spectrum a, Spectrum b)
+{
+    Spectrum r;
 #define C(c) r.c = a.c - b.c;
-BINARY(spectrum_sub, C)
+    SPECTRUM_EACH(C)
 #undef C
+    return r;
+}
+inline Spectrum spectrum_mul(Spectrum a, Spectrum b)
+{
+    Spectrum r;
 #define C(c) r.c = a.c * b.c;
-BINARY(spectrum_mul, C)
+    SPECTRUM_EACH(C)
 #undef C
+    return r;
+}
+inline Spectrum spectrum_div(Spectrum a, Spectrum b)
+{
+    Spectrum r;
 #define C(c) r.c = a.c / b.c;
-BINARY(spectrum_div, C)
+    SPECTRUM_EACH(C)
 #undef C
-#undef BINARY
+    return r;
+}
 inline Spectrum spectrum_scale(Spectrum a, real s)
 {
     Spectrum r;
