@@ -8,10 +8,10 @@ import pytest
 from clpt.render.films import film_colours, film_shares
 from clpt.scene.materials import Conductor, GltfSurface, Layer
 from clpt.scene.params import device_params
+from clpt.testing.checks import albedos
 from clpt.testing.probe import LAMBDAS
 from clpt.testing.settings import pairs, tilted
 from tests.kernels.harness import Probe
-from tests.kernels.test_bsdf_energy import albedos
 
 UP = np.array([[0.0, 0.0, 1.0]])
 PLAIN = GltfSurface()

@@ -45,6 +45,13 @@ class Flawed(m.Material):
     source = FLAWED
 
 
+def glass() -> type[m.Material]:
+    """What RoughDielectric is, with all it has: two indices, thin films, an inside that absorbs."""
+    text = (device.kernels_folder() / "bsdf" / "rough_dielectric.cl").read_text(encoding="utf-8")
+    text = text.replace("rough_dielectric_", "glass_").replace("RoughDielectric", "Glass")
+    return type("Glass", (m.RoughDielectric,), {"source": text, "disperses": True})
+
+
 def scene(cls: type[m.Material], mode: str = "rgb") -> Scene:
     """A lit corner with a material of this class bare, and with every composite around it."""
     board = textures.Checkerboard(color0=0.9, color1=(0.2, 0.3, 0.7))
@@ -80,6 +87,20 @@ def test_its_programs_are_those_of_ours(mode: str) -> None:
     theirs = theirs.replace("Paint", "Diffuse").replace("paint", "diffuse")
     number = re.compile(r"(BSDF_KIND|BSDF_COUNT|MATERIAL_KIND\(word\) ==) \d+")
     assert number.sub("", theirs) == number.sub("", ours)
+
+
+@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+def test_glass_from_outside_disperses_and_absorbs(mode: str) -> None:
+    made = []
+    for cls in (m.RoughDielectric, glass()):
+        one = cls(int_ior="bk7", absorption=2.0, layers=[m.Layer(thickness=300.0)])
+        balls = [shapes.Sphere(material=one), shapes.Sphere(material=m.Diffuse())]
+        features = lower(dataclasses.replace(scene(m.Diffuse, mode), shapes=balls)).features
+        assert features.absorption and (features.dispersion or mode == "rgb")
+        text = programs.sources(features, "wide8", 8, queued=False)[f"shade_{cls.kind}"].text
+        made.append(re.sub(r"^#line .*\n|BSDF_KIND \d+", "", text, flags=re.MULTILINE))
+    theirs = made[1].replace("Glass", "RoughDielectric").replace("glass_", "rough_dielectric_")
+    assert theirs == made[0]
 
 
 @pytest.mark.slow
