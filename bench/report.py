@@ -111,6 +111,7 @@ TABLES: dict[str, Callable[[Sequence[Row]], str]] = {
     "startup": startup,
     "traversal": plain,
     "building": plain,
+    "refit": plain,
 }
 
 

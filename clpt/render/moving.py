@@ -167,10 +167,16 @@ class Moving:
         front = self.front
         if not isinstance(new, Instance):
             region.shape = new
+        table, (first, count) = front.named["vertices"], region.vertices
+        still = placed is None and np.array_equal(matrix, transforms.IDENTITY)
         if points is not None and placed is None:
-            if not np.array_equal(matrix, transforms.IDENTITY):
+            if not still:
                 points = transforms.transform_points(matrix, points).astype(np.float32)
-            front.stream.write(front.named["vertices"], points, 12 * region.vertices[0])
+            front.stream.write(table, points, 12 * first)
+        elif still:
+            source, begin = self._local(region, "vertices")
+            places = {"src_offset": 4 * begin, "dst_offset": 12 * first, "byte_count": 12 * count}
+            front.stream.copy(table, source, **places)
         else:
             placed = placed or self._matrix(region, matrix)
             self._run("place_vertices", region, self._local(region, "vertices"), placed)

@@ -63,26 +63,25 @@ inline float8 leaf_store_block(global float *block, global const float *vertices
 {
     global float8 *rows = (global float8 *)block;
     global const uint *prims = (global const uint *)(rows + 9);
-    float8 v[9];
-    int8 sound = (int8)(-1);
-    for (uint i = 0; i < 3; i++) {
-        float3 p[8];
-        for (uint k = 0; k < 8; k++) {
-            uint corner = prims[k] == BVH_MISS ? 3 * prims[0] : 3 * prims[k] + i;
-            p[k] = vload3(faces[corner], vertices);
-        }
-        v[3 * i] = LEAF_ROW(p, x);
-        v[3 * i + 1] = LEAF_ROW(p, y);
-        v[3 * i + 2] = LEAF_ROW(p, z);
+    float3 a[8], b[8], c[8];
+    for (uint k = 0; k < 8; k++) {
+        uint there = prims[k] != BVH_MISS; /* elsewhere three times a corner of the first */
+        global const uint *face = faces + 3 * (ulong)prims[k * there];
+        a[k] = vload3(face[0], vertices);
+        b[k] = vload3(face[there], vertices);
+        c[k] = vload3(face[2 * there], vertices);
     }
+    float8 v[9] = {LEAF_ROW(a, x), LEAF_ROW(a, y), LEAF_ROW(a, z), LEAF_ROW(b, x), LEAF_ROW(b, y),
+                   LEAF_ROW(b, z), LEAF_ROW(c, x), LEAF_ROW(c, y), LEAF_ROW(c, z)};
+    int8 sound = (int8)(-1);
     for (uint i = 0; i < 9; i++) sound &= fabs(v[i]) < LEAF_REACH; /* NaN fails the comparison */
     if (!all(sound)) { /* those that are not become a point of one that is */
-        union { float8 row[3]; float at[24]; } c = {{v[0], v[1], v[2]}};
+        union { float8 row[3]; float at[24]; } corner = {{v[0], v[1], v[2]}};
         union { int8 row; int at[8]; } usable = {sound};
         uint k = 0;
         while (k < 8 && !usable.at[k]) k++;
         for (uint i = 0; i < 9; i++)
-            v[i] = select((float8)(k < 8 ? c.at[8 * (i % 3) + k] : 0.0f), v[i], sound);
+            v[i] = select((float8)(k < 8 ? corner.at[8 * (i % 3) + k] : 0.0f), v[i], sound);
     }
     for (uint i = 0; i < 9; i++) rows[i] = v[i];
     if (!any(sound)) return (float8)(FLT_MAX);
