@@ -42,6 +42,7 @@ MODULES = {
     "clpt.device": "device",
     "clpt.bvh": "bvh",
     "clpt.testing": "testing",
+    "clpt.trimesh_ray": "trimesh_ray",
 }
 LINK = re.compile(r"(!?)\[((?:`[^`]*`|[^\]\[])*)\]\((?!\w+:)([^)#\s]*)(#[^)\s]*)?\)")
 
