@@ -17,13 +17,14 @@ from numpy.typing import NDArray
 from clpt import bvh, transforms
 from clpt.render import instancing, shapes
 from clpt.render.arrays import on_device
+from clpt.render.moving_spheres import MovingSpheres
 from clpt.render.wavefront import Wavefront
 from clpt.scene import Scene
-from clpt.scene.shapes import Instance, Shape
+from clpt.scene.shapes import Instance, Shape, Spheres
 
 _ROOT = "stage/place.cl"
 _NORMALS = 1  # SHAPE_NORMALS of kernels/lib/surface_flags.cl
-_MOVES = {"to_world", "vertices", "normals"}  # what may change in place
+_MOVES = {"to_world", "vertices", "normals", "centers"}  # what may change in place
 
 Action = Callable[[], None]
 Place = tuple[cl.Buffer, int]  # a buffer, and where in it something begins [words]
@@ -66,6 +67,7 @@ class Moving:
         self._outlines: dict[int, shapes.Points] = {}
         self._boxes: dict[str, tuple[NDArray[np.float32], cl.Buffer]] = {}
         self._moved: set[str] = set()
+        self._spheres = MovingSpheres(front, self.building)
         instances = self.lowered.instances
         world = len(self.lowered.faces) - sum(instances.triangles)
         for region in self._all_regions():
@@ -128,8 +130,10 @@ class Moving:
 
     def _plan(self, region: _Region, old: Any, new: Any) -> list[Action] | None:
         """What moves a region with its shape; None if nothing can."""
-        if region.shape.emission is not None or region.row["kind"]:
+        if region.shape.emission is not None:
             return None
+        if region.row["kind"]:
+            return self._spheres_plan(region, new)
         count = region.vertices[1]
         for values in (getattr(new, name, None) for name in ("vertices", "normals")):
             if on_device(values) and self._floats(values, (count, 3)) is None:
@@ -151,6 +155,23 @@ class Moving:
                 if len(points) != count:
                     return None
         return [lambda: self._place(region, new, points, matrix, placed)]
+
+    def _spheres_plan(self, region: _Region, new: Any) -> list[Action] | None:
+        """What moves many spheres in one; None if nothing can, or for another analytic shape."""
+        shape = region.shape if isinstance(new, Instance) else new
+        if not isinstance(shape, Spheres) or on_device(new.to_world):
+            return None
+        matrix = shapes.placement(new) @ region.own
+        place = self._spheres.plan(region.row, shape, matrix)
+        if place is None:
+            return None
+
+        def act() -> None:
+            region.shape = shape
+            place(self._boxes_of("shape", self.lowered.boxes)[1])
+            self._moved.add("shape")
+
+        return [act]
 
     def _place(
         self,

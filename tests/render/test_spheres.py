@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 
 import numpy as np
@@ -9,6 +10,7 @@ import pyopencl.array as cl_array
 import pytest
 
 import clpt
+from clpt import device
 from clpt import transforms as T
 from clpt.cli.info import summary
 from clpt.errors import SceneError
@@ -166,3 +168,55 @@ def test_an_instance_must_not_stretch_them() -> None:
     placed = shapes.Instance(group=shapes.Group((good,)), to_world=T.scale([1, 2, 1]))
     with pytest.raises(SceneError, match="use a mesh"):
         lower(Scene(camera=SCENE.camera, shapes=[placed]))
+
+
+def test_they_move_on_the_device(monkeypatch: pytest.MonkeyPatch) -> None:
+    """After a move the picture is that of a new renderer; nothing is read, nothing waited for."""
+    before, after = (RNG.normal(size=(300, 3)).astype(np.float32) for _ in range(2))
+    matrix = T.translate([0.2, 0.1, 0.0]) @ T.scale(0.8)
+    queue = opened().queue
+    body = shapes.Spheres(centers=before, radii=0.2, to_world=matrix, name="bodies")
+    film = integrators.Film(width=32, height=32, mode="rgb")
+    sky = lights.Constant(radiance=1.0)
+    path = integrators.Path(max_depth=3)
+
+    def scene(**given) -> Scene:
+        placed = [dataclasses.replace(body, **given), shapes.Sphere(center=(0.0, 0.0, 2.0))]
+        return Scene(camera=SCENE.camera, shapes=placed, lights=[sky], film=film, integrator=path)
+
+    def picture(renderer: clpt.Renderer) -> np.ndarray:
+        renderer.step(2)
+        return renderer.image()
+
+    def agree(renderer: clpt.Renderer, **given) -> bool:
+        expected = picture(clpt.Renderer(scene(**given), queue=queue))
+        return (np.abs(picture(renderer) - expected).max(axis=2) > 1e-3).mean() < 0.01  # outlines
+
+    memory = cl_array.to_device(queue, before)
+    renderer = clpt.Renderer(scene(centers=memory), queue=queue)
+    assert not agree(renderer, centers=after)
+    memory.set(after)
+    with monkeypatch.context() as patched:
+        for name in ("read", "read_later", "wait"):
+            patched.delattr(device.Stream, name)
+        renderer.update(vertices={"bodies": memory})
+    assert agree(renderer, centers=after)
+    four = np.column_stack([before, np.full(300, 0.1)]).astype(np.float32)
+    renderer.update(vertices={"bodies": cl_array.to_device(queue, four)})
+    assert agree(renderer, centers=four)
+    renderer.update(transforms={"bodies": np.eye(4)})
+    assert agree(renderer, centers=four, to_world=np.eye(4))
+    nowhere = four.copy()
+    nowhere[:200, 0] = np.nan
+    nowhere[200:250, 3] = 0.0
+    renderer.update(vertices={"bodies": cl_array.to_device(queue, nowhere)})
+    assert agree(renderer, centers=four[250:], to_world=np.eye(4))
+    renderer.update(vertices={"bodies": memory})
+    renderer.update(materials={"bodies": materials.Diffuse(reflectance=0.2)})
+    paint = materials.Diffuse(reflectance=0.2)
+    assert agree(renderer, centers=after, to_world=np.eye(4), material=paint)
+    glow = lights.Area(radiance=1.0)
+    body = dataclasses.replace(renderer.scene.shapes[0], emission=glow)
+    lit = dataclasses.replace(renderer.scene, shapes=[body, renderer.scene.shapes[1]])
+    renderer.update(scene=lit)  # tables that were moved are made anew
+    assert agree(renderer, centers=after, to_world=np.eye(4), material=paint, emission=glow)

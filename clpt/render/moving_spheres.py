@@ -1,0 +1,110 @@
+"""Spheres whose centres come from device memory, frame after frame, without a way over the host."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pyopencl as cl
+
+from clpt import transforms
+from clpt.bvh import Building
+from clpt.errors import SceneError
+from clpt.records import SHAPE
+from clpt.render import shapes, spheres
+from clpt.render.arrays import on_device
+from clpt.render.wavefront import Wavefront
+from clpt.scene.shapes import Spheres
+
+_ROOT = "stage/place_spheres.cl"
+
+
+class MovingSpheres:
+    """What writes the spheres of a render anew where they are: their table and their boxes.
+
+    Of spheres that were moved by arrays of the host, a copy of these stays on the device.
+    """
+
+    def __init__(self, front: Wavefront, building: Building):
+        self.front, self.building = front, building
+        self._sources: dict[int, cl.Buffer] = {}
+
+    def plan(
+        self, row: Any, shape: Spheres, matrix: transforms.Matrix
+    ) -> Callable[[cl.Buffer], None] | None:
+        """Return what enqueues that spheres are as in a shape, given the buffer of all boxes.
+
+        row: theirs in `shapes`; shape: as it will be; matrix: its placement in the world. None for
+        another number of spheres, and for those that emit: lights follow from them.
+
+        Raises SceneError for centres of another form, or a matrix that stretches.
+        """
+        count = self._count(row)
+        if shape.emission is not None or _length(shape.centers) != count:
+            return None
+        placed = dataclasses.replace(shape, to_world=matrix)
+        common = spheres.common(placed)
+        scale = float(common.view(np.float32)[shapes.member("sphere", "radius")])
+        if on_device(shape.centers):
+            source, begin, columns = _memory(shape, self.front.device.context)
+        elif on_device(shape.radii):
+            return None
+        else:
+            given = spheres.balls(dataclasses.replace(shape, to_world=np.eye(4)))
+            columns = 4
+
+        def act(boxes: cl.Buffer) -> None:
+            front = self.front
+            at, geometry = int(row["params"]), front.lowered.tables["geometry"]
+            if not np.array_equal(geometry[at : at + len(common)], common):
+                front.stream.write(front.named["geometry"], common, 4 * at)
+                geometry[at : at + len(common)] = common
+            front.moved.add("spheres")
+            if on_device(shape.centers):
+                front.stream.after(getattr(shape.centers, "events", ()))
+                found, first = source, begin
+            else:
+                found, first = self._sent(int(row["prim"]), given), 0
+            prim = int(row["prim"])
+            self.building.run_each(
+                _ROOT, "place_spheres", count, source=found, source_begin=first, columns=columns,
+                matrix=np.asarray(matrix, np.float32).ravel(), scale=scale,
+                padding=shapes.PADDING, first=prim - int(front.lowered.settings["single_count"]),
+                first_box=prim, spheres=front.named["spheres"], boxes=boxes,
+            )  # fmt: skip
+
+        return act
+
+    def _count(self, row: Any) -> int:
+        """How many spheres a row of `shapes` stands for."""
+        rows = self.front.lowered.tables["shapes"].view(SHAPE.dtype)
+        behind = rows["prim"][(rows["kind"] == row["kind"]) & (rows["prim"] > row["prim"])]
+        end = int(behind.min()) if len(behind) else len(self.front.lowered.boxes)
+        return end - int(row["prim"])
+
+    def _sent(self, prim: int, given: spheres.Balls) -> cl.Buffer:
+        """A buffer with centres and radii that come from the host."""
+        if prim not in self._sources:
+            self._sources[prim] = self.front.buffers.allocate("spheres that move", given.nbytes)
+        self.front.stream.write(self._sources[prim], given)
+        return self._sources[prim]
+
+
+def _length(centers: Any) -> int:
+    """The number of spheres; of a buffer, of rows of three."""
+    return centers.size // 12 if isinstance(centers, cl.Buffer) else len(centers)
+
+
+def _memory(shape: Spheres, context: cl.Context) -> tuple[cl.Buffer, int, int]:
+    """The buffer that centres are in, where they begin there, and numbers in a row."""
+    centers: Any = shape.centers
+    if isinstance(centers, cl.Buffer):
+        return centers, 0, 3
+    form = len(centers.shape) == 2 and centers.shape[1] in (3, 4)
+    if not form or centers.dtype != np.float32 or not centers.flags.c_contiguous:
+        found = f"{centers.shape} {centers.dtype}"
+        message = f"centers must be (n, 3) or (n, 4) float32, C-contiguous, found {found}"
+        raise SceneError(message, where=shapes.where(shape))
+    return centers.base_data, centers.offset // 4, centers.shape[1]
