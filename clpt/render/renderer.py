@@ -277,7 +277,7 @@ class Renderer(Turns):
         if not (values and updates.rewrite(self.wavefronts, self.scene, new)):
             for event in events:
                 event.wait()  # arrays on the device may be read
-            self._lower_again(new)
+            self._lower_again(new, refit=scene is None)
         self.scene = new
         self._names.replace(swaps)
         return self.reset()
@@ -294,13 +294,13 @@ class Renderer(Turns):
         self._names.replace(swaps)
         return True
 
-    def _lower_again(self, scene: Scene) -> None:
+    def _lower_again(self, scene: Scene, refit: bool) -> None:
         """Lower a scene and let it take the place of the one on the device."""
         if getattr(scene.integrator, "channels", ()) != self.channels:
             raise SceneError("other channels need a new Renderer", where="integrator.channels")
         front = self.wavefronts[0]
         lowered = lower(adopted(scene, front.stream.queue), self._texture_budget, front.lowered)
-        updates.take(self.wavefronts, lowered)
+        updates.take(self.wavefronts, lowered, refit)
         self.warnings = list(lowered.warnings)
 
     @property

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from clpt import device
+from clpt import bvh, device
 from clpt.errors import SceneError
 from clpt.records import TABLES
 from clpt.render import programs
@@ -25,6 +25,7 @@ log = logging.getLogger(__name__)
 
 GAP = 256  # words that are written though they are the same, rather than by two commands
 PIECES = 64  # writes from which the whole range between the first and the last is one
+FITTED = "the tree"  # among what has moved: it is not that which would be built
 FIXED = ("width", "height", "crop_x", "crop_y", "film_width", "film_height", "bands")
 KEPT = ("slots", "per_plane", "planes")  # settings that follow from the film and the device
 
@@ -100,12 +101,13 @@ def _pair(old: Any, new: Any, found: dict[int, tuple[Any, Any]]) -> bool:
     return True
 
 
-def take(fronts: Sequence[Wavefront], lowered: Lowered) -> None:
+def take(fronts: Sequence[Wavefront], lowered: Lowered, refit: bool = False) -> None:
     """Let another lowering take the place of the one that is rendered.
 
-    fronts: all of a renderer, the first one and its siblings. Programs are built where the features
-    differ, trees where triangles or boxes do; of tables the words that differ are written. The
-    picture is then that of a new renderer.
+    fronts: all of a renderer, the first one and its siblings; refit: fit the tree over triangles
+    that only moved, which is faster, and leaves a tree that is slower where they went far. Programs
+    are built where the features differ, trees where triangles or boxes do; of tables the words that
+    differ are written. The picture is then that of a new renderer.
 
     Raises SceneError for a film of another size, KernelBuildError, MemoryBudgetError.
     """
@@ -127,7 +129,7 @@ def take(fronts: Sequence[Wavefront], lowered: Lowered) -> None:
     first.lowered, first.queued = lowered, queued
     known = dict(first.named)
     _write_tables(first, former)
-    _build_trees(first, former, layout)
+    _follow(first, former, layout, refit)
     if anew:
         first.allocate_queue()
     moved = {name: now for name, now in first.named.items() if known.get(name) is not now}
@@ -151,7 +153,7 @@ def _write_tables(front: Wavefront, former: Lowered) -> None:
     for name in TABLES:
         old, new = former.table(name), front.lowered.table(name)
         if name == "instances":
-            continue  # their rows name the trees, see `_build_trees`
+            continue  # their rows name the trees, see `_follow`
         lent = front.lowered.lent.get(name)
         if lent is not None:
             front.named[name] = lent
@@ -194,26 +196,26 @@ def _same(some: np.ndarray, others: np.ndarray) -> bool:
     return some.shape == others.shape and np.array_equal(_words(some), _words(others))
 
 
-def _build_trees(front: Wavefront, former: Lowered, layout: str) -> None:
-    """Build those trees anew whose triangles or boxes are others."""
-    lowered = front.lowered
-    old, new = former.instances, lowered.instances
-    triangles = layout != front.tree.layout or old.triangles != new.triangles
-    triangles |= not all(
-        _same(getattr(former, name), getattr(lowered, name))
-        for name in ("vertices", "faces", "tags")
-    )
-    triangles |= "vertices" in front.moved
-    boxes = triangles or not _same(former.boxes, lowered.boxes)
-    boxes |= bool(front.moved)
+def _follow(front: Wavefront, former: Lowered, layout: str, refit: bool) -> None:
+    """Let trees follow the tables: build them anew, or fit that over triangles that only moved."""
+    lowered, moved = front.lowered, front.moved - {FITTED}
+    fitted = FITTED in front.moved
     front.moved.clear()
-    boxes |= not all(
-        _same(getattr(old, name), getattr(new, name)) for name in ("rows", "boxes", "prototypes")
-    )
-    if not (triangles or boxes):
-        return
-    front.stream.wait()  # what trees are built of has to be there
-    if triangles:
-        front.build_triangles(layout)
-    front.build_boxes()
-    log.info("built anew: the trees over %s", "triangles and boxes" if triangles else "boxes")
+    other = layout != front.tree.layout or former.instances.triangles != lowered.instances.triangles
+    other |= not (_same(former.faces, lowered.faces) and _same(former.tags, lowered.tags))
+    shifted = "vertices" in moved or not _same(former.vertices, lowered.vertices)
+    anew = other or (not refit and (shifted or fitted))
+    boxes = anew or moved or not _same(former.boxes, lowered.boxes)
+    parts = zip(vars(former.instances).values(), vars(lowered.instances).values(), strict=True)
+    boxes = boxes or not all(_same(*map(np.asarray, pair)) for pair in parts)
+    if shifted and not anew:
+        building = bvh.Building(front.device, stream=front.stream)
+        bvh.refit(building, front.tree, front.named["vertices"], front.named["faces"])
+    if not anew and (shifted or fitted):
+        front.moved.add(FITTED)
+    if anew or boxes:
+        front.stream.wait()  # what trees are built of has to be there
+        if anew:
+            front.build_triangles(layout)
+        front.build_boxes()
+        log.info("trees are built over %s", "triangles and boxes" if anew else "boxes")

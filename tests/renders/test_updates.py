@@ -202,7 +202,23 @@ def test_arrays_of_another_context(renderer: clpt.Renderer) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+def test_trees_are_fitted_or_built(caplog: pytest.LogCaptureFixture) -> None:
+    """A lamp that moves is lowered again and its tree fitted; a scene that is given is built."""
+    own = clpt.Renderer(scene(), device.choose(), layout="wide8")
+    tree = own.wavefronts[0].tree
+    own.update(transforms={LAMP: tf.translate([0.3, 2.8, 0.5]) @ LAMP.to_world, FLOOR: tf.scale(2)})
+    assert own.wavefronts[0].tree is tree
+    fresh = picture(clpt.Renderer(own.scene, own.device, layout="wide8"))
+    np.testing.assert_allclose(picture(own), fresh, atol=1e-5)
+    with caplog.at_level(logging.INFO, "clpt.render.updates"):
+        own.update(scene=own.scene)
+    assert own.wavefronts[0].tree is not tree
+    assert [r.message for r in caplog.records] == ["trees are built over triangles and boxes"]
+    np.testing.assert_array_equal(picture(own), fresh)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["spectral"])
 def test_values_and_sources(mode: str) -> None:
     """Of more kinds than are shaded in place; edits of values and of where values come from."""
     kinds = [RED, METAL, m.Plastic(), m.Conductor(), m.Phong(), m.RoughPlastic()]
