@@ -68,6 +68,8 @@ def render(queue: cl.CommandQueue, scene: clpt.Scene) -> None:
     with told_as("make"):
         renderer = clpt.Renderer(scene, queue=queue, slots=1024)
     late = cl.UserEvent(queue.context)
+    place = cl_array.to_device(queue, np.float32(scene.shapes[-1].to_world))
+    renderer.update(transforms={-1 + len(scene.shapes): place})
     renderer.step(1)
     renderer.update(camera=dataclasses.replace(scene.camera, fov=25.0))
     renderer.resolve()
@@ -76,6 +78,7 @@ def render(queue: cl.CommandQueue, scene: clpt.Scene) -> None:
         "step after a late event": lambda: renderer.step(2, wait_for=[late]),
         "step": lambda: renderer.step(3),
         "camera": lambda: renderer.update(camera=scene.camera),
+        "move": lambda: renderer.update(transforms={-1 + len(scene.shapes): place}),
         "reset": renderer.reset,
         "resolve": lambda: renderer.resolve(made),
         "film": lambda: renderer.film,

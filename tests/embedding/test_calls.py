@@ -14,7 +14,7 @@ import pytest
 HERE = Path(__file__).resolve().parent
 HOST = ("clFinish", "clEnqueueReadBuffer", "clEnqueueMapBuffer", "clWaitForEvents")
 MAKING = ("clGetPlatformIDs", "clCreateContext", "clCreateCommandQueue")
-ENQUEUED = ("step after a late event", "step", "reset", "resolve", "film")
+ENQUEUED = ("step after a late event", "step", "move", "reset", "resolve", "film")
 QUERIES = ("intersect", "occluded", "refit")
 
 Calls = dict[str, dict[str, int]]

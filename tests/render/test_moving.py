@@ -6,6 +6,7 @@ import dataclasses
 from typing import Any
 
 import numpy as np
+import pyopencl as cl
 import pyopencl.array as cl_array
 import pytest
 import trimesh
@@ -118,6 +119,23 @@ def test_a_mesh_that_explodes_is_not_seen_and_comes_back(renderer: Renderer) -> 
     assert np.isfinite(gone).all() and np.abs(gone - before).max() > 0.05
     renderer.update(vertices={0: VERTICES})
     np.testing.assert_allclose(picture(renderer), before, atol=1e-4)
+
+
+def test_moves_on_a_queue_out_of_order(device: dev.Device) -> None:
+    """Vertices of the caller wait for the caller's event, what follows for what comes before."""
+    pictures = []
+    for properties in (0, cl.command_queue_properties.OUT_OF_ORDER_EXEC_MODE_ENABLE):
+        queue = cl.CommandQueue(device.context, properties=properties)
+        with Renderer(scene(), queue=queue, layout="wide8") as renderer:
+            points = cl_array.to_device(queue, bent(0.2))
+            late = cl.UserEvent(device.context)
+            waits = [late]
+            up = tf.translate([-1, 1.5, 1])
+            renderer.update(vertices={"ball": points}, transforms={"left": up}, wait_for=waits)
+            renderer.update(transforms={"ball": tf.scale([1, 0.5, 1]), "cube": up})
+            late.set_status(cl.command_execution_status.COMPLETE)
+            pictures.append(picture(renderer))
+    np.testing.assert_array_equal(*pictures)
 
 
 def test_what_cannot_be_is_told(renderer: Renderer) -> None:
