@@ -62,8 +62,8 @@ def plate(material: Dielectric, degrees: float, light: Any, below: bool) -> Scen
 
 
 @pytest.mark.parametrize("integrator", DEEP)
-@pytest.mark.parametrize("degrees", [0.0, 40.0, 75.0])
-@pytest.mark.parametrize("centre", [450.0, 550.0, 640.0])
+@pytest.mark.parametrize("degrees", [0.0, pytest.param(40.0, marks=pytest.mark.slow), 75.0])
+@pytest.mark.parametrize("centre", [450.0, pytest.param(550.0, marks=pytest.mark.slow), 640.0])
 def test_plate(integrator: str, degrees: float, centre: float) -> None:
     """A dyed plate of flint in narrow light, at angles and wavelengths: what passes, and all."""
     light = band(centre)
@@ -120,8 +120,8 @@ def test_lamp_inside(layers: tuple, mode: str) -> None:
     assert_mean(exposures(scene, 8, 64), [np.exp(-2.0 * 0.75)] * 3, 0.01, 1e-3)
 
 
-@pytest.mark.parametrize("mode", ["rgb", "spectral"])
-@pytest.mark.parametrize("integrator", ["path", "whitted"])
+@pytest.mark.parametrize("mode", [pytest.param("rgb", marks=pytest.mark.slow), "spectral"])
+@pytest.mark.parametrize("integrator", ["path", pytest.param("whitted", marks=pytest.mark.slow)])
 def test_direct_light_inside(integrator: str, mode: str) -> None:
     """The middle of a table inside, a point light .5 m above: the light's way and ours absorb."""
     table = Rectangle(to_world=tf.scale(0.6), material=Diffuse(reflectance=0.5))
@@ -201,8 +201,9 @@ def coloured(material: type, **changes: Any) -> Scene:
     )
 
 
-@pytest.mark.parametrize("mode", [pytest.param("rgb", marks=pytest.mark.slow), "spectral"])
-@pytest.mark.parametrize("integrator", ["path", pytest.param("whitted", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+@pytest.mark.parametrize("integrator", ["path", "whitted"])
 def test_no_absorption_changes_no_bit(integrator: str, mode: str) -> None:
     """A coefficient of 0, with the code that reads it and without, gives the same picture."""
     zero = spectra.Tabulated((400.0, 700.0), (0.0, 0.0))
@@ -219,8 +220,10 @@ MITSUBA = {"dielectric": Dielectric, "roughdielectric": RoughDielectric}
 
 
 @pytest.mark.peers
-@pytest.mark.parametrize("mode", ["rgb", "spectral"])
-@pytest.mark.parametrize("plugin", MITSUBA)
+@pytest.mark.parametrize("mode", [pytest.param("rgb", marks=pytest.mark.slow), "spectral"])
+@pytest.mark.parametrize(
+    "plugin", ["dielectric", pytest.param("roughdielectric", marks=pytest.mark.slow)]
+)
 def test_ball_beside_mitsuba(plugin: str, mode: str) -> None:
     """The ball with a homogeneous medium that only absorbs, through Mitsuba's `volpath`."""
     mi = pytest.importorskip("mitsuba", reason="the renderer that we compare with is not installed")

@@ -30,12 +30,23 @@ from tests.renders.builders import (
 from tests.renders.support import assert_mean, exposures
 
 MODES = ("rgb", "spectral")
+QUICK = ("disk", "point", "envmap")  # on a surface, in a point, around all
 COLOUR = {"rgb": 2e-4, "spectral": 1e-3}  # what uplifting a colour may change
 
 
-@pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("kind", EXPECTED)
-def test_light_on_a_plane(kind: str, mode: str) -> None:
+def test_light_on_a_plane_in_rgb(kind: str) -> None:
+    assert_light(kind, "rgb")
+
+
+@pytest.mark.parametrize(
+    "kind", [pytest.param(k, marks=() if k in QUICK else pytest.mark.slow) for k in EXPECTED]
+)
+def test_light_on_a_plane_of_wavelengths(kind: str) -> None:
+    assert_light(kind, "spectral")
+
+
+def assert_light(kind: str, mode: str) -> None:
     """Irradiance from every kind of light, through `path`."""
     images = exposures(lit_ground(kind, mode), 24, 64)
     expected = ALBEDO / np.pi * RADIANCE * EXPECTED[kind]
@@ -67,7 +78,7 @@ def test_small_and_huge_sphere_lights(radius: float) -> None:
     assert_mean(exposures(scene, 24, 64), [ALBEDO * RADIANCE * radius**2] * 3, 0.005, 5e-4)
 
 
-@pytest.mark.parametrize("kind", ["rectangle", "mesh"])
+@pytest.mark.parametrize("kind", [pytest.param("rectangle", marks=pytest.mark.slow), "mesh"])
 def test_textured_light(kind: str) -> None:
     """Small squares by turns bright and dim shine like their mean."""
     uv = np.diag([32.0, 32.0, 1.0])
@@ -152,7 +163,7 @@ def test_lossless_bodies_in_a_furnace() -> None:
             assert_mean(images[:, rows, columns], [1.0] * 3, 0.01, COLOUR["spectral"])
 
 
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("mode", [pytest.param("rgb", marks=pytest.mark.slow), "spectral"])
 def test_sides_and_mixtures(mode: str) -> None:
     """Masks, blends, one-sided and two-sided squares in even light, each as its formula says."""
     a, b = m.Diffuse(reflectance=0.6), m.Diffuse(reflectance=0.2)

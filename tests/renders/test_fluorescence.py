@@ -201,6 +201,7 @@ def test_no_light_is_made() -> None:
     assert np.all(given + rest.sample(at) < 1.005)
 
 
+@pytest.mark.slow
 def test_without_a_dye_it_is_diffuse() -> None:
     grey = Tabulated((300.0, 830.0), (0.2, 0.7))
     images = [exposures(plane(LIGHTS["A"], kind(reflectance=grey)), 16, 32)

@@ -78,9 +78,8 @@ def test_a_step_in_the_index_is_two_indices(kind: type[materials.Material]) -> N
     assert abs(ours.mean() / (parts[0] + parts[1]).mean() - 1.0) < 0.02
 
 
-@pytest.mark.parametrize(
-    ("alpha", "bound"), [pytest.param(0.3, 1.1, marks=pytest.mark.slow), (0.05, 1.3)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("alpha", "bound"), [(0.3, 1.1), (0.05, 1.3)])
 def test_rough_dispersive_glass_costs_little_noise(alpha: float, bound: float) -> None:
     """Between exposures, rough flint varies nearly as little as glass of an even index.
 

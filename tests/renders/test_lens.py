@@ -70,6 +70,7 @@ def test_blur_of_a_disk_out_of_its_focus(wavelength):
         assert blur > 0.2 * expected  # what is tested is there
 
 
+@pytest.mark.slow
 def test_glass_that_does_not_disperse_changes_no_bit():
     plain = scene(spectra.Constant(1.0))
     flat = dataclasses.replace(plain, camera=dataclasses.replace(plain.camera, glass=1.7))

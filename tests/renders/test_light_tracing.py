@@ -104,6 +104,7 @@ LIGHTS = {
     "sphere": 30.0, "disk": 10.0, "rectangle": 10.0, "mesh": 20.0, "cylinder": 10.0, "point": 3.0,
     "spot": 8.0, "directional": 2.0, "constant": 1.0, "envmap": 2.0, "cube_map": 1.0,
 }  # fmt: skip
+QUICK = ("sphere", "spot", "envmap")  # on a surface, in a point, around all
 
 
 def still_life(mode: str, on: dict[str, float], camera: Camera | None = None) -> Scene:
@@ -133,7 +134,9 @@ def both(scene: Scene, spp: int, what: str, *, many: int = 1, depth: int = 4, **
     assert_agree(blocks(exposures(from_lights, 12, many * spp, **kw)), reference, what)
 
 
-@pytest.mark.parametrize("kind", LIGHTS)
+@pytest.mark.parametrize(
+    "kind", [pytest.param(k, marks=() if k in QUICK else pytest.mark.slow) for k in LIGHTS]
+)
 def test_every_light(kind: str) -> None:
     """Diffuse, rough and smoothed surfaces under one kind of light."""
     both(still_life("rgb", {kind: LIGHTS[kind]}), 16, kind)
@@ -208,6 +211,7 @@ def test_beam(mode: str) -> None:
     assert_mean(exposures(beam_through(None, mode), 12, 128), 0.5 * 2.0 / np.pi * white, 0.02, 2e-3)
 
 
+@pytest.mark.slow
 def test_beam_through_glass_that_absorbs() -> None:
     """What passes a slab at right angles once: (1 - f)^2 a, f being Fresnel's reflectance and a
     what absorption leaves; the path is too short for what is reflected inside."""
@@ -339,6 +343,7 @@ def bow_radius(index: float, reflections: int) -> float:
     return float(np.tan(angle) + side * 0.04 * np.sin(i) / np.cos(angle))
 
 
+@pytest.mark.slow
 def test_rainbow() -> None:
     """Both bows are where they ought to be, and the band between them is dark."""
     scene = with_film(clpt.load(ROOT / "scenes/rainbow"), width=240, height=150)

@@ -70,7 +70,13 @@ def fresnel(i: float, r: float) -> float:
     return 0.5 * (s**2 + p**2)
 
 
-PRISMS = [("bk7", 60.0, None), ("sf11", 60.0, 75.0), ("diamond", 35.0, None), ("water", 60.0, 40.0)]
+PRISMS = [
+    ("bk7", 60.0, None),
+    *(
+        pytest.param(*prism, marks=pytest.mark.slow)
+        for prism in (("sf11", 60.0, 75.0), ("diamond", 35.0, None), ("water", 60.0, 40.0))
+    ),
+]
 
 
 @pytest.mark.parametrize(("glass", "apex", "incidence"), PRISMS, ids=lambda v: str(v))
@@ -100,7 +106,7 @@ def test_prism(glass: str, apex: float, incidence: float | None) -> None:
         assert_arrives(found, share, f"{glass}, {nm:.0f} nm, {np.degrees(deviation):.3f} degrees")
 
 
-@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("order", [1, pytest.param(2, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("incidence", [None, pytest.param(68.0, marks=pytest.mark.slow)])
 def test_rainbow(order: int, incidence: float | None) -> None:
     """A drop's deviation 2 (i - r) + k (pi - 2 r) for k reflections inside.

@@ -118,7 +118,13 @@ def test_bands_do_not_depend_on_passes() -> None:
     assert np.array_equal(passes.image(), whole.image())
 
 
-@pytest.mark.parametrize("film", [{"lambda_min": 300.0}, {"lambda_min": 300.0, "bands": 4}])
+@pytest.mark.parametrize(
+    "film",
+    [
+        {"lambda_min": 300.0},
+        pytest.param({"lambda_min": 300.0, "bands": 4}, marks=pytest.mark.slow),
+    ],
+)
 def test_a_wide_range_changes_no_colour(film: dict) -> None:
     """Also where light that the eye does not see is strong."""
     light = Tabulated((300.0, 355.0, 400.0, 830.0), (50.0, 50.0, 1.0, 1.0))

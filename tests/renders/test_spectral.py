@@ -82,7 +82,10 @@ def test_no_ripple(sampler: object, spp: int) -> None:
             assert_mean(column, expected, 0.12, 2e-3)
 
 
-@pytest.mark.parametrize("ends", [(360.0, 830.0), (450.0, 620.0), (300.0, 990.0)])
+@pytest.mark.parametrize(
+    "ends",
+    [(360.0, 830.0), (450.0, 620.0), pytest.param((300.0, 990.0), marks=pytest.mark.slow)],
+)
 def test_range_of_wavelengths(ends: tuple[float, float]) -> None:
     """A film records its own range; a flat light has there what the observer sees of it."""
     film = Film(width=16, height=16, lambda_min=ends[0], lambda_max=ends[1])

@@ -48,9 +48,8 @@ def strip(material, mode):
     )
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=() if n == "soap" else pytest.mark.slow) for n in MATERIALS]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", MATERIALS)
 def test_rgb_is_close_to_spectral(name):
     """Delta E 2000 of the means over 4 x 4 pixels; of films on water, exposed as one would."""
     colour = pytest.importorskip("colour", reason="colour-science is for developers")
