@@ -201,10 +201,11 @@ def _srgb_decoded(x: NDArray[Any]) -> NDArray[Any]:
 
 @cache
 def srgb8_steps() -> Array:
-    """The least linear value whose 8-bit sRGB code is 1, 2, ... 255: (255,) float32, rising."""
+    """The least linear value of each 8-bit sRGB code, then infinity: (257,) float32, rising."""
     exact = _srgb_decoded((np.arange(255) + 0.5) / 255.0)
     steps = exact.astype(np.float32)
-    return np.where(steps < exact, np.nextafter(steps, np.float32(1.0)), steps)
+    steps = np.where(steps < exact, np.nextafter(steps, np.float32(1.0)), steps)
+    return np.concatenate([[-np.inf], steps, [np.inf]]).astype(np.float32)
 
 
 def linear_to_srgb(x: Array) -> Array:
@@ -217,7 +218,11 @@ def to_srgb8(image: Array, exposure: float = 0.0) -> NDArray[np.uint8]:
     """Linear (h, w, c) as 8-bit sRGB, scaled by 2^exposure; NaN becomes black, infinity white."""
     finite = np.nan_to_num(image, nan=0.0, posinf=np.inf, neginf=0.0)
     colour, alpha = finite[..., :3], finite[..., 3:]
-    codes = np.searchsorted(srgb8_steps(), colour * np.float32(2.0**exposure), side="right")
+    shown = np.clip(colour * np.float32(2.0**exposure), 0, 1)
+    scaled = linear_to_srgb(shown) * 255
+    codes = np.round(scaled)
+    close = np.abs(scaled - codes) > 0.499  # where float32 may round to the wrong side
+    codes[close] = np.searchsorted(srgb8_steps(), shown[close], side="right") - 1
     stored = np.round(np.clip(alpha, 0, 1) * 255)
     return np.concatenate([codes, stored], axis=2).astype(np.uint8)
 

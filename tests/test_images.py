@@ -80,6 +80,15 @@ def test_png_all_levels_survive(tmp_path):
         np.testing.assert_array_equal(np.asarray(png), levels)
 
 
+def test_png_rounds_the_transfer():
+    """Codes are of the transfer in float64, to the last value before each of them."""
+    steps = images.srgb8_steps()[1:-1]
+    x = np.concatenate([np.nextafter(steps, np.float32(0)), steps]).reshape(1, -1, 1)
+    exact = x.astype(np.float64)
+    exact = np.where(exact <= 0.0031308, 12.92 * exact, 1.055 * exact ** (1 / 2.4) - 0.055)
+    np.testing.assert_array_equal(images.to_srgb8(x), np.round(exact * 255))
+
+
 def test_png_exposure_and_broken_values(tmp_path):
     image = np.array([[[np.nan, np.inf, -np.inf], [0.25, 0.5, 1]]], np.float32)
     images.write(tmp_path / "a.png", image, exposure=1)

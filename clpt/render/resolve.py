@@ -55,6 +55,7 @@ class Resolve:
         self.device, self.stream = on, stream
         self.program = device.build(on, device.assemble("stage/resolve.cl"))
         self.steps = device.Buffers(on).upload("the sRGB transfer", srgb8_steps())
+        self._bound: dict[str, device.Bound] = {}
 
     def __call__(
         self,
@@ -88,7 +89,7 @@ class Resolve:
         }
         if not target.is_image:
             named["at"] = target.at
-        bound = self.program.kernel(target.kernel).bind(**named)
+        bound = self._bind(target.kernel, named)
         self.stream.after(wait_for)
         if isinstance(target.memory, Array):
             self.stream.after(target.memory.events)
@@ -97,6 +98,14 @@ class Resolve:
             return event
         device.supersede(target.memory, event)
         return target.memory
+
+    def _bind(self, kernel: str, named: dict[str, Any]) -> device.Bound:
+        """A kernel with its arguments; it is kept, as making one takes longer than setting them."""
+        if kernel in self._bound:
+            self._bound[kernel].set(**named)
+        else:
+            self._bound[kernel] = self.program.kernel(kernel).bind(**named)
+        return self._bound[kernel]
 
     def _target(self, film: Array, into: Any, dtype: Any) -> _Target:
         """Where to, checked. Raises DeviceError, telling what would fit."""

@@ -1,5 +1,5 @@
 /* From a film (r g b linear, samples) to a picture for a screen or a program: exposure, a tone curve,
- * the sRGB transfer (IEC 61966-2-1), opaque alpha. NaN is black. Codes of 8 bits are found in a table of
+ * the sRGB transfer (IEC 61966-2-1), opaque alpha. NaN is black. Codes of 8 bits come from a table of
  * the least linear value of each, clpt.images.srgb8_steps, so they are those of a written .png to the bit.
  *
  * Reinhard: Reinhard et al. 2002, "Photographic Tone Reproduction", eq. 3, of the luminance of Rec. 709.
@@ -25,23 +25,30 @@ inline float4 shown(float4 v, int converted, float4 red, float4 green, float4 bl
     return select(v, (float4)(0.0f), isnan(v)); /* infinity times 0 */
 }
 
-/* How many of the steps a value has reached: its 8-bit code. */
-inline uchar srgb_code(global const float *steps, float v)
-{
-    int code = 0;
-    for (int step = 128; step > 0; step >>= 1) code += v >= steps[code + step - 1] ? step : 0;
-    return (uchar)code;
-}
-
 inline float srgb_transfer(float v)
 {
     return v <= 0.0031308f ? 12.92f * v : 1.055f * pow(v, 1.0f / 2.4f) - 0.055f;
 }
 
+/* The codes of a colour: near ones, by a fit to the transfer that is right to 0.1 of a code (minimax over
+ * [0.0031308, 1], our own), then by the steps of a code and the next one; these go from -inf to inf. */
+inline uint4 srgb_codes(global const float *steps, float4 v)
+{
+    v = clamp(v, 0.0f, 1.0f);
+    float4 root = sqrt(v), shown = 0.833733f * root + 0.298129f * sqrt(root) - 0.0553134f * v - 0.0769088f;
+    shown = select(shown, 12.92f * v, v <= 0.0031308f);
+    int4 code = convert_int4(shown * 255.0f + 0.5f);
+    code.x += (v.x >= steps[code.x + 1]) - (v.x < steps[code.x]);
+    code.y += (v.y >= steps[code.y + 1]) - (v.y < steps[code.y]);
+    code.z += (v.z >= steps[code.z + 1]) - (v.z < steps[code.z]);
+    return as_uint4(code);
+}
+
 inline uchar4 as_bytes(float4 v, global const float *steps, int encoded)
 {
-    if (!encoded) return (uchar4)(convert_uchar3_sat_rte(v.xyz * 255.0f), 255);
-    return (uchar4)(srgb_code(steps, v.x), srgb_code(steps, v.y), srgb_code(steps, v.z), 255);
+    uint4 code = encoded ? srgb_codes(steps, v) : convert_uint4_sat_rte(v * 255.0f);
+    code.w = 255;
+    return convert_uchar4_sat(code);
 }
 
 inline float4 as_floats(float4 v, int encoded)
