@@ -66,7 +66,7 @@ def scene() -> clpt.Scene:
         for x, m in ((-2.1, paint), (0.0, velvet), (2.1, woven))
     ]
     return clpt.Scene(
-        camera=cameras.Perspective(to_world=look_at((0, 2, 8), (0, 0.9, 0), (0, 1, 0)), fov=40),
+        camera=cameras.Perspective(to_world=look_at((0, 2, 8), (0, 0.9, 0), (0, 1, 0)), fov=46),
         shapes=[*placed, shapes.Rectangle(to_world=rotate((1, 0, 0), -90) @ scale(20.0))],
         lights=[lights.Constant()],
         film=Film(width=384, height=192),
