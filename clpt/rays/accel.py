@@ -87,7 +87,7 @@ class Accel(Queries):
         Each triangle is met once at most; a ray through an edge meets both triangles there. It
         waits, since the number of hits is not known before; the rays are as for `intersect`.
         """
-        rays = batch.rays(self.queue.context, origins, directions, t_min, t_max)
+        rays = batch.rays(*self._where, origins, directions, t_min, t_max)
         with self._lock:
             self._opened()
             self._stream.after(wait_for)
@@ -108,8 +108,8 @@ class Accel(Queries):
 
     def _fill(self, kernel: str, rays: batch.Rays, arrays: dict[str, NDArray[Any]]) -> None:
         """Run a kernel on arrays of the host."""
-        context = self.queue.context
-        places = {name: batch.lent(context, array, True) for name, array in arrays.items()}
+        context, shares = self._where
+        places = {name: batch.lent(context, array, shares) for name, array in arrays.items()}
         self._wait(kernel, rays, arrays, places)
 
     def _laid(self, name: str, given: Given, *kinds: type) -> tuple[Any, int]:

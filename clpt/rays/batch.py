@@ -32,9 +32,17 @@ class Rays:
 
 
 def rays(
-    context: cl.Context, origins: Given, directions: Given, t_min: Given, t_max: Given
+    context: cl.Context,
+    shares: bool,
+    origins: Given,
+    directions: Given,
+    t_min: Given,
+    t_max: Given,
 ) -> Rays:
-    """Check a batch, and put on the device what is not there. Raises SceneError."""
+    """Check a batch, and put on the device what is not there. Raises SceneError.
+
+    shares: whether the device works in the host's memory.
+    """
     both = {"origins": origins, "directions": directions}
     waits = not any(map(on_device, both.values()))
     looked: dict[str, Any] = {
@@ -48,38 +56,39 @@ def rays(
     for name, one in looked.items():
         if not isinstance(one, Held):
             same = np.repeat(one, count, 0) if len(one) == 1 else one
-            looked[name] = lent(context, same, waits)
+            looked[name] = lent(context, same, waits and shares)
         if looked[name].rows != count:
             message = f"{lengths[0]} origins have {lengths[1]} directions"
             raise SceneError(message, where="directions")
     named: dict[str, Any] = {name: one.buffer for name, one in looked.items()}
     for name, given in (("t_min", t_min), ("t_max", t_max)):
-        each = _ends(context, name, given, count, waits)
+        each = _ends(context, name, given, count, waits and shares)
         looked[name] = each or Held(None, count)
         named |= {f"{name}s": looked[name].buffer, name: 0.0 if each else given}
     return Rays(count, waits, named, tuple(looked.values()))
 
 
-def _ends(context: cl.Context, name: str, given: Given, count: int, waits: bool) -> Held | None:
+def _ends(context: cl.Context, name: str, given: Given, count: int, shared: bool) -> Held | None:
     """Where each of the rays begins or ends; None if one number says it."""
     if on_device(given):
         each = held(context, name, given, 0, np.float32)
     elif isinstance(given, (int, float)) or np.ndim(given) == 0:
         return None
     else:
-        each = lent(context, np.ascontiguousarray(given, np.float32).ravel(), waits)
+        each = lent(context, np.ascontiguousarray(given, np.float32).ravel(), shared)
     if each.rows != count:
         raise SceneError(f"{count} rays have {each.rows} of it", where=name)
     return each
 
 
-def lent(context: cl.Context, array: NDArray[Any], waits: bool) -> Held:
-    """An array of the host for a kernel; where it lies, if the kernel is waited for."""
+def lent(context: cl.Context, array: NDArray[Any], shared: bool) -> Held:
+    """An array of the host for a kernel: where it lies, for one that is waited for, or a copy."""
     if not array.size:
         return Held(None, len(array))
     flags = cl.mem_flags
-    how = flags.READ_WRITE | (flags.USE_HOST_PTR if waits else flags.COPY_HOST_PTR)
-    return Held(cl.Buffer(context, how, hostbuf=array), len(array))
+    access = flags.READ_WRITE if array.flags.writeable else flags.READ_ONLY
+    how = flags.USE_HOST_PTR if shared else flags.COPY_HOST_PTR
+    return Held(cl.Buffer(context, access | how, hostbuf=array), len(array))
 
 
 def results(
@@ -105,14 +114,14 @@ def results(
 
 
 def host_results(
-    context: cl.Context, count: int, made: Made
+    context: cl.Context, shares: bool, count: int, made: Made
 ) -> tuple[dict[str, NDArray[Any]], dict[str, Held]]:
     """The same on the host, for a kernel that is waited for."""
     arrays: dict[str, NDArray[Any]] = {
         name: np.empty((count, columns) if columns else count, kind)
         for name, (columns, kind) in made.items()
     }
-    return arrays, {name: lent(context, array, True) for name, array in arrays.items()}
+    return arrays, {name: lent(context, array, shares) for name, array in arrays.items()}
 
 
 def begins(parts: Sequence[Held]) -> tuple[int, ...]:

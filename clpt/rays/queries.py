@@ -83,6 +83,7 @@ class Queries:
         self.layout = choose_tree(self.device) if layout is None else layout
         if self.layout not in _TREES:
             raise SceneError(f"{layout!r} is none of {', '.join(_TREES)}", where="layout")
+        self._where = queue.context, self.device.info.is_cpu
         self._stream = Stream(queue)
         self._lock = threading.RLock()
         self._kernels: dict[str, Bound] = {}
@@ -110,7 +111,7 @@ class Queries:
         """
         made = {**_HITS, "instance": (0, np.int32)} if self.instanced else _HITS
         before = {} if out is None else vars(out)
-        rays = batch.rays(self.queue.context, origins, directions, t_min, t_max)
+        rays = batch.rays(*self._where, origins, directions, t_min, t_max)
         found, event = self._run("query_closest", rays, made, before, wait_for)
         return Hits(**{"instance": None, **found}, event=event)
 
@@ -130,7 +131,7 @@ class Queries:
         of its `events` is. out: such an array to be written again.
         """
         before = {} if out is None else {"met": out}
-        rays = batch.rays(self.queue.context, origins, directions, t_min, t_max)
+        rays = batch.rays(*self._where, origins, directions, t_min, t_max)
         found, _ = self._run("query_occluded", rays, {"met": (0, np.uint8)}, before, wait_for)
         return found["met"]
 
@@ -175,7 +176,7 @@ class Queries:
             self._opened()
             if rays.waits:
                 self._stream.after(wait_for)
-                arrays, places = batch.host_results(self.queue.context, rays.count, made)
+                arrays, places = batch.host_results(*self._where, rays.count, made)
                 return arrays, self._wait(name, rays, arrays, places)
             there, places = batch.results(self.queue, rays.count, made, out)
             self._stream.after(wait_for)
@@ -194,7 +195,7 @@ class Queries:
         """Run a kernel that writes arrays of the host."""
         event = self._enqueue(name, rays, places)
         for key, array in arrays.items():
-            if array.size:  # onto itself: it comes back from where the device has a copy
+            if array.size:  # onto itself, where the device works in the host's memory
                 event = self._stream.read_later(places[key].buffer, array)
         event.wait()
         if rays.count:  # the kernel lets go of the host's memory

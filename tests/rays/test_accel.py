@@ -82,6 +82,25 @@ def test_waits_for_events_of_any_order(accel, soup, rays):
     np.testing.assert_array_equal(second.t.get(), expected.t)
 
 
+def test_updates_only_enqueue(accel, soup, rays):
+    """Of meshes and instances, while an event that they wait for is not there."""
+    context, (vertices, faces) = accel.queue.context, soup
+    queue = cl.CommandQueue(context)
+    mesh = clpt.Accel(queue, vertices, faces)
+    town = clpt.InstancedAccel(queue, [mesh], [0], np.eye(4)[None])
+    before = town.intersect(*rays).t
+    gate, there = cl.UserEvent(context), [to_device(queue, part) for part in rays]
+    mesh.update(to_device(queue, vertices + np.float32(9)), wait_for=[gate])
+    mesh.update(vertices)
+    town.update(np.eye(4)[None])
+    hits = town.intersect(*there)
+    early = hits.event.command_execution_status
+    gate.set_status(COMPLETE)
+    hits.event.wait()
+    assert early != COMPLETE
+    np.testing.assert_allclose(hits.t.get(), before, rtol=1e-5)
+
+
 def test_update_moves_the_triangles(queue, soup, rays):
     vertices, faces = soup
     accel = clpt.Accel(queue, to_device(queue, vertices), to_device(queue, faces))
@@ -112,6 +131,9 @@ def test_one_origin_for_all_rays_and_other_types(accel, rays):
     one = accel.intersect([0.5, 0.5, 0.5], d.astype(np.float64)[:, ::-1])
     many = accel.intersect(np.full_like(d, 0.5), np.ascontiguousarray(d[:, ::-1]))
     np.testing.assert_array_equal(one.t, many.t)
+    fixed = np.ascontiguousarray(d[:, ::-1])
+    fixed.flags.writeable = False
+    np.testing.assert_array_equal(accel.intersect([[0.5, 0.5, 0.5]], fixed).t, many.t)
 
 
 def test_odd_rays_meet_nothing(accel):
