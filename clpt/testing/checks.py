@@ -13,7 +13,7 @@ from clpt.scene.params import device_params
 from clpt.testing.probe import Probe
 from clpt.testing.settings import directions, pairs, settings, tilted
 
-TRANSMIT, DELTA = 2, 4  # kernels/lib/bsdf.cl
+TRANSMIT, DELTA, DISPERSE = 2, 4, 8  # kernels/lib/bsdf.cl
 SAMPLES, THETA, PHI, FINE = 60_000, 16, 24, 12
 ANGLES = (25.0, 75.0, 140.0)  # of wo to the normal [degrees]
 ALL_ANGLES = (1.0, 30.0, 60.0, 80.0, 88.0, 100.0, 135.0, 178.0)
@@ -80,6 +80,23 @@ def lobes_are_told_truly(
     if not hero_alone:
         dark = r["eval"][r["pdf"] == 0.0] < 1e-6
         _hold(np.all(dark), f"eval is above 0 where pdf is 0, {params}")
+
+
+def flags_are_told_truly(probe: Probe, params: Params, rng: Random) -> None:
+    """The class tells the kernels what `sample` does: `choosy`, `delta`, `disperses`."""
+    cls = probe.cls
+    wo, u = directions(rng, 1000), rng.random((1000, 3))
+    r = probe(params, wo, wo, u)
+    made = r["sampled_pdf"] > 0.0
+    if not (cls.choosy or cls.shifts):
+        again = probe(params, wo, wo, np.where([True, True, False], u, rng.random((1000, 3))))
+        same = np.array_equal(r["wi"], again["wi"]) and np.array_equal(r["lobe"], again["lobe"])
+        _hold(same, f"sample uses u.z: set choosy = True, {params}")
+    if cls.delta:
+        _hold(np.all(r["lobe"][made] & DELTA), f"a lobe is not delta, but delta is True, {params}")
+    if cls.source is not None and not cls.disperses:
+        alone = r["lobe"][made] & DISPERSE
+        _hold(not np.any(alone), f"LOBE_DISPERSE is returned: set disperses = True, {params}")
 
 
 def lanes_agree(wide: Probe, narrow: Probe, params: Params, rng: Random) -> None:

@@ -33,7 +33,7 @@ def check_material(
 
     `sample` follows `pdf`, its weight is `eval` / `pdf`, with every reflectance at one no energy is
     made, f is reciprocal, nothing is NaN at grazing directions and at the ends of the parameters,
-    and all numbers of lanes give the same.
+    all numbers of lanes give the same, and the class's flags are what `sample` does.
 
     material: a class, whose parameters are drawn within their limits, or an instance, of which only
     textures are. reciprocal: whether f(wo, wi) is to be f(wi, wo). tolerance: how much more energy
@@ -55,6 +55,7 @@ def check_material(
         for number, params in enumerate(drawn):
             same = 2 * number < SETTINGS  # at all wavelengths
             checks.lobes_are_told_truly(probe, params, rng, hero_alone=not same)
+            checks.flags_are_told_truly(probe, params, rng)
             checks.weight_is_eval_over_pdf(probe, params, rng)
             checks.samples_follow_the_pdf(probe, params, rng, CHANCE / tests)
             checks.delta_lobes_keep_energy(probe, params, rng)

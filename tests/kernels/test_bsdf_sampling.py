@@ -47,6 +47,7 @@ def test_lobes_are_told_truly(cls, mode):
     rng, probe = np.random.default_rng(4), Probe(cls, mode)
     for i, params in enumerate(settings(cls, mode, rng, SETTINGS)):
         checks.lobes_are_told_truly(probe, params, rng, hero_alone=2 * i >= SETTINGS)
+        checks.flags_are_told_truly(probe, params, rng)
 
 
 @kinds
