@@ -19,7 +19,7 @@ from numpy.typing import DTypeLike, NDArray
 from clpt import device as dev
 from clpt import images
 from clpt.errors import DeviceError, SceneError, UnknownKindError
-from clpt.render import updates
+from clpt.render import updates, values
 from clpt.render.edits import MaterialKey, Names, ShapeKey, adopted, edited, followed
 from clpt.render.facts import Facts, gather
 from clpt.render.lower import lower
@@ -273,8 +273,8 @@ class Renderer(Turns):
             swaps |= more
         if camera is not None:
             new = dataclasses.replace(new, camera=camera)
-        values = scene is None and not transforms and not vertices
-        if not (values and updates.rewrite(self.wavefronts, self.scene, new)):
+        only = scene is None and not transforms and not vertices
+        if not (only and values.rewrite(self.wavefronts, self.scene, new)):
             for event in events:
                 event.wait()  # arrays on the device may be read
             self._lower_again(new, refit=scene is None)

@@ -5,21 +5,17 @@ from __future__ import annotations
 import dataclasses
 import logging
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
+import pyopencl as cl
 
 from clpt import bvh, device
 from clpt.errors import SceneError
 from clpt.records import TABLES
 from clpt.render import programs
-from clpt.render.cameras import dispersive_glass, lower_camera
-from clpt.render.instancing import distinct
-from clpt.render.lower import CLEAR, Lowered
+from clpt.render.lower import Lowered
 from clpt.render.wavefront import QUEUE, Wavefront
-from clpt.scene import Scene
-from clpt.scene.materials import COMPOSITES, Material
-from clpt.scene.params import params
 
 log = logging.getLogger(__name__)
 
@@ -28,77 +24,19 @@ PIECES = 64  # writes from which the whole range between the first and the last 
 FITTED = "the tree"  # among what has moved: it is not that which would be built
 FIXED = ("width", "height", "crop_x", "crop_y", "film_width", "film_height", "bands")
 KEPT = ("slots", "per_plane", "planes")  # settings that follow from the film and the device
+OWN = ("film", "image", "bands", "band_image")  # buffers of one wavefront, not of all
 
 
-def rewrite(fronts: Sequence[Wavefront], former: Scene, scene: Scene) -> bool:
-    """Bring a scene to the device that differs from the one there in values only: a few words.
+@dataclass(frozen=True)
+class _Changes:
+    """What becomes of kernels and trees: kernels, triangles, boxes: made anew; fit: fitted."""
 
-    It may differ in its camera, which must be of the same kind, and in values of materials. Returns
-    False, with nothing changed, where more than that differs. Raises SceneError as `lower` does.
-    """
-    front = fronts[0]
-    lowered, encoder = front.lowered, front.lowered.encoder
-    pairs = [] if scene.shapes is former.shapes else _pairs(former, scene)
-    if pairs is None or (pairs and encoder is None):
-        return False
-    if scene.camera is not former.camera:
-        if dispersive_glass(scene.camera) != dispersive_glass(former.camera):
-            return False
-        film, row = scene.film, lowered.glass_row
-        kind, words = lower_camera(scene.camera, film.width, film.height, row)
-        if kind != lowered.features.camera:
-            return False
-    rows: list[tuple[int, Any]] = []
-    for old, new in pairs:
-        found = encoder.replaced(old, new, "materials") if encoder else None
-        if found is None:
-            for one in fronts:
-                one.lowered.encoder = None  # it has been written to; the next lowering has another
-            return False
-        rows += found
-    if scene.camera is not former.camera:
-        front.stream.write(front.named["camera"], words)
-        lowered.tables["camera"] = words
-    table = lowered.tables["materials"]
-    for first, new in rows:
-        own = table[first : first + len(new)]
-        for begin, end in ranges(own, new):
-            front.stream.write(front.named["materials"], new[begin:end], 4 * (first + begin))
-        own[:] = new
-    return True
-
-
-def _pairs(former: Scene, scene: Scene) -> list[tuple[Any, Any]] | None:
-    """The leaf materials that took the places of others, None where more than values differs."""
-    found: dict[int, tuple[Any, Any]] = {}
-    for old, new in zip(distinct(former.shapes), distinct(scene.shapes), strict=True):
-        if not _pair(old.material, new.material, found):
-            return None
-    changed = [(old, new) for old, new in found.values() if old is not new]
-    return [(old, new) for old, new in changed if not isinstance(old, COMPOSITES)]
-
-
-def _pair(old: Any, new: Any, found: dict[int, tuple[Any, Any]]) -> bool:
-    """Note what took the place of what; whether the two may differ in values only."""
-    if id(old) in found:
-        return found[id(old)][1] is new
-    found[id(old)] = old, new
-    if old is new and not isinstance(old, COMPOSITES):
-        return True
-    if type(old) is not type(new):
-        return False
-    if not isinstance(old, COMPOSITES):
-        absorb = [getattr(one, "absorption", CLEAR) != CLEAR for one in (old, new)]
-        traits = [(one.transmits, one.turns) for one in (old, new)]
-        return absorb[0] == absorb[1] and traits[0] == traits[1]
-    for name in params(type(old)):
-        a, b = getattr(old, name), getattr(new, name)
-        if isinstance(a, Material) and isinstance(b, Material):
-            if not _pair(a, b, found):
-                return False
-        elif a is not b and name != "name":
-            return False
-    return True
+    layout: str
+    queued: bool
+    kernels: bool
+    triangles: bool
+    boxes: bool
+    fit: bool
 
 
 def take(fronts: Sequence[Wavefront], lowered: Lowered, refit: bool = False) -> None:
@@ -109,61 +47,125 @@ def take(fronts: Sequence[Wavefront], lowered: Lowered, refit: bool = False) -> 
     are built where the features differ, trees where triangles or boxes do; of tables the words that
     differ are written. The picture is then that of a new renderer.
 
-    Raises SceneError for a film of another size, KernelBuildError, MemoryBudgetError.
+    Raises SceneError for a film of another size, KernelBuildError, MemoryBudgetError; nothing has
+    changed then.
     """
     first = fronts[0]
-    former = first.lowered
+    former, known = first.lowered, first.named
     if any(former.settings[name] != lowered.settings[name] for name in FIXED):
         raise SceneError("its size and bands stay as they are; make a new Renderer", where="film")
     for name in KEPT:
         lowered.settings[name] = former.settings[name]
-    layout, queued = first.suited(lowered)
-    anew = former.features != lowered.features
-    anew |= (layout, queued) != (first.tree.layout, first.queued)
-    if anew:
-        before = first.device.builds.programs
-        texts = programs.sources(lowered.features, layout, first.lanes, queued=queued)
-        device.build_all(first.device, texts)  # before anything changes: it may fail
-        built = first.device.builds.programs - before
-        log.info("another set of kernels: %d programs were built", built)
-    first.lowered, first.queued = lowered, queued
-    known = dict(first.named)
-    _write_tables(first, former)
-    _follow(first, former, layout, refit)
-    if anew:
-        first.allocate_queue()
-    moved = {name: now for name, now in first.named.items() if known.get(name) is not now}
-    own = ("film", "image", "bands", "band_image")
+    changes = _changes(first, lowered, refit)
+    _make(first, lowered, changes)
+    moved = {name for name, now in first.named.items() if known.get(name) is not now}
+    _write_tables(first, former, moved)
+    _fit(first, changes)
     for front in fronts:
         if front is not first:
             channel = front.lowered.features.channel
             features = dataclasses.replace(lowered.features, channel=channel)
             front.lowered = dataclasses.replace(lowered, features=features)
-            front.tree, front.box_trees, front.queued = first.tree, first.box_trees, queued
-            front.named = {**first.named, **{n: front.named[n] for n in own if n in front.named}}
-        if anew or moved:
-            front.bind_again(rebuilt=anew)
-    for name in moved:
-        if name in (*TABLES, *QUEUE) and name in known and name not in former.lent:
-            first.buffers.release(known[name])
+            front.tree, front.box_trees, front.queued = first.tree, first.box_trees, first.queued
+            front.named = {**first.named, **{n: front.named[n] for n in OWN if n in front.named}}
+        if changes.kernels or moved:
+            front.bind_again(rebuilt=changes.kernels)
+    for name in moved & {*TABLES, *QUEUE} & known.keys() - former.lent.keys():
+        first.buffers.release(known[name])
 
 
-def _write_tables(front: Wavefront, former: Lowered) -> None:
-    """Enqueue that words of tables become what they are now; what has another size is made anew."""
+def _changes(front: Wavefront, lowered: Lowered, refit: bool) -> _Changes:
+    """What another lowering needs."""
+    former, moved = front.lowered, front.moved - {FITTED}
+    layout, queued = front.suited(lowered)
+    other = layout != front.tree.layout or former.instances.triangles != lowered.instances.triangles
+    other |= not (_same(former.faces, lowered.faces) and _same(former.tags, lowered.tags))
+    shifted = "vertices" in moved or not _same(former.vertices, lowered.vertices)
+    triangles = other or (not refit and (shifted or FITTED in front.moved))
+    parts = zip(vars(former.instances).values(), vars(lowered.instances).values(), strict=True)
+    kernels = former.features != lowered.features
+    return _Changes(
+        layout,
+        queued,
+        kernels=kernels or (layout, queued) != (front.tree.layout, front.queued),
+        triangles=triangles,
+        boxes=triangles
+        or bool(moved)
+        or not _same(former.boxes, lowered.boxes)
+        or not all(_same(*map(np.asarray, pair)) for pair in parts),
+        fit=shifted and not triangles,
+    )
+
+
+def _make(front: Wavefront, lowered: Lowered, changes: _Changes) -> None:
+    """Make kernels, buffers and trees that are new, and let them take their places.
+
+    What is on the device stays as it is; should something not fit there, all is as before.
+    """
+    before, used = dict(vars(front)), front.buffers.used
+    try:
+        if changes.kernels:
+            built = front.device.builds.programs
+            texts = programs.sources(
+                lowered.features, changes.layout, front.lanes, queued=changes.queued
+            )
+            device.build_all(front.device, texts)
+            built = front.device.builds.programs - built
+            log.info("the scene needs other kernels: %d programs were built", built)
+        front.named = {**front.named, **_new_tables(front, lowered, changes)}
+        front.lowered, front.queued = lowered, changes.queued
+        if changes.triangles:
+            front.build_triangles(changes.layout)
+        if changes.boxes:
+            front.build_boxes()
+            which = "triangles and boxes" if changes.triangles else "boxes"
+            log.info("trees are built over %s", which)
+        if changes.kernels:
+            front.allocate_queue()
+    except BaseException:
+        vars(front).update(before)
+        front.buffers.used = used
+        raise
+
+
+def _new_tables(front: Wavefront, lowered: Lowered, changes: _Changes) -> dict[str, cl.Buffer]:
+    """Buffers of tables of another size, and those that are lent or lent no more."""
+    former, made = front.lowered, {}
     for name in TABLES:
-        old, new = former.table(name), front.lowered.table(name)
-        if name == "instances":
-            continue  # their rows name the trees, see `_follow`
-        lent = front.lowered.lent.get(name)
+        old, new = former.table(name), lowered.table(name)
+        lent = lowered.lent.get(name)
+        built = name == "vertices" and changes.triangles  # what a tree is built of is there before
         if lent is not None:
-            front.named[name] = lent
-        elif name in former.lent or old.nbytes != new.nbytes:
-            front.named[name] = front.buffers.upload(f"the table of {name}", new)
-        elif name in front.moved:
-            front.stream.write(front.named[name], new)
+            made[name] = lent
+        elif name == "instances":
+            continue  # `build_boxes` makes it
+        elif name in former.lent or old.nbytes != new.nbytes or built:
+            made[name] = front.buffers.upload(f"the table of {name}", new)
+    return made
+
+
+def _write_tables(front: Wavefront, former: Lowered, new: set[str]) -> None:
+    """Enqueue that words of tables become what they are now, but in buffers that are new."""
+    for name in TABLES:
+        old, now = former.table(name), front.lowered.table(name)
+        if name in new or name in front.lowered.lent or name == "instances":
+            continue
+        if name in front.moved:
+            front.stream.write(front.named[name], now)
         else:
-            _write(front, name, old, new)
+            _write(front, name, old, now)
     _write(front, "settings", former.settings.reshape(1), front.lowered.settings.reshape(1))
+
+
+def _fit(front: Wavefront, changes: _Changes) -> None:
+    """Let the tree over triangles follow them where it was not built anew."""
+    fitted = FITTED in front.moved and not changes.triangles
+    front.moved.clear()
+    if changes.fit:
+        building = bvh.Building(front.device, stream=front.stream)
+        bvh.refit(building, front.tree, front.named["vertices"], front.named["faces"])
+    if changes.fit or fitted:
+        front.moved.add(FITTED)
 
 
 def _write(front: Wavefront, name: str, old: np.ndarray, new: np.ndarray) -> None:
@@ -194,28 +196,3 @@ def _same(some: np.ndarray, others: np.ndarray) -> bool:
     if some is others:
         return True
     return some.shape == others.shape and np.array_equal(_words(some), _words(others))
-
-
-def _follow(front: Wavefront, former: Lowered, layout: str, refit: bool) -> None:
-    """Let trees follow the tables: build them anew, or fit that over triangles that only moved."""
-    lowered, moved = front.lowered, front.moved - {FITTED}
-    fitted = FITTED in front.moved
-    front.moved.clear()
-    other = layout != front.tree.layout or former.instances.triangles != lowered.instances.triangles
-    other |= not (_same(former.faces, lowered.faces) and _same(former.tags, lowered.tags))
-    shifted = "vertices" in moved or not _same(former.vertices, lowered.vertices)
-    anew = other or (not refit and (shifted or fitted))
-    boxes = anew or moved or not _same(former.boxes, lowered.boxes)
-    parts = zip(vars(former.instances).values(), vars(lowered.instances).values(), strict=True)
-    boxes = boxes or not all(_same(*map(np.asarray, pair)) for pair in parts)
-    if shifted and not anew:
-        building = bvh.Building(front.device, stream=front.stream)
-        bvh.refit(building, front.tree, front.named["vertices"], front.named["faces"])
-    if not anew and (shifted or fitted):
-        front.moved.add(FITTED)
-    if anew or boxes:
-        front.stream.wait()  # what trees are built of has to be there
-        if anew:
-            front.build_triangles(layout)
-        front.build_boxes()
-        log.info("trees are built over %s", "triangles and boxes" if anew else "boxes")

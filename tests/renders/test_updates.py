@@ -14,7 +14,7 @@ import pytest
 import clpt
 from clpt import device
 from clpt import transforms as tf
-from clpt.errors import SceneError
+from clpt.errors import MemoryBudgetError, SceneError
 from clpt.scene import Scene
 from clpt.scene import materials as m
 from clpt.scene.cameras import Perspective
@@ -161,8 +161,15 @@ def test_what_cannot_be_changes_nothing(renderer: clpt.Renderer) -> None:
         with pytest.raises(SceneError, match=told):
             renderer.update(**edit)
         assert renderer.scene is now
+    buffers = renderer.wavefronts[0].buffers
+    limit, buffers.limit = buffers.limit, buffers.used + 40
+    with pytest.raises(MemoryBudgetError):
+        renderer.update(scene=dataclasses.replace(now, shapes=[*now.shapes, SIDE, SIDE]))
+    buffers.limit = limit
     renderer.reset()
     np.testing.assert_array_equal(picture(renderer), before)
+    renderer.update(scene=dataclasses.replace(now, shapes=[*now.shapes, SIDE]))
+    check(renderer)
 
 
 def test_arrays_of_the_device(renderer: clpt.Renderer) -> None:
