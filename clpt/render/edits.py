@@ -66,14 +66,14 @@ def edited(
         else:
             edit.change(edit.shape(key, "materials"), "material", material)
     for key, matrix in (transforms or {}).items():
-        given = matrix if on_device(matrix) else np.array(matrix, float)
+        # another object: an array that is the same one would be taken to hold the same
+        given = another(matrix) if on_device(matrix) else np.array(matrix, float)
         edit.change(edit.shape(key, "transforms"), "to_world", given)
     for key, points in (vertices or {}).items():
         shape = edit.shape(key, "vertices")
         field = next((name for name in ("vertices", "centers") if hasattr(shape, name)), None)
         if field is None:
             raise SceneError(f"a {shape.kind} has none", where=f"vertices[{key!r}]")
-        # another object: an array that is the same one would be taken to hold the same
         new = another(points) if on_device(points) else np.asarray(points).view()
         edit.change(shape, field, new)
         if getattr(shape, "normals", None) is not None:  # the former vertices' are of no use

@@ -19,6 +19,7 @@ import pyopencl as cl
 import pyopencl.array as cl_array
 
 import clpt
+from clpt.scene.materials import Diffuse
 from tests.renders.support import with_film
 
 NAMES = (
@@ -73,11 +74,12 @@ def render(queue: cl.CommandQueue, scene: clpt.Scene) -> None:
     renderer.step(1)
     renderer.update(camera=dataclasses.replace(scene.camera, fov=25.0))
     renderer.resolve()
-    made = cl_array.empty(queue, (20, 24, 4), np.uint8)
+    made, white = cl_array.empty(queue, (20, 24, 4), np.uint8), scene.shapes[0].material
     commands: dict[str, Callable[[], Any]] = {
         "step after a late event": lambda: renderer.step(2, wait_for=[late]),
         "step": lambda: renderer.step(3),
         "camera": lambda: renderer.update(camera=scene.camera),
+        "material": lambda: renderer.update(materials={white: Diffuse(reflectance=0.3)}),
         "move": lambda: renderer.update(transforms={-1 + len(scene.shapes): place}),
         "reset": renderer.reset,
         "resolve": lambda: renderer.resolve(made),

@@ -14,7 +14,7 @@ import pytest
 HERE = Path(__file__).resolve().parent
 HOST = ("clFinish", "clEnqueueReadBuffer", "clEnqueueMapBuffer", "clWaitForEvents")
 MAKING = ("clGetPlatformIDs", "clCreateContext", "clCreateCommandQueue")
-ENQUEUED = ("step after a late event", "step", "move", "reset", "resolve", "film")
+ENQUEUED = ("step after a late event", "step", "material", "move", "reset", "resolve", "film")
 QUERIES = ("intersect", "occluded", "refit")
 
 Calls = dict[str, dict[str, int]]
@@ -60,6 +60,11 @@ def test_a_camera_is_written_without_waiting(calls: Calls) -> None:
     """PyOpenCL asks once whether an earlier copy, which is over, has ended."""
     assert {name: calls["camera"][name] for name in HOST[:3]} == dict.fromkeys(HOST[:3], 0)
     assert calls["camera"]["clWaitForEvents"] <= 1
+
+
+def test_a_move_reaches_the_device(calls: Calls) -> None:
+    """Also when the very array is given again: what is in it may be another matrix."""
+    assert calls["move"]["clEnqueueNDRangeKernel"] > 0
 
 
 def test_a_step_is_few_commands(calls: Calls) -> None:
