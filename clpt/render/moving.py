@@ -6,6 +6,7 @@ lie on the device, then the tree is fitted to it.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -15,27 +16,30 @@ import pyopencl as cl
 from numpy.typing import NDArray
 
 from clpt import bvh, transforms
-from clpt.render import instancing, shapes
+from clpt.records import SHAPE
+from clpt.render import shapes
 from clpt.render.arrays import on_device
+from clpt.render.moving_instances import Boxes, MovingInstances, Place
 from clpt.render.moving_spheres import MovingSpheres
+from clpt.render.tessellate import keeps_its_kind
 from clpt.render.wavefront import Wavefront
 from clpt.scene import Scene
-from clpt.scene.shapes import Instance, Shape, Spheres
+from clpt.scene.shapes import Instance, Mesh, Shape, Spheres
 
 _ROOT = "stage/place.cl"
 _NORMALS = 1  # SHAPE_NORMALS of kernels/lib/surface_flags.cl
 _MOVES = {"to_world", "vertices", "normals", "centers"}  # what may change in place
 
 Action = Callable[[], None]
-Place = tuple[cl.Buffer, int]  # a buffer, and where in it something begins [words]
 
 
 @dataclass(eq=False)
 class _Region:
     """What one shape has in the tables, a run of each.
 
-    row: its row of `shapes`; vertices, faces: first and number; own: its transform within the
-    instance that places it; flips: whether its faces are turned round. Buffers are made when a move
+    row: its row of `shapes`; vertices, faces: first and number; flips: whether its faces are turned
+    round; whole: whether none was left out; own: its transform within the instance that places it.
+    Buffers are made when a move
     first asks for them: matrix: where it is placed; local: vertices and normals before that, and
     what they were made of; around: the triangles around each vertex, as place.cl has them.
     """
@@ -44,7 +48,8 @@ class _Region:
     shape: Any
     vertices: tuple[int, int]
     faces: tuple[int, int]
-    flips: bool
+    flips: bool = False
+    whole: bool = True
     own: transforms.Matrix = field(default_factory=lambda: transforms.IDENTITY)
     matrix: cl.Buffer | None = None
     local: tuple[Any, dict[str, cl.Buffer]] | None = None
@@ -63,11 +68,10 @@ class Moving:
         self.front, self.lowered = front, front.lowered
         self.building = bvh.Building(front.device, stream=front.stream)
         self.regions: dict[int, list[_Region]] = {}  # by the number of the scene's shape
-        self.rows: dict[int, list[int]] = {}  # of `instances`, in the scene's order, likewise
-        self._outlines: dict[int, shapes.Points] = {}
         self._boxes: dict[str, tuple[NDArray[np.float32], cl.Buffer]] = {}
         self._moved: set[str] = set()
         self._spheres = MovingSpheres(front, self.building)
+        self._instances = MovingInstances(front, self.building)
         instances = self.lowered.instances
         world = len(self.lowered.faces) - sum(instances.triangles)
         for region in self._all_regions():
@@ -79,8 +83,6 @@ class Moving:
                 outer = shapes.placement(placed)
                 region.own = transforms.inverse(outer) @ shapes.placement(region.shape)
             self.regions.setdefault(number, []).append(region)
-        for k, number in enumerate(instances.rows["number"].tolist()):
-            self.rows.setdefault(number, []).append(k)
 
     def move(self, scene: Scene, swaps: Mapping[int, tuple[Any, Any]]) -> bool:
         """Enqueue that shapes are where others that take their place are, and what follows.
@@ -97,19 +99,26 @@ class Moving:
         numbers = {id(shape): number for number, shape in enumerate(scene.shapes)}
         actions: list[Action] = []
         instances: list[tuple[int, Shape]] = []
+        places: list[Place | None] = []
         for old, new in swaps.values():
             number = numbers.get(id(old))
             if number is None or not _moves_only(old, new):
                 return False
-            if isinstance(new, Instance) and on_device(new.to_world):
+            place = self._floats(new.to_world, (4, 4)) if on_device(new.to_world) else None
+            if place is None and on_device(new.to_world):
                 return False
             for region in self.regions.get(number, ()):
-                made = self._plan(region, old, new)
+                made = self._plan(region, old, new, place)
                 if made is None:
                     return False
                 actions += made
-            instances += [(k, new) for k in self.rows.get(number, ())]
-        actions += self._instances(instances)
+            rows = self._instances.rows.get(number, ())
+            instances += [(k, new) for k in rows]
+            places += [place for _ in rows]
+        if instances:
+            act = self._instances.plan(instances, places)
+            given = self.lowered.instances.boxes
+            actions.append(lambda: act(self._boxes_of("instance", given)))
         for action in actions:
             action()
         self._fit()
@@ -121,34 +130,36 @@ class Moving:
         made, ends = [], (len(lowered.vertices), len(lowered.faces))
         for row, shape, vertex, face in reversed(lowered.owners):
             if row["kind"]:
-                made.append(_Region(row, shape, (0, 0), (0, 0), False))
+                made.append(_Region(row, shape, (0, 0), (0, 0)))
                 continue
             runs = (vertex, ends[0] - vertex), (face, ends[1] - face)
-            made.append(_Region(row, shape, *runs, _flips(shape)))
+            flips = transforms.flips_handedness(shapes.placement(shape))
+            whole = not isinstance(shape, Mesh) or len(shape.faces) == runs[1][1]
+            made.append(_Region(row, shape, *runs, flips, whole))
             ends = vertex, face
         return made[::-1]
 
-    def _plan(self, region: _Region, old: Any, new: Any) -> list[Action] | None:
+    def _plan(
+        self, region: _Region, old: Any, new: Any, placed: Place | None
+    ) -> list[Action] | None:
         """What moves a region with its shape; None if nothing can."""
         if region.shape.emission is not None:
             return None
         if region.row["kind"]:
-            return self._spheres_plan(region, new)
+            return None if placed else self._analytic(region, new)
         count = region.vertices[1]
         for values in (getattr(new, name, None) for name in ("vertices", "normals")):
             if on_device(values) and self._floats(values, (count, 3)) is None:
                 return None
-        placed, matrix, points = None, transforms.IDENTITY, None
-        if on_device(new.to_world):
-            placed = self._floats(new.to_world, (4, 4))
-            if placed is None:
-                return None
-        else:
+        matrix, points = transforms.IDENTITY, None
+        if placed is None:
             matrix = shapes.placement(new) @ region.own
             if transforms.flips_handedness(matrix) != region.flips:
                 return None
+        elif isinstance(new, Instance):
+            return None
         if getattr(new, "vertices", None) is not getattr(old, "vertices", None):
-            if len(new.faces) != region.faces[1]:
+            if not region.whole:
                 return None
             if not on_device(new.vertices):
                 points = shapes.points(new)
@@ -156,22 +167,52 @@ class Moving:
                     return None
         return [lambda: self._place(region, new, points, matrix, placed)]
 
-    def _spheres_plan(self, region: _Region, new: Any) -> list[Action] | None:
-        """What moves many spheres in one; None if nothing can, or for another analytic shape."""
+    def _analytic(self, region: _Region, new: Any) -> list[Action] | None:
+        """What moves what is no triangles; None where that is another shape then."""
         shape = region.shape if isinstance(new, Instance) else new
-        if not isinstance(shape, Spheres) or on_device(new.to_world):
-            return None
         matrix = shapes.placement(new) @ region.own
-        place = self._spheres.plan(region.row, shape, matrix)
-        if place is None:
+        placed = dataclasses.replace(shape, to_world=matrix)
+        if not keeps_its_kind(placed):
             return None
+        many = isinstance(shape, Spheres)
+        place = self._spheres.plan(region.row, shape, matrix) if many else None
+        if many and place is None:
+            return None
+        single = None if many else self._single(region, placed)
 
-        def act() -> None:
+        def move() -> None:
             region.shape = shape
-            place(self._boxes_of("shape", self.lowered.boxes)[1])
-            self._moved.add("shape")
+            boxes = self._boxes_of("shape", self.lowered.boxes)
+            if place is not None:
+                place(boxes[1])
+            elif single is not None:
+                single(boxes)
+            self.front.moved |= {"geometry", "spheres"}
 
-        return [act]
+        return [move]
+
+    def _single(self, region: _Region, shape: Shape) -> Callable[[Boxes], None]:
+        """What enqueues that a sphere, disk or cylinder has other parameters and another box."""
+        words, box = shapes.row(shape), np.stack(shapes.bounds(shape))
+        rows = self.lowered.tables["shapes"].view(SHAPE.dtype)
+        first = int(self.lowered.settings["first_analytic"])
+        number = int(np.flatnonzero(rows["params"][first:] == region.row["params"])[0])
+
+        def act(boxes: Boxes) -> None:
+            stream = self.front.stream
+            stream.write(self.front.named["geometry"], words, 4 * int(region.row["params"]))
+            boxes[0][number] = box
+            stream.write(boxes[1], box, box.nbytes * number)
+
+        return act
+
+    def _boxes_of(self, name: str, given: NDArray[np.float32]) -> Boxes:
+        """The boxes under a tree, which will be fitted to what they are then."""
+        if name not in self._boxes:
+            host = given.copy()
+            self._boxes[name] = host, self.front.buffers.upload("boxes of what moves", host)
+        self._moved.add(name)
+        return self._boxes[name]
 
     def _place(
         self,
@@ -199,6 +240,7 @@ class Moving:
             places = {"src_offset": 4 * begin, "dst_offset": 12 * first, "byte_count": 12 * count}
             front.stream.copy(table, source, **places)
         else:
+            front.stream.after(getattr(new.to_world, "events", ()) if placed else ())
             placed = placed or self._matrix(region, matrix)
             self._run("place_vertices", region, self._local(region, "vertices"), placed)
         if region.row["flags"] & _NORMALS:
@@ -277,58 +319,6 @@ class Moving:
             _ROOT, "smooth_normals", count, first=first, **named, **region.around
         )
 
-    def _instances(self, moved: list[tuple[int, Shape]]) -> list[Action]:
-        """What moves instances, each given by its row in the scene's order."""
-        if not moved:
-            return []
-        lowered, front = self.lowered.instances, self.front
-        matrices = instancing.matrices([new for _, new in moved])
-        rows = np.array([k for k, _ in moved])
-        prototypes = lowered.prototypes[rows]
-        made: list[tuple[NDArray[Any], NDArray[Any], NDArray[np.float32]]] = []
-        for prototype in np.unique(prototypes).tolist():
-            these = prototypes == prototype
-            numbers = lowered.rows["number"][rows[these]]
-            outline, middle = self._outline(prototype), lowered.middles[prototype]
-            placed, boxes = instancing.place(matrices[these], numbers, outline, middle)
-            made.append((rows[these], placed, boxes))
-
-        def act() -> None:
-            table = front.instances
-            back = np.argsort(front.instance_order)  # row of the device, by the scene's order
-            host, buffer = self._boxes_of("instance", lowered.boxes)
-            for these, placed, boxes in made:
-                for name in ("origin", "x", "y", "z"):
-                    table[name][back[these]] = placed[name]
-                host[these] = boxes
-            touched = back[rows]
-            _write_run(front, front.named["instances"], table.view(np.uint32), touched, len(table))
-            _write_run(front, buffer, host, rows, len(host))
-            front.moved.add("instances")
-            self._moved.add("instance")
-
-        return [act]
-
-    def _outline(self, prototype: int) -> shapes.Points:
-        """Points around the triangles of a prototype."""
-        if prototype not in self._outlines:
-            lowered = self.lowered
-            triangles = lowered.instances.triangles
-            end = len(lowered.faces) - sum(triangles[prototype + 1 :])
-            faces = lowered.faces[end - triangles[prototype] : end]
-            owned = lowered.vertices[faces.min() : faces.max() + 1]
-            self._outlines[prototype] = instancing.outline(owned)
-        return self._outlines[prototype]
-
-    def _boxes_of(
-        self, name: str, given: NDArray[np.float32]
-    ) -> tuple[NDArray[np.float32], cl.Buffer]:
-        """The boxes under a tree, on the host and on the device."""
-        if name not in self._boxes:
-            host = given.copy()
-            self._boxes[name] = host, self.front.buffers.upload("boxes of what moves", host)
-        return self._boxes[name]
-
     def _fit(self) -> None:
         """Enqueue that trees follow what has moved."""
         front = self.front
@@ -337,16 +327,9 @@ class Moving:
             bvh.refit(self.building, front.tree, named["vertices"], named["faces"], parts=[0])
         for name in self._moved & set(front.box_trees):
             bvh.refit_boxes(self.building, front.box_trees[name], self._boxes[name][1])
+        if "instance" in self._moved:
+            front.moved.add("instances")
         self._moved.clear()
-
-
-def _write_run(
-    front: Wavefront, buffer: cl.Buffer, host: NDArray[Any], rows: NDArray[Any], count: int
-) -> None:
-    """Enqueue that a table's rows, and what lies between them, are written."""
-    table = host.reshape(count, -1)
-    begin, end = int(rows.min()), int(rows.max()) + 1
-    front.stream.write(buffer, table[begin:end], begin * table[:1].nbytes)
 
 
 def _moves_only(old: Any, new: Any) -> bool:
@@ -354,8 +337,3 @@ def _moves_only(old: Any, new: Any) -> bool:
     if not isinstance(new, Shape) or type(old) is not type(new):
         return False
     return {name for name, value in vars(new).items() if value is not vars(old)[name]} <= _MOVES
-
-
-def _flips(shape: Shape) -> bool:
-    """Whether a shape's faces are turned round by its transform."""
-    return transforms.flips_handedness(shapes.placement(shape))

@@ -3,6 +3,8 @@
  * A matrix is 16 floats, row after row, that take a shape's own space to the world; `begin` is the first
  * element of a thing in its buffer. Vertices `first` to first + count - 1 of the table are the shape's.
  */
+#include "bvh/placed.cl"
+
 inline float3 place_row(global const float *matrix, uint row) { return vload3(0, matrix + 4 * row); }
 
 inline float3 place_unit(float3 n)
@@ -57,4 +59,12 @@ kernel void smooth_normals(global const float *restrict vertices, global const u
         sum += cross(vload3(faces[face + 1], vertices) - v0, vload3(faces[face + 2], vertices) - v0);
     }
     vstore3(place_unit(sum), first + i, normals);
+}
+
+/* One instance, whose row begins at word `at`; see bvh/placed.cl. */
+kernel void place_instance(global const float *restrict matrix, uint matrix_begin, float4 middle, float4 low,
+                           float4 high, uint at, uint number, global uint *restrict instances,
+                           global float *restrict boxes)
+{
+    placed_write(matrix + matrix_begin, middle.xyz, low.xyz, high.xyz, instances + at, boxes + 6 * number);
 }

@@ -21,7 +21,7 @@ from clpt.scene import materials as m
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Film, ParticleTracer
 from clpt.scene.lights import Area, Constant
-from clpt.scene.shapes import Cube, Group, Instance, Mesh, Rectangle
+from clpt.scene.shapes import Cube, Group, Instance, Mesh, Rectangle, Shape, Sphere
 
 BALL = trimesh.creation.icosphere(2)
 VERTICES = BALL.vertices.astype(np.float32)
@@ -45,6 +45,7 @@ def scene(**more: Any) -> Scene:
                 to_world=tf.translate([0, 5, 2]) @ tf.rotate([1, 0, 0], 90),
                 emission=Area(radiance=12.0),
             ),
+            Sphere(name="bead", center=(-2, -1, 0), radius=0.4, material=RED),
             Instance(name="left", group=slab, to_world=tf.translate([-2, 1, 0])),
             Instance(name="right", group=slab, to_world=tf.translate([2, 1, 0])),
         ],
@@ -73,7 +74,7 @@ def bent(amount: float) -> np.ndarray:
     return shape.astype(np.float32)
 
 
-def host(shape: Mesh) -> np.ndarray:
+def host(shape: Shape) -> np.ndarray:
     matrix = shape.to_world
     return matrix.get() if isinstance(matrix, cl_array.Array) else matrix
 
@@ -81,10 +82,9 @@ def host(shape: Mesh) -> np.ndarray:
 def fresh(renderer: Renderer, **points: np.ndarray) -> np.ndarray:
     """What a new renderer makes of the scene, with vertices on the device as they are given."""
     shapes = [
-        dataclasses.replace(s, to_world=host(s), vertices=points.get(s.name, VERTICES))
-        if isinstance(s, Mesh)
-        else s
+        dataclasses.replace(s, to_world=host(s), **changed)
         for s in renderer.scene.shapes
+        for changed in [{"vertices": points.get(s.name, VERTICES)} if s.name == "ball" else {}]
     ]
     new = dataclasses.replace(renderer.scene, shapes=shapes)
     return picture(Renderer(new, renderer.device, layout=renderer.wavefronts[0].tree.layout))
@@ -105,6 +105,13 @@ def test_what_moved_is_seen_where_a_new_renderer_has_it(renderer: Renderer) -> N
     moved = picture(renderer)
     assert np.abs(moved - first).max() > 0.05
     np.testing.assert_allclose(moved, fresh(renderer, ball=bent(0.1)), atol=1e-3)
+
+    place = tf.translate([1.5, -0.5, 1]) @ tf.rotate([0, 1, 1], 50) @ tf.scale([0.5, 1, 2])
+    on_device = cl_array.to_device(queue, np.float32(place))
+    renderer.update(transforms={"right": on_device, "bead": tf.translate([1, 1, 1]) @ tf.scale(2)})
+    seen = picture(renderer)
+    assert np.abs(moved - seen).max() > 0.05
+    np.testing.assert_allclose(seen, fresh(renderer, ball=bent(0.1)), atol=1e-3)
 
     points.set(bent(0.4))  # the same array, with other content; and it is placed now
     renderer.update(vertices={"ball": points.base_data}, transforms={"ball": squeeze})
