@@ -9,7 +9,8 @@ import numpy as np
 
 from .. import __version__, images, spectral_exr
 from ..errors import SceneError
-from ..render.renderer import Image, Renderer
+from ..render.pictures import Image
+from ..render.renderer import Renderer
 from ..render.views import sheet
 from ..scene import Scene
 from ..scene.integrators import Aov

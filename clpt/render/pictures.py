@@ -1,0 +1,134 @@
+"""The picture that a renderer has so far, in every form in which others want it."""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import numpy as np
+import pyopencl as cl
+from numpy.typing import DTypeLike, NDArray
+from pyopencl.array import Array
+
+from clpt import device as dev
+from clpt import images
+from clpt.errors import SceneError, UnknownKindError
+from clpt.render.resolve import Resolve
+from clpt.render.turns import Turns, alone
+from clpt.render.views import sheet
+from clpt.render.wavefront import Wavefront
+from clpt.scene import Scene
+from clpt.scene.integrators import CHANNELS
+from clpt.spectral_exr import SpectralImage
+
+Image = NDArray[np.float32]
+
+
+class Pictures(Turns):
+    """Base of what renders: its picture as an array, on the device or the host.
+
+    channels: of the `aov` integrator, else none; wavefronts: one a channel, at least one.
+    """
+
+    scene: Scene
+    device: dev.Device
+    channels: tuple[str, ...]
+    wavefronts: list[Wavefront]
+
+    @property
+    @alone
+    def film(self) -> dev.DeviceArray:
+        """The picture so far on the device, (h, w, 4) float32, valid when its `events` have ended.
+
+        Red, green and blue, linear in the film's output space; last, how many samples the pixel
+        has. Always the same memory, on the renderer's queue; steps wait for those of its `events`
+        that readers add, as its `get_async` does. Of `aov`, the first channel.
+        """
+        return self.wavefronts[0].film
+
+    @property
+    @alone
+    def films(self) -> dict[str, dev.DeviceArray]:
+        """The values of the `aov` integrator by name, as `film` has them."""
+        return {n: w.film for n, w in zip(self.channels, self.wavefronts, strict=True)}
+
+    @alone
+    def resolve(
+        self,
+        into: Array | cl.MemoryObject | None = None,
+        *,
+        channel: str | None = None,
+        dtype: DTypeLike | None = None,
+        exposure: float = 0.0,
+        tone: str = "none",
+        srgb: bool | None = None,
+        flip: bool = False,
+        wait_for: dev.Events = None,
+    ) -> Any:
+        """Enqueue a picture (h, w, 4) for a screen, opaque, from the film as it then is.
+
+        into: the caller's Array or Buffer, or 2D Image of 8-bit or float RGBA, as OpenGL shares
+        them; None makes an Array. dtype: uint8 (the default, the bytes of a .png) or float32.
+        exposure [stops]; tone: none, reinhard or aces; srgb: whether the sRGB transfer is applied,
+        by default to uint8 only; colours become Rec. 709. flip: the first row is the lowest.
+        channel: of the `aov` integrator, by default its first; values stay as they are.
+
+        Returns the Array, whose `events` hold the event of the picture; for an Image the event.
+        Raises DeviceError if the picture does not fit, UnknownKindError for names.
+        """
+        if channel is not None and channel not in self.channels:
+            raise UnknownKindError("channel", channel, self.channels)
+        return self._resolve(
+            self.films[channel] if channel else self.film, into, dtype=dtype, exposure=exposure,
+            tone=tone, srgb=srgb, flip=flip, wait_for=wait_for,
+            space="rec709" if self.channels else self.scene.film.output_space,
+        )  # fmt: skip
+
+    @functools.cached_property
+    def _resolve(self) -> Resolve:
+        return Resolve(self.device, self.wavefronts[0].stream)
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
+        """`image()`, for numpy.asarray(renderer): a copy, which waits."""
+        if copy is False:
+            raise ValueError("a picture on a device becomes an array of numpy only by a copy")
+        image = self.image()
+        return image if dtype is None else image.astype(dtype, copy=False)
+
+    def _repr_png_(self) -> bytes:
+        """What a notebook shows of a renderer: its picture so far; waits."""
+        if self.channels:
+            return images.png(images.to_srgb8(sheet(self.layers())))
+        return images.png(self.resolve().get()[..., :3])
+
+    @alone
+    def image(self) -> Image:
+        """The picture so far: (h, w, 3) float32, linear in the film's output space.
+
+        Of a film with bands (h, w, bands), the mean radiance in each; of `aov` (h, w, channels).
+        """
+        if self.channels:
+            return np.concatenate(list(self.layers().values()), axis=2)
+        film = self.scene.film
+        if film.bands:
+            return self.wavefronts[0].bands() * np.float32(film.exposure)
+        return self.colours()
+
+    @alone
+    def colours(self) -> Image:
+        """The picture so far in three colours, (h, w, 3) float32, also of a film with bands."""
+        return self.wavefronts[0].image()
+
+    def spectral_image(self) -> SpectralImage:
+        """The picture so far of a film with bands, at their centres. Raises SceneError without."""
+        if not self.scene.film.bands or self.channels:
+            raise SceneError("this picture has no bands; set the film's", where="film.bands")
+        return SpectralImage(self.image(), self.scene.film.band_centres, emissive=True)
+
+    @alone
+    def layers(self) -> dict[str, Image]:
+        """The values of the `aov` integrator by name, (h, w, 1 to 3) float32."""
+        return {
+            name: wavefront.image()[:, :, : CHANNELS[name]]
+            for name, wavefront in zip(self.channels, self.wavefronts, strict=True)
+        }
