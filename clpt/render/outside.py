@@ -20,7 +20,8 @@ from clpt.scene import KINDS
 from clpt.scene.materials import LEAVES, Material
 
 MOST = 255  # kinds in a scene: what the upper bits of a material word count, but for mixtures
-VERBS = ("sample", "eval", "pdf", "pdfs", "albedo", "load", "colour")
+CONTRACT = ("sample", "eval", "pdf", "albedo")  # what each has, see kernels/lib/bsdf.cl
+VERBS = (*CONTRACT, "pdfs", "load", "colour")
 # what else tables keep sources under, see clpt.render.tables
 INNER = ("bend", "emission", "factor", "layer", "mixture")
 
@@ -47,7 +48,7 @@ def ordered(found: dict[type[Material], str]) -> tuple[type[Material], ...]:
 
 
 def check(cls: type[Material], where: str | None = None) -> None:
-    """Raise SceneError for a class that has no kernel text, or a name that the kernels have."""
+    """Raise SceneError for a class without its functions, or with a name that kernels have."""
     if cls.source is None:
         raise SceneError(
             f"the material class {cls.__name__!r} has no `source`: the text or the path of its "
@@ -68,6 +69,10 @@ def check(cls: type[Material], where: str | None = None) -> None:
         )
     if not cls.__name__.isascii():
         raise SceneError(f"{cls.__name__!r} is no name in OpenCL: use a to z", where=where)
+    part, verbs = text(cls), (*CONTRACT, *(("pdfs",) if cls.chromatic else ()))
+    missing = {f"{cls.kind}_{verb}" for verb in verbs} - set(re.findall(r"\w+", part.text))
+    if missing:
+        raise SceneError(f"has no {', '.join(sorted(missing))}", file=part.file, where=where)
 
 
 def text(cls: type[Material]) -> device.Part:

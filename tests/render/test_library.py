@@ -142,7 +142,7 @@ def test_a_kind_from_outside() -> None:
 
     with pytest.raises(clpt.SceneError, match=r"chalk\.cl"):
         clpt.kernel_source(Chalk)
-    Chalk.source = "Spectrum chalk_albedo(Chalk m) { return spectrum_of(1.0f); }"
+    Chalk.source = "Spectrum chalk_albedo(Chalk m) {} // chalk_eval chalk_pdf chalk_sample"
     text = clpt.kernel_source(Chalk, lines=False)
     assert text.endswith(f"}} Chalk;\n{Chalk.source}\n")
 

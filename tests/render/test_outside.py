@@ -27,6 +27,9 @@ DIFFUSE = (device.kernels_folder() / "bsdf" / "diffuse.cl").read_text(encoding="
 FLAWED = """
 #include "lib/microfacet.cl"
 BsdfSample flawed_sample(Flawed m, vec3 wo, vec3 u) { return nonsense; }
+Spectrum flawed_eval(Flawed m, vec3 wo, vec3 wi) { return spectrum_of(0.0f); }
+real flawed_pdf(Flawed m, vec3 wo, vec3 wi) { return 0.0f; }
+Spectrum flawed_albedo(Flawed m) { return spectrum_of(0.0f); }
 """
 
 
@@ -130,7 +133,7 @@ def test_its_functions_and_constants_are_its_own() -> None:
         }
     """
     text = device.Source("own", outside.text(type("Own", (Paint,), {"source": helped})).text, ())
-    private = text.with_private().text
+    private = text.with_private("own").text
     assert "\nstatic constant float table[2]" in private
     assert "\nstatic real helper(real x)" in private and "static return" not in private
 
@@ -159,6 +162,11 @@ def test_a_file_is_found_beside_the_class(tmp_path: Path) -> None:
         ("Hero", "int x() {}", "clpt has 'hero_"),
         ("Path", "int x() {}", "clpt has 'Path'|clpt has 'path'"),
         ("Äther", "int x() {}", "no name in OpenCL"),
+        (
+            "Half",
+            "int half_pdf, half_eval() {}",
+            "has no half_albedo, half_sample",
+        ),
     ],
 )
 def test_names_that_cannot_be(name: str, source: str | None, fault: str) -> None:
