@@ -3,7 +3,7 @@
 from .build import Bvh, build, build_boxes, build_parts, choose_layout, choose_tree
 from .building import Building
 from .layouts import LAYOUTS
-from .refit import refit, refit_boxes
+from .refit import rebuild_boxes, refit, refit_boxes
 
 __all__ = [
     "LAYOUTS",
@@ -14,6 +14,7 @@ __all__ = [
     "build_parts",
     "choose_layout",
     "choose_tree",
+    "rebuild_boxes",
     "refit",
     "refit_boxes",
 ]

@@ -16,6 +16,7 @@ from .building import Building
 _COLLAPSE = "bvh/collapse.cl"
 _BINARY_LEAF = 4  # triangles of a leaf, at most
 _BLOCK = 8
+SHAPES_LEAF = 2  # boxes of a leaf of "shapes", at most
 _LEAF, _DEEPEST = 0x80000000, 48  # BVH_LEAF and BVH_DEPTH of kernels/bvh/node.cl
 
 
@@ -153,7 +154,7 @@ LAYOUTS: dict[str, Callable[[Building, Mesh], Packed]] = {
     "wide8": wide8,
 }
 BOX_LAYOUTS: dict[str, Callable[[Building, int, cl.Buffer], Packed]] = {
-    "shapes": partial(binary_boxes, leaf_size=2),
+    "shapes": partial(binary_boxes, leaf_size=SHAPES_LEAF),
     "binary": binary_boxes,
     "wide8": wide8_boxes,
 }

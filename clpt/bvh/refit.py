@@ -11,9 +11,10 @@ from collections.abc import Iterable
 
 import pyopencl as cl
 
+from . import tree as trees
 from .build import Bvh
 from .building import Building
-from .layouts import Part
+from .layouts import SHAPES_LEAF, Part
 
 _ROOT = "bvh/refit.cl"
 _NO_TRIANGLES = {"vertices": None, "faces": None, "leaves": None}
@@ -57,6 +58,25 @@ def refit_boxes(building: Building, tree: Bvh, boxes: cl.Buffer) -> cl.Event | N
     """
     boxed = {"boxes": boxes, "indices": tree.buffers["indices"]}
     _refit(building, tree, tree.parts[0], {**boxed, **_NO_TRIANGLES})
+    return building.stream.last
+
+
+def rebuild_boxes(building: Building, tree: Bvh, boxes: cl.Buffer) -> cl.Event | None:
+    """Enqueue that a tree of the layout "shapes", in place, is built anew over its boxes.
+
+    boxes: as of `refit_boxes`. Takes about five times as long as that, and 160 bytes a box until
+    the next time; rays are then as fast as ever. Nothing is read or waited for.
+    """
+    part = tree.parts[0]
+    if tree.count:
+        own = Building(building.device, building)  # whose memory is counted by itself
+        items, extents = trees.items_of_boxes(own, tree.count, boxes)
+        built = trees.over(own, tree.count, items, extents, SHAPES_LEAF)
+        indices = tree.buffers["indices"]
+        own.run_each("bvh/pack.cl", "pack_indices", tree.count, items=items, indices=indices)
+        building.stream.copy(tree.buffers["nodes"], built.nodes)
+        if part.ranges is not None:
+            building.stream.copy(part.ranges, built.ranges)
     return building.stream.last
 
 

@@ -29,6 +29,7 @@ from clpt.scene.shapes import Instance, Mesh, Shape, Spheres
 _ROOT = "stage/place.cl"
 _NORMALS = 1  # SHAPE_NORMALS of kernels/lib/surface_flags.cl
 _MOVES = {"to_world", "vertices", "normals", "centers"}  # what may change in place
+ANEW = 16  # moves of spheres, which go each its own way, from one tree to the next
 
 Action = Callable[[], None]
 
@@ -70,6 +71,7 @@ class Moving:
         self.regions: dict[int, list[_Region]] = {}  # by the number of the scene's shape
         self._boxes: dict[str, tuple[NDArray[np.float32], cl.Buffer]] = {}
         self._moved: set[str] = set()
+        self._moves = 0  # of spheres
         self._spheres = MovingSpheres(front, self.building)
         self._instances = MovingInstances(front, self.building)
         instances = self.lowered.instances
@@ -326,7 +328,10 @@ class Moving:
             named = front.named
             bvh.refit(self.building, front.tree, named["vertices"], named["faces"], parts=[0])
         for name in self._moved & set(front.box_trees):
-            bvh.refit_boxes(self.building, front.box_trees[name], self._boxes[name][1])
+            self._moves += name == "shape"
+            anew = name == "shape" and self._moves % ANEW == 0
+            fit = bvh.rebuild_boxes if anew else bvh.refit_boxes
+            fit(self.building, front.box_trees[name], self._boxes[name][1])
         if "instance" in self._moved:
             front.moved.add("instances")
         self._moved.clear()

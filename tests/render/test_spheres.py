@@ -10,7 +10,7 @@ import pyopencl.array as cl_array
 import pytest
 
 import clpt
-from clpt import device
+from clpt import bvh, device
 from clpt import transforms as T
 from clpt.cli.info import summary
 from clpt.errors import SceneError
@@ -220,3 +220,21 @@ def test_they_move_on_the_device(monkeypatch: pytest.MonkeyPatch) -> None:
     lit = dataclasses.replace(renderer.scene, shapes=[body, renderer.scene.shapes[1]])
     renderer.update(scene=lit)  # tables that were moved are made anew
     assert agree(renderer, centers=after, to_world=np.eye(4), material=paint, emission=glow)
+
+
+def test_a_tree_is_built_anew_in_place() -> None:
+    """Over boxes that moved, bit for bit as a new one."""
+    on = opened()
+    old, new = (spheres.boxes([RNG.random((500, 4)).astype(np.float32)]) for _ in range(2))
+    tree, expected = (bvh.build_boxes(on, boxes) for boxes in (old, new))
+    building = bvh.Building(on)
+    bvh.rebuild_boxes(building, tree, building.upload(new, np.float32))
+    for name, buffer in tree.buffers.items():
+        found, wanted = (
+            building.read(b, buffer.size // 4, np.uint32) for b in (buffer, expected.buffers[name])
+        )
+        used = slice(0, None) if name == "indices" else slice(0, 8)
+        np.testing.assert_array_equal(found[used], wanted[used])
+    assert not np.array_equal(
+        building.read(tree.buffers["nodes"], 8, np.float32)[:3], old.min(axis=(0, 1))
+    )
