@@ -443,6 +443,7 @@ def _join_args(features: Features, layout: str) -> dict[str, str]:
 def loop_arguments(features: Features, layout: str) -> tuple[device.Argument, ...]:
     """Return what the kernel of stage/loop.cl takes: linked kernels do not tell it themselves."""
     args = {**_SLAB_ARGS, **_SCENE_ARGS, **_trace_args(features, layout), **_begin_args(features)}
+    args["turns"] = "uint "
     return tuple(
         device.Argument(
             name,

@@ -94,14 +94,10 @@ class Renderer(Pictures):
         self._texture_budget, self._names = texture_budget, Names()
         lowered = lower(adopted(scene, device.queue), texture_budget)
         self._seconds = {"lower": time.perf_counter() - self._start}
-        first = Wavefront(device, lowered, **wavefront)
+        first = Wavefront(device, lowered, **{"looped": queue is not None, **wavefront})
         self.wavefronts = [first, *(first.sibling(channel) for channel in self.channels[1:])]
-        if queue is None:
-            for front in self.wavefronts:
-                _ = front.stages  # so that the first samples come at once
-        else:
-            for front in self.wavefronts:
-                _ = front.loop
+        for front in self.wavefronts:  # so that the first samples come at once
+            _ = front.loop if front.looped else front.stages
         self._built = device.builds.programs - self._built
         self._seconds |= {**first.seconds, "ready": time.perf_counter() - self._start}
         self.warnings = list(self.wavefronts[0].lowered.warnings)

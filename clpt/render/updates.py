@@ -10,10 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 import pyopencl as cl
 
-from clpt import bvh, device
+from clpt import bvh
 from clpt.errors import SceneError
 from clpt.records import TABLES
-from clpt.render import programs
 from clpt.render.lower import Lowered
 from clpt.render.wavefront import QUEUE, Wavefront
 
@@ -106,10 +105,7 @@ def _make(front: Wavefront, lowered: Lowered, changes: _Changes) -> None:
     try:
         if changes.kernels:
             built = front.device.builds.programs
-            texts = programs.sources(
-                lowered.features, changes.layout, front.lanes, queued=changes.queued
-            )
-            device.build_all(front.device, texts)
+            front.build_ahead(lowered.features, changes.layout, changes.queued)
             built = front.device.builds.programs - built
             log.info("the scene needs other kernels: %d programs were built", built)
         front.named = {**front.named, **_new_tables(front, lowered, changes)}

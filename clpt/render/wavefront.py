@@ -24,6 +24,7 @@ from clpt.device.timing import Timings
 from clpt.errors import MemoryBudgetError, SceneError
 from clpt.records import PATH, SLABS, TABLES
 from clpt.render import programs
+from clpt.render.features import Features
 from clpt.render.lower import Lowered
 
 FILM_WORDS = 7  # kernels/lib/film.cl
@@ -31,7 +32,8 @@ FRESH = 0x2000  # kernels/lib/path_state.cl
 COUNTERS = ("done", "samples", "closest", "shadow", "rejected")
 PADDING = 80  # words between streams: powers of two collide in a cache
 GROUP = 64  # slots are a multiple of it, and it is the local size of one-lane kernels
-BATCH = 8  # iterations that are enqueued before counters are asked for
+BATCH = 8  # bounces that are enqueued before counters are asked for
+ENDLESS = 0xFFFFFFFF  # bounces of a loop that goes on till all paths have ended
 CPU_SLOTS, GPU_SLOTS = 1 << 14, 1 << 20
 BRUTE_SHAPES = 32  # analytic shapes up to which all of them are tried
 QUEUE = ("queue", "counts", "queue_starts", "queue_counts")
@@ -67,7 +69,8 @@ class Wavefront:
     """The device side of a render: buffers, programs, and `expose`, which runs the bounce loop.
 
     layout: of the triangles, None for what suits the device; slots: paths in flight, None likewise;
-    queued: whether shading is sorted, None likewise.
+    queued: whether shading is sorted, None likewise; looped: whether `expose` too uses the loop on
+    the device.
 
     Raises MemoryBudgetError, KernelBuildError, DeviceError.
     """
@@ -80,6 +83,7 @@ class Wavefront:
         layout: str | None = None,
         slots: int | None = None,
         queued: bool | None = None,
+        looped: bool = False,
     ):
         self.device, self.lowered = on, lowered
         self.counts = Counts()
@@ -87,7 +91,7 @@ class Wavefront:
         self.stream = device.Stream(on.queue)
         self.timings = Timings(on.queue)
         self.buffers = Buffers(on)
-        self._wanted = layout, queued
+        self._wanted, self.looped = (layout, queued), looped
         layout, self.queued = self.suited(lowered)
         self.lanes = on.lanes
         self.programs: dict[str, device.Program] = {}
@@ -251,7 +255,7 @@ class Wavefront:
         if rebuilt:
             self.programs = {}
         elif "loop" in made:
-            self.loop = self._bind(made["loop"].kernel, first=0, end=0)
+            self.loop = self._bind(made["loop"].kernel, first=0, end=0, turns=ENDLESS)
         self._bind_film()
         for name in made:
             getattr(self, name)
@@ -288,12 +292,30 @@ class Wavefront:
     def loop(self) -> device.Bound:
         """The kernel of the bounce loop on the device, for a host that does not wait."""
         start = time.perf_counter()
-        features, layout = self.lowered.features, self.tree.layout
+        kernel = self._link(self.lowered.features, self.tree.layout).kernel("loop")
+        self.seconds["programs"] += time.perf_counter() - start
+        return self._bind(kernel, first=0, end=0, turns=ENDLESS)
+
+    def _link(self, features: Features, layout: str) -> device.Program:
         texts = programs.loop_sources(features, layout, self.lanes)
         signatures = {"loop": programs.loop_arguments(features, layout)}
-        kernel = device.link(self.device, texts, "loop", signatures).kernel("loop")
-        self.seconds["programs"] += time.perf_counter() - start
-        return self._bind(kernel, first=0, end=0)
+        return device.link(self.device, texts, "loop", signatures)
+
+    def build_ahead(self, features: Features, layout: str, queued: bool) -> None:
+        """Build for other features the programs that are in use, so that it fails here or never."""
+        if "loop" in vars(self):
+            self._link(features, layout)
+        if "stages" in vars(self):
+            device.build_all(
+                self.device, programs.sources(features, layout, self.lanes, queued=queued)
+            )
+
+    @property
+    def _round(self) -> list[_Step]:
+        """What `expose` enqueues between two looks at the counters."""
+        if self.looped:
+            return [_Step("loop", self.loop, *self._sizes(self.lanes))]
+        return self.stages * BATCH
 
     def _bound(self, program: str, name: str, **given: Any) -> device.Bound:
         return self._bind(self.programs[program].kernel(name), **given)
@@ -325,7 +347,7 @@ class Wavefront:
     def enqueue(self, first: int, end: int) -> None:
         """Enqueue that samples first to end - 1 of every pixel are added; nothing is waited for."""
         self._rewind()
-        self.loop.set(first=first, end=end)
+        self.loop.set(first=first, end=end, turns=ENDLESS)
         size, group = self._sizes(self.lanes)
         self.timings.add("loop", self.stream.run(self.loop, size, group))
         self.exposed += end - first
@@ -340,14 +362,15 @@ class Wavefront:
         brought to its end and the exposure stops: a valid film, whose pixels differ in their number
         of samples. Returns whether it ran to its end.
         """
-        begin = self.stages[0].bound
+        steps = self._round
+        begin = steps[0].bound
         self._rewind()
-        begin.set(first=first, end=end)
+        begin.set(first=first, end=end, **({"turns": BATCH} if self.looped else {}))
         before, finished = self.counts.samples, True
         reads: deque[tuple[np.ndarray, cl.Event]] = deque()
         while True:
-            for _ in range(BATCH):
-                self._iterate()
+            for step in steps:
+                self.timings.add(step.name, self.stream.run(step.bound, step.size, step.group))
             host = np.zeros(len(COUNTERS), np.uint32)
             event = self.stream.read_later(self.named["counters"], host)
             self.stream.flush()
@@ -375,11 +398,6 @@ class Wavefront:
         word = next(m.word for m in PATH.members if m.name == "state")
         self._fill("path_words", FRESH, 4 * word * self.stride, 4 * self.slots)
         self._fill("counters", 0, 0, 4)
-
-    def _iterate(self) -> None:
-        """One bounce of every path."""
-        for step in self.stages:
-            self.timings.add(step.name, self.stream.run(step.bound, step.size, step.group))
 
     def _count(self, now: np.ndarray) -> None:
         """Add what the counters have gained since they were read last."""
