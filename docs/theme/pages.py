@@ -10,6 +10,7 @@ from __future__ import annotations
 import importlib
 import posixpath
 import re
+import sys
 from pathlib import Path
 
 import click
@@ -76,7 +77,7 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
         if files.get_file_from_path(there) is None:
             if not (ROOT / path).exists():
                 return match[0]  # a dead link: MkDocs complains
-            return text
+            return f"`{text}`" if "." in text and "`" not in text else text
         relative = posixpath.relpath(there, posixpath.dirname(own) or ".")
         return f"{picture}[{text}]({relative}{anchor})"
 
@@ -88,7 +89,7 @@ def names_of_clpt() -> str:
     groups: dict[str, list[str]] = {}
     for name in clpt.__all__:
         if not name.startswith("_"):
-            groups.setdefault(getattr(clpt, name).__module__, []).append(name)
+            groups.setdefault(_home(name), []).append(name)
     last = {"clpt.render.renderer": -1, errors.__name__: 1}
     parts = ["# `clpt`"]
     for module in sorted(groups, key=lambda module: (last.get(module, 0), module)):
@@ -96,11 +97,24 @@ def names_of_clpt() -> str:
         parts.append(f"## {re.split('[:;]', told.rstrip('.'))[0]}")
         for name in groups[module]:
             own = f"{module}.{getattr(clpt, name).__name__}"
-            options = {"show_root_heading": True, "heading_level": 3, "heading": name}
+            options = {
+                "show_root_heading": True,
+                "heading_level": 3,
+                "heading": name,
+                "inherited_members": True,
+            }
             parts.append(
                 f"[`{name}`][{own}]" if module in MODULES else f"::: {own}\n    options: {options}"
             )
     return "\n\n".join(parts)
+
+
+def _home(name: str) -> str:
+    """The module that a public name is from: a package, where that says so."""
+    module = getattr(clpt, name).__module__
+    package = module.rpartition(".")[0]
+    told = package != "clpt" and name in getattr(sys.modules[package], "__all__", ())
+    return package if told else module
 
 
 def command_line() -> str:
