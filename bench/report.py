@@ -101,11 +101,18 @@ def plain(rows: Sequence[Row]) -> str:
     return table(names, ([cell(row.get(name, "")) for name in names] for row in rows))
 
 
+def queries(rows: Sequence[Row]) -> str:
+    """Ray queries beside the bare kernel and embreex, then calls with few rays in microseconds."""
+    parts = [[row for row in rows if name in row] for name in ("overhead", "python_us")]
+    return "\n".join(plain(part) for part in parts if part)
+
+
 TABLES: dict[str, Callable[[Sequence[Row]], str]] = {
     "renders": renders,
     "spectral": plain,
     "effects": plain,
     "lights": plain,
+    "queries": queries,
     "instancing": plain,
     "embedding": plain,
     "startup": startup,
