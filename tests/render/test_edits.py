@@ -6,11 +6,13 @@ import dataclasses
 from typing import Any
 
 import numpy as np
+import pyopencl.array as cl_array
 import pytest
 
+from clpt import device
 from clpt import transforms as tf
 from clpt.errors import SceneError
-from clpt.render.edits import Names, edited
+from clpt.render.edits import Names, adopted, edited
 from clpt.render.lower import Lowered, lower
 from clpt.scene import Scene
 from clpt.scene import materials as m
@@ -90,6 +92,33 @@ def test_edits_replace_only_what_they_touch() -> None:
     moved, _ = edited(new, names, vertices={0: points, "pebble": points})
     assert not moved.shapes[0].vertices.any() and moved.shapes[0].vertices is not points
     assert not moved.shapes[4].group.shapes[0].vertices.any()
+
+
+def test_what_is_used_in_place() -> None:
+    """Faces and uvs of the only mesh, where they are as the tables are."""
+    queue = device.choose().queue
+    stone = dataclasses.replace(mesh(), uvs=RNG.random((40, 2)).astype(np.float32))
+    made = {name: cl_array.to_device(queue, getattr(stone, name)) for name in ("faces", "uvs")}
+    there = dataclasses.replace(stone, vertices=cl_array.to_device(queue, stone.vertices), **made)
+    wide = cl_array.to_device(queue, stone.uvs.astype(np.float64))
+    buffers = {name: array.data for name, array in made.items()}
+    for shapes, lent in (
+        ([there], buffers),
+        ([there, Sphere()], buffers),
+        ([stone], {}),
+        ([there, stone], {}),
+        ([dataclasses.replace(there, flip_normals=True)], {"uvs": buffers["uvs"]}),
+        ([dataclasses.replace(there, faces=made["faces"].data)], buffers),
+        (
+            [dataclasses.replace(there, uvs=wide)],
+            {"faces": buffers["faces"]},
+        ),
+    ):
+        found = lower(adopted(dataclasses.replace(scene(), shapes=shapes), queue)).lent
+        assert found == lent
+    with pytest.raises(SceneError, match="uvs must be rows of 8 bytes, found a buffer of 156"):
+        odd = dataclasses.replace(there, uvs=made["faces"].data)
+        adopted(dataclasses.replace(scene(), shapes=[odd]), queue)
 
 
 @pytest.mark.parametrize(
