@@ -11,10 +11,9 @@ import pyopencl as cl
 
 from clpt import transforms
 from clpt.bvh import Building
-from clpt.errors import SceneError
 from clpt.records import SHAPE
 from clpt.render import shapes, spheres
-from clpt.render.arrays import on_device
+from clpt.render.arrays import on_device, shaped
 from clpt.render.wavefront import Wavefront
 from clpt.scene.shapes import Spheres
 
@@ -37,23 +36,24 @@ class MovingSpheres:
         """Return what enqueues that spheres are as in a shape, given the buffer of all boxes.
 
         row: theirs in `shapes`; shape: as it will be; matrix: its placement in the world. None for
-        another number of spheres, and for those that emit: lights follow from them.
+        another number of spheres, for arrays on the device of another type or form, and for spheres
+        that emit: lights follow from them.
 
-        Raises SceneError for centres of another form, or a matrix that stretches.
+        Raises SceneError for memory of another context, or a matrix that stretches.
         """
-        count = self._count(row)
-        if shape.emission is not None or _length(shape.centers) != count:
+        count, where, queue = self._count(row), shapes.where(shape), self.front.stream.queue
+        centers = shaped(shape.centers, "centers", queue, where)
+        if shape.emission is not None or len(centers) != count:
             return None
         placed = dataclasses.replace(shape, to_world=matrix)
         common = spheres.common(placed)
         scale = float(common.view(np.float32)[shapes.member("sphere", "radius")])
-        if on_device(shape.centers):
-            source, begin, columns = _memory(shape, self.front.device.context)
-        elif on_device(shape.radii):
-            return None
-        else:
+        given = None
+        if not on_device(centers) and not on_device(shape.radii):
             given = spheres.balls(dataclasses.replace(shape, to_world=np.eye(4)))
-            columns = 4
+        elif not (on_device(centers) and _in_place(centers)):
+            return None
+        columns = centers.shape[1] if given is None else 4
 
         def act(boxes: cl.Buffer) -> None:
             front = self.front
@@ -62,14 +62,14 @@ class MovingSpheres:
                 front.stream.write(front.named["geometry"], common, 4 * at)
                 geometry[at : at + len(common)] = common
             front.moved.add("spheres")
-            if on_device(shape.centers):
-                front.stream.after(getattr(shape.centers, "events", ()))
-                found, first = source, begin
+            if given is None:
+                front.stream.after(centers.events)
+                source, begin = centers.base_data, centers.offset // 4
             else:
-                found, first = self._sent(int(row["prim"]), given), 0
+                source, begin = self._sent(int(row["prim"]), given), 0
             prim = int(row["prim"])
             self.building.run_each(
-                _ROOT, "place_spheres", count, source=found, source_begin=first, columns=columns,
+                _ROOT, "place_spheres", count, source=source, source_begin=begin, columns=columns,
                 matrix=np.asarray(matrix, np.float32).ravel(), scale=scale,
                 padding=shapes.PADDING, first=prim - int(front.lowered.settings["single_count"]),
                 first_box=prim, spheres=front.named["spheres"], boxes=boxes,
@@ -92,19 +92,7 @@ class MovingSpheres:
         return self._sources[prim]
 
 
-def _length(centers: Any) -> int:
-    """The number of spheres; of a buffer, of rows of three."""
-    return centers.size // 12 if isinstance(centers, cl.Buffer) else len(centers)
-
-
-def _memory(shape: Spheres, context: cl.Context) -> tuple[cl.Buffer, int, int]:
-    """The buffer that centres are in, where they begin there, and numbers in a row."""
-    centers: Any = shape.centers
-    if isinstance(centers, cl.Buffer):
-        return centers, 0, 3
+def _in_place(centers: Any) -> bool:
+    """Whether a kernel can read centres where they are on the device."""
     form = len(centers.shape) == 2 and centers.shape[1] in (3, 4)
-    if not form or centers.dtype != np.float32 or not centers.flags.c_contiguous:
-        found = f"{centers.shape} {centers.dtype}"
-        message = f"centers must be (n, 3) or (n, 4) float32, C-contiguous, found {found}"
-        raise SceneError(message, where=shapes.where(shape))
-    return centers.base_data, centers.offset // 4, centers.shape[1]
+    return form and centers.dtype == np.float32 and bool(centers.flags.c_contiguous)

@@ -233,10 +233,11 @@ class Renderer(Pictures):
         camera: another one; of the same kind it takes one small write. materials: by what they
         stand for, a material of the scene or a shape's key; where only values differ a few words
         are written. transforms: (4, 4) by shape; vertices: (n, 3) float32 by shape, of numpy or on
-        the device. The key of a shape is the shape, its name, or its place in `scene.shapes`;
-        shapes and materials that were given at first go on to name what took their place. scene:
-        another scene of the same film, for whatever else; what its shapes and lights share with the
-        present one, the same arrays and images, is not looked at again.
+        the device; of `Spheres` their centres, perhaps (n, 4) with the radii. The key of a shape is
+        the shape, its name, or its place in `scene.shapes`; shapes and materials that were given at
+        first go on to name what took their place. scene: another scene of the same film, for
+        whatever else; what its shapes and lights share with the present one, the same arrays and
+        images, is not looked at again.
 
         What only moves does so on the device, where trees are fitted to it, see
         clpt.render.moving; nothing is waited for. Else what the device needs is found by lowering
