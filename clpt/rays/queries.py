@@ -175,6 +175,8 @@ class Queries:
         with self._lock:
             self._opened()
             if rays.waits:
+                if out:
+                    raise SceneError("it is for rays that are on the device", where="out")
                 self._stream.after(wait_for)
                 arrays, places = batch.host_results(*self._where, rays.count, made)
                 return arrays, self._wait(name, rays, arrays, places)

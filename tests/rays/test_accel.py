@@ -136,6 +136,15 @@ def test_one_origin_for_all_rays_and_other_types(accel, rays):
     np.testing.assert_array_equal(accel.intersect([[0.5, 0.5, 0.5]], fixed).t, many.t)
 
 
+def test_directions_of_any_length(accel, rays):
+    o, d = rays[0], rays[1] / np.linalg.norm(rays[1], axis=1, keepdims=True)
+    unit = accel.intersect(o, d)
+    for power in (-50, 50):  # of two, so that nothing is rounded
+        hits = accel.intersect(o, d * np.float32(2.0**power))
+        np.testing.assert_array_equal(hits.primitive, unit.primitive)
+        np.testing.assert_allclose(hits.t, unit.t * np.float32(2.0**-power), rtol=1e-5)
+
+
 def test_odd_rays_meet_nothing(accel):
     odd = [0.0, np.nan, np.inf, -np.inf, 1e-45]
     d = np.array([(x, y, 0.0) for x in odd for y in odd], np.float32)
@@ -185,6 +194,8 @@ def test_what_is_refused(queue, soup, rays):
             accel.intersect(*arguments)
     with pytest.raises(clpt.SceneError, match="out: 1000 rays have 10 t"):
         accel.intersect(there, there, out=accel.intersect(there[:10], there[:10]))
+    with pytest.raises(clpt.SceneError, match="out: it is for rays that are on the device"):
+        accel.occluded(o, d, out=accel.occluded(there, there))
     accel.close()
     with pytest.raises(clpt.DeviceError, match="closed"):
         accel.intersect(o, d)
