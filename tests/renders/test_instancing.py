@@ -113,7 +113,7 @@ def test_brute_force_holds_no_instances() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+@pytest.mark.parametrize("mode", ["rgb", pytest.param("spectral", marks=pytest.mark.slow)])
 def test_pictures_are_those_of_copies(scenes: Path, mode: str) -> None:
     loaded = with_film(clpt.load(scenes / "instances.xml"), mode=mode)
     copies = [
@@ -129,7 +129,7 @@ def test_pictures_are_those_of_copies(scenes: Path, mode: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+@pytest.mark.parametrize("mode", ["rgb", pytest.param("spectral", marks=pytest.mark.slow)])
 def test_lanes_change_nothing(scenes: Path, mode: str) -> None:
     loaded = with_film(clpt.load(scenes / "instances.xml"), mode=mode)
     images = []

@@ -34,7 +34,7 @@ CASES.remove(("spectra", "rgb"))  # of black bodies Mitsuba has no colour
 LEFT = [(name, "rgb") for name in ("plastic", "textures", "orthographic", "principled_thin")]
 LEFT += [(name, "spectral") for name in ("instances", "principled", "principled_thin")]
 LEFT += [(name, "spectral") for name in ("glass_metal", "thin_lens", "light_tracing")]
-LEFT += [(name, "rgb") for name in ("light_tracing", "thrown_images")]
+LEFT += [(name, "rgb") for name in ("light_tracing", "thrown_images", "thin_lens")]
 LEFT += [(name, "spectral") for name in ("orthographic", "delta_lights", "cornell")]
 QUICK = [case for case in CASES if case not in LEFT]
 MEAN_WITHIN = 0.015  # relative; at a quick test's number of samples most of it is noise

@@ -66,6 +66,7 @@ def test_lights_that_both_ways_find(mode: str) -> None:
     assert_mean(images, [expected] * 3, 0.02, 2e-3)
 
 
+@pytest.mark.slow
 def test_light_paths_pass_as_well() -> None:
     """The same ground seen by light tracing, through a screen, under two and a spot light."""
     shine = Spot(

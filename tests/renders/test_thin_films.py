@@ -63,7 +63,8 @@ def test_rgb_is_close_to_spectral(name):
     assert difference.mean() < 2.0 and difference.max() < 7.0
 
 
-@pytest.mark.parametrize("mode", ["spectral", pytest.param("rgb", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["spectral", "rgb"])
 def test_films_that_absorb_nothing_in_a_white_furnace(mode):
     """However often light passes the walls, all of it comes through; means within 1 %."""
     for name in ("soap", "oil"):
