@@ -29,9 +29,7 @@ class DeviceArray(Array):
 
     def __dlpack_device__(self) -> tuple[int, int]:
         """DLPack's type of the device, 1 for a CPU or 4 for OpenCL, and its number."""
-        if self.queue.device.type & cl.device_type.CPU:
-            return dlpack.CPU, 0
-        return self._opencl_device
+        return (dlpack.CPU, 0) if self._is_hosts else self._opencl_device
 
     def __dlpack__(
         self,
@@ -63,11 +61,16 @@ class DeviceArray(Array):
         return dlpack.opencl_capsule(owner, wanted[1])
 
     @property
+    def _is_hosts(self) -> bool:
+        """Whether the device's memory is the host's."""
+        return bool(self.queue.device.type & cl.device_type.CPU)
+
+    @property
     def _opencl_device(self) -> tuple[int, int]:
         return dlpack.OPENCL, self.context.devices.index(self.queue.device)
 
     def _mapped(self) -> NDArray[Any]:
-        if not self.queue.device.type & cl.device_type.CPU:
+        if not self._is_hosts:
             raise BufferError("memory of this OpenCL device becomes the host's only by a copy")
         return self.map_to_host()
 

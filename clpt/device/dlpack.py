@@ -6,6 +6,7 @@ The structures are those of dlpack.h 0.8, whose data pointer is the cl_mem handl
 from __future__ import annotations
 
 import ctypes as c
+import sys
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,6 @@ CPU, OPENCL = 1, 4  # DLDeviceType
 _NAME = b"dltensor"  # until a consumer renames it
 _CODES = {"i": 0, "u": 1, "f": 2}  # DLDataTypeCode
 _Deleter = c.CFUNCTYPE(None, c.c_void_p)
-_Destructor = c.PYFUNCTYPE(None, c.c_void_p)
 
 
 class _Tensor(c.Structure):
@@ -33,11 +33,9 @@ class _Managed(c.Structure):
 _kept: dict[int, tuple[Any, ...]] = {}  # by the structure's address: what lives as long as it
 
 _new = c.pythonapi.PyCapsule_New
-_new.restype, _new.argtypes = c.py_object, (c.c_void_p, c.c_char_p, _Destructor)
+_new.restype, _new.argtypes = c.py_object, (c.c_void_p, c.c_char_p, c.c_void_p)
 _valid = c.pythonapi.PyCapsule_IsValid
-_valid.restype, _valid.argtypes = c.c_int, (c.c_void_p, c.c_char_p)
-_pointer = c.pythonapi.PyCapsule_GetPointer
-_pointer.restype, _pointer.argtypes = c.c_void_p, (c.c_void_p, c.c_char_p)
+_valid.restype, _valid.argtypes = c.c_int, (c.py_object, c.c_char_p)
 
 
 @_Deleter
@@ -45,15 +43,21 @@ def _delete(managed: int) -> None:
     _kept.pop(managed, None)
 
 
-@_Destructor
-def _destroy(capsule: int) -> None:
-    """Of a capsule that nobody took; who takes one renames it and calls its deleter later."""
-    if _valid(capsule, _NAME):
-        _delete(_pointer(capsule, _NAME))
+def _sweep() -> None:
+    """Let go of what nobody took: a capsule under its first name that nobody holds but us.
+
+    A destructor would do so at once, but Python may run it while it raises a consumer's error,
+    which a function of Python cannot stand in for.
+    """
+    for address, (*_, capsule) in list(_kept.items()):
+        held = sys.getrefcount(capsule) - 3  # by `_kept`, `capsule` and the call
+        if held <= 0 and _valid(capsule, _NAME):
+            _kept.pop(address, None)
 
 
 def opencl_capsule(array: Any, device: int) -> Any:
     """A capsule of a `pyopencl.array.Array`, which lives until the capsule's consumer ends."""
+    _sweep()
     dtype, ndim = np.dtype(array.dtype), array.ndim
     if dtype.kind not in _CODES:
         raise BufferError(f"DLPack is not given arrays of {dtype}")
@@ -68,5 +72,6 @@ def opencl_capsule(array: Any, device: int) -> Any:
         _delete,
     )  # fmt: skip
     address = c.addressof(managed)
-    _kept[address] = managed, sizes, steps, array.base_data
-    return _new(address, _NAME, _destroy)
+    capsule = _new(address, _NAME, None)
+    _kept[address] = managed, sizes, steps, array.base_data, capsule
+    return capsule
