@@ -12,9 +12,14 @@ import clpt
 
 FOLDER = Path(__file__).resolve().parents[1] / "examples"
 EXAMPLES = sorted(FOLDER.glob("*.py"))
+LONG = ("custom_material", "nbody")  # quick tests elsewhere have what these show
 
 
-@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "example",
+    [pytest.param(e, marks=[pytest.mark.slow] if e.stem in LONG else []) for e in EXAMPLES],
+    ids=[example.stem for example in EXAMPLES],
+)
 def test_it_writes_a_picture(
     example: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
 ):
