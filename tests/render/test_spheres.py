@@ -238,3 +238,29 @@ def test_a_tree_is_built_anew_in_place() -> None:
     assert not np.array_equal(
         building.read(tree.buffers["nodes"], 8, np.float32)[:3], old.min(axis=(0, 1))
     )
+
+
+@pytest.mark.slow
+def test_each_shines_in_its_own_colour() -> None:
+    """As single spheres do; both are means of 2 million paths, which are within 1 percent."""
+    centers, radii = np.array([[0, 1, 0], [-1.5, 0.8, 0.5], [1.5, 0.9, -0.3]]), [0.3, 0.2, 0.4]
+    colours = np.array([[6.0, 1.0, 1.0], [1.0, 8.0, 1.0], [1.0, 1.0, 5.0]])
+    black = materials.Diffuse(reflectance=0.0)
+    glow = lights.Area(radiance=MeshAttribute(name="vertex_glow"))
+    given = {"vertex_glow": colours}
+    many = shapes.Spheres(
+        centers=centers, radii=radii, material=black, attributes=given, emission=glow
+    )
+    singles = [
+        shapes.Sphere(center=c, radius=r, material=black, emission=lights.Area(radiance=tuple(e)))
+        for c, r, e in zip(centers, radii, colours, strict=True)
+    ]
+    floor = shapes.Rectangle(to_world=T.rotate([1, 0, 0], -90) @ T.scale(9.0))
+    view = T.look_at([0, 3, 6], [0, 0.4, 0], [0, 1, 0])
+    film = integrators.Film(width=48, height=48, mode="rgb")
+    camera = cameras.Perspective(to_world=view, fov=40)
+    found = [
+        clpt.render(Scene(camera=camera, shapes=[floor, *lamps], film=film), 900).mean(axis=(0, 1))
+        for lamps in ([many], singles)
+    ]
+    np.testing.assert_allclose(found[0], found[1], rtol=0.01)
