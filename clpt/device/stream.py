@@ -30,7 +30,7 @@ class Stream:
         self.ordered = not queue.properties & out_of_order
         self.last: cl.Event | None = None
         self._before: list[cl.Event] = []
-        self._copies: deque[cl.Event] = deque()  # from and to the host, that may not be over
+        self._copies: deque[cl.Event] = deque()  # to the host, that may not be over
 
     def after(self, events: Events) -> None:
         """Let the next command wait for events of others too."""
@@ -57,13 +57,11 @@ class Stream:
 
     def write(self, target: cl.Buffer, source: np.ndarray, offset: int = 0) -> cl.Event:
         """Enqueue that an array goes to a buffer, from a copy of it: it may change at once."""
-        kept = np.array(source)  # the event keeps it alive
-        return self._keep(
-            cl.enqueue_copy(
-                self.queue, target, kept, dst_offset=offset, is_blocking=False,
-                wait_for=self._waits(),
-            )
-        )  # fmt: skip
+        # The copy is a buffer, which the driver keeps until it is read: PyOpenCL's event of a copy
+        # from the host waits when nobody refers to it, and no other thread of Python runs then.
+        flags = cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR
+        kept = cl.Buffer(self.queue.context, flags, hostbuf=np.ascontiguousarray(source))
+        return self.copy(target, kept, dst_offset=offset, byte_count=kept.size)
 
     def mark(self) -> cl.Event:
         """Enqueue nothing, after what `after` was told of: an event of all before."""
@@ -100,10 +98,7 @@ class Stream:
         return waits or None
 
     def _keep(self, event: cl.Event) -> cl.Event:
-        """Note an event of a copy, and refer to it until it is over.
-
-        PyOpenCL's would wait when nobody refers to it any more, and no other thread would run.
-        """
+        """Note an event of a copy to the host, and refer to it until it is over."""
         done = cl.command_execution_status.COMPLETE
         while self._copies and self._copies[0].command_execution_status <= done:
             self._copies.popleft()

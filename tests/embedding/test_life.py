@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 import gc
 import logging
 import pickle
@@ -66,6 +67,24 @@ def test_a_closed_one_tells(made: clpt.Renderer, scene: clpt.Scene) -> None:
             use()
     assert film.get().any(), "what the host still holds stays"
     assert made.scene is scene
+
+
+@pytest.mark.parametrize("end", [clpt.Renderer.close, lambda renderer: None])
+def test_what_was_enqueued_ends_without_its_renderer(
+    scene: clpt.Scene, queue: cl.CommandQueue, picture: np.ndarray, end
+) -> None:
+    """Closed or dropped while its commands are held up; it does not wait for them either."""
+    late = cl.UserEvent(queue.context)
+    renderer = clpt.Renderer(scene, queue=queue, slots=SLOTS)
+    film = renderer.film
+    renderer.update(camera=dataclasses.replace(scene.camera, fov=25.0), wait_for=[late])
+    renderer.update(camera=scene.camera)
+    event = renderer.step(4)
+    end(renderer)
+    del renderer
+    late.set_status(cl.command_execution_status.COMPLETE)
+    event.wait()
+    assert np.array_equal(film.get()[..., :3], picture)
 
 
 @pytest.mark.parametrize("take", [pickle.dumps, copy.copy, copy.deepcopy])
