@@ -59,11 +59,19 @@ class Packed:
 
 
 def brute(building: Building, mesh: Mesh) -> Packed:
-    """Records of the triangles."""
-    records = building.allocate(64 * mesh.count)
-    source = {"vertices": mesh.vertices, "faces": mesh.faces, "tags": mesh.tags}
-    building.run_each("bvh/pack.cl", "pack_brute", mesh.count, records=records, **source)
-    return Packed({"tris": records}, Part(mesh.count))
+    """Records of the triangles, on the host: so few are not worth compiling a kernel for."""
+    size = mesh.vertices.size // 12
+    vertices = building.read(mesh.vertices, 3 * size, np.float32).reshape(size, 3)
+    faces = building.read(mesh.faces, 3 * mesh.count, np.uint32).reshape(-1, 3)
+    v0, v1, v2 = vertices[faces].transpose(1, 0, 2)
+    edges = [v1 - v0, v2 - v0]
+    words = np.zeros((mesh.count, 4), np.uint32)
+    words[:, 0] = np.arange(mesh.count)
+    words[:, 1] = building.read(mesh.tags, mesh.count, np.uint32)
+    records = np.concatenate([v0, *edges, np.cross(*edges), words.view(np.float32)], 1)
+    held = building.allocate(records.nbytes)  # refitting writes to it
+    building.stream.write(held, records.astype(np.float32))
+    return Packed({"tris": held}, Part(mesh.count))
 
 
 def binary(building: Building, mesh: Mesh) -> Packed:

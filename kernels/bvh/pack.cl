@@ -52,20 +52,6 @@ kernel APART void pack_triangles(global const float8 *restrict items, uint count
     vstore4((float4)(as_float(prim), as_float(tags[prim]), 0.0f, 0.0f), 3, record);
 }
 
-/* The records of brute.cl, in the caller's order. */
-kernel APART void pack_brute(global const float *restrict vertices, global const uint *restrict faces,
-                             global const uint *restrict tags, uint count,
-                             global float *restrict records)
-{
-    uint prim = get_global_id(0);
-    if (prim >= count) return;
-    float4 corners[3];
-    global float *record = records + (ulong)prim * 16;
-    leaf_corners(vertices, faces, prim, corners);
-    leaf_store_brute(record, corners);
-    vstore4((float4)(as_float(prim), as_float(tags[prim]), 0.0f, 0.0f), 3, record);
-}
-
 /* The items' indices alone, for trees over shapes that the caller keeps. */
 kernel APART void pack_indices(global const float8 *restrict items, uint count,
                                global uint *restrict indices)

@@ -81,7 +81,7 @@ def test_hits_are_those_of_a_new_tree(device, building, trace, layout, move):
         assert move == "flat" or met.mean() > 0.5
 
 
-@pytest.mark.parametrize("layout", LAYOUTS)
+@pytest.mark.parametrize("layout", ["binary", "wide8"])  # a host makes brute's records
 def test_a_tree_that_did_not_move_is_the_same_to_the_bit(device, building, layout):
     rng = np.random.default_rng(4)
     vertices, faces = mesh(triangles(rng))
