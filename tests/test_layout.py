@@ -10,7 +10,7 @@ from clpt import device
 from clpt.layout import TYPES, Record
 from clpt.records import LIGHT, PATH, SETTINGS, SHAPE, SLABS
 from clpt.render import cameras
-from clpt.render.programs import scene_text
+from clpt.render.arguments import scene_text
 
 UNIFORM = [SETTINGS, *cameras.RECORDS.values()]
 

@@ -101,7 +101,7 @@ def adopted(scene: Scene, queue: cl.CommandQueue) -> Scene:
     Raises SceneError for memory of another context, or a buffer of the wrong size.
     """
     edit = _Edit(scene, Names())
-    for shape in edit.shapes.values():
+    for shape in (one for one in edit.shapes.values() if isinstance(one, Shape)):
         for name, values in readable(shape, queue, shapes.where(shape)).items():
             edit.change(shape, name, values)
     return edit.scene_made() if edit.changes else scene

@@ -7,7 +7,7 @@ import re
 from clpt import device
 from clpt.errors import SceneError, UnknownKindError
 from clpt.render import outside
-from clpt.render.programs import functions_text, layout_text
+from clpt.render.stage_texts import functions_text, layout_text
 from clpt.scene.integrators import SAMPLERS
 from clpt.scene.materials import LEAVES, Material
 

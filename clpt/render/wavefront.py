@@ -23,7 +23,7 @@ from clpt.device.buffers import Buffers
 from clpt.device.timing import Timings
 from clpt.errors import MemoryBudgetError, SceneError
 from clpt.records import PATH, SLABS, TABLES
-from clpt.render import programs
+from clpt.render import arguments, programs
 from clpt.render.features import Features
 from clpt.render.lower import Lowered
 
@@ -298,7 +298,7 @@ class Wavefront:
 
     def _link(self, features: Features, layout: str) -> device.Program:
         texts = programs.loop_sources(features, layout, self.lanes)
-        signatures = {"loop": programs.loop_arguments(features, layout)}
+        signatures = {"loop": arguments.loop_arguments(features, layout)}
         return device.link(self.device, texts, "loop", signatures)
 
     def build_ahead(self, features: Features, layout: str, queued: bool) -> None:

@@ -14,7 +14,7 @@ inline real trace_open(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real t, Waveleng
     real share = 1.0f;
     int surfaces = 0;
     while (any(active)) {
-        TraceHit h = trace_closest(TRACE, scene, o, d, t, active);
+        TraceHit h = trace_closest(TRACE_PASSED, scene, o, d, t, active);
         active = active & (h.prim >= 0) & (t > 0.0f);
         if (any(active)) {
             ShapeRow shape = shape_row_row(scene.shapes, sel_i(active, h.shape, (integer)(0)) * SHAPE_ROW_WORDS);

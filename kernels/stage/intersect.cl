@@ -17,7 +17,7 @@ STAGE(intersect)(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS STAGE_AT_ARG)
     if (any(active)) {
         vec3 o = load_path_o(path, at), d = load_path_d(path, at);
         real far = sel((state & PATH_DEPTH) == 0, -load_path_pdf(path, at), (real)(FAR));
-        TraceHit h = trace_closest(TRACE, scene, o, d, far, active);
+        TraceHit h = trace_closest(TRACE_PASSED, scene, o, d, far, active);
         integer shape = sel_i(h.prim >= 0, h.shape, (integer)(0)), row = shape * SHAPE_ROW_WORDS;
         ShapeRow s = shape_row_row(scene.shapes, row);
         store_hit_t(hit, at, active, h.t);

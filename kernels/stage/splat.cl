@@ -17,7 +17,7 @@ STAGE(splat)(SLAB_ARGS, SCENE_ARGS, JOIN_ARGS STAGE_AT_ARG)
     if (any(active)) {
         vec3 o = load_shadow_o(shadow, at), d = load_shadow_d(shadow, at);
         Wavelengths lambdas = load_path_lambdas(path, at);
-        real share = trace_open(TRACE, scene, o, d, t, lambdas, active);
+        real share = trace_open(TRACE_PASSED, scene, o, d, t, lambdas, active);
         mask open = active & (share > 0.0f);
         vec3 value = film_value(scene, spectrum_scale(load_shadow_value(shadow, at), share), lambdas);
         mask sane = open & (fabs(value.x) + fabs(value.y) + fabs(value.z) < 1e30f); /* false for NaN */

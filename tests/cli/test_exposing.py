@@ -22,7 +22,7 @@ class Counting:
     def __init__(self, seconds: float = 0.0):
         self.samples, self.seconds, self.passes = 0, seconds, []
 
-    def step(self, samples, progress):
+    def run(self, samples, progress):
         self.passes.append(samples)
         for done in range(samples):
             time.sleep(self.seconds)

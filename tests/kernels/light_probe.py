@@ -11,7 +11,7 @@ import pyopencl as cl
 
 from clpt import device
 from clpt.records import SETTINGS, SHAPE
-from clpt.render import kinds, lights, programs, shapes, textures
+from clpt.render import kinds, lights, shapes, textures
 from clpt.render.tables import STEP, Tables
 from tests.kernels.harness import opened
 
@@ -98,7 +98,7 @@ def _program(
         **shapes.virtual_files(),
         **lights.virtual_files(),
         "probe.cl": probe,
-        "generated/scene.cl": programs.scene_text(),
+        "generated/scene.cl": scene_text(),
         "generated/spectrum.cl": f'#include "spectrum/{mode}.cl"\n',
         "generated/spectrum_read.cl": f'#include "spectrum/{mode}_read.cl"\n',
         "generated/lights.cl": light_text,

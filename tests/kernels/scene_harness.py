@@ -9,7 +9,7 @@ import pyopencl as cl
 
 from clpt import device
 from clpt.records import SETTINGS, TABLES
-from clpt.render.programs import scene_text
+from clpt.render.arguments import scene_text
 from tests.kernels.harness import opened
 
 BLOCK = 16

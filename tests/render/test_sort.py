@@ -8,7 +8,7 @@ import pytest
 
 from clpt import device
 from clpt.records import HIT, PATH
-from clpt.render.programs import scene_text
+from clpt.render.arguments import scene_text
 
 ALIVE = 0x1000
 KINDS = 5

@@ -1,0 +1,257 @@
+"""Generated parts of the stages' text: what there is of each sort in a scene, and how it is chosen.
+
+The physics is always in a file.
+"""
+
+from __future__ import annotations
+
+from clpt.layout import Record
+from clpt.records import SHAPE
+from clpt.render import bends, cameras, films, kinds, lights, shapes
+from clpt.render.features import Features, Sources
+from clpt.scene import materials
+from clpt.scene.params import device_params, interior_params
+
+
+def spectrum_text(features: Features) -> str:
+    """Reading spectra in a mode, and how the camera draws wavelengths."""
+    text = f'#include "spectrum/{features.mode}_read.cl"\n'
+    if features.mode == "spectral":
+        drawn = "density" if features.tabulated_density else "visible"
+        text += f'#include "spectrum/{drawn}.cl"\n'
+    return text
+
+
+def camera_text(kind: str, glass: bool) -> str:
+    record: Record = cameras.RECORDS[kind]
+    camera = f"(global const {record.name} *)(scene).camera"
+    made = f"{kind}_ray({camera}, film, lens)"
+    if glass:
+        row = f"(integer)(({camera})->glass)"
+        made = f"{kind}_glass_ray({camera}, film, lens, spectra_row(scene, {row}, lambdas).x)"
+    return (
+        f'{record.uniform_text()}#include "camera/{kind}.cl"\n'
+        f"#define camera_ray(scene, film, lens, lambdas) {made}\n"
+    )
+
+
+def connect_text(kind: str) -> str:
+    record: Record = cameras.RECORDS[kind]
+    return (
+        f'#include "camera/{kind}_connect.cl"\n#define camera_connect(scene, p, away, lens) '
+        f"{kind}_connect((global const {record.name} *)(scene).camera, (scene).settings, "
+        "p, away, lens)\n"
+    )
+
+
+def emits_textures(features: Features) -> bool:
+    """Whether some emission is a texture."""
+    return "texture" in _emissions(features)
+
+
+def _emissions(features: Features) -> frozenset[str]:
+    return features.sources.get("emission", {}).get("value", frozenset({"constant"}))
+
+
+def lights_text(features: Features) -> str:
+    """The loader of emissions, from wherever they come in this scene, and the lights' dispatch."""
+    textured = emits_textures(features)
+    factors = features.sources.get("factor", {}).get("value", frozenset())
+    return (
+        ('#include "generated/textures.cl"\n' if textured or "texture" in factors else "")
+        + kinds.emission_text(_emissions(features))
+        + (kinds.factor_text(factors) if factors else "")
+        + lights.dispatch_text(
+            features.lights, textured, features.two_sided_lights, features.light_tree
+        )
+    )
+
+
+def mixture_text(features: Features) -> str:
+    """The loader of the weights of masks and blends."""
+    found = features.sources.get("mixture", {}).get("weight", frozenset({"constant"}))
+    return kinds.mixture_text(found)
+
+
+def facing_text(features: Features) -> str:
+    """The frame of shading; the loader of the maps that bend it, where there are some."""
+    if not features.bends:
+        return '#include "lib/facing.cl"\n'
+    found = features.sources["bend"]["value"]
+    return f'#define BEND_WORDS {bends.WORDS}\n{bends.text(found)}#include "lib/facing_bent.cl"\n'
+
+
+def null_share_text(features: Features) -> str:
+    """`null_share`: how much of the light passes a surface with some material word.
+
+    A mixture's children are one level below it, since kernels cannot call themselves.
+    """
+    leaves = enumerate(features.leaves)
+    passing = [f"(MATERIAL_KIND(word) == {i})" for i, cls in leaves if cls.passes]
+    arguments = "Scene scene, integer word, TexturePoint point, Wavelengths lambdas"
+    lines = [
+        f"inline real null_share_0({arguments})",
+        "{",
+        f"    return sel({' | '.join(passing) or 'mask_of(0)'}, (real)(1.0f), (real)(0.0f));",
+        "}",
+    ]
+    for level in range(1, features.mixtures + 1):
+        below = f"null_share_{level - 1}"
+        lines += [
+            f"inline real null_share_{level}({arguments})",
+            "{",
+            "    mask mixed = MATERIAL_KIND(word) == 0xff;",
+            f"    real share = {below}(scene, word, point, lambdas);",
+            "    if (any(mixed)) {",
+            "        integer row = sel_i(mixed, MATERIAL_ROW(word), (integer)(0));",
+            "        real w = mixture_weight(scene, row, point, lambdas);",
+            "        integer a = gather_i(scene.mixtures, row + 2);",
+            "        integer b = gather_i(scene.mixtures, row + 3);",
+            f"        real first = {below}(scene, a, point, lambdas);",
+            f"        real second = {below}(scene, b, point, lambdas);",
+            "        share = sel(mixed, first + w * (second - first), share);",
+            "    }",
+            "    return share;",
+            "}",
+        ]
+    return "\n".join([*lines, f"#define null_share null_share_{features.mixtures}", ""])
+
+
+def medium_text(features: Features) -> str:
+    """What absorbs between surfaces, where something does."""
+    if not features.absorption:
+        return ""
+    found = [own.get("absorption", frozenset()) for own in features.sources.values()]
+    return kinds.medium_text(frozenset().union(*found)) + '#include "lib/medium.cl"\n'
+
+
+def _interior_text(features: Features, cls: type[materials.Material]) -> list[str]:
+    """How the medium inside of a material is named, see kernels/lib/medium.cl."""
+    if not features.absorption:
+        return []
+    first = 1 + sum(map(kinds.words, device_params(cls).values()))
+    inside = f"((row) + {first})" if interior_params(cls) else "((integer)(0))"
+    if interior_params(cls) and "thin" in device_params(cls):  # a sheet has no inside
+        before = [*device_params(cls)].index("thin")
+        at = sum(map(kinds.words, [*device_params(cls).values()][:before]))
+        thin = f"gather_i(scene.materials, (row) + {at}) != 0"
+        inside = f"sel_i({thin}, (integer)(0), {inside})"
+    return [f"#define BSDF_INTERIOR(row) {inside}"]
+
+
+def trace_text(layout: str) -> str:
+    return f'#include "lib/trace_{"lanes" if layout == "brute" else "one"}.cl"\n'
+
+
+def _includes(features: Features) -> list[str]:
+    return [f'#include "generated/shape/{kind}.cl"' for kind in features.analytic]
+
+
+def shape_tree_text(features: Features) -> str:
+    """Meeting one analytic shape, the same for all lanes, and for one ray the tree over them."""
+    if not features.analytic:
+        return ""
+    word = {member.name: member.word for member in SHAPE.members}
+    cases = [
+        f"    if (kind == {1 + shapes.ANALYTIC.index(kind)})\n"
+        f"        return {shapes.ONE_OF.get(kind, kind)}_intersect({_shape_text(kind, 'params')}, "
+        "o, d, tmin, tmax);"
+        for kind in features.analytic
+    ]
+    rows = "many" if set(features.analytic) & set(shapes.ONE_OF) else "single"
+    return "\n".join(
+        [
+            *_includes(features),
+            f'#include "lib/shape_rows_{rows}.cl"',
+            "inline ShapeHit shape_hit(Scene scene, int prim, int row, vec3 o, vec3 d, real tmin, "
+            "real tmax)",
+            "{",
+            "    global const uint *shape = scene.shapes + row * SHAPE_ROW_WORDS;",
+            f"    int kind = (int)shape[{word['kind']}];",
+            f"    integer params = (int)shape[{word['params']}];",
+            *cases,
+            "    ShapeHit none = {FAR, {0.0f, 0.0f, 1.0f}, {0.0f, 0.0f}};",
+            "    return none;",
+            "}",
+            "",
+        ]
+    )
+
+
+def _shape_text(kind: str, params: str, active: str = "mask_of(1)") -> str:
+    """The parameters of primitive `prim`, which lie at `params` or, of many in one, beside it."""
+    if kind in shapes.ONE_OF:
+        return f"{kind}_one(scene, {params}, prim, {active})"
+    return f"{kind}_row(scene.geometry, {params})"
+
+
+def tangents_text(features: Features) -> str:
+    """dpdu and dpdv of analytic shapes, in lanes."""
+    if not (features.analytic and features.tangents):
+        return ""
+    lines = _includes(features)
+    for tangent in ("dpdu", "dpdv"):
+        lines += [
+            f"inline vec3 {tangent}_of_shape(Scene scene, ShapeRow shape, integer prim, vec3 p, "
+            "vec2 uv)",
+            "{",
+            "    vec3 r = v3(0.0f, 0.0f, 0.0f);",
+        ]
+        for kind in features.analytic:
+            lines += [
+                "    {",
+                f"        mask m = shape.kind == {1 + shapes.ANALYTIC.index(kind)};",
+                "        integer params = sel_i(m, shape.params, (integer)(0));",
+                f"        if (any(m)) r = sel3(m, {shapes.ONE_OF.get(kind, kind)}_{tangent}("
+                f"{_shape_text(kind, 'params', 'm')}, p, uv), r);",
+                "    }",
+            ]
+        lines += ["    return r;", "}", ""]
+    return "\n".join(lines)
+
+
+def shifts(features: Features, cls: type[materials.Material]) -> bool:
+    return cls.shifts and features.mode == "spectral"
+
+
+def functions_text(cls: type[materials.Material], mode: str, sources: Sources) -> str:
+    """Return a kind's struct and functions, with what its boundary needs."""
+    boundary = films.boundary_text(cls, mode, sources)
+    return f'{boundary}{kinds.struct_text(cls)}#include "bsdf/{cls.kind}.cl"\n'
+
+
+def bsdf_text(features: Features, cls: type[materials.Material]) -> str:
+    """A kind's struct, functions and loader, under the names that the integrators use."""
+    kind = cls.kind
+    reflectivity = "(m).reflectivity" if "reflectivity" in device_params(cls) else "(real)(0.0f)"
+    verbs = ("sample", "eval", "pdf", "albedo", "load", *(("pdfs",) if cls.chromatic else ()))
+    return "\n".join(
+        [
+            functions_text(cls, features.mode, features.sources),
+            kinds.load_text(cls, features.sources.get(kind, {}), "materials"),
+            f"typedef {cls.__name__} Bsdf;",
+            f"#define BSDF_REFLECTIVITY(m) {reflectivity}",
+            *(f"#define bsdf_{verb} {kind}_{verb}" for verb in verbs),
+            *_interior_text(features, cls),
+            *(_shift_text(cls) if shifts(features, cls) else ()),
+            "",
+        ]
+    )
+
+
+def _shift_text(cls: type[materials.Material]) -> list[str]:
+    """`bsdf_shift`: the wavelengths by which light comes to a surface at `row`."""
+    declared = device_params(cls)
+    before = [*declared.values()][: [*declared].index("reradiation")]
+    table = f"gather_i((scene).materials, (row) + {sum(map(kinds.words, before))})"
+    own = "&(m).reflectance, &(m).reradiation, (m).amount"
+    return [
+        '#include "lib/reradiation.cl"',
+        "#define bsdf_shift(scene, row, m, lambdas, u, depth) "
+        f"reradiation_shift(scene, {table}, {own}, lambdas, u, depth)",
+    ]
+
+
+def layout_text(layout: str) -> str:
+    """Return the traversal of a layout, whose verbs are then LAYOUT(closest), LAYOUT(occluded)."""
+    return f'#include "bvh/{layout}.cl"\n#define LAYOUT(verb) {layout}_##verb\n'
