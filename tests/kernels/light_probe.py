@@ -12,6 +12,7 @@ import pyopencl as cl
 from clpt import device
 from clpt.records import SETTINGS, SHAPE
 from clpt.render import kinds, lights, shapes, textures
+from clpt.render.arguments import scene_text
 from clpt.render.tables import STEP, Tables
 from tests.kernels.harness import opened
 
