@@ -84,7 +84,7 @@ def begin_args(features: Features) -> dict[str, str]:
     """What the stage takes that begins paths."""
     film = ["film", "bands"] if features.bands else ["film"]
     counters = {"counters": "global uint *"}
-    return {**dict.fromkeys(film, "global float *"), **counters, "first": "int ", "end": "int "}
+    return {**dict.fromkeys(film, "global float *"), **counters, "samples": "int2 "}
 
 
 def join_args(features: Features, layout: str) -> dict[str, str]:
@@ -97,7 +97,7 @@ def join_args(features: Features, layout: str) -> dict[str, str]:
 def loop_arguments(features: Features, layout: str) -> tuple[device.Argument, ...]:
     """Return what the kernel of stage/loop.cl takes: linked kernels do not tell it themselves."""
     args = {**SLAB_ARGS, **SCENE_ARGS, **trace_args(features, layout), **begin_args(features)}
-    args["turns"] = "uint "
+    args |= {"turns": "uint ", "restart": "uint "}
     return tuple(
         device.Argument(
             name,

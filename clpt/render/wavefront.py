@@ -34,6 +34,7 @@ PADDING = 80  # words between streams: powers of two collide in a cache
 GROUP = 64  # slots are a multiple of it, and it is the local size of one-lane kernels
 BATCH = 8  # bounces that are enqueued before counters are asked for
 ENDLESS = 0xFFFFFFFF  # bounces of a loop that goes on till all paths have ended
+IDLE = {"samples": (0, 0), "turns": 0, "restart": 0}  # of a loop that was asked for nothing
 CPU_SLOTS, GPU_SLOTS = 1 << 14, 1 << 20
 BRUTE_SHAPES = 32  # analytic shapes up to which all of them are tried
 QUEUE = ("queue", "counts", "queue_starts", "queue_counts")
@@ -255,7 +256,7 @@ class Wavefront:
         if rebuilt:
             self.programs = {}
         elif "loop" in made:
-            self.loop = self._bind(made["loop"].kernel, first=0, end=0, turns=ENDLESS)
+            self.loop = self._bind(made["loop"].kernel, **IDLE)
         self._bind_film()
         for name in made:
             getattr(self, name)
@@ -283,7 +284,7 @@ class Wavefront:
                     ("sort_place", chunks),
                 ):
                     made.append(_Step(name, self._bound("sort", name), (size,), None))
-            given = {"first": 0, "end": 0} if not made else {}
+            given = {"samples": (0, 0)} if not made else {}
             bound = self._bound(stage.program, stage.kernel, **given)
             made.append(_Step(stage.program, bound, *self._sizes(stage.lanes)))
         return made
@@ -294,7 +295,7 @@ class Wavefront:
         start = time.perf_counter()
         kernel = self._link(self.lowered.features, self.tree.layout).kernel("loop")
         self.seconds["programs"] += time.perf_counter() - start
-        return self._bind(kernel, first=0, end=0, turns=ENDLESS)
+        return self._bind(kernel, **IDLE)
 
     def _link(self, features: Features, layout: str) -> device.Program:
         texts = programs.loop_sources(features, layout, self.lanes)
@@ -346,8 +347,7 @@ class Wavefront:
 
     def enqueue(self, first: int, end: int) -> None:
         """Enqueue that samples first to end - 1 of every pixel are added; nothing is waited for."""
-        self._rewind()
-        self.loop.set(first=first, end=end, turns=ENDLESS)
+        self.loop.set(samples=(first, end), turns=ENDLESS, restart=1)
         size, group = self._sizes(self.lanes)
         self.timings.add("loop", self.stream.run(self.loop, size, group))
         self.exposed += end - first
@@ -365,7 +365,9 @@ class Wavefront:
         steps = self._round
         begin = steps[0].bound
         self._rewind()
-        begin.set(first=first, end=end, **({"turns": BATCH} if self.looped else {}))
+        begin.set(samples=(first, end))
+        if self.looped:
+            begin.set(turns=BATCH, restart=0)
         before, finished = self.counts.samples, True
         reads: deque[tuple[np.ndarray, cl.Event]] = deque()
         while True:
@@ -381,7 +383,7 @@ class Wavefront:
             event.wait()
             self._count(now)
             if on_batch and finished and not on_batch(self.counts):
-                begin.set(end=first)
+                begin.set(samples=(first, first))
                 finished = False
             if now[0] >= self.slots:
                 break

@@ -23,6 +23,7 @@ STAGE(emit)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
     SLABS
     SCENE
     STAGE_AT
+    int first = samples.x, end = samples.y;
     integer state = load_path_state(path, at), depth = state & PATH_DEPTH;
     mask began = (state & PATH_FRESH) == 0;
     mask missed = began & ((state & PATH_ALIVE) != 0) & (load_hit_prim(hit, at) < 0);

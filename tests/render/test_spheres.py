@@ -55,7 +55,7 @@ def nearest(balls: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.nda
     return np.where(np.isfinite(top), which, -1), top
 
 
-@pytest.mark.parametrize("layout", ["brute", "wide8"])
+@pytest.mark.parametrize("layout", [pytest.param("brute", marks=pytest.mark.slow), "wide8"])
 def test_rays_meet_the_nearest_sphere(layout: str) -> None:
     """Place, normal, number and colour of what is met, against float64."""
     image = clpt.render(SCENE, spp=1, layout=layout).reshape(48 * 48, -1)
