@@ -10,7 +10,7 @@ import re
 import threading
 import time
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import astuple, dataclass
 from typing import Any
@@ -199,24 +199,8 @@ def build(device: Device, source: Source, options: Sequence[str] = ()) -> Progra
     Raises KernelBuildError with our file and line, the log, and where the text was kept.
     """
     flags = _flags(device, options)
-    entry = _entry(device, source, flags)
-    key = (device.info.cl_device.int_ptr, entry)  # devices of one context may be alike
-    program = device.kept.find(key)
-    if program is not None:
-        return program
-    start = time.perf_counter()
     own = not has_src_build_cache(device.info.cl_device)
-    with _REMARKS:
-        program = _from_cache(device, source, flags, entry) if own else None
-        if program is None:
-            program = _from_source(device, source, flags)
-            if own:
-                cache.store(entry, _encode(program.signatures), _binary(program))
-    seconds = time.perf_counter() - start
-    device.builds.add(seconds)
-    log.debug("%s is built in %.2f s", source.name, seconds)
-    device.kept.keep(key, program)
-    return program
+    return _once(device, source, flags, own, lambda: _from_source(device, source, flags))
 
 
 def link(
@@ -232,23 +216,35 @@ def link(
     files = dict.fromkeys(file for source in sources.values() for file in source.files)
     text = "\n".join(source.text for source in sources.values())
     whole = Source(sources[main].name, text, tuple(files))
-    entry = _entry(device, whole, flags)
-    key = (device.info.cl_device.int_ptr, entry)
-    program = device.kept.find(key)
+
+    def make() -> Program:
+        linked = _linked(device, sources.values(), whole, flags)
+        return Program(whole.name, linked, signatures)
+
+    own = not _is_oclgrind(device)  # which has no compiled form
+    return _once(device, whole, flags, own, make)
+
+
+def _once(
+    device: Device, source: Source, flags: list[str], own: bool, make: Callable[[], Program]
+) -> Program:
+    """What `make` compiles, if neither the context nor, where `own`, the cache folder has it."""
+    entry = _entry(device, source, flags)
+    key = (device.info.cl_device.int_ptr, entry)  # devices of one context may be alike
+    program: Program | None = device.kept.find(key)
     if program is not None:
         return program
     start = time.perf_counter()
     with _REMARKS:
-        program = _from_cache(device, whole, flags, entry)
+        program = _from_cache(device, source, flags, entry) if own else None
         if program is None:
-            linked = _linked(device, sources.values(), whole, flags)
-            program = Program(whole.name, linked, signatures)
-            if not _is_oclgrind(device):  # it has no compiled form
+            program = make()
+            if own:  # what comes from there is compiled to the end, what was made may not be
                 cache.store(entry, _encode(program.signatures), _binary(program))
-                program = _from_cache(device, whole, flags, entry) or program
+                program = _from_cache(device, source, flags, entry) or program
     seconds = time.perf_counter() - start
     device.builds.add(seconds)
-    log.debug("%s is linked in %.2f s", whole.name, seconds)
+    log.debug("%s is built in %.2f s", source.name, seconds)
     device.kept.keep(key, program)
     return program
 
