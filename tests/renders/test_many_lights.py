@@ -7,6 +7,7 @@ import pytest
 
 import clpt
 from clpt import transforms as tf
+from clpt.device import choose
 from clpt.render import lower
 from clpt.scene import Film, Scene, materials
 from clpt.scene.cameras import Perspective
@@ -60,6 +61,10 @@ def test_the_tree_and_the_choice_by_power_agree(mode, monkeypatch):
 
 @pytest.mark.slow
 def test_lanes_agree():
-    pictures = [clpt.render(crowd("rgb"), spp=2, lanes=lanes) for lanes in (1, 8, 16)]
+    pictures = []
+    for lanes in (1, 8, 16):
+        device = choose()
+        device.lanes = lanes
+        pictures.append(clpt.render(crowd("rgb"), spp=2, device=device))
     for other in pictures[1:]:
         np.testing.assert_array_equal(pictures[0], other)
