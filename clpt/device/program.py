@@ -154,7 +154,8 @@ class Bound:
     def set(self, **named: Any) -> None:
         """Set arguments again by name. Raises TypeError as `Kernel.bind` does."""
         for name, given in named.items():
-            if isinstance(given, (int, float, tuple)) and self._given.get(name) == given:
+            plain = isinstance(given, (int, float, tuple))
+            if plain and type(given) is type(old := self._given.get(name)) and given == old:
                 continue  # a number takes longer to set than a kernel to enqueue
             if name not in self._places:
                 known = ", ".join(self._places) or "nothing"

@@ -240,6 +240,7 @@ class Wavefront:
         self.band_bytes = sizes.get("bands", 0)
         shape, image = (*self._size[::-1], 4), self.named["image"]
         self.film = device.DeviceArray(self.device.queue, shape, np.float32, data=image)
+        self._pictured: cl.Event | None = None  # the event of the last command that wrote `film`
         self._bind_film()
         self.clear()
 
@@ -347,7 +348,8 @@ class Wavefront:
 
     def enqueue(self, first: int, end: int) -> None:
         """Enqueue that samples first to end - 1 of every pixel are added; nothing is waited for."""
-        self.loop.set(samples=(first, end), turns=ENDLESS, restart=1)
+        samples = np.array([first, end], np.int32)
+        self.loop.set(samples=samples, turns=ENDLESS, restart=1)
         size, group = self._sizes(self.lanes)
         self.timings.add("loop", self.stream.run(self.loop, size, group))
         self.exposed += end - first
@@ -416,8 +418,10 @@ class Wavefront:
     def _accumulate(self) -> None:
         if self.lowered.features.light_paths:
             self.accumulate.set(samples=self.exposed)
-        self.stream.after(self.film.events)  # of who reads it
-        device.supersede(self.film, self.stream.run(self.accumulate, self._size))
+        others = [e for e in self.film.events if e is not self._pictured]  # of who reads it
+        self.stream.after(others)
+        self._pictured = self.stream.run(self.accumulate, self._size)
+        device.supersede(self.film, self._pictured)
 
     def image(self) -> np.ndarray:
         """The picture so far, (h, w, 3) float32 in the film's output space; waits for it."""
@@ -432,7 +436,7 @@ class Wavefront:
         shape = (height, width, int(self.lowered.settings["bands"]))
         return self.stream.read(self.named["band_image"], np.empty(shape, np.float32))
 
-    @property
+    @cached_property
     def _size(self) -> tuple[int, int]:
         """Width and height of the film [pixels]."""
         return int(self.lowered.settings["width"]), int(self.lowered.settings["height"])
