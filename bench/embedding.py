@@ -83,7 +83,7 @@ def measure(call: Callable[[int], cl.Event], rounds: int) -> tuple[float, float]
 
 
 @click.command(help=__doc__)
-@click.option("--rounds", default=50, show_default=True)
+@click.option("--rounds", default=300, show_default=True)
 @click.option("--json", "json_file", type=click.Path(), help="append the figures as JSON lines")
 def main(rounds: int, json_file: str | None) -> None:
     own = device.choose()
