@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -36,7 +35,7 @@ from clpt.render.memo import Memo
 from clpt.render.tables import STEP, Tables
 from clpt.render.wavelengths import Density, density, emissions
 from clpt.scene import materials as mt
-from clpt.scene.params import device_params, params
+from clpt.scene.params import device_params
 from clpt.scene.shapes import Mesh, Shape
 from clpt.spectra import Constant
 from clpt.spectra.cie import tanh_ends
@@ -318,7 +317,7 @@ class _Lowering:
         """Material words of front and back, and whether the back is turned round."""
         two_sided = _any_of(shape.material, mt.TwoSided)
         name = shapes.where(shape)
-        if two_sided and any(part.transmits for part in _parts(shape.material)):
+        if two_sided and any(part.transmits for part in mt.parts(shape.material)):
             raise SceneError(
                 "a transmissive material cannot be mixed with a two-sided one", where=name
             )
@@ -461,40 +460,23 @@ def _leaf_kinds(scene: sc.Scene) -> tuple[type[mt.Material], ...]:
     """The leaf kinds of a scene, in the order of their table; those from outside follow."""
     found: dict[type[mt.Material], str] = {}
 
-    def walk(material: Any, where: str) -> None:
-        children = [
-            getattr(material, n) for n, p in params(type(material)).items() if p.role == "host"
-        ]
-        children = [c for c in children if isinstance(c, mt.Material)]
-        if isinstance(material, mt.Mask) or material.hollow:
-            found.setdefault(mt.Null, where)
-        if not isinstance(material, mt.COMPOSITES):
-            found.setdefault(type(material), where)
-        for child in children:
-            walk(child, where)
-
     for shape in scene.shapes:
         if not isinstance(shape.material, mt.Material):
             raise SceneError(f"{shape.material!r} is not a material", where=shapes.where(shape))
         where = shapes.where(shape)
-        walk(shape.material, where)
+        for material in mt.parts(shape.material):
+            if isinstance(material, mt.Mask) or material.hollow:
+                found.setdefault(mt.Null, where)
+            if not isinstance(material, mt.COMPOSITES):
+                found.setdefault(type(material), where)
         if _any_of(shape.material, mt.TwoSided) and not isinstance(shape.material, mt.TwoSided):
             found.setdefault(mt.Diffuse, where)  # the black back of a part that is not two-sided
     return outside.ordered(found) or (mt.Diffuse,)
 
 
-def _parts(material: Any) -> Iterator[Any]:
-    """A material and those inside it."""
-    yield material
-    for name, param in params(type(material)).items():
-        inner = getattr(material, name)
-        if param.role == "host" and isinstance(inner, mt.Material):
-            yield from _parts(inner)
-
-
 def _any_of(material: Any, classes: Any) -> bool:
     """Whether a material or one inside it is of these classes."""
-    return any(isinstance(part, classes) for part in _parts(material))
+    return any(isinstance(part, classes) for part in mt.parts(material))
 
 
 def _sphere_around(vertices: np.ndarray, *boxes: np.ndarray) -> tuple[np.ndarray, float]:
