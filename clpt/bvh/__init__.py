@@ -2,7 +2,7 @@
 
 from .build import Bvh, build, build_boxes, build_parts, choose_layout, choose_tree
 from .building import Building
-from .layouts import LAYOUTS
+from .layouts import LAYOUTS, traversal_text
 from .refit import rebuild_boxes, refit, refit_boxes
 
 __all__ = [
@@ -17,4 +17,5 @@ __all__ = [
     "rebuild_boxes",
     "refit",
     "refit_boxes",
+    "traversal_text",
 ]

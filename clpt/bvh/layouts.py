@@ -168,6 +168,15 @@ BOX_LAYOUTS: dict[str, Callable[[Building, int, cl.Buffer], Packed]] = {
 }
 
 
+def traversal_text(layout: str, every: bool = False) -> str:
+    """Return the traversal of a layout, whose verbs are then LAYOUT(closest), LAYOUT(occluded).
+
+    every: the one that meets all triangles of a ray instead.
+    """
+    file = f"bvh/{layout}{'_every' * every}.cl"
+    return f'#include "{file}"\n#define LAYOUT(verb) {layout}_##verb\n'
+
+
 def _binary_part(building: Building, built: tree.Tree) -> Part:
     """Its subtrees at once, then level by level what stands above them."""
     steps = tuple(((1 << level) - 1, 1 << level) for level in reversed(range(built.levels + 1)))

@@ -13,7 +13,7 @@ import pyopencl as cl
 from numpy.typing import NDArray
 from pyopencl.array import Array
 
-from ..bvh import choose_tree
+from ..bvh import choose_tree, traversal_text
 from ..device import Bound, Device, Events, Program, Stream, assemble, build
 from ..errors import DeviceError, SceneError
 from ..records import INSTANCE
@@ -27,12 +27,12 @@ _HITS: batch.Made = {
     "barycentrics": (2, np.float32),
 }
 _TREES = ("wide8", "binary")
-_PROGRAMS = {  # of a kernel: the program that has it, and what it includes of a layout
-    "query_closest": ("bvh/query.cl", ""),
-    "query_occluded": ("bvh/query.cl", ""),
-    "query_count": ("bvh/query_every.cl", "_every"),
-    "query_every": ("bvh/query_every.cl", "_every"),
-    "place_instances": ("bvh/place.cl", ""),
+_PROGRAMS = {  # of a kernel: the program that has it, and whether it meets all triangles of a ray
+    "query_closest": ("bvh/query.cl", False),
+    "query_occluded": ("bvh/query.cl", False),
+    "query_count": ("bvh/query_every.cl", True),
+    "query_every": ("bvh/query_every.cl", True),
+    "place_instances": ("bvh/place.cl", False),
 }
 _LENT = ("origins", "directions", "t_mins", "t_maxs")
 _Self = TypeVar("_Self", bound="Queries")
@@ -231,10 +231,9 @@ class Queries:
 
     def _program(self, kernel: str) -> Program:
         """The program of a kernel, for the layout."""
-        root, what = _PROGRAMS[kernel]
-        include = f'#include "bvh/{self.layout}{what}.cl"'
+        root, every = _PROGRAMS[kernel]
         texts = {
-            "generated/layout.cl": f"{include}\n#define LAYOUT(verb) {self.layout}_##verb\n",
+            "generated/layout.cl": traversal_text(self.layout, every),
             "generated/instance_traversal.cl": self._instances_text(),
         }
         defines = {

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 
-from clpt import device
+from clpt import bvh, device
 from clpt.errors import SceneError, UnknownKindError
 from clpt.render import outside
-from clpt.render.stage_texts import functions_text, layout_text
+from clpt.render.stage_texts import functions_text
 from clpt.scene.integrators import SAMPLERS
 from clpt.scene.materials import LEAVES, Material
 
@@ -58,7 +58,7 @@ def kernel_source(
     virtual: dict[str, str | device.Part] = {
         "generated/spectrum.cl": f'#include "spectrum/{mode}.cl"\n',
         "generated/sampler.cl": f'#include "sampler/{sampler}.cl"\n',
-        "generated/layout.cl": layout_text(layout),
+        "generated/layout.cl": bvh.traversal_text(layout),
     }
     files: list[str] = []
     for part in parts:

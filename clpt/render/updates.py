@@ -14,7 +14,8 @@ from clpt import bvh
 from clpt.errors import SceneError
 from clpt.records import TABLES
 from clpt.render.lower import Lowered
-from clpt.render.wavefront import QUEUE, Wavefront
+from clpt.render.resident import QUEUE
+from clpt.render.wavefront import Wavefront
 
 log = logging.getLogger(__name__)
 

@@ -18,28 +18,20 @@ from typing import Any
 import numpy as np
 import pyopencl as cl
 
-from clpt import bvh, device
-from clpt.device.buffers import Buffers
+from clpt import device
 from clpt.device.timing import Timings
-from clpt.errors import MemoryBudgetError, SceneError
-from clpt.records import PATH, SLABS, TABLES
+from clpt.errors import MemoryBudgetError
+from clpt.records import PATH
 from clpt.render import arguments, programs
 from clpt.render.features import Features
 from clpt.render.lower import Lowered
+from clpt.render.resident import CHUNK, COUNTERS, GROUP, Resident
 
 FILM_WORDS = 7  # kernels/lib/film.cl
 FRESH = 0x2000  # kernels/lib/path_state.cl
-COUNTERS = ("done", "samples", "closest", "shadow", "rejected")
-PADDING = 80  # words between streams: powers of two collide in a cache
-GROUP = 64  # slots are a multiple of it, and it is the local size of one-lane kernels
 BATCH = 8  # bounces that are enqueued before counters are asked for
 ENDLESS = 0xFFFFFFFF  # bounces of a loop that goes on till all paths have ended
 IDLE = {"samples": (0, 0), "turns": 0, "restart": 0}  # of a loop that was asked for nothing
-CPU_SLOTS, GPU_SLOTS = 1 << 14, 1 << 20
-BRUTE_SHAPES = 32  # analytic shapes up to which all of them are tried
-QUEUE = ("queue", "counts", "queue_starts", "queue_counts")
-SORT = ("sort_count", "sort_scan", "sort_place")
-CHUNK = 256  # slots that a work-item of the sort counts
 
 
 @dataclass
@@ -66,59 +58,21 @@ class _Step:
     group: tuple[int] | None
 
 
-class Wavefront:
+class Wavefront(Resident):
     """The device side of a render: buffers, programs, and `expose`, which runs the bounce loop.
 
-    layout: of the triangles, None for what suits the device; slots: paths in flight, None likewise;
-    queued: whether shading is sorted, None likewise; looped: whether `expose` too uses the loop on
-    the device.
+    looped: whether `expose` too uses the loop on the device; sizes: see `Resident`.
 
     Raises MemoryBudgetError, KernelBuildError, DeviceError.
     """
 
-    def __init__(
-        self,
-        on: device.Device,
-        lowered: Lowered,
-        *,
-        layout: str | None = None,
-        slots: int | None = None,
-        queued: bool | None = None,
-        looped: bool = False,
-    ):
-        self.device, self.lowered = on, lowered
-        self.counts = Counts()
-        self.moved: set[str] = set()  # tables that hold something else than `lowered`
-        self.stream = device.Stream(on.queue)
-        self.timings = Timings(on.queue)
-        self.buffers = Buffers(on)
-        self._wanted, self.looped = (layout, queued), looped
-        layout, self.queued = self.suited(lowered)
+    def __init__(self, on: device.Device, lowered: Lowered, *, looped: bool = False, **sizes: Any):
+        super().__init__(on, lowered, **sizes)
+        self.looped = looped
         self.lanes = on.lanes
+        self.timings = Timings(on.queue)
         self.programs: dict[str, device.Program] = {}
-        self.seconds = {"programs": 0.0}
-        self._place_slots(slots or (CPU_SLOTS if on.info.is_cpu else GPU_SLOTS))
-        self._allocate(layout)
         self._expose_new()
-
-    def suited(self, lowered: Lowered) -> tuple[str, bool]:
-        """The layout for a scene and whether shading is sorted: as asked, or as suits the device.
-
-        Raises SceneError for a layout that cannot hold the scene.
-        """
-        layout, queued = self._wanted
-        features, on = lowered.features, self.device
-        if layout is None:
-            layout = bvh.choose_layout(on, len(lowered.faces))
-            many = len(lowered.boxes) > BRUTE_SHAPES or features.instances
-            if layout == "brute" and many:
-                layout = "wide8" if on.info.is_cpu else "binary"
-        elif layout == "brute" and features.instances:
-            raise SceneError("the layout brute holds no instances; choose wide8 or binary")
-        kinds = len(features.materials)
-        if queued is None:
-            queued = kinds > 1 and (not on.info.is_cpu or kinds > 4)
-        return layout, queued
 
     def sibling(self, channel: str) -> Wavefront:
         """Another film of the same scene, for another channel of the `aov` integrator.
@@ -129,97 +83,11 @@ class Wavefront:
         features = dataclasses.replace(self.lowered.features, channel=channel)
         other.lowered = dataclasses.replace(self.lowered, features=features)
         other.named = dict(self.named)
-        shared = {n: program for n, program in self.programs.items() if not n.startswith("shade_")}
-        other.programs = shared
+        other.programs = {n: p for n, p in self.programs.items() if not n.startswith("shade_")}
         for made in ("stages", "loop"):
             other.__dict__.pop(made, None)
         other._expose_new()
         return other
-
-    def _place_slots(self, wanted: int) -> None:
-        """Divide the film among slots: as many as wanted, or as memory allows."""
-        settings = self.lowered.settings
-        places = int(settings["places"])
-        words = sum(record.words for record in SLABS) + 2
-        largest = max(record.words for record in SLABS)
-        room = min(
-            self.buffers.limit // 2 // (4 * words), self.device.info.max_alloc // 4 // largest
-        )
-        wanted = min(wanted, int(room) - PADDING)
-        if wanted < GROUP:
-            raise MemoryBudgetError(
-                "the least number of paths", 4 * words * GROUP, self.buffers.limit,
-                "close other programs or choose another device",
-            )  # fmt: skip
-        whole = -(-places // GROUP) * GROUP
-        per_plane = min(wanted // GROUP * GROUP, whole)
-        planes = max(1, wanted // whole) if per_plane == whole else 1
-        settings["per_plane"], settings["planes"] = per_plane, planes
-        settings["slots"] = per_plane * planes
-        self.slots, self.stride = per_plane * planes, per_plane * planes + PADDING
-
-    def _allocate(self, layout: str) -> None:
-        lowered, give = self.lowered, self.buffers
-        settings = lowered.settings
-        self.named: dict[str, Any] = {"stride": self.stride}
-        for name in TABLES:
-            self.named[name] = lowered.lent.get(name) or give.upload(
-                f"the table of {name}", lowered.table(name)
-            )
-        self.build_triangles(layout)
-        self.build_boxes()
-        for record in SLABS:
-            name = f"{record.name.lower()}_words"
-            advice = "lower the number of slots"
-            self.named[name] = give.allocate(name, 4 * record.words * self.stride, advice)
-            self.stream.fill(self.named[name], 0, 0, 4 * record.words * self.stride)
-        self.named["counters"] = give.allocate("the counters", 4 * len(COUNTERS))
-        self.named["settings"] = give.upload("the settings", settings.reshape(1).view(np.uint32))
-        self.allocate_queue()
-
-    def allocate_queue(self) -> None:
-        """What sorting by material works on, where there is sorting."""
-        if self.queued:
-            give, kinds = self.buffers, len(self.lowered.features.materials)
-            chunks = -(-self.slots // CHUNK)
-            sizes = self.slots, chunks * kinds, kinds, kinds
-            for name, words in zip(QUEUE, sizes, strict=True):
-                self.named[name] = give.allocate("the sort", 4 * words)
-            self.named.update(chunk=CHUNK, chunks=chunks, slots=self.slots)
-
-    def build_triangles(self, layout: str) -> None:
-        """The trees over triangles, of the world and of every group."""
-        start = time.perf_counter()
-        lowered, instances = self.lowered, self.lowered.instances
-        vertices = self.named["vertices"] if len(lowered.faces) else lowered.vertices
-        counts = [len(lowered.faces) - sum(instances.triangles), *instances.triangles]
-        for name in ("tris", "nodes", "leaves"):  # of the tree before
-            self.named.pop(name, None)
-        self.tree, self._begins = bvh.build_parts(
-            self.device, vertices, lowered.faces, lowered.tags, counts, layout
-        )
-        self.named.update(self.tree.buffers, triangles=max(self.tree.count, 0))
-        self.seconds["trees"] = time.perf_counter() - start
-
-    def build_boxes(self) -> None:
-        """Trees over analytic shapes and instances, which learn where their triangles begin."""
-        start = time.perf_counter()
-        lowered, instances, layout = self.lowered, self.lowered.instances, self.tree.layout
-        self.box_trees = {}
-        if lowered.features.analytic and layout != "brute":
-            self.box_trees["shape"] = bvh.build_boxes(self.device, lowered.boxes)
-        if lowered.features.instances:
-            self.box_trees["instance"] = bvh.build_boxes(self.device, instances.boxes, layout)
-            indices = self.box_trees["instance"].buffers["indices"]
-            order = self.buffers.download(indices, (len(instances.rows),), np.uint32)
-            rows = instances.rows[order]  # as the leaves, so that neighbours are near each other
-            rows["nodes"], rows["leaves"] = self._begins[1 + instances.prototypes[order]].T
-            words = rows.view(np.uint32)
-            self.named["instances"] = self.buffers.upload("the table of instances", words)
-            self.instances, self.instance_order = rows, order
-        for name, tree in self.box_trees.items():
-            self.named |= {f"{name}_{part}": buffer for part, buffer in tree.buffers.items()}
-        self.seconds["trees"] += time.perf_counter() - start
 
     def _expose_new(self) -> None:
         """A film and a picture of its own, and kernels bound to them."""
@@ -246,7 +114,7 @@ class Wavefront:
 
     def _bind_film(self) -> None:
         """The kernels that make a picture of the film."""
-        self._build("accumulate", *(["bands"] if self.band_bytes else []))
+        self._build(programs.film_sources(self.lowered.features, self.tree.layout))
         self.accumulate = self._bound("accumulate", "accumulate", samples=0.0)
         if self.band_bytes:
             self.accumulate_bands = self._bound("bands", "accumulate_bands")
@@ -262,19 +130,21 @@ class Wavefront:
         for name in made:
             getattr(self, name)
 
-    def _build(self, *wanted: str) -> None:
-        """Build the programs of these names that are not there yet; all, if none is named."""
+    def _build(self, texts: dict[str, device.Source]) -> None:
+        """Build the programs of these that are not there yet."""
         start = time.perf_counter()
-        features, layout = self.lowered.features, self.tree.layout
-        texts = programs.sources(features, layout, self.lanes, queued=self.queued)
-        missing = {n: texts[n] for n in wanted or texts if n not in self.programs}
+        missing = {n: text for n, text in texts.items() if n not in self.programs}
         self.programs |= device.build_all(self.device, missing)
         self.seconds["programs"] += time.perf_counter() - start
+
+    def _texts(self) -> dict[str, device.Source]:
+        features, layout = self.lowered.features, self.tree.layout
+        return programs.sources(features, layout, self.lanes, queued=self.queued)
 
     @cached_property
     def stages(self) -> list[_Step]:
         """The kernels of a bounce in their order, for a host that enqueues bounce after bounce."""
-        self._build()
+        self._build(self._texts())
         made: list[_Step] = []
         chunks = -(-self.slots // CHUNK)
         for stage in programs.order(self.lowered.features, self.tree.layout, self.lanes):
@@ -305,12 +175,12 @@ class Wavefront:
 
     def build_ahead(self, features: Features, layout: str, queued: bool) -> None:
         """Build for other features the programs that are in use, so that it fails here or never."""
+        device.build_all(self.device, programs.film_sources(features, layout))
         if "loop" in vars(self):
             self._link(features, layout)
         if "stages" in vars(self):
-            device.build_all(
-                self.device, programs.sources(features, layout, self.lanes, queued=queued)
-            )
+            texts = programs.sources(features, layout, self.lanes, queued=queued)
+            device.build_all(self.device, texts)
 
     @property
     def _round(self) -> list[_Step]:
@@ -409,11 +279,6 @@ class Wavefront:
         self._seen = now
         for name, n in zip(COUNTERS[1:], new[1:].tolist(), strict=True):
             setattr(self.counts, name, getattr(self.counts, name) + n)
-
-    def count(self) -> Counts:
-        """The counts of all that was enqueued; waits for it."""
-        self._count(self.stream.read(self.named["counters"], np.empty(len(COUNTERS), np.uint32)))
-        return self.counts
 
     def _accumulate(self) -> None:
         if self.lowered.features.light_paths:

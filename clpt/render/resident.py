@@ -1,0 +1,154 @@
+"""A lowered scene on a device: its tables and trees, and the slabs of the paths in flight."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+
+from clpt import bvh, device
+from clpt.device.buffers import Buffers
+from clpt.errors import MemoryBudgetError, SceneError
+from clpt.records import SLABS, TABLES
+from clpt.render.lower import Lowered
+
+COUNTERS = ("done", "samples", "closest", "shadow", "rejected")
+PADDING = 80  # words between streams: powers of two collide in a cache
+GROUP = 64  # slots are a multiple of it, and it is the local size of one-lane kernels
+CPU_SLOTS, GPU_SLOTS = 1 << 14, 1 << 20
+BRUTE_SHAPES = 32  # analytic shapes up to which all of them are tried
+QUEUE = ("queue", "counts", "queue_starts", "queue_counts")
+CHUNK = 256  # slots that a work-item of the sort counts
+
+
+class Resident:
+    """What a scene is on a device, by the names of the kernels' arguments in `named`.
+
+    layout: of the triangles, None for what suits the device; slots: paths in flight, None likewise;
+    queued: whether shading is sorted, None likewise.
+
+    Raises MemoryBudgetError, DeviceError, SceneError for a layout that cannot hold the scene.
+    """
+
+    def __init__(
+        self,
+        on: device.Device,
+        lowered: Lowered,
+        layout: str | None = None,
+        slots: int | None = None,
+        queued: bool | None = None,
+    ):
+        self.device, self.lowered = on, lowered
+        self.moved: set[str] = set()  # tables that hold something else than `lowered`
+        self.stream = device.Stream(on.queue)
+        self.buffers = Buffers(on)
+        self.seconds = {"programs": 0.0}
+        self._wanted = layout, queued
+        layout, self.queued = self.suited(lowered)
+        self._place_slots(slots or (CPU_SLOTS if on.info.is_cpu else GPU_SLOTS))
+        self._allocate(layout)
+
+    def suited(self, lowered: Lowered) -> tuple[str, bool]:
+        """The layout for a scene and whether shading is sorted: as asked, or as suits the device.
+
+        Raises SceneError for a layout that cannot hold the scene.
+        """
+        layout, queued = self._wanted
+        features, on = lowered.features, self.device
+        if layout is None:
+            layout = bvh.choose_layout(on, len(lowered.faces))
+            many = len(lowered.boxes) > BRUTE_SHAPES or features.instances
+            if layout == "brute" and many:
+                layout = "wide8" if on.info.is_cpu else "binary"
+        elif layout == "brute" and features.instances:
+            raise SceneError("the layout brute holds no instances; choose wide8 or binary")
+        kinds = len(features.materials)
+        if queued is None:
+            queued = kinds > 1 and (not on.info.is_cpu or kinds > 4)
+        return layout, queued
+
+    def _place_slots(self, wanted: int) -> None:
+        """Divide the film among slots: as many as wanted, or as memory allows."""
+        settings = self.lowered.settings
+        places = int(settings["places"])
+        words = sum(record.words for record in SLABS) + 2
+        largest = max(record.words for record in SLABS)
+        room = min(
+            self.buffers.limit // 2 // (4 * words), self.device.info.max_alloc // 4 // largest
+        )
+        wanted = min(wanted, int(room) - PADDING)
+        if wanted < GROUP:
+            raise MemoryBudgetError(
+                "the least number of paths", 4 * words * GROUP, self.buffers.limit,
+                "close other programs or choose another device",
+            )  # fmt: skip
+        whole = -(-places // GROUP) * GROUP
+        per_plane = min(wanted // GROUP * GROUP, whole)
+        planes = max(1, wanted // whole) if per_plane == whole else 1
+        settings["per_plane"], settings["planes"] = per_plane, planes
+        settings["slots"] = per_plane * planes
+        self.slots, self.stride = per_plane * planes, per_plane * planes + PADDING
+
+    def _allocate(self, layout: str) -> None:
+        lowered, give = self.lowered, self.buffers
+        settings = lowered.settings
+        self.named: dict[str, Any] = {"stride": self.stride}
+        for name in TABLES:
+            self.named[name] = lowered.lent.get(name) or give.upload(
+                f"the table of {name}", lowered.table(name)
+            )
+        self.build_triangles(layout)
+        self.build_boxes()
+        for record in SLABS:
+            name = f"{record.name.lower()}_words"
+            advice = "lower the number of slots"
+            self.named[name] = give.allocate(name, 4 * record.words * self.stride, advice)
+            self.stream.fill(self.named[name], 0, 0, 4 * record.words * self.stride)
+        self.named["counters"] = give.allocate("the counters", 4 * len(COUNTERS))
+        self.named["settings"] = give.upload("the settings", settings.reshape(1).view(np.uint32))
+        self.allocate_queue()
+
+    def allocate_queue(self) -> None:
+        """What sorting by material works on, where there is sorting."""
+        if self.queued:
+            give, kinds = self.buffers, len(self.lowered.features.materials)
+            chunks = -(-self.slots // CHUNK)
+            sizes = self.slots, chunks * kinds, kinds, kinds
+            for name, words in zip(QUEUE, sizes, strict=True):
+                self.named[name] = give.allocate("the sort", 4 * words)
+            self.named.update(chunk=CHUNK, chunks=chunks, slots=self.slots)
+
+    def build_triangles(self, layout: str) -> None:
+        """The trees over triangles, of the world and of every group."""
+        start = time.perf_counter()
+        lowered, instances = self.lowered, self.lowered.instances
+        vertices = self.named["vertices"] if len(lowered.faces) else lowered.vertices
+        counts = [len(lowered.faces) - sum(instances.triangles), *instances.triangles]
+        for name in ("tris", "nodes", "leaves"):  # of the tree before
+            self.named.pop(name, None)
+        self.tree, self._begins = bvh.build_parts(
+            self.device, vertices, lowered.faces, lowered.tags, counts, layout
+        )
+        self.named.update(self.tree.buffers, triangles=max(self.tree.count, 0))
+        self.seconds["trees"] = time.perf_counter() - start
+
+    def build_boxes(self) -> None:
+        """Trees over analytic shapes and instances, which learn where their triangles begin."""
+        start = time.perf_counter()
+        lowered, instances, layout = self.lowered, self.lowered.instances, self.tree.layout
+        self.box_trees = {}
+        if lowered.features.analytic and layout != "brute":
+            self.box_trees["shape"] = bvh.build_boxes(self.device, lowered.boxes)
+        if lowered.features.instances:
+            self.box_trees["instance"] = bvh.build_boxes(self.device, instances.boxes, layout)
+            indices = self.box_trees["instance"].buffers["indices"]
+            order = self.buffers.download(indices, (len(instances.rows),), np.uint32)
+            rows = instances.rows[order]  # as the leaves, so that neighbours are near each other
+            rows["nodes"], rows["leaves"] = self._begins[1 + instances.prototypes[order]].T
+            words = rows.view(np.uint32)
+            self.named["instances"] = self.buffers.upload("the table of instances", words)
+            self.instances, self.instance_order = rows, order
+        for name, tree in self.box_trees.items():
+            self.named |= {f"{name}_{part}": buffer for part, buffer in tree.buffers.items()}
+        self.seconds["trees"] += time.perf_counter() - start
