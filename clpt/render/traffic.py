@@ -94,9 +94,7 @@ def _kept(lines: list[str]) -> Iterator[str]:
 
 def _holds(condition: str, defined: dict[str, str]) -> bool:
     """Whether a condition of numbers, names, comparisons and && || ! holds."""
-    text = re.sub(
-        r"\bdefined\s*\(?\s*(\w+)\s*\)?", lambda m: str(int(m[1] in defined)), condition
-    )
+    text = re.sub(r"\bdefined\s*\(?\s*(\w+)\s*\)?", lambda m: str(int(m[1] in defined)), condition)
     text = re.sub(r"\b\w+\(\w+\)", "0", text)  # __has_attribute(...), __has_builtin(...)
     for _ in range(4):  # names that stand for names
         text = re.sub(r"\b[A-Za-z_]\w*\b", lambda m: defined.get(m[0], "0") or "0", text)
