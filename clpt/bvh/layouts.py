@@ -86,7 +86,7 @@ def binary(building: Building, mesh: Mesh) -> Packed:
 
 def wide8(building: Building, mesh: Mesh) -> Packed:
     """The binary tree made 8 wide, and blocks of 8 triangles."""
-    built = _binary_tree(building, mesh, _BLOCK)
+    built = _binary_tree(building, mesh, _BLOCK, at_once=_BLOCK)
     wide = _collapse(building, mesh.count, built)
     blocks = building.allocate(352 * wide.leaves)
     source = {"vertices": mesh.vertices, "faces": mesh.faces, "tags": mesh.tags}
@@ -183,6 +183,6 @@ def _binary_part(building: Building, built: tree.Tree) -> Part:
     return Part(built.count, built.reach(building), steps, built.ranges)
 
 
-def _binary_tree(building: Building, mesh: Mesh, leaf_size: int) -> tree.Tree:
+def _binary_tree(building: Building, mesh: Mesh, leaf_size: int, at_once: int = 1) -> tree.Tree:
     items, parts = tree.items_of_triangles(building, mesh.count, mesh.vertices, mesh.faces)
-    return tree.over(building, mesh.count, items, parts, leaf_size)
+    return tree.over(building, mesh.count, items, parts, leaf_size, at_once)
