@@ -2,11 +2,12 @@
 
 from .build import Bvh, build, build_boxes, build_parts, choose_layout, choose_tree
 from .building import Building
-from .layouts import LAYOUTS, traversal_text
+from .layouts import LAYOUTS, TREES, traversal_text
 from .refit import rebuild_boxes, refit, refit_boxes
 
 __all__ = [
     "LAYOUTS",
+    "TREES",
     "Building",
     "Bvh",
     "build",

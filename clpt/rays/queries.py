@@ -13,7 +13,7 @@ import pyopencl as cl
 from numpy.typing import NDArray
 from pyopencl.array import Array
 
-from ..bvh import choose_tree, traversal_text
+from ..bvh import TREES, choose_tree, traversal_text
 from ..device import Bound, Device, Events, Program, Stream, assemble, build
 from ..errors import DeviceError, SceneError
 from ..records import INSTANCE
@@ -26,7 +26,6 @@ _HITS: batch.Made = {
     "primitive": (0, np.int32),
     "barycentrics": (2, np.float32),
 }
-_TREES = ("wide8", "binary")
 _PROGRAMS = {  # of a kernel: the program that has it, and whether it meets all triangles of a ray
     "query_closest": ("bvh/query.cl", False),
     "query_occluded": ("bvh/query.cl", False),
@@ -81,8 +80,8 @@ class Queries:
         self.queue = queue
         self.device = Device.adopt(queue)
         self.layout = choose_tree(self.device) if layout is None else layout
-        if self.layout not in _TREES:
-            raise SceneError(f"{layout!r} is none of {', '.join(_TREES)}", where="layout")
+        if self.layout not in TREES:
+            raise SceneError(f"{layout!r} is none of {', '.join(TREES)}", where="layout")
         self._where = queue.context, self.device.info.is_cpu
         self._stream = Stream(queue)
         self._lock = threading.RLock()

@@ -11,7 +11,6 @@ from clpt.render.stage_texts import functions_text
 from clpt.scene.integrators import SAMPLERS
 from clpt.scene.materials import LEAVES, Material
 
-LAYOUTS = ("wide8", "binary")  # that have a tree
 LANES = (1, 8, 16)
 _MATH = ("lib/lanes.cl", "lib/math.cl")
 _SPECTRUM = (*_MATH, "generated/spectrum.cl", "lib/spectrum.cl")
@@ -50,7 +49,7 @@ def kernel_source(
     Raises SceneError for an option that is not there, UnknownKindError for such a part.
     """
     options = {"mode": (mode, ("rgb", "spectral")), "lanes": (lanes, LANES)}
-    options |= {"layout": (layout, LAYOUTS)}
+    options |= {"layout": (layout, bvh.TREES)}
     options |= {"sampler": (sampler, tuple(cls.kind for cls in SAMPLERS))}
     for name, (given, known) in options.items():
         if given not in known:

@@ -60,9 +60,11 @@ class Resident:
             layout = bvh.choose_layout(on, len(lowered.faces))
             many = len(lowered.boxes) > BRUTE_SHAPES or features.instances
             if layout == "brute" and many:
-                layout = "wide8" if on.info.is_cpu else "binary"
+                layout = bvh.choose_tree(on)
         elif layout == "brute" and features.instances:
-            raise SceneError("the layout brute holds no instances; choose wide8 or binary")
+            raise SceneError(
+                f"the layout brute holds no instances; choose {' or '.join(bvh.TREES)}"
+            )
         kinds = len(features.materials)
         if queued is None:
             queued = kinds > 1 and (not on.info.is_cpu or kinds > 4)

@@ -1,0 +1,195 @@
+/* Traversal of the compressed 8-wide tree (Ylitie, Karras and Laine 2017), one ray a work-item: the layout for
+ * GPUs, which wait for memory more than they compute.
+ *
+ * A node is 20 words: a corner p (3 floats); the exponents of three steps, a byte each, and in the highest
+ * byte which slots hold nodes; the first child node; the first item; 8 bytes that tell of the slots; then 8
+ * bytes each for low x, low y, low z, high x, high y, high z of the slots' boxes, in steps from p. What a
+ * node has below it are neighbours, in the order of its slots: nodes among nodes, items among items.
+ *
+ * A slot's byte is 0 where there is nothing. Bits 0 to 4 say which bit of a word stands for it: of a node
+ * 24 + slot, of items, 3 at most, the first of theirs among the node's 24. Bits 5 to 7 are as many ones.
+ * Slot i stands where its box has more of x, y, z by bits 0, 1, 2 of i, so that a ray finds the nearer ones
+ * first when it goes through the slots in the order of i xor its octant.
+ *
+ * `leaves` holds 12 words an item: three corners, prim, tag, one unused. */
+#include "bvh/hit.cl"
+#include "bvh/ray.cl"
+#include "bvh/shear.cl"
+
+#define COMPACT_NODES 0xff000000u /* of a group: the slots with nodes that wait */
+
+typedef struct {
+    float3 o, r;     /* r = 1 / d */
+    float tmin;
+    uint octant;     /* bits 0, 1, 2: x, y, z grow along the ray */
+    uint octants;    /* the same in every byte */
+} CompactRay;
+
+/* A ray on its way: nodes that wait, of one parent each. A group's x is the first child node of the parent; of y
+ * the highest byte says which of them wait, in the ray's order, and the lowest which there are, by slot. */
+typedef struct {
+    uint2 group, waiting[BVH_DEPTH];
+    uint waits;
+} CompactWay;
+
+inline CompactRay compact_ray(float ox, float oy, float oz, float dx, float dy, float dz, float tmin)
+{
+    uint octant = (uint)(dx >= 0.0f) | (uint)(dy >= 0.0f) << 1 | (uint)(dz >= 0.0f) << 2;
+    CompactRay r = {(float3)(ox, oy, oz),
+                    (float3)(ray_reciprocal(dx), ray_reciprocal(dy), ray_reciprocal(dz)), tmin, octant,
+                    octant * 0x01010101u};
+    return r;
+}
+
+inline void compact_begin(CompactWay *way)
+{
+    way->group = (uint2)(0u, 0x80000000u);
+    way->waits = 0;
+}
+
+inline float4 compact_min(float4 a, float4 b) { return a < b ? a : b; }
+inline float4 compact_max(float4 a, float4 b) { return a > b ? a : b; }
+
+inline float4 compact_bytes(uint word) { return convert_float4(as_uchar4(word)); }
+
+/* The corners of the box around everything. */
+inline void compact_bounds(global const float *nodes, float3 *low, float3 *high)
+{
+    global const uint *node = (global const uint *)nodes;
+    global const uchar *bytes = (global const uchar *)(node + 6);
+    float lows[3], highs[3];
+    for (uint axis = 0; axis < 3; axis++) {
+        float step = as_float((node[3] >> 8 * axis & 0xffu) << 23);
+        lows[axis] = INFINITY;
+        highs[axis] = -INFINITY;
+        for (uint slot = 0; slot < 8; slot++) {
+            uchar first = bytes[8 + 8 * axis + slot], last = bytes[32 + 8 * axis + slot];
+            if (bytes[slot] == 0 || first > last) continue;
+            lows[axis] = ray_min(lows[axis], nodes[axis] + first * step);
+            highs[axis] = ray_max(highs[axis], nodes[axis] + last * step);
+        }
+        lows[axis] -= fabs(lows[axis]) * 0x1p-22f; /* the sums were rounded */
+        highs[axis] += fabs(highs[axis]) * 0x1p-22f;
+    }
+    *low = (float3)(lows[0], lows[1], lows[2]);
+    *high = (float3)(highs[0], highs[1], highs[2]);
+}
+
+/* Of four slots the bits of those whose box the ray meets between tmin and t. `near` and `far`: the bytes of
+ * their planes; planes are at step * byte + begin along the ray. */
+inline uint compact_boxes(const CompactRay *r, float t, float3 step, float3 begin, uint3 near, uint3 far,
+                          uint meta)
+{
+    float4 x = mad(compact_bytes(near.x), step.x, begin.x), far_x = mad(compact_bytes(far.x), step.x, begin.x);
+    float4 y = mad(compact_bytes(near.y), step.y, begin.y), far_y = mad(compact_bytes(far.y), step.y, begin.y);
+    float4 z = mad(compact_bytes(near.z), step.z, begin.z), far_z = mad(compact_bytes(far.z), step.z, begin.z);
+    float4 entry = compact_max(compact_max(x, y), compact_max(z, (float4)(r->tmin)));
+    float4 exit = compact_min(compact_min(far_x, far_y), far_z);
+    exit = compact_min(compact_max(exit, exit * RAY_WIDER), (float4)(t));
+    uint inner = (meta & meta << 1 & 0x10101010u) >> 4; /* 1 in the bytes of nodes */
+    uint4 shift = (uint4)(0, 8, 16, 24);
+    uint4 at = (uint4)(meta ^ (r->octants & inner * 7u)) >> shift & 31u;
+    uint4 bits = ((uint4)(meta >> 5) >> shift & 7u) << at;
+    bits &= as_uint4(entry <= exit);
+    return bits.x | bits.y | bits.z | bits.w;
+}
+
+/* Looks into the next node on the way: the items that the ray may meet there are bits 0 to 23 of items->y,
+ * counted from items->x. Returns 0 if there was no node left. */
+inline int compact_next(global const float *nodes, const CompactRay *r, float t, CompactWay *way, uint2 *items)
+{
+    uint2 group = way->group;
+    if (group.y < 1u << 24) {
+        if (!way->waits) return 0;
+        group = way->waiting[--way->waits];
+    }
+    uint bit = 31 - clz(group.y);
+    group.y ^= 1u << bit;
+    if (group.y >= 1u << 24) way->waiting[way->waits++] = group;
+    uint slot = (bit - 24) ^ r->octant;
+    uint at = group.x + popcount(group.y & ((1u << slot) - 1) & 0xffu);
+
+    global const uint4 *node = (global const uint4 *)nodes + (ulong)at * (COMPACT_WORDS / 4);
+    uint4 a = node[0], b = node[1], c = node[2], d = node[3], e = node[4];
+    float3 begin = (as_float3(a.xyz) - r->o) * r->r;
+    float3 step = as_float3((uint3)(a.w << 23, a.w << 15, a.w << 7) & 0x7f800000u) * r->r;
+    int x = r->r.x < 0.0f, y = r->r.y < 0.0f, z = r->r.z < 0.0f;
+    uint3 low = (uint3)(c.x, c.z, d.x), high = (uint3)(d.z, e.x, e.z);
+    uint3 near = (uint3)(x ? high.x : low.x, y ? high.y : low.y, z ? high.z : low.z);
+    uint3 far = (uint3)(x ? low.x : high.x, y ? low.y : high.y, z ? low.z : high.z);
+    uint bits = compact_boxes(r, t, step, begin, near, far, b.z);
+    low = (uint3)(c.y, c.w, d.y);
+    high = (uint3)(d.w, e.y, e.w);
+    near = (uint3)(x ? high.x : low.x, y ? high.y : low.y, z ? high.z : low.z);
+    far = (uint3)(x ? low.x : high.x, y ? low.y : high.y, z ? low.z : high.z);
+    bits |= compact_boxes(r, t, step, begin, near, far, b.w);
+    way->group = (uint2)(b.x, (bits & COMPACT_NODES) | a.w >> 24);
+    *items = (uint2)(b.y, bits & ~COMPACT_NODES);
+    return 1;
+}
+
+/* The first of the items that are left, which is then no longer among them. */
+inline uint compact_item(uint2 *items)
+{
+    uint bit = 31 - clz(items->y);
+    items->y ^= 1u << bit;
+    return items->x + bit;
+}
+
+inline TriHit compact_hit(global const float *leaves, uint item, float t, float u, float v)
+{
+    global const float *c = leaves + (ulong)item * 12;
+    float e1x = c[3] - c[0], e1y = c[4] - c[1], e1z = c[5] - c[2];
+    float e2x = c[6] - c[0], e2y = c[7] - c[1], e2z = c[8] - c[2];
+    TriHit hit = {t, u, v, as_uint(c[9]), as_uint(c[10]),
+                  e1y * e2z - e1z * e2y, e1z * e2x - e1x * e2z, e1x * e2y - e1y * e2x};
+    return hit;
+}
+
+inline TriHit compact_closest(global const float *nodes, global const float *leaves, float ox, float oy,
+                              float oz, float dx, float dy, float dz, float tmin, float tmax)
+{
+    if (!ray_finite(ox, oy, oz, dx, dy, dz)) return tri_miss(tmax);
+    CompactRay r = compact_ray(ox, oy, oz, dx, dy, dz, tmin);
+    Shear shear = shear_make(ox, oy, oz, dx, dy, dz);
+    CompactWay way;
+    uint2 items;
+    uint best = BVH_MISS;
+    float t = tmax, u = 0.0f, v = 0.0f;
+    compact_begin(&way);
+    while (compact_next(nodes, &r, t, &way, &items)) {
+        while (items.y) {
+            uint item = compact_item(&items);
+            float at, b1, b2;
+            int inside = shear_intersect(&shear, leaves + (ulong)item * 12, 1, &at, &b1, &b2);
+            if (inside && at > tmin && at < t) {
+                t = at;
+                u = b1;
+                v = b2;
+                best = item;
+            }
+        }
+    }
+    return best == BVH_MISS ? tri_miss(tmax) : compact_hit(leaves, best, t, u, v);
+}
+
+/* Whether anything is between tmin and tmax. */
+inline int compact_occluded(global const float *nodes, global const float *leaves, float ox, float oy,
+                            float oz, float dx, float dy, float dz, float tmin, float tmax)
+{
+    if (!ray_finite(ox, oy, oz, dx, dy, dz)) return 0;
+    CompactRay r = compact_ray(ox, oy, oz, dx, dy, dz, tmin);
+    Shear shear = shear_make(ox, oy, oz, dx, dy, dz);
+    CompactWay way;
+    uint2 items;
+    compact_begin(&way);
+    while (compact_next(nodes, &r, tmax, &way, &items)) {
+        while (items.y) {
+            float at, u, v;
+            uint item = compact_item(&items);
+            int inside = shear_intersect(&shear, leaves + (ulong)item * 12, 1, &at, &u, &v);
+            if (inside && at > tmin && at < tmax) return 1;
+        }
+    }
+    return 0;
+}

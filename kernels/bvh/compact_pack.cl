@@ -1,0 +1,87 @@
+/* From the collapse of a binary tree to the compressed nodes of compact.cl, but for their boxes and the corners
+ * of triangles: those refit.cl finds, which goes on from here.
+ *
+ * Siblings change places, for they stand in the order of their slots. So `places` keeps of every node its
+ * number in the collapse, and the first item of those below it: a node has its own items first, then come
+ * those of its children, one after the other. */
+#include "bvh/apart.cl"
+#include "bvh/collapsed.cl"
+#include "bvh/items.cl"
+
+/* Slots for the children: the pair with the farthest way along a slot's diagonal first, and so on. */
+inline void compact_slots(global const float8 *nodes, float8 parent, const uint *children, uint found,
+                          uint slots[8])
+{
+    float4 middle = parent.lo + parent.hi;
+    for (uint i = 0; i < 8; i++) slots[i] = 8;
+    uint taken = 0;
+    for (uint round = 0; round < found; round++) {
+        uint child = 0, slot = 0;
+        float farthest = -INFINITY;
+        for (uint i = 0; i < found; i++) {
+            if (slots[i] < 8) continue;
+            float8 box = nodes[children[i]];
+            float4 way = box.lo + box.hi - middle;
+            for (uint s = 0; s < 8; s++) {
+                float far = (s & 1 ? way.x : -way.x) + (s & 2 ? way.y : -way.y) + (s & 4 ? way.z : -way.z);
+                if (!(taken >> s & 1) && far > farthest) {
+                    farthest = far;
+                    child = i;
+                    slot = s;
+                }
+            }
+        }
+        slots[child] = slot;
+        taken |= 1u << slot;
+    }
+}
+
+/* Nodes from `begin` on, a level; those above it are there. leaves: records of triangles, which get their
+ * tags and the caller's numbers; or where `tags` is null the numbers alone. */
+kernel APART void compact_nodes(global const float8 *restrict nodes, global const float8 *restrict items,
+                                global const float8 *restrict costs, global const uint *restrict roots,
+                                global const uint2 *restrict firsts, uint begin, uint count,
+                                global uint2 *restrict places, global uint *restrict compact,
+                                global uint *restrict leaves, global const uint *restrict tags)
+{
+    if (get_global_id(0) >= count) return;
+    uint w = begin + get_global_id(0), children[8], slots[8];
+    uint2 place = w ? places[w] : (uint2)(0);
+    uint found = collapse_children(nodes, costs, roots[place.x], children), mask = 0, next = 0;
+    compact_slots(nodes, nodes[roots[place.x]], children, found, slots);
+    global uint *node = compact + (ulong)w * COMPACT_WORDS;
+    uint numbers[8], base = firsts[place.x].x, own = 0;
+    union { uint words[2]; uchar at[8]; } meta = {{0, 0}};
+    for (uint i = 0; i < found; i++) {
+        float8 child = nodes[children[i]];
+        numbers[i] = base + next;
+        if (node_is_leaf(child)) {
+            meta.at[slots[i]] = (uchar)(own | (0xe0u >> (3 - node_count(child)) & 0xe0u));
+            for (uint k = 0; k < node_count(child); k++, own++) {
+                uint at = place.y + own, prim = item_index(items[node_link(child) + k]);
+                if (tags) {
+                    vstore3((uint3)(prim, tags[prim], 0u), 0, leaves + (ulong)at * 12 + 9);
+                } else {
+                    leaves[at] = prim;
+                }
+            }
+        } else {
+            meta.at[slots[i]] = (uchar)(0x20u | (24 + slots[i]));
+            mask |= 1u << slots[i];
+            next++;
+        }
+    }
+    node[3] = mask << 24;
+    node[4] = base;
+    node[5] = place.y;
+    node[6] = meta.words[0];
+    node[7] = meta.words[1];
+    uint item = place.y + own, position = base;
+    for (uint slot = 0; slot < 8; slot++) {
+        if (!(mask >> slot & 1)) continue;
+        uint i = 0;
+        while (slots[i] != slot) i++;
+        places[position++] = (uint2)(numbers[i], item);
+        item += node_count(nodes[children[i]]);
+    }
+}
