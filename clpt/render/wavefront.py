@@ -49,7 +49,7 @@ class Counts:
 
 
 @dataclass(frozen=True)
-class _Step:
+class Step:
     """A kernel of a bounce with its arguments, work-items, and those of a group."""
 
     name: str
@@ -142,10 +142,10 @@ class Wavefront(Resident):
         return programs.sources(features, layout, self.lanes, queued=self.queued)
 
     @cached_property
-    def stages(self) -> list[_Step]:
+    def stages(self) -> list[Step]:
         """The kernels of a bounce in their order, for a host that enqueues bounce after bounce."""
         self._build(self._texts())
-        made: list[_Step] = []
+        made: list[Step] = []
         chunks = -(-self.slots // CHUNK)
         for stage in programs.order(self.lowered.features, self.tree.layout, self.lanes):
             if self.queued and stage.kernel == "shade" and made[-1].bound.kernel.name != "shade":
@@ -154,10 +154,10 @@ class Wavefront(Resident):
                     ("sort_scan", 1),
                     ("sort_place", chunks),
                 ):
-                    made.append(_Step(name, self._bound("sort", name), (size,), None))
+                    made.append(Step(name, self._bound("sort", name), (size,), None))
             given = {"samples": (0, 0)} if not made else {}
             bound = self._bound(stage.program, stage.kernel, **given)
-            made.append(_Step(stage.program, bound, *self._sizes(stage.lanes)))
+            made.append(Step(stage.program, bound, *self._sizes(stage.lanes)))
         return made
 
     @cached_property
@@ -183,10 +183,10 @@ class Wavefront(Resident):
             device.build_all(self.device, texts)
 
     @property
-    def _round(self) -> list[_Step]:
+    def _round(self) -> list[Step]:
         """What `expose` enqueues between two looks at the counters."""
         if self.looped:
-            return [_Step("loop", self.loop, *self._sizes(self.lanes))]
+            return [Step("loop", self.loop, *self._sizes(self.lanes))]
         return self.stages * BATCH
 
     def _bound(self, program: str, name: str, **given: Any) -> device.Bound:
@@ -236,7 +236,7 @@ class Wavefront(Resident):
         """
         steps = self._round
         begin = steps[0].bound
-        self._rewind()
+        self.rewind()
         begin.set(samples=(first, end))
         if self.looped:
             begin.set(turns=BATCH, restart=0)
@@ -267,7 +267,7 @@ class Wavefront(Resident):
         self._accumulate()
         return finished
 
-    def _rewind(self) -> None:
+    def rewind(self) -> None:
         """Let every slot begin its list again."""
         word = next(m.word for m in PATH.members if m.name == "state")
         self._fill("path_words", FRESH, 4 * word * self.stride, 4 * self.slots)

@@ -1,0 +1,78 @@
+"""The benchmark: rays, stages, builds and starts of any OpenCL device, from nothing but clpt.
+
+`clpt bench` runs it; docs/benchmark.md tells what the figures mean. `measure` gives them one after
+the other, each as soon as it is known; one that cannot be true tells why in `refused`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Sequence
+
+from clpt import device
+from clpt.scene import Scene
+
+from . import bandwidth, building, rays, scenes, stages, starting
+from .figures import Figure
+
+__all__ = ["PARTS", "Figure", "measure", "opened"]
+
+PARTS = {
+    "bandwidth": "a kernel that only copies, GB/s",
+    "rays": "rays a second by layout, set and query, hits checked",
+    "stages": "what each stage of a render gets through, Mitems/s and GB/s; sort and film too",
+    "building": "trees built and refitted, Mtri/s",
+    "start": "whole processes until a first picture, with empty caches and with full ones",
+}
+START_SCENE = "cornell"  # where none is asked for
+
+
+def opened(name: str, mode: str | None = None) -> Scene:
+    """A scene that comes with the benchmark, or any file or folder that clpt loads.
+
+    mode: rgb or spectral, the scene's own by default. Raises SceneError.
+    """
+    if name in scenes.SCENES:
+        scene = scenes.made(name)
+    else:
+        from clpt.formats import load
+
+        scene = load(name)
+        scene.name = scene.name or name
+    if mode is None:
+        return scene
+    return dataclasses.replace(scene, film=dataclasses.replace(scene.film, mode=mode))
+
+
+def measure(
+    on: device.Device,
+    *,
+    parts: Sequence[str] = tuple(PARTS),
+    only: Sequence[str] = (),
+    scene: str | None = None,
+    mode: str | None = None,
+    layouts: Sequence[str] = rays.LAYOUTS,
+    rounds: int = 5,
+    count: int | None = None,
+) -> Iterator[Figure]:
+    """Figures of a device, whose queue must be profiling.
+
+    parts: names of PARTS; only: of the stages, if not all; scene: as of `opened`, by default the
+    atrium, and for starts the Cornell box; layouts: keys of clpt.bvh.LAYOUTS with a tree; rounds:
+    of each figure; count: rays of a set. Raises SceneError, DeviceError.
+    """
+    if "bandwidth" in parts:
+        yield from bandwidth.measure(on, rounds)
+    inside = {"rays", "stages", "building"} & set(parts)
+    if inside:
+        plan = opened(scene or "atrium", mode)
+        if "rays" in parts:
+            yield from rays.measure(on, plan, rounds, layouts, count)
+        if "stages" in parts:
+            yield from stages.measure(on, plan, rounds, only)
+        if "building" in parts:
+            yield from building.measure(on, plan, rounds, layouts)
+    if "start" in parts:
+        name = scene or START_SCENE
+        which = on.info.label if on.info.index < 0 else on.info.index
+        yield from starting.measure(name, mode, which, max(1, min(rounds, 3)), name)

@@ -1,0 +1,192 @@
+"""How fast layouts answer rays, taken from the scene itself, and whether they answer right.
+
+`primary`: the camera's, in tiles of 4 x 4 pixels; `diffuse`: cosine-distributed from what those
+met; `shadow`: from there to the scene's lights, as its integrator chooses them. `closest` asks for
+the nearest triangle, `any` whether there is one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import device
+from clpt.errors import SceneError
+from clpt.rays import Accel, Hits
+from clpt.records import HIT, PATH, SHADOW
+from clpt.scene import Scene
+
+from . import checks
+from .bandwidth import Copying
+from .figures import Figure, Taken, clock_complaint, rates, timed
+from .flight import Flight
+
+LAYOUTS = ("wide8", "binary")
+CPU_RAYS, GPU_RAYS = 1 << 16, 1 << 20
+RAY_BYTES, HIT_BYTES, MET_BYTES = 28, 16, 1  # what a kernel reads and writes of each ray at least
+POISON = -7  # a primitive that nothing answers
+
+
+@dataclass(frozen=True)
+class Rays:
+    """Rays: origins and directions (n, 3) float32, far ends (n,) float32 in units of those."""
+
+    origins: NDArray[np.float32]
+    directions: NDArray[np.float32]
+    t_max: NDArray[np.float32]
+
+    def __len__(self) -> int:
+        return len(self.origins)
+
+
+@dataclass(frozen=True)
+class Sets:
+    """Triangles of a scene, vertices (n, 3) float32 and faces (m, 3) uint32, and rays by set."""
+
+    vertices: NDArray[np.float32]
+    faces: NDArray[np.uint32]
+    rays: Mapping[str, Rays]
+
+
+def sets(on: device.Device, scene: Scene, count: int | None = None) -> Sets:
+    """About `count` rays of each set, from the stages of a render; sets without rays are left out.
+
+    Raises SceneError for a scene without triangles.
+    """
+    count = count or (CPU_RAYS if on.info.is_cpu else GPU_RAYS)
+    flight = Flight(on, scene, count)
+    lowered = flight.wavefront.lowered
+    own = len(lowered.faces) - sum(lowered.instances.triangles)
+    if not own:
+        raise SceneError("rays are measured on triangles, and the scene has none outside of groups")
+    found: dict[str, Rays] = {}
+
+    def look(step: Any, enqueue: Any) -> None:
+        enqueue()
+        name = step.bound.kernel.name
+        if name in ("generate", "emit"):
+            found["primary"] = _path_rays(flight)
+        elif name == "intersect":
+            found["diffuse"] = _diffuse(flight)
+        elif name == "shade":
+            found["shadow"] = _shadow_rays(flight)
+
+    flight.bounce(look)
+    return Sets(
+        lowered.vertices, lowered.faces[:own], {n: rays for n, rays in found.items() if len(rays)}
+    )
+
+
+def _path_rays(flight: Flight) -> Rays:
+    which = flight.alive
+    far = np.full(which.sum(), np.inf, np.float32)
+    return Rays(flight.read(PATH, "o")[which], flight.read(PATH, "d")[which], far)
+
+
+def _shadow_rays(flight: Flight) -> Rays:
+    which = flight.shadowed
+    return Rays(*(flight.read(SHADOW, name)[which] for name in ("o", "d", "t")))
+
+
+def _diffuse(flight: Flight) -> Rays:
+    """Rays from what has been met, off its surface by a small share of the scene."""
+    which = flight.met
+    o, d, n = (
+        flight.read(record, name)[which].astype(np.float64)
+        for record, name in ((PATH, "o"), (PATH, "d"), (HIT, "n"))
+    )
+    t = flight.read(HIT, "t")[which][:, None]
+    n /= np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-30)
+    n = np.where((n * d).sum(1, keepdims=True) > 0.0, -n, n)
+    w = np.random.default_rng(1).normal(size=n.shape)
+    onward = n + 0.9999 * w / np.linalg.norm(w, axis=1, keepdims=True)
+    onward /= np.linalg.norm(onward, axis=1, keepdims=True)
+    radius = float(flight.wavefront.lowered.settings["scene_radius"])
+    origins = (o + t * d + 3e-5 * radius * n).astype(np.float32)
+    return Rays(origins, onward.astype(np.float32), np.full(len(o), np.inf, np.float32))
+
+
+class Traced:
+    """A set of rays on the device, and what a layout answers."""
+
+    def __init__(self, on: device.Device, rays: Rays):
+        self.device, self.count = on, len(rays)
+        self.named = {
+            name: self._filled(getattr(rays, name)) for name in ("origins", "directions", "t_max")
+        }
+
+    def _filled(self, array: NDArray) -> device.DeviceArray:
+        there = device.DeviceArray(self.device.queue, array.shape, array.dtype)
+        there.set(array)
+        return there
+
+    def closest(self, tree: Any, rounds: int) -> tuple[dict[str, NDArray], list]:
+        """The hits of the last round by name, and what each took."""
+        n = self.count
+        out = Hits(
+            t=self._filled(np.full(n, np.nan, np.float32)),
+            primitive=self._filled(np.full(n, POISON, np.int32)),
+            barycentrics=self._filled(np.full((n, 2), np.nan, np.float32)),
+            instance=None,
+            event=None,
+        )
+        taken = [
+            timed(self.device, lambda: [tree.intersect(**self.named, out=out).event])
+            for _ in range(rounds)
+        ]
+        return {k: getattr(out, k).get() for k in ("t", "primitive", "barycentrics")}, taken
+
+    def occluded(self, tree: Any, rounds: int) -> tuple[NDArray[np.uint8], list]:
+        """Whether each ray met anything in the last round, and what each took."""
+        out = self._filled(np.full(self.count, 0xEE, np.uint8))
+        taken = [
+            timed(self.device, lambda: tree.occluded(**self.named, out=out).events[-1:])
+            for _ in range(rounds)
+        ]
+        return out.get(), taken
+
+
+def measure(
+    on: device.Device,
+    scene: Scene,
+    rounds: int,
+    layouts: Sequence[str] = LAYOUTS,
+    count: int | None = None,
+    accel: Any = Accel,
+) -> Iterator[Figure]:
+    """Figures of every layout, set and query, in Mrays/s; raises as `sets` does.
+
+    accel: what is measured, called as clpt.rays.Accel is.
+    """
+    given = sets(on, scene, count)
+    copying = Copying(on)
+    trees = {name: accel(on.queue, given.vertices, given.faces, layout=name) for name in layouts}
+    for name, rays in given.rays.items():
+        traced, others = Traced(on, rays), None
+        truth = checks.Truth(given.vertices, given.faces, rays)
+        for layout, tree in trees.items():
+            hits, taken = traced.closest(tree, rounds + 1)
+            wrong = truth.closest(hits) or (checks.differ(hits, others) if others else "")
+            shared = copying, scene.name, len(rays)
+            yield _figure(f"{layout} {name} closest", taken, wrong, HIT_BYTES, *shared)
+            met, taken = traced.occluded(tree, rounds + 1)
+            wrong = checks.any_hit(met, hits)
+            yield _figure(f"{layout} {name} any", taken, wrong, MET_BYTES, *shared)
+            others = others or hits
+
+
+def _figure(
+    name: str, taken: list[Taken], wrong: str, out: int, copying: Copying, scene: str, count: int
+) -> Figure:
+    taken = taken[1:]  # the first one compiles
+    seconds = [one.device for one in taken]
+    nbytes = count * (RAY_BYTES + out)
+    slow = clock_complaint(taken) or copying.complaint(nbytes, min(seconds), nbytes)
+    layout, rays, query = name.split()
+    more = {"layout": layout, "rays": rays, "query": query, "count": count}
+    figure = Figure("rays", name, "Mrays/s", rates(count, seconds), scene, more)
+    return figure.refuse(wrong, slow)
