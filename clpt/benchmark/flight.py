@@ -14,7 +14,8 @@ from clpt import device
 from clpt.layout import Record
 from clpt.records import HIT, PATH, SHADOW
 from clpt.render.lower import lower
-from clpt.render.wavefront import CPU_SLOTS, GPU_SLOTS, Step, Wavefront
+from clpt.render.resident import CPU_SLOTS, GPU_SLOTS
+from clpt.render.wavefront import Step, Wavefront
 from clpt.scene import Scene
 
 ALIVE, FRESH, DONE = 0x1000, 0x2000, 0x4000  # kernels/lib/path_state.cl

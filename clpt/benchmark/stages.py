@@ -15,13 +15,15 @@ import numpy as np
 from clpt import device
 from clpt.records import SLABS
 from clpt.render import programs
-from clpt.render.wavefront import CHUNK, FILM_WORDS, QUEUE, SORT, Step
+from clpt.render.resident import CHUNK, QUEUE
+from clpt.render.wavefront import FILM_WORDS, Step
 from clpt.scene import Scene
 
 from .bandwidth import Copying
 from .figures import Figure, Taken, clock_complaint, timed
 from .flight import Flight
 
+SORT = ("sort_count", "sort_scan", "sort_place")
 WARM = 4  # bounces before anything is noted, so that paths of all depths are in flight
 
 # kernel: (members read, members written) of the slabs Path, Hit and Shadow
