@@ -11,7 +11,7 @@ from ..errors import SceneError
 from ..formats import load
 from ..render.lower import lower
 from ..render.programs import film_sources, sources
-from .info import variables
+from .variables import variables
 
 
 @click.command()

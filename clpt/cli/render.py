@@ -20,7 +20,7 @@ from ..spectra.sensors import OBSERVERS
 from . import outputs, report
 from .display import display
 from .exposing import expose
-from .info import variables
+from .variables import variables
 
 INTERRUPTED = 130
 LARGEST = 65536  # pixels of a side
