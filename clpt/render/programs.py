@@ -63,6 +63,11 @@ def film_sources(features: Features, layout: str) -> dict[str, device.Source]:
     return {name: _source(name, shared, common, 1) for name in names}
 
 
+def noise_sources(features: Features, layout: str) -> dict[str, device.Source]:
+    """Return the text of what tells a film's noise, by program name."""
+    return {"noise": _source("noise", _shared(features, layout), _defines(features), 1)}
+
+
 @dataclass(frozen=True)
 class Stage:
     """A stage of a bounce: its program, its kernel there, how many slots a work-item serves."""

@@ -11,6 +11,7 @@ from clpt import bvh, device
 from clpt.device.buffers import Buffers
 from clpt.errors import MemoryBudgetError, SceneError
 from clpt.records import SLABS, TABLES
+from clpt.render import walks
 from clpt.render.lower import Lowered
 
 COUNTERS = ("done", "samples", "closest", "shadow", "rejected")
@@ -109,7 +110,13 @@ class Resident:
             self.stream.fill(self.named[name], 0, 0, 4 * record.words * self.stride)
         self.named["counters"] = give.allocate("the counters", 4 * len(COUNTERS))
         self.named["settings"] = give.upload("the settings", settings.reshape(1).view(np.uint32))
+        whole = walks.table(settings, walks.inside(settings))
+        self.named["walk"] = give.upload("the walk over the film", whole)
         self.allocate_queue()
+
+    def walk(self, places: walks.Places, ends: walks.Places | None = None) -> None:
+        """Enqueue that exposures take these places from now on, each up to its own end."""
+        self.stream.write(self.named["walk"], walks.table(self.lowered.settings, places, ends))
 
     def allocate_queue(self) -> None:
         """What sorting by material works on, where there is sorting."""

@@ -223,7 +223,7 @@ class Wavefront(Resident):
         size, group = self._sizes(self.lanes)
         self.timings.add("loop", self.stream.run(self.loop, size, group))
         self.exposed += end - first
-        self._accumulate()
+        self.accumulate_film()
 
     def expose(
         self, first: int, end: int, on_batch: Callable[[Counts], bool] | None = None
@@ -264,7 +264,7 @@ class Wavefront(Resident):
         width, height = self._size
         new = (self.counts.samples - before) / (width * height)
         self.exposed += end - first if finished else new
-        self._accumulate()
+        self.accumulate_film()
         return finished
 
     def rewind(self) -> None:
@@ -280,7 +280,8 @@ class Wavefront(Resident):
         for name, n in zip(COUNTERS[1:], new[1:].tolist(), strict=True):
             setattr(self.counts, name, getattr(self.counts, name) + n)
 
-    def _accumulate(self) -> None:
+    def accumulate_film(self) -> None:
+        """Enqueue that `film` becomes the picture of what was exposed."""
         if self.lowered.features.light_paths:
             self.accumulate.set(samples=self.exposed)
         others = [e for e in self.film.events if e is not self._pictured]  # of who reads it

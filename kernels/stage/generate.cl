@@ -70,12 +70,12 @@ STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
         integer slot = LANE_INDEX + (int)at, plane = divide(slot, per_plane);
         integer start = plane_sample(plane, planes, first);
         sample += planes;
-        mask turn = ended & (!began | (sample >= end));
+        mask turn = ended & (!began | (sample >= walk_end(settings, walk, place, end)));
         mask done = (integer)(0);
         if (any(turn)) {
             film_store(settings, film, turn & began, plane, place, e);
-            integer next = place_inside(settings, sel_i(began, place + per_plane, slot - plane * per_plane));
-            done = turn & ((next >= settings->places) | (start >= end));
+            integer next = walk_next(settings, walk, turn, began, place, slot - plane * per_plane, start, end);
+            done = turn & (next >= settings->places);
             mask begin = turn & !done;
             place = sel_i(begin, next, place);
             sample = sel_i(begin, start, sample);

@@ -1,0 +1,205 @@
+"""Adaptive sampling: a pixel gets samples until the noise around it is as low as was asked.
+
+The film is cut into squares, and their pixels into the two colours of a chessboard: two cells. How
+many samples a cell gets is decided by its partner's pixels alone, never by its own. Samples of
+different pixels are independent of each other, so a pixel's number of samples is independent of
+what they say, and its mean has no bias: exactly, not in the limit. (To stop by a cell's own samples
+makes a picture too dark: where they missed the light there seems to be no noise.)
+
+For that a partner's decision must not depend on how long the cell itself was sampled either. Where
+a cell has finished and its partner has not, it goes on for the partner's sake, and what it then
+gathers does not go into the picture.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import device
+from clpt.errors import SceneError
+from clpt.render import programs, walks
+from clpt.render.features import Features
+from clpt.render.wavefront import Wavefront
+
+SIDE = 16  # pixels of a square, a multiple of four
+LEAST = 8  # samples of a pixel before the film is looked at; it takes twice as many to tell noise
+STEPS = 4  # in which samples are given from one look to the next, at twice as many
+DARK = 0.01  # of the picture's luminance: what is darker counts as if it were so bright
+OPEN = walks.FOREVER  # of a cell whose number of samples is not decided
+
+Cells = NDArray[np.int64]
+Tell = Callable[[Any], bool]
+
+
+def checked(noise: float, features: Features) -> float:
+    """The noise that was asked for, if it makes sense there. Raises SceneError."""
+    number = isinstance(noise, (int, float, np.number)) and not isinstance(noise, bool)
+    if not number or not 0.0 < noise < math.inf:
+        raise SceneError(f"noise must be a number above zero, such as 0.02, not {noise!r}")
+    if features.channel:
+        raise SceneError("noise: the values of the integrator aov are no light; leave noise out")
+    if features.light_paths:
+        raise SceneError(
+            "noise: the integrator particle_tracer cannot choose which pixels its paths reach; "
+            "leave noise out, or choose path"
+        )
+    return float(noise)
+
+
+class Adaptive:
+    """What is known of the noise in a wavefront's film, and how many samples each cell gets.
+
+    Cells are (2 * squares,): a square's two colours after each other, so that a cell's partner is
+    its number with the last bit changed.
+    """
+
+    def __init__(self, front: Wavefront):
+        self.front = front
+        settings = front.lowered.settings
+        x, y = walks.pixels(settings)
+        self._inside = walks.inside(settings)
+        across, down = (-(-int(settings[name]) // SIDE) for name in ("width", "height"))
+        self._cell = 2 * (y // SIDE * across + x // SIDE) + (x + y) % 2  # of every place
+        count = 2 * across * down
+        self._partner = np.arange(count) ^ 1
+        self._pixels = np.bincount(self._cell[self._inside], minlength=count)
+        self.noise = 0.0
+        self.next = np.zeros(count, np.int64)  # the first sample that a cell's pixels do not have
+        self.stop = np.full(count, OPEN)  # how many they will have
+        self._level = 0  # samples at the last look
+        self._looked = np.zeros(count, np.int64)  # samples at the last look at each cell; 0: none
+        self._variance = np.full(count, np.inf)  # of a sample, relative
+        self._dark: NDArray[np.float64] | None = None
+        self._prepare(int(settings["places"]), count)
+
+    def _prepare(self, places: int, count: int) -> None:
+        front, give = self.front, self.front.buffers
+        texts = programs.noise_sources(front.lowered.features, front.tree.layout)
+        kernel = device.build_all(front.device, texts)["noise"].kernel("noise")
+        self._tiles = places // 16
+        self._asked = give.allocate("the cells of the film", 4 * count)
+        self._found = give.allocate("the film's noise", 24 * self._tiles)
+        self._former = give.allocate("the film's former luminance", 8 * places)
+        front.stream.fill(self._former, 0, 0, self._former.size)
+        self._look = kernel.bind(
+            settings=front.named["settings"], film=front.named["film"], asked=self._asked,
+            former=self._former, found=self._found, side=SIDE,
+        )  # fmt: skip
+        self._kept: dict[str, Any] = {}
+
+    @property
+    def active(self) -> float:
+        """The share of the picture's pixels that go on."""
+        return float(self._pixels[self.next < self.stop].sum() / self._pixels.sum())
+
+    def skip(self, samples: int) -> None:
+        """Every pixel has got all samples before this one, whatever its noise."""
+        self.next[:] = samples
+        self._level = max(self._level, samples)
+        self.stop[self.stop < samples] = samples
+
+    def run(self, end: int, noise: float, tell: Tell) -> bool:
+        """Add samples till the noise is as low, or all pixels have `end`; whether it came to that.
+
+        noise: of a square's pixels the root of the mean square of the standard error of their
+        luminance, relative to the mean luminance of the 4x4 pixels around.
+        """
+        if noise != self.noise:
+            self.noise = noise
+            self.stop[:] = OPEN
+            self._decide()
+        try:
+            while (self.next < np.minimum(self.stop, end)).any():
+                if not self._round(end, tell):
+                    return False
+        finally:
+            self.front.walk(self._inside)
+        return True
+
+    def _round(self, end: int, tell: Tell) -> bool:
+        """Go on to the next look, or the end."""
+        look = self._next_look()
+        goal = min(look, end)
+        ends = np.minimum(self.stop, goal)
+        if not self._expose(ends, tell):
+            return False
+        self.next = np.maximum(self.next, ends)
+        guides = self.stop[self._partner] == OPEN
+        if goal < look:
+            return True
+        self._level = look
+        beyond = guides & (self.next < look)
+        if not beyond.any():
+            self._measure(guides)
+        else:
+            self._keep()
+            finished = self._expose(np.where(beyond, look, 0), tell)
+            if finished:
+                self._measure(guides)
+            self._restore()
+            if not finished:
+                return False
+        self._decide()
+        return True
+
+    def _next_look(self) -> int:
+        """A power of two: so many points of a Sobol sequence are spread best."""
+        return 1 << math.ceil(math.log2(max(LEAST, 1.5 * self._level)))
+
+    def _expose(self, ends: Cells, tell: Tell) -> bool:
+        """Bring every cell to its end, if it is not beyond."""
+        behind = self.next < ends
+        for first in np.unique(self.next[behind]):
+            cells = behind & (self.next == first)
+            places = self._inside[cells[self._cell[self._inside]]]
+            own = ends[self._cell[places]]
+            self.front.walk(places, own)
+            if not self.front.expose(int(first), int(own.max()), tell):
+                return False
+        return True
+
+    def _measure(self, asked: NDArray[np.bool_]) -> None:
+        """Estimate the relative variance of a sample in these cells."""
+        stream = self.front.stream
+        stream.write(self._asked, asked.astype(np.uint32))
+        stream.run(self._look, (self._tiles,))
+        found = stream.read(self._found, np.empty((self._tiles, 2, 3), np.float32)).astype(float)
+        variance, luminance, pixels = np.moveaxis(found, 2, 0)
+        if self._dark is None:  # of each colour by itself
+            self._dark = DARK * luminance.sum(axis=0) / np.maximum(pixels.sum(axis=0), 1)
+        mean = luminance / np.maximum(pixels, 1) + self._dark
+        relative = np.divide(variance, mean**2, out=np.zeros_like(mean), where=mean > 0.0)
+        cell = self._cell[::16, None] // 2 * 2 + np.arange(2)
+        sums = np.bincount(cell.ravel(), relative.ravel(), len(self.stop))
+        known = asked & (self._looked > 0)
+        self._variance[known] = self._level * (sums / np.maximum(self._pixels, 1))[known]
+        self._looked[asked] = self._level
+
+    def _decide(self) -> None:
+        """Tell how many samples cells get, where their partners know it closely enough."""
+        looked = self._looked[self._partner]
+        needed = self._variance[self._partner] / self.noise**2
+        sure = (self.stop == OPEN) & (needed <= 2.0 * looked)
+        step = np.maximum(looked // STEPS, 1)
+        wanted = np.ceil(np.where(sure, needed, 0.0) / step) * step
+        self.stop[sure] = np.maximum(wanted, looked)[sure]
+
+    def _keep(self) -> None:
+        """Keep a copy of the film."""
+        front = self.front
+        for name in ("film", "bands"):
+            if name in front.named and name not in self._kept:
+                size = front.named[name].size
+                self._kept[name] = front.buffers.allocate(f"a copy of the {name}", size)
+        for name, kept in self._kept.items():
+            front.stream.copy(kept, front.named[name])
+
+    def _restore(self) -> None:
+        for name, kept in self._kept.items():
+            self.front.stream.copy(self.front.named[name], kept)
+        self.front.accumulate_film()
