@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Sequence
 
-from clpt import device
+from clpt import bvh, device
 from clpt.scene import Scene
 
 from . import bandwidth, building, rays, scenes, stages, starting
@@ -51,14 +51,14 @@ def measure(
     only: Sequence[str] = (),
     scene: str | None = None,
     mode: str | None = None,
-    layouts: Sequence[str] = rays.LAYOUTS,
+    layouts: Sequence[str] = bvh.TREES,
     rounds: int = 5,
     count: int | None = None,
 ) -> Iterator[Figure]:
     """Figures of a device, whose queue must be profiling.
 
     parts: names of PARTS; only: of the stages, if not all; scene: as of `opened`, by default the
-    atrium, and for starts the Cornell box; layouts: keys of clpt.bvh.LAYOUTS with a tree; rounds:
+    atrium, and for starts the Cornell box; layouts: names of clpt.bvh.TREES; rounds:
     of each figure; count: rays of a set. Raises SceneError, DeviceError.
     """
     if "bandwidth" in parts:

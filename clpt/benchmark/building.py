@@ -12,7 +12,7 @@ from clpt.scene import Scene
 
 from .bandwidth import Copying
 from .figures import Figure, rates
-from .rays import LAYOUTS, Sets, sets
+from .rays import Sets, sets
 
 BEND = 0.02  # of the scene's height, by which vertices move
 
@@ -21,7 +21,7 @@ def measure(
     on: device.Device,
     scene: Scene,
     rounds: int,
-    layouts: Sequence[str] = LAYOUTS,
+    layouts: Sequence[str] = bvh.TREES,
     count: int | None = None,
 ) -> Iterator[Figure]:
     """Figures of builds and refits, in Mtri/s by the host's clock, from arrays on the device."""

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import device
+from clpt import bvh, device
 from clpt.errors import SceneError
 from clpt.rays import Accel, Hits
 from clpt.records import HIT, PATH, SHADOW
@@ -25,7 +25,6 @@ from .bandwidth import Copying
 from .figures import Figure, Taken, clock_complaint, rates, timed
 from .flight import Flight
 
-LAYOUTS = ("wide8", "binary")
 CPU_RAYS, GPU_RAYS = 1 << 16, 1 << 20
 RAY_BYTES, HIT_BYTES, MET_BYTES = 28, 16, 1  # what a kernel reads and writes of each ray at least
 POISON = -7  # a primitive that nothing answers
@@ -154,7 +153,7 @@ def measure(
     on: device.Device,
     scene: Scene,
     rounds: int,
-    layouts: Sequence[str] = LAYOUTS,
+    layouts: Sequence[str] = bvh.TREES,
     count: int | None = None,
     accel: Any = Accel,
 ) -> Iterator[Figure]:

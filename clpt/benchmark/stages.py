@@ -1,8 +1,8 @@
 """What the stages of a render get through: items a second, and bytes beside a copy's.
 
 Each stage runs on the state that the stages before have left; its items are the slots that it has
-work for. Bytes are those of the slabs' members that it reads and writes of each item, without the
-scene's tables, trees and textures: so much must be moved, more may be.
+work for. Bytes are those of clpt.render.traffic: what it must move of each path's state, without
+the scene's tables, trees and textures.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from clpt import device
 from clpt.records import SLABS
 from clpt.render import programs
 from clpt.render.resident import CHUNK, QUEUE
+from clpt.render.traffic import traffic
 from clpt.render.wavefront import FILM_WORDS, Step
 from clpt.scene import Scene
 
@@ -25,37 +26,9 @@ from .flight import Flight
 
 SORT = ("sort_count", "sort_scan", "sort_place")
 WARM = 4  # bounces before anything is noted, so that paths of all depths are in flight
+BOUNCES = 4  # of a round: in a single one few paths may begin
 
-# kernel: (members read, members written) of the slabs Path, Hit and Shadow
-MOVED: dict[str, tuple[str, str]] = {
-    "generate": (
-        "state prim radiance lambdas place sample sum rest samples weight",
-        "state sample sum rest samples weight o d lambdas beta radiance pdf eta",
-    ),
-    "intersect": ("state o d pdf", "hit.t u v n prim shape material"),
-    "shade": (
-        "state prim material shape o d beta radiance lambdas pdf place sample hit.t u v n eta",
-        "o d beta radiance pdf state eta shadow.o shadow.d shadow.t value",
-    ),
-    "shadow": ("shadow.t shadow.o shadow.d value radiance lambdas", "radiance shadow.t"),
-    "mix_materials": ("state prim material hit.t u v o d", "material"),
-    "sort": ("state prim material state prim material", ""),
-}
-MOVED |= {"emit": MOVED["generate"], "splat": MOVED["shadow"]}
-
-
-def words(kernel: str) -> int:
-    """Words of the slabs that a stage reads and writes of each item."""
-    return sum(_words(name) for names in MOVED[kernel] for name in names.split())
-
-
-def _words(name: str) -> int:
-    record, _, member = name.rpartition(".")
-    for own in SLABS if not record else [r for r in SLABS if r.name.lower() == record]:
-        for m in own.members:
-            if m.name == member:
-                return m.words
-    raise KeyError(name)
+Work = tuple[int, Taken]  # items, and what they took
 
 
 def measure(
@@ -65,33 +38,51 @@ def measure(
     only: Sequence[str] = (),
     **wavefront: Any,
 ) -> Iterator[Figure]:
-    """Figures of every stage, in Mitems/s, each round a bounce. only: names of stages, or all.
+    """Figures of every stage, in Mitems/s, each round a few bounces.
+
+    only: names of stages, or how they begin, as `shade`; all by default.
 
     wavefront: parameters of clpt.render.wavefront.Wavefront; raises as that does.
     """
     flight, copying = Flight(on, scene, **wavefront), Copying(on)
     for _ in range(WARM):
         flight.bounce()
-    noted: dict[str, list[tuple[int, Taken]]] = {}
+    noted: dict[str, list[Work]] = {}
 
     def note(step: Step, enqueue: Callable[[], Any]) -> None:
         items = flight.items(step)
         noted.setdefault(step.name, []).append((items, timed(on, lambda: [enqueue()])))
 
-    for _ in range(rounds):
-        flight.bounce(note)
-    kernels = {step.name: step.bound.kernel.name for step in flight.wavefront.stages}
+    for number in range(rounds):
+        for _ in range(BOUNCES):
+            flight.bounce(note)
+        for name, each in noted.items():
+            noted[name] = [*each[:number], _whole(each[number:])]
+    wave = flight.wavefront
+    features, layout = wave.lowered.features, wave.tree.layout
+    moved = traffic(features, layout, queued=wave.queued)
     for name, found in noted.items():
-        if name not in SORT and (not only or name in only):
-            yield _figure(flight, copying, name, 4 * words(kernels[name]), found)
-    if not only or "sort" in only:
+        if name not in SORT and _asked(name, only):
+            yield _figure(flight, copying, name, moved[name].total, found)
+    if _asked("sort", only):
         yield _sort(flight, copying, rounds)
-    if not only or "accumulate" in only:
+    if _asked("accumulate", only):
         yield _accumulate(flight, copying, rounds)
 
 
+def _whole(each: Sequence[Work]) -> Work:
+    """The bounces of a round as one, without those that had nothing to do."""
+    busy = [(items, taken) for items, taken in each if items]
+    taken = Taken(sum(t.device for _, t in busy), sum(t.host for _, t in busy))
+    return sum(items for items, _ in busy), taken
+
+
+def _asked(name: str, only: Sequence[str]) -> bool:
+    return not only or any(name == one or name.startswith(f"{one}_") for one in only)
+
+
 def _figure(
-    flight: Flight, copying: Copying, name: str, nbytes: float, found: list[tuple[int, Taken]]
+    flight: Flight, copying: Copying, name: str, nbytes: float, found: list[Work]
 ) -> Figure:
     """What a stage got through; rounds in which it had nothing to do count for nothing."""
     busy = [(items, taken) for items, taken in found if items]
@@ -104,7 +95,7 @@ def _figure(
     copied = copying.rate(within) * 1e-9
     gigabytes = float(np.median(speeds)) * nbytes * 1e-3
     more |= {
-        "items": float(np.mean([items for items, _ in found])),
+        "items": float(np.mean([items for items, _ in busy])),
         "bytes": nbytes,
         "gbytes": gigabytes,
         "copy_gbytes": copied,
@@ -145,7 +136,7 @@ def _sort(flight: Flight, copying: Copying, rounds: int) -> Figure:
         taken = timed(on, lambda: [wave.stream.run(kernel, size) for kernel, size in steps])
         found.append((flight.slots, taken))
     queue = give.download(named["queue"], (flight.slots,), np.uint32)[: len(expected)]
-    nbytes = 4 * (words("sort") + len(expected) / flight.slots)
+    nbytes = traffic(features, wave.tree.layout, queued=True)["sort"].total
     figure = _figure(flight, copying, "sort", nbytes, found[1:])
     wrong = int((queue != expected).sum())
     return figure.refuse(

@@ -16,7 +16,7 @@ from .. import device as dev
 from ..benchmark import comparing, records, scenes
 from ..benchmark.comparing import Ratio
 from ..benchmark.figures import Figure
-from ..benchmark.rays import LAYOUTS
+from ..bvh import TREES
 from ..device.context import trial
 
 SLOWER = 3  # the exit status if a figure was refused, or is below --fail-below
@@ -30,9 +30,7 @@ HEADINGS = ("figure", "", "unit", "±", "GB/s", "of a copy", "")
     "--stage", "wanted", multiple=True, metavar="NAME",
     help="What to measure: see --list; repeat it for several.  [default: all]",
 )  # fmt: skip
-@click.option(
-    "--layout", "layouts", multiple=True, type=click.Choice(LAYOUTS), help="Of the trees."
-)
+@click.option("--layout", "layouts", multiple=True, type=click.Choice(TREES), help="Of the trees.")
 @click.option("--mode", type=click.Choice(["spectral", "rgb"]), help="What light is made of.")
 @click.option("--device", help="Index or part of the name of a device, or all.")
 @click.option(
@@ -50,6 +48,10 @@ HEADINGS = ("figure", "", "unit", "±", "GB/s", "of a copy", "")
     "--fail-below", type=float, metavar="RATIO",
     help="With --compare: exit with 3 if a figure is worse than that, beyond noise.",
 )  # fmt: skip
+@click.option(
+    "--plot", "drawing", type=click.Path(path_type=Path),
+    help="Plot the figures to a .png, .svg or .pdf; of several devices the last one's.",
+)  # fmt: skip
 @click.option("--list", "listed", is_flag=True, help="Tell what can be measured, and where.")
 def bench(
     scene: str | None,
@@ -59,6 +61,7 @@ def bench(
     target: Path | None,
     former: Path | None,
     fail_below: float | None,
+    drawing: Path | None,
     listed: bool,
     **settings: Any,
 ) -> int:
@@ -74,6 +77,10 @@ def bench(
         return 0
     if fail_below is not None and former is None:
         raise click.UsageError("--fail-below compares: give --compare FILE too")
+    if drawing is not None:
+        from . import bench_plot  # not needed else, and slow to import
+
+        bench_plot.check(drawing)
     before = None if former is None else records.read(former)
     parts, only = _chosen(wanted)
     failed = False
@@ -83,17 +90,21 @@ def bench(
             f"[bold]{info.label}[/], {info.version}, driver {info.driver}", highlight=False
         )
         figures = _measured(
-            console, on, parts=parts, only=only, scene=scene, layouts=layouts or LAYOUTS, **settings
+            console, on, parts=parts, only=only, scene=scene, layouts=layouts or TREES, **settings
         )
         good = [figure for figure in figures if figure.rounds and not figure.refused]
         failed |= any(figure.refused for figure in figures)
         if target is not None:
             about = records.of_device(info)
             records.append(target, [{**figure.record(), **about} for figure in good])
+        ratios = []
         if before is not None:
             ratios = comparing.against(figures, before, info.label)
             _show_ratios(console, ratios, fail_below)
             failed |= fail_below is not None and any(r.below(fail_below) for r in ratios)
+        if drawing is not None:
+            then = {figures.index(one.figure): float(one.then["value"]) for one in ratios}
+            bench_plot.write(drawing, f"{info.label}, clpt bench", figures, then)
     return SLOWER if failed else 0
 
 
@@ -191,7 +202,7 @@ def _list(console: Console) -> None:
     for heading, found in (
         ("--stage", rows),
         ("--scene", {name: make.__doc__ for name, make in scenes.SCENES.items()}),
-        ("--layout", dict.fromkeys(LAYOUTS, "")),
+        ("--layout", dict.fromkeys(TREES, "")),
         ("--device", {str(info.index): info.label for info in dev.devices()}),
     ):
         table = Table(heading, "", box=None, pad_edge=False, title_justify="left")
