@@ -20,11 +20,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import device
 from clpt.errors import SceneError
 from clpt.render import programs, walks
 from clpt.render.features import Features
 from clpt.render.wavefront import Wavefront
+from clpt.scene import check_noise
 
 SIDE = 16  # pixels of a square, a multiple of four
 LEAST = 8  # samples of a pixel before the film is looked at; it takes twice as many to tell noise
@@ -38,16 +38,13 @@ Tell = Callable[[Any], bool]
 
 def checked(noise: float, features: Features) -> float:
     """The noise that was asked for, if it makes sense there. Raises SceneError."""
-    number = isinstance(noise, (int, float, np.number)) and not isinstance(noise, bool)
-    if not number or not 0.0 < noise < math.inf:
-        raise SceneError(f"noise must be a number above zero, such as 0.02, not {noise!r}")
+    check_noise(noise)
     if features.channel:
-        raise SceneError("noise: the values of the integrator aov are no light; leave noise out")
+        message = "the values of the integrator aov are no light; leave it out"
+        raise SceneError(message, where="noise")
     if features.light_paths:
-        raise SceneError(
-            "noise: the integrator particle_tracer cannot choose which pixels its paths reach; "
-            "leave noise out, or choose path"
-        )
+        message = "the integrator particle_tracer cannot choose which pixels its paths reach"
+        raise SceneError(f"{message}; leave it out, or choose path", where="noise")
     return float(noise)
 
 
@@ -80,16 +77,13 @@ class Adaptive:
     def _prepare(self, places: int, count: int) -> None:
         front, give = self.front, self.front.buffers
         texts = programs.noise_sources(front.lowered.features, front.tree.layout)
-        kernel = device.build_all(front.device, texts)["noise"].kernel("noise")
         self._tiles = places // 16
         self._asked = give.allocate("the cells of the film", 4 * count)
         self._found = give.allocate("the film's noise", 24 * self._tiles)
         self._former = give.allocate("the film's former luminance", 8 * places)
         front.stream.fill(self._former, 0, 0, self._former.size)
-        self._look = kernel.bind(
-            settings=front.named["settings"], film=front.named["film"], asked=self._asked,
-            former=self._former, found=self._found, side=SIDE,
-        )  # fmt: skip
+        given = {"asked": self._asked, "found": self._found, "former": self._former, "side": SIDE}
+        self._look = front.tool(texts, "noise", **given)
         self._kept: dict[str, Any] = {}
 
     @property

@@ -353,10 +353,10 @@ def render(
 ) -> Image:
     """Render a scene: (h, w, 3) float32 linear Rec. 709; else see `Renderer.image`.
 
-    spp: samples per pixel, the scene's own by default; noise: see `Renderer.run`. Raises as
+    spp: samples per pixel, noise: see `Renderer.run`; the scene's own by default. Raises as
     `Renderer` does.
     """
     spp = _whole(scene.spp if spp is None else spp)
     renderer = Renderer(scene, device, **wavefront)
-    renderer.run(spp, progress, noise=noise)
+    renderer.run(spp, progress, noise=scene.noise if noise is None else noise)
     return renderer.image()

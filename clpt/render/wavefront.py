@@ -189,6 +189,11 @@ class Wavefront(Resident):
             return [Step("loop", self.loop, *self._sizes(self.lanes))]
         return self.stages * BATCH
 
+    def tool(self, texts: dict[str, device.Source], name: str, **given: Any) -> device.Bound:
+        """A kernel beside the bounce, of the program of its name in `texts`, with its arguments."""
+        self._build(texts)
+        return self._bound(name, name, **given)
+
     def _bound(self, program: str, name: str, **given: Any) -> device.Bound:
         return self._bind(self.programs[program].kernel(name), **given)
 
