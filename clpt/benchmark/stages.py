@@ -15,7 +15,7 @@ import numpy as np
 from clpt import device
 from clpt.records import SLABS
 from clpt.render import programs
-from clpt.render.resident import CHUNK, QUEUE
+from clpt.render.queues import CHUNK, QUEUE
 from clpt.render.traffic import traffic
 from clpt.render.wavefront import FILM_WORDS, Step
 from clpt.scene import Scene

@@ -15,12 +15,13 @@ from clpt.render.reradiation import STEP as SHIFT_STEP
 
 
 def sources(
-    features: Features, layout: str, lanes: int, *, queued: bool
+    features: Features, layout: str, lanes: int, *, queued: bool | str
 ) -> dict[str, device.Source]:
     """Return the text of every program of a bounce, by program name.
 
     layout: of the triangles, a name in clpt.bvh.LAYOUTS; lanes: paths that a work-item shades;
-    queued: whether shading goes along sorted queues.
+    queued: whether shading goes along queues, or how: one of clpt.render.queues.WAYS; "sort" if
+    True.
     """
     trace_lanes = lanes if layout == "brute" else 1
     shared = _shared(features, layout)
@@ -34,7 +35,8 @@ def sources(
     if features.mixtures:
         made["mix"] = _source("mix", shared, common, lanes)
     if queued:
-        made["sort"] = _source("sort", shared, common, 1)
+        way = "sort" if queued is True else queued
+        made[way] = _source(way, shared, common, 1)
     for number, cls in enumerate(features.leaves):
         own: dict[str, str | device.Part] = {
             **shared,
@@ -50,7 +52,7 @@ def sources(
             "BSDF_SHIFTS": int(stage_texts.shifts(features, cls)),
             "BSDF_PASSES": int(cls.passes and features.passes),
             "USES_CHOICE": int(cls.choosy or cls.shifts or features.many_lights),
-            "QUEUED": int(queued),
+            "QUEUED": int(bool(queued)),
         }
         made[f"shade_{cls.kind}"] = _source("shade", own, defines, lanes)
     return made

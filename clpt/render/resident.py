@@ -11,7 +11,7 @@ from clpt import bvh, device
 from clpt.device.buffers import Buffers
 from clpt.errors import MemoryBudgetError, SceneError
 from clpt.records import SLABS, TABLES
-from clpt.render import walks
+from clpt.render import queues, walks
 from clpt.render.lower import Lowered
 
 COUNTERS = ("done", "samples", "closest", "shadow", "rejected")
@@ -19,15 +19,13 @@ PADDING = 80  # words between streams: powers of two collide in a cache
 GROUP = 64  # slots are a multiple of it, and it is the local size of one-lane kernels
 CPU_SLOTS, GPU_SLOTS = 1 << 14, 1 << 20
 BRUTE_SHAPES = 32  # analytic shapes up to which all of them are tried
-QUEUE = ("queue", "counts", "queue_starts", "queue_counts")
-CHUNK = 256  # slots that a work-item of the sort counts
 
 
 class Resident:
     """What a scene is on a device, by the names of the kernels' arguments in `named`.
 
     layout: of the triangles, None for what suits the device; slots: paths in flight, None likewise;
-    queued: whether shading is sorted, None likewise.
+    queued: whether shading goes along queues, None likewise, or how, see clpt.render.queues.WAYS.
 
     Raises MemoryBudgetError, DeviceError, SceneError for a layout that cannot hold the scene.
     """
@@ -38,7 +36,7 @@ class Resident:
         lowered: Lowered,
         layout: str | None = None,
         slots: int | None = None,
-        queued: bool | None = None,
+        queued: bool | str | None = None,
     ):
         self.device, self.lowered = on, lowered
         self.moved: set[str] = set()  # tables that hold something else than `lowered`
@@ -50,8 +48,8 @@ class Resident:
         self._place_slots(slots or (CPU_SLOTS if on.info.is_cpu else GPU_SLOTS))
         self._allocate(layout)
 
-    def suited(self, lowered: Lowered) -> tuple[str, bool]:
-        """The layout for a scene and whether shading is sorted: as asked, or as suits the device.
+    def suited(self, lowered: Lowered) -> tuple[str, str]:
+        """The layout for a scene, and how slots are queued, "" if not: as asked, or as suits.
 
         Raises SceneError for a layout that cannot hold the scene.
         """
@@ -69,7 +67,11 @@ class Resident:
         kinds = len(features.materials)
         if queued is None:
             queued = kinds > 1 and (not on.info.is_cpu or kinds > 4)
-        return layout, queued
+        if queued is True:
+            queued = "sort" if on.info.is_cpu else "append"
+        if queued and queued not in queues.WAYS:
+            raise SceneError(f"{queued!r} is none of {', '.join(queues.WAYS)}", where="queued")
+        return layout, queued or ""
 
     def _place_slots(self, wanted: int) -> None:
         """Divide the film among slots: as many as wanted, or as memory allows."""
@@ -119,14 +121,12 @@ class Resident:
         self.stream.write(self.named["walk"], walks.table(self.lowered.settings, places, ends))
 
     def allocate_queue(self) -> None:
-        """What sorting by material works on, where there is sorting."""
+        """What queues by material are in, where there are some."""
         if self.queued:
-            give, kinds = self.buffers, len(self.lowered.features.materials)
-            chunks = -(-self.slots // CHUNK)
-            sizes = self.slots, chunks * kinds, kinds, kinds
-            for name, words in zip(QUEUE, sizes, strict=True):
-                self.named[name] = give.allocate("the sort", 4 * words)
-            self.named.update(chunk=CHUNK, chunks=chunks, slots=self.slots)
+            kinds = len(self.lowered.features.materials)
+            for name, words in queues.sizes(self.queued, self.slots, kinds).items():
+                self.named[name] = self.buffers.allocate("the queues", 4 * words)
+            self.named.update(queues.numbers(self.slots))
 
     def build_triangles(self, layout: str) -> None:
         """The trees over triangles, of the world and of every group."""

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from clpt.records import SLABS
-from clpt.render import programs
+from clpt.render import programs, queues
 from clpt.render.features import Features
 
 _WORD = 4  # bytes
@@ -20,7 +20,11 @@ _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 _DEFINE = re.compile(r"\s*#\s*define\s+(\w+)(?:\s+(\w+))?\s*$")
 _CONDITION = re.compile(r"\s*#\s*(if|ifdef|ifndef|elif|else|endif)\b(.*)")
 _CALL = re.compile(r"(?<!\w)(?P<verb>load|store)_(?P<member>\w+)\((?!Slab )")
-_QUEUED = {"sort": (0, 1), "shade": (1, 0)}  # words of the queue that are read and written
+_QUEUED = {
+    "sort": (0, 1),
+    "append": (0, 1),
+    "shade": (1, 0),
+}  # words of the queue that are read and written
 
 
 @dataclass(frozen=True)
@@ -35,12 +39,12 @@ class Moved:
         return self.read + self.written
 
 
-def traffic(features: Features, layout: str, *, queued: bool = False) -> dict[str, Moved]:
+def traffic(features: Features, layout: str, *, queued: bool | str = False) -> dict[str, Moved]:
     """Return what a slot's part of each program moves, by the names of `programs.sources`.
 
     An item is a slot that has work there: in `generate` a path that ends and the one that begins,
-    in `intersect` and `shade_...` a ray and its hit, in `shadow` a shadow ray, in `sort` a slot,
-    whose key is read twice.
+    in `intersect` and `shade_...` a ray and its hit, in `shadow` a shadow ray, in `append` and
+    `sort` a slot, whose key `sort` reads twice.
     """
     texts = programs.sources(features, layout, 1, queued=queued)
     return {name: _moved(name, source.text, features.mode) for name, source in texts.items()}
@@ -61,7 +65,7 @@ def _moved(name: str, text: str, mode: str) -> Moved:
     read, written = (sum(sizes[member] for member in words[verb]) for verb in ("load", "store"))
     if name == "sort":
         read *= 2
-    if name == "sort" or "#define QUEUED 1\n" in text:
+    if name in queues.WAYS or "#define QUEUED 1\n" in text:
         own = _QUEUED[name.split("_")[0]]
         read, written = read + own[0], written + own[1]
     return Moved(_WORD * read, _WORD * written)

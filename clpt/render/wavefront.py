@@ -22,10 +22,10 @@ from clpt import device
 from clpt.device.timing import Timings
 from clpt.errors import MemoryBudgetError
 from clpt.records import PATH
-from clpt.render import arguments, programs
+from clpt.render import arguments, programs, queues
 from clpt.render.features import Features
 from clpt.render.lower import Lowered
-from clpt.render.resident import CHUNK, COUNTERS, GROUP, Resident
+from clpt.render.resident import COUNTERS, GROUP, Resident
 
 FILM_WORDS = 7  # kernels/lib/film.cl
 FRESH = 0x2000  # kernels/lib/path_state.cl
@@ -146,15 +146,12 @@ class Wavefront(Resident):
         """The kernels of a bounce in their order, for a host that enqueues bounce after bounce."""
         self._build(self._texts())
         made: list[Step] = []
-        chunks = -(-self.slots // CHUNK)
         for stage in programs.order(self.lowered.features, self.tree.layout, self.lanes):
             if self.queued and stage.kernel == "shade" and made[-1].bound.kernel.name != "shade":
-                for name, size in (
-                    ("sort_count", chunks),
-                    ("sort_scan", 1),
-                    ("sort_place", chunks),
-                ):
-                    made.append(Step(name, self._bound("sort", name), (size,), None))
+                kinds = len(self.lowered.features.materials)
+                for name, size, group in queues.steps(self.queued, self.slots, kinds):
+                    bound = self._bound(self.queued, name)
+                    made.append(Step(name, bound, (size,), (group,) if group else None))
             given = {"samples": (0, 0)} if not made else {}
             bound = self._bound(stage.program, stage.kernel, **given)
             made.append(Step(stage.program, bound, *self._sizes(stage.lanes)))
@@ -173,7 +170,7 @@ class Wavefront(Resident):
         signatures = {"loop": arguments.loop_arguments(features, layout)}
         return device.link(self.device, texts, "loop", signatures)
 
-    def build_ahead(self, features: Features, layout: str, queued: bool) -> None:
+    def build_ahead(self, features: Features, layout: str, queued: str) -> None:
         """Build for other features the programs that are in use, so that it fails here or never."""
         device.build_all(self.device, programs.film_sources(features, layout))
         if "loop" in vars(self):

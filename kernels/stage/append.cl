@@ -1,0 +1,29 @@
+/* Gathers the paths that met a surface by the kind of its material, a queue for each, `slots` words apart. A
+ * group of work-items counts in local memory what it has of each kind, and takes places for all of them
+ * with one addition to a kind's count. In what order groups come does not matter to the picture. */
+#include "lib/base.cl"
+#include "lib/waiting.cl"
+
+/* Empty queues; a work-item for each. */
+kernel void append_begin(global uint *queue_starts, global uint *queue_counts, uint slots)
+{
+    uint kind = get_global_id(0);
+    queue_starts[kind] = kind * slots;
+    queue_counts[kind] = 0;
+}
+
+kernel void append(SLAB_ARGS, global uint *queue, global uint *queue_counts, uint slots)
+{
+    SLABS
+    local uint tally[BSDF_COUNT], begin[BSDF_COUNT];
+    uint own = get_local_id(0), size = get_local_size(0), slot = get_global_id(0), rank = 0;
+    for (uint k = own; k < BSDF_COUNT; k += size) tally[k] = 0;
+    barrier(CLK_LOCAL_MEM_FENCE);
+    int kind = slot < slots ? waiting_kind(path, hit, slot) : -1;
+    if (kind >= 0) rank = atomic_inc(&tally[kind]);
+    barrier(CLK_LOCAL_MEM_FENCE);
+    for (uint k = own; k < BSDF_COUNT; k += size)
+        if (tally[k]) begin[k] = atomic_add(&queue_counts[k], tally[k]);
+    barrier(CLK_LOCAL_MEM_FENCE);
+    if (kind >= 0) queue[kind * slots + begin[kind] + rank] = slot;
+}
