@@ -154,6 +154,7 @@ class _Lowering:
             self.tables.expected = reradiation.expected(emissions(scene), nodes)
         self.words: dict[tuple[int, tuple[Any, ...]], int] = {}
         self.uses = dict.fromkeys(("normals", "uvs", "tangents", "absorption"), False)
+        self.transmitting: set[str] = set()  # kinds of leaves
         self.bent = any(_any_of(shape.material, mt.Bent) for shape in scene.shapes)
         self.nested: dict[int, int] = {}  # how deep mixtures are, by their words
         self.triangles: list[tuple[np.ndarray, np.ndarray, int]] = []  # vertices, faces, shape
@@ -357,6 +358,8 @@ class _Lowering:
                 if getattr(getattr(part, name), "is_texture", False):
                     self.uses["uvs"] = True
         self.uses["tangents"] |= material.turns
+        if material.transmits:
+            self.transmitting.add(material.kind)
         self.uses["absorption"] |= getattr(material, "absorption", CLEAR) != CLEAR
         return self.leaves.index(type(material)) << 24 | row
 
@@ -389,6 +392,7 @@ class _Lowering:
             filter=scene.film.filter.kind,
             integrator={"direct": "path"}.get(scene.integrator.kind, scene.integrator.kind),
             leaves=self.leaves,
+            transmitting=tuple(sorted(self.transmitting)),
             lights=self.lights.kinds,
             textures=tuple(sorted({kind for kind, _ in tables.texture_roles})),
             texture_roles=tuple(sorted(tables.texture_roles)),

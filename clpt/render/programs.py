@@ -48,6 +48,7 @@ def sources(
             **common,
             "BSDF_KIND": number,
             "BSDF_DELTA": int(cls.delta),
+            "BSDF_TRANSMITS": int(cls.kind in features.transmitting),
             "BSDF_CHROMATIC": int(cls.chromatic),
             "BSDF_SHIFTS": int(stage_texts.shifts(features, cls)),
             "BSDF_PASSES": int(cls.passes and features.passes),

@@ -31,7 +31,7 @@ STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
         if (any(sky)) {
             real pdf = load_path_pdf(path, at);
             vec3 d = load_path_d(path, at);
-            Spectrum arrives = infinite_gather(scene, d, pdf, lambdas);
+            Spectrum arrives = infinite_gather(scene, load_path_side(path, at), d, pdf, lambdas);
 #if USES_ABSORPTION
             integer medium = sel_i(sky, load_path_medium(path, at), (integer)(0));
             arrives = spectrum_mul(arrives, medium_transmittance(scene, medium, (real)(FAR), lambdas));
