@@ -21,12 +21,10 @@ from rich.table import Table
 
 from bench import machine
 from bench.reference import Reference, mean_error, reference
-from bench.scenes import SCENES as PLAIN
-from bench.varied import SCENES as VARIED
+from bench.scenes import SCENES
 from bench.workers import Shot, Worker
 
 MODES = ("rgb", "spectral")
-SCENES = {**PLAIN, **VARIED}
 CONTENDERS = (
     ("clpt", "sobol"),
     ("mitsuba", "multijitter"),

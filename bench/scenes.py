@@ -184,7 +184,7 @@ def write_cornell(folder: Path) -> Path:
         "light": (lamp, light(15)),
     }
     view = {"depth": 8, "fov": 39.3077, "origin": "0, 0, 3.9", "target": "0, 0, 0"}
-    return write_scene(folder, "cornell", parts, view)
+    return _write(folder, "cornell", parts, view)
 
 
 def write_atrium(folder: Path) -> Path:
@@ -202,7 +202,7 @@ def write_atrium(folder: Path) -> Path:
     }
     sky = '  <emitter type="constant"><rgb name="radiance" value="1, 1, 1"/></emitter>\n'
     view = {"depth": 8, "fov": 60, "origin": "-10, 1.8, 0.4", "target": "0, 2.6, -0.2"}
-    return write_scene(folder, "atrium", parts, view, sky)
+    return _write(folder, "atrium", parts, view, sky)
 
 
 def write_glass(folder: Path) -> Path:
@@ -220,7 +220,7 @@ def write_glass(folder: Path) -> Path:
         "prism": ((np.concatenate([end, end + np.array([0, 0, 1.4])]), np.array(sides)), GLASS),
     }
     view = {"depth": 12, "fov": 45, "origin": "0, 2, 4.5", "target": "0, 0.6, 0"}
-    return write_scene(folder, "glass", parts, view)
+    return _write(folder, "glass", parts, view)
 
 
 SCENES: dict[str, Callable[[Path], Path]] = {
@@ -230,11 +230,10 @@ SCENES: dict[str, Callable[[Path], Path]] = {
 }
 
 
-def write_scene(
-    folder: Path, scene: str, parts: dict[str, tuple[Mesh, str]], view: dict, more: str = ""
+def _write(
+    folder: Path, scene: str, parts: dict[str, tuple[Mesh, str]], view: dict, lights: str = ""
 ) -> Path:
-    """Write meshes, each with what stands inside its shape, and a scene of them and of more."""
-    text = HEAD.format(**view) + more
+    text = HEAD.format(**view) + lights
     for part, ((vertices, faces), inside) in parts.items():
         name = f"{scene}_{part}"
         trimesh.Trimesh(vertices, faces, process=False).export(folder / f"{name}.ply")

@@ -12,17 +12,15 @@ from dataclasses import dataclass
 from functools import cache
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 import OpenEXR
 from numpy.typing import ArrayLike, NDArray
+from PIL import Image, UnidentifiedImageError
 
 from .errors import SceneError
 from .spectra.spaces import between, chromaticities
-
-if TYPE_CHECKING:  # else imported where it is used, for many pictures are EXR only
-    from PIL import Image
 
 Array = NDArray[np.float32]
 Metadata = Mapping[str, str | int | float | tuple[float, ...]]
@@ -144,8 +142,6 @@ def write_stored(path: Path, values: NDArray[np.uint8]) -> None:
 
 def png(values: NDArray[np.uint8]) -> bytes:
     """A .png file of (h, w) or (h, w, 1, 3 or 4), stored as they are."""
-    from PIL import Image
-
     file = BytesIO()
     grey = values.ndim == 3 and values.shape[2] == 1
     Image.fromarray(values[..., 0] if grey else values).save(file, "png")
@@ -244,8 +240,6 @@ def _fail(path: Path, message: str) -> NoReturn:
 
 
 def _read_pillow(path: Path) -> Stored:
-    from PIL import Image, UnidentifiedImageError
-
     try:
         with Image.open(path) as image:
             return stored_from_pillow(image)

@@ -12,7 +12,6 @@ with the device. Three forms of text are made of a record:
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -63,7 +62,7 @@ class Record:
         """Size in 4-byte words."""
         return sum(m.words for m in self.members)
 
-    @cached_property
+    @property
     def dtype(self) -> np.dtype:
         """The record as a packed numpy structure."""
         fields = []

@@ -17,6 +17,7 @@ PATH = Record(
     radiance=("spectrum", "what the path has gathered so far"),
     lambdas=("spectrum", "wavelengths [nm]; unused in RGB mode"),
     pdf=("real", "of d [1/sr]; below 0 if the last event was delta; at the camera, -(its far end)"),
+    side=("vec3", "normal of the side to which d was chosen; no side: 0; see kernels/lib/light.cl"),
     gone=("real", "how far from where d was chosen, past null boundaries, the ray begins [m]"),
     ratio=("spectrum", "pdf of the path at each wavelength, over the mean of the four"),
     eta=("real", "product of the relative indices so far, for Russian roulette"),

@@ -93,7 +93,7 @@ def transform_points(matrix: ArrayLike, points: ArrayLike) -> Matrix:
     """Apply to points (..., 3), dividing by w where the matrix is projective."""
     matrix, points = np.asarray(matrix, np.float64), np.asarray(points, np.float64)
     moved = points @ matrix[:3, :3].T + matrix[:3, 3]
-    if is_affine(matrix):
+    if np.array_equal(matrix[3], IDENTITY[3]):
         return moved
     return moved / (points @ matrix[3, :3] + matrix[3, 3])[..., None]
 
@@ -118,11 +118,6 @@ def inverse(matrix: ArrayLike) -> Matrix:
     if is_singular(matrix):
         raise SceneError("the transform cannot be inverted: it flattens space or is not finite")
     return np.linalg.inv(np.asarray(matrix, np.float64))
-
-
-def is_affine(matrix: Matrix) -> bool:
-    """Whether the last row of a 4x4 matrix is 0 0 0 1."""
-    return bool(matrix[3].tolist() == [0.0, 0.0, 0.0, 1.0])
 
 
 def is_singular(matrix: ArrayLike) -> bool:

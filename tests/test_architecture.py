@@ -24,7 +24,6 @@ MAY_IMPORT = {
     "trimesh_ray": BASE | {"device", "rays"},
     "render": BASE | {"scene", "device", "bvh"},
     "formats": BASE | {"scene"},
-    "benchmark": BASE | {"scene", "device", "bvh", "rays", "render", "formats"},
 }
 OPENCL = {"device", "bvh", "rays", "render"}  # only these import pyopencl
 # kernels/<folder>: the folders that its files may include; generated text stands between them.

@@ -2,12 +2,11 @@
 
 from .build import Bvh, build, build_boxes, build_parts, choose_layout, choose_tree
 from .building import Building
-from .layouts import LAYOUTS, TREES, traversal_text
+from .layouts import LAYOUTS
 from .refit import rebuild_boxes, refit, refit_boxes
 
 __all__ = [
     "LAYOUTS",
-    "TREES",
     "Building",
     "Bvh",
     "build",
@@ -18,5 +17,4 @@ __all__ = [
     "rebuild_boxes",
     "refit",
     "refit_boxes",
-    "traversal_text",
 ]

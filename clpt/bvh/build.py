@@ -43,9 +43,8 @@ class Bvh:
     @property
     def bytes(self) -> int:
         """Device memory that it holds."""
-        own = [buffer for part in self.parts for buffer in (part.ranges, part.bounds)]
-        whole = [*self.buffers.values(), *(buffer for buffer in own if buffer is not None)]
-        return sum(buffer.size for buffer in whole)
+        ranges = [part.ranges.size for part in self.parts if part.ranges is not None]
+        return sum(buffer.size for buffer in self.buffers.values()) + sum(ranges)
 
 
 def choose_layout(device: Device, n_triangles: int) -> str:
@@ -56,11 +55,8 @@ def choose_layout(device: Device, n_triangles: int) -> str:
 
 
 def choose_tree(device: Device) -> str:
-    """The layout that suits the device best among those that have a tree.
-
-    Measured on CPUs; for others it is what the literature finds best, see bench/NOTES.md.
-    """
-    return "wide8" if device.info.is_cpu else "compact"
+    """The layout that traces fastest on the device among those that have a tree."""
+    return "wide8" if device.info.is_cpu else "binary"
 
 
 def build(
@@ -76,8 +72,8 @@ def build(
     comes back in its hits (zeros if None). Buffers of these types are read in place, not checked.
     layout: a key of LAYOUTS; None asks `choose_layout`.
 
-    While it runs it takes up to 280 bytes a triangle on the device for wide8 and compact and 170
-    for binary, of which about 70, 60 and 130 stay; single buffers up to 64 bytes a triangle.
+    While it runs it takes up to 280 bytes a triangle on the device for wide8 and 170 for
+    binary, of which about 70 and 130 stay; single buffers up to 64 bytes a triangle.
     Trees are never deeper than BVH_DEPTH of kernels/bvh/node.cl: traversals cannot overflow.
 
     Raises SceneError for vertices that are not finite or beyond 1e12 and for indices out of range,
@@ -151,8 +147,8 @@ def build_parts(
 def build_boxes(device: Device, boxes: NDArray, layout: str = "shapes") -> Bvh:
     """A tree over boxes, (m, 2, 3) float32 low and high corners.
 
-    layout: a key of BOX_LAYOUTS. Leaves of "shapes" hold up to two boxes; those of the others
-    one, and their nodes are as in the layout of that name. Raises as `build` does.
+    layout: a key of BOX_LAYOUTS. Leaves of "shapes" hold up to two boxes; those of "binary" and
+    "wide8" one, and their nodes are as in the layout of that name. Raises as `build` does.
     """
     start = time.perf_counter()
     boxes = np.asarray(boxes, np.float32).reshape(-1, 2, 3)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from itertools import pairwise
 
@@ -13,10 +13,9 @@ import pyopencl as cl
 from . import tree
 from .building import Building
 
-_COLLAPSE, _REFIT = "bvh/collapse.cl", "bvh/refit.cl"
+_COLLAPSE = "bvh/collapse.cl"
 _BINARY_LEAF = 4  # triangles of a leaf, at most
 _BLOCK = 8
-_COMPACT_LEAF = 3  # triangles of a leaf, at most; kernels/bvh/compact.cl counts them in 3 bits
 SHAPES_LEAF = 2  # boxes of a leaf of "shapes", at most
 _LEAF, _DEEPEST = 0x80000000, 48  # BVH_LEAF and BVH_DEPTH of kernels/bvh/node.cl
 
@@ -38,14 +37,13 @@ class Part:
     reach: the largest coordinate that it was built with; steps: (begin, count) of what a kernel
     takes at once, from the leaves up: wide nodes, or ranges in the heap `ranges` of a binary tree;
     count: triangles or boxes; nodes, leaves: where its own begin, in steps of 32 bytes; first: its
-    first triangle; bounds: of the nodes of a compressed tree, before they became steps.
+    first triangle.
     """
 
     count: int
     reach: float = 0.0
     steps: tuple[tuple[int, int], ...] = ()
     ranges: cl.Buffer | None = None
-    bounds: cl.Buffer | None = None
     nodes: int = 0
     leaves: int = 0
     first: int = 0
@@ -88,8 +86,8 @@ def binary(building: Building, mesh: Mesh) -> Packed:
 
 def wide8(building: Building, mesh: Mesh) -> Packed:
     """The binary tree made 8 wide, and blocks of 8 triangles."""
-    built = _binary_tree(building, mesh, _BLOCK, at_once=_BLOCK)
-    wide = _wide_nodes(building, built)
+    built = _binary_tree(building, mesh, _BLOCK)
+    wide = _collapse(building, mesh.count, built)
     blocks = building.allocate(352 * wide.leaves)
     source = {"vertices": mesh.vertices, "faces": mesh.faces, "tags": mesh.tags}
     leaves = {"nodes": built.nodes, "items": built.items, "leaf_roots": wide.leaf_roots}
@@ -113,113 +111,11 @@ def wide8_boxes(building: Building, count: int, boxes: cl.Buffer) -> Packed:
     """The binary tree over boxes (count, 2, 3) made 8 wide, and the boxes in their order."""
     items, parts = tree.items_of_boxes(building, count, boxes)
     built = tree.over(building, count, items, parts, 1)
-    wide = _wide_nodes(building, built)
+    wide = _collapse(building, count, built)
     indices = building.allocate(4 * count)
     leaves = {"nodes": built.nodes, "items": items, "leaf_roots": wide.leaf_roots}
     building.run_each(_COLLAPSE, "collapse_indices", count, indices=indices, **leaves)
     return Packed({"nodes": wide.nodes, "indices": indices}, wide.part, wide.stats)
-
-
-def compact(building: Building, mesh: Mesh) -> Packed:
-    """The binary tree made 8 wide in compressed nodes, and records in the order of its leaves."""
-    built = _binary_tree(building, mesh, _COMPACT_LEAF)
-    leaves = building.allocate(_whole(48 * mesh.count))
-    nodes, part, stats = _compact_nodes(building, built, leaves, mesh.tags)
-    source = {"vertices": mesh.vertices, "faces": mesh.faces, "boxes": None, "indices": None}
-    follow(building, part, nodes=nodes, leaves=leaves, **source)
-    return Packed({"nodes": nodes, "leaves": leaves}, part, stats)
-
-
-def compact_boxes(building: Building, count: int, boxes: cl.Buffer) -> Packed:
-    """The binary tree over boxes (count, 2, 3) in compressed nodes, and their order."""
-    items, parts = tree.items_of_boxes(building, count, boxes)
-    built = tree.over(building, count, items, parts, 1)
-    indices = building.allocate(4 * count)
-    nodes, part, stats = _compact_nodes(building, built, indices, None)
-    source = {"vertices": None, "faces": None, "boxes": boxes, "indices": indices}
-    follow(building, part, nodes=nodes, leaves=None, **source)
-    return Packed({"nodes": nodes, "indices": indices}, part, stats)
-
-
-def _compact_nodes(
-    building: Building, built: tree.Tree, leaves: cl.Buffer, tags: cl.Buffer | None
-) -> tuple[cl.Buffer, Part, dict[str, float]]:
-    """Compressed nodes that have no boxes yet, and what their leaves hold; see `follow`."""
-    wide = _collapse(building, built)
-    n_nodes = int(wide.stats["nodes"])
-    nodes, bounds = building.allocate(_whole(80 * n_nodes)), building.allocate(32 * n_nodes)
-    common = {"places": building.allocate(8 * n_nodes), "compact": nodes, "tags": tags}
-    common |= {"nodes": built.nodes, "items": built.items, "leaves": leaves}
-    common |= {"costs": wide.costs, "roots": wide.roots, "firsts": wide.firsts}
-    for begin, count in reversed(wide.part.steps):
-        building.run_each("bvh/compact_pack.cl", "compact_nodes", count, begin=begin, **common)
-    return nodes, replace(wide.part, bounds=bounds), wide.stats
-
-
-def follow(building: Building, part: Part, **buffers: cl.Buffer | None) -> None:
-    """Enqueue that a tree in place has the boxes of what is in it, from the leaves up.
-
-    buffers: those of the tree, and either vertices and faces or boxes and indices, the others None.
-    """
-    common = {
-        "nodes_begin": part.nodes,
-        "leaves_begin": part.leaves,
-        "faces_begin": part.first,
-        "reach": part.reach,
-        **buffers,
-    }
-    kernel, own = "refit_wide8", {}
-    if part.bounds is not None:
-        kernel, own = "refit_compact", {"bounds": part.bounds}
-    for i, (begin, count) in enumerate(part.steps):
-        if part.ranges is None:
-            building.run_each(_REFIT, kernel, count, begin=begin, **own, **common)
-        else:
-            kernel = "refit_level" if i else "refit_subtree"
-            building.run(_REFIT, kernel, count, begin=begin, ranges=part.ranges, **common)
-
-
-@dataclass(frozen=True)
-class _Collapse:
-    """What becomes of a binary tree made 8 wide, as kernels/bvh/collapse.cl has it.
-
-    leaf_roots: the binary nodes that wide leaves were, `leaves` of them.
-    """
-
-    costs: cl.Buffer
-    occlusion: cl.Buffer
-    roots: cl.Buffer
-    firsts: cl.Buffer
-    leaf_roots: cl.Buffer
-    leaves: int
-    part: Part
-    stats: dict[str, float]
-
-
-def _collapse(building: Building, built: tree.Tree) -> _Collapse:
-    """Choose and number the wide nodes."""
-    n = built.count
-    costs, occlusion = building.allocate(64 * n), building.allocate(8 * n)
-    below = {"nodes": built.nodes, "costs": costs, "occlusion": occlusion}
-    parts = {"items": built.items, "ranges": built.ranges, **below}
-    begin = (1 << built.levels) - 1
-    building.run(_COLLAPSE, "collapse_subtree", 1 << built.levels, begin=begin, **parts)
-    for level in reversed(range(built.levels)):
-        begin = (1 << level) - 1
-        building.run(_COLLAPSE, "collapse_level", 1 << level, begin=begin, **parts)
-
-    roots, firsts = building.allocate(4 * n), building.allocate(8 * n)
-    leaf_roots, totals = building.allocate(4 * n), building.allocate(4 * (4 + _DEEPEST))
-    places = {"roots": roots, "firsts": firsts, "leaf_roots": leaf_roots, "totals": totals}
-    building.run(_COLLAPSE, "collapse_number", 1, nodes=built.nodes, costs=costs, **places)
-    words = building.read(totals, 4 + _DEEPEST, np.uint32)
-    n_nodes, n_leaves, levels = words[:3].tolist()
-    starts = [*words[4 : 4 + levels].tolist(), n_nodes]
-    steps = tuple((begin, end - begin) for begin, end in pairwise(starts))[::-1]
-    cost = float(words[3:].view(np.float32)[0])
-    stats = {"nodes": n_nodes, "leaves": n_leaves, "depth": levels - 1, "cost": cost}
-    part = Part(n, built.reach(building), steps)
-    return _Collapse(costs, occlusion, roots, firsts, leaf_roots, n_leaves, part, stats)
 
 
 @dataclass(frozen=True)
@@ -233,40 +129,43 @@ class _Wide:
     stats: dict[str, float]
 
 
-def _wide_nodes(building: Building, built: tree.Tree) -> _Wide:
-    """The inner nodes of a binary tree made 8 wide."""
-    made = _collapse(building, built)
-    n_nodes = int(made.stats["nodes"])
+def _collapse(building: Building, n: int, built: tree.Tree) -> _Wide:
+    """The inner nodes of a binary tree over n items made 8 wide."""
+    costs, occlusion = building.allocate(64 * n), building.allocate(8 * n)
+    below = {"nodes": built.nodes, "costs": costs, "occlusion": occlusion}
+    parts = {"items": built.items, "ranges": built.ranges, **below}
+    begin = (1 << built.levels) - 1
+    building.run(_COLLAPSE, "collapse_subtree", 1 << built.levels, begin=begin, **parts)
+    for level in reversed(range(built.levels)):
+        begin = (1 << level) - 1
+        building.run(_COLLAPSE, "collapse_level", 1 << level, begin=begin, **parts)
+
+    numbers = {"roots": building.allocate(4 * n), "firsts": building.allocate(8 * n)}
+    leaf_roots, totals = building.allocate(4 * n), building.allocate(4 * (4 + _DEEPEST))
+    places = {"leaf_roots": leaf_roots, "totals": totals, **numbers}
+    building.run(_COLLAPSE, "collapse_number", 1, nodes=built.nodes, costs=costs, **places)
+    words = building.read(totals, 4 + _DEEPEST, np.uint32)
+    n_nodes, n_leaves, levels = words[:3].tolist()
+    starts = [*words[4 : 4 + levels].tolist(), n_nodes]
+    steps = tuple((begin, end - begin) for begin, end in pairwise(starts))[::-1]
+
     wide = building.allocate(256 * n_nodes)
-    below = {"nodes": built.nodes, "costs": made.costs, "occlusion": made.occlusion}
-    numbers = {"roots": made.roots, "firsts": made.firsts}
     building.run_each(_COLLAPSE, "collapse_nodes", n_nodes, wide=wide, **numbers, **below)
-    return _Wide(wide, made.leaf_roots, made.leaves, made.part, made.stats)
+    cost = float(words[3:].view(np.float32)[0])
+    stats = {"nodes": n_nodes, "leaves": n_leaves, "depth": levels - 1, "cost": cost}
+    return _Wide(wide, leaf_roots, n_leaves, Part(n, built.reach(building), steps), stats)
 
 
 LAYOUTS: dict[str, Callable[[Building, Mesh], Packed]] = {
     "brute": brute,
     "binary": binary,
     "wide8": wide8,
-    "compact": compact,
 }
 BOX_LAYOUTS: dict[str, Callable[[Building, int, cl.Buffer], Packed]] = {
     "shapes": partial(binary_boxes, leaf_size=SHAPES_LEAF),
     "binary": binary_boxes,
     "wide8": wide8_boxes,
-    "compact": compact_boxes,
 }
-
-TREES = tuple(name for name in LAYOUTS if name in BOX_LAYOUTS)  # what is not brute force
-
-
-def traversal_text(layout: str, every: bool = False) -> str:
-    """Return the traversal of a layout, whose verbs are then LAYOUT(closest), LAYOUT(occluded).
-
-    every: the one that meets all triangles of a ray instead.
-    """
-    file = f"bvh/{layout}{'_every' * every}.cl"
-    return f'#include "{file}"\n#define LAYOUT(verb) {layout}_##verb\n'
 
 
 def _binary_part(building: Building, built: tree.Tree) -> Part:
@@ -275,11 +174,6 @@ def _binary_part(building: Building, built: tree.Tree) -> Part:
     return Part(built.count, built.reach(building), steps, built.ranges)
 
 
-def _binary_tree(building: Building, mesh: Mesh, leaf_size: int, at_once: int = 1) -> tree.Tree:
+def _binary_tree(building: Building, mesh: Mesh, leaf_size: int) -> tree.Tree:
     items, parts = tree.items_of_triangles(building, mesh.count, mesh.vertices, mesh.faces)
-    return tree.over(building, mesh.count, items, parts, leaf_size, at_once)
-
-
-def _whole(nbytes: int) -> int:
-    """As many bytes or a few more: trees that share a buffer begin in steps of 32."""
-    return -(-nbytes // 32) * 32
+    return tree.over(building, mesh.count, items, parts, leaf_size)

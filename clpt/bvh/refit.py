@@ -14,7 +14,7 @@ import pyopencl as cl
 from . import tree as trees
 from .build import Bvh
 from .building import Building
-from .layouts import SHAPES_LEAF, follow
+from .layouts import SHAPES_LEAF, Part
 
 _ROOT = "bvh/refit.cl"
 _NO_TRIANGLES = {"vertices": None, "faces": None, "leaves": None}
@@ -45,9 +45,8 @@ def refit(
             building.run_each(_ROOT, "refit_brute", tree.count, **records, **source)
         return building.stream.last
     triangles = {"vertices": vertices, "faces": faces, "leaves": tree.buffers["leaves"]}
-    for part in (tree.parts[number] for number in numbers):
-        if part.count:
-            follow(building, part, nodes=tree.buffers["nodes"], **triangles, **_NO_BOXES)
+    for number in numbers:
+        _refit(building, tree, tree.parts[number], {**triangles, **_NO_BOXES})
     return building.stream.last
 
 
@@ -58,9 +57,7 @@ def refit_boxes(building: Building, tree: Bvh, boxes: cl.Buffer) -> cl.Event | N
     box that is inside out or not finite is met by no ray. For the rest see `refit`.
     """
     boxed = {"boxes": boxes, "indices": tree.buffers["indices"]}
-    if tree.count:
-        nodes = tree.buffers["nodes"]
-        follow(building, tree.parts[0], nodes=nodes, **boxed, **_NO_TRIANGLES)
+    _refit(building, tree, tree.parts[0], {**boxed, **_NO_TRIANGLES})
     return building.stream.last
 
 
@@ -81,3 +78,23 @@ def rebuild_boxes(building: Building, tree: Bvh, boxes: cl.Buffer) -> cl.Event |
         if part.ranges is not None:
             building.stream.copy(part.ranges, built.ranges)
     return building.stream.last
+
+
+def _refit(building: Building, tree: Bvh, part: Part, source: dict) -> None:
+    """Enqueue the steps of one tree."""
+    if not part.count:
+        return
+    common = {
+        "nodes": tree.buffers["nodes"],
+        "nodes_begin": part.nodes,
+        "leaves_begin": part.leaves,
+        "faces_begin": part.first,
+        "reach": part.reach,
+        **source,
+    }
+    for i, (begin, count) in enumerate(part.steps):
+        if part.ranges is None:
+            building.run_each(_ROOT, "refit_wide8", count, begin=begin, **common)
+        else:
+            kernel = "refit_level" if i else "refit_subtree"
+            building.run(_ROOT, kernel, count, begin=begin, ranges=part.ranges, **common)

@@ -60,17 +60,9 @@ def _items(
 
 
 def over(
-    building: Building,
-    count: int,
-    items: cl.Buffer,
-    parts: cl.Buffer,
-    leaf_size: int,
-    at_once: int = 1,
+    building: Building, count: int, items: cl.Buffer, parts: cl.Buffer, leaf_size: int
 ) -> Tree:
-    """Build over items, which are put in the order of the leaves.
-
-    leaf_size: items of a leaf, at most; at_once: as many cost as much to test as one.
-    """
+    """Build over items, which are put in the order of the leaves."""
     wanted = _SUBTREES * building.device.info.compute_units
     levels = int(math.log2(max(1, min(wanted, count // leaf_size))))
     ranges = building.allocate(16 * (2 << levels))
@@ -79,7 +71,7 @@ def over(
     n_parts = -(-count // _RUN)
     heap = {"ranges": ranges, "extents": extents}
     building.run(_BUILD, "build_root", 1, parts=parts, n_parts=n_parts, count=count, **heap)
-    shared = {"items": items, "nodes": nodes, "leaf_size": leaf_size, "share": 1 / at_once, **heap}
+    shared = {"items": items, "nodes": nodes, "leaf_size": leaf_size, **heap}
     for level in range(levels):
         building.run(_BUILD, "build_level", 1 << level, begin=(1 << level) - 1, **shared)
     building.run(_BUILD, "build_subtree", 1 << levels, begin=(1 << levels) - 1, **shared)

@@ -1,216 +1,22 @@
-"""`clpt bench`: how fast rays, stages, builds and starts are on a device, and beside a record."""
+"""`clpt bench`: the benchmarks of the repository, from a checkout."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import subprocess
+import sys
 from pathlib import Path
-from typing import Any
 
 import click
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
-from .. import benchmark
-from .. import device as dev
-from ..benchmark import comparing, records, scenes
-from ..benchmark.comparing import Ratio
-from ..benchmark.figures import Figure
-from ..bvh import TREES
-from ..device.context import trial
+from ..errors import ClptError
 
-SLOWER = 3  # the exit status if a figure was refused, or is below --fail-below
-STAGES = ("generate", "emit", "intersect", "mix", "shade", "shadow", "splat", "sort", "accumulate")
-HEADINGS = ("figure", "", "unit", "±", "GB/s", "of a copy", "")
+ROOT = Path(__file__).parents[2]
 
 
-@click.command()
-@click.option("--scene", help="A scene's file or folder, or atrium or cornell, made from formulas.")
-@click.option(
-    "--stage", "wanted", multiple=True, metavar="NAME",
-    help="What to measure: see --list; repeat it for several.  [default: all]",
-)  # fmt: skip
-@click.option("--layout", "layouts", multiple=True, type=click.Choice(TREES), help="Of the trees.")
-@click.option("--mode", type=click.Choice(["spectral", "rgb"]), help="What light is made of.")
-@click.option("--device", help="Index or part of the name of a device, or all.")
-@click.option(
-    "--rounds", type=click.IntRange(1), default=5, show_default=True, help="Of each figure."
-)
-@click.option("--count", type=click.IntRange(64), help="Rays of a set.")
-@click.option(
-    "--json", "target", type=click.Path(path_type=Path), help="Append JSON lines to a file."
-)
-@click.option(
-    "--compare", "former", type=click.Path(path_type=Path),
-    help="JSON lines to compare with, of before or of another device.",
-)  # fmt: skip
-@click.option(
-    "--fail-below", type=float, metavar="RATIO",
-    help="With --compare: exit with 3 if a figure is worse than that, beyond noise.",
-)  # fmt: skip
-@click.option(
-    "--plot", "drawing", type=click.Path(path_type=Path),
-    help="Plot the figures to a .png, .svg or .pdf; of several devices the last one's.",
-)  # fmt: skip
-@click.option("--list", "listed", is_flag=True, help="Tell what can be measured, and where.")
-def bench(
-    scene: str | None,
-    wanted: tuple[str, ...],
-    layouts: tuple[str, ...],
-    device: str | None,
-    target: Path | None,
-    former: Path | None,
-    fail_below: float | None,
-    drawing: Path | None,
-    listed: bool,
-    **settings: Any,
-) -> int:
-    """Measure rays, stages of rendering, builds and starts of an OpenCL device.
-
-    Figures are medians of rounds; ± is half the distance of their quartiles. A result that cannot
-    be true (rays not traced, hits that differ from what is there, times below what memory allows)
-    is refused: it is not recorded, and the exit status is 3.
-    """
-    console = _console()
-    if listed:
-        _list(console)
-        return 0
-    if fail_below is not None and former is None:
-        raise click.UsageError("--fail-below compares: give --compare FILE too")
-    if drawing is not None:
-        from . import bench_plot  # not needed else, and slow to import
-
-        bench_plot.check(drawing)
-    before = None if former is None else records.read(former)
-    parts, only = _chosen(wanted)
-    failed = False
-    for info in _infos(device):
-        on = dev.Device.open(info, profiling=True)
-        console.print(
-            f"[bold]{info.label}[/], {info.version}, driver {info.driver}", highlight=False
-        )
-        figures = _measured(
-            console, on, parts=parts, only=only, scene=scene, layouts=layouts or TREES, **settings
-        )
-        good = [figure for figure in figures if figure.rounds and not figure.refused]
-        failed |= any(figure.refused for figure in figures)
-        if target is not None:
-            about = records.of_device(info)
-            records.append(target, [{**figure.record(), **about} for figure in good])
-        ratios = []
-        if before is not None:
-            ratios = comparing.against(figures, before, info.label)
-            _show_ratios(console, ratios, fail_below)
-            failed |= fail_below is not None and any(r.below(fail_below) for r in ratios)
-        if drawing is not None:
-            then = {figures.index(one.figure): float(one.then["value"]) for one in ratios}
-            bench_plot.write(drawing, f"{info.label}, clpt bench", figures, then)
-    return SLOWER if failed else 0
-
-
-def _chosen(wanted: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Parts, and stages of a render if not all. Raises click.BadParameter."""
-    parts, only = [], []
-    for name in wanted:
-        if name in benchmark.PARTS:
-            parts.append(name)
-        elif name.split("_")[0] in STAGES:
-            only.append(name)
-        else:
-            known = ", ".join([*benchmark.PARTS, *STAGES])
-            raise click.BadParameter(f"{name!r} is none of {known}", param_hint="--stage")
-    if only and "stages" not in parts:
-        parts.append("stages")
-    return parts or list(benchmark.PARTS), only
-
-
-def _infos(device: str | None) -> list[dev.DeviceInfo]:
-    if device != "all":
-        return [dev.choose(device).info]
-    return [info for info in dev.devices() if trial(info) is None]
-
-
-def _measured(console: Console, on: dev.Device, **settings: Any) -> list[Figure]:
-    """All figures, each told when it is there."""
-    figures: list[Figure] = []
-    table = None
-    with console.status("measuring") as status:
-        for figure in benchmark.measure(on, **settings):
-            if table is None or figure.part != figures[-1].part:
-                if table is not None:
-                    console.print(table)
-                table = _table(figure)
-            table.add_row(*_cells(figure), style="red" if figure.refused else "")
-            figures.append(figure)
-            status.update(f"{figure.part}: {figure.name}")
-    if table is not None:
-        console.print(table)
-    return figures
-
-
-def _table(figure: Figure) -> Table:
-    title = " of ".join(filter(None, (figure.part, figure.scene)))
-    table = Table(title=title, title_justify="left", title_style="bold", box=None, pad_edge=False)
-    for i, heading in enumerate(HEADINGS):
-        table.add_column(heading, justify="right" if i in (1, 3, 4, 5) else "left")
-    return table
-
-
-def _cells(figure: Figure) -> list[str | Text]:
-    more = figure.more
-    told = f"refused: {figure.refused}" if figure.refused else str(more.get("note", ""))
-    if not told and figure.part == "start":
-        told = f"{more['programs']} programs in {more['build_seconds']:.2f} s"
-        told += f", {more['memory'] / 2**20:.0f} MiB" if more["memory"] else ""
-    bytes_ = (f"{more['gbytes']:.2f}", f"{more['of_copy']:.1%}") if "gbytes" in more else ("", "")
-    return [
-        figure.name,
-        f"{figure.value:.3g}" if figure.rounds and figure.value < 1000 else f"{figure.value:.0f}",
-        figure.unit,
-        f"{figure.spread:.1%}" if len(figure.rounds) > 1 else "",
-        *bytes_,
-        Text(told),
-    ]
-
-
-def _show_ratios(console: Console, ratios: Sequence[Ratio], limit: float | None) -> None:
-    then = ratios[0].then
-    title = f"beside {then.get('device', 'a record')}, {then.get('date', '')[:10]} "
-    title += f"{then.get('commit') or then.get('clpt', '')}; above 1 is better now"
-    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
-    for heading in ("figure", "now", "then", "unit", "ratio", "noise", ""):
-        table.add_column(heading, justify="left" if heading in ("figure", "unit", "") else "right")
-    for one in ratios:
-        worse = limit is not None and one.below(limit)
-        clear = abs(one.ratio - 1.0) > one.noise
-        table.add_row(
-            f"{one.figure.part} {one.figure.name}",
-            f"{one.figure.value:.4g}",
-            f"{one.then['value']:.4g}",
-            one.figure.unit,
-            f"{one.ratio:.2f}",
-            f"{one.noise:.1%}",
-            f"below {limit:g}" if worse else "" if clear else "within noise",
-            style="red" if worse else "",
-        )
-    console.print(table)
-
-
-def _list(console: Console) -> None:
-    """What --stage, --scene and --device take."""
-    rows = {**benchmark.PARTS, "a stage": "of `stages` alone: " + ", ".join(STAGES)}
-    for heading, found in (
-        ("--stage", rows),
-        ("--scene", {name: make.__doc__ for name, make in scenes.SCENES.items()}),
-        ("--layout", dict.fromkeys(TREES, "")),
-        ("--device", {str(info.index): info.label for info in dev.devices()}),
-    ):
-        table = Table(heading, "", box=None, pad_edge=False, title_justify="left")
-        for name, told in found.items():
-            table.add_row(name, told)
-        console.print(table)
-
-
-def _console() -> Console:
-    there = Console()
-    return there if there.is_terminal else Console(width=200)
+@click.command(context_settings={"ignore_unknown_options": True, "help_option_names": []})
+@click.argument("arguments", nargs=-1, type=click.UNPROCESSED)
+def bench(arguments: tuple[str, ...]) -> int:
+    """Measure speed, start-up and memory, beside Mitsuba and Embree (from a checkout)."""
+    if not (ROOT / "bench" / "__main__.py").is_file():
+        raise ClptError("the benchmarks are in clpt's repository: run `clpt bench` from a checkout")
+    return subprocess.run([sys.executable, "-m", "bench", *arguments], cwd=ROOT).returncode

@@ -174,10 +174,9 @@ def figures(
     """
     seconds, done = max(progress.seconds, 1e-9), fraction - since[1]
     left = f"{clock((seconds - since[0]) * (1.0 - fraction) / done)} left" if done > 0.0 else ""
-    samples = f"{int(progress.samples)}{f'/{progress.total}' if progress.total else ''} spp"
-    left_over = f", {progress.active:.0%} of the pixels left" if progress.active < 1.0 else ""
+    samples = int(progress.samples)
     return {
-        "samples": samples + left_over,
+        "samples": f"{samples}/{progress.total} spp" if progress.total else f"{samples} spp",
         "speed": f"{progress.paths / seconds * 1e-6:.3g} Msamples/s",
         "rays": f"{progress.rays / seconds * 1e-6:.3g} Mrays/s",
         "elapsed": clock(progress.seconds),

@@ -21,11 +21,8 @@ def expose(
     spp: int | None,
     limit: float | None,
     show: Callable[[Progress], None],
-    noise: float | None = None,
 ) -> bool:
     """Render until every pixel has `spp` samples or `limit` [s] is over; None means without end.
-
-    With `noise` it ends too when that is what is left of it.
 
     The first pass gives every pixel a sample, whatever the limit. Ctrl-C ends the rendering within
     a second; a second one is a KeyboardInterrupt. Returns whether it was not interrupted.
@@ -40,11 +37,11 @@ def expose(
 
     size, end = 1, began
     with _interrupts() as interrupted:
-        while renderer.run(size, tell, noise=noise):
+        while renderer.run(size, tell):
             start, end = end, time.perf_counter()
             seconds_left = math.inf if limit is None else began + limit - end
             samples_left = math.inf if spp is None else spp - renderer.samples
-            if samples_left <= 0 or seconds_left <= 0 or renderer.active == 0.0:
+            if samples_left <= 0 or seconds_left <= 0:
                 break
             rate = size / max(end - start, 1e-9)
             size = pass_size(renderer.samples, rate, samples_left, seconds_left)

@@ -17,7 +17,6 @@ from ..formats import load, studio
 from ..render.shapes import triangles
 from ..scene import Scene, materials, shapes, textures
 from ..scene.params import Kind
-from .variables import variables
 
 FLAT_TRIANGLES = {shapes.Rectangle: 2, shapes.Cube: 12}
 
@@ -45,6 +44,17 @@ def info(scene: Path, defines: tuple[str, ...], as_json: bool) -> None:
     if not console.is_terminal:
         console = Console(width=200)  # a file or a pipe has no edge to wrap at
     console.print(table)
+
+
+def variables(defines: Iterable[str]) -> dict[str, Any]:
+    """Return NAME=VALUE options as a dictionary. Raises click.BadParameter."""
+    pairs = [define.partition("=") for define in defines]
+    wrong = next((name for name, equals, _ in pairs if not (name and equals)), None)
+    if wrong is not None:
+        raise click.BadParameter(f"{wrong!r} does not look like NAME=VALUE", param_hint="-D")
+    if any(name == "progress" for name, _, _ in pairs):
+        raise click.BadParameter("no variable can be called progress", param_hint="-D")
+    return {name: value for name, _, value in pairs}
 
 
 def summary(scene: Scene) -> dict[str, Any]:

@@ -10,8 +10,8 @@ from ..bvh.layouts import LAYOUTS
 from ..errors import SceneError
 from ..formats import load
 from ..render.lower import lower
-from ..render.programs import film_sources, sources
-from .variables import variables
+from ..render.programs import sources
+from .info import variables
 
 
 @click.command()
@@ -44,7 +44,7 @@ def kernels(
     Each is a whole program: any OpenCL compiler takes it as it is. No device is needed.
     """
     features = lower(load(scene, **variables(defines))).features
-    made = sources(features, layout, int(lanes), queued=queued) | film_sources(features, layout)
+    made = sources(features, layout, int(lanes), queued=queued)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, source in made.items():

@@ -64,10 +64,7 @@ def write(
         _write_bands(path, renderer, facts)
     elif not renderer.channels:
         picture = renderer.colours()
-        layers = {} if renderer.scene.noise is None else {"samples": renderer.film.get()[..., 3]}
-        images.write(
-            path, picture, metadata=facts, exposure=exposure, layers=layers, space=film.output_space
-        )
+        images.write(path, picture, metadata=facts, exposure=exposure, space=film.output_space)
     elif path.suffix.lower() == ".png":
         images.write(path, sheet(renderer.layers()), exposure=exposure)
     else:

@@ -20,7 +20,7 @@ from ..spectra.sensors import OBSERVERS
 from . import outputs, report
 from .display import display
 from .exposing import expose
-from .variables import variables
+from .info import variables
 
 INTERRUPTED = 130
 LARGEST = 65536  # pixels of a side
@@ -102,10 +102,6 @@ class White(click.ParamType):
 )  # fmt: skip
 @click.option("--mode", type=click.Choice(["spectral", "rgb"]), help="What light is made of.")
 @click.option("--spp", type=click.IntRange(1, 2**31 - 1), help="Samples of a pixel.")
-@click.option(
-    "--noise", type=click.FloatRange(0.0), metavar="SHARE",
-    help="Leave pixels with less noise, such as 0.02 of the light around; 0: leave none.",
-)  # fmt: skip
 @click.option("--time", "limit", type=Duration(), help="Stop after 30s, 5m, 1h30m of rendering.")
 @click.option("--size", type=Size(), help="Size of the picture.")
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), help="Of the random numbers.")
@@ -146,17 +142,16 @@ def render(
 ) -> int:
     """Render the scene file, mesh or folder SCENE.
 
-    What is not given is as the scene says. With --time or --noise but no --spp the render goes on
-    until the time is over, or the noise as low. Ctrl-C stops it within a second; what is there is
-    written all the same, and the exit status is 130.
+    What is not given is as the scene says. With --time but no --spp the render goes on until the
+    time is over. Ctrl-C stops it within a second; what is there is written all the same, and the
+    exit status is 130.
     """
     shown = display(quiet, limit)
     began = time.perf_counter()
     with shown.loading(scene.name) as tell:
         plan = changed(load(scene, progress=tell, **variables(defines)), **changes)
     loading = time.perf_counter() - began
-    ends = limit is not None or bool(changes["noise"])
-    spp = changes["spp"] if ends else plan.spp
+    spp = changes["spp"] if limit is not None else plan.spp
     targets = outputs.checked(paths or outputs.default(scene), plan)
     on = dev.choose(device, profiling=verbose)
     with shown.phase(f"building kernels for {on.info.name}"):
@@ -167,7 +162,7 @@ def render(
         report.before(renderer, loading)
     began = time.perf_counter()
     with shown.rendering():
-        finished = expose(renderer, spp, limit, shown.show, plan.noise)
+        finished = expose(renderer, spp, limit, shown.show)
     seconds = time.perf_counter() - began
     rejected = sum(wavefront.counts.rejected for wavefront in renderer.wavefronts)
     if rejected:
@@ -186,7 +181,6 @@ def changed(
     *,
     mode: str | None = None,
     spp: int | None = None,
-    noise: float | None = None,
     size: tuple[int, int] | None = None,
     seed: int | None = None,
     integrator: str | None = None,
@@ -199,8 +193,6 @@ def changed(
     """
     film = {name: value for name, value in {"mode": mode, **film}.items() if value is not None}
     film |= {} if size is None else {"width": size[0], "height": size[1]}
-    if noise is not None:
-        scene = dataclasses.replace(scene, noise=noise or None)
     given: dict[str, Any] = {"spp": spp, "seed": seed}
     given["film"] = dataclasses.replace(scene.film, **film)
     if integrator is not None and integrator != scene.integrator.kind:

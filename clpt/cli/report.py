@@ -37,14 +37,6 @@ def before(renderer: Renderer, loading: float) -> None:
 def after(renderer: Renderer) -> None:
     """Tell how long the first sample and each stage took."""
     _line("seconds until a sample", f"{renderer.facts.seconds.get('first_sample', 0.0):.2f}")
-    if renderer.scene.noise is not None:
-        samples = renderer.film.get()[..., 3]
-        done = 1.0 - renderer.active
-        _line("noise", f"below {renderer.scene.noise:g} in {done:.1%} of the pixels")
-        _line(
-            "samples",
-            f"{samples.mean():.1f} in the mean, {samples.min():.0f} to {samples.max():.0f}",
-        )
     for wavefront in renderer.wavefronts:
         timings = wavefront.timings.collect()
         whole = sum(timing.seconds for timing in timings.values())

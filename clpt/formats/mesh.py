@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 SUFFIXES = (".obj", ".ply", ".stl", ".off")
 COLOURS = ("vertex_color", "face_color")  # attributes that show where no material is named
 DUMMIES = (None, (2, 2))  # sizes of the image in trimesh's default material
-SUMMED = 1 << 20  # triangles whose normals are summed at a time
 CHUNK = 1 << 14  # triangles that are checked at a time: in float64 they take 400 bytes each
 USEMTL = re.compile(rb"(?m)^[ \t]*usemtl[^\n]*")
 GREY = TwoSided(front=Diffuse(reflectance=0.6, name="grey"))
@@ -98,14 +97,8 @@ def has_area(mesh: Mesh) -> bool:
 
 def smooth_normals(vertices: NDArray[Any], faces: NDArray[Any]) -> NDArray[np.float32]:
     """Vertex normals (n, 3): those of the faces, weighted by angle (Thuermer, Wuethrich 1998)."""
-    total = np.zeros((len(vertices), 3))
-    for first in range(0, len(faces), SUMMED):
-        _add_normals(total, vertices, faces[first : first + SUMMED])
-    return _unit(total).astype(np.float32)
-
-
-def _add_normals(total: NDArray[Any], vertices: NDArray[Any], faces: NDArray[Any]) -> None:
     corners = vertices[faces].astype(np.float64)
+    total = np.zeros((len(vertices), 3))
     normals = _unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
     for i in range(3):
         a = _unit(corners[:, (i + 1) % 3] - corners[:, i])
@@ -114,6 +107,7 @@ def _add_normals(total: NDArray[Any], vertices: NDArray[Any], faces: NDArray[Any
         for axis in range(3):
             weights = angles * normals[:, axis]
             total[:, axis] += np.bincount(faces[:, i], weights, len(vertices))
+    return _unit(total).astype(np.float32)
 
 
 def checked(

@@ -53,7 +53,6 @@ the same to an editor: begin a file with `"$schema": "../schema.json"`.
 | `shapes` | a list of [shapes](#shapes) |
 | `lights` | a list of [lights](#lights); area lights stand on shapes, as `emission` |
 | `spp` | samples of a pixel |
-| `noise` | noise, such as 0.02, below which a pixel gets no more samples; `spp` is then the most |
 | `seed` | of the random numbers |
 | `name` | for people, and for the names of pictures |
 

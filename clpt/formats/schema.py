@@ -71,11 +71,6 @@ def schema() -> Schema:
             "shapes": {"type": "array", "items": _ref("shape")},
             "lights": {"type": "array", "items": _ref("light")},
             "spp": {"type": "integer", "minimum": 1, "description": "samples of a pixel"},
-            "noise": {
-                "type": "number",
-                "exclusiveMinimum": 0,
-                "description": "below which a pixel gets no more samples",
-            },
             "seed": {"type": "integer", "description": "of the random numbers"},
         },
         "$defs": defs,

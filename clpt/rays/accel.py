@@ -24,7 +24,7 @@ class Accel(Queries):
     array or buffer is read where it lies, by the constructor, which waits until that is done, and
     is not copied: faces on the device must stay as they are for as long as `update` is called. What
     is on the device is not checked: a face that names no vertex reads outside of its buffer.
-    layout: "wide8", "compact" or "binary"; by default what suits the device. wait_for: events that
+    layout: "wide8" or "binary"; by default what is quickest on the device. wait_for: events that
     the arrays wait for; those that PyOpenCL arrays know are waited for anyhow.
 
     moved: the event of the last update, None before the first.

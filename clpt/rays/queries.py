@@ -13,7 +13,7 @@ import pyopencl as cl
 from numpy.typing import NDArray
 from pyopencl.array import Array
 
-from ..bvh import TREES, choose_tree, traversal_text
+from ..bvh import choose_tree
 from ..device import Bound, Device, Events, Program, Stream, assemble, build
 from ..errors import DeviceError, SceneError
 from ..records import INSTANCE
@@ -26,12 +26,13 @@ _HITS: batch.Made = {
     "primitive": (0, np.int32),
     "barycentrics": (2, np.float32),
 }
-_PROGRAMS = {  # of a kernel: the program that has it, and whether it meets all triangles of a ray
-    "query_closest": ("bvh/query.cl", False),
-    "query_occluded": ("bvh/query.cl", False),
-    "query_count": ("bvh/query_every.cl", True),
-    "query_every": ("bvh/query_every.cl", True),
-    "place_instances": ("bvh/place.cl", False),
+_TREES = ("wide8", "binary")
+_PROGRAMS = {  # of a kernel: the program that has it, and what it includes of a layout
+    "query_closest": ("bvh/query.cl", ""),
+    "query_occluded": ("bvh/query.cl", ""),
+    "query_count": ("bvh/query_every.cl", "_every"),
+    "query_every": ("bvh/query_every.cl", "_every"),
+    "place_instances": ("bvh/place.cl", ""),
 }
 _LENT = ("origins", "directions", "t_mins", "t_maxs")
 _Self = TypeVar("_Self", bound="Queries")
@@ -80,8 +81,8 @@ class Queries:
         self.queue = queue
         self.device = Device.adopt(queue)
         self.layout = choose_tree(self.device) if layout is None else layout
-        if self.layout not in TREES:
-            raise SceneError(f"{layout!r} is none of {', '.join(TREES)}", where="layout")
+        if self.layout not in _TREES:
+            raise SceneError(f"{layout!r} is none of {', '.join(_TREES)}", where="layout")
         self._where = queue.context, self.device.info.is_cpu
         self._stream = Stream(queue)
         self._lock = threading.RLock()
@@ -230,9 +231,10 @@ class Queries:
 
     def _program(self, kernel: str) -> Program:
         """The program of a kernel, for the layout."""
-        root, every = _PROGRAMS[kernel]
+        root, what = _PROGRAMS[kernel]
+        include = f'#include "bvh/{self.layout}{what}.cl"'
         texts = {
-            "generated/layout.cl": traversal_text(self.layout, every),
+            "generated/layout.cl": f"{include}\n#define LAYOUT(verb) {self.layout}_##verb\n",
             "generated/instance_traversal.cl": self._instances_text(),
         }
         defines = {

@@ -83,8 +83,8 @@ def trace_args(features: Features, layout: str) -> dict[str, str]:
 def begin_args(features: Features) -> dict[str, str]:
     """What the stage takes that begins paths."""
     film = ["film", "bands"] if features.bands else ["film"]
-    rest = {"counters": "global uint *", "walk": "global const uint *", "samples": "int2 "}
-    return {**dict.fromkeys(film, "global float *"), **rest}
+    counters = {"counters": "global uint *"}
+    return {**dict.fromkeys(film, "global float *"), **counters, "samples": "int2 "}
 
 
 def join_args(features: Features, layout: str) -> dict[str, str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, TypeAlias
 from weakref import WeakKeyDictionary
 
@@ -15,7 +15,8 @@ from clpt.render import shapes
 from clpt.render.arrays import another, on_device, readable
 from clpt.render.instancing import distinct
 from clpt.scene import Scene
-from clpt.scene.materials import Material, inner, parts
+from clpt.scene.materials import Material
+from clpt.scene.params import params
 from clpt.scene.shapes import SMOOTH, Group, Instance, Shape
 
 ShapeKey: TypeAlias = Shape | str | int
@@ -140,7 +141,7 @@ class _Edit:
         """The material of the scene that a key means."""
         if self._parts is None:
             owned = (shape.material for shape in self.shapes.values())
-            self._parts = {id(part): part for material in owned for part in parts(material)}
+            self._parts = {id(part): part for material in owned for part in _parts(material)}
         for found in (key, self.names.now(key)):
             if id(found) in self._parts:
                 return found
@@ -170,14 +171,30 @@ class _Edit:
     def _fields(self, thing: Any) -> dict[str, Any]:
         """What some fields of a thing are afterwards."""
         if isinstance(thing, Material):
-            return {name: self.made(part) for name, part in inner(thing)}
+            return {name: self.made(part) for name, part in _inner(thing)}
         if isinstance(thing, Group):
-            members = tuple(self.made(shape) for shape in thing.shapes)
-            same = all(a is b for a, b in zip(members, thing.shapes, strict=True))
-            return {"shapes": thing.shapes if same else members}
+            inner = tuple(self.made(shape) for shape in thing.shapes)
+            same = all(a is b for a, b in zip(inner, thing.shapes, strict=True))
+            return {"shapes": thing.shapes if same else inner}
         fields = self.changes.get(id(thing), {})
         if isinstance(thing, Instance):
             return {**fields, "group": self.made(thing.group)}
         if isinstance(thing.material, Material) and "material" not in fields:
             return {**fields, "material": self.made(thing.material)}
         return fields
+
+
+def _inner(material: Material) -> Iterator[tuple[str, Material]]:
+    """The materials that one is made of, by its parameters."""
+    for name in params(type(material)):
+        part = getattr(material, name)
+        if isinstance(part, Material):
+            yield name, part
+
+
+def _parts(material: Any) -> Iterator[Material]:
+    """A material and those inside it."""
+    if isinstance(material, Material):
+        yield material
+        for _, inner in _inner(material):
+            yield from _parts(inner)

@@ -25,6 +25,7 @@ class Features:
     filter: str
     integrator: str
     leaves: tuple[type[Material], ...]
+    transmitting: tuple[str, ...] = ()  # kinds of leaves of which some let light through
     lights: tuple[str, ...] = ()
     textures: tuple[str, ...] = ()
     texture_roles: tuple[tuple[str, str], ...] = ()

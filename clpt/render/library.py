@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 
-from clpt import bvh, device
+from clpt import device
 from clpt.errors import SceneError, UnknownKindError
 from clpt.render import outside
-from clpt.render.stage_texts import functions_text
+from clpt.render.stage_texts import functions_text, layout_text
 from clpt.scene.integrators import SAMPLERS
 from clpt.scene.materials import LEAVES, Material
 
+LAYOUTS = ("wide8", "binary")  # that have a tree
 LANES = (1, 8, 16)
 _MATH = ("lib/lanes.cl", "lib/math.cl")
 _SPECTRUM = (*_MATH, "generated/spectrum.cl", "lib/spectrum.cl")
@@ -49,7 +50,7 @@ def kernel_source(
     Raises SceneError for an option that is not there, UnknownKindError for such a part.
     """
     options = {"mode": (mode, ("rgb", "spectral")), "lanes": (lanes, LANES)}
-    options |= {"layout": (layout, bvh.TREES)}
+    options |= {"layout": (layout, LAYOUTS)}
     options |= {"sampler": (sampler, tuple(cls.kind for cls in SAMPLERS))}
     for name, (given, known) in options.items():
         if given not in known:
@@ -57,7 +58,7 @@ def kernel_source(
     virtual: dict[str, str | device.Part] = {
         "generated/spectrum.cl": f'#include "spectrum/{mode}.cl"\n',
         "generated/sampler.cl": f'#include "sampler/{sampler}.cl"\n',
-        "generated/layout.cl": bvh.traversal_text(layout),
+        "generated/layout.cl": layout_text(layout),
     }
     files: list[str] = []
     for part in parts:

@@ -238,11 +238,11 @@ def dispatch_text(
     some shape emits from its back too; tree: the rows are followed by a tree that chooses among
     them. It includes the files of `virtual_files`, here and in clpt.render.shapes.
 
-    light_sample(scene, p, pick, u, lambdas)      chooses a light and a direction to it
-    light_pdf(scene, row, p, wi, t, n)            of it, [1/sr], for a ray that met a shape
-    light_shows(scene, row, front)                whether the side of a shape that was met emits
-    infinite_light(scene, row, d, lambdas, ...)   radiance and pdf of one infinite light
-    infinite_gather(scene, d, pdf, lambdas)       what they all add to a path that left the scene
+    light_sample(scene, p, side, pick, u, lambdas)  chooses a light and a direction to it
+    light_pdf(scene, row, p, wi, t, n)              of it, [1/sr], for a ray that met a shape
+    light_shows(scene, row, front)                  whether the side of a shape that was met emits
+    infinite_light(scene, row, side, d, lambdas, ...)  radiance and pdf of one infinite light
+    infinite_gather(scene, side, d, pdf, lambdas)   what they all add to a path that left the scene
     """
     present = [kind for kind in KINDS if kind in set(kinds)]
     lamps = [kind for kind in present if kind in RECORDS]
@@ -317,7 +317,10 @@ def _sample_text(
     lamps: list[str], surfaces: list[str], textured: bool, two_sided: bool, tree: bool
 ) -> list[str]:
     only = len(lamps) + len(surfaces) == 1
-    head = "LightSample light_sample(Scene scene, vec3 p, real pick, vec2 u, Wavelengths lambdas)"
+    head = (
+        "LightSample light_sample(Scene scene, vec3 p, vec3 side, real pick, vec2 u, "
+        "Wavelengths lambdas)"
+    )
     if not lamps and not surfaces:
         return [f"inline {head} {{ return light_nothing(); }}"]
     number = "FEW_LIGHTS ? &u.x : &pick"
@@ -333,7 +336,8 @@ def _sample_text(
         "    LightSample s = light_nothing();",
     ]
     for kind in lamps:
-        sampled = f"{kind}_sample({row_text(kind)}, scene, p, u, lambdas)"
+        seen = "side" if kind in INFINITE else "p"
+        sampled = f"{kind}_sample({row_text(kind)}, scene, {seen}, u, lambdas)"
         lines += case_text(kind, only, [f"s = light_sel(m, {sampled}, s);"])
     if surfaces:
         lines += [
@@ -374,7 +378,7 @@ def _infinite_text(kinds: list[str]) -> list[str]:
     if not kinds:
         return []
     lines = [
-        "inline void infinite_light(Scene scene, int row, vec3 d, Wavelengths lambdas,",
+        "inline void infinite_light(Scene scene, int row, vec3 side, vec3 d, Wavelengths lambdas,",
         "                           Spectrum *radiance, real *pdf)",
         "{",
         "    LightRow l = light_at(scene, (integer)(row));",
@@ -385,7 +389,7 @@ def _infinite_text(kinds: list[str]) -> list[str]:
         body = [
             f"{RECORDS[kind].name} light = {row_text(kind)};",
             f"*radiance = spectrum_sel(m, {kind}_radiance(light, scene, d, lambdas), *radiance);",
-            f"*pdf = sel(m, {kind}_pdf(light, scene, d) * l.pmf, *pdf);",
+            f"*pdf = sel(m, {kind}_pdf(light, scene, side, d) * l.pmf, *pdf);",
         ]
         lines += case_text(kind, len(kinds) == 1, body)
     return [*lines, "}", '#include "lib/infinite.cl"']

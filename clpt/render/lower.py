@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -35,7 +36,7 @@ from clpt.render.memo import Memo
 from clpt.render.tables import STEP, Tables
 from clpt.render.wavelengths import Density, density, emissions
 from clpt.scene import materials as mt
-from clpt.scene.params import device_params
+from clpt.scene.params import device_params, params
 from clpt.scene.shapes import Mesh, Shape
 from clpt.spectra import Constant
 from clpt.spectra.cie import tanh_ends
@@ -154,6 +155,7 @@ class _Lowering:
             self.tables.expected = reradiation.expected(emissions(scene), nodes)
         self.words: dict[tuple[int, tuple[Any, ...]], int] = {}
         self.uses = dict.fromkeys(("normals", "uvs", "tangents", "absorption"), False)
+        self.transmitting: set[str] = set()  # kinds of leaves
         self.bent = any(_any_of(shape.material, mt.Bent) for shape in scene.shapes)
         self.nested: dict[int, int] = {}  # how deep mixtures are, by their words
         self.triangles: list[tuple[np.ndarray, np.ndarray, int]] = []  # vertices, faces, shape
@@ -317,7 +319,7 @@ class _Lowering:
         """Material words of front and back, and whether the back is turned round."""
         two_sided = _any_of(shape.material, mt.TwoSided)
         name = shapes.where(shape)
-        if two_sided and any(part.transmits for part in mt.parts(shape.material)):
+        if two_sided and any(part.transmits for part in _parts(shape.material)):
             raise SceneError(
                 "a transmissive material cannot be mixed with a two-sided one", where=name
             )
@@ -357,6 +359,8 @@ class _Lowering:
                 if getattr(getattr(part, name), "is_texture", False):
                     self.uses["uvs"] = True
         self.uses["tangents"] |= material.turns
+        if material.transmits:
+            self.transmitting.add(material.kind)
         self.uses["absorption"] |= getattr(material, "absorption", CLEAR) != CLEAR
         return self.leaves.index(type(material)) << 24 | row
 
@@ -389,6 +393,7 @@ class _Lowering:
             filter=scene.film.filter.kind,
             integrator={"direct": "path"}.get(scene.integrator.kind, scene.integrator.kind),
             leaves=self.leaves,
+            transmitting=tuple(sorted(self.transmitting)),
             lights=self.lights.kinds,
             textures=tuple(sorted({kind for kind, _ in tables.texture_roles})),
             texture_roles=tuple(sorted(tables.texture_roles)),
@@ -460,23 +465,40 @@ def _leaf_kinds(scene: sc.Scene) -> tuple[type[mt.Material], ...]:
     """The leaf kinds of a scene, in the order of their table; those from outside follow."""
     found: dict[type[mt.Material], str] = {}
 
+    def walk(material: Any, where: str) -> None:
+        children = [
+            getattr(material, n) for n, p in params(type(material)).items() if p.role == "host"
+        ]
+        children = [c for c in children if isinstance(c, mt.Material)]
+        if isinstance(material, mt.Mask) or material.hollow:
+            found.setdefault(mt.Null, where)
+        if not isinstance(material, mt.COMPOSITES):
+            found.setdefault(type(material), where)
+        for child in children:
+            walk(child, where)
+
     for shape in scene.shapes:
         if not isinstance(shape.material, mt.Material):
             raise SceneError(f"{shape.material!r} is not a material", where=shapes.where(shape))
         where = shapes.where(shape)
-        for material in mt.parts(shape.material):
-            if isinstance(material, mt.Mask) or material.hollow:
-                found.setdefault(mt.Null, where)
-            if not isinstance(material, mt.COMPOSITES):
-                found.setdefault(type(material), where)
+        walk(shape.material, where)
         if _any_of(shape.material, mt.TwoSided) and not isinstance(shape.material, mt.TwoSided):
             found.setdefault(mt.Diffuse, where)  # the black back of a part that is not two-sided
     return outside.ordered(found) or (mt.Diffuse,)
 
 
+def _parts(material: Any) -> Iterator[Any]:
+    """A material and those inside it."""
+    yield material
+    for name, param in params(type(material)).items():
+        inner = getattr(material, name)
+        if param.role == "host" and isinstance(inner, mt.Material):
+            yield from _parts(inner)
+
+
 def _any_of(material: Any, classes: Any) -> bool:
     """Whether a material or one inside it is of these classes."""
-    return any(isinstance(part, classes) for part in mt.parts(material))
+    return any(isinstance(part, classes) for part in _parts(material))
 
 
 def _sphere_around(vertices: np.ndarray, *boxes: np.ndarray) -> tuple[np.ndarray, float]:

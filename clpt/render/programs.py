@@ -8,20 +8,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from clpt import bvh, device
+from clpt import device
 from clpt.render import arguments, emission, lights, outside, shapes, stage_texts, textures
 from clpt.render.features import Features
 from clpt.render.reradiation import STEP as SHIFT_STEP
 
 
 def sources(
-    features: Features, layout: str, lanes: int, *, queued: bool | str
+    features: Features, layout: str, lanes: int, *, queued: bool
 ) -> dict[str, device.Source]:
-    """Return the text of every program of a bounce, by program name.
+    """Return the text of every program that a scene needs, by program name.
 
     layout: of the triangles, a name in clpt.bvh.LAYOUTS; lanes: paths that a work-item shades;
-    queued: whether shading goes along queues, or how: one of clpt.render.queues.WAYS; "sort" if
-    True.
+    queued: whether shading goes along sorted queues.
     """
     trace_lanes = lanes if layout == "brute" else 1
     shared = _shared(features, layout)
@@ -31,12 +30,14 @@ def sources(
         begin: _source(begin, shared, common, lanes),
         "intersect": _source("intersect", shared, common, trace_lanes),
         test: _source(test, shared, common, trace_lanes),
+        "accumulate": _source("accumulate", shared, common, 1),
     }
+    if features.bands:
+        made["bands"] = _source("bands", shared, common, 1)
     if features.mixtures:
         made["mix"] = _source("mix", shared, common, lanes)
     if queued:
-        way = "sort" if queued is True else queued
-        made[way] = _source(way, shared, common, 1)
+        made["sort"] = _source("sort", shared, common, 1)
     for number, cls in enumerate(features.leaves):
         own: dict[str, str | device.Part] = {
             **shared,
@@ -48,26 +49,15 @@ def sources(
             **common,
             "BSDF_KIND": number,
             "BSDF_DELTA": int(cls.delta),
+            "BSDF_TRANSMITS": int(cls.kind in features.transmitting),
             "BSDF_CHROMATIC": int(cls.chromatic),
             "BSDF_SHIFTS": int(stage_texts.shifts(features, cls)),
             "BSDF_PASSES": int(cls.passes and features.passes),
             "USES_CHOICE": int(cls.choosy or cls.shifts or features.many_lights),
-            "QUEUED": int(bool(queued)),
+            "QUEUED": int(queued),
         }
         made[f"shade_{cls.kind}"] = _source("shade", own, defines, lanes)
     return made
-
-
-def film_sources(features: Features, layout: str) -> dict[str, device.Source]:
-    """Return the texts of what makes pictures of a film, by program name."""
-    shared, common = _shared(features, layout), _defines(features)
-    names = ["accumulate", *(["bands"] if features.bands else [])]
-    return {name: _source(name, shared, common, 1) for name in names}
-
-
-def noise_sources(features: Features, layout: str) -> dict[str, device.Source]:
-    """Return the text of what tells a film's noise, by program name."""
-    return {"noise": _source("noise", _shared(features, layout), _defines(features), 1)}
 
 
 @dataclass(frozen=True)
@@ -207,7 +197,7 @@ def _shared(features: Features, layout: str) -> dict[str, str]:
         "generated/medium.cl": stage_texts.medium_text(features),
         "generated/shapes.cl": stage_texts.tangents_text(features),
         "generated/trace.cl": stage_texts.trace_text(layout),
-        "generated/layout.cl": bvh.traversal_text(layout),
+        "generated/layout.cl": stage_texts.layout_text(layout),
         "generated/shape_tree.cl": stage_texts.shape_tree_text(features),
         "generated/shape_traversal.cl": '#include "bvh/shapes.cl"\n' if features.analytic else "",
         "generated/instances.cl": '#include "lib/instances.cl"\n' if features.instances else "",

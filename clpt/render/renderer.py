@@ -15,7 +15,7 @@ import pyopencl as cl
 
 from clpt import device as dev
 from clpt.errors import DeviceError, SceneError
-from clpt.render import adaptive, updates, values
+from clpt.render import updates, values
 from clpt.render.edits import MaterialKey, Names, ShapeKey, adopted, edited, followed
 from clpt.render.facts import Facts, gather
 from clpt.render.lower import lower
@@ -38,7 +38,7 @@ class Progress:
     """How far a render is.
 
     samples, total: per pixel, in the mean; paths: samples of all pixels; rays: traced so far;
-    seconds: since the first; active: the share of the pixels that are not finished.
+    seconds: since the first.
     """
 
     samples: float
@@ -46,7 +46,6 @@ class Progress:
     paths: int
     rays: int
     seconds: float
-    active: float = 1.0
 
 
 class Renderer(Pictures):
@@ -105,7 +104,6 @@ class Renderer(Pictures):
         self.samples = 0
         self._progress = progress
         self._moving: Moving | None = None
-        self._adaptive: adaptive.Adaptive | None = None
         log.info("ready in %.2f s", self._seconds["ready"])
 
     @alone
@@ -148,22 +146,12 @@ class Renderer(Pictures):
         event.set_callback(cl.command_execution_status.COMPLETE, tell)
 
     @alone
-    def run(
-        self,
-        samples: int,
-        progress: Callable[[Progress], bool] | None = None,
-        *,
-        noise: float | None = None,
-    ) -> bool:
+    def run(self, samples: int, progress: Callable[[Progress], bool] | None = None) -> bool:
         """Add samples to every pixel and wait; `samples` in all are kept in `self.samples`.
 
-        noise: leave pixels as soon as the noise around them is as low, relative to the picture,
-        such as 0.02; `samples` is then the most that a pixel gets. See clpt.render.adaptive.
         progress: called every few milliseconds to seconds; if it returns False the run stops soon,
         as after `cancel`. Returns whether it came to its end. What progress raises, or Ctrl+C in
         it, is raised when the paths in flight have ended: the film is whole then too.
-
-        Raises SceneError for noise that makes no sense with the scene.
         """
         start = time.perf_counter()
         first, end = self.samples, self.samples + _whole(samples)
@@ -181,36 +169,18 @@ class Renderer(Pictures):
             if self._stop.is_set() or progress is None:
                 return not self._stop.is_set()
             try:
-                return progress(Progress(paths / pixels, end, paths, rays, seconds, self.active))
+                return progress(Progress(paths / pixels, end, paths, rays, seconds))
             except BaseException as error:
                 raised.append(error)
                 return False
 
-        if not self._expose(first, end, noise, tell):
-            if raised:
-                raise raised.pop()
-            return False
+        for wavefront in self.wavefronts:
+            if not wavefront.expose(first, end, tell):
+                if raised:
+                    raise raised.pop()
+                return False
         self.samples = end
         return True
-
-    def _expose(
-        self, first: int, end: int, noise: float | None, tell: Callable[[Any], bool]
-    ) -> bool:
-        """Add samples to all pixels, or where there is noise; whether that came to its end."""
-        if noise is None:
-            if self._adaptive is not None:
-                self._adaptive.skip(end)
-            return all(wavefront.expose(first, end, tell) for wavefront in self.wavefronts)
-        noise = adaptive.checked(noise, self.wavefronts[0].lowered.features)
-        if self._adaptive is None:
-            self._adaptive = adaptive.Adaptive(self.wavefronts[0])
-            self._adaptive.skip(first)
-        return self._adaptive.run(end, noise, tell)
-
-    @property
-    def active(self) -> float:
-        """The share of the pixels that would get more samples, 1 but for `run` with `noise`."""
-        return 1.0 if self._adaptive is None else self._adaptive.active
 
     def cancel(self) -> None:
         """Let the `run` of another thread stop soon; it then returns False. A step is not stopped.
@@ -226,7 +196,7 @@ class Renderer(Pictures):
         stream.after(wait_for)
         for wavefront in self.wavefronts:
             wavefront.clear()
-        self.samples, self._adaptive = 0, None
+        self.samples = 0
         stream.flush()
         return stream.last
 
@@ -238,7 +208,7 @@ class Renderer(Pictures):
         """
         with self._turn:
             self._closed = True
-            self.wavefronts, self._moving, self._adaptive = [], None, None
+            self.wavefronts, self._moving = [], None
             self.__dict__.pop("_resolve", None)
 
     def __enter__(self) -> Renderer:
@@ -348,15 +318,13 @@ def render(
     *,
     device: dev.Device | str | int | None = None,
     progress: Callable[[Progress], bool] | None = None,
-    noise: float | None = None,
     **wavefront: Any,
 ) -> Image:
     """Render a scene: (h, w, 3) float32 linear Rec. 709; else see `Renderer.image`.
 
-    spp: samples per pixel, noise: see `Renderer.run`; the scene's own by default. Raises as
-    `Renderer` does.
+    spp: samples per pixel, the scene's own by default. Raises as `Renderer` does.
     """
     spp = _whole(scene.spp if spp is None else spp)
     renderer = Renderer(scene, device, **wavefront)
-    renderer.run(spp, progress, noise=scene.noise if noise is None else noise)
+    renderer.run(spp, progress)
     return renderer.image()

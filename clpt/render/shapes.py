@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -29,9 +28,6 @@ ANALYTIC = ("sphere", "disk", "cylinder", "spheres")  # rays meet these as they 
 ONE_OF = {"spheres": "sphere"}  # kinds of many: what each of them is
 UNEVEN = 1e-5  # relative difference of lengths or cosine of axes from which a sphere is none
 PADDING = 1e-6  # of the size of an analytic shape, for what float32 rounds in its kernel
-
-SUMMED = 1 << 20  # triangles whose normals are summed at a time
-CHUNK = 1 << 16  # triangles that are looked at at a time: what is made of them stays in the cache
 
 _FLAT = {
     "center": ("vec3", "[m]"),
@@ -200,18 +196,13 @@ def _in_world(shape: Shape) -> tuple[Points, Faces, Points | None, Points | None
 
 def _solid(vertices: Points, faces: Faces) -> NDArray[np.bool_]:
     """Which faces have a cross product that is not zero in float32."""
-    found = np.empty(len(faces), np.bool_)
-    for first in range(0, len(faces), CHUNK):
-        crosses = _crosses(vertices, faces[first : first + CHUNK])
-        found[first : first + CHUNK] = (crosses * crosses > 0.0).any(axis=1)
-    return found
+    return np.linalg.norm(_crosses(vertices, faces), axis=1) > 0.0
 
 
-def _crosses(vertices: NDArray[Any], faces: Faces) -> NDArray[Any]:
-    """Cross products of the edges at each triangle's first vertex, (m, 3) like the vertices."""
+def _crosses(vertices: Points, faces: Faces) -> Points:
+    """Cross products of the edges at each triangle's first vertex, (m, 3) float32."""
     v0, v1, v2 = (vertices[faces[:, i]] for i in range(3))
-    (ax, ay, az), (bx, by, bz) = (v1 - v0).T, (v2 - v0).T
-    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
+    return np.cross(v1 - v0, v2 - v0)
 
 
 def triangle_areas(vertices: Points, faces: Faces) -> NDArray[np.float64]:
@@ -369,17 +360,10 @@ def local(shape: Shape) -> tuple[Points, Faces, Points | None, Points | None]:
         square = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], np.float32)
         halves = np.array([(0, 1, 2), (0, 2, 3)], np.uint32)
         return square, halves, None, (square[:, :2] + np.float32(1.0)) * np.float32(0.5)
-    corners, faces, uvs = _cube()
-    return corners.copy(), faces.copy(), None, uvs.copy()
-
-
-@cache
-def _cube() -> tuple[Points, Faces, Points]:
-    """Vertices, faces and uvs of a cube from -1 to 1."""
     corners = [[{"+": 1, "-": -1}[c] for c in v] for side in _CUBE for v in side.split()]
     faces = 4 * np.arange(6)[:, None, None] + np.array(_CORNER_FACES)
     uvs = np.tile(np.array(_CORNER_UVS, np.float32), (6, 1))
-    return np.array(corners, np.float32), faces.reshape(-1, 3).astype(np.uint32), uvs
+    return np.array(corners, np.float32), faces.reshape(-1, 3).astype(np.uint32), None, uvs
 
 
 def _mesh(shape: shapes.Mesh) -> tuple[Points, Faces, Points | None, Points | None]:
@@ -400,7 +384,7 @@ def _mesh(shape: shapes.Mesh) -> tuple[Points, Faces, Points | None, Points | No
         )
     normals = _normals(shape, vertices, faces)
     uvs = None if shape.uvs is None else _array(shape, "uvs", 2, len(vertices))
-    return vertices, faces.astype(np.uint32, copy=False), normals, uvs
+    return vertices, faces.astype(np.uint32), normals, uvs
 
 
 def _normals(shape: shapes.Mesh, vertices: Points, faces: NDArray[Any]) -> Points | None:
@@ -408,13 +392,10 @@ def _normals(shape: shapes.Mesh, vertices: Points, faces: NDArray[Any]) -> Point
     if not smooth(shape):
         return None if shape.normals is None else _array(shape, "normals", 3, len(vertices))
     sums = np.zeros((len(vertices), 3))
-    points = vertices.astype(np.float64)
-    for first in range(0, len(faces), SUMMED):
-        some = faces[first : first + SUMMED]
-        crosses = _crosses(points, some)
-        for axis in range(3):
-            for corner in some.T:
-                sums[:, axis] += np.bincount(corner, crosses[:, axis], len(vertices))
+    crosses = _crosses(vertices.astype(np.float64), faces)
+    for axis in range(3):
+        for corner in faces.T:
+            sums[:, axis] += np.bincount(corner, crosses[:, axis], len(vertices))
     lengths = np.linalg.norm(sums, axis=1, keepdims=True)
     return (sums / np.where(lengths > 0.0, lengths, 1.0)).astype(np.float32)
 
@@ -465,7 +446,7 @@ def placement(shape: Shape) -> NDArray[np.float64]:
         raise SceneError(
             "its transform is singular: it flattens space or is not finite", where=where(shape)
         )
-    if not transforms.is_affine(matrix):
+    if not np.array_equal(matrix[3], transforms.IDENTITY[3]):
         raise SceneError("its transform is a projection, not affine", where=where(shape))
     return matrix
 

@@ -250,3 +250,8 @@ def _shift_text(cls: type[materials.Material]) -> list[str]:
         "#define bsdf_shift(scene, row, m, lambdas, u, depth) "
         f"reradiation_shift(scene, {table}, {own}, lambdas, u, depth)",
     ]
+
+
+def layout_text(layout: str) -> str:
+    """Return the traversal of a layout, whose verbs are then LAYOUT(closest), LAYOUT(occluded)."""
+    return f'#include "bvh/{layout}.cl"\n#define LAYOUT(verb) {layout}_##verb\n'

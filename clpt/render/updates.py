@@ -14,8 +14,7 @@ from clpt import bvh
 from clpt.errors import SceneError
 from clpt.records import TABLES
 from clpt.render.lower import Lowered
-from clpt.render.queues import QUEUE
-from clpt.render.wavefront import Wavefront
+from clpt.render.wavefront import QUEUE, Wavefront
 
 log = logging.getLogger(__name__)
 
@@ -32,7 +31,7 @@ class _Changes:
     """What becomes of kernels and trees: kernels, triangles, boxes: made anew; fit: fitted."""
 
     layout: str
-    queued: str
+    queued: bool
     kernels: bool
     triangles: bool
     boxes: bool

@@ -18,20 +18,28 @@ from typing import Any
 import numpy as np
 import pyopencl as cl
 
-from clpt import device
+from clpt import bvh, device
+from clpt.device.buffers import Buffers
 from clpt.device.timing import Timings
-from clpt.errors import MemoryBudgetError
-from clpt.records import PATH
-from clpt.render import arguments, programs, queues
+from clpt.errors import MemoryBudgetError, SceneError
+from clpt.records import PATH, SLABS, TABLES
+from clpt.render import arguments, programs
 from clpt.render.features import Features
 from clpt.render.lower import Lowered
-from clpt.render.resident import COUNTERS, GROUP, Resident
 
 FILM_WORDS = 7  # kernels/lib/film.cl
 FRESH = 0x2000  # kernels/lib/path_state.cl
+COUNTERS = ("done", "samples", "closest", "shadow", "rejected")
+PADDING = 80  # words between streams: powers of two collide in a cache
+GROUP = 64  # slots are a multiple of it, and it is the local size of one-lane kernels
 BATCH = 8  # bounces that are enqueued before counters are asked for
 ENDLESS = 0xFFFFFFFF  # bounces of a loop that goes on till all paths have ended
 IDLE = {"samples": (0, 0), "turns": 0, "restart": 0}  # of a loop that was asked for nothing
+CPU_SLOTS, GPU_SLOTS = 1 << 14, 1 << 20
+BRUTE_SHAPES = 32  # analytic shapes up to which all of them are tried
+QUEUE = ("queue", "counts", "queue_starts", "queue_counts")
+SORT = ("sort_count", "sort_scan", "sort_place")
+CHUNK = 256  # slots that a work-item of the sort counts
 
 
 @dataclass
@@ -49,7 +57,7 @@ class Counts:
 
 
 @dataclass(frozen=True)
-class Step:
+class _Step:
     """A kernel of a bounce with its arguments, work-items, and those of a group."""
 
     name: str
@@ -58,21 +66,59 @@ class Step:
     group: tuple[int] | None
 
 
-class Wavefront(Resident):
+class Wavefront:
     """The device side of a render: buffers, programs, and `expose`, which runs the bounce loop.
 
-    looped: whether `expose` too uses the loop on the device; sizes: see `Resident`.
+    layout: of the triangles, None for what suits the device; slots: paths in flight, None likewise;
+    queued: whether shading is sorted, None likewise; looped: whether `expose` too uses the loop on
+    the device.
 
     Raises MemoryBudgetError, KernelBuildError, DeviceError.
     """
 
-    def __init__(self, on: device.Device, lowered: Lowered, *, looped: bool = False, **sizes: Any):
-        super().__init__(on, lowered, **sizes)
-        self.looped = looped
-        self.lanes = on.lanes
+    def __init__(
+        self,
+        on: device.Device,
+        lowered: Lowered,
+        *,
+        layout: str | None = None,
+        slots: int | None = None,
+        queued: bool | None = None,
+        looped: bool = False,
+    ):
+        self.device, self.lowered = on, lowered
+        self.counts = Counts()
+        self.moved: set[str] = set()  # tables that hold something else than `lowered`
+        self.stream = device.Stream(on.queue)
         self.timings = Timings(on.queue)
+        self.buffers = Buffers(on)
+        self._wanted, self.looped = (layout, queued), looped
+        layout, self.queued = self.suited(lowered)
+        self.lanes = on.lanes
         self.programs: dict[str, device.Program] = {}
+        self.seconds = {"programs": 0.0}
+        self._place_slots(slots or (CPU_SLOTS if on.info.is_cpu else GPU_SLOTS))
+        self._allocate(layout)
         self._expose_new()
+
+    def suited(self, lowered: Lowered) -> tuple[str, bool]:
+        """The layout for a scene and whether shading is sorted: as asked, or as suits the device.
+
+        Raises SceneError for a layout that cannot hold the scene.
+        """
+        layout, queued = self._wanted
+        features, on = lowered.features, self.device
+        if layout is None:
+            layout = bvh.choose_layout(on, len(lowered.faces))
+            many = len(lowered.boxes) > BRUTE_SHAPES or features.instances
+            if layout == "brute" and many:
+                layout = "wide8" if on.info.is_cpu else "binary"
+        elif layout == "brute" and features.instances:
+            raise SceneError("the layout brute holds no instances; choose wide8 or binary")
+        kinds = len(features.materials)
+        if queued is None:
+            queued = kinds > 1 and (not on.info.is_cpu or kinds > 4)
+        return layout, queued
 
     def sibling(self, channel: str) -> Wavefront:
         """Another film of the same scene, for another channel of the `aov` integrator.
@@ -83,11 +129,97 @@ class Wavefront(Resident):
         features = dataclasses.replace(self.lowered.features, channel=channel)
         other.lowered = dataclasses.replace(self.lowered, features=features)
         other.named = dict(self.named)
-        other.programs = {n: p for n, p in self.programs.items() if not n.startswith("shade_")}
+        shared = {n: program for n, program in self.programs.items() if not n.startswith("shade_")}
+        other.programs = shared
         for made in ("stages", "loop"):
             other.__dict__.pop(made, None)
         other._expose_new()
         return other
+
+    def _place_slots(self, wanted: int) -> None:
+        """Divide the film among slots: as many as wanted, or as memory allows."""
+        settings = self.lowered.settings
+        places = int(settings["places"])
+        words = sum(record.words for record in SLABS) + 2
+        largest = max(record.words for record in SLABS)
+        room = min(
+            self.buffers.limit // 2 // (4 * words), self.device.info.max_alloc // 4 // largest
+        )
+        wanted = min(wanted, int(room) - PADDING)
+        if wanted < GROUP:
+            raise MemoryBudgetError(
+                "the least number of paths", 4 * words * GROUP, self.buffers.limit,
+                "close other programs or choose another device",
+            )  # fmt: skip
+        whole = -(-places // GROUP) * GROUP
+        per_plane = min(wanted // GROUP * GROUP, whole)
+        planes = max(1, wanted // whole) if per_plane == whole else 1
+        settings["per_plane"], settings["planes"] = per_plane, planes
+        settings["slots"] = per_plane * planes
+        self.slots, self.stride = per_plane * planes, per_plane * planes + PADDING
+
+    def _allocate(self, layout: str) -> None:
+        lowered, give = self.lowered, self.buffers
+        settings = lowered.settings
+        self.named: dict[str, Any] = {"stride": self.stride}
+        for name in TABLES:
+            self.named[name] = lowered.lent.get(name) or give.upload(
+                f"the table of {name}", lowered.table(name)
+            )
+        self.build_triangles(layout)
+        self.build_boxes()
+        for record in SLABS:
+            name = f"{record.name.lower()}_words"
+            advice = "lower the number of slots"
+            self.named[name] = give.allocate(name, 4 * record.words * self.stride, advice)
+            self.stream.fill(self.named[name], 0, 0, 4 * record.words * self.stride)
+        self.named["counters"] = give.allocate("the counters", 4 * len(COUNTERS))
+        self.named["settings"] = give.upload("the settings", settings.reshape(1).view(np.uint32))
+        self.allocate_queue()
+
+    def allocate_queue(self) -> None:
+        """What sorting by material works on, where there is sorting."""
+        if self.queued:
+            give, kinds = self.buffers, len(self.lowered.features.materials)
+            chunks = -(-self.slots // CHUNK)
+            sizes = self.slots, chunks * kinds, kinds, kinds
+            for name, words in zip(QUEUE, sizes, strict=True):
+                self.named[name] = give.allocate("the sort", 4 * words)
+            self.named.update(chunk=CHUNK, chunks=chunks, slots=self.slots)
+
+    def build_triangles(self, layout: str) -> None:
+        """The trees over triangles, of the world and of every group."""
+        start = time.perf_counter()
+        lowered, instances = self.lowered, self.lowered.instances
+        vertices = self.named["vertices"] if len(lowered.faces) else lowered.vertices
+        counts = [len(lowered.faces) - sum(instances.triangles), *instances.triangles]
+        for name in ("tris", "nodes", "leaves"):  # of the tree before
+            self.named.pop(name, None)
+        self.tree, self._begins = bvh.build_parts(
+            self.device, vertices, lowered.faces, lowered.tags, counts, layout
+        )
+        self.named.update(self.tree.buffers, triangles=max(self.tree.count, 0))
+        self.seconds["trees"] = time.perf_counter() - start
+
+    def build_boxes(self) -> None:
+        """Trees over analytic shapes and instances, which learn where their triangles begin."""
+        start = time.perf_counter()
+        lowered, instances, layout = self.lowered, self.lowered.instances, self.tree.layout
+        self.box_trees = {}
+        if lowered.features.analytic and layout != "brute":
+            self.box_trees["shape"] = bvh.build_boxes(self.device, lowered.boxes)
+        if lowered.features.instances:
+            self.box_trees["instance"] = bvh.build_boxes(self.device, instances.boxes, layout)
+            indices = self.box_trees["instance"].buffers["indices"]
+            order = self.buffers.download(indices, (len(instances.rows),), np.uint32)
+            rows = instances.rows[order]  # as the leaves, so that neighbours are near each other
+            rows["nodes"], rows["leaves"] = self._begins[1 + instances.prototypes[order]].T
+            words = rows.view(np.uint32)
+            self.named["instances"] = self.buffers.upload("the table of instances", words)
+            self.instances, self.instance_order = rows, order
+        for name, tree in self.box_trees.items():
+            self.named |= {f"{name}_{part}": buffer for part, buffer in tree.buffers.items()}
+        self.seconds["trees"] += time.perf_counter() - start
 
     def _expose_new(self) -> None:
         """A film and a picture of its own, and kernels bound to them."""
@@ -114,7 +246,7 @@ class Wavefront(Resident):
 
     def _bind_film(self) -> None:
         """The kernels that make a picture of the film."""
-        self._build(programs.film_sources(self.lowered.features, self.tree.layout))
+        self._build("accumulate", *(["bands"] if self.band_bytes else []))
         self.accumulate = self._bound("accumulate", "accumulate", samples=0.0)
         if self.band_bytes:
             self.accumulate_bands = self._bound("bands", "accumulate_bands")
@@ -130,31 +262,32 @@ class Wavefront(Resident):
         for name in made:
             getattr(self, name)
 
-    def _build(self, texts: dict[str, device.Source]) -> None:
-        """Build the programs of these that are not there yet."""
+    def _build(self, *wanted: str) -> None:
+        """Build the programs of these names that are not there yet; all, if none is named."""
         start = time.perf_counter()
-        missing = {n: text for n, text in texts.items() if n not in self.programs}
+        features, layout = self.lowered.features, self.tree.layout
+        texts = programs.sources(features, layout, self.lanes, queued=self.queued)
+        missing = {n: texts[n] for n in wanted or texts if n not in self.programs}
         self.programs |= device.build_all(self.device, missing)
         self.seconds["programs"] += time.perf_counter() - start
 
-    def _texts(self) -> dict[str, device.Source]:
-        features, layout = self.lowered.features, self.tree.layout
-        return programs.sources(features, layout, self.lanes, queued=self.queued)
-
     @cached_property
-    def stages(self) -> list[Step]:
+    def stages(self) -> list[_Step]:
         """The kernels of a bounce in their order, for a host that enqueues bounce after bounce."""
-        self._build(self._texts())
-        made: list[Step] = []
+        self._build()
+        made: list[_Step] = []
+        chunks = -(-self.slots // CHUNK)
         for stage in programs.order(self.lowered.features, self.tree.layout, self.lanes):
             if self.queued and stage.kernel == "shade" and made[-1].bound.kernel.name != "shade":
-                kinds = len(self.lowered.features.materials)
-                for name, size, group in queues.steps(self.queued, self.slots, kinds):
-                    bound = self._bound(self.queued, name)
-                    made.append(Step(name, bound, (size,), (group,) if group else None))
+                for name, size in (
+                    ("sort_count", chunks),
+                    ("sort_scan", 1),
+                    ("sort_place", chunks),
+                ):
+                    made.append(_Step(name, self._bound("sort", name), (size,), None))
             given = {"samples": (0, 0)} if not made else {}
             bound = self._bound(stage.program, stage.kernel, **given)
-            made.append(Step(stage.program, bound, *self._sizes(stage.lanes)))
+            made.append(_Step(stage.program, bound, *self._sizes(stage.lanes)))
         return made
 
     @cached_property
@@ -170,26 +303,21 @@ class Wavefront(Resident):
         signatures = {"loop": arguments.loop_arguments(features, layout)}
         return device.link(self.device, texts, "loop", signatures)
 
-    def build_ahead(self, features: Features, layout: str, queued: str) -> None:
+    def build_ahead(self, features: Features, layout: str, queued: bool) -> None:
         """Build for other features the programs that are in use, so that it fails here or never."""
-        device.build_all(self.device, programs.film_sources(features, layout))
         if "loop" in vars(self):
             self._link(features, layout)
         if "stages" in vars(self):
-            texts = programs.sources(features, layout, self.lanes, queued=queued)
-            device.build_all(self.device, texts)
+            device.build_all(
+                self.device, programs.sources(features, layout, self.lanes, queued=queued)
+            )
 
     @property
-    def _round(self) -> list[Step]:
+    def _round(self) -> list[_Step]:
         """What `expose` enqueues between two looks at the counters."""
         if self.looped:
-            return [Step("loop", self.loop, *self._sizes(self.lanes))]
+            return [_Step("loop", self.loop, *self._sizes(self.lanes))]
         return self.stages * BATCH
-
-    def tool(self, texts: dict[str, device.Source], name: str, **given: Any) -> device.Bound:
-        """A kernel beside the bounce, of the program of its name in `texts`, with its arguments."""
-        self._build(texts)
-        return self._bound(name, name, **given)
 
     def _bound(self, program: str, name: str, **given: Any) -> device.Bound:
         return self._bind(self.programs[program].kernel(name), **given)
@@ -225,7 +353,7 @@ class Wavefront(Resident):
         size, group = self._sizes(self.lanes)
         self.timings.add("loop", self.stream.run(self.loop, size, group))
         self.exposed += end - first
-        self.accumulate_film()
+        self._accumulate()
 
     def expose(
         self, first: int, end: int, on_batch: Callable[[Counts], bool] | None = None
@@ -238,7 +366,7 @@ class Wavefront(Resident):
         """
         steps = self._round
         begin = steps[0].bound
-        self.rewind()
+        self._rewind()
         begin.set(samples=(first, end))
         if self.looped:
             begin.set(turns=BATCH, restart=0)
@@ -266,10 +394,10 @@ class Wavefront(Resident):
         width, height = self._size
         new = (self.counts.samples - before) / (width * height)
         self.exposed += end - first if finished else new
-        self.accumulate_film()
+        self._accumulate()
         return finished
 
-    def rewind(self) -> None:
+    def _rewind(self) -> None:
         """Let every slot begin its list again."""
         word = next(m.word for m in PATH.members if m.name == "state")
         self._fill("path_words", FRESH, 4 * word * self.stride, 4 * self.slots)
@@ -282,8 +410,12 @@ class Wavefront(Resident):
         for name, n in zip(COUNTERS[1:], new[1:].tolist(), strict=True):
             setattr(self.counts, name, getattr(self.counts, name) + n)
 
-    def accumulate_film(self) -> None:
-        """Enqueue that `film` becomes the picture of what was exposed."""
+    def count(self) -> Counts:
+        """The counts of all that was enqueued; waits for it."""
+        self._count(self.stream.read(self.named["counters"], np.empty(len(COUNTERS), np.uint32)))
+        return self.counts
+
+    def _accumulate(self) -> None:
         if self.lowered.features.light_paths:
             self.accumulate.set(samples=self.exposed)
         others = [e for e in self.film.events if e is not self._pictured]  # of who reads it

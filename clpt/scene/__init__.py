@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import numbers
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -48,11 +46,10 @@ class Scene:
 
     shapes, lights: what there is; lights that are surfaces are a shape's `emission`. integrator:
     how light is followed; sampler: where its random numbers come from; film: size, mode, filter and
-    colours of the picture. spp: samples of a pixel, for `clpt.render`; noise: below which it gets
-    no more, None for all, see clpt.render.adaptive; seed: of the random numbers.
+    colours of the picture. spp: samples of a pixel, for `clpt.render`; seed: of the random numbers.
     warnings: what a loader had to pass over; extra: what else it found, for people.
 
-    Raises SceneError for `spp` that is no whole number above zero, and `noise` likewise.
+    Raises SceneError for `spp` that is no whole number above zero.
     """
 
     camera: cameras.Camera
@@ -62,7 +59,6 @@ class Scene:
     sampler: integrators.Sampler = field(default_factory=Sobol)
     film: Film = field(default_factory=Film)
     spp: int = 64
-    noise: float | None = None
     seed: int = 0
     name: str = ""
     warnings: list[str] = field(default_factory=list)
@@ -71,13 +67,3 @@ class Scene:
     def __post_init__(self) -> None:
         if isinstance(self.spp, bool) or not isinstance(self.spp, int) or self.spp < 1:
             raise SceneError(f"must be a whole number above zero, not {self.spp!r}", where="spp")
-        if self.noise is not None:
-            check_noise(self.noise)
-
-
-def check_noise(noise: Any) -> None:
-    """Raise SceneError for what is no limit of noise."""
-    number = isinstance(noise, numbers.Real) and not isinstance(noise, bool)
-    if not number or not 0.0 < noise < math.inf:
-        message = f"must be a number above zero, such as 0.02, not {noise!r}"
-        raise SceneError(message, where="noise")

@@ -50,7 +50,7 @@ class Path(Integrator):
     """
 
     max_depth: int = host(8, "longest path; -1: no limit")
-    rr_depth: int = host(5, "depth from which Russian roulette may end a path")
+    rr_depth: int = host(3, "depth from which Russian roulette may end a path")
     hide_lights: bool = flag(False, "the camera sees through lights, also those on shapes")
 
 
@@ -79,7 +79,7 @@ class ParticleTracer(Integrator):
     """
 
     max_depth: int = host(8, "longest path, as of `path`; -1: no limit")
-    rr_depth: int = host(5, "depth from which Russian roulette may end a path")
+    rr_depth: int = host(3, "depth from which Russian roulette may end a path")
     hide_lights: bool = flag(False, "lights shine, but are not seen to shine")
 
 

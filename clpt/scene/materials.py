@@ -6,7 +6,6 @@ none: lowering turns it into rules by which a hit chooses its leaf.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -24,7 +23,6 @@ from clpt.scene.params import (
     host,
     index,
     layers,
-    params,
     per_order,
     real,
     reflectance,
@@ -560,19 +558,3 @@ LEAVES = (
 )
 COMPOSITES = (TwoSided, Mask, Blend, NormalMap, BumpMap)
 KINDS = LEAVES + COMPOSITES
-
-
-def inner(material: Material) -> Iterator[tuple[str, Material]]:
-    """The materials that one is made of, by its parameters."""
-    for name in params(type(material)):
-        part = getattr(material, name)
-        if isinstance(part, Material):
-            yield name, part
-
-
-def parts(material: Any) -> Iterator[Material]:
-    """A material and those inside it; nothing of what is no material."""
-    if isinstance(material, Material):
-        yield material
-        for _, part in inner(material):
-            yield from parts(part)

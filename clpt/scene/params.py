@@ -27,10 +27,8 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cache
-from types import MappingProxyType
 from typing import Any, ClassVar
 
 import numpy as np
@@ -162,7 +160,7 @@ class Kind:
     @classproperty
     def kind(cls) -> str:
         """The name in scene files and kernels: RoughConductor -> rough_conductor."""
-        return _snake(cls.__name__)  # type: ignore[attr-defined]
+        return re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower()  # type: ignore[attr-defined]
 
     def __post_init__(self) -> None:
         for name, param in params(type(self)).items():
@@ -174,35 +172,19 @@ class Kind:
         """Raise SceneError where the parameters contradict each other."""
 
 
-@cache
-def _snake(name: str) -> str:
-    return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
-
-
-@cache  # every object of a scene asks, and there are thousands
-def _declared(cls: Any) -> Mapping[str, Param]:
-    fields = dataclasses.fields(cls)
-    return MappingProxyType({f.name: f.metadata["param"] for f in fields if "param" in f.metadata})
-
-
-@cache
-def _declared_of(cls: Any, *roles: str) -> Mapping[str, Param]:
-    return MappingProxyType({name: p for name, p in _declared(cls).items() if p.role in roles})
-
-
-def params(cls: type) -> Mapping[str, Param]:
+def params(cls: type) -> dict[str, Param]:
     """Return the declared parameters of a kind, by name, in their order."""
-    return _declared(cls)
+    return {f.name: f.metadata["param"] for f in dataclasses.fields(cls) if "param" in f.metadata}
 
 
-def device_params(cls: type) -> Mapping[str, Param]:
+def device_params(cls: type) -> dict[str, Param]:
     """Return those parameters that the kernels see."""
-    return _declared_of(cls, *DEVICE_ROLES)
+    return {name: p for name, p in params(cls).items() if p.role in DEVICE_ROLES}
 
 
-def interior_params(cls: type) -> Mapping[str, Param]:
+def interior_params(cls: type) -> dict[str, Param]:
     """Return the parameters of what is inside of a body; they follow the others in its row."""
-    return _declared_of(cls, "coefficient")
+    return {name: p for name, p in params(cls).items() if p.role == "coefficient"}
 
 
 def _checked(value: Any, param: Param, where: str) -> Any:

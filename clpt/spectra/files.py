@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+import yaml
 from numpy.typing import NDArray
 
 from clpt.errors import SceneError
@@ -144,8 +145,6 @@ def _tabulated(
 
 def _page(path: str | Path, text: str) -> tuple[Spectrum | None, Spectrum]:
     """Read eta, if there is one, and k from a page of the database."""
-    import yaml  # takes as long to import as all of clpt.spectra
-
     try:
         page = yaml.safe_load(text)
     except yaml.YAMLError as error:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.scene.materials import Material
 from clpt.scene.params import device_params
 from clpt.testing.probe import Probe
 from clpt.testing.settings import directions, pairs, settings, tilted
@@ -83,7 +84,7 @@ def lobes_are_told_truly(
 
 
 def flags_are_told_truly(probe: Probe, params: Params, rng: Random) -> None:
-    """The class tells the kernels what `sample` does: `choosy`, `delta`, `disperses`."""
+    """The class tells the kernels what it does: `choosy`, `delta`, `disperses`, `transmits`."""
     cls = probe.cls
     wo, u = directions(rng, 1000), rng.random((1000, 3))
     r = probe(params, wo, wo, u)
@@ -97,6 +98,9 @@ def flags_are_told_truly(probe: Probe, params: Params, rng: Random) -> None:
     if cls.source is not None and not cls.disperses:
         alone = r["lobe"][made] & DISPERSE
         _hold(not np.any(alone), f"LOBE_DISPERSE is returned: set disperses = True, {params}")
+    if cls.transmits is Material.transmits:
+        through = r["lobe"][made] & (TRANSMIT | DELTA) == TRANSMIT
+        _hold(not np.any(through), f"light goes through: define `transmits`, {params}")
 
 
 def lanes_agree(wide: Probe, narrow: Probe, params: Params, rng: Random) -> None:

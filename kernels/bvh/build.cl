@@ -1,11 +1,10 @@
 /* A binary tree over boxes, top down, by the surface area heuristic with binned centroids (Wald 2007).
  *
+ * The children of a range that is cut before item m stand at nodes 2m and 2m + 1: every cut has an m
+ * of its own, so work-items need no counter, and two builds make the same tree.
+ *
  * The first levels run one kernel a level, one work-item a range; what is left are subtrees, one
  * work-item each. Ranges stand in a binary heap: those under range k are 2k + 1 and 2k + 2.
- *
- * The children of a range that is cut before item m stand at nodes 2m and 2m + 1, those of a subtree's
- * ranges one after the other where its first cut may be: neighbours share cache lines and pages. So no
- * counter is shared, and two builds make the same tree.
  */
 #include "bvh/apart.cl"
 #include "bvh/items.cl"
@@ -18,7 +17,6 @@ typedef struct {
     global float8 *items, *nodes;
     float reach;    /* the largest coordinate of the scene */
     uint leaf_size; /* items of a leaf, at most */
-    float share;    /* of a test in one item, where several are tested at once */
 } Build;
 
 inline float build_reach(float8 scene)
@@ -33,7 +31,7 @@ inline float8 build_node(float8 bounds, float reach, uint link, uint count)
 }
 
 /* Small ranges are cut with fewer bins: there they cost more than they find. */
-inline uint build_bins(uint count) { return count > 24 ? BUILD_BINS : 4; }
+inline int build_bins(uint count) { return count > 24 ? BUILD_BINS : 4; }
 
 inline int4 build_bin(float8 item, float4 low, float4 scale)
 {
@@ -41,138 +39,103 @@ inline int4 build_bin(float8 item, float4 low, float4 scale)
     return clamp(bin, (int4)(0), (int4)(BUILD_BINS - 1));
 }
 
-/* What it costs to test `count` items in a box. A side that nothing is in has no number for an area. */
-inline float build_cost(const Build *b, float8 bounds, uint count)
+/* The cheapest plane: axis in x, last bin of the left side in y; x < 0 if no plane divides. */
+inline int2 build_plane(global const float8 *items, uint first, uint count, float4 low, float4 scale)
 {
-    return item_half_area(bounds) * ceil(count * b->share);
-}
-
-/* Adds an item to its bins of the three axes, and to their numbers of items, 8 bits a bin. */
-inline void build_put(float8 bounds[BUILD_BINS][3], ulong4 *numbers, float8 item, float4 low, float4 scale)
-{
-    int4 bin = build_bin(item, low, scale);
-    *numbers += (ulong4)(1) << convert_ulong4(8 * bin);
-    bounds[bin.x][0] = item_union(bounds[bin.x][0], item);
-    bounds[bin.y][1] = item_union(bounds[bin.y][1], item);
-    bounds[bin.z][2] = item_union(bounds[bin.z][2], item);
-}
-
-/* The cheapest plane: axis in x, last bin of the left side in y; x < 0 if no plane divides.
- *
- * Every second item goes to bins of its own: neighbours tend to fall into the same bin, and what was
- * stored a moment ago is slow to load. */
-inline int2 build_plane(const Build *b, uint first, uint count, float4 low, float4 scale)
-{
-    uint bins = build_bins(count), end = first + count;
-    float8 bounds[BUILD_BINS][3], others[BUILD_BINS][3];
-    uint counts[BUILD_BINS][3];
-    for (uint k = 0; k < bins; k++)
-        for (int axis = 0; axis < 3; axis++) {
-            bounds[k][axis] = others[k][axis] = (float8)(INFINITY);
-            counts[k][axis] = 0;
+    int bins = build_bins(count);
+    float8 bounds[3][BUILD_BINS];
+    uint counts[3][BUILD_BINS];
+    for (int axis = 0; axis < 3; axis++)
+        for (int k = 0; k < bins; k++) {
+            bounds[axis][k] = (float8)(INFINITY);
+            counts[axis][k] = 0;
         }
-    for (uint i = first; i < end;) {
-        ulong4 numbers = (ulong4)(0);
-        for (uint until = min(i + 254, end); i < until; i += 2) {
-            build_put(bounds, &numbers, b->items[i], low, scale);
-            if (i + 1 < until) build_put(others, &numbers, b->items[i + 1], low, scale);
-        }
-        for (uint k = 0; k < bins; k++) {
-            counts[k][0] += numbers.x >> 8 * k & 255;
-            counts[k][1] += numbers.y >> 8 * k & 255;
-            counts[k][2] += numbers.z >> 8 * k & 255;
-        }
+    for (uint i = first; i < first + count; i++) {
+        float8 item = items[i];
+        int4 bin = build_bin(item, low, scale);
+        bounds[0][bin.x] = item_union(bounds[0][bin.x], item);
+        bounds[1][bin.y] = item_union(bounds[1][bin.y], item);
+        bounds[2][bin.z] = item_union(bounds[2][bin.z], item);
+        counts[0][bin.x]++;
+        counts[1][bin.y]++;
+        counts[2][bin.z]++;
     }
-    for (uint k = 0; k < bins; k++)
-        for (int axis = 0; axis < 3; axis++)
-            bounds[k][axis] = item_union(bounds[k][axis], others[k][axis]);
     int2 plane = (int2)(-1, 0);
     float cheapest = INFINITY;
     for (int axis = 0; axis < 3; axis++) {
         float left[BUILD_BINS];
-        float8 side = bounds[0][axis];
-        uint on_side = counts[0][axis];
-        for (uint k = 0; k < bins - 1; k++) {
-            left[k] = build_cost(b, side, on_side);
-            side = item_union(side, bounds[k + 1][axis]);
-            on_side += counts[k + 1][axis];
+        float8 side = bounds[axis][0];
+        uint below = counts[axis][0];
+        for (int k = 0; k < bins - 1; k++) {
+            left[k] = below ? item_half_area(side) * below : INFINITY;
+            side = item_union(side, bounds[axis][k + 1]);
+            below += counts[axis][k + 1];
         }
-        side = bounds[bins - 1][axis];
-        on_side = counts[bins - 1][axis];
+        side = bounds[axis][bins - 1];
+        uint above = counts[axis][bins - 1];
         for (int k = bins - 2; k >= 0; k--) {
-            float cost = left[k] + build_cost(b, side, on_side);
-            if (cost < cheapest) { /* NaN fails the comparison */
+            float cost = above ? left[k] + item_half_area(side) * above : INFINITY;
+            if (cost < cheapest) {
                 cheapest = cost;
                 plane = (int2)(axis, k);
             }
-            side = item_union(side, bounds[k][axis]);
-            on_side += counts[k][axis];
+            side = item_union(side, bounds[axis][k]);
+            above += counts[axis][k];
         }
     }
     return plane;
 }
 
-/* Moves the items of a range whose bin is `last` or before to its front; returns where the others begin.
- * An item that is not of a side is made NaN for it, which a union leaves out. */
-inline uint build_divide(global float8 *items, Range r, int axis, int last, float8 span, float4 scale,
-                         Extent *left, Extent *right)
-{
-    global const float *corner = (global const float *)(items + r.first) + axis;
-    float low = axis == 0 ? span.s0 : axis == 1 ? span.s1 : span.s2;
-    float per = axis == 0 ? scale.x : axis == 1 ? scale.y : scale.z, least = last + 1;
-    uint mid = r.first;
-    *left = *right = extent_empty();
-    for (uint i = r.first; i < r.first + r.count; i++, corner += 8) {
-        float8 item = items[i], centroid = item_centroid(item);
-        float at = (corner[0] - corner[4] - low) * per; /* as in build_bin */
-        int beyond = at >= least;
-        int8 not_left = (int8)(-beyond), not_right = (int8)(beyond - 1);
-        items[i] = items[mid];
-        items[mid] = item;
-        mid += 1 - beyond;
-        left->bounds = item_union(as_float8(as_int8(item) | not_left), left->bounds);
-        left->span = item_union(as_float8(as_int8(centroid) | not_left), left->span);
-        right->bounds = item_union(as_float8(as_int8(item) | not_right), right->bounds);
-        right->span = item_union(as_float8(as_int8(centroid) | not_right), right->span);
-    }
-    return mid;
-}
-
 /* Moves the items of a range so that its two extents follow each other; returns where the second
  * begins. Where no plane divides, or the depth runs out, it is the middle: then the depth that is
  * left always suffices. */
-inline uint build_cut(const Build *b, Range r, float8 span, Extent *left, Extent *right)
+inline uint build_cut(global float8 *items, Range r, float8 span, Extent *left, Extent *right)
 {
     uint mid = r.first;
     uint levels = 32 - clz(r.count - 1); /* of a balanced tree */
     float4 extent = -span.hi - span.lo;
     if (r.depth + levels < BVH_DEPTH) {
         float4 scale = extent > 0.0f ? (build_bins(r.count) * 0.999999f) / extent : (float4)(0.0f);
-        int2 plane = build_plane(b, r.first, r.count, span.lo, scale);
-        if (plane.x >= 0) mid = build_divide(b->items, r, plane.x, plane.y, span, scale, left, right);
+        int2 plane = build_plane(items, r.first, r.count, span.lo, scale);
+        if (plane.x >= 0) {
+            uint end = r.first + r.count;
+            *left = *right = extent_empty();
+            while (mid < end) {
+                float8 item = items[mid];
+                int4 bin = build_bin(item, span.lo, scale);
+                int at = plane.x == 0 ? bin.x : plane.x == 1 ? bin.y : bin.z;
+                if (at <= plane.y) {
+                    *left = extent_add(*left, item);
+                    mid++;
+                } else {
+                    *right = extent_add(*right, item);
+                    end--;
+                    items[mid] = items[end];
+                    items[end] = item;
+                }
+            }
+        }
     }
     if (mid == r.first || mid == r.first + r.count) {
         mid = r.first + r.count / 2;
         *left = *right = extent_empty();
-        for (uint i = r.first; i < mid; i++) *left = extent_add(*left, b->items[i]);
-        for (uint i = mid; i < r.first + r.count; i++) *right = extent_add(*right, b->items[i]);
+        for (uint i = r.first; i < mid; i++) *left = extent_add(*left, items[i]);
+        for (uint i = mid; i < r.first + r.count; i++) *right = extent_add(*right, items[i]);
     }
     return mid;
 }
 
-/* Writes the node of a range; if it is to be divided, does so and returns 1. next: where its children
- * go, or 0: by the place of the cut. */
-inline int build_range(const Build *b, Range r, Extent h, uint next, Range children[2], Extent extents[2])
+/* Writes the node of a range; if it is to be divided, does so and returns 1. */
+inline int build_range(const Build *b, Range r, Extent h, Range children[2], Extent extents[2])
 {
     if (r.count <= b->leaf_size) {
         b->nodes[r.node] = build_node(h.bounds, b->reach, BVH_LEAF | r.first, r.count);
         return 0;
     }
-    uint mid = build_cut(b, r, h.span, &extents[0], &extents[1]);
-    next = next ? next : 2 * mid;
-    b->nodes[r.node] = build_node(h.bounds, b->reach, next, r.count);
-    children[0] = (Range){next, r.first, mid - r.first, r.depth + 1};
-    children[1] = (Range){next + 1, mid, r.first + r.count - mid, r.depth + 1};
+    uint mid = build_cut(b->items, r, h.span, &extents[0], &extents[1]);
+    b->nodes[r.node] = build_node(h.bounds, b->reach, 2 * mid, r.count);
+    children[0] = (Range){2 * mid, r.first, mid - r.first, r.depth + 1};
+    children[1] = (Range){2 * mid + 1, mid, r.first + r.count - mid, r.depth + 1};
     return 1;
 }
 
@@ -191,13 +154,13 @@ kernel APART void build_root(global const Extent *restrict parts, uint n_parts, 
 /* Ranges from `begin` on in the heap, a level of it. Those with no items are no ranges. */
 kernel APART void build_level(global float8 *restrict items, global float8 *restrict nodes,
                               global Range *restrict ranges, global Extent *restrict extents,
-                              uint begin, uint leaf_size, float share)
+                              uint begin, uint leaf_size)
 {
     uint k = begin + get_global_id(0);
-    Build b = {items, nodes, build_reach(extents[0].bounds), leaf_size, share};
+    Build b = {items, nodes, build_reach(extents[0].bounds), leaf_size};
     Range r = ranges[k], children[2] = {{0, 0, 0, 0}, {0, 0, 0, 0}};
     Extent sides[2];
-    if (r.count && build_range(&b, r, extents[k], 0, children, sides)) {
+    if (r.count && build_range(&b, r, extents[k], children, sides)) {
         extents[2 * k + 1] = sides[0];
         extents[2 * k + 2] = sides[1];
     }
@@ -207,19 +170,16 @@ kernel APART void build_level(global float8 *restrict items, global float8 *rest
 
 kernel APART void build_subtree(global float8 *restrict items, global float8 *restrict nodes,
                                 global const Range *restrict ranges,
-                                global const Extent *restrict extents, uint begin, uint leaf_size,
-                                float share)
+                                global const Extent *restrict extents, uint begin, uint leaf_size)
 {
-    Build b = {items, nodes, build_reach(extents[0].bounds), leaf_size, share};
+    Build b = {items, nodes, build_reach(extents[0].bounds), leaf_size};
     Range waiting[BVH_DEPTH];
     Extent waiting_halves[BVH_DEPTH];
     int n = 0;
     Range r = ranges[begin + get_global_id(0)], children[2];
     Extent h = extents[begin + get_global_id(0)], sides[2];
-    uint next = 2 * (r.first + 1);
     while (r.count) {
-        if (build_range(&b, r, h, next, children, sides)) {
-            next += 2;
+        if (build_range(&b, r, h, children, sides)) {
             waiting[n] = children[1];
             waiting_halves[n++] = sides[1];
             r = children[0];

@@ -8,7 +8,6 @@
  * Wide nodes are 8 rows of float8: low x, high x, low y, high y, low z, high z of the children,
  * their words, and 1 where there is a child; its word is its wide node, or its block with BVH_LEAF set.
  */
-#include "bvh/collapsed.cl"
 #include "bvh/hit.cl"
 #include "bvh/items.cl"
 #include "bvh/leaves.cl"
@@ -98,6 +97,36 @@ kernel APART void collapse_level(global const float8 *restrict nodes,
 {
     Range r = ranges[begin + get_global_id(0)];
     if (r.count) collapse_node(nodes, items, costs, occlusion, r.node);
+}
+
+/* Of so many trees below a node, how many the left child gets. */
+inline uint collapse_share(global const float8 *costs, uint node, uint trees)
+{
+    return as_uint(((global const float *)(costs + node))[7]) >> 3 * (trees - 2) & 7u;
+}
+
+/* The binary nodes that become the children of the wide node at `root`; returns their number. */
+inline uint collapse_children(global const float8 *nodes, global const float8 *costs, uint root,
+                              uint children[8])
+{
+    uint waiting[8], trees[8], n = 0, found = 0, at = root, i = 8;
+    for (;;) {
+        uint share = 0;
+        if (node_is_leaf(nodes[at])) i = 1;
+        while (i > 1 && (share = collapse_share(costs, at, i)) == 0) i--;
+        if (i > 1) {
+            uint left = node_link(nodes[at]);
+            waiting[n] = left + 1;
+            trees[n++] = i - share;
+            at = left;
+            i = share;
+        } else {
+            children[found++] = at;
+            if (!n) return found;
+            at = waiting[--n];
+            i = trees[n];
+        }
+    }
 }
 
 /* Numbers the wide nodes and blocks, level by level: a node's child nodes, and its blocks, have

@@ -1,4 +1,4 @@
-/* Eight truth values as bits, the first and the last of them; the one place with a compiler's own words.
+/* Eight truth values as bits, and the first of them; the one place with a compiler's own words.
  *
  * On x86 the sign bits of a vector are one instruction away; elsewhere eight bytes of a ulong serve.
  */
@@ -12,12 +12,8 @@
 typedef uint Mask8;
 inline Mask8 mask8(int8 m) { return (uint)__builtin_ia32_movmskps256(as_float8(m)); }
 inline uint mask8_first(Mask8 m) { return (uint)__builtin_ctz(m); }
-inline uint mask8_last(Mask8 m) { return 31 - clz(m); }
-inline Mask8 mask8_without(Mask8 m, uint i) { return m ^ 1u << i; }
 #else
 typedef ulong Mask8;
 inline Mask8 mask8(int8 m) { return as_ulong(convert_char8(m)) & 0x0101010101010101ul; }
 inline uint mask8_first(Mask8 m) { return (uint)(63 - clz(m & -m)) >> 3; }
-inline uint mask8_last(Mask8 m) { return (uint)(63 - clz(m)) >> 3; }
-inline Mask8 mask8_without(Mask8 m, uint i) { return m ^ 1ul << 8 * i; }
 #endif

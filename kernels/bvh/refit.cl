@@ -6,7 +6,6 @@
  * nothing in it is inside out, but in a binary node a point beyond everything, for traversals of those
  * sort the planes of a box.
  */
-#include "bvh/compact_store.cl"
 #include "bvh/hit.cl"
 #include "bvh/items.cl"
 #include "bvh/leaves.cl"
@@ -162,45 +161,6 @@ kernel APART void refit_wide8(global float8 *nodes, uint nodes_begin, uint begin
         row[32] = bounds.s2;
         row[40] = -bounds.s6;
     }
-}
-
-/* The bounds of item `at` of a compressed tree, whose record is written. */
-inline float8 refit_item(Refit tree, uint at)
-{
-    if (tree.boxes) return refit_box(tree, at);
-    float4 v[3];
-    global float *record = tree.leaves + (ulong)at * 12;
-    int sound = leaf_corners(tree.vertices, tree.faces, as_uint(record[9]), v);
-    for (uint i = 0; i < 3; i++) vstore3(v[i].xyz, i, record);
-    return sound ? refit_triangle(v) : REFIT_NOTHING;
-}
-
-/* Compressed nodes from `begin` on, a level; those below it are done. bounds: of every node, as they were
- * before they became steps, so that nothing grows from level to level. */
-kernel APART void refit_compact(global float8 *nodes, uint nodes_begin, global float8 *restrict bounds,
-                                uint begin, uint count, REFIT_ARGS)
-{
-    if (get_global_id(0) >= count) return;
-    Refit tree = REFIT;
-    uint at = begin + get_global_id(0);
-    global uint *node = (global uint *)(nodes + nodes_begin) + (ulong)at * COMPACT_WORDS;
-    uint mask = node[3] >> 24, child = node[4];
-    float8 rows[8], whole = REFIT_NOTHING;
-    for (uint slot = 0; slot < 8; slot++) {
-        uint meta = node[6 + slot / 4] >> 8 * (slot % 4) & 0xffu;
-        rows[slot] = REFIT_NOTHING;
-        if (mask >> slot & 1) {
-            rows[slot] = bounds[child++];
-        } else if (meta) {
-            uint first = node[5] + (meta & 31u);
-            for (uint i = 0; i < popcount(meta >> 5); i++)
-                rows[slot] = item_union(rows[slot], refit_item(tree, first + i));
-            if (rows[slot].s0 < FLT_MAX) rows[slot] = refit_pad(rows[slot], tree.reach);
-        }
-        whole = item_union(whole, rows[slot]);
-    }
-    bounds[at] = whole;
-    compact_store(node, rows);
 }
 
 /* The records of brute.cl; prim and tag stay. */

@@ -7,16 +7,13 @@
 #include "bvh/ray.cl"
 #include "bvh/shear.cl"
 
-/* What is added to offsets for rounding. The products o * r and plane * r are wrong by 2^-24 of themselves at
- * most; they differ by the distance, errors of which RAY_WIDER looks after. */
-#define WIDE8_PRODUCTS 0x1p-22f
 #define WIDE8_STACK (7 * BVH_DEPTH + 8) /* a node on the way leaves 7 children waiting */
 
 typedef struct {
-    float tmin;
-    float rx, ry, rz, px, py, pz; /* where it enters a box: plane * r + p */
-    float fx, fy, fz, gx, gy, gz; /* where it leaves: plane * f + g */
-    uint nx, ny, nz; /* rows of a node with the near planes; the far ones are in row ^ 1 */
+    float ox, oy, oz, tmin;
+    float rx, ry, rz;    /* 1 / d */
+    float fx, fy, fz;    /* the same for far planes, by rounding errors longer */
+    uint nx, ny, nz;     /* rows of a node with the near planes; the far ones are in row ^ 1 */
     Shear shear;
 } Wide8Ray;
 
@@ -25,14 +22,10 @@ inline float8 wide8_max(float8 a, float8 b) { return a > b ? a : b; }
 
 inline Wide8Ray wide8_ray(float ox, float oy, float oz, float dx, float dy, float dz, float tmin)
 {
-    float4 o = (float4)(ox, oy, oz, 0.0f);
-    float4 r = (float4)(ray_reciprocal(dx), ray_reciprocal(dy), ray_reciprocal(dz), 1.0f), f = r * RAY_WIDER;
-    float4 p = -o * r, g = -o * f, wider = copysign((float4)(WIDE8_PRODUCTS), p);
-    p *= 1.0f - wider;
-    g *= 1.0f + wider;
-    Wide8Ray ray = {tmin, r.x, r.y, r.z, p.x, p.y, p.z, f.x, f.y, f.z, g.x, g.y, g.z,
-                    r.x < 0.0f, 2 + (r.y < 0.0f), 4 + (r.z < 0.0f), shear_make(ox, oy, oz, dx, dy, dz)};
-    return ray;
+    float rx = ray_reciprocal(dx), ry = ray_reciprocal(dy), rz = ray_reciprocal(dz);
+    Wide8Ray r = {ox, oy, oz, tmin, rx, ry, rz, rx * RAY_WIDER, ry * RAY_WIDER, rz * RAY_WIDER,
+                  rx < 0.0f, 2 + (ry < 0.0f), 4 + (rz < 0.0f), shear_make(ox, oy, oz, dx, dy, dz)};
+    return r;
 }
 
 /* The corners of the box around everything; children that are not there are inside out. */
@@ -50,9 +43,9 @@ inline void wide8_bounds(global const float *nodes, float3 *low, float3 *high)
 inline Mask8 wide8_boxes(global const float *node, const Wide8Ray *r, float t, float8 *entry)
 {
     global const float8 *row = (global const float8 *)node;
-    float8 x = row[r->nx] * r->rx + r->px, far_x = row[r->nx ^ 1] * r->fx + r->gx;
-    float8 y = row[r->ny] * r->ry + r->py, far_y = row[r->ny ^ 1] * r->fy + r->gy;
-    float8 z = row[r->nz] * r->rz + r->pz, far_z = row[r->nz ^ 1] * r->fz + r->gz;
+    float8 x = (row[r->nx] - r->ox) * r->rx, far_x = (row[r->nx ^ 1] - r->ox) * r->fx;
+    float8 y = (row[r->ny] - r->oy) * r->ry, far_y = (row[r->ny ^ 1] - r->oy) * r->fy;
+    float8 z = (row[r->nz] - r->oz) * r->rz, far_z = (row[r->nz ^ 1] - r->oz) * r->fz;
     *entry = wide8_max(wide8_max(x, y), wide8_max(z, (float8)(r->tmin)));
     float8 exit = wide8_min(wide8_min(far_x, far_y), wide8_min(far_z, (float8)(t)));
     return mask8(*entry <= exit);
@@ -72,9 +65,9 @@ inline Mask8 wide8_triangles(global const float *block, const Wide8Ray *r, float
     global const float8 *b = (global const float8 *)block;
     const Shear *s = &r->shear;
     float8 az = b[s->kz] - s->oz, bz = b[3 + s->kz] - s->oz, cz = b[6 + s->kz] - s->oz;
-    float8 ax = b[s->kx] - s->ox - s->x * az, ay = b[s->ky] - s->oy - s->y * az;
-    float8 bx = b[3 + s->kx] - s->ox - s->x * bz, by = b[3 + s->ky] - s->oy - s->y * bz;
-    float8 cx = b[6 + s->kx] - s->ox - s->x * cz, cy = b[6 + s->ky] - s->oy - s->y * cz;
+    float8 ax = mad(-s->x, az, b[s->kx] - s->ox), ay = mad(-s->y, az, b[s->ky] - s->oy);
+    float8 bx = mad(-s->x, bz, b[3 + s->kx] - s->ox), by = mad(-s->y, bz, b[3 + s->ky] - s->oy);
+    float8 cx = mad(-s->x, cz, b[6 + s->kx] - s->ox), cy = mad(-s->y, cz, b[6 + s->ky] - s->oy);
     float8 u = wide8_edge(cx, cy, bx, by), v = wide8_edge(ax, ay, cx, cy);
     float8 w = wide8_edge(bx, by, ax, ay);
     int8 inside = (wide8_min(wide8_min(u, v), w) >= 0.0f) | (wide8_max(wide8_max(u, v), w) <= 0.0f);
@@ -167,35 +160,26 @@ inline TriHit wide8_closest(global const float *nodes, global const float *leave
     }
 }
 
-/* Whether anything is between tmin and tmax; of the children that are met, the last promises most. A node
- * with children left waits with the set of them. */
+/* Whether anything is between tmin and tmax; children with the best promise stand last. */
 inline int wide8_occluded(global const float *nodes, global const float *leaves, float ox, float oy,
                           float oz, float dx, float dy, float dz, float tmin, float tmax)
 {
     if (!ray_finite(ox, oy, oz, dx, dy, dz)) return 0;
     Wide8Ray r = wide8_ray(ox, oy, oz, dx, dy, dz, tmin);
-    uint waiting[BVH_DEPTH];
-    Mask8 children[BVH_DEPTH];
+    uint waiting[WIDE8_STACK];
     uint n = 0, at = 0;
     float8 unused[2];
     for (;;) {
-        uint node = at;
-        Mask8 m = 0;
         if (at & BVH_LEAF) {
             global const float *block = leaves + (ulong)(at & ~BVH_LEAF) * 88;
             if (wide8_triangles(block, &r, tmax, &unused[0], &unused[1])) return 1;
         } else {
-            m = wide8_boxes(nodes + (ulong)node * 64, &r, tmax, &unused[0]);
+            global const float *node = nodes + (ulong)at * 64;
+            global const uint *words = (global const uint *)(node + 48);
+            Mask8 m = wide8_boxes(node, &r, tmax, &unused[0]);
+            for (; m; m &= m - 1) waiting[n++] = words[mask8_first(m)];
         }
-        if (!m) {
-            if (!n) return 0;
-            node = waiting[--n];
-            m = children[n];
-        }
-        uint i = mask8_last(m);
-        at = as_uint(nodes[(ulong)node * 64 + 48 + i]);
-        waiting[n] = node;
-        children[n] = mask8_without(m, i);
-        n += children[n] != 0;
+        if (!n) return 0;
+        at = waiting[--n];
     }
 }

@@ -63,7 +63,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     real strength = spectrum_max(beta) * load_path_weight(path, at);
     next = next & (strength > 0.0f);
     if (any(next & survivor)) {
-        real q = min_r(strength, (real)(0.95f));
+        real q = roulette_chance(strength);
         vec2 u = sampler_pair(sampler, dimension + DIMENSION_ROULETTE);
         next = next & (!survivor | (u.x < q));
         beta = spectrum_scale(beta, sel(survivor, 1.0f / max_r(q, (real)(1e-6f)), (real)(1.0f)));

@@ -47,7 +47,8 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
 
 #if USES_LIGHTS && !BSDF_DELTA
     /* Next-event estimation. */
-    LightSample ls = light_sample(scene, s.p, choice.x, sampler_pair(sampler, dimension + DIMENSION_LIGHT), lambdas);
+    vec3 side = vertex_side(frame, wo);
+    LightSample ls = light_sample(scene, s.p, side, choice.x, sampler_pair(sampler, dimension + DIMENSION_LIGHT), lambdas);
     vec3 wi = to_local(frame, ls.wi);
     Spectrum f = spectrum_scale(bsdf_eval(m, wo, wi), facing_share(facing, ls.wi));
     real w = sel(ls.pdf < 0.0f, (real)(1.0f), mis_weight(ls.pdf, hero_pdf(m, wo, wi, ratio)));
@@ -71,7 +72,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     real strength = spectrum_max(beta);
     next = next & (strength > 0.0f);
     if (any(next & survivor)) {
-        real q = min_r(strength * eta * eta, (real)(0.95f));
+        real q = roulette_chance(strength * eta * eta);
         vec2 u = sampler_pair(sampler, dimension + DIMENSION_ROULETTE);
         next = next & (!survivor | (u.x < q));
         beta = spectrum_scale(beta, sel(survivor, 1.0f / max_r(q, (real)(1e-6f)), (real)(1.0f)));
@@ -83,6 +84,9 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
 #else
     path_turned(path, at, next);
     store_path_pdf(path, at, next, sel((bs.lobe & LOBE_DELTA) != 0, (real)(-1.0f), bs.pdf));
+#if USES_INFINITE && !BSDF_DELTA
+    store_path_side(path, at, next, side);
+#endif
 #endif
     store_path_eta(path, at, next, eta);
     hero_keep(path, at, next, ratio);

@@ -36,7 +36,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     Spectrum everywhere = spectrum_mul(spectrum_mul(own, bsdf_albedo(m)), ambient);
     radiance = spectrum_sel(active, spectrum_add(radiance, everywhere), radiance);
 #if USES_LIGHTS
-    LightSample ls = light_sample(scene, s.p, choice.x, sampler_pair(sampler, dimension + DIMENSION_LIGHT), lambdas);
+    LightSample ls = light_sample(scene, s.p, vertex_side(frame, wo), choice.x, sampler_pair(sampler, dimension + DIMENSION_LIGHT), lambdas);
     Spectrum f = spectrum_scale(bsdf_eval(m, wo, to_local(frame, ls.wi)), facing_share(facing, ls.wi));
     mask shine = active & (ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
     Spectrum value = spectrum_scale(spectrum_mul(spectrum_mul(own, f), ls.radiance), 1.0f / sel(shine, fabs(ls.pdf), (real)(1.0f)));

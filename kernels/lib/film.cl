@@ -21,6 +21,17 @@ inline vec2 film_position(global const Settings *settings, vec2 pixel, vec2 offs
     return p;
 }
 
+/* `place`, or the first one after it in steps of `step` whose pixel lies inside the film. */
+inline integer place_inside(global const Settings *settings, integer place)
+{
+    for (;;) {
+        vec2 p = place_pixel(settings, place);
+        mask outside = (place < settings->places) & ((p.x >= (float)settings->width) | (p.y >= (float)settings->height));
+        if (!any(outside)) return place;
+        place += sel_i(outside, (integer)(settings->per_plane), (integer)(0));
+    }
+}
+
 /* The first sample at or after `first` that belongs to a plane. */
 inline integer plane_sample(integer plane, int planes, int first)
 {
@@ -34,28 +45,6 @@ inline void sum_add(real *sum, real *rest, real v)
     real total = *sum + v;
     *rest += sel(fabs(*sum) >= fabs(v), (*sum - total) + v, (v - total) + *sum);
     *sum = total;
-}
-
-/* A slot's walk. `walk` holds for each place the one after it in its slot's list, then for each place the sample
- * before which it is left, then where the slots of a plane begin; a place outside the film ends a list. */
-inline integer walk_end(global const Settings *settings, global const uint *walk, integer place, int end)
-{
-    return min_i(gather_i(walk, place + settings->places), (integer)(end));
-}
-
-/* The place after `place`, or the first one of a slot that has not `begun`, where a sample from `start` on is wanted. */
-inline integer walk_next(global const Settings *settings, global const uint *walk, mask turn, mask begun, integer place,
-                         integer index, integer start, int end)
-{
-    int places = settings->places;
-    integer next = gather_i(walk, sel_i(begun, place, index + 2 * places));
-    for (;;) {
-        mask there = turn & (next < places);
-        integer at = sel_i(there, next, (integer)(0));
-        mask idle = there & (start >= walk_end(settings, walk, at, end));
-        if (!any(idle)) return next;
-        next = sel_i(idle, gather_i(walk, at), next);
-    }
 }
 
 typedef struct {

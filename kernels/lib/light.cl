@@ -2,12 +2,13 @@
  *
  *   LightSample <kind>_sample(<Kind> l, Scene scene, vec3 p, vec2 u, Wavelengths lambdas);
  *
- * which chooses a direction toward the light as seen from p, and for those that a ray can meet
- * (infinite ones),
+ * which chooses a direction toward the light as seen from p. Those that a ray can meet (infinite ones) have
  *
+ *   LightSample <kind>_sample(<Kind> l, Scene scene, vec3 side, vec2 u, Wavelengths lambdas);
  *   Spectrum <kind>_radiance(<Kind> l, Scene scene, vec3 d, Wavelengths lambdas);   along a ray that leaves the scene
- *   real     <kind>_pdf(<Kind> l, Scene scene, vec3 d);                             of sample, [1/sr]
+ *   real     <kind>_pdf(<Kind> l, Scene scene, vec3 side, vec3 d);                  of sample, [1/sr]
  *
+ * where `side` is the unit normal of the only side of the surface that matters, or 0 where both do.
  * The struct <Kind> is declared as a Record in clpt/render/lights.py and loaded from `lamps`.
  */
 typedef struct {
@@ -16,6 +17,9 @@ typedef struct {
     Spectrum radiance; /* what comes along it; for a delta light, irradiance on a facing surface */
     real pdf;          /* [1/sr]; below 0: a delta light, to be taken as it is; 0: nothing comes */
 } LightSample;
+
+/* Whether there is only one side to send light to. */
+inline mask light_sided(vec3 side) { return dot3(side, side) > 0.5f; }
 
 inline LightSample light_nothing(void)
 {

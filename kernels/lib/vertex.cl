@@ -35,6 +35,13 @@ inline Vertex vertex_load(Scene scene, Slab path, Slab hit, At at, mask active)
     return v;
 }
 
+/* The side of the surface to which the material sends light, for lib/light.cl. */
+inline vec3 vertex_side(Frame frame, vec3 wo)
+{
+    real sign = BSDF_TRANSMITS ? (real)(0.0f) : sel(wo.z < 0.0f, (real)(-1.0f), (real)(1.0f));
+    return scale3(frame.n, sign);
+}
+
 /* `value` after t metres along w, which leads away from the vertex. */
 inline Spectrum vertex_beyond(Scene scene, Vertex v, vec3 w, real t, Wavelengths lambdas, Spectrum value)
 {

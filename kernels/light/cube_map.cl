@@ -45,7 +45,7 @@ Spectrum cube_map_radiance(CubeMap l, Scene scene, vec3 d, Wavelengths lambdas)
     return cube_map_between(l, scene, cube_map_point(l, d), lambdas);
 }
 
-real cube_map_pdf(CubeMap l, Scene scene, vec3 d)
+real cube_map_pdf(CubeMap l, Scene scene, vec3 side, vec3 d)
 {
     CubePoint p = cube_map_point(l, d);
     real cells = to_real(l.width * 2), column = (p.a + 1.0f) * 0.5f * cells, row = (p.b + 1.0f) * 0.5f * cells;
@@ -55,7 +55,7 @@ real cube_map_pdf(CubeMap l, Scene scene, vec3 d)
     return pdf * sqr(to_real(l.width)) * p.jacobian;
 }
 
-LightSample cube_map_sample(CubeMap l, Scene scene, vec3 p, vec2 u, Wavelengths lambdas)
+LightSample cube_map_sample(CubeMap l, Scene scene, vec3 side, vec2 u, Wavelengths lambdas)
 {
     GridPoint g = grid_sample(scene, cube_map_grid(l), u);
     real step = 1.0f / to_real(l.width);

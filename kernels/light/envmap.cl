@@ -53,7 +53,7 @@ Spectrum envmap_radiance(Envmap l, Scene scene, vec3 d, Wavelengths lambdas)
     return envmap_between(l, scene, p.row, p.column, p.at, lambdas);
 }
 
-real envmap_pdf(Envmap l, Scene scene, vec3 d)
+real envmap_pdf(Envmap l, Scene scene, vec3 side, vec3 d)
 {
     EnvmapPoint p = envmap_point(l, d);
     return envmap_solid_angle_pdf(l, grid_pdf(scene, envmap_grid(l), p.row, p.column, p.at), p.sin_t);
@@ -74,7 +74,7 @@ inline LightSample envmap_direction(Envmap l, GridPoint g)
     return s;
 }
 
-LightSample envmap_sample(Envmap l, Scene scene, vec3 p, vec2 u, Wavelengths lambdas)
+LightSample envmap_sample(Envmap l, Scene scene, vec3 side, vec2 u, Wavelengths lambdas)
 {
     GridPoint g = grid_sample(scene, envmap_grid(l), u);
     LightSample s = envmap_direction(l, g);

@@ -26,9 +26,9 @@ Spectrum spectral_envmap_radiance(SpectralEnvmap l, Scene scene, vec3 d, Wavelen
     return spectral_envmap_between(l, scene, p.row, p.column, p.at, lambdas);
 }
 
-real spectral_envmap_pdf(SpectralEnvmap l, Scene scene, vec3 d) { return envmap_pdf(spectral_envmap_image(l), scene, d); }
+real spectral_envmap_pdf(SpectralEnvmap l, Scene scene, vec3 side, vec3 d) { return envmap_pdf(spectral_envmap_image(l), scene, side, d); }
 
-LightSample spectral_envmap_sample(SpectralEnvmap l, Scene scene, vec3 p, vec2 u, Wavelengths lambdas)
+LightSample spectral_envmap_sample(SpectralEnvmap l, Scene scene, vec3 side, vec2 u, Wavelengths lambdas)
 {
     Envmap image = spectral_envmap_image(l);
     GridPoint g = grid_sample(scene, envmap_grid(image), u);

@@ -39,9 +39,9 @@ STAGE(emit)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
         integer slot = LANE_INDEX + (int)at, plane = divide(slot, per_plane);
         integer place = load_path_place(path, at), start = plane_sample(plane, planes, first);
         integer sample = load_path_sample(path, at) + planes;
-        mask turn = ended & (!began | (sample >= walk_end(settings, walk, place, end)));
-        integer next = walk_next(settings, walk, turn, began, place, slot - plane * per_plane, start, end);
-        mask done = turn & (next >= settings->places);
+        mask turn = ended & (!began | (sample >= end));
+        integer next = place_inside(settings, sel_i(turn, sel_i(began, place + per_plane, slot - plane * per_plane), place));
+        mask done = turn & ((next >= settings->places) | (start >= end));
         place = sel_i(turn & !done, next, place);
         sample = sel_i(turn & !done, start, sample);
         mask go = ended & !done;

@@ -31,7 +31,7 @@ STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
         if (any(sky)) {
             real pdf = load_path_pdf(path, at);
             vec3 d = load_path_d(path, at);
-            Spectrum arrives = infinite_gather(scene, d, pdf, lambdas);
+            Spectrum arrives = infinite_gather(scene, load_path_side(path, at), d, pdf, lambdas);
 #if USES_ABSORPTION
             integer medium = sel_i(sky, load_path_medium(path, at), (integer)(0));
             arrives = spectrum_mul(arrives, medium_transmittance(scene, medium, (real)(FAR), lambdas));
@@ -70,12 +70,12 @@ STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
         integer slot = LANE_INDEX + (int)at, plane = divide(slot, per_plane);
         integer start = plane_sample(plane, planes, first);
         sample += planes;
-        mask turn = ended & (!began | (sample >= walk_end(settings, walk, place, end)));
+        mask turn = ended & (!began | (sample >= end));
         mask done = (integer)(0);
         if (any(turn)) {
             film_store(settings, film, turn & began, plane, place, e);
-            integer next = walk_next(settings, walk, turn, began, place, slot - plane * per_plane, start, end);
-            done = turn & (next >= settings->places);
+            integer next = place_inside(settings, sel_i(began, place + per_plane, slot - plane * per_plane));
+            done = turn & ((next >= settings->places) | (start >= end));
             mask begin = turn & !done;
             place = sel_i(begin, next, place);
             sample = sel_i(begin, start, sample);

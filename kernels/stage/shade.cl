@@ -18,6 +18,7 @@
 #include "generated/medium.cl"
 #include "lib/vertex.cl"
 #include "lib/hero.cl"
+#include "lib/roulette.cl"
 #include "generated/integrator.cl"
 
 #if QUEUED

@@ -2,7 +2,14 @@
  * indices, so that a kind's indices ascend. Every work-item counts, and later places, a chunk of
  * neighbouring slots; in between, one work-item sums. No atomics, no barriers. */
 #include "lib/base.cl"
-#include "lib/waiting.cl"
+#include "lib/surface_flags.cl"
+
+/* The kind that a slot waits for, or -1. */
+inline int sort_key(Slab path, Slab hit, uint slot)
+{
+    int alive = (load_path_state(path, slot) & PATH_ALIVE) != 0 && load_hit_prim(hit, slot) >= 0;
+    return alive ? MATERIAL_KIND(load_hit_material(hit, slot)) : -1;
+}
 
 /* counts[kind * chunks + chunk]: how many of a chunk's slots wait for a kind. */
 kernel void sort_count(SLAB_ARGS, global uint *counts, uint chunk, uint slots)
@@ -11,7 +18,7 @@ kernel void sort_count(SLAB_ARGS, global uint *counts, uint chunk, uint slots)
     uint id = get_global_id(0), chunks = get_global_size(0), tally[BSDF_COUNT];
     for (int k = 0; k < BSDF_COUNT; k++) tally[k] = 0;
     for (uint slot = id * chunk; slot < min((id + 1) * chunk, slots); slot++) {
-        int kind = waiting_kind(path, hit, slot);
+        int kind = sort_key(path, hit, slot);
         if (kind >= 0) tally[kind]++;
     }
     for (int k = 0; k < BSDF_COUNT; k++) counts[k * chunks + id] = tally[k];
@@ -38,7 +45,7 @@ kernel void sort_place(SLAB_ARGS, global const uint *counts, global uint *queue,
     uint id = get_global_id(0), chunks = get_global_size(0), next[BSDF_COUNT];
     for (int k = 0; k < BSDF_COUNT; k++) next[k] = counts[k * chunks + id];
     for (uint slot = id * chunk; slot < min((id + 1) * chunk, slots); slot++) {
-        int kind = waiting_kind(path, hit, slot);
+        int kind = sort_key(path, hit, slot);
         if (kind >= 0) queue[next[kind]++] = slot;
     }
 }

@@ -21,11 +21,8 @@ class Counting:
 
     def __init__(self, seconds: float = 0.0):
         self.samples, self.seconds, self.passes = 0, seconds, []
-        self.active = 1.0
 
-    def run(self, samples, progress, noise=None):
-        self.active = 1.0 if noise is None else noise / (self.samples + samples)
-        self.active = 0.0 if self.active < 0.01 else self.active
+    def run(self, samples, progress):
         self.passes.append(samples)
         for done in range(samples):
             time.sleep(self.seconds)
@@ -39,12 +36,6 @@ def test_passes_grow_and_end_at_the_last_sample():
     renderer = Counting()
     assert expose(renderer, 100, None, lambda progress: None)
     assert renderer.passes == [1, 3, 12, 48, 36]
-
-
-def test_noise_ends_it():
-    renderer = Counting()
-    assert expose(renderer, None, None, lambda progress: None, noise=1.0)
-    assert renderer.passes == [1, 3, 12, 48, 192]
 
 
 def test_the_limit_ends_a_pass_but_not_the_first():

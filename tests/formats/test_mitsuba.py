@@ -62,7 +62,7 @@ def test_defaults_are_mitsubas(scene):
     made = scene("")
     assert (made.film.width, made.film.height, made.spp) == (768, 576, 4)
     assert isinstance(made.film.filter, integrators.Gaussian)
-    assert (made.integrator.max_depth, made.integrator.rr_depth) == (-1, 5)
+    assert (made.integrator.max_depth, made.integrator.rr_depth) == (-1, 3)
     # The field of view of a 50 mm lens, as Mitsuba 3.9.1 prints it.
     assert made.camera.fov == pytest.approx(38.1848, abs=1e-4)
 
@@ -728,7 +728,7 @@ def test_light_tracing(scene):
     )
     tracer = loaded.integrator
     assert isinstance(tracer, integrators.ParticleTracer)
-    assert (tracer.max_depth, tracer.rr_depth, tracer.hide_lights) == (-1, 5, True)
+    assert (tracer.max_depth, tracer.rr_depth, tracer.hide_lights) == (-1, 3, True)
     beam = loaded.shapes[0].emission
     assert isinstance(beam, lights.DirectionalArea)
     assert beam.irradiance == RGBIlluminant(3, 3, 3)

@@ -26,7 +26,8 @@ PICK = """
 """
 SAMPLE = """
     vec2 u = {x[4], x[5]};
-    LightSample s = light_sample(scene, v3(x[0], x[1], x[2]), x[3], u, lambdas);
+    vec3 both = v3(0.0f, 0.0f, 0.0f);
+    LightSample s = light_sample(scene, v3(x[0], x[1], x[2]), both, x[3], u, lambdas);
     r[0] = s.wi.x; r[1] = s.wi.y; r[2] = s.wi.z; r[3] = s.pdf; r[4] = s.radiance.y;
 """
 

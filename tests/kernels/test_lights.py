@@ -37,19 +37,31 @@ NAMES = {"rgb": "xyz", "spectral": "xyzw"}
 
 SAMPLE = """
     vec2 u = {x[4], x[5]};
-    LightSample s = light_sample(scene, v3(x[0], x[1], x[2]), x[3], u, lambdas);
+    vec3 both = v3(0.0f, 0.0f, 0.0f);
+    LightSample s = light_sample(scene, v3(x[0], x[1], x[2]), both, x[3], u, lambdas);
     r[0] = s.wi.x; r[1] = s.wi.y; r[2] = s.wi.z; r[3] = s.t; r[4] = s.pdf;
     r[5] = s.radiance.x; r[6] = s.radiance.y; r[7] = s.radiance.z;
 """
 INFINITE = """
     Spectrum s;
     real pdf;
-    infinite_light(scene, 0, v3(x[0], x[1], x[2]), lambdas, &s, &pdf);
+    infinite_light(scene, 0, v3(0.0f, 0.0f, 0.0f), v3(x[0], x[1], x[2]), lambdas, &s, &pdf);
     r[0] = s.x; r[1] = s.y; r[2] = s.z; r[3] = pdf;
 """
 PDF = """
     r[0] = light_pdf(scene, to_integer(x[0]), v3(x[1], x[2], x[3]), v3(x[4], x[5], x[6]), x[7],
                      v3(x[8], x[9], x[10]));
+"""
+
+
+SIDED = """
+    vec2 u = {x[3], x[4]};
+    vec3 side = v3(x[0], x[1], x[2]);
+    LightSample s = light_sample(scene, v3(0.0f, 0.0f, 0.0f), side, 0.0f, u, lambdas);
+    Spectrum le;
+    infinite_light(scene, 0, side, s.wi, lambdas, &le, r + 8);
+    r[0] = s.wi.x; r[1] = s.wi.y; r[2] = s.wi.z; r[3] = s.pdf;
+    r[4] = s.radiance.x; r[5] = s.radiance.y; r[6] = s.radiance.z; r[7] = le.x;
 """
 
 
@@ -323,6 +335,21 @@ def test_light_pdf_is_that_of_the_sample(name):
         n = np.tile((normal / np.linalg.norm(normal))[:, None], 500)
     given = np.vstack([np.full(500, row), np.zeros((3, 500)), r[:4], n])
     np.testing.assert_allclose(scene(PDF, given, 1)[0], r[4] * pmf, rtol=2e-3)
+
+
+def test_the_sky_over_a_side_is_sampled_by_the_cosine():
+    """Radiance times cosine over pdf is the same everywhere: its irradiance without any noise."""
+    side, rng = directions(400, 8), np.random.default_rng(9)
+    r = lit([Constant(radiance=(1.0, 2.0, 3.0))])(SIDED, np.vstack([side, rng.random((2, 400))]), 9)
+    cos = (side * r[:3]).sum(axis=0)
+    assert (cos > -1e-6).all()
+    seen = cos > 1e-3
+    expected = np.pi * np.array([[1.0], [2.0], [3.0]])
+    np.testing.assert_allclose(
+        (r[4:7] * cos / r[3])[:, seen], np.tile(expected, seen.sum()), rtol=2e-3
+    )
+    np.testing.assert_allclose(r[8], r[3], rtol=1e-6)  # what a ray that meets it is told
+    np.testing.assert_allclose(r[7], r[4])
 
 
 # ---- images

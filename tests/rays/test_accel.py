@@ -10,12 +10,11 @@ import pytest
 from pyopencl.array import to_device
 
 import clpt
-from clpt.bvh import TREES
 
 COMPLETE = cl.command_execution_status.COMPLETE
 
 
-@pytest.mark.parametrize("layout", TREES)
+@pytest.mark.parametrize("layout", ["wide8", "binary"])
 def test_agrees_with_reference(queue, soup, rays, reference, layout):
     """Every ray, but for the few in a thousand that meet a triangle where it ends."""
     t, bary = reference(*soup, *rays)
@@ -154,7 +153,7 @@ def test_odd_rays_meet_nothing(accel):
     assert (accel.intersect(d, np.ones_like(d)).t > 0).all()
 
 
-@pytest.mark.parametrize("layout", TREES)
+@pytest.mark.parametrize("layout", ["wide8", "binary"])
 def test_odd_meshes(queue, layout):
     """None, one, points and lines, and a face many times: what has no area is not met."""
     o, d = np.array([[0.25, 0.25, -1]]), np.array([[0, 0, 1]])
@@ -217,7 +216,7 @@ def test_threads(accel, rays):
     assert all((t == expected).all() for each in found.values() for t in each)
 
 
-@pytest.mark.parametrize("layout", TREES)
+@pytest.mark.parametrize("layout", ["wide8", "binary"])
 def test_all_hits(queue, soup, rays, reference, layout):
     """None is lost, none comes twice, and they are in order."""
     t, _ = reference(*soup, *rays)

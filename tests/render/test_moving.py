@@ -58,10 +58,7 @@ def device() -> dev.Device:
     return dev.choose()
 
 
-@pytest.fixture(
-    scope="module",
-    params=["wide8", *(pytest.param(n, marks=pytest.mark.slow) for n in ("compact", "binary"))],
-)
+@pytest.fixture(scope="module", params=["wide8", pytest.param("binary", marks=pytest.mark.slow)])
 def renderer(device: dev.Device, request: pytest.FixtureRequest) -> Renderer:
     return Renderer(scene(), device, layout=request.param)
 

@@ -65,7 +65,6 @@ def test_stages_build(lanes: int, queued: bool) -> None:
     mask = m.Mask(material=textured(m.Diffuse), opacity=textures.Checkerboard())
     features = lowered([mask, m.Diffuse()], "spectral").features
     texts = programs.sources(features, "binary", lanes, queued=queued)
-    texts |= programs.film_sources(features, "binary")
     assert {"mix", "shade_diffuse", "shade_null"} <= set(texts)
     assert ("sort" in texts) == queued
     device.build_all(device.choose(), texts)
@@ -78,17 +77,15 @@ def test_stages_of_a_spectral_film_build(lanes: int) -> None:
     plain_ = lowered([m.Diffuse()], "spectral").features
     banded = lower(Scene(camera=Perspective(), lights=[Constant()], film=film)).features
     texts = programs.sources(banded, "brute", lanes, queued=False)
-    texts |= programs.film_sources(banded, "brute")
     device.build_all(device.choose(), {name: texts[name] for name in ("generate", "bands")})
     others = programs.sources(plain_, "brute", lanes, queued=False)
-    others |= programs.film_sources(plain_, "brute")
     assert "bands" not in others and "wavelengths_weigh" in texts["generate"].text
     assert not any("wavelengths_weigh" in source.text for source in others.values())
 
 
 def test_text_holds_only_what_the_scene_has() -> None:
     texts = programs.sources(lowered([m.Diffuse()], "rgb").features, "wide8", 8, queued=False)
-    assert set(texts) == {"generate", "intersect", "shadow", "shade_diffuse"}
+    assert set(texts) == {"generate", "intersect", "shadow", "accumulate", "shade_diffuse"}
     shade = texts["shade_diffuse"].text
     assert not any(f"{kind}_row(" in shade for kind in ("bitmap", "checkerboard", "sphere"))
     assert "rough_conductor" not in shade

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image, UnidentifiedImageError
 
 from clpt import images
 from clpt.formats.gltf import accessors
@@ -76,8 +77,6 @@ def _image(texture: Element, raw: bool) -> NDArray[Any]:
 
 def _all(document: Document) -> dict[str, Future[images.Stored]]:
     """The images of all textures, decoded side by side; one that fails does where it is used."""
-    from PIL import Image  # Pillow is not imported before there is an image
-
     sources = [_source(texture) for texture in document.root.children("textures")]
     distinct = {source.path: source for source in sources if source is not None}
     budget = _Budget()
@@ -103,8 +102,6 @@ class _Budget:
 
 
 def _decoded(source: Element, budget: _Budget) -> images.Stored:
-    from PIL import Image, UnidentifiedImageError
-
     inside = "uri" not in source
     data = bytes(accessors.view(source)[0]) if inside else source.document.resource(source)
     try:

@@ -265,7 +265,7 @@ def _integrator(element: Element, context: Context) -> Integrator:
 def _path(props: Properties) -> Integrator:
     return integrators.Path(
         max_depth=props.integer("max_depth", -1, -1),
-        rr_depth=props.integer("rr_depth", 5, 1),
+        rr_depth=props.integer("rr_depth", integrators.Path.rr_depth, 1),
         hide_lights=props.flag("hide_emitters", False),
     )
 
@@ -282,7 +282,7 @@ def _direct(props: Properties) -> Integrator:
 def _particle_tracer(props: Properties) -> Integrator:
     return integrators.ParticleTracer(
         max_depth=props.integer("max_depth", -1, -1),
-        rr_depth=props.integer("rr_depth", 5, 1),
+        rr_depth=props.integer("rr_depth", integrators.Path.rr_depth, 1),
         hide_lights=props.flag("hide_emitters", False),
     )
 

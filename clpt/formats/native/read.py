@@ -17,14 +17,14 @@ from clpt.formats.native import spectra as json_spectra
 from clpt.formats.native.cursor import Cursor, parse, placed
 from clpt.formats.native.spectra import find_file, kind_name
 from clpt.formats.native.transforms import matrix
-from clpt.scene import Scene, cameras, check_noise, integrators, kinds, lights, materials, shapes
+from clpt.scene import Scene, cameras, integrators, kinds, lights, materials, shapes
 from clpt.scene.params import SPECTRUM_ROLES, Kind, Param, params
 from clpt.scene.textures import ATTRIBUTES
 
 ON_SHAPES = tuple(cls.kind for cls in lights.ON_SHAPES)
 KEYS = (
     "$schema", "name", "camera", "film", "integrator", "sampler", "materials", "groups", "shapes",
-    "lights", "spp", "noise", "seed",
+    "lights", "spp", "seed",
 )  # fmt: skip
 # A mesh's arrays: numbers in a row, and of what type.
 ARRAYS = {
@@ -112,7 +112,6 @@ class _Reader:
             "lights": lambda c: [self.light(entry) for entry in c.entries()],
             "shapes": lambda c: [made for entry in c.entries() for made in self.shape(entry)],
             "spp": Cursor.integer,
-            "noise": _noise,
             "seed": Cursor.integer,
             "name": lambda c: c.expect(str),
         }
@@ -408,9 +407,3 @@ def _array(cursor: Cursor, width: int, dtype: type) -> np.ndarray | None:
     if dtype is np.uint32 and not ((values >= 0) & (values < 2**31) & (values % 1 == 0)).all():
         raise cursor.error("must be whole numbers from zero")
     return values.astype(dtype)
-
-
-def _noise(cursor: Cursor) -> float:
-    noise = cursor.number()
-    placed(cursor, lambda: check_noise(noise))
-    return noise

@@ -62,7 +62,6 @@ class _Writer:
             "integrator": self.kind(scene.integrator),
             "sampler": self.kind(scene.sampler),
             "spp": scene.spp,
-            **({} if scene.noise is None else {"noise": scene.noise}),
             "seed": scene.seed,
             "materials": self.materials,
             "groups": self.groups,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -148,11 +148,19 @@ def _mix(params: Parameters, state: State) -> Material:
     first, second = (state.named_material(name, params) for name in names)
     weight = textured(params, "amount", "real", state, 0.5)
     made = materials.Blend(first=first, second=second, weight=weight)
-    kinds = list(materials.parts(made))
+    kinds = list(_parts(made))
     if any(part.transmits for part in kinds) and materials.TwoSided in map(type, kinds):
         state.warn(params, "beside what lets light through, the rest is black from behind")
         return _one_sided(made)
     return made
+
+
+def _parts(made: Material) -> Iterator[Material]:
+    """A material and all that it is composed of."""
+    yield made
+    for name in ("front", "material", "first", "second"):
+        if isinstance(part := getattr(made, name, None), Material):
+            yield from _parts(part)
 
 
 def _one_sided(made: Material) -> Material:
