@@ -1,0 +1,143 @@
+"""Where a render's time goes: each stage, beside what the same rays cost in a bare kernel.
+
+Paths are run a stage at a time. Before `intersect` and `shadow` their rays are read back and traced
+once more by the bare traversal, in the order of their slots. What a render takes beyond that, its
+share of shading, sorting and bookkeeping, is what this is about. Milliseconds per million
+closest-hit rays, by processor time; scenes with instances or analytic shapes have no bare figure.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import tempfile
+import time
+from collections import defaultdict
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+import pyopencl as cl
+from numpy.typing import NDArray
+from rich.table import Table
+
+import clpt
+from bench import machine
+from bench.renders import MODES, SCENES
+from bench.traversal import HIT, KERNELS
+from clpt import bvh, device
+from clpt.benchmark.flight import Flight
+from clpt.records import PATH, SHADOW
+
+WARM, BOUNCES = 6, 24
+SHORT = 1e-4  # of a shadow ray that is left out at its end
+
+
+class Bare:
+    """Kernels that only trace, with room for so many rays."""
+
+    def __init__(self, on: device.Device, tree: bvh.Bvh, room: int):
+        self.queue, self.room = on.queue, room
+        self.rays = np.zeros((room, 8), np.float32)
+        source = device.assemble("bench", {"bench": KERNELS.format(layout=tree.layout)})
+        program = device.build(on, source)
+        give = device.Buffers(on)
+        self.buffer = give.allocate("the rays", self.rays.nbytes)
+        shared = {**tree.buffers, "rays": self.buffer}
+        self.kernels = {
+            name: program.kernel(name).bind(**shared, hits=give.allocate("hits", size * room))
+            for name, size in (("closest", HIT.itemsize), ("occluded", 4))
+        }
+
+    def trace(self, name: str, found: NDArray[np.float32]) -> float:
+        """Trace rays (n, 8); return the seconds of processor time that it took."""
+        self.rays[: len(found)] = found
+        self.rays[len(found) :, 7] = -1.0  # those that fill the last group meet nothing
+        cl.enqueue_copy(self.queue, self.buffer, self.rays)
+        start = time.process_time()
+        self.kernels[name].enqueue(self.queue, (-(-len(found) // 64) * 64,), (64,))
+        self.queue.finish()
+        return time.process_time() - start
+
+
+def rays(flight: Flight, kernel: str) -> NDArray[np.float32]:
+    """The rays (n, 8) that a stage is about to trace: origin, tmin, direction, tmax."""
+    record, active = (PATH, flight.alive) if kernel == "intersect" else (SHADOW, flight.shadowed)
+    o, d = (flight.read(record, name)[active] for name in "od")
+    far = flight.read(SHADOW, "t")[active] * (1 - SHORT) if record is SHADOW else np.inf
+    ends = np.zeros((len(o), 1)), np.broadcast_to(far, len(o))[:, None]
+    return np.concatenate([o, ends[0], d, ends[1]], axis=1).astype(np.float32)
+
+
+def measure(path: Path, mode: str, bounces: int = BOUNCES) -> dict[str, Any]:
+    """A scene's stages, in milliseconds per million closest-hit rays."""
+    scene = clpt.load(path)
+    scene.film = dataclasses.replace(scene.film, mode=mode)
+    on = device.choose()
+    flight = Flight(on, scene)
+    features, tree = flight.wavefront.lowered.features, flight.wavefront.tree
+    plain = tree.layout != "brute" and not (features.instances or features.analytic)
+    bare = Bare(on, tree, flight.slots) if plain else None
+    seconds: dict[str, float] = defaultdict(float)
+    counts = dict.fromkeys(("intersect", "shadow"), 0)
+
+    def note(step: Any, enqueue: Callable[[], Any]) -> None:
+        kernel = step.bound.kernel.name
+        if kernel in counts:
+            found = rays(flight, kernel)
+            counts[kernel] += len(found)
+            if bare and len(found):
+                name = {"intersect": "closest", "shadow": "occluded"}[kernel]
+                seconds[f"bare {name}"] += bare.trace(name, found)
+        on.queue.finish()
+        start = time.process_time()
+        enqueue()
+        on.queue.finish()
+        seconds[step.name] += time.process_time() - start
+
+    for _ in range(WARM):
+        flight.bounce()
+    if bare:
+        for name, kernel in (("closest", "intersect"), ("occluded", "shadow")):
+            bare.trace(name, rays(flight, kernel))  # compiles
+    for _ in range(bounces):
+        flight.bounce(note)
+    alone = sum(s for name, s in seconds.items() if name.startswith("bare"))
+    total = sum(seconds.values()) - alone
+    millions = counts["intersect"] * 1e-6
+    row: dict[str, Any] = {
+        "scene": path.stem,
+        "mode": mode,
+        "layout": tree.layout,
+        "ms": {name: s * 1e3 / millions for name, s in seconds.items()},
+        "shadow_rays": counts["shadow"] / counts["intersect"],
+        "traced": (seconds["intersect"] + seconds["shadow"]) / total,
+    }
+    return row | ({"beyond": 1 - alone / total} if bare else {})
+
+
+@click.command(help=__doc__)
+@click.option("--scene", "scenes", multiple=True, type=click.Choice(list(SCENES)))
+@click.option("--mode", "modes", multiple=True, type=click.Choice(MODES), default=("rgb",))
+@click.option("--json", "json_file", type=click.Path(), help="append the figures as JSON lines")
+def main(scenes: tuple[str, ...], modes: tuple[str, ...], json_file: str | None) -> None:
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        for name in scenes or SCENES:
+            path = SCENES[name](Path(folder))
+            for mode in modes:
+                rows.append(measure(path, mode))
+                machine.append(json_file, "shares", rows[-1:])
+    table = Table("scene", "mode", "stage", "ms per M rays", title=machine.processor())
+    for row in rows:
+        for stage, milliseconds in row["ms"].items():
+            table.add_row(row["scene"], row["mode"], stage, f"{milliseconds:.1f}")
+        for what in ("traced", "beyond"):
+            if what in row:
+                table.add_row(row["scene"], row["mode"], what, f"{row[what]:.0%}")
+    machine.console().print(table)
+
+
+if __name__ == "__main__":
+    main()
