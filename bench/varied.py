@@ -246,7 +246,7 @@ def _moved(steps: str) -> str:
     return f'<transform name="to_world">{steps}</transform>'
 
 
-SCENES: dict[str, Callable[[Path], Path]] = {
+SCENES: dict[str, Callable[..., Path]] = {
     "materials": write_materials,
     "textures": write_textures,
     "instances": write_instances,

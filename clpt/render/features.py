@@ -60,3 +60,8 @@ class Features:
     def materials(self) -> tuple[str, ...]:
         """Names of the leaf materials, in their order."""
         return tuple(cls.kind for cls in self.leaves)
+
+    @property
+    def costly(self) -> bool:
+        """Whether shading a vertex takes about as long as its ray: textures, a tree over lights."""
+        return self.light_tree or bool(self.textures)

@@ -19,6 +19,7 @@ PADDING = 80  # words between streams: powers of two collide in a cache
 GROUP = 64  # slots are a multiple of it, and it is the local size of one-lane kernels
 CPU_SLOTS, GPU_SLOTS = 1 << 14, 1 << 20
 BRUTE_SHAPES = 32  # analytic shapes up to which all of them are tried
+UNSORTED = 4  # kinds of cheap materials up to which sorting costs more; measured, bench/NOTES.md
 
 
 class Resident:
@@ -66,7 +67,8 @@ class Resident:
             )
         kinds = len(features.materials)
         if queued is None:
-            queued = kinds > 1 and (not on.info.is_cpu or kinds > 4)
+            few = 1 if not on.info.is_cpu or features.costly else UNSORTED
+            queued = kinds > few
         if queued is True:
             queued = "sort" if on.info.is_cpu else "append"
         if queued and queued not in queues.WAYS:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 
@@ -14,6 +16,7 @@ from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Direct, Path
 from clpt.scene.lights import Area, Constant, Directional, Point
 from clpt.scene.shapes import Cube, Mesh, Rectangle, Shape, Sphere
+from clpt.scene.textures import Checkerboard
 
 CORNERS = np.eye(3, dtype=np.float32)
 FACE = np.array([[0, 1, 2]], np.uint32)
@@ -135,3 +138,36 @@ def test_few_lights_are_chosen_from_a_tree_where_they_stand_apart() -> None:
     assert not tree(lights=points[:2]) and not tree(lights=far + points[:2])
     assert not tree(cube, lights=points[:1])
     assert tree(cube, lights=points[:2])
+
+
+def test_shapes_cost_the_same_however_many() -> None:
+    """Calls of functions, which a busy machine does not change: twice as many of twice as many."""
+
+    def calls(count: int) -> int:
+        colours = np.linspace(0.1, 0.9, count)
+        shapes = [Cube(material=m.Diffuse(reflectance=float(c))) for c in colours]
+        whole, made = scene(*shapes, lights=[Constant(radiance=1.0)]), 0
+
+        def count_one(_: object, event: str, __: object) -> None:
+            nonlocal made
+            made += event == "call"
+
+        sys.setprofile(count_one)
+        try:
+            lower(whole)
+        finally:
+            sys.setprofile(None)
+        return made
+
+    calls(1)  # what is kept for all
+    few, many = calls(100), calls(300)
+    assert (many - few) / 200 < 1.1 * few / 100 < 250
+
+
+def test_what_is_costly_to_shade() -> None:
+    """Textures and a tree over lights are, few lights and plain colours are not."""
+    texture = Checkerboard()
+    lamps = [Rectangle(emission=Area(radiance=1.0)) for _ in range(40)]
+    assert lower(scene(Rectangle(material=m.Diffuse(reflectance=texture)))).features.costly
+    assert lower(scene(Rectangle(), *lamps)).features.costly
+    assert not lower(scene(Rectangle(), Sphere(material=m.Dielectric()), lamps[0])).features.costly
