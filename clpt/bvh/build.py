@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..device import Device
 from ..errors import SceneError
 from .building import Array, Building
-from .layouts import BOX_LAYOUTS, LAYOUTS, Mesh, Part
+from .layouts import BOX_LAYOUTS, LAYOUTS, Mesh, Part, Quality
 
 log = logging.getLogger(__name__)
 
@@ -69,6 +69,7 @@ def build(
     faces: Array,
     tags: Array | None = None,
     layout: str | None = None,
+    quality: Quality = "high",
 ) -> Bvh:
     """An acceleration structure over triangles.
 
@@ -83,11 +84,16 @@ def build(
     Raises SceneError for vertices that are not finite or beyond 1e12 and for indices out of range,
     MemoryBudgetError if the device has too little memory.
     """
-    return _build(Building(device), vertices, faces, tags, layout)
+    return _build(Building(device), vertices, faces, tags, layout, quality)
 
 
 def _build(
-    building: Building, vertices: Array, faces: Array, tags: Array | None, layout: str | None
+    building: Building,
+    vertices: Array,
+    faces: Array,
+    tags: Array | None,
+    layout: str | None,
+    quality: Quality,
 ) -> Bvh:
     start = time.perf_counter()
     count, device = _check(vertices, faces, tags), building.device
@@ -99,7 +105,8 @@ def _build(
         n,
         building.upload(vertices, np.float32),
         building.upload(faces, np.uint32),
-        building.upload(np.zeros(n) if tags is None else tags, np.uint32),
+        building.upload(np.zeros(n, np.uint32) if tags is None else tags, np.uint32),
+        quality,
     )
     packed = LAYOUTS[layout](building, mesh)
     building.stream.wait()
@@ -116,6 +123,7 @@ def build_parts(
     tags: NDArray,
     counts: Sequence[int],
     layout: str,
+    quality: Quality = "high",
 ) -> tuple[Bvh, NDArray[np.uint32]]:
     """A tree for each run of triangles, `counts` long one after the other, in shared buffers.
 
@@ -127,7 +135,7 @@ def build_parts(
     trees, building = [], Building(device)
     for i, j in pairwise(np.cumsum([0, *counts]).tolist()):
         building = Building(device, building)
-        trees.append(_build(building, vertices, faces[i:j], tags[i:j], layout))
+        trees.append(_build(building, vertices, faces[i:j], tags[i:j], layout, quality))
     if len(trees) == 1:
         return trees[0], np.zeros((1, 2), np.uint32)
     sizes = np.array([[b.size for b in (t.buffers["nodes"], t.buffers["leaves"])] for t in trees])

@@ -6,12 +6,16 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 import pyopencl as cl
 
 from . import tree
 from .building import Building
+
+Quality = Literal["high", "fast"]
+"""high: planes by the surface area heuristic down to the leaves; fast: leaves cut out of a curve."""
 
 _COLLAPSE, _REFIT = "bvh/collapse.cl", "bvh/refit.cl"
 _BINARY_LEAF = 4  # triangles of a leaf, at most
@@ -23,12 +27,16 @@ _LEAF, _DEEPEST = 0x80000000, 48  # BVH_LEAF and BVH_DEPTH of kernels/bvh/node.c
 
 @dataclass(frozen=True)
 class Mesh:
-    """Triangles on the device: vertices (n, 3) float32, faces (count, 3), tags (count,) uint32."""
+    """Triangles on the device: vertices (n, 3) float32, faces (count, 3), tags (count,) uint32.
+
+    quality: of the tree over them.
+    """
 
     count: int
     vertices: cl.Buffer
     faces: cl.Buffer
     tags: cl.Buffer
+    quality: Quality = "high"
 
 
 @dataclass(frozen=True)
@@ -277,6 +285,8 @@ def _binary_part(building: Building, built: tree.Tree) -> Part:
 
 def _binary_tree(building: Building, mesh: Mesh, leaf_size: int, at_once: int = 1) -> tree.Tree:
     items, parts = tree.items_of_triangles(building, mesh.count, mesh.vertices, mesh.faces)
+    if mesh.quality == "fast":
+        return tree.over_runs(building, mesh.count, items, parts, leaf_size)
     return tree.over(building, mesh.count, items, parts, leaf_size, at_once)
 
 

@@ -19,6 +19,7 @@ typedef struct {
     float reach;    /* the largest coordinate of the scene */
     uint leaf_size; /* items of a leaf, at most */
     float share;    /* of a test in one item, where several are tested at once */
+    uint runs;      /* are the items runs of curve.cl? Each is a leaf then */
 } Build;
 
 inline float build_reach(float8 scene)
@@ -165,7 +166,13 @@ inline uint build_cut(const Build *b, Range r, float8 span, Extent *left, Extent
 inline int build_range(const Build *b, Range r, Extent h, uint next, Range children[2], Extent extents[2])
 {
     if (r.count <= b->leaf_size) {
-        b->nodes[r.node] = build_node(h.bounds, b->reach, BVH_LEAF | r.first, r.count);
+        uint first = r.first, count = r.count;
+        if (b->runs) {
+            float8 run = b->items[first];
+            first = item_index(run);
+            count = run.s7;
+        }
+        b->nodes[r.node] = build_node(h.bounds, b->reach, BVH_LEAF | first, count);
         return 0;
     }
     uint mid = build_cut(b, r, h.span, &extents[0], &extents[1]);
@@ -191,10 +198,10 @@ kernel APART void build_root(global const Extent *restrict parts, uint n_parts, 
 /* Ranges from `begin` on in the heap, a level of it. Those with no items are no ranges. */
 kernel APART void build_level(global float8 *restrict items, global float8 *restrict nodes,
                               global Range *restrict ranges, global Extent *restrict extents,
-                              uint begin, uint leaf_size, float share)
+                              uint begin, uint leaf_size, float share, uint runs)
 {
     uint k = begin + get_global_id(0);
-    Build b = {items, nodes, build_reach(extents[0].bounds), leaf_size, share};
+    Build b = {items, nodes, build_reach(extents[0].bounds), leaf_size, share, runs};
     Range r = ranges[k], children[2] = {{0, 0, 0, 0}, {0, 0, 0, 0}};
     Extent sides[2];
     if (r.count && build_range(&b, r, extents[k], 0, children, sides)) {
@@ -208,9 +215,9 @@ kernel APART void build_level(global float8 *restrict items, global float8 *rest
 kernel APART void build_subtree(global float8 *restrict items, global float8 *restrict nodes,
                                 global const Range *restrict ranges,
                                 global const Extent *restrict extents, uint begin, uint leaf_size,
-                                float share)
+                                float share, uint runs)
 {
-    Build b = {items, nodes, build_reach(extents[0].bounds), leaf_size, share};
+    Build b = {items, nodes, build_reach(extents[0].bounds), leaf_size, share, runs};
     Range waiting[BVH_DEPTH];
     Extent waiting_halves[BVH_DEPTH];
     int n = 0;

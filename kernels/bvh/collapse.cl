@@ -199,9 +199,9 @@ kernel APART void collapse_blocks(global const float8 *restrict nodes,
     global float *block = blocks + (ulong)b * 88;
     global uint *words = (global uint *)block + 72;
     for (uint k = 0; k < 8; k++) {
-        uint prim = k < n ? item_index(items[first + k]) : BVH_MISS;
-        words[k] = prim;
-        words[8 + k] = k < n ? tags[prim] : 0u;
+        uint prim = item_index(items[first + min(k, n - 1)]), there = -(uint)(k < n);
+        words[k] = prim | ~there; /* BVH_MISS */
+        words[8 + k] = tags[prim] & there;
     }
     leaf_store_block(block, vertices, faces);
 }

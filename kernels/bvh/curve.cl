@@ -1,0 +1,145 @@
+/* Leaves without a search for planes: items in the order of a curve through space, and the curve cut into
+ * runs, each of which is a leaf.
+ *
+ * The curve is Morton's, by 11 bits an axis of the centroid; keys are sorted by their digits, 11 bits at a
+ * time, stably, so that two builds make the same tree. Of all ways to cut a stretch of the curve into runs
+ * of at most `leaf_size` items, that with the least sum of the boxes' areas is found by dynamic
+ * programming over its items.
+ *
+ * A key is Morton's code above the item's index. What stands for a run, to build a tree over, is an item
+ * named after its first, with the number of items in place of the area.
+ */
+#include "bvh/apart.cl"
+#include "bvh/items.cl"
+
+#define CURVE_BITS 11 /* of an axis, and of a digit */
+#define CURVE_INDEX 31
+#define CURVE_SHARE 0.2f
+#define CURVE_FAR 1e37f /* more than any sum of areas */
+
+/* Bits of each number moved to every third place. */
+inline ulong4 curve_spread(ulong4 x)
+{
+    x = (x | x << 16) & 0x070000ff0000fful;
+    x = (x | x << 8) & 0x700f00f00f00ful;
+    x = (x | x << 4) & 0x430c30c30c30c3ul;
+    return (x | x << 2) & 0x1249249249249249ul;
+}
+
+kernel APART void curve_keys(global const float8 *restrict items, uint count,
+                             global const Extent *restrict whole, global ulong *restrict keys)
+{
+    uint i = get_global_id(0);
+    if (i >= count) return;
+    float8 span = whole->span;
+    float4 extent = -span.hi - span.lo, low = span.lo;
+    float4 scale = extent > 0.0f ? ((1 << CURVE_BITS) * 0.999999f) / extent : (float4)(0.0f);
+    int4 cell = convert_int4((items[i].lo - items[i].hi - low) * scale);
+    cell = clamp(cell, (int4)(0), (int4)((1 << CURVE_BITS) - 1));
+    ulong4 bits = curve_spread(convert_ulong4(cell));
+    keys[i] = (bits.x << 2 | bits.y << 1 | bits.z) << CURVE_INDEX | i;
+}
+
+inline uint curve_digit(ulong key, uint shift) { return key >> shift & ((1 << CURVE_BITS) - 1); }
+
+/* How often each digit stands among `run` neighbours; one work-item has so many. */
+kernel APART void curve_count(global const ulong *restrict keys, uint count, uint run, uint shift,
+                              global uint *restrict numbers)
+{
+    uint begin = get_global_id(0) * run, end = min(begin + run, count);
+    numbers += get_global_id(0) << CURVE_BITS;
+    for (uint k = 0; k < 1 << CURVE_BITS; k++) numbers[k] = 0;
+    for (uint i = begin; i < end; i++) numbers[curve_digit(keys[i], shift)]++;
+}
+
+/* Numbers made places: of `columns` digits, each of which has its places side by side, row after row; after
+ * the last, the sum of all. */
+kernel APART void curve_scan(global uint *restrict numbers, uint rows, uint columns)
+{
+    uint sum = 0;
+    for (uint k = 0; k < columns; k++)
+        for (uint row = 0; row < rows; row++) {
+            uint number = numbers[row * columns + k];
+            numbers[row * columns + k] = sum;
+            sum += number;
+        }
+    numbers[rows * columns] = sum;
+}
+
+/* Moves the keys that curve_count has counted to their places. */
+kernel APART void curve_move(global const ulong *restrict keys, uint count, uint run, uint shift,
+                             global uint *restrict numbers, global ulong *restrict sorted)
+{
+    uint begin = get_global_id(0) * run, end = min(begin + run, count);
+    numbers += get_global_id(0) << CURVE_BITS;
+    for (uint i = begin; i < end; i++) sorted[numbers[curve_digit(keys[i], shift)]++] = keys[i];
+}
+
+/* Lanes one further, and what comes to the first. */
+inline float8 curve_shift(float8 v, float first)
+{
+    v = v.s70123456;
+    v.s0 = first;
+    return v;
+}
+
+/* A bound of the last 1 .. 8 items, with one more. */
+inline float8 curve_reach(float8 last, float next)
+{
+    return item_union(curve_shift(last, INFINITY), (float8)(next));
+}
+
+/* Puts `run` items in order and finds for each how long the run is that ends with it, if one does; numbers
+ * the runs that are made of them. */
+kernel APART void curve_cut(global const float8 *restrict items, global const ulong *restrict keys,
+                            uint count, uint run, uint leaf_size, global float8 *restrict sorted,
+                            global uchar *restrict lengths, global uint *restrict numbers)
+{
+    uint begin = get_global_id(0) * run, end = min(begin + run, count);
+    const int8 lanes = (int8)(0, 1, 2, 3, 4, 5, 6, 7); /* lane k: what ends with a run of k + 1 items */
+    const float8 limit = lanes < (int8)(leaf_size) ? (float8)(0.0f) : (float8)(CURVE_FAR);
+    float8 x = (float8)(INFINITY), y = x, z = x, to_x = x, to_y = x, to_z = x;
+    float8 before = (float8)(CURVE_FAR); /* the least cost of all before the run, less that of one item less */
+    before.s0 = 0.0f;
+    for (uint i = begin; i < end; i++) {
+        float8 item = items[keys[i] & (1ul << CURVE_INDEX) - 1];
+        sorted[i] = item;
+        x = curve_reach(x, item.s0);
+        y = curve_reach(y, item.s1);
+        z = curve_reach(z, item.s2);
+        to_x = curve_reach(to_x, item.s4);
+        to_y = curve_reach(to_y, item.s5);
+        to_z = curve_reach(to_z, item.s6);
+        float8 dx = -to_x - x, dy = -to_y - y, dz = -to_z - z;
+        float8 area = dx * dy + dy * dz + dz * dx;
+        float8 cost = before + area + CURVE_SHARE * area.s7 + limit;
+        cost = as_float8((as_int8(cost) & ~7) | 7 - lanes); /* so that the least one tells its lane */
+        float4 four = cost.lo < cost.hi ? cost.lo : cost.hi;
+        float2 two = four.lo < four.hi ? four.lo : four.hi;
+        float least = two.x < two.y ? two.x : two.y;
+        lengths[i] = 8 - (as_uint(least) & 7);
+        before = curve_shift(before - least, 0.0f);
+    }
+    uint number = 0;
+    for (uint i = end; i > begin; i -= lengths[i - 1]) number++;
+    numbers[get_global_id(0)] = number;
+}
+
+/* Writes what stands for the runs; numbers: where those of each stretch begin. */
+kernel APART void curve_runs(global const float8 *restrict sorted, uint count, uint run,
+                             global const uchar *restrict lengths, global const uint *restrict numbers,
+                             global float8 *restrict runs, global Extent *restrict extents)
+{
+    uint begin = get_global_id(0) * run, end = min(begin + run, count);
+    uint at = numbers[get_global_id(0) + 1];
+    Extent h = extent_empty();
+    for (uint i = end; i > begin;) {
+        uint length = lengths[i - 1];
+        float8 bounds = (float8)(INFINITY);
+        for (uint k = 0; k < length; k++) bounds = item_union(bounds, sorted[--i]);
+        float8 item = item_make(bounds.lo, -bounds.hi, i, (float)length);
+        runs[--at] = item;
+        h = extent_add(h, item);
+    }
+    extents[get_global_id(0)] = h;
+}
