@@ -2,7 +2,7 @@
 
 from .build import Bvh, build, build_boxes, build_parts, choose_layout, choose_tree
 from .building import Building
-from .layouts import LAYOUTS, TREES, traversal_text
+from .layouts import LAYOUTS, TREES, Quality, traversal_text
 from .refit import rebuild_boxes, refit, refit_boxes
 
 __all__ = [
@@ -10,6 +10,7 @@ __all__ = [
     "TREES",
     "Building",
     "Bvh",
+    "Quality",
     "build",
     "build_boxes",
     "build_parts",

@@ -7,6 +7,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import get_args
 
 import numpy as np
 import pyopencl as cl
@@ -75,7 +76,8 @@ def build(
 
     vertices: (n, 3) float32; faces: (m, 3) uint32; tags: (m,) uint32, a word for each triangle that
     comes back in its hits (zeros if None). Buffers of these types are read in place, not checked.
-    layout: a key of LAYOUTS; None asks `choose_layout`.
+    layout: a key of LAYOUTS; None asks `choose_layout`. quality: "fast" cuts leaves out of a
+    space-filling curve, and only what stands above them is built as in "high"; brute has no tree.
 
     While it runs it takes up to 280 bytes a triangle on the device for wide8 and compact and 170
     for binary, of which about 70, 60 and 130 stay; single buffers up to 64 bytes a triangle.
@@ -99,6 +101,8 @@ def _build(
     count, device = _check(vertices, faces, tags), building.device
     if count == 0:  # one triangle that is a point: nothing hits it
         vertices, faces, tags = np.zeros((1, 3)), np.zeros((1, 3)), None
+    if quality not in get_args(Quality):
+        raise SceneError(f"a tree's quality is high or fast, not {quality!r}")
     layout = layout or choose_layout(device, count)
     n = max(count, 1)
     mesh = Mesh(

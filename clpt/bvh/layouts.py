@@ -15,7 +15,7 @@ from . import tree
 from .building import Building
 
 Quality = Literal["high", "fast"]
-"""high: planes by the surface area heuristic down to the leaves; fast: leaves cut out of a curve."""
+"""high: the surface area heuristic down to the leaves; fast: leaves are cut out of a curve."""
 
 _COLLAPSE, _REFIT = "bvh/collapse.cl", "bvh/refit.cl"
 _BINARY_LEAF = 4  # triangles of a leaf, at most

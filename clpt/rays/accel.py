@@ -24,8 +24,9 @@ class Accel(Queries):
     array or buffer is read where it lies, by the constructor, which waits until that is done, and
     is not copied: faces on the device must stay as they are for as long as `update` is called. What
     is on the device is not checked: a face that names no vertex reads outside of its buffer.
-    layout: "wide8", "compact" or "binary"; by default what suits the device. wait_for: events that
-    the arrays wait for; those that PyOpenCL arrays know are waited for anyhow.
+    layout: "wide8", "compact" or "binary"; by default what suits the device. quality: "fast"
+    is built sooner and traced a little slower. wait_for: events that the arrays wait for; those
+    that PyOpenCL arrays know are waited for anyhow.
 
     moved: the event of the last update, None before the first.
 
@@ -40,6 +41,7 @@ class Accel(Queries):
         faces: Given,
         *,
         layout: str | None = None,
+        quality: bvh.Quality = "high",
         wait_for: Events = None,
     ):
         super().__init__(queue, layout)
@@ -47,7 +49,7 @@ class Accel(Queries):
         points, self.vertices = self._laid("vertices", vertices, np.float32)
         corners, _ = self._laid("faces", faces, np.uint32, np.int32)
         self._stream.mark().wait()  # the build has another stream
-        self.tree = bvh.build(self.device, points, corners, layout=self.layout)
+        self.tree = bvh.build(self.device, points, corners, layout=self.layout, quality=quality)
         self._trees = self.tree.buffers
         self._faces = self._upload(corners, np.uint32)
         self._refitting = bvh.Building(self.device, stream=self._stream)

@@ -26,7 +26,8 @@ class Resident:
     """What a scene is on a device, by the names of the kernels' arguments in `named`.
 
     layout: of the triangles, None for what suits the device; slots: paths in flight, None likewise;
-    queued: whether shading goes along queues, None likewise, or how, see clpt.render.queues.WAYS.
+    queued: whether shading goes along queues, None likewise, or how, see clpt.render.queues.WAYS;
+    tree_quality: see clpt.bvh.build, for previews and scenes that are often built anew.
 
     Raises MemoryBudgetError, DeviceError, SceneError for a layout that cannot hold the scene.
     """
@@ -38,13 +39,14 @@ class Resident:
         layout: str | None = None,
         slots: int | None = None,
         queued: bool | str | None = None,
+        tree_quality: bvh.Quality = "high",
     ):
         self.device, self.lowered = on, lowered
         self.moved: set[str] = set()  # tables that hold something else than `lowered`
         self.stream = device.Stream(on.queue)
         self.buffers = Buffers(on)
         self.seconds = {"programs": 0.0}
-        self._wanted = layout, queued
+        self._wanted, self.tree_quality = (layout, queued), tree_quality
         layout, self.queued = self.suited(lowered)
         self._place_slots(slots or (CPU_SLOTS if on.info.is_cpu else GPU_SLOTS))
         self._allocate(layout)
@@ -139,7 +141,13 @@ class Resident:
         for name in ("tris", "nodes", "leaves"):  # of the tree before
             self.named.pop(name, None)
         self.tree, self._begins = bvh.build_parts(
-            self.device, vertices, lowered.faces, lowered.tags, counts, layout
+            self.device,
+            vertices,
+            lowered.faces,
+            lowered.tags,
+            counts,
+            layout,
+            self.tree_quality,
         )
         self.named.update(self.tree.buffers, triangles=max(self.tree.count, 0))
         self.seconds["trees"] = time.perf_counter() - start

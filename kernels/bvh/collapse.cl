@@ -27,7 +27,9 @@ inline float collapse_leaf_occlusion(global const float8 *items, float8 node)
     return half_area > 0.0f ? 1.0f - through : 0.0f;
 }
 
-inline void collapse_node(global const float8 *nodes, global const float8 *items, global float8 *costs,
+/* Costs of a node whose children's are there. Its count becomes theirs together: a tree over runs of items
+ * has counted runs. */
+inline void collapse_node(global float8 *nodes, global const float8 *items, global float8 *costs,
                           global float *occlusion, uint at)
 {
     float8 node = nodes[at];
@@ -38,6 +40,7 @@ inline void collapse_node(global const float8 *nodes, global const float8 *items
         return;
     }
     uint left = node_link(node), right = left + 1, choices = 0;
+    ((global uint *)(nodes + at))[7] = node_count(nodes[left]) + node_count(nodes[right]);
     union { float8 v; float at[8]; } l, r, c;
     l.v = costs[left];
     r.v = costs[right];
@@ -67,7 +70,7 @@ inline void collapse_node(global const float8 *nodes, global const float8 *items
 }
 
 /* Costs below the ranges that build_subtree was given, children before parents. */
-kernel APART void collapse_subtree(global const float8 *restrict nodes,
+kernel APART void collapse_subtree(global float8 *restrict nodes,
                                    global const float8 *restrict items,
                                    global const Range *restrict ranges, uint begin,
                                    global float8 *restrict costs, global float *restrict occlusion)
@@ -91,7 +94,7 @@ kernel APART void collapse_subtree(global const float8 *restrict nodes,
 }
 
 /* Costs of one level of the heap of ranges; those below it are there. */
-kernel APART void collapse_level(global const float8 *restrict nodes,
+kernel APART void collapse_level(global float8 *restrict nodes,
                                  global const float8 *restrict items,
                                  global const Range *restrict ranges, uint begin,
                                  global float8 *restrict costs, global float *restrict occlusion)

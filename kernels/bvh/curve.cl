@@ -117,7 +117,7 @@ kernel APART void curve_cut(global const float8 *restrict items, global const ul
         float4 four = cost.lo < cost.hi ? cost.lo : cost.hi;
         float2 two = four.lo < four.hi ? four.lo : four.hi;
         float least = two.x < two.y ? two.x : two.y;
-        lengths[i] = 8 - (as_uint(least) & 7);
+        lengths[i] = min(8 - (as_uint(least) & 7), min(leaf_size, i - begin + 1)); /* were it NaN */
         before = curve_shift(before - least, 0.0f);
     }
     uint number = 0;

@@ -11,11 +11,11 @@ kernel APART void items_of_triangles(global const float *restrict vertices,
     uint begin = get_global_id(0) * run, end = min(begin + run, count);
     Extent h = extent_empty();
     for (uint i = begin; i < end; i++) {
-        float4 a = (float4)(vload3(faces[3 * i], vertices), 0.0f);
-        float4 b = (float4)(vload3(faces[3 * i + 1], vertices), 0.0f);
-        float4 c = (float4)(vload3(faces[3 * i + 2], vertices), 0.0f);
-        float area = length(cross(b - a, c - a)); /* both sides */
-        float8 item = item_make(fmin(a, fmin(b, c)), fmax(a, fmax(b, c)), i, area);
+        float4 v[3];
+        leaf_corners(vertices, faces, i, v);
+        float area = length(cross(v[1] - v[0], v[2] - v[0])); /* both sides */
+        float4 lo = v[0] < v[1] ? v[0] : v[1], hi = v[0] > v[1] ? v[0] : v[1];
+        float8 item = item_make(lo < v[2] ? lo : v[2], hi > v[2] ? hi : v[2], i, area);
         items[i] = item;
         h = extent_add(h, item);
     }

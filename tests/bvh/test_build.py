@@ -1,6 +1,7 @@
 """Trees: what they hold, how deep they are, and input that trees break on."""
 
 import dataclasses
+from typing import get_args
 
 import numpy as np
 import pyopencl as cl
@@ -13,6 +14,7 @@ from clpt.errors import MemoryBudgetError, SceneError
 
 LEAF = 0x80000000
 MISS = 0xFFFFFFFF
+QUALITIES = get_args(bvh.Quality)
 DEPTH = 48  # BVH_DEPTH of kernels/bvh/node.cl
 LAYOUTS = [("brute", 1), ("brute", 8), ("brute", 16), ("binary", 1), ("wide8", 1), ("compact", 1)]
 
@@ -57,10 +59,11 @@ SHAPES = {
 }
 
 
+@pytest.mark.parametrize("quality", QUALITIES)
 @pytest.mark.parametrize("shape", SHAPES)
-def test_binary_tree_holds_everything_once(device, shape):
+def test_binary_tree_holds_everything_once(device, shape, quality):
     triangles = SHAPES[shape](np.random.default_rng(3))
-    tree = bvh.build(device, *mesh(triangles), layout="binary")
+    tree = bvh.build(device, *mesh(triangles), layout="binary", quality=quality)
     nodes = read(device, tree.buffers["nodes"], np.float32).reshape(-1, 2, 4)
     words = nodes.view(np.uint32)
     prims = read(device, tree.buffers["leaves"], np.uint32).reshape(-1, 16)[:, 12]
@@ -85,10 +88,11 @@ def test_binary_tree_holds_everything_once(device, shape):
     assert deepest <= DEPTH
 
 
+@pytest.mark.parametrize("quality", QUALITIES)
 @pytest.mark.parametrize("shape", SHAPES)
-def test_wide_tree_holds_everything_once(device, shape):
+def test_wide_tree_holds_everything_once(device, shape, quality):
     triangles = SHAPES[shape](np.random.default_rng(3))
-    tree = bvh.build(device, *mesh(triangles), layout="wide8")
+    tree = bvh.build(device, *mesh(triangles), layout="wide8", quality=quality)
     nodes = read(device, tree.buffers["nodes"], np.float32).reshape(-1, 8, 8)
     words = nodes.view(np.uint32)[:, 6]
     blocks = read(device, tree.buffers["leaves"], np.float32).reshape(-1, 11, 8)
@@ -108,12 +112,47 @@ def test_wide_tree_holds_everything_once(device, shape):
     assert tree.bytes == nodes.nbytes + blocks.nbytes
 
 
+@pytest.mark.parametrize("quality", QUALITIES)
 @pytest.mark.parametrize("layout", bvh.TREES)
-def test_builds_are_repeatable(device, layout):
+def test_builds_are_repeatable(device, layout, quality):
     triangles = random_triangles(np.random.default_rng(4), 3000, 0.02)
-    builds = [bvh.build(device, *mesh(triangles), layout=layout) for _ in range(2)]
+    builds = [bvh.build(device, *mesh(triangles), layout=layout, quality=quality) for _ in range(2)]
     first, second = (read(device, tree.buffers["leaves"], np.uint32) for tree in builds)
     np.testing.assert_array_equal(first, second)
+
+
+@pytest.mark.parametrize("layout", bvh.TREES)
+def test_qualities_meet_the_same_triangles(device, trace, layout):
+    """Their costs for a random line differ, but not by much."""
+    rng = np.random.default_rng(9)
+    triangles = random_triangles(rng, 20000, 0.01)
+    ends = np.zeros((3000, 1)), np.full((3000, 1), np.inf)
+    rays = np.concatenate([rng.random((3000, 3)), ends[0], rng.normal(0, 1, (3000, 3)), ends[1]], 1)
+    trees = [bvh.build(device, *mesh(triangles), layout=layout, quality=q) for q in QUALITIES]
+    (high, met), (fast, met_too) = (trace(tree, rays.astype(np.float32)) for tree in trees)
+    np.testing.assert_array_equal(high["prim"], fast["prim"])
+    np.testing.assert_array_equal(met, met_too)
+    assert 0.3 < (high["prim"] != MISS).mean() < 0.6
+    if "cost" in trees[0].stats:
+        assert trees[1].stats["cost"] < 1.3 * trees[0].stats["cost"]
+
+
+@pytest.mark.parametrize("quality", QUALITIES)
+def test_what_is_not_finite_on_the_device_is_not_met(device, trace, quality):
+    """Buffers are not checked: triangles without a place must not spoil those that have one."""
+    triangles = random_triangles(np.random.default_rng(10), 3000, 0.02)
+    for value, at in zip((np.nan, np.inf, -np.inf, 1e30), range(4), strict=True):
+        triangles[at::7] = value
+    flags = cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR
+    vertices, faces = (cl.Buffer(device.context, flags, hostbuf=a) for a in mesh(triangles))
+    tree = bvh.build(device, vertices, faces, layout="wide8", quality=quality)
+    sound = triangles[5::7]
+    o = sound.mean(1) - np.cross(sound[:, 1] - sound[:, 0], sound[:, 2] - sound[:, 0])
+    limits = np.zeros((len(o), 1)), np.full((len(o), 1), np.inf)
+    rays = np.concatenate([o, limits[0], sound.mean(1) - o, limits[1]], 1).astype(np.float32)
+    hits, _ = trace(tree, rays)
+    assert (hits["prim"] != MISS).all()
+    assert not np.isin(hits["prim"] % 7, range(4)).any()
 
 
 @pytest.mark.parametrize(("layout", "lanes"), LAYOUTS)
@@ -145,6 +184,8 @@ def test_indices_and_coordinates_are_checked(device):
             bvh.build(device, np.full((3, 3), bad), faces)
     with pytest.raises(SceneError, match="vertex 3 of 3"):
         bvh.build(device, triangles, faces + 1)
+    with pytest.raises(SceneError, match="high or fast"):
+        bvh.build(device, triangles, faces, quality="low")
     with pytest.raises(SceneError, match="tags"):
         bvh.build(device, triangles, faces, np.zeros(2, np.uint32))
     with pytest.raises(SceneError, match="not finite"):
