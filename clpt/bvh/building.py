@@ -14,6 +14,7 @@ from ..device import build as build_program
 
 Array: TypeAlias = NDArray | cl.Buffer
 
+_BORROWED = 1 << 16  # [bytes] of an array that is not copied, at least
 _GROUP = 8  # work-items of a group where each has one triangle or node
 _RAISED = "use fewer triangles, or a device with more memory"
 
@@ -55,6 +56,19 @@ class Building:
         if isinstance(array, cl.Buffer):
             return array
         return self.buffers.upload("the scene's triangles", array, dtype, _RAISED)
+
+    def borrow(self, array: Array, dtype: DTypeLike) -> cl.Buffer:
+        """As `upload`, until the build has ended: a CPU reads an array of that type where it lies.
+
+        The caller keeps the array, and waits for the stream before it forgets it.
+        """
+        if isinstance(array, cl.Buffer):
+            return array
+        host = np.ascontiguousarray(array, dtype)
+        if not (self.device.info.is_cpu and host.nbytes >= _BORROWED):
+            return self.upload(host, dtype)
+        flags = cl.mem_flags.READ_ONLY | cl.mem_flags.USE_HOST_PTR
+        return cl.Buffer(self.device.context, flags, hostbuf=host)
 
     def read(self, buffer: cl.Buffer, n: int, dtype: DTypeLike) -> NDArray:
         """The first n values of a buffer."""
