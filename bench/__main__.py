@@ -1,6 +1,7 @@
 """Measure everything: `python -m bench [NAME ...]`, or `make bench`.
 
-Every part runs in a process of its own; records go to bench/results/<date>-<machine>.jsonl, and the
+`device` is `clpt bench`; the others compare with other renderers, or ask one question each. Every
+part runs in a process of its own; records go to bench/results/<date>-<machine>.jsonl, and the
 page beside them is made again. The first run renders references for the errors, a few minutes more.
 """
 
@@ -17,7 +18,8 @@ import click
 
 from bench import machine, report
 
-PARTS = {
+PARTS: dict[str, tuple[str, ...]] = {
+    "device": (),
     "traversal": ("--layout", "wide8"),
     "building": (),
     "queries": (),
@@ -40,7 +42,8 @@ def main(parts: tuple[str, ...]) -> None:
     for part in parts or PARTS:
         with tempfile.TemporaryDirectory() as folder:
             records = Path(folder) / "records.jsonl"
-            command = [sys.executable, "-m", f"bench.{part}", *PARTS[part], "--json", str(records)]
+            what = ["clpt", "bench"] if part == "device" else [f"bench.{part}"]
+            command = [sys.executable, "-m", *what, *PARTS[part], "--json", str(records)]
             if subprocess.run(command, cwd=machine.ROOT).returncode:
                 failed.append(part)
             elif records.is_file():

@@ -11,6 +11,7 @@ import numpy as np
 RESULTS = Path(__file__).parent / "results"
 WHICH = (
     "scene", "mode", "renderer", "sampler", "threads", "layout", "rays", "query", "effect",
+    "figure",
 )  # fmt: skip
 
 HEAD = """# What was measured
@@ -25,7 +26,10 @@ Row = dict[str, object]
 
 def newest(records: Iterable[Row]) -> list[Row]:
     """The last record of each figure, in the order in which they first came."""
-    kept = {(r["bench"], *(r.get(name) for name in WHICH)): r for r in records}
+    kept = {}
+    for r in records:
+        device = r["device"] if "figure" in r else ""
+        kept[(r["bench"], device, *(r.get(name) for name in WHICH))] = r
     return list(kept.values())
 
 
@@ -107,7 +111,22 @@ def queries(rows: Sequence[Row]) -> str:
     return "\n".join(plain(part) for part in parts if part)
 
 
+def figures(rows: Sequence[Row]) -> str:
+    """By `clpt bench`: medians of rounds; ± is half the distance of their quartiles."""
+
+    def cells(row: Row) -> list[str]:
+        moved = (f"{row['gbytes']:.2f}", f"{row['of_copy']:.1%}") if "gbytes" in row else ("", "")
+        built = f"{row['build_seconds']:.2f} s" if "build_seconds" in row else ""
+        about = (str(row.get(name, "")) for name in ("scene", "mode", "figure"))
+        value = f"{row['value']:.3g} {row['unit']}"
+        return [row["device"], *about, value, f"{row['spread']:.1%}", *moved, built]
+
+    headings = ("device", "scene", "mode", "figure", "", "±", "GB/s", "of a copy", "programs")
+    return table(headings, map(cells, rows))
+
+
 TABLES: dict[str, Callable[[Sequence[Row]], str]] = {
+    **dict.fromkeys(("bandwidth", "rays", "stages", "build", "start"), figures),
     "renders": renders,
     "spectral": plain,
     "effects": plain,

@@ -21,7 +21,7 @@ PARTS = {
     "bandwidth": "a kernel that only copies, GB/s",
     "rays": "rays a second by layout, set and query, hits checked",
     "stages": "what each stage of a render gets through, Mitems/s and GB/s; sort and film too",
-    "building": "trees built and refitted, Mtri/s",
+    "build": "trees built and refitted, Mtri/s",
     "start": "whole processes until a first picture, with empty caches and with full ones",
 }
 START_SCENE = "cornell"  # where none is asked for
@@ -63,14 +63,14 @@ def measure(
     """
     if "bandwidth" in parts:
         yield from bandwidth.measure(on, rounds)
-    inside = {"rays", "stages", "building"} & set(parts)
+    inside = {"rays", "stages", "build"} & set(parts)
     if inside:
         plan = opened(scene or "atrium", mode)
         if "rays" in parts:
             yield from rays.measure(on, plan, rounds, layouts, count)
         if "stages" in parts:
             yield from stages.measure(on, plan, rounds, only)
-        if "building" in parts:
+        if "build" in parts:
             yield from building.measure(on, plan, rounds, layouts)
     if "start" in parts:
         name = scene or START_SCENE

@@ -44,7 +44,7 @@ def _layout(
     more = {"layout": layout, "triangles": count, "bytes": tree.bytes, **tree.stats}
     more.pop("seconds")
     least = given.vertices.nbytes + given.faces.nbytes + tree.bytes
-    figure = Figure("building", f"build {layout}", "Mtri/s", rates(count, seconds[1:]), scene, more)
+    figure = Figure("build", f"build {layout}", "Mtri/s", rates(count, seconds[1:]), scene, more)
     yield figure.refuse(copying.complaint(least, min(seconds[1:]), least))
 
     building = bvh.Building(on)
@@ -58,5 +58,5 @@ def _layout(
         building.stream.wait()
         seconds.append(time.perf_counter() - start)
     more = {"layout": layout, "triangles": count}
-    figure = Figure("building", f"refit {layout}", "Mtri/s", rates(count, seconds[1:]), scene, more)
+    figure = Figure("build", f"refit {layout}", "Mtri/s", rates(count, seconds[1:]), scene, more)
     yield figure.refuse(copying.complaint(least, min(seconds[1:]), least))

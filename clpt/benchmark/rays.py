@@ -20,7 +20,7 @@ from clpt.rays import Accel, Hits
 from clpt.records import HIT, PATH, SHADOW
 from clpt.scene import Scene
 
-from . import checks
+from . import checks, triangles
 from .bandwidth import Copying
 from .figures import Figure, Taken, clock_complaint, rates, timed
 from .flight import Flight
@@ -58,10 +58,9 @@ def sets(on: device.Device, scene: Scene, count: int | None = None) -> Sets:
     """
     count = count or (CPU_RAYS if on.info.is_cpu else GPU_RAYS)
     flight = Flight(on, scene, count)
-    lowered = flight.wavefront.lowered
-    own = len(lowered.faces) - sum(lowered.instances.triangles)
-    if not own:
-        raise SceneError("rays are measured on triangles, and the scene has none outside of groups")
+    vertices, faces = triangles.world(flight.wavefront.lowered)
+    if not len(faces):
+        raise SceneError("rays are measured on triangles, and the scene has none")
     found: dict[str, Rays] = {}
 
     def look(step: Any, enqueue: Any) -> None:
@@ -75,9 +74,7 @@ def sets(on: device.Device, scene: Scene, count: int | None = None) -> Sets:
             found["shadow"] = _shadow_rays(flight)
 
     flight.bounce(look)
-    return Sets(
-        lowered.vertices, lowered.faces[:own], {n: rays for n, rays in found.items() if len(rays)}
-    )
+    return Sets(vertices, faces, {name: rays for name, rays in found.items() if len(rays)})
 
 
 def _path_rays(flight: Flight) -> Rays:

@@ -83,7 +83,7 @@ def of_device(info: device.DeviceInfo) -> dict[str, Any]:
         "opencl": info.version,
         "driver": info.driver,
         "compute_units": info.compute_units,
-        "memory": info.global_mem,
+        "global_mem": info.global_mem,
     }
 
 

@@ -98,4 +98,4 @@ def _panel(
 
 def _kind(figure: Figure) -> str:
     """What has a colour of its own in a panel."""
-    return str(figure.more.get("layout", "")) if figure.part in ("rays", "building") else ""
+    return str(figure.more.get("layout", "")) if figure.part in ("rays", "build") else ""
