@@ -14,8 +14,7 @@ import numpy as np
 
 from clpt import device
 from clpt.records import SLABS
-from clpt.render import programs
-from clpt.render.queues import CHUNK, QUEUE
+from clpt.render import programs, queues
 from clpt.render.traffic import traffic
 from clpt.render.wavefront import FILM_WORDS, Step
 from clpt.scene import Scene
@@ -24,7 +23,7 @@ from .bandwidth import Copying
 from .figures import Figure, Taken, clock_complaint, timed
 from .flight import Flight
 
-SORT = ("sort_count", "sort_scan", "sort_place")
+QUEUEING = ("sort_count", "sort_scan", "sort_place", "append_begin", "append")
 WARM = 4  # bounces before anything is noted, so that paths of all depths are in flight
 BOUNCES = 4  # of a round: in a single one few paths may begin
 
@@ -41,7 +40,6 @@ def measure(
     """Figures of every stage, in Mitems/s, each round a few bounces.
 
     only: names of stages, or how they begin, as `shade`; all by default.
-
     wavefront: parameters of clpt.render.wavefront.Wavefront; raises as that does.
     """
     flight, copying = Flight(on, scene, **wavefront), Copying(on)
@@ -62,10 +60,11 @@ def measure(
     features, layout = wave.lowered.features, wave.tree.layout
     moved = traffic(features, layout, queued=wave.queued)
     for name, found in noted.items():
-        if name not in SORT and _asked(name, only):
+        if name not in QUEUEING and _asked(name, only):
             yield _figure(flight, copying, name, moved[name].total, found)
-    if _asked("sort", only):
-        yield _sort(flight, copying, rounds)
+    for way in queues.WAYS:
+        if _asked(way, only):
+            yield _queue(flight, copying, way, rounds)
     if _asked("accumulate", only):
         yield _accumulate(flight, copying, rounds)
 
@@ -109,39 +108,43 @@ def _figure(
     return figure.refuse(clock_complaint(t for _, t in busy), *wrong)
 
 
-def _sort(flight: Flight, copying: Copying, rounds: int) -> Figure:
-    """The counting sort of all slots by the kind of their material, looked at afterwards."""
+def _queue(flight: Flight, copying: Copying, way: str, rounds: int) -> Figure:
+    """All slots brought into queues by the kind of their material, looked at afterwards."""
     on, wave = flight.device, flight.wavefront
     features = wave.lowered.features
+    kinds = len(features.materials)
     for step in wave.stages:  # so that hits wait to be shaded
-        if step.bound.kernel.name == "shade" or step.name in SORT:
+        if step.bound.kernel.name == "shade" or step.name in QUEUEING:
             break
         flight.stage(step)
-    text = programs.sources(features, wave.tree.layout, wave.lanes, queued=True)["sort"]
-    program = device.build(on, text)
-    chunks, kinds = -(-flight.slots // CHUNK), len(features.materials)
-    named = {**wave.named, "chunk": CHUNK, "chunks": chunks, "slots": flight.slots}
-    give = device.Buffers(on)
-    for name, size in zip(QUEUE, (flight.slots, chunks * kinds, kinds, kinds), strict=True):
-        named[name] = give.allocate("the sort", 4 * size)
-    bound = []
-    for name in SORT:
+    texts = programs.sources(features, wave.tree.layout, wave.lanes, queued=way)
+    program = device.build(on, texts[way])
+    named, give = {**wave.named, **queues.numbers(flight.slots)}, device.Buffers(on)
+    for name, size in queues.sizes(way, flight.slots, kinds).items():
+        named[name] = give.allocate("the queues", 4 * size)
+    steps = []
+    for name, size, group in queues.steps(way, flight.slots, kinds):
         kernel = program.kernel(name)
-        bound.append(kernel.bind(**{a.name: named[a.name] for a in kernel.arguments}))
-    steps = list(zip(bound, ((chunks,), (1,), (chunks,)), strict=True))
-    expected = np.argsort(flight.kinds, kind="stable")[(flight.kinds < 0).sum() :]
+        bound = kernel.bind(**{a.name: named[a.name] for a in kernel.arguments})
+        steps.append((bound, (size,), (group,) if group else None))
     found = []
     for _ in range(rounds + 1):
-        wave.stream.fill(named["queue"], 0xFFFFFFFF, 0, 4 * flight.slots)
-        taken = timed(on, lambda: [wave.stream.run(kernel, size) for kernel, size in steps])
+        wave.stream.fill(named["queue"], 0xFFFFFFFF, 0, named["queue"].size)
+        taken = timed(on, lambda: [wave.stream.run(*step) for step in steps])
         found.append((flight.slots, taken))
-    queue = give.download(named["queue"], (flight.slots,), np.uint32)[: len(expected)]
-    nbytes = traffic(features, wave.tree.layout, queued=True)["sort"].total
-    figure = _figure(flight, copying, "sort", nbytes, found[1:])
-    wrong = int((queue != expected).sum())
-    return figure.refuse(
-        f"{wrong:,} of {len(queue):,} slots are not where they belong" if wrong else ""
+    nbytes = traffic(features, wave.tree.layout, queued=way)[way].total
+    figure = _figure(flight, copying, way, nbytes, found[1:])
+    queue, starts, counts = (
+        give.download(named[name], (named[name].size // 4,), np.uint32)
+        for name in ("queue", "queue_starts", "queue_counts")
     )
+    wrong = 0
+    for kind in range(kinds):
+        own = queue[starts[kind] :][: counts[kind]]
+        expected = np.flatnonzero(flight.kinds == kind)
+        own = own if way == "sort" else np.sort(own)  # which is stable
+        wrong += int((own != expected).sum()) if len(own) == len(expected) else len(expected)
+    return figure.refuse(f"{wrong:,} slots are not where they belong" if wrong else "")
 
 
 def _accumulate(flight: Flight, copying: Copying, rounds: int) -> Figure:

@@ -18,9 +18,12 @@ from ..benchmark.comparing import Ratio
 from ..benchmark.figures import Figure
 from ..bvh import TREES
 from ..device.context import trial
+from ..render.queues import WAYS
 
 SLOWER = 3  # the exit status if a figure was refused, or is below --fail-below
-STAGES = ("generate", "emit", "intersect", "mix", "shade", "shadow", "splat", "sort", "accumulate")
+STAGES = (
+    "generate", "emit", "intersect", "mix", "shade", "shadow", "splat", *WAYS, "accumulate",
+)  # fmt: skip
 HEADINGS = ("figure", "", "unit", "±", "GB/s", "of a copy", "")
 
 

@@ -136,7 +136,7 @@ def test_layouts_that_lie_are_refused(
 def test_stages_have_work_and_a_sort_that_is_right(on: device.Device, scene: Scene) -> None:
     figures = {f.name: f for f in stages.measure(on, scene, 2, slots=COUNT)}
     assert list(figures) == [
-        "generate", "intersect", "shade_diffuse", "shadow", "sort", "accumulate",
+        "generate", "intersect", "shade_diffuse", "shadow", "sort", "append", "accumulate",
     ]  # fmt: skip
     for figure in figures.values():
         assert figure.refused == "" and figure.value > 0.0
