@@ -30,6 +30,8 @@ PARTS: dict[str, tuple[str, ...]] = {
     "instancing": (),
     "embedding": (),
     "startup": (),
+    "shares": (),
+    "sizes": ("--plot", str(report.RESULTS / "sizes.png")),
 }
 
 

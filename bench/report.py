@@ -11,7 +11,7 @@ import numpy as np
 RESULTS = Path(__file__).parent / "results"
 WHICH = (
     "scene", "mode", "renderer", "sampler", "threads", "layout", "rays", "query", "effect",
-    "figure",
+    "figure", "triangles",
 )  # fmt: skip
 
 HEAD = """# What was measured
@@ -125,6 +125,46 @@ def figures(rows: Sequence[Row]) -> str:
     return table(headings, map(cells, rows))
 
 
+def sizes(rows: Sequence[Row]) -> str:
+    """Hilly ground of ever more triangles, one picture; a ray's time is plotted in `sizes.png`."""
+
+    def cells(row: Row) -> list[str]:
+        count = int(str(row["triangles"]))
+        return [
+            f"{count:,}",
+            *(f"{row[name]:.2f}" for name in ("cpu_load", "seconds_lower", "seconds_build")),
+            f"{row['peak'] / 2**20:,.0f}",
+            *(f"{row[f'{name}_bytes'] / count:.0f}" for name in ("tree", "table")),
+            f"{row['largest_buffer'] / row['max_alloc']:.1%}",
+            f"{row['us_per_sample']:.2f}",
+            f"{row['us_per_ray']:.3f}",
+        ]
+
+    headings = ["triangles", "load [s]", "lower [s]", "build [s]", "peak [MiB]"]
+    headings += ["tree [bytes / triangle]", "tables [bytes / triangle]"]
+    headings += ["largest buffer of what is allowed", "µs a sample", "µs a ray"]
+    return table(headings, map(cells, rows))
+
+
+def shares(rows: Sequence[Row]) -> str:
+    """Milliseconds per million closest-hit rays by stage, and the same rays in a bare kernel."""
+
+    def cells(row: Row) -> list[str]:
+        taken = dict(row["ms"])
+        named = ("bare closest", "intersect", "bare occluded", "shadow", "generate")
+        first = [taken.pop(name, None) for name in named]
+        share = row.get("beyond")
+        return [
+            *(str(row[name]) for name in ("scene", "mode")),
+            *("" if ms is None else f"{ms:.0f}" for ms in first),
+            ", ".join(f"{name} {ms:.0f}" for name, ms in taken.items()),
+            "" if share is None else f"{share:.0%}",
+        ]
+
+    headings = ["scene", "mode", "bare closest", "intersect", "bare any", "shadow", "generate"]
+    return table([*headings, "other stages", "beyond bare rays"], map(cells, rows))
+
+
 TABLES: dict[str, Callable[[Sequence[Row]], str]] = {
     **dict.fromkeys(("bandwidth", "rays", "stages", "build", "start"), figures),
     "renders": renders,
@@ -138,6 +178,9 @@ TABLES: dict[str, Callable[[Sequence[Row]], str]] = {
     "traversal": plain,
     "building": plain,
     "refit": plain,
+    "shares": shares,
+    "sizes": sizes,
+    "sizes_fit": plain,
 }
 
 

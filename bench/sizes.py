@@ -1,7 +1,7 @@
 """What a scene's size costs: hilly ground of 10 thousand to 10 million triangles, one picture.
 
-Every size in a process of its own: seconds and peak memory to load the file, to lower it, to build
-its tree; bytes that stay on the device; processor time of a sample and of a ray. The time of a ray
+Every size in a process of its own: processor time and peak memory to load the file, and to lower it and
+build its tree; bytes that stay on the device; processor time of a sample and of a ray. The time of a ray
 is fitted by a + b log2(triangles); the plot is written where `--plot` says.
 """
 
@@ -56,7 +56,7 @@ class Watch:
         self.seconds: dict[str, float] = {}
 
     def __call__(self, name: str, what: Callable[[], Made]) -> Made:
-        """Do it; keep its seconds and the peak."""
+        """Do it; keep its processor time and the peak."""
         over, top = threading.Event(), [_resident()]
 
         def look() -> None:
@@ -65,9 +65,9 @@ class Watch:
 
         looking = threading.Thread(target=look)
         looking.start()
-        start = time.perf_counter()
+        start = time.process_time()
         made = what()
-        self.seconds[name] = time.perf_counter() - start
+        self.seconds[name] = time.process_time() - start
         over.set()
         looking.join()
         self.peaks[name] = max(top[0], _resident())
@@ -113,10 +113,10 @@ def measure(path: Path, layout: str | None) -> dict[str, Any]:
     return {
         "triangles": count,
         "layout": front.tree.layout,
-        "seconds_load": watch.seconds["load"],
+        "cpu_load": watch.seconds["load"],
+        "cpu_prepare": watch.seconds["prepare"],
         "seconds_lower": facts.seconds["lower"],
         "seconds_build": facts.seconds["trees"],
-        "mtri_per_second": count / facts.seconds["trees"] * 1e-6,
         "peak_load": watch.peaks["load"] - before,
         "peak_prepare": watch.peaks["prepare"] - before,
         "peak": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
@@ -156,7 +156,7 @@ def plot(path: Path, rows: Sequence[dict[str, Any]], fit: dict[str, float]) -> N
 
 COLUMNS = {
     "triangles": ("triangles", 1),
-    "load [s]": ("seconds_load", 1),
+    "load [s]": ("cpu_load", 1),
     "lower [s]": ("seconds_lower", 1),
     "build [s]": ("seconds_build", 1),
     "peak [MiB]": ("peak", 2**20),

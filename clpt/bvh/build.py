@@ -22,6 +22,7 @@ log = logging.getLogger(__name__)
 
 BRUTE_LIMIT = 96  # triangles up to which brute force is faster; measured, see bench/NOTES.md
 
+MOST = (2**31 - 1) // 3  # triangles or vertices: kernels count words of them by an int
 _REACH = 1e12  # so that products of three coordinates stay inside a float
 
 
@@ -83,8 +84,8 @@ def build(
     for binary, of which about 70, 60 and 130 stay; single buffers up to 64 bytes a triangle.
     Trees are never deeper than BVH_DEPTH of kernels/bvh/node.cl: traversals cannot overflow.
 
-    Raises SceneError for vertices that are not finite or beyond 1e12 and for indices out of range,
-    MemoryBudgetError if the device has too little memory.
+    Raises SceneError for vertices that are not finite or beyond 1e12, for indices out of range and
+    for more triangles than MOST, MemoryBudgetError if the device has too little memory.
     """
     return _build(Building(device), vertices, faces, tags, layout, quality)
 
@@ -179,6 +180,8 @@ def build_boxes(device: Device, boxes: NDArray, layout: str = "shapes") -> Bvh:
 def _check(vertices: Array, faces: Array, tags: Array | None) -> int:
     """The number of triangles, after looking at arrays for what a tree cannot hold."""
     count = faces.size // 12 if isinstance(faces, cl.Buffer) else len(faces)
+    if count > MOST:
+        raise SceneError(f"{count:,} triangles are more than a tree holds, {MOST:,}")
     if isinstance(faces, np.ndarray) and count:
         top = vertices.size // 12 if isinstance(vertices, cl.Buffer) else len(vertices)
         if faces.ndim != 2 or faces.shape[1] != 3:

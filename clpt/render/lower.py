@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from clpt import scene as sc
 from clpt import transforms
+from clpt.bvh.build import MOST
 from clpt.errors import SceneError
 from clpt.records import SETTINGS, SHAPE
 from clpt.render import (
@@ -306,6 +307,11 @@ class _Lowering:
 
     def _joined(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """All triangles in one array."""
+        if max(self.n_vertices, self.n_faces) > MOST:
+            raise SceneError(
+                f"{self.n_faces:,} triangles with {self.n_vertices:,} vertices: of either there "
+                f"may be {MOST:,}; use instances for what repeats"
+            )
         if not self.triangles:
             return np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint32), np.zeros(0, np.uint32)
         vertices = np.concatenate([v for v, _, _ in self.triangles])

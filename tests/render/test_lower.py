@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import importlib
 import sys
 
 import numpy as np
 import pytest
 
 import clpt
+from clpt.errors import SceneError
 from clpt.records import SETTINGS, SHAPE, TABLES
 from clpt.render.lower import DEEPEST, MIXTURE, SHAPE_NORMALS, SHAPE_TWO_SIDED, SHAPE_UVS, lower
 from clpt.scene import Film, Scene
@@ -171,3 +173,10 @@ def test_what_is_costly_to_shade() -> None:
     assert lower(scene(Rectangle(material=m.Diffuse(reflectance=texture)))).features.costly
     assert lower(scene(Rectangle(), *lamps)).features.costly
     assert not lower(scene(Rectangle(), Sphere(material=m.Dielectric()), lamps[0])).features.costly
+
+
+def test_more_triangles_than_kernels_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.import_module("clpt.render.lower"), "MOST", 12)
+    assert len(lower(scene(Rectangle())).faces) == 2
+    with pytest.raises(SceneError, match="use instances"):
+        lower(scene(Cube(), Rectangle()))
