@@ -1,8 +1,8 @@
 """What a scene's size costs: hilly ground of 10 thousand to 10 million triangles, one picture.
 
-Every size in a process of its own: processor time and peak memory to load the file, and to lower it and
-build its tree; bytes that stay on the device; processor time of a sample and of a ray. The time of a ray
-is fitted by a + b log2(triangles); the plot is written where `--plot` says.
+Every size in a process of its own: processor time and peak memory to load the file, then to lower
+it and build its tree; bytes that stay on the device; processor time of a sample and of a ray. A
+ray's time is fitted by a + b log2(triangles); the plot is written where `--plot` says.
 """
 
 from __future__ import annotations
