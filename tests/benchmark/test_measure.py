@@ -67,6 +67,9 @@ class Lying:
     def __init__(self, *given: Any, **named: Any):
         self.accel = Accel(*given, **named)
 
+    def update(self, vertices: np.ndarray) -> None:
+        self.accel.update(vertices)
+
     def intersect(self, **named: Any) -> Any:
         hits = self.accel.intersect(**named)
         type(self).change("closest", hits)
@@ -161,8 +164,12 @@ def test_state_is_read_as_it_lies(on: device.Device, scene: Scene) -> None:
 
 
 def test_builds_and_copies(on: device.Device, scene: Scene) -> None:
-    built = [f.name for f in building.measure(on, scene, 1, ("wide8",), COUNT) if not f.refused]
-    assert built == ["build wide8", "refit wide8"]
+    built = [f for f in building.measure(on, scene, 1, ("wide8",), COUNT) if not f.refused]
+    assert [figure.name for figure in built] == ["build wide8", "build wide8 fast", "refit wide8"]
+    assert built[0].more["triangles"] == 36
+    Lying.change = staticmethod(_misses)
+    refused = [f.refused for f in building.measure(on, scene, 1, ("wide8",), COUNT, Lying)]
+    assert all("tried with every triangle" in told for told in refused)
     (copied,) = bandwidth.measure(on, 2, (1 << 16,))
     assert copied.refused == "" and 0.01 < copied.value < 1e5
     copying = bandwidth.Copying(on)
