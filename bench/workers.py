@@ -90,7 +90,7 @@ class Clpt:
     def stages(self, spp: int) -> dict[str, Any]:
         import clpt
 
-        renderer = clpt.Renderer(self.scene, profiling=True)
+        renderer = clpt.Renderer(self.scene, profiling=True, looped=False)
         renderer.run(spp)
         (wavefront,) = renderer.wavefronts
         timings = wavefront.timings.collect()

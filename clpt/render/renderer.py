@@ -95,7 +95,9 @@ class Renderer(Pictures):
         self._texture_budget, self._names = texture_budget, Names()
         lowered = lower(adopted(scene, device.queue), texture_budget)
         self._seconds = {"lower": time.perf_counter() - self._start}
-        first = Wavefront(device, lowered, **{"looped": queue is not None, **wavefront})
+        paths = scene.spp * math.prod(scene.film.size)
+        wanted = {"paths": paths, "looped": None if queue is None else True, **wavefront}
+        first = Wavefront(device, lowered, **wanted)
         self.wavefronts = [first, *(first.sibling(channel) for channel in self.channels[1:])]
         for front in self.wavefronts:  # so that the first samples come at once
             _ = front.loop if front.looped else front.stages
@@ -357,6 +359,6 @@ def render(
     `Renderer` does.
     """
     spp = _whole(scene.spp if spp is None else spp)
-    renderer = Renderer(scene, device, **wavefront)
+    renderer = Renderer(dataclasses.replace(scene, spp=spp), device, **wavefront)
     renderer.run(spp, progress, noise=scene.noise if noise is None else noise)
     return renderer.image()

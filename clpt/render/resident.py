@@ -18,6 +18,10 @@ COUNTERS = ("done", "samples", "closest", "shadow", "rejected")
 PADDING = 80  # words between streams: powers of two collide in a cache
 GROUP = 64  # slots are a multiple of it, and it is the local size of one-lane kernels
 CPU_SLOTS, GPU_SLOTS = 1 << 14, 1 << 20
+# A work-item of the loop keeps its paths in the first cache, and waits the less for the longest of
+# them the more samples each slot has to take: few slots, measured on CPUs.
+LOOP_SLOTS = 1 << 10  # a core
+LOOP_PATHS = 1 << 22  # to be taken, from which a loop is worth its compilation
 BRUTE_SHAPES = 32  # analytic shapes up to which all of them are tried
 UNSORTED = 4  # kinds of cheap materials up to which sorting costs more; measured, bench/NOTES.md
 
@@ -27,7 +31,8 @@ class Resident:
 
     layout: of the triangles, None for what suits the device; slots: paths in flight, None likewise;
     queued: whether shading goes along queues, None likewise, or how, see clpt.render.queues.WAYS;
-    tree_quality: see clpt.bvh.build, for previews and scenes that are often built anew.
+    looped: whether the loop of stages is on the device, None likewise, for as many paths as will be
+    taken; tree_quality: see clpt.bvh.build, for previews and scenes that are often built anew.
 
     Raises MemoryBudgetError, DeviceError, SceneError for a layout that cannot hold the scene.
     """
@@ -39,6 +44,8 @@ class Resident:
         layout: str | None = None,
         slots: int | None = None,
         queued: bool | str | None = None,
+        looped: bool | None = None,
+        paths: int = 0,
         tree_quality: bvh.Quality = "high",
     ):
         self.device, self.lowered = on, lowered
@@ -48,7 +55,12 @@ class Resident:
         self.seconds = {"programs": 0.0}
         self._wanted, self.tree_quality = (layout, queued), tree_quality
         layout, self.queued = self.suited(lowered)
+        if looped is None:
+            looped = on.info.is_cpu and not self.queued and paths >= LOOP_PATHS
+        self.looped = looped
         self._place_slots(slots or (CPU_SLOTS if on.info.is_cpu else GPU_SLOTS))
+        if slots is None and looped and on.info.is_cpu:
+            self._narrow(LOOP_SLOTS * on.info.compute_units)
         self._allocate(layout)
 
     def suited(self, lowered: Lowered) -> tuple[str, str]:
@@ -95,6 +107,17 @@ class Resident:
         whole = -(-places // GROUP) * GROUP
         per_plane = min(wanted // GROUP * GROUP, whole)
         planes = max(1, wanted // whole) if per_plane == whole else 1
+        self._set_slots(per_plane, planes)
+
+    def _narrow(self, wanted: int) -> None:
+        """Take fewer slots a plane; sums, and so the picture, follow from the number of planes."""
+        settings = self.lowered.settings
+        planes = int(settings["planes"])
+        fewer = max(wanted // planes // GROUP, 1) * GROUP
+        self._set_slots(min(fewer, int(settings["per_plane"])), planes)
+
+    def _set_slots(self, per_plane: int, planes: int) -> None:
+        settings = self.lowered.settings
         settings["per_plane"], settings["planes"] = per_plane, planes
         settings["slots"] = per_plane * planes
         self.slots, self.stride = per_plane * planes, per_plane * planes + PADDING

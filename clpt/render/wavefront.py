@@ -30,6 +30,7 @@ from clpt.render.resident import COUNTERS, GROUP, Resident
 FILM_WORDS = 7  # kernels/lib/film.cl
 FRESH = 0x2000  # kernels/lib/path_state.cl
 BATCH = 8  # bounces that are enqueued before counters are asked for
+CORE_BOUNCES = 1 << 16  # of all slots, that a core's part of a loop takes at once
 ENDLESS = 0xFFFFFFFF  # bounces of a loop that goes on till all paths have ended
 IDLE = {"samples": (0, 0), "turns": 0, "restart": 0}  # of a loop that was asked for nothing
 
@@ -61,14 +62,13 @@ class Step:
 class Wavefront(Resident):
     """The device side of a render: buffers, programs, and `expose`, which runs the bounce loop.
 
-    looped: whether `expose` too uses the loop on the device; sizes: see `Resident`.
+    What is wanted of it: see `Resident`.
 
     Raises MemoryBudgetError, KernelBuildError, DeviceError.
     """
 
-    def __init__(self, on: device.Device, lowered: Lowered, *, looped: bool = False, **sizes: Any):
-        super().__init__(on, lowered, **sizes)
-        self.looped = looped
+    def __init__(self, on: device.Device, lowered: Lowered, **wanted: Any):
+        super().__init__(on, lowered, **wanted)
         self.lanes = on.lanes
         self.timings = Timings(on.queue)
         self.programs: dict[str, device.Program] = {}
@@ -191,6 +191,12 @@ class Wavefront(Resident):
         self._build(texts)
         return self._bound(name, name, **given)
 
+    @property
+    def _turns(self) -> int:
+        """Bounces of a loop between two looks at the counters: some hundredths of a second."""
+        info = self.device.info
+        return max(BATCH, CORE_BOUNCES * info.compute_units // self.slots) if info.is_cpu else BATCH
+
     def _bound(self, program: str, name: str, **given: Any) -> device.Bound:
         return self._bind(self.programs[program].kernel(name), **given)
 
@@ -241,7 +247,7 @@ class Wavefront(Resident):
         self.rewind()
         begin.set(samples=(first, end))
         if self.looped:
-            begin.set(turns=BATCH, restart=0)
+            begin.set(turns=self._turns, restart=0)
         before, finished = self.counts.samples, True
         reads: deque[tuple[np.ndarray, cl.Event]] = deque()
         while True:
