@@ -69,6 +69,7 @@ SETTINGS = Record(
     per_plane=("integer", "slots that work on one film plane"),
     planes=("integer", "film planes; slots of different planes share pixels"),
     seed=("natural", "of the sampler"),
+    sample_bits=("integer", "of a pixel's number of samples, as a power of two; zsobol"),
     max_depth=("integer", "longest path"),
     rr_depth=("integer", "depth from which Russian roulette is played"),
     hide_lights=("integer", "1: the camera does not see lights"),

@@ -46,6 +46,7 @@ MIXTURE = 0xFF
 FEW_LIGHTS = 256  # up to which one random number chooses a light and a point on it
 TREE_FROM = 16  # lights from which a tree chooses among them, see bench/lights.py
 CLEAR = Constant(0.0)  # absorption of what absorbs nothing
+MOST_SAMPLE_BITS = 16  # of a zsobol pixel's part of its sequence
 DEEPEST = 4000  # path state has 12 bits for the depth
 
 
@@ -442,6 +443,7 @@ class _Lowering:
         settings["tiles_x"] = -(-width // 4)
         settings["places"] = 16 * settings["tiles_x"] * -(-height // 4)
         settings["seed"] = scene.seed % 2**32
+        settings["sample_bits"] = min((max(scene.spp, 1) - 1).bit_length(), MOST_SAMPLE_BITS)
         depth: int = {"direct": 2, "aov": 1}.get(integrator.kind, 0)
         depth = depth or getattr(integrator, "max_depth", -1)
         settings["max_depth"] = DEEPEST if depth < 0 else min(depth, DEEPEST)

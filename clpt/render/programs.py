@@ -188,7 +188,7 @@ def _shared(features: Features, layout: str) -> dict[str, str]:
         "generated/spectrum.cl": f'#include "spectrum/{features.mode}.cl"\n',
         "generated/spectrum_read.cl": stage_texts.spectrum_text(features),
         "generated/bands.cl": '#include "lib/bands.cl"\n' if features.bands else "",
-        "generated/sampler.cl": f'#include "sampler/{features.sampler}.cl"\n',
+        "generated/sampler.cl": stage_texts.sampler_text(features.sampler),
         "generated/camera.cl": stage_texts.camera_text(features.camera, features.glass_lens),
         "generated/connect.cl": stage_texts.connect_text(features.camera),
         "generated/emission.cl": emission.dispatch_text(

@@ -22,6 +22,12 @@ def spectrum_text(features: Features) -> str:
     return text
 
 
+def sampler_text(kind: str) -> str:
+    """A sampler, and how it numbers the places of the film: as they come, or along a curve."""
+    order = "_z" if kind == "zsobol" else ""
+    return f'#include "sampler/{kind}.cl"\n#include "lib/place_sampler{order}.cl"\n'
+
+
 def camera_text(kind: str, glass: bool) -> str:
     record: Record = cameras.RECORDS[kind]
     camera = f"(global const {record.name} *)(scene).camera"

@@ -111,6 +111,15 @@ class Sobol(Sampler):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Zsobol(Sampler):
+    """One Sobol sequence for all pixels, so that what is left of noise is fine-grained.
+
+    Neighbours err in opposite directions (Ahmed and Wonka 2020), best at the scene's `spp`; a
+    pixel by itself has the error of `sobol`.
+    """
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Independent(Sampler):
     """Uniform random numbers."""
 
@@ -266,5 +275,5 @@ def _white_balance(given: Any) -> Any:
 
 
 KINDS = (Path, Direct, Whitted, ParticleTracer, Aov)
-SAMPLERS = (Sobol, Independent)
+SAMPLERS = (Sobol, Zsobol, Independent)
 FILTERS = (Box, Tent, Gaussian, Mitchell, Lanczos, BlackmanHarris)

@@ -30,7 +30,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
 #endif
     mask next = active & !hidden & (depth + 1 < settings->max_depth);
 
-    Sampler sampler = sampler_start(settings->seed, as_natural(load_path_place(path, at)), as_natural(load_path_sample(path, at)));
+    Sampler sampler = place_sampler(settings, load_path_place(path, at), load_path_sample(path, at));
     natural dimension = as_natural(DIMENSION_VERTEX + depth * DIMENSIONS_A_VERTEX);
     vec2 choice = {0.0f, 0.0f};
 #if USES_CHOICE

@@ -21,7 +21,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     Facing facing = facing_load(scene, v.row, s, v.d, lambdas);
     Frame frame = facing.frame;
     vec3 wo = to_local(frame, neg3(v.d));
-    Sampler sampler = sampler_start(settings->seed, as_natural(load_path_place(path, at)), as_natural(load_path_sample(path, at)));
+    Sampler sampler = place_sampler(settings, load_path_place(path, at), load_path_sample(path, at));
     natural dimension = as_natural(DIMENSION_VERTEX + depth * DIMENSIONS_A_VERTEX);
     vec2 choice = sampler_pair(sampler, dimension + DIMENSION_CHOICE);
     real mirror = BSDF_REFLECTIVITY(m);

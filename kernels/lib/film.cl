@@ -2,9 +2,6 @@
  * A slot owns its place, so nothing here is atomic but the counters. */
 #define FILM_WORDS 7 /* sum and rest of three channels, and how many samples; a stream of `places` per word and plane */
 
-/* a / b for 0 <= a < 2^23; an integer division would run lane by lane. */
-inline integer divide(integer a, int b) { return to_integer((to_real(a) + 0.5f) / (float)b); }
-
 /* The pixel of a place: x and y, whole numbers. */
 inline vec2 place_pixel(global const Settings *settings, integer place)
 {

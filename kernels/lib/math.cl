@@ -102,3 +102,6 @@ inline real erfinv_r(real x)
              + b * (-0.00367342844f + b * (0.00134934322f + b * (0.000100950558f - b * 0.000200214257f)))))));
     return x * sel(w < 5.0f, p, q);
 }
+
+/* a / b for 0 <= a < 2^23; an integer division would run lane by lane. */
+inline integer divide(integer a, int b) { return to_integer((to_real(a) + 0.5f) / (float)b); }

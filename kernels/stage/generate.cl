@@ -44,7 +44,7 @@ STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
         Exposure e = {load_path_sum(path, at), load_path_rest(path, at), load_path_samples(path, at)};
         mask deposit = ended & began;
 #if USES_SHIFTS /* the film sees the camera's wavelengths, not those by which the light came */
-        Sampler began_with = sampler_start(settings->seed, as_natural(place), as_natural(sample));
+        Sampler began_with = place_sampler(settings, place, sample);
         lambdas = wavelengths_sample(scene, sampler_pair(began_with, (natural)(DIMENSION_WAVELENGTH)).x);
 #endif
         vec3 value = film_value(scene, radiance, lambdas);
@@ -96,7 +96,7 @@ STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
 
         /* The camera's ray. */
         vec2 pixel = place_pixel(settings, place);
-        Sampler sampler = sampler_start(settings->seed, as_natural(place), as_natural(sample));
+        Sampler sampler = place_sampler(settings, place, sample);
         vec2 offset;
         filter_sample(scene, sampler_pair(sampler, (natural)(DIMENSION_FILM)), &offset, &weight);
         vec2 position = film_position(settings, pixel, offset);

@@ -23,7 +23,7 @@ STAGE(mix_materials)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
         mask front, chosen = open;
         Surface s = surface_load(scene, hit, at, open, load_path_o(path, at), load_path_d(path, at), &front);
         Wavelengths lambdas = load_path_lambdas(path, at);
-        Sampler sampler = sampler_start(scene.settings->seed, as_natural(load_path_place(path, at)), as_natural(load_path_sample(path, at)));
+        Sampler sampler = place_sampler(scene.settings, load_path_place(path, at), load_path_sample(path, at));
         natural dimension = as_natural(DIMENSION_VERTEX + (state & PATH_DEPTH) * DIMENSIONS_A_VERTEX + DIMENSION_ROULETTE);
         real u = sampler_pair(sampler, dimension).y;
         for (; any(open); open = open & (MATERIAL_KIND(word) == MIXTURE)) {

@@ -129,6 +129,83 @@ def test_all_lane_widths_give_the_same_bits(kind):
         np.testing.assert_array_equal(pairs(kind, pixel, sample, dimension, lanes=lanes), single)
 
 
+ON_FILM = """
+    Sampler sampler = place_sampler(scene.settings, to_integer(x[0]), to_integer(x[1]));
+    vec2 u = sampler_pair(sampler, to_natural(x[2]));
+    r[0] = u.x; r[1] = u.y;
+"""
+SIDE, BITS = 32, 2  # of the film [pixels], and how many samples a pixel takes, 4
+
+
+@pytest.fixture(scope="module")
+def along_the_curve():
+    """Points (n, 2) of zsobol for pixels x, y of a film, samples and dimensions."""
+    settings = {"tiles_x": SIDE // 4, "sample_bits": BITS, "seed": 3}
+    files = ("sampler/zsobol.cl", "lib/place_sampler_z.cl")
+    probe = SceneProbe(ON_FILM, 3, 2, files=files, settings=settings)
+
+    def points(x, y, sample, dimension):
+        place = (y // 4 * (SIDE // 4) + x // 4) * 16 + y % 4 * 4 + x % 4
+        given = np.broadcast_arrays(place, sample, dimension)
+        return probe(*(np.ravel(g) for g in given)).T
+
+    return points
+
+
+def _square(side, left=0, top=0):
+    """Pixels x and y of a square, each for all samples of the first part."""
+    x, y, sample = np.meshgrid(
+        np.arange(left, left + side), np.arange(top, top + side), np.arange(1 << BITS)
+    )
+    return x, y, sample
+
+
+def test_zsobol_squares_share_a_net(along_the_curve):
+    """All samples of a square of pixels are a net together, whatever the square and dimension."""
+    for k, corners in ((0, ((0, 0), (5, 18))), (2, ((4, 8), (28, 12))), (4, ((0, 0), (16, 0)))):
+        for left, top in corners:
+            x, y, sample = _square(1 << k, left, top)
+            for dimension in (0, 1, 9):
+                for part in (0, 3):
+                    points = along_the_curve(x, y, sample + (part << BITS), dimension)
+                    assert _is_net(points, 2 * k + BITS)
+
+
+def test_zsobol_is_uniform_over_parts(along_the_curve):
+    """Chi-square of a pixel's numbers over parts of its sequence and dimensions, pooled."""
+    part, dimension = np.meshgrid(np.arange(512), np.arange(32))
+    for x, y in ((0, 0), (13, 30)):
+        points = along_the_curve(x, y, part << BITS, dimension)
+        counts, _, _ = np.histogram2d(*points.T, bins=16, range=[[0, 1], [0, 1]])
+        assert stats.chisquare(counts.ravel()).pvalue > SIGNIFICANCE
+
+
+def test_zsobol_errs_less_after_a_blur(along_the_curve):
+    """Of a smooth integral a pixel errs alike, a square of 4 x 4 less than a third of sobol's.
+
+    Over many dimensions: in one of them, pixels have a kind of net in common.
+    """
+    x, y, sample = _square(SIDE)
+    place = (y * SIDE + x).ravel()
+    exact = (1.0 - np.cos(3.0)) / 3.0 * (np.e - 1.0)
+    made = {
+        "zsobol": lambda dimension: along_the_curve(x, y, sample, dimension),
+        "sobol": lambda dimension: pairs("sobol", place, sample.ravel(), dimension),
+    }
+    error = {}
+    for kind, draw in made.items():
+        squares = np.zeros(2)
+        for dimension in range(32):
+            points = draw(dimension).astype(float)
+            values = np.sin(3.0 * points[:, 0]) * np.exp(points[:, 1]) - exact
+            pixels = values.reshape(SIDE, SIDE, -1).mean(axis=2)
+            blurred = pixels.reshape(SIDE // 4, 4, SIDE // 4, 4).mean(axis=(1, 3))
+            squares += [np.mean(v**2) for v in (pixels, blurred)]
+        error[kind] = np.sqrt(squares)
+    assert error["zsobol"][0] == pytest.approx(error["sobol"][0], rel=0.15)
+    assert error["zsobol"][1] < error["sobol"][1] / 3.0
+
+
 def test_sobol_converges_faster_than_random():
     """Error of a smooth integral over 64 pixels at 256 samples: far below that of random points."""
     pixel, sample = np.meshgrid(np.arange(64), np.arange(256), indexing="ij")

@@ -162,7 +162,8 @@ def sampler(found: Definition | None) -> tuple[Sampler, int, int | None]:
     seed = params.one("seed", "integer", None)
     if not 0 < spp < 2**31:
         raise params.error(f"there must be at least one sample in a pixel, not {spp}")
-    made: Sampler = integrators.Independent() if found.kind in RANDOM else integrators.Sobol()
+    own = {"zsobol": integrators.Zsobol(), **dict.fromkeys(RANDOM, integrators.Independent())}
+    made: Sampler = own.get(found.kind, integrators.Sobol())
     return made, spp, None if seed is None else seed % 2**31
 
 
