@@ -25,14 +25,18 @@ def _library() -> ctypes.CDLL:
     loaded = ctypes.CDLL(str(library))
     library.unlink()
     folder.rmdir()
-    for name in ("harness_build_seconds", "harness_closest", "harness_occluded"):
+    figures = "harness_build_seconds", "harness_build_wall", "harness_closest", "harness_occluded"
+    for name in figures:
         getattr(loaded, name).restype = ctypes.c_double
     loaded.harness_build.restype = ctypes.c_void_p
     return loaded
 
 
 class Embree:
-    """A scene in Embree; rays are (n, 8) float32: origin, tmin, direction, tmax."""
+    """A scene in Embree; rays are (n, 8) float32: origin, tmin, direction, tmax.
+
+    build_seconds, build_wall: of its tree, processor time and by the clock.
+    """
 
     def __init__(
         self, vertices: np.ndarray, faces: np.ndarray, threads: int = 1, quality: str = "medium"
@@ -51,6 +55,7 @@ class Embree:
             )
         )
         self.build_seconds = self._library.harness_build_seconds(self._harness)
+        self.build_wall = self._library.harness_build_wall(self._harness)
 
     def closest(self, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
         """t (n,), prim (n,) uint32 (2^32 - 1: none), and the seconds of processor time it took."""
