@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pyopencl as cl
+from numpy.typing import NDArray
 
 from .building import Building
 
 _CURVE, _BUILD = "bvh/curve.cl", "bvh/build.cl"
-_BITS, _INDEX = 11, 31  # CURVE_BITS and CURVE_INDEX of that file
+_DIGIT, _INDEX = 11, 31  # CURVE_BITS and CURVE_INDEX of that file
+_CODE = 33  # bits of a key above those of the index
 _CHUNKS = 4  # for each compute unit, to sort
 _RUN = 2048  # items of the curve that one work-item cuts, and puts into the tree's bounds
 
@@ -38,20 +42,44 @@ def runs(
 def _sorted(building: Building, count: int, items: cl.Buffer, parts: cl.Buffer) -> cl.Buffer:
     """The items' keys, ascending."""
     whole, unused = building.allocate(64), building.allocate(16)
-    n_parts = parts.size // 64
-    root = {"parts": parts, "n_parts": n_parts, "ranges": unused, "extents": whole}
+    root = {"parts": parts, "n_parts": parts.size // 64, "ranges": unused, "extents": whole}
     building.run(_BUILD, "build_root", 1, count=count, **root)
     keys, others = building.allocate(8 * count), building.allocate(8 * count)
-    building.run_each(_CURVE, "curve_keys", count, items=items, whole=whole, keys=keys)
+    cells = _cells(building.read(whole, 16, np.float32)[8:])
+    cells["tables"] = building.upload(cells["tables"], np.uint64)
+    building.run_each(_CURVE, "curve_keys", count, items=items, keys=keys, **cells)
     chunk = -(-count // (_CHUNKS * building.device.info.compute_units))
     chunks = -(-count // chunk)
-    numbers = building.allocate(4 * ((chunks << _BITS) + 1))
+    numbers = building.allocate(4 * ((chunks << _DIGIT) + 1))
     chunked = {"count": count, "run": chunk, "numbers": numbers}
-    for digit in range(3):
-        shift = _INDEX + _BITS * digit
+    for shift in range(_INDEX, _INDEX + _CODE, _DIGIT):
         building.run(_CURVE, "curve_count", chunks, keys=keys, shift=shift, **chunked)
-        building.run(_CURVE, "curve_scan", 1, numbers=numbers, rows=chunks, columns=1 << _BITS)
+        building.run(_CURVE, "curve_scan", 1, numbers=numbers, rows=chunks, columns=1 << _DIGIT)
         moved = {"keys": keys, "sorted": others}
         building.run(_CURVE, "curve_move", chunks, shift=shift, **moved, **chunked)
         keys, others = others, keys
     return keys
+
+
+def _cells(span: NDArray[np.float32]) -> dict[str, Any]:
+    """From a doubled centroid to its code: as `curve_keys` takes it.
+
+    span: low corner and negated high corner of the doubled centroids, (8,). A cell's longest side
+    is halved, again and again; what is halved first is the code's highest bit (Vinkler, Bittner and
+    Havran 2017, "Extended Morton codes").
+    """
+    low = span[:3].astype(float)
+    size = np.maximum(-span[4:7].astype(float) - low, 0.0)
+    left, bits = size.copy(), np.zeros(3, int)
+    tables = np.zeros((3, 2, 256), np.uint64)
+    halved = []
+    for _ in range(_CODE):
+        axis = int(np.argmax(np.where(bits < 16, left, -1.0)))
+        left[axis] /= 2
+        bits[axis] += 1
+        halved.append((axis, bits[axis]))
+    for place, (axis, nth) in enumerate(reversed(halved)):
+        byte, bit = divmod(int(bits[axis] - nth), 8)
+        tables[axis, byte] |= (np.arange(256, dtype=np.uint64) >> bit & 1) << place
+    scale = 0.999999 * 2.0**bits / np.maximum(size, 1e-30)  # finite as a float32
+    return {"low": (*low, 0.0), "scale": (*scale, 0.0), "tables": tables}

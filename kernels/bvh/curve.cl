@@ -1,8 +1,8 @@
 /* Leaves without a search for planes: items in the order of a curve through space, and the curve cut into
  * runs, each of which is a leaf.
  *
- * The curve is Morton's, by 11 bits an axis of the centroid; keys are sorted by their digits, 11 bits at a
- * time, stably, so that two builds make the same tree. Of all ways to cut a stretch of the curve into runs
+ * The curve is Morton's through cells that are as good as cubes, 33 times the scene's longest side halved;
+ * keys are sorted by their digits, 11 bits at a time, stably, so that two builds make the same tree. Of all ways to cut a stretch of the curve into runs
  * of at most `leaf_size` items, that with the least sum of the boxes' areas is found by dynamic
  * programming over its items.
  *
@@ -12,32 +12,28 @@
 #include "bvh/apart.cl"
 #include "bvh/items.cl"
 
-#define CURVE_BITS 11 /* of an axis, and of a digit */
+#define CURVE_BITS 11 /* of a digit */
 #define CURVE_INDEX 31
-#define CURVE_SHARE 0.2f
+#define CURVE_SHARE 0.2f /* of the area of the last eight items: what one leaf more costs above it */
 #define CURVE_FAR 1e37f /* more than any sum of areas */
 
-/* Bits of each number moved to every third place. */
-inline ulong4 curve_spread(ulong4 x)
+/* The bits of a cell's coordinate at their places in the code, byte by byte. */
+inline ulong curve_spread(global const ulong *table, int cell)
 {
-    x = (x | x << 16) & 0x070000ff0000fful;
-    x = (x | x << 8) & 0x700f00f00f00ful;
-    x = (x | x << 4) & 0x430c30c30c30c3ul;
-    return (x | x << 2) & 0x1249249249249249ul;
+    return table[cell & 255] | table[256 + (cell >> 8)];
 }
 
-kernel APART void curve_keys(global const float8 *restrict items, uint count,
-                             global const Extent *restrict whole, global ulong *restrict keys)
+/* low, scale: from a doubled centroid to its cell; tables: of two bytes of each axis. */
+kernel APART void curve_keys(global const float8 *restrict items, uint count, float4 low, float4 scale,
+                             global const ulong *restrict tables, global ulong *restrict keys)
 {
     uint i = get_global_id(0);
     if (i >= count) return;
-    float8 span = whole->span;
-    float4 extent = -span.hi - span.lo, low = span.lo;
-    float4 scale = extent > 0.0f ? ((1 << CURVE_BITS) * 0.999999f) / extent : (float4)(0.0f);
     int4 cell = convert_int4((items[i].lo - items[i].hi - low) * scale);
-    cell = clamp(cell, (int4)(0), (int4)((1 << CURVE_BITS) - 1));
-    ulong4 bits = curve_spread(convert_ulong4(cell));
-    keys[i] = (bits.x << 2 | bits.y << 1 | bits.z) << CURVE_INDEX | i;
+    cell = clamp(cell, (int4)(0), (int4)(65535));
+    ulong code = curve_spread(tables, cell.x) | curve_spread(tables + 512, cell.y) |
+                 curve_spread(tables + 1024, cell.z);
+    keys[i] = code << CURVE_INDEX | i;
 }
 
 inline uint curve_digit(ulong key, uint shift) { return key >> shift & ((1 << CURVE_BITS) - 1); }
