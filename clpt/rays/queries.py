@@ -21,14 +21,16 @@ from . import batch
 from .arrays import Given, Held
 
 _GROUP = 64  # rays of a work-group
+_BATCH = 64  # BATCH of kernels/bvh/query_flights.cl
 _HITS: batch.Made = {
     "t": (0, np.float32),
     "primitive": (0, np.int32),
     "barycentrics": (2, np.float32),
 }
+_ONE_BY_ONE, _FLIGHTS = "bvh/query.cl", "bvh/query_flights.cl"
 _PROGRAMS = {  # of a kernel: the program that has it, and whether it meets all triangles of a ray
-    "query_closest": ("bvh/query.cl", False),
-    "query_occluded": ("bvh/query.cl", False),
+    "query_closest": (_ONE_BY_ONE, False),
+    "query_occluded": (_ONE_BY_ONE, False),
     "query_count": ("bvh/query_every.cl", True),
     "query_every": ("bvh/query_every.cl", True),
     "place_instances": ("bvh/place.cl", False),
@@ -86,6 +88,7 @@ class Queries:
         self._stream = Stream(queue)
         self._lock = threading.RLock()
         self._kernels: dict[str, Bound] = {}
+        self._flights = False  # whether work-items have several rays in flight
         self._trees: dict[str, cl.Buffer] | None = {}
 
     def intersect(
@@ -217,6 +220,8 @@ class Queries:
             "begins": batch.begins(parts),
         }
         bound = self._bind(name, arguments)
+        if self._program_of(name) == _FLIGHTS:
+            return self._stream.run(bound, (-(-rays.count // _BATCH),), (1,))
         return self._stream.run(bound, (-(-rays.count // _GROUP) * _GROUP,), (_GROUP,))
 
     def _bind(self, name: str, arguments: Mapping[str, Any]) -> Bound:
@@ -230,7 +235,7 @@ class Queries:
 
     def _program(self, kernel: str) -> Program:
         """The program of a kernel, for the layout."""
-        root, every = _PROGRAMS[kernel]
+        root, every = self._program_of(kernel), _PROGRAMS[kernel][1]
         texts = {
             "generated/layout.cl": traversal_text(self.layout, every),
             "generated/instance_traversal.cl": self._instances_text(),
@@ -241,6 +246,11 @@ class Queries:
             "LANES": 1,
         }
         return build(self.device, assemble(root, texts, defines))
+
+    def _program_of(self, kernel: str) -> str:
+        """The file that a kernel is taken from."""
+        root = _PROGRAMS[kernel][0]
+        return _FLIGHTS if self._flights and root == _ONE_BY_ONE else root
 
     def _instances_text(self) -> str:
         """What traversal of instances includes."""
