@@ -9,12 +9,10 @@ open roof. A result whose hits differ from Embree's is refused.
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import os
 import statistics
 import time
-from pathlib import Path
 
 import click
 import numpy as np
@@ -43,12 +41,10 @@ MISS = 0xFFFFFFFF
 
 
 def atrium() -> tuple[np.ndarray, np.ndarray]:
-    """vertices and faces of scenes/atrium."""
-    path = Path(__file__).parent.parent / "scenes" / "atrium" / "generate.py"
-    spec = importlib.util.spec_from_file_location("atrium", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    vertices, faces, _ = module.atrium()
+    """The vertices and faces that scenes/atrium is made of."""
+    from clpt.benchmark import atrium as court
+
+    vertices, faces, _ = court.atrium()
     return vertices, faces
 
 
