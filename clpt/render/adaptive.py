@@ -28,8 +28,10 @@ from clpt.scene import check_noise
 
 SIDE = 16  # pixels of a square, a multiple of four
 LEAST = 8  # samples of a pixel before the film is looked at; it takes twice as many to tell noise
+AHEAD = 4  # times the samples of a look that it may tell how many are needed
 STEPS = 4  # in which samples are given from one look to the next, at twice as many
 DARK = 0.01  # of the picture's luminance: what is darker counts as if it were so bright
+PIXELWISE = ("sobol", "independent")  # samplers whose pixels do not know of each other
 OPEN = walks.FOREVER  # of a cell whose number of samples is not decided
 
 Cells = NDArray[np.int64]
@@ -45,6 +47,9 @@ def checked(noise: float, features: Features) -> float:
     if features.light_paths:
         message = "the integrator particle_tracer cannot choose which pixels its paths reach"
         raise SceneError(f"{message}; leave it out, or choose path", where="noise")
+    if features.sampler not in PIXELWISE:
+        message = f"neighbouring pixels share the points of the sampler {features.sampler}"
+        raise SceneError(f"{message}; leave it out, or choose sobol", where="noise")
     return float(noise)
 
 
@@ -92,7 +97,7 @@ class Adaptive:
         return float(self._pixels[self.next < self.stop].sum() / self._pixels.sum())
 
     def skip(self, samples: int) -> None:
-        """Every pixel has got all samples before this one, whatever its noise."""
+        """Note that every pixel has got its samples before this one, whatever its noise."""
         self.next[:] = samples
         self._level = max(self._level, samples)
         self.stop[self.stop < samples] = samples
@@ -166,19 +171,23 @@ class Adaptive:
         variance, luminance, pixels = np.moveaxis(found, 2, 0)
         if self._dark is None:  # of each colour by itself
             self._dark = DARK * luminance.sum(axis=0) / np.maximum(pixels.sum(axis=0), 1)
-        mean = luminance / np.maximum(pixels, 1) + self._dark
-        relative = np.divide(variance, mean**2, out=np.zeros_like(mean), where=mean > 0.0)
         cell = self._cell[::16, None] // 2 * 2 + np.arange(2)
+        count = np.maximum(self._pixels, 1)
+        whole = np.bincount(cell.ravel(), luminance.ravel(), len(self.stop)) / count
+        mean = luminance / np.maximum(pixels, 1)
+        # A tile that a few paths have lit is as bright as its cell, for all that is known.
+        uncertain = np.minimum(_over(variance, luminance**2), 1.0)
+        relative = _over(variance, (mean + uncertain * (whole[cell] - mean) + self._dark) ** 2)
         sums = np.bincount(cell.ravel(), relative.ravel(), len(self.stop))
         known = asked & (self._looked > 0)
-        self._variance[known] = self._level * (sums / np.maximum(self._pixels, 1))[known]
+        self._variance[known] = self._level * (sums / count)[known]
         self._looked[asked] = self._level
 
     def _decide(self) -> None:
         """Tell how many samples cells get, where their partners know it closely enough."""
         looked = self._looked[self._partner]
         needed = self._variance[self._partner] / self.noise**2
-        sure = (self.stop == OPEN) & (needed <= 2.0 * looked)
+        sure = (self.stop == OPEN) & (needed <= AHEAD * looked)
         step = np.maximum(looked // STEPS, 1)
         wanted = np.ceil(np.where(sure, needed, 0.0) / step) * step
         self.stop[sure] = np.maximum(wanted, looked)[sure]
@@ -197,3 +206,8 @@ class Adaptive:
         for name, kept in self._kept.items():
             self.front.stream.copy(self.front.named[name], kept)
         self.front.accumulate_film()
+
+
+def _over(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """a / b, and 0 where b is."""
+    return np.divide(a, b, out=np.zeros_like(a), where=b > 0.0)

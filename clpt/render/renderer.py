@@ -126,6 +126,8 @@ class Renderer(Pictures):
         for wavefront in self.wavefronts:
             wavefront.enqueue(first, end)
         self.samples = end
+        if self._adaptive is not None:
+            self._adaptive.skip(end)
         stream.flush()
         event = stream.last
         if self._progress is not None:
@@ -200,9 +202,10 @@ class Renderer(Pictures):
     ) -> bool:
         """Add samples to all pixels, or where there is noise; whether that came to its end."""
         if noise is None:
-            if self._adaptive is not None:
+            finished = all(wavefront.expose(first, end, tell) for wavefront in self.wavefronts)
+            if finished and self._adaptive is not None:
                 self._adaptive.skip(end)
-            return all(wavefront.expose(first, end, tell) for wavefront in self.wavefronts)
+            return finished
         noise = adaptive.checked(noise, self.wavefronts[0].lowered.features)
         if self._adaptive is None:
             self._adaptive = adaptive.Adaptive(self.wavefronts[0])

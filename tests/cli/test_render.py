@@ -49,6 +49,17 @@ def test_passes_add_up_to_one_step(tmp_path):
     assert np.array_equal(np.load(path), whole.image())
 
 
+def test_noise_ends_a_render(tmp_path, capsys):
+    """The .exr tells how many samples each pixel got; 0 takes the scene's noise back."""
+    path = tmp_path / "out.exr"
+    common = ["--size", "17x9", "--mode", "rgb", "-o", str(path)]
+    assert run(["render", CORNELL, *common, "--noise", "0.5", "--verbose"]) == 0
+    assert "below 0.5 in 100.0% of the pixels" in capsys.readouterr().err
+    samples = images.read_layers(path)["samples"]
+    assert samples.shape == (9, 17) and samples.min() >= 16
+    assert changed(changed(load(CORNELL), noise=0.5), noise=0.0).noise is None
+
+
 def test_a_limit_of_time_leaves_a_whole_picture(tmp_path, capsys):
     path = tmp_path / "out.exr"
     arguments = ["-o", str(path), "--size", "64x64", "--time", "0.01s"]
