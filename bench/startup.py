@@ -1,9 +1,9 @@
 """Whole processes: seconds from the shell to a picture, with caches and without, and peak memory.
 
-`clpt render` of the Cornell box at 64x64 with one sample, and the same by Mitsuba; cold is with
-empty cache folders of everything involved. Memory is the largest resident set of a process that
-renders the atrium, when it compiles kernels (cold) and when it finds them in caches. What else is
-installed matters: trimesh imports scipy where it finds it, so `--python` names the Python of an
+`clpt render` of the Cornell box at 256x256 with 16 samples, and the same by Mitsuba; cold is with
+empty cache folders of everything involved but Python's bytecode. Memory is the largest resident set of a process
+that renders the atrium, when it compiles kernels (cold) and when it finds them in caches. What else
+is installed matters: trimesh imports scipy where it finds it, so `--python` names the Python of an
 environment that has clpt and nothing more.
 """
 
@@ -34,7 +34,7 @@ scene = mitsuba.load_file(sys.argv[1], res=sys.argv[3])
 image = mitsuba.render(scene, spp=int(sys.argv[4]))
 mitsuba.Bitmap(image).write(sys.argv[5])
 """
-SIZES = {"cornell": (64, 1), "atrium": (256, 16)}  # a side's pixels, spp
+SIZES = {"cornell": (256, 16), "atrium": (256, 16)}  # a side's pixels, spp
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,8 @@ def run(command: Sequence[str], caches: Path) -> Process:
         "POCL_CACHE_DIR": caches / "pocl",
     }
     os.makedirs(variables["POCL_CACHE_DIR"], exist_ok=True)
-    environment = {**os.environ, **{name: str(path) for name, path in variables.items()}}
+    kept = {n: value for n, value in os.environ.items() if n != "PYTHONDONTWRITEBYTECODE"}
+    environment = {**kept, **{name: str(path) for name, path in variables.items()}}
     with tempfile.TemporaryFile("w+") as output:
         start = time.perf_counter()
         process = subprocess.Popen(

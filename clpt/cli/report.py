@@ -26,9 +26,11 @@ def before(renderer: Renderer, loading: float) -> None:
         _line(f"table {name}", _bytes(size))
     _line("paths", f"{first.slots:,} in flight, {first.lanes} to a work-item")
     _line("device memory", _bytes(facts.memory))
-    _line("programs", f"{facts.programs}")
+    others = facts.programs - facts.programs_kept
+    kept = f"{facts.programs_kept} from clpt's cache, {others} from the driver or its cache"
+    _line("programs", f"{facts.programs} in {facts.seconds['programs']:.2f} s: {kept}")
     _line("seconds to load", f"{loading:.2f}")
-    for name in ("lower", "trees", "programs", "ready"):
+    for name in ("lower", "trees", "ready"):
         _line(
             f"seconds {'until ' if name == 'ready' else 'for '}{name}", f"{facts.seconds[name]:.2f}"
         )

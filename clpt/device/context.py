@@ -78,15 +78,21 @@ class Choice:
 
 @dataclass
 class Builds:
-    """What has been compiled so far: programs, and the seconds that took (summed over threads)."""
+    """What has been built so far: programs, and the seconds that took (summed over threads).
+
+    kept: how many of them lay in clpt's cache; whether a driver takes one from its own, it does not
+    tell.
+    """
 
     programs: int = 0
+    kept: int = 0
     seconds: float = 0.0
     _lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
 
-    def add(self, seconds: float) -> None:
+    def add(self, seconds: float, kept: bool) -> None:
         with self._lock:
             self.programs += 1
+            self.kept += kept
             self.seconds += seconds
 
 

@@ -238,14 +238,15 @@ def _once(
     start = time.perf_counter()
     with _REMARKS:
         program = _from_cache(device, source, flags, entry) if own else None
+        kept = program is not None
         if program is None:
             program = make()
             if own:  # what comes from there is compiled to the end, what was made may not be
                 cache.store(entry, _encode(program.signatures), _binary(program))
                 program = _from_cache(device, source, flags, entry) or program
     seconds = time.perf_counter() - start
-    device.builds.add(seconds)
-    log.debug("%s is built in %.2f s", source.name, seconds)
+    device.builds.add(seconds, kept)
+    log.debug("%s is %s in %.2f s", source.name, "loaded" if kept else "built", seconds)
     device.kept.keep(key, program)
     return program
 

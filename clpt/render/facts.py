@@ -13,7 +13,8 @@ class Facts:
 
     triangles: as they are held, triangles_instanced: as they are seen; analytic: shapes that rays
     meet as they are; lights: rows to choose from. tables, trees: bytes by name; memory: bytes of
-    all buffers on the device; programs: built or taken from the cache, over all threads.
+    all buffers on the device; programs: built until samples could come, programs_kept: those of
+    them that lay in clpt's cache (a driver does not tell what it takes from its own).
     seconds: `lower`, `trees`, `programs`, `ready` (from the start to when samples may come) and,
     once there is one, `first_sample` (from the start likewise).
     """
@@ -27,10 +28,11 @@ class Facts:
     trees: dict[str, int]
     memory: int
     programs: int
+    programs_kept: int
     seconds: dict[str, float]
 
 
-def gather(fronts: list[Wavefront], programs: int, seconds: dict[str, float]) -> Facts:
+def gather(fronts: list[Wavefront], programs: int, kept: int, seconds: dict[str, float]) -> Facts:
     """Return the figures of a render's wavefronts, which share all but film and picture."""
     first = fronts[0]
     lowered, instances = first.lowered, first.lowered.instances
@@ -49,5 +51,6 @@ def gather(fronts: list[Wavefront], programs: int, seconds: dict[str, float]) ->
         trees={name: tree.bytes for name, tree in trees.items()},
         memory=sum(front.buffers.used for front in fronts) + sum(t.bytes for t in trees.values()),
         programs=programs,
+        programs_kept=kept,
         seconds=seconds,
     )

@@ -89,7 +89,8 @@ class Renderer(Pictures):
         self.channels: tuple[str, ...] = ()
         if isinstance(scene.integrator, Aov):
             self.channels = scene.integrator.channels
-        self._start, self._built = time.perf_counter(), device.builds.programs
+        self._start = time.perf_counter()
+        before = device.builds.programs, device.builds.kept
         if texture_budget is None:
             texture_budget = _texture_budget(device)
         self._texture_budget, self._names = texture_budget, Names()
@@ -101,7 +102,7 @@ class Renderer(Pictures):
         self.wavefronts = [first, *(first.sibling(channel) for channel in self.channels[1:])]
         for front in self.wavefronts:  # so that the first samples come at once
             _ = front.loop if front.looped else front.stages
-        self._built = device.builds.programs - self._built
+        self._built = device.builds.programs - before[0], device.builds.kept - before[1]
         self._seconds |= {**first.seconds, "ready": time.perf_counter() - self._start}
         self.warnings = list(self.wavefronts[0].lowered.warnings)
         self.samples = 0
@@ -332,7 +333,7 @@ class Renderer(Pictures):
     @alone
     def facts(self) -> Facts:
         """What the render took so far: numbers of things, bytes by table and tree, seconds."""
-        return gather(self.wavefronts, self._built, dict(self._seconds))
+        return gather(self.wavefronts, *self._built, dict(self._seconds))
 
 
 def _whole(samples: int) -> int:

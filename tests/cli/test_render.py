@@ -97,8 +97,9 @@ def test_verbose_tells_of_tables_and_stages(tmp_path, capsys):
     arguments = ["-o", str(path), "--size", "8x8", "--spp", "1", "--verbose"]
     assert run(["render", CORNELL, *arguments]) == 0
     told = capsys.readouterr().err
-    expected = ("36 triangles", "tree triangles", "table vertices", "programs", "seconds to load",
-                "seconds until ready", "seconds until a sample", "stage shade_diffuse")  # fmt: skip
+    expected = ("36 triangles", "tree triangles", "table vertices", "from clpt's cache",
+                "seconds to load", "seconds until ready", "seconds until a sample",
+                "stage shade_diffuse")  # fmt: skip
     for words in expected:
         assert words in told
 

@@ -137,9 +137,10 @@ def test_our_cache(device, cache_folder, monkeypatch):
     built = []
     monkeypatch.setattr(program, "_from_source", lambda *a: built.append(1) or from_source(*a))
 
-    cold = build(Device.open(device.info), source())
-    warm = build(Device.open(device.info), source())
+    first, again = Device.open(device.info), Device.open(device.info)
+    cold, warm = build(first, source()), build(again, source())
     assert len(built) == 1
+    assert (first.builds.kept, again.builds.kept, again.builds.programs) == (0, 1, 1)
     assert warm.signatures == cold.signatures
 
     (entry,) = (cache_folder / "programs").iterdir()
