@@ -1,10 +1,10 @@
 """Whole processes: seconds from the shell to a picture, with caches and without, and peak memory.
 
 `clpt render` of the Cornell box at 256x256 with 16 samples, and the same by Mitsuba; cold is with
-empty cache folders of everything involved but Python's bytecode. Memory is the largest resident set of a process
-that renders the atrium, when it compiles kernels (cold) and when it finds them in caches. What else
-is installed matters: trimesh imports scipy where it finds it, so `--python` names the Python of an
-environment that has clpt and nothing more.
+empty cache folders of everything involved but Python's bytecode. Memory is the largest resident
+set of a process that renders the atrium, when it compiles kernels (cold) and when it finds them in
+caches. What else is installed matters: trimesh imports scipy where it finds it, so `--python` names
+the Python of an environment that has clpt and nothing more.
 """
 
 from __future__ import annotations
