@@ -14,7 +14,7 @@ from clpt import device
 from clpt.layout import Record
 from clpt.records import HIT, PATH, SHADOW
 from clpt.render.lower import lower
-from clpt.render.resident import CPU_SLOTS, GPU_SLOTS
+from clpt.render.resident import suited_slots
 from clpt.render.wavefront import Step, Wavefront
 from clpt.scene import Scene
 
@@ -31,7 +31,7 @@ class Flight:
     """
 
     def __init__(self, on: device.Device, scene: Scene, slots: int | None = None, **wavefront: Any):
-        slots = slots or (CPU_SLOTS if on.info.is_cpu else GPU_SLOTS)
+        slots = slots or suited_slots(on.info)
         width, height = scene.film.size
         side = math.sqrt(slots * width / height)
         width, height = (max(4, round(n / 4) * 4) for n in (side, slots / side))

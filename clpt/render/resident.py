@@ -17,13 +17,27 @@ from clpt.render.lower import Lowered
 COUNTERS = ("done", "samples", "closest", "shadow", "rejected")
 PADDING = 80  # words between streams: powers of two collide in a cache
 GROUP = 64  # slots are a multiple of it, and it is the local size of one-lane kernels
-CPU_SLOTS, GPU_SLOTS = 1 << 14, 1 << 20
+CPU_SLOTS = 1 << 14
+UNIT_SLOTS = 1 << 14  # of a compute unit of what is no CPU, which holds about an eighth at once
+MOST_SLOTS = 1 << 22  # kernels/lib/film.cl divides them as floats
 # A work-item of the loop keeps its paths in the first cache, and waits the less for the longest of
 # them the more samples each slot has to take: few slots, measured on CPUs.
 LOOP_SLOTS = 1 << 10  # a core
 LOOP_PATHS = 1 << 22  # to be taken, from which a loop is worth its compilation
 BRUTE_SHAPES = 32  # analytic shapes up to which all of them are tried
 UNSORTED = 4  # kinds of cheap materials up to which sorting costs more; measured, bench/NOTES.md
+
+
+def suited_slots(info: device.DeviceInfo) -> int:
+    """How many paths in flight suit a device: more for one with more compute units.
+
+    A CPU has as many as its cache takes. What is no CPU gets several times as many as it holds at
+    once, so that the queues of several kinds of material, and what is left at the end of a queue,
+    do not leave units idle. `Resident` takes fewer where memory is short.
+    """
+    if info.is_cpu:
+        return CPU_SLOTS
+    return min(info.compute_units * UNIT_SLOTS, MOST_SLOTS)
 
 
 class Resident:
@@ -58,7 +72,7 @@ class Resident:
         if looped is None:
             looped = on.info.is_cpu and not self.queued and paths >= LOOP_PATHS
         self.looped = looped
-        self._place_slots(slots or (CPU_SLOTS if on.info.is_cpu else GPU_SLOTS))
+        self._place_slots(slots or suited_slots(on.info))
         if slots is None and looped and on.info.is_cpu:
             self._narrow(LOOP_SLOTS * on.info.compute_units)
         self._allocate(layout)
