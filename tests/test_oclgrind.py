@@ -33,7 +33,8 @@ from clpt import device
 from tests.test_oclgrind import small_scene
 name, mode, lanes, layout, queued = sys.argv[1:]
 device.Device.lanes = property(lambda self: int(lanes))
-image = clpt.render(small_scene(name, mode), 2, slots=64, layout=layout, queued={"0": False, "1": True}.get(queued, queued))
+queued = {"0": False, "1": True}.get(queued, queued)
+image = clpt.render(small_scene(name, mode), 2, slots=64, layout=layout, queued=queued)
 assert image.shape[:2] == (5, 6) and image.sum() < 1e6 and image.max() > 0.0
 assert mode == "spectral" or image.min() >= 0.0  # a few wavelengths make colours beyond Rec. 709
 """
