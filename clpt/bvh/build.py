@@ -80,8 +80,8 @@ def build(
     layout: a key of LAYOUTS; None asks `choose_layout`. quality: "fast" cuts leaves out of a
     space-filling curve, and only what stands above them is built as in "high"; brute has no tree.
 
-    While it runs it takes up to 280 bytes a triangle on the device for wide8 and compact and 170
-    for binary, of which about 70, 60 and 130 stay; single buffers up to 64 bytes a triangle.
+    While it runs it takes up to 250 bytes a triangle on the device, beside the arrays given, of
+    which about 60 stay (binary: 130); no buffer has more than 64 bytes a triangle.
     Trees are never deeper than BVH_DEPTH of kernels/bvh/node.cl: traversals cannot overflow.
 
     Raises SceneError for vertices that are not finite or beyond 1e12, for indices out of range and

@@ -192,6 +192,24 @@ def test_indices_and_coordinates_are_checked(device):
         bvh.build_boxes(device, np.full((1, 2, 3), np.nan))
 
 
+@pytest.mark.parametrize("quality", QUALITIES)
+@pytest.mark.parametrize("layout", bvh.TREES)
+def test_memory_of_a_build(device, monkeypatch, layout, quality):
+    """All that a build allocates together is within what `build` says."""
+    sizes, create = [], dev.Buffers._create
+
+    def noted(buffers, what, nbytes, advice, host):
+        sizes.append(nbytes)
+        return create(buffers, what, nbytes, advice, host)
+
+    monkeypatch.setattr(dev.Buffers, "_create", noted)
+    sphere = trimesh.creation.icosphere(5)
+    bvh.build(device, sphere.vertices, sphere.faces, layout=layout, quality=quality)
+    n = len(sphere.faces)
+    assert sum(sizes) < (250 if quality == "high" else 240) * n
+    assert max(sizes) <= 64 * n
+
+
 def test_a_buffer_beyond_the_device_is_refused(device):
     small = dev.Device(
         device.context, device.queue, dataclasses.replace(device.info, max_alloc=100_000)
