@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import Any, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from clpt import bvh, device
 from clpt.bvh.layouts import Quality
@@ -36,10 +35,30 @@ def measure(
     count: rays by which the trees are checked; accel: what answers them, called as Accel is.
     """
     work = _Work(on, sets(on, scene, count), scene.name, accel)
-    for layout in layouts:
-        for quality in get_args(Quality):
-            yield work.build(layout, quality, rounds)
-        yield work.refit(layout, rounds)
+    builds = [(layout, quality) for layout in layouts for quality in get_args(Quality)]
+    trees: dict[tuple[str, Quality], bvh.Bvh] = {}
+    seconds: dict[str, list[float]] = {}
+    for number in range(rounds + 1):  # taking turns, so that a noisy second meets all
+        for layout, quality in builds:
+            start = time.perf_counter()
+            trees[layout, quality] = work.build(layout, quality)
+            seconds.setdefault(_name(layout, quality), []).append(time.perf_counter() - start)
+        for layout in layouts:
+            start = time.perf_counter()
+            work.refit(trees[layout, "high"], number)
+            seconds.setdefault(f"refit {layout}", []).append(time.perf_counter() - start)
+    for layout, quality in builds:
+        tree, name = trees[layout, quality], _name(layout, quality)
+        yield work.figure(name, layout, quality, seconds[name], tree, moves=False)
+        if quality == get_args(Quality)[-1]:
+            name = f"refit {layout}"
+            yield work.figure(
+                name, layout, "high", seconds[name], trees[layout, "high"], moves=True
+            )
+
+
+def _name(layout: str, quality: Quality) -> str:
+    return f"build {layout}" + (" fast" if quality == "fast" else "")
 
 
 class _Work:
@@ -52,40 +71,34 @@ class _Work:
         self.bent = (given.vertices + BEND * height * wave).astype(np.float32)
         self.rays = given.rays.get("diffuse") or given.rays["primary"]
         self.copying, give = Copying(on), device.Buffers(on)
+        self._building = bvh.Building(on)
         self.points, self.moved = (
             give.upload("vertices", points, np.float32) for points in (given.vertices, self.bent)
         )
         self.faces = give.upload("faces", given.faces, np.uint32)
 
-    def build(self, layout: str, quality: Quality, rounds: int) -> Figure:
-        """A build of a layout from the beginning."""
-        kept: list[bvh.Bvh] = []
+    def build(self, layout: str, quality: Quality) -> bvh.Bvh:
+        """A tree from the beginning."""
+        return bvh.build(self.device, self.points, self.faces, layout=layout, quality=quality)
 
-        def once(_: int) -> None:
-            kept[:] = [
-                bvh.build(self.device, self.points, self.faces, layout=layout, quality=quality)
-            ]
+    def refit(self, tree: bvh.Bvh, number: int) -> None:
+        """Let a tree follow its vertices, there and back."""
+        bvh.refit(self._building, tree, (self.moved, self.points)[number % 2], self.faces)
+        self._building.stream.wait()
 
-        seconds = _timed(once, rounds)
-        tree = kept[0]
-        more = {"quality": quality, "bytes": tree.bytes, **tree.stats}
-        del more["seconds"]
-        name = f"build {layout}" + (" fast" if quality == "fast" else "")
-        wrong = self._answers(layout, quality, moves=False)
-        return self._figure(name, layout, seconds, more, tree.bytes).refuse(wrong)
-
-    def refit(self, layout: str, rounds: int) -> Figure:
-        """A tree that follows its vertices there and back."""
-        tree = bvh.build(self.device, self.points, self.faces, layout=layout)
-        building = bvh.Building(self.device)
-
-        def once(number: int) -> None:
-            bvh.refit(building, tree, (self.moved, self.points)[number % 2], self.faces)
-            building.stream.wait()
-
-        seconds = _timed(once, rounds)
-        wrong = self._answers(layout, "high", moves=True)
-        return self._figure(f"refit {layout}", layout, seconds, {}, tree.bytes).refuse(wrong)
+    def figure(
+        self, name: str, layout: str, quality: Quality, seconds: list[float], tree: bvh.Bvh,
+        *, moves: bool,
+    ) -> Figure:  # fmt: skip
+        """What the rounds gave after the first one, which compiles; looked at."""
+        count = len(self.given.faces)
+        stats = {} if moves else {k: v for k, v in tree.stats.items() if k != "seconds"}
+        more = {"layout": layout, "quality": quality, "triangles": count, **stats}
+        least = self.given.vertices.nbytes + self.given.faces.nbytes + tree.bytes
+        rounds = rates(count, seconds[1:])
+        figure = Figure("build", name, "Mtri/s", rounds, self.scene, {**more, "bytes": tree.bytes})
+        slow = self.copying.complaint(least, min(seconds[1:]), least)
+        return figure.refuse(slow, self._answers(layout, quality, moves=moves))
 
     @cached_property
     def _truths(self) -> tuple[Truth, Truth]:
@@ -99,28 +112,5 @@ class _Work:
         tree = self.accel(queue, given.vertices, given.faces, layout=layout, quality=quality)
         if moves:
             tree.update(self.bent)
-        hits, _ = Traced(self.device, self.rays).closest(tree, 1)
+        hits, _ = Traced(self.device, self.rays).closest(tree)
         return self._truths[int(moves)].closest(hits)
-
-    def _figure(
-        self, name: str, layout: str, seconds: list[float], more: dict[str, Any], size: int
-    ) -> Figure:
-        count = len(self.given.faces)
-        about = {"layout": layout, "triangles": count, **more}
-        least = _bytes(self.given.vertices, self.given.faces) + size
-        figure = Figure("build", name, "Mtri/s", rates(count, seconds), self.scene, about)
-        return figure.refuse(self.copying.complaint(least, min(seconds), least))
-
-
-def _bytes(*arrays: NDArray) -> int:
-    return sum(array.nbytes for array in arrays)
-
-
-def _timed(once: Callable[[int], None], rounds: int) -> list[float]:
-    """Seconds of each round, after one that compiles."""
-    seconds = []
-    for number in range(rounds + 1):
-        start = time.perf_counter()
-        once(number)
-        seconds.append(time.perf_counter() - start)
-    return seconds[1:]

@@ -26,7 +26,8 @@ from .figures import Figure, Taken, clock_complaint, rates, timed
 from .flight import Flight
 
 CPU_RAYS, GPU_RAYS = 1 << 16, 1 << 20
-RAY_BYTES, HIT_BYTES, MET_BYTES = 28, 16, 1  # what a kernel reads and writes of each ray at least
+RAY_BYTES = 28  # that a kernel reads of each ray at least
+ANSWER_BYTES = {"closest": 16, "any": 1}  # and writes
 POISON = -7  # a primitive that nothing answers
 
 
@@ -120,8 +121,8 @@ class Traced:
         there.set(array)
         return there
 
-    def closest(self, tree: Any, rounds: int) -> tuple[dict[str, NDArray], list]:
-        """The hits of the last round by name, and what each took."""
+    def closest(self, tree: Any) -> tuple[dict[str, NDArray], Taken]:
+        """The hits by name, and what they took."""
         n = self.count
         out = Hits(
             t=self._filled(np.full(n, np.nan, np.float32)),
@@ -130,19 +131,13 @@ class Traced:
             instance=None,
             event=None,
         )
-        taken = [
-            timed(self.device, lambda: [tree.intersect(**self.named, out=out).event])
-            for _ in range(rounds)
-        ]
+        taken = timed(self.device, lambda: [tree.intersect(**self.named, out=out).event])
         return {k: getattr(out, k).get() for k in ("t", "primitive", "barycentrics")}, taken
 
-    def occluded(self, tree: Any, rounds: int) -> tuple[NDArray[np.uint8], list]:
-        """Whether each ray met anything in the last round, and what each took."""
+    def occluded(self, tree: Any) -> tuple[NDArray[np.uint8], Taken]:
+        """Whether each ray meets anything, and what that took."""
         out = self._filled(np.full(self.count, 0xEE, np.uint8))
-        taken = [
-            timed(self.device, lambda: tree.occluded(**self.named, out=out).events[-1:])
-            for _ in range(rounds)
-        ]
+        taken = timed(self.device, lambda: tree.occluded(**self.named, out=out).events[-1:])
         return out.get(), taken
 
 
@@ -162,27 +157,34 @@ def measure(
     copying = Copying(on)
     trees = {name: accel(on.queue, given.vertices, given.faces, layout=name) for name in layouts}
     for name, rays in given.rays.items():
-        traced, others = Traced(on, rays), None
-        truth = checks.Truth(given.vertices, given.faces, rays)
-        for layout, tree in trees.items():
-            hits, taken = traced.closest(tree, rounds + 1)
-            wrong = truth.closest(hits) or (checks.differ(hits, others) if others else "")
-            shared = copying, scene.name, len(rays)
-            yield _figure(f"{layout} {name} closest", taken, wrong, HIT_BYTES, *shared)
-            met, taken = traced.occluded(tree, rounds + 1)
-            wrong = checks.any_hit(met, hits)
-            yield _figure(f"{layout} {name} any", taken, wrong, MET_BYTES, *shared)
-            others = others or hits
+        traced, truth = Traced(on, rays), checks.Truth(given.vertices, given.faces, rays)
+        taken: dict[str, list[Taken]] = {}
+        hits: dict[str, dict[str, NDArray]] = {}
+        wrong: dict[str, str] = {}
+        for _ in range(rounds + 1):  # taking turns, so that a noisy second meets all
+            for layout, tree in trees.items():
+                closest, either = f"{layout} {name} closest", f"{layout} {name} any"
+                hits[layout], one = traced.closest(tree)
+                taken.setdefault(closest, []).append(one)
+                met, one = traced.occluded(tree)
+                taken.setdefault(either, []).append(one)
+                wrong[either] = wrong.get(either) or checks.any_hit(met, hits[layout])
+        first = next(iter(hits.values()))
+        for layout, found in hits.items():
+            told = truth.closest(found) or checks.differ(found, first)
+            wrong[f"{layout} {name} closest"] = told
+        for figure, each in taken.items():
+            yield _figure(figure, each, wrong[figure], copying, scene.name, len(rays))
 
 
 def _figure(
-    name: str, taken: list[Taken], wrong: str, out: int, copying: Copying, scene: str, count: int
+    name: str, taken: list[Taken], wrong: str, copying: Copying, scene: str, count: int
 ) -> Figure:
     taken = taken[1:]  # the first one compiles
     seconds = [one.device for one in taken]
-    nbytes = count * (RAY_BYTES + out)
-    slow = clock_complaint(taken) or copying.complaint(nbytes, min(seconds), nbytes)
     layout, rays, query = name.split()
+    nbytes = count * (RAY_BYTES + ANSWER_BYTES[query])
+    slow = clock_complaint(taken) or copying.complaint(nbytes, min(seconds), nbytes)
     more = {"layout": layout, "rays": rays, "query": query, "count": count}
     figure = Figure("rays", name, "Mrays/s", rates(count, seconds), scene, more)
     return figure.refuse(wrong, slow)
