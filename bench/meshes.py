@@ -1,4 +1,4 @@
-"""Meshes as files, written by numpy: trimesh would take minutes for the large ones."""
+"""Meshes made finer, and as files, written by numpy: trimesh would take minutes for large ones."""
 
 from __future__ import annotations
 
@@ -39,3 +39,14 @@ def ball(side: int, bumps: float = 0.1) -> tuple[NDArray, NDArray, NDArray]:
     corners = first + np.array([0, 1, side + 2, 0, side + 2, side + 1])
     vertices = (radius[..., None] * out).reshape(-1, 3)
     return vertices.astype(np.float32), corners.reshape(-1, 3), np.stack([u, v], -1).reshape(-1, 2)
+
+
+def finer(vertices: np.ndarray, faces: np.ndarray, times: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    """The same surface of four times as many triangles, `times` times over."""
+    corners = vertices[faces]
+    for _ in range(times):
+        a, b, c = corners.transpose(1, 0, 2)
+        ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+        parts = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
+        corners = np.concatenate([np.stack(part, 1) for part in parts])
+    return corners.reshape(-1, 3), np.arange(3 * len(corners), dtype=np.uint32).reshape(-1, 3)

@@ -4,7 +4,8 @@
 
 One thread each, in seconds of processor time. The rays: `primary`, a camera's in tiles of 4 x 4;
 `diffuse`, cosine-distributed bounces from what those hit; `shadow`, from there to points of the
-open roof. A result whose hits differ from Embree's is refused.
+open roof. A result whose hits differ from Embree's is refused. `Accel` is clpt's own queries, which
+have several rays in flight where a tree outgrows the caches; `--finer 2`: 16 triangles of each.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ import time
 
 import click
 import numpy as np
+
+from bench.meshes import finer
 
 KERNELS = """
 #include "bvh/{layout}.cl"
@@ -96,7 +99,8 @@ class Tracer:
         from clpt import device as dev
 
         source = dev.assemble("bench", {"bench": kernels.format(layout=tree.layout)})
-        self.device, self.tree, self.program = device, tree, dev.build(device, source)
+        self.label, self.tree = tree.layout, tree
+        self.device, self.program = device, dev.build(device, source)
 
     def run(self, kernel: str, rays: np.ndarray, repeats: int = 3) -> tuple[np.ndarray, float]:
         """What the kernel wrote, and the least seconds of processor time it took."""
@@ -119,6 +123,33 @@ class Tracer:
         return result, min(seconds)
 
 
+class Asked:
+    """The same rays as an application sends them; the layout is clpt's choice."""
+
+    label = "Accel"
+
+    def __init__(self, device, vertices: np.ndarray, faces: np.ndarray):
+        import clpt
+
+        self.accel = clpt.Accel(device.queue, vertices, faces)
+
+    def run(self, kernel: str, rays: np.ndarray, repeats: int = 3) -> tuple[np.ndarray, float]:
+        """As `Tracer.run`."""
+        parts = [np.ascontiguousarray(rays[:, part]) for part in (slice(3), slice(4, 7), 3, 7)]
+        seconds = []
+        for _ in range(repeats):
+            start = time.process_time()
+            if kernel == "closest":
+                found = self.accel.intersect(*parts)
+            else:
+                result = self.accel.occluded(*parts)
+            seconds.append(time.process_time() - start)
+        if kernel == "closest":
+            result = np.zeros(len(rays), HIT)
+            result["t"], result["prim"] = found.t, found.primitive.view(np.uint32)
+        return result, min(seconds)
+
+
 def agreement(hits: np.ndarray, t: np.ndarray, prim: np.ndarray, rays: np.ndarray) -> float:
     """The share of rays for which both have no hit, or hits at the same distance.
 
@@ -132,7 +163,9 @@ def agreement(hits: np.ndarray, t: np.ndarray, prim: np.ndarray, rays: np.ndarra
     return float(((met == other) & (near | ~met)).mean())
 
 
-def compare(tracer: Tracer, reference, name: str, rays: np.ndarray, rounds: int) -> list[dict]:
+def compare(
+    tracer: Tracer | Asked, reference, name: str, rays: np.ndarray, rounds: int
+) -> list[dict]:
     """Figures of closest and any hit: Mrays/s of both, their ratio, and the agreement of hits."""
     rows = []
     for kernel in ("closest", "occluded"):
@@ -149,11 +182,11 @@ def compare(tracer: Tracer, reference, name: str, rays: np.ndarray, rounds: int)
                 agree = float(((hits != 0) == met).mean())
             theirs.append(seconds)
         if agree < 0.9999:
-            raise SystemExit(f"{tracer.tree.layout} {name} {kernel}: only {agree:.4%} hits agree")
+            raise SystemExit(f"{tracer.label} {name} {kernel}: only {agree:.4%} hits agree")
         n = len(rays) * 1e-6
         rows.append(
             {
-                "layout": tracer.tree.layout,
+                "layout": tracer.label,
                 "rays": name,
                 "query": kernel,
                 "mrays": n / min(ours),
@@ -167,11 +200,14 @@ def compare(tracer: Tracer, reference, name: str, rays: np.ndarray, rounds: int)
 
 @click.command(help=__doc__)
 @click.option("--json", "json_file", type=click.Path(), help="append the figures as JSON lines")
-@click.option("--layout", "layouts", multiple=True, default=("wide8", "binary"))
+@click.option("--layout", "layouts", multiple=True, default=("wide8", "binary", "Accel"))
+@click.option("--finer", "times", default=0, show_default=True, help="4 triangles of 1, so often")
 @click.option("--rounds", default=5, show_default=True)
 @click.option("--side", default=512, show_default=True, help="rays a set: side * side")
 @click.option("--cpu", default=0, show_default=True, help="the core to run on")
-def main(json_file: str | None, layouts: tuple[str, ...], rounds: int, side: int, cpu: int) -> None:
+def main(
+    json_file: str | None, layouts: tuple[str, ...], times: int, rounds: int, side: int, cpu: int
+) -> None:
     os.environ["POCL_MAX_PTHREAD_COUNT"] = "1"
     os.sched_setaffinity(0, {cpu})
     from bench.embree import Embree
@@ -179,7 +215,7 @@ def main(json_file: str | None, layouts: tuple[str, ...], rounds: int, side: int
     from clpt import device as dev
 
     device = dev.choose()
-    vertices, faces = atrium()
+    vertices, faces = finer(*atrium(), times)
     reference = Embree(vertices, faces)
     sets = ray_sets(vertices, faces, reference, side)
     print(f"{device.info.label}, one thread, {len(faces)} triangles; Mrays/s")
@@ -188,7 +224,11 @@ def main(json_file: str | None, layouts: tuple[str, ...], rounds: int, side: int
         flush=True,
     )
     for layout in layouts:
-        tracer = Tracer(device, bvh.build(device, vertices, faces, layout=layout))
+        tracer: Tracer | Asked = (
+            Asked(device, vertices, faces)
+            if layout == "Accel"
+            else Tracer(device, bvh.build(device, vertices, faces, layout=layout))
+        )
         for name, rays in sets.items():
             for row in compare(tracer, reference, name, rays, rounds):
                 print(
@@ -196,7 +236,11 @@ def main(json_file: str | None, layouts: tuple[str, ...], rounds: int, side: int
                     f"{row['embree']:8.2f}{row['ratio']:7.2f}  {row['agreement']:.4%}"
                 )
                 if json_file:
-                    row |= {"bench": "traversal", "device": device.info.label}
+                    row |= {
+                        "bench": "traversal",
+                        "device": device.info.label,
+                        "triangles": len(faces),
+                    }
                     with open(json_file, "a") as file:
                         file.write(json.dumps(row) + "\n")
 
