@@ -27,6 +27,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "spectral": (),
     "effects": (),
     "lights": (),
+    "noise": (),
     "instancing": (),
     "embedding": (),
     "startup": (),

@@ -171,6 +171,7 @@ TABLES: dict[str, Callable[[Sequence[Row]], str]] = {
     "spectral": plain,
     "effects": plain,
     "lights": plain,
+    "noise": plain,
     "queries": queries,
     "instancing": plain,
     "embedding": plain,
