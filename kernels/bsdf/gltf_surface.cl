@@ -204,7 +204,7 @@ inline Spectrum gltf_value(GltfSurface m, GltfParts p, vec3 wo, vec3 wi)
     RefractingFacet h = refracting_facet(wo, wi, (real)(1.0f));
     real facets = microfacet_visible_pdf(p.facets, wo, h.h) * h.jacobian * microfacet_g1(p.facets, wi, h.h);
     Spectrum f = gltf_facet(m, p.f0, p.f90, gltf_cosine(m, h.o, p.eta.x));
-    if (any(!front & spectrum_varies(p.eta))) {
+    if (any(spectrum_varies(p.eta) & !front)) {
 #define C(c) f.c = gltf_facet(m, p.f0, p.f90, gltf_cosine(m, h.o, p.eta.c)).c;
         SPECTRUM_EACH(C)
 #undef C
