@@ -1,6 +1,7 @@
-/* FETCH(address): the line of memory there is wanted soon. Nothing where a compiler has no word for it. */
+/* FETCH(address): the line of memory there is wanted soon. Nothing where a compiler has no word for it, and
+ * under Oclgrind (NOT_INLINED), which cannot interpret it. */
 #define FETCH(address)
-#ifdef __has_builtin
+#if defined(__has_builtin) && !defined(NOT_INLINED)
 #if __has_builtin(__builtin_prefetch)
 #undef FETCH
 #define FETCH(address) __builtin_prefetch((const void *)(ulong)(address))
