@@ -11,6 +11,7 @@ from typing import Any
 import click
 
 from .. import device as dev
+from ..bvh import LAYOUTS
 from ..formats import load
 from ..render.renderer import Renderer
 from ..scene import Scene, kinds
@@ -110,6 +111,7 @@ class White(click.ParamType):
 @click.option("--size", type=Size(), help="Size of the picture.")
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), help="Of the random numbers.")
 @click.option("--device", metavar="NAME-OR-INDEX", help="Where to render: see `clpt devices`.")
+@click.option("--bvh", "layout", type=click.Choice([*LAYOUTS]), help="What rays go through.")
 @click.option("--integrator", metavar="NAME", help=f"One of {', '.join(kinds('integrator'))}.")
 @click.option("--max-depth", type=click.IntRange(-1, 4000), help="Longest path; -1: no limit.")
 @click.option("--sensor", type=SensorName(), help="cie1931, cie1964 or a file of three curves.")
@@ -137,6 +139,7 @@ def render(
     paths: tuple[Path, ...],
     limit: float | None,
     device: str | None,
+    layout: str | None,
     exposure: float,
     defines: tuple[str, ...],
     texture_budget: int | None,
@@ -160,7 +163,7 @@ def render(
     targets = outputs.checked(paths or outputs.default(scene), plan)
     on = dev.choose(device, profiling=verbose)
     with shown.phase(f"building kernels for {on.info.name}"):
-        renderer = Renderer(plan, on, texture_budget=texture_budget)
+        renderer = Renderer(plan, on, texture_budget=texture_budget, layout=layout)
     for warning in [*plan.warnings, *renderer.warnings]:
         shown.note(f"clpt: warning: {warning}")
     if verbose:
