@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import re
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -155,13 +156,15 @@ def render(
     """
     shown = display(quiet, limit)
     began = time.perf_counter()
-    with shown.loading(scene.name) as tell:
-        plan = changed(load(scene, progress=tell, **variables(defines)), **changes)
-    loading = time.perf_counter() - began
-    ends = limit is not None or bool(changes["noise"])
-    spp = changes["spp"] if ends else plan.spp
-    targets = outputs.checked(paths or outputs.default(scene), plan)
-    on = dev.choose(device, profiling=verbose)
+    with ThreadPoolExecutor(max_workers=1) as beside:
+        chosen = beside.submit(dev.choose, device, profiling=verbose)
+        with shown.loading(scene.name) as tell:
+            plan = changed(load(scene, progress=tell, **variables(defines)), **changes)
+        loading = time.perf_counter() - began
+        ends = limit is not None or bool(changes["noise"])
+        spp = changes["spp"] if ends else plan.spp
+        targets = outputs.checked(paths or outputs.default(scene), plan)
+        on = chosen.result()
     with shown.phase(f"building kernels for {on.info.name}"):
         renderer = Renderer(plan, on, texture_budget=texture_budget, layout=layout)
     for warning in [*plan.warnings, *renderer.warnings]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import NoReturn
 
@@ -93,6 +94,15 @@ def assemble(
     return Source(root, "\n".join([*head, *assembly.rows, ""]), tuple(assembly.files))
 
 
+@cache
+def _text(folder: Path, name: str) -> str:
+    """A file's text. Raises OSError where there is none inside of the folder."""
+    path = (folder / name).resolve()
+    if not path.is_relative_to(folder.resolve()):
+        raise FileNotFoundError(name)
+    return path.read_text(encoding="utf-8")
+
+
 class _Assembly:
     """The state of one `assemble`: rows written so far and the files they came from."""
 
@@ -111,6 +121,9 @@ class _Assembly:
         self.rows.append(f'#line {part.line} "{label}"')
         depth = 0
         for number, row in enumerate(part.text.splitlines(), start=part.line):
+            if "#" not in row:  # most are no directives
+                self.rows.append(row)
+                continue
             depth += bool(_OPEN_IF.match(row)) - bool(_CLOSE_IF.match(row))
             include = _INCLUDE.match(row)
             if include is None:
@@ -132,10 +145,10 @@ class _Assembly:
         if name in self.virtual:
             given = self.virtual[name]
             return given if isinstance(given, Part) else Part(given, name)
-        path = (self.folder / name).resolve()
-        if not path.is_relative_to(self.folder.resolve()) or not path.is_file():
+        try:
+            return Part(_text(self.folder, name), f"kernels/{name}")
+        except OSError:
             self._fail(includer, line, f"no file {name!r} in {self.folder} and no generated one")
-        return Part(path.read_text(encoding="utf-8"), f"kernels/{name}")
 
     def _fail(self, file: str | None, line: int, message: str) -> NoReturn:
         raise KernelBuildError(self.root, file, line or None, f"error: {message}", None)

@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
 from clpt.errors import SceneError
-from clpt.formats import gltf, mesh, mitsuba, native, pbrt, studio
 from clpt.scene import Scene
 from clpt.scene.materials import Material
 
-FORMATS: dict[str, Callable[..., Scene]] = {
-    ".json": native.load,
-    ".xml": mitsuba.load,
-    ".pbrt": pbrt.load,
-    ".pbrt.gz": pbrt.load,
-    **dict.fromkeys(gltf.SUFFIXES, gltf.load),
-    **dict.fromkeys(mesh.SUFFIXES, studio.load),
+FORMATS = {  # the module whose `load` reads files of a suffix, imported when it is used
+    ".json": "native",
+    ".xml": "mitsuba",
+    ".pbrt": "pbrt",
+    ".pbrt.gz": "pbrt",
+    ".glb": "gltf",
+    ".gltf": "gltf",
+    ".obj": "studio",
+    ".ply": "studio",
+    ".stl": "studio",
+    ".off": "studio",
 }
+WITH_VARIABLES = ("mitsuba", "gltf")
 
 IN_FOLDERS = ("scene.json", "scene.xml", "scene.pbrt", "scene-v4.pbrt")  # the first of these, or
-SCENES = (".xml", ".pbrt", ".pbrt.gz", *gltf.SUFFIXES)  # what is called as the folder, or alone
+SCENES = (".xml", ".pbrt", ".pbrt.gz", ".glb", ".gltf")  # what is called as the folder, or alone
 NAMED = 8  # scenes of a folder that a message names
 
 __all__ = ["FORMATS", "load"]
@@ -44,20 +49,21 @@ def load(
     """
     path = _existing(Path(path))
     name = path.name.lower()
-    loader = next((load for suffix, load in FORMATS.items() if name.endswith(suffix)), None)
-    if loader is None:
+    kind = next((kind for suffix, kind in FORMATS.items() if name.endswith(suffix)), None)
+    if kind is None:
         known = " ".join(FORMATS)
         raise SceneError(f"unknown format {path.suffix!r}; known: {known}", file=path)
-    if variables and loader not in (mitsuba.load, gltf.load):
+    if variables and kind not in WITH_VARIABLES:
         raise SceneError(
             f"only .xml and glTF have variables, so {min(variables)!r} means nothing", file=path
         )
-    if kinds and loader is not native.load:
+    if kinds and kind != "native":
         raise SceneError("only a scene.json can have kinds that are not clpt's own", file=path)
-    if loader is native.load:
-        return native.load(path, kinds)
-    if loader is pbrt.load:
-        return pbrt.load(path, progress)
+    loader = importlib.import_module(f"clpt.formats.{kind}").load
+    if kind == "native":
+        return loader(path, kinds)
+    if kind == "pbrt":
+        return loader(path, progress)
     return loader(path, **variables)
 
 

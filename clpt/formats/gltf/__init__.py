@@ -24,7 +24,6 @@ from clpt.formats.mesh import MeshFile
 from clpt.scene import Scene
 from clpt.scene.shapes import Mesh
 
-SUFFIXES = (".glb", ".gltf")
 VARIABLES = ("time", "animation", "camera", "scene")
 SUPPORTED = (
     draco.NAME, *meshopt.EXTENSIONS, "KHR_mesh_quantization", "KHR_texture_transform",
@@ -33,7 +32,7 @@ SUPPORTED = (
 )  # fmt: skip
 VARIANTS = "KHR_materials_variants"
 
-__all__ = ["SUFFIXES", "load", "read_mesh"]
+__all__ = ["load", "read_mesh"]
 
 
 def load(path: Path, /, **variables: Any) -> Scene:

@@ -11,7 +11,7 @@ import numpy as np
 
 from clpt import spectra
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
-from clpt.formats import gltf, mesh, particles, strands
+from clpt.formats import mesh, particles, strands
 from clpt.formats.native import reradiation
 from clpt.formats.native import spectra as json_spectra
 from clpt.formats.native.cursor import Cursor, parse, placed
@@ -302,7 +302,11 @@ def _only_in_file(cursor: Cursor, keys: Iterable[str]) -> None:
 
 
 def _meshes(path: Path) -> mesh.MeshFile:
-    return (gltf if path.suffix.lower() in gltf.SUFFIXES else mesh).read_mesh(path)
+    if path.suffix.lower() not in (".glb", ".gltf"):
+        return mesh.read_mesh(path)
+    from clpt.formats import gltf  # here: most scenes have no use for it
+
+    return gltf.read_mesh(path)
 
 
 def _placements(cursor: Cursor) -> np.ndarray:
