@@ -11,12 +11,9 @@ from __future__ import annotations
 
 import os
 import statistics
-import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import click
@@ -25,6 +22,7 @@ from rich.table import Table
 from bench import machine
 from bench.scenes import write_atrium, write_cornell
 from bench.workers import find_llvm
+from clpt.benchmark.starting import run
 
 MITSUBA = """
 import sys
@@ -34,40 +32,25 @@ scene = mitsuba.load_file(sys.argv[1], res=sys.argv[3])
 image = mitsuba.render(scene, spp=int(sys.argv[4]))
 mitsuba.Bitmap(image).write(sys.argv[5])
 """
+SMALL = """
+import os, sys
+pid = os.posix_spawnp(sys.argv[2], sys.argv[2:], os.environ)
+_, status, usage = os.wait4(pid, 0)
+open(sys.argv[1], "w").write(str(usage.ru_maxrss))
+sys.exit(os.waitstatus_to_exitcode(status))
+"""
 SIZES = {"cornell": (256, 16), "atrium": (256, 16)}  # a side's pixels, spp
 
 
-@dataclass(frozen=True)
-class Process:
-    """What a process took: seconds from start to end, of processor time, peak memory in bytes."""
+def peak(command: Sequence[str], caches: Path) -> int:
+    """The largest resident set of a command [bytes]; raises as `run` does.
 
-    seconds: float
-    cpu: float
-    memory: int
-
-
-def run(command: Sequence[str], caches: Path) -> Process:
-    """Run a command whose caches lie in a folder. Raises SystemExit with its words if it fails."""
-    variables = {
-        "HOME": caches,
-        "XDG_CACHE_HOME": caches / "xdg",
-        "POCL_CACHE_DIR": caches / "pocl",
-    }
-    os.makedirs(variables["POCL_CACHE_DIR"], exist_ok=True)
-    kept = {n: value for n, value in os.environ.items() if n != "PYTHONDONTWRITEBYTECODE"}
-    environment = {**kept, **{name: str(path) for name, path in variables.items()}}
-    with tempfile.TemporaryFile("w+") as output:
-        start = time.perf_counter()
-        process = subprocess.Popen(
-            command, env=environment, cwd=machine.ROOT, stdout=output, stderr=output
-        )
-        _, status, usage = os.wait4(process.pid, 0)
-        seconds = time.perf_counter() - start
-        if status:
-            output.seek(0)
-            raise SystemExit(f"{' '.join(command)}: failed\n{output.read()}")
-    process.returncode = 0
-    return Process(seconds, usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024)
+    A process counts what the one that started it held, so a small one starts it.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        told = Path(folder) / "kilobytes"
+        run([sys.executable, "-I", "-S", "-c", SMALL, str(told), *command], caches)
+        return int(told.read_text()) * 1024
 
 
 def commands(scene: Path, mode: str, out: Path, python: str) -> dict[str, list[str]]:
@@ -84,6 +67,7 @@ def commands(scene: Path, mode: str, out: Path, python: str) -> dict[str, list[s
 def measure(folder: Path, mode: str, rounds: int, python: str) -> list[dict]:
     """A row for each renderer."""
     find_llvm()
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     cornell = commands(write_cornell(folder), mode, folder / "out.exr", python)
     atrium = commands(write_atrium(folder), mode, folder / "out.exr", python)
     rows = []
@@ -101,8 +85,8 @@ def measure(folder: Path, mode: str, rounds: int, python: str) -> list[dict]:
                 "warm": statistics.median(process.seconds for process in warm),
                 "cold_cpu": statistics.median(process.cpu for process in cold),
                 "warm_cpu": statistics.median(process.cpu for process in warm),
-                "memory_cold": run(atrium[renderer], caches).memory,
-                "memory": run(atrium[renderer], caches).memory,
+                "memory_cold": peak(atrium[renderer], caches),
+                "memory": peak(atrium[renderer], caches),
             }
         )
     rows[0]["memory_ratio"] = rows[0]["memory"] / rows[1]["memory"]
