@@ -11,7 +11,7 @@ import numpy as np
 RESULTS = Path(__file__).parent / "results"
 WHICH = (
     "scene", "mode", "renderer", "sampler", "threads", "layout", "rays", "query", "effect",
-    "figure", "triangles",
+    "figure", "triangles", "builder",
 )  # fmt: skip
 
 HEAD = """# What was measured
