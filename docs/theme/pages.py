@@ -42,6 +42,7 @@ MODULES = {
     "clpt.transforms": "transforms",
     "clpt.device": "device",
     "clpt.bvh": "bvh",
+    "clpt.benchmark": "benchmark",
     "clpt.testing": "testing",
     "clpt.trimesh_ray": "trimesh_ray",
 }
