@@ -19,9 +19,7 @@ kernel void copy(global const uint16 *restrict from, global uint16 *restrict to)
 """
 LARGEST = 1 << 27  # [bytes] beyond the caches of most devices
 WORD = 0x9E3779B9
-SLACK = (
-    1.25  # by which a kernel may be faster than a copy: parts of what it moves stay in registers
-)
+SLACK = 1.25  # how much faster than a copy may be: parts of what moves stay in registers
 
 
 class Copying:

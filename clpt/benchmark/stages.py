@@ -23,7 +23,7 @@ from .bandwidth import Copying
 from .figures import Figure, Taken, clock_complaint, timed
 from .flight import Flight
 
-QUEUEING = ("sort_count", "sort_scan", "sort_place", "append_begin", "append")
+QUEUEING = [kernel for way in queues.WAYS for kernel, *_ in queues.steps(way, 1, 1)]
 WARM = 4  # bounces before anything is noted, so that paths of all depths are in flight
 BOUNCES = 4  # of a round: in a single one few paths may begin
 

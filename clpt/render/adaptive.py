@@ -25,13 +25,13 @@ from clpt.render import programs, walks
 from clpt.render.features import Features
 from clpt.render.wavefront import Wavefront
 from clpt.scene import check_noise
+from clpt.scene.integrators import PIXELWISE
 
 SIDE = 16  # pixels of a square, a multiple of four
 LEAST = 8  # samples of a pixel before the film is looked at; it takes twice as many to tell noise
 AHEAD = 4  # times the samples of a look that it may tell how many are needed
 STEPS = 4  # in which samples are given from one look to the next, at twice as many
 DARK = 0.01  # of the picture's luminance: what is darker counts as if it were so bright
-PIXELWISE = ("sobol", "independent")  # samplers whose pixels do not know of each other
 OPEN = walks.FOREVER  # of a cell whose number of samples is not decided
 
 Cells = NDArray[np.int64]
@@ -47,7 +47,7 @@ def checked(noise: float, features: Features) -> float:
     if features.light_paths:
         message = "the integrator particle_tracer cannot choose which pixels its paths reach"
         raise SceneError(f"{message}; leave it out, or choose path", where="noise")
-    if features.sampler not in PIXELWISE:
+    if features.sampler not in [cls.kind for cls in PIXELWISE]:
         message = f"neighbouring pixels share the points of the sampler {features.sampler}"
         raise SceneError(f"{message}; leave it out, or choose sobol", where="noise")
     return float(noise)

@@ -8,6 +8,7 @@ from clpt import bvh, device
 from clpt.errors import SceneError, UnknownKindError
 from clpt.render import outside
 from clpt.render.stage_texts import functions_text
+from clpt.scene.integrators import PIXELWISE
 from clpt.scene.materials import LEAVES, Material
 
 LANES = (1, 8, 16)
@@ -49,7 +50,7 @@ def kernel_source(
     """
     options = {"mode": (mode, ("rgb", "spectral")), "lanes": (lanes, LANES)}
     options |= {"layout": (layout, bvh.TREES)}
-    options |= {"sampler": (sampler, ("independent", "sobol"))}
+    options |= {"sampler": (sampler, tuple(cls.kind for cls in PIXELWISE))}
     for name, (given, known) in options.items():
         if given not in known:
             raise SceneError(f"{given!r} is none of {', '.join(map(str, known))}", where=name)

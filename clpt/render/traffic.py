@@ -20,11 +20,7 @@ _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 _DEFINE = re.compile(r"\s*#\s*define\s+(\w+)(?:\s+(\w+))?\s*$")
 _CONDITION = re.compile(r"\s*#\s*(if|ifdef|ifndef|elif|else|endif)\b(.*)")
 _CALL = re.compile(r"(?<!\w)(?P<verb>load|store)_(?P<member>\w+)\((?!Slab )")
-_QUEUED = {
-    "sort": (0, 1),
-    "append": (0, 1),
-    "shade": (1, 0),
-}  # words of the queue that are read and written
+_QUEUED = {"sort": (0, 1), "append": (0, 1), "shade": (1, 0)}  # words read and written of a queue
 
 
 @dataclass(frozen=True)
@@ -52,8 +48,8 @@ def traffic(features: Features, layout: str, *, queued: bool | str = False) -> d
 
 def _moved(name: str, text: str, mode: str) -> Moved:
     sizes = {
-        f"{record.name.lower()}_{member.name}": member.words - (member.type == "spectrum" and rgb)
-        for rgb in (mode == "rgb",)
+        f"{record.name.lower()}_{member.name}": member.words
+        - (member.type == "spectrum" and mode == "rgb")
         for record in SLABS
         for member in record.members
     }

@@ -276,4 +276,5 @@ def _white_balance(given: Any) -> Any:
 
 KINDS = (Path, Direct, Whitted, ParticleTracer, Aov)
 SAMPLERS = (Sobol, Zsobol, Independent)
+PIXELWISE = (Sobol, Independent)  # samplers whose pixels do not know of each other
 FILTERS = (Box, Tent, Gaussian, Mitchell, Lanczos, BlackmanHarris)

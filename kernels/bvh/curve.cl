@@ -2,9 +2,9 @@
  * runs, each of which is a leaf.
  *
  * The curve is Morton's through cells that are as good as cubes, 33 times the scene's longest side halved;
- * keys are sorted by their digits, 11 bits at a time, stably, so that two builds make the same tree. Of all ways to cut a stretch of the curve into runs
- * of at most `leaf_size` items, that with the least sum of the boxes' areas is found by dynamic
- * programming over its items.
+ * keys are sorted by their digits, 11 bits at a time, stably, so that two builds make the same tree. Of all
+ * ways to cut a stretch of the curve into runs of at most `leaf_size` items, that with the least sum of the
+ * boxes' areas is found by dynamic programming over its items.
  *
  * A key is Morton's code above the item's index. What stands for a run, to build a tree over, is an item
  * named after its first, with the number of items in place of the area.

@@ -1,5 +1,6 @@
 /* What all infinite lights add to a path that leaves the scene along d, a direction chosen with
- * `pdf` (below 0: delta) where `side` was the one that matters; weighted against the choice of that direction on the light. */
+ * `pdf` (below 0: delta) where `side` was the one that matters; weighted against the choice of that
+ * direction on the light. */
 inline Spectrum infinite_gather(Scene scene, vec3 side, vec3 d, real pdf, Wavelengths lambdas)
 {
     Spectrum sum = spectrum_of(0.0f);

@@ -23,12 +23,12 @@ def test_a_ray_and_its_hit() -> None:
 
 
 def test_a_path_that_ends_and_the_next() -> None:
-    """Spectra have three words in rgb mode, four in spectral; a sky is gathered by d, pdf, beta."""
+    """Spectra have three words in rgb mode, four in spectral; a sky is gathered by side, d, pdf, beta."""
     rest = 3 + 3 + 1 + 1 + 1 + 1 + 1 + 1  # sum, rest, samples, weight, place, sample, state, prim
     assert moved("rgb", False)["generate"].read == 4 * (rest + 2 * 3)
     assert moved("spectral", False)["generate"].read == 4 * (rest + 2 * 4)
     with_sky = moved("spectral", False, lights.Constant())["generate"].read
-    assert with_sky == 4 * (rest + 2 * 4 + 3 + 1 + 4)
+    assert with_sky == 4 * (rest + 2 * 4 + 3 + 3 + 1 + 4)
 
 
 def test_queues() -> None:
