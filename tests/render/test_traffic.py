@@ -23,7 +23,7 @@ def test_a_ray_and_its_hit() -> None:
 
 
 def test_a_path_that_ends_and_the_next() -> None:
-    """Spectra have three words in rgb mode, four in spectral; a sky is gathered by side, d, pdf, beta."""
+    """Spectra have three words in rgb mode, four in spectral; a sky takes side, d, pdf, beta."""
     rest = 3 + 3 + 1 + 1 + 1 + 1 + 1 + 1  # sum, rest, samples, weight, place, sample, state, prim
     assert moved("rgb", False)["generate"].read == 4 * (rest + 2 * 3)
     assert moved("spectral", False)["generate"].read == 4 * (rest + 2 * 4)
