@@ -139,7 +139,7 @@ def build_parts(
     start = time.perf_counter()
     trees, building = [], Building(device)
     for i, j in pairwise(np.cumsum([0, *counts]).tolist()):
-        building = Building(device, building)
+        building = Building(device, building.stream)
         trees.append(_build(building, vertices, faces[i:j], tags[i:j], layout, quality))
     if len(trees) == 1:
         return trees[0], np.zeros((1, 2), np.uint32)

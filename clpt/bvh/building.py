@@ -9,7 +9,7 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import DTypeLike, NDArray
 
-from ..device import Bound, Buffers, Device, Source, Stream, assemble
+from ..device import Buffers, Device, Program, Source, Stream, assemble
 from ..device import build as build_program
 
 Array: TypeAlias = NDArray | cl.Buffer
@@ -25,19 +25,16 @@ def _source(root: str) -> Source:
 
 
 class Building:
-    """What the steps of a build share. Programs are compiled once in a context.
+    """What the steps of a build share. Programs and kernels are made once in a context.
 
-    former: a build that is over, whose kernels are taken on; to make them again takes longer than
-    a small tree. stream: what everything is enqueued on, one of its own by default.
+    stream: what everything is enqueued on, one of its own by default.
     """
 
-    def __init__(
-        self, device: Device, former: Building | None = None, stream: Stream | None = None
-    ):
+    def __init__(self, device: Device, stream: Stream | None = None):
         self.device = device
         self.buffers = Buffers(device)
-        self.stream: Stream = stream or (former.stream if former else Stream(device.queue))
-        self._kernels: dict[tuple[str, str], Bound] = former._kernels if former else {}
+        self.stream: Stream = stream or Stream(device.queue)
+        self._programs: dict[str, Program] = {}
 
     def run(self, root: str, kernel: str, n: int, **arguments: Any) -> None:
         """Enqueue n work-items of a kernel of the program at `root`, each by itself."""
@@ -75,10 +72,8 @@ class Building:
         return self.stream.read(buffer, np.empty(n, dtype))
 
     def _enqueue(self, root: str, kernel: str, n: int, group: int, arguments: dict) -> None:
-        bound = self._kernels.get((root, kernel))
-        if bound is None:
-            program = build_program(self.device, _source(root))
-            bound = self._kernels[root, kernel] = program.kernel(kernel).bind(**arguments)
-        else:
-            bound.set(**arguments)
-        self.stream.run(bound, (-(-n // group) * group,), (group,))
+        program = self._programs.get(root)
+        if program is None:
+            program = self._programs[root] = build_program(self.device, _source(root))
+        with program.lend(kernel, **arguments) as bound:
+            self.stream.run(bound, (-(-n // group) * group,), (group,))

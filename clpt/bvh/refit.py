@@ -67,12 +67,12 @@ def refit_boxes(building: Building, tree: Bvh, boxes: cl.Buffer) -> cl.Event | N
 def rebuild_boxes(building: Building, tree: Bvh, boxes: cl.Buffer) -> cl.Event | None:
     """Enqueue that a tree of the layout "shapes", in place, is built anew over its boxes.
 
-    boxes: as of `refit_boxes`. Takes about five times as long as that, and 160 bytes a box until
-    the next time; rays are then as fast as ever. Nothing is read or waited for.
+    boxes: as of `refit_boxes`. Takes about five times as long as that, and 160 bytes a box while
+    it runs; rays are then as fast as ever. Nothing is read or waited for.
     """
     part = tree.parts[0]
     if tree.count:
-        own = Building(building.device, building)  # whose memory is counted by itself
+        own = Building(building.device, building.stream)  # whose memory is counted by itself
         items, extents = trees.items_of_boxes(own, tree.count, boxes)
         built = trees.over(own, tree.count, items, extents, SHAPES_LEAF)
         indices = tree.buffers["indices"]

@@ -10,8 +10,9 @@ import re
 import threading
 import time
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import astuple, dataclass
 from typing import Any
 
@@ -110,6 +111,8 @@ class Program:
 
     def __init__(self, name: str, cl_program: cl.Program, signatures: Signatures):
         self.name, self.cl_program, self.signatures = name, cl_program, signatures
+        self._lent: dict[str, Bound] = {}
+        self._lending = threading.Lock()
 
     def kernel(self, name: str) -> Kernel:
         """The kernel of that name. Raises KeyError, telling which there are."""
@@ -117,6 +120,26 @@ class Program:
             known = ", ".join(sorted(self.signatures)) or "no kernel"
             raise KeyError(f"program {self.name!r} has no kernel {name!r}; it has {known}")
         return Kernel(self, name)
+
+    @contextmanager
+    def lend(self, name: str, **named: Any) -> Iterator[Bound]:
+        """A kernel with its arguments, to enqueue; it is made the first time only.
+
+        PyOpenCL takes half a millisecond to make one. Who asks meanwhile, on another thread, waits.
+        Raises as `kernel` and `Kernel.bind` do.
+        """
+        with self._lending:
+            bound = self._lent.get(name)
+            if bound is None:
+                # of a twin, for a cycle would keep the driver's memory until it is collected
+                twin = Program(self.name, self.cl_program, self.signatures)
+                bound = self._lent[name] = twin.kernel(name).bind(**named)
+            else:
+                bound.bind(**named)
+            try:
+                yield bound
+            finally:
+                bound.forget()
 
 
 class Kernel:
@@ -146,10 +169,18 @@ class Bound:
         self._places = {argument.name: (i, argument) for i, argument in enumerate(kernel.arguments)}
         self._values: dict[str, Any] = {}
         self._given: dict[str, Any] = {}
+        self.bind(**named)
+
+    def bind(self, **named: Any) -> None:
+        """Set all arguments. Raises TypeError as `Kernel.bind` does."""
         missing = [name for name in self._places if name not in named]
         if missing:
-            raise TypeError(f"kernel {kernel.name!r} also takes {', '.join(missing)}")
+            raise TypeError(f"kernel {self.kernel.name!r} also takes {', '.join(missing)}")
         self.set(**named)
+
+    def forget(self) -> None:
+        """Let go of buffers, which the driver keeps while a command of them is under way."""
+        self._values.clear()
 
     def set(self, **named: Any) -> None:
         """Set arguments again by name. Raises TypeError as `Kernel.bind` does."""
@@ -170,7 +201,10 @@ class Bound:
                     f"{type(given).__name__} {given!r} does not fit: {error}"
                 ) from error
             self._values[name] = value  # the driver does not keep buffers alive
-            self._given[name] = given
+            if plain:
+                self._given[name] = given
+            else:
+                self._given.pop(name, None)
 
     def enqueue(
         self,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import warnings
 import weakref
 
@@ -66,6 +67,18 @@ def test_two_bindings_do_not_disturb(device, fill, out):
     first, second = fill.bind(**arguments(out)), fill.bind(**arguments(out, sign=100))
     assert (result(device, second, out) == 114).all()
     assert (result(device, first, out) == 13).all()
+
+
+def test_what_is_lent_lets_go_of_buffers_and_asks_for_all(device, fill, out):
+    held = sys.getrefcount(out)
+    for sign in (-1, -1, 100):
+        with fill.program.lend("fill", **arguments(out, sign=sign)) as bound:
+            assert (result(device, bound, out) == 14 + sign).all()
+        assert sys.getrefcount(out) == held
+    with fill.program.lend("fill", **arguments(out)) as again:
+        assert again is bound
+    with pytest.raises(TypeError, match="'fill' also takes out"), fill.program.lend("fill", n=3):
+        pass
 
 
 def test_events_chain(device, fill, out):
@@ -164,6 +177,8 @@ def test_a_context_keeps_its_programs(device):
     assert build(first, source(), ["-DX=1"]) is not built
     assert first.builds.programs == 2
     bound = built.kernel("other").bind(x=None)
+    with built.lend("other", x=None):
+        pass
     gone = weakref.ref(built)
     del first, queue, built, bound
     assert gone() is None, "at once, without the collector of cycles"
