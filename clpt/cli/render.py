@@ -7,12 +7,12 @@ import re
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import click
 
 from .. import device as dev
-from ..bvh import LAYOUTS
+from ..bvh import LAYOUTS, Quality
 from ..formats import load
 from ..render.renderer import Renderer
 from ..scene import Scene, kinds
@@ -113,6 +113,10 @@ class White(click.ParamType):
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), help="Of the random numbers.")
 @click.option("--device", metavar="NAME-OR-INDEX", help="Where to render: see `clpt devices`.")
 @click.option("--bvh", "layout", type=click.Choice([*LAYOUTS]), help="What rays go through.")
+@click.option(
+    "--tree-quality", type=click.Choice(get_args(Quality)), default="high",
+    help="fast: built sooner, a little slower to trace.",
+)  # fmt: skip
 @click.option("--integrator", metavar="NAME", help=f"One of {', '.join(kinds('integrator'))}.")
 @click.option("--max-depth", type=click.IntRange(-1, 4000), help="Longest path; -1: no limit.")
 @click.option("--sensor", type=SensorName(), help="cie1931, cie1964 or a file of three curves.")
@@ -141,6 +145,7 @@ def render(
     limit: float | None,
     device: str | None,
     layout: str | None,
+    tree_quality: Quality,
     exposure: float,
     defines: tuple[str, ...],
     texture_budget: int | None,
@@ -166,7 +171,9 @@ def render(
         targets = outputs.checked(paths or outputs.default(scene), plan)
         on = chosen.result()
     with shown.phase(f"building kernels for {on.info.name}"):
-        renderer = Renderer(plan, on, texture_budget=texture_budget, layout=layout)
+        renderer = Renderer(
+            plan, on, texture_budget=texture_budget, layout=layout, tree_quality=tree_quality
+        )
     for warning in [*plan.warnings, *renderer.warnings]:
         shown.note(f"clpt: warning: {warning}")
     if verbose:

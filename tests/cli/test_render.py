@@ -16,6 +16,7 @@ from clpt import __version__, images, spectral_exr
 from clpt.__main__ import run
 from clpt.cli import outputs
 from clpt.cli.render import changed
+from clpt.errors import SceneError
 from clpt.formats import load
 from clpt.render.renderer import Renderer
 from clpt.spectra import read_sensor
@@ -102,6 +103,24 @@ def test_verbose_tells_of_tables_and_stages(tmp_path, capsys):
                 "stage shade_diffuse")  # fmt: skip
     for words in expected:
         assert words in told
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [((), "high None"), (("--tree-quality", "fast", "--bvh", "compact"), "fast compact")],
+)
+def test_the_renderer_gets_the_tree_that_was_asked_for(given, told, monkeypatch, capsys):
+    def refuse(*_, tree_quality, layout, **__):
+        raise SceneError(f"{tree_quality} {layout}")
+
+    monkeypatch.setattr(sys.modules["clpt.cli.render"], "Renderer", refuse)
+    assert run(["render", CORNELL, "--quiet", *given]) == 2
+    assert f"clpt: error: {told}" in capsys.readouterr().err
+
+
+def test_a_quality_of_trees_that_there_is_not(capsys):
+    assert run(["render", CORNELL, "--tree-quality", "best"]) == 2
+    assert "'high', 'fast'" in capsys.readouterr().err
 
 
 def test_aov_has_its_layers(tmp_path):
