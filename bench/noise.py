@@ -25,7 +25,6 @@ from clpt.formats import load
 from clpt.render.adaptive import SIDE
 from clpt.scene import Scene
 
-LIMITS = {"cornell": 0.08, "atrium": 0.08, "glass": 0.08}
 WORST = 99  # percentile of the squares
 
 
@@ -89,14 +88,16 @@ def compare(name: str, size: int, most: int, limit: float, seeds: int) -> dict[s
 
 @click.command(help=__doc__)
 @click.option("--scene", "names", multiple=True, type=click.Choice(list(SCENES)))
-@click.option("--limit", type=float, help="noise below which a square is finished")
+@click.option(
+    "--limit", default=0.08, show_default=True, help="noise below which a square is finished"
+)
 @click.option("--most", default=1024, show_default=True, help="samples of a pixel")
 @click.option("--size", default=128, show_default=True, help="pixels of a side")
 @click.option("--seeds", default=6, show_default=True, help="pictures from which errors are told")
 @click.option("--json", "json_file", type=click.Path(), help="append the figures as JSON lines")
 def main(
     names: tuple[str, ...],
-    limit: float | None,
+    limit: float,
     most: int,
     size: int,
     seeds: int,
@@ -106,7 +107,7 @@ def main(
     headings += ["worst squares", "uniform", "better"]
     table = Table(*headings, title=machine.processor())
     for name in names or SCENES:
-        row = compare(name, size, most, limit or LIMITS[name], seeds)
+        row = compare(name, size, most, limit, seeds)
         machine.append(json_file, "noise", [row])
         table.add_row(name, *(f"{value:.3g}" for value in list(row.values())[1:]))
     machine.console().print(table)
