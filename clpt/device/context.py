@@ -48,10 +48,6 @@ class DeviceInfo:
         return self.kind == "cpu"
 
     @property
-    def is_gpu(self) -> bool:
-        return self.kind == "gpu"
-
-    @property
     def lanes(self) -> int:
         """Paths that one work-item shades: the SIMD width on a CPU, 1 elsewhere."""
         if not self.is_cpu:

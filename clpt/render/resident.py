@@ -19,7 +19,7 @@ PADDING = 80  # words between streams: powers of two collide in a cache
 GROUP = 64  # slots are a multiple of it, and it is the local size of one-lane kernels
 CPU_SLOTS = 1 << 14
 UNIT_SLOTS = 1 << 14  # of a compute unit of what is no CPU, which holds about an eighth at once
-MOST_SLOTS = 1 << 22  # kernels/lib/film.cl divides them as floats
+MOST_SLOTS = 1 << 22  # kernels/lib/math.cl divides them as floats
 # A work-item of the loop keeps its paths in the first cache, and waits the less for the longest of
 # them the more samples each slot has to take: few slots, measured on CPUs.
 LOOP_SLOTS = 1 << 10  # a core
