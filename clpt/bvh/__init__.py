@@ -1,6 +1,6 @@
 """Acceleration structures: triangles and boxes to nodes, built on the device."""
 
-from .build import Bvh, build, build_boxes, build_parts, choose_layout, choose_tree
+from .build import Bvh, build, build_boxes, build_parts, choose_layout, choose_tree, outgrows_caches
 from .building import Building
 from .layouts import LAYOUTS, TREES, Quality, traversal_text
 from .refit import rebuild_boxes, refit, refit_boxes
@@ -16,6 +16,7 @@ __all__ = [
     "build_parts",
     "choose_layout",
     "choose_tree",
+    "outgrows_caches",
     "rebuild_boxes",
     "refit",
     "refit_boxes",

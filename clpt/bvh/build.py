@@ -22,6 +22,7 @@ log = logging.getLogger(__name__)
 
 BRUTE_LIMIT = 96  # triangles up to which brute force is faster; measured, see bench/NOTES.md
 
+WIDE8_BYTES = 54  # of a triangle, with its share of nodes, in large scenes
 MOST = (2**31 - 1) // 3  # triangles or vertices: kernels count words of them by an int
 _REACH = 1e12  # so that products of three coordinates stay inside a float
 
@@ -63,6 +64,12 @@ def choose_tree(device: Device) -> str:
     Measured on CPUs; for others it is what the literature finds best, see bench/NOTES.md.
     """
     return "wide8" if device.info.is_cpu else "compact"
+
+
+def outgrows_caches(device: Device, layout: str, n_triangles: int) -> bool:
+    """Whether rays of all directions would wait for memory, so that several in flight pay."""
+    caches = device.info.cl_device.global_mem_cache_size
+    return device.info.is_cpu and layout == "wide8" and WIDE8_BYTES * n_triangles > caches
 
 
 def build(

@@ -51,7 +51,7 @@ class Accel(Queries):
         self._stream.mark().wait()  # the build has another stream
         self.tree = bvh.build(self.device, points, corners, layout=self.layout, quality=quality)
         self._trees = self.tree.buffers
-        self._flights = self._outgrows_caches()
+        self._flights = bvh.outgrows_caches(self.device, self.layout, self.tree.count)
         self._faces = self._upload(corners, np.uint32)
         self._refitting = bvh.Building(self.device, stream=self._stream)
         self.moved: cl.Event | None = None
@@ -108,13 +108,6 @@ class Accel(Queries):
         ray = np.repeat(np.arange(rays.count), counts)
         order = np.lexsort((found["t"], ray))
         return AllHits(ray=ray[order], **{name: array[order] for name, array in found.items()})
-
-    def _outgrows_caches(self) -> bool:
-        """Whether rays of all directions would wait for memory most of the time."""
-        info = self.device.info
-        size = sum(buffer.size for buffer in self.tree.buffers.values())
-        caches = info.cl_device.global_mem_cache_size
-        return info.is_cpu and self.layout == "wide8" and size > caches
 
     def _fill(self, kernel: str, rays: batch.Rays, arrays: dict[str, NDArray[Any]]) -> None:
         """Run a kernel on arrays of the host."""

@@ -11,17 +11,20 @@ from dataclasses import dataclass
 from clpt import bvh, device
 from clpt.render import arguments, emission, lights, outside, shapes, stage_texts, textures
 from clpt.render.features import Features
+from clpt.render.lower import Lowered
 from clpt.render.reradiation import STEP as SHIFT_STEP
+
+FLIGHT_TRIANGLES = 1 << 20  # from which rays in flight pay in a bounce; measured, bench/NOTES.md
 
 
 def sources(
-    features: Features, layout: str, lanes: int, *, queued: bool | str
+    features: Features, layout: str, lanes: int, *, queued: bool | str, flights: bool = False
 ) -> dict[str, device.Source]:
     """Return the text of every program of a bounce, by program name.
 
     layout: of the triangles, a name in clpt.bvh.LAYOUTS; lanes: paths that a work-item shades;
     queued: whether shading goes along queues, or how: one of clpt.render.queues.WAYS; "sort" if
-    True.
+    True; flights: whether `intersect` has the rays of several paths in flight, see `flies`.
     """
     trace_lanes = lanes if layout == "brute" else 1
     shared = _shared(features, layout)
@@ -29,7 +32,12 @@ def sources(
     begin, test = stages(features)
     made = {
         begin: _source(begin, shared, common, lanes),
-        "intersect": _source("intersect", shared, common, trace_lanes),
+        "intersect": _source(
+            "intersect",
+            {**shared, "generated/trace.cl": stage_texts.trace_text(layout, flights)},
+            common,
+            lanes if flights else trace_lanes,
+        ),
         test: _source(test, shared, common, trace_lanes),
     }
     if features.mixtures:
@@ -80,14 +88,22 @@ class Stage:
     lanes: int
 
 
-def order(features: Features, layout: str, lanes: int) -> list[Stage]:
+def flies(on: device.Device, lowered: Lowered, layout: str) -> bool:
+    """Whether rays in flight pay: in trees larger than the caches, where all is triangles."""
+    features = lowered.features
+    only = not (features.instances or features.analytic)
+    count = len(lowered.faces)
+    return only and count >= FLIGHT_TRIANGLES and bvh.outgrows_caches(on, layout, count)
+
+
+def order(features: Features, layout: str, lanes: int, flights: bool = False) -> list[Stage]:
     """Return the stages of a bounce in their order, but for sorting."""
     trace_lanes = lanes if layout == "brute" else 1
     begin, test = stages(features)
     made = [Stage(begin, begin, lanes)]
     if features.light_paths and features.visible_lights:
         made.append(Stage(test, test, trace_lanes))
-    made.append(Stage("intersect", "intersect", trace_lanes))
+    made.append(Stage("intersect", "intersect", lanes if flights else trace_lanes))
     if features.mixtures:
         made.append(Stage("mix", "mix_materials", lanes))
     made += [Stage(f"shade_{kind}", "shade", lanes) for kind in features.materials]
@@ -96,13 +112,15 @@ def order(features: Features, layout: str, lanes: int) -> list[Stage]:
     return made
 
 
-def loop_sources(features: Features, layout: str, lanes: int) -> dict[str, device.Source]:
+def loop_sources(
+    features: Features, layout: str, lanes: int, flights: bool = False
+) -> dict[str, device.Source]:
     """Return the texts that are linked to the loop of all stages on the device, by name.
 
     "loop" holds the kernel; the others are the stages as functions, see kernels/lib/stage.cl.
     """
-    made = sources(features, layout, lanes, queued=False)
-    bounce = order(features, layout, lanes)
+    made = sources(features, layout, lanes, queued=False, flights=flights)
+    bounce = order(features, layout, lanes, flights)
     names = dict.fromkeys(stage.program for stage in bounce)
     parts = {name: made[name].with_private(name, {"PART": f"loop_{name}"}) for name in names}
     shared = {**_shared(features, layout), "generated/loop.cl": _loop_text(features, bounce)}

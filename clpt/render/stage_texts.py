@@ -145,8 +145,9 @@ def _interior_text(features: Features, cls: type[materials.Material]) -> list[st
     return [f"#define BSDF_INTERIOR(row) {inside}"]
 
 
-def trace_text(layout: str) -> str:
-    return f'#include "lib/trace_{"lanes" if layout == "brute" else "one"}.cl"\n'
+def trace_text(layout: str, flights: bool = False) -> str:
+    way = "lanes" if layout == "brute" else "flights" if flights else "one"
+    return f'#include "lib/trace_{way}.cl"\n'
 
 
 def _includes(features: Features) -> list[str]:

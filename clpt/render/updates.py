@@ -13,6 +13,7 @@ import pyopencl as cl
 from clpt import bvh
 from clpt.errors import SceneError
 from clpt.records import TABLES
+from clpt.render import programs
 from clpt.render.lower import Lowered
 from clpt.render.queues import QUEUE
 from clpt.render.wavefront import Wavefront
@@ -84,6 +85,8 @@ def _changes(front: Wavefront, lowered: Lowered, refit: bool) -> _Changes:
     triangles = other or (not refit and (shifted or FITTED in front.moved))
     parts = zip(vars(former.instances).values(), vars(lowered.instances).values(), strict=True)
     kernels = former.features != lowered.features
+    flew = programs.flies(front.device, former, front.tree.layout)
+    kernels |= flew != programs.flies(front.device, lowered, layout)
     return _Changes(
         layout,
         queued,
@@ -106,7 +109,7 @@ def _make(front: Wavefront, lowered: Lowered, changes: _Changes) -> None:
     try:
         if changes.kernels:
             built = front.device.builds.programs
-            front.build_ahead(lowered.features, changes.layout, changes.queued)
+            front.build_ahead(lowered, changes.layout, changes.queued)
             built = front.device.builds.programs - built
             log.info("the scene needs other kernels: %d programs were built", built)
         front.named = {**front.named, **_new_tables(front, lowered, changes)}

@@ -23,7 +23,6 @@ from clpt.device.timing import Timings
 from clpt.errors import MemoryBudgetError
 from clpt.records import PATH
 from clpt.render import arguments, programs, queues
-from clpt.render.features import Features
 from clpt.render.lower import Lowered
 from clpt.render.resident import COUNTERS, GROUP, Resident
 
@@ -137,18 +136,22 @@ class Wavefront(Resident):
         self.programs |= device.build_all(self.device, missing)
         self.seconds["programs"] += time.perf_counter() - start
 
-    def _texts(self) -> dict[str, device.Source]:
-        features, layout = self.lowered.features, self.tree.layout
-        return programs.sources(features, layout, self.lanes, queued=self.queued)
+    def _texts(self, lowered: Lowered, layout: str, queued: str) -> dict[str, device.Source]:
+        flights = programs.flies(self.device, lowered, layout)
+        return programs.sources(
+            lowered.features, layout, self.lanes, queued=queued, flights=flights
+        )
 
     @cached_property
     def stages(self) -> list[Step]:
         """The kernels of a bounce in their order, for a host that enqueues bounce after bounce."""
-        self._build(self._texts())
+        features, layout = self.lowered.features, self.tree.layout
+        self._build(self._texts(self.lowered, layout, self.queued))
+        flights = programs.flies(self.device, self.lowered, layout)
         made: list[Step] = []
-        for stage in programs.order(self.lowered.features, self.tree.layout, self.lanes):
+        for stage in programs.order(features, layout, self.lanes, flights):
             if self.queued and stage.kernel == "shade" and made[-1].bound.kernel.name != "shade":
-                kinds = len(self.lowered.features.materials)
+                kinds = len(features.materials)
                 for name, size, group in queues.steps(self.queued, self.slots, kinds):
                     bound = self._bound(self.queued, name)
                     made.append(Step(name, bound, (size,), (group,) if group else None))
@@ -161,23 +164,23 @@ class Wavefront(Resident):
     def loop(self) -> device.Bound:
         """The kernel of the bounce loop on the device, for a host that does not wait."""
         start = time.perf_counter()
-        kernel = self._link(self.lowered.features, self.tree.layout).kernel("loop")
+        kernel = self._link(self.lowered, self.tree.layout).kernel("loop")
         self.seconds["programs"] += time.perf_counter() - start
         return self._bind(kernel, **IDLE)
 
-    def _link(self, features: Features, layout: str) -> device.Program:
-        texts = programs.loop_sources(features, layout, self.lanes)
+    def _link(self, lowered: Lowered, layout: str) -> device.Program:
+        features, flights = lowered.features, programs.flies(self.device, lowered, layout)
+        texts = programs.loop_sources(features, layout, self.lanes, flights)
         signatures = {"loop": arguments.loop_arguments(features, layout)}
         return device.link(self.device, texts, "loop", signatures)
 
-    def build_ahead(self, features: Features, layout: str, queued: str) -> None:
-        """Build for other features the programs that are in use, so that it fails here or never."""
-        device.build_all(self.device, programs.film_sources(features, layout))
+    def build_ahead(self, lowered: Lowered, layout: str, queued: str) -> None:
+        """Build for another scene the programs that are in use, so that it fails here or never."""
+        device.build_all(self.device, programs.film_sources(lowered.features, layout))
         if "loop" in vars(self):
-            self._link(features, layout)
+            self._link(lowered, layout)
         if "stages" in vars(self):
-            texts = programs.sources(features, layout, self.lanes, queued=queued)
-            device.build_all(self.device, texts)
+            device.build_all(self.device, self._texts(lowered, layout, queued))
 
     @property
     def _round(self) -> list[Step]:

@@ -8,7 +8,6 @@
 #define BATCH 64
 #define FLIGHT 8
 #define TREE_ARGS global const float *nodes, global const float *leaves
-#define ALIKE 0.95f /* cosine squared of 13 degrees */
 
 /* Whether three quarters of the rays from `first` on look the way of the one before. */
 inline int query_alike(global const float *directions, uint first, uint end)
@@ -17,8 +16,7 @@ inline int query_alike(global const float *directions, uint first, uint end)
     float3 before = vload3(first, directions);
     for (uint i = first + 1; i < end; i++) {
         float3 d = vload3(i, directions);
-        float along = dot(before, d);
-        alike += along > 0.0f && along * along > ALIKE * dot(before, before) * dot(d, d);
+        alike += wide8_alike(before, d);
         before = d;
     }
     return 4 * alike >= 3 * (end - first - 1);

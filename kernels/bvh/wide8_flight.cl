@@ -15,6 +15,13 @@ typedef struct {
     } waiting;
 } Wide8Flight;
 
+/* Whether two rays look about the same way: the squared cosine is of 13 degrees. */
+inline int wide8_alike(float3 a, float3 b)
+{
+    float along = dot(a, b);
+    return along > 0.0f && along * along > 0.95f * dot(a, a) * dot(b, b);
+}
+
 /* Asks for the lines of memory that a node or a block fills. */
 inline void wide8_fetch(global const float *nodes, global const float *leaves, uint at)
 {

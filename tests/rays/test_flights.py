@@ -12,14 +12,14 @@ import clpt
 def flying(queue, soup):
     """The triangles of `accel` as if they outgrew the caches."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(clpt.Accel, "_outgrows_caches", lambda self: True)
+        patch.setattr("clpt.bvh.outgrows_caches", lambda *of: True)
         return clpt.Accel(queue, *soup, layout="wide8")
 
 
 @pytest.fixture(scope="module")
 def single(queue, soup):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(clpt.Accel, "_outgrows_caches", lambda self: False)
+        patch.setattr("clpt.bvh.outgrows_caches", lambda *of: False)
         return clpt.Accel(queue, *soup, layout="wide8")
 
 
