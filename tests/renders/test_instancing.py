@@ -63,7 +63,8 @@ def scene(shapes: list[Shape], center: float = 0.0, size: float = 1.0) -> Scene:
 
 
 @pytest.mark.parametrize(
-    "layout", ["wide8", "compact", pytest.param("binary", marks=pytest.mark.slow)]
+    "layout",
+    ["wide8", *(pytest.param(name, marks=pytest.mark.slow) for name in ("compact", "binary"))],
 )
 def test_values_are_those_of_copies(layout: str) -> None:
     """Position, normals, uv and numbers, with few exceptions at edges."""
