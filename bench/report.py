@@ -11,7 +11,7 @@ import numpy as np
 RESULTS = Path(__file__).parent / "results"
 WHICH = (
     "scene", "mode", "renderer", "sampler", "threads", "layout", "rays", "query", "effect",
-    "figure", "triangles", "builder",
+    "figure", "triangles", "builder", "bent",
 )  # fmt: skip
 
 HEAD = """# What was measured
@@ -26,10 +26,7 @@ Row = dict[str, object]
 
 def newest(records: Iterable[Row]) -> list[Row]:
     """The last record of each figure, in the order in which they first came."""
-    kept = {}
-    for r in records:
-        device = r["device"] if "figure" in r else ""
-        kept[(r["bench"], device, *(r.get(name) for name in WHICH))] = r
+    kept = {(r["bench"], r.get("device"), *(r.get(name) for name in WHICH)): r for r in records}
     return list(kept.values())
 
 
@@ -96,8 +93,12 @@ def startup(rows: Sequence[Row]) -> str:
 
 def plain(rows: Sequence[Row]) -> str:
     """Records as they are, without what is the same for all."""
-    about = ("bench", "date", "commit", "processor", "cores", "load", "device")
-    names = [name for name in rows[0] if name not in about]
+    about = {"bench", "date", "clpt", "commit", "processor", "cores", "load", "device"}
+    if len({row.get("device") for row in rows}) > 1:
+        about.remove("device")
+    names = [
+        name for name in dict.fromkeys(key for row in rows for key in row) if name not in about
+    ]
 
     def cell(value: object) -> str:
         return f"{value:.4g}" if isinstance(value, float) else str(value)
