@@ -30,7 +30,7 @@ STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
         mask sky = missed & ((depth > 0) | mask_of(settings->hide_lights == 0));
         if (any(sky)) {
             real pdf = load_path_pdf(path, at);
-            vec3 d = load_path_d(path, at);
+            vec3 d = sel3(sky, load_path_d(path, at), v3(0.0f, 0.0f, 1.0f)); /* a slot without a pixel has none */
             Spectrum arrives = infinite_gather(scene, load_path_side(path, at), d, pdf, lambdas);
 #if USES_ABSORPTION
             integer medium = sel_i(sky, load_path_medium(path, at), (integer)(0));

@@ -11,12 +11,13 @@ import dataclasses
 import numpy as np
 import pytest
 
+import clpt
 from clpt import transforms as tf
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m
 from clpt.scene.cameras import Orthographic
 from clpt.scene.integrators import Direct, Independent, Path
-from clpt.scene.lights import Area, Constant
+from clpt.scene.lights import Area, Constant, CubeMap
 from clpt.scene.shapes import Rectangle, Sphere
 from clpt.scene.textures import Checkerboard
 from tests.renders.builders import (
@@ -201,3 +202,11 @@ def test_sides_and_mixtures(mode: str) -> None:
     images = exposures(scene, 32, 32)
     for i, (_, _, expected) in enumerate(cases):
         assert_mean(images[:, :, 4 * i : 4 * i + 4], [expected] * 3, 0.05, COLOUR[mode])
+
+
+def test_a_sky_over_a_film_that_fills_no_block_of_slots() -> None:
+    """Slots without a pixel look into no direction, beside others that look into the cube map."""
+    image = np.tile(np.float32([0.25, 0.5, 0.75]), (6, 4, 4, 1))
+    film = Film(width=50, height=38, mode="rgb")
+    scene = Scene(camera=Orthographic(), lights=[CubeMap(image=image)], film=film)
+    assert np.allclose(clpt.render(scene, 4), [0.25, 0.5, 0.75], rtol=1e-5)
