@@ -64,7 +64,7 @@ def examine(path: Path, film: int) -> Row:
         renderer.run(1)
         row["warnings"] = [*row["warnings"], *renderer.warnings]
         row["finite"] = bool(np.isfinite(renderer.image()).all())
-        row |= {f"seconds_{name}": value for name, value in renderer.facts.seconds.items()}
+        row |= {f"seconds_{name}": value for name, value in renderer.stats.seconds.items()}
         row["seconds"] = time.perf_counter() - start
         return row
     except clpt.ClptError as error:

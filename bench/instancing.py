@@ -109,13 +109,13 @@ def measure(name: str, things: list[Shape], side: float = 50.0) -> dict[str, obj
     start = time.process_time()
     renderer.run(SPP)
     rays = (renderer.wavefronts[0].counts.rays - before) / (time.process_time() - start)
-    facts = renderer.facts
+    stats = renderer.stats
     return {
         "scene": name,
-        "triangles seen": facts.triangles_instanced,
-        "MiB": (sum(facts.trees.values()) + sum(facts.tables.values())) / 2**20,
-        "seconds to lower": facts.seconds["lower"],
-        "seconds for trees": facts.seconds["trees"],
+        "triangles seen": stats.triangles_instanced,
+        "MiB": (sum(stats.trees.values()) + sum(stats.tables.values())) / 2**20,
+        "seconds to lower": stats.seconds["lower"],
+        "seconds for trees": stats.seconds["trees"],
         "Mrays/s a core": rays / 1e6,
     }
 

@@ -18,7 +18,6 @@ import clpt
 from bench import machine
 from bench.effects import noise
 from clpt import transforms as tf
-from clpt.render import lower
 from clpt.scene import Film, Scene, materials
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Path
@@ -81,11 +80,11 @@ def rooms(count: int) -> Scene:
 
 def renderer(scene: Scene, tree: bool) -> clpt.Renderer:
     """A renderer that uses the tree, or not, whatever the number of lights."""
-    usual, lower.TREE_FROM = lower.TREE_FROM, 1 if tree else 1 << 30
+    usual, scene.TREE_FROM = scene.TREE_FROM, 1 if tree else 1 << 30
     try:
         return clpt.Renderer(scene)
     finally:
-        lower.TREE_FROM = usual
+        scene.TREE_FROM = usual
 
 
 def compare(count: int, spp: int, rounds: int) -> dict[str, object]:

@@ -1,6 +1,6 @@
 """Adaptive sampling beside as many samples everywhere: what error a second of rendering leaves.
 
-The three scenes of `bench.scenes` in RGB, the two taking turns in one process: squares of 16x16
+The three scenes of `bench.peer_scenes` in RGB, the two taking turns in one process: squares of 16x16
 pixels get samples until their noise is below a limit, then every pixel the mean number of those.
 From the variance of pictures of several seeds: the relative mean squared error of the picture, and
 that of its noisiest squares (the 99th percentile). Efficiency is 1 over error and time, as a ratio.
@@ -20,9 +20,9 @@ from rich.table import Table
 
 import clpt
 from bench import machine
-from bench.scenes import SCENES
+from bench.peer_scenes import SCENES
 from clpt.formats import load
-from clpt.render.adaptive import SIDE
+from clpt.render.wavefront.adaptive import SIDE
 from clpt.scene import Scene
 
 WORST = 99  # percentile of the squares

@@ -20,8 +20,8 @@ import numpy as np
 from rich.table import Table
 
 from bench import machine
+from bench.peer_scenes import SCENES as PLAIN
 from bench.reference import Reference, mean_error, reference
-from bench.scenes import SCENES as PLAIN
 from bench.varied import SCENES as VARIED
 from bench.workers import Shot, Worker
 

@@ -24,7 +24,7 @@ from rich.table import Table
 
 from bench import machine
 from bench.meshes import write_ply
-from bench.scenes import grid
+from bench.peer_scenes import grid
 
 SIZES = (10_000, 30_000, 100_000, 300_000, 1_000_000, 3_000_000, 10_000_000)
 SPP, SIDE, DEPTH = 4, 256, 5
@@ -103,25 +103,25 @@ def measure(path: Path, layout: str | None) -> dict[str, Any]:
     rays, start = front.counts.rays, time.process_time()
     renderer.run(SPP)
     cpu, rays = time.process_time() - start, front.counts.rays - rays
-    facts, info = renderer.facts, renderer.device.info
+    stats, info = renderer.stats, renderer.device.info
     largest = max(
         b.size for b in (*front.named.values(), *front.tree.buffers.values()) if hasattr(b, "size")
     )
     if not np.isfinite(renderer.image()).all() or front.counts.rejected:
         raise SystemExit(f"{path.name}: refused: samples that are not finite")
-    count = facts.triangles
+    count = stats.triangles
     return {
         "triangles": count,
         "layout": front.tree.layout,
         "cpu_load": watch.seconds["load"],
         "cpu_prepare": watch.seconds["prepare"],
-        "seconds_lower": facts.seconds["lower"],
-        "seconds_build": facts.seconds["trees"],
+        "seconds_lower": stats.seconds["lower"],
+        "seconds_build": stats.seconds["trees"],
         "peak_load": watch.peaks["load"] - before,
         "peak_prepare": watch.peaks["prepare"] - before,
         "peak": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
-        "tree_bytes": facts.trees["triangles"],
-        "table_bytes": sum(facts.tables.values()),
+        "tree_bytes": stats.trees["triangles"],
+        "table_bytes": sum(stats.tables.values()),
         "largest_buffer": largest,
         "max_alloc": info.max_alloc,
         "rays_per_sample": rays / (SPP * SIDE * SIDE),

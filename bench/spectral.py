@@ -17,12 +17,12 @@ import click
 from rich.table import Table
 
 from bench import machine
+from bench.peer_scenes import SCENES
 from bench.reference import reference
 from bench.renders import MODES, TRIM, ImpossibleError, figures
-from bench.scenes import SCENES
 from bench.workers import Shot, Worker
 
-DIFFUSE = ("cornell", "atrium")  # of bench.scenes, those without a spectral effect
+DIFFUSE = ("cornell", "atrium")  # of bench.peer_scenes, those without a spectral effect
 KEPT = ("seconds", "relmse", "relmse_trimmed")
 
 

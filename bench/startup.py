@@ -20,7 +20,7 @@ import click
 from rich.table import Table
 
 from bench import machine
-from bench.scenes import write_atrium, write_cornell
+from bench.peer_scenes import write_atrium, write_cornell
 from bench.workers import find_llvm
 from clpt.benchmark.starting import run
 

@@ -1,4 +1,4 @@
-"""Scenes of other shapes, as Mitsuba XML that both renderers read: see `bench.scenes`.
+"""Scenes of other shapes, as Mitsuba XML that both renderers read: see `bench.peer_scenes`.
 
 materials: 400 shapes, each with a material of its own, of seven kinds. textures: colour and
 roughness from bitmaps of a megapixel. instances: 300 of a mesh of 69,600 triangles. outdoors: an
@@ -16,7 +16,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from bench.meshes import ball, write_ply
-from bench.scenes import box, diffuse, grid, joined, knot, light, quad, write_scene
+from bench.peer_scenes import box, diffuse, grid, joined, knot, light, quad, write_scene
 from clpt import images
 
 METAL = '<string name="material" value="Al"/>'  # of others the two have different measurements

@@ -21,7 +21,7 @@ from clpt.errors import (
 from clpt.formats import load
 from clpt.images import read, write
 from clpt.rays import Accel, AllHits, Hits, InstancedAccel
-from clpt.render.library import kernel_source
+from clpt.render.codegen.library import kernel_source
 from clpt.render.renderer import Progress, Renderer, render
 from clpt.scene import Scene
 from clpt.spectral_exr import SpectralImage

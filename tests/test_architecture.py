@@ -27,17 +27,21 @@ MAY_IMPORT = {
     "benchmark": BASE | {"scene", "device", "bvh", "rays", "render", "formats"},
 }
 OPENCL = {"device", "bvh", "rays", "render"}  # only these import pyopencl
+# clpt/render/<room>: arrows point down; rooms of one floor do not know each other.
+FLOORS = ({"contract"}, {"lowering", "codegen"}, {"wavefront"}, {"editing"})
+# What kinds share, by what a reader looks for.
+SHARED = {
+    "core", "film", "interface", "lighting", "optics", "path", "spectrum", "texturing", "tracing",
+}  # fmt: skip
+KINDS = {"bsdf", "camera", "emission", "light", "medium", "sampler", "shape", "texture"}
 # kernels/<folder>: the folders that its files may include; generated text stands between them.
 MAY_INCLUDE = {
-    "lib": {"lib", "generated", "bvh"},
-    "spectrum": {"lib", "spectrum"},
-    "stage": {"lib", "generated", "bvh"},
-    "integrator": {"lib", "generated"},
-    "bvh": {"lib", "bvh", "generated"},
-    **{
-        k: {"lib"}
-        for k in ("bsdf", "light", "shape", "camera", "texture", "medium", "sampler", "emission")
-    },
+    **dict.fromkeys(SHARED, SHARED | {"generated", "bvh"}),
+    **dict.fromkeys(KINDS, SHARED),
+    "integrator": SHARED | {"generated"},
+    "bvh": {"bvh", "core", "generated", "tracing"},
+    "motion": {"core", "generated", "bvh"},
+    "stage": SHARED | {"generated", "bvh"},
 }
 
 
@@ -62,7 +66,7 @@ def imports(path: Path) -> set[str]:
 
 
 def part_of(name: str) -> str | None:
-    """The part of clpt that a full name belongs to: "render" of clpt.render.lower."""
+    """The part of clpt that a full name belongs to: "render" of clpt.render.lowering.scene."""
     parts = name.split(".")
     return parts[1] if parts[0] == "clpt" and len(parts) > 1 else None
 
@@ -76,6 +80,18 @@ def test_imports_follow_the_direction(path: Path) -> None:
     found = {part_of(name) for name in imports(path)} & parts
     wrong = found - MAY_IMPORT[own] - {own, None}
     assert not wrong, f"{own} imports {', '.join(sorted(wrong))}"
+
+
+@pytest.mark.parametrize("path", modules(), ids=lambda p: str(p.relative_to(ROOT)))
+def test_rooms_of_render_know_only_lower_floors(path: Path) -> None:
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    rooms = [room for floor in FLOORS for room in floor]
+    if parts[:2] != ("clpt", "render") or parts[2] not in rooms:
+        return
+    own = next(i for i, floor in enumerate(FLOORS) if parts[2] in floor)
+    known = {parts[2]}.union(*FLOORS[:own])
+    found = {name.split(".")[2] for name in imports(path) if name.startswith("clpt.render.")}
+    assert not found - known, f"{parts[2]} imports {', '.join(sorted(found - known))}"
 
 
 @pytest.mark.parametrize("path", modules(), ids=lambda p: str(p.relative_to(ROOT)))
@@ -138,7 +154,7 @@ def kernel_files() -> list[Path]:
 
 @pytest.mark.parametrize("path", kernel_files(), ids=lambda p: str(p.relative_to(KERNELS)))
 def test_kernel_files(path: Path) -> None:
-    """A comment first; includes in their direction; entry points only in stage/ and bvh/."""
+    """A comment first; includes in their direction; entry points only in stage/, motion/ and bvh/."""
     text = path.read_text(encoding="utf-8")
     assert text.startswith("/*"), "a kernel file begins with what it is for"
     folder = path.relative_to(KERNELS).parts[0]
@@ -146,18 +162,9 @@ def test_kernel_files(path: Path) -> None:
     wrong = included - MAY_INCLUDE[folder]
     assert not wrong, f"{folder}/ includes {', '.join(sorted(wrong))}/"
     if re.search(r"\bkernel void\b", text):
-        assert folder in ("stage", "bvh")
+        assert folder in ("stage", "bvh", "motion")
     code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
-    if folder in (
-        "bsdf",
-        "light",
-        "shape",
-        "camera",
-        "texture",
-        "medium",
-        "integrator",
-        "emission",
-    ):
+    if folder in KINDS | {"integrator"}:
         assert "#pragma" not in code
     assert "double" not in re.findall(r"\w+", code)
     in_memory = re.findall(r"global\s+(?:const\s+)?(\w+)\s*\*", code)

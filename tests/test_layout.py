@@ -9,10 +9,10 @@ import pytest
 from clpt import device
 from clpt.layout import TYPES, Record
 from clpt.records import LIGHT, PATH, SETTINGS, SHAPE, SLABS
-from clpt.render import cameras
-from clpt.render.arguments import scene_text
+from clpt.render.codegen.signatures import scene_text
+from clpt.render.contract import camera_records
 
-UNIFORM = [SETTINGS, *cameras.RECORDS.values()]
+UNIFORM = [SETTINGS, *camera_records.RECORDS.values()]
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +74,7 @@ def test_offsets_on_the_device(opened: device.Device, record: Record) -> None:
     )
     n = len(record.members)
     kernel = (
-        f'#include "lib/base.cl"\n{text}kernel void probe(global uint *a, global uint *b)\n{{\n'
+        f'#include "core/base.cl"\n{text}kernel void probe(global uint *a, global uint *b)\n{{\n'
         f"    global {record.name} *r = (global {record.name} *)b;\n{writes}"
         f"    a[{n}] = sizeof({record.name});\n}}\n"
     )
@@ -102,7 +102,7 @@ def test_slab_members_go_in_and_out(opened: device.Device, lanes: int, queued: i
         f"    store_path_{m.name}(to, at, m, load_path_{m.name}(from, at));\n" for m in PATH.members
     )
     kernel = (
-        '#include "lib/base.cl"\n'
+        '#include "core/base.cl"\n'
         "kernel void probe(global float *a, global float *b, global const uint *c, "
         "global const uint *d)\n{\n"
         f"    Slab from = {{a, {stride}}}, to = {{b, {stride}}};\n"
@@ -130,7 +130,7 @@ def test_rows_are_gathered(opened: device.Device, record: Record, lanes: int) ->
         for i, m in enumerate(record.members)
     )
     kernel = (
-        '#include "lib/base.cl"\n'
+        '#include "core/base.cl"\n'
         "kernel void probe(global const uint *a, global float *b, global const uint *c)\n{\n"
         f"    integer row = {at};\n"
         f"    {record.name} r = {name}_row(a, row * {record.words});\n{writes}}}\n"

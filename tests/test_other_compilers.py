@@ -17,8 +17,9 @@ import pytest
 
 import clpt
 from clpt import bvh, device
-from clpt.render import programs, queues
-from clpt.render.lower import Lowered, lower
+from clpt.render.codegen import programs
+from clpt.render.lowering.scene import Lowered, lower
+from clpt.render.wavefront import queues
 from clpt.scene import Film, Scene, lights, materials, shapes
 from clpt.scene.cameras import Perspective
 

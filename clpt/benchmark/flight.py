@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from clpt import device
 from clpt.layout import Record
 from clpt.records import HIT, PATH, SHADOW
-from clpt.render.lower import lower
-from clpt.render.resident import suited_slots
-from clpt.render.wavefront import Step, Wavefront
+from clpt.render.lowering.scene import lower
+from clpt.render.wavefront.device_scene import default_slots
+from clpt.render.wavefront.wavefront import Step, Wavefront
 from clpt.scene import Scene
 
-ALIVE, FRESH, DONE = 0x1000, 0x2000, 0x4000  # kernels/lib/path_state.cl
+ALIVE, FRESH, DONE = 0x1000, 0x2000, 0x4000  # kernels/path/path_state.cl
 ENDLESS = 1 << 24  # samples of a pixel
 _TYPES = {"integer": np.int32, "natural": np.uint32}
 
@@ -27,11 +27,11 @@ class Flight:
     """A scene's paths in flight, a slot for about every pixel: a picture in small.
 
     slots: paths in flight, by default what a render on the device has. The other parameters are
-    those of clpt.render.wavefront.Wavefront. Raises as that does.
+    those of clpt.render.wavefront.wavefront.Wavefront. Raises as that does.
     """
 
     def __init__(self, on: device.Device, scene: Scene, slots: int | None = None, **wavefront: Any):
-        slots = slots or suited_slots(on.info)
+        slots = slots or default_slots(on.info)
         width, height = scene.film.size
         side = math.sqrt(slots * width / height)
         width, height = (max(4, round(n / 4) * 4) for n in (side, slots / side))
@@ -46,7 +46,7 @@ class Flight:
         """Empty the film, and let every slot begin at its first sample."""
         self.wavefront.clear()
         self.wavefront.rewind()
-        self.wavefront.stages[0].bound.set(samples=(0, ENDLESS))
+        self.wavefront.stages[0].bound.set_args(samples=(0, ENDLESS))
 
     def bounce(self, around: Callable[[Step, Callable[[], Any]], Any] | None = None) -> None:
         """Enqueue the stages of one bounce.

@@ -1,7 +1,7 @@
 """What the stages of a render get through: items a second, and bytes beside a copy's.
 
 Each stage runs on the state that the stages before have left; its items are the slots that it has
-work for. Bytes are those of clpt.render.traffic: what it must move of each path's state, without
+work for. Bytes are those of clpt.benchmark.traffic: what it must move of each path's state, without
 the scene's tables, trees and textures.
 """
 
@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 
 from clpt import device
+from clpt.benchmark.traffic import traffic
 from clpt.records import SLABS
-from clpt.render import programs, queues
-from clpt.render.traffic import traffic
-from clpt.render.wavefront import FILM_WORDS, Step
+from clpt.render.codegen import programs
+from clpt.render.wavefront import queues
+from clpt.render.wavefront.wavefront import FILM_WORDS, Step
 from clpt.scene import Scene
 
 from .bandwidth import Copying
@@ -40,7 +41,7 @@ def measure(
     """Figures of every stage, in Mitems/s, each round a few bounces.
 
     only: names of stages, or how they begin, as `shade`; all by default.
-    wavefront: parameters of clpt.render.wavefront.Wavefront; raises as that does.
+    wavefront: parameters of clpt.render.wavefront.wavefront.Wavefront; raises as that does.
     """
     flight, copying = Flight(on, scene, **wavefront), Copying(on)
     for _ in range(WARM):

@@ -80,20 +80,20 @@ def measure(
         told = Path(folder) / "told.json"
         command = [sys.executable, "-m", __name__, str(told), scene, mode or "", str(device)]
         for what, times in (("cold", 1), ("warm", rounds)):
-            taken, facts = [], []
+            taken, stats = [], []
             for _ in range(times):
                 told.unlink(missing_ok=True)
                 taken.append(run(command, Path(folder) / "caches"))
-                facts.append(json.loads(told.read_text(encoding="utf-8")))
-            yield _figure(f"{what} start", taken, facts, name)
+                stats.append(json.loads(told.read_text(encoding="utf-8")))
+            yield _figure(f"{what} start", taken, stats, name)
 
 
-def _figure(name: str, taken: list[Process], facts: list[dict[str, Any]], scene: str) -> Figure:
+def _figure(name: str, taken: list[Process], stats: list[dict[str, Any]], scene: str) -> Figure:
     middle = sorted(range(len(taken)), key=lambda i: taken[i].seconds)[len(taken) // 2]
-    more = {**facts[middle], "cpu": taken[middle].cpu}
+    more = {**stats[middle], "cpu": taken[middle].cpu}
     figure = Figure("start", name, SECONDS, tuple(one.seconds for one in taken), scene, more)
-    dark = any(not fact["mean"] > 0.0 for fact in facts)
-    longer = any(fact["ready"] > one.seconds for fact, one in zip(facts, taken, strict=True))
+    dark = any(not fact["mean"] > 0.0 for fact in stats)
+    longer = any(fact["ready"] > one.seconds for fact, one in zip(stats, taken, strict=True))
     return figure.refuse(
         "its picture is black or not finite" if dark else "",
         "it was ready later than its process ended" if longer else "",
@@ -116,7 +116,7 @@ def _main(target: str, scene: str, mode: str, which: str) -> None:
     renderer.run(1)
     mean = float(renderer.image().mean())
     builds = renderer.device.builds
-    facts = {
+    stats = {
         "mode": plan.film.mode,
         "ready": ready,
         "programs": builds.programs,
@@ -124,7 +124,7 @@ def _main(target: str, scene: str, mode: str, which: str) -> None:
         "mean": mean if mean < float("inf") else 0.0,
         "memory": _peak(),
     }
-    Path(target).write_text(json.dumps(facts), encoding="utf-8")
+    Path(target).write_text(json.dumps(stats), encoding="utf-8")
 
 
 def _peak() -> int:

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.render.lower import Lowered
+from clpt.render.lowering.scene import Lowered
 
 MOST = 1 << 22  # triangles that instances may become; further ones are left out
 

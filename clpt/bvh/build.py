@@ -115,9 +115,9 @@ def _build(
     n = max(count, 1)
     mesh = Mesh(
         n,
-        building.borrow(vertices, np.float32),
-        building.borrow(faces, np.uint32),
-        building.borrow(np.zeros(n, np.uint32) if tags is None else tags, np.uint32),
+        building.wrap_host(vertices, np.float32),
+        building.wrap_host(faces, np.uint32),
+        building.wrap_host(np.zeros(n, np.uint32) if tags is None else tags, np.uint32),
         quality,
     )
     packed = LAYOUTS[layout](building, mesh)
@@ -178,7 +178,7 @@ def build_boxes(device: Device, boxes: NDArray, layout: str = "shapes") -> Bvh:
     boxes = np.asarray(boxes, np.float32).reshape(-1, 2, 3)
     _check_reach(boxes, "a shape's box")
     building, n = Building(device), len(boxes)
-    packed = BOX_LAYOUTS[layout](building, n, building.borrow(boxes, np.float32))
+    packed = BOX_LAYOUTS[layout](building, n, building.wrap_host(boxes, np.float32))
     building.stream.wait()
     stats = {"seconds": time.perf_counter() - start}
     return Bvh(layout, n, packed.buffers, (packed.part,), stats)

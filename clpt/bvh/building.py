@@ -54,7 +54,7 @@ class Building:
             return array
         return self.buffers.upload("the scene's triangles", array, dtype, _RAISED)
 
-    def borrow(self, array: Array, dtype: DTypeLike) -> cl.Buffer:
+    def wrap_host(self, array: Array, dtype: DTypeLike) -> cl.Buffer:
         """As `upload`, until the build has ended: a CPU reads an array of that type where it lies.
 
         The caller keeps the array, and waits for the stream before it forgets it.
@@ -75,5 +75,5 @@ class Building:
         program = self._programs.get(root)
         if program is None:
             program = self._programs[root] = build_program(self.device, _source(root))
-        with program.lend(kernel, **arguments) as bound:
+        with program.borrow_kernel(kernel, **arguments) as bound:
             self.stream.run(bound, (-(-n // group) * group,), (group,))

@@ -11,6 +11,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from clpt.render.wavefront.queues import WAYS
+
 from .. import benchmark
 from .. import device as dev
 from ..benchmark import comparing, records, scenes
@@ -18,7 +20,6 @@ from ..benchmark.comparing import Ratio
 from ..benchmark.figures import Figure
 from ..bvh import TREES
 from ..device.context import trial
-from ..render.queues import WAYS
 
 SLOWER = 3  # the exit status if a figure was refused, or is below --fail-below
 STAGES = (

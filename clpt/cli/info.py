@@ -13,8 +13,10 @@ import click
 from rich.console import Console
 from rich.table import Table
 
-from ..formats import load, studio
-from ..render.shapes import triangles
+from clpt.formats import load
+from clpt.formats.meshes import framing
+from clpt.render.lowering.geometry.shapes import triangles
+
 from ..scene import Scene, materials, shapes, textures
 from ..scene.params import Kind
 from .variables import variables
@@ -63,7 +65,7 @@ def summary(scene: Scene) -> dict[str, Any]:
     kinds = list(_nested(surfaces))
     lights = [light.kind for light in scene.lights[: len(scene.lights) - added["lights"]]]
     lights += [shape.emission.kind for shape in surfaces if shape.emission is not None]
-    bounds = [corner.tolist() for corner in studio.world_bounds(own)] if own else None
+    bounds = [corner.tolist() for corner in framing.world_bounds(own)] if own else None
     return {
         "format": scene.extra.get("format", "python"),
         "triangles": sum(counts.values()),

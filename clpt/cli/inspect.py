@@ -47,7 +47,7 @@ class Opened:
     lambdas: np.ndarray | None
     colours: np.ndarray | None
     quantity: str
-    facts: dict[str, str]
+    stats: dict[str, str]
 
 
 @click.command()
@@ -72,7 +72,7 @@ def inspect(file: Path, places: tuple[Place, ...], output: Path | None, as_json:
     if as_json:
         pixels = [{"at": place, "values": values.tolist()} for place, values in found.items()]
         names = {"wavelengths": image.lambdas.tolist()} if image.lambdas is not None else {}
-        told = {**image.facts, "channels": image.labels, **names, "pixels": pixels}
+        told = {**image.stats, "channels": image.labels, **names, "pixels": pixels}
         click.echo(json.dumps(told, indent=2))
     else:
         _tell(image, found)
@@ -103,8 +103,8 @@ def opened(path: Path) -> Opened:
     colours = values[..., :3] if labels[:3] == tuple("RGB") else None
     if labels[0] == "Y":
         colours = np.repeat(values[..., :1], 3, axis=2)
-    facts = {"size": _size(values), "channels": str(len(labels))}
-    return Opened(path, values, labels, None, colours, "value (linear)", facts)
+    stats = {"size": _size(values), "channels": str(len(labels))}
+    return Opened(path, values, labels, None, colours, "value (linear)", stats)
 
 
 def _spectral(path: Path) -> Opened:
@@ -113,7 +113,7 @@ def _spectral(path: Path) -> Opened:
     quantity = "reflectance"
     if image.emissive:
         quantity = f"radiance [{image.units}]" if image.units else "radiance"
-    facts = {
+    stats = {
         "size": _size(image.values),
         "holds": "light" if image.emissive else "reflectances",
         "bands": f"{len(lambdas)}, {lambdas[0]:g} to {lambdas[-1]:g} nm",
@@ -125,7 +125,7 @@ def _spectral(path: Path) -> Opened:
     }
     colours = image.to_rgb() * np.float32(2.0**image.exposure)
     labels = tuple(f"{nm:g} nm" for nm in lambdas)
-    return Opened(path, image.values, labels, lambdas, colours, quantity, facts)
+    return Opened(path, image.values, labels, lambdas, colours, quantity, stats)
 
 
 def _size(values: np.ndarray) -> str:
@@ -157,10 +157,10 @@ def _tell(image: Opened, found: dict[Place, np.ndarray]) -> None:
     if not console.is_terminal:
         console = Console(width=200)  # a file or a pipe has no edge to wrap at
     console.print(str(image.path), markup=False, highlight=False)
-    facts = Table(show_header=False)
-    for name, value in image.facts.items():
-        facts.add_row(name, value)
-    console.print(facts)
+    stats = Table(show_header=False)
+    for name, value in image.stats.items():
+        stats.add_row(name, value)
+    console.print(stats)
     if not found:
         return
     console.print(image.quantity, markup=False)

@@ -6,11 +6,12 @@ from pathlib import Path
 
 import click
 
+from clpt.render.codegen.programs import film_sources, sources
+from clpt.render.lowering.scene import lower
+
 from ..bvh.layouts import LAYOUTS
 from ..errors import SceneError
 from ..formats import load
-from ..render.lower import lower
-from ..render.programs import film_sources, sources
 from .variables import variables
 
 

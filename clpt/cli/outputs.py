@@ -7,11 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
+from clpt.render.aov_preview import sheet
+
 from .. import __version__, images, spectral_exr
 from ..errors import SceneError
 from ..render.pictures import Image
 from ..render.renderer import Renderer
-from ..render.views import sheet
 from ..scene import Scene
 from ..scene.integrators import Aov
 from ..spectra.spaces import chromaticities
@@ -56,36 +57,36 @@ def metadata(renderer: Renderer, scene: Path, seconds: float) -> dict[str, str |
 
 
 def write(
-    path: Path, renderer: Renderer, facts: dict[str, str | int | float], exposure: float
+    path: Path, renderer: Renderer, stats: dict[str, str | int | float], exposure: float
 ) -> None:
     """Write the picture so far. Raises SceneError."""
     film = renderer.scene.film
     if film.bands and path.suffix.lower() in BAND_FORMATS and not renderer.channels:
-        _write_bands(path, renderer, facts)
+        _write_bands(path, renderer, stats)
     elif not renderer.channels:
         picture = renderer.colours()
         layers = {} if renderer.scene.noise is None else {"samples": renderer.film.get()[..., 3]}
         images.write(
-            path, picture, metadata=facts, exposure=exposure, layers=layers, space=film.output_space
+            path, picture, metadata=stats, exposure=exposure, layers=layers, space=film.output_space
         )
     elif path.suffix.lower() == ".png":
         images.write(path, sheet(renderer.layers()), exposure=exposure)
     else:
-        _write_layers(path, renderer.layers(), facts)
+        _write_layers(path, renderer.layers(), stats)
 
 
-def _write_bands(path: Path, renderer: Renderer, facts: dict[str, str | int | float]) -> None:
+def _write_bands(path: Path, renderer: Renderer, stats: dict[str, str | int | float]) -> None:
     """All bands: an array, or a spectral .exr that shows the film's colours."""
     if path.suffix.lower() == ".npy":
         np.save(path, renderer.image())
         return
-    stated = {**facts, "chromaticities": chromaticities(renderer.scene.film.output_space)}
+    stated = {**stats, "chromaticities": chromaticities(renderer.scene.film.output_space)}
     preview = renderer.colours()
     spectral_exr.write(path, renderer.spectral_image(), preview=preview, metadata=stated)
 
 
 def _write_layers(
-    path: Path, layers: dict[str, Image], facts: dict[str, str | int | float]
+    path: Path, layers: dict[str, Image], stats: dict[str, str | int | float]
 ) -> None:
     """One .exr: the first layer of colours as its picture, each layer by its name, in float."""
     colours = [layer for layer in layers.values() if layer.shape[2] == 3]
@@ -97,4 +98,4 @@ def _write_layers(
             named |= {f"{name}.u": layer[..., 0], f"{name}.v": layer[..., 1]}
         else:
             named[name] = layer
-    images.write(path, picture, half=False, metadata=facts, layers=named)
+    images.write(path, picture, half=False, metadata=stats, layers=named)

@@ -21,7 +21,7 @@ from ..spectra import read_sensor, spaces
 from ..spectra.sensors import OBSERVERS
 from . import outputs, report
 from .display import display
-from .exposing import expose
+from .rendering import render_samples
 from .variables import variables
 
 INTERRUPTED = 130
@@ -180,15 +180,15 @@ def render(
         report.before(renderer, loading)
     began = time.perf_counter()
     with shown.rendering():
-        finished = expose(renderer, spp, limit, shown.show, plan.noise)
+        finished = render_samples(renderer, spp, limit, shown.show, plan.noise)
     seconds = time.perf_counter() - began
     rejected = sum(wavefront.counts.rejected for wavefront in renderer.wavefronts)
     if rejected:
         shown.note(f"clpt: warning: {rejected} samples were not finite and count as black")
-    facts = outputs.metadata(renderer, scene, seconds)
+    stats = outputs.metadata(renderer, scene, seconds)
     for target in targets:
-        outputs.write(target, renderer, facts, exposure)
-        shown.note(f"{target}  {facts['spp']:.4g} spp, {seconds:.1f} s")
+        outputs.write(target, renderer, stats, exposure)
+        shown.note(f"{target}  {stats['spp']:.4g} spp, {seconds:.1f} s")
     if verbose:
         report.after(renderer)
     return 0 if finished else INTERRUPTED

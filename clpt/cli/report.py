@@ -9,36 +9,36 @@ from ..render.renderer import Renderer
 
 def before(renderer: Renderer, loading: float) -> None:
     """Tell what the scene became and what that took; `loading` is what its file did [s]."""
-    first, facts = renderer.wavefronts[0], renderer.facts
+    first, stats = renderer.wavefronts[0], renderer.stats
     _line("device", renderer.device.info.label)
-    parts = [f"{facts.triangles:,} triangles"]
-    if facts.instances:
-        seen = f"{facts.triangles_instanced:,} triangles seen"
-        parts += [f"{facts.instances:,} instances", seen]
-    if facts.analytic:
-        parts.append(f"{facts.analytic:,} shapes as they are")
+    parts = [f"{stats.triangles:,} triangles"]
+    if stats.instances:
+        seen = f"{stats.triangles_instanced:,} triangles seen"
+        parts += [f"{stats.instances:,} instances", seen]
+    if stats.analytic:
+        parts.append(f"{stats.analytic:,} shapes as they are")
     _line("geometry", ", ".join(parts))
-    _line("lights", f"{facts.lights:,}")
-    for name, size in facts.trees.items():
+    _line("lights", f"{stats.lights:,}")
+    for name, size in stats.trees.items():
         layout = f"{first.tree.layout}, " if name == "triangles" else ""
         _line(f"tree {name}", layout + _bytes(size))
-    for name, size in sorted(facts.tables.items(), key=lambda item: -item[1]):
+    for name, size in sorted(stats.tables.items(), key=lambda item: -item[1]):
         _line(f"table {name}", _bytes(size))
     _line("paths", f"{first.slots:,} in flight, {first.lanes} to a work-item")
-    _line("device memory", _bytes(facts.memory))
-    others = facts.programs - facts.programs_kept
-    kept = f"{facts.programs_kept} from clpt's cache, {others} from the driver or its cache"
-    _line("programs", f"{facts.programs} in {facts.seconds['programs']:.2f} s: {kept}")
+    _line("device memory", _bytes(stats.memory))
+    others = stats.programs - stats.programs_cached
+    kept = f"{stats.programs_cached} from clpt's cache, {others} from the driver or its cache"
+    _line("programs", f"{stats.programs} in {stats.seconds['programs']:.2f} s: {kept}")
     _line("seconds to load", f"{loading:.2f}")
     for name in ("lower", "trees", "ready"):
         _line(
-            f"seconds {'until ' if name == 'ready' else 'for '}{name}", f"{facts.seconds[name]:.2f}"
+            f"seconds {'until ' if name == 'ready' else 'for '}{name}", f"{stats.seconds[name]:.2f}"
         )
 
 
 def after(renderer: Renderer) -> None:
     """Tell how long the first sample and each stage took."""
-    _line("seconds until a sample", f"{renderer.facts.seconds.get('first_sample', 0.0):.2f}")
+    _line("seconds until a sample", f"{renderer.stats.seconds.get('first_sample', 0.0):.2f}")
     if renderer.scene.noise is not None:
         samples = renderer.film.get()[..., 3]
         done = 1.0 - renderer.active

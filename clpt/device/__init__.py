@@ -3,14 +3,14 @@
 from .array import DeviceArray, supersede
 from .buffers import Buffers
 from .context import Device, DeviceInfo, choose, devices
-from .program import Argument, Bound, Kernel, Program, build, build_all, link
+from .program import Argument, BoundKernel, Kernel, Program, build, build_all, link
 from .source import Part, Source, Virtual, assemble, kernels_folder
 from .stream import Events, Stream
 from .timing import Timing, Timings
 
 __all__ = [
     "Argument",
-    "Bound",
+    "BoundKernel",
     "Buffers",
     "Device",
     "DeviceArray",

@@ -12,8 +12,9 @@ from functools import cached_property
 import numpy as np
 import pyopencl as cl
 
+from clpt.device import memory, program_cache, runtimes
+
 from ..errors import DeviceError
-from . import kept, memory, runtimes
 
 log = logging.getLogger(__name__)
 
@@ -76,19 +77,18 @@ class Choice:
 class Builds:
     """What has been built so far: programs, and the seconds that took (summed over threads).
 
-    kept: how many of them lay in clpt's cache; whether a driver takes one from its own, it does not
-    tell.
+    cached: how many of them came from clpt's own cache; drivers do not tell what theirs gave.
     """
 
     programs: int = 0
-    kept: int = 0
+    cached: int = 0
     seconds: float = 0.0
     _lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
 
-    def add(self, seconds: float, kept: bool) -> None:
+    def add(self, seconds: float, cached: bool) -> None:
         with self._lock:
             self.programs += 1
-            self.kept += kept
+            self.cached += cached
             self.seconds += seconds
 
 
@@ -102,7 +102,7 @@ class Device:
     def __init__(self, context: cl.Context, queue: cl.CommandQueue, info: DeviceInfo):
         self.context, self.queue, self.info = context, queue, info
         self.builds = Builds()
-        self.kept = kept.of(queue)
+        self.programs = program_cache.of(queue)
 
     @classmethod
     def open(cls, info: DeviceInfo, *, profiling: bool = False) -> Device:

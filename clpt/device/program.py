@@ -20,8 +20,9 @@ import numpy as np
 import pyopencl as cl
 from pyopencl.characterize import has_src_build_cache
 
+from clpt.device import disk_cache
+
 from ..errors import DeviceError, KernelBuildError
-from . import cache
 from .context import Device
 from .source import Source
 
@@ -75,7 +76,7 @@ class Argument:
 Signatures = Mapping[str, tuple[Argument, ...]]
 
 
-class _Remarks:
+class _QuietWarnings:
     """While any thread is inside, PyOpenCL does not warn of a driver's remarks: they are logged."""
 
     def __init__(self) -> None:
@@ -100,7 +101,7 @@ class _Remarks:
                 self._filters.__exit__(None, None, None)
 
 
-_REMARKS = _Remarks()
+_quiet_warnings = _QuietWarnings()
 
 
 class Program:
@@ -111,7 +112,7 @@ class Program:
 
     def __init__(self, name: str, cl_program: cl.Program, signatures: Signatures):
         self.name, self.cl_program, self.signatures = name, cl_program, signatures
-        self._lent: dict[str, Bound] = {}
+        self._lent: dict[str, BoundKernel] = {}
         self._lending = threading.Lock()
 
     def kernel(self, name: str) -> Kernel:
@@ -122,7 +123,7 @@ class Program:
         return Kernel(self, name)
 
     @contextmanager
-    def lend(self, name: str, **named: Any) -> Iterator[Bound]:
+    def borrow_kernel(self, name: str, **named: Any) -> Iterator[BoundKernel]:
         """A kernel with its arguments, to enqueue; it is made the first time only.
 
         PyOpenCL takes half a millisecond to make one. Who asks meanwhile, on another thread, waits.
@@ -139,7 +140,7 @@ class Program:
             try:
                 yield bound
             finally:
-                bound.forget()
+                bound.drop_buffers()
 
 
 class Kernel:
@@ -149,7 +150,7 @@ class Kernel:
         self.program, self.name = program, name
         self.arguments = program.signatures[name]
 
-    def bind(self, **named: Any) -> Bound:
+    def bind(self, **named: Any) -> BoundKernel:
         """The kernel with every argument set, by name.
 
         Buffers for pointers (None is a null pointer), `pyopencl.LocalMemory` for local ones,
@@ -157,10 +158,10 @@ class Kernel:
 
         Raises TypeError if a name is missing or unknown, or a value does not fit.
         """
-        return Bound(self, named)
+        return BoundKernel(self, named)
 
 
-class Bound:
+class BoundKernel:
     """A kernel with its arguments: bind once, enqueue many times."""
 
     def __init__(self, kernel: Kernel, named: Mapping[str, Any]):
@@ -176,13 +177,13 @@ class Bound:
         missing = [name for name in self._places if name not in named]
         if missing:
             raise TypeError(f"kernel {self.kernel.name!r} also takes {', '.join(missing)}")
-        self.set(**named)
+        self.set_args(**named)
 
-    def forget(self) -> None:
+    def drop_buffers(self) -> None:
         """Let go of buffers, which the driver keeps while a command of them is under way."""
         self._values.clear()
 
-    def set(self, **named: Any) -> None:
+    def set_args(self, **named: Any) -> None:
         """Set arguments again by name. Raises TypeError as `Kernel.bind` does."""
         for name, given in named.items():
             plain = isinstance(given, (int, float, tuple))
@@ -266,22 +267,22 @@ def _once(
     """What `make` compiles, if neither the context nor, where `own`, the cache folder has it."""
     entry = _entry(device, source, flags)
     key = (device.info.cl_device.int_ptr, entry)  # devices of one context may be alike
-    program: Program | None = device.kept.find(key)
+    program: Program | None = device.programs.find(key)
     if program is not None:
         return program
     start = time.perf_counter()
-    with _REMARKS:
+    with _quiet_warnings:
         program = _from_cache(device, source, flags, entry) if own else None
         kept = program is not None
         if program is None:
             program = make()
             if own:  # what comes from there is compiled to the end, what was made may not be
-                cache.store(entry, _encode(program.signatures), _binary(program))
+                disk_cache.store(entry, _encode(program.signatures), _binary(program))
                 program = _from_cache(device, source, flags, entry) or program
     seconds = time.perf_counter() - start
     device.builds.add(seconds, kept)
     log.debug("%s is %s in %.2f s", source.name, "loaded" if kept else "built", seconds)
-    device.kept.keep(key, program)
+    device.programs.keep(key, program)
     return program
 
 
@@ -358,7 +359,7 @@ def _from_source(device: Device, source: Source, flags: list[str]) -> Program:
 
 def _from_cache(device: Device, source: Source, flags: list[str], entry: str) -> Program | None:
     """The program as it was kept; None if it was not, or the driver no longer takes it."""
-    kept = cache.load(entry)
+    kept = disk_cache.load(entry)
     if kept is None:
         return None
     try:
@@ -392,7 +393,7 @@ def _build_error(source: Source, log: str) -> KernelBuildError:
     rows = (row for row in log.splitlines() if re.search(r"\berror\b", row))
     first = next(filter(None, map(place.search, rows)), None)
     file, line = (first[1], int(first[2])) if first else (None, None)
-    return KernelBuildError(source.name, file, line, log, cache.keep_failed(source))
+    return KernelBuildError(source.name, file, line, log, disk_cache.keep_failed(source))
 
 
 def _kernels(program: cl.Program) -> list[cl.Kernel]:

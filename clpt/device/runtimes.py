@@ -19,7 +19,7 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from . import cache
+from clpt.device import disk_cache
 
 log = logging.getLogger(__name__)
 
@@ -75,8 +75,8 @@ def icd_files(folders: Iterable[Path]) -> dict[str, str]:
 def write_vendors(drivers: dict[str, str]) -> Path:
     """A folder in the user's cache with these ICD files; its name follows from its content."""
     digest = hashlib.sha256(repr(sorted(drivers.items())).encode()).hexdigest()[:16]
-    folder = cache.folder() / "vendors" / digest
+    folder = disk_cache.folder() / "vendors" / digest
     for name, driver in drivers.items():
         if not (folder / name).is_file():
-            cache.write_atomically(folder / name, driver.encode())
+            disk_cache.write_atomically(folder / name, driver.encode())
     return folder

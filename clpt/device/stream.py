@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pyopencl as cl
 
-from .program import Bound
+from .program import BoundKernel
 
 Events = Iterable[cl.Event] | None  # as `wait_for` takes them
 
@@ -37,7 +37,10 @@ class Stream:
         self._before += events or ()
 
     def run(
-        self, bound: Bound, global_size: Sequence[int], local_size: Sequence[int] | None = None
+        self,
+        bound: BoundKernel,
+        global_size: Sequence[int],
+        local_size: Sequence[int] | None = None,
     ) -> cl.Event:
         """Enqueue a kernel. Raises DeviceError if the driver refuses it."""
         return self._note(bound.enqueue(self.queue, global_size, local_size, self._waits()))

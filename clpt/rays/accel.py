@@ -13,7 +13,7 @@ from .. import bvh
 from ..device import Events
 from ..errors import SceneError
 from . import batch
-from .arrays import Given, held, on_device
+from .arrays import Given, device_arg, on_device
 from .queries import AllHits, Queries
 
 
@@ -112,7 +112,7 @@ class Accel(Queries):
     def _fill(self, kernel: str, rays: batch.Rays, arrays: dict[str, NDArray[Any]]) -> None:
         """Run a kernel on arrays of the host."""
         context, shares = self._where
-        places = {name: batch.lent(context, array, shares) for name, array in arrays.items()}
+        places = {name: batch.wrap_host(context, array, shares) for name, array in arrays.items()}
         self._wait(kernel, rays, arrays, places)
 
     def _laid(self, name: str, given: Given, *kinds: type) -> tuple[Any, int]:
@@ -129,7 +129,7 @@ class Accel(Queries):
                 there = f"{array.shape} {array.dtype}"
                 raise SceneError(f"{wanted} is wanted, not {there}", where=name)
             return array, len(array)
-        found = held(self.queue.context, name, given, 3, *kinds)
+        found = device_arg(self.queue.context, name, given, 3, *kinds)
         if not found.rows:
             return np.zeros((0, 3), kinds[0]), 0
         self._stream.after(found.events)
@@ -145,4 +145,4 @@ class Accel(Queries):
         """The array on the device, at once; None for no values. What is there is taken as it is."""
         if not isinstance(array, np.ndarray):
             return array
-        return batch.lent(self.queue.context, np.ascontiguousarray(array, kind), False).buffer
+        return batch.wrap_host(self.queue.context, np.ascontiguousarray(array, kind), False).buffer

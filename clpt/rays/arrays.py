@@ -17,7 +17,7 @@ Given: TypeAlias = Any  # what numpy makes an array of, a pyopencl Array, or a B
 
 
 @dataclass
-class Held:
+class DeviceArg:
     """Values on the device.
 
     buffer: what they lie in, None for none at all; begin: where, in elements; rows: how many;
@@ -35,7 +35,9 @@ def on_device(given: Given) -> bool:
     return isinstance(given, (Array, cl.MemoryObjectHolder))
 
 
-def held(context: cl.Context, name: str, given: Given, columns: int, *dtypes: type) -> Held:
+def device_arg(
+    context: cl.Context, name: str, given: Given, columns: int, *dtypes: type
+) -> DeviceArg:
     """An argument that is on the device, looked at.
 
     columns: of its rows, 0 if it has one axis; dtypes: those it may have, the first that of a
@@ -48,7 +50,7 @@ def held(context: cl.Context, name: str, given: Given, columns: int, *dtypes: ty
         rows, rest = divmod(given.size, size * max(columns, 1))
         if rest:
             raise _wrong(name, f"{given.size} bytes", columns, dtypes[0])
-        return Held(given, rows)
+        return DeviceArg(given, rows)
     shape = given.shape
     if len(shape) != (2 if columns else 1) or (columns and shape[1] != columns):
         raise _wrong(name, shape, columns, dtypes[0])
@@ -56,7 +58,7 @@ def held(context: cl.Context, name: str, given: Given, columns: int, *dtypes: ty
         raise _wrong(name, f"{shape} {given.dtype}", columns, dtypes[0])
     if not given.flags.c_contiguous:
         raise SceneError(f"its rows do not stand behind each other: {given.strides}", where=name)
-    return Held(given.base_data, shape[0], given.offset // size, given.events)
+    return DeviceArg(given.base_data, shape[0], given.offset // size, given.events)
 
 
 def _wrong(name: str, found: Any, columns: int, dtype: type) -> SceneError:

@@ -13,8 +13,8 @@ from ..device import Buffers, Events
 from ..errors import SceneError
 from ..records import INSTANCE
 from .accel import Accel
-from .arrays import Given, Held, held, on_device
-from .batch import lent
+from .arrays import DeviceArg, Given, device_arg, on_device
+from .batch import wrap_host
 from .queries import Queries
 
 _ADVICE = "place fewer or smaller meshes"
@@ -118,19 +118,19 @@ class InstancedAccel(Queries):
             message = f"{which.max()} is none of {len(self.accels)} meshes"
             raise SceneError(message, where="prototypes")
 
-    def _laid(self, transforms: Given) -> Held:
+    def _laid(self, transforms: Given) -> DeviceArg:
         """Transforms on the device."""
         if on_device(transforms):
             shape = getattr(transforms, "shape", ())
             flat = transforms.reshape(-1, 16) if shape[1:] == (4, 4) else transforms
-            found = held(self.queue.context, "transforms", flat, 16, np.float32)
+            found = device_arg(self.queue.context, "transforms", flat, 16, np.float32)
             if getattr(transforms, "events", ()):
                 found.events = transforms.events
         else:
             array = np.ascontiguousarray(transforms, np.float32)
             if array.shape[1:] != (4, 4):
                 raise SceneError(f"(k, 4, 4) is wanted, not {array.shape}", where="transforms")
-            found = lent(self.queue.context, array, False)
+            found = wrap_host(self.queue.context, array, False)
         if found.rows != self.count:
             message = f"{self.count} instances have {found.rows} of them"
             raise SceneError(message, where="transforms")
@@ -163,10 +163,10 @@ class InstancedAccel(Queries):
     def _instances_text(self) -> str:
         return "\n".join(
             [
-                '#include "lib/lanes.cl"',
-                '#include "lib/math.cl"',
+                '#include "core/lanes.cl"',
+                '#include "core/math.cl"',
                 "typedef struct { global const uint *instances; } Scene;",
                 INSTANCE.row_text(),
-                f'#include "lib/instances_{self.layout}.cl"\n',
+                f'#include "tracing/instances_{self.layout}.cl"\n',
             ]
         )

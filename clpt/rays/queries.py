@@ -14,20 +14,20 @@ from numpy.typing import NDArray
 from pyopencl.array import Array
 
 from ..bvh import TREES, choose_tree, traversal_text
-from ..device import Bound, Device, Events, Program, Stream, assemble, build
+from ..device import BoundKernel, Device, Events, Program, Stream, assemble, build
 from ..errors import DeviceError, SceneError
 from ..records import INSTANCE
 from . import batch
-from .arrays import Given, Held
+from .arrays import DeviceArg, Given
 
 _GROUP = 64  # rays of a work-group
-_BATCH = 64  # BATCH of kernels/bvh/query_flights.cl
+_BATCH = 64  # BATCH of kernels/bvh/query_interleaved.cl
 _HITS: batch.Made = {
     "t": (0, np.float32),
     "primitive": (0, np.int32),
     "barycentrics": (2, np.float32),
 }
-_ONE_BY_ONE, _FLIGHTS = "bvh/query.cl", "bvh/query_flights.cl"
+_ONE_BY_ONE, _FLIGHTS = "bvh/query.cl", "bvh/query_interleaved.cl"
 _PROGRAMS = {  # of a kernel: the program that has it, and whether it meets all triangles of a ray
     "query_closest": (_ONE_BY_ONE, False),
     "query_occluded": (_ONE_BY_ONE, False),
@@ -87,7 +87,7 @@ class Queries:
         self._where = queue.context, self.device.info.is_cpu
         self._stream = Stream(queue)
         self._lock = threading.RLock()
-        self._kernels: dict[str, Bound] = {}
+        self._kernels: dict[str, BoundKernel] = {}
         self._flights = False  # whether work-items have several rays in flight
         self._trees: dict[str, cl.Buffer] | None = {}
 
@@ -194,7 +194,7 @@ class Queries:
         name: str,
         rays: batch.Rays,
         arrays: Mapping[str, NDArray[Any]],
-        places: Mapping[str, Held],
+        places: Mapping[str, DeviceArg],
     ) -> cl.Event:
         """Run a kernel that writes arrays of the host."""
         event = self._enqueue(name, rays, places)
@@ -203,12 +203,12 @@ class Queries:
                 event = self._stream.read_later(places[key].buffer, array)
         event.wait()
         if rays.count:  # the kernel lets go of the host's memory
-            self._kernels[name].set(**dict.fromkeys([*_LENT, *places]))
+            self._kernels[name].set_args(**dict.fromkeys([*_LENT, *places]))
         return event
 
-    def _enqueue(self, name: str, rays: batch.Rays, places: Mapping[str, Held]) -> cl.Event:
+    def _enqueue(self, name: str, rays: batch.Rays, places: Mapping[str, DeviceArg]) -> cl.Event:
         """Enqueue a kernel for every ray, after what its arrays wait for."""
-        parts = [*rays.held, *places.values()]
+        parts = [*rays.device_arg, *places.values()]
         self._stream.after([event for part in parts for event in part.events])
         if not rays.count:
             return self._stream.mark()
@@ -217,20 +217,20 @@ class Queries:
             **rays.named,
             **{key: place.buffer for key, place in places.items()},
             "count": rays.count,
-            "begins": batch.begins(parts),
+            "begins": batch.offsets(parts),
         }
         bound = self._bind(name, arguments)
         if self._program_of(name) == _FLIGHTS:
             return self._stream.run(bound, (-(-rays.count // _BATCH),), (1,))
         return self._stream.run(bound, (-(-rays.count // _GROUP) * _GROUP,), (_GROUP,))
 
-    def _bind(self, name: str, arguments: Mapping[str, Any]) -> Bound:
+    def _bind(self, name: str, arguments: Mapping[str, Any]) -> BoundKernel:
         """A kernel with its arguments; the same one each time."""
         bound = self._kernels.get(name)
         if bound is None:
             bound = self._kernels[name] = self._program(name).kernel(name).bind(**arguments)
         else:
-            bound.set(**arguments)
+            bound.set_args(**arguments)
         return bound
 
     def _program(self, kernel: str) -> Program:

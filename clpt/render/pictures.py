@@ -13,10 +13,10 @@ from pyopencl.array import Array
 from clpt import device as dev
 from clpt import images
 from clpt.errors import SceneError, UnknownKindError
+from clpt.render.aov_preview import sheet
+from clpt.render.locking import DeviceOwner, synchronized
 from clpt.render.resolve import Resolve
-from clpt.render.turns import Turns, alone
-from clpt.render.views import sheet
-from clpt.render.wavefront import Wavefront
+from clpt.render.wavefront.wavefront import Wavefront
 from clpt.scene import Scene
 from clpt.scene.integrators import CHANNELS
 from clpt.spectral_exr import SpectralImage
@@ -24,7 +24,7 @@ from clpt.spectral_exr import SpectralImage
 Image = NDArray[np.float32]
 
 
-class Pictures(Turns):
+class Pictures(DeviceOwner):
     """Base of what renders: its picture as an array, on the device or the host.
 
     channels: of the `aov` integrator, else none; wavefronts: one a channel, at least one.
@@ -36,7 +36,7 @@ class Pictures(Turns):
     wavefronts: list[Wavefront]
 
     @property
-    @alone
+    @synchronized
     def film(self) -> dev.DeviceArray:
         """The picture so far on the device, (h, w, 4) float32, valid when its `events` have ended.
 
@@ -47,12 +47,12 @@ class Pictures(Turns):
         return self.wavefronts[0].film
 
     @property
-    @alone
+    @synchronized
     def films(self) -> dict[str, dev.DeviceArray]:
         """The values of the `aov` integrator by name, as `film` has them."""
         return {n: w.film for n, w in zip(self.channels, self.wavefronts, strict=True)}
 
-    @alone
+    @synchronized
     def resolve(
         self,
         into: Array | cl.MemoryObject | None = None,
@@ -101,7 +101,7 @@ class Pictures(Turns):
             return images.png(images.to_srgb8(sheet(self.layers())))
         return images.png(self.resolve().get()[..., :3])
 
-    @alone
+    @synchronized
     def image(self) -> Image:
         """The picture so far: (h, w, 3) float32, linear in the film's output space.
 
@@ -114,7 +114,7 @@ class Pictures(Turns):
             return self.wavefronts[0].bands() * np.float32(film.exposure)
         return self.colours()
 
-    @alone
+    @synchronized
     def colours(self) -> Image:
         """The picture so far in three colours, (h, w, 3) float32, also of a film with bands."""
         return self.wavefronts[0].image()
@@ -125,7 +125,7 @@ class Pictures(Turns):
             raise SceneError("this picture has no bands; set the film's", where="film.bands")
         return SpectralImage(self.image(), self.scene.film.band_centres, emissive=True)
 
-    @alone
+    @synchronized
     def layers(self) -> dict[str, Image]:
         """The values of the `aov` integrator by name, (h, w, 1 to 3) float32."""
         return {

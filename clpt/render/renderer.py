@@ -15,14 +15,22 @@ import pyopencl as cl
 
 from clpt import device as dev
 from clpt.errors import DeviceError, SceneError
-from clpt.render import adaptive, updates, values
-from clpt.render.edits import MaterialKey, Names, ShapeKey, adopted, edited, followed
-from clpt.render.facts import Facts, gather
-from clpt.render.lower import lower
-from clpt.render.moving import Moving
+from clpt.render.editing import parameter_patch, rebuild
+from clpt.render.editing.moving import Moving
+from clpt.render.editing.scene_edit import (
+    MaterialKey,
+    Names,
+    ShapeKey,
+    edited,
+    match_replacements,
+    resolve_device_arrays,
+)
+from clpt.render.locking import synchronized
+from clpt.render.lowering.scene import lower
 from clpt.render.pictures import Image, Pictures
-from clpt.render.turns import alone
-from clpt.render.wavefront import Wavefront
+from clpt.render.stats import RenderStats, collect
+from clpt.render.wavefront import adaptive
+from clpt.render.wavefront.wavefront import Wavefront
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
 from clpt.scene.integrators import Aov
@@ -57,7 +65,7 @@ class Renderer(Pictures):
     commands go there, and nothing else is made or changed. progress: called when a step has ended,
     in a thread of the driver.
     texture_budget: [bytes] that bitmaps may take, larger ones are halved; by default half of what
-    the device has free. The other parameters are those of clpt.render.wavefront.Wavefront.
+    the device has free. The other parameters are those of clpt.render.wavefront.wavefront.Wavefront.
 
     It may be used from several threads: one method runs at a time. With `with`, `close`, or when it
     is dropped, it gives the device's memory back.
@@ -90,19 +98,19 @@ class Renderer(Pictures):
         if isinstance(scene.integrator, Aov):
             self.channels = scene.integrator.channels
         self._start = time.perf_counter()
-        before = device.builds.programs, device.builds.kept
+        before = device.builds.programs, device.builds.cached
         if texture_budget is None:
             texture_budget = _texture_budget(device)
         self._texture_budget, self._names = texture_budget, Names()
-        lowered = lower(adopted(scene, device.queue), texture_budget)
+        lowered = lower(resolve_device_arrays(scene, device.queue), texture_budget)
         self._seconds = {"lower": time.perf_counter() - self._start}
         paths = scene.spp * math.prod(scene.film.size)
         wanted = {"paths": paths, "looped": None if queue is None else True, **wavefront}
         first = Wavefront(device, lowered, **wanted)
-        self.wavefronts = [first, *(first.sibling(channel) for channel in self.channels[1:])]
+        self.wavefronts = [first, *(first.with_channel(channel) for channel in self.channels[1:])]
         for front in self.wavefronts:  # so that the first samples come at once
             _ = front.loop if front.looped else front.stages
-        self._built = device.builds.programs - before[0], device.builds.kept - before[1]
+        self._built = device.builds.programs - before[0], device.builds.cached - before[1]
         self._seconds |= {**first.seconds, "ready": time.perf_counter() - self._start}
         self.warnings = list(self.wavefronts[0].lowered.warnings)
         self.samples = 0
@@ -111,7 +119,7 @@ class Renderer(Pictures):
         self._adaptive: adaptive.Adaptive | None = None
         log.info("ready in %.2f s", self._seconds["ready"])
 
-    @alone
+    @synchronized
     def step(self, samples: int = 1, wait_for: dev.Events = None) -> cl.Event:
         """Enqueue that every pixel gets `samples` more; `self.samples` tells how many it then has.
 
@@ -152,7 +160,7 @@ class Renderer(Pictures):
 
         event.set_callback(cl.command_execution_status.COMPLETE, tell)
 
-    @alone
+    @synchronized
     def run(
         self,
         samples: int,
@@ -163,7 +171,7 @@ class Renderer(Pictures):
         """Add samples to every pixel and wait; `samples` in all are kept in `self.samples`.
 
         noise: leave pixels as soon as the noise around them is as low, relative to the picture,
-        such as 0.02; `samples` is then the most that a pixel gets. See clpt.render.adaptive.
+        such as 0.02; `samples` is then the most that a pixel gets. See clpt.render.wavefront.adaptive.
         progress: called every few milliseconds to seconds; if it returns False the run stops soon,
         as after `cancel`. Returns whether it came to its end. What progress raises, or Ctrl+C in
         it, is raised when the paths in flight have ended: the film is whole then too.
@@ -203,7 +211,9 @@ class Renderer(Pictures):
     ) -> bool:
         """Add samples to all pixels, or where there is noise; whether that came to its end."""
         if noise is None:
-            finished = all(wavefront.expose(first, end, tell) for wavefront in self.wavefronts)
+            finished = all(
+                wavefront.render_samples(first, end, tell) for wavefront in self.wavefronts
+            )
             if finished and self._adaptive is not None:
                 self._adaptive.skip(end)
             return finished
@@ -225,7 +235,7 @@ class Renderer(Pictures):
         """
         self._stop.set()
 
-    @alone
+    @synchronized
     def reset(self, wait_for: dev.Events = None) -> cl.Event:
         """Enqueue that the film is emptied; the next sample is number 0 again."""
         stream = self.wavefronts[0].stream
@@ -242,7 +252,7 @@ class Renderer(Pictures):
         It waits for a `run` of another thread, not for what was enqueued. An array that the caller
         still holds, such as `film`, keeps its memory. Dropping a renderer does the same.
         """
-        with self._turn:
+        with self._lock:
             self._closed = True
             self.wavefronts, self._moving, self._adaptive = [], None, None
             self.__dict__.pop("_resolve", None)
@@ -253,7 +263,7 @@ class Renderer(Pictures):
     def __exit__(self, *error: object) -> None:
         self.close()
 
-    @alone
+    @synchronized
     def update(
         self,
         *,
@@ -276,7 +286,7 @@ class Renderer(Pictures):
         images, is not looked at again.
 
         What only moves does so on the device, where trees are fitted to it, see
-        clpt.render.moving; nothing is waited for. Else what the device needs is found by lowering
+        clpt.render.editing.moving; nothing is waited for. Else what the device needs is found by lowering
         again: tables are written where they differ, trees built where triangles do, kernels built
         where others are needed. `self.scene` is then the new scene, and the picture will be that of
         a new renderer.
@@ -293,14 +303,14 @@ class Renderer(Pictures):
             if materials is None and camera is None:
                 return event
         new = self.scene if scene is None else scene
-        swaps = {} if scene is None else followed(self.scene, new)
+        swaps = {} if scene is None else match_replacements(self.scene, new)
         if materials or transforms or vertices:
             new, more = edited(new, self._names, materials, transforms, vertices)
             swaps |= more
         if camera is not None:
             new = dataclasses.replace(new, camera=camera)
         only = scene is None and not transforms and not vertices
-        if not (only and values.rewrite(self.wavefronts, self.scene, new)):
+        if not (only and parameter_patch.rewrite(self.wavefronts, self.scene, new)):
             for event in events:
                 event.wait()  # arrays on the device may be read
             self._lower_again(new, refit=scene is None)
@@ -325,15 +335,17 @@ class Renderer(Pictures):
         if getattr(scene.integrator, "channels", ()) != self.channels:
             raise SceneError("other channels need a new Renderer", where="integrator.channels")
         front = self.wavefronts[0]
-        lowered = lower(adopted(scene, front.stream.queue), self._texture_budget, front.lowered)
-        updates.take(self.wavefronts, lowered, refit)
+        lowered = lower(
+            resolve_device_arrays(scene, front.stream.queue), self._texture_budget, front.lowered
+        )
+        rebuild.take(self.wavefronts, lowered, refit)
         self.warnings = list(lowered.warnings)
 
     @property
-    @alone
-    def facts(self) -> Facts:
+    @synchronized
+    def stats(self) -> RenderStats:
         """What the render took so far: numbers of things, bytes by table and tree, seconds."""
-        return gather(self.wavefronts, *self._built, dict(self._seconds))
+        return collect(self.wavefronts, *self._built, dict(self._seconds))
 
 
 def _whole(samples: int) -> int:

@@ -55,7 +55,7 @@ class Resolve:
         self.device, self.stream = on, stream
         self.program = device.build(on, device.assemble("stage/resolve.cl"))
         self.steps = device.Buffers(on).upload("the sRGB transfer", srgb8_steps())
-        self._bound: dict[str, device.Bound] = {}
+        self._bound: dict[str, device.BoundKernel] = {}
 
     def __call__(
         self,
@@ -99,10 +99,10 @@ class Resolve:
         device.supersede(target.memory, event)
         return target.memory
 
-    def _bind(self, kernel: str, named: dict[str, Any]) -> device.Bound:
+    def _bind(self, kernel: str, named: dict[str, Any]) -> device.BoundKernel:
         """A kernel with its arguments; it is kept, as making one takes longer than setting them."""
         if kernel in self._bound:
-            self._bound[kernel].set(**named)
+            self._bound[kernel].set_args(**named)
         else:
             self._bound[kernel] = self.program.kernel(kernel).bind(**named)
         return self._bound[kernel]

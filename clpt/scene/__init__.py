@@ -49,7 +49,7 @@ class Scene:
     shapes, lights: what there is; lights that are surfaces are a shape's `emission`. integrator:
     how light is followed; sampler: where its random numbers come from; film: size, mode, filter and
     colours of the picture. spp: samples of a pixel, for `clpt.render`; noise: below which it gets
-    no more, None for all, see clpt.render.adaptive; seed: of the random numbers.
+    no more, None for all, see clpt.render.wavefront.adaptive; seed: of the random numbers.
     warnings: what a loader had to pass over; extra: what else it found, for people.
 
     Raises SceneError for `spp` that is no whole number above zero, and `noise` likewise.

@@ -73,12 +73,12 @@ class Material(Kind):
 
     source: ClassVar[str | Path | None] = None
     delta: ClassVar[bool] = False  # every lobe is one: a light cannot be sampled through it
-    choosy: ClassVar[bool] = False  # `sample` uses u.z
+    uses_lobe_sample: ClassVar[bool] = False  # `sample` uses u.z
     chromatic: ClassVar[bool] = False  # the pdf differs between wavelengths: it has `pdfs`
     disperses: ClassVar[bool] = False  # whatever its parameters, directions depend on wavelength
-    shifts: ClassVar[bool] = False  # light may leave at another wavelength: it has `shift`
-    passes: ClassVar[bool] = False  # light goes on as if nothing were there, to lights as well
-    hollow: ClassVar[bool] = False  # its back is not there
+    fluoresces: ClassVar[bool] = False  # light may leave at another wavelength: it has `shift`
+    is_null: ClassVar[bool] = False  # light goes on as if nothing were there, to lights as well
+    no_back: ClassVar[bool] = False  # its back is not there
 
     @property
     def transmits(self) -> bool:
@@ -86,7 +86,7 @@ class Material(Kind):
         return False
 
     @property
-    def turns(self) -> bool:
+    def uses_tangents(self) -> bool:
         """Whether what it does differs between the tangent and across."""
         u, v = (getattr(self, name, None) for name in ("alpha_u", "alpha_v"))
         return u is not v and u != v
@@ -109,7 +109,7 @@ class Phong(Material):
     mirror share that only the `whitted` integrator knows.
     """
 
-    choosy = True
+    uses_lobe_sample = True
 
     diffuse: Any = reflectance(0.5, "diffuse albedo")
     specular: Any = reflectance(0.2, "albedo of the lobe")
@@ -122,7 +122,7 @@ class Dielectric(Material):
     """A smooth boundary of two dielectrics; both sides."""
 
     delta = True
-    choosy = True
+    uses_lobe_sample = True
 
     int_ior: Any = index(1.5046, "inside index, number, glass name or spectrum")
     ext_ior: Any = index(1.000277, "outside index")
@@ -141,7 +141,7 @@ class ThinDielectric(Material):
     """A thin slab of a dielectric: reflections inside are summed, light passes undeviated."""
 
     delta = True
-    choosy = True
+    uses_lobe_sample = True
 
     int_ior: Any = index(1.5046, "index of the slab")
     ext_ior: Any = index(1.000277, "index around it")
@@ -157,7 +157,7 @@ class ThinDielectric(Material):
 class RoughDielectric(Material):
     """A rough boundary of two dielectrics (Walter et al. 2007); both sides."""
 
-    choosy = True
+    uses_lobe_sample = True
     chromatic = True
 
     int_ior: Any = index(1.5046, "inside index")
@@ -204,7 +204,7 @@ class RoughConductor(Material):
 class Plastic(Material):
     """A diffuse base under a smooth dielectric coat, with all internal reflections; front side."""
 
-    choosy = True
+    uses_lobe_sample = True
 
     diffuse_reflectance: Any = reflectance(0.5, "albedo of the base")
     int_ior: Any = index(1.49, "index of the coat")
@@ -217,7 +217,7 @@ class Plastic(Material):
 class RoughPlastic(Material):
     """A diffuse base under a rough dielectric coat; front side."""
 
-    choosy = True
+    uses_lobe_sample = True
 
     diffuse_reflectance: Any = reflectance(0.5, "albedo of the base")
     int_ior: Any = index(1.49, "index of the coat")
@@ -235,7 +235,7 @@ class CoatedConductor(Material):
     Closed form: see docs/materials.md for how far it is from a random walk between the two.
     """
 
-    choosy = True
+    uses_lobe_sample = True
 
     coat_ior: Any = index(1.5046, "index of the coat")
     ext_ior: Any = index(1.000277, "index outside")
@@ -257,7 +257,7 @@ class Principled(Material):
     Both sides where `spec_trans` is above zero. The microfacets have the square of `roughness`.
     """
 
-    choosy = True
+    uses_lobe_sample = True
     chromatic = True
     tints = ("spec_tint", "sheen_tint")
 
@@ -279,7 +279,7 @@ class Principled(Material):
         return self.spec_trans != 0.0
 
     @property
-    def turns(self) -> bool:
+    def uses_tangents(self) -> bool:
         return self.anisotropic != 0.0
 
 
@@ -287,7 +287,7 @@ class Principled(Material):
 class PrincipledThin(Material):
     """The principled model of a thin sheet (Burley 2015), as Mitsuba 3 defines it; both sides."""
 
-    choosy = True
+    uses_lobe_sample = True
     tints = ("spec_tint", "sheen_tint")
 
     base_color: Any = reflectance(0.5, "colour of all but reflection and sheen")
@@ -308,7 +308,7 @@ class PrincipledThin(Material):
         return True
 
     @property
-    def turns(self) -> bool:
+    def uses_tangents(self) -> bool:
         return self.anisotropic != 0.0
 
 
@@ -319,7 +319,7 @@ class DiffuseTransmission(Material):
     Where the two shares add up to more than one they are scaled down to conserve energy.
     """
 
-    choosy = True
+    uses_lobe_sample = True
 
     transmittance: Any = reflectance(0.25, "share that goes through")
     reflectance: Any = reflectance(0.25, "share that is scattered back")
@@ -337,7 +337,7 @@ class GltfSurface(Material):
     microfacets have the square of a `roughness`, at least 0.001.
     """
 
-    choosy = True
+    uses_lobe_sample = True
     chromatic = True
     needs_wavelengths = True
 
@@ -371,7 +371,7 @@ class GltfSurface(Material):
         return self.transmission != 0.0 or self.diffuse_transmission != 0.0
 
     @property
-    def turns(self) -> bool:
+    def uses_tangents(self) -> bool:
         return self.anisotropy != 0.0
 
 
@@ -384,7 +384,7 @@ class Grating(Material):
     """
 
     delta = True
-    choosy = True
+    uses_lobe_sample = True
     disperses = True
     needs_wavelengths = True
 
@@ -412,7 +412,7 @@ class Grating(Material):
         return self.mode == "transmissive"
 
     @property
-    def turns(self) -> bool:
+    def uses_tangents(self) -> bool:
         return True
 
     def check(self) -> None:
@@ -428,7 +428,7 @@ class Fluorescent(Material):
     In RGB mode it is diffuse, of the colour that it has under D65, at most white.
     """
 
-    shifts = True
+    fluoresces = True
 
     reflectance: Any = reflectance(0.5, "albedo of the light that keeps its wavelength")
     reradiation: Any = reradiation(None, "what is given out at other wavelengths")
@@ -458,8 +458,8 @@ class Hair(Material):
     within a fibre's radius. What is let through is not reciprocal.
     """
 
-    choosy = True
-    hollow = True
+    uses_lobe_sample = True
+    no_back = True
 
     sigma_a: Any = factor(pigment(1.3, 0.2), "absorption, per radius of the fibre")
     longitudinal_roughness: Any = _share(0.3, "of the angle along the fibre")
@@ -472,7 +472,7 @@ class Hair(Material):
         return True
 
     @property
-    def turns(self) -> bool:
+    def uses_tangents(self) -> bool:
         return True
 
 
@@ -481,7 +481,7 @@ class Null(Material):
     """No surface at all: light passes as if it were not there."""
 
     delta = True
-    passes = True
+    is_null = True
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -510,7 +510,7 @@ class Blend(Material):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Bent(Material):
+class NormalMapped(Material):
     """Base of the maps that bend the shading normal. Their flags and defaults are Mitsuba 3's."""
 
     material: Any = host(Diffuse(), "what is shaded with the bent normal")
@@ -520,7 +520,7 @@ class Bent(Material):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class NormalMap(Bent):
+class NormalMap(NormalMapped):
     """Takes the shading normal from an image, relative to that of the surface."""
 
     map: Any = host(None, "bitmap, read raw; its colours are (x, y, z) / 2 + 1/2; None: none")
@@ -532,7 +532,7 @@ class NormalMap(Bent):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class BumpMap(Bent):
+class BumpMap(NormalMapped):
     """Bends the shading normal as if the surface were raised by a height."""
 
     height: Any = real(0.0, "what it is raised by", "m", textured=True)

@@ -43,7 +43,7 @@ DEVICE_ROLES = (
     "reflectance", "emission", "index", "factor", "reradiation", "real", "flag", "choice", "orders",
     "layers",
 )  # fmt: skip
-ORDERS = 8  # highest order of diffraction, see kernels/lib/diffraction.cl
+ORDERS = 8  # highest order of diffraction, see kernels/optics/diffraction.cl
 LAMBDAS = np.arange(200.0, 1201.0)  # [nm] at which a spectrum's limits are checked
 
 
@@ -91,7 +91,7 @@ def factor(default: Any, doc: str) -> Any:
 def coefficient(default: Any, doc: str, unit: str = "1/m") -> Any:
     """Declare a property of the inside of a body; no member of its kind's struct.
 
-    Light meets it between surfaces: kernels/lib/medium.cl reads it from behind the kind's row.
+    Light meets it between surfaces: kernels/optics/medium.cl reads it from behind the kind's row.
     """
     return _field(default, Param("coefficient", doc, unit, low=0.0))
 
@@ -157,7 +157,7 @@ class Kind:
 
     needs_wavelengths: ClassVar[bool] = False  # its struct in the kernels has them as `lambdas`
     tints: ClassVar[tuple[str, ...]] = ()  # where one is above 0, its struct has the `luminance`
-    # of `base_color`; its kernel file includes lib/luminance.cl
+    # of `base_color`; its kernel file includes core/luminance.cl
 
     @classproperty
     def kind(cls) -> str:

@@ -14,7 +14,7 @@ from clpt.scene.params import device_params
 from clpt.testing.probe import Probe
 from clpt.testing.settings import directions, pairs, settings, tilted
 
-TRANSMIT, DELTA, DISPERSE = 2, 4, 8  # kernels/lib/bsdf.cl
+TRANSMIT, DELTA, DISPERSE = 2, 4, 8  # kernels/interface/bsdf.cl
 SAMPLES, THETA, PHI, FINE = 60_000, 16, 24, 12
 ANGLES = (25.0, 75.0, 140.0)  # of wo to the normal [degrees]
 ALL_ANGLES = (1.0, 30.0, 60.0, 80.0, 88.0, 100.0, 135.0, 178.0)
@@ -84,15 +84,15 @@ def lobes_are_told_truly(
 
 
 def flags_are_told_truly(probe: Probe, params: Params, rng: Random) -> None:
-    """The class tells the kernels what it does: `choosy`, `delta`, `disperses`, `transmits`."""
+    """The class tells the kernels what it does: `uses_lobe_sample`, `delta`, `disperses`, `transmits`."""
     cls = probe.cls
     wo, u = directions(rng, 1000), rng.random((1000, 3))
     r = probe(params, wo, wo, u)
     made = r["sampled_pdf"] > 0.0
-    if not (cls.choosy or cls.shifts):
+    if not (cls.uses_lobe_sample or cls.fluoresces):
         again = probe(params, wo, wo, np.where([True, True, False], u, rng.random((1000, 3))))
         same = np.array_equal(r["wi"], again["wi"]) and np.array_equal(r["lobe"], again["lobe"])
-        _hold(same, f"sample uses u.z: set choosy = True, {params}")
+        _hold(same, f"sample uses u.z: set uses_lobe_sample = True, {params}")
     if cls.delta:
         _hold(np.all(r["lobe"][made] & DELTA), f"a lobe is not delta, but delta is True, {params}")
     if cls.source is not None and not cls.disperses:

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from clpt import device, spectra
-from clpt.render import outside
-from clpt.render.kinds import ORDERS_WORDS
-from clpt.render.tables import RGB_ROLES
+from clpt.render.contract import custom_materials
+from clpt.render.contract.parameter_words import ORDERS_WORDS
+from clpt.render.lowering.tables import RGB_ROLES
 from clpt.scene.materials import LEAVES, Material
 from clpt.scene.params import Param, device_params
 from clpt.testing import checks
@@ -45,7 +45,7 @@ def check_material(
     """
     cls = material if isinstance(material, type) else type(material)
     if cls not in LEAVES:
-        outside.check(cls)
+        custom_materials.check(cls)
     on = _chosen(device)
     for mode in modes:
         fixed = {} if isinstance(material, type) else _values(material, mode)

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import device
-from clpt.render import outside
-from clpt.render.films import COSINES, film_colours
-from clpt.render.kinds import array_size, lane_type, struct_text
-from clpt.render.library import BSDF
+from clpt.render.codegen.library import BSDF
+from clpt.render.codegen.parameters import array_size, lane_type, struct_text
+from clpt.render.contract import custom_materials
+from clpt.render.contract.parameter_words import FILM_COSINES
+from clpt.render.lowering.materials.thin_films import film_colours
 from clpt.scene.materials import Layer, Material
 from clpt.scene.params import Param, device_params
 
@@ -94,7 +95,7 @@ class Probe:
         c = self.components
         virtual: dict[str, str | device.Part] = {"probe.cl": self._text(len(layers), len(given))}
         if self.cls.source is not None:
-            virtual[f"bsdf/{self.cls.kind}.cl"] = outside.text(self.cls)
+            virtual[f"bsdf/{self.cls.kind}.cl"] = custom_materials.text(self.cls)
         table = self._table(params, layers)
         out = run(self.on, virtual, self.lanes, given, 8 + 4 * c, table).T
         parts = np.split(out, np.cumsum([3, c, 1, 1, 1, c, 1, c, 1]), axis=1)
@@ -125,7 +126,7 @@ class Probe:
         if "layers" not in device_params(self.cls):
             return ["", ""]
         if not count:
-            return ['#include "lib/boundary_bare.cl"', "    m.layers = layers_none();"]
+            return ['#include "optics/boundary_bare.cl"', "    m.layers = layers_none();"]
         if self.mode == "spectral":
             lambdas = ", ".join(f"(real)({v}f)" for v in LAMBDAS)
             return [
@@ -134,14 +135,14 @@ class Probe:
                 "inline Layer layer_at(Layers l, integer i)\n{\n    i *= 4;\n"
                 "    Layer r = {spectrum_of(gather(l.at, i)), spectrum_of(gather(l.at, i + 1)),\n"
                 "               gather(l.at, i + 2), gather(l.at, i + 3)};\n    return r;\n}\n"
-                '#include "lib/boundary_film.cl"',
+                '#include "optics/boundary_film.cl"',
                 f"    Layers layers = {{in + {rows} * n, {count}, {{{lambdas}}}}};\n"
                 "    m.layers = layers;",
             ]
         return [
             "typedef struct { global const float *spectra; } Tables;\n"
             "typedef struct { Tables scene; integer count, table, rows; real profile; } Layers;\n"
-            f'#define FILM_COSINES {COSINES}\n#include "lib/boundary_table.cl"',
+            f'#define FILM_COSINES {FILM_COSINES}\n#include "optics/boundary_table.cl"',
             f"    Layers layers = {{{{in + {rows} * n}}, {count}, 0, 1, 1.0f}};\n"
             "    m.layers = layers;",
         ]

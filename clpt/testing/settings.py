@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from clpt.render.kinds import array_size, lane_type
+from clpt.render.codegen.parameters import array_size, lane_type
 from clpt.scene.materials import Layer
 from clpt.scene.params import Kind, Param, device_params
 from clpt.testing.probe import COMPONENTS

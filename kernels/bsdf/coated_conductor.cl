@@ -6,9 +6,9 @@
  * inside is summed as a geometric series: along the mirror direction as between smooth boundaries, or,
  * the rougher the metal, as a diffuse light like plastic's. Of a coat that disperses, only the reflection
  * does; what it bends and lets through is by the mean index. */
-#include "lib/fresnel.cl"
-#include "lib/microfacet.cl"
-#include "lib/rough_coat.cl"
+#include "optics/fresnel.cl"
+#include "optics/microfacet.cl"
+#include "optics/rough_coat.cl"
 
 typedef struct {
     Microfacets coat, metal;

@@ -1,6 +1,6 @@
 /* Smooth metal, front side: mirror reflection, Fresnel's reflectance of the index eta + i k, or
  * that of the thin films on it. */
-#include "lib/fresnel.cl"
+#include "optics/fresnel.cl"
 
 BsdfSample conductor_sample(Conductor m, vec3 wo, vec3 u)
 {

@@ -1,7 +1,7 @@
 /* Smooth boundary of two dielectrics, both sides: mirror reflection and refraction by Snell's law,
  * chosen by the mean of the boundary's reflectance at the path's wavelengths. Radiance that is
  * refracted is scaled by 1 / eta^2. Thin films on the boundary bend nothing: their faces are parallel. */
-#include "lib/fresnel.cl"
+#include "optics/fresnel.cl"
 
 BsdfSample dielectric_sample(Dielectric m, vec3 wo, vec3 u)
 {

@@ -1,7 +1,7 @@
 /* Lambertian paint that fluoresces: f = (reflectance + glow) / pi [1/sr], where glow is the integral
  * [1] of the re-radiation over the wavelengths that come, at those that leave (Donaldson 1954). By which
- * wavelengths light came is chosen by lib/reradiation.cl, with probabilities that divide out. */
-#include "lib/glow.cl"
+ * wavelengths light came is chosen by optics/reradiation.cl, with probabilities that divide out. */
+#include "optics/glow.cl"
 
 Spectrum fluorescent_albedo(Fluorescent m) { return with_glow(m.reflectance, m.reradiation, m.amount); }
 

@@ -3,7 +3,7 @@
  * in a clear coat, sheen, and microfacets over a base that scatters light back, scatters it through or
  * lets it through, all mixed with a metal. A layer dims what lies under it by its directional albedo.
  * f [1/sr]. Front side; both sides where light goes through; thin: both sides are alike, light is not bent. */
-#include "lib/gltf_layers.cl"
+#include "optics/gltf_layers.cl"
 
 /* Both directions as the lobes see them: along and across the anisotropy, thin ones' back turned up. */
 typedef struct { vec3 wo, wi; } GltfPair;
@@ -192,7 +192,7 @@ inline Spectrum gltf_passed(GltfSurface m, GltfParts p, vec3 wo, vec3 wi, real i
     real scale = sel(m.thin != 0, (real)(1.0f), sel(wo.z > 0.0f, 1.0f / sqr(index), sqr(index)));
     real v = microfacet_visible_pdf(p.facets, wo, t.h) * t.jacobian * microfacet_g1(p.facets, seen, t.h) * scale;
     Spectrum f = layer_cover(gltf_facet(m, p.base_f0, m.specular, gltf_cosine(m, t.o, index)));
-    return spectrum_scale(spectrum_sub(spectrum_of(1.0f), f), sel(t.facing, v * p.passed, (real)(0.0f)));
+    return spectrum_scale(spectrum_sub(spectrum_of(1.0f), f), sel(t.shading, v * p.passed, (real)(0.0f)));
 }
 
 /* f |cos| of turned directions. */
@@ -210,7 +210,7 @@ inline Spectrum gltf_value(GltfSurface m, GltfParts p, vec3 wo, vec3 wi)
 #undef C
     }
     real share = sel(front, (real)(1.0f), p.passed);
-    Spectrum v = spectrum_scale(f, sel(h.facing & reflected, facets * share, (real)(0.0f)));
+    Spectrum v = spectrum_scale(f, sel(h.shading & reflected, facets * share, (real)(0.0f)));
     if (any(crossed & (p.passed > 0.0f))) {
         Spectrum t = gltf_passed(m, p, wo, wi, p.eta.x);
         if (any(spectrum_varies(p.eta))) {
@@ -245,7 +245,7 @@ inline Spectrum gltf_value(GltfSurface m, GltfParts p, vec3 wo, vec3 wi)
         real coat = microfacet_visible_pdf(d, wo, h.h) * h.jacobian * microfacet_g1(d, wi, h.h), y = 1.0f - fabs(h.o);
         coat *= m.clearcoat * (0.04f + 0.96f * y * y * y * y * y);
         v = spectrum_scale(v, 1.0f - max_r(gltf_coat_albedo(m, z_o), gltf_coat_albedo(m, z_i)));
-        v = spectrum_add(v, spectrum_of(sel(h.facing & outside, coat, (real)(0.0f))));
+        v = spectrum_add(v, spectrum_of(sel(h.shading & outside, coat, (real)(0.0f))));
     }
     return spectrum_sel(seen & (reflected | crossed), v, spectrum_of(0.0f));
 }
@@ -257,13 +257,13 @@ inline real gltf_density(GltfSurface m, GltfParts p, GltfLobes l, vec3 wo, vec3 
     RefractingFacet h = refracting_facet(wo, wi, (real)(1.0f));
     real facets = microfacet_visible_pdf(p.facets, wo, h.h) * gltf_reflects(m, p, gltf_cosine(m, h.o, index)) * l.facets;
     if (any(l.coat > 0.0f)) facets += microfacet_visible_pdf(gltf_coat_facets(m), wo, h.h) * l.coat;
-    real pdf = sel(h.facing, facets * h.jacobian, (real)(0.0f));
+    real pdf = sel(h.shading, facets * h.jacobian, (real)(0.0f));
     pdf += sel(wo.z > 0.0f, l.sheen * INV_2PI + l.scattered * cosine_hemisphere_pdf(wi.z), (real)(0.0f));
     if (any(crossed & ((p.passed > 0.0f) | (p.through > 0.0f)))) {
         RefractingFacet t = gltf_passing(m, wo, wi, index);
         real passes = (1.0f - gltf_reflects(m, p, gltf_cosine(m, t.o, index))) * l.facets;
         passes *= microfacet_visible_pdf(p.facets, wo, t.h) * t.jacobian;
-        real behind = sel(t.facing, passes, (real)(0.0f)) + l.through * cosine_hemisphere_pdf(fabs(wi.z));
+        real behind = sel(t.shading, passes, (real)(0.0f)) + l.through * cosine_hemisphere_pdf(fabs(wi.z));
         pdf = sel(crossed, behind, pdf);
     }
     return sel(reflected | (crossed & ((p.passed > 0.0f) | (p.through > 0.0f))), pdf, (real)(0.0f));

@@ -4,8 +4,8 @@
  * out, and the others share all the light. Reflective: front side; transmissive: both sides, the same
  * medium before and behind. Order 0 is chosen by its mean share at the path's wavelengths and keeps
  * them all; of the others one is chosen by the hero's shares, and its direction holds for the hero. */
-#include "lib/fresnel.cl"
-#include "lib/diffraction.cl"
+#include "optics/fresnel.cl"
+#include "optics/diffraction.cl"
 
 #define GRATING_TRANSMISSIVE 1 /* of `mode` */
 

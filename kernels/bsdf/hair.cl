@@ -4,8 +4,8 @@
  * both. Light is reflected (p = 0), passes (1), is reflected once inside (2), or more often (the rest):
  * of each the product of a longitudinal and an azimuthal distribution and the share that is left.
  * f |cos| [1/sr]. All leaves from where wo came in; the fibre's far side is taken for nothing. */
-#include "lib/fresnel.cl"
-#include "lib/bessel.cl"
+#include "optics/fresnel.cl"
+#include "core/bessel.cl"
 #define HAIR_LOBES 4
 #define HAIR_NARROWEST 0.01f /* roughness, below which lobes are too narrow for float32 */
 

@@ -2,7 +2,7 @@
  * Fresnel's transmittance; what the coat reflects back inside falls on the base again and again, a
  * geometric series. Diffuse part: f = (1 - F(wo)) (1 - F(wi)) d / (pi eta^2 (1 - d' Fdr)), where d'
  * is d or, if the colour is kept linear, 1 [1/sr]. */
-#include "lib/fresnel.cl"
+#include "optics/fresnel.cl"
 
 /* The probability of the coat's mirror reflection, from the two parts' strengths. */
 inline real plastic_mirror_probability(Plastic m, real f)

@@ -2,8 +2,8 @@
  * sheen, a rough metal of the base's colour and a rough dielectric, under a clearcoat. Front side; both
  * sides where light is let through. f [1/sr]. With a dispersive index each wavelength is refracted with
  * a half vector of its own; directions are sampled for the hero. */
-#include "lib/principled.cl"
-#include "lib/refracting_facet.cl"
+#include "optics/principled.cl"
+#include "optics/refracting_facet.cl"
 
 /* The index, kept off one where light is refracted: h would be undefined. */
 inline Spectrum principled_index(Principled m)
@@ -66,7 +66,7 @@ inline Spectrum principled_reflected(Principled m, Microfacets d, vec3 wo, vec3 
     share = spectrum_madd(spectrum_sub(metal, share), m.metallic, share);
     share = spectrum_sel(front, share, spectrum_scale(f, principled_passed(m)));
     real facets = microfacet_visible_pdf(d, wo, p.h) * p.jacobian * microfacet_g1(d, wi, p.h);
-    Spectrum v = spectrum_scale(share, sel(p.facing & reflects, facets, (real)(0.0f)));
+    Spectrum v = spectrum_scale(share, sel(p.shading & reflects, facets, (real)(0.0f)));
 
     real cos_o = fabs(wo.z), cos_i = fabs(wi.z), c = dot3(p.h, wi);
     real base = principled_diffuse(cos_o, cos_i, c, m.roughness, m.flatness) * principled_base(m) * INV_PI;
@@ -76,7 +76,7 @@ inline Spectrum principled_reflected(Principled m, Microfacets d, vec3 wo, vec3 
         Microfacets masking = microfacets_of((integer)(0), (real)(0.25f), (real)(0.25f));
         real coat = 0.25f * m.clearcoat * (0.04f + 0.96f * weight.x) * principled_coat_d(m, p.h)
                   * microfacet_g1(masking, wo, p.h) * microfacet_g1(masking, wi, p.h);
-        below = spectrum_add(below, spectrum_of(sel(p.facing, coat, (real)(0.0f))));
+        below = spectrum_add(below, spectrum_of(sel(p.shading, coat, (real)(0.0f))));
     }
     return spectrum_madd(below, sel(front, cos_i, (real)(0.0f)), v);
 }
@@ -109,7 +109,7 @@ inline real principled_density(Principled m, vec3 wo, vec3 wi, real index)
     real coat = lobes.coat * principled_coat_d(m, p.h) * p.h.z;
     real facets = sel(crossed, lobes.transmit, lobes.reflect) * microfacet_visible_pdf(d, wo, p.h);
     facets = (facets + sel(reflected, coat, (real)(0.0f))) * p.jacobian;
-    real pdf = sel(p.facing, facets, (real)(0.0f));
+    real pdf = sel(p.shading, facets, (real)(0.0f));
     pdf += sel(reflected, lobes.diffuse * cosine_hemisphere_pdf(wi.z), (real)(0.0f));
     return sel(reflected | crossed, pdf, (real)(0.0f));
 }

@@ -2,13 +2,13 @@
  * transmission, and a rough dielectric slab that does not bend light; both sides alike. f [1/sr]. What
  * passes the slab is a reflection, turned to the other side, of facets whose roughness grows with the
  * index (Burley 2015, fig. 15). */
-#include "lib/principled.cl"
+#include "optics/principled.cl"
 
 /* A pair of directions, turned so that wo is on the front. */
 typedef struct {
     vec3 wo, wi, h; /* h: of wo and of wi, or wi's mirror image on the front */
     Microfacets d;  /* those that light meets on its way between them */
-    mask crossed, facing;
+    mask crossed, shading;
 } ThinPair;
 
 inline Microfacets principled_thin_facets(PrincipledThin m, mask crossed)
@@ -25,7 +25,7 @@ inline ThinPair principled_thin_pair(PrincipledThin m, vec3 wo, vec3 wi)
     p.crossed = p.wi.z < 0.0f;
     p.h = normalize3(add3(p.wo, v3(p.wi.x, p.wi.y, fabs(p.wi.z))));
     p.d = principled_thin_facets(m, p.crossed);
-    p.facing = (dot3(p.wo, p.h) > 0.0f) & (dot3(p.wi, p.h) * p.wi.z > 0.0f);
+    p.shading = (dot3(p.wo, p.h) > 0.0f) & (dot3(p.wi, p.h) * p.wi.z > 0.0f);
     return p;
 }
 
@@ -33,7 +33,7 @@ inline ThinPair principled_thin_pair(PrincipledThin m, vec3 wo, vec3 wi)
 inline real principled_thin_lobe(ThinPair p)
 {
     real v = microfacet_visible_pdf(p.d, p.wo, p.h) / max_r(4.0f * dot3(p.wo, p.h), (real)(1e-20f));
-    return sel(p.facing, v, (real)(0.0f));
+    return sel(p.shading, v, (real)(0.0f));
 }
 
 Spectrum principled_thin_eval(PrincipledThin m, vec3 wo, vec3 wi)
@@ -82,7 +82,7 @@ BsdfSample principled_thin_sample(PrincipledThin m, vec3 wo, vec3 u)
     mask kept = s.wi.z > 0.0f;
     s.wi.z *= sel(crossed, (real)(-1.0f), (real)(1.0f));
     s.wi = scale3(s.wi, side);
-    kept = kept & (!specular | principled_thin_pair(m, wo, s.wi).facing);
+    kept = kept & (!specular | principled_thin_pair(m, wo, s.wi).shading);
     s.pdf = sel(kept, principled_thin_pdf(m, wo, s.wi), (real)(0.0f));
     Spectrum f = principled_thin_eval(m, wo, s.wi);
     s.weight = spectrum_scale(f, sel(s.pdf > 0.0f, 1.0f / s.pdf, (real)(0.0f)));

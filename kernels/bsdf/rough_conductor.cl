@@ -2,8 +2,8 @@
  * eq. 20): f = F D G / (4 |cos| |cos|) [1/sr], G the product of Smith's two; normals are sampled as
  * wo sees them. F is that of the thin films, if facets wear some. One bounce between facets: the energy
  * of further ones is lost. */
-#include "lib/fresnel.cl"
-#include "lib/microfacet.cl"
+#include "optics/fresnel.cl"
+#include "optics/microfacet.cl"
 
 BsdfSample rough_conductor_sample(RoughConductor m, vec3 wo, vec3 u)
 {

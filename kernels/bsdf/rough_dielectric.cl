@@ -3,8 +3,8 @@
  * refracted is scaled by 1 / eta^2. One event at a facet: the energy of further ones is lost.
  * With a dispersive index each wavelength has its own half vector, so eval is exact at all of them;
  * directions are sampled for the hero. Thin films on the facets change the shares, not the directions. */
-#include "lib/fresnel.cl"
-#include "lib/microfacet.cl"
+#include "optics/fresnel.cl"
+#include "optics/microfacet.cl"
 
 /* The index, kept off one: there a facet would not bend light, and h would be undefined. */
 inline Spectrum rough_dielectric_index(RoughDielectric m)
@@ -22,7 +22,7 @@ typedef struct {
     Boundary b;    /* what the facet reflects and lets through */
     real jacobian; /* solid angle of normals per solid angle of wi, times |cos| between h and wi */
     real scale;    /* of radiance: 1, or 1 / eta^2 */
-    mask facing;   /* both directions see the facet from their own sides */
+    mask shading;   /* both directions see the facet from their own sides */
 } RoughDielectricPair;
 
 inline RoughDielectricPair rough_dielectric_pair(RoughDielectric m, vec3 wo, vec3 wi, real index)
@@ -37,7 +37,7 @@ inline RoughDielectricPair rough_dielectric_pair(RoughDielectric m, vec3 wo, vec
     real bent = sqr(eta) * fabs(i) / max_r(sqr(o + eta * i), (real)(1e-20f));
     p.jacobian = sel(reflected, 0.25f / max_r(fabs(o), (real)(1e-20f)), bent);
     p.scale = 1.0f / sqr(eta);
-    p.facing = (o * wo.z > 0.0f) & (i * wi.z > 0.0f);
+    p.shading = (o * wo.z > 0.0f) & (i * wi.z > 0.0f);
     return p;
 }
 
@@ -47,7 +47,7 @@ inline Spectrum rough_dielectric_value(RoughDielectric m, Microfacets d, vec3 wo
     RoughDielectricPair p = rough_dielectric_pair(m, wo, wi, index);
     Spectrum share = spectrum_sel(wo.z * wi.z > 0.0f, p.b.r, spectrum_scale(p.b.t, p.scale));
     real pdf = microfacet_visible_pdf(d, wo, p.h) * p.jacobian;
-    return spectrum_scale(share, sel(p.facing, pdf * microfacet_g1(d, wi, p.h), (real)(0.0f)));
+    return spectrum_scale(share, sel(p.shading, pdf * microfacet_g1(d, wi, p.h), (real)(0.0f)));
 }
 
 Spectrum rough_dielectric_eval(RoughDielectric m, vec3 wo, vec3 wi)
@@ -69,7 +69,7 @@ inline real rough_dielectric_density(RoughDielectric m, Microfacets d, vec3 wo, 
 {
     RoughDielectricPair p = rough_dielectric_pair(m, wo, wi, index);
     real share = sel(wo.z * wi.z > 0.0f, p.b.p, 1.0f - p.b.p);
-    return sel(p.facing, share * microfacet_visible_pdf(d, wo, p.h) * p.jacobian, (real)(0.0f));
+    return sel(p.shading, share * microfacet_visible_pdf(d, wo, p.h) * p.jacobian, (real)(0.0f));
 }
 
 Spectrum rough_dielectric_pdfs(RoughDielectric m, vec3 wo, vec3 wi)

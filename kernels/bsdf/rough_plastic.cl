@@ -1,9 +1,9 @@
 /* A diffuse base under a rough dielectric coat, front side: microfacets on top (Walter et al. 2007
  * eq. 20), and below, as in plastic.cl, f = T(wo) T(wi) d / (pi eta^2 (1 - d' R)) [1/sr], with the rough
  * coat's transmittance T and inner reflectance R, d' being d or, if the colour is kept linear, 1. */
-#include "lib/fresnel.cl"
-#include "lib/microfacet.cl"
-#include "lib/rough_coat.cl"
+#include "optics/fresnel.cl"
+#include "optics/microfacet.cl"
+#include "optics/rough_coat.cl"
 
 inline Microfacets rough_plastic_facets(RoughPlastic m)
 {

@@ -1,6 +1,6 @@
 /* A thin slab, both sides: the reflections between its two faces add up to 2 F / (1 + F), the rest
  * passes undeviated (Stokes 1862; without interference). */
-#include "lib/fresnel.cl"
+#include "optics/fresnel.cl"
 
 inline Spectrum thin_dielectric_reflected(Spectrum f)
 {

@@ -5,7 +5,7 @@
  * all lanes of the work-item.
  */
 #include "bvh/hit.cl"
-#include "lib/lanes.cl"
+#include "core/lanes.cl"
 
 #define BRUTE_EDGE 2e-6f
 

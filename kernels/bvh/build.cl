@@ -7,7 +7,7 @@
  * ranges one after the other where its first cut may be: neighbours share cache lines and pages. So no
  * counter is shared, and two builds make the same tree.
  */
-#include "bvh/apart.cl"
+#include "bvh/no_vectorize.cl"
 #include "bvh/items.cl"
 #include "bvh/node.cl"
 
@@ -183,7 +183,7 @@ inline int build_range(const Build *b, Range r, Extent h, uint next, Range child
     return 1;
 }
 
-kernel APART void build_root(global const Extent *restrict parts, uint n_parts, uint count,
+kernel NO_VECTORIZE void build_root(global const Extent *restrict parts, uint n_parts, uint count,
                              global Range *restrict ranges, global Extent *restrict extents)
 {
     Extent h = extent_empty();
@@ -196,7 +196,7 @@ kernel APART void build_root(global const Extent *restrict parts, uint n_parts, 
 }
 
 /* Ranges from `begin` on in the heap, a level of it. Those with no items are no ranges. */
-kernel APART void build_level(global float8 *restrict items, global float8 *restrict nodes,
+kernel NO_VECTORIZE void build_level(global float8 *restrict items, global float8 *restrict nodes,
                               global Range *restrict ranges, global Extent *restrict extents,
                               uint begin, uint leaf_size, float share, uint runs)
 {
@@ -212,7 +212,7 @@ kernel APART void build_level(global float8 *restrict items, global float8 *rest
     ranges[2 * k + 2] = children[1];
 }
 
-kernel APART void build_subtree(global float8 *restrict items, global float8 *restrict nodes,
+kernel NO_VECTORIZE void build_subtree(global float8 *restrict items, global float8 *restrict nodes,
                                 global const Range *restrict ranges,
                                 global const Extent *restrict extents, uint begin, uint leaf_size,
                                 float share, uint runs)

@@ -70,7 +70,7 @@ inline void collapse_node(global float8 *nodes, global const float8 *items, glob
 }
 
 /* Costs below the ranges that build_subtree was given, children before parents. */
-kernel APART void collapse_subtree(global float8 *restrict nodes,
+kernel NO_VECTORIZE void collapse_subtree(global float8 *restrict nodes,
                                    global const float8 *restrict items,
                                    global const Range *restrict ranges, uint begin,
                                    global float8 *restrict costs, global float *restrict occlusion)
@@ -94,7 +94,7 @@ kernel APART void collapse_subtree(global float8 *restrict nodes,
 }
 
 /* Costs of one level of the heap of ranges; those below it are there. */
-kernel APART void collapse_level(global float8 *restrict nodes,
+kernel NO_VECTORIZE void collapse_level(global float8 *restrict nodes,
                                  global const float8 *restrict items,
                                  global const Range *restrict ranges, uint begin,
                                  global float8 *restrict costs, global float *restrict occlusion)
@@ -107,7 +107,7 @@ kernel APART void collapse_level(global float8 *restrict nodes,
  * neighbouring numbers. roots, leaf_roots: the binary node of each; firsts: a node's first child node
  * and first block. totals: nodes, blocks, levels, as a float the tree's cost for a line that meets its
  * box, and the first node of each level. */
-kernel APART void collapse_number(global const float8 *restrict nodes,
+kernel NO_VECTORIZE void collapse_number(global const float8 *restrict nodes,
                                   global const float8 *restrict costs, global uint *restrict roots,
                                   global uint2 *restrict firsts, global uint *restrict leaf_roots,
                                   global uint *restrict totals)
@@ -145,7 +145,7 @@ inline float collapse_promise(global const float8 *nodes, global const float8 *c
 
 /* Writes one wide node. Children stand in ascending promise, for traversals visit the last slot
  * first. Empty slots hold what no ray meets, and lead to block 0 if one does nevertheless. */
-kernel APART void collapse_nodes(global const float8 *restrict nodes,
+kernel NO_VECTORIZE void collapse_nodes(global const float8 *restrict nodes,
                                  global const float8 *restrict costs,
                                  global const float *restrict occlusion,
                                  global const uint *restrict roots,
@@ -188,7 +188,7 @@ kernel APART void collapse_nodes(global const float8 *restrict nodes,
 }
 
 /* Writes one block. */
-kernel APART void collapse_blocks(global const float8 *restrict nodes,
+kernel NO_VECTORIZE void collapse_blocks(global const float8 *restrict nodes,
                                   global const float8 *restrict items,
                                   global const uint *restrict leaf_roots, uint count,
                                   global const float *restrict vertices,
@@ -210,7 +210,7 @@ kernel APART void collapse_blocks(global const float8 *restrict nodes,
 }
 
 /* The items of leaves that hold one each, by their indices. */
-kernel APART void collapse_indices(global const float8 *restrict nodes,
+kernel NO_VECTORIZE void collapse_indices(global const float8 *restrict nodes,
                                    global const float8 *restrict items,
                                    global const uint *restrict leaf_roots, uint count,
                                    global uint *restrict indices)

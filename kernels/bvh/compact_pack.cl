@@ -4,7 +4,7 @@
  * Siblings change places, for they stand in the order of their slots. So `places` keeps of every node its
  * number in the collapse, and the first item of those below it: a node has its own items first, then come
  * those of its children, one after the other. */
-#include "bvh/apart.cl"
+#include "bvh/no_vectorize.cl"
 #include "bvh/collapsed.cl"
 #include "bvh/items.cl"
 
@@ -38,7 +38,7 @@ inline void compact_slots(global const float8 *nodes, float8 parent, const uint 
 
 /* Nodes from `begin` on, a level; those above it are there. leaves: records of triangles, which get their
  * tags and the caller's numbers; or where `tags` is null the numbers alone. */
-kernel APART void compact_nodes(global const float8 *restrict nodes, global const float8 *restrict items,
+kernel NO_VECTORIZE void compact_nodes(global const float8 *restrict nodes, global const float8 *restrict items,
                                 global const float8 *restrict costs, global const uint *restrict roots,
                                 global const uint2 *restrict firsts, uint begin, uint count,
                                 global uint2 *restrict places, global uint *restrict compact,

@@ -9,7 +9,7 @@
  * A key is Morton's code above the item's index. What stands for a run, to build a tree over, is an item
  * named after its first, with the number of items in place of the area.
  */
-#include "bvh/apart.cl"
+#include "bvh/no_vectorize.cl"
 #include "bvh/items.cl"
 
 #define CURVE_BITS 11 /* of a digit */
@@ -24,7 +24,7 @@ inline ulong curve_spread(global const ulong *table, int cell)
 }
 
 /* low, scale: from a doubled centroid to its cell; tables: of two bytes of each axis. */
-kernel APART void curve_keys(global const float8 *restrict items, uint count, float4 low, float4 scale,
+kernel NO_VECTORIZE void curve_keys(global const float8 *restrict items, uint count, float4 low, float4 scale,
                              global const ulong *restrict tables, global ulong *restrict keys)
 {
     uint i = get_global_id(0);
@@ -39,7 +39,7 @@ kernel APART void curve_keys(global const float8 *restrict items, uint count, fl
 inline uint curve_digit(ulong key, uint shift) { return key >> shift & ((1 << CURVE_BITS) - 1); }
 
 /* How often each digit stands among `run` neighbours; one work-item has so many. */
-kernel APART void curve_count(global const ulong *restrict keys, uint count, uint run, uint shift,
+kernel NO_VECTORIZE void curve_count(global const ulong *restrict keys, uint count, uint run, uint shift,
                               global uint *restrict numbers)
 {
     uint begin = get_global_id(0) * run, end = min(begin + run, count);
@@ -50,7 +50,7 @@ kernel APART void curve_count(global const ulong *restrict keys, uint count, uin
 
 /* Numbers made places: of `columns` digits, each of which has its places side by side, row after row; after
  * the last, the sum of all. */
-kernel APART void curve_scan(global uint *restrict numbers, uint rows, uint columns)
+kernel NO_VECTORIZE void curve_scan(global uint *restrict numbers, uint rows, uint columns)
 {
     uint sum = 0;
     for (uint k = 0; k < columns; k++)
@@ -63,7 +63,7 @@ kernel APART void curve_scan(global uint *restrict numbers, uint rows, uint colu
 }
 
 /* Moves the keys that curve_count has counted to their places. */
-kernel APART void curve_move(global const ulong *restrict keys, uint count, uint run, uint shift,
+kernel NO_VECTORIZE void curve_move(global const ulong *restrict keys, uint count, uint run, uint shift,
                              global uint *restrict numbers, global ulong *restrict sorted)
 {
     uint begin = get_global_id(0) * run, end = min(begin + run, count);
@@ -87,7 +87,7 @@ inline float8 curve_reach(float8 last, float next)
 
 /* Puts `run` items in order and finds for each how long the run is that ends with it, if one does; numbers
  * the runs that are made of them. */
-kernel APART void curve_cut(global const float8 *restrict items, global const ulong *restrict keys,
+kernel NO_VECTORIZE void curve_cut(global const float8 *restrict items, global const ulong *restrict keys,
                             uint count, uint run, uint leaf_size, global float8 *restrict sorted,
                             global uchar *restrict lengths, global uint *restrict numbers)
 {
@@ -122,7 +122,7 @@ kernel APART void curve_cut(global const float8 *restrict items, global const ul
 }
 
 /* Writes what stands for the runs; numbers: where those of each stretch begin. */
-kernel APART void curve_runs(global const float8 *restrict sorted, uint count, uint run,
+kernel NO_VECTORIZE void curve_runs(global const float8 *restrict sorted, uint count, uint run,
                              global const uchar *restrict lengths, global const uint *restrict numbers,
                              global float8 *restrict runs, global Extent *restrict extents)
 {

@@ -5,7 +5,7 @@
  * for it; n = cross(v1 - v0, v2 - v0), not normalised: its length is twice the triangle's area.
  * A hit has tmin < t < tmax.
  */
-#include "bvh/apart.cl"
+#include "bvh/no_vectorize.cl"
 
 #define BVH_MISS 0xffffffffu
 

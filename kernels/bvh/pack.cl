@@ -1,10 +1,10 @@
 /* From triangles and boxes to items, and from items to what traversals read; leaves.cl has the forms. */
-#include "bvh/apart.cl"
+#include "bvh/no_vectorize.cl"
 #include "bvh/items.cl"
 #include "bvh/leaves.cl"
 
 /* One work-item takes `run` neighbours and leaves the bounds of all of them in `extents`. */
-kernel APART void items_of_triangles(global const float *restrict vertices,
+kernel NO_VECTORIZE void items_of_triangles(global const float *restrict vertices,
                                   global const uint *restrict faces, uint count, uint run,
                                   global float8 *restrict items, global Extent *restrict extents)
 {
@@ -23,7 +23,7 @@ kernel APART void items_of_triangles(global const float *restrict vertices,
 }
 
 /* The same for boxes given as low and high corner; what is inside is taken for an ellipsoid. */
-kernel APART void items_of_boxes(global const float *restrict boxes, uint count, uint run,
+kernel NO_VECTORIZE void items_of_boxes(global const float *restrict boxes, uint count, uint run,
                               global float8 *restrict items, global Extent *restrict extents)
 {
     uint begin = get_global_id(0) * run, end = min(begin + run, count);
@@ -37,7 +37,7 @@ kernel APART void items_of_boxes(global const float *restrict boxes, uint count,
     extents[get_global_id(0)] = h;
 }
 
-kernel APART void pack_triangles(global const float8 *restrict items, uint count,
+kernel NO_VECTORIZE void pack_triangles(global const float8 *restrict items, uint count,
                                  global const float *restrict vertices,
                                  global const uint *restrict faces,
                                  global const uint *restrict tags, global float *restrict records)
@@ -53,7 +53,7 @@ kernel APART void pack_triangles(global const float8 *restrict items, uint count
 }
 
 /* The items' indices alone, for trees over shapes that the caller keeps. */
-kernel APART void pack_indices(global const float8 *restrict items, uint count,
+kernel NO_VECTORIZE void pack_indices(global const float8 *restrict items, uint count,
                                global uint *restrict indices)
 {
     uint i = get_global_id(0);

@@ -27,7 +27,7 @@ inline uint query_instances(global const float *nodes, global const float *leave
 #define HIT_ARGS global float *t, global int *primitive, global float *barycentrics
 #endif
 
-kernel APART void query_closest(TREE_ARGS, RAY_ARGS, HIT_ARGS)
+kernel NO_VECTORIZE void query_closest(TREE_ARGS, RAY_ARGS, HIT_ARGS)
 {
     size_t i = get_global_id(0);
     if (i >= count) return;
@@ -46,7 +46,7 @@ kernel APART void query_closest(TREE_ARGS, RAY_ARGS, HIT_ARGS)
     barycentrics[begins.s6 + 2 * i + 1] = hit.v;
 }
 
-kernel APART void query_occluded(TREE_ARGS, RAY_ARGS, global uchar *met)
+kernel NO_VECTORIZE void query_occluded(TREE_ARGS, RAY_ARGS, global uchar *met)
 {
     size_t i = get_global_id(0);
     if (i >= count) return;

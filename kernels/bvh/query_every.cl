@@ -3,7 +3,7 @@
 #include "bvh/query_rays.cl"
 #include "generated/layout.cl"
 
-kernel APART void query_count(global const float *nodes, global const float *leaves, RAY_ARGS,
+kernel NO_VECTORIZE void query_count(global const float *nodes, global const float *leaves, RAY_ARGS,
                               global uint *counts)
 {
     size_t i = get_global_id(0);
@@ -13,7 +13,7 @@ kernel APART void query_count(global const float *nodes, global const float *lea
     counts[i] = LAYOUT(every)(nodes, leaves, nowhere, QUERY_ONE);
 }
 
-kernel APART void query_every(global const float *nodes, global const float *leaves, RAY_ARGS,
+kernel NO_VECTORIZE void query_every(global const float *nodes, global const float *leaves, RAY_ARGS,
                               global const ulong *firsts, global float *t, global int *primitive,
                               global float *barycentrics)
 {

@@ -105,7 +105,7 @@ inline Refit refit_tree(global float *leaves, uint leaves_begin, global const fl
 #define REFIT refit_tree(leaves, leaves_begin, vertices, faces, faces_begin, indices, boxes, reach)
 
 /* Below the ranges that build_subtree was given, children before parents. */
-kernel APART void refit_subtree(global float8 *nodes, uint nodes_begin, global const Range *restrict ranges,
+kernel NO_VECTORIZE void refit_subtree(global float8 *nodes, uint nodes_begin, global const Range *restrict ranges,
                                 uint begin, REFIT_ARGS)
 {
     Refit tree = REFIT;
@@ -129,7 +129,7 @@ kernel APART void refit_subtree(global float8 *nodes, uint nodes_begin, global c
 }
 
 /* One level of the heap of ranges; those below it are done. */
-kernel APART void refit_level(global float8 *nodes, uint nodes_begin, global const Range *restrict ranges,
+kernel NO_VECTORIZE void refit_level(global float8 *nodes, uint nodes_begin, global const Range *restrict ranges,
                               uint begin, REFIT_ARGS)
 {
     Range r = ranges[begin + get_global_id(0)];
@@ -137,7 +137,7 @@ kernel APART void refit_level(global float8 *nodes, uint nodes_begin, global con
 }
 
 /* Wide nodes from `begin` on, a level; those below it are done. */
-kernel APART void refit_wide8(global float8 *nodes, uint nodes_begin, uint begin, uint count, REFIT_ARGS)
+kernel NO_VECTORIZE void refit_wide8(global float8 *nodes, uint nodes_begin, uint begin, uint count, REFIT_ARGS)
 {
     if (get_global_id(0) >= count) return;
     Refit tree = REFIT;
@@ -177,7 +177,7 @@ inline float8 refit_item(Refit tree, uint at)
 
 /* Compressed nodes from `begin` on, a level; those below it are done. bounds: of every node, as they were
  * before they became steps, so that nothing grows from level to level. */
-kernel APART void refit_compact(global float8 *nodes, uint nodes_begin, global float8 *restrict bounds,
+kernel NO_VECTORIZE void refit_compact(global float8 *nodes, uint nodes_begin, global float8 *restrict bounds,
                                 uint begin, uint count, REFIT_ARGS)
 {
     if (get_global_id(0) >= count) return;
@@ -204,7 +204,7 @@ kernel APART void refit_compact(global float8 *nodes, uint nodes_begin, global f
 }
 
 /* The records of brute.cl; prim and tag stay. */
-kernel APART void refit_brute(global float *restrict records, global const float *restrict vertices,
+kernel NO_VECTORIZE void refit_brute(global float *restrict records, global const float *restrict vertices,
                               global const uint *restrict faces, uint count)
 {
     uint prim = get_global_id(0);

@@ -4,11 +4,11 @@
  * the geometric cosine of the side where it leaves (Veach 1997, 5.3.2): what bsdf_sample gives for the
  * opposite flow lacks, where light is refracted, eta^2, and where normals are smoothed, the quotient
  * |wo . ns| |wi . n| / (|wo . n| |wi . ns|), wo being the side where the light came from. */
-#include "lib/camera.cl"
+#include "interface/camera.cl"
 #include "generated/camera.cl"
-#include "lib/connect.cl"
+#include "film/connect.cl"
 #include "generated/connect.cl"
-#include "lib/light_path.cl"
+#include "lighting/light_path.cl"
 
 void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mask active)
 {
@@ -19,15 +19,15 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     Spectrum beta = v.beta, ratio = hero_ratio(path, at);
     integer state = v.state, depth = v.depth;
 
-    Sampler sampler = light_path_sampler(settings, load_path_place(path, at), load_path_sample(path, at));
+    Sampler sampler = light_path_sampler(settings, load_path_pixel_index(path, at), load_path_sample(path, at));
     natural dimension = as_natural(DIMENSION_VERTEX + depth * DIMENSIONS_A_VERTEX);
     vec2 choice = {0.0f, 0.0f};
 #if USES_CHOICE
     choice = sampler_pair(sampler, dimension + DIMENSION_CHOICE);
 #endif
     Bsdf m = bsdf_load(scene, v.row, surface_texture_point(s), lambdas);
-    Facing facing = facing_load(scene, v.row, s, v.d, lambdas);
-    Frame frame = facing.frame;
+    ShadingFrame shading = shading_frame_load(scene, v.row, s, v.d, lambdas);
+    Frame frame = shading.frame;
     vec3 wo = to_local(frame, neg3(v.d));
     real arrives = 1.0f / max_r(fabs(dot3(s.n, v.d)), (real)(1e-6f));
 
@@ -36,7 +36,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     CameraPoint c = camera_connect(scene, s.p, mask_of(0), sampler_pair(sampler, dimension + DIMENSION_LIGHT));
     Spectrum f = bsdf_eval(m, to_local(frame, neg3(c.d)), wo);
     mask shine = active & (c.pixel >= 0) & (spectrum_max(f) > 0.0f);
-    real turned = fabs(dot3(s.n, c.d)) * arrives * c.importance * facing_share(facing, neg3(v.d));
+    real turned = fabs(dot3(s.n, c.d)) * arrives * c.importance * shading_frame_share(shading, neg3(v.d));
     Spectrum value = spectrum_scale(spectrum_mul(beta, f), turned);
     value = vertex_beyond(scene, v, neg3(c.d), c.t, lambdas, value);
     connect_camera(shadow, at, active, shine, s, c, value);
@@ -56,7 +56,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     Spectrum exact = spectrum_scale(bsdf_eval(m, bs.wi, wo), leaves / sel(spread, bs.pdf, (real)(1.0f)));
     carried = spectrum_sel(spread, exact, carried);
 #endif
-    beta = spectrum_scale(spectrum_mul(beta, carried), facing_share(facing, neg3(v.d)));
+    beta = spectrum_scale(spectrum_mul(beta, carried), shading_frame_share(shading, neg3(v.d)));
 
     /* Russian roulette, on what is left of what the light gave. */
     integer survivor = depth >= settings->rr_depth;

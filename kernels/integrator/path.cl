@@ -20,8 +20,8 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     mask lit = active & (s.light >= 0) & light_shows(scene, s.light, v.front) & !hidden;
     if (any(lit)) {
         integer light = sel_i(lit, s.light, (integer)(0));
-        real pdf = load_path_pdf(path, at), gone = path_gone(path, at);
-        real other = light_pdf(scene, light, madd3(v.d, -gone, v.o), v.d, v.t + gone, s.n);
+        real pdf = load_path_pdf(path, at), null_distance = path_null_distance(path, at);
+        real other = light_pdf(scene, light, madd3(v.d, -null_distance, v.o), v.d, v.t + null_distance, s.n);
         real w = sel(pdf < 0.0f, (real)(1.0f), mis_weight(pdf, other));
         Spectrum le = emission_load(scene, light_at(scene, light).radiance, surface_texture_point(s), lambdas);
         le = spectrum_scale(spectrum_mul(beta, le), w);
@@ -30,19 +30,19 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
 #endif
     mask next = active & !hidden & (depth + 1 < settings->max_depth);
 
-    Sampler sampler = place_sampler(settings, load_path_place(path, at), load_path_sample(path, at));
+    Sampler sampler = pixel_sampler(settings, load_path_pixel_index(path, at), load_path_sample(path, at));
     natural dimension = as_natural(DIMENSION_VERTEX + depth * DIMENSIONS_A_VERTEX);
     vec2 choice = {0.0f, 0.0f};
 #if USES_CHOICE
     choice = sampler_pair(sampler, dimension + DIMENSION_CHOICE);
 #endif
     Bsdf m = bsdf_load(scene, v.row, surface_texture_point(s), lambdas);
-#if BSDF_SHIFTS
+#if BSDF_FLUORESCES
     lambdas = bsdf_shift(scene, v.row, m, lambdas, choice.y, depth); /* from here on, those by which light comes */
     store_path_lambdas(path, at, active & !hidden, lambdas);
 #endif
-    Facing facing = facing_load(scene, v.row, s, v.d, lambdas);
-    Frame frame = facing.frame;
+    ShadingFrame shading = shading_frame_load(scene, v.row, s, v.d, lambdas);
+    Frame frame = shading.frame;
     vec3 wo = to_local(frame, neg3(v.d));
 
 #if USES_LIGHTS && !BSDF_DELTA
@@ -50,7 +50,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     vec3 side = vertex_side(frame, wo);
     LightSample ls = light_sample(scene, s.p, side, choice.x, sampler_pair(sampler, dimension + DIMENSION_LIGHT), lambdas);
     vec3 wi = to_local(frame, ls.wi);
-    Spectrum f = spectrum_scale(bsdf_eval(m, wo, wi), facing_share(facing, ls.wi));
+    Spectrum f = spectrum_scale(bsdf_eval(m, wo, wi), shading_frame_share(shading, ls.wi));
     real w = sel(ls.pdf < 0.0f, (real)(1.0f), mis_weight(ls.pdf, hero_pdf(m, wo, wi, ratio)));
     mask shine = next & (ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
     Spectrum value = spectrum_scale(spectrum_mul(spectrum_mul(beta, f), ls.radiance), w / sel(shine, fabs(ls.pdf), (real)(1.0f)));
@@ -64,7 +64,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     BsdfSample bs = hero_sample(m, wo, v3(uv.x, uv.y, choice.y), &ratio);
     next = next & (bs.pdf > 0.0f);
     vec3 onward = normalize3(to_world(frame, bs.wi));
-    beta = spectrum_scale(spectrum_mul(beta, bs.weight), facing_share(facing, onward));
+    beta = spectrum_scale(spectrum_mul(beta, bs.weight), shading_frame_share(shading, onward));
     real eta = load_path_eta(path, at) * bs.eta;
 
     /* Russian roulette. */
@@ -79,13 +79,13 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     }
 
     vertex_leave(path, at, next, v, onward, beta);
-#if BSDF_PASSES /* for weighing a light that is met further on, nothing has happened */
-    store_path_gone(path, at, next, load_path_gone(path, at) + v.t);
+#if BSDF_IS_NULL /* for weighing a light that is met further on, nothing has happened */
+    store_path_null_distance(path, at, next, load_path_null_distance(path, at) + v.t);
 #else
     path_turned(path, at, next);
     store_path_pdf(path, at, next, sel((bs.lobe & LOBE_DELTA) != 0, (real)(-1.0f), bs.pdf));
 #if USES_INFINITE && !BSDF_DELTA
-    store_path_side(path, at, next, side);
+    store_path_sampled_hemisphere(path, at, next, side);
 #endif
 #endif
     store_path_eta(path, at, next, eta);

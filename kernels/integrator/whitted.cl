@@ -18,14 +18,14 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     }
 #endif
     Bsdf m = bsdf_load(scene, v.row, surface_texture_point(s), lambdas);
-    Facing facing = facing_load(scene, v.row, s, v.d, lambdas);
-    Frame frame = facing.frame;
+    ShadingFrame shading = shading_frame_load(scene, v.row, s, v.d, lambdas);
+    Frame frame = shading.frame;
     vec3 wo = to_local(frame, neg3(v.d));
-    Sampler sampler = place_sampler(settings, load_path_place(path, at), load_path_sample(path, at));
+    Sampler sampler = pixel_sampler(settings, load_path_pixel_index(path, at), load_path_sample(path, at));
     natural dimension = as_natural(DIMENSION_VERTEX + depth * DIMENSIONS_A_VERTEX);
     vec2 choice = sampler_pair(sampler, dimension + DIMENSION_CHOICE);
     real mirror = BSDF_REFLECTIVITY(m);
-#if BSDF_SHIFTS
+#if BSDF_FLUORESCES
     lambdas = bsdf_shift(scene, v.row, m, lambdas, choice.y, depth); /* from here on, those by which light comes */
     store_path_lambdas(path, at, active, lambdas);
 #endif
@@ -37,7 +37,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     radiance = spectrum_sel(active, spectrum_add(radiance, everywhere), radiance);
 #if USES_LIGHTS
     LightSample ls = light_sample(scene, s.p, vertex_side(frame, wo), choice.x, sampler_pair(sampler, dimension + DIMENSION_LIGHT), lambdas);
-    Spectrum f = spectrum_scale(bsdf_eval(m, wo, to_local(frame, ls.wi)), facing_share(facing, ls.wi));
+    Spectrum f = spectrum_scale(bsdf_eval(m, wo, to_local(frame, ls.wi)), shading_frame_share(shading, ls.wi));
     mask shine = active & (ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
     Spectrum value = spectrum_scale(spectrum_mul(spectrum_mul(own, f), ls.radiance), 1.0f / sel(shine, fabs(ls.pdf), (real)(1.0f)));
     value = vertex_beyond(scene, v, ls.wi, ls.t, lambdas, value);
@@ -58,7 +58,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
 #endif
     next = next & (depth + 1 < settings->max_depth);
     vec3 onward = normalize3(to_world(frame, wi));
-    beta = spectrum_scale(beta, facing_share(facing, onward));
+    beta = spectrum_scale(beta, shading_frame_share(shading, onward));
     store_path_radiance(path, at, active, radiance);
     vertex_leave(path, at, next, v, onward, beta);
     store_path_pdf(path, at, next, (real)(-1.0f));

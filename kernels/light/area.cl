@@ -1,4 +1,4 @@
-/* Light from a shape: LightRow.way is 0 where it leaves the front, evenly in all directions, 1 where it
+/* Light from a shape: LightRow.emission_mode is 0 where it leaves the front, evenly in all directions, 1 where it
  * leaves along the normal only (particle_tracer's), 2 where it leaves both sides. */
 inline ShapeSample area_turned(ShapeSample q, mask both)
 {

@@ -2,7 +2,7 @@
  * left and right edges at -z, and +x a quarter from the left. Rows run from pole to pole, the first and the
  * last one on the poles; columns wrap. Radiance is bilinear between texels in both modes, while Mitsuba's
  * spectral variants interpolate a spectrum's shape and its factor apart. */
-#include "lib/grid.cl"
+#include "core/grid.cl"
 
 inline Grid envmap_grid(Envmap l)
 {

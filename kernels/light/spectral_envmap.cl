@@ -1,6 +1,6 @@
 /* An environment of spectra: the directions of envmap.cl, with `bands` values in every texel. It is chosen
  * by its luminance and, a little, by all its light. */
-#include "lib/band_texels.cl"
+#include "texturing/band_texels.cl"
 
 inline Envmap spectral_envmap_image(SpectralEnvmap l)
 {

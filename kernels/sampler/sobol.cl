@@ -1,2 +1,2 @@
 /* Owen-scrambled Sobol points, each pixel's its own. */
-#include "lib/sobol.cl"
+#include "core/sobol.cl"

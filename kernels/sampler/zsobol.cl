@@ -3,7 +3,7 @@
  * samples of a pixel are a well-spread part of it, those of each square of pixels too, so that neighbours err
  * in opposite directions. The order of squares, and of the samples in a pixel, is shuffled by the nested
  * scrambling of the index, anew in every dimension. */
-#include "lib/sobol.cl"
+#include "core/sobol.cl"
 
 /* pixel: along the Z curve; a pixel takes 2^bits neighbouring points, then as many of another sequence. */
 inline Sampler zsobol_start(uint seed, uint bits, natural pixel, natural sample)

@@ -1,5 +1,5 @@
 /* An open tube; sampled evenly over its area. u is the azimuth over 2 pi, v runs along the axis. */
-#include "lib/analytic.cl"
+#include "tracing/analytic.cl"
 
 inline real cylinder_pdf_area(Cylinder q)
 {

@@ -1,6 +1,6 @@
 /* A disk, or an ellipse where its transform stretches it; sampled evenly over its area. u is the
  * distance from the centre (1 at the rim), v the azimuth over 2 pi. */
-#include "lib/analytic.cl"
+#include "tracing/analytic.cl"
 
 inline real disk_pdf_area(Disk q)
 {

@@ -1,7 +1,7 @@
 /* A sphere. As a light it is sampled evenly over the cone that it fills from outside, and evenly over
  * its area from inside. u is the azimuth about its z axis over 2 pi, v the angle from it over pi. */
-#include "lib/analytic.cl"
-#include "lib/surface_flags.cl"
+#include "tracing/analytic.cl"
+#include "path/surface_flags.cl"
 
 inline vec2 sphere_uv(Sphere q, vec3 outward)
 {

@@ -1,7 +1,7 @@
 /* Sums the planes of the film into a picture, pixel by pixel, and takes it to the output space by the
  * matrix in the settings; the fourth value of a pixel is its number of samples. Planes are added in a fixed order, so a picture does not depend on timing. */
-#include "lib/base.cl"
-#include "lib/film.cl"
+#include "core/base.cl"
+#include "film/film.cl"
 
 #ifdef LIGHT_PATHS /* how many there were per pixel; they leave something anywhere */
 #define SAMPLES_ARG , float samples
@@ -13,13 +13,13 @@
 
 kernel void accumulate(global const Settings *settings, global const float *film, global float *image SAMPLES_ARG)
 {
-    int x = get_global_id(0), y = get_global_id(1), places = settings->places;
+    int x = get_global_id(0), y = get_global_id(1), padded_pixels = settings->padded_pixels;
     if (x < settings->width && y < settings->height) {
-        int place = ((y >> 2) * settings->tiles_x + (x >> 2)) * 16 + (y & 3) * 4 + (x & 3);
+        int pixel_index = ((y >> 2) * settings->tiles_x + (x >> 2)) * 16 + (y & 3) * 4 + (x & 3);
         float v[FILM_WORDS];
         for (int i = 0; i < FILM_WORDS; i++) v[i] = 0.0f;
         for (int plane = 0; plane < settings->planes; plane++)
-            for (int i = 0; i < FILM_WORDS; i++) v[i] += film[(plane * FILM_WORDS + i) * places + place];
+            for (int i = 0; i < FILM_WORDS; i++) v[i] += film[(plane * FILM_WORDS + i) * padded_pixels + pixel_index];
         float scale = SAMPLES(v[6]) > 0.0f ? 1.0f / SAMPLES(v[6]) : 1.0f;
         float a = (v[0] + v[3]) * scale, b = (v[1] + v[4]) * scale, c = (v[2] + v[5]) * scale;
         global float *pixel = image + 4 * ((size_t)y * settings->width + x);

@@ -1,8 +1,8 @@
 /* Gathers the paths that met a surface by the kind of its material, a queue for each, `slots` words apart. A
  * group of work-items counts in local memory what it has of each kind, and takes places for all of them
  * with one addition to a kind's count. In what order groups come does not matter to the picture. */
-#include "lib/base.cl"
-#include "lib/waiting.cl"
+#include "core/base.cl"
+#include "path/waiting.cl"
 
 /* Empty queues; a work-item for each. */
 kernel void append_begin(global uint *queue_starts, global uint *queue_counts, uint slots)

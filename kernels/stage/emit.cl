@@ -1,22 +1,22 @@
 /* Ends what is finished and begins what comes next, for integrators that start at lights: the twin of
  * generate.cl. A slot walks the places of the film as there, but they only count paths: what a path
  * leaves on the film is added where the camera sees it, by splat.cl. */
-#include "lib/base.cl"
-#include "lib/stage.cl"
+#include "core/base.cl"
+#include "interface/stage.cl"
 #include "generated/sampler.cl"
-#include "lib/camera.cl"
+#include "interface/camera.cl"
 #include "generated/camera.cl"
-#include "lib/connect.cl"
+#include "film/connect.cl"
 #include "generated/connect.cl"
-#include "lib/film.cl"
-#include "lib/shape.cl"
-#include "lib/light.cl"
+#include "film/film.cl"
+#include "interface/shape.cl"
+#include "interface/light.cl"
 #include "generated/lights.cl"
 #include "generated/emission.cl"
 #include "generated/shapes.cl"
-#include "lib/surface.cl"
-#include "lib/next_event.cl"
-#include "lib/light_path.cl"
+#include "path/surface.cl"
+#include "lighting/next_event.cl"
+#include "lighting/light_path.cl"
 
 STAGE(emit)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
 {
@@ -37,20 +37,20 @@ STAGE(emit)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
         /* The next sample of the place, or the next place. */
         int planes = settings->planes, per_plane = settings->per_plane;
         integer slot = LANE_INDEX + (int)at, plane = divide(slot, per_plane);
-        integer place = load_path_place(path, at), start = plane_sample(plane, planes, first);
+        integer pixel_index = load_path_pixel_index(path, at), start = plane_sample(plane, planes, first);
         integer sample = load_path_sample(path, at) + planes;
-        mask turn = ended & (!began | (sample >= walk_end(settings, walk, place, end)));
-        integer next = walk_next(settings, walk, turn, began, place, slot - plane * per_plane, start, end);
-        mask done = turn & (next >= settings->places);
-        place = sel_i(turn & !done, next, place);
+        mask turn = ended & (!began | (sample >= work_list_end(settings, work_list, pixel_index, end)));
+        integer next = work_list_next(settings, work_list, turn, began, pixel_index, slot - plane * per_plane, start, end);
+        mask done = turn & (next >= settings->padded_pixels);
+        pixel_index = sel_i(turn & !done, next, pixel_index);
         sample = sel_i(turn & !done, start, sample);
         mask go = ended & !done;
-        store_path_place(path, at, go, place);
+        store_path_pixel_index(path, at, go, pixel_index);
         store_path_sample(path, at, go, sample);
         count(counters, COUNTER_DONE, done, (integer)(1));
 
         /* The light's ray. */
-        Sampler sampler = light_path_sampler(settings, place, sample);
+        Sampler sampler = light_path_sampler(settings, pixel_index, sample);
         vec2 u = sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH));
         Wavelengths lambdas = wavelengths_sample(scene, u.x);
         LightRay r = light_emit(scene, u.y, sampler_pair(sampler, (natural)(DIMENSION_FILM)),

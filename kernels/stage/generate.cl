@@ -1,15 +1,15 @@
 /* Ends what is finished and begins what comes next: a path that missed gathers the light from
  * infinity, a path that ended is put on the film, and its slot starts the next sample of its list. */
-#include "lib/base.cl"
-#include "lib/stage.cl"
+#include "core/base.cl"
+#include "interface/stage.cl"
 #include "generated/sampler.cl"
-#include "lib/camera.cl"
+#include "interface/camera.cl"
 #include "generated/camera.cl"
-#include "lib/filter.cl"
-#include "lib/film.cl"
+#include "film/filter.cl"
+#include "film/film.cl"
 #include "generated/bands.cl"
-#include "lib/shape.cl"
-#include "lib/light.cl"
+#include "interface/shape.cl"
+#include "interface/light.cl"
 #include "generated/lights.cl"
 #include "generated/medium.cl"
 
@@ -31,7 +31,7 @@ STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
         if (any(sky)) {
             real pdf = load_path_pdf(path, at);
             vec3 d = sel3(sky, load_path_d(path, at), v3(0.0f, 0.0f, 1.0f)); /* a slot without a pixel has none */
-            Spectrum arrives = infinite_gather(scene, load_path_side(path, at), d, pdf, lambdas);
+            Spectrum arrives = infinite_gather(scene, load_path_sampled_hemisphere(path, at), d, pdf, lambdas);
 #if USES_ABSORPTION
             integer medium = sel_i(sky, load_path_medium(path, at), (integer)(0));
             arrives = spectrum_mul(arrives, medium_transmittance(scene, medium, (real)(FAR), lambdas));
@@ -40,11 +40,11 @@ STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
         }
 #endif
         /* Deposit. */
-        integer place = load_path_place(path, at), sample = load_path_sample(path, at);
-        Exposure e = {load_path_sum(path, at), load_path_rest(path, at), load_path_samples(path, at)};
+        integer pixel_index = load_path_pixel_index(path, at), sample = load_path_sample(path, at);
+        Exposure e = {load_path_sum(path, at), load_path_compensation(path, at), load_path_samples(path, at)};
         mask deposit = ended & began;
-#if USES_SHIFTS /* the film sees the camera's wavelengths, not those by which the light came */
-        Sampler began_with = place_sampler(settings, place, sample);
+#if USES_FLUORESCENCE /* the film sees the camera's wavelengths, not those by which the light came */
+        Sampler began_with = pixel_sampler(settings, pixel_index, sample);
         lambdas = wavelengths_sample(scene, sampler_pair(began_with, (natural)(DIMENSION_WAVELENGTH)).x);
 #endif
         vec3 value = film_value(scene, radiance, lambdas);
@@ -52,13 +52,13 @@ STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
         mask sane = deposit & (fabs(value.x) + fabs(value.y) + fabs(value.z) < 1e30f); /* false for NaN */
         weight = sel(sane, weight, (real)(0.0f));
         value = sel3(sane, value, v3(0.0f, 0.0f, 0.0f));
-        sum_add(&e.sum.x, &e.rest.x, value.x * weight);
-        sum_add(&e.sum.y, &e.rest.y, value.y * weight);
-        sum_add(&e.sum.z, &e.rest.z, value.z * weight);
+        sum_add(&e.sum.x, &e.compensation.x, value.x * weight);
+        sum_add(&e.sum.y, &e.compensation.y, value.y * weight);
+        sum_add(&e.sum.z, &e.compensation.z, value.z * weight);
         e.samples += 1.0f;
 #if USES_BANDS
         integer own = divide(LANE_INDEX + (int)at, settings->per_plane);
-        bands_add(scene, bands, sane, own, place, radiance, lambdas, weight);
+        bands_add(scene, bands, sane, own, pixel_index, radiance, lambdas, weight);
 #endif
         count(counters, COUNTER_SAMPLES, deposit, (integer)(1));
         count(counters, COUNTER_CLOSEST, deposit, depth + sel_i(missed, (integer)(1), (integer)(0)));
@@ -70,33 +70,33 @@ STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
         integer slot = LANE_INDEX + (int)at, plane = divide(slot, per_plane);
         integer start = plane_sample(plane, planes, first);
         sample += planes;
-        mask turn = ended & (!began | (sample >= walk_end(settings, walk, place, end)));
+        mask turn = ended & (!began | (sample >= work_list_end(settings, work_list, pixel_index, end)));
         mask done = (integer)(0);
         if (any(turn)) {
-            film_store(settings, film, turn & began, plane, place, e);
-            integer next = walk_next(settings, walk, turn, began, place, slot - plane * per_plane, start, end);
-            done = turn & (next >= settings->places);
+            film_store(settings, film, turn & began, plane, pixel_index, e);
+            integer next = work_list_next(settings, work_list, turn, began, pixel_index, slot - plane * per_plane, start, end);
+            done = turn & (next >= settings->padded_pixels);
             mask begin = turn & !done;
-            place = sel_i(begin, next, place);
+            pixel_index = sel_i(begin, next, pixel_index);
             sample = sel_i(begin, start, sample);
             if (any(begin)) {
-                Exposure next_place = film_load(settings, film, begin, plane, place);
-                e.sum = sel3(begin, next_place.sum, e.sum);
-                e.rest = sel3(begin, next_place.rest, e.rest);
-                e.samples = sel(begin, next_place.samples, e.samples);
+                Exposure next_pixel = film_load(settings, film, begin, plane, pixel_index);
+                e.sum = sel3(begin, next_pixel.sum, e.sum);
+                e.compensation = sel3(begin, next_pixel.compensation, e.compensation);
+                e.samples = sel(begin, next_pixel.samples, e.samples);
             }
-            store_path_place(path, at, begin, place);
+            store_path_pixel_index(path, at, begin, pixel_index);
             count(counters, COUNTER_DONE, done, (integer)(1));
         }
         mask go = ended & !done;
         store_path_sample(path, at, go, sample);
         store_path_sum(path, at, go, e.sum);
-        store_path_rest(path, at, go, e.rest);
+        store_path_compensation(path, at, go, e.compensation);
         store_path_samples(path, at, go, e.samples);
 
         /* The camera's ray. */
-        vec2 pixel = place_pixel(settings, place);
-        Sampler sampler = place_sampler(settings, place, sample);
+        vec2 pixel = pixel_of_index(settings, pixel_index);
+        Sampler sampler = pixel_sampler(settings, pixel_index, sample);
         vec2 offset;
         filter_sample(scene, sampler_pair(sampler, (natural)(DIMENSION_FILM)), &offset, &weight);
         vec2 position = film_position(settings, pixel, offset);

@@ -1,11 +1,11 @@
 /* Finds where every ray in flight ends. Triangles go through a layout of kernels/bvh, as many
  * rays a work-item as it likes; analytic shapes through a tree of their own, one ray at a time. The hit takes
  * along what shading needs first: the normal and the material of the side that was met. */
-#include "lib/base.cl"
-#include "lib/shape.cl"
-#include "lib/surface_flags.cl"
+#include "core/base.cl"
+#include "interface/shape.cl"
+#include "path/surface_flags.cl"
 #include "generated/trace.cl"
-#include "lib/stage.cl"
+#include "interface/stage.cl"
 
 STAGE(intersect)(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS STAGE_AT_ARG)
 {

@@ -1,14 +1,14 @@
 /* Chooses a leaf for every hit on a mixture (a mask or a blend), at random by its weight, so that what
  * follows shades one material. A row of `mixtures`: the weight (a number and 1 + its texture), and the
  * material words taken where a random number is above and below it; these may be mixtures again. */
-#include "lib/base.cl"
-#include "lib/stage.cl"
+#include "core/base.cl"
+#include "interface/stage.cl"
 #include "generated/sampler.cl"
-#include "lib/shape.cl"
+#include "interface/shape.cl"
 #include "generated/textures.cl"
 #include "generated/mixture.cl"
 #include "generated/shapes.cl"
-#include "lib/surface.cl"
+#include "path/surface.cl"
 
 #define MIXTURE 0xff /* the kind in a mixture's material word */
 
@@ -23,7 +23,7 @@ STAGE(mix_materials)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
         mask front, chosen = open;
         Surface s = surface_load(scene, hit, at, open, load_path_o(path, at), load_path_d(path, at), &front);
         Wavelengths lambdas = load_path_lambdas(path, at);
-        Sampler sampler = place_sampler(scene.settings, load_path_place(path, at), load_path_sample(path, at));
+        Sampler sampler = pixel_sampler(scene.settings, load_path_pixel_index(path, at), load_path_sample(path, at));
         natural dimension = as_natural(DIMENSION_VERTEX + (state & PATH_DEPTH) * DIMENSIONS_A_VERTEX + DIMENSION_ROULETTE);
         real u = sampler_pair(sampler, dimension).y;
         for (; any(open); open = open & (MATERIAL_KIND(word) == MIXTURE)) {

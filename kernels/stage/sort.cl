@@ -1,8 +1,8 @@
 /* Sorts the paths that met a surface by the kind of its material: a stable counting sort of slot
  * indices, so that a kind's indices ascend. Every work-item counts, and later places, a chunk of
  * neighbouring slots; in between, one work-item sums. No atomics, no barriers. */
-#include "lib/base.cl"
-#include "lib/waiting.cl"
+#include "core/base.cl"
+#include "path/waiting.cl"
 
 /* counts[kind * chunks + chunk]: how many of a chunk's slots wait for a kind. */
 kernel void sort_count(SLAB_ARGS, global uint *counts, uint chunk, uint slots)

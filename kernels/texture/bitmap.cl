@@ -33,7 +33,7 @@ inline void bitmap_axis(real x, integer size, integer wrap, mask smooth, integer
 
 inline BitmapPlace bitmap_place(Bitmap t, Scene scene, TexturePoint point)
 {
-    vec3 p = texture_uv(scene, t.mapping, t.place, point);
+    vec3 p = texture_uv(scene, t.mapping, t.transform, point);
     mask smooth = t.filter == BITMAP_FILTER_BILINEAR;
     BitmapPlace b;
     bitmap_axis(dot3(t.to_u, p), t.width, t.wrap_u, smooth, &b.x0, &b.x1, &b.u0, &b.u1);

@@ -2,7 +2,7 @@
  * the form that parameters have, or for a real the number in the first of them. */
 inline integer checkerboard_at(Checkerboard t, Scene scene, TexturePoint point)
 {
-    vec3 p = texture_uv(scene, t.mapping, t.place, point);
+    vec3 p = texture_uv(scene, t.mapping, t.transform, point);
     real u = dot3(t.to_u, p), v = dot3(t.to_v, p);
     mask same = (u - floor(u) > 0.5f) == (v - floor(v) > 0.5f);
     return sel_i(same, t.color0, t.color1);

@@ -1,7 +1,7 @@
 /* Zero and one by turns in cubes of unit size. */
 inline real checkers_value(Checkers t, Scene scene, TexturePoint point)
 {
-    vec3 p = texture_place(scene, t.place, point.p);
+    vec3 p = texture_transformed(scene, t.transform, point.p);
     real half_sum = 0.5f * (floor(p.x) + floor(p.y) + floor(p.z));
     return sel(half_sum == floor(half_sum), (real)(0.0f), (real)(1.0f));
 }

@@ -1,10 +1,10 @@
 /* One within round dots, zero elsewhere, as pbrt's dots: of the cells of uv around whole numbers half have
  * a dot of radius 0.35, put somewhere in it by noise. */
-#include "lib/noise.cl"
+#include "texturing/perlin_noise.cl"
 
 inline real dots_value(Dots t, Scene scene, TexturePoint point)
 {
-    vec3 p = texture_uv(scene, t.mapping, t.place, point);
+    vec3 p = texture_uv(scene, t.mapping, t.transform, point);
     real u = dot3(t.to_u, p), v = dot3(t.to_v, p), i = floor(u + 0.5f), j = floor(v + 0.5f);
     mask has = perlin_noise(scene, v3(i + 0.5f, j + 0.5f, (real)(0.5f))) > 0.0f;
     real x = u - (i + 0.15f * perlin_noise(scene, v3(i + 1.5f, j + 2.8f, (real)(0.5f))));

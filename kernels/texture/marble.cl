@@ -1,11 +1,11 @@
 /* Marble as pbrt has it: along y runs a sine, disturbed by noise, through a row of cubic Bezier curves
  * between nine colours, 1.5 times their brightness. */
-#include "lib/noise.cl"
+#include "texturing/perlin_noise.cl"
 
 /* The colours between which it lies, from word `first`, and how far along. */
 inline integer marble_at(Marble t, Scene scene, TexturePoint point, real *along)
 {
-    vec3 p = scale3(texture_place(scene, t.place, point.p), t.scale);
+    vec3 p = scale3(texture_transformed(scene, t.transform, point.p), t.scale);
     real turns = (p.y + t.variation * fractal_noise(scene, p, t.octaves, t.roughness, mask_of(0))) * INV_2PI, s, c;
     sincos_2pi(clamp_r(turns - floor(turns), (real)(0.0f), (real)(1.0f)), &s, &c);
     real x = (0.5f + 0.5f * s) * 6.0f;

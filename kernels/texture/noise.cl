@@ -1,11 +1,11 @@
 /* Numbers that vary in space: sums of Perlin's noise (2002) as pbrt has them. fbm sums octaves, each 1.99
  * times as fine and `roughness` as strong; wrinkled sums their absolute values; windy is a height of waves
  * times the strength of gusts. All octaves are summed: samples of a pixel average what is finer than it. */
-#include "lib/noise.cl"
+#include "texturing/perlin_noise.cl"
 
 inline real noise_value(Noise t, Scene scene, TexturePoint point)
 {
-    vec3 p = texture_place(scene, t.place, point.p);
+    vec3 p = texture_transformed(scene, t.transform, point.p);
     mask windy = t.pattern == NOISE_PATTERN_WINDY, wrinkled = t.pattern == NOISE_PATTERN_WRINKLED;
     real value = fractal_noise(scene, p, sel_i(windy, (integer)(6), t.octaves), sel(windy, (real)(0.5f), t.roughness), wrinkled);
     if (any(windy)) {

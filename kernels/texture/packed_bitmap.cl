@@ -2,7 +2,7 @@
  * four, or eight as a spectrum (spectrum_packed_texel). `decode` is the first of 256 values that bytes mean. */
 inline Bitmap packed_bitmap_image(PackedBitmap t)
 {
-    Bitmap b = {t.kind, t.to_u, t.to_v, t.mapping, t.place, t.width, t.height, t.first, t.filter, t.wrap_u, t.wrap_v, t.decode};
+    Bitmap b = {t.kind, t.to_u, t.to_v, t.mapping, t.transform, t.width, t.height, t.first, t.filter, t.wrap_u, t.wrap_v, t.decode};
     return b;
 }
 

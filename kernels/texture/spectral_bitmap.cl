@@ -1,14 +1,14 @@
 /* An image with a spectrum in every texel, placed on uv as bitmap.cl places its colours. A reflectance
  * goes on beyond its first and last band as it is there, light ends. */
-#include "lib/band_texels.cl"
+#include "texturing/band_texels.cl"
 
 inline Bitmap spectral_bitmap_image(SpectralBitmap t)
 {
-    Bitmap b = {t.kind, t.to_u, t.to_v, t.mapping, t.place, t.width, t.height, t.first, t.filter, t.wrap_u, t.wrap_v, t.decode};
+    Bitmap b = {t.kind, t.to_u, t.to_v, t.mapping, t.transform, t.width, t.height, t.first, t.filter, t.wrap_u, t.wrap_v, t.decode};
     return b;
 }
 
-inline Spectrum spectral_bitmap_at(SpectralBitmap t, Scene scene, TexturePoint point, Spectrum place)
+inline Spectrum spectral_bitmap_at(SpectralBitmap t, Scene scene, TexturePoint point, Spectrum transform)
 {
     Bitmap image = spectral_bitmap_image(t);
     BitmapPlace b = bitmap_place(image, scene, point);
@@ -16,7 +16,7 @@ inline Spectrum spectral_bitmap_at(SpectralBitmap t, Scene scene, TexturePoint p
     for (int corner = 0; corner < 4; corner++) {
         real weight;
         integer at = t.first + t.bands * bitmap_corner(image, b, corner, &weight);
-        sum = spectrum_madd(bands_texel(scene, at, t.bands, place), weight, sum);
+        sum = spectrum_madd(bands_texel(scene, at, t.bands, transform), weight, sum);
     }
     return sum;
 }
@@ -28,6 +28,6 @@ Spectrum spectral_bitmap_reflectance(SpectralBitmap t, Scene scene, TexturePoint
 
 Spectrum spectral_bitmap_emission(SpectralBitmap t, Scene scene, TexturePoint point, Wavelengths lambdas)
 {
-    Spectrum place = spectra_row(scene, t.number, lambdas);
-    return bands_lit(spectral_bitmap_at(t, scene, point, place), t.bands, place);
+    Spectrum transform = spectra_row(scene, t.number, lambdas);
+    return bands_lit(spectral_bitmap_at(t, scene, point, transform), t.bands, transform);
 }

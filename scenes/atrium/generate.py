@@ -1,6 +1,6 @@
 """Writes the meshes that scene.json is made of, 8 MB; `clpt.benchmark.atrium` has the formulas.
 
-    python scenes/atrium/generate.py
+python scenes/atrium/generate.py
 """
 
 from __future__ import annotations

@@ -54,8 +54,20 @@ def knot() -> trimesh.Trimesh:
 
 def top() -> trimesh.Trimesh:
     """A spinning top, turned round the axis y."""
-    profile = [(0.0, 0.0), (0.02, 0.02), (0.1, 0.1), (0.34, 0.28), (0.42, 0.38), (0.4, 0.46),
-               (0.26, 0.53), (0.09, 0.57), (0.055, 0.64), (0.05, 0.78), (0.065, 0.83), (0.0, 0.85)]
+    profile = [
+        (0.0, 0.0),
+        (0.02, 0.02),
+        (0.1, 0.1),
+        (0.34, 0.28),
+        (0.42, 0.38),
+        (0.4, 0.46),
+        (0.26, 0.53),
+        (0.09, 0.57),
+        (0.055, 0.64),
+        (0.05, 0.78),
+        (0.065, 0.83),
+        (0.0, 0.85),
+    ]
     radius, height = np.array(profile).T
     fine = np.linspace(0, len(profile) - 1, 60)
     steps = np.arange(len(profile))

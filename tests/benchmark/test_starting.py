@@ -41,9 +41,9 @@ def test_cold_and_warm() -> None:
 
 
 def test_a_black_picture_is_refused() -> None:
-    facts = {"mean": 0.0, "ready": 0.5}
-    figure = starting._figure("cold start", [starting.Process(1.0, 1.0)], [facts], "box")
+    stats = {"mean": 0.0, "ready": 0.5}
+    figure = starting._figure("cold start", [starting.Process(1.0, 1.0)], [stats], "box")
     assert "black" in figure.refused
-    facts = {"mean": 0.5, "ready": 2.0}
-    figure = starting._figure("cold start", [starting.Process(1.0, 1.0)], [facts], "box")
+    stats = {"mean": 0.5, "ready": 2.0}
+    figure = starting._figure("cold start", [starting.Process(1.0, 1.0)], [stats], "box")
     assert "later" in figure.refused

@@ -6,7 +6,7 @@ import numpy as np
 
 from clpt import transforms
 from clpt.benchmark import triangles
-from clpt.render.lower import lower
+from clpt.render.lowering.scene import lower
 from clpt.scene import Scene
 from clpt.scene.cameras import Perspective
 from clpt.scene.shapes import Group, Instance, Mesh

@@ -32,8 +32,8 @@ def made(monkeypatch: pytest.MonkeyPatch) -> Made:
             more = {"gbytes": 1.0, "of_copy": 0.1, "mode": "rgb"}
             yield Figure("stages", "shade_diffuse", "Mitems/s", (1e3, 2e3), "box", more)
             yield Figure("stages", "mix", "Mitems/s", (), "box", {"note": "no slot had work"})
-            facts = {"programs": 5, "build_seconds": 1.0, "memory": 1 << 28}
-            yield Figure("start", "cold start", "s", (2.0 / factor,), "box", facts)
+            stats = {"programs": 5, "build_seconds": 1.0, "memory": 1 << 28}
+            yield Figure("start", "cold start", "s", (2.0 / factor,), "box", stats)
 
         monkeypatch.setattr(benchmark, "measure", measure)
         return asked

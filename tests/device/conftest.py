@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from clpt.device import Device, cache, choose
+from clpt.device import Device, choose, disk_cache
 
 
 @pytest.fixture(scope="session")
@@ -14,5 +14,5 @@ def device() -> Device:
 
 @pytest.fixture
 def cache_folder(tmp_path, monkeypatch):
-    monkeypatch.setattr(cache, "folder", lambda: tmp_path / "cache")
+    monkeypatch.setattr(disk_cache, "folder", lambda: tmp_path / "cache")
     return tmp_path / "cache"

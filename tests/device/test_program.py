@@ -10,7 +10,7 @@ import numpy as np
 import pyopencl as cl
 import pytest
 
-from clpt.device import Buffers, Device, assemble, build, build_all, cache, program
+from clpt.device import Buffers, Device, assemble, build, build_all, disk_cache, program
 from clpt.errors import KernelBuildError
 
 TEXT = """
@@ -59,7 +59,7 @@ def test_signature(fill):
 def test_runs_and_sets_again(device, fill, out):
     bound = fill.bind(**arguments(out))
     assert (result(device, bound, out) == 2 * 7 - 1).all()
-    bound.set(sign=1, v=np.float32([0, 3, 0, 0]))
+    bound.set_args(sign=1, v=np.float32([0, 3, 0, 0]))
     assert (result(device, bound, out) == 3 * 7 + 1).all()
 
 
@@ -72,12 +72,15 @@ def test_two_bindings_do_not_disturb(device, fill, out):
 def test_what_is_lent_lets_go_of_buffers_and_asks_for_all(device, fill, out):
     held = sys.getrefcount(out)
     for sign in (-1, -1, 100):
-        with fill.program.lend("fill", **arguments(out, sign=sign)) as bound:
+        with fill.program.borrow_kernel("fill", **arguments(out, sign=sign)) as bound:
             assert (result(device, bound, out) == 14 + sign).all()
         assert sys.getrefcount(out) == held
-    with fill.program.lend("fill", **arguments(out)) as again:
+    with fill.program.borrow_kernel("fill", **arguments(out)) as again:
         assert again is bound
-    with pytest.raises(TypeError, match="'fill' also takes out"), fill.program.lend("fill", n=3):
+    with (
+        pytest.raises(TypeError, match="'fill' also takes out"),
+        fill.program.borrow_kernel("fill", n=3),
+    ):
         pass
 
 
@@ -125,7 +128,7 @@ def test_an_error_names_our_file_and_line(device, cache_folder):
 
 def test_an_unwritable_cache_does_not_hide_the_error(device, tmp_path, monkeypatch):
     (tmp_path / "file").write_text("in the way")
-    monkeypatch.setattr(cache, "folder", lambda: tmp_path / "file")
+    monkeypatch.setattr(disk_cache, "folder", lambda: tmp_path / "file")
     with pytest.raises(KernelBuildError) as raised:
         build(device, source("constant int x = nothing;"))
     assert raised.value.kept is None
@@ -153,7 +156,7 @@ def test_our_cache(device, cache_folder, monkeypatch):
     first, again = Device.open(device.info), Device.open(device.info)
     cold, warm = build(first, source()), build(again, source())
     assert len(built) == 1
-    assert (first.builds.kept, again.builds.kept, again.builds.programs) == (0, 1, 1)
+    assert (first.builds.cached, again.builds.cached, again.builds.programs) == (0, 1, 1)
     assert warm.signatures == cold.signatures
 
     (entry,) = (cache_folder / "programs").iterdir()
@@ -177,7 +180,7 @@ def test_a_context_keeps_its_programs(device):
     assert build(first, source(), ["-DX=1"]) is not built
     assert first.builds.programs == 2
     bound = built.kernel("other").bind(x=None)
-    with built.lend("other", x=None):
+    with built.borrow_kernel("other", x=None):
         pass
     gone = weakref.ref(built)
     del first, queue, built, bound

@@ -13,9 +13,9 @@ def test_the_kernels_are_found():
 
 
 def test_a_kernel_file_is_named_by_its_path():
-    source = assemble("root", {"root": '#include "lib/lanes.cl"\nint after;'})
-    assert source.files[:2] == ("root", "lib/lanes.cl")
-    assert '#line 1 "kernels/lib/lanes.cl"' in source.text
+    source = assemble("root", {"root": '#include "core/lanes.cl"\nint after;'})
+    assert source.files[:2] == ("root", "core/lanes.cl")
+    assert '#line 1 "kernels/core/lanes.cl"' in source.text
     assert source.text.endswith('#line 2 "root"\nint after;\n')
 
 
@@ -48,7 +48,7 @@ def test_defines_come_first():
 
 
 def test_a_generated_file_wins_over_one_on_disk():
-    virtual = {"a": '#include "lib/lanes.cl"', "lib/lanes.cl": "mine"}
+    virtual = {"a": '#include "core/lanes.cl"', "core/lanes.cl": "mine"}
     assert "mine" in assemble("a", virtual).text
 
 

@@ -28,7 +28,7 @@ QUEUES = {
 }
 
 
-def another(queue: cl.CommandQueue, properties: int = 0) -> cl.CommandQueue:
+def fresh_view(queue: cl.CommandQueue, properties: int = 0) -> cl.CommandQueue:
     """A queue in the same context."""
     return cl.CommandQueue(queue.context, queue.device, properties)
 
@@ -36,7 +36,7 @@ def another(queue: cl.CommandQueue, properties: int = 0) -> cl.CommandQueue:
 @pytest.mark.parametrize("kind", QUEUES)
 def test_orders(scene: clpt.Scene, queue: cl.CommandQueue, picture: np.ndarray, kind: str) -> None:
     """Steps, a reset and a camera between them: one after the other, whatever the queue allows."""
-    with clpt.Renderer(scene, queue=another(queue, QUEUES[kind]), slots=SLOTS) as renderer:
+    with clpt.Renderer(scene, queue=fresh_view(queue, QUEUES[kind]), slots=SLOTS) as renderer:
         renderer.step(2)
         renderer.update(camera=dataclasses.replace(scene.camera, fov=25.0))
         renderer.step(1)
@@ -55,7 +55,7 @@ def test_a_step_begins_after_the_hosts_event(
     scene: clpt.Scene, queue: cl.CommandQueue, picture: np.ndarray, kind: str
 ) -> None:
     """The host's thread goes on; the step, and all after it, wait for an event set much later."""
-    with clpt.Renderer(scene, queue=another(queue, QUEUES[kind]), slots=SLOTS) as renderer:
+    with clpt.Renderer(scene, queue=fresh_view(queue, QUEUES[kind]), slots=SLOTS) as renderer:
         late = cl.UserEvent(queue.context)
         events = [
             renderer.step(1, wait_for=[late]),
@@ -63,7 +63,7 @@ def test_a_step_begins_after_the_hosts_event(
             renderer.reset(),
             renderer.step(4),
         ]
-        looks = cl_array.zeros(another(queue), 4, np.float32)  # another queue is not held up
+        looks = cl_array.zeros(fresh_view(queue), 4, np.float32)  # another queue is not held up
         assert not looks.get().any()
         assert all(event.command_execution_status != COMPLETE for event in events)
         late.set_status(COMPLETE)
@@ -75,8 +75,8 @@ def test_another_queue_waits_for_a_step(
     scene: clpt.Scene, queue: cl.CommandQueue, picture: np.ndarray
 ) -> None:
     """The host's commands on a second queue see the film that the event promised, and hold it."""
-    other = another(queue)
-    with clpt.Renderer(scene, queue=another(queue), slots=SLOTS) as renderer:
+    other = fresh_view(queue)
+    with clpt.Renderer(scene, queue=fresh_view(queue), slots=SLOTS) as renderer:
         copied = np.zeros((20, 24, 4), np.float32)
         for _ in range(3):
             done = renderer.step(4)

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from clpt.errors import SceneError
-from clpt.formats import load, native, schema
+from clpt.formats import load, native
+from clpt.formats.native import schema
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Perspective
 from clpt.spectra import Blackbody, Constant, Sensor, Tabulated

@@ -11,13 +11,19 @@ import pyopencl as cl
 
 from clpt import device
 from clpt.records import SETTINGS, SHAPE
-from clpt.render import kinds, lights, shapes, textures
-from clpt.render.arguments import scene_text
-from clpt.render.tables import STEP, Tables
+from clpt.render.codegen import lights as light_dispatch
+from clpt.render.codegen import parameters
+from clpt.render.codegen import shapes as shape_text
+from clpt.render.codegen import textures as texture_text
+from clpt.render.codegen.signatures import scene_text
+from clpt.render.contract import shape_records
+from clpt.render.lowering.geometry import shapes
+from clpt.render.lowering.lights import lights
+from clpt.render.lowering.tables import STEP, Tables
 from tests.kernels.harness import opened
 
 LAMBDAS = (450.0, 520.0, 580.0, 640.0)  # of the spectral mode's probes [nm]
-INCLUDES = ("lib/base.cl", "lib/shape.cl", "lib/light.cl", "generated/lights.cl")
+INCLUDES = ("core/base.cl", "interface/shape.cl", "interface/light.cl", "generated/lights.cl")
 
 
 @dataclass
@@ -58,13 +64,15 @@ class Lit:
         text = ""
         if tables.texture_roles:
             used = {kind for kind, _ in tables.texture_roles}
-            text += textures.dispatch_text(used, tables.texture_roles)
-        text += kinds.emission_text(found)
+            text += texture_text.dispatch_text(used, tables.texture_roles)
+        text += parameters.emission_text(found)
         if sources["factor"]["value"]:
-            text += kinds.factor_text(frozenset(sources["factor"]["value"]))
+            text += parameters.factor_text(frozenset(sources["factor"]["value"]))
         rows = self.rows
         tree = rows.tree is not None
-        return text + lights.dispatch_text(rows.kinds, "texture" in found, rows.two_sided, tree)
+        return text + light_dispatch.dispatch_text(
+            rows.kinds, "texture" in found, rows.two_sided, tree
+        )
 
     def _settings(self) -> np.ndarray:
         settings = np.zeros(1, SETTINGS.dtype)
@@ -96,8 +104,8 @@ def _program(
         + f"{reads}    {body}\n{writes}}}\n"
     )
     virtual = {
-        **shapes.virtual_files(),
-        **lights.virtual_files(),
+        **shape_text.virtual_files(),
+        **light_dispatch.virtual_files(),
         "probe.cl": probe,
         "generated/scene.cl": scene_text(),
         "generated/spectrum.cl": f'#include "spectrum/{mode}.cl"\n',
@@ -110,7 +118,12 @@ def _program(
 
 
 def lit(
-    lamps=(), emitters=(), mode: str = "rgb", radius: float = 1.0, files=(), tree: bool = False
+    lamps=(),
+    emitters=(),
+    mode: str = "rgb",
+    radius: float = 1.0,
+    files=(),
+    tree: bool = False,
 ) -> Lit:
     """A scene of lamps and emissive shapes; `files` are further includes; `tree` chooses lights."""
     tables = Tables(mode)
@@ -119,7 +132,7 @@ def lit(
         row = np.zeros(1, SHAPE.dtype)
         row["prim"] = first
         vertices = faces = uvs = None
-        if shape.kind not in shapes.ANALYTIC:
+        if shape.kind not in shape_records.ANALYTIC:
             vertices, faces, _, uvs = shapes.triangles(shape)
             base = tables.size("uvs") // 2
             tables.append("faces", faces + np.uint32(base))

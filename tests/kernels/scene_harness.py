@@ -9,14 +9,14 @@ import pyopencl as cl
 
 from clpt import device
 from clpt.records import SETTINGS, TABLES
-from clpt.render.arguments import scene_text
+from clpt.render.codegen.signatures import scene_text
 from tests.kernels.harness import opened
 
 BLOCK = 16
 
 
 def scene_files(mode: str) -> dict[str, str]:
-    """The generated files that lib/base.cl includes."""
+    """The generated files that core/base.cl includes."""
     return {
         "generated/scene.cl": scene_text(),
         "generated/spectrum.cl": f'#include "spectrum/{mode}.cl"\n',
@@ -27,7 +27,7 @@ def scene_files(mode: str) -> dict[str, str]:
 class SceneProbe:
     """`body` on lanes, as a function of arrays: it sets r[0..results) from x[0..arguments).
 
-    files: included after lib/base.cl; virtual: generated ones among them; tables: arrays by their
+    files: included after core/base.cl; virtual: generated ones among them; tables: arrays by their
     names in clpt.records.TABLES, settings by theirs.
     """
 
@@ -46,7 +46,7 @@ class SceneProbe:
         settings: Mapping[str, object] | None = None,
     ):
         self.arguments, self.results, self.lanes = arguments, results, lanes
-        includes = "".join(f'#include "{name}"\n' for name in ("lib/base.cl", *files))
+        includes = "".join(f'#include "{name}"\n' for name in ("core/base.cl", *files))
         text = includes + _kernel(body, arguments, results)
         common = {"LANES": lanes, "QUEUED": 0, "SPECTRA_SIZE": 471, "SPECTRA_STEP": "1.0f"}
         made = {**scene_files(mode), **(virtual or {}), "probe.cl": text}

@@ -9,7 +9,8 @@ import pytest
 
 from clpt import spectra, transforms
 from clpt.errors import SceneError
-from clpt.render import cameras
+from clpt.render.contract import camera_records
+from clpt.render.lowering.camera import cameras
 from clpt.scene import cameras as scene
 from tests.kernels.scene_harness import SceneProbe
 
@@ -24,7 +25,7 @@ PLACE = transforms.look_at([3.0, 2.0, -1.5], [0.2, 0.4, 0.1], [0.1, 1.0, 0.2])
 
 @cache
 def _text(kind: str) -> dict[str, str]:
-    record = cameras.RECORDS[kind]
+    record = camera_records.RECORDS[kind]
     return {"generated/camera.cl": f'{record.uniform_text()}#include "camera/{kind}.cl"\n'}
 
 
@@ -34,12 +35,12 @@ def rays(camera, width, height, film, lens=None, lanes=8, index=None):
     call = f"{kind}_ray(camera, film, lens)"
     if index is not None:
         call = f"{kind}_glass_ray(camera, film, lens, {index:.9f}f)"
-    defines = {"RAY(camera, film, lens)": call, "RECORD": cameras.RECORDS[kind].name}
+    defines = {"RAY(camera, film, lens)": call, "RECORD": camera_records.RECORDS[kind].name}
     probe = SceneProbe(
         BODY,
         4,
         6,
-        files=("lib/camera.cl", "generated/camera.cl"),
+        files=("interface/camera.cl", "generated/camera.cl"),
         lanes=lanes,
         virtual=_text(kind),
         defines=defines,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from clpt.errors import SceneError
-from clpt.render import filters
+from clpt.render.lowering.camera import filters
 from clpt.scene import integrators as scene
 from clpt.scene.params import params
 from tests.kernels.scene_harness import SceneProbe
@@ -43,7 +43,7 @@ def sampled(chosen, u, lanes=8, fast=True):
         BODY,
         2,
         3,
-        files=("lib/filter.cl",),
+        files=("film/filter.cl",),
         lanes=lanes,
         defines=defines,
         tables={"distributions": filters.table(chosen)},

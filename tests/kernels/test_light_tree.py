@@ -9,7 +9,8 @@ import pytest
 from scipy.stats import chi2
 
 from clpt import transforms as T
-from clpt.render import light_bounds, light_tree
+from clpt.render.contract import light_records
+from clpt.render.lowering.lights import light_bounds, light_tree
 from clpt.scene.lights import Area, Constant, Directional, Goniometric, Point, Projector, Spot
 from clpt.scene.shapes import Disk, Mesh, Rectangle, Sphere
 from tests.kernels.light_probe import Lit, lit
@@ -112,7 +113,7 @@ def importance(nodes: np.ndarray, p: np.ndarray) -> np.ndarray:
 def reference(there: Lit, p: np.ndarray) -> np.ndarray:
     """Probabilities (rows,) at one point, from the root down."""
     count = len(there.rows.rows)
-    nodes = there.rows.tree[count:].view(light_tree.NODE.dtype)
+    nodes = there.rows.tree[count:].view(light_records.NODE.dtype)
     value, chance = importance(nodes, p), np.zeros(len(nodes))
     chance[0] = 1.0
     for at in range(len(nodes)):  # children stand behind their parents

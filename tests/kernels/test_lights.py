@@ -10,8 +10,10 @@ from scipy.stats import chi2
 
 from clpt import transforms as T
 from clpt.errors import SceneError
-from clpt.render import image_lights, lights, shapes
-from clpt.render.image_lights import face_coordinates, face_directions
+from clpt.render.contract import light_records
+from clpt.render.lowering.geometry import shapes
+from clpt.render.lowering.lights import image_lights, lights
+from clpt.render.lowering.lights.image_lights import face_coordinates, face_directions
 from clpt.scene.lights import (
     Area,
     Constant,
@@ -193,7 +195,9 @@ def test_all_lights_together_are_their_sum():
     alone = [lit([lamp]) for lamp in lamps] + [lit(emitters=[shape]) for shape in glowing]
     parts = [irradiance(scene, p, n, seed=i) for i, scene in enumerate(alone)]
     together = lit(lamps, glowing, radius=3.0)
-    assert set(together.rows.kinds) == set(lights.KINDS) - {"spectral_envmap"}  # of the other mode
+    assert set(together.rows.kinds) == set(light_records.KINDS) - {
+        "spectral_envmap"
+    }  # of the other mode
     mean, error = irradiance(together, p, n, count=1 << 18, seed=77)
     expected = np.sum([m for m, _ in parts], axis=0)
     spread = np.sqrt(error**2 + np.sum([e**2 for _, e in parts], axis=0))
@@ -527,7 +531,7 @@ def test_rows_are_infinite_lights_then_lamps_then_shapes():
     shapes_ = [glows(Cube, radiance=2.0), FORMULAS["disk"][0]]
     scene = lit([Point(), Constant(), Directional()], shapes_)
     rows = scene.rows
-    kinds = [lights.KINDS[k] for k in rows.rows["kind"]]
+    kinds = [light_records.KINDS[k] for k in rows.rows["kind"]]
     assert kinds == ["constant", "point", "directional", *["triangle"] * 12, "disk"]
     assert rows.infinite == 1 and rows.first == (3, 15) and rows.whole == (False, True)
     pmf = rows.rows["pmf"].astype(float)
@@ -563,7 +567,7 @@ def test_uv_on_a_mesh():
 
 
 def test_brightness_of_a_texture_is_its_mean():
-    from clpt.render.lamps import brightness
+    from clpt.render.lowering.lights.non_shape_lights import brightness
 
     board = Checkerboard(color0=(1.0, 1.0, 1.0), color1=(0.0, 0.5, 1.0))
     assert brightness(board) == pytest.approx(0.75)

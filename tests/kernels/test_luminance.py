@@ -8,7 +8,7 @@ from clpt import spectra
 from clpt.spectra import RGB, cie
 from tests.kernels.harness import map_text, run
 
-FILES = ("lib/luminance.cl",)
+FILES = ("core/luminance.cl",)
 NODES = "Spectrum s = luminance_lambdas(); r[0] = s.x; r[1] = s.y; r[2] = s.z; r[3] = s.w;"
 VALUE = "Spectrum s = {x[0], x[1], x[2], x[3]}; r[0] = luminance_of(s);"
 

@@ -1,4 +1,4 @@
-"""The polynomials of kernels/lib/math.cl keep the errors that they state."""
+"""The polynomials of kernels/core/math.cl keep the errors that they state."""
 
 from __future__ import annotations
 

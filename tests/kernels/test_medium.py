@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from clpt import spectra
-from clpt.render.kinds import medium_text
-from clpt.render.tables import Tables
+from clpt.render.codegen.parameters import medium_text
+from clpt.render.lowering.tables import Tables
 from tests.kernels.scene_harness import SceneProbe
 
 FAR = 1e30
@@ -34,7 +34,7 @@ def transmittance(lanes: int, medium: np.ndarray, t: np.ndarray, lambdas: np.nda
         lanes=lanes,
         virtual={
             "generated/medium.cl": medium_text(frozenset({"constant", "table"}))
-            + '#include "lib/medium.cl"\n'
+            + '#include "optics/medium.cl"\n'
         },
         tables=tables.arrays(),
         settings={"lambda_min": 360.0, "lambda_max": 830.0},
@@ -86,7 +86,8 @@ CASES = [
 @pytest.mark.parametrize("lanes", [1, 8, 16])
 def test_which_medium(lanes: int) -> None:
     text = (
-        "#define medium_absorption(s, at, uv, l) spectrum_of(0.0f)\n" + '#include "lib/medium.cl"\n'
+        "#define medium_absorption(s, at, uv, l) spectrum_of(0.0f)\n"
+        + '#include "optics/medium.cl"\n'
     )
     probe = SceneProbe(
         MEDIA,

@@ -1,4 +1,4 @@
-"""kernels/lib/fresnel.cl and microfacet.cl against references in double precision."""
+"""kernels/optics/fresnel.cl and microfacet.cl against references in double precision."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from scipy.integrate import quad
 
 from tests.kernels.harness import map_text, run
 
-FILES = ("lib/fresnel.cl", "lib/microfacet.cl", "lib/rough_coat.cl")
+FILES = ("optics/fresnel.cl", "optics/microfacet.cl", "optics/rough_coat.cl")
 NAMES = ("ggx", "beckmann")
 
 

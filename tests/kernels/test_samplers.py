@@ -141,7 +141,7 @@ SIDE, BITS = 32, 2  # of the film [pixels], and how many samples a pixel takes, 
 def along_the_curve():
     """Points (n, 2) of zsobol for pixels x, y of a film, samples and dimensions."""
     settings = {"tiles_x": SIDE // 4, "sample_bits": BITS, "seed": 3}
-    files = ("sampler/zsobol.cl", "lib/place_sampler_z.cl")
+    files = ("sampler/zsobol.cl", "path/pixel_sampler_z.cl")
     probe = SceneProbe(ON_FILM, 3, 2, files=files, settings=settings)
 
     def points(x, y, sample, dimension):

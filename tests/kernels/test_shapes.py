@@ -8,7 +8,8 @@ from scipy.stats import chi2
 
 from clpt import transforms as T
 from clpt.errors import SceneError
-from clpt.render import shapes as rs
+from clpt.render.contract import shape_records
+from clpt.render.lowering.geometry import shapes as rs
 from clpt.scene.shapes import Cube, Cylinder, Disk, Mesh, Rectangle, Sphere
 from tests.kernels.light_probe import shape_probe
 
@@ -21,7 +22,7 @@ SHAPES = {
     "cylinder": Cylinder(p0=(0.1, 0.2, -0.4), p1=(-0.2, 0.5, 0.9), radius=0.6, to_world=PLACED),
     "rectangle": Rectangle(to_world=STRETCHED),
 }
-ANALYTIC = [name for name, shape in SHAPES.items() if shape.kind in rs.ANALYTIC]
+ANALYTIC = [name for name, shape in SHAPES.items() if shape.kind in shape_records.ANALYTIC]
 OUTSIDE, FAR_OFF = (2.0, 1.5, -1.0), (30.0, -60.0, 80.0)
 NEAR = (0.4, -0.22, 0.73)  # inside of the closed shapes
 # Chance that any one chi-square test of this file fails where all is right: 1e-3 (Sidak).
@@ -51,7 +52,7 @@ MEET = """
 
 
 def call(shape, body: str, given: np.ndarray, results: int, lanes: int = 8) -> np.ndarray:
-    record = rs.RECORDS[shape.kind]
+    record = shape_records.RECORDS[shape.kind]
     text = body.format(T=record.name, k=shape.kind)
     return shape_probe(shape)(text, given, results, lanes).astype(np.float64)
 

@@ -7,8 +7,9 @@ import pytest
 
 from clpt import spectra
 from clpt.errors import SceneError
-from clpt.render import noise, textures
-from clpt.render.tables import Tables
+from clpt.render.codegen.textures import dispatch_text
+from clpt.render.lowering.tables import Tables
+from clpt.render.lowering.textures import noise, textures
 from clpt.scene import textures as scene
 from clpt.spectra.spectrum import d65
 from tests.kernels.scene_harness import SceneProbe
@@ -36,7 +37,7 @@ def look_up(made, role, places=PLACES, mode="rgb", lanes=8):
     body += f"{kind} s = texture_{role}(scene, to_integer(x[0]), point, lambdas);"
     parts = ["s"] if role == "real" else [f"s.{c}" for c in components]
     body += "".join(f"r[{i}] = {part};" for i, part in enumerate(parts))
-    text = textures.dispatch_text(
+    text = dispatch_text(
         {kind for kind, _ in tables.texture_roles},
         tables.texture_roles,
         tables.texture_depth,

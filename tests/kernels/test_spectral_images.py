@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from clpt.errors import SceneError
-from clpt.render.tables import Tables
-from clpt.render.texels import FAR, bands
-from clpt.render.textures import dispatch_text, lower_texture
+from clpt.render.codegen.textures import dispatch_text
+from clpt.render.lowering.tables import Tables
+from clpt.render.lowering.textures.texels import FAR, bands
+from clpt.render.lowering.textures.textures import lower_texture
 from clpt.scene import textures as scene
 from clpt.scene.lights import Constant, CubeMap, Envmap
 from clpt.spectra import Tabulated, luminance

@@ -10,11 +10,12 @@ from PIL import Image
 
 from clpt import images, spectra
 from clpt.errors import SceneError
-from clpt.render import textures
-from clpt.render.bitmaps import NODES, pack
-from clpt.render.tables import Tables
-from clpt.render.texels import texels
-from clpt.render.texture_programs import folded
+from clpt.render.codegen.textures import dispatch_text
+from clpt.render.lowering.tables import Tables
+from clpt.render.lowering.textures import textures
+from clpt.render.lowering.textures.bitmaps import NODES, pack
+from clpt.render.lowering.textures.texels import texels
+from clpt.render.lowering.textures.texture_programs import folded
 from clpt.scene import textures as scene
 from clpt.spectra import cie
 from clpt.spectra.spectrum import d65
@@ -30,7 +31,7 @@ COLOURS = np.random.default_rng(1).random((5, 7, 3)).astype(np.float32)
 
 @cache
 def _dispatch(roles):
-    return textures.dispatch_text({kind for kind, _ in roles}, roles, 4)
+    return dispatch_text({kind for kind, _ in roles}, roles, 4)
 
 
 def _body(role, mode):
@@ -490,7 +491,7 @@ def test_a_texture_is_put_in_once(tmp_path):
 
 
 def test_no_textures_no_text():
-    assert textures.dispatch_text((), ()).strip() == ""
+    assert dispatch_text((), ()).strip() == ""
 
 
 @pytest.mark.parametrize(

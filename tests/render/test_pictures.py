@@ -14,7 +14,7 @@ from PIL import Image
 import clpt
 from clpt import images
 from clpt.errors import UnknownKindError
-from clpt.render.views import sheet
+from clpt.render.aov_preview import sheet
 from clpt.scene import Film, Scene, cameras, shapes
 from clpt.scene.integrators import Aov
 from tests.renders.support import with_film

@@ -40,7 +40,7 @@ def exposures(scene: Scene, count: int, spp: int, first_seed: int = 1, **wavefro
         settings["seed"] = seed
         cl.enqueue_copy(renderer.device.queue, front.named["settings"], settings.reshape(1))
         front.clear()
-        assert front.expose(0, spp)
+        assert front.render_samples(0, spp)
         assert front.counts.rejected == 0, "samples were not finite"
         made.append(renderer.image().astype(np.float64))
     return np.array(made)

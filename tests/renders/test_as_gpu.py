@@ -10,7 +10,7 @@ import pytest
 
 import clpt
 from clpt import device as dev
-from clpt.render.resident import MOST_SLOTS, UNIT_SLOTS, suited_slots
+from clpt.render.wavefront.device_scene import MOST_SLOTS, UNIT_SLOTS, default_slots
 from tests.renders.support import with_film
 
 
@@ -38,4 +38,4 @@ def test_forms(gpu: dev.Device, scenes: Path) -> None:
 
 def test_slots_grow_with_the_device(gpu: dev.Device) -> None:
     units = [dataclasses.replace(gpu.info, compute_units=n) for n in (1, 20, 10_000)]
-    assert [*map(suited_slots, units)] == [UNIT_SLOTS, 20 * UNIT_SLOTS, MOST_SLOTS]
+    assert [*map(default_slots, units)] == [UNIT_SLOTS, 20 * UNIT_SLOTS, MOST_SLOTS]

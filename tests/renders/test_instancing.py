@@ -79,7 +79,7 @@ def test_values_are_those_of_copies(layout: str) -> None:
     assert len(np.unique(expected[..., 8])) > 20  # nearly all are seen
     off = np.abs(ours - expected) > 1e-4 * (1.0 + np.abs(expected))
     assert off.any(axis=2).sum() <= 3
-    told, other = (renderer.facts for renderer in renderers)
+    told, other = (renderer.stats for renderer in renderers)
     assert (told.instances, other.instances) == (32, 2)
     assert told.triangles == 192 + 1 and other.triangles == told.triangles_instanced - 1
     assert told.trees["triangles"] < other.trees["triangles"] / 10

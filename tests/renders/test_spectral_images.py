@@ -12,8 +12,8 @@ import clpt
 from clpt import spectra
 from clpt import transforms as tf
 from clpt.formats.native.write import save
-from clpt.render.lower import lower
-from clpt.render.wavelengths import density
+from clpt.render.lowering.camera.wavelengths import density
+from clpt.render.lowering.scene import lower
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Orthographic
 from clpt.scene.integrators import Path as PathIntegrator

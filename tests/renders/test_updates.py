@@ -216,7 +216,7 @@ def test_trees_are_fitted_or_built(caplog: pytest.LogCaptureFixture) -> None:
     assert own.wavefronts[0].tree is tree
     fresh = picture(clpt.Renderer(own.scene, own.device, layout="wide8"))
     np.testing.assert_allclose(picture(own), fresh, atol=1e-5)
-    with caplog.at_level(logging.INFO, "clpt.render.updates"):
+    with caplog.at_level(logging.INFO, "clpt.render.editing.rebuild"):
         own.update(scene=own.scene)
     assert own.wavefronts[0].tree is not tree
     assert [r.message for r in caplog.records] == ["trees are built over triangles and boxes"]

@@ -59,7 +59,7 @@ FAULTS = {
     "sample does not follow pdf": ("{u.x, u.y}", "{u.x * u.x, u.y}"),
     r"pdf integrates to 1\.5": ("wo.z > 0.0f, cosine", "wo.z > 0.0f, 1.5f * cosine"),
     "LOBE_TRANSMIT is not": ("s.weight = ", "s.wi.z = -s.wi.z; s.weight = "),
-    "set choosy = True": ("{u.x, u.y}", "{u.x, u.z}"),
+    "set uses_lobe_sample = True": ("{u.x, u.y}", "{u.x, u.z}"),
     "set disperses = True": ("s.weight = ", "s.lobe |= LOBE_DISPERSE; s.weight = "),
     "too much energy": ("spectrum_scale(m.colour, ", "spectrum_scale(m.colour, 2.0f * "),
     r"f\(wo, wi\) is not f\(wi, wo\)": ("max_r(wo.z, (real)(0.0f)) * ", ""),

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from clpt.errors import SceneError
-from clpt.formats import studio
 from clpt.formats.gltf import (
     animation,
     cameras,
@@ -20,7 +19,8 @@ from clpt.formats.gltf import (
     nodes,
 )  # fmt: skip
 from clpt.formats.gltf.document import Document
-from clpt.formats.mesh import MeshFile
+from clpt.formats.meshes import framing
+from clpt.formats.meshes.mesh import MeshFile
 from clpt.scene import Scene
 from clpt.scene.shapes import Mesh
 
@@ -47,7 +47,7 @@ def load(path: Path, /, **variables: Any) -> Scene:
     shapes = meshes.shapes(graph)
     if not shapes:
         document.warn("holds no triangles")
-    scene = studio.show(
+    scene = framing.show(
         shapes,
         camera=chosen[0] if chosen else None,
         given_lights=lights.placed(graph),

@@ -15,7 +15,7 @@ from clpt.formats.gltf.accessors import floats
 from clpt.formats.gltf.document import Element
 from clpt.formats.gltf.nodes import Graph, Matrix, compose
 from clpt.formats.gltf.primitives import Geometry, geometry
-from clpt.formats.mesh import checked
+from clpt.formats.meshes.mesh import checked
 from clpt.scene.lights import Area
 from clpt.scene.materials import Material
 from clpt.scene.shapes import Group, Instance, Mesh, Shape

@@ -8,15 +8,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from clpt.formats.meshes.framing import framing_camera
 from clpt.formats.mitsuba import sensors
 from clpt.formats.mitsuba.bsdfs import bsdf
 from clpt.formats.mitsuba.emitters import emitter
+from clpt.formats.mitsuba.properties import Context, Properties
 from clpt.formats.mitsuba.sensors import sensor
 from clpt.formats.mitsuba.shapes import shapes_of
 from clpt.formats.mitsuba.spectra import texture
-from clpt.formats.mitsuba.values import Context, Properties
 from clpt.formats.mitsuba.xml import Element, parse
-from clpt.formats.studio import framing_camera
 from clpt.scene import Scene, integrators
 
 __all__ = ["load"]

@@ -9,8 +9,8 @@ from clpt import spectra
 from clpt.formats.mitsuba.fluorescence import fluorescent
 from clpt.formats.mitsuba.hair import hair
 from clpt.formats.mitsuba.principled import principled, principled_thin
+from clpt.formats.mitsuba.properties import Context, Properties, numbers, placed, unknown
 from clpt.formats.mitsuba.spectra import coefficient, index, ior, real, reflectance, texture
-from clpt.formats.mitsuba.values import Context, Properties, numbers, placed, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene import materials
 from clpt.scene.materials import Material

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from clpt import images
+from clpt.formats.mitsuba.properties import Context, Properties, placed, unknown
 from clpt.formats.mitsuba.sensors import from_focal_length
 from clpt.formats.mitsuba.spectra import TOP_DOWN, emission, reflectance
-from clpt.formats.mitsuba.values import Context, Properties, placed, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene import lights
 from clpt.scene.lights import Light

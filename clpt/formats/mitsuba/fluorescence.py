@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from clpt import spectra
+from clpt.formats.mitsuba.properties import Properties, placed
 from clpt.formats.mitsuba.spectra import real, reflectance
-from clpt.formats.mitsuba.values import Properties, placed
 from clpt.spectra import Constant, Spectrum
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from clpt.formats.mitsuba.properties import Properties
 from clpt.formats.mitsuba.spectra import factor, ior, real
-from clpt.formats.mitsuba.values import Properties
 from clpt.scene.materials import pigment
 from clpt.scene.textures import Product
 from clpt.spectra import Constant, RGBUnbounded, Spectrum

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from clpt.formats.mitsuba.properties import Properties
 from clpt.formats.mitsuba.spectra import index, real, reflectance
-from clpt.formats.mitsuba.values import Properties
 
 LEAST_SPECULAR, LEAST_ETA = 1e-3, 1.001  # Mitsuba's, of what lets light through
 SHARED = (

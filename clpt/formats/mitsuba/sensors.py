@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from clpt.errors import UnknownKindError
-from clpt.formats.mitsuba.values import Context, Properties, placed, unknown
+from clpt.formats.mitsuba.properties import Context, Properties, placed, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene import cameras, integrators
 from clpt.scene.integrators import Film, Filter, Integrator, Sampler

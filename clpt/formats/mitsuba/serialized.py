@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.errors import SceneError
-from clpt.formats import mesh
+from clpt.formats.meshes import mesh
 from clpt.scene.shapes import Mesh
 
 MAGIC = 0x041C

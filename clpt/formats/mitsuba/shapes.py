@@ -9,11 +9,11 @@ import numpy as np
 
 from clpt import transforms
 from clpt.errors import SceneError
-from clpt.formats import mesh, strands
+from clpt.formats.meshes import mesh, strands
 from clpt.formats.mitsuba import serialized
 from clpt.formats.mitsuba.bsdfs import bsdf
 from clpt.formats.mitsuba.emitters import area
-from clpt.formats.mitsuba.values import Context, Properties, placed, unknown
+from clpt.formats.mitsuba.properties import Context, Properties, placed, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene import shapes
 from clpt.scene.materials import Diffuse

@@ -14,7 +14,7 @@ import numpy as np
 
 from clpt import spectra
 from clpt.formats.colour import colour
-from clpt.formats.mitsuba.values import Context, Properties, number, numbers, placed, unknown
+from clpt.formats.mitsuba.properties import Context, Properties, number, numbers, placed, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene.textures import ATTRIBUTES, Bitmap, Checkerboard, MeshAttribute, Product, Texture
 from clpt.spectra import (

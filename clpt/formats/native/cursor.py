@@ -25,7 +25,7 @@ NAMES = {
 
 
 @dataclass(frozen=True)
-class Twice:
+class DuplicateKey:
     """Stands for an object in which a key is given twice."""
 
     key: str
@@ -52,7 +52,7 @@ class Cursor:
 
     def expect(self, kind: type, what: str = "") -> Any:
         """Return the value, which must be of a type."""
-        if isinstance(self.value, Twice):
+        if isinstance(self.value, DuplicateKey):
             raise self.error(f"the key {self.value.key!r} is given twice")
         if not isinstance(self.value, kind):
             found = NAMES.get(type(self.value), "something else")
@@ -78,7 +78,7 @@ class Cursor:
     def number(self) -> float:
         """Return a finite number."""
         if isinstance(self.value, bool) or not isinstance(self.value, (int, float)):
-            self.expect(str if isinstance(self.value, Twice) else float, "a number")
+            self.expect(str if isinstance(self.value, DuplicateKey) else float, "a number")
             raise self.error("must be a number, not true or false")
         try:
             value = float(self.value)
@@ -121,12 +121,12 @@ def parse(path: Path) -> Cursor:
     return cursor
 
 
-def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any] | Twice:
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any] | DuplicateKey:
     values = dict(pairs)
     if len(values) == len(pairs):
         return values
     keys = [key for key, _ in pairs]
-    return Twice(next(key for i, key in enumerate(keys) if key in keys[:i]))
+    return DuplicateKey(next(key for i, key in enumerate(keys) if key in keys[:i]))
 
 
 def _line(text: str, path: tuple[str | int, ...]) -> int:

@@ -11,7 +11,7 @@ import numpy as np
 
 from clpt import spectra
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
-from clpt.formats import mesh, particles, strands
+from clpt.formats.meshes import mesh, particles, strands
 from clpt.formats.native import reradiation
 from clpt.formats.native import spectra as json_spectra
 from clpt.formats.native.cursor import Cursor, parse, placed

@@ -15,8 +15,8 @@ import numpy as np
 
 from clpt import images, spectral_exr
 from clpt.errors import SceneError
-from clpt.formats import particles, strands
-from clpt.formats.mesh import smooth_normals
+from clpt.formats.meshes import particles, strands
+from clpt.formats.meshes.mesh import smooth_normals
 from clpt.formats.native import reradiation as json_reradiation
 from clpt.formats.native import spectra as json_spectra
 from clpt.formats.native.read import ARRAYS, default

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from clpt.formats.pbrt import assembly, films, reader, views
-from clpt.formats.pbrt.assembly import Progress
+from clpt.formats.pbrt import build_scene, camera_film, films, reader
+from clpt.formats.pbrt.build_scene import Progress
 from clpt.formats.pbrt.files import Contents
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.state import Definition, State
@@ -26,16 +26,16 @@ def load(path: Path, progress: Progress | None = None) -> Scene:
     """
     contents = reader.read(path)
     shared = contents.shared
-    shared.make_material = assembly.named
+    shared.make_material = build_scene.named
     options = contents.options
     seen = options.get("Camera") or _default_camera(path, contents)
-    exposure = views.exposure_time(seen.params)
+    exposure = camera_film.exposure_time(seen.params)
     film = films.film(options.get("Film"), options.get("PixelFilter"), exposure)
     sampler, spp, seed = films.sampler(options.get("Sampler"))
     scene = Scene(
-        camera=views.camera(seen, film),
-        shapes=assembly.shapes(contents, progress),
-        lights=assembly.lights(contents),
+        camera=camera_film.camera(seen, film),
+        shapes=build_scene.shapes(contents, progress),
+        lights=build_scene.lights(contents),
         integrator=films.integrator(options.get("Integrator")),
         sampler=sampler,
         film=film,
@@ -44,9 +44,9 @@ def load(path: Path, progress: Progress | None = None) -> Scene:
         name=path.name.partition(".pbrt")[0],
         extra={"format": "pbrt"},
     )
-    assembly.remaining(contents)
-    assembly.report([found for name, found in options.items() if name != "Accelerator"])
-    scene.warnings = assembly.folded(shared.warnings)
+    build_scene.remaining(contents)
+    build_scene.report([found for name, found in options.items() if name != "Accelerator"])
+    scene.warnings = build_scene.folded(shared.warnings)
     return scene
 
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from clpt import spectra
 from clpt.errors import SceneError, UnknownKindError
-from clpt.formats.pbrt import coats
-from clpt.formats.pbrt.mapped import mapped
+from clpt.formats.pbrt import coated_albedo
+from clpt.formats.pbrt.map_values import mapped
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.roughness import alphas, isotropic, rough, smooth
 from clpt.formats.pbrt.spectra import spectrum
@@ -36,7 +36,7 @@ def coated_diffuse(params: Parameters, state: State) -> Material:
     base = textured(params, "reflectance", "reflectance", state, 0.5)
     thickness = coat(params, state)
     if thickness > 0.0:
-        looks = coats.under_coat(middle(eta), thickness)
+        looks = coated_albedo.under_coat(middle(eta), thickness)
         key = ("coat", base, middle(eta), thickness)
         base = state.shared.once(key, params, partial(mapped, base, looks, bytes_stay=True))
     return plastic(base, eta, isotropic(alphas(params, state), params, state))
@@ -81,17 +81,17 @@ def subsurface(params: Parameters, state: State) -> Material:
     }  # fmt: skip
     scattering, absorption = given["sigma_s"], given["sigma_a"]
     if medium:
-        if medium not in coats.MEDIA:
-            raise UnknownKindError("medium", medium, coats.MEDIA)
-        (scattering, absorption), g = coats.MEDIA[medium], 0.0
+        if medium not in coated_albedo.MEDIA:
+            raise UnknownKindError("medium", medium, coated_albedo.MEDIA)
+        (scattering, absorption), g = coated_albedo.MEDIA[medium], 0.0
     elif (scattering is None) != (absorption is None):
         raise SceneError("'sigma_a' and 'sigma_s' are given together or not at all")
     elif scattering is None and given["reflectance"] is None:
-        scattering, absorption = coats.MEDIA["Wholemilk"]
+        scattering, absorption = coated_albedo.MEDIA["Wholemilk"]
     if scattering is not None:
         base = _albedo(scattering, absorption, g)
     else:
-        looks = coats.from_body_reflectance(middle(eta))
+        looks = coated_albedo.from_body_reflectance(middle(eta))
         base = mapped(given["reflectance"], looks, bytes_stay=True)
     state.warn(
         params, "light leaves a 'subsurface' body where it entered: a diffuse base of its albedo"
@@ -100,7 +100,7 @@ def subsurface(params: Parameters, state: State) -> Material:
 
 
 def _albedo(scattering: Any, absorption: Any, g: float) -> Any:
-    albedo = coats.body_albedo(_colour(scattering), _colour(absorption), g)
+    albedo = coated_albedo.body_albedo(_colour(scattering), _colour(absorption), g)
     return tuple(float(v) for v in albedo)
 
 

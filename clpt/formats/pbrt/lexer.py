@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.errors import SceneError
-from clpt.formats.packed import read_bytes
+from clpt.formats.gzip_file import read_bytes
 from clpt.formats.pbrt.params import ALIASES, TYPES, Parameter
 from clpt.formats.pbrt.state import nearest
 

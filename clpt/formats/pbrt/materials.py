@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from clpt.errors import SceneError, UnknownKindError
-from clpt.formats.pbrt import coats
+from clpt.formats.pbrt import coated_albedo
 from clpt.formats.pbrt.hair import hair
 from clpt.formats.pbrt.layered import both, coat, coated_diffuse, middle, subsurface
-from clpt.formats.pbrt.mapped import mapped
+from clpt.formats.pbrt.map_values import mapped
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.roughness import alphas, isotropic, rough, smooth, stretched
 from clpt.formats.pbrt.spectra import named, spectrum
@@ -104,7 +104,7 @@ def _metal(params: Parameters, state: State, prefix: str) -> dict[str, Any]:
 
 def _damped(metal: dict[str, Any], ior: float, thickness: float) -> dict[str, Any]:
     """A metal under a coat that absorbs, which is a factor on its reflection."""
-    return {**metal, "specular_reflectance": coats.let_through(ior, thickness) ** 2}
+    return {**metal, "specular_reflectance": coated_albedo.let_through(ior, thickness) ** 2}
 
 
 def _extinction(r: Any) -> Any:

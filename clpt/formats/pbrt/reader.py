@@ -12,8 +12,8 @@ from clpt.errors import SceneError, UnknownKindError
 from clpt.formats.pbrt.files import Contents
 from clpt.formats.pbrt.lexer import UPGRADE
 from clpt.formats.pbrt.params import Parameters
-from clpt.formats.pbrt.placing import Placing
 from clpt.formats.pbrt.state import TARGETS, Definition, State, nearest
+from clpt.formats.pbrt.transforms import Placing
 
 COLOUR_SPACES = ("srgb", "rec2020", "aces2065-1", "dci-p3")
 OPTIONS = ("Camera", "Film", "PixelFilter", "Sampler", "Integrator", "Accelerator")

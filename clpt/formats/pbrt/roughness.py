@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from clpt.errors import SceneError
-from clpt.formats.pbrt.mapped import mapped
+from clpt.formats.pbrt.map_values import mapped
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.state import State
 from clpt.formats.pbrt.textures import textured

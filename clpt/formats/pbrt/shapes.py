@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from clpt import transforms
 from clpt.errors import SceneError, UnknownKindError
-from clpt.formats import mesh, ply
+from clpt.formats.meshes import mesh, ply
 from clpt.formats.pbrt import curves, subdivision, surfaces
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.state import Definition, State

@@ -15,7 +15,7 @@ import numpy as np
 
 from clpt import transforms
 from clpt.errors import SceneError, UnknownKindError
-from clpt.formats.pbrt.mapped import mapped
+from clpt.formats.pbrt.map_values import mapped
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.spectra import SPECTRUM_TYPES, spectrum, value_of
 from clpt.formats.pbrt.state import Definition, State

@@ -185,7 +185,7 @@ def test_what_must_be_in_the_world(write):
 
 
 def test_gzip_bombs_and_doubling_includes_end(write, monkeypatch):
-    monkeypatch.setattr("clpt.formats.packed.LARGEST", 1 << 20)
+    monkeypatch.setattr("clpt.formats.gzip_file.LARGEST", 1 << 20)
     bomb = write(gzip.compress(b" " * (2 << 20)), "bomb.pbrt.gz")
     with pytest.raises(SceneError, match="larger than"):
         load(bomb)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from clpt.errors import SceneError
-from clpt.formats import load, ply
+from clpt.formats import load
+from clpt.formats.meshes import ply
 
 hypothesis = pytest.importorskip("hypothesis")
 st = hypothesis.strategies

@@ -8,7 +8,7 @@ from scipy import integrate
 
 from clpt import spectra
 from clpt.errors import SceneError
-from clpt.formats.pbrt import coats
+from clpt.formats.pbrt import coated_albedo
 from clpt.formats.pbrt.materials import MAKERS, material
 from clpt.formats.pbrt.state import Definition
 from clpt.scene import materials
@@ -130,10 +130,10 @@ def layered(r, eta, thickness, bounces=200):
 @pytest.mark.parametrize("r", [0.05, 0.5, 0.95])
 def test_a_base_under_a_coat_that_absorbs(r):
     """Without absorption, the changed base leaves what the base left with it, twice passed."""
-    changed = coats.under_coat(1.5, 0.1)(r)
+    changed = coated_albedo.under_coat(1.5, 0.1)(r)
     share = layered(1e-9, 1.5, 0.1) / layered(1e-9, 1.5, 0.0)  # what entering loses, as leaving
     assert layered(changed, 1.5, 0.0) == pytest.approx(share * layered(r, 1.5, 0.1), rel=2e-3)
-    assert coats.under_coat(1.5, 0.0)(r) == pytest.approx(r)
+    assert coated_albedo.under_coat(1.5, 0.0)(r) == pytest.approx(r)
 
 
 def test_coated_diffuse():
@@ -153,7 +153,7 @@ def test_albedo_of_a_half_space(single):
     for _ in range(500):
         h = 1.0 / (np.sqrt(1.0 - single) + 0.5 * single * kernel @ h)
     wanted = 1.0 - 2.0 * np.sqrt(1.0 - single) * (weights * mu) @ h
-    assert coats.body_albedo(single, 1.0 - single, 0.0) == pytest.approx(wanted, abs=3e-3)
+    assert coated_albedo.body_albedo(single, 1.0 - single, 0.0) == pytest.approx(wanted, abs=3e-3)
 
 
 def test_scattering_bodies():

@@ -9,7 +9,7 @@ from clpt import transforms
 from clpt.errors import SceneError
 from clpt.formats import load
 from clpt.formats.pbrt import subdivision
-from clpt.render import shapes as lowering
+from clpt.render.lowering.geometry import shapes as lowering
 from clpt.scene import shapes
 from clpt.scene.materials import Mask, Null, TwoSided
 

@@ -8,7 +8,7 @@ from PIL import Image
 
 from clpt import transforms
 from clpt.errors import SceneError
-from clpt.formats.pbrt.mapped import mapped
+from clpt.formats.pbrt.map_values import mapped
 from clpt.formats.pbrt.textures import textured
 from clpt.scene.textures import Bitmap, Checkerboard, Checkers, Dots, Mix, Noise, Product
 from tests.formats.pbrt.directives import define, params, state

@@ -1,0 +1,73 @@
+"""Rendering in passes, so that a picture is complete early and can be had at any time."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import signal
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+from ..render.renderer import Progress, Renderer
+
+PASS_SECONDS = 5.0  # a pass has a tail in which few paths are left: long passes make it rare
+GROWTH = 3  # times what has been rendered so far
+
+
+def render_samples(
+    renderer: Renderer,
+    spp: int | None,
+    limit: float | None,
+    show: Callable[[Progress], None],
+    noise: float | None = None,
+) -> bool:
+    """Render until every pixel has `spp` samples or `limit` [s] is over; None means without end.
+
+    With `noise` it ends too when that is what is left of it.
+
+    The first pass gives every pixel a sample, whatever the limit. Ctrl-C ends the rendering within
+    a second; a second one is a KeyboardInterrupt. Returns whether it was not interrupted.
+    """
+    began = time.perf_counter()
+
+    def tell(progress: Progress) -> bool:
+        seconds = time.perf_counter() - began
+        show(dataclasses.replace(progress, total=spp or 0, seconds=seconds))
+        over = limit is not None and seconds >= limit and renderer.samples > 0
+        return not (interrupted or over)
+
+    size, end = 1, began
+    with _interrupts() as interrupted:
+        while renderer.run(size, tell, noise=noise):
+            start, end = end, time.perf_counter()
+            seconds_left = math.inf if limit is None else began + limit - end
+            samples_left = math.inf if spp is None else spp - renderer.samples
+            if samples_left <= 0 or seconds_left <= 0 or renderer.active == 0.0:
+                break
+            rate = size / max(end - start, 1e-9)
+            size = pass_size(renderer.samples, rate, samples_left, seconds_left)
+        return not interrupted
+
+
+def pass_size(samples: int, rate: float, samples_left: float, seconds_left: float) -> int:
+    """How many samples a pass takes after `samples`, at `rate` [1/s], and with that much left."""
+    in_time = int(rate * min(PASS_SECONDS, seconds_left))
+    return int(max(1, min(GROWTH * samples, in_time, samples_left)))
+
+
+@contextmanager
+def _interrupts() -> Iterator[list[int]]:
+    """A list that is no longer empty once Ctrl-C was pressed; the next press acts as always."""
+    pressed: list[int] = []
+
+    def press(number: int, frame: FrameType | None) -> None:
+        pressed.append(number)
+        signal.signal(signal.SIGINT, before)
+
+    before = signal.signal(signal.SIGINT, press)
+    try:
+        yield pressed
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -1,0 +1,219 @@
+"""A place to show what comes without one: a camera that frames it, a ground and a soft light.
+
+Up is +z for .stl, where printers and CAD have it, and +y for every other format.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import transforms
+from clpt.errors import SceneError
+from clpt.formats.meshes import mesh
+from clpt.scene import Scene, cameras, integrators, lights, shapes
+from clpt.scene.cameras import Perspective
+from clpt.scene.materials import Diffuse
+from clpt.spectra import RGBIlluminant
+
+FOV = 35.0
+EXACT = 1 << 25  # points of instances to place; of more, boxes are
+CHUNK = 1 << 18  # of them at a time
+MARGIN = 1.05
+BELOW = 1e-3  # radii from what is shown to the ground, so that flat things do not lie in it
+FROM = (0.4, 0.35, 1.0)  # the camera, seen from the middle of the scene, +y up
+KEY_FROM = (-0.8, 1.3, 0.7)  # the key light, likewise
+Z_UP = transforms.rotate([1.0, 0.0, 0.0], 90.0)
+
+
+def load(path: Path) -> Scene:
+    """Read a bare mesh and put it into the studio, whatever its size and place."""
+    file = mesh.read_mesh(path)
+    if not any(mesh.has_area(part) for part in file.meshes):
+        raise SceneError("none of its triangles has an area", file=path)
+    up = Z_UP if path.suffix.lower() == ".stl" else np.eye(4)
+    scene = show(file.meshes, file=path, up=up)
+    scene.warnings = file.warnings
+    return scene
+
+
+def show(
+    things: Sequence[shapes.Shape],
+    *,
+    file: Path,
+    camera: cameras.Camera | None = None,
+    given_lights: Sequence[lights.Light] = (),
+    up: transforms.Matrix = transforms.IDENTITY,
+) -> Scene:
+    """Return a scene of shapes, with the camera and the lights that are missing.
+
+    Without any light there is one all around and a key light: a square, above a ground, where the
+    camera is ours too; else one from afar, which nothing hides and no camera sees.
+    `extra["studio"]` counts what was added. Raises SceneError for shapes too large to be framed.
+    """
+    low, high = world_bounds(things)
+    middle, radius = (low + high) / 2.0, _radius(low, high)
+    if not np.isfinite(radius):
+        raise SceneError("is too large to be framed", file=file)
+    furniture: list[shapes.Shape] = []
+    lit: list[lights.Light] = []
+    if not given_lights:
+        lit = [lights.Constant(radiance=RGBIlluminant(0.35, 0.35, 0.35))]
+        if camera is None:
+            floor, axis = middle.copy(), int(np.argmax(up[:3, 1]))
+            floor[axis] = low[axis] - BELOW * radius
+            furniture = [_ground(floor, radius, up), _key(middle, radius, up)]
+        else:
+            lit.append(_distant_key(up))
+    return Scene(
+        camera=camera or framing_camera(things, up),
+        shapes=[*things, *furniture],
+        lights=[*given_lights, *lit],
+        film=integrators.Film(filter=integrators.Gaussian()),
+        name=file.stem,
+        extra={
+            "format": file.suffix.lower()[1:],
+            "studio": {"camera": camera is None, "shapes": len(furniture), "lights": len(lit)},
+        },
+    )
+
+
+def framing_camera(
+    things: Sequence[shapes.Shape], up: transforms.Matrix = transforms.IDENTITY
+) -> Perspective:
+    """Return a camera from the front and above, whose shorter side all shapes together fill."""
+    low, high = world_bounds(things)
+    middle, radius = (low + high) / 2.0, _radius(low, high)
+    view = transforms.look_at(_direction(FROM, up), np.zeros(3), up[:3, 1])[:3, :3]
+    distance = 1.5 * radius
+    for points in _outlines(things):
+        seen = (points - middle) @ view
+        aside = np.abs(seen[:, :2]).max(axis=1) / np.tan(np.radians(FOV / 2.0))
+        distance = max(distance, MARGIN * float(np.max(aside - seen[:, 2])))
+    origin = middle + distance * _direction(FROM, up)
+    return Perspective(
+        to_world=transforms.look_at(origin, middle, up[:3, 1]),
+        fov=FOV,
+        fov_axis="smaller",
+        near=1e-3 * distance,
+        far=1e3 * distance,
+    )
+
+
+def world_bounds(
+    things: Sequence[shapes.Shape],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Least and largest corner (3,) of all shapes in world space; a unit box where there are none.
+
+    Of very many instances the corners of their groups' boxes count.
+    """
+    boxes = [shape_bounds(thing) for thing in things if not isinstance(thing, shapes.Instance)]
+    boxes += [(points.min(axis=0), points.max(axis=0)) for points in _placed_points(things)]
+    if not boxes:
+        boxes = [(-np.ones(3), np.ones(3))]
+    return np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)
+
+
+def shape_bounds(thing: shapes.Shape) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Least and largest corner (3,) of a shape in world space."""
+    matrix = np.asarray(thing.to_world, np.float64)
+    linear = matrix[:3, :3]
+    if isinstance(thing, shapes.Sphere):
+        points = transforms.transform_points(matrix, [thing.center])
+        reach = thing.radius * np.linalg.norm(linear, axis=1)
+    elif isinstance(thing, shapes.Spheres):
+        given = np.asarray(thing.centers, np.float64)
+        points = transforms.transform_points(matrix, given[:, :3])
+        radius = np.max(given[:, 3] if given.shape[1] == 4 else thing.radii)
+        reach = radius * np.linalg.norm(linear, axis=1)
+    elif isinstance(thing, shapes.Disk):
+        points, reach = matrix[None, :3, 3], np.linalg.norm(linear[:, :2], axis=1)
+    elif isinstance(thing, shapes.Cylinder):
+        points = transforms.transform_points(matrix, [thing.p0, thing.p1])
+        axis = np.subtract(thing.p1, thing.p0) / np.linalg.norm(np.subtract(thing.p1, thing.p0))
+        # A circle about the axis reaches r |row x axis| along each row of the matrix.
+        reach = thing.radius * np.linalg.norm(np.cross(linear, axis), axis=1)
+    elif isinstance(thing, shapes.Curves):
+        given = np.asarray(thing.points, np.float64)
+        points = transforms.transform_points(matrix, given[:, :3])
+        reach = given[:, 3].max() * np.linalg.norm(linear, axis=1)
+    else:
+        points, reach = transforms.transform_points(matrix, _corners(thing)), np.zeros(3)
+    return points.min(axis=0) - reach, points.max(axis=0) + reach
+
+
+def _outlines(things: Sequence[shapes.Shape]) -> Iterator[NDArray[np.float64]]:
+    """Points (n, 3) in world space whose hull holds a shape, for each."""
+    for thing in things:
+        if isinstance(thing, shapes.Mesh):
+            yield transforms.transform_points(thing.to_world, thing.vertices)
+        elif not isinstance(thing, shapes.Instance):
+            yield _box_corners(*shape_bounds(thing))
+    yield from _placed_points(things)
+
+
+def _placed_points(things: Sequence[shapes.Shape]) -> Iterator[NDArray[np.float64]]:
+    """Points (n, 3) around instances: those of groups, or the corners of boxes for very many."""
+    placed: dict[int, list[shapes.Instance]] = {}
+    for thing in things:
+        if isinstance(thing, shapes.Instance) and thing.group.shapes:
+            placed.setdefault(id(thing.group), []).append(thing)
+    for own in placed.values():
+        matrices = np.stack([np.asarray(thing.to_world, np.float64)[:3] for thing in own])
+        points = np.concatenate(list(_outlines(own[0].group.shapes)))
+        if len(points) * len(matrices) > EXACT:
+            points = _box_corners(points.min(axis=0), points.max(axis=0))
+        step = max(CHUNK // len(points), 1)
+        for first in range(0, len(matrices), step):
+            part = matrices[first : first + step]
+            yield (points @ part[:, :, :3].transpose(0, 2, 1) + part[:, None, :, 3]).reshape(-1, 3)
+
+
+def _box_corners(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
+    return low + (high - low) * (_corners(shapes.Cube()) + 1.0) / 2.0
+
+
+def _corners(thing: shapes.Shape) -> NDArray[np.float64]:
+    if isinstance(thing, shapes.Mesh):
+        return np.asarray(thing.vertices, np.float64)
+    depth = (-1.0, 1.0) if isinstance(thing, shapes.Cube) else (0.0,)
+    return np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in depth])
+
+
+def _radius(low: NDArray[np.float64], high: NDArray[np.float64]) -> float:
+    """Radius of the sphere around a box; one that is not zero, even around a point."""
+    radius = float(np.linalg.norm(high - low)) / 2.0
+    return radius if radius > 0.0 else max(1.0, float(np.abs(low).max()))
+
+
+def _direction(from_: Sequence[float], up: transforms.Matrix) -> NDArray[np.float64]:
+    turned = transforms.transform_vectors(up, from_)
+    return turned / np.linalg.norm(turned)
+
+
+def _ground(floor: NDArray[np.float64], radius: float, up: transforms.Matrix) -> shapes.Shape:
+    flat = up @ transforms.rotate([1.0, 0.0, 0.0], -90.0)
+    to_world = transforms.translate(floor) @ flat @ transforms.scale(40.0 * radius)
+    return shapes.Disk(to_world=to_world, material=Diffuse(reflectance=0.5), name="ground")
+
+
+def _distant_key(up: transforms.Matrix) -> lights.Light:
+    """About as bright as the square one, from the same side."""
+    return lights.Directional(
+        direction=tuple(-_direction(KEY_FROM, up)), irradiance=RGBIlluminant(4.0, 4.0, 4.0)
+    )
+
+
+def _key(middle: NDArray[np.float64], radius: float, up: transforms.Matrix) -> shapes.Shape:
+    """A square light of 3 radii, 4 radii away, that shines on the middle."""
+    origin = middle + 4.0 * radius * _direction(KEY_FROM, up)
+    to_world = transforms.look_at(origin, middle, up[:3, 1]) @ transforms.scale(1.5 * radius)
+    return shapes.Rectangle(
+        to_world=to_world,
+        material=Diffuse(reflectance=0.0),
+        emission=lights.Area(radiance=RGBIlluminant(8.0, 8.0, 8.0)),
+        name="key light",
+    )

@@ -1,0 +1,256 @@
+"""The reference of scene.json as a page, made from the dataclasses' own declarations.
+
+`python -m clpt.formats.native.reference` writes it to docs/scene_format.md.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import json
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from clpt import spectra
+from clpt.formats.native.read import ARRAYS, default
+from clpt.formats.native.reradiation import RERADIATIONS
+from clpt.formats.native.spectra import SPECTRA
+from clpt.scene import KINDS, integrators, materials
+from clpt.scene.params import Kind, Param, params
+
+INTRODUCTION = """# scene.json
+
+This page is made by `python -m clpt.formats.native.reference` from the dataclasses in `clpt/scene`: a name
+here is the class's name there, and every parameter is one of its fields. `scenes/schema.json` says
+the same to an editor: begin a file with `"$schema": "../schema.json"`.
+
+```json
+{
+  "camera": {"type": "perspective", "fov": 40,
+             "to_world": {"look_at": {"origin": [0, 1, 5], "target": [0, 1, 0], "up": [0, 1, 0]}}},
+  "film": {"width": 640, "height": 480},
+  "materials": {"red": {"type": "diffuse", "reflectance": [0.6, 0.05, 0.04]}},
+  "shapes": [{"type": "sphere", "center": [0, 1, 0], "material": "red"},
+             {"type": "mesh", "file": "teapot.ply", "material": {"type": "dielectric"}}],
+  "lights": [{"type": "constant", "radiance": "D65"}]
+}
+```
+
+## A scene
+
+| key | what it is |
+| --- | --- |
+| `camera` | one of the [cameras](#cameras); the only key that must be there |
+| `film` | size, mode and filter: see [film](#film) |
+| `integrator` | how light is followed: [integrators](#integrators) |
+| `sampler` | where random numbers come from: [samplers](#samplers) |
+| `materials` | name -> [material](#materials); shapes refer to them by name |
+| `groups` | name -> a list of shapes; an [instance](#instance) places all of them |
+| `shapes` | a list of [shapes](#shapes) |
+| `lights` | a list of [lights](#lights); area lights stand on shapes, as `emission` |
+| `spp` | samples of a pixel |
+| `noise` | noise, such as 0.02, below which a pixel gets no more samples; `spp` is then the most |
+| `seed` | of the random numbers |
+| `name` | for people, and for the names of pictures |
+
+Lengths are in metres, angles in degrees, wavelengths in nm. Names of files are relative to the
+scene file. A key that means nothing is an error, and so is a number outside its limits: the message
+names file, line and place.
+
+## Values
+
+**Transforms** (`to_world`) are a 4x4 matrix in rows, or a list of steps of which the first is
+applied first: `{"translate": [x, y, z]}`, `{"scale": s}` or `{"scale": [x, y, z]}`,
+`{"rotate": {"axis": [x, y, z], "angle": degrees}}`,
+`{"look_at": {"origin": ..., "target": ..., "up": ...}}`. `to_uv` is a 3x3 matrix, or steps in the
+plane of u and v.
+
+**Spectra** are a number (the same at every wavelength), `[r, g, b]` in linear Rec. 709, a name, or
+an object. What a colour means depends on the parameter's role:
+
+| role | `[r, g, b]` | name |
+| --- | --- | --- |
+| reflectance | the smoothest reflectance of that colour (Jakob and Hanika 2019) | - |
+| emission | D65 times such a spectrum | an illuminant |
+| index | a smooth unbounded spectrum | a glass or liquid |
+| factor | a smooth unbounded spectrum | - |
+| coefficient | a smooth unbounded spectrum | - |
+"""
+
+HEADINGS = {
+    "camera": "Cameras", "shape": "Shapes", "material": "Materials", "texture": "Textures",
+    "light": "Lights", "integrator": "Integrators", "sampler": "Samplers", "filter": "Filters",
+}  # fmt: skip
+ROLES = {
+    "reflectance": "reflectance",
+    "emission": "emission",
+    "index": "index",
+    "factor": "factor",
+    "coefficient": "coefficient",
+    "real": "number",
+    "flag": "true or false",
+    "reradiation": "[re-radiation](#re-radiation)",
+    "orders": "list of numbers",
+    "layers": "list of [layers](#layers)",
+}
+
+
+def text() -> str:
+    """Return the page as the published file has it."""
+    parts = [INTRODUCTION, *_spectra()]
+    for category, heading in HEADINGS.items():
+        parts += [f"## {heading}\n", *map(_kind, KINDS[category])]
+        if category == "integrator":
+            parts += ["## Film\n", _summary(integrators.Film), _table(integrators.Film)]
+        if category == "material":
+            parts += ["## Layers\n", _summary(materials.Layer), _table(materials.Layer)]
+    return "\n".join(parts)
+
+
+def _spectra() -> list[str]:
+    """What the objects and names that stand for spectra are."""
+    file = "the same from a file of columns, or a page of refractiveindex.info (.yml, .csv)"
+    rows = [
+        "| object | what it is |",
+        "| --- | --- |",
+        '| `{"values": [[nm, value], ...]}` | a table, linear between its rows |',
+        f'| `{{"file": "name"}}` | {file} |',
+    ]
+    for name, cls in SPECTRA.items():
+        fields = dataclasses.fields(cls)  # type: ignore[arg-type]
+        keys = "".join(f', "{field.name}": ...' for field in fields)
+        rows.append(f'| `{{"type": "{name}"{keys}}}` | {_first_line(cls)} |')
+    names = {
+        "Illuminants": spectra.illuminants(),
+        "Glasses and liquids": spectra.glasses(),
+        'Metals (`"metal": name` or `{"file": name}` in place of `eta` and `k`)': spectra.metals(),
+    }
+    told = [f"{what}: {', '.join(f'`{name}`' for name in known)}." for what, known in names.items()]
+    return ["\n".join(rows) + "\n", "\n\n".join(told) + "\n", *_reradiations()]
+
+
+def _reradiations() -> list[str]:
+    """What the objects that stand for fluorescence are."""
+    file = "a measured BFC matrix (whose diagonal is a spectrum of the same `file`), or a table"
+    rows = ["| object | what it is |", "| --- | --- |", f'| `{{"file": "name"}}` | {file} |']
+    for name, cls in RERADIATIONS.items():
+        fields = dataclasses.fields(cls)  # type: ignore[arg-type]
+        keys = "".join(f', "{field.name}": ...' for field in fields)
+        rows.append(f'| `{{"type": "{name}"{keys}}}` | {_first_line(cls)} |')
+    return [
+        "## Re-radiation\n",
+        "See [fluorescence](spectral.md#fluorescence).\n",
+        "\n".join(rows) + "\n",
+    ]
+
+
+def _kind(cls: type[Kind]) -> str:
+    return f"### `{cls.kind}`\n\n{_summary(cls)}\n{_table(cls)}"
+
+
+def _summary(cls: type) -> str:
+    return inspect.cleandoc(cls.__doc__ or "") + "\n"
+
+
+def _first_line(cls: type) -> str:
+    return _summary(cls).split("\n\n")[0].strip().replace("\n", " ").replace("|", "\\|")
+
+
+def _table(cls: type[Kind]) -> str:
+    defaults = {field.name: default(field) for field in dataclasses.fields(cls)}
+    declared = params(cls)
+    if not declared:
+        return "It has no parameters.\n"
+    rows = ["| parameter | accepts | default | meaning |", "| --- | --- | --- | --- |"]
+    if issubclass(cls, KINDS["shape"][0]):
+        rows.append("| `file` | name of a mesh file | - | in place of the arrays below |")
+    if "points" in declared:
+        rows_of = "lines of x y z radius, blank ones between strands"
+        rows.append(f"| `file` | name of a text file | - | {rows_of}, in place of both below |")
+    if "centers" in declared:
+        arrays = "arrays of these names, and attributes by theirs"
+        rows.append(f"| `file` | name of a .npz file | - | {arrays}, in place of all three |")
+    if "group" in declared:
+        several = "matrices (n, 3, 4), an instance for each"
+        rows.append(f"| `file` | name of a .npy file | - | {several} |")
+    for name, param in declared.items():
+        unit = f" [{param.unit}]" if param.unit else ""
+        shown = _shown(defaults[name])
+        rows.append(
+            f"| `{name}` | {_accepts(name, param, defaults[name])} | {shown} | {param.doc}{unit} |"
+        )
+    return "\n".join(rows) + "\n"
+
+
+def _accepts(name: str, param: Param, value: Any) -> str:
+    if param.role == "choice":
+        return ", ".join([f"`{c}`" for c in param.choices] + ["none"] * param.optional)
+    if param.role == "host":
+        return _host(name, value)
+    limits = _limits(param) if param.role == "real" else ""
+    return ROLES[param.role] + limits + (" or texture" if param.textured else "")
+
+
+def _limits(param: Param) -> str:
+    low, high = math.isfinite(param.low), math.isfinite(param.high)
+    if low and high:
+        return f" {param.low:g} to {param.high:g}"
+    return f" from {param.low:g}" if low else ""
+
+
+def _host(name: str, value: Any) -> str:
+    """What only the host needs, by its name or by the type of its default."""
+    if name in ARRAYS:
+        width, item = ARRAYS[name]
+        return f"rows of {width} {item}s"
+    special = {
+        "image": "name of an image file",
+        "attributes": "object of rows of 1 or 3 numbers by name",
+        "emission": "`area` or `directional_area` light",
+        "back": "material",
+        "crop": "four whole numbers",
+        "map": "`bitmap` texture",
+        "points": "rows of 4 numbers",
+        "centers": "rows of 3 numbers",
+        "radii": "number, or a list of them",
+        "lengths": "whole numbers",
+        "group": "a name in `groups`",
+        "sensor": '`cie1931`, `cie1964`, `{"file": name}` or `{"curves": [three spectra]}`,'
+        " the latter two perhaps with a `matrix`",
+        "white_balance": "`none`, an illuminant, a number [K] or `[x, y]`",
+    }
+    if name in special:
+        return special[name]
+    if isinstance(value, materials.Material):
+        return "material, or its name"
+    if isinstance(value, Kind):
+        return "object with a `type`"
+    if isinstance(value, np.ndarray):
+        return "transform"
+    if isinstance(value, tuple):
+        return "list of names" if value and isinstance(value[0], str) else "three numbers"
+    names = {bool: "true or false", int: "whole number", float: "number", str: "text"}
+    return names[type(value)]
+
+
+def _shown(value: Any) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, np.ndarray):
+        return "identity"
+    if isinstance(value, Kind):
+        return f"`{value.kind}`"
+    if isinstance(value, tuple) and value and isinstance(value[0], str):
+        return "all"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return f"`{json.dumps(value)}`" if value != "" else "-"
+
+
+if __name__ == "__main__":
+    target = Path(sys.argv[1] if len(sys.argv) > 1 else "docs/scene_format.md")
+    target.write_text(text(), "utf-8")

@@ -1,0 +1,187 @@
+"""Kernel text of the lights: choosing one, sampling it, its pdf, and what infinite ones add."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from clpt.records import LIGHT, SHAPE
+from clpt.render.contract import light_records, shape_records
+from clpt.render.contract.light_records import BASES, BOTH, INFINITE, KINDS, RECORDS
+
+
+def virtual_files() -> dict[str, str]:
+    """Return generated/light/<kind>.cl per kind: its struct, its loader and its functions."""
+    made = {
+        f"generated/light/{kind}.cl": f'{record.row_text()}#include "light/{kind}.cl"\n'
+        for kind, record in RECORDS.items()
+    }
+    for kind, base in BASES.items():
+        name = f"generated/light/{kind}.cl"
+        made[name] = f'#include "generated/light/{base}.cl"\n{made[name]}'
+    return made
+
+
+def dispatch_text(
+    kinds: Iterable[str], textured: bool = False, two_sided: bool = False, tree: bool = False
+) -> str:
+    """Return the functions over all lights, for the kinds in the scene (`LightRows.kinds`).
+
+    textured: some emission is a texture, so that triangles need the uv of their mesh; two_sided:
+    some shape emits from its back too; tree: the rows are followed by a tree that chooses among
+    them. It includes the files of `virtual_files`, here and in clpt.render.lowering.geometry.shapes.
+
+    light_sample(scene, p, side, pick, u, lambdas)  chooses a light and a direction to it
+    light_pdf(scene, row, p, wi, t, n)              of it, [1/sr], for a ray that met a shape
+    light_shows(scene, row, front)                  whether the side of a shape that was met emits
+    infinite_light(scene, row, side, d, lambdas, ...)  radiance and pdf of one infinite light
+    infinite_gather(scene, side, d, pdf, lambdas)   what they all add to a path that left the scene
+    """
+    present = [kind for kind in KINDS if kind in set(kinds)]
+    others = [kind for kind in present if kind in RECORDS]
+    surfaces = [kind for kind in present if kind in shape_records.RECORDS]
+    includes = ["path/surface_flags.cl", "interface/shape.cl", "interface/light.cl", "core/mis.cl"]
+    includes += ["lighting/light_choice.cl"]
+    includes += [f"generated/light/{kind}.cl" for kind in others]
+    includes += [f"generated/shape/{kind}.cl" for kind in surfaces]
+    includes += ["light/area.cl"] if surfaces else []
+    parts = [f"#define LIGHT_ROW_WORDS {LIGHT.words}", f"#define SHAPE_ROW_WORDS {SHAPE.words}"]
+    parts += [f"#define LIGHT_{kind.upper()} {KINDS.index(kind)}" for kind in present]
+    parts += [f'#include "{name}"' for name in includes]
+    parts += _tree_text() if tree else []
+    parts.append(_sides_text(two_sided))
+    parts += _sample_text(others, surfaces, textured, two_sided, tree)
+    parts += _pdf_text(surfaces, tree)
+    parts += _infinite_text([kind for kind in others if kind in INFINITE])
+    return "\n".join(parts) + "\n"
+
+
+def case_text(kind: str, only: bool, body: Sequence[str]) -> list[str]:
+    """Lines that do `body` where the light `l` is of a kind, under the mask `m`; `only`: always."""
+    if only:
+        rows = ["mask m = (integer)(-1);", *body]
+        return ["    {", *(f"        {line}" for line in rows), "    }"]
+    head = ["    {", f"        mask m = l.kind == LIGHT_{kind.upper()};", "        if (any(m)) {"]
+    return [*head, *(f"            {line}" for line in body), "        }", "    }"]
+
+
+def row_text(kind: str) -> str:
+    """The kind's parameters of the light `l`; other lanes read the first row, see `blank_row`."""
+    table = "light_params" if kind in RECORDS else "geometry"
+    return f"{kind}_row(scene.{table}, sel_i(m, l.params, (integer)(0)))"
+
+
+def point_text(kind: str, uv: str) -> list[str]:
+    """Lines that set `point`, what a texture sees, where the light `l` is a shape of a kind."""
+    if kind not in ("triangle", "sphere"):
+        place = "v3(0.0f, 0.0f, 0.0f)"
+        return [f"point = texture_point_sel(m, texture_point({uv}, {place}), point);"]
+    made = f"area_{kind}_point(scene, shape, sel_i(m, row, shape.light), {uv})"
+    return [
+        "integer at = sel_i(m, l.shape, (integer)(0)) * SHAPE_ROW_WORDS;",
+        "ShapeRow shape = shape_row_row(scene.shapes, at);",
+        f"point = texture_point_sel(m, {made}, point);",
+    ]
+
+
+def _tree_text() -> list[str]:
+    """Nodes of the tree over lights, and how one goes down in it."""
+    node = light_records.NODE
+    child = next(member.word for member in node.members if member.name == "child")
+    return [
+        node.row_text(),
+        f"#define LIGHT_NODE_WORDS {node.words}",
+        f"#define LIGHT_NODE_CHILD {child}",
+        '#include "lighting/light_tree.cl"',
+    ]
+
+
+def _sides_text(two_sided: bool) -> str:
+    """Whether the side of a shape that a ray met emits; most scenes need not look at the row."""
+    if not two_sided:
+        return "#define light_shows(scene, row, front) (front)"
+    return (
+        "inline mask light_shows(Scene scene, integer row, mask front)\n{\n"
+        f"    return front | (light_at(scene, max_i(row, (integer)(0))).way == {BOTH});\n}}"
+    )
+
+
+def _sample_text(
+    others: list[str], surfaces: list[str], textured: bool, two_sided: bool, tree: bool
+) -> list[str]:
+    only = len(others) + len(surfaces) == 1
+    head = (
+        "LightSample light_sample(Scene scene, vec3 p, vec3 side, real pick, vec2 u, "
+        "Wavelengths lambdas)"
+    )
+    if not others and not surfaces:
+        return [f"inline {head} {{ return light_nothing(); }}"]
+    number = "FEW_LIGHTS ? &u.x : &pick"
+    if tree:
+        chosen = ["real pmf;", f"integer row = light_tree_pick(scene, p, {number}, &pmf);"]
+    else:
+        chosen = [f"integer row = light_pick(scene, {number});"]
+    lines = [
+        f"inline {head}",
+        "{",
+        *(f"    {line}" for line in chosen),
+        "    LightRow l = light_at(scene, row);",
+        "    LightSample s = light_nothing();",
+    ]
+    for kind in others:
+        seen = "side" if kind in INFINITE else "p"
+        sampled = f"{kind}_sample({row_text(kind)}, scene, {seen}, u, lambdas)"
+        lines += case_text(kind, only, [f"s = light_sel(m, {sampled}, s);"])
+    if surfaces:
+        lines += [
+            "    ShapeSample q = shape_sample_nothing();",
+            "    TexturePoint point = texture_point_nowhere();",
+        ]
+    for kind in surfaces:
+        body = [f"ShapeSample r = {kind}_sample({row_text(kind)}, p, u);"]
+        body += point_text(kind, "r.uv") if textured else []
+        lines += case_text(kind, only, [*body, "q = shape_sample_sel(m, r, q);"])
+    if two_sided:
+        lines.append(f"    q = area_turned(q, l.way == {BOTH});")
+    if surfaces:
+        lines += [
+            "    point.p = madd3(q.wi, q.t, p);",
+            "    Spectrum le = emission_load(scene, l.radiance, point, lambdas);",
+            "    s = light_sel(l.shape >= 0, area_sample(q, le), s);",
+        ]
+    return [*lines, f"    return light_chosen(s, {'pmf' if tree else 'l.pmf'});", "}"]
+
+
+def _pdf_text(surfaces: list[str], tree: bool) -> list[str]:
+    lines = [
+        "inline real light_pdf(Scene scene, integer row, vec3 p, vec3 wi, real t, vec3 n)",
+        "{",
+        "    LightRow l = light_at(scene, row);",
+        "    real pdf = 0.0f;",
+    ]
+    for kind in surfaces:
+        body = f"pdf = sel(m, {kind}_pdf({row_text(kind)}, p, wi, t, n), pdf);"
+        lines += case_text(kind, len(surfaces) == 1, [body])
+    pmf = "light_tree_pmf(scene, row, p)" if tree else "l.pmf"
+    return [*lines, f"    return pdf * {pmf};", "}"]
+
+
+def _infinite_text(kinds: list[str]) -> list[str]:
+    """`row` is the same in all lanes."""
+    if not kinds:
+        return []
+    lines = [
+        "inline void infinite_light(Scene scene, int row, vec3 side, vec3 d, Wavelengths lambdas,",
+        "                           Spectrum *radiance, real *pdf)",
+        "{",
+        "    LightRow l = light_at(scene, (integer)(row));",
+        "    *radiance = spectrum_of(0.0f);",
+        "    *pdf = 0.0f;",
+    ]
+    for kind in kinds:
+        body = [
+            f"{RECORDS[kind].name} light = {row_text(kind)};",
+            f"*radiance = spectrum_sel(m, {kind}_radiance(light, scene, d, lambdas), *radiance);",
+            f"*pdf = sel(m, {kind}_pdf(light, scene, side, d) * l.pmf, *pdf);",
+        ]
+        lines += case_text(kind, len(kinds) == 1, body)
+    return [*lines, "}", '#include "lighting/infinite.cl"']

@@ -1,0 +1,108 @@
+"""What kernels take, as macros: records, tables and slabs; trees; film and counters.
+
+Every list stands here once: as it is declared, as it is passed on, and as the host binds it.
+"""
+
+from __future__ import annotations
+
+from clpt import device
+from clpt.records import INSTANCE, LIGHT, SETTINGS, SHAPE, SLABS, TABLES
+from clpt.render.contract.features import Features
+
+SLAB_ARGS = {f"{record.name.lower()}_words": "global float *restrict " for record in SLABS}
+SLAB_ARGS["stride"] = "uint "
+SCENE_ARGS = {n: f"global const {element} *restrict " for n, (element, _) in TABLES.items()}
+SCENE_ARGS["settings"] = "global const Settings *restrict "
+
+
+def args_text(name: str, args: dict[str, str]) -> list[str]:
+    """Macros with arguments as they are declared, and as they are passed on."""
+    declared = ", ".join(f"{type_}{own}" for own, type_ in args.items())
+    return [f"#define {name}_ARGS {declared}", f"#define {name}_PASSED {', '.join(args)}"]
+
+
+def virtual_files(features: Features, layout: str) -> dict[str, str]:
+    """Return the generated files with arguments."""
+    groups = {
+        "trace_args": {"TRACE": trace_args(features, layout)},
+        "stage_args": {"BEGIN": begin_args(features), "JOIN": join_args(features, layout)},
+    }
+    made = {"generated/scene.cl": scene_text()}
+    for file, args in groups.items():
+        rows = [row for name, own in args.items() for row in args_text(name, own)]
+        made[f"generated/{file}.cl"] = "\n".join([*rows, ""])
+    return made
+
+
+def scene_text() -> str:
+    """Return records, the `Scene` struct and the macros that carry it through arguments."""
+    slabs = [record.slab_text() for record in SLABS]
+    rows = [record.row_text() for record in (SHAPE, INSTANCE, LIGHT)]
+    members = [
+        f"    global const {element} *{name}; /* {doc} */"
+        for name, (element, doc) in TABLES.items()
+    ]
+    slab_sets = [
+        f"{record.name.lower()} = {{{name}, stride}}"
+        for record, name in zip(SLABS, SLAB_ARGS, strict=False)
+    ]
+    return "\n".join(
+        [
+            SETTINGS.uniform_text(),
+            *slabs,
+            "typedef struct {",
+            *members,
+            "    global const Settings *settings;",
+            "} Scene;",
+            *rows,
+            f"#define SHAPE_ROW_WORDS {SHAPE.words}",
+            f"#define SHAPE_ROW_PRIM {next(m.word for m in SHAPE.members if m.name == 'prim')}",
+            f"#define INSTANCE_ROW_WORDS {INSTANCE.words}",
+            f"#define LIGHT_ROW_WORDS {LIGHT.words}",
+            *args_text("SCENE", SCENE_ARGS),
+            "#define SCENE Scene scene = {SCENE_PASSED};",
+            *args_text("SLAB", SLAB_ARGS),
+            f"#define SLABS Slab {', '.join(slab_sets)};",
+            "",
+        ]
+    )
+
+
+def trace_args(features: Features, layout: str) -> dict[str, str]:
+    """The buffers of all trees, in which rays are traced."""
+    if layout == "brute":
+        return {"tris": "global const float *", "triangles": "uint "}
+    trees = dict.fromkeys(("nodes", "leaves"), "global const float *")
+    if features.analytic:
+        trees |= {"shape_nodes": "global const float *", "shape_indices": "global const uint *"}
+    if features.instances:
+        trees["instance_nodes"] = "global const float *"
+    return trees
+
+
+def begin_args(features: Features) -> dict[str, str]:
+    """What the stage takes that begins paths."""
+    film = ["film", "bands"] if features.bands else ["film"]
+    rest = {"counters": "global uint *", "work_list": "global const uint *", "samples": "int2 "}
+    return {**dict.fromkeys(film, "global float *"), **rest}
+
+
+def join_args(features: Features, layout: str) -> dict[str, str]:
+    """What the stage takes that tests whether paths can be joined to a light, or the camera."""
+    own = begin_args(features) if features.light_paths else {}
+    there = {name: type_ for name, type_ in own.items() if name in ("film", "counters")}
+    return {**trace_args(features, layout), **there}
+
+
+def loop_arguments(features: Features, layout: str) -> tuple[device.Argument, ...]:
+    """Return what the kernel of stage/loop.cl takes: linked kernels do not tell it themselves."""
+    args = {**SLAB_ARGS, **SCENE_ARGS, **trace_args(features, layout), **begin_args(features)}
+    args |= {"bounces": "uint ", "restart": "uint "}
+    return tuple(
+        device.Argument(
+            name,
+            "*" if "*" in type_ else type_.strip(),
+            "global" if type_.startswith("global") else "private",
+        )
+        for name, type_ in args.items()
+    )

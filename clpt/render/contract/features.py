@@ -1,0 +1,67 @@
+"""Features: what a lowered scene needs of the kernels. They alone decide the kernels' text."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from clpt.scene.materials import Material
+
+Sources = dict[str, dict[str, frozenset[str]]]
+
+
+@dataclass(frozen=True)
+class Features:
+    """What occurs in a scene.
+
+    leaves: classes of leaf materials in their order, a material word's upper bits count in it;
+    lights: device kinds of lights (see clpt.render.lowering.lights.lights); textures, texture_roles: kinds and
+    (kind, role) pairs; analytic: kinds of shapes that rays meet as they are; sources: see
+    clpt.render.lowering.tables.
+    """
+
+    mode: str
+    camera: str
+    sampler: str
+    filter: str
+    integrator: str
+    leaves: tuple[type[Material], ...]
+    transmitting: tuple[str, ...] = ()  # kinds of leaves of which some let light through
+    lights: tuple[str, ...] = ()
+    textures: tuple[str, ...] = ()
+    texture_roles: tuple[tuple[str, str], ...] = ()
+    texture_mappings: bool = False  # some texture makes uv of the place
+    texture_depth: int = 0  # how many values their programs stack
+    analytic: tuple[str, ...] = ()
+    instances: bool = False
+    normals: bool = False
+    uvs: bool = False
+    tangents: bool = False
+    attributes: bool = False  # some texture reads what meshes say per vertex or face
+    mixtures: int = 0  # how deep masks and blends nest
+    normal_maps_used: bool = False  # some material has a normal or a bump map
+    is_null: bool = False  # some surface lets light through as if it were not there
+    infinite: bool = False
+    light_paths: bool = False  # paths start at lights
+    visible_lights: bool = False  # some light is no delta light: a camera may see it
+    two_sided_lights: bool = False  # some shape emits from its back too
+    light_tree: bool = False  # a tree chooses among the lights
+    many_lights: bool = False  # too many to be chosen by the number that also places the point
+    dispersion: bool = False
+    absorption: bool = False  # inside of a dielectric
+    glass_lens: bool = False  # of a glass that disperses
+    channel: str = ""
+    bands: bool = False  # a spectral film
+    tabulated_density: bool = False  # of wavelengths
+    spectra_size: int = 0
+    spectra_step: float = 1.0
+    sources: Sources = field(default_factory=dict)
+
+    @property
+    def materials(self) -> tuple[str, ...]:
+        """Names of the leaf materials, in their order."""
+        return tuple(cls.kind for cls in self.leaves)
+
+    @property
+    def costly(self) -> bool:
+        """Whether shading a vertex takes about as long as its ray: textures, a tree over lights."""
+        return self.light_tree or bool(self.textures)

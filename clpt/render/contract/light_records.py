@@ -1,0 +1,119 @@
+"""The records of lights: what lowering writes into `lights` and `light_params`, and kernels read there."""
+
+from __future__ import annotations
+
+from clpt.layout import Record
+from clpt.render.contract import shape_records
+
+_IMAGE = {
+    "x": ("vec3", "the light's own axes in the world, unit length"),
+    "y": ("vec3", "up"),
+    "z": ("vec3", ""),
+    "width": ("integer", "of the image, or of a face [texels]"),
+    "height": ("integer", "[texels]"),
+    "texels": ("integer", "first float of the first texel in `texels`"),
+    "corners": ("integer", "first weight in `distributions`"),
+    "marginal": ("integer", "first of the cumulative sums over rows"),
+    "conditional": ("integer", "first of those within rows"),
+    "norm": ("real", "one over the sum of the cells' mean weights"),
+}
+
+IMAGE_RECORDS: dict[str, Record] = {
+    "envmap": Record("Envmap", "An image in latitude and longitude.", **_IMAGE),
+    "cube_map": Record("CubeMap", "Six square images, with a border of one texel.", **_IMAGE),
+    "spectral_envmap": Record(
+        "SpectralEnvmap",
+        "An image of spectra in latitude and longitude.",
+        **_IMAGE,
+        bands=("integer", "values in a texel"),
+        number=("integer", "row in `spectra`: the number of the band by wavelength"),
+    ),
+}
+_PLACEMENT = {
+    "position": ("vec3", "[m]"),
+    "x": ("vec3", "the light's own axes in the world"),
+    "y": ("vec3", ""),
+    "z": ("vec3", "unit length"),
+}
+
+_RADIANCE = ("integer", "first word of the emission parameter in `light_params`")
+
+_SCALE = ("real", "what the image's values were divided by")
+
+_FACTOR = ("integer", "first word in `light_params` of what it is multiplied by")
+
+PROJECTED_RECORDS: dict[str, Record] = {
+    "projector": Record(
+        "Projector",
+        "A pinhole camera in reverse; x and y are over half the size of the image at a metre.",
+        **_PLACEMENT,
+        scale=_SCALE,
+        radiance=_RADIANCE,
+        factor=_FACTOR,
+    ),
+    "image_spot": Record(
+        "ImageSpot",
+        "A spot light with an image; x and y are over half its size at a metre.",
+        **_PLACEMENT,
+        cutoff=("real", "half angle beyond which it is dark [rad]"),
+        beam_width=("real", "half angle of full intensity [rad]"),
+        smooth=("integer", "1: it falls off smoothly in the cosine; 0: linearly in the angle"),
+        radiance=_RADIANCE,
+        factor=_FACTOR,
+    ),
+    "goniometric": Record(
+        "Goniometric",
+        "A point light with an image around it.",
+        **_PLACEMENT,
+        scale=_SCALE,
+        radiance=_RADIANCE,
+        factor=_FACTOR,
+    ),
+}
+INFINITE = ("constant", *IMAGE_RECORDS)  # a ray that leaves the scene meets these
+PLACED = ("point", "spot", *PROJECTED_RECORDS)  # all other lamps are infinitely far away
+
+
+RECORDS: dict[str, Record] = {
+    "point": Record(
+        "Point",
+        "A point light.",
+        position=("vec3", "[m]"),
+        falloff=("real", "1: irradiance falls with the square of the distance; 0: it does not"),
+        radiance=_RADIANCE,
+    ),
+    "spot": Record(
+        "Spot",
+        "A spot light.",
+        position=("vec3", "[m]"),
+        axis=("vec3", "unit vector in which it shines"),
+        cutoff=("real", "half angle beyond which it is dark [rad]"),
+        beam_width=("real", "half angle of full intensity [rad]"),
+        smooth=("integer", "1: it falls off smoothly in the cosine; 0: linearly in the angle"),
+        radiance=_RADIANCE,
+    ),
+    **PROJECTED_RECORDS,
+    "directional": Record(
+        "Directional",
+        "Parallel light.",
+        direction=("vec3", "unit vector in which it travels"),
+        radiance=_RADIANCE,
+    ),
+    "constant": Record("Constant", "Even radiance from everywhere.", radiance=_RADIANCE),
+    **IMAGE_RECORDS,
+}
+FRONT, ALONG, BOTH = range(3)  # LightRow.way, see kernels/light/area.cl
+
+BASES = {"spectral_envmap": "envmap", "image_spot": "spot"}  # whose functions a kind uses
+
+KINDS = (*RECORDS, *shape_records.RECORDS)  # LightRow.kind is a position in this tuple
+NODE = Record(
+    "LightNode",
+    "A node of the tree over lights; the two children of a node are neighbours.",
+    center=("vec3", "of the sphere around its lights [m]"),
+    radius=("real", "[m]; below 0: it shines on the whole scene, power is all that counts"),
+    axis=("natural", "of the cone around its lights' normals: 16 bits each of an octahedral map"),
+    cones=("natural", "cosines of theta_o, in 16 bits, and of theta_e, in 15, and the bit `both`"),
+    power=("real", "of all its lights"),
+    child=("integer", "the first of its children; below 0: -1 - the row in `lights`"),
+)

@@ -1,0 +1,46 @@
+"""How many words each parameter takes in a row, and other sizes that lowering and kernels share."""
+
+from __future__ import annotations
+
+from clpt.scene.params import (
+    ORDERS,
+    SPECTRUM_ROLES,
+    Kind,
+    Param,
+    device_params,
+    interior_params,
+)
+
+# See kernels/path/shading_frame_mapped.cl.
+NORMAL_MAP_WORDS = 11
+
+
+FILM_COSINES = 128  # of the table, from 0 to 1
+
+
+RERADIATION_STEP = 5  # [nm] between the nodes of a matrix
+
+
+SPECTRAL = (*SPECTRUM_ROLES, "reradiation")  # roles whose values are spectra in the kernels
+
+# How many words a parameter takes in a row of `materials`, `textures` or `light_params`.
+SPECTRUM_WORDS = 5  # x y z w and where the value comes from: 0 here, > 0 texture, < 0 table
+
+REAL_WORDS = 2  # the value, and 0 or 1 + the texture
+
+ORDERS_WORDS = 2 * ORDERS + 1
+
+LAYERS_WORDS = 2  # where the layers lie in the table, see clpt.render.lowering.materials.thin_films, and how many
+
+
+def words(param: Param) -> int:
+    """Return the number of 4-byte words that a parameter takes in its row."""
+    if param.role in SPECTRAL:
+        return SPECTRUM_WORDS
+    given = {"real": REAL_WORDS, "orders": ORDERS_WORDS, "layers": LAYERS_WORDS}
+    return given.get(param.role, 1)
+
+
+def row_words(cls: type[Kind]) -> int:
+    """Return the length of a kind's row."""
+    return sum(map(words, [*device_params(cls).values(), *interior_params(cls).values()]))

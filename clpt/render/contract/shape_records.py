@@ -1,0 +1,49 @@
+"""The records of shapes: what lowering writes into `geometry` and kernels read there."""
+
+from __future__ import annotations
+
+from clpt.layout import Record
+
+ANALYTIC = ("sphere", "disk", "cylinder", "spheres")  # rays meet these as they are
+
+ONE_OF = {"spheres": "sphere"}  # kinds of many: what each of them is
+
+_FLAT = {
+    "center": ("vec3", "[m]"),
+    "s": ("vec3", "from the centre to where local x is 1 [m]"),
+    "t": ("vec3", "the same for local y"),
+    "n": ("vec3", "unit normal, toward the front"),
+}
+
+RECORDS: dict[str, Record] = {
+    "triangle": Record(
+        "Triangle",
+        "One triangle as a light.",
+        v0=("vec3", "first vertex [m]"),
+        e1=("vec3", "from it to the second"),
+        e2=("vec3", "from it to the third"),
+        side=("real", "1: counter-clockwise seen from the front; -1: clockwise"),
+    ),
+    "rectangle": Record("Rectangle", "A parallelogram, local x and y in [-1, 1].", **_FLAT),
+    "disk": Record("Disk", "A disk or ellipse, x^2 + y^2 <= 1 in local x and y.", **_FLAT),
+    "sphere": Record(
+        "Sphere",
+        "A sphere.",
+        center=("vec3", "[m]"),
+        radius=("real", "[m]"),
+        side=("real", "1: the front is outside; -1: inside"),
+        x=("vec3", "unit axis where the azimuth is 0"),
+        y=("vec3", "unit axis where it is 90 degrees"),
+        z=("vec3", "unit axis to the pole"),
+    ),
+    "cylinder": Record(
+        "Cylinder",
+        "An open tube.",
+        p0=("vec3", "start of the axis [m]"),
+        axis=("vec3", "from there to its end"),
+        radius=("real", "[m]"),
+        side=("real", "1: the front is outside; -1: inside"),
+        x=("vec3", "unit axis where the azimuth is 0, across the line"),
+        y=("vec3", "unit axis where it is 90 degrees"),
+    ),
+}

@@ -1,0 +1,145 @@
+"""Cameras on their way to the device: the uniform records that kernels/camera/<kind>.cl read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import spectra, transforms
+from clpt.errors import SceneError
+from clpt.render.contract.camera_records import RECORDS
+from clpt.scene.cameras import Camera, Matrix, Orthographic, Perspective, Spherical, ThinLens
+from clpt.spectra import RGB, Constant, RGBUnbounded, Spectrum
+
+DESIGN_WAVELENGTH = 587.56  # [nm], the helium line d, at which a lens's focal length is given
+
+
+def dispersive_glass(camera: Camera) -> Spectrum | None:
+    """Return the index of a lens's glass, or None where it is the same at all wavelengths."""
+    index = getattr(camera, "glass", Constant(1.0))
+    if isinstance(index, str):
+        index = spectra.glass(index)
+    if type(index) is RGB:
+        index = RGBUnbounded(index.r, index.g, index.b)
+    return None if isinstance(index, Constant) else index
+
+
+def lower_camera(
+    camera: Camera, width: int, height: int, glass_row: int = 0
+) -> tuple[str, NDArray[np.float32]]:
+    """Return a camera's kind and the words (n,) float32 of its record.
+
+    width, height: of the film [pixels]; glass_row: in `spectra`, of its `dispersive_glass`. Raises
+    SceneError for a matrix or a glass that cannot be used.
+    """
+    record = RECORDS[camera.kind]
+    words = np.zeros((), record.dtype)
+    for name, value in MEMBERS[type(camera)](camera, width, height).items():
+        words[name] = value
+    if dispersive_glass(camera) is not None:
+        words["glass"] = glass_row
+    return camera.kind, words.reshape(1).view(np.float32)
+
+
+def _matrix(camera: Camera, name: str) -> NDArray[np.float64]:
+    """A 4x4 matrix of a camera that has an inverse."""
+    where = f"{camera.kind}.{name}"
+    try:
+        matrix = np.asarray(getattr(camera, name), np.float64)
+    except (TypeError, ValueError):
+        matrix = np.zeros(0)
+    if matrix.shape != (4, 4):
+        raise SceneError("must be a 4x4 matrix", where=where)
+    if transforms.is_singular(matrix):
+        raise SceneError("must have an inverse and be finite", where=where)
+    return matrix
+
+
+def _to_world(camera: Camera) -> NDArray[np.float64]:
+    matrix = _matrix(camera, "to_world")
+    if not np.allclose(matrix[3], [0.0, 0.0, 0.0, 1.0]):
+        raise SceneError("its last row must be 0 0 0 1", where=f"{camera.kind}.to_world")
+    return matrix
+
+
+def _rigid(camera: Camera) -> NDArray[np.float64]:
+    """`to_world` of a camera whose angles a scale or a shear would change."""
+    matrix = _to_world(camera)
+    linear = matrix[:3, :3]
+    if not np.allclose(linear.T @ linear, np.eye(3), atol=1e-3):
+        raise SceneError("must not scale or shear", where=f"{camera.kind}.to_world")
+    return matrix
+
+
+def _pinhole(camera: Perspective, width: int, height: int) -> dict[str, Any]:
+    _check_planes(camera)
+    side = 2.0 * np.tan(np.radians(camera.fov) / 2.0)
+    axis = {"smaller": "x" if width <= height else "y", "larger": "x" if width >= height else "y"}
+    along_x = axis.get(camera.fov_axis, camera.fov_axis) == "x"
+    pixel = side / (width if along_x else height)
+    return {
+        "to_world": _rigid(camera),
+        "extent": [pixel * width, pixel * height],
+        "offset": [camera.offset_x, camera.offset_y],
+        "near": camera.near,
+        "far": camera.far,
+    }
+
+
+def _thin_lens(camera: ThinLens, width: int, height: int) -> dict[str, Any]:
+    names = ("aperture_radius", "focus_distance", "focal_length")
+    lens = {name: getattr(camera, name) for name in names}
+    glass = dispersive_glass(camera)
+    power = 1.0 if glass is None else float(glass.sample(DESIGN_WAVELENGTH)) - 1.0
+    if power < 1e-3:
+        raise SceneError(
+            f"its index must be above 1, not {power + 1.0:.4g}", where="thin_lens.glass"
+        )
+    return {**_pinhole(camera, width, height), **lens, "power": power}
+
+
+def _orthographic(camera: Orthographic, width: int, height: int) -> dict[str, Any]:
+    _check_planes(camera)
+    planes = {"near": camera.near, "far": camera.far}
+    return {"to_world": _to_world(camera), "aspect": height / width, **planes}
+
+
+def _check_planes(camera: Any) -> None:
+    if not camera.near < camera.far:
+        raise SceneError("near must be below far", where=camera.kind)
+
+
+def _spherical(camera: Spherical, width: int, height: int) -> dict[str, Any]:
+    return {"to_world": _rigid(camera)}
+
+
+def _unprojection(camera: Matrix, width: int, height: int) -> dict[str, Any]:
+    """Both the ray's direction and its homogeneous point on the near plane are affine in x and y.
+
+    A clip point at depth z comes from p(z) = A + z B, A = M (x, y, 0, 1), B = M (0, 0, 1, 0), M the
+    inverse; the derivative of p.xyz / p.w by z is a positive multiple of B A.w - A B.w, which holds
+    no z: so it needs no far plane, and the large terms cancel here in float64.
+    """
+    forward = _matrix(camera, "projection") @ _matrix(camera, "view")
+    if transforms.is_singular(forward):
+        raise SceneError("projection @ view must have an inverse", where="matrix.projection")
+    x, y, b, a = np.linalg.inv(forward).T
+    scale = 1.0 / np.abs(np.stack([x, y, b, a])).max()  # keeps tiny scenes off float32's limits
+    x, y, b, a = x * scale, y * scale, b * scale, a * scale
+    parts = [b[:3] * column[3] - column[:3] * b[3] for column in (a, x, y)]
+    length = max(np.linalg.norm(parts[0]), 1e-300)
+    names = ("direction", "direction_x", "direction_y")
+    members = {name: part / length for name, part in zip(names, parts, strict=True)}
+    return {**members, "near": a - b, "near_x": x, "near_y": y}
+
+
+MEMBERS: dict[type[Camera], Callable[..., dict[str, Any]]] = {
+    Perspective: _pinhole,
+    ThinLens: _thin_lens,
+    Orthographic: _orthographic,
+    Spherical: _spherical,
+    Matrix: _unprojection,
+}

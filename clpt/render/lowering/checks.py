@@ -1,0 +1,94 @@
+"""Whether a scene is made of what it should be; values are checked where each is declared."""
+
+from __future__ import annotations
+
+from typing import Any, NoReturn
+
+from clpt.errors import SceneError
+from clpt.render.lowering.camera.cameras import dispersive_glass
+from clpt.render.lowering.geometry import shapes
+from clpt.render.lowering.geometry.instancing import distinct
+from clpt.scene import Scene
+from clpt.scene.cameras import Camera
+from clpt.scene.integrators import Aov, Film, Filter, Integrator, ParticleTracer, Sampler
+from clpt.scene.lights import ON_SHAPES, DirectionalArea, Light, Point
+from clpt.scene.materials import Material
+from clpt.scene.params import params
+from clpt.scene.shapes import Shape
+
+CONNECTED = ("perspective", "thin_lens")  # cameras that particle_tracer can join a point to
+LARGEST = 1 << 26  # pixels of a film; its tiles are divided in float32, see kernels/film/film.cl
+
+
+def check(scene: Scene) -> None:
+    """Raise SceneError for an entry of a scene that is of the wrong kind, or a film too large."""
+    for name, base in (
+        ("camera", Camera), ("integrator", Integrator), ("sampler", Sampler), ("film", Film),
+    ):  # fmt: skip
+        _check_kind(getattr(scene, name), base, name)
+    _check_kind(scene.film.filter, Filter, "film.filter")
+    if isinstance(scene.seed, bool) or not isinstance(scene.seed, int):
+        raise SceneError(f"must be a whole number, not {scene.seed!r}", where="seed")
+    for i, light in enumerate(scene.lights):
+        _check_kind(light, Light, f"lights[{i}]")
+    for i, shape in enumerate(scene.shapes):
+        _check_kind(shape, Shape, f"shapes[{i}]")
+    for shape in distinct(scene.shapes):
+        if not isinstance(shape.emission, (*ON_SHAPES, type(None))):
+            names = " or ".join(f"`{cls.kind}`" for cls in ON_SHAPES)
+            raise SceneError(f"its emission must be {names}", where=shapes.where(shape))
+    if scene.film.mode == "rgb" and not isinstance(scene.integrator, Aov):
+        for name, plain in (("sensor", "cie1931"), ("bands", 0)):
+            if getattr(scene.film, name) != plain:
+                raise SceneError("needs the mode spectral", where=f"film.{name}")
+    width, height = scene.film.size
+    if width * height > LARGEST:
+        raise SceneError(f"{width}x{height} are more than {LARGEST >> 20} Mi pixels", where="film")
+    _check_light_paths(scene)
+
+
+def _check_light_paths(scene: Scene) -> None:
+    """Raise SceneError for what only paths from lights can do, and for what they cannot."""
+    if not isinstance(scene.integrator, ParticleTracer):
+        for shape in distinct(scene.shapes):
+            if isinstance(shape.emission, DirectionalArea):
+                raise SceneError(
+                    "only the integrator particle_tracer finds a directional_area light, "
+                    f"not {scene.integrator.kind}",
+                    where=shapes.where(shape),
+                )
+        return
+    spectral = scene.film.mode == "spectral"
+    if scene.camera.kind not in CONNECTED:
+        names = " and ".join(CONNECTED)
+        _refuse(f"the cameras {names}, not {scene.camera.kind}", "camera")
+    if spectral and dispersive_glass(scene.camera) is not None:
+        _refuse("a lens whose glass does not disperse", "camera.glass")
+    if scene.film.bands:
+        _refuse("a film without bands", "film.bands")
+    for i, light in enumerate(scene.lights):
+        if isinstance(light, Point) and not light.falloff:
+            _refuse("a point light whose irradiance falls with distance", f"lights[{i}]")
+    for shape in distinct(scene.shapes):
+        if spectral and _has(shape.material, "fluoresces"):
+            _refuse("materials that keep the wavelength", shapes.where(shape))
+        if _has(shape.material, "no_back"):
+            _refuse("materials that are reciprocal, which hair is not", shapes.where(shape))
+
+
+def _refuse(needed: str, where: str) -> NoReturn:
+    raise SceneError(f"particle_tracer needs {needed}", where=where)
+
+
+def _has(material: Any, trait: str) -> bool:
+    """Whether a material, or one inside it, has a trait of its class."""
+    parts = [getattr(material, name) for name in params(type(material))]
+    return getattr(material, trait, False) or any(
+        _has(part, trait) for part in parts if isinstance(part, Material)
+    )
+
+
+def _check_kind(value: Any, base: type, where: str) -> None:
+    if not isinstance(value, base):
+        wanted = base.__name__.lower()
+        raise SceneError(f"must be of a kind of {wanted}, not {value!r}", where=where)

@@ -1,0 +1,90 @@
+"""Arrays of a scene that lie on a device: `pyopencl.array.Array` and `pyopencl.Buffer`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pyopencl as cl
+import pyopencl.array as cl_array
+
+from clpt.errors import SceneError
+
+# What shapes have of arrays: numbers in a row (0: the array is flat), and their type.
+COLUMNS: dict[str, tuple[int, type]] = {
+    "vertices": (3, np.float32),
+    "normals": (3, np.float32),
+    "uvs": (2, np.float32),
+    "faces": (3, np.uint32),
+    "centers": (3, np.float32),
+    "radii": (0, np.float32),
+}
+
+
+def on_device(values: Any) -> bool:
+    """Return whether values lie in device memory."""
+    return isinstance(values, (cl_array.Array, cl.Buffer))
+
+
+def on_host(values: Any) -> Any:
+    """Return values in host memory; of an array on a device a copy, for which it waits."""
+    return values.get() if isinstance(values, cl_array.Array) else values
+
+
+def is_table(values: Any, kind: str) -> bool:
+    """Return whether values are an array on a device as a table is, of words of a numpy kind."""
+    return (
+        isinstance(values, cl_array.Array)
+        and values.dtype.itemsize == 4
+        and values.dtype.kind in kind
+        and values.flags.c_contiguous
+        and values.offset == 0
+    )
+
+
+def fresh_view(values: Any) -> Any:
+    """Return another object for the same memory on a device: what it holds may be other now."""
+    if isinstance(values, cl_array.Array):
+        return values.view()
+    return cl.Buffer.from_int_ptr(values.int_ptr)
+
+
+def as_array(values: Any, name: str, queue: cl.CommandQueue, where: str) -> Any:
+    """Return what `on_host` can read: a buffer as an array of a shape's COLUMNS, on the queue.
+
+    Host arrays come back as they are. Raises SceneError for memory of another context, and for a
+    buffer of no whole number of rows.
+    """
+    if not on_device(values):
+        return values
+    buffer = values.base_data if isinstance(values, cl_array.Array) else values
+    if buffer is None or buffer.context != queue.context:
+        raise SceneError(
+            f"{name} lie in another OpenCL context than the renderer's; make both of one context, "
+            "or give them as numpy arrays",
+            where=where,
+        )
+    if isinstance(values, cl_array.Array):
+        return values if values.queue is not None else values.with_queue(queue)
+    if name not in COLUMNS:
+        message = f"a buffer does not tell the width of {name!r}: give a pyopencl.array.Array"
+        raise SceneError(message, where=where)
+    columns, dtype = COLUMNS[name]
+    row = 4 * max(columns, 1)
+    if values.size == 0 or values.size % row:
+        message = f"{name} must be rows of {row} bytes, found a buffer of {values.size}"
+        raise SceneError(message, where=where)
+    shape = (values.size // row, columns) if columns else (values.size // row,)
+    return cl_array.Array(queue, shape, dtype, data=values)
+
+
+def readable(shape: Any, queue: cl.CommandQueue, where: str) -> dict[str, Any]:
+    """Return those fields of a shape that `shaped` makes other objects of."""
+    fields = {name: getattr(shape, name) for name in COLUMNS if hasattr(shape, name)}
+    made = {name: as_array(values, name, queue, where) for name, values in fields.items()}
+    changed = {name: values for name, values in made.items() if values is not fields[name]}
+    given = getattr(shape, "attributes", {})
+    own = {name: as_array(values, name, queue, where) for name, values in given.items()}
+    if any(own[name] is not given[name] for name in given):
+        changed["attributes"] = own
+    return changed

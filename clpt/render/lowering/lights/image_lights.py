@@ -1,0 +1,257 @@
+"""Images around the scene on their way to the device: texels, and a grid to choose directions by.
+
+A grid has a weight at every corner of its cells and is bilinear inside them; it follows radiance
+times solid angle. Cells are chosen by rows and then columns, points in a cell by the bilinear
+function itself (kernels/core/grid.cl).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from clpt import images, spectral_exr, transforms
+from clpt.errors import SceneError
+from clpt.render.lowering.device_arrays import on_host
+from clpt.render.lowering.textures.texels import bands, texels
+from clpt.scene.lights import CubeMap, Envmap
+from clpt.spectra import Tabulated, luminance
+from clpt.spectral_exr import SpectralImage
+
+Array = NDArray[np.float32]
+
+ROWS = 256  # of an image that are worked on at a time
+UNSEEN = 0.1  # share of the mean over bands in the weight of a texel: light of no colour counts too
+
+FACES = "+x -x +y -y +z -z"
+# Columns and rows of the faces in crosses of 4x3 and 3x4; the last one stands on its head.
+_WIDE = ((2, 1), (0, 1), (1, 0), (1, 2), (1, 1), (3, 1))
+_TALL = ((2, 1), (0, 1), (1, 0), (1, 2), (1, 1), (1, 3))
+
+
+class _Content(NamedTuple):
+    """What an image light is made of: texels, and cells to choose among by their mean weights.
+
+    bands, number: of texels that are spectra: how many values they have, which one by wavelength.
+    """
+
+    width: int
+    height: int
+    texels: Array
+    corners: NDArray[Any]
+    marginal: NDArray[np.float64]
+    conditional: Array
+    total: float
+    bands: int = 0
+    number: Tabulated | None = None
+
+
+def lower_image(lamp: Envmap | CubeMap, tables: Any) -> tuple[dict[str, ArrayLike], float]:
+    """Put an image light's texels and grid into the tables; its members, and its mean radiance.
+
+    Those of a spectral image have `bands`. Raises SceneError for what is no image, or a transform
+    that is more than a rotation.
+    """
+    axes = _axes(lamp)
+    made: _Content
+    if isinstance(lamp, Envmap):
+        ends = tables.lambda_min, tables.lambda_max
+        made = tables.cache(_sphere, lamp.image, lamp.scale, tables.spectral, *ends)
+        cell = np.pi / (made.height - 1) * 2.0 * np.pi / made.width
+    else:
+        made = tables.cache(_cube, lamp.image, lamp.scale, tables.spectral)
+        cell = made.width**-2.0
+    members: dict[str, ArrayLike] = {name: axes[:, i] for i, name in enumerate("xyz")}
+    members |= {
+        "width": made.width,
+        "height": made.height,
+        "texels": tables.append_floats("texels", made.texels),
+        "corners": tables.append_floats("distributions", made.corners),
+        "marginal": tables.append_floats("distributions", made.marginal),
+        "conditional": tables.append_floats("distributions", made.conditional),
+        "norm": 1.0 / made.total if made.total > 0.0 else 0.0,
+    }
+    if made.number is not None:
+        members |= {"bands": made.bands, "number": tables.spectra_row(made.number)}
+    return members, made.total * cell / (4.0 * np.pi)
+
+
+def _sphere(given: Any, scale: float, spectral: bool, lo: float, hi: float) -> _Content:
+    """An image in latitude and longitude, its spectra from lo to hi [nm]."""
+    where = "envmap.image"
+    found = spectral_exr.find(given, emissive=True)
+    image = _loaded(given if found is None else found.to_rgb(), where)
+    image = _at_least_two_rows(image * np.float32(scale))
+    height, width, _ = image.shape
+    if found is None or not spectral:
+        corners = _latitude_weights(_brightness(image))[None]
+        values = texels(image.reshape(1, -1, 3), "emission", spectral)
+        return _Content(width, height, values, corners, *_cumulative(corners))
+    found = _scaled(found, scale, where)
+    corners = _latitude_weights(luminance(image) + UNSEEN * _brightness(found.values))[None]
+    values, number = bands(found, lo, hi)
+    cells = _cumulative(corners)
+    return _Content(width, height, values, corners, *cells, values.shape[1], number)
+
+
+def _cube(given: Any, scale: float, spectral: bool) -> _Content:
+    """The faces of a cube, with their borders."""
+    faces = _faces(given, "cube_map.image") * np.float32(scale)
+    image, size = _bordered(faces), faces.shape[1]
+    corners = _cube_weights(_brightness(image))
+    values = texels(image.reshape(1, -1, 3), "emission", spectral)
+    return _Content(size, size, values, corners, *_cumulative(corners))
+
+
+def _axes(lamp: Envmap | CubeMap) -> NDArray[np.float64]:
+    """Where the light's own axes point, the columns of (3, 3)."""
+    matrix = np.asarray(lamp.to_world, np.float64)
+    where = f"{lamp.kind}.to_world"
+    if matrix.shape != (4, 4) or transforms.is_singular(matrix):
+        raise SceneError("must be an invertible (4, 4) matrix", where=where)
+    axes = matrix[:3, :3] / np.linalg.norm(matrix[:3, :3], axis=0)
+    if np.abs(axes.T @ axes - np.eye(3)).max() > 1e-5:
+        raise SceneError("must be a rotation: this one shears", where=where)
+    return axes
+
+
+def _at_least_two_rows(values: Array) -> Array:
+    """An image (h, w, n) with a row for each pole."""
+    return np.repeat(values, 2, axis=0) if len(values) == 1 else values
+
+
+def _scaled(image: SpectralImage, scale: float, where: str) -> SpectralImage:
+    """An image of spectra as a light's texels. Raises SceneError if a value is not finite."""
+    values = _at_least_two_rows(image.values * np.float32(scale))
+    if not np.isfinite(values).all():
+        raise SceneError("has a texel that is not finite", where=where)
+    return dataclasses.replace(image, values=np.maximum(values, np.float32(0.0)))
+
+
+def _loaded(image: Any, where: str) -> Array:
+    """An image as (h, w, 3) float32 without negative values. Raises SceneError."""
+    if spectral_exr.find(image, emissive=True) is not None:
+        raise SceneError("spectral images can be an envmap only", where=where)
+    if image is None:
+        raise SceneError("an image is needed: a path, or an array (h, w, 3)", where=where)
+    named = isinstance(image, (str, Path))
+    values = images.read(image) if named else np.asarray(on_host(image), np.float32)
+    if values.ndim == 2:
+        values = values[..., None]
+    if values.ndim != 3 or values.shape[2] not in (1, 3, 4) or 0 in values.shape:
+        raise SceneError(f"must be (h, w, 3), found {values.shape}", where=where)
+    values = np.repeat(values, 3, axis=2) if values.shape[2] == 1 else values[..., :3]
+    if not np.isfinite(values).all():
+        raise SceneError("has a texel that is not finite", where=where)
+    return np.maximum(values, np.float32(0.0))
+
+
+def _faces(image: Any, where: str) -> Array:
+    """The six faces of a cube map (6, n, n, 3), in the order of FACES."""
+    if isinstance(image, (list, tuple)) or (isinstance(image, np.ndarray) and image.ndim == 4):
+        if len(image) != 6:
+            raise SceneError(f"six faces are needed ({FACES}), found {len(image)}", where=where)
+        faces = [_loaded(face, where) for face in image]
+    else:
+        cross = _loaded(image, where)
+        height, width, _ = cross.shape
+        if width * 3 == height * 4:
+            n, places = width // 4, _WIDE
+        elif width * 4 == height * 3:
+            n, places = width // 3, _TALL
+        else:
+            raise SceneError(
+                f"one image must be a cross of 4x3 or 3x4 faces, found {width}x{height}",
+                where=where,
+            )
+        faces = [cross[r * n : (r + 1) * n, c * n : (c + 1) * n] for c, r in places]
+        if places is _TALL:
+            faces[5] = faces[5][::-1, ::-1]
+    if any(face.shape != (faces[0].shape[0],) * 2 + (3,) for face in faces):
+        raise SceneError("the faces must be squares of one size", where=where)
+    return np.stack(faces).astype(np.float32)
+
+
+def face_directions(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
+    """Directions (6, ..., 3), not normalised, at face coordinates: a to the right, b down, [-1, 1].
+
+    OpenGL's cube map (OpenGL 4.6 core, table 8.19).
+    """
+    a, b = np.broadcast_arrays(np.asarray(a, np.float64), np.asarray(b, np.float64))
+    one = np.ones_like(a)
+    rows = [(one, -b, -a), (-one, -b, a), (a, one, b), (a, -one, -b), (a, -b, one), (-a, -b, -one)]
+    return np.stack([np.stack(row, axis=-1) for row in rows])
+
+
+def face_coordinates(d: ArrayLike) -> tuple[NDArray[np.int64], Any, Any]:
+    """The face that a direction (..., 3) meets, and a and b there."""
+    x, y, z = np.moveaxis(np.asarray(d, np.float64), -1, 0)
+    major = np.argmax(np.abs([x, y, z]), axis=0)
+    size = np.choose(major, np.abs([x, y, z]))
+    negative = np.choose(major, [x, y, z]) < 0.0
+    face = 2 * major + negative
+    a = np.choose(face, [-z, z, x, x, x, -x]) / size
+    b = np.choose(face, [-y, -y, z, -z, -y, -y]) / size
+    return face, a, b
+
+
+def _bordered(faces: Array) -> Array:
+    """The faces (6, n + 2, n + 2, 3) with the nearest texels of their neighbours around them."""
+    n = faces.shape[1]
+    centers = (np.arange(-1, n + 1) + 0.5) / n * 2.0 - 1.0
+    face, a, b = face_coordinates(face_directions(centers[None, :], centers[:, None]))
+    column, row = (np.clip(((c + 1.0) * 0.5 * n).astype(int), 0, n - 1) for c in (a, b))
+    return faces[face, row, column]
+
+
+def _brightness(image: Array) -> Array:
+    """The mean over the last axis; a product is many times faster than a sum over few."""
+    count = image.shape[-1]
+    return image @ np.full(count, 1.0 / count, np.float32)
+
+
+def _latitude_weights(bright: Array) -> Array:
+    """Weights (h, w + 1) at the texels' centres; the first column comes again at the end."""
+    height, width = bright.shape
+    rows = np.arange(height, dtype=np.float64)
+    rows[0], rows[-1] = 0.25, height - 1.25  # the poles have no area, but light comes from there
+    weights = np.empty((height, width + 1), np.float32)
+    sines = np.sin(np.pi * rows / (height - 1)).astype(np.float32)
+    np.multiply(bright, sines[:, None], out=weights[:, :width])
+    weights[:, width] = weights[:, 0]
+    return weights
+
+
+def _cube_weights(bright: Array) -> NDArray[np.float64]:
+    """Weights (6, 2n + 1, 2n + 1) at the texels' edges and centres, of bordered faces."""
+    n = bright.shape[1] - 2
+    wide = np.empty((6, 2 * n + 1, n + 2))
+    wide[:, 1::2], wide[:, ::2] = bright[:, 1:-1], 0.5 * (bright[:, 1:] + bright[:, :-1])
+    weights = np.empty((6, 2 * n + 1, 2 * n + 1))
+    weights[..., 1::2], weights[..., ::2] = wide[..., 1:-1], 0.5 * (wide[..., 1:] + wide[..., :-1])
+    at = np.linspace(-1.0, 1.0, 2 * n + 1)
+    return weights * (1.0 + at[None, :] ** 2 + at[:, None] ** 2) ** -1.5
+
+
+def _cumulative(corners: NDArray[Any]) -> tuple[NDArray[np.float64], Array, float]:
+    """Sums over rows and within rows, each up to 1, of the cells of grids (k, r + 1, c + 1)."""
+    grids, rows, columns = corners.shape[0], corners.shape[1] - 1, corners.shape[2] - 1
+    conditional = np.empty((grids, rows, columns), np.float32)
+    sums = np.empty((grids, rows))
+    for grid, own, total in zip(corners, conditional, sums, strict=True):
+        for first in range(0, rows, ROWS):
+            part = grid[first : first + ROWS + 1]
+            wide = part[1:].astype(np.float64) + part[:-1]
+            cells = np.cumsum(0.25 * (wide[:, 1:] + wide[:, :-1]), axis=1)
+            total[first : first + ROWS] = cells[:, -1]
+            cells /= np.where(cells[:, -1:] > 0.0, cells[:, -1:], 1.0)
+            own[first : first + ROWS] = cells
+    marginal = np.cumsum(sums)
+    whole = float(marginal[-1])
+    marginal /= whole if whole > 0.0 else 1.0
+    conditional[..., -1] = marginal[-1] = 1.0
+    return marginal, conditional.reshape(-1, columns), whole

@@ -1,0 +1,222 @@
+"""A tree over lights, to choose one in proportion to what it sends to a point.
+
+Conty Estevez and Kulla 2018: a node bounds where its lights are (a box) and where they shine
+(cones), and sums their power. It is built from the top by their surface area orientation
+heuristic, over bins as in pbrt-v4 (12.6.3), all nodes of a level at once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.render.contract.light_records import NODE
+from clpt.render.lowering.lights.light_bounds import Bounds, Floats
+from clpt.render.lowering.lights.light_cones import Cones, around, measure, merged
+
+BINS = 12  # places along an axis where a node may be split
+DEEPEST = 31  # levels below the root: bits of a trail
+SLACK = 2e-4  # [rad] by which cones are widened, for what 16 bits round
+
+
+@dataclass(frozen=True)
+class Tree:
+    """nodes (k,) structured as NODE; trails (n,) uint32: which child leads to a light, by level."""
+
+    nodes: np.ndarray
+    trails: NDArray[np.uint32]
+
+    def words(self) -> NDArray[np.uint32]:
+        """Return what stands behind the rows in `lights`: a trail for every row, then the nodes."""
+        return np.concatenate([self.trails, self.nodes.view(np.uint32)])
+
+
+def build(bounds: Bounds, pmf: Floats) -> Tree:
+    """Build the tree over lights with these bounds, n at least; pmf (n,): their share of the power.
+
+    Lights that are not placed keep their share whatever the point; they have a branch of their own.
+    """
+    builder = _Builder(bounds, np.asarray(pmf, np.float64))
+    rows = np.arange(len(bounds))
+    groups = [g for g in (rows[bounds.placed], rows[~bounds.placed]) if len(g)]
+    if len(groups) == 2:
+        order = np.concatenate(groups)
+        builder.node(np.array([0]), builder.summed(order, np.array([0])), child=np.array([1]))
+        starts, depth = np.array([0, len(groups[0])]), 1
+    else:
+        order, starts, depth = rows, np.array([0]), 0
+    builder.trails[order] = np.repeat(np.arange(len(starts)), _counts(starts, len(order)))
+    builder.run(order, starts, depth)
+    return builder.tree()
+
+
+@dataclass
+class _Level:
+    """What the nodes of a level hold: sums and bounds (k,) over segments of lights."""
+
+    low: Floats
+    high: Floats
+    cones: Cones
+    power: Floats
+
+
+def _counts(starts: NDArray[np.int64], n: int) -> NDArray[np.int64]:
+    return np.diff(np.append(starts, n))
+
+
+class _Builder:
+    """The state of one `build`: nodes so far, and the trail of every light."""
+
+    def __init__(self, bounds: Bounds, power: Floats):
+        self.bounds, self.power = bounds, power
+        self.nodes = np.zeros(2 * len(bounds) + 1, NODE.dtype)
+        self.count = 1
+        self.trails = np.zeros(len(bounds), np.uint32)
+
+    def tree(self) -> Tree:
+        return Tree(self.nodes[: self.count], self.trails)
+
+    def summed(self, order: NDArray[np.int64], starts: NDArray[np.int64]) -> _Level:
+        """Bounds and power over the segments of `order` that begin at `starts`."""
+        own = self.bounds[order]
+        return _Level(
+            np.minimum.reduceat(own.low, starts),
+            np.maximum.reduceat(own.high, starts),
+            around(Cones.of(own), starts),
+            np.add.reduceat(self.power[order], starts),
+        )
+
+    def node(self, at: NDArray[np.int64], level: _Level, child: NDArray[np.int64]) -> None:
+        """Fill in nodes; those that are fixed get their radius afterwards."""
+        nodes = np.zeros(len(at), NODE.dtype)
+        nodes["center"] = 0.5 * (level.low + level.high)
+        nodes["radius"] = 0.5 * np.linalg.norm(level.high - level.low, axis=1) * (1.0 + 1e-5)
+        nodes["axis"], nodes["cones"] = level.cones.packed(SLACK)
+        nodes["power"], nodes["child"] = level.power, child
+        self.nodes[at] = nodes
+        self.count = max(self.count, int(at.max()) + 1)
+
+    def run(self, order: NDArray[np.int64], starts: NDArray[np.int64], depth: int) -> None:
+        """Make the nodes of a level, which are those of segments of `order`, and all below."""
+        at = depth + np.arange(len(starts))
+        free = int(at[-1]) + 1
+        apart = depth == 1  # two neighbours whose shares are fixed
+        while len(order):
+            level, counts = self.summed(order, starts), _counts(starts, len(order))
+            inner = counts > 1
+            child = np.where(inner, free + 2 * (np.cumsum(inner) - 1), -1 - order[starts])
+            self.node(at, level, child)
+            self.nodes["radius"][at[~self.bounds.placed[order[starts]] | apart]] = -1.0
+            apart = False
+            kept = np.repeat(inner, counts)
+            order, counts = order[kept], counts[inner]
+            if not len(order):
+                break
+            starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+            side = self._sides(order, starts, counts, level, inner, depth)
+            segment = np.repeat(np.arange(len(counts)), counts)
+            order = order[np.argsort(2 * segment + side, kind="stable")]
+            right = np.add.reduceat(side.astype(np.int64), starts)
+            side = np.sort(2 * segment + side) & 1
+            self.trails[order] |= (side << depth).astype(np.uint32)
+            starts = np.stack([starts, starts + counts - right], axis=1).ravel()
+            at = free + np.arange(2 * len(counts))
+            free += 2 * len(counts)
+            depth += 1
+
+    def _sides(
+        self,
+        order: NDArray[np.int64],
+        starts: NDArray[np.int64],
+        counts: NDArray[np.int64],
+        level: _Level,
+        inner: NDArray[np.bool_],
+        depth: int,
+    ) -> NDArray[np.int64]:
+        """Which child (n,) each light goes to: 0 or 1, neither of them empty."""
+        segment = np.repeat(np.arange(len(counts)), counts)
+        place = np.arange(len(order)) - starts[segment]
+        side = (2 * place >= counts[segment]).astype(np.int64)
+        deep = depth + np.ceil(np.log2(counts)).astype(np.int64) + 1 >= DEEPEST
+        large = (counts > 2) & ~deep
+        if not large.any():
+            return side
+        chosen = large[segment]
+        number = np.cumsum(large) - 1
+        size = (level.high - level.low)[inner][large]
+        found, split = self._splits(order[chosen], number[segment[chosen]], size)
+        side[chosen] = np.where(split[number[segment[chosen]]], found, side[chosen])
+        return side
+
+    def _splits(
+        self, order: NDArray[np.int64], segment: NDArray[np.int64], size: Floats
+    ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """The best side of each light (n,), and the segments (k,) in which there is a split."""
+        own, power, k = self.bounds[order], self.power[order], len(size)
+        starts = np.searchsorted(segment, np.arange(k))
+        centers = 0.5 * (own.low + own.high)
+        lo, hi = np.minimum.reduceat(centers, starts), np.maximum.reduceat(centers, starts)
+        best = np.full(k, np.inf)
+        side = np.zeros(len(order), np.int64)
+        longest = np.maximum(size.max(axis=1), 1e-30)
+        for axis in range(3):
+            extent = hi[:, axis] - lo[:, axis]
+            scale = np.where(extent > 0.0, BINS / np.where(extent > 0.0, extent, 1.0), 0.0)
+            bins = np.minimum((centers[:, axis] - lo[segment, axis]) * scale[segment], BINS - 1)
+            bins = bins.astype(np.int64)
+            costs = _costs(own, power, segment * BINS + bins, k)
+            costs *= (longest / np.maximum(size[:, axis], 1e-3 * longest))[:, None]
+            costs[extent <= 0.0] = np.inf
+            at = np.argmin(costs, axis=1)
+            cost = costs[np.arange(k), at]
+            better = cost < best
+            best = np.where(better, cost, best)
+            side = np.where(better[segment], bins > at[segment], side)
+        return side, np.isfinite(best)
+
+
+def _costs(own: Bounds, power: Floats, key: NDArray[np.int64], k: int) -> Floats:
+    """Costs (k, BINS - 1) of splitting behind each bin; infinite where a side is empty.
+
+    The heuristic of Conty Estevez and Kulla 2018 eq. 1: power times surface area times the measure
+    of the directions, of both sides. A little area is added to what is flat or a point.
+    """
+    sort = np.argsort(key, kind="stable")
+    present, starts = np.unique(key[sort], return_index=True)
+    shape = (k, BINS)
+    low, high = np.full((k * BINS, 3), np.inf), np.full((k * BINS, 3), -np.inf)
+    low[present] = np.minimum.reduceat(own.low[sort], starts)
+    high[present] = np.maximum.reduceat(own.high[sort], starts)
+    cones = Cones.none(k * BINS)
+    cones[present] = around(Cones.of(own[sort]), starts)
+    sums = np.bincount(key, power, k * BINS).reshape(shape)
+    number = np.bincount(key, minlength=k * BINS).reshape(shape)
+    boxes = low.reshape(*shape, 3), high.reshape(*shape, 3)
+    total = np.zeros((k, BINS - 1))
+    empty = np.zeros((k, BINS - 1), bool)
+    for step in (1, -1):
+        span = slice(None, None, step)
+        lows = np.minimum.accumulate(boxes[0][:, span], axis=1)
+        highs = np.maximum.accumulate(boxes[1][:, span], axis=1)
+        reach = np.maximum(highs - lows, 0.0)
+        area = (reach * np.roll(reach, 1, axis=2)).sum(axis=2) + 1e-6 * reach.max(axis=2) ** 2
+        counts = np.cumsum(number[:, span], axis=1)
+        part = np.cumsum(sums[:, span], axis=1) * np.maximum(area, 1e-30)
+        part *= _measures(cones, shape, step)
+        total += part[:, :-1] if step == 1 else part[:, :-1][:, ::-1]
+        none = counts[:, :-1] == 0
+        empty |= none if step == 1 else none[:, ::-1]
+    return np.where(empty, np.inf, total)
+
+
+def _measures(cones: Cones, shape: tuple[int, int], step: int) -> Floats:
+    """Measures (k, BINS) of the cones around the bins up to each one; of those behind for -1."""
+    at = np.arange(shape[0] * shape[1]).reshape(shape)[:, ::step]
+    made = np.empty(shape)
+    sofar = cones[at[:, 0]]
+    for i in range(shape[1]):
+        sofar = sofar if i == 0 else merged(sofar, cones[at[:, i]])
+        made[:, i] = measure(sofar)
+    return made

@@ -1,0 +1,222 @@
+"""Lights on their way to the device: their rows, how often each is chosen, and the dispatch text.
+
+What is chosen is a row of `lights`: a lamp, a shape that is sampled as a whole, or one triangle of
+an emissive mesh or cube. Infinite lights come first, for the rays that leave the scene.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from clpt.errors import SceneError
+from clpt.records import LIGHT
+from clpt.render.contract import shape_records
+from clpt.render.contract.light_records import ALONG, BOTH, FRONT, INFINITE, KINDS
+from clpt.render.lowering.geometry import shapes, spheres
+from clpt.render.lowering.lights import light_bounds, light_tree
+from clpt.render.lowering.lights.non_shape_lights import Sink, blank_row, brightness, lower_lamp
+from clpt.render.lowering.lights.triangle_means import triangle_means
+from clpt.render.lowering.lowering_cache import content
+from clpt.scene.lights import DirectionalArea, Light
+from clpt.scene.shapes import Shape
+
+PLACED_LIGHT_WEIGHT = (
+    6  # triangles that a light at a place of its own counts as, where a tree is thought of
+)
+INFINITE_SHARE = 0.5  # of the choices, where there are other lights too
+
+
+@dataclass(frozen=True)
+class Emitter:
+    """A shape with an `emission`.
+
+    shape_row: its row in `shapes`; vertices, faces, uvs: its triangles as `shapes.triangles` gave
+    them, needed for a mesh and a cube; of `spheres`, vertices are their balls.
+    """
+
+    shape: Shape
+    shape_row: int
+    vertices: shapes.Points | None = None
+    faces: shapes.Faces | None = None
+    uvs: shapes.Points | None = None
+
+
+@dataclass(frozen=True)
+class LightRows:
+    """The table `lights` and what follows from it.
+
+    rows: structured (n,) of LIGHT.dtype; infinite: how many of them, the first ones, are infinite;
+    kinds: those that occur, for `dispatch_text`; first: per emitter, its first row; whole: per
+    emitter, whether that one row stands for all of it; visible: whether one is no delta light;
+    two_sided: whether one shines from the back of its shape too; tree: the words of the tree that
+    stand behind the rows, None where the alias table chooses.
+    """
+
+    rows: np.ndarray
+    infinite: int
+    kinds: tuple[str, ...]
+    first: tuple[int, ...]
+    whole: tuple[bool, ...]
+    visible: bool
+    two_sided: bool
+    tree: NDArray[np.uint32] | None
+
+
+class Block(NamedTuple):
+    """The rows of one lamp or emitter, their power [W/nm], and where they shine."""
+
+    rows: np.ndarray
+    power: np.ndarray
+    bounds: light_bounds.Bounds
+
+
+def light_rows(
+    lamps: Sequence[Light],
+    emitters: Sequence[Emitter],
+    tables: Sink,
+    scene_radius: float,
+    tree_from: int | None = None,
+) -> LightRows:
+    """Put the parameters of all lights into the tables, and make the rows of `lights`.
+
+    scene_radius: of a sphere around the scene [m]; tree_from: the number of rows from which a tree
+    chooses among them, or 1 / PLACED_LIGHT_WEIGHT of it of lights at places. Raises SceneError for a light that
+    has no place.
+    """
+    if tables.append("light_params", blank_row()) != 0:
+        raise ValueError("`light_params` must be empty before the lights are put in")
+    ordered = sorted(lamps, key=lambda lamp: lamp.kind not in INFINITE)
+    infinite = sum(lamp.kind in INFINITE for lamp in ordered)
+    blocks = [_lamp_block(lamp, tables, scene_radius) for lamp in ordered]
+    blocks += [_emitter_block(emitter, tables) for emitter in emitters]
+    first = np.cumsum([0, *(len(block.rows) for block in blocks)])[len(ordered) : -1]
+    rows = np.concatenate([np.zeros(0, LIGHT.dtype), *(block.rows for block in blocks)])
+    tree = None
+    if len(rows):
+        weights = _shared(np.concatenate([block.power for block in blocks]), infinite)
+        same = content(weights)
+        rows["pmf"], rows["keep"], rows["alias"] = tables.cache(alias_table, weights, by=(same,))
+        apart = sum(bool(block.bounds.placed.any()) for block in blocks)
+        if tree_from is not None and max(len(rows), PLACED_LIGHT_WEIGHT * apart) >= tree_from:
+            bounds = light_bounds.concatenated([block.bounds for block in blocks])
+            by = same, content(*vars(bounds).values())
+            tree = tables.cache(_tree_words, bounds, weights / weights.sum(), by=by)
+    kinds = tuple(KINDS[i] for i in np.unique(rows["kind"]))
+    return LightRows(
+        rows=rows,
+        infinite=infinite,
+        kinds=kinds,
+        first=tuple(int(i) for i in first),
+        whole=tuple(_whole(emitter.shape) for emitter in emitters),
+        visible=infinite > 0
+        or bool(((rows["shape"] >= 0) & (rows["emission_mode"] != ALONG)).any()),
+        two_sided=bool((rows["emission_mode"] == BOTH).any()),
+        tree=tree,
+    )
+
+
+def _tree_words(bounds: light_bounds.Bounds, pmf: np.ndarray) -> NDArray[np.uint32]:
+    return light_tree.build(bounds, pmf).words()
+
+
+def _whole(shape: Shape) -> bool:
+    """Whether the shape is sampled as one light; a mesh and a cube are many."""
+    return shape.kind in shape_records.RECORDS
+
+
+def _block(count: int, kind: str, params: ArrayLike, radiance: int, shape_row: int) -> np.ndarray:
+    rows = np.zeros(count, LIGHT.dtype)
+    rows["kind"], rows["params"] = KINDS.index(kind), params
+    rows["radiance"], rows["shape"] = radiance, shape_row
+    return rows
+
+
+def _lamp_block(lamp: Light, tables: Sink, scene_radius: float) -> Block:
+    """The row of a light that is not on a shape."""
+    kind, at, radiance, power = lower_lamp(lamp, tables, scene_radius)
+    row = _block(1, kind, at, radiance, -1)
+    return Block(row, np.array([power]), light_bounds.of_lamp(lamp))
+
+
+def _emitter_block(emitter: Emitter, tables: Sink) -> Block:
+    """The rows of a shape that emits."""
+    shape = emitter.shape
+    emission = shape.emission
+    along = isinstance(emission, DirectionalArea)
+    emission_mode = ALONG if along else BOTH if emission.two_sided else FRONT
+    value = emission.irradiance if along else emission.radiance
+    radiance = tables.append("light_params", tables.emission_words(value))
+    strength = {FRONT: np.pi, ALONG: 1.0, BOTH: 2.0 * np.pi}[emission_mode]
+    if _whole(shape):
+        at = tables.append("geometry", shapes.row(shape))
+        rows = _block(1, shape.kind, at, radiance, emitter.shape_row)
+        rows["emission_mode"] = emission_mode
+        bounds = light_bounds.of_shape(shape, emission_mode == BOTH)
+        return Block(rows, np.array([strength * shapes.area(shape) * brightness(value)]), bounds)
+    if shape.kind in shape_records.ONE_OF:
+        return _balls_block(emitter, tables, emission_mode, radiance, strength * brightness(value))
+    if emitter.vertices is None or emitter.faces is None:
+        raise SceneError("its triangles are missing", where=shapes.where(shape))
+    cache, corners = tables.cache, (emitter.vertices, emitter.faces)
+    geometry = cache(shapes.triangle_rows, *corners)
+    count, words = geometry.shape
+    at = tables.append("geometry", geometry) + words * np.arange(count)
+    rows = _block(count, "triangle", at, radiance, emitter.shape_row)
+    rows["emission_mode"] = emission_mode
+    bounds = cache(light_bounds.of_triangles, *corners, emission_mode == BOTH)
+    bright = cache(triangle_means, value, emitter.uvs, emitter.faces)
+    areas = cache(shapes.triangle_areas, *corners)
+    return Block(rows, strength * areas * bright, bounds)
+
+
+def _balls_block(
+    emitter: Emitter, tables: Sink, emission_mode: int, radiance: int, strength: float
+) -> Block:
+    """A row for each of many spheres; strength: what a square metre of them emits."""
+    placed: Any = emitter.vertices
+    geometry = spheres.rows(emitter.shape, placed)
+    count, words = geometry.shape
+    at = tables.append("geometry", geometry) + words * np.arange(count)
+    rows = _block(count, "sphere", at, radiance, emitter.shape_row)
+    rows["emission_mode"] = emission_mode
+    areas = 4.0 * np.pi * placed[:, 3].astype(np.float64) ** 2
+    return Block(rows, strength * areas, light_bounds.of_balls(placed))
+
+
+def _shared(weights: np.ndarray, infinite: int) -> np.ndarray:
+    """Weights with the infinite lights' share fixed where there are others; even if all are 0."""
+    ours, others = weights[:infinite].sum(), weights[infinite:].sum()
+    if not ours + others > 0.0:
+        return np.ones_like(weights)
+    if not (ours > 0.0 and others > 0.0):
+        return weights
+    shared = weights / others * (1.0 - INFINITE_SHARE)
+    shared[:infinite] = weights[:infinite] / ours * INFINITE_SHARE
+    return shared
+
+
+def alias_table(
+    weights: ArrayLike,
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int32]]:
+    """Return pmf, keep and alias (n,) to choose a row by its weight (Vose 1991).
+
+    Row i of n, chosen evenly, is kept with probability keep[i], else alias[i] is taken.
+    """
+    weights = np.asarray(weights, np.float64)
+    pmf = weights / weights.sum()
+    left = (pmf * len(pmf)).tolist()
+    keep, alias = [1.0] * len(left), list(range(len(left)))
+    small = [i for i, p in enumerate(left) if p < 1.0]
+    large = [i for i, p in enumerate(left) if p >= 1.0]
+    while small and large:
+        i, j = small.pop(), large[-1]
+        keep[i], alias[i] = left[i], j
+        left[j] -= 1.0 - left[i]
+        if left[j] < 1.0:
+            small.append(large.pop())
+    return pmf.astype(np.float32), np.array(keep, np.float32), np.array(alias, np.int32)

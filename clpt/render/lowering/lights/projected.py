@@ -1,0 +1,80 @@
+"""Points that throw an image on their way to the device: projector, goniometric, spot with one."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from clpt import transforms
+from clpt.errors import SceneError
+from clpt.render.lowering.textures.texels import pixels, spectral_image
+from clpt.scene.lights import SPOT_EDGES, Goniometric, Light, Projector, Spot
+from clpt.scene.textures import Bitmap
+
+
+def kind_of(lamp: Light) -> str:
+    """Return the record of a light: a spot with an image has one of its own."""
+    plain = isinstance(lamp, Spot) and getattr(lamp.image, "is_texture", False)
+    return "image_spot" if plain else lamp.kind
+
+
+def members(lamp: Light, tables: Any) -> dict[str, ArrayLike]:
+    """Return the members of a light's record but for `radiance`.
+
+    Raises SceneError for a transform that shears, or an image that cannot be used.
+    """
+    if isinstance(lamp, Projector):
+        half = float(np.tan(np.radians(lamp.fov) / 2.0))
+        axes = _place(lamp.to_world, "projector.to_world", half, half / _aspect(lamp))
+        return {**axes, **_image(lamp.image, tables)}
+    if isinstance(lamp, Goniometric):
+        return {**_place(lamp.to_world, "goniometric.to_world"), **_image(lamp.image, tables)}
+    assert isinstance(lamp, Spot)
+    half = float(np.tan(np.radians(lamp.cutoff)))
+    return {
+        **_place(lamp.to_world, "spot.to_world", half, half),
+        "cutoff": np.radians(lamp.cutoff),
+        "beam_width": np.radians(min(lamp.beam_width, lamp.cutoff)),
+        "smooth": SPOT_EDGES.index(lamp.edge),
+        "factor": tables.append("light_params", tables.factor_words(lamp.image)),
+    }
+
+
+def image_area(lamp: Projector) -> float:
+    """Return the area of a projector's image a metre before it [m^2]."""
+    half = float(np.tan(np.radians(lamp.fov) / 2.0))
+    return 4.0 * half * half / _aspect(lamp)
+
+
+def _aspect(lamp: Projector) -> float:
+    if lamp.aspect > 0.0 or not isinstance(lamp.image, Bitmap):
+        return lamp.aspect or 1.0
+    height, width = pixels(lamp.image, "reflectance").shape[:2]
+    return width / height
+
+
+def _image(image: Any, tables: Any) -> dict[str, ArrayLike]:
+    """The members of an image whose values are brought below 1, as those of a reflectance are."""
+    scale = 1.0
+    if isinstance(image, Bitmap) and spectral_image(image, "reflectance") is None:
+        values = pixels(image, "reflectance")
+        scale = max(float(values.max()), 0.0) or 1.0
+        image = dataclasses.replace(image, image=values / np.float32(scale), raw=True)
+    return {"scale": scale, "factor": tables.append("light_params", tables.factor_words(image))}
+
+
+def _place(
+    to_world: ArrayLike, where: str, half_x: float = 1.0, half_y: float = 1.0
+) -> dict[str, NDArray[np.float64]]:
+    """Position and axes; x and y over half the image's size, along rows (1, 1) of unit length."""
+    matrix = np.asarray(to_world, np.float64)
+    if matrix.shape != (4, 4) or transforms.is_singular(matrix):
+        raise SceneError("must be an invertible (4, 4) matrix", where=where)
+    axes = matrix[:3, :3] / np.linalg.norm(matrix[:3, :3], axis=0)
+    if np.abs(axes.T @ axes - np.eye(3)).max() > 1e-5:
+        raise SceneError("must not shear", where=where)
+    x, y, z = axes.T
+    return {"position": matrix[:3, 3], "x": x / half_x, "y": y / half_y, "z": z}

@@ -1,0 +1,86 @@
+"""Normal and bump maps on their way to the device: words before a material's row."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.errors import SceneError
+from clpt.render.contract.parameter_words import NORMAL_MAP_WORDS
+from clpt.scene.materials import BumpMap, NormalMap
+from clpt.scene.textures import Bitmap
+
+INSIDE, ALONG_V, AS_IT_IS, UNSHADED, NORMAL, HEIGHT = (1 << i for i in range(6))
+
+Map: TypeAlias = NormalMap | BumpMap
+Words = NDArray[np.uint32]
+
+
+class Sink(Protocol):
+    """What is needed of clpt.render.lowering.tables.Tables."""
+
+    sources: Any
+
+    def param_words(
+        self, value: Any, role: str, choices: tuple[str, ...] = ()
+    ) -> tuple[Words, str]: ...
+
+
+@dataclass(frozen=True)
+class NormalPerturbation:
+    """The maps around a leaf. inside: whether they stand inside of a two-sided material."""
+
+    normal: NormalMap | None = None
+    bump: BumpMap | None = None
+    inside: bool = False
+
+    def within(self, outer: Map, inside: bool) -> NormalPerturbation:
+        """Return this with one more map. Raises SceneError for a second one of its kind."""
+        if (self.normal if isinstance(outer, NormalMap) else self.bump) is not None:
+            raise SceneError(f"a {outer.kind} inside of a {outer.kind} is not supported")
+        if (self.normal or self.bump) and self.inside != inside:
+            raise SceneError("of two maps, one cannot stand inside and one around a two_sided")
+        if isinstance(outer, NormalMap):
+            return dataclasses.replace(self, normal=outer, inside=inside)
+        return dataclasses.replace(self, bump=outer, inside=inside)
+
+    @property
+    def key(self) -> tuple[int, int, bool]:
+        """What makes two the same."""
+        return id(self.normal), id(self.bump), self.inside
+
+    def words(self, tables: Sink) -> Words:
+        """Return the NORMAL_MAP_WORDS words, and put the textures into the tables."""
+        made = np.zeros(NORMAL_MAP_WORDS, np.uint32)
+        flags = INSIDE if self.inside else 0
+        if self.normal is not None and self.normal.map is not None:
+            flags |= NORMAL | _flags(self.normal) | (ALONG_V if self.normal.along_v else 0)
+            made[1] = np.float32(self.normal.scale).view(np.uint32)
+            for i, channel in enumerate("rgb"):
+                image = _channel(self.normal.map, channel)
+                made[3 + 2 * i : 5 + 2 * i] = _real(image, tables)
+        if self.bump is not None:
+            flags |= HEIGHT | _flags(self.bump)
+            made[2] = np.float32(self.bump.scale).view(np.uint32)
+            made[9:11] = _real(self.bump.height, tables)
+        made[0] = flags
+        return made
+
+
+def _real(value: Any, tables: Sink) -> Words:
+    words, source = tables.param_words(value, "real")
+    tables.sources["perturbation"]["value"].add(source)
+    return words
+
+
+def _flags(outer: Map) -> int:
+    return (0 if outer.flip_invalid else AS_IT_IS) | (0 if outer.shadowing else UNSHADED)
+
+
+def _channel(texture: Bitmap, channel: str) -> Bitmap:
+    """One coordinate of the normals, 0 to 1."""
+    return dataclasses.replace(texture, channel=channel, raw=True)

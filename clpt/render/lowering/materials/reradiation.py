@@ -1,0 +1,52 @@
+"""Re-radiation matrices as kernels/optics/reradiation.cl reads them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.render.contract.parameter_words import RERADIATION_STEP
+from clpt.spectra import Reradiation, Spectrum
+
+EVEN = 0.25  # share of the light to expect that is the same at all wavelengths
+
+Values = NDArray[np.float64]
+
+
+def nodes(low: float, high: float) -> Values:
+    """The wavelengths [nm] between which a film's matrices are linear."""
+    count = int(np.ceil((high - low) / RERADIATION_STEP - 1e-9)) + 1
+    return np.asarray(low + RERADIATION_STEP * np.arange(count), np.float64)
+
+
+def expected(lights: Iterable[Spectrum], at: Values) -> Values:
+    """How much light to expect at nodes, mean about 1: it decides where to look for it.
+
+    Every light counts the same, whatever its power: which one a surface sees is not known here.
+    """
+    fine = np.arange(at[0], at[-1] + 1e-6)
+    hats = np.maximum(1.0 - np.abs(fine[:, None] - at) / RERADIATION_STEP, 0.0)
+    found = [light.sample(fine) @ hats for light in lights]
+    found = [values / values.mean() for values in found if values.mean() > 0.0]
+    return EVEN + (1.0 - EVEN) * (np.mean(found, axis=0) if found else np.ones_like(at))
+
+
+def table(value: Reradiation | None, at: Values, light: Values) -> tuple[Values, Values]:
+    """Return what stands in `distributions` for a matrix, and the integrals of its rows (n,) [1].
+
+    at: nodes (n,) [nm]; light: what to expect there, see `expected`.
+    """
+    rows = np.zeros((len(at), len(at)))
+    if value is not None:
+        rows = value.sample(at[:, None], at)
+    running = _running(rows * light)
+    shares = running / np.maximum(running[:, -1:], 1e-30)
+    flat = np.concatenate([light, running[:, -1], np.hstack([rows, shares]).ravel()])
+    return flat, _running(rows)[:, -1]
+
+
+def _running(rows: Values) -> Values:
+    """Integrals from the first node to each other one, of rows that are linear between nodes."""
+    return np.cumsum(0.5 * RERADIATION_STEP * (rows[:, 1:] + rows[:, :-1]), axis=1)

@@ -1,0 +1,87 @@
+"""What meshes say per vertex or face, on its way to the device: the table `attributes`.
+
+It begins with a directory of zeros, for what has no attributes. A mesh has a directory of its own:
+per (name, role) that textures ask for, where its values would begin for vertex or face 0 of the
+scene, and how many words each takes. A colour takes four words, as a texel does, a number one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from clpt import spectra
+from clpt.errors import SceneError
+from clpt.render.contract import shape_records
+from clpt.render.lowering.geometry import shapes
+from clpt.render.lowering.textures.texels import texels
+from clpt.scene.shapes import Shape
+from clpt.scene.textures import SECOND_UV, MeshAttribute, textures_in
+
+if TYPE_CHECKING:
+    from clpt.render.lowering.tables import Tables
+
+COLOUR_WORDS = 4
+Placed = tuple[np.ndarray, Shape, int, int]  # a row of `shapes`, its shape, first vertex and face
+
+
+def lower_attributes(placed: Iterable[Placed], tables: Tables, single_count: int = 0) -> None:
+    """Put what the textures of shapes ask of them into the tables, and its place into their rows.
+
+    single_count: see clpt.records.SETTINGS.
+
+    Raises SceneError for a shape that lacks what its material or light asks for.
+    """
+    if not tables.attributes:
+        return
+    count = len(tables.attributes)
+    if tables.append("attributes", np.zeros(2 * count, np.uint32)) != 0:
+        raise ValueError("`attributes` must be empty before those of the meshes are put in")
+    for row, shape, first_vertex, first_face in placed:
+        names = _names(shape)
+        if not names:
+            continue
+        directory = np.zeros((count, 2), np.int32)
+        for (name, role), number in tables.attributes.items():
+            if name in names:
+                words = 1 if role == "real" else COLOUR_WORDS
+                first = first_face if per_face(name) else first_vertex
+                if shape.kind in shape_records.ONE_OF:
+                    first = int(row["prim"]) - single_count
+                given = (shape, name, role, tables.spectral)
+                value = getattr(shape, "attributes", {})[name]
+                own = (*shapes.geometry(shape), value, *given[1:])
+                at = tables.append("attributes", tables.cache(_words, *given, by=own))
+                directory[number] = at - words * first, words
+        row["attributes"] = tables.append("attributes", directory.view(np.uint32))
+
+
+def per_face(name: str) -> bool:
+    """Whether an attribute has a value for each face, by its name."""
+    return name.startswith("face_")
+
+
+def _names(shape: Shape) -> set[str]:
+    """The attributes that a shape's material and emission read."""
+    kinds = (shape.material, shape.emission)
+    names: set[str] = set()
+    for texture in (t for kind in kinds for t in textures_in(kind)):
+        if isinstance(texture, MeshAttribute):
+            names.add(texture.name)
+        elif getattr(texture, "mapping", "") == "uv1":
+            names |= set(SECOND_UV)
+    missing = sorted(names - set(getattr(shape, "attributes", ())))
+    if missing:
+        known = ", ".join(getattr(shape, "attributes", ())) or "none"
+        message = f"its material asks for the attribute {missing[0]!r}; it has {known}"
+        raise SceneError(message, where=shapes.where(shape))
+    return names
+
+
+def _words(shape: Shape, name: str, role: str, spectral: bool) -> np.ndarray:
+    values: np.ndarray = shapes.attribute(shape, name)
+    if role == "real" and values.shape[1] == 3:
+        values = spectra.luminance(values)[:, None]
+    return texels(values[:, None].astype(np.float32), role, spectral).view(np.uint32)

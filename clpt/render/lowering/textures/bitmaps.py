@@ -1,0 +1,285 @@
+"""The images of bitmaps: decoded in threads, halved where too large, packed for the device.
+
+Images of 8 bits a channel stay small: a number takes a byte, a colour four bytes, or as a spectrum
+eight: its sigmoid's argument at three wavelengths, of 21 bits each. Other images are floats.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import defaultdict
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import images, spectra
+from clpt.errors import SceneError
+from clpt.images import Stored
+from clpt.render.lowering.device_arrays import on_host
+from clpt.render.lowering.lowering_cache import LoweringCache
+from clpt.render.lowering.textures.texels import channel, spectral_image, texels
+from clpt.scene.textures import Bitmap
+
+NODES = np.array([400.0, 550.0, 700.0])  # [nm] of packed spectra, as in spectral_read.cl
+LARGEST = 2**31 - 1  # words in `images` that an index reaches
+THREADS = 8
+Words = NDArray[np.uint32]
+
+
+@dataclass
+class _Image:
+    """An image in one role, and the rows of `textures` that show it."""
+
+    texture: Bitmap
+    role: str
+    stored: Future[Stored]
+    rows: list[np.ndarray] = field(default_factory=list)
+    halvings: int = 0
+
+
+class Images:
+    """The images of a scene, each in the roles that it has; `finish` puts them into the tables.
+
+    budget: [bytes] that they may take, None for any number; memo: of what is decoded and packed.
+    """
+
+    def __init__(
+        self, spectral: bool, budget: int | None = None, cache: LoweringCache | None = None
+    ):
+        self.spectral, self.budget, self.cache = spectral, budget, cache or LoweringCache()
+        self._wanted: dict[Any, _Image] = {}
+        self._decoding: dict[bool, int] = {}
+        self._spectra: dict[bool, _Spectra] = defaultdict(_Spectra)
+
+    def add(self, texture: Bitmap, role: str, row: np.ndarray) -> None:
+        """Ask for an image; its place will be written into the texture's row.
+
+        Raises SceneError for what is no image.
+        """
+        key: Any = (identity(texture), texture.raw, role, role == "real" and texture.channel)
+        if key not in self._wanted:
+            spectral = spectral_image(texture, role)
+            image = texture.image if spectral is None else spectral.to_rgb()
+            self._wanted[key] = _Image(texture, role, self._read(image))
+        self._wanted[key].rows.append(row)
+
+    def finish(self, tables: Any, kinds: tuple[str, ...]) -> list[str]:
+        """Put the images that were asked for into `tables`; return warnings.
+
+        kinds: the table of texture kinds. Raises SceneError for files that cannot be read.
+        """
+        wanted, self._wanted = list(self._wanted.values()), {}
+        notes = self._fit(wanted)
+        for image in wanted:
+            stored = image.stored.result()
+            packed = _packs(stored, image, self.spectral)
+            texture, halvings = image.texture, image.halvings
+            by = (named(texture), texture.raw, image.role, texture.channel, halvings, self.spectral)
+            words, (height, width) = self.cache(Images._words, self, stored, image, by=by)
+            kind = "packed_bitmap" if packed else "bitmap"
+            if tables.size("images") + words.size > LARGEST:
+                raise SceneError("all images together have too many texels", where="bitmap.image")
+            curved = stored.encoded and not image.texture.raw and not _is_alpha(image)
+            for row in image.rows:
+                row["kind"], row["width"], row["height"] = kinds.index(kind), width, height
+                row["decode"] = self._decode(curved, tables) if packed else 0
+            first = tables.append("images", words)
+            for row in image.rows:
+                row["first"] = first
+            tables.texture_roles.add((kind, image.role))
+        return notes
+
+    def _words(self, stored: Stored, image: _Image) -> tuple[Words, tuple[int, ...]]:
+        """The words of an image, row by row from the top, and its height and width."""
+        texture, role = image.texture, image.role
+        values, curved = _shaped(stored.values), stored.encoded and not texture.raw
+        if image.halvings:
+            values = _halved(values, curved, image.halvings)
+        size = values.shape[:2]
+        if role == "real" and _packs(stored, image, self.spectral):
+            number = "rgba".find(texture.channel) if values.shape[2] > 1 else 0
+            if texture.channel == "a" and values.shape[2] < 4:
+                return np.full(1, 0xFFFFFFFF, np.uint32), (1, 1)
+            chosen = values[..., number].reshape(-1)
+            return np.pad(chosen, (0, -len(chosen) % 4)).view("<u4"), size
+        if _packs(stored, image, self.spectral):
+            codes = _codes(values)
+            return (self._spectra[curved].packed(codes, curved) if self.spectral else codes), size
+        decoded = Stored(values, curved).decoded()
+        if role == "real":
+            numbers = np.nan_to_num(channel(decoded, texture.channel).astype(np.float32))
+            return numbers.reshape(-1).view(np.uint32), size
+        made = texels(np.nan_to_num(decoded[..., :3]), role, self.spectral)
+        made = made if self.spectral else made[:, :3]
+        return np.ascontiguousarray(made).reshape(-1).view(np.uint32), size
+
+    def _read(self, image: Any) -> Future[Stored]:
+        """An image, or the promise of a file's, of which each is decoded once."""
+        if isinstance(image, (str, Path)):
+            return self.cache(_read_later, str(image))
+        made: Future[Stored] = Future()
+        made.set_result(_array(image))
+        return made
+
+    def _decode(self, curved: bool, tables: Any) -> int:
+        """The first of 256 words that say what bytes mean."""
+        if curved not in self._decoding:
+            self._decoding[curved] = tables.append("images", _meaning(curved).view(np.uint32))
+        return self._decoding[curved]
+
+    def _fit(self, wanted: list[_Image]) -> list[str]:
+        """Halve the largest images until all fit into the budget."""
+        if self.budget is None:
+            return []
+        sizes = [_size(image, self.spectral) for image in wanted]
+        total = sum(sizes)
+        while total > self.budget and sizes:
+            worst = int(np.argmax(sizes))
+            before = sizes[worst]
+            wanted[worst].halvings += 1
+            sizes[worst] = _size(wanted[worst], self.spectral)
+            total += sizes[worst] - before
+            if sizes[worst] == before:
+                break  # single texels
+        return [_note(image) for image in wanted if image.halvings]
+
+
+def named(texture: Bitmap) -> Any:
+    """A texture's image; of a file its name."""
+    return str(texture.image) if isinstance(texture.image, (str, Path)) else texture.image
+
+
+def identity(texture: Bitmap) -> Any:
+    """What makes two images the same: the file's name, or being one object."""
+    image = named(texture)
+    return image if isinstance(image, str) else id(image)
+
+
+def _read_later(file: str) -> Future[Stored]:
+    return _pool().submit(images.read_stored, file)
+
+
+@cache
+def _pool() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(min(THREADS, os.cpu_count() or 1), "clpt-images")
+
+
+def _array(image: Any) -> Stored:
+    values = np.asarray(on_host(image))
+    values = values[..., None] if values.ndim == 2 else values
+    if values.dtype != np.uint8 and values.dtype.kind != "f":
+        wanted = "must be a path or an array of floats or of bytes"
+        raise SceneError(wanted, where="bitmap.image")
+    if values.dtype != np.uint8:
+        return Stored(_shaped(values).astype(np.float32, copy=False), encoded=False)
+    return Stored(_shaped(values), encoded=True)
+
+
+def _shaped(values: NDArray[Any]) -> NDArray[Any]:
+    if values.ndim != 3 or values.shape[2] not in (1, 3, 4) or values.size == 0:
+        wanted = "must be (h, w) or (h, w, 1, 3 or 4) and not empty"
+        raise SceneError(f"{wanted}, not {values.shape}", where="bitmap.image")
+    return values
+
+
+def _is_alpha(image: _Image) -> bool:
+    return image.role == "real" and image.texture.channel == "a"
+
+
+def _packs(stored: Stored, image: _Image, spectral: bool) -> bool:
+    """Whether bytes stay bytes."""
+    if stored.values.dtype != np.uint8:
+        return False
+    if image.role == "real":
+        return stored.values.shape[2] == 1 or image.texture.channel != "luminance"
+    return not spectral or image.role == "reflectance"
+
+
+def _size(image: _Image, spectral: bool) -> int:
+    """Bytes on the device."""
+    stored = image.stored.result()
+    height, width = (max(1, -(-n >> image.halvings)) for n in stored.values.shape[:2])
+    packed = _packs(stored, image, spectral)
+    if image.role == "real":
+        return height * width * (1 if packed else 4)
+    if packed:
+        return height * width * (8 if spectral else 4)
+    return height * width * (16 if spectral else 12)
+
+
+def _note(image: _Image) -> str:
+    height, width = image.stored.result().values.shape[:2]
+    small = " x ".join(str(max(1, -(-n >> image.halvings))) for n in (width, height))
+    source = image.texture.image
+    name = source if isinstance(source, (str, Path)) else "an image"
+    return f"{name}: {width} x {height} texels made {small}, to keep to the texture budget"
+
+
+def _meaning(curved: bool) -> NDArray[np.float32]:
+    """What the 256 bytes mean."""
+    return Stored(np.arange(256, dtype=np.uint8).reshape(-1, 1, 1), curved).decoded().reshape(-1)
+
+
+def _halved(values: NDArray[Any], curved: bool, times: int) -> NDArray[Any]:
+    """Means of 2x2 texels of linear light, `times` over; bytes are made bytes again."""
+    made = Stored(values, curved).decoded()
+    for _ in range(times):
+        odd = [(0, n % 2 if n > 1 else 0) for n in made.shape[:2]]
+        made = np.pad(made, (*odd, (0, 0)), "edge")
+        made = made if made.shape[0] == 1 else 0.5 * (made[0::2] + made[1::2])
+        made = made if made.shape[1] == 1 else 0.5 * (made[:, 0::2] + made[:, 1::2])
+    stored = images.linear_to_srgb(made) if curved else made
+    if values.dtype != np.uint8 and not curved:
+        return made
+    if values.shape[2] == 4:
+        stored[..., 3] = made[..., 3]
+    if values.dtype != np.uint8:
+        return stored
+    return np.round(np.clip(stored, 0.0, 1.0) * 255.0).astype(np.uint8)
+
+
+def _codes(values: NDArray[np.uint8]) -> Words:
+    """r, g and b of each texel in the three lower bytes of a word, (n,)."""
+    r, g, b = (values[..., i % values.shape[2]].reshape(-1) for i in range(3))
+    made = r.astype(np.uint32)
+    made |= g.astype(np.uint32) << np.uint32(8)
+    made |= b.astype(np.uint32) << np.uint32(16)
+    return made
+
+
+class _Spectra:
+    """Packed spectra of colours of 8 bits a channel; each is made once, whatever images have it."""
+
+    def __init__(self) -> None:
+        self.known = np.zeros(1 << 24, bool)
+        self.words = np.zeros((1 << 24, 2), np.uint32)  # pages that are not written take no memory
+
+    def packed(self, codes: Words, curved: bool) -> Words:
+        """Two words for each colour of `_codes`, (2 n,)."""
+        new = np.zeros(1 << 24, bool)
+        new[codes] = True
+        new &= ~self.known
+        made = np.flatnonzero(new)
+        channels = np.stack([made & 255, made >> 8 & 255, made >> 16], axis=1)
+        self.words[made] = pack(spectra.uplift(_meaning(curved)[channels]))
+        self.known |= new
+        return self.words[codes].reshape(-1)
+
+
+def pack(coefficients: NDArray[np.float32]) -> Words:
+    """Sigmoid coefficients (n, 3) as two words each (n, 2): x at NODES, of 21 bits.
+
+    The upper 21 bits of the words are the first two; the third's are in what is left.
+    """
+    c = coefficients.astype(np.float64)[:, :, None]
+    x = ((c[:, 0] * NODES + c[:, 1]) * NODES + c[:, 2]).astype(np.float32)
+    bits = x.view(np.uint32) + np.uint32(0x400)  # to the nearest
+    upper = bits & np.uint32(0xFFFFF800)
+    rest = bits[:, 2] >> np.uint32(11)
+    first, second = upper[:, 0] | rest >> np.uint32(10), upper[:, 1] | rest & np.uint32(0x3FF)
+    return np.stack([first, second], axis=1).astype(np.uint32)

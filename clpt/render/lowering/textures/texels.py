@@ -1,0 +1,129 @@
+"""Images as the kernels read them: texels of colours, of spectra, of bands, or of numbers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import images, spectra, spectral_exr
+from clpt.errors import SceneError
+from clpt.render.lowering.device_arrays import on_host
+from clpt.scene.textures import Bitmap
+from clpt.spectra import Tabulated
+from clpt.spectral_exr import SpectralImage
+
+Floats = NDArray[np.float32]
+
+FAR = 1000.0  # bands: how far beyond its ends a spectral image's bands are numbered
+
+
+def spectral_image(texture: Any, role: str) -> SpectralImage | None:
+    """Return a texture's image if it is a bitmap of spectra, in the role of a parameter."""
+    if not isinstance(texture, Bitmap):
+        return None
+    return spectral_exr.find(texture.image, emissive=role == "emission")
+
+
+def pixels(texture: Bitmap, role: str) -> Floats:
+    """Return a bitmap's image, (h, w, 1 or 3) float32, top row first; for "real" (h, w, 1).
+
+    role: "reflectance", "emission", "index" or "real"; of spectra it chooses the colour that stands
+    for them. Raises SceneError if it cannot be read or is no image.
+    """
+    spectral = spectral_image(texture, role)
+    image = texture.image if spectral is None else spectral.to_rgb()
+    if isinstance(image, (str, Path)):
+        image = images.read(image, linear=not texture.raw)
+    image = np.asarray(on_host(image))
+    image = image[..., None] if image.ndim == 2 else image
+    if image.dtype == np.uint8 and image.ndim == 3:
+        image = images.Stored(image, encoded=True).decoded(not texture.raw)
+    if image.dtype.kind != "f":
+        wanted = "must be a path or an array of floats or of bytes"
+        raise SceneError(wanted, where="bitmap.image")
+    if image.ndim != 3 or image.shape[2] not in (1, 3, 4) or image.size == 0:
+        wanted = "must be (h, w) or (h, w, 1, 3 or 4) and not empty"
+        raise SceneError(f"{wanted}, not {image.shape}", where="bitmap.image")
+    chosen = channel(image, texture.channel) if role == "real" else image[..., :3]
+    return np.nan_to_num(chosen.astype(np.float32))
+
+
+def channel(image: NDArray[Any], name: str) -> NDArray[Any]:
+    """The channel (h, w, 1) that stands for a number, of (h, w, 1, 3 or 4); a is 1 if missing."""
+    count = image.shape[2]
+    if name == "a":
+        return image[..., 3:] if count == 4 else np.ones_like(image[..., :1])
+    if count == 1:
+        return image
+    if name == "luminance":
+        return spectra.luminance(image[..., :3])[..., None]
+    return image[..., "rgb".index(name), None]
+
+
+def texels(image: Floats, role: str, spectral: bool) -> Floats:
+    """Return what stands in `texels` for an image of `pixels`, row by row from the top.
+
+    (h * w, 4): rgb, or sigmoid coefficients and a factor where `spectral`; (h * w,) for "real".
+    """
+    if role == "real":
+        return image.reshape(-1)
+    colours = np.broadcast_to(image, (*image.shape[:2], 3)).reshape(-1, 3)
+    made = np.ones((len(colours), 4), np.float32)
+    if not spectral:
+        np.clip(colours, 0.0, 1.0 if role == "reflectance" else None, out=made[:, :3])
+    elif role == "reflectance":
+        distinct, which = _palette(np.clip(colours, 0.0, 1.0))
+        made[:, :3] = spectra.uplift(distinct)[which]
+    else:
+        made[:, 3], made[:, :3] = spectra.unbounded(colours)
+    return made
+
+
+def bands(image: SpectralImage, lo: float, hi: float) -> tuple[Floats, Tabulated]:
+    """Return what stands in `texels` for a spectral image seen from `lo` to `hi` [nm].
+
+    (h * w, n) float32 and the number of the band by wavelength: whole at the bands' wavelengths,
+    linear between them and beyond the ends. Bands outside the range but for the next are left out.
+    Raises SceneError if there are fewer than two.
+    """
+    lambdas, n = image.lambdas, len(image.lambdas)
+    if n < 2:
+        raise SceneError("a texture of spectra needs two wavelengths at least", where="image")
+    first = min(max(int(np.searchsorted(lambdas, lo, "right")) - 1, 0), n - 2)
+    end = max(min(int(np.searchsorted(lambdas, hi)) + 1, n), first + 2)
+    kept = lambdas[first:end]
+    last, ends = len(kept) - 1.0, np.array([kept[1] - kept[0], kept[-1] - kept[-2]]) * FAR
+    number = Tabulated(
+        [kept[0] - ends[0], *kept, kept[-1] + ends[1]],
+        [-FAR, *np.arange(len(kept)), last + FAR],
+    )
+    values = np.nan_to_num(image.values[..., first:end].reshape(-1, len(kept)))
+    return np.clip(values, 0.0, None if image.emissive else 1.0), number
+
+
+def _palette(colours: Floats) -> tuple[Floats, Any]:
+    """Distinct colours (k, 3), and which of them each of (n, 3) is, if channels have few values.
+
+    The channels of an 8-bit image have at most 256. Other images come back as they are.
+    """
+    number, counts = np.zeros(len(colours), np.int64), 1
+    for channel in colours.T:
+        coarse = np.ascontiguousarray(channel).view(np.uint32) >> 12
+        values = np.zeros(1 << 20, np.float32)
+        values[coarse] = channel
+        present = np.zeros(1 << 20, bool)
+        present[coarse] = True
+        levels = int(present.sum())
+        if levels > 256 or not np.array_equal(values[coarse], channel):
+            return colours, slice(None)
+        number = number * levels + (np.cumsum(present) - 1)[coarse]
+        counts *= levels
+    chosen = np.full(counts, -1, np.int64)
+    chosen[number] = np.arange(len(colours))
+    used = np.flatnonzero(chosen >= 0)
+    place = np.zeros(counts, np.int64)
+    place[used] = np.arange(len(used))
+    return colours[chosen[used]], place[number]

@@ -1,0 +1,58 @@
+"""What a render took: how much of everything, how many bytes, how many seconds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from clpt.render.wavefront.wavefront import Wavefront
+
+
+@dataclass(frozen=True)
+class RenderStats:
+    """Figures of a renderer, for people and reports; `dataclasses.asdict` makes them JSON.
+
+    triangles: as they are held, triangles_instanced: as they are seen; analytic: shapes that rays
+    meet as they are; lights: rows to choose from. tables, trees: bytes by name; memory: bytes of
+    all buffers on the device; programs: built until samples could come, programs_cached: those of
+    them that lay in clpt's cache (a driver does not tell what it takes from its own).
+    seconds: `lower`, `trees`, `programs`, `ready` (from the start to when samples may come) and,
+    once there is one, `first_sample` (from the start likewise).
+    """
+
+    triangles: int
+    triangles_instanced: int
+    instances: int
+    analytic: int
+    lights: int
+    tables: dict[str, int]
+    trees: dict[str, int]
+    memory: int
+    programs: int
+    programs_cached: int
+    seconds: dict[str, float]
+
+
+def collect(
+    fronts: list[Wavefront], programs: int, kept: int, seconds: dict[str, float]
+) -> RenderStats:
+    """Return the figures of a render's wavefronts, which share all but film and picture."""
+    first = fronts[0]
+    lowered, instances = first.lowered, first.lowered.instances
+    own = len(lowered.faces) - sum(instances.triangles)
+    placed = sum(instances.triangles[prototype] for prototype in instances.prototypes.tolist())
+    arrays = {**lowered.tables, "vertices": lowered.vertices, "faces": lowered.faces}
+    trees = {"triangles": first.tree, **first.box_trees}
+    return RenderStats(
+        triangles=len(lowered.faces),
+        triangles_instanced=own + placed,
+        instances=len(instances.rows),
+        analytic=len(lowered.boxes),
+        lights=int(lowered.settings["light_count"]),
+        # Of what a scene does not have, a word stands there.
+        tables={name: array.nbytes for name, array in arrays.items() if array.size > 1},
+        trees={name: tree.bytes for name, tree in trees.items()},
+        memory=sum(front.buffers.used for front in fronts) + sum(t.bytes for t in trees.values()),
+        programs=programs,
+        programs_cached=kept,
+        seconds=seconds,
+    )

@@ -1,0 +1,38 @@
+/* The contract of a camera kind: kernels/camera/<kind>.cl has
+ *
+ *   CameraRay <kind>_ray(global const <Kind>Camera *camera, vec2 film, vec2 lens);
+ *
+ * and of a kind that can be of glass which disperses
+ *
+ *   CameraRay <kind>_glass_ray(global const <Kind>Camera *camera, vec2 film, vec2 lens, real index);
+ *
+ * film: position on the film, x and y in [0, 1], y down; lens: a point of the unit square;
+ * index: of the glass at the hero's wavelength, for which alone the ray then holds.
+ * The struct is a uniform Record in clpt/render/lowering/camera/cameras.py.
+ */
+typedef struct {
+    vec3 o, d; /* [m]; unit length. The origin lies on the near plane. */
+    real far;  /* distance from there to the far plane [m]; FAR: none */
+} CameraRay;
+
+/* Throughput as a path begins, and what path/hero.cl keeps of it. */
+inline Spectrum camera_start(void)
+{
+    Spectrum r = spectrum_of(1.0f);
+#if CAMERA_DISPERSES
+    r = spectrum_of(0.0f);
+    r.x = 4.0f;
+#endif
+    return r;
+}
+
+inline vec3 matrix_point(global const float *m, real x, real y, real z) /* row-major, affine */
+{
+    return v3(m[0] * x + m[1] * y + m[2] * z + m[3], m[4] * x + m[5] * y + m[6] * z + m[7],
+              m[8] * x + m[9] * y + m[10] * z + m[11]);
+}
+inline vec3 matrix_vector(global const float *m, real x, real y, real z)
+{
+    return v3(m[0] * x + m[1] * y + m[2] * z, m[4] * x + m[5] * y + m[6] * z,
+              m[8] * x + m[9] * y + m[10] * z);
+}

@@ -1,0 +1,33 @@
+/* The contract of a shape kind: kernels/shape/<kind>.cl has, where <Kind> is a Record in
+ * clpt/render/lowering/geometry/shapes.py whose rows lie in `geometry`,
+ *
+ *   ShapeSample <kind>_sample(<Kind> s, vec3 p, vec2 u);      a point of the shape, as seen from p
+ *   real        <kind>_pdf(<Kind> s, vec3 p, vec3 wi, real t, vec3 n);   of sample [1/sr], for a hit at distance t with unit normal n
+ *
+ * and, for shapes that rays meet as they are (not as triangles),
+ *
+ *   ShapeHit    <kind>_intersect(<Kind> s, vec3 o, vec3 d, real tmin, real tmax);    nearest hit in (tmin, tmax)
+ *   vec3        <kind>_dpdu(<Kind> s, vec3 p, vec2 uv);                              tangent at a point of it
+ *   vec3        <kind>_dpdv(<Kind> s, vec3 p, vec2 uv);                              and along v
+ *
+ * Normals point to the front, outward for closed shapes.
+ */
+typedef struct {
+    vec3 wi;  /* unit length, from p to the point */
+    real t;   /* distance [m] */
+    vec3 n;   /* unit normal there, toward the front */
+    vec2 uv;
+    real pdf; /* [1/sr]; 0: nothing */
+} ShapeSample;
+
+typedef struct {
+    real t; /* [m]; FAR: missed */
+    vec3 n; /* unit normal, toward the front */
+    vec2 uv;
+} ShapeHit;
+
+/* From area to solid angle: the pdf of a point at distance t whose normal leans by cos to wi. */
+inline real solid_angle_pdf(real pdf_area, real t, real cos_t)
+{
+    return pdf_area * t * t / max_r(cos_t, (real)(1e-9f));
+}

@@ -1,0 +1,66 @@
+/* Choosing one row of `lights`. */
+inline LightRow light_at(Scene scene, integer row)
+{
+    return light_row_row(scene.lights, row * LIGHT_ROW_WORDS);
+}
+
+/* Where there are few lights, the number that chooses one is good enough to go on with: the light and
+ * the point on it then come from one well-spread pair. Of many, it would have no bits left. */
+#ifndef FEW_LIGHTS
+#define FEW_LIGHTS 0
+#endif
+
+/* A row by the alias method (Walker 1977): *u chooses a place, its rest whether to stay; what is left
+ * of it is uniform in [0, 1) again. */
+inline integer light_pick(Scene scene, real *u)
+{
+    int count = scene.settings->light_count;
+    if (count == 1) return (integer)(0);
+    real position = *u * (float)count;
+    integer row = min_i(to_integer(position), (integer)(count - 1));
+    LightRow l = light_at(scene, row);
+    real remainder = position - to_real(row);
+    mask stay = remainder < l.keep;
+    real left = sel(stay, remainder, remainder - l.keep), share = sel(stay, l.keep, 1.0f - l.keep);
+    *u = clamp_r(left / max_r(share, (real)(1e-20f)), (real)(0.0f), (real)(0.99999994f));
+    return sel_i(stay, row, l.alias);
+}
+
+/* With the probability of the row in it; a delta light keeps its mark and carries it as a factor. */
+inline LightSample light_chosen(LightSample s, real pmf)
+{
+    mask delta = s.pdf < 0.0f;
+    s.radiance = spectrum_scale(s.radiance, sel(delta, 1.0f / max_r(pmf, (real)(1e-30f)), (real)(1.0f)));
+    s.pdf = sel(delta, s.pdf, s.pdf * pmf);
+    return s;
+}
+
+inline LightSample light_sel(mask m, LightSample a, LightSample b)
+{
+    a.wi = sel3(m, a.wi, b.wi);
+    a.t = sel(m, a.t, b.t);
+    a.radiance = spectrum_sel(m, a.radiance, b.radiance);
+    a.pdf = sel(m, a.pdf, b.pdf);
+    return a;
+}
+inline ShapeSample shape_sample_sel(mask m, ShapeSample a, ShapeSample b)
+{
+    a.wi = sel3(m, a.wi, b.wi);
+    a.t = sel(m, a.t, b.t);
+    a.n = sel3(m, a.n, b.n);
+    a.uv.x = sel(m, a.uv.x, b.uv.x);
+    a.uv.y = sel(m, a.uv.y, b.uv.y);
+    a.pdf = sel(m, a.pdf, b.pdf);
+    return a;
+}
+inline ShapeSample shape_sample_nothing(void)
+{
+    ShapeSample s;
+    s.wi = v3(0.0f, 0.0f, 1.0f);
+    s.t = FAR;
+    s.n = s.wi;
+    s.uv.x = 0.0f;
+    s.uv.y = 0.0f;
+    s.pdf = 0.0f;
+    return s;
+}

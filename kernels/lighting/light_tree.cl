@@ -1,0 +1,96 @@
+/* Choosing a light in proportion to what it may send to a point, by a tree over all lights (Conty Estevez
+ * and Kulla 2018; its nodes' importance after pbrt-v4, 12.6.3). Behind the rows in `lights` lies a trail of
+ * bits for every row, the way down to it, and then the nodes, see clpt/render/lowering/lights/light_tree.py. */
+#define LIGHT_TREE_SLACK 1e-3f /* of a cosine, so that rounding hides no light */
+
+/* cos and sin of max(a - b, 0) for angles in [0, pi]. */
+inline void light_tree_minus(real cos_a, real sin_a, real cos_b, real sin_b, real *c, real *s)
+{
+    mask below = cos_a > cos_b;
+    *c = sel(below, (real)(1.0f), cos_a * cos_b + sin_a * sin_b);
+    *s = sel(below, (real)(0.0f), sin_a * cos_b - cos_a * sin_b);
+}
+
+inline real light_tree_16(natural word, int shift) { return to_real(as_integer((word >> shift) & 0xffffu)) * (2.0f / 65535.0f) - 1.0f; }
+
+inline vec3 light_tree_axis(natural word)
+{
+    real u = light_tree_16(word, 0), v = light_tree_16(word, 16), z = 1.0f - fabs(u) - fabs(v);
+    real fold = max_r(-z, (real)(0.0f));
+    return normalize3(v3(u + sel(u < 0.0f, fold, -fold), v + sel(v < 0.0f, fold, -fold), z));
+}
+
+/* What the lights below a node may send to p, all surfaces there shading them: their power, times the
+ * cosine at the light, over the squared distance. */
+inline real light_tree_importance(LightNode n, vec3 p)
+{
+    vec3 from = sub3(p, n.center), axis = light_tree_axis(n.axis);
+    real r2 = n.radius * n.radius, d2 = max_r(dot3(from, from), (real)(1e-20f));
+    mask outside = d2 > r2;
+    real cos_w = dot3(axis, from) / sqrt(d2);
+    cos_w = sel((n.cones & 0x80000000u) != 0, fabs(cos_w), cos_w);
+    real cos_o = light_tree_16(n.cones, 0);
+    real cos_e = to_real(as_integer((n.cones >> 16) & 0x7fffu)) * (2.0f / 32767.0f) - 1.0f;
+    real sin2_b = sel(outside, r2 / d2, (real)(1.0f)), cos_x, sin_x, cos_p, sin_p;
+    light_tree_minus(cos_w, sqrt_r(1.0f - cos_w * cos_w), cos_o, sqrt_r(1.0f - cos_o * cos_o), &cos_x, &sin_x);
+    light_tree_minus(cos_x, sin_x, sqrt_r(1.0f - sin2_b), sqrt(sin2_b), &cos_p, &sin_p);
+    cos_p = sel(outside, cos_p, (real)(1.0f));
+    real importance = n.power * max_r(cos_p, (real)(LIGHT_TREE_SLACK)) / max_r(d2, r2);
+    importance = sel(cos_p > cos_e - LIGHT_TREE_SLACK, importance, (real)(0.0f));
+    return sel(n.radius < 0.0f, n.power, importance);
+}
+
+/* The chance to go on to the first child of a pair, and where either leads. */
+inline real light_tree_chance(Scene scene, integer pair, vec3 p, integer *first, integer *second)
+{
+    int nodes = scene.settings->light_count * (LIGHT_ROW_WORDS + 1);
+    LightNode a = light_node_row(scene.lights, pair * LIGHT_NODE_WORDS + nodes);
+    LightNode b = light_node_row(scene.lights, (pair + 1) * LIGHT_NODE_WORDS + nodes);
+    real ia = light_tree_importance(a, p), ib = light_tree_importance(b, p), sum = ia + ib;
+    *first = a.child;
+    *second = b.child;
+    return sel(sum > 0.0f, ia / max_r(sum, (real)(1e-37f)), (real)(0.5f));
+}
+
+inline integer light_tree_root(Scene scene)
+{
+    int nodes = scene.settings->light_count * (LIGHT_ROW_WORDS + 1);
+    return (integer)(as_int(scene.lights[nodes + LIGHT_NODE_CHILD]));
+}
+
+/* A row, and its chance at p; what is left of *u is uniform in [0, 1) again. */
+inline integer light_tree_pick(Scene scene, vec3 p, real *u, real *pmf)
+{
+    integer at = light_tree_root(scene), first, second;
+    mask open = at >= 0;
+    *pmf = 1.0f;
+    while (any(open)) {
+        real chance = light_tree_chance(scene, sel_i(open, at, (integer)(1)), p, &first, &second);
+        mask left = *u < chance;
+        real share = sel(left, chance, 1.0f - chance), remainder = sel(left, *u, *u - chance) / max_r(share, (real)(1e-20f));
+        *u = sel(open, clamp_r(remainder, (real)(0.0f), (real)(0.99999994f)), *u);
+        *pmf *= sel(open, share, (real)(1.0f));
+        at = sel_i(open, sel_i(left, first, second), at);
+        open = at >= 0;
+    }
+    return -1 - at;
+}
+
+/* The chance of a row at p. */
+inline real light_tree_pmf(Scene scene, integer row, vec3 p)
+{
+    int trails = scene.settings->light_count * LIGHT_ROW_WORDS;
+    natural trail = as_natural(gather_i(scene.lights, row + trails));
+    integer at = light_tree_root(scene), first, second;
+    mask open = at >= 0;
+    real pmf = 1.0f;
+    while (any(open)) {
+        real chance = light_tree_chance(scene, sel_i(open, at, (integer)(1)), p, &first, &second);
+        mask left = (trail & 1u) == 0;
+        pmf *= sel(open, sel(left, chance, 1.0f - chance), (real)(1.0f));
+        at = sel_i(open, sel_i(left, first, second), at);
+        trail = trail >> 1;
+        open = at >= 0;
+    }
+    return pmf;
+}

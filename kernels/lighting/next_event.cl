@@ -1,0 +1,23 @@
+/* Puts a shadow ray into its slab, for the lanes that `shine`; the other active ones have none. It goes
+ * from off the surface to the point on the light: along ls.wi it would meet another one, and a light
+ * seen at a grazing angle would shade itself. */
+inline void shadow_toward(Slab shadow, At at, mask active, mask shine, Surface s, LightSample ls, Spectrum value)
+{
+    vec3 from = surface_offset(s, ls.wi), to = sub3(madd3(ls.wi, ls.t, s.p), from);
+    real t = sqrt(dot3(to, to));
+    mask near = ls.t < FAR;
+    store_shadow_o(shadow, at, shine, from);
+    store_shadow_d(shadow, at, shine, sel3(near, scale3(to, 1.0f / t), ls.wi));
+    store_shadow_t(shadow, at, active, sel(shine, sel(near, t, ls.t) * SHADOW_SHORTER, (real)(-1.0f)));
+    store_shadow_value(shadow, at, shine, value);
+}
+
+/* Where a light is weighed that a ray has met, what counts is the pdf with which its direction was chosen,
+ * and from where: further back than where the ray begins if it has passed null boundaries since. */
+#if USES_NULL_SURFACES
+#define path_null_distance(path, at) load_path_null_distance(path, at)
+#define path_turned(path, at, m) store_path_null_distance(path, at, m, (real)(0.0f))
+#else
+#define path_null_distance(path, at) ((real)(0.0f))
+#define path_turned(path, at, m)
+#endif

@@ -1,0 +1,15 @@
+/* The numbers of a sample of a place of the film, along the Z curve: x and y by turns (Morton 1966). */
+inline natural spread_bits(natural x) /* of 16 to every other one of 32 */
+{
+    x = (x | (x << 8u)) & 0x00ff00ffu;
+    x = (x | (x << 4u)) & 0x0f0f0f0fu;
+    x = (x | (x << 2u)) & 0x33333333u;
+    return (x | (x << 1u)) & 0x55555555u;
+}
+
+inline Sampler pixel_sampler(global const Settings *settings, integer pixel_index, integer sample)
+{
+    integer tile = pixel_index >> 4, row = divide(tile, settings->tiles_x), column = tile - row * settings->tiles_x;
+    natural x = as_natural(column * 4 + (pixel_index & 3)), y = as_natural(row * 4 + ((pixel_index >> 2) & 3));
+    return zsobol_start(settings->seed, (uint)settings->sample_bits, spread_bits(x) | (spread_bits(y) << 1u), as_natural(sample));
+}

@@ -1,0 +1,9 @@
+/* The frame in which a surface is shaded, where nothing bends it. */
+typedef struct { Frame frame; } ShadingFrame;
+
+inline ShadingFrame shading_frame_load(Scene scene, integer row, Surface s, vec3 d, Wavelengths lambdas)
+{
+    ShadingFrame f = {surface_frame(s)};
+    return f;
+}
+inline real shading_frame_share(ShadingFrame f, vec3 w) { return 1.0f; }

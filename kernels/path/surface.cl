@@ -1,0 +1,170 @@
+/* Where a path is: the point that a ray hit, with all that shading asks for. */
+#include "path/surface_flags.cl"
+#include "tracing/trace_hit.cl"
+#include "generated/instances.cl"
+
+typedef struct {
+    vec3 p;       /* [m] */
+    vec3 n;       /* geometric normal, unit length, on the side of the front */
+    vec3 ns;      /* shading normal, unit length */
+    vec3 dpdu;    /* along the surface's u; not normalised, may be zero */
+    vec3 dpdv;    /* and along v */
+    vec2 uv;
+    mask turned;  /* the back of a two-sided surface: ns has been turned round */
+    integer light; /* row in `lights`, -1: does not emit */
+#if USES_ATTRIBUTES
+    integer attributes, face; /* of triangles, see texturing/texture_point.cl */
+    vec2 b;
+#endif
+} Surface;
+
+inline vec3 vertex_vec3(global const float *table, integer vertex)
+{
+    integer at = vertex * 3;
+    return v3(gather(table, at), gather(table, at + 1), gather(table, at + 2));
+}
+inline vec2 vertex_vec2(global const float *table, integer vertex)
+{
+    vec2 r = {gather(table, vertex * 2), gather(table, vertex * 2 + 1)};
+    return r;
+}
+
+/* The surface where the ray from `o` along `d` ends. `front` tells which side was hit. A two-sided
+ * back is turned round, so that the BSDF sees a front. USES_NORMALS, USES_UVS and USES_TANGENTS say
+ * what the scene needs; dpdu_of_shape and dpdv_of_shape are generated for its analytic shapes. */
+inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, mask *front)
+{
+    Surface s;
+    ShapeRow shape = shape_row_row(scene.shapes, sel_i(active, h.shape, (integer)(0)) * SHAPE_ROW_WORDS);
+    s.n = normalize3(sel3(active, h.n, v3(0.0f, 0.0f, 1.0f)));
+    s.p = madd3(d, h.t, o);
+    s.ns = s.n;
+    s.uv.x = h.u;
+    s.uv.y = h.v;
+    s.dpdu = v3(0.0f, 0.0f, 0.0f);
+    s.dpdv = v3(0.0f, 0.0f, 0.0f);
+    s.light = -1;
+    integer prim = sel_i(active, h.prim, (integer)(0));
+#if USES_ATTRIBUTES
+    s.attributes = shape.attributes;
+    s.face = sel_i(active & (shape.kind == 0), prim, (integer)(0));
+#if USES_ANALYTIC
+    mask many = active & ((shape.flags & SHAPE_MANY) != 0);
+    s.face = sel_i(many, texture_face_of_sphere(prim - scene.settings->single_count), s.face);
+#endif
+    s.b = s.uv;
+#endif
+#if USES_INSTANCES
+    mask placed = active & (h.instance > 0);
+    InstanceFrame space = instance_frame(scene, placed, h.instance);
+#endif
+    mask emits = active & (shape.light >= 0);
+    if (any(emits)) {
+        integer offset = sel_i((shape.flags & SHAPE_ONE_LIGHT) != 0, (integer)(0), prim - shape.prim);
+        s.light = sel_i(emits, shape.light + offset, (integer)(-1));
+    }
+#if USES_NORMALS || USES_UVS || USES_TANGENTS
+    mask triangle = active & (shape.kind == 0);
+    integer corner = sel_i(triangle, prim, (integer)(0)) * 3;
+    integer a = gather_i(scene.faces, corner), b = gather_i(scene.faces, corner + 1), c = gather_i(scene.faces, corner + 2);
+    real u = s.uv.x, v = s.uv.y, w = 1.0f - u - v;
+#endif
+#if USES_NORMALS
+    mask smooth = triangle & ((shape.flags & SHAPE_NORMALS) != 0);
+    if (any(smooth)) {
+        vec3 ns = madd3(vertex_vec3(scene.normals, a), w,
+                        madd3(vertex_vec3(scene.normals, b), u, scale3(vertex_vec3(scene.normals, c), v)));
+        mask usable = smooth & (dot3(ns, ns) > 1e-12f);
+#if USES_INSTANCES
+        ns = sel3(placed, instance_normal(space, ns), ns);
+#endif
+        s.ns = sel3(usable, normalize3(ns), s.ns);
+    }
+#endif
+#if USES_UVS
+    mask mapped = triangle & ((shape.flags & SHAPE_UVS) != 0);
+    if (any(mapped)) {
+        vec2 ta = vertex_vec2(scene.uvs, a), tb = vertex_vec2(scene.uvs, b), tc = vertex_vec2(scene.uvs, c);
+        s.uv.x = sel(mapped, ta.x * w + tb.x * u + tc.x * v, s.uv.x);
+        s.uv.y = sel(mapped, ta.y * w + tb.y * u + tc.y * v, s.uv.y);
+#if USES_TANGENTS
+        vec3 pa = vertex_vec3(scene.vertices, a);
+        vec3 e1 = sub3(vertex_vec3(scene.vertices, b), pa), e2 = sub3(vertex_vec3(scene.vertices, c), pa);
+        real du1 = tb.x - ta.x, dv1 = tb.y - ta.y, du2 = tc.x - ta.x, dv2 = tc.y - ta.y;
+        real det = du1 * dv2 - dv1 * du2;
+        mask regular = mapped & (fabs(det) > 1e-20f);
+        real inv = 1.0f / sel(regular, det, (real)(1.0f));
+        s.dpdu = sel3(regular, scale3(sub3(scale3(e1, dv2), scale3(e2, dv1)), inv), s.dpdu);
+        s.dpdv = sel3(regular, scale3(sub3(scale3(e2, du1), scale3(e1, du2)), inv), s.dpdv);
+#if USES_INSTANCES
+        s.dpdu = sel3(placed, instance_vector(space, s.dpdu), s.dpdu);
+        s.dpdv = sel3(placed, instance_vector(space, s.dpdv), s.dpdv);
+#endif
+#endif
+    }
+#endif
+#if USES_ANALYTIC && USES_TANGENTS
+    mask analytic = active & (shape.kind != 0);
+    if (any(analytic)) {
+        s.dpdu = sel3(analytic, dpdu_of_shape(scene, shape, prim, s.p, s.uv), s.dpdu);
+        s.dpdv = sel3(analytic, dpdv_of_shape(scene, shape, prim, s.p, s.uv), s.dpdv);
+    }
+#endif
+    *front = dot3(s.n, d) < 0.0f;
+    /* Each normal is turned to the viewer by itself: where they disagree, as at the silhouette of a coarse
+     * mesh, a BSDF that saw its back would be black. */
+    mask both = (shape.flags & SHAPE_TWO_SIDED) != 0;
+    s.turned = both & (dot3(s.ns, d) > 0.0f);
+    s.n = sel3(both & !*front, neg3(s.n), s.n);
+    s.ns = sel3(s.turned, neg3(s.ns), s.ns);
+    return s;
+}
+
+/* The same from what the intersect stage has kept. */
+inline Surface surface_load(Scene scene, Slab hit, At at, mask active, vec3 o, vec3 d, mask *front)
+{
+    TraceHit h = {load_hit_t(hit, at), load_hit_u(hit, at), load_hit_v(hit, at), load_hit_n(hit, at),
+                  load_hit_prim(hit, at), load_hit_shape(hit, at)};
+#if USES_INSTANCES
+    h.instance = load_hit_instance(hit, at);
+#endif
+    return surface_at(scene, h, active, o, d, front);
+}
+
+inline TexturePoint surface_texture_point(Surface s)
+{
+    TexturePoint t = texture_point(s.uv, s.p);
+#if USES_ATTRIBUTES
+    t.attributes = s.attributes;
+    t.face = s.face;
+    t.b = s.b;
+#endif
+    return t;
+}
+
+/* The shading frame: s along dpdu where there is one (Mitsuba's and pbrt's convention). */
+inline Frame surface_frame(Surface s)
+{
+    Frame f = frame_of(s.ns);
+#if USES_TANGENTS
+    vec3 t = sub3(s.dpdu, scale3(s.ns, dot3(s.ns, s.dpdu)));
+    mask given = dot3(t, t) > 1e-20f;
+    t = normalize3(sel3(given, t, f.s));
+    f.s = t;
+    f.t = cross3(s.ns, t);
+#endif
+    return f;
+}
+
+/* How far off the surface a ray starts: by more than what rounding may have put it under. */
+inline real surface_step(Surface s)
+{
+    return (1.0f + max_r(max_r(fabs(s.p.x), fabs(s.p.y)), fabs(s.p.z))) * RAY_EPSILON;
+}
+
+/* Where a ray toward `w` starts. */
+inline vec3 surface_offset(Surface s, vec3 w)
+{
+    real step = surface_step(s);
+    return madd3(s.n, sel(dot3(s.n, w) < 0.0f, -step, step), s.p);
+}

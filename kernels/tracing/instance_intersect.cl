@@ -1,0 +1,20 @@
+/* One ray and one instance: the ray is turned into the group's space and goes through its tree by
+ * LAYOUT(verb). Its direction keeps the length that it gets, so that t is the world's. */
+#include "tracing/instances.cl"
+
+/* If the instance at row `at` is met between tmin and hit->t, 1 is returned and the hit becomes that one,
+ * still in the group's space. With `first_only` the hit stays. */
+inline int instance_meet(global const float *nodes, global const float *leaves, Scene scene, uint at, vec3 o,
+                         vec3 d, float tmin, TriHit *hit, int first_only)
+{
+    InstanceRow i = instance_row_row(scene.instances, (int)at * INSTANCE_ROW_WORDS);
+    vec3 s = {o.x - i.origin.x, o.y - i.origin.y, o.z - i.origin.z};
+    vec3 p = {dot3(i.x, s), dot3(i.y, s), dot3(i.z, s)}, v = {dot3(i.x, d), dot3(i.y, d), dot3(i.z, d)};
+    nodes += (ulong)i.nodes * 8;
+    leaves += (ulong)i.leaves * 8;
+    if (first_only) return LAYOUT(occluded)(nodes, leaves, p.x, p.y, p.z, v.x, v.y, v.z, tmin, hit->t);
+    TriHit own = LAYOUT(closest)(nodes, leaves, p.x, p.y, p.z, v.x, v.y, v.z, tmin, hit->t);
+    if (own.prim == BVH_MISS) return 0;
+    *hit = own;
+    return 1;
+}

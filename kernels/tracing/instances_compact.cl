@@ -1,0 +1,24 @@
+/* The compressed tree over instances; an item is, by its number, the row of an instance. */
+#include "tracing/instance_intersect.cl"
+
+/* The row of the nearest instance that is met between tmin and hit->t, with `first_only` of any, and the
+ * hit as `instance_meet` leaves it; BVH_MISS if there is none. */
+inline uint instances_trace(global const float *nodes, global const float *leaves,
+                            global const float *instance_nodes, Scene scene, vec3 o, vec3 d, float tmin,
+                            TriHit *hit, int first_only)
+{
+    CompactRay ray = compact_ray(o.x, o.y, o.z, d.x, d.y, d.z, tmin);
+    CompactWay way;
+    uint2 items;
+    uint noise_sums = BVH_MISS;
+    compact_begin(&way);
+    while (compact_next(instance_nodes, &ray, hit->t, &way, &items)) {
+        while (items.y) {
+            uint row = compact_item(&items);
+            if (!instance_meet(nodes, leaves, scene, row, o, d, tmin, hit, first_only)) continue;
+            noise_sums = row;
+            if (first_only) return noise_sums;
+        }
+    }
+    return noise_sums;
+}

@@ -1,0 +1,83 @@
+/* Tracing the rays of a work-item's lanes through the 8-wide tree, all of them in flight, for a tree of
+ * nothing but triangles that is larger than a processor's caches. Where most look the way of their neighbours,
+ * one after another: see bvh/query_interleaved.cl. */
+#include "tracing/trace.cl"
+#include "bvh/wide8_interleaved.cl"
+#include "generated/trace_args.cl"
+
+typedef union { real v; float at[LANES]; } TraceReal;
+typedef union { integer v; int at[LANES]; } TraceInteger;
+typedef struct { TraceReal ox, oy, oz, dx, dy, dz, t; } TraceRays;
+typedef struct { TraceReal t, u, v, nx, ny, nz; TraceInteger prim, tag; } TraceHits;
+#define TRACE_RAY(r, i) (r)->ox.at[i], (r)->oy.at[i], (r)->oz.at[i], (r)->dx.at[i], (r)->dy.at[i], \
+                        (r)->dz.at[i], 0.0f, (r)->t.at[i]
+
+/* The lanes with a ray, in their order, and how many they are. */
+inline uint trace_active(mask active, uint *rays)
+{
+    TraceInteger is = {active};
+    uint n = 0;
+    for (uint i = 0; i < LANES; i++)
+        if (is.at[i]) rays[n++] = i;
+    return n;
+}
+
+/* Whether three quarters of the rays look the way of the one before. */
+inline int trace_alike(const TraceRays *r, const uint *rays, uint count)
+{
+    uint alike = 0;
+    for (uint k = 1; k < count; k++) {
+        uint i = rays[k - 1], j = rays[k];
+        alike += wide8_alike((float3)(r->dx.at[i], r->dy.at[i], r->dz.at[i]),
+                             (float3)(r->dx.at[j], r->dy.at[j], r->dz.at[j]));
+    }
+    return 4 * alike + 3 >= 3 * count;
+}
+
+inline void trace_put(TraceHits *h, uint i, TriHit hit)
+{
+    h->t.at[i] = hit.t;
+    h->u.at[i] = hit.u;
+    h->v.at[i] = hit.v;
+    h->nx.at[i] = hit.nx;
+    h->ny.at[i] = hit.ny;
+    h->nz.at[i] = hit.nz;
+    h->prim.at[i] = as_int(hit.prim);
+    h->tag.at[i] = as_int(hit.tag);
+}
+
+/* Each ray a node or block on in turn, till all have arrived. */
+inline void trace_step_all(global const float *nodes, global const float *leaves, const TraceRays *r, uint *rays,
+                      uint active, TraceHits *h)
+{
+    Wide8RayState states[LANES];
+    for (int started = 0; active; started = 1) {
+        uint left = 0;
+        for (uint k = 0; k < active; k++) {
+            uint i = rays[k];
+            Wide8RayState *f = states + i;
+            int goes = started || wide8_start(f, TRACE_RAY(r, i));
+            if (goes && wide8_step(nodes, leaves, f))
+                rays[left++] = i;
+            else
+                trace_put(h, i, wide8_finish(leaves, f));
+        }
+        active = left;
+    }
+}
+
+inline TraceHit trace_closest(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real far, mask active)
+{
+    TraceReal none = {(real)(0.0f)};
+    TraceHits h = {{far}, none, none, none, none, none, {(integer)(-1)}, {(integer)(0)}};
+    TraceRays r = {{o.x}, {o.y}, {o.z}, {d.x}, {d.y}, {d.z}, {far}};
+    uint rays[LANES], count = trace_active(active, rays);
+    if (!trace_alike(&r, rays, count)) {
+        trace_step_all(nodes, leaves, &r, rays, count, &h);
+    } else {
+        for (uint k = 0; k < count; k++)
+            trace_put(&h, rays[k], wide8_closest(nodes, leaves, TRACE_RAY(&r, rays[k])));
+    }
+    TraceHit hit = {h.t.v, h.u.v, h.v.v, {h.nx.v, h.ny.v, h.nz.v}, h.prim.v, h.tag.v};
+    return hit;
+}

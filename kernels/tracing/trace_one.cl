@@ -1,0 +1,44 @@
+/* Tracing one ray a work-item: triangles through LAYOUT(verb), analytic shapes through bvh/shapes.cl. */
+#include "tracing/trace.cl"
+#include "generated/layout.cl"
+#include "generated/trace_args.cl"
+#include "generated/shape_tree.cl"
+#include "tracing/trace_shapes.cl"
+#include "generated/shape_traversal.cl"
+#include "generated/instance_traversal.cl"
+
+inline TraceHit trace_closest(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real far, mask active)
+{
+    TriHit t = LAYOUT(closest)(nodes, leaves, o.x, o.y, o.z, d.x, d.y, d.z, 0.0f, far);
+    TraceHit h = {t.t, t.u, t.v, {t.nx, t.ny, t.nz}, as_int(t.prim), as_int(t.tag)};
+#if USES_INSTANCES
+    instances_closest(nodes, leaves, instance_nodes, scene, o, d, t, &h);
+#endif
+#if USES_ANALYTIC
+    uint shape = shapes_closest(shape_nodes, shape_indices, scene, o.x, o.y, o.z, d.x, d.y, d.z, 0.0f, &h.t);
+    if (shape != BVH_MISS) {
+        h.prim = as_int(shape);
+        h.shape = shape_row_of(scene, h.prim);
+        ShapeHit s = shape_hit(scene, h.prim, h.shape, o, d, 0.0f, FAR);
+        h.n = s.n;
+        h.u = s.uv.x;
+        h.v = s.uv.y;
+#if USES_INSTANCES
+        h.instance = 0;
+#endif
+    }
+#endif
+    return h;
+}
+inline mask trace_occluded(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real t, mask active)
+{
+    if (LAYOUT(occluded)(nodes, leaves, o.x, o.y, o.z, d.x, d.y, d.z, 0.0f, t)) return 1;
+#if USES_INSTANCES
+    if (instances_occluded(nodes, leaves, instance_nodes, scene, o, d, t)) return 1;
+#endif
+#if USES_ANALYTIC
+    return shapes_occluded(shape_nodes, shape_indices, scene, o.x, o.y, o.z, d.x, d.y, d.z, 0.0f, t);
+#else
+    return 0;
+#endif
+}

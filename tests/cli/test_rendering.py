@@ -1,0 +1,143 @@
+"""The passes of `clpt render`, with a renderer that only counts."""
+
+from __future__ import annotations
+
+import io
+import signal
+import threading
+import time
+
+import pytest
+from rich.console import Console
+
+from clpt.cli import rendering
+from clpt.cli.display import Bar, Lines, clock, figures
+from clpt.cli.rendering import pass_size, render_samples
+from clpt.render.renderer import Progress
+
+
+class Counting:
+    """Takes `seconds` for a sample and asks after each."""
+
+    def __init__(self, seconds: float = 0.0):
+        self.samples, self.seconds, self.passes = 0, seconds, []
+        self.active = 1.0
+
+    def run(self, samples, progress, noise=None):
+        self.active = 1.0 if noise is None else noise / (self.samples + samples)
+        self.active = 0.0 if self.active < 0.01 else self.active
+        self.passes.append(samples)
+        for done in range(samples):
+            time.sleep(self.seconds)
+            if not progress(Progress(self.samples + done + 1, 0, 0, 0, 0.0)):
+                return False
+        self.samples += samples
+        return True
+
+
+def test_passes_grow_and_end_at_the_last_sample():
+    renderer = Counting()
+    assert render_samples(renderer, 100, None, lambda progress: None)
+    assert renderer.passes == [1, 3, 12, 48, 36]
+
+
+def test_noise_ends_it():
+    renderer = Counting()
+    assert render_samples(renderer, None, None, lambda progress: None, noise=1.0)
+    assert renderer.passes == [1, 3, 12, 48, 192]
+
+
+def test_the_limit_ends_a_pass_but_not_the_first():
+    renderer = Counting(0.05)
+    assert render_samples(renderer, None, 0.01, lambda progress: None)
+    assert renderer.samples == 1
+    renderer = Counting(0.01)
+    began = time.perf_counter()
+    assert render_samples(renderer, None, 0.3, lambda progress: None)
+    assert 0.3 <= time.perf_counter() - began < 30.0
+
+
+@pytest.fixture
+def listening():
+    """Ctrl-C as Python starts with, though a shell ignores it in what runs in the background."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.skipif(
+    threading.current_thread() is not threading.main_thread(), reason="signals need it"
+)
+def test_ctrl_c_ends_the_rendering_and_a_second_one_the_program(listening):
+    shown = []
+
+    def press(progress):
+        shown.append(progress)
+        if len(shown) == 9:
+            signal.raise_signal(signal.SIGINT)
+
+    before = signal.getsignal(signal.SIGINT)
+    assert not render_samples(Counting(), 1000, None, press)
+    assert len(shown) == 9
+    assert signal.getsignal(signal.SIGINT) is before
+
+    def press_twice(progress):
+        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        render_samples(Counting(), 1000, None, press_twice)
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_size_of_a_pass():
+    everything = float("inf")
+    assert pass_size(10, 1e9, everything, everything) == 10 * rendering.GROWTH
+    assert pass_size(1000, 2.0, everything, everything) == int(2 * rendering.PASS_SECONDS)
+    assert pass_size(1000, 2.0, 3, everything) == 3
+    assert pass_size(1000, 2.0, everything, 0.9) == 1
+    assert pass_size(1, 1e-3, everything, everything) == 1  # slower than a sample in a pass
+
+
+def test_figures():
+    told = figures(Progress(32.4, 64, 2_000_000, 9_000_000, 2.0), 0.5)
+    assert list(told.values()) == ["32/64 spp", "1 Msamples/s", "4.5 Mrays/s", "0:02", "0:02 left"]
+    assert clock(59.6) == "1:00" and clock(3661) == "1:01:01"
+
+
+def test_what_is_left_does_not_count_how_long_the_first_sample_took(monkeypatch, capsys):
+    now = [0.0]
+    monkeypatch.setattr(time, "perf_counter", lambda: now[0])
+    lines = Lines()
+    for samples, second in ((1, 20.0), (5, 21.0), (11, 26.0)):
+        now[0] = second
+        lines.show(Progress(samples, 101, 10**6, 10**6, second))
+    first, last = capsys.readouterr().err.splitlines()
+    assert first.endswith("0:20")  # nothing is known yet
+    assert "0:54 left" in last  # 90 samples, at ten in six seconds
+
+
+def test_lines_come_now_and_then(monkeypatch, capsys):
+    now = [100.0]
+    monkeypatch.setattr(time, "perf_counter", lambda: now[0])
+    lines = Lines(limit=100.0)
+    for second in range(12):
+        now[0] = 100.0 + second
+        lines.show(Progress(second, 0, 10**6, 10**6, float(second)))
+    told = capsys.readouterr().err.splitlines()
+    assert [line.split()[0] for line in told] == ["5", "10"]
+    assert "0:05" in told[0] and "1:35 left" in told[0]
+
+
+def test_a_terminal_gets_a_bar():
+    bar = Bar(limit=None)
+    bar.console = Console(file=io.StringIO(), force_terminal=True, width=120, highlight=False)
+    with bar.phase("building kernels"):
+        pass
+    with bar.rendering():
+        bar.show(Progress(1.0, 64, 31_250, 100_000, 1.5))
+        bar.show(Progress(64.0, 64, 2_000_000, 9_000_000, 2.0))
+    bar.note("a warning with [brackets]")
+    told = bar.console.file.getvalue()
+    for words in ("64/64 spp", "1 Msamples/s", "4.5 Mrays/s", "0:00 left", "[brackets]"):
+        assert words in told
