@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import logging
 import re
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -47,8 +48,8 @@ def test_commands_and_options_exist(page: Path):
 
 
 @pytest.fixture
-def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
-    """Run a page's Python in one namespace, its films made small and RGB; return what it defines.
+def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Run]:
+    """Yield what runs a page's Python in one namespace, films small and RGB; it returns the names.
 
     The folder looks like the repository's root, but what a page writes stays out of that.
     """
@@ -70,7 +71,9 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
             exec(compile(_smaller(code), f"{page}, block {i + 1}", "exec"), names)
         return names
 
-    return run
+    level = logging.getLogger("clpt").level
+    yield run
+    logging.getLogger("clpt").setLevel(level)
 
 
 def _smaller(text: str) -> str:
