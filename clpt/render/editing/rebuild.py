@@ -13,7 +13,6 @@ import pyopencl as cl
 from clpt import bvh
 from clpt.errors import SceneError
 from clpt.records import TABLES
-from clpt.render.codegen import programs
 from clpt.render.lowering.scene import Lowered
 from clpt.render.wavefront.queues import QUEUE
 from clpt.render.wavefront.wavefront import Wavefront, use_interleaved_rays

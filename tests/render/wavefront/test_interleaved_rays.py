@@ -7,8 +7,8 @@ import pytest
 
 import clpt
 from clpt import device
-from clpt.render.wavefront import wavefront
 from clpt.render.lowering.scene import lower
+from clpt.render.wavefront import wavefront
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Perspective
 from clpt.scene.lights import Constant
