@@ -6,13 +6,11 @@ the other, each as soon as it is known; one that cannot be true tells why in `re
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterator, Sequence
 
 from clpt import bvh, device
-from clpt.scene import Scene
 
-from . import bandwidth, building, rays, scenes, stages, starting
+from . import bandwidth, building, rays, stages, starting
 from .figures import Figure
 from .scenes import opened
 
