@@ -20,6 +20,7 @@ from ..benchmark.comparing import Ratio
 from ..benchmark.figures import Figure
 from ..bvh import TREES
 from ..device.context import trial
+from .output_console import output_console
 
 SLOWER = 3  # the exit status if a figure was refused, or is below --fail-below
 STAGES = (
@@ -75,7 +76,7 @@ def bench(
     be true (rays not traced, hits that differ from what is there, times below what memory allows)
     is refused: it is not recorded, and the exit status is 3.
     """
-    console = _console()
+    console = output_console()
     if listed:
         _list(console)
         return 0
@@ -213,8 +214,3 @@ def _list(console: Console) -> None:
         for name, told in found.items():
             table.add_row(name, told)
         console.print(table)
-
-
-def _console() -> Console:
-    there = Console()
-    return there if there.is_terminal else Console(width=200)
