@@ -33,26 +33,28 @@ class RenderStats:
 
 
 def collect(
-    fronts: list[Wavefront], programs: int, kept: int, seconds: dict[str, float]
+    wavefronts: list[Wavefront], programs: int, cached: int, seconds: dict[str, float]
 ) -> RenderStats:
-    """Return the figures of a render's wavefronts, which share all but film and picture."""
-    first = fronts[0]
-    lowered, instances = first.lowered, first.lowered.instances
-    own = len(lowered.faces) - sum(instances.triangles)
-    placed = sum(instances.triangles[prototype] for prototype in instances.prototypes.tolist())
+    """Return the figures of a render's wavefronts, which share all but film and picture.
+
+    programs, cached: how many were built, and how many of them came from clpt's cache.
+    """
+    scene = wavefronts[0].scene
+    lowered, instances = scene.lowered, scene.lowered.instances
+    of_world = len(lowered.faces) - sum(instances.triangles)
+    instanced = sum(instances.triangles[prototype] for prototype in instances.prototypes.tolist())
     arrays = {**lowered.tables, "vertices": lowered.vertices, "faces": lowered.faces}
-    trees = {"triangles": first.tree, **first.box_trees}
     return RenderStats(
         triangles=len(lowered.faces),
-        triangles_instanced=own + placed,
+        triangles_instanced=of_world + instanced,
         instances=len(instances.rows),
         analytic=len(lowered.boxes),
         lights=int(lowered.settings["light_count"]),
-        # Of what a scene does not have, a word stands there.
+        # A table that the scene does not need has one word.
         tables={name: array.nbytes for name, array in arrays.items() if array.size > 1},
-        trees={name: tree.bytes for name, tree in trees.items()},
-        memory=sum(front.buffers.used for front in fronts) + sum(t.bytes for t in trees.values()),
+        trees=scene.trees.bytes,
+        memory=scene.buffers.used + sum(scene.trees.bytes.values()),
         programs=programs,
-        programs_cached=kept,
+        programs_cached=cached,
         seconds=seconds,
     )

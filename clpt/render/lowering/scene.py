@@ -45,18 +45,17 @@ MOST_SAMPLE_BITS = 16  # of a zsobol pixel's part of its sequence
 DEEPEST = 4000  # path state has 12 bits for the depth
 
 
-@dataclass
+@dataclass(frozen=True)
 class Lowered:
-    """A scene ready for the device.
+    """A scene ready for the device: data that nobody writes to, which several devices may share.
 
     vertices (n, 3) float32, faces (m, 3) uint32 and tags (m,) uint32 (the shape of each triangle)
     are what the acceleration structures are built of, the world's before those of the groups that
     `instances` share; boxes (k, 2, 3) float32 those of the analytic shapes, which are the last rows
     of `shapes`. tables: every other read-only array by name; where an instance's tree begins is
-    filled in when trees are built. lent: those that are the caller's buffers. owners: of each row
-    of `shapes`. glass_row: of the camera, see `lower_camera`. encoder: what made the tables, for
-    values that are edited; None once it is of no use; memo: what the next lowering need not make
-    again.
+    filled in when trees are built. zero_copy: those that are the caller's buffers. owners: of each
+    row of `shapes`. glass_row: of the camera, see `lower_camera`. encoder: what made the tables,
+    for values that are edited; cache: what the next lowering need not make again.
     """
 
     features: Features
@@ -71,8 +70,13 @@ class Lowered:
     owners: list[attributes.Placed]
     glass_row: int
     warnings: list[str]
-    encoder: Tables | None
+    encoder: Tables
     cache: LoweringCache
+
+    def __post_init__(self) -> None:
+        own = (self.vertices, self.faces, self.tags, self.boxes, self.settings)
+        for array in (*own, *self.tables.values(), self.instances.rows, self.instances.boxes):
+            array.flags.writeable = False
 
     def table(self, name: str) -> np.ndarray:
         """A table by its name in clpt.records.TABLES."""

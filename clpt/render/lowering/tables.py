@@ -95,6 +95,7 @@ class Tables:
         self._sizes: dict[str, int] = dict.fromkeys(TABLES, 0)
         self._spectra: dict[Any, int] = {}
         self._rows: dict[tuple[int, str, bytes], tuple[int, Kind]] = {}
+        self._spent = False  # whether it knows of words that no device has
         if mode == "spectral":
             self._sensor(sensor or observer("cie1931"), density or Density(lambda_min, lambda_max))
 
@@ -206,13 +207,16 @@ class Tables:
     def replaced(self, old: Kind, new: Kind, table: str) -> list[tuple[int, Words]] | None:
         """Put a kind in the rows of another whose values differ, after `arrays`.
 
-        Returns first words of the rows and what stands there now; None, with nothing changed but
-        what is then of no use, where more than values differs: the tables must be made anew.
+        Returns first words of the rows and what stands there now; None, from then on for all kinds,
+        where more than values differs: the tables must be made anew.
         """
+        if self._spent:
+            return None
         owned = [key for key in self._rows if key[:2] == (id(old), table)]
         known = any(key[:2] == (id(new), table) for key in self._rows)
         if known or not owned:
             return None
+        self._spent = True
         sizes, sources, found = dict(self._sizes), self.sources, []
         for kind in (old, new):
             self.sources = defaultdict(lambda: defaultdict(set))
@@ -221,6 +225,7 @@ class Tables:
         self.sources = sources
         if found[0] != found[1] or sizes != self._sizes:
             return None
+        self._spent = False
         rows = [self._rows.pop(key)[0] for key in owned]
         for key, row in zip(owned, rows, strict=True):
             self._rows[id(new), key[1], key[2]] = row, new

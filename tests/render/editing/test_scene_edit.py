@@ -116,7 +116,7 @@ def test_what_is_used_in_place() -> None:
     ):
         found = lower(
             resolve_device_arrays(dataclasses.replace(scene(), shapes=shapes), queue)
-        ).lent
+        ).zero_copy
         assert found == lent
     with pytest.raises(SceneError, match="uvs must be rows of 8 bytes, found a buffer of 156"):
         odd = dataclasses.replace(there, uvs=made["faces"].data)
