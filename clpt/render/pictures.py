@@ -1,4 +1,4 @@
-"""The picture that a renderer has so far, in every form in which others want it."""
+"""The picture that a renderer has so far, as arrays of the device and of the host."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Image = NDArray[np.float32]
 
 
 class Pictures(DeviceOwner):
-    """Base of what renders: its picture as an array, on the device or the host.
+    """Base of renderers: their picture as an array, on the device or the host.
 
     channels: of the `aov` integrator, else none; wavefronts: one a channel, at least one.
     """

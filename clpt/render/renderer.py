@@ -19,9 +19,9 @@ from clpt.render.editing import parameter_patch, rebuild
 from clpt.render.editing.moving import Moving
 from clpt.render.editing.scene_edit import (
     MaterialKey,
-    Names,
     ShapeKey,
-    edited,
+    Successors,
+    edit_scene,
     match_replacements,
     resolve_device_arrays,
 )
@@ -101,7 +101,7 @@ class Renderer(Pictures):
         before = device.builds.programs, device.builds.cached
         if texture_budget is None:
             texture_budget = _texture_budget(device)
-        self._texture_budget, self._names = texture_budget, Names()
+        self._texture_budget, self._successors = texture_budget, Successors()
         lowered = lower(resolve_device_arrays(scene, device.queue), texture_budget)
         self._seconds = {"lower": time.perf_counter() - self._start}
         paths = scene.spp * math.prod(scene.film.size)
@@ -314,30 +314,30 @@ class Renderer(Pictures):
             if materials is None and camera is None:
                 return event
         new = self.scene if scene is None else scene
-        swaps = {} if scene is None else match_replacements(self.scene, new)
+        replaced = {} if scene is None else match_replacements(self.scene, new)
         if materials or transforms or vertices:
-            new, more = edited(new, self._names, materials, transforms, vertices)
-            swaps |= more
+            new, more = edit_scene(new, self._successors, materials, transforms, vertices)
+            replaced |= more
         if camera is not None:
             new = dataclasses.replace(new, camera=camera)
         parameters_only = scene is None and not transforms and not vertices
         if not (parameters_only and self._patch(new)):
             self._rebuild(new, events, refit=scene is None)
         self.scene = new
-        self._names.replace(swaps)
+        self._successors.note(replaced)
         return self.reset()
 
     def _move(self, transforms: Mapping[ShapeKey, Any], vertices: Mapping[ShapeKey, Any]) -> bool:
         """Move shapes on the device; return whether they could."""
         if self._moving is None:
             self._moving = Moving(self.wavefronts[0].scene, self.scene)
-        moved, swaps = edited(self.scene, self._names, None, transforms, vertices)
-        refusal = self._moving.move(self.scene, swaps)
+        moved, replaced = edit_scene(self.scene, self._successors, None, transforms, vertices)
+        refusal = self._moving.move(self.scene, replaced)
         if refusal is not None:
             log.debug("shapes cannot move on the device: %s", refusal)
             return False
         self.scene = moved
-        self._names.replace(swaps)
+        self._successors.note(replaced)
         return True
 
     def _patch(self, scene: Scene) -> bool:

@@ -1,4 +1,4 @@
-"""What a render took: how much of everything, how many bytes, how many seconds."""
+"""What a render took: numbers of things, bytes, seconds."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from clpt.render.wavefront.wavefront import Wavefront
 class RenderStats:
     """Figures of a renderer, for people and reports; `dataclasses.asdict` makes them JSON.
 
-    triangles: as they are held, triangles_instanced: as they are seen; analytic: shapes that rays
-    meet as they are; lights: rows to choose from. tables, trees: bytes by name; memory: bytes of
-    all buffers on the device; programs: built until samples could come, programs_cached: those of
-    them that lay in clpt's cache (a driver does not tell what it takes from its own).
-    seconds: `lower`, `trees`, `programs`, `ready` (from the start to when samples may come) and,
-    once there is one, `first_sample` (from the start likewise).
+    triangles: on the device; triangles_instanced: as many as instances show; analytic: shapes that
+    are intersected without triangles; lights: rows to choose from. tables, trees: bytes by name;
+    memory: bytes of all buffers on the device. programs: built before the first sample;
+    programs_cached: those of them that were in clpt's cache (a driver does not tell what it takes
+    from its own). seconds: of `lower`, `trees` and `programs`; from the start to `ready`, when
+    samples may begin, and, once there is one, to `first_sample`.
     """
 
     triangles: int

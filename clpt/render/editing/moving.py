@@ -7,7 +7,7 @@ may be on the device. Nothing is lowered or built, and the host waits for nothin
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -20,6 +20,7 @@ from clpt.records import SHAPE
 from clpt.render.editing.cannot_move import CannotMove
 from clpt.render.editing.moving_instances import Boxes, Location, MovingInstances
 from clpt.render.editing.moving_spheres import MovingSpheres
+from clpt.render.editing.scene_edit import Replacements
 from clpt.render.lowering.device_arrays import on_device
 from clpt.render.lowering.geometry import shapes
 from clpt.render.lowering.geometry.tessellate import keeps_its_kind
@@ -87,12 +88,11 @@ class Moving:
                 ranges.own = transforms.inverse(outer) @ shapes.placement(ranges.shape)
             self.ranges.setdefault(number, []).append(ranges)
 
-    def move(self, scene: Scene, swaps: Mapping[int, tuple[Any, Any]]) -> str | None:
+    def move(self, scene: Scene, replaced: Replacements) -> str | None:
         """Enqueue that shapes have other transforms or vertices, and that trees follow.
 
-        scene: as it is; swaps: the shapes that move and what takes their place, see
-        clpt.render.editing.scene_edit. Returns None; or, with nothing done, why the scene must be
-        lowered again.
+        scene: as it is; replaced: the shapes that move, and what they become. Returns None, or,
+        with nothing done, why the scene must be lowered again.
 
         Triangles, instances, spheres, disks and cylinders can move. A shape must keep its number of
         vertices, its orientation and its kind, and must not emit light. A mesh of which a triangle
@@ -102,7 +102,7 @@ class Moving:
         Raises SceneError for a transform that is singular, and arrays of the wrong shape or type.
         """
         try:
-            actions = self._plan(scene, swaps)
+            actions = self._plan(scene, replaced)
         except CannotMove as reason:
             return str(reason)
         for action in actions:
@@ -110,7 +110,7 @@ class Moving:
         self._fit_trees()
         return None
 
-    def _plan(self, scene: Scene, swaps: Mapping[int, tuple[Any, Any]]) -> list[Action]:
+    def _plan(self, scene: Scene, replaced: Replacements) -> list[Action]:
         """What enqueues a move. Raises CannotMove."""
         if self.target.lowered.features.light_paths:
             raise CannotMove("light is traced from lights, whose choice follows from the shapes")
@@ -118,10 +118,10 @@ class Moving:
         actions: list[Action] = []
         instances: list[tuple[int, Shape]] = []
         matrices: list[Location | None] = []
-        for old, new in swaps.values():
+        for old, new in replaced.values():
             number = numbers.get(id(old))
             if number is None:
-                raise CannotMove(f"{_name(old)} is of a group")
+                raise CannotMove(f"{_name(old)} is a group, or of one")
             _check_fields(old, new)
             matrix = None
             if on_device(new.to_world):
