@@ -20,11 +20,11 @@ def before(renderer: Renderer, loading: float) -> None:
     _line("geometry", ", ".join(parts))
     _line("lights", f"{stats.lights:,}")
     for name, size in stats.trees.items():
-        layout = f"{first.tree.layout}, " if name == "triangles" else ""
+        layout = f"{first.scene.strategy.layout}, " if name == "triangles" else ""
         _line(f"tree {name}", layout + _bytes(size))
     for name, size in sorted(stats.tables.items(), key=lambda item: -item[1]):
         _line(f"table {name}", _bytes(size))
-    _line("paths", f"{first.slots:,} in flight, {first.lanes} to a work-item")
+    _line("paths", f"{first.paths.slots:,} in flight, {first.lanes} to a work-item")
     _line("device memory", _bytes(stats.memory))
     others = stats.programs - stats.programs_cached
     kept = f"{stats.programs_cached} from clpt's cache, {others} from the driver or its cache"

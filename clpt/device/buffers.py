@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import numpy as np
 import pyopencl as cl
@@ -60,6 +61,16 @@ class Buffers:
         if host.nbytes:
             cl.enqueue_copy(self.device.queue, host, buffer, is_blocking=True)
         return host
+
+    @contextmanager
+    def all_or_nothing(self) -> Iterator[None]:
+        """Count what is allocated inside as given back where an error ends it."""
+        used = self.used
+        try:
+            yield
+        except BaseException:
+            self.used = used
+            raise
 
     def release(self, *buffers: cl.Buffer) -> None:
         """Give buffers back."""

@@ -1,4 +1,4 @@
-"""The picture that a renderer has so far, in every form in which others want it."""
+"""The picture that a renderer has so far, as arrays of the device and of the host."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Image = NDArray[np.float32]
 
 
 class Pictures(DeviceOwner):
-    """Base of what renders: its picture as an array, on the device or the host.
+    """Base of renderers: their picture as an array, on the device or the host.
 
     channels: of the `aov` integrator, else none; wavefronts: one a channel, at least one.
     """
@@ -44,13 +44,13 @@ class Pictures(DeviceOwner):
         has. Always the same memory, on the renderer's queue; steps wait for those of its `events`
         that readers add, as its `get_async` does. Of `aov`, the first channel.
         """
-        return self.wavefronts[0].film
+        return self.wavefronts[0].film.picture
 
     @property
     @synchronized
     def films(self) -> dict[str, dev.DeviceArray]:
         """The values of the `aov` integrator by name, as `film` has them."""
-        return {n: w.film for n, w in zip(self.channels, self.wavefronts, strict=True)}
+        return {n: w.film.picture for n, w in zip(self.channels, self.wavefronts, strict=True)}
 
     @synchronized
     def resolve(

@@ -18,8 +18,8 @@ typedef struct {
     real pdf;          /* [1/sr]; below 0: a delta light, to be taken as it is; 0: nothing comes */
 } LightSample;
 
-/* Whether there is only one side to send light to. */
-inline mask light_sided(vec3 side) { return dot3(side, side) > 0.5f; }
+/* Whether light from one hemisphere only matters. */
+inline mask hemisphere_given(vec3 hemisphere) { return dot3(hemisphere, hemisphere) > 0.5f; }
 
 inline LightSample light_nothing(void)
 {

@@ -16,8 +16,8 @@ inline void shadow_toward(Slab shadow, At at, mask active, mask shine, Surface s
  * and from where: further back than where the ray begins if it has passed null boundaries since. */
 #if USES_NULL_SURFACES
 #define path_null_distance(path, at) load_path_null_distance(path, at)
-#define path_turned(path, at, m) store_path_null_distance(path, at, m, (real)(0.0f))
+#define path_scattered(path, at, m) store_path_null_distance(path, at, m, (real)(0.0f))
 #else
 #define path_null_distance(path, at) ((real)(0.0f))
-#define path_turned(path, at, m)
+#define path_scattered(path, at, m)
 #endif

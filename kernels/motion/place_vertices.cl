@@ -62,9 +62,9 @@ kernel void smooth_normals(global const float *restrict vertices, global const u
 }
 
 /* One instance, whose row begins at word `at`; see bvh/placed.cl. */
-kernel void place_instance(global const float *restrict matrix, uint matrix_begin, float4 middle, float4 low,
+kernel void place_instance(global const float *restrict matrix, uint matrix_begin, float4 centre, float4 low,
                            float4 high, uint at, uint number, global uint *restrict instances,
                            global float *restrict boxes)
 {
-    placed_write(matrix + matrix_begin, middle.xyz, low.xyz, high.xyz, instances + at, boxes + 6 * number);
+    placed_write(matrix + matrix_begin, centre.xyz, low.xyz, high.xyz, instances + at, boxes + 6 * number);
 }

@@ -111,9 +111,7 @@ def test_bands_do_not_depend_on_passes() -> None:
     for samples in (1, 4, 7):
         passes.run(samples)
     np.testing.assert_allclose(passes.image(), whole.image(), rtol=1e-6, atol=1e-9)
-    for wavefront in passes.wavefronts:
-        wavefront.clear()
-    passes.samples = 0
+    passes.reset()
     passes.run(12)
     assert np.array_equal(passes.image(), whole.image())
 
@@ -132,7 +130,7 @@ def test_a_wide_range_changes_no_colour(film: dict) -> None:
     made = sky(light, output_space="xyz", sampler=Independent(), **film)
     renderer, found = clpt.Renderer(made), []
     for i in range(16):
-        renderer.wavefronts[0].clear()
+        renderer.reset()
         renderer.samples = 64 * i  # independent samples of one sequence
         renderer.run(64)
         found.append(renderer.colours())

@@ -65,11 +65,11 @@ def _surfaces_text(kinds: list[str], only: bool, textured: bool, two_sided: bool
         body += point_text(kind, "p.uv") if textured else []
         lines += case_text(kind, only, [*body, "q = surface_point_sel(m, p, q);"])
     if two_sided:
-        lines.append(f"    q = surface_point_turned(q, l.way == {BOTH}, &v);")
+        lines.append(f"    q = surface_point_turned(q, l.emission_mode == {BOTH}, &v);")
     return [
         *lines,
         "    point.p = q.p;",
         "    Spectrum value = emission_load(scene, l.radiance, point, lambdas);",
-        f"    LightRay s = surface_emit(q, l.way == {ALONG}, value, v);",
+        f"    LightRay s = surface_emit(q, l.emission_mode == {ALONG}, value, v);",
         "    r = light_ray_sel(l.shape >= 0, s, r);",
     ]

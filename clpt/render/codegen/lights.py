@@ -101,7 +101,7 @@ def _sides_text(two_sided: bool) -> str:
         return "#define light_shows(scene, row, front) (front)"
     return (
         "inline mask light_shows(Scene scene, integer row, mask front)\n{\n"
-        f"    return front | (light_at(scene, max_i(row, (integer)(0))).way == {BOTH});\n}}"
+        f"    return front | (light_at(scene, max_i(row, (integer)(0))).emission_mode == {BOTH});\n}}"
     )
 
 
@@ -141,7 +141,7 @@ def _sample_text(
         body += point_text(kind, "r.uv") if textured else []
         lines += case_text(kind, only, [*body, "q = shape_sample_sel(m, r, q);"])
     if two_sided:
-        lines.append(f"    q = area_turned(q, l.way == {BOTH});")
+        lines.append(f"    q = area_turned(q, l.emission_mode == {BOTH});")
     if surfaces:
         lines += [
             "    point.p = madd3(q.wi, q.t, p);",

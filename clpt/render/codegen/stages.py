@@ -153,8 +153,8 @@ def _interior_text(features: Features, cls: type[materials.Material]) -> list[st
 
 
 def trace_text(layout: str, interleaved: bool = False) -> str:
-    way = "lanes" if layout == "brute" else "flights" if interleaved else "one"
-    return f'#include "tracing/trace_{way}.cl"\n'
+    rays = "lanes" if layout == "brute" else "interleaved" if interleaved else "one"
+    return f'#include "tracing/trace_{rays}.cl"\n'
 
 
 def _includes(features: Features) -> list[str]:

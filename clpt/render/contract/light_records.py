@@ -102,7 +102,7 @@ RECORDS: dict[str, Record] = {
     "constant": Record("Constant", "Even radiance from everywhere.", radiance=_RADIANCE),
     **IMAGE_RECORDS,
 }
-FRONT, ALONG, BOTH = range(3)  # LightRow.way, see kernels/light/area.cl
+FRONT, ALONG, BOTH = range(3)  # LightRow.emission_mode, see kernels/light/area.cl
 
 BASES = {"spectral_envmap": "envmap", "image_spot": "spot"}  # whose functions a kind uses
 

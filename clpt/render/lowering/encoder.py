@@ -52,6 +52,7 @@ class Encoder:
         self.textures = TextureTable(self.store, self.spectra, images)
         self._sources: dict[str, dict[str, set[str]]] = _no_sources()
         self._rows: dict[tuple[int, str, bytes], tuple[int, Kind]] = {}
+        self._spent = False  # whether it knows of words that no device has
 
     @property
     def sources(self) -> Sources:
@@ -80,13 +81,16 @@ class Encoder:
     def replaced(self, old: Kind, new: Kind, table: str) -> list[tuple[int, Words]] | None:
         """Put a kind in the rows of another whose values differ, after the arrays were taken.
 
-        Return the first word of each row and its new words. Return None where more than values
-        differs: the tables must be made again then, and this encoder is of no more use.
+        Return the first word of each row and its new words. Return None, from then on for all
+        kinds, where more than values differs: the tables must be made again.
         """
+        if self._spent:
+            return None
         owned = [key for key in self._rows if key[:2] == (id(old), table)]
         known = any(key[:2] == (id(new), table) for key in self._rows)
         if known or not owned:
             return None
+        self._spent = True
         sizes, kept = self.store.sizes, self._sources
         sources = []
         for kind in (old, new):
@@ -96,6 +100,7 @@ class Encoder:
         self._sources = kept
         if sources[0] != sources[1] or sizes != self.store.sizes:
             return None
+        self._spent = False
         rows = [self._rows.pop(key)[0] for key in owned]
         for key, row in zip(owned, rows, strict=True):
             self._rows[id(new), key[1], key[2]] = row, new

@@ -40,16 +40,16 @@ from clpt.scene.shapes import Mesh
 TREE_FROM = 16  # lights from which a tree chooses among them, see bench/lights.py
 
 
-@dataclass
+@dataclass(frozen=True)
 class Lowered:
-    """A scene ready for the device.
+    """A scene ready for the device: data that nobody writes to, which several devices may share.
 
     vertices (n, 3) float32, faces (m, 3) uint32, tags (m,) uint32, boxes (k, 2, 3) float32 and
     instances: what trees are built of, see `Geometry`. tables: every other read-only array by name;
     where an instance's tree begins is filled in when trees are built. zero_copy: tables that are the
     caller's buffers. owners: of each row of `shapes`. glass_row: of the camera, see `lower_camera`.
-    encoder: what made the tables, for values that are edited; None once it is of no use. cache: what
-    the next lowering need not make again.
+    encoder: what made the tables, for values that are edited. cache: what the next lowering need not
+    make again.
     """
 
     features: Features
@@ -64,8 +64,13 @@ class Lowered:
     owners: tuple[Owner, ...]
     glass_row: int
     warnings: tuple[str, ...]
-    encoder: Encoder | None
+    encoder: Encoder
     cache: LoweringCache
+
+    def __post_init__(self) -> None:
+        own = (self.vertices, self.faces, self.tags, self.boxes, self.settings)
+        for array in (*own, *self.tables.values(), self.instances.rows, self.instances.boxes):
+            array.flags.writeable = False
 
     def table(self, name: str) -> np.ndarray:
         """A table by its name in clpt.records.TABLES."""
