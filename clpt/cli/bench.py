@@ -20,6 +20,7 @@ from ..benchmark.comparing import Ratio
 from ..benchmark.figures import Figure
 from ..bvh import TREES
 from ..device.context import trial
+from .extras import extra
 from .output_console import output_console
 
 SLOWER = 3  # the exit status if a figure was refused, or is below --fail-below
@@ -83,7 +84,8 @@ def bench(
     if fail_below is not None and former is None:
         raise click.UsageError("--fail-below compares: give --compare FILE too")
     if drawing is not None:
-        from . import bench_plot  # not needed else, and slow to import
+        with extra("plot", "a plot"):
+            from . import bench_plot  # here: matplotlib is an extra, and slow to import
 
         bench_plot.check(drawing)
     before = None if former is None else records.read(former)

@@ -11,6 +11,7 @@ import click
 import numpy as np
 from rich.table import Table
 
+from .extras import extra
 from .image_contents import ImageContents, Pixel, read_contents
 from .output_console import output_console
 
@@ -51,7 +52,8 @@ def inspect(file: Path, pixels: tuple[Pixel, ...], output: Path | None, as_json:
     else:
         _print(image, values)
     if pixels:
-        from . import plots  # matplotlib takes its time
+        with extra("plot", "a plot"):
+            from . import plots  # here: matplotlib is an extra, and slow to import
 
         target = output or Path(f"{file.stem}.spectrum.png")
         plots.write(target, image, values)
