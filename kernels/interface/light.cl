@@ -9,24 +9,10 @@
  *   real     <kind>_pdf(<Kind> l, Scene scene, vec3 side, vec3 d);                  of sample, [1/sr]
  *
  * where `side` is the unit normal of the only side of the surface that matters, or 0 where both do.
- * The struct <Kind> is declared as a Record in clpt/render/lowering/lights/lights.py and loaded from `lamps`.
+ * The struct <Kind> is declared as a Record in clpt/render/contract/light_records.py and loaded from
+ * `light_params`, and there LightSample.
  */
-typedef struct {
-    vec3 wi;           /* unit length, from p */
-    real t;            /* distance [m]; FAR for lights at infinity */
-    Spectrum radiance; /* what comes along it; for a delta light, irradiance on a shading surface */
-    real pdf;          /* [1/sr]; below 0: a delta light, to be taken as it is; 0: nothing comes */
-} LightSample;
+#include "generated/light_sample.cl"
 
 /* Whether there is only one side to send light to. */
 inline mask light_sided(vec3 side) { return dot3(side, side) > 0.5f; }
-
-inline LightSample light_nothing(void)
-{
-    LightSample s;
-    s.wi = v3(0.0f, 0.0f, 1.0f);
-    s.t = FAR;
-    s.radiance = spectrum_of(0.0f);
-    s.pdf = 0.0f;
-    return s;
-}

@@ -15,7 +15,7 @@ from clpt.bvh.build import MOST
 from clpt.errors import SceneError
 from clpt.records import SETTINGS, SHAPE
 from clpt.render.contract import custom_materials, shape_records
-from clpt.render.contract.features import Features
+from clpt.render.contract.features import Features, disperses
 from clpt.render.contract.parameter_words import row_words
 from clpt.render.lowering.camera import cameras, filters
 from clpt.render.lowering.camera.colour import output_matrix, sensor
@@ -382,15 +382,11 @@ class _Lowering:
 
     def _features(self, analytic: set[str], camera: str) -> Features:
         scene, tables = self.scene, self.tables
-        sources = {
-            kind: {name: frozenset(found) for name, found in values.items()}
+        sources = frozenset(
+            (kind, name, source)
             for kind, values in tables.sources.items()
-        }
-        index_tables = any(
-            "table" in found
-            for kind in ("dielectric", "rough_dielectric", "principled", "gltf_surface")
-            for name, found in sources.get(kind, {}).items()
-            if name in ("int_ior", "ext_ior", "eta", "ior")
+            for name, found in values.items()
+            for source in found
         )
         glass_lens = self.mode == "spectral" and bool(cameras.dispersive_glass(scene.camera))
         return Features(
@@ -425,7 +421,7 @@ class _Lowering:
             light_tree=self.lights.tree is not None,
             many_lights=len(self.lights.rows) > FEW_LIGHTS,
             absorption=self.uses["absorption"] and not self.channels,
-            dispersion=index_tables or glass_lens or any(cls.disperses for cls in self.leaves),
+            dispersion=glass_lens or disperses(self.leaves, sources),
             glass_lens=glass_lens,
             channel=self.channels[0] if self.channels else "",
             bands=bool(scene.film.bands) and not self.channels,
