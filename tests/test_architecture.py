@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
-
 from itertools import pairwise
 from pathlib import Path
 

@@ -11,15 +11,9 @@
  *   vec3        <kind>_dpdu(<Kind> s, vec3 p, vec2 uv);                              tangent at a point of it
  *   vec3        <kind>_dpdv(<Kind> s, vec3 p, vec2 uv);                              and along v
  *
- * Normals point to the front, outward for closed shapes.
+ * Normals point to the front, outward for closed shapes. ShapeSample is declared beside the kinds.
  */
-typedef struct {
-    vec3 wi;  /* unit length, from p to the point */
-    real t;   /* distance [m] */
-    vec3 n;   /* unit normal there, toward the front */
-    vec2 uv;
-    real pdf; /* [1/sr]; 0: nothing */
-} ShapeSample;
+#include "generated/shape_sample.cl"
 
 typedef struct {
     real t; /* [m]; FAR: missed */

@@ -34,33 +34,3 @@ inline LightSample light_chosen(LightSample s, real pmf)
     s.pdf = sel(delta, s.pdf, s.pdf * pmf);
     return s;
 }
-
-inline LightSample light_sel(mask m, LightSample a, LightSample b)
-{
-    a.wi = sel3(m, a.wi, b.wi);
-    a.t = sel(m, a.t, b.t);
-    a.radiance = spectrum_sel(m, a.radiance, b.radiance);
-    a.pdf = sel(m, a.pdf, b.pdf);
-    return a;
-}
-inline ShapeSample shape_sample_sel(mask m, ShapeSample a, ShapeSample b)
-{
-    a.wi = sel3(m, a.wi, b.wi);
-    a.t = sel(m, a.t, b.t);
-    a.n = sel3(m, a.n, b.n);
-    a.uv.x = sel(m, a.uv.x, b.uv.x);
-    a.uv.y = sel(m, a.uv.y, b.uv.y);
-    a.pdf = sel(m, a.pdf, b.pdf);
-    return a;
-}
-inline ShapeSample shape_sample_nothing(void)
-{
-    ShapeSample s;
-    s.wi = v3(0.0f, 0.0f, 1.0f);
-    s.t = FAR;
-    s.n = s.wi;
-    s.uv.x = 0.0f;
-    s.uv.y = 0.0f;
-    s.pdf = 0.0f;
-    return s;
-}

@@ -1,15 +1,15 @@
 /* By which wavelengths light came that leaves a fluorescent surface (Mojzik et al. 2018, for paths from the camera). A
- * matrix lies in `distributions`, on a grid of SHIFT_STEP nm from lambda_min
+ * matrix lies in `distributions`, on a grid of RERADIATION_STEP nm from lambda_min
  * (clpt/render/lowering/materials/reradiation.py): at each node how much light to expect, then the integral of each
  * row times that, then of each row its values [1/nm] and the normalised running integral of the product. */
 #include "core/grid.cl"
-#define SHIFT_CELLS ((SPECTRA_SIZE - 1 + SHIFT_STEP - 1) / SHIFT_STEP)
+#define SHIFT_CELLS ((SPECTRA_SIZE - 1 + RERADIATION_STEP - 1) / RERADIATION_STEP)
 #define SHIFT_ROW (2 * SHIFT_CELLS + 1)
 
 /* A cell of the grid, and how far along it: [0, 1). */
 inline integer shift_cell(Scene scene, real lambda, real *along)
 {
-    real x = clamp_r((lambda - scene.settings->lambda_min) * (1.0f / SHIFT_STEP), (real)(0.0f),
+    real x = clamp_r((lambda - scene.settings->lambda_min) * (1.0f / RERADIATION_STEP), (real)(0.0f),
                      (real)(SHIFT_CELLS - 0.001f));
     integer cell = to_integer(x);
     *along = x - to_real(cell);
@@ -44,7 +44,7 @@ inline real reradiation_sample(Scene scene, integer table, real out, real u, rea
     p1 += t * (gather(scene.distributions, far + cell + 1) - p1);
     real density = i0 * p0 + along * (i1 * p1 - i0 * p0);
     *weight = sel(density > 0.0f, whole * (p0 + along * (p1 - p0)) / max_r(density, (real)(1e-30f)), (real)(0.0f));
-    return scene.settings->lambda_min + (to_real(cell) + along) * SHIFT_STEP;
+    return scene.settings->lambda_min + (to_real(cell) + along) * RERADIATION_STEP;
 }
 
 /* The wavelengths in, of a path's wavelengths out: each stays, for light that was reflected, or is drawn

@@ -67,14 +67,18 @@ class Lit:
     def _text(self) -> str:
         """The lights' functions, with the look-ups of textures where there are any."""
         encoder, sources = self.encoder, self.encoder.sources
-        found = frozenset(sources["emission"]["value"] or {"constant"})
+        found, factors = (
+            frozenset(source for kind, _, source in sources if kind == wanted)
+            for wanted in ("emission", "factor")
+        )
+        found = found or frozenset({"constant"})
         text = ""
         if encoder.textures.roles:
             used = {kind for kind, _ in encoder.textures.roles}
             text += texture_text.dispatch_text(used, encoder.textures.roles)
         text += parameters.emission_text(found)
-        if sources["factor"]["value"]:
-            text += parameters.factor_text(frozenset(sources["factor"]["value"]))
+        if factors:
+            text += parameters.factor_text(factors)
         rows = self.rows
         tree = rows.tree is not None
         return text + light_dispatch.dispatch_text(
