@@ -173,7 +173,7 @@ def selection(which: str | int | None = None) -> Choice:
         failures.append(f"{info.label} ({failure})")
     if failures:
         raise DeviceError("no OpenCL device works: " + "; ".join(failures))
-    raise DeviceError(f"{asked} does not exist; there is " + _listing(found))
+    raise DeviceError(f"{asked} is not there; there is " + _listing(found))
 
 
 def by_preference(infos: tuple[DeviceInfo, ...]) -> list[DeviceInfo]:
