@@ -50,7 +50,7 @@ def load(path: Path, /, **variables: Any) -> Scene:
     scene = framing.show(
         shapes,
         camera=chosen[0] if chosen else None,
-        given_lights=lights.lights_of(graph),
+        own_lights=lights.lights_of(graph),
         file=path,
     )
     scene.warnings = document.warnings
