@@ -106,7 +106,7 @@ def wide8(building: Building, mesh: Mesh) -> Packed:
 
 
 def binary_boxes(building: Building, count: int, boxes: cl.Buffer, leaf_size: int = 1) -> Packed:
-    """Build a binary tree over boxes (count, 2, 3), and their indices in the order of its leaves."""
+    """Build a binary tree over boxes (count, 2, 3), and indices in the order of its leaves."""
     indices = building.allocate(4 * count)
     if count:
         items, parts = tree.items_of_boxes(building, count, boxes)

@@ -240,8 +240,11 @@ class Renderer(Pictures):
     def reset(self, wait_for: dev.Events = None, *, seed: int | None = None) -> cl.Event:
         """Enqueue that the film is emptied; the next sample is number 0 again.
 
-        seed: of the samples from now on, which `self.scene` then has; by default as before.
+        seed: of the samples from now on, which `self.scene` then has; by default as before. Raises
+        SceneError for a seed that is no whole number.
         """
+        if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int)):
+            raise SceneError(f"must be a whole number, not {seed!r}", where="seed")
         stream = self.wavefronts[0].stream
         stream.after(wait_for)
         if seed is not None:
