@@ -105,7 +105,7 @@ def _main(target: str, scene: str, mode: str, which: str) -> None:
     start = time.perf_counter()
     import dataclasses
 
-    from clpt.benchmark import opened
+    from clpt.benchmark.scenes import opened
     from clpt.render.renderer import Renderer
 
     plan = opened(scene, mode or None)

@@ -268,12 +268,12 @@ BOX_LAYOUTS: dict[str, Callable[[Building, int, cl.Buffer], Packed]] = {
 TREES = tuple(name for name in LAYOUTS if name in BOX_LAYOUTS)  # all but brute force
 
 
-def traversal_text(layout: str, every: bool = False) -> str:
+def traversal_text(layout: str, all_hits: bool = False) -> str:
     """Return the text of a layout's traversal: LAYOUT(closest) and LAYOUT(occluded).
 
-    every: the traversal that finds all triangles that a ray meets instead.
+    all_hits: the traversal that finds all triangles that a ray meets instead, LAYOUT(all_hits).
     """
-    file = f"bvh/{layout}{'_every' * every}.cl"
+    file = f"bvh/{layout}{'_all_hits' * all_hits}.cl"
     return f'#include "{file}"\n#define LAYOUT(verb) {layout}_##verb\n'
 
 

@@ -20,6 +20,8 @@ from ..benchmark.comparing import Ratio
 from ..benchmark.figures import Figure
 from ..bvh import TREES
 from ..device.context import trial
+from .extras import extra
+from .output_console import output_console
 
 SLOWER = 3  # the exit status if a figure was refused, or is below --fail-below
 STAGES = (
@@ -75,14 +77,15 @@ def bench(
     be true (rays not traced, hits that differ from what is there, times below what memory allows)
     is refused: it is not recorded, and the exit status is 3.
     """
-    console = _console()
+    console = output_console()
     if listed:
         _list(console)
         return 0
     if fail_below is not None and former is None:
         raise click.UsageError("--fail-below compares: give --compare FILE too")
     if drawing is not None:
-        from . import bench_plot  # not needed else, and slow to import
+        with extra("plot", "a plot"):
+            from . import bench_plot  # here: matplotlib is an extra, and slow to import
 
         bench_plot.check(drawing)
     before = None if former is None else records.read(former)
@@ -213,8 +216,3 @@ def _list(console: Console) -> None:
         for name, told in found.items():
             table.add_row(name, told)
         console.print(table)
-
-
-def _console() -> Console:
-    there = Console()
-    return there if there.is_terminal else Console(width=200)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 
 import click
-from rich.console import Console
 from rich.table import Table
 
 from .. import device
 from ..device import runtimes
 from ..device.context import DeviceInfo, selection, trial
 from ..errors import DeviceError
+from .output_console import output_console
 
 
 @click.command()
@@ -29,9 +29,7 @@ def devices(as_json: bool) -> None:
     if as_json:
         click.echo(json.dumps(_as_json(there, failures), indent=2))
         return
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=200)  # a file or a pipe has no edge to wrap at
+    console = output_console()
     try:
         choice = selection()
     except DeviceError:

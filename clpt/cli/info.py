@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import click
-from rich.console import Console
 from rich.table import Table
 
 from clpt.formats import load
@@ -19,34 +18,26 @@ from clpt.render.lowering.geometry.shapes import triangles
 
 from ..scene import Scene, materials, shapes, textures
 from ..scene.params import Kind
-from .variables import variables
+from .output_console import output_console
+from .scene_variables import scene_variables
 
 FLAT_TRIANGLES = {shapes.Rectangle: 2, shapes.Cube: 12}
 
 
 @click.command()
 @click.argument("scene", type=click.Path(path_type=Path))
-@click.option(
-    "-D",
-    "defines",
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="Of an .xml a $name, of glTF camera, scene, time.",
-)
+@scene_variables
 @click.option("--json", "as_json", is_flag=True, help="Write JSON instead of a table.")
-def info(scene: Path, defines: tuple[str, ...], as_json: bool) -> None:
+def info(scene: Path, variables: dict[str, Any], as_json: bool) -> None:
     """Tell what the file or folder SCENE holds, without rendering it."""
-    found = summary(load(scene, **variables(defines)))
+    found = summary(load(scene, **variables))
     if as_json:
         click.echo(json.dumps(found, indent=2))
         return
     table = Table(show_header=False, title=str(scene), title_justify="left")
     for name, value in found.items():
         table.add_row(name.replace("_", " "), _shown(value))
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=200)  # a file or a pipe has no edge to wrap at
-    console.print(table)
+    output_console().print(table)
 
 
 def summary(scene: Scene) -> dict[str, Any]:

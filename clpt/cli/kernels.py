@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -12,7 +13,7 @@ from clpt.render.lowering.scene import lower
 from ..bvh.layouts import LAYOUTS
 from ..errors import SceneError
 from ..formats import load
-from .variables import variables
+from .scene_variables import scene_variables
 
 
 @click.command()
@@ -30,21 +31,15 @@ from .variables import variables
     help="Acceleration structure of the triangles.",
 )  # fmt: skip
 @click.option("--queued", is_flag=True, help="Shade along queues that are sorted by material.")
-@click.option(
-    "-D",
-    "defines",
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="Of an .xml a $name, of glTF camera, scene, time.",
-)
+@scene_variables
 def kernels(
-    scene: Path, folder: Path, lanes: str, layout: str, queued: bool, defines: tuple[str, ...]
+    scene: Path, folder: Path, lanes: str, layout: str, queued: bool, variables: dict[str, Any]
 ) -> None:
     """Write the OpenCL programs that SCENE is rendered with, one file each.
 
     Each is a whole program: any OpenCL compiler takes it as it is. No device is needed.
     """
-    features = lower(load(scene, **variables(defines))).features
+    features = lower(load(scene, **variables)).features
     made = sources(features, layout, int(lanes), queued=queued) | film_sources(features, layout)
     try:
         folder.mkdir(parents=True, exist_ok=True)

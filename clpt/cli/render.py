@@ -22,7 +22,7 @@ from ..spectra.sensors import OBSERVERS
 from . import outputs, report
 from .display import display
 from .rendering import render_samples
-from .variables import variables
+from .scene_variables import scene_variables
 
 INTERRUPTED = 130
 LARGEST = 65536  # pixels of a side
@@ -126,13 +126,7 @@ class White(click.ParamType):
 @click.option("--lambda-min", type=float, help="Shortest wavelength of the light [nm].")
 @click.option("--lambda-max", type=float, help="Longest one; fluorescence asks for 300 to 830.")
 @click.option("--exposure", type=float, default=0.0, help="Brighten .png by this many stops.")
-@click.option(
-    "-D",
-    "defines",
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="Of an .xml a $name, of glTF camera, scene, time.",
-)
+@scene_variables
 @click.option(
     "--texture-budget", type=Bytes(), metavar="SIZE",
     help="Memory for images, such as 500M; larger ones are halved.  [default: half the free]",
@@ -147,7 +141,7 @@ def render(
     layout: str | None,
     tree_quality: Quality,
     exposure: float,
-    defines: tuple[str, ...],
+    variables: dict[str, Any],
     texture_budget: int | None,
     verbose: bool,
     quiet: bool,
@@ -164,7 +158,7 @@ def render(
     with ThreadPoolExecutor(max_workers=1) as beside:
         chosen = beside.submit(dev.choose, device, profiling=verbose)
         with shown.loading(scene.name) as tell:
-            plan = changed(load(scene, progress=tell, **variables(defines)), **changes)
+            plan = changed(load(scene, progress=tell, **variables), **changes)
         loading = time.perf_counter() - began
         ends = limit is not None or bool(changes["noise"])
         spp = changes["spp"] if ends else plan.spp

@@ -61,7 +61,7 @@ class Part:
     line: int = 1
 
 
-Virtual = Mapping[str, str | Part]
+Virtual = Mapping[str, str | Part | tuple[str, ...]]
 
 
 def kernels_folder() -> Path:
@@ -79,8 +79,8 @@ def assemble(
     """The text of `root` with its includes in place, each file once.
 
     root: a path under the kernels folder ("stage/shade.cl") or the name of a virtual file.
-    virtual: name -> generated text, or a Part, includable by that name; it wins over a file of that
-    name.
+    virtual: name -> generated text, a Part, or the names of files that stand for it, includable by
+    that name; it wins over a file of that name.
     defines: written as `#define` lines at the top.
 
     Every part is announced by `#line`, so that a compiler names our file and line. Includes are
@@ -144,6 +144,8 @@ class _Assembly:
     def _read(self, name: str, includer: str | None, line: int) -> Part:
         if name in self.virtual:
             given = self.virtual[name]
+            if isinstance(given, tuple):
+                given = "".join(f'#include "{file}"\n' for file in given)
             return given if isinstance(given, Part) else Part(given, name)
         try:
             return Part(_text(self.folder, name), f"kernels/{name}")

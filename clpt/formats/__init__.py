@@ -18,10 +18,10 @@ FORMATS = {  # the module whose `load` reads files of a suffix, imported when it
     ".pbrt.gz": "pbrt",
     ".glb": "gltf",
     ".gltf": "gltf",
-    ".obj": "studio",
-    ".ply": "studio",
-    ".stl": "studio",
-    ".off": "studio",
+    ".obj": "meshes.framing",
+    ".ply": "meshes.framing",
+    ".stl": "meshes.framing",
+    ".off": "meshes.framing",
 }
 WITH_VARIABLES = ("mitsuba", "gltf")
 

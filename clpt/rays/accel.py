@@ -104,7 +104,7 @@ class Accel(Queries):
                 "barycentrics": np.empty((total, 2), np.float32),
             }
             if total:
-                self._fill("query_every", rays, {"firsts": ends - counts, **hits})
+                self._fill("query_all_hits", rays, {"firsts": ends - counts, **hits})
         ray = np.repeat(np.arange(rays.count), counts)
         order = np.lexsort((hits["t"], ray))
         return AllHits(ray=ray[order], **{name: array[order] for name, array in hits.items()})

@@ -31,8 +31,8 @@ _ONE_BY_ONE, _INTERLEAVED = "bvh/query.cl", "bvh/query_interleaved.cl"
 _PROGRAMS = {  # of a kernel: its program, and whether it finds all triangles that a ray meets
     "query_closest": (_ONE_BY_ONE, False),
     "query_occluded": (_ONE_BY_ONE, False),
-    "query_count": ("bvh/query_every.cl", True),
-    "query_every": ("bvh/query_every.cl", True),
+    "query_count": ("bvh/query_all_hits.cl", True),
+    "query_all_hits": ("bvh/query_all_hits.cl", True),
     "place_instances": ("bvh/place.cl", False),
 }
 _RAY_ARRAYS = ("origins", "directions", "t_mins", "t_maxs")
@@ -235,9 +235,9 @@ class Queries:
 
     def _program(self, kernel: str) -> Program:
         """The program of a kernel, for the layout."""
-        root, every = self._root_of(kernel), _PROGRAMS[kernel][1]
+        root, all_hits = self._root_of(kernel), _PROGRAMS[kernel][1]
         texts = {
-            "generated/layout.cl": traversal_text(self.layout, every),
+            "generated/layout.cl": traversal_text(self.layout, all_hits),
             "generated/instance_traversal.cl": self._instances_text(),
         }
         defines = {

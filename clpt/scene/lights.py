@@ -119,6 +119,7 @@ class Envmap(Light):
         None,
         "path of an .exr or .hdr file, or an array (h, w, 3) float32; an .exr may hold spectra, "
         "as clpt.SpectralImage does",
+        form="image",
     )
     scale: float = real(1.0, "factor on the radiance", low=0.0)
     to_world: Any = host(np.eye(4), "rotation, (4, 4)")
@@ -131,6 +132,7 @@ class CubeMap(Light):
     image: Any = host(
         None,
         "six images +x -x +y -y +z -z (paths or arrays), or one with the faces in a 4x3 cross",
+        form="cube_images",
     )
     scale: float = real(1.0, "factor on the radiance", low=0.0)
     to_world: Any = host(np.eye(4), "rotation, (4, 4)")

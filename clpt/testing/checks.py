@@ -84,7 +84,7 @@ def lobes_are_told_truly(
 
 
 def flags_are_told_truly(probe: Probe, params: Params, rng: Random) -> None:
-    """The class tells the kernels what it does: `uses_lobe_sample`, `delta`, `disperses`, `transmits`."""
+    """The class tells the kernels what it does: by its flags and `transmits`."""
     cls = probe.cls
     wo, u = directions(rng, 1000), rng.random((1000, 3))
     r = probe(params, wo, wo, u)
@@ -95,7 +95,7 @@ def flags_are_told_truly(probe: Probe, params: Params, rng: Random) -> None:
         _hold(same, f"sample uses u.z: set uses_lobe_sample = True, {params}")
     if cls.delta:
         _hold(np.all(r["lobe"][made] & DELTA), f"a lobe is not delta, but delta is True, {params}")
-    if cls.source is not None and not cls.disperses:
+    if not (cls.disperses or cls.refracts):
         alone = r["lobe"][made] & DISPERSE
         _hold(not np.any(alone), f"LOBE_DISPERSE is returned: set disperses = True, {params}")
     if cls.transmits is Material.transmits:

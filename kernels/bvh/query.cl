@@ -7,7 +7,7 @@
 #define TREE_ARGS global const float *nodes, global const float *leaves, \
                   global const float *instance_nodes, global const uint *instances
 #define HIT_ARGS global float *t, global int *primitive, global float *barycentrics, global int *instance
-#define QUERY_INSTANCES(hit, first_only)                                                                 \
+#define QUERY_INSTANCES(hit, first_only) \
     query_instances(nodes, leaves, instance_nodes, instances, QUERY_ONE, hit, first_only)
 
 /* The row of the instance that is met first, with `first_only` of any; BVH_MISS if there is none. */

@@ -38,7 +38,8 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
 #endif
     v.x = to_real(number);
 #elif CHANNEL == CHANNEL_PRIMITIVE_ID
-    v.x = sel((shape.kind == 0) | ((shape.flags & SHAPE_MANY) != 0), to_real(load_hit_prim(hit, at) - shape.prim), (real)(0.0f));
+    v.x = sel((shape.kind == 0) | ((shape.flags & SHAPE_MANY) != 0), to_real(load_hit_prim(hit, at) - shape.prim),
+              (real)(0.0f));
 #endif
     Spectrum value = {v.x, v.y, v.z};
     store_path_radiance(path, at, active, value);

@@ -10,7 +10,7 @@ typedef struct {
     vec3 dpdu;    /* along the surface's u; not normalised, may be zero */
     vec3 dpdv;    /* and along v */
     vec2 uv;
-    mask turned;  /* the back of a two-sided surface: ns has been turned round */
+    mask flipped; /* the back of a two-sided surface: ns points to where the front does not */
     integer light; /* row in `lights`, -1: does not emit */
 #if USES_ATTRIBUTES
     integer attributes, face; /* of triangles, see texturing/texture_point.cl */
@@ -66,7 +66,8 @@ inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, 
 #if USES_NORMALS || USES_UVS || USES_TANGENTS
     mask triangle = active & (shape.kind == 0);
     integer corner = sel_i(triangle, prim, (integer)(0)) * 3;
-    integer a = gather_i(scene.faces, corner), b = gather_i(scene.faces, corner + 1), c = gather_i(scene.faces, corner + 2);
+    integer a = gather_i(scene.faces, corner), b = gather_i(scene.faces, corner + 1);
+    integer c = gather_i(scene.faces, corner + 2);
     real u = s.uv.x, v = s.uv.y, w = 1.0f - u - v;
 #endif
 #if USES_NORMALS
@@ -114,9 +115,9 @@ inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, 
     /* Each normal is turned to the viewer by itself: where they disagree, as at the silhouette of a coarse
      * mesh, a BSDF that saw its back would be black. */
     mask both = (shape.flags & SHAPE_TWO_SIDED) != 0;
-    s.turned = both & (dot3(s.ns, d) > 0.0f);
+    s.flipped = both & (dot3(s.ns, d) > 0.0f);
     s.n = sel3(both & !*front, neg3(s.n), s.n);
-    s.ns = sel3(s.turned, neg3(s.ns), s.ns);
+    s.ns = sel3(s.flipped, neg3(s.ns), s.ns);
     return s;
 }
 

@@ -314,7 +314,7 @@ def test_images_are_chosen_by_what_they_send(name):
     value = r[5] / r[4]
     assert (r[4] > 0.0).all()
     assert value.std() < 0.1 * value.mean()
-    _, mean = image_lights.lower_image(lamp, scene.tables)
+    _, mean = image_lights.lower_image(lamp, scene.encoder)
     assert value.mean() == pytest.approx(4.0 * np.pi * mean, rel=0.02)
 
 

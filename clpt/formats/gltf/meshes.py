@@ -13,8 +13,9 @@ from clpt import transforms
 from clpt.formats.gltf import materials, skins
 from clpt.formats.gltf.accessors import floats
 from clpt.formats.gltf.document import Element
+from clpt.formats.gltf.geometry import Geometry
 from clpt.formats.gltf.nodes import Graph, Matrix, compose
-from clpt.formats.gltf.primitives import Geometry, geometry
+from clpt.formats.gltf.primitives import geometry
 from clpt.formats.meshes.mesh import checked
 from clpt.scene.lights import Area
 from clpt.scene.materials import Material

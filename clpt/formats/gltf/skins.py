@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from clpt.formats.gltf.accessors import floats
 from clpt.formats.gltf.document import Element
-from clpt.formats.gltf.primitives import Geometry
+from clpt.formats.gltf.geometry import Geometry
 
 CHUNK = 1 << 16  # vertices at a time: each takes a matrix
 

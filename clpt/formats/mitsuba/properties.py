@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -32,18 +31,6 @@ UNSUPPORTED = {
 SEPARATOR = re.compile(r"[\s,]+")
 LARGEST_INTEGER = 2**31 - 1
 MAX_PARTS = 1000  # of one material or texture
-
-
-@contextmanager
-def placed(element: Element) -> Iterator[None]:
-    """Give errors that know no file the place of `element`."""
-    try:
-        yield
-    except SceneError as error:
-        if error.file is not None:
-            raise
-        where = f"{error.where}: " if error.where else ""
-        raise element.error(where + error.message) from None
 
 
 class Context:
@@ -245,7 +232,7 @@ class Properties:
             if self.context.resolve(child).tag in ("medium", "phase"):
                 raise child.error("is not supported: clpt has no participating media")
         for name, child in self.named.items():
-            raise UnusedParameterError(label, name, set(self.asked), **child.place())
+            raise UnusedParameterError(label, name, set(self.asked), **child.location())
         for child in self.nested:
             self.context.resolve(child)
             raise child.error(f"cannot stand in {label}")
@@ -259,7 +246,7 @@ def unknown(element: Element, known: Iterable[str]) -> SceneError:
     """Return the error for a plugin that is none of the `known` ones."""
     if element.type in UNSUPPORTED:
         return element.error("is a plugin of Mitsuba that is not supported")
-    return UnknownKindError(element.tag, element.type, known, **element.place())
+    return UnknownKindError(element.tag, element.type, known, **element.location())
 
 
 def number(child: Element) -> float:
@@ -301,7 +288,7 @@ def transform(element: Element) -> transforms.Matrix:
     """Return the product of a <transform>'s steps, (4, 4); the first is applied first."""
     matrix = np.eye(4)
     for step in element.children:
-        with placed(step):
+        with step.locating():
             matrix = _step(step) @ matrix
     if not np.isfinite(matrix).all():
         raise element.error("the transform is not finite")

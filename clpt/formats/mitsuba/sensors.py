@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from clpt.errors import UnknownKindError
-from clpt.formats.mitsuba.properties import Context, Properties, placed, unknown
+from clpt.formats.mitsuba.properties import Context, Properties, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene import cameras, integrators
 from clpt.scene.integrators import Film, Filter, Integrator, Sampler
@@ -53,7 +53,7 @@ def sensor(element: Element, context: Context) -> Sensor:
     props.ignore("shutter_open", "shutter_close")
     if element.type != "thinlens":
         props.ignore("focus_distance")
-    with placed(element):
+    with element.locating():
         camera = CAMERAS[element.type](props, film)
     props.finish()
     return Sensor(camera, film, sampler, spp, seed)
@@ -167,7 +167,7 @@ def _film(element: Element, context: Context) -> Film:
     props.ignore("banner")
     child = props.object("rfilter")
     width, height = props.integer("width", 768, 1), props.integer("height", 576, 1)
-    with placed(element):
+    with element.locating():
         film = Film(
             width=width,
             height=height,
@@ -214,7 +214,7 @@ def _filter(element: Element, context: Context) -> Filter:
     }
     if element.type not in makers:
         raise unknown(element, makers)
-    with placed(element):
+    with element.locating():
         made = makers[element.type]()
     props.finish()
     return made
@@ -256,7 +256,7 @@ def _integrator(element: Element, context: Context) -> Integrator:
         raise unknown(element, INTEGRATORS)
     props = Properties(element, context)
     props.ignore("block_size", "samples_per_pass", "timeout")
-    with placed(element):
+    with element.locating():
         made = INTEGRATORS[element.type](props)
     props.finish()
     return made
@@ -305,7 +305,7 @@ def _aov(props: Properties) -> Integrator:
     for entry in names.split(","):
         kind = entry.strip().rpartition(":")[2]
         if kind not in CHANNELS:
-            raise UnknownKindError("aov", kind, CHANNELS, **props.element.place())
+            raise UnknownKindError("aov", kind, CHANNELS, **props.element.location())
         channels.append(CHANNELS[kind])
     return integrators.Aov(channels=tuple(dict.fromkeys(channels)))
 

@@ -13,7 +13,7 @@ from clpt.formats.meshes import mesh, strands
 from clpt.formats.mitsuba import serialized
 from clpt.formats.mitsuba.bsdfs import bsdf
 from clpt.formats.mitsuba.emitters import area
-from clpt.formats.mitsuba.properties import Context, Properties, placed, unknown
+from clpt.formats.mitsuba.properties import Context, Properties, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene import shapes
 from clpt.scene.materials import Diffuse
@@ -69,7 +69,7 @@ def shape(element: Element, context: Context) -> Shape:
     if cls is shapes.Sphere and transforms.flips_handedness(parameters["to_world"]):
         # A mirror turns Mitsuba's spheres inside out, and no other shape.
         parameters["flip_normals"] = not parameters["flip_normals"]
-    with placed(element):
+    with element.locating():
         made = cls(**parameters)
     props.finish()
     return made
@@ -81,7 +81,7 @@ def _instance(element: Element, context: Context) -> Shape:
     if found is None or found.type != "shapegroup":
         raise element.error('needs a <shape type="shapegroup">, or a <ref> to one')
     name = element.attributes.get("id", "")
-    with placed(element):
+    with element.locating():
         made = Instance(group=_group(found, context), to_world=props.placement(), name=name)
     props.finish()
     return made

@@ -14,7 +14,7 @@ import numpy as np
 
 from clpt import spectra
 from clpt.formats.colour import colour
-from clpt.formats.mitsuba.properties import Context, Properties, number, numbers, placed, unknown
+from clpt.formats.mitsuba.properties import Context, Properties, number, numbers, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene.textures import ATTRIBUTES, Bitmap, Checkerboard, MeshAttribute, Product, Texture
 from clpt.spectra import (
@@ -71,10 +71,10 @@ def ior(props: Properties, name: str, default: str) -> Any:
     if child is None:
         return spectra.glass(default, dispersion=False)
     if child.tag == "spectrum":
-        with placed(child):
+        with child.locating():
             return _spectrum(child, "index", props, name)
     if child.tag == "string":
-        with placed(child):
+        with child.locating():
             return spectra.glass(child.attribute("value"), dispersion=False)
     return number(child)
 
@@ -85,7 +85,7 @@ def real(props: Properties, name: str, default: float) -> float | Texture:
     if child is None:
         return default
     target = props.context.resolve(child)
-    with placed(target):
+    with target.locating():
         made = _made(target, "factor", props, name)
     if isinstance(made, Constant):
         return made.value
@@ -103,7 +103,7 @@ def _take(props: Properties, name: str, role: str, default: Any) -> Any:
     if child is None:
         return default
     target = props.context.resolve(child)
-    with placed(target):
+    with target.locating():
         return _made(target, role, props, name)
 
 
@@ -295,7 +295,7 @@ def _texture(element: Element, outer: Properties) -> Texture:
     if element.type not in TEXTURES:
         raise unknown(element, TEXTURES)
     props = Properties(element, outer.context)
-    with placed(element):
+    with element.locating():
         made = TEXTURES[element.type](props)
     props.finish()
     return made

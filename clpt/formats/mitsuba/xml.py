@@ -14,6 +14,7 @@ from typing import Any
 from xml.parsers import expat
 
 from clpt.errors import SceneError
+from clpt.formats.located import Located
 
 MAX_NESTING = 64
 MAX_INCLUDES = 16  # of files inside each other
@@ -26,7 +27,7 @@ RENAMED = {"lookAt": "lookat"}
 
 
 @dataclass(eq=False)
-class Element:
+class Element(Located):
     """One XML element: tag, attributes, children, and where it stands."""
 
     tag: str
@@ -50,13 +51,8 @@ class Element:
         shown = next((k for k in ("type", "name", "id") if k in self.attributes), None)
         return f'<{self.tag} {shown}="{self.attributes[shown]}">' if shown else f"<{self.tag}>"
 
-    def place(self) -> dict[str, Any]:
-        """Keyword arguments that tell an exception where it happened."""
+    def location(self) -> dict[str, Any]:
         return {"file": self.file, "line": self.line, "where": self.label()}
-
-    def error(self, message: str) -> SceneError:
-        """Return an exception that names this element."""
-        return SceneError(message, **self.place())
 
     def attribute(self, name: str) -> str:
         """Return an attribute that must be there."""

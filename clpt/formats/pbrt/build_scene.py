@@ -41,7 +41,7 @@ def shapes(contents: Contents, progress: Progress | None) -> list[Shape]:
             hint = nearest(use.kind, contents.objects)
             raise use.params.error(f"there is no object {use.kind!r}{hint}")
         if groups[use.kind].shapes:
-            with use.params.placed():
+            with use.params.locating():
                 whole.append(Instance(group=groups[use.kind], to_world=use.state.ctm))
     return whole
 
@@ -85,7 +85,7 @@ def _shape(found: Definition, read: Geometry | None) -> Shape | None:
         if read.kind is Curves:
             state.warn(given, "textures run around and along curves, not along and across")
         read = with_uvs(read)
-    with given.placed():
+    with given.locating():
         return read.made(material=surface, emission=emission)
 
 

@@ -28,10 +28,10 @@ ROUND = np.array([[0.0, 0, -1, 0], [0, 1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
 def camera(found: Definition, film: Film) -> cameras.Camera:
     """Make the camera that a Camera directive describes. Raises SceneError."""
     if found.kind not in CAMERAS:
-        raise UnknownKindError("camera", found.kind, CAMERAS, **found.params.place)
+        raise UnknownKindError("camera", found.kind, CAMERAS, **found.params.location())
     params, state = found.params, found.state
     exposure_time(params)
-    with params.placed():
+    with params.locating():
         return CAMERAS[found.kind](params, state, film)
 
 

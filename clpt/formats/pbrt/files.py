@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Iterator
-from contextlib import contextmanager
+from abc import abstractmethod
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
-from clpt.errors import SceneError
+from clpt.formats.located import Located
 from clpt.formats.pbrt.lexer import Lexer
 from clpt.formats.pbrt.state import Definition, Shared, State
 
@@ -30,7 +29,7 @@ class Contents:
     seed: int | None = None
 
 
-class Files(ABC):
+class Files(Located):
     """Goes through the files; `state` is the graphics state at the place it has come to."""
 
     def __init__(self, path: Path):
@@ -68,16 +67,8 @@ class Files(ABC):
         if outer is not None:
             self.lexer = outer
 
-    @contextmanager
-    def placed(self) -> Iterator[None]:
-        """Give errors that know no file the place of the directive."""
-        try:
-            yield
-        except SceneError as error:
-            if error.file is not None:
-                raise
-            file, line = self.lexer.path, self.lexer.line
-            raise SceneError(error.message, file=file, line=line, where=self.name) from None
+    def location(self) -> dict[str, Any]:
+        return {"file": self.lexer.path, "line": self.lexer.line, "where": self.name}
 
     def warn(self, text: str) -> None:
         """Remember what the picture will lack, with this place."""

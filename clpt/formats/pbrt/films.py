@@ -32,12 +32,12 @@ def film(found: Definition | None, filter: Definition | None, exposure: float) -
     if found.kind == "image":
         raise params.error("the film 'image' is PBRT version 3's; convert the file by --upgrade")
     if found.kind not in FILMS:
-        raise UnknownKindError("film", found.kind, FILMS, **params.place)
+        raise UnknownKindError("film", found.kind, FILMS, **params.location())
     params.ignore(*STORED)
     if found.kind == "gbuffer":
         params.ignore("coordinatesystem")
     width, height = (params.one(name, "integer", n) for name, n in SIZE)
-    with params.placed():
+    with params.locating():
         made_film = Film(
             width=width,
             height=height,
@@ -101,8 +101,8 @@ def _filter(found: Definition | None) -> Filter:
     if found is None:
         return integrators.Gaussian()
     if found.kind not in FILTERS:
-        raise UnknownKindError("filter", found.kind, FILTERS, **found.params.place)
-    with found.params.placed():
+        raise UnknownKindError("filter", found.kind, FILTERS, **found.params.location())
+    with found.params.locating():
         return FILTERS[found.kind](found.params, found.state)
 
 
@@ -152,7 +152,7 @@ def sampler(found: Definition | None) -> tuple[Sampler, int, int | None]:
         return integrators.Sobol(), 16, None
     params = found.params
     if found.kind not in SAMPLERS:
-        raise UnknownKindError("sampler", found.kind, SAMPLERS, **params.place)
+        raise UnknownKindError("sampler", found.kind, SAMPLERS, **params.location())
     if found.kind == "stratified":
         params.ignore("jitter")
         spp = math.prod(params.one(name, "integer", 4) for name in ("xsamples", "ysamples"))
@@ -188,7 +188,9 @@ def integrator(found: Definition | None) -> Integrator:
     if found.kind in ("ao", "function"):
         raise params.error("this integrator shows no light; use 'path'")
     if found.kind not in (*LIGHT_PATHS, *OTHERS):
-        raise UnknownKindError("integrator", found.kind, (*LIGHT_PATHS, *OTHERS), **params.place)
+        raise UnknownKindError(
+            "integrator", found.kind, (*LIGHT_PATHS, *OTHERS), **params.location()
+        )
     if found.kind in OTHERS:
         state.warn(params, "paths are traced from the camera instead: the same light, other noise")
     params.ignore(*IGNORED, *OTHERS.get(found.kind, ()))

@@ -41,8 +41,8 @@ def material(kind: str, params: Parameters, state: State, name: str = "") -> Mat
             f"{kind!r} is a material of pbrt-v3; pbrt --upgrade converts it to {OLD[kind]!r}"
         )
     if kind not in MAKERS:
-        raise UnknownKindError("material", kind, MAKERS, **params.place)
-    with params.placed():
+        raise UnknownKindError("material", kind, MAKERS, **params.location())
+    with params.locating():
         return replace(_bumped(MAKERS[kind](params, state), params, state), name=name)
 
 

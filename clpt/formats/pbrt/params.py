@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.errors import SceneError
+from clpt.formats.located import Located
 
 SIZES = {  # how many numbers one value of a type has
     "integer": 1, "float": 1, "blackbody": 1, "point2": 2, "vector2": 2, "point3": 3,
@@ -24,20 +23,8 @@ TYPES = (*SIZES, *ALIASES, *TEXTS, "bool", "spectrum")
 LARGEST_INTEGER = 2**31 - 1
 
 
-@contextmanager
-def placed(place: Parameter | Parameters) -> Iterator[None]:
-    """Give errors that know no file the place of a parameter or of a directive."""
-    try:
-        yield
-    except SceneError as error:
-        if error.file is not None:
-            raise
-        where = f"{error.where}: " if error.where else ""
-        raise place.error(where + error.message) from None
-
-
 @dataclass(eq=False)
-class Parameter:
+class Parameter(Located):
     """One `"type name" [values]`; `values` are float64 numbers, texts, or truths."""
 
     type: str
@@ -48,14 +35,8 @@ class Parameter:
     where: str = ""
     used: bool = False
 
-    @property
-    def place(self) -> dict[str, Any]:
-        """File, line and element, as errors take them."""
+    def location(self) -> dict[str, Any]:
         return {"file": self.file, "line": self.line, "where": f"{self.where}: {self.name!r}"}
-
-    def error(self, message: str) -> SceneError:
-        """Return the error that says `message` about this parameter."""
-        return SceneError(message, **self.place)
 
     @property
     def is_text(self) -> bool:
@@ -117,13 +98,9 @@ class Parameter:
             raise self.error(f"has {len(values)} numbers, which is no multiple of {size}")
         return values if size == 1 else values.reshape(-1, size)
 
-    def placed(self) -> Any:
-        """Context in which errors without a place get this one."""
-        return placed(self)
-
 
 @dataclass(eq=False)
-class Parameters:
+class Parameters(Located):
     """All parameters of a directive; what nothing asked for is left in `unused`.
 
     `label` names the directive for messages: `Shape "sphere"`. `defaults` are those that an
@@ -147,18 +124,8 @@ class Parameters:
             own.add(parameter.name)
             self._named[parameter.name] = parameter
 
-    @property
-    def place(self) -> dict[str, Any]:
-        """File, line and element, as errors take them."""
+    def location(self) -> dict[str, Any]:
         return {"file": self.file, "line": self.line, "where": self.label}
-
-    def error(self, message: str) -> SceneError:
-        """Return the error that says `message` about the directive."""
-        return SceneError(message, **self.place)
-
-    def placed(self) -> Any:
-        """Context in which errors without a place get this one."""
-        return placed(self)
 
     def __contains__(self, name: str) -> bool:
         return name in self._named

@@ -50,7 +50,7 @@ class _Reader(Placing):
         action = DIRECTIVES.get(self.name)
         if action is None:
             raise self._unknown()
-        with self.placed():
+        with self.locating():
             action(self)
 
     def _unknown(self) -> SceneError:

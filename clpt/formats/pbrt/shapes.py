@@ -61,8 +61,8 @@ def geometry(found: Definition) -> Geometry | None:
     if kind in OLD:
         raise params.error(f"the shape {kind!r} is PBRT version 3's; use a mesh")
     if kind not in SHAPES:
-        raise UnknownKindError("shape", kind, SHAPES, **params.place)
-    with params.placed():
+        raise UnknownKindError("shape", kind, SHAPES, **params.location())
+    with params.locating():
         if transforms.is_singular(found.state.ctm):
             raise SceneError("its transform flattens space")
         made = SHAPES[kind](params, found.state)

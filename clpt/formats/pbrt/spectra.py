@@ -54,7 +54,7 @@ def spectrum(params: Parameters, name: str, role: str, state: State, default: An
     given = params.find(name, "float", *SPECTRUM_TYPES)
     if given is None:
         return default
-    with given.placed():
+    with given.locating():
         return value_of(given, role, state)
 
 

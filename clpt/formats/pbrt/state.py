@@ -80,7 +80,7 @@ class State:
 
     def warn(self, place: Parameters | Parameter, text: str) -> None:
         """Remember what the picture will lack, with the file and line."""
-        where = place.place["where"]
+        where = place.location()["where"]
         self.shared.warnings.append(f"{place.file.name}:{place.line}: {where}: {text}")
 
     def file(self, name: str) -> Path:

@@ -49,7 +49,7 @@ def textured(params: Parameters, name: str, role: str, state: State, default: An
     if given is None:
         return default
     if given.type != "texture":
-        with given.placed():
+        with given.locating():
             return value_of(given, role, state)
     found = state.texture(form, given.text(), given)
     return state.shared.once(found, given, lambda: _texture(form, found))
@@ -58,8 +58,8 @@ def textured(params: Parameters, name: str, role: str, state: State, default: An
 def _texture(form: str, found: Definition) -> Any:
     kind, params, state = found.kind, found.params, found.state
     if kind not in MAKERS:
-        raise UnknownKindError("texture", kind, MAKERS, **params.place)
-    with params.placed():
+        raise UnknownKindError("texture", kind, MAKERS, **params.location())
+    with params.locating():
         made = MAKERS[kind](form, params, state)
     for extra in params.unused():
         state.warn(extra, "is not known here and is passed over")

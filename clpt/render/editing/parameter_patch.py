@@ -9,7 +9,7 @@ from clpt.render.editing.rebuild import ranges
 from clpt.render.editing.scene_edit import Replacements
 from clpt.render.lowering.camera.cameras import dispersive_glass, lower_camera
 from clpt.render.lowering.geometry.instancing import distinct
-from clpt.render.lowering.scene import CLEAR
+from clpt.render.lowering.materials.material_words import CLEAR
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene import Scene
 from clpt.scene.materials import COMPOSITES, Material

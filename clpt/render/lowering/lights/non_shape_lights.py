@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,27 +11,12 @@ from clpt import transforms
 from clpt.errors import SceneError
 from clpt.render.contract import light_records
 from clpt.render.contract.light_records import RECORDS
+from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.lights import image_lights, projected
-from clpt.render.lowering.lowering_cache import LoweringCache
 from clpt.render.lowering.textures.texels import pixels
 from clpt.scene import lights
 from clpt.scene.lights import Light
 from clpt.scene.textures import Bitmap, Checkerboard, Dots, MeshAttribute, Mix, Product, Solid
-
-
-class Sink(Protocol):
-    """What is needed of clpt.render.lowering.tables.Tables."""
-
-    cache: LoweringCache
-
-    def append(self, name: str, words: ArrayLike) -> int: ...
-    def append_floats(self, name: str, values: ArrayLike) -> int: ...
-    def emission_words(self, value: Any) -> NDArray[np.uint32]: ...
-    def factor_words(self, value: Any) -> NDArray[np.uint32]: ...
-
-    def spectra_row(self, spectrum: Any) -> int: ...
-    @property
-    def spectral(self) -> bool: ...
 
 
 def blank_row() -> NDArray[np.uint32]:
@@ -44,7 +29,7 @@ def blank_row() -> NDArray[np.uint32]:
     return words.view(np.uint32)
 
 
-def lower_lamp(lamp: Light, tables: Sink, scene_radius: float) -> tuple[str, int, int, float]:
+def lower_lamp(lamp: Light, encoder: Encoder, scene_radius: float) -> tuple[str, int, int, float]:
     """Put a light into the tables; its record, its row and emission in `light_params`, its power [W/nm].
 
     The power is an estimate, the mean of channels; scene_radius: of a sphere around the scene [m].
@@ -54,13 +39,13 @@ def lower_lamp(lamp: Light, tables: Sink, scene_radius: float) -> tuple[str, int
         raise SceneError(f"a light of kind {lamp.kind!r} is a shape's `emission`", where="lights")
     kind = projected.kind_of(lamp)
     if isinstance(lamp, (lights.Envmap, lights.CubeMap)):
-        members, strength = image_lights.lower_image(lamp, tables)
+        members, strength = image_lights.lower_image(lamp, encoder)
         kind = "spectral_envmap" if "bands" in members else kind
         radiance = 0
     else:
-        radiance = tables.append("light_params", tables.emission_words(_emitted(lamp)))
+        radiance = encoder.store.append("light_params", encoder.emission_words(_emitted(lamp)))
         own = (
-            projected.members(lamp, tables)
+            projected.members(lamp, encoder)
             if kind in light_records.PROJECTED_RECORDS
             else _members(lamp)
         )
@@ -69,7 +54,7 @@ def lower_lamp(lamp: Light, tables: Sink, scene_radius: float) -> tuple[str, int
     words = np.zeros(1, RECORDS[kind].dtype)
     for name, value in members.items():
         words[name] = value
-    at = tables.append("light_params", words.view(np.uint32))
+    at = encoder.store.append("light_params", words.view(np.uint32))
     return kind, at, radiance, power(lamp, strength, scene_radius)
 
 

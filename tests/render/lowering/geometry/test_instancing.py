@@ -80,7 +80,7 @@ def test_lights_and_analytic_shapes_are_placed_one_by_one() -> None:
     assert sorted(rows["number"][rows["kind"] != 0]) == [0, 1, 2]
     assert (rows["light"] >= 0).sum() == 3
     np.testing.assert_allclose(made.boxes[2, 1, 0], 2.0 + 3 * 0.5, rtol=1e-4)
-    assert made.warnings == []
+    assert made.warnings == ()
 
 
 def test_a_stretched_sphere_becomes_triangles() -> None:
