@@ -33,10 +33,10 @@ def runs(
     building.run(_CURVE, "curve_cut", stretches, **curve, **cut)
     building.run(_CURVE, "curve_scan", 1, numbers=numbers, rows=stretches, columns=1)
     n = int(building.read(numbers, stretches + 1, np.uint32)[-1])
-    found, extents = building.allocate(32 * n), building.allocate(64 * stretches)
-    made = {"numbers": numbers, "runs": found, "extents": extents}
-    building.run(_CURVE, "curve_runs", stretches, **curve, **made)
-    return n, ordered, found, extents
+    leaves, extents = building.allocate(32 * n), building.allocate(64 * stretches)
+    output = {"numbers": numbers, "runs": leaves, "extents": extents}
+    building.run(_CURVE, "curve_runs", stretches, **curve, **output)
+    return n, ordered, leaves, extents
 
 
 def _sorted(building: Building, count: int, items: cl.Buffer, parts: cl.Buffer) -> cl.Buffer:
@@ -78,8 +78,8 @@ def _cells(span: NDArray[np.float32]) -> dict[str, Any]:
         left[axis] /= 2
         bits[axis] += 1
         halved.append((axis, bits[axis]))
-    for place, (axis, nth) in enumerate(reversed(halved)):
+    for position, (axis, nth) in enumerate(reversed(halved)):
         byte, bit = divmod(int(bits[axis] - nth), 8)
-        tables[axis, byte] |= (np.arange(256, dtype=np.uint64) >> bit & 1) << place
+        tables[axis, byte] |= (np.arange(256, dtype=np.uint64) >> bit & 1) << position
     scale = 0.999999 * 2.0**bits / np.maximum(size, 1e-30)  # finite as a float32
     return {"low": (*low, 0.0), "scale": (*scale, 0.0), "tables": tables}

@@ -106,7 +106,7 @@ def wide8(building: Building, mesh: Mesh) -> Packed:
 
 
 def binary_boxes(building: Building, count: int, boxes: cl.Buffer, leaf_size: int = 1) -> Packed:
-    """Build a binary tree over boxes (count, 2, 3), and their indices in the order of its leaves."""
+    """Build a binary tree over boxes (count, 2, 3), and indices in the order of its leaves."""
     indices = building.allocate(4 * count)
     if count:
         items, parts = tree.items_of_boxes(building, count, boxes)
@@ -218,8 +218,8 @@ def _collapse(building: Building, built: tree.Tree) -> _Collapse:
 
     roots, firsts = building.allocate(4 * n), building.allocate(8 * n)
     leaf_roots, totals = building.allocate(4 * n), building.allocate(4 * (4 + _DEEPEST))
-    places = {"roots": roots, "firsts": firsts, "leaf_roots": leaf_roots, "totals": totals}
-    building.run(_COLLAPSE, "collapse_number", 1, nodes=built.nodes, costs=costs, **places)
+    numbers = {"roots": roots, "firsts": firsts, "leaf_roots": leaf_roots, "totals": totals}
+    building.run(_COLLAPSE, "collapse_number", 1, nodes=built.nodes, costs=costs, **numbers)
     words = building.read(totals, 4 + _DEEPEST, np.uint32)
     n_nodes, n_leaves, levels = words[:3].tolist()
     starts = [*words[4 : 4 + levels].tolist(), n_nodes]
@@ -243,13 +243,13 @@ class _Wide:
 
 def _wide_nodes(building: Building, built: tree.Tree) -> _Wide:
     """The inner nodes of a binary tree made 8 wide."""
-    made = _collapse(building, built)
-    n_nodes = int(made.stats["nodes"])
+    collapse = _collapse(building, built)
+    n_nodes = int(collapse.stats["nodes"])
     wide = building.allocate(256 * n_nodes)
-    below = {"nodes": built.nodes, "costs": made.costs, "occlusion": made.occlusion}
-    numbers = {"roots": made.roots, "firsts": made.firsts}
+    below = {"nodes": built.nodes, "costs": collapse.costs, "occlusion": collapse.occlusion}
+    numbers = {"roots": collapse.roots, "firsts": collapse.firsts}
     building.run_each(_COLLAPSE, "collapse_nodes", n_nodes, wide=wide, **numbers, **below)
-    return _Wide(wide, made.leaf_roots, made.leaves, made.part, made.stats)
+    return _Wide(wide, collapse.leaf_roots, collapse.leaves, collapse.part, collapse.stats)
 
 
 LAYOUTS: dict[str, Callable[[Building, Mesh], Packed]] = {

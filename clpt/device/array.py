@@ -45,7 +45,7 @@ class DeviceArray(Array):
         that of `__dlpack_device__`. copy: False for the memory itself. On a CPU it is mapped until
         the consumer releases it, and OpenCL forbids that the device writes to it meanwhile.
 
-        Raises BufferError for another device, or where `copy` cannot be as it was asked for.
+        Raises BufferError for another device, or where `copy` is not possible.
         """
         wanted = tuple(dl_device or self.__dlpack_device__())
         if wanted == (dlpack.CPU, 0):

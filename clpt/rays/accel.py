@@ -87,7 +87,7 @@ class Accel(Queries):
     ) -> AllHits:
         """All that each ray meets at t_min < t < t_max, by ray and then by distance.
 
-        Each triangle is met once at most; a ray through an edge meets both triangles there. It
+        A ray meets each triangle at most once, and both triangles at an edge. The call
         waits, since the number of hits is not known before; the rays are as for `intersect`.
         """
         rays = batch.rays(*self._memory, origins, directions, t_min, t_max)
@@ -98,16 +98,16 @@ class Accel(Queries):
             self._fill("query_count", rays, {"counts": counts})
             ends = np.cumsum(counts, dtype=np.uint64)
             total = int(ends[-1]) if rays.count else 0
-            found: dict[str, NDArray[Any]] = {
+            hits: dict[str, NDArray[Any]] = {
                 "t": np.empty(total, np.float32),
                 "primitive": np.empty(total, np.int32),
                 "barycentrics": np.empty((total, 2), np.float32),
             }
             if total:
-                self._fill("query_all_hits", rays, {"firsts": ends - counts, **found})
+                self._fill("query_all_hits", rays, {"firsts": ends - counts, **hits})
         ray = np.repeat(np.arange(rays.count), counts)
-        order = np.lexsort((found["t"], ray))
-        return AllHits(ray=ray[order], **{name: array[order] for name, array in found.items()})
+        order = np.lexsort((hits["t"], ray))
+        return AllHits(ray=ray[order], **{name: array[order] for name, array in hits.items()})
 
     def _fill(self, kernel: str, rays: batch.Rays, arrays: dict[str, NDArray[Any]]) -> None:
         """Run a kernel on arrays of the host."""

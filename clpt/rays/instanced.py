@@ -17,7 +17,7 @@ from .arrays import ArrayInput, DeviceArg, device_arg, on_device
 from .batch import wrap_host
 from .queries import Queries
 
-_ADVICE = "place fewer or smaller meshes"
+_ADVICE = "use fewer instances or smaller meshes"
 
 
 class InstancedAccel(Queries):
@@ -68,11 +68,11 @@ class InstancedAccel(Queries):
         self._copy_trees(range(len(accels)))
         self._transforms = self._input(transforms)
         self._place_instances()
-        placed = self._stream.read(boxes, np.empty((self.count, 2, 3), np.float32))
-        if not np.isfinite(placed).all():
-            wrong = np.argmin(np.isfinite(placed).all(axis=(1, 2)))
+        corners = self._stream.read(boxes, np.empty((self.count, 2, 3), np.float32))
+        if not np.isfinite(corners).all():
+            wrong = np.argmin(np.isfinite(corners).all(axis=(1, 2)))
             raise SceneError(f"instance {wrong} is singular or out of reach", where="transforms")
-        self.tree = bvh.build_boxes(self.device, placed, self.layout)
+        self.tree = bvh.build_boxes(self.device, corners, self.layout)
         order = self._stream.read(self.tree.buffers["indices"], np.empty(self.count, np.uint32))
         self._arrays["slots"] = buffers.upload(
             "the order of instances", np.argsort(order), np.uint32

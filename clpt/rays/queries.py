@@ -45,8 +45,8 @@ class Hits:
 
     t: (n,) float32 in units of the direction, inf where nothing is met; primitive: (n,) int32 row
     of `faces`, -1 where nothing is met; barycentrics: (n, 2) float32 of the face's second and third
-    vertex; instance: (n,) int32, which one, or -1, and None where there are no instances; event:
-    after which they are valid.
+    vertex; instance: (n,) int32, or -1, and None for meshes without instances; event: after which
+    the arrays are valid.
     """
 
     t: Any
@@ -71,7 +71,7 @@ class AllHits:
 
 
 class Queries:
-    """What an acceleration structure can be asked.
+    """The queries of an acceleration structure.
 
     Every method may be called from any thread; calls on one object run one after the other.
     """
@@ -114,8 +114,8 @@ class Queries:
         columns = {**_HITS, "instance": (0, np.int32)} if self.instanced else _HITS
         before = {} if out is None else vars(out)
         rays = batch.rays(*self._memory, origins, directions, t_min, t_max)
-        found, event = self._run("query_closest", rays, columns, before, wait_for)
-        return Hits(**{"instance": None, **found}, event=event)
+        results, event = self._run("query_closest", rays, columns, before, wait_for)
+        return Hits(**{"instance": None, **results}, event=event)
 
     def occluded(
         self,
@@ -134,8 +134,8 @@ class Queries:
         """
         before = {} if out is None else {"met": out}
         rays = batch.rays(*self._memory, origins, directions, t_min, t_max)
-        found, _ = self._run("query_occluded", rays, {"met": (0, np.uint8)}, before, wait_for)
-        return found["met"]
+        results, _ = self._run("query_occluded", rays, {"met": (0, np.uint8)}, before, wait_for)
+        return results["met"]
 
     @property
     def buffers(self) -> dict[str, cl.Buffer]:

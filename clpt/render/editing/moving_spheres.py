@@ -24,7 +24,7 @@ _ROOT = "motion/place_spheres.cl"
 
 
 class MovingSpheres:
-    """The spheres of a scene on a device, whose table and boxes kernels write anew.
+    """The spheres of a scene on a device, and the kernels that write their table and boxes.
 
     Of spheres that were moved by arrays of the host, a copy of these stays on the device.
     """
