@@ -373,10 +373,10 @@ def test_triangles_without_an_area_are_left_out():
     mesh = Mesh(vertices=vertices, faces=np.array([[0, 1, 2], [0, 1, 3], [1, 1, 2]]), name="leaf")
     _, faces, _, _ = rs.triangles(mesh, flat)
     assert faces.tolist() == [[0, 1, 2]]
-    assert rs.told([]) == []
-    assert rs.told(flat) == ["mesh 'leaf': 2 of 3 triangles have no area, left out"]
+    assert rs.warnings_of([]) == []
+    assert rs.warnings_of(flat) == ["mesh 'leaf': 2 of 3 triangles have no area, left out"]
     more = [*flat, rs.Flat("mesh", 1200, 9000), rs.Flat("mesh", 1, 2)]
-    assert rs.told(more)[0].endswith("left out; with those of 2 more shapes 1,203 in all")
+    assert rs.warnings_of(more)[0].endswith("left out; with those of 2 more shapes 1,203 in all")
 
 
 GOOD = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
