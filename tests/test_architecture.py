@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -217,3 +218,29 @@ def test_kernel_files(path: Path) -> None:
     assert "double" not in re.findall(r"\w+", code)
     in_memory = re.findall(r"global\s+(?:const\s+)?(\w+)\s*\*", code)
     assert not {"float3", "int3", "uint3", "bool", "size_t"} & set(in_memory)
+
+
+@pytest.mark.parametrize("path", kernel_files(), ids=lambda p: str(p.relative_to(KERNELS)))
+def test_comments_of_kernels_name_what_exists(path: Path) -> None:
+    """Kernel files as `folder/file.cl`, others by their path, modules by their full name."""
+    comments = " ".join(re.findall(r"/\*.*?\*/", path.read_text(encoding="utf-8"), re.DOTALL))
+    for name in re.findall(r"(?<![\w/<>*])[\w/]+\.cl\b", comments):
+        file = KERNELS / name.removeprefix("kernels/")
+        assert file.is_file() or name.startswith("generated/"), name
+    for name in re.findall(r"\b(?:clpt|tests|bench|docs)/[\w/]+\.\w+", comments):
+        assert (ROOT / name).is_file(), name
+    for name in re.findall(r"\bclpt(?:\.\w+)+", comments):
+        module = ROOT.joinpath(*name.split("."))
+        inside = module.parent.with_suffix(".py")  # of a module: the name that it must have
+        there = module.is_dir() or module.with_suffix(".py").is_file()
+        assert there or re.search(rf"\b{module.name}\b", inside.read_text("utf-8")), name
+
+
+@pytest.mark.parametrize("path", kernel_files(), ids=lambda p: str(p.relative_to(KERNELS)))
+def test_lines_of_kernels(path: Path) -> None:
+    """120 columns at most; the backslashes of a macro stand below each other."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    assert max(map(len, lines)) <= 120
+    for line, after in pairwise(lines):
+        if line.endswith("\\") and after.endswith("\\"):
+            assert len(line) == len(after), after

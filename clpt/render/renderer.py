@@ -58,13 +58,13 @@ class Progress:
 
 
 class Renderer(Pictures):
-    """Renders a scene; its picture can be asked for at any time.
+    """Renders a scene; its picture so far is available at any time.
 
     device: where to render, a name or index (see clpt.device.choose), or a clpt.device.Device.
-    queue: the caller's, instead; all buffers and programs are then made in its context, all
-    commands go there, and nothing else is made or changed. progress: called when a step has ended,
-    in a thread of the driver. texture_budget: [bytes] that bitmaps may take, larger ones are
-    halved; by default half of what the device has free. The other parameters are those of
+    queue: the caller's, instead of a device; all buffers and programs are then made in its context,
+    all commands go there, and no other OpenCL object is made or changed. progress: called when a
+    step has ended, in a thread of the driver. texture_budget: [bytes] that bitmaps may take, larger
+    ones are halved; by default half of what the device has free. The other parameters are those of
     clpt.render.wavefront.wavefront.Wavefront.create.
 
     It may be used from several threads: one method runs at a time. With `with`, `close`, or when it
@@ -170,7 +170,7 @@ class Renderer(Pictures):
         *,
         noise: float | None = None,
     ) -> bool:
-        """Add samples to every pixel and wait; `samples` in all are kept in `self.samples`.
+        """Add samples to every pixel and wait; `self.samples` counts all so far.
 
         noise: leave pixels as soon as the noise around them is as low, relative to the picture,
         such as 0.02; `samples` is then the most that a pixel gets, see
@@ -240,8 +240,11 @@ class Renderer(Pictures):
     def reset(self, wait_for: dev.Events = None, *, seed: int | None = None) -> cl.Event:
         """Enqueue that the film is emptied; the next sample is number 0 again.
 
-        seed: of the samples from now on, which `self.scene` then has; by default as before.
+        seed: of the samples from now on, which `self.scene` then has; by default as before. Raises
+        SceneError for a seed that is no whole number.
         """
+        if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int)):
+            raise SceneError(f"must be a whole number, not {seed!r}", where="seed")
         stream = self.wavefronts[0].stream
         stream.after(wait_for)
         if seed is not None:
@@ -291,7 +294,7 @@ class Renderer(Pictures):
         film, for any other change; arrays and images that it shares with the present one are taken
         to be unchanged.
 
-        Three ways lead there, the first that can:
+        The first of three ways that is possible is taken:
 
         1. Shapes that only move do so on the device, where trees are refitted to them; nothing is
            waited for. See clpt.render.editing.moving.
@@ -348,7 +351,7 @@ class Renderer(Pictures):
         return refusal is None
 
     def _rebuild(self, scene: Scene, events: list[cl.Event], refit: bool) -> None:
-        """Lower a scene and let it take the place of the one on the device; see `rebuild.take`.
+        """Lower a scene and render it from now on; see `rebuild.take`.
 
         events: that arrays on the device wait for, which may be read.
         """

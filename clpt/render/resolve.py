@@ -104,7 +104,7 @@ class Resolve:
         return target.memory
 
     def _bind(self, kernel: str, named: dict[str, Any]) -> device.BoundKernel:
-        """A kernel with its arguments, made once: that takes longer than to set them."""
+        """A kernel with its arguments. It is made once: that takes longer than to set them."""
         if kernel in self._bound:
             self._bound[kernel].set_args(**named)
         else:

@@ -76,6 +76,7 @@ class Material(Kind):
     uses_lobe_sample: ClassVar[bool] = False  # `sample` uses u.z
     chromatic: ClassVar[bool] = False  # the pdf differs between wavelengths: it has `pdfs`
     disperses: ClassVar[bool] = False  # whatever its parameters, directions depend on wavelength
+    refracts: ClassVar[bool] = False  # they do so where a parameter of the role index does
     fluoresces: ClassVar[bool] = False  # light may leave at another wavelength: it has `shift`
     is_null: ClassVar[bool] = False  # light goes on as if nothing were there, to lights as well
     no_back: ClassVar[bool] = False  # its back is not there
@@ -123,6 +124,7 @@ class Dielectric(Material):
 
     delta = True
     uses_lobe_sample = True
+    refracts = True
 
     int_ior: Any = index(1.5046, "inside index, number, glass name or spectrum")
     ext_ior: Any = index(1.000277, "outside index")
@@ -158,6 +160,7 @@ class RoughDielectric(Material):
     """A rough boundary of two dielectrics (Walter et al. 2007); both sides."""
 
     uses_lobe_sample = True
+    refracts = True
     chromatic = True
 
     int_ior: Any = index(1.5046, "inside index")
@@ -258,6 +261,7 @@ class Principled(Material):
     """
 
     uses_lobe_sample = True
+    refracts = True
     chromatic = True
     tints = ("spec_tint", "sheen_tint")
 
@@ -338,6 +342,7 @@ class GltfSurface(Material):
     """
 
     uses_lobe_sample = True
+    refracts = True
     chromatic = True
     needs_wavelengths = True
 

@@ -46,7 +46,8 @@ inline integer film_index_at(global const Settings *settings, real x, real y)
 /* A pinhole, or a lens on which the light arrives at (a, b): the plane at distance `focus` is sharp. The
  * matrix is rigid, so its transpose leads back to the camera's space. */
 inline CameraPoint pinhole_connect(global const Settings *settings, global const float *m, global const float *extent,
-                                   global const float *offset, float near, float far, float focus, vec2 lens, vec3 p, mask away)
+                                   global const float *offset, float near, float far, float focus, vec2 lens, vec3 p,
+                                   mask away)
 {
     vec3 to = sel3(away, p, sub3(p, v3((real)(m[3]), (real)(m[7]), (real)(m[11]))));
     vec3 d = v3(m[0] * to.x + m[4] * to.y + m[8] * to.z, m[1] * to.x + m[5] * to.y + m[9] * to.z,

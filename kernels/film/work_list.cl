@@ -13,7 +13,8 @@ inline integer plane_sample(integer plane, int planes, int first)
 }
 
 /* The sample before which a pixel is left, `end` at most. */
-inline integer work_list_end(global const Settings *settings, global const uint *work_list, integer pixel_index, int end)
+inline integer work_list_end(global const Settings *settings, global const uint *work_list, integer pixel_index,
+                             int end)
 {
     return min_i(gather_i(work_list, pixel_index + settings->padded_pixels), (integer)(end));
 }

@@ -18,7 +18,7 @@ from clpt.render.codegen import textures as texture_text
 from clpt.render.codegen.signatures import scene_text
 from clpt.render.contract import shape_records
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.geometry import shapes
+from clpt.render.lowering.geometry import analytic, triangles
 from clpt.render.lowering.lights import lights
 from clpt.render.lowering.spectra_table import STEP
 from tests.kernels.harness import opened
@@ -67,14 +67,18 @@ class Lit:
     def _text(self) -> str:
         """The lights' functions, with the look-ups of textures where there are any."""
         encoder, sources = self.encoder, self.encoder.sources
-        found = frozenset(sources["emission"]["value"] or {"constant"})
+        found, factors = (
+            frozenset(source for kind, _, source in sources if kind == wanted)
+            for wanted in ("emission", "factor")
+        )
+        found = found or frozenset({"constant"})
         text = ""
         if encoder.textures.roles:
             used = {kind for kind, _ in encoder.textures.roles}
             text += texture_text.dispatch_text(used, encoder.textures.roles)
         text += parameters.emission_text(found)
-        if sources["factor"]["value"]:
-            text += parameters.factor_text(frozenset(sources["factor"]["value"]))
+        if factors:
+            text += parameters.factor_text(factors)
         rows = self.rows
         tree = rows.tree is not None
         return text + light_dispatch.dispatch_text(
@@ -140,7 +144,7 @@ def lit(
         row["prim"] = first
         vertices = faces = uvs = None
         if shape.kind not in shape_records.ANALYTIC:
-            vertices, faces, _, uvs = shapes.triangles(shape)
+            vertices, faces, _, uvs = triangles.triangulate(shape)
             base = encoder.store.size("uvs") // 2
             encoder.store.append("faces", faces + np.uint32(base))
             encoder.store.append_floats("uvs", np.zeros((len(vertices), 2)) if uvs is None else uvs)
@@ -162,6 +166,6 @@ def lit(
 def shape_probe(shape) -> Lit:
     """A scene whose `geometry` holds one shape, and the kind's functions."""
     encoder = Encoder("rgb")
-    encoder.store.append("geometry", shapes.row(shape))
+    encoder.store.append("geometry", analytic.row(shape))
     none = lights.light_rows((), (), encoder, 1.0)
     return Lit(encoder, none, (f"generated/shape/{shape.kind}.cl",))

@@ -148,6 +148,19 @@ def test_values_are_a_few_words(
     check(renderer)
 
 
+def test_the_log_says_why_an_update_was_slow(
+    renderer: clpt.Renderer, caplog: pytest.LogCaptureFixture
+) -> None:
+    renderer.update(scene=scene())
+    with caplog.at_level(logging.DEBUG, "clpt.render.renderer"):
+        renderer.update(transforms={LAMP: tf.translate([0, 3, 0.5])})
+        renderer.update(materials={"wall": m.RoughConductor()})
+    assert [r.message for r in caplog.records] == [
+        "shapes cannot move on the device: rectangle emits light: lights follow from it",
+        "words alone do not change the scene: a material is of another kind or structure",
+    ]
+
+
 def test_what_cannot_be_changes_nothing(renderer: clpt.Renderer) -> None:
     renderer.update(scene=scene())
     before, now = picture(renderer), renderer.scene

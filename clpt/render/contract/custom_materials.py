@@ -16,6 +16,7 @@ from textwrap import dedent
 from clpt import device
 from clpt.errors import SceneError
 from clpt.records import INSTANCE, LIGHT, SETTINGS, SHAPE, SLABS
+from clpt.render.contract import light_records, shape_records
 from clpt.scene import KINDS
 from clpt.scene.materials import LEAVES, Material
 
@@ -111,7 +112,8 @@ def _identifiers() -> frozenset[str]:
     """Types and functions of the kernels."""
     files = device.kernels_folder().rglob("*.cl")
     kernels = "\n".join(path.read_text(encoding="utf-8") for path in files)
-    records = (SETTINGS, *SLABS, SHAPE, INSTANCE, LIGHT)
+    records = [SETTINGS, *SLABS, SHAPE, INSTANCE, LIGHT]
+    records += [*shape_records.VALUES, *light_records.VALUES]
     return frozenset(
         [
             *(record.name for record in records),

@@ -1,4 +1,4 @@
-"""The records of lights: what lowering writes into `lights` and `light_params`, and kernels read there."""
+"""The records of lights: their rows in `lights` and `light_params`, and what they give."""
 
 from __future__ import annotations
 
@@ -117,3 +117,31 @@ NODE = Record(
     power=("real", "of all its lights"),
     child=("integer", "the first of its children; below 0: -1 - the row in `lights`"),
 )
+
+# What the functions of lights return, see kernels/interface/light.cl and emission.cl.
+LIGHT_SAMPLE = Record(
+    "LightSample",
+    "A direction to a light, chosen as seen from some point p.",
+    wi=("vec3", "unit length, from p", "v3(0.0f, 0.0f, 1.0f)"),
+    t=("real", "distance [m]; FAR for lights at infinity", "FAR"),
+    radiance=(
+        "spectrum",
+        "what comes along it; for a delta light, irradiance on a shading surface",
+    ),
+    pdf=("real", "[1/sr]; below 0: a delta light, to be taken as it is; 0: nothing comes"),
+)
+LIGHT_RAY = Record(
+    "LightRay",
+    "A ray that leaves a light.",
+    o=("vec3", "where it starts [m]"),
+    d=("vec3", "in which direction, unit length", "v3(0.0f, 0.0f, 1.0f)"),
+    n=("vec3", "unit normal of the surface there; d off all surfaces", "v3(0.0f, 0.0f, 1.0f)"),
+    power=("spectrum", "radiance |cos| over the pdf of o and d [W/nm]"),
+    seen=(
+        "spectrum",
+        "radiance over the pdf of o, or from infinity of d: what a camera may gather; "
+        "0: a delta light",
+    ),
+    away=("integer", "a mask: it comes from infinity"),
+)
+VALUES = (LIGHT_SAMPLE, LIGHT_RAY)

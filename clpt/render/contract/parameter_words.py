@@ -30,7 +30,7 @@ REAL_WORDS = 2  # the value, and 0 or 1 + the texture
 
 ORDERS_WORDS = 2 * ORDERS + 1
 
-LAYERS_WORDS = 2  # where the layers lie in the table, see clpt.render.lowering.materials.thin_films, and how many
+LAYERS_WORDS = 2  # where the layers lie, see clpt.render.lowering.materials.thin_films; how many
 
 
 def words(param: Param) -> int:

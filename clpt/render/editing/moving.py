@@ -22,7 +22,7 @@ from clpt.render.editing.moving_instances import Boxes, Location, MovingInstance
 from clpt.render.editing.moving_spheres import MovingSpheres
 from clpt.render.editing.scene_edit import Replacements
 from clpt.render.lowering.device_arrays import on_device
-from clpt.render.lowering.geometry import shapes
+from clpt.render.lowering.geometry import analytic, shapes, triangles
 from clpt.render.lowering.geometry.tessellate import keeps_its_kind
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene import Scene
@@ -42,7 +42,7 @@ class _Ranges:
 
     row: its row of `shapes`; vertices, faces: first and number; mirrored: whether its transform
     flips its faces; whole: whether no triangle was left out; own: its transform within its group.
-    Buffers are made by the first move that needs them: matrix: its transform; local: its vertices
+    The first move that needs a buffer makes it. matrix: its transform; local: its vertices
     and normals before the transform, and the array of vertices that they are of; around: the
     triangles around each vertex, for `smooth_normals` of place_vertices.cl.
     """
@@ -60,11 +60,11 @@ class _Ranges:
 
 
 class Moving:
-    """The shapes of a scene on a device that can move there.
+    """The shapes of a scene on a device, and the kernels that move them.
 
-    scene: the scene that was lowered. A copy of the vertices and normals of each shape that moved
-    without new vertices stays on the device, and for each smooth mesh whose vertices moved 4 bytes
-    a vertex and 12 a triangle.
+    target: the scene on the device; scene: as it was lowered. A copy of the vertices and normals of
+    each shape that moved without new vertices stays on the device, and for each smooth mesh whose
+    vertices moved 4 bytes a vertex and 12 a triangle.
     """
 
     def __init__(self, target: DeviceScene, scene: Scene):
@@ -82,9 +82,9 @@ class Moving:
             number = int(ranges.row["number"])
             if ranges.row["kind"] == 0 and ranges.faces[0] >= world:
                 continue  # of a group: its instances move, not it
-            placed = scene.shapes[number]
-            if isinstance(placed, Instance):
-                outer = shapes.placement(placed)
+            shape = scene.shapes[number]
+            if isinstance(shape, Instance):
+                outer = shapes.placement(shape)
                 ranges.own = transforms.inverse(outer) @ shapes.placement(ranges.shape)
             self.ranges.setdefault(number, []).append(ranges)
 
@@ -140,17 +140,17 @@ class Moving:
     def _all_ranges(self) -> list[_Ranges]:
         """The ranges of every shape, in the order of their rows."""
         lowered = self.target.lowered
-        made, ends = [], (len(lowered.vertices), len(lowered.faces))
+        backwards, ends = [], (len(lowered.vertices), len(lowered.faces))
         for row, shape, vertex, face in reversed(lowered.owners):
             if row["kind"]:
-                made.append(_Ranges(row, shape, (0, 0), (0, 0)))
+                backwards.append(_Ranges(row, shape, (0, 0), (0, 0)))
                 continue
             vertices, faces = (vertex, ends[0] - vertex), (face, ends[1] - face)
             mirrored = transforms.flips_handedness(shapes.placement(shape))
             whole = not isinstance(shape, Mesh) or len(shape.faces) == faces[1]
-            made.append(_Ranges(row, shape, vertices, faces, mirrored, whole))
+            backwards.append(_Ranges(row, shape, vertices, faces, mirrored, whole))
             ends = vertex, face
-        return made[::-1]
+        return backwards[::-1]
 
     def _plan_shape(
         self, ranges: _Ranges, old: Any, new: Any, device_matrix: Location | None
@@ -174,12 +174,12 @@ class Moving:
             if transforms.flips_handedness(matrix) != ranges.mirrored:
                 raise CannotMove(f"the transform of {name} mirrors it")
         elif isinstance(new, Instance):
-            raise CannotMove(f"{name} places a copy, and its transform is on the device")
+            raise CannotMove(f"{name} is copied, not shared, and its transform is on the device")
         if getattr(new, "vertices", None) is not getattr(old, "vertices", None):
             if not ranges.whole:
                 raise CannotMove(f"{name} has triangles without an area")
             if not on_device(new.vertices):
-                points = shapes.points(new)
+                points = triangles.points(new)
                 if len(points) != count:
                     raise CannotMove(f"{name} has {len(points)} vertices, and had {count}")
         return [lambda: self._move_vertices(ranges, new, points, matrix, device_matrix)]
@@ -188,13 +188,13 @@ class Moving:
         """What moves an analytic shape. Raises CannotMove where that is another kind then."""
         shape = ranges.shape if isinstance(new, Instance) else new
         matrix = shapes.placement(new) @ ranges.own
-        placed = dataclasses.replace(shape, to_world=matrix)
-        if not keeps_its_kind(placed):
+        in_world = dataclasses.replace(shape, to_world=matrix)
+        if not keeps_its_kind(in_world):
             raise CannotMove(f"the transform of {_name(new)} makes triangles of it")
         if isinstance(shape, Spheres):
             act = self._spheres.plan(ranges.row, shape, matrix)
         else:
-            act = self._plan_single(ranges, placed)
+            act = self._plan_single(ranges, in_world)
 
         def move() -> None:
             ranges.shape = shape
@@ -206,7 +206,7 @@ class Moving:
     def _plan_single(self, ranges: _Ranges, shape: Shape) -> Callable[[Boxes], None]:
         """What gives a sphere, disk or cylinder other parameters and another box."""
         lowered, first_word = self.target.lowered, int(ranges.row["params"])
-        words, box = shapes.row(shape), np.stack(shapes.bounds(shape))
+        words, box = analytic.row(shape), np.stack(analytic.bounds(shape))
         rows = lowered.tables["shapes"].view(SHAPE.dtype)
         first = int(lowered.settings["first_analytic"])
         number = int(np.flatnonzero(rows["params"][first:] == first_word)[0])
@@ -259,7 +259,7 @@ class Moving:
             device_matrix = device_matrix or self._upload_matrix(ranges, matrix)
             self._run("vertices", ranges, self._local(ranges, "vertices"), device_matrix)
         if ranges.row["flags"] & _NORMALS:
-            if shapes.smooth(ranges.shape):
+            if triangles.smooth(ranges.shape):
                 self._smooth(ranges)
             else:
                 device_matrix = device_matrix or self._upload_matrix(ranges, matrix)
@@ -280,7 +280,7 @@ class Moving:
         )  # fmt: skip
 
     def _upload_matrix(self, ranges: _Ranges, matrix: transforms.Matrix) -> Location:
-        """Where a shape's transform is, which is sent there."""
+        """Enqueue that a shape's transform is on the device; return where."""
         if ranges.matrix is None:
             ranges.matrix = self.target.buffers.allocate("a shape's transform", 64)
         self.target.stream.write(ranges.matrix, matrix.astype(np.float32))
@@ -298,7 +298,7 @@ class Moving:
             ranges.local = vertices, {}
         buffers = ranges.local[1]
         if name not in buffers:
-            points, _, normals, _ = shapes.local(shape)
+            points, _, normals, _ = triangles.local(shape)
             array: Any = points if name == "vertices" else normals
             what = f"{name} of a shape that moves"
             buffers[name] = self.target.buffers.upload(what, array, np.float32)

@@ -25,7 +25,7 @@ Transformed = tuple[NDArray[Any], NDArray[Any], NDArray[np.float32]]
 
 
 class MovingInstances:
-    """The instances of a scene on a device, whose rows and boxes are written anew.
+    """The instances of a scene on a device, and what moves them.
 
     numbers: by the number of a scene's shape, which instances it is, in the scene's order.
     """

@@ -6,6 +6,7 @@ import dataclasses
 from typing import Any
 
 from clpt.render.editing.rebuild import ranges
+from clpt.render.editing.scene_edit import Replacements
 from clpt.render.lowering.camera.cameras import dispersive_glass, lower_camera
 from clpt.render.lowering.geometry.instancing import distinct
 from clpt.render.lowering.materials.material_words import CLEAR
@@ -36,10 +37,10 @@ def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> str | None:
             return "the camera is of another kind"
     rows: list[tuple[int, Any]] = []
     for old, new in pairs:
-        found = lowered.encoder.replaced(old, new, "materials")
-        if found is None:
+        changed = lowered.encoder.replaced(old, new, "materials")
+        if changed is None:
             return f"parameters of a {new.kind} come from elsewhere, such as a texture or a table"
-        rows += found
+        rows += changed
     _write(on_device, camera, rows)
     return None
 
@@ -63,20 +64,20 @@ def _write(on_device: DeviceScene, camera: Any, rows: list[tuple[int, Any]]) -> 
 
 
 def _pairs(former: Scene, scene: Scene) -> list[tuple[Any, Any]] | None:
-    """The leaf materials that took the places of others, None where more than values differs."""
-    found: dict[int, tuple[Any, Any]] = {}
+    """The leaf materials that replace others, None where more than values differs."""
+    pairs: Replacements = {}
     for old, new in zip(distinct(former.shapes), distinct(scene.shapes), strict=True):
-        if not _pair(old.material, new.material, found):
+        if not _pair(old.material, new.material, pairs):
             return None
-    changed = [(old, new) for old, new in found.values() if old is not new]
+    changed = [(old, new) for old, new in pairs.values() if old is not new]
     return [(old, new) for old, new in changed if not isinstance(old, COMPOSITES)]
 
 
-def _pair(old: Any, new: Any, found: dict[int, tuple[Any, Any]]) -> bool:
+def _pair(old: Any, new: Any, pairs: Replacements) -> bool:
     """Note which material replaces which; return whether they may differ in values only."""
-    if id(old) in found:
-        return found[id(old)][1] is new
-    found[id(old)] = old, new
+    if id(old) in pairs:
+        return pairs[id(old)][1] is new
+    pairs[id(old)] = old, new
     if old is new and not isinstance(old, COMPOSITES):
         return True
     if type(old) is not type(new):
@@ -88,7 +89,7 @@ def _pair(old: Any, new: Any, found: dict[int, tuple[Any, Any]]) -> bool:
     for name in params(type(old)):
         a, b = getattr(old, name), getattr(new, name)
         if isinstance(a, Material) and isinstance(b, Material):
-            if not _pair(a, b, found):
+            if not _pair(a, b, pairs):
                 return False
         elif a is not b and name != "name":
             return False

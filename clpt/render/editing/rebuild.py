@@ -1,4 +1,4 @@
-"""Another lowering of a scene that is on a device: what differs goes there, the rest stays."""
+"""Another lowering of a scene that is on a device: only what differs is written or built."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ class _Changes:
 
 @dataclass(frozen=True)
 class _Staged:
-    """What a lowering needs on the device, before it takes the place of what is there.
+    """New buffers, trees and queues for a lowering, which nothing uses yet.
 
-    tables: those with a buffer of their own, by name.
+    tables: those that need a new buffer, by name.
     """
 
     tables: dict[str, cl.Buffer]
@@ -50,12 +50,12 @@ class _Staged:
 
 
 def take(wavefronts: Sequence[Wavefront], lowered: Lowered, refit: bool = False) -> None:
-    """Let another lowering take the place of the one that is rendered.
+    """Render another lowering from now on.
 
     wavefronts: all of a renderer, which share their scene; refit: refit the tree over triangles
-    that only moved, which is faster, and leaves a tree that is slower where they went far. Programs
-    are built where the features differ, trees where triangles or boxes do; of tables the words that
-    differ are written. The picture is then that of a new renderer.
+    that only moved, which is faster to do, and slower to trace where they went far. Programs are
+    built if the features differ, trees if triangles or boxes do; of tables the words that differ
+    are written. The picture is then that of a new renderer.
 
     Raises SceneError for a film of another size, KernelBuildError, MemoryBudgetError; nothing has
     changed then.
@@ -138,7 +138,7 @@ def _new_tables(scene: DeviceScene, lowered: Lowered, changes: _Changes) -> dict
 
 
 def _replaced(wavefront: Wavefront, staged: _Staged) -> list[cl.Buffer]:
-    """The buffers of clpt that what is staged takes the place of."""
+    """The buffers of clpt that will not be used any more."""
     scene, queue = wavefront.scene, wavefront.paths.queue
     of_caller = scene.lowered.zero_copy
     buffers = [scene.tables[name] for name in staged.tables if name not in of_caller]
@@ -163,7 +163,7 @@ def _write_tables(scene: DeviceScene, lowered: Lowered, new: dict[str, cl.Buffer
 
 
 def _refit(scene: DeviceScene, changes: _Changes) -> None:
-    """Let the tree over triangles follow them where it was not built anew."""
+    """Refit the tree over triangles to them, if it is not a new one."""
     if changes.refit:
         building = bvh.Building(scene.device, stream=scene.stream)
         triangles = scene.trees.triangles

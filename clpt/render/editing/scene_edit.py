@@ -145,7 +145,7 @@ class _Edit:
         for material in (key, self.successors.of(key)):
             if id(material) in self._parts:
                 return material
-        raise SceneError(f"a {key.kind} that was given is not in the scene", where="materials")
+        raise SceneError(f"the {key.kind} is not in the scene", where="materials")
 
     def change(self, shape: Shape, name: str, value: Any) -> None:
         """Let a field of a shape have another value."""

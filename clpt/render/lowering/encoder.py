@@ -56,14 +56,16 @@ class Encoder:
 
     @property
     def sources(self) -> Sources:
-        """Where the values of each kind's parameters come from.
+        """Where values come from: (kind, parameter, source).
 
-        "none" (the share of a lobe is 0), "constant", "table", "texture" or "layers".
+        A source is "none" (the share of a lobe is 0), "constant", "table", "texture" or "layers".
         """
-        return {
-            kind: {name: frozenset(sources) for name, sources in params.items()}
+        return frozenset(
+            (kind, name, source)
             for kind, params in self._sources.items()
-        }
+            for name, sources in params.items()
+            for source in sources
+        )
 
     def row(self, kind: Kind, table: str, before: Words | None = None) -> int:
         """Append what the kernels read of a kind to a table; return its first word.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from clpt.render.contract import shape_records
-from clpt.render.contract.features import Features, Sources
+from clpt.render.contract.features import Features, disperses
 from clpt.render.lowering.camera.cameras import dispersive_glass
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.geometry.geometry import Geometry
@@ -30,7 +30,6 @@ def features_of(
     tangents = materials.tangents or index.normal_mapped
     uvs = materials.uvs or geometry.uvs or tangents or "uv" in channels
     glass_lens = index.spectral and bool(dispersive_glass(scene.camera))
-    disperses = any(cls.disperses for cls in index.leaves)
     return Features(
         mode=index.mode,
         camera=scene.camera.kind,
@@ -60,7 +59,7 @@ def features_of(
         light_tree=lights.tree is not None,
         many_lights=len(lights.rows) > FEW_LIGHTS,
         absorption=materials.absorption and not channels,
-        dispersion=_tabulated_index(sources) or glass_lens or disperses,
+        dispersion=glass_lens or disperses(index.leaves, sources),
         glass_lens=glass_lens,
         channel=channels[0] if channels else "",
         bands=bool(scene.film.bands) and not channels,
@@ -68,14 +67,4 @@ def features_of(
         spectra_size=encoder.spectra.samples,
         spectra_step=STEP,
         sources=sources,
-    )
-
-
-def _tabulated_index(sources: Sources) -> bool:
-    """Whether a material that transmits has an index that is tabulated by wavelength."""
-    return any(
-        "table" in found
-        for kind in ("dielectric", "rough_dielectric", "principled", "gltf_surface")
-        for name, found in sources.get(kind, {}).items()
-        if name in ("int_ior", "ext_ior", "eta", "ior")
     )

@@ -1,10 +1,10 @@
-"""Adaptive sampling: a pixel gets samples until the noise around it is as low as was asked.
+"""Adaptive sampling: a pixel gets samples until the noise around it is below a limit.
 
 The film is cut into squares, and their pixels into the two colours of a chessboard: two cells. The
 pixels of a cell's partner alone decide how many samples the cell gets, never its own. Samples of
 different pixels are independent of each other, so a pixel's number of samples is independent of
 their values, and its mean has no bias: exactly, not in the limit. (To stop by a cell's own samples
-makes a picture too dark: where they missed the light there seems to be no noise.)
+makes a picture too dark: cells whose samples all missed the light seem to have no noise.)
 
 For that a partner's decision must not depend on how long the cell itself was sampled either. Where
 a cell has finished and its partner has not, the cell is sampled on as the partner's guide, and
@@ -41,7 +41,7 @@ OnBatch = Callable[[Any], bool]
 
 
 def checked(noise: float, features: Features) -> float:
-    """Return the noise that was asked for. Raises SceneError where it makes no sense."""
+    """Return a limit of noise. Raises SceneError where it makes no sense."""
     check_noise(noise)
     if features.channel:
         message = "the values of the integrator aov are no light; leave it out"
@@ -61,7 +61,7 @@ class Adaptive:
     Cells are (2 * squares,): a square's two colours after each other, so that a cell's partner is
     its number with the last bit changed.
 
-    noise: that was asked for; next: (cells,) the first sample that a cell's pixels do not have;
+    noise: the limit; next: (cells,) the first sample that a cell's pixels do not have;
     stop: (cells,) how many samples they will have.
     """
 
@@ -111,7 +111,7 @@ class Adaptive:
         self.stop[self.stop < samples] = samples
 
     def run(self, end: int, noise: float, on_batch: OnBatch) -> bool:
-        """Add samples until the noise is as low, or all pixels have `end`.
+        """Add samples until the noise is below a limit, or all pixels have `end`.
 
         noise: of a square's pixels the root of the mean square of the standard error of their
         luminance, relative to the mean luminance of the 4x4 pixels around. on_batch: see

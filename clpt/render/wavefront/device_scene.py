@@ -14,7 +14,7 @@ from clpt.render.lowering.scene import Lowered
 from clpt.render.wavefront import trees
 from clpt.render.wavefront.strategy import Strategy
 
-UPLOADED = tuple(name for name in TABLES if name != "instances")  # which clpt.bvh.Trees holds
+UPLOADED = tuple(name for name in TABLES if name != "instances")  # that one is of the trees
 
 
 class DeviceScene:

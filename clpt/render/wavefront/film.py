@@ -1,4 +1,4 @@
-"""A film on a device: sums of samples by pixel and plane, and the picture that is made of them."""
+"""A film on a device: sums of samples by pixel and plane, and the picture of them."""
 
 from __future__ import annotations
 

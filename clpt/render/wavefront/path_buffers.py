@@ -121,8 +121,8 @@ class PathBuffers:
         if not queued:
             return {}
         sizes = queues.sizes(queued, self.slots, kinds)
-        made = {name: self.buffers.allocate("the queues", 4 * n) for name, n in sizes.items()}
-        return {**made, **queues.numbers(self.slots)}
+        buffers = {name: self.buffers.allocate("the queues", 4 * n) for name, n in sizes.items()}
+        return {**buffers, **queues.numbers(self.slots)}
 
     def set_work_list(
         self, padded_pixels: work_list.PixelIndices, ends: work_list.PixelIndices | None = None

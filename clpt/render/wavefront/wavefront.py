@@ -28,10 +28,10 @@ from clpt.render.wavefront.film import Film
 from clpt.render.wavefront.path_buffers import GROUP, PathBuffers, divide_film
 from clpt.render.wavefront.strategy import Strategy, Tuning
 
-BATCH = 8  # bounces that are enqueued before counters are asked for
+BATCH = 8  # bounces that are enqueued between two reads of the counters
 CORE_BOUNCES = 1 << 16  # of all slots, that a core's part of a loop takes at once
 ENDLESS = 0xFFFFFFFF  # bounces of a loop that goes on till all paths have ended
-IDLE = {"samples": (0, 0), "bounces": 0, "restart": 0}  # of a loop that was asked for nothing
+IDLE = {"samples": (0, 0), "bounces": 0, "restart": 0}  # of a loop that has nothing to do
 
 
 @dataclass
@@ -158,7 +158,7 @@ class Wavefront:
             self._link(lowered, chosen)
 
     def bind_again(self, rebuilt: bool) -> None:
-        """Bind all kernels to the buffers that are there now; rebuilt: also build the programs."""
+        """Bind all kernels to the present buffers; rebuilt: build their programs again too."""
         has_stages, has_loop = self._stages is not None, self._loop is not None
         self._stages = self._loop = None
         if rebuilt:
@@ -312,7 +312,7 @@ class Wavefront:
         return device.link(self.device, texts, "loop", known)
 
     def _build(self, texts: dict[str, device.Source]) -> None:
-        """Build those programs that are not there yet."""
+        """Build those programs that are not built yet."""
         start = time.perf_counter()
         missing = {n: text for n, text in texts.items() if n not in self.programs}
         self.programs |= device.build_all(self.device, missing)
