@@ -264,8 +264,8 @@ class Renderer(Pictures):
         """
         with self._lock:
             self._closed = True
-            self.wavefronts, self._moving, self._adaptive = [], None, None
-            self.__dict__.pop("_resolve", None)
+            self.wavefronts = []
+            self._moving = self._adaptive = self._resolve = None
 
     def __enter__(self) -> Renderer:
         return self
