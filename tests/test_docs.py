@@ -148,6 +148,11 @@ def test_the_code_of_choosing(run: Run):
     assert 16 <= names["samples"].min() <= names["samples"].max() <= 256
 
 
+def test_the_code_of_architecture(run: Run, capsys: pytest.CaptureFixture):
+    run("architecture.md")
+    assert capsys.readouterr().out == "real True\n"
+
+
 def test_the_code_of_limits(run: Run):
     messages = run("limits.md")["messages"]
     assert "must be 1 to 65536" in messages[0] and "are more than 64 Mi pixels" in messages[1]
@@ -155,16 +160,16 @@ def test_the_code_of_limits(run: Run):
 
 LIMITS = (  # on the page, and where the code has them
     ("65 536 pixels", "clpt.cli.render", "LARGEST", 65536),
-    ("67 108 864 pixels", "clpt.render.checks", "LARGEST", 67108864),
+    ("67 108 864 pixels", "clpt.render.lowering.checks", "LARGEST", 67108864),
     ("| 1024 |", "clpt.scene.integrators", "MOST_BANDS", 1024),
-    ("| 4000 |", "clpt.render.lower", "DEEPEST", 4000),
+    ("| 4000 |", "clpt.render.lowering.settings", "DEEPEST", 4000),
     ("715 827 882", "clpt.bvh.build", "MOST", 715827882),
-    ("| 255 |", "clpt.render.outside", "MOST", 255),
+    ("| 255 |", "clpt.render.contract.custom_materials", "MOST", 255),
     ("| 32 |", "clpt.scene.textures", "MOST_OCTAVES", 32),
-    ("| 1 GiB a file |", "clpt.formats.packed", "LARGEST", 1 << 30),
-    ("| 65 536 bytes |", "clpt.formats.ply", "LONGEST_HEADER", 65536),
-    ("| 4096 corners |", "clpt.formats.ply", "MOST_CORNERS", 4096),
-    ("| 1 GiB |", "clpt.formats.strands", "LARGEST", 1 << 30),
+    ("| 1 GiB a file |", "clpt.formats.gzip_file", "LARGEST", 1 << 30),
+    ("| 65 536 bytes |", "clpt.formats.meshes.ply", "LONGEST_HEADER", 65536),
+    ("| 4096 corners |", "clpt.formats.meshes.ply", "MOST_CORNERS", 4096),
+    ("| 1 GiB |", "clpt.formats.meshes.strands", "LARGEST", 1 << 30),
     ("| 2 GiB | `is larger than 2048 MiB`", "clpt.formats.mitsuba.serialized", "LARGEST", 1 << 31),
     ("2^26 pixels each", "clpt.formats.gltf.textures", "PIXELS", 1 << 26),
     ("2^30 together", "clpt.formats.gltf.textures", "TOGETHER", 1 << 30),

@@ -171,8 +171,8 @@ def measure(
                 wrong[either] = wrong.get(either) or checks.any_hit(met, hits[layout])
         first = next(iter(hits.values()))
         for layout, found in hits.items():
-            told = truth.closest(found) or checks.differ(found, first)
-            wrong[f"{layout} {name} closest"] = told
+            complaint = truth.closest(found) or checks.differ(found, first)
+            wrong[f"{layout} {name} closest"] = complaint
         for figure, each in taken.items():
             yield _figure(figure, each, wrong[figure], copying, scene.name, len(rays))
 

@@ -14,7 +14,7 @@ from rich.table import Table
 
 from clpt.formats import load
 from clpt.formats.meshes import framing
-from clpt.render.lowering.geometry.shapes import triangles
+from clpt.render.lowering.geometry.triangles import triangulate
 
 from ..scene import Scene, materials, shapes, textures
 from ..scene.params import Kind
@@ -95,7 +95,7 @@ def _triangles(shape: shapes.Shape) -> int:
     if isinstance(shape, shapes.Mesh):
         return len(shape.faces)
     if isinstance(shape, shapes.Curves):
-        return len(triangles(shape)[1])
+        return len(triangulate(shape)[1])
     return FLAT_TRIANGLES.get(type(shape), 0)
 
 

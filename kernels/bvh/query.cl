@@ -1,4 +1,5 @@
-/* What each of an application's rays meets first, and whether it meets anything. */
+/* The nearest hit of each of an application's rays, and whether there is any, one ray a work-item: see
+ * bvh/query_rays.cl. */
 #include "bvh/query_rays.cl"
 #include "generated/layout.cl"
 #include "generated/instance_traversal.cl"

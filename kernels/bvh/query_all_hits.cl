@@ -1,5 +1,5 @@
-/* All that each of an application's rays meets: first how many hits there are, then, when the host has made
- * room for them, what they are. */
+/* All hits of each of an application's rays: first their number, then, when the host has allocated the arrays, the
+ * hits themselves: see bvh/query_rays.cl. */
 #include "bvh/query_rays.cl"
 #include "generated/layout.cl"
 

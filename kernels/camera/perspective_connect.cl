@@ -1,4 +1,4 @@
-/* A point as the pinhole sees it. */
+/* A point as the pinhole sees it: see film/connect.cl. */
 CameraPoint perspective_connect(global const PerspectiveCamera *camera, global const Settings *settings, vec3 p,
                                 mask away, vec2 lens)
 {

@@ -1,4 +1,4 @@
-/* A point as one point of the aperture sees it; a pixel gathers from all of them. */
+/* A point as one point of the aperture sees it: see film/connect.cl. A pixel gathers from all of the aperture. */
 CameraPoint thin_lens_connect(global const ThinLensCamera *camera, global const Settings *settings, vec3 p, mask away,
                               vec2 lens)
 {

@@ -1,4 +1,5 @@
-/* Arbitrary output values of the first surface, in three channels; CHANNEL says which. */
+/* Arbitrary output values of the first surface, in three channels; CHANNEL says which. Depth along the ray and position
+ * in metres. */
 #define CHANNEL_DEPTH 0
 #define CHANNEL_POSITION 1
 #define CHANNEL_GEOMETRIC_NORMAL 2

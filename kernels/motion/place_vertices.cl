@@ -1,7 +1,7 @@
-/* Shapes that move: their vertices and normals are written anew into the scene's tables.
+/* Shapes that move: their vertices [m] and normals are written anew into the scene's tables.
  *
- * A matrix is 16 floats, row after row, that take a shape's own space to the world; `begin` is the first
- * element of a thing in its buffer. Vertices `first` to first + count - 1 of the table are the shape's.
+ * A matrix is 16 floats, row after row, that take a shape's own space to the world; `<name>_begin` is the first element
+ * of `name` in its buffer. Vertices `first` to first + count - 1 of the table are the shape's.
  */
 #include "bvh/placed.cl"
 

@@ -1,4 +1,4 @@
-/* Which paths have ended since their slots were looked at last, for the stages that begin paths. */
+/* Which paths have ended in the last bounce, for the stages that begin paths. */
 #include "film/film.cl"
 
 typedef struct {

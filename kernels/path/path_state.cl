@@ -1,4 +1,5 @@
-/* Path.state: depth in bits 0 to 11, flags, and the number of shadow rays from bit 16 up. */
+/* What Path.state holds: depth in bits 0 to 11, flags, and the number of shadow rays from bit 16 up; and the dimensions
+ * of a sample. */
 #define PATH_DEPTH 0x0fff
 #define PATH_ALIVE 0x1000 /* a ray is in flight */
 #define PATH_FRESH 0x2000 /* no sample has been begun: there is nothing to deposit */

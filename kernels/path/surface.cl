@@ -1,4 +1,4 @@
-/* Where a path is: the point that a ray hit, with all that shading asks for. */
+/* The point of a surface that a ray hit, with all that shading asks for. */
 #include "path/surface_flags.cl"
 #include "tracing/trace_hit.cl"
 #include "generated/instances.cl"
@@ -10,7 +10,7 @@ typedef struct {
     vec3 dpdu;    /* along the surface's u; not normalised, may be zero */
     vec3 dpdv;    /* and along v */
     vec2 uv;
-    mask flipped; /* the back of a two-sided surface: ns points to where the front does not */
+    mask flipped; /* the back of a two-sided surface was hit, and ns negated */
     integer light; /* row in `lights`, -1: does not emit */
 #if USES_ATTRIBUTES
     integer attributes, face; /* of triangles, see texturing/texture_point.cl */
@@ -30,7 +30,7 @@ inline vec2 vertex_vec2(global const float *table, integer vertex)
 }
 
 /* The surface where the ray from `o` along `d` ends. `front` tells which side was hit. A two-sided
- * back is turned round, so that the BSDF sees a front. USES_NORMALS, USES_UVS and USES_TANGENTS say
+ * back has its normals negated, so that the BSDF sees a front. USES_NORMALS, USES_UVS and USES_TANGENTS say
  * what the scene needs; dpdu_of_shape and dpdv_of_shape are generated for its analytic shapes. */
 inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, mask *front)
 {

@@ -1,4 +1,4 @@
-/* Tracing the rays of a work-item's lanes through the 8-wide tree, all of them in flight, for a tree of
+/* Tracing the rays of a work-item's lanes through the 8-wide tree, interleaved, for a tree of
  * nothing but triangles that is larger than a processor's caches. Where most rays have about the direction of the one
  * before, they are traced one after another: see bvh/query_interleaved.cl. */
 #include "tracing/trace.cl"

@@ -18,7 +18,7 @@ from clpt.render.codegen import textures as texture_text
 from clpt.render.codegen.signatures import scene_text
 from clpt.render.contract import shape_records
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.geometry import shapes
+from clpt.render.lowering.geometry import analytic, triangles
 from clpt.render.lowering.lights import lights
 from clpt.render.lowering.spectra_table import STEP
 from tests.kernels.harness import opened
@@ -144,7 +144,7 @@ def lit(
         row["prim"] = first
         vertices = faces = uvs = None
         if shape.kind not in shape_records.ANALYTIC:
-            vertices, faces, _, uvs = shapes.triangles(shape)
+            vertices, faces, _, uvs = triangles.triangulate(shape)
             base = encoder.store.size("uvs") // 2
             encoder.store.append("faces", faces + np.uint32(base))
             encoder.store.append_floats("uvs", np.zeros((len(vertices), 2)) if uvs is None else uvs)
@@ -166,6 +166,6 @@ def lit(
 def shape_probe(shape) -> Lit:
     """A scene whose `geometry` holds one shape, and the kind's functions."""
     encoder = Encoder("rgb")
-    encoder.store.append("geometry", shapes.row(shape))
+    encoder.store.append("geometry", analytic.row(shape))
     none = lights.light_rows((), (), encoder, 1.0)
     return Lit(encoder, none, (f"generated/shape/{shape.kind}.cl",))

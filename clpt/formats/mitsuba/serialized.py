@@ -109,8 +109,8 @@ def _place(path: Path, data: bytes, index: int) -> tuple[int, int, int]:
         raise SceneError("has a broken table of meshes", file=path)
     if index >= count:
         raise SceneError(f"has no mesh {index}: it holds {count}", file=path)
-    places = [*np.frombuffer(data, f"<u{width}", count, table).tolist(), table]
-    first, end = places[index], places[index + 1]
+    offsets = [*np.frombuffer(data, f"<u{width}", count, table).tolist(), table]
+    first, end = offsets[index], offsets[index + 1]
     if not first + 4 <= end <= table or struct.unpack_from("<H", data, first)[0] != MAGIC:
         raise SceneError(f"has a broken mesh {index}", file=path)
     return first, end, version

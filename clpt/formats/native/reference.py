@@ -58,8 +58,8 @@ says the same to an editor: begin a file with `"$schema": "../schema.json"`.
 | `name` | for people, and for the names of pictures |
 
 Lengths are in metres, angles in degrees, wavelengths in nm. Names of files are relative to the
-scene file. A key that means nothing is an error, and so is a number outside its limits: the message
-names file, line and place.
+scene file. An unknown key is an error, and so is a number outside its limits: the message
+names file, line and path of the value.
 
 ## Values
 
@@ -117,8 +117,10 @@ def _spectra() -> list[str]:
         "Glasses and liquids": spectra.glasses(),
         'Metals (`"metal": name` or `{"file": name}` in place of `eta` and `k`)': spectra.metals(),
     }
-    told = [f"{what}: {', '.join(f'`{name}`' for name in known)}." for what, known in names.items()]
-    return ["\n".join(rows) + "\n", "\n\n".join(told) + "\n", *_reradiations()]
+    lists = [
+        f"{what}: {', '.join(f'`{name}`' for name in known)}." for what, known in names.items()
+    ]
+    return ["\n".join(rows) + "\n", "\n\n".join(lists) + "\n", *_reradiations()]
 
 
 def _reradiations() -> list[str]:

@@ -1,4 +1,4 @@
-"""Going through a PBRT file and those that it includes, within limits."""
+"""Reading a PBRT file and those that it includes, within limits."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Contents:
 
 
 class Files(Located):
-    """Goes through the files; `state` is the graphics state at the place it has come to."""
+    """Reads the files; `state` is the graphics state at the directive that is being read."""
 
     def __init__(self, path: Path):
         self.path = path
@@ -38,16 +38,16 @@ class Files(Located):
         self.state = State(self.contents.shared, path.parent)
         self.files: list[Path] = []
         self.count = self.bytes = 0
-        self.told: set[str] = set()
+        self.warned: set[str] = set()
         self.lexer: Lexer
         self.name = ""
 
     @abstractmethod
     def directive(self) -> None:
-        """Take the next directive and do what it says."""
+        """Take the next directive and carry it out."""
 
     def go_through(self, path: Path) -> None:
-        """Go through a file, which an Include may have named."""
+        """Read a file, which an Include may have named."""
         real = path.resolve()
         if real in self.files:
             raise self.lexer.error(f"{path.name} includes itself")
@@ -71,12 +71,12 @@ class Files(Located):
         return {"file": self.lexer.path, "line": self.lexer.line, "where": self.name}
 
     def warn(self, text: str) -> None:
-        """Remember what the picture will lack, with this place."""
-        place = f"{self.lexer.path.name}:{self.lexer.line}: {self.name}"
-        self.contents.shared.warnings.append(f"{place}: {text}")
+        """Warn of what the picture will lack, with this location."""
+        location = f"{self.lexer.path.name}:{self.lexer.line}: {self.name}"
+        self.contents.shared.warnings.append(f"{location}: {text}")
 
     def warn_once(self, text: str) -> None:
-        """The same, for the first time that it is said."""
-        if text not in self.told:
-            self.told.add(text)
+        """Warn, but only once of the same."""
+        if text not in self.warned:
+            self.warned.add(text)
             self.warn(text)

@@ -152,10 +152,10 @@ def _upward(image: np.ndarray) -> float:
     """
     centres = (np.arange(len(image)) + 0.5) / len(image)
     cosine = octahedral.to_sphere(np.stack(np.meshgrid(centres, centres), axis=-1))[..., 2]
-    found = 2.0 * np.pi * float((luminance(image) * np.maximum(cosine, 0.0)).mean())
-    if not found > 0.0:
+    lux = 2.0 * np.pi * float((luminance(image) * np.maximum(cosine, 0.0)).mean())
+    if not lux > 0.0:
         raise SceneError("the upper half of the image is dark, so it has no 'illuminance'")
-    return found
+    return lux
 
 
 def _goniometric(params: Parameters, state: State) -> Light:

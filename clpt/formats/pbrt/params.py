@@ -1,4 +1,4 @@
-"""The parameters of a directive: typed values by name, each with the place that it stands in."""
+"""The parameters of a directive: typed values by name, each with its file and line."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ class Parameter(Located):
 
 @dataclass(eq=False)
 class Parameters(Located):
-    """All parameters of a directive; what nothing asked for is left in `unused`.
+    """All parameters of a directive; `unused` has those that nothing has read.
 
     `label` names the directive for messages: `Shape "sphere"`. `defaults` are those that an
     `Attribute` directive gave for the target; they count where the directive has none of that name,
@@ -131,49 +131,49 @@ class Parameters(Located):
         return name in self._named
 
     def find(self, name: str, *types: str) -> Parameter | None:
-        """Take a parameter of one of the types, or None; an integer counts as a float.
+        """Take a parameter of one of the types, None without it; an integer counts as a float.
 
         Raises SceneError where it has another type.
         """
         self._asked.add(name)
-        found = self._named.get(name)
-        if found is None:
+        parameter = self._named.get(name)
+        if parameter is None:
             return None
-        found.used = True
-        as_float = found.type == "integer" and "float" in types
-        if types and found.type not in types and not as_float:
-            raise found.error(f"must be of the type {' or '.join(types)}, not {found.type}")
-        return found
+        parameter.used = True
+        as_float = parameter.type == "integer" and "float" in types
+        if types and parameter.type not in types and not as_float:
+            raise parameter.error(f"must be of the type {' or '.join(types)}, not {parameter.type}")
+        return parameter
 
     def one(self, name: str, type: str, default: Any) -> Any:
         """Take one value, or `default`: a float, int, bool, str, or an array (2,) or (3,)."""
-        found = self.find(name, type)
-        if found is None:
+        parameter = self.find(name, type)
+        if parameter is None:
             return default
         if type == "bool":
-            return found.truth()
+            return parameter.truth()
         if type in TEXTS:
-            return found.text()
+            return parameter.text()
         size = SIZES[type]
         if type == "integer":
-            whole = found.whole()
+            whole = parameter.whole()
             if len(whole) != 1:
-                raise found.error(f"must be one whole number, not {len(whole)}")
+                raise parameter.error(f"must be one whole number, not {len(whole)}")
             return int(whole[0])
-        values = found.numbers(size)
+        values = parameter.numbers(size)
         return values[0] if size == 1 else np.array(values)
 
     def several(self, name: str, type: str) -> Any:
         """Take all values, or None: (n,), (n, 2) or (n, 3) as the type has it, or a list of str."""
-        found = self.find(name, type)
-        return None if found is None else found.rows()
+        parameter = self.find(name, type)
+        return None if parameter is None else parameter.rows()
 
     def choice(self, name: str, default: str, choices: Iterable[str]) -> str:
         """Take a string that is one of `choices`."""
         value = self.one(name, "string", default)
         if value not in choices:
-            found = self._named.get(name, self)
-            raise found.error(f"{value[:40]!r} is none of {', '.join(choices)}")
+            source: Located = self._named.get(name, self)
+            raise source.error(f"{value[:40]!r} is none of {', '.join(choices)}")
         return str(value)
 
     def above_zero(self, name: str, default: float) -> float:

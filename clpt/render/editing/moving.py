@@ -22,7 +22,7 @@ from clpt.render.editing.moving_instances import Boxes, Location, MovingInstance
 from clpt.render.editing.moving_spheres import MovingSpheres
 from clpt.render.editing.scene_edit import Replacements
 from clpt.render.lowering.device_arrays import on_device
-from clpt.render.lowering.geometry import shapes
+from clpt.render.lowering.geometry import analytic, shapes, triangles
 from clpt.render.lowering.geometry.tessellate import keeps_its_kind
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene import Scene
@@ -179,7 +179,7 @@ class Moving:
             if not ranges.whole:
                 raise CannotMove(f"{name} has triangles without an area")
             if not on_device(new.vertices):
-                points = shapes.points(new)
+                points = triangles.points(new)
                 if len(points) != count:
                     raise CannotMove(f"{name} has {len(points)} vertices, and had {count}")
         return [lambda: self._move_vertices(ranges, new, points, matrix, device_matrix)]
@@ -206,7 +206,7 @@ class Moving:
     def _plan_single(self, ranges: _Ranges, shape: Shape) -> Callable[[Boxes], None]:
         """What gives a sphere, disk or cylinder other parameters and another box."""
         lowered, first_word = self.target.lowered, int(ranges.row["params"])
-        words, box = shapes.row(shape), np.stack(shapes.bounds(shape))
+        words, box = analytic.row(shape), np.stack(analytic.bounds(shape))
         rows = lowered.tables["shapes"].view(SHAPE.dtype)
         first = int(lowered.settings["first_analytic"])
         number = int(np.flatnonzero(rows["params"][first:] == first_word)[0])
@@ -259,7 +259,7 @@ class Moving:
             device_matrix = device_matrix or self._upload_matrix(ranges, matrix)
             self._run("vertices", ranges, self._local(ranges, "vertices"), device_matrix)
         if ranges.row["flags"] & _NORMALS:
-            if shapes.smooth(ranges.shape):
+            if triangles.smooth(ranges.shape):
                 self._smooth(ranges)
             else:
                 device_matrix = device_matrix or self._upload_matrix(ranges, matrix)
@@ -298,7 +298,7 @@ class Moving:
             ranges.local = vertices, {}
         buffers = ranges.local[1]
         if name not in buffers:
-            points, _, normals, _ = shapes.local(shape)
+            points, _, normals, _ = triangles.local(shape)
             array: Any = points if name == "vertices" else normals
             what = f"{name} of a shape that moves"
             buffers[name] = self.target.buffers.upload(what, array, np.float32)

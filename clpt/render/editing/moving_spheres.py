@@ -16,7 +16,7 @@ from clpt.records import SHAPE
 from clpt.render.editing.cannot_move import CannotMove
 from clpt.render.editing.moving_instances import Boxes
 from clpt.render.lowering.device_arrays import as_array, on_device
-from clpt.render.lowering.geometry import shapes, spheres
+from clpt.render.lowering.geometry import analytic, shapes, spheres
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene.shapes import Spheres
 
@@ -77,8 +77,8 @@ class MovingSpheres:
         self.building.run_each(
             _ROOT, "place_spheres", self._count(row), source=source, source_begin=offset,
             columns=centers.shape[1], matrix=np.asarray(matrix, np.float32).ravel(),
-            scale=float(common.view(np.float32)[shapes.member("sphere", "radius")]),
-            padding=shapes.PADDING, first=prim - int(scene.lowered.settings["single_count"]),
+            scale=float(common.view(np.float32)[analytic.member("sphere", "radius")]),
+            padding=analytic.PADDING, first=prim - int(scene.lowered.settings["single_count"]),
             first_box=prim, spheres=scene.tables["spheres"], boxes=boxes,
         )  # fmt: skip
 

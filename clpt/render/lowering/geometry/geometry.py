@@ -14,7 +14,7 @@ from clpt.errors import SceneError
 from clpt.records import SHAPE
 from clpt.render.contract import shape_records
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.geometry import instancing, shapes, spheres
+from clpt.render.lowering.geometry import analytic, instancing, shapes, spheres, triangles
 from clpt.render.lowering.geometry.instancing import Instances, Placed, Prototype
 from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.lights.lights import Emitter
@@ -75,9 +75,9 @@ def lower_geometry(index: SceneIndex, encoder: Encoder, materials: MaterialWords
     """
     kinds = shape_records.ANALYTIC
     meshes = [one for one in index.placed if one.shape.kind not in kinds]
-    analytic = [one for one in index.placed if one.shape.kind in kinds]
-    analytic.sort(key=lambda one: one.shape.kind in shape_records.ONE_OF)
-    single = [one for one in analytic if one.shape.kind not in shape_records.ONE_OF]
+    others = [one for one in index.placed if one.shape.kind in kinds]
+    others.sort(key=lambda one: one.shape.kind in shape_records.ONE_OF)
+    single = [one for one in others if one.shape.kind not in shape_records.ONE_OF]
     builder = _Builder(encoder, materials, len(single))
     for one in meshes:
         builder.add(one)
@@ -85,9 +85,9 @@ def lower_geometry(index: SceneIndex, encoder: Encoder, materials: MaterialWords
     instances = instancing.concatenated([builder.share(p) for p in index.prototypes])
     encoder.store.append("instances", instances.rows.view(np.uint32))
     first_analytic = len(builder.rows)
-    for one in analytic:
+    for one in others:
         builder.add(one)
-    boxes = [shapes.bounds(one.shape) for one in single]
+    boxes = [analytic.bounds(one.shape) for one in single]
     vertices, faces, tags = builder.concatenated()
     return Geometry(
         rows=tuple(builder.rows),
@@ -103,10 +103,10 @@ def lower_geometry(index: SceneIndex, encoder: Encoder, materials: MaterialWords
         world_vertices=world_vertices,
         first_analytic=first_analytic,
         single_count=len(single),
-        analytic=frozenset(one.shape.kind for one in analytic),
+        analytic=frozenset(one.shape.kind for one in others),
         normals=builder.normals,
         uvs=builder.uvs,
-        warnings=tuple(shapes.warnings_of(builder.flat)),
+        warnings=tuple(triangles.warnings_of(builder.flat)),
     )
 
 
@@ -120,8 +120,8 @@ class _Builder:
     rows: list[np.ndarray] = field(default_factory=list)
     owners: list[Owner] = field(default_factory=list)
     emitters: list[Emitter] = field(default_factory=list)
-    triangles: list[tuple[np.ndarray, np.ndarray, int]] = field(default_factory=list)
-    flat: list[shapes.Flat] = field(default_factory=list)
+    parts: list[tuple[np.ndarray, np.ndarray, int]] = field(default_factory=list)
+    flat: list[triangles.Flat] = field(default_factory=list)
     balls: list[spheres.Balls] = field(default_factory=list)
     vertex_count: int = 0
     face_count: int = 0
@@ -141,7 +141,7 @@ class _Builder:
             corners = self._add_triangles(shape, row)
         else:
             row["kind"] = 1 + shape_records.ANALYTIC.index(shape.kind)
-            row["params"] = self.encoder.store.append("geometry", shapes.row(shape))
+            row["params"] = self.encoder.store.append("geometry", analytic.row(shape))
             many = shape.kind in shape_records.ONE_OF
             corners = self._add_balls(shape, row) if many else (None, None, None)
         if shape.emission is not None:
@@ -161,7 +161,7 @@ class _Builder:
 
     def _add_triangles(self, shape: Any, row: np.ndarray) -> tuple[Any, Any, Any]:
         """Append a shape's triangles; return their vertices, faces and uvs."""
-        made = self.encoder.cache(shapes.counted, shape, by=shapes.geometry(shape))
+        made = self.encoder.cache(triangles.counted, shape, by=shapes.geometry(shape))
         vertices, faces, normals, uvs, flat = made
         self.flat += flat
         row["prim"] = self.face_count
@@ -172,22 +172,22 @@ class _Builder:
         self.encoder.store.append_floats("uvs", zeros[:, :2] if uvs is None else uvs)
         self.normals |= normals is not None
         moved = faces + np.uint32(self.vertex_count)
-        self.triangles.append((vertices, moved, len(self.rows)))
+        self.parts.append((vertices, moved, len(self.rows)))
         self.vertex_count += len(vertices)
         self.face_count += len(faces)
         return vertices, faces, uvs
 
     def share(self, prototype: Prototype) -> instancing.Shared:
         """Append the rows of shapes that instances share, and their triangles once."""
-        before, first = len(self.triangles), self.face_count
+        before, first = len(self.parts), self.face_count
         for shape in prototype.shapes:
             self.add(Placed(shape, 0))
-        own = self.triangles[before:]
+        own = self.parts[before:]
         whole, centre = instancing.centred(np.concatenate([v for v, _, _ in own]))
         points = instancing.hull_points(whole)
         placed, boxes = instancing.place(prototype.to_world, prototype.numbers, points, centre)
         ends = np.cumsum([len(v) for v, _, _ in own])[:-1]
-        self.triangles[before:] = [
+        self.parts[before:] = [
             (moved, faces, number)
             for moved, (_, faces, number) in zip(np.split(whole, ends), own, strict=True)
         ]
@@ -201,10 +201,10 @@ class _Builder:
                 f"{self.face_count:,} triangles with {self.vertex_count:,} vertices: of either "
                 f"there may be {MOST:,}; use instances for what repeats"
             )
-        if not self.triangles:
+        if not self.parts:
             return np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint32), np.zeros(0, np.uint32)
-        vertices, faces, numbers = zip(*self.triangles, strict=True)
-        self.triangles.clear()
+        vertices, faces, numbers = zip(*self.parts, strict=True)
+        self.parts.clear()
         tags = [np.full(len(f), n, np.uint32) for f, n in zip(faces, numbers, strict=True)]
         return np.concatenate(vertices), np.concatenate(faces), np.concatenate(tags)
 

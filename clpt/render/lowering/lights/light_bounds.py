@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt.render.lowering.geometry import shapes
+from clpt.render.lowering.geometry import analytic, shapes
 from clpt.scene import lights
 from clpt.scene.lights import Light
 from clpt.scene.shapes import Shape
@@ -66,10 +66,10 @@ def of_lamp(lamp: Light) -> Bounds:
 
 def of_shape(shape: Shape, two_sided: bool) -> Bounds:
     """Return the bounds (1) of a shape that is sampled as a whole."""
-    low, high = (np.asarray(corner, np.float64) for corner in shapes.bounds(shape))
+    low, high = (np.asarray(corner, np.float64) for corner in analytic.bounds(shape))
     if shape.kind in ("sphere", "cylinder"):
         return _one(low, high=high)
-    axis = shapes.facing(shape)
+    axis = analytic.facing(shape)
     return _one(low, axis, 0.0, np.pi / 2.0, high=high, both=two_sided)
 
 

@@ -18,7 +18,7 @@ from clpt.records import LIGHT
 from clpt.render.contract import shape_records
 from clpt.render.contract.light_records import ALONG, BOTH, FRONT, INFINITE, KINDS
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.geometry import shapes, spheres
+from clpt.render.lowering.geometry import analytic, shapes, spheres, triangles
 from clpt.render.lowering.lights import light_bounds, light_tree
 from clpt.render.lowering.lights.non_shape_lights import blank_row, brightness, lower_lamp
 from clpt.render.lowering.lights.triangle_means import triangle_means
@@ -154,24 +154,24 @@ def _emitter_block(emitter: Emitter, encoder: Encoder) -> Block:
     radiance = encoder.store.append("light_params", encoder.emission_words(value))
     strength = {FRONT: np.pi, ALONG: 1.0, BOTH: 2.0 * np.pi}[emission_mode]
     if _whole(shape):
-        at = encoder.store.append("geometry", shapes.row(shape))
+        at = encoder.store.append("geometry", analytic.row(shape))
         rows = _block(1, shape.kind, at, radiance, emitter.shape_row)
         rows["emission_mode"] = emission_mode
         bounds = light_bounds.of_shape(shape, emission_mode == BOTH)
-        return Block(rows, np.array([strength * shapes.area(shape) * brightness(value)]), bounds)
+        return Block(rows, np.array([strength * analytic.area(shape) * brightness(value)]), bounds)
     if shape.kind in shape_records.ONE_OF:
         return _balls_block(emitter, encoder, emission_mode, radiance, strength * brightness(value))
     if emitter.vertices is None or emitter.faces is None:
         raise SceneError("its triangles are missing", where=shapes.where(shape))
     cache, corners = encoder.cache, (emitter.vertices, emitter.faces)
-    geometry = cache(shapes.triangle_rows, *corners)
+    geometry = cache(triangles.triangle_rows, *corners)
     count, words = geometry.shape
     at = encoder.store.append("geometry", geometry) + words * np.arange(count)
     rows = _block(count, "triangle", at, radiance, emitter.shape_row)
     rows["emission_mode"] = emission_mode
     bounds = cache(light_bounds.of_triangles, *corners, emission_mode == BOTH)
     bright = cache(triangle_means, value, emitter.uvs, emitter.faces)
-    areas = cache(shapes.triangle_areas, *corners)
+    areas = cache(triangles.triangle_areas, *corners)
     return Block(rows, strength * areas * bright, bounds)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from clpt import spectra
 from clpt.errors import SceneError
 from clpt.render.contract import shape_records
-from clpt.render.lowering.geometry import shapes
+from clpt.render.lowering.geometry import shapes, triangles
 from clpt.render.lowering.lowering_cache import LoweringCache
 from clpt.render.lowering.textures.texels import texels
 from clpt.render.lowering.textures.textures import TextureTable, per_face
@@ -76,7 +76,7 @@ def _names(shape: Shape) -> set[str]:
 
 
 def _words(shape: Shape, name: str, role: str, spectral: bool) -> np.ndarray:
-    values: np.ndarray = shapes.attribute(shape, name)
+    values: np.ndarray = triangles.attribute(shape, name)
     if role == "real" and values.shape[1] == 3:
         values = spectra.luminance(values)[:, None]
     return texels(values[:, None].astype(np.float32), role, spectral).view(np.uint32)

@@ -16,8 +16,8 @@ from clpt.errors import SceneError
 from clpt.formats.native import save
 from clpt.records import INSTANCE, SHAPE
 from clpt.render.lowering.geometry import instancing
-from clpt.render.lowering.geometry.shapes import triangles
 from clpt.render.lowering.geometry.tessellate import tessellate
+from clpt.render.lowering.geometry.triangles import triangles
 from clpt.render.lowering.scene import lower
 from clpt.scene import Scene
 from clpt.scene.cameras import Perspective
