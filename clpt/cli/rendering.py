@@ -10,7 +10,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-from ..render.renderer import Progress, Renderer
+from ..render.progress import Progress
+from ..render.renderer import Renderer
 
 PASS_SECONDS = 5.0  # at the end of a pass few paths are left: long passes make that rare
 GROWTH = 3  # times what has been rendered so far

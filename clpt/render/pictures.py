@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from typing import Any
 
 import numpy as np
@@ -34,6 +33,7 @@ class Pictures(DeviceOwner):
     device: dev.Device
     channels: tuple[str, ...]
     wavefronts: list[Wavefront]
+    _resolve: Resolve | None = None  # built when a picture is first resolved
 
     @property
     @synchronized
@@ -78,15 +78,13 @@ class Pictures(DeviceOwner):
         """
         if channel is not None and channel not in self.channels:
             raise UnknownKindError("channel", channel, self.channels)
+        if self._resolve is None:
+            self._resolve = Resolve(self.device, self.wavefronts[0].stream)
         return self._resolve(
             self.films[channel] if channel else self.film, into, dtype=dtype, exposure=exposure,
             tone=tone, srgb=srgb, flip=flip, wait_for=wait_for,
             space="rec709" if self.channels else self.scene.film.output_space,
         )  # fmt: skip
-
-    @functools.cached_property
-    def _resolve(self) -> Resolve:
-        return Resolve(self.device, self.wavefronts[0].stream)
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         """`image()`, for numpy.asarray(renderer): a copy, which waits."""

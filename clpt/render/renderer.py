@@ -28,6 +28,7 @@ from clpt.render.editing.scene_edit import (
 from clpt.render.locking import synchronized
 from clpt.render.lowering.scene import lower
 from clpt.render.pictures import Image, Pictures
+from clpt.render.progress import Progress
 from clpt.render.stats import RenderStats, collect
 from clpt.render.wavefront import adaptive
 from clpt.render.wavefront.wavefront import Wavefront
@@ -39,22 +40,6 @@ from clpt.scene.materials import Material
 log = logging.getLogger(__name__)
 
 TEXTURE_SHARE = 0.5  # of a device's free memory, for bitmaps
-
-
-@dataclasses.dataclass(frozen=True)
-class Progress:
-    """How far a render is.
-
-    samples, total: per pixel, in the mean; paths: samples of all pixels; rays: traced so far;
-    seconds: since the first; active: the share of the pixels that are not finished.
-    """
-
-    samples: float
-    total: int
-    paths: int
-    rays: int
-    seconds: float
-    active: float = 1.0
 
 
 class Renderer(Pictures):
@@ -264,8 +249,8 @@ class Renderer(Pictures):
         """
         with self._lock:
             self._closed = True
-            self.wavefronts, self._moving, self._adaptive = [], None, None
-            self.__dict__.pop("_resolve", None)
+            self.wavefronts = []
+            self._moving = self._adaptive = self._resolve = None
 
     def __enter__(self) -> Renderer:
         return self
