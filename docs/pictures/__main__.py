@@ -21,6 +21,7 @@ from clpt.render.aov_preview import sheet as aov_sheet
 from . import sheet, table
 
 DOCS = Path(__file__).parents[1]
+LARGE = 26_000  # bytes
 
 
 def main(names: list[str]) -> None:
@@ -31,7 +32,7 @@ def main(names: list[str]) -> None:
         began = time.time()
         file = table.FOLDER / f"{name}.png"
         file.parent.mkdir(parents=True, exist_ok=True)
-        render(picture).save(file, optimize=True)
+        save(render(picture), file)
         size, took = file.stat().st_size / 1e3, time.time() - began
         print(f"{name}: {size:.0f} kB, {took:.0f} s", flush=True)
     captions = {name: picture.caption for name, picture in pictures.items()}
@@ -42,12 +43,19 @@ def main(names: list[str]) -> None:
 
 
 def render(picture: table.Picture) -> Image.Image:
-    """Return the picture with 256 colours of its own, which halves its file."""
     with clpt.Renderer(picture.scene()) as renderer:
         renderer.run(picture.spp)
         image = aov_sheet(renderer.layers()) if renderer.channels else renderer.image()
-    values = images.to_srgb8(image).repeat(picture.zoom, 0).repeat(picture.zoom, 1)
-    return Image.fromarray(values).quantize(256, dither=Image.Dither.NONE)
+    return Image.fromarray(images.to_srgb8(image).repeat(picture.zoom, 0).repeat(picture.zoom, 1))
 
 
-main(sys.argv[1:])
+def save(image: Image.Image, file: Path) -> None:
+    """Write the picture; where its file would be large, with 256 colours of its own."""
+    image.save(file, optimize=True)
+    if file.stat().st_size > LARGE:
+        few = image.quantize(256, Image.Quantize.MAXCOVERAGE, 3, dither=Image.Dither.NONE)
+        few.save(file, optimize=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -52,9 +52,9 @@ def traced(caption: str, integrator: integrators.Integrator, *, spp: int = 128) 
 
     def scene() -> Scene:
         lamp = shapes.Rectangle(
-            to_world=translate([0, 1.98, 0]) @ rotate([1, 0, 0], 90) @ scale([0.36, 0.27, 1]),
+            to_world=translate([0, 1.98, 0]) @ rotate([1, 0, 0], 90) @ scale([0.6, 0.4, 1]),
             material=BLACK,
-            emission=lights.Area(radiance=(13.0, 12.0, 10.0)),
+            emission=lights.Area(radiance=(6.0, 5.6, 4.8)),
         )
         point = lights.Point(position=(0.0, 1.9, 0.2), intensity=(1.6, 1.5, 1.3))
         whitted = isinstance(integrator, integrators.Whitted)
@@ -113,7 +113,9 @@ def filtered(caption: str, chosen: integrators.Filter) -> Picture:
 
 
 INTEGRATORS = {
-    "path": traced("All light: from wall to wall, by glass and mirrors.", integrators.Path()),
+    "path": traced(
+        "All light: from wall to wall, by glass and mirrors.", integrators.Path(), spp=256
+    ),
     "direct": traced("Straight from the lamp: the ceiling stays dark.", integrators.Direct()),
     "whitted": traced(
         "A point light: hard shadows, mirrors, glass, and the same ambient light everywhere.",

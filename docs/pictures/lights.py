@@ -115,7 +115,7 @@ LIGHTS = {
     "directional_area": lit(
         "A disk sends a beam through the room, by the `particle_tracer`.",
         integrator=integrators.ParticleTracer(),
-        extra=[beam(look_at([1.6, 3.4, 3.6], [-0.35, 0.9, -1.0], UP) @ scale(0.8), 7.0)],
+        extra=[beam(look_at([1.6, 3.4, 3.6], [-0.35, 0.9, -1.0], UP) @ scale(1.0), 4.0)],
         spp=128,
     ),
     "point": lit(

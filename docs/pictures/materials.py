@@ -161,7 +161,7 @@ def strips() -> Shapes:
 
 
 def blue_lamp() -> Shapes:
-    return [panel(3.0, [-2.4, 4.6, 4.0], [0, 0.5, 0], spectra.LED(445.0, 22.0, 0.9))]
+    return [panel(3.0, [-2.4, 4.6, 4.0], [0, 0.5, 0], spectra.LED(450.0, 22.0, 20.0))]
 
 
 CHECKS = np.diag([10.0, 8.0, 1.0])
@@ -258,7 +258,7 @@ MATERIALS = {
         *each(Fluorescent, "amount", (0.0, 0.4, 1.0), **dye()),
         mode="spectral",
         lamps=blue_lamp(),
-        dim=0.03,
+        dim=0.05,
     ),
     "hair": three(
         "`sigma_a` of blond, red and black hair.",

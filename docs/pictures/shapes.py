@@ -32,10 +32,15 @@ def alone(caption: str, make: Callable[[], Sequence[shapes.Shape]]) -> Picture:
 
 def meshes() -> list[shapes.Shape]:
     """The same ball, coarse: flat, and with smooth normals."""
-    ball = lathe([*arc(0.0, 0.0, 0.7, -90.0, 90.0, 9)], around=14)
-    parts = {name: ball[name] for name in ("vertices", "faces", "uvs")}
+    ball = lathe([*arc(0.0, 0.0, 0.7, -90.0, 90.0, 8)], around=12)
+    parts = {name: ball[name] for name in ("vertices", "faces")}
     return [
-        shapes.Mesh(**parts, normals=normals, material=chart(), to_world=translate([x, 0.7, 0.0]))
+        shapes.Mesh(
+            **parts,
+            normals=normals,
+            material=Diffuse(reflectance=(0.7, 0.45, 0.2)),
+            to_world=translate([x, 0.7, 0.0]),
+        )
         for x, normals in ((-0.78, None), (0.78, ball["normals"]))
     ]
 

@@ -79,7 +79,7 @@ def arc(x: float, y: float, radius: float, start: float, end: float, steps: int)
 
 
 def knob(material: Any, x: float = 0.0, z: float = 0.0) -> shapes.Mesh:
-    """A ball of radius 0.56 on a foot with a thin rim, 1.5 high: closed, smooth but for the rim."""
+    """A ball of radius 0.56 on a foot with a thin rim, 1.5 high, just above the floor."""
     pieces = (
         [(0.0, 0.0), (0.58, 0.0)],
         [(0.58, 0.0), (0.58, 0.09)],
