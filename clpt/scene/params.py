@@ -45,7 +45,8 @@ DEVICE_ROLES = (
 )  # fmt: skip
 # What a host parameter holds. clpt/formats/native/forms.py reads, writes and describes each form.
 HostForm = Literal[
-    "boolean", "integer", "number", "text", "names", "numbers", "vector", "matrix3", "matrix4",
+    "boolean", "integer", "number", "text", "names", "numbers",
+    "vector", "direction", "matrix3", "matrix4",
     "material", "texture", "filter", "area_light", "group",
     "rows2", "rows3", "rows4", "triangles", "attributes", "number_or_list", "lengths",
     "image", "cube_images", "crop", "sensor", "white_balance",

@@ -49,7 +49,7 @@ def test_observers(name: str, light: Tabulated) -> None:
 
 @pytest.mark.parametrize("mode", ["spectral", "rgb"])
 def test_white_balance_makes_white(mode: str) -> None:
-    """A light of that colour is (1, 1, 1) (tests/render/lowering/camera/test_colour.py: in every space)."""
+    """A light of that colour is (1, 1, 1) (in every space: see test_colour.py)."""
     light = spectra.illuminant("A")
     images = exposures(sky(light, mode=mode, white_balance="A", output_space="acescg"), 24, 64)
     assert_mean(images, np.ones(3), 0.01, 1e-3)

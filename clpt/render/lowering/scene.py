@@ -46,10 +46,10 @@ class Lowered:
 
     vertices (n, 3) float32, faces (m, 3) uint32, tags (m,) uint32, boxes (k, 2, 3) float32 and
     instances: what trees are built of, see `Geometry`. tables: every other read-only array by name;
-    where an instance's tree begins is filled in when trees are built. zero_copy: tables that are the
-    caller's buffers. owners: of each row of `shapes`. glass_row: of the camera, see `lower_camera`.
-    encoder: what made the tables, for values that are edited. cache: what the next lowering need not
-    make again.
+    where an instance's tree begins is filled in when trees are built. zero_copy: tables that are
+    the caller's buffers. owners: of each row of `shapes`. glass_row: of the camera, see
+    `lower_camera`. encoder: what made the tables, for values that are edited. cache: what the next
+    lowering need not make again.
     """
 
     features: Features

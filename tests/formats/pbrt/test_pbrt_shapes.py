@@ -257,7 +257,10 @@ def test_broken_shapes_say_where(scene, text, message):
 
 def test_what_is_passed_over_is_told_once(scene):
     found = scene('Shape "sphere" "float raduis" 2\n' + 'Shape "sphere" "float zmin" 1\n' * 3)
-    unknown = "a.pbrt:2: Shape \"sphere\": 'raduis': is not known here and is left out; did you mean 'radius'?"
+    unknown = (
+        "a.pbrt:2: Shape \"sphere\": 'raduis': is not known here and is left out; did you mean "
+        "'radius'?"
+    )
     assert unknown in found.warnings
     assert scene('Shape "sphere" "float zmin" 1').shapes == []
     assert next(text for text in found.warnings if "no area" in text).endswith("(in 3 places)")

@@ -159,7 +159,7 @@ def triangle_rows(vertices: Points, faces: Faces) -> Words:
 
 
 def local(shape: Shape) -> tuple[Points, Faces, Points | None, Points | None]:
-    """Return vertices, faces, normals and uvs before the transform; raises as `triangulate` does."""
+    """Return vertices, faces, normals and uvs before the transform, as `triangulate` does."""
     if isinstance(shape, shapes.Mesh):
         return _mesh(shape)
     if isinstance(shape, shapes.Curves):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -61,6 +62,10 @@ def of_lamp(lamp: Light) -> Bounds:
         if isinstance(lamp, lights.Projector):
             return _one(place, axis, np.pi / 2.0, NARROW)
         return _one(place)
+    if lamp.reach == "placed" and not isinstance(lamp, lights.Point):
+        own: Any = lamp
+        position = own.to_world[:3, 3] if hasattr(lamp, "to_world") else own.position
+        return _one(np.asarray(position, np.float64))
     return _one(np.zeros(3), placed=False)
 
 

@@ -86,8 +86,8 @@ def light_rows(
     """Put the parameters of all lights into the tables, and make the rows of `lights`.
 
     scene_radius: of a sphere around the scene [m]; tree_from: the number of rows from which a tree
-    chooses among them, or 1 / PLACED_LIGHT_WEIGHT of it of lights at places. Raises SceneError for a light that
-    has no place.
+    chooses among them, or 1 / PLACED_LIGHT_WEIGHT of it of lights at places. Raises SceneError for
+    a light that has no place.
     """
     if encoder.store.append("light_params", blank_row()) != 0:
         raise ValueError("`light_params` must be empty before the lights are put in")

@@ -1,7 +1,7 @@
 """Material words: what a hit finds its material by, for each side of a shape.
 
-The upper 8 bits of a word are the number of a leaf kind, or MIXTURE; the lower 24 bits are the first
-word of a row in `materials`, or in `mixtures`.
+The upper 8 bits of a word are the number of a leaf kind, or MIXTURE; the lower 24 bits are the
+first word of a row in `materials`, or in `mixtures`.
 """
 
 from __future__ import annotations

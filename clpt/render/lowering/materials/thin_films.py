@@ -1,10 +1,10 @@
 """Thin films in RGB mode: a table of the colours that they reflect and let through.
 
-In spectral mode the kernels sum the waves themselves (kernels/optics/thin_film.cl). In RGB mode there
-are no waves to sum: the host does it for every angle, and thickness where a texture varies it, and
-integrates what is reflected and what goes through over the wavelengths of D65, as an RGB renderer
-sees all reflectances. Belcour and Barla 2017 integrate on the device, by a Fourier series of the
-observer; a table is exact, and as fast.
+In spectral mode the kernels sum the waves themselves (kernels/optics/thin_film.cl). In RGB mode
+there are no waves to sum: the host does it for every angle, and thickness where a texture varies
+it, and integrates what is reflected and what goes through over the wavelengths of D65, as an RGB
+renderer sees all reflectances. Belcour and Barla 2017 integrate on the device, by a Fourier series
+of the observer; a table is exact, and as fast.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ def film_colours(material: Kind) -> NDArray[np.float32]:
     """Return what a material's layers reflect and let through under D65, linear Rec. 709.
 
     (parts, profiles, FILM_COSINES, 6) float32: r and t; the parts are those of
-    kernels/optics/boundary_table.cl, a metal has only the first. Profiles and cosines are even from 0
-    to 1; where no texture varies the thickness there is one profile.
+    kernels/optics/boundary_table.cl, a metal has only the first. Profiles and cosines are even from
+    0 to 1; where no texture varies the thickness there is one profile.
     """
     layers: tuple[Layer, ...] = material.layers  # type: ignore[attr-defined]
     textured = [layer for layer in layers if _textured(layer)]

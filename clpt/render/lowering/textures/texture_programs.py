@@ -100,7 +100,7 @@ class _Writer:
         self.role, self.store, self.spectra, self.lower = role, store, spectra_, lower
 
     def code(self, value: Any, use: str) -> tuple[Code, int]:
-        """Instructions that push a value, and how many values they stack; use: an operand's name."""
+        """Instructions that push a value, and how many they stack; use: an operand's name."""
         if isinstance(value, Product):
             second = "factor" if use == "own" and self.role == "emission" else use
             return self._joined([(value.first, use)], (value.second, second), "multiply")
