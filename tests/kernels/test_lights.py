@@ -258,7 +258,24 @@ def skies(seed: int = 3):
         "envmap": Envmap(image=wide, to_world=TURNED),
         "cube_map": CubeMap(image=faces, to_world=TURNED @ T.scale([-1, 1, 1])),
         "one_row": Envmap(image=wide[:1]),
+        **{
+            f"default {kind}": cls()
+            for kind, cls in light_records.DECLARED.items()
+            if cls.reach == "infinite" and cls is not Constant
+        },
     }
+
+
+@pytest.mark.parametrize("kind", light_records.DECLARED)
+def test_samples_of_declared_lights(kind):
+    """Unit directions, and finite light that is there or not."""
+    lamp = light_records.DECLARED[kind]()
+    r = samples(lit([lamp]), (0.3, -0.4, 0.5), 512)
+    shines = r[4] != 0.0
+    assert np.isfinite(r).all() and (r[3] > 0.0).all() and (r[5:] >= 0.0).all() and shines.any()
+    np.testing.assert_allclose(np.linalg.norm(r[:3], axis=0), 1.0, atol=1e-5)
+    if lamp.reach == "infinite":
+        assert (r[4] > 0.0).all()
 
 
 @pytest.mark.parametrize("name", skies())
