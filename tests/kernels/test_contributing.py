@@ -48,7 +48,7 @@ def test_the_example_is_a_material(mode):
 
 @pytest.mark.slow
 def test_the_example_is_a_light(tmp_path: Path):
-    """In a copy of the package: the light that a horizontal ground reflects, against its integral."""
+    """In a copy of the package: light that a ground reflects, against its integral."""
     root = GUIDE.parent
     for folder in ("clpt", "kernels"):
         shutil.copytree(root / folder, tmp_path / folder)
