@@ -1,8 +1,8 @@
 """How the parameters of a kind are declared.
 
-A kind is a frozen dataclass that derives from `Kind`; each field is made by one of the functions
-below, which says its role. From the role follow what a user may give for it, its form on the
-device, and its line in the documentation and the JSON schema:
+A kind is a frozen dataclass that derives from `Kind`. One of the functions below declares each
+field and gives it a role. The role decides which values it accepts, its type in the kernels, and
+its entry in the documentation and the JSON schema:
 
 =============  =====================================  ==========================  ===============
 role           accepted                               in the kernel               texture
@@ -59,7 +59,7 @@ LAMBDAS = np.arange(200.0, 1201.0)  # [nm] at which a spectrum's limits are chec
 class Param:
     """One parameter: role (see the table above), documentation, unit, limits, form in files.
 
-    form: that of a host parameter, "" where a scene file cannot hold it; the role of any other.
+    form: of a host parameter, "" where a scene file cannot hold it.
     """
 
     role: str
@@ -91,19 +91,19 @@ def emission(default: Any, doc: str, unit: str, *, textured: bool = False) -> An
 
 
 def index(default: Any, doc: str, *, textured: bool = False) -> Any:
-    """Declare a refractive index or extinction coefficient, perhaps by name, perhaps dispersive."""
+    """Declare a refractive index or extinction coefficient; may be a name or dispersive."""
     return _field(default, Param("index", doc, low=0.0, textured=textured))
 
 
 def factor(default: Any, doc: str) -> Any:
-    """Declare a spectrum without limits that others are multiplied by; may be a texture."""
+    """Declare a factor: a spectrum without limits; may be a texture."""
     return _field(default, Param("factor", doc, textured=True))
 
 
 def coefficient(default: Any, doc: str, unit: str = "1/m") -> Any:
-    """Declare a property of the inside of a body; no member of its kind's struct.
+    """Declare a property of the inside of a body; it is no member of its kind's struct.
 
-    Light meets it between surfaces: kernels/optics/medium.cl reads it from behind the kind's row.
+    It acts between surfaces: kernels/optics/medium.cl reads it after the kind's row.
     """
     return _field(default, Param("coefficient", doc, unit, low=0.0))
 
@@ -128,12 +128,12 @@ def real(
 
 
 def flag(default: bool, doc: str) -> Any:
-    """Declare a yes or no."""
+    """Declare true or false."""
     return _field(default, Param("flag", doc))
 
 
 def choice(default: str | None, doc: str, choices: Sequence[str]) -> Any:
-    """Declare one of several names, or none of them if that is the default."""
+    """Declare one of several names; with the default None, also None."""
     optional = default is None
     return _field(default, Param("choice", doc, choices=tuple(choices), optional=optional))
 
@@ -151,7 +151,7 @@ def layers(doc: str) -> Any:
 def host(default: Any, doc: str, unit: str = "", *, form: HostForm | None = None) -> Any:
     """Declare what only the host needs: geometry, matrices, nested kinds.
 
-    form: what it holds; without it the default's type says so.
+    form: what it holds; None for what the type of the default implies.
     """
     return _field(default, Param("host", doc, unit, form=form or _form_of(default)))
 
@@ -180,11 +180,11 @@ class classproperty:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Kind:
-    """Base of all that can be added: its name in files and kernels follows from the class."""
+    """Base of all kinds; the class name gives the name in files and kernels."""
 
-    needs_wavelengths: ClassVar[bool] = False  # its struct in the kernels has them as `lambdas`
+    needs_wavelengths: ClassVar[bool] = False  # its struct in the kernels has `lambdas`
     tints: ClassVar[tuple[str, ...]] = ()  # where one is above 0, its struct has the `luminance`
-    # of `base_color`; its kernel file includes core/luminance.cl
+    # of `base_color`, and its kernel file includes core/luminance.cl
 
     @classproperty
     def kind(cls) -> str:
@@ -206,7 +206,7 @@ def _snake(name: str) -> str:
     return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
 
 
-@cache  # every object of a scene asks, and there are thousands
+@cache  # thousands of objects ask
 def _declared(cls: Any) -> Mapping[str, Param]:
     fields = dataclasses.fields(cls)
     return MappingProxyType({f.name: f.metadata["param"] for f in fields if "param" in f.metadata})
@@ -232,12 +232,12 @@ def defaults(cls: type) -> dict[str, Any]:
 
 
 def device_params(cls: type) -> Mapping[str, Param]:
-    """Return those parameters that the kernels see."""
+    """Return the parameters that the kernels read."""
     return _declared_of(cls, *DEVICE_ROLES)
 
 
 def interior_params(cls: type) -> Mapping[str, Param]:
-    """Return the parameters of what is inside of a body; they follow the others in its row."""
+    """Return the parameters of the inside of a body; they follow the others in its row."""
     return _declared_of(cls, "coefficient")
 
 

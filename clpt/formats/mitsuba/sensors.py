@@ -262,12 +262,16 @@ def _integrator(element: Element, context: Context) -> Integrator:
     return made
 
 
+def _depths(props: Properties) -> dict[str, Any]:
+    return {
+        "max_depth": props.integer("max_depth", -1, -1),
+        "rr_depth": props.integer("rr_depth", integrators.Path.rr_depth, 1),
+        "hide_lights": props.flag("hide_emitters", False),
+    }
+
+
 def _path(props: Properties) -> Integrator:
-    return integrators.Path(
-        max_depth=props.integer("max_depth", -1, -1),
-        rr_depth=props.integer("rr_depth", integrators.Path.rr_depth, 1),
-        hide_lights=props.flag("hide_emitters", False),
-    )
+    return integrators.Path(**_depths(props))
 
 
 def _direct(props: Properties) -> Integrator:
@@ -280,11 +284,7 @@ def _direct(props: Properties) -> Integrator:
 
 
 def _particle_tracer(props: Properties) -> Integrator:
-    return integrators.ParticleTracer(
-        max_depth=props.integer("max_depth", -1, -1),
-        rr_depth=props.integer("rr_depth", integrators.Path.rr_depth, 1),
-        hide_lights=props.flag("hide_emitters", False),
-    )
+    return integrators.ParticleTracer(**_depths(props))
 
 
 def _volume_path(props: Properties) -> Integrator:

@@ -255,12 +255,9 @@ def test_broken_shapes_say_where(scene, text, message):
     assert "a.pbrt:2: Shape" in str(caught.value)
 
 
-def test_what_is_passed_over_is_told_once(scene):
+def test_what_is_left_out_is_warned_of_once(scene):
     found = scene('Shape "sphere" "float raduis" 2\n' + 'Shape "sphere" "float zmin" 1\n' * 3)
-    unknown = (
-        "a.pbrt:2: Shape \"sphere\": 'raduis': is not known here and is left out; did you mean "
-        "'radius'?"
-    )
-    assert unknown in found.warnings
+    unknown = "'raduis': is not known here and is left out; did you mean 'radius'?"
+    assert f'a.pbrt:2: Shape "sphere": {unknown}' in found.warnings
     assert scene('Shape "sphere" "float zmin" 1').shapes == []
     assert next(text for text in found.warnings if "no area" in text).endswith("(in 3 places)")

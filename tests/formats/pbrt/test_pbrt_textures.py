@@ -110,11 +110,8 @@ def test_functions_of_textures(images):
     made = map_values(Product(first=board, second=0.5), np.sqrt)
     assert made.first.color0.value == pytest.approx(0.5)
     assert made.first.color1.to_rgb() == pytest.approx([0.5, 0.4, 0.2])
-    assert map_values(0.25, np.sqrt) == 0.5 and map_values((0.25, 0.0, 1.0), np.sqrt) == (
-        0.5,
-        0.0,
-        1.0,
-    )
+    assert map_values(0.25, np.sqrt) == 0.5
+    assert map_values((0.25, 0.0, 1.0), np.sqrt) == (0.5, 0.0, 1.0)
 
 
 def test_patterns_are_placed_by_the_texture_space():
