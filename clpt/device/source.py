@@ -12,6 +12,7 @@ from typing import NoReturn
 from ..errors import KernelBuildError
 
 _INCLUDE = re.compile(r'\s*#\s*include\s+"([^"]+)"\s*(?://.*|/\*.*\*/\s*)?$')
+_WORD = re.compile(r"\w+")
 _OPEN_IF = re.compile(r"\s*#\s*if")
 _FUNCTION = re.compile(  # at the beginning of a line: type, name, and a first argument or "void"
     r"^(?!static\b|kernel\b|typedef\b|return\b|else\b|void loop_)"
@@ -81,17 +82,21 @@ def assemble(
     root: a path under the kernels folder ("stage/shade.cl") or the name of a virtual file.
     virtual: name -> generated text, a Part, or the names of files that stand for it, includable by
     that name; it wins over a file of that name.
-    defines: written as `#define` lines at the top.
+    defines: written as `#define` lines at the top, but for those that the text does not name; so
+    programs that differ by nothing else are built once.
 
     A `#line` before every part lets a compiler name our file and line. Includes are resolved before
     the preprocessor runs, so they have to stand outside of `#if`.
 
     Raises KernelBuildError for an include that names nothing, or that stands inside an `#if`.
     """
-    head = [f"#define {name} {value}" for name, value in (defines or {}).items()]
     assembly = _Assembly(root, virtual or {}, kernels_folder())
     assembly.add(root, None, 0)
-    return Source(root, "\n".join([*head, *assembly.rows, ""]), tuple(assembly.files))
+    text = "\n".join([*assembly.rows, ""])
+    given = {name: f"#define {name} {value}\n" for name, value in (defines or {}).items()}
+    named = set(_WORD.findall(text)).union(*(_WORD.findall(row)[2:] for row in given.values()))
+    head = "".join(row for name, row in given.items() if name.partition("(")[0] in named)
+    return Source(root, head + text, tuple(assembly.files))
 
 
 @cache

@@ -493,15 +493,15 @@ class Null(Material):
 class TwoSided(Material):
     """Gives one-sided materials to both sides of a surface."""
 
-    front: Any = host(Diffuse(), "material of the front")
-    back: Any = host(None, "material of the back; the front's when None")
+    front: Any = host(Diffuse(), "material of the front", form="material")
+    back: Any = host(None, "material of the back; the front's when None", form="material")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Mask(Material):
     """Lets light through where `opacity` is below one."""
 
-    material: Any = host(Diffuse(), "what is there where it is opaque")
+    material: Any = host(Diffuse(), "what is there where it is opaque", form="material")
     opacity: Any = real(0.5, "share of light that meets the material", "", 0.0, 1.0, textured=True)
 
 
@@ -509,8 +509,8 @@ class Mask(Material):
 class Blend(Material):
     """A linear mixture of two materials."""
 
-    first: Any = host(Diffuse(), "material where the weight is 0")
-    second: Any = host(Diffuse(), "material where the weight is 1")
+    first: Any = host(Diffuse(), "material where the weight is 0", form="material")
+    second: Any = host(Diffuse(), "material where the weight is 1", form="material")
     weight: Any = real(0.5, "share of the second", "", 0.0, 1.0, textured=True)
 
 
@@ -518,7 +518,7 @@ class Blend(Material):
 class NormalMapped(Material):
     """Base of the maps that bend the shading normal. Their flags and defaults are Mitsuba 3's."""
 
-    material: Any = host(Diffuse(), "what is shaded with the bent normal")
+    material: Any = host(Diffuse(), "what is shaded with the bent normal", form="material")
     scale: float = real(1.0, "factor on what the map bends")
     flip_invalid: bool = flag(True, "turn a normal round that faces away from the viewer")
     shadowing: bool = flag(True, "soften the edge where the bent surface turns dark")
@@ -528,7 +528,11 @@ class NormalMapped(Material):
 class NormalMap(NormalMapped):
     """Takes the shading normal from an image, relative to that of the surface."""
 
-    map: Any = host(None, "bitmap, read raw; its colours are (x, y, z) / 2 + 1/2; None: none")
+    map: Any = host(
+        None,
+        "bitmap, read raw; its colours are (x, y, z) / 2 + 1/2; None: none",
+        form="texture",
+    )
     along_v: bool = flag(False, "y of the map goes along v even where uv are mirrored, as in glTF")
 
     def check(self) -> None:

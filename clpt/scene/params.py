@@ -18,7 +18,7 @@ flag           bool                                   int                       
 choice         one of the names listed                int, the name's position    no
 orders         numbers of orders -n to n              real[17], of -8 to 8        no
 layers         Layers, from the outside in            Layers                      their profile
-host           whatever the lowering needs            -                           -
+host           what the lowering needs, see HostForm  -                           -
 =============  =====================================  ==========================  ===============
 """
 
@@ -31,7 +31,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -43,13 +43,24 @@ DEVICE_ROLES = (
     "reflectance", "emission", "index", "factor", "reradiation", "real", "flag", "choice", "orders",
     "layers",
 )  # fmt: skip
+# What a host parameter holds. clpt/formats/native/forms.py reads, writes and describes each form.
+HostForm = Literal[
+    "boolean", "integer", "number", "text", "names", "numbers",
+    "vector", "direction", "matrix3", "matrix4",
+    "material", "texture", "filter", "area_light", "group",
+    "rows2", "rows3", "rows4", "triangles", "attributes", "number_or_list", "lengths",
+    "image", "cube_images", "crop", "sensor", "white_balance",
+]  # fmt: skip
 ORDERS = 8  # highest order of diffraction, see kernels/optics/diffraction.cl
 LAMBDAS = np.arange(200.0, 1201.0)  # [nm] at which a spectrum's limits are checked
 
 
 @dataclass(frozen=True)
 class Param:
-    """One parameter: role (see the table above), documentation, unit and limits."""
+    """One parameter: role (see the table above), documentation, unit, limits, form in files.
+
+    form: that of a host parameter, "" where a scene file cannot hold it; the role of any other.
+    """
 
     role: str
     doc: str
@@ -59,6 +70,7 @@ class Param:
     choices: tuple[str, ...] = ()
     optional: bool = False
     textured: bool = False
+    form: str = ""
     lobe: bool = False  # 0 leaves a lobe out: kernels are made without it where all have 0
 
 
@@ -136,9 +148,24 @@ def layers(doc: str) -> Any:
     return _field((), Param("layers", doc))
 
 
-def host(default: Any, doc: str, unit: str = "") -> Any:
-    """Declare what only the host needs: geometry, matrices, nested kinds."""
-    return _field(default, Param("host", doc, unit))
+def host(default: Any, doc: str, unit: str = "", *, form: HostForm | None = None) -> Any:
+    """Declare what only the host needs: geometry, matrices, nested kinds.
+
+    form: what it holds; without it the default's type says so.
+    """
+    return _field(default, Param("host", doc, unit, form=form or _form_of(default)))
+
+
+def _form_of(default: Any) -> str:
+    """Return the HostForm that a default's type implies, "" where it implies none."""
+    if isinstance(default, np.ndarray) and default.shape in ((3, 3), (4, 4)):
+        return f"matrix{len(default)}"
+    if isinstance(default, tuple) and default:
+        if isinstance(default[0], str):
+            return "names"
+        return "vector" if len(default) == 3 else "numbers"
+    forms: dict[type, str] = {bool: "boolean", int: "integer", float: "number", str: "text"}
+    return forms.get(type(default), "")
 
 
 class classproperty:
@@ -193,6 +220,15 @@ def _declared_of(cls: Any, *roles: str) -> Mapping[str, Param]:
 def params(cls: type) -> Mapping[str, Param]:
     """Return the declared parameters of a kind, by name, in their order."""
     return _declared(cls)
+
+
+def defaults(cls: type) -> dict[str, Any]:
+    """Return the defaults of a kind's declared parameters, by name."""
+    fields = {f.name: f for f in dataclasses.fields(cls) if "param" in f.metadata}
+    return {
+        name: f.default if f.default_factory is dataclasses.MISSING else f.default_factory()
+        for name, f in fields.items()
+    }
 
 
 def device_params(cls: type) -> Mapping[str, Param]:

@@ -69,8 +69,8 @@ def lobes_are_told_truly(
     r = probe(params, wo, wi, rng.random((len(wo), 3)))
     made = r["sampled_pdf"] > 0.0
     crossed = (wo[:, 2] * r["wi"][:, 2] < 0.0)[made]
-    told = (r["lobe"][made] & TRANSMIT) != 0
-    _hold(np.array_equal(crossed, told), f"LOBE_TRANSMIT is not where wi crosses, {params}")
+    flagged = (r["lobe"][made] & TRANSMIT) != 0
+    _hold(np.array_equal(crossed, flagged), f"LOBE_TRANSMIT is not where wi crosses, {params}")
     _hold(np.all(r["eta"][made][~crossed] == 1.0), f"eta of a reflection is not 1, {params}")
     delta = made & (r["lobe"] & DELTA != 0)
     _hold(np.all(r["sampled_pdf"][delta] <= 1.0), f"a delta lobe's pdf is above 1, {params}")

@@ -1,5 +1,5 @@
 /* Light as it leaves a light, for integrators that start there: kernels/emission/<kind>.cl has, for
- * lamps that stand somewhere,
+ * lights at a point,
  *
  *   LightRay <kind>_emit(<Kind> l, Scene scene, vec2 u, vec2 v, Wavelengths lambdas);
  *
@@ -7,7 +7,7 @@
  *
  *   SurfacePoint <kind>_point(<Kind> s, vec2 u);      a point of its surface, evenly over the area
  *
- * u: a point of the unit square for the place; v: for the direction. Light from infinity needs no more
+ * u: a point of the unit square for the position; v: for the direction. Light from infinity needs no more
  * than the <kind>_sample of interface/light.cl, see `distant_emit`. LightRay and SurfacePoint are Records in
  * clpt/render/contract.
  */
@@ -51,7 +51,8 @@ inline LightRay distant_emit(Scene scene, LightSample s, vec2 v)
     vec3 center = v3((real)(settings->center[0]), (real)(settings->center[1]), (real)(settings->center[2]));
     r.o = add3(center, to_world(f, v3(q.x * radius, q.y * radius, (real)(-radius))));
     r.n = r.d;
-    r.seen = spectrum_sel(s.pdf > 0.0f, spectrum_scale(s.radiance, 1.0f / max_r(s.pdf, (real)(1e-30f))), spectrum_of(0.0f));
+    r.seen = spectrum_sel(s.pdf > 0.0f, spectrum_scale(s.radiance, 1.0f / max_r(s.pdf, (real)(1e-30f))),
+                          spectrum_of(0.0f));
     r.power = spectrum_scale(spectrum_sel(s.pdf > 0.0f, r.seen, s.radiance), PI * radius * radius);
     r.away = mask_of(1);
     return r;

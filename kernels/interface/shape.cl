@@ -2,7 +2,8 @@
  * clpt/render/contract/shape_records.py whose rows lie in `geometry`,
  *
  *   ShapeSample <kind>_sample(<Kind> s, vec3 p, vec2 u);      a point of the shape, as seen from p
- *   real        <kind>_pdf(<Kind> s, vec3 p, vec3 wi, real t, vec3 n);   of sample [1/sr], for a hit at distance t with unit normal n
+ *   real        <kind>_pdf(<Kind> s, vec3 p, vec3 wi, real t, vec3 n);   of sample [1/sr], for a hit at distance t
+ *                                                                         with unit normal n
  *
  * and, for shapes that rays meet as they are (not as triangles),
  *

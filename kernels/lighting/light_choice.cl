@@ -1,4 +1,4 @@
-/* Choosing one row of `lights`. */
+/* Choosing one row of `lights`, by the alias method (Walker 1977). */
 inline LightRow light_at(Scene scene, integer row)
 {
     return light_row_row(scene.lights, row * LIGHT_ROW_WORDS);
@@ -10,8 +10,8 @@ inline LightRow light_at(Scene scene, integer row)
 #define FEW_LIGHTS 0
 #endif
 
-/* A row by the alias method (Walker 1977): *u chooses a place, its rest whether to stay; what is left
- * of it is uniform in [0, 1) again. */
+/* A row of `lights`: *u chooses a row, and by its fraction either that row or its alias; what is left of it is uniform
+ * in [0, 1) again. */
 inline integer light_pick(Scene scene, real *u)
 {
     int count = scene.settings->light_count;

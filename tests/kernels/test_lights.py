@@ -11,7 +11,7 @@ from scipy.stats import chi2
 from clpt import transforms as T
 from clpt.errors import SceneError
 from clpt.render.contract import light_records
-from clpt.render.lowering.geometry import shapes
+from clpt.render.lowering.geometry import triangles
 from clpt.render.lowering.lights import image_lights, lights
 from clpt.render.lowering.lights.image_lights import face_coordinates, face_directions
 from clpt.scene.lights import (
@@ -314,7 +314,7 @@ def test_images_are_chosen_by_what_they_send(name):
     value = r[5] / r[4]
     assert (r[4] > 0.0).all()
     assert value.std() < 0.1 * value.mean()
-    _, mean = image_lights.lower_image(lamp, scene.tables)
+    _, mean = image_lights.lower_image(lamp, scene.encoder)
     assert value.mean() == pytest.approx(4.0 * np.pi * mean, rel=0.02)
 
 
@@ -560,7 +560,7 @@ def test_uv_on_a_mesh():
         r[0] = uv.x; r[1] = uv.y;
     """
     given = np.array([[first, first + 1], [0.25, 0.5], [0.125, 0.25]])
-    _, faces, _, _ = shapes.triangles(mesh)
+    _, faces, _, _ = triangles.triangulate(mesh)
     weights = np.stack([1.0 - given[1] - given[2], given[1], given[2]], axis=1)
     expected = [w @ uvs[f] for w, f in zip(weights, faces, strict=True)]
     np.testing.assert_allclose(scene(body, given, 2).T, expected, atol=1e-6)

@@ -130,7 +130,7 @@ def test_all_lane_widths_give_the_same_bits(kind):
 
 
 ON_FILM = """
-    Sampler sampler = place_sampler(scene.settings, to_integer(x[0]), to_integer(x[1]));
+    Sampler sampler = pixel_sampler(scene.settings, to_integer(x[0]), to_integer(x[1]));
     vec2 u = sampler_pair(sampler, to_natural(x[2]));
     r[0] = u.x; r[1] = u.y;
 """

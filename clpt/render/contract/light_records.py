@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from clpt.layout import Record
 from clpt.render.contract import shape_records
+from clpt.scene.lights import KINDS as LIGHTS
+from clpt.scene.lights import Light
+from clpt.scene.params import Param, params
 
 _IMAGE = {
     "x": ("vec3", "the light's own axes in the world, unit length"),
@@ -70,18 +73,35 @@ PROJECTED_RECORDS: dict[str, Record] = {
         factor=_FACTOR,
     ),
 }
-INFINITE = ("constant", *IMAGE_RECORDS)  # a ray that leaves the scene meets these
-PLACED = ("point", "spot", *PROJECTED_RECORDS)  # all other lamps are infinitely far away
 
 
-RECORDS: dict[str, Record] = {
-    "point": Record(
-        "Point",
-        "A point light.",
-        position=("vec3", "[m]"),
-        falloff=("real", "1: irradiance falls with the square of the distance; 0: it does not"),
-        radiance=_RADIANCE,
-    ),
+def declared_record(cls: type[Light]) -> Record:
+    """Return the record of a light whose members are its parameters, as they are declared.
+
+    An emission is the first word of its five in `light_params`; a number in degrees comes in
+    radians; a direction has unit length; `to_world` becomes position and unit axes.
+    """
+    members: dict[str, tuple[str, str]] = {}
+    for name, param in params(cls).items():
+        doc = f"{param.doc} [{param.unit}]" if param.unit else param.doc
+        members |= {member: (type_, doc) for member, type_ in _members(name, param).items()}
+    summary = (cls.__doc__ or cls.__name__).split("\n")[0]
+    return Record(cls.__name__, summary, **members)
+
+
+def _members(name: str, param: Param) -> dict[str, str]:
+    """The members of a parameter by name, with their types."""
+    if param.role == "host":
+        forms = {"vector": {name: "vec3"}, "direction": {name: "vec3"}, "matrix4": PLACEMENT}
+        if param.form not in forms:
+            raise TypeError(f"a light cannot declare {name!r} as a host parameter of this form")
+        return forms[param.form]
+    return {name: "real" if param.role == "real" else "integer"}
+
+
+PLACEMENT = {"position": "vec3", "x": "vec3", "y": "vec3", "z": "vec3"}
+# Lights whose rows the lowering computes; those of all other kinds follow from their declaration.
+COMPUTED: dict[str, Record] = {
     "spot": Record(
         "Spot",
         "A spot light.",
@@ -93,15 +113,16 @@ RECORDS: dict[str, Record] = {
         radiance=_RADIANCE,
     ),
     **PROJECTED_RECORDS,
-    "directional": Record(
-        "Directional",
-        "Parallel light.",
-        direction=("vec3", "unit vector in which it travels"),
-        radiance=_RADIANCE,
-    ),
-    "constant": Record("Constant", "Even radiance from everywhere.", radiance=_RADIANCE),
     **IMAGE_RECORDS,
 }
+DECLARED = {cls.kind: cls for cls in LIGHTS if cls.reach != "surface" and cls.kind not in COMPUTED}
+RECORDS: dict[str, Record] = {
+    **{kind: declared_record(cls) for kind, cls in DECLARED.items()},
+    **COMPUTED,
+}
+# A ray that leaves the scene meets INFINITE lights; PLACED ones have a position.
+INFINITE = (*(cls.kind for cls in LIGHTS if cls.reach == "infinite"), "spectral_envmap")
+PLACED = (*(cls.kind for cls in LIGHTS if cls.reach == "placed"), "image_spot")
 FRONT, ALONG, BOTH = range(3)  # LightRow.emission_mode, see kernels/light/area.cl
 
 BASES = {"spectral_envmap": "envmap", "image_spot": "spot"}  # whose functions a kind uses
