@@ -23,12 +23,9 @@ _DEFINE = re.compile(r"\s*#\s*define\s+(\w+)(?:\s+(\w+))?\s*$")
 _CONDITION = re.compile(r"\s*#\s*(if|ifdef|ifndef|elif|else|endif)\b(.*)")
 _TERM = re.compile(
     r"(?P<not>!)?\s*(?:(?P<defined>defined)\s*\(?\s*)?(?P<left>\w+)(?P<asked>\(\w+\))?\)?"
-    r"(?:\s*(?P<compare>[=!<>]=|[<>])\s*(?P<right>\w+))?"
+    r"(?:\s*(?P<compare>==|>)\s*(?P<right>\w+))?"
 )
-_COMPARE = {
-    "==": operator.eq, "!=": operator.ne, "<": operator.lt, "<=": operator.le,
-    ">": operator.gt, ">=": operator.ge,
-}  # fmt: skip
+_COMPARE = {"==": operator.eq, ">": operator.gt}
 _CALL = re.compile(r"(?<!\w)(?P<verb>load|store)_(?P<member>\w+)\((?!Slab )")
 _QUEUED = {"sort": (0, 1), "append": (0, 1), "shade": (1, 0)}  # words read and written of a queue
 
@@ -118,7 +115,7 @@ def _term(term: str, defined: Mapping[str, str]) -> bool:
     """
     found = _TERM.fullmatch(term)
     if found is None:
-        raise ValueError(f"the condition {term!r} cannot be read: write it with && || ! and names")
+        raise ValueError(f"the condition {term!r} is not of ! defined == > and names")
     if found["defined"]:
         holds = found["left"] in defined
     elif found["compare"]:

@@ -36,15 +36,15 @@ class Source:
     files: tuple[str, ...]
 
     def with_private(self, prefix: str, defines: Mapping[str, str] | None = None) -> Source:
-        """The same with functions and constants that other programs do not see, to be linked.
+        """Return a source whose functions and constants other programs do not see, to be linked.
 
-        Those whose line begins with their type become static, and get names of their own by the
-        prefix, for some linkers heed nothing but names; kernels, and what a macro names, do not.
-        defines: more `#define` lines at the top.
+        The rule: a definition begins at the beginning of a line, with its type. It becomes static
+        and gets the prefix, since some linkers look at nothing but names. Kernels, and functions
+        that a macro names, stay as they are. defines: more `#define` lines at the top.
         """
         private = (_FUNCTION, _CONSTANT)
-        found = (match for pattern in private for match in pattern.finditer(self.text))
-        names = dict.fromkeys(match["name"] for match in found)
+        matches = (match for pattern in private for match in pattern.finditer(self.text))
+        names = dict.fromkeys(match["name"] for match in matches)
         renamed = {name: f"{prefix}_{name}" for name in names}
         head = [f"#define {name} {value}" for name, value in {**(defines or {}), **renamed}.items()]
         text = self.text
@@ -55,7 +55,7 @@ class Source:
 
 @dataclass(frozen=True)
 class Part:
-    """A virtual file that stands elsewhere: errors name that file, and its lines from `line`."""
+    """A virtual file whose text stands elsewhere: errors name `file`, and lines from `line` on."""
 
     text: str
     file: str
@@ -66,7 +66,7 @@ Virtual = Mapping[str, str | Part | tuple[str, ...]]
 
 
 def kernels_folder() -> Path:
-    """The folder with the kernels: inside the installed package, or beside it in a checkout."""
+    """Return the folder of the kernels: in the installed package, or beside it in a checkout."""
     package = Path(__file__).resolve().parent.parent
     installed = package / "kernels"
     return installed if installed.is_dir() else package.parent / "kernels"
@@ -77,7 +77,7 @@ def assemble(
     virtual: Virtual | None = None,
     defines: Mapping[str, str | int | float] | None = None,
 ) -> Source:
-    """The text of `root` with its includes in place, each file once.
+    """Return the text of `root` with its includes in place, each file once.
 
     root: a path under the kernels folder ("stage/shade.cl") or the name of a virtual file.
     virtual: name -> generated text, a Part, or the names of files that stand for it, includable by
@@ -85,8 +85,8 @@ def assemble(
     defines: written as `#define` lines at the top, but for those that the text does not name; so
     programs that differ by nothing else are built once.
 
-    Every part is announced by `#line`, so that a compiler names our file and line. Includes are
-    resolved before the preprocessor runs and therefore have to stand outside of `#if`.
+    A `#line` before every part lets a compiler name our file and line. Includes are resolved before
+    the preprocessor runs, so they have to stand outside of `#if`.
 
     Raises KernelBuildError for an include that names nothing, or that stands inside an `#if`.
     """

@@ -105,16 +105,16 @@ def _member(
     target: str, param: Param, at: str, sources: frozenset[str] | None, table: str
 ) -> list[str]:
     """Set a member from the sources that occur; a lane's word after the value says from which."""
-    form, found = lane_type(param), sources or frozenset({"constant"})
+    form, present = lane_type(param), sources or frozenset({"constant"})
     if form == "integer":
         return [f"{target} = gather_i(scene.{table}, {at});"]
     if form == "Layers":
         loaded = f"layers_load(scene, {at}, point, lambdas)"
-        return [f"{target} = {loaded if 'layers' in found else 'layers_none()'};"]
-    if found == {"none"}:
+        return [f"{target} = {loaded if 'layers' in present else 'layers_none()'};"]
+    if present == {"none"}:
         return [f"{target} = {'spectrum_of(0.0f)' if form == 'Spectrum' else '(real)(0.0f)'};"]
-    if "none" in found:
-        found |= {"constant"}
+    if "none" in present:
+        present |= {"constant"}
     prefix = form.lower()
     source = f"{at} + {(SPECTRUM_WORDS if form == 'Spectrum' else REAL_WORDS) - 1}"
     loads = {
@@ -125,7 +125,7 @@ def _member(
             f"{prefix}_texture_{param.role}(scene, scene.{table}, {at}, point, lambdas)",
         ),
     }
-    (_, first), *others = [load for name, load in loads.items() if name in found]
+    (_, first), *others = [load for name, load in loads.items() if name in present]
     cases = [Case(f"gather_i(scene.{table}, {source}) {test}", value) for test, value in others]
     return [f"{target} = {first};", *choose(target, form, *cases)]
 

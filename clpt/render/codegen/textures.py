@@ -19,6 +19,8 @@ from clpt.scene.params import device_params
 from clpt.scene.textures import KINDS as TEXTURE_KINDS
 from clpt.scene.textures import MAPPINGS, Texture
 
+_LOOKED_UP = "(Scene scene, integer row, TexturePoint point, Wavelengths lambdas)"
+
 
 def dispatch_text(
     kinds: Iterable[str],
@@ -34,17 +36,17 @@ def dispatch_text(
     spectrum_texture_<role>(scene, table, at, point, lambdas)  that the parameter at `at` names
     real_texture_real(scene, table, at, point, lambdas)        the same for a real
     """
-    pairs, found = set(roles), set(kinds)
+    pairs, used = set(roles), set(kinds)
     lines = [f"#define MAPPING_{name.upper()} {i}" for i, name in enumerate(MAPPINGS)]
     lines += [
         f"#define USES_MAPPINGS {int(mappings)}",
         f"#define TEXTURE_PERMUTATION {RECORDS['spectral_bitmap'].words}",
     ]
-    if found & {"spectral_bitmap", "packed_bitmap"}:
-        found.add("bitmap")  # which knows what lies where
-    present = [kind for kind in RECORDS if kind in found]
+    if used & {"spectral_bitmap", "packed_bitmap"}:
+        used.add("bitmap")  # whose file has their addressing
+    present = [kind for kind in RECORDS if kind in used]
     by_kind = {cls.kind: cls for cls in TEXTURE_KINDS}
-    parts = [*lines, '#include "interface/texture.cl"'] if found else []
+    parts = [*lines, '#include "interface/texture.cl"'] if used else []
     for kind in present:
         parts += _choice_lines(by_kind[kind]) if kind in by_kind else []
         parts += [RECORDS[kind].row_text(), f'#include "texture/{kind}.cl"']
@@ -64,15 +66,12 @@ def dispatch_text(
 
 
 def _choice_lines(cls: type[Texture]) -> list[str]:
-    """#define KIND_PARAMETER_CHOICE for the choices that a kind's row holds as numbers."""
+    """`#define KIND_PARAMETER_CHOICE` for the choices that a kind's row holds as numbers."""
     return [
         f"#define {f'{cls.kind}_{name}_{choice}'.upper()} {number}"
         for name, param in device_params(cls).items()
         for number, choice in enumerate(param.choices)
     ]
-
-
-_LOOKED_UP = "(Scene scene, integer row, TexturePoint point, Wavelengths lambdas)"
 
 
 def _type(role: str) -> str:

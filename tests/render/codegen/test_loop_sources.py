@@ -1,7 +1,6 @@
 """Programs that are linked to the loop: nothing but the stages is seen outside of its program.
 
-`Source.with_private` finds definitions by how they are written. Here they are found by their
-braces.
+`Source.with_private` finds definitions by how they are written; this test finds them by braces.
 """
 
 from __future__ import annotations
