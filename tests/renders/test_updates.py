@@ -165,13 +165,13 @@ def test_what_cannot_be_changes_nothing(renderer: clpt.Renderer) -> None:
     renderer.update(scene=scene())
     before, now = picture(renderer), renderer.scene
     wide = dataclasses.replace(now, film=Film(width=40, height=16, mode="rgb"))
-    for edit, told in (
+    for edit, message in (
         ({"scene": wide}, "make a new Renderer"),
         ({"transforms": {"wall": np.zeros((4, 4))}}, "rectangle 'wall': .*singular"),
         ({"vertices": {"floor": CORNERS[:2]}}, "a face names vertex 3, there are 2"),
         ({"materials": {RED: 3}}, "3 is not a material"),
     ):
-        with pytest.raises(SceneError, match=told):
+        with pytest.raises(SceneError, match=message):
             renderer.update(**edit)
         assert renderer.scene is now
     buffers = renderer.wavefronts[0].buffers
