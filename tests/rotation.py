@@ -13,7 +13,7 @@ def rotating(
     names: str,
     first: Sequence[Any],
     *others: Sequence[Any],
-    turn: Callable[[Any], int] | int = 0,
+    turn: Callable[[Any], Any] | int = 0,
 ) -> Any:
     """Parametrize a test over a product; each of `first` is quick with one combination of `others`.
 

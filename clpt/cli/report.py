@@ -1,4 +1,4 @@
-"""What `clpt render --verbose` tells, on stderr."""
+"""What `clpt render --verbose` prints on stderr."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from ..render.renderer import Renderer
 
 
 def before(renderer: Renderer, loading: float) -> None:
-    """Tell what the scene became and what that took; `loading` is what its file did [s]."""
+    """Print what was made of the scene, and the time; loading: seconds for its file."""
     first, stats = renderer.wavefronts[0], renderer.stats
     _line("device", renderer.device.info.label)
     parts = [f"{stats.triangles:,} triangles"]
@@ -37,7 +37,7 @@ def before(renderer: Renderer, loading: float) -> None:
 
 
 def after(renderer: Renderer) -> None:
-    """Tell how long the first sample and each stage took."""
+    """Print the time of the first sample and of each stage."""
     _line("seconds until a sample", f"{renderer.stats.seconds.get('first_sample', 0.0):.2f}")
     if renderer.scene.noise is not None:
         samples = renderer.film.get()[..., 3]

@@ -97,7 +97,7 @@ def test_light_leaves_the_front_only() -> None:
     assert exposures(scene, 2, 16).max() == 0.0
 
 
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("mode", [pytest.param("rgb", marks=pytest.mark.slow), "spectral"])
 @pytest.mark.parametrize("albedo", [0.0, 0.3, 0.8])
 def test_sphere_in_a_furnace(albedo: float, mode: str) -> None:
     """A convex diffuse body in even light shows its albedo."""

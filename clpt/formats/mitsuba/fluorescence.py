@@ -1,4 +1,4 @@
-"""Our own plugin `fluorescent`: paint that glows; Mitsuba has none like it."""
+"""The plugin `fluorescent`, clpt's own: Mitsuba has no fluorescent material."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ CHANNELS = {
 
 @dataclass
 class Sensor:
-    """What a <sensor> and its children say."""
+    """What a <sensor> and its children describe."""
 
     camera: cameras.Camera
     film: Film
@@ -82,15 +82,15 @@ def _thin_lens(props: Properties, film: Film) -> cameras.Camera:
 
 def _glass(props: Properties) -> dict[str, Any]:
     """Ours, see docs/mitsuba_plugins.md: what a lens that disperses is made of."""
-    given: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     child = props.take("glass")
     if child is not None:
         if child.tag != "string":
             raise child.error("must be a <string> with the name of a glass")
-        given["glass"] = child.attribute("value")
+        values["glass"] = child.attribute("value")
     if "lens_focal_length" in props.named:
-        given["focal_length"] = props.number("lens_focal_length", 0.0)
-    return given
+        values["focal_length"] = props.number("lens_focal_length", 0.0)
+    return values
 
 
 def _orthographic(props: Properties, _: Film) -> cameras.Camera:
@@ -130,7 +130,7 @@ def _clip(props: Properties) -> tuple[float, float]:
 
 
 def _field_of_view(props: Properties, film: Film) -> tuple[float, str]:
-    """Return the angle [degrees] and its axis; a diagonal one is turned into that along x."""
+    """Return the angle [degrees] and its axis; a diagonal angle becomes that along x."""
     axes = ("x", "y", "diagonal", "smaller", "larger")
     axis = props.text("fov_axis", "x", axes)
     if "fov" in props.named:
@@ -294,7 +294,7 @@ def _volume_path(props: Properties) -> Integrator:
 
 
 def _aov(props: Properties) -> Integrator:
-    """What is nested makes the picture, as in Mitsuba; without it the values are rendered."""
+    """A nested integrator makes the picture, as in Mitsuba; without one the values do."""
     nested = props.object("integrator")
     names = props.text("aovs", "")
     if nested is not None:

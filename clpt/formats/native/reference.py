@@ -9,6 +9,7 @@ import dataclasses
 import inspect
 import json
 import sys
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -91,7 +92,7 @@ def text() -> str:
     """Return the page as the published file has it."""
     parts = [INTRODUCTION, *_spectra()]
     for category, heading in HEADINGS.items():
-        parts += [f"## {heading}\n", *map(_kind, KINDS[category])]
+        parts += [f"## {heading}\n", *(_kind(category, cls) for cls in KINDS[category])]
         if category == "integrator":
             parts += ["## Film\n", _summary(integrators.Film), _table(integrators.Film)]
         if category == "material":
@@ -138,8 +139,23 @@ def _reradiations() -> list[str]:
     ]
 
 
-def _kind(cls: type[Kind]) -> str:
-    return f"### `{cls.kind}`\n\n{_summary(cls)}\n{_table(cls)}"
+def _kind(category: str, cls: type[Kind]) -> str:
+    return f"### `{cls.kind}`\n\n{_summary(cls)}{_picture(category, cls)}\n{_table(cls)}"
+
+
+def _picture(category: str, cls: type[Kind]) -> str:
+    """Return the kind's picture and its caption, where `docs.pictures` has one."""
+    caption = _captions().get(f"{category}/{cls.kind}")
+    if caption is None:
+        return ""
+    shown = f"![{category} {cls.kind}](pictures/kinds/{category}/{cls.kind}.png)"
+    return f"\n{shown}\n\n*{caption}*\n"
+
+
+@cache
+def _captions() -> dict[str, str]:
+    file = Path(__file__).parents[3] / "docs" / "pictures" / "kinds" / "captions.json"
+    return json.loads(file.read_text("utf-8"))
 
 
 def _summary(cls: type) -> str:

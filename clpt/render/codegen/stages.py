@@ -6,7 +6,7 @@ The physics is always in a file.
 from __future__ import annotations
 
 from clpt.render.codegen import flags, lights, parameters, thin_films
-from clpt.render.codegen.dispatch import active, function
+from clpt.render.codegen.dispatch import Case, Function, active, function
 from clpt.render.contract import camera_records
 from clpt.render.contract.features import Features
 from clpt.render.contract.parameter_words import row_words, words
@@ -72,23 +72,15 @@ def null_transmittance_text(features: Features) -> str:
     parts = [function(f"real null_share_0{arguments}", f"return {passes};")]
     for level in range(1, features.mixtures + 1):
         below = f"null_share_{level - 1}"
-        parts.append(
-            function(
-                f"real null_share_{level}{arguments}",
-                "mask m = MATERIAL_KIND(word) == 0xff;",
-                f"real share = {below}(scene, word, point, lambdas);",
-                "if (any(m)) {",
-                f"    integer row = {active('MATERIAL_ROW(word)')};",
-                "    real w = mixture_weight(scene, row, point, lambdas);",
-                "    integer a = gather_i(scene.mixtures, row + 2);",
-                "    integer b = gather_i(scene.mixtures, row + 3);",
-                f"    real first = {below}(scene, a, point, lambdas);",
-                f"    real second = {below}(scene, b, point, lambdas);",
-                "    share = sel(m, first + w * (second - first), share);",
-                "}",
-                "return share;",
-            )
+        children = (
+            f"integer row = {active('MATERIAL_ROW(word)')};",
+            "real w = mixture_weight(scene, row, point, lambdas);",
+            f"real first = {below}(scene, gather_i(scene.mixtures, row + 2), point, lambdas);",
+            f"real second = {below}(scene, gather_i(scene.mixtures, row + 3), point, lambdas);",
         )
+        mixed = Case("MATERIAL_KIND(word) == 0xff", "first + w * (second - first)", children)
+        leaf = f"{below}(scene, word, point, lambdas)"
+        parts.append(Function(f"real null_share_{level}{arguments}", leaf, [mixed]).text())
     return "".join([*parts, f"#define null_transmittance null_share_{features.mixtures}\n"])
 
 

@@ -1,0 +1,74 @@
+"""The pictures of kinds in docs/pictures: each kind has one, and the pages show all of them."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from clpt.scene import KINDS
+from clpt.scene.params import Kind
+from docs.pictures import sheet, table
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def test_every_kind_has_a_picture_and_every_picture_is_of_a_kind():
+    assert {c: list(made) for c, made in table.PICTURES.items()} == {
+        category: [cls.kind for cls in classes] for category, classes in KINDS.items()
+    }
+    files = {
+        f.relative_to(table.FOLDER).with_suffix("").as_posix() for f in table.FOLDER.glob("*/*")
+    }
+    assert files == set(table.pictures()), "run python -m docs.pictures with the names that differ"
+
+
+@pytest.mark.parametrize("name", table.pictures())
+def test_the_picture_of_a_kind_shows_it(name: str):
+    category, kind = name.split("/")
+    scene = table.pictures()[name].scene()
+    assert kind in {part.kind for part in _parts(scene) if isinstance(part, _base(category))}
+    image = np.asarray(Image.open(table.FOLDER / f"{name}.png").convert("RGB"), float)
+    assert 20.0 < image.mean() < 235.0 and image.std() > 15.0  # neither black nor blown out
+
+
+def test_captions_and_contact_sheet_are_up_to_date():
+    told = {name: picture.caption for name, picture in table.pictures().items()}
+    assert json.loads(table.CAPTIONS.read_text("utf-8")) == told, "run python -m docs.pictures none"
+    page = (ROOT / "docs/gallery.md").read_text("utf-8")
+    assert page == sheet.written(page), "run python -m docs.pictures none"
+
+
+def test_the_gallery_has_every_scene():
+    page = (ROOT / "docs/gallery.md").read_text("utf-8")
+    for picture in ROOT.glob("scenes/*/picture*.png"):
+        name = picture.relative_to(ROOT).as_posix()
+        assert f"](../{name})" in page
+        assert f"clpt render scenes/{picture.parent.name}" in page
+
+
+def test_pictures_are_small():
+    assert sum(f.stat().st_size for f in (ROOT / "docs/pictures").rglob("*.png")) < 2.5e6
+
+
+def _base(category: str) -> type[Kind]:
+    """The class that all kinds of a category derive from."""
+    return next(cls for cls in KINDS[category][0].__mro__ if cls.__mro__[1] is Kind)
+
+
+def _parts(thing: Any) -> Iterator[Kind]:
+    """All kinds in a scene, at whatever depth."""
+    if isinstance(thing, Kind):
+        yield thing
+    if isinstance(thing, (list, tuple)):
+        for entry in thing:
+            yield from _parts(entry)
+    elif dataclasses.is_dataclass(thing):
+        for field in dataclasses.fields(thing):
+            yield from _parts(getattr(thing, field.name))
