@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import pyopencl as cl
 import pyopencl.array as cl_array
 import pytest
 
@@ -214,8 +215,8 @@ def test_arrays_of_the_device(renderer: clpt.Renderer) -> None:
 
 
 def test_arrays_of_another_context(renderer: clpt.Renderer) -> None:
-    other = device.choose()
-    floor = dataclasses.replace(FLOOR, vertices=cl_array.to_device(other.queue, CORNERS))
+    other = cl.CommandQueue(cl.Context([renderer.device.info.cl_device]))
+    floor = dataclasses.replace(FLOOR, vertices=cl_array.to_device(other, CORNERS))
     with pytest.raises(SceneError, match="mesh 'floor': vertices lie in another OpenCL context"):
         renderer.update(scene=scene(shapes=[floor]))
 
