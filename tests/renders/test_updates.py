@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import pyopencl as cl
 import pyopencl.array as cl_array
 import pytest
 
@@ -165,13 +166,13 @@ def test_what_cannot_be_changes_nothing(renderer: clpt.Renderer) -> None:
     renderer.update(scene=scene())
     before, now = picture(renderer), renderer.scene
     wide = dataclasses.replace(now, film=Film(width=40, height=16, mode="rgb"))
-    for edit, told in (
+    for edit, message in (
         ({"scene": wide}, "make a new Renderer"),
         ({"transforms": {"wall": np.zeros((4, 4))}}, "rectangle 'wall': .*singular"),
         ({"vertices": {"floor": CORNERS[:2]}}, "a face names vertex 3, there are 2"),
         ({"materials": {RED: 3}}, "3 is not a material"),
     ):
-        with pytest.raises(SceneError, match=told):
+        with pytest.raises(SceneError, match=message):
             renderer.update(**edit)
         assert renderer.scene is now
     buffers = renderer.wavefronts[0].buffers
@@ -214,8 +215,8 @@ def test_arrays_of_the_device(renderer: clpt.Renderer) -> None:
 
 
 def test_arrays_of_another_context(renderer: clpt.Renderer) -> None:
-    other = device.choose()
-    floor = dataclasses.replace(FLOOR, vertices=cl_array.to_device(other.queue, CORNERS))
+    other = cl.CommandQueue(cl.Context([renderer.device.info.cl_device]))
+    floor = dataclasses.replace(FLOOR, vertices=cl_array.to_device(other, CORNERS))
     with pytest.raises(SceneError, match="mesh 'floor': vertices lie in another OpenCL context"):
         renderer.update(scene=scene(shapes=[floor]))
 

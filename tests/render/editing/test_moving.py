@@ -176,5 +176,5 @@ def test_the_reason_why_a_shape_does_not_move(
     scene_ = scene()
     moving = Moving(renderer.wavefronts[0].scene, scene_)
     old = next(shape for shape in scene_.shapes if shape.name == name)
-    told = moving.move(scene_, {id(old): (old, dataclasses.replace(old, **changes))})
-    assert told is not None and reason in told
+    refusal = moving.move(scene_, {id(old): (old, dataclasses.replace(old, **changes))})
+    assert refusal is not None and reason in refusal

@@ -124,7 +124,7 @@ def test_what_is_used_in_place() -> None:
 
 
 @pytest.mark.parametrize(
-    ("edit", "told"),
+    ("edit", "message"),
     [
         ({"materials": {m.Diffuse(): RED}}, "not in the scene"),
         ({"materials": {"ball": 3}}, "3 is not a material"),
@@ -136,6 +136,6 @@ def test_what_is_used_in_place() -> None:
         ({"transforms": {"": np.eye(4)}}, "3 shapes have the name ''"),
     ],
 )
-def test_keys_that_mean_nothing(edit: dict[str, Any], told: str) -> None:
-    with pytest.raises(SceneError, match=told):
+def test_keys_that_mean_nothing(edit: dict[str, Any], message: str) -> None:
+    with pytest.raises(SceneError, match=message):
         edit_scene(scene(), Successors(), **edit)
