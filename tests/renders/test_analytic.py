@@ -31,7 +31,6 @@ from tests.renders.builders import (
 from tests.renders.support import assert_mean, exposures
 
 MODES = ("rgb", "spectral")
-QUICK = ("disk", "point", "envmap")  # on a surface, in a point, around all
 COLOUR = {"rgb": 2e-4, "spectral": 1e-3}  # what uplifting a colour may change
 
 
@@ -40,9 +39,8 @@ def test_light_on_a_plane_in_rgb(kind: str) -> None:
     assert_light(kind, "rgb")
 
 
-@pytest.mark.parametrize(
-    "kind", [pytest.param(k, marks=() if k in QUICK else pytest.mark.slow) for k in EXPECTED]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", EXPECTED)
 def test_light_on_a_plane_of_wavelengths(kind: str) -> None:
     assert_light(kind, "spectral")
 
