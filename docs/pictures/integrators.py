@@ -47,7 +47,9 @@ def view() -> cameras.Perspective:
     return cameras.Perspective(to_world=look_at([0, 1, 5.0], [0, 1, 0], UP), fov=34.5)
 
 
-def traced(caption: str, integrator: integrators.Integrator, *, spp: int = 128) -> Picture:
+def traced(
+    caption: str, integrator: integrators.Integrator, *, spp: int = 128, size: Any = SMALL
+) -> Picture:
     """The room, with a lamp below its ceiling; of what knows no surfaces that shine, a point."""
 
     def scene() -> Scene:
@@ -59,13 +61,13 @@ def traced(caption: str, integrator: integrators.Integrator, *, spp: int = 128) 
         point = lights.Point(position=(0.0, 1.9, 0.2), intensity=(1.6, 1.5, 1.3))
         whitted = isinstance(integrator, integrators.Whitted)
         box = isinstance(integrator, integrators.ParticleTracer)
-        picture = integrators.Film(width=SMALL[0], height=SMALL[1], mode="rgb")
+        picture = integrators.Film(width=size[0], height=size[1], mode="rgb")
         return Scene(
             camera=view(),
             shapes=room() if whitted else [*room(), lamp],
             lights=[point] if whitted else [],
             integrator=integrator,
-            film=picture if box else film(SMALL),
+            film=picture if box else film(size),
         )
 
     return Picture(caption, scene, spp)
@@ -128,9 +130,10 @@ INTEGRATORS = {
         spp=192,
     ),
     "aov": traced(
-        "Channels `depth`, `shading_normal`, `albedo` and `shape_id`.",
-        integrators.Aov(channels=("depth", "shading_normal", "albedo", "shape_id")),
+        "Channels `shading_normal` and `shape_id`, as colours.",
+        integrators.Aov(channels=("shading_normal", "shape_id")),
         spp=32,
+        size=(144, 108),
     ),
 }
 SAMPLERS = {

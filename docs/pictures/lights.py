@@ -119,25 +119,25 @@ LIGHTS = {
         spp=128,
     ),
     "point": lit(
-        "Near the floor between the things.",
-        lights.Point(position=(0.0, 0.75, -0.45), intensity=(2.6, 2.2, 1.6)),
+        "In front of the things: shadows grow with the distance.",
+        lights.Point(position=(0.1, 1.1, 1.3), intensity=(4.6, 4.2, 3.4)),
     ),
     "spot": lit(
         "Two cones: `edge` linear and smooth.",
         lights.Spot(
             to_world=look_at([-1.9, 2.9, 2.0], [-0.75, 0.5, 0.0], UP),
-            intensity=(26.0, 22.0, 17.0), cutoff=17.0, beam_width=14.0,
+            intensity=(34.0, 29.0, 22.0), cutoff=17.0, beam_width=14.0,
         ),
         lights.Spot(
             to_world=look_at([1.9, 2.9, 2.0], [0.75, 0.5, 0.0], UP),
-            intensity=(12.0, 17.0, 26.0), cutoff=24.0, beam_width=4.0, edge="smooth",
+            intensity=(16.0, 23.0, 34.0), cutoff=24.0, beam_width=4.0, edge="smooth",
         ),
     ),
     "projector": lit(
         "Throws an image at the wall.",
         lights.Projector(
             image=Bitmap(image=SCENES / "poppy_field" / "picture.png"),
-            irradiance=(60.0, 60.0, 60.0), fov=34.0,
+            irradiance=(105.0, 105.0, 105.0), fov=34.0,
             to_world=look_at([0.4, 2.2, 4.6], [0.0, 1.25, -1.6], UP),
         ),
     ),

@@ -28,7 +28,7 @@ from .studio import PLACES, SMALL, WIDE, Picture, arc, lathe, near_camera, studi
 
 FIELD = Path(__file__).parents[2] / "scenes" / "poppy_field" / "picture.png"
 RED, CREAM, DARK = (0.6, 0.07, 0.04), (0.8, 0.72, 0.58), (0.03, 0.06, 0.16)
-BALL = rotate([1, 0, 0], -90)  # uv of a sphere: v along y
+BALL = rotate([1, 0, 0], 90)  # an image stands upright on it
 
 
 def uv_scale(u: float, v: float) -> Any:
