@@ -21,11 +21,11 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     ),
     "generated/shading_frame.cl": lambda f, _: (
         ("generated/normal_map.cl", "path/shading_frame_mapped.cl")
-        if f.normal_maps_used
+        if f.normal_mapped
         else ("path/shading_frame.cl",)
     ),
     "generated/transmittance.cl": lambda f, _: (
-        f"tracing/transmittance{'' if f.is_null else '_opaque'}.cl",
+        f"tracing/transmittance{'' if f.null_surfaces else '_opaque'}.cl",
     ),
     "generated/trace.cl": lambda _, layout: (
         f"tracing/trace_{'lanes' if layout == 'brute' else 'one'}.cl",

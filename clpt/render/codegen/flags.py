@@ -31,7 +31,7 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "USES_ATTRIBUTES": lambda f: f.attributes,
     "USES_ANALYTIC": lambda f: bool(f.analytic),
     "USES_INSTANCES": lambda f: f.instances,
-    "USES_NULL_SURFACES": lambda f: f.is_null,
+    "USES_NULL_SURFACES": lambda f: f.null_surfaces,
     "USES_ABSORPTION": lambda f: f.absorption,
     "USES_DISPERSION": lambda f: f.dispersion and f.mode == "spectral",
     "USES_FLUORESCENCE": lambda f: any(fluoresces(f, cls) for cls in f.leaves),
@@ -57,7 +57,7 @@ MATERIAL: dict[str, Callable[[Features, type[Material]], str | int]] = {
     "BSDF_TRANSMITS": lambda f, cls: int(cls.kind in f.transmitting),  # kernels calculate with it
     "BSDF_CHROMATIC": lambda f, cls: cls.chromatic,
     "BSDF_FLUORESCES": fluoresces,
-    "BSDF_IS_NULL": lambda f, cls: cls.is_null and f.is_null,
+    "BSDF_IS_NULL": lambda f, cls: cls.is_null and f.null_surfaces,
     "USES_CHOICE": lambda f, cls: cls.uses_lobe_sample or cls.fluoresces or f.many_lights,
 }
 

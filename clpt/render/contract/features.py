@@ -53,8 +53,8 @@ class Features:
     tangents: bool = False
     attributes: bool = False  # some texture reads what meshes say per vertex or face
     mixtures: int = 0  # how deep masks and blends nest
-    normal_maps_used: bool = False  # some material has a normal or a bump map
-    is_null: bool = False  # some surface lets light through as if it were not there
+    normal_mapped: bool = False  # some material has a normal or a bump map
+    null_surfaces: bool = False  # some surface lets light through as if it were not there
     infinite: bool = False
     light_paths: bool = False  # paths start at lights
     visible_lights: bool = False  # some light is no delta light: a camera may see it
