@@ -9,7 +9,7 @@ from clpt.errors import KernelBuildError
 
 
 def test_the_kernels_are_found():
-    assert (kernels_folder() / "lib").is_dir()
+    assert (kernels_folder() / "core").is_dir()
 
 
 def test_a_kernel_file_is_named_by_its_path():

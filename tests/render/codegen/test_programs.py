@@ -120,7 +120,7 @@ def test_only_what_fluoresces_shifts_wavelengths() -> None:
     ):
         texts = programs.sources(lowered(materials, mode).features, "wide8", 8, queued=False)
         there = len(materials) > 1 and mode == "spectral"
-        assert ("#define USES_SHIFTS 1" in texts["generate"].text) == there
+        assert ("#define USES_FLUORESCENCE 1" in texts["generate"].text) == there
         for name, source in texts.items():
             shifts = there and name == "shade_fluorescent"
             assert ("inline Wavelengths reradiation_shift(" in source.text) == shifts
