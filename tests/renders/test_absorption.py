@@ -22,7 +22,7 @@ from clpt.scene.integrators import ParticleTracer, Path, Whitted
 from clpt.scene.lights import Area, Constant, Point
 from clpt.scene.materials import Dielectric, Diffuse, Layer, Null, RoughDielectric
 from clpt.scene.shapes import Cube, Rectangle, Sphere
-from tests.renders.builders import BLACK, DOWN, HIDDEN, UP
+from tests.renders.builders import BLACK, DOWN, UP
 from tests.renders.support import assert_agree, assert_mean, blocks, exposures
 from tests.renders.test_spectral import FINE, HALF_WIDTH, band, to_rgb
 from tests.rotation import rotating
@@ -31,6 +31,7 @@ THICKNESS = 0.4  # [m]
 GLASS = spectra.glass("sf11")
 DYE = spectra.Tabulated((360.0, 500.0, 560.0, 830.0), (0.4, 1.0, 6.0, 2.0))  # [1/m]
 DEEP = {"path": Path(max_depth=60, rr_depth=100), "whitted": Whitted(max_depth=60)}
+OUT_OF_SIGHT = tf.translate([0, 60, -50]) @ tf.scale(1e-3)
 DARK = spectra.Tabulated((400.0, 700.0), (0.0, 0.0))
 CLEAR = {"int_ior": 1.0, "ext_ior": 1.0}  # a boundary that bends and reflects nothing
 
@@ -54,7 +55,7 @@ def plate(material: Dielectric, degrees: float, light: Any, below: bool) -> Scen
     """
     t = np.radians(degrees)
     eye = np.array([np.sin(t), 0.0, np.cos(t)]) * 5.0
-    lamp = tf.translate([0, 0, -1.0]) @ tf.scale(1000.0) if below else HIDDEN @ tf.scale(1e-3)
+    lamp = tf.translate([0, 0, -1.0]) @ tf.scale(1000.0) if below else OUT_OF_SIGHT
     shapes = [
         Cube(to_world=tf.scale([90.0, 90.0, THICKNESS / 2]), material=material),
         Rectangle(to_world=lamp, material=BLACK, emission=Area(radiance=light if below else DARK)),
