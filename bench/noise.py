@@ -1,9 +1,10 @@
 """Adaptive sampling beside as many samples everywhere: what error a second of rendering leaves.
 
-The three scenes of `bench.peer_scenes` in RGB, the two taking turns in one process: squares of 16x16
-pixels get samples until their noise is below a limit, then every pixel the mean number of those.
-From the variance of pictures of several seeds: the relative mean squared error of the picture, and
-that of its noisiest squares (the 99th percentile). Efficiency is 1 over error and time, as a ratio.
+The three scenes of `bench.peer_scenes` in RGB, the two taking turns in one process: squares of
+16x16 pixels get samples until their noise is below a limit, then every pixel the mean number of
+those. From the variance of pictures of several seeds: the relative mean squared error of the
+picture, and that of its noisiest squares (the 99th percentile). Efficiency is 1 over error and
+time, as a ratio.
 """
 
 from __future__ import annotations

@@ -76,7 +76,8 @@ def measure(path: Path, mode: str, bounces: int = BOUNCES) -> dict[str, Any]:
     scene.film = dataclasses.replace(scene.film, mode=mode)
     on = device.choose()
     flight = Flight(on, scene)
-    features, tree = flight.wavefront.lowered.features, flight.wavefront.tree
+    features = flight.wavefront.features
+    tree = flight.wavefront.scene.trees.triangles
     plain = tree.layout != "brute" and not (features.instances or features.analytic)
     bare = Bare(on, tree, flight.slots) if plain else None
     seconds: dict[str, float] = defaultdict(float)

@@ -104,9 +104,7 @@ def measure(path: Path, layout: str | None) -> dict[str, Any]:
     renderer.run(SPP)
     cpu, rays = time.process_time() - start, front.counts.rays - rays
     stats, info = renderer.stats, renderer.device.info
-    largest = max(
-        b.size for b in (*front.named.values(), *front.tree.buffers.values()) if hasattr(b, "size")
-    )
+    largest = max(b.size for b in front.arguments.values() if hasattr(b, "size"))
     if not np.isfinite(renderer.image()).all() or front.counts.rejected:
         raise SystemExit(f"{path.name}: refused: samples that are not finite")
     count = stats.triangles

@@ -48,9 +48,9 @@ def peak(command: Sequence[str], caches: Path) -> int:
     A process counts what the one that started it held, so a small one starts it.
     """
     with tempfile.TemporaryDirectory() as folder:
-        told = Path(folder) / "kilobytes"
-        run([sys.executable, "-I", "-S", "-c", SMALL, str(told), *command], caches)
-        return int(told.read_text()) * 1024
+        kilobytes = Path(folder) / "kilobytes"
+        run([sys.executable, "-I", "-S", "-c", SMALL, str(kilobytes), *command], caches)
+        return int(kilobytes.read_text()) * 1024
 
 
 def commands(scene: Path, mode: str, out: Path, python: str) -> dict[str, list[str]]:

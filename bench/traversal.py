@@ -22,15 +22,15 @@ from bench.meshes import finer
 
 KERNELS = """
 #include "bvh/{layout}.cl"
-kernel APART void closest(global const float *nodes, global const float *leaves,
-                    global const float8 *rays, global TriHit *hits)
+kernel NO_VECTORIZE void closest(global const float *nodes, global const float *leaves,
+                                 global const float8 *rays, global TriHit *hits)
 {{
     uint i = get_global_id(0);
     float8 r = rays[i];
     hits[i] = {layout}_closest(nodes, leaves, r.s0, r.s1, r.s2, r.s4, r.s5, r.s6, r.s3, r.s7);
 }}
-kernel APART void occluded(global const float *nodes, global const float *leaves,
-                     global const float8 *rays, global int *hits)
+kernel NO_VECTORIZE void occluded(global const float *nodes, global const float *leaves,
+                                  global const float8 *rays, global int *hits)
 {{
     uint i = get_global_id(0);
     float8 r = rays[i];

@@ -97,7 +97,7 @@ class Clpt:
         return {
             "milliseconds": {name: round(t.seconds * 1e3, 2) for name, t in timings.items()},
             "rays": {"closest": wavefront.counts.closest, "shadow": wavefront.counts.shadow},
-            "layout": wavefront.tree.layout,
+            "layout": wavefront.scene.strategy.layout,
             "lanes": wavefront.lanes,
             "slots": wavefront.slots,
         }

@@ -22,7 +22,8 @@ from clpt.formats import load
 from clpt.images import read, write
 from clpt.rays import Accel, AllHits, Hits, InstancedAccel
 from clpt.render.codegen.library import kernel_source
-from clpt.render.renderer import Progress, Renderer, render
+from clpt.render.progress import Progress
+from clpt.render.renderer import Renderer, render
 from clpt.scene import Scene
 from clpt.spectral_exr import SpectralImage
 from clpt.spectral_exr import read as read_spectral

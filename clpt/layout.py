@@ -1,12 +1,13 @@
 """Records: one declaration, from which the numpy dtype and the OpenCL text follow.
 
 Every member consists of 4-byte words, so that no compiler pads anything; a test compares offsets
-with the device. Three forms of text are made of a record:
+with the device. Four forms of text are made of a record:
 
 - `uniform_text`: a struct of scalars in memory, the same for all lanes (settings, cameras);
 - `row_text`: a lane struct and a loader that gathers one row per lane from a table of words;
-- `slab_text`: a lane struct and a load and a store per member for structure-of-arrays slabs, where
-  each word is a stream of its own.
+- `slab_text`: a load and a store per member for structure-of-arrays slabs, where each word is a
+  stream of its own;
+- `select_text`: a lane struct that is never in memory, its value of nothing and the choice of two.
 """
 
 from __future__ import annotations
@@ -28,16 +29,29 @@ TYPES: dict[str, tuple[int, str, str, tuple[str, ...]]] = {
     "matrix": (16, "float", "", ()),
 }
 _NUMPY = {"real": "f4", "integer": "i4", "natural": "u4"}
+_SELECT = {"real": "sel", "integer": "sel_i", "natural": "sel_n", "vec3": "sel3"}
+_ZERO = {
+    "integer": "0", "natural": "0", "vec3": "v3(0.0f, 0.0f, 0.0f)", "Spectrum": "spectrum_of(0.0f)",
+}  # fmt: skip
+
+
+def select_name(lane: str) -> str:
+    """Return the kernels' function that chooses between two values of a lane type or a record."""
+    return _SELECT.get(lane) or f"{_snake(lane)}_sel"
 
 
 @dataclass(frozen=True)
 class Member:
-    """One member of a record: where its first word stands, its type and why it is there."""
+    """One member of a record: its type, why it is there, where its first word stands.
+
+    nothing: its value, as OpenCL, in what `name_nothing()` of `select_text` returns; "": 0.
+    """
 
     name: str
     type: str
     doc: str
     word: int
+    nothing: str = ""
 
     @property
     def words(self) -> int:
@@ -47,16 +61,22 @@ class Member:
 class Record:
     """A named sequence of members; declared order is memory order.
 
+    members: a type in TYPES, a documentation and, if it is not 0, `Member.nothing`.
     Raises ValueError for a type that is not in TYPES.
     """
 
-    def __init__(self, name: str, doc: str, **members: tuple[str, str]):
+    def __init__(self, name: str, doc: str, **members: tuple[str, str] | tuple[str, str, str]):
         self.name, self.doc = name, doc
         self.members: tuple[Member, ...] = ()
-        for member, (kind, text) in members.items():
+        for member, (kind, text, *nothing) in members.items():
             if kind not in TYPES:
                 raise ValueError(f"{name}.{member}: {kind!r} is none of {', '.join(TYPES)}")
-            self.members += (Member(member, kind, text, self.words),)
+            self.members += (Member(member, kind, text, self.words, *nothing),)
+
+    @property
+    def snake_name(self) -> str:
+        """The name as the kernels' functions have it: LightRow is light_row."""
+        return _snake(self.name)
 
     @property
     def words(self) -> int:
@@ -92,7 +112,7 @@ class Record:
 
     def row_text(self) -> str:
         """Return the lane struct and `name_row(table, at)`; `at`: a row's first word, per lane."""
-        lower = _snake(self.name)
+        lower = self.snake_name
         body = []
         for m in self.members:
             read = "gather_i" if m.type == "integer" else "gather_w"
@@ -109,9 +129,30 @@ class Record:
             [head, "{", f"    {self.name} r;", *body, "    return r;", "}", ""]
         )
 
+    def select_text(self) -> str:
+        """Return the lane struct, `name_sel(m, a, b)`, a where m, else b, and `name_nothing()`."""
+        choices, values = [], []
+        for m in self.members:
+            lane, components = TYPES[m.type][2:]
+            whole = m.type != "vec2"  # which has no function of its own
+            for path in (m.name,) if whole else tuple(m.name + c for c in components):
+                select = select_name(lane if whole else "real")
+                choices.append(f"    a.{path} = {select}(m, a.{path}, b.{path});")
+                values.append(f"    r.{path} = {m.nothing or _ZERO.get(lane, '0.0f')};")
+        lower = self.snake_name
+        return self.lane_text() + "\n".join(
+            [
+                f"inline {self.name} {lower}_sel(mask m, {self.name} a, {self.name} b)",
+                "{", *choices, "    return a;", "}",
+                f"inline {self.name} {lower}_nothing(void)",
+                "{", f"    {self.name} r;", *values, "    return r;", "}",
+                "",
+            ]
+        )  # fmt: skip
+
     def slab_text(self) -> str:
         """Return `load_name_member(slab, at)` and `store_name_member(slab, at, m, v)`, for each."""
-        lower = _snake(self.name)
+        lower = self.snake_name
         parts = [f"#define {lower.upper()}_WORDS {self.words}"]
         for m in self.members:
             lane = TYPES[m.type][2]

@@ -1,4 +1,4 @@
-"""Ray queries for trimesh: what its own `mesh.ray` answers, with the same names and results.
+"""Ray queries for trimesh: the methods of its own `mesh.ray`, with the same results.
 
 >>> mesh.ray = clpt.trimesh_ray.RayMeshIntersector(mesh)
 """
@@ -21,7 +21,7 @@ from clpt.errors import SceneError
 from clpt.rays import Accel
 
 SAME = 1e-6  # of the mesh's scale: hits nearer to each other, of one facing, are one surface
-GRAZING = 1e-9  # cosine below which a plane says nothing of where it is met
+GRAZING = 1e-9  # cosine below which the plane of a triangle does not locate a hit
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -29,13 +29,13 @@ Integers = NDArray[np.int64]
 
 @functools.cache
 def _default_queue() -> Any:
-    """The queue that intersectors share that were given none."""
+    """The queue of all intersectors that were made without one."""
     return device.choose().queue
 
 
 @dataclass(frozen=True)
-class _Placed:
-    """A mesh as the device has it: moved by -centre, then scaled."""
+class _DeviceMesh:
+    """A mesh on the device: translated by -centre, then scaled."""
 
     accel: Accel
     centre: Floats
@@ -43,11 +43,11 @@ class _Placed:
 
 
 class RayMeshIntersector:
-    """Answers ray queries about a `trimesh.Trimesh`; may stand in its attribute `ray`.
+    """Answers ray queries about a `trimesh.Trimesh`, also as its attribute `ray`.
 
     queue: a `pyopencl.CommandQueue` to run on; by default that of the first device that works. The
-    tree is built on first use, and again when the mesh has changed. The mesh is moved to the origin
-    in float64 first, so that its coordinates may be large; hits are located in float64.
+    tree is built on first use, and again when the mesh has changed. The mesh is translated to the
+    origin in float64 first, so that its coordinates may be large; hits are located in float64.
     """
 
     def __init__(self, geometry: Any, queue: Any = None):
@@ -86,65 +86,67 @@ class RayMeshIntersector:
         origins, directions = _rays(ray_origins, ray_directions)
         scaled = self._scaled(origins, directions)
         if multiple_hits:
-            hits = self._placed.accel.intersect_all(*scaled)
+            hits = self._on_device.accel.intersect_all(*scaled)
             rays, triangles, t = hits.ray, hits.primitive.astype(np.int64), hits.t
         else:
-            first = self._placed.accel.intersect(*scaled)
+            first = self._on_device.accel.intersect(*scaled)
             rays = np.flatnonzero(first.primitive >= 0)
             triangles, t = first.primitive[rays].astype(np.int64), first.t[rays]
         if multiple_hits or return_locations:
             cosines, distances = self._planes(triangles, origins[rays], directions[rays], t)
         if multiple_hits:
-            kept = _one_of_each(rays, cosines < 0, distances, SAME * self.mesh.scale, max_hits)
-            rays, triangles, distances = rays[kept], triangles[kept], distances[kept]
+            distinct = _distinct(rays, cosines < 0, distances, SAME * self.mesh.scale, max_hits)
+            rays, triangles, distances = rays[distinct], triangles[distinct], distances[distinct]
         if not return_locations:
             return triangles, rays
         return triangles, rays, origins[rays] + distances[:, None] * directions[rays]
 
     def intersects_first(self, ray_origins: ArrayLike, ray_directions: ArrayLike) -> Integers:
-        """The triangle that each ray meets first: (n,), -1 where there is none."""
+        """Return the triangle that each ray meets first: (n,), -1 for none."""
         scaled = self._scaled(*_rays(ray_origins, ray_directions))
-        return self._placed.accel.intersect(*scaled).primitive.astype(np.int64)
+        return self._on_device.accel.intersect(*scaled).primitive.astype(np.int64)
 
     def intersects_any(
         self, ray_origins: ArrayLike, ray_directions: ArrayLike
     ) -> NDArray[np.bool_]:
-        """Whether each ray meets anything: (n,)."""
+        """Return whether each ray meets anything: (n,)."""
         scaled = self._scaled(*_rays(ray_origins, ray_directions))
-        return np.asarray(self._placed.accel.occluded(*scaled), np.bool_)
+        return np.asarray(self._on_device.accel.occluded(*scaled), np.bool_)
 
     def contains_points(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """Whether points (n, 3) are inside of a closed mesh, by rays from there."""
+        """Return whether points (n, 3) are inside of a closed mesh, by rays from them."""
         return np.asarray(contains_points(self, points), np.bool_)
 
     @cache_decorator  # type: ignore[untyped-decorator]
-    def _placed(self) -> _Placed:
-        """The tree, and where the mesh lies in it; a power of two scales without rounding."""
+    def _on_device(self) -> _DeviceMesh:
+        """The mesh on the device; a power of two scales without rounding."""
         empty = not len(self.mesh.faces)
         size = 1.0 if empty else float(self.mesh.scale)
         scale = 2.0 ** -round(math.log2(size)) if 0 < size < math.inf else 1.0
         centre = np.zeros(3) if empty else np.mean(self.mesh.bounds, axis=0)
         vertices = (np.asarray(self.mesh.vertices, np.float64) - centre) * scale
         queue = _default_queue() if self.queue is None else self.queue
-        return _Placed(Accel(queue, vertices, np.asarray(self.mesh.faces)), centre, scale)
+        return _DeviceMesh(Accel(queue, vertices, np.asarray(self.mesh.faces)), centre, scale)
 
     def _scaled(self, origins: Floats, directions: Floats) -> tuple[Floats, Floats]:
-        return (origins - self._placed.centre) * self._placed.scale, directions
+        return (origins - self._on_device.centre) * self._on_device.scale, directions
 
     def _planes(
         self, triangles: Integers, origins: Floats, directions: Floats, t: NDArray[np.float32]
     ) -> tuple[Floats, Floats]:
-        """n . d and the distance to the triangle's plane, or where there is none t."""
+        """n . d, and the distance to the triangle's plane; t where the ray is parallel to it."""
         normals = self.mesh.face_normals[triangles]
         corners = self.mesh.vertices[self.mesh.faces[triangles, 0]]
         cosines = (normals * directions).sum(axis=1)
-        met = np.abs(cosines) > GRAZING
-        apart = ((corners - origins) * normals).sum(axis=1)
-        distances = np.where(met, apart / np.where(met, cosines, 1.0), t / self._placed.scale)
+        crosses = np.abs(cosines) > GRAZING
+        heights = ((corners - origins) * normals).sum(axis=1)
+        distances = np.where(
+            crosses, heights / np.where(crosses, cosines, 1.0), t / self._on_device.scale
+        )
         return cosines, distances
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without what lives on a device; a copy that is read elsewhere has the default queue."""
+        """Only the mesh: an unpickled intersector has the default queue."""
         return {"mesh": self.mesh}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -164,12 +166,12 @@ def _rays(origins: ArrayLike, directions: ArrayLike) -> tuple[Floats, Floats]:
     return o, unitize(d)
 
 
-def _one_of_each(
+def _distinct(
     rays: Integers, facing: NDArray[np.bool_], distances: Floats, same: float, most: int
 ) -> Integers:
-    """Of hits, which to keep, by ray and distance: of those at one place that face alike the first.
+    """Indices of distinct hits by ray and distance: of equal ones that face alike the first.
 
-    rays is sorted; most: of each ray.
+    rays: sorted; same: distance below which hits are equal; most: of each ray.
     """
     order = np.lexsort((distances, rays))
     ray, face, distance = rays[order], facing[order], distances[order]

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
+import pyopencl as cl
 import pytest
+
+from clpt import device
 
 HERE = Path(__file__).resolve().parent
 
@@ -24,3 +29,27 @@ def assets() -> Path:
 def scenes() -> Path:
     """The folder of the small scenes that belong to the tests."""
     return HERE / "scenes"
+
+
+@cache
+def _first() -> device.Device:
+    return device.choose()
+
+
+@pytest.fixture(scope="module")
+def one_context() -> Iterator[None]:
+    """Open one context for all renderers that are given no device, each with a queue of its own.
+
+    Programs are then built, or loaded, once a process.
+    """
+    first, opened = _first(), device.choose
+
+    def choose(which: str | int | None = None, *, profiling: bool = False) -> device.Device:
+        if which is not None or profiling:
+            return opened(which, profiling=profiling)
+        queue = cl.CommandQueue(first.context, first.info.cl_device)
+        return device.Device(first.context, queue, first.info)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(device, "choose", choose)
+        yield

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ast
 import re
+from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -50,19 +52,50 @@ def modules() -> list[Path]:
     return sorted(PACKAGE.rglob("*.py"))
 
 
-def imports(path: Path) -> set[str]:
-    """The modules that a file imports, anywhere in it, with full names."""
+def statements(path: Path) -> Iterator[tuple[str, list[str]]]:
+    """The imports of a file, anywhere in it: a module's full name, and the names taken from it."""
     inside = path.relative_to(ROOT).with_suffix("").parts
-    found = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
+            yield from ((alias.name, []) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             package = ".".join(inside[: len(inside) - node.level]) if node.level else ""
             base = ".".join(part for part in (package, node.module or "") if part)
-            found.add(base)
-            found |= {f"{base}.{alias.name}" for alias in node.names}
-    return found
+            yield base, [alias.name for alias in node.names]
+
+
+def imports(path: Path) -> set[str]:
+    """The modules that a file imports, anywhere in it, with full names."""
+    return {
+        name
+        for base, taken in statements(path)
+        for name in (base, *(f"{base}.{part}" for part in taken))
+    }
+
+
+def module_names() -> dict[str, Path]:
+    """The modules of the package by their full names; a package is its __init__."""
+    names = {".".join(path.relative_to(ROOT).with_suffix("").parts): path for path in modules()}
+    return {name.removesuffix(".__init__"): path for name, path in names.items()}
+
+
+def circle(graph: dict[str, set[str]]) -> list[str]:
+    """A circle of a graph, its first node again at the end; empty if there is none."""
+    done: set[str] = set()
+    for start in graph:
+        path: list[str] = []
+        open_ = [iter([start])]
+        while open_:
+            if (node := next(open_[-1], None)) is None:
+                open_.pop()
+                done |= set(path[-1:])
+                del path[-1:]
+            elif node in path:
+                return [*path[path.index(node) :], node]
+            elif node not in done:
+                path.append(node)
+                open_.append(iter(sorted(graph[node])))
+    return []
 
 
 def part_of(name: str) -> str | None:
@@ -92,6 +125,22 @@ def test_rooms_of_render_know_only_lower_floors(path: Path) -> None:
     known = {parts[2]}.union(*FLOORS[:own])
     found = {name.split(".")[2] for name in imports(path) if name.startswith("clpt.render.")}
     assert not found - known, f"{parts[2]} imports {', '.join(sorted(found - known))}"
+
+
+def test_a_circle_is_found() -> None:
+    assert circle({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == []
+    assert circle({"a": {"b"}, "b": {"c", "d"}, "c": set(), "d": {"b"}}) == ["b", "d", "b"]
+
+
+def test_no_modules_import_each_other() -> None:
+    """No circle of imports, those inside functions and for type checking included."""
+    paths = module_names()
+    graph: dict[str, set[str]] = {}
+    for name in sorted(paths):
+        taken = [(base, part) for base, parts in statements(paths[name]) for part in parts or [""]]
+        targets = {f"{b}.{part}" if f"{b}.{part}" in paths else b for b, part in taken}
+        graph[name] = targets & paths.keys()
+    assert not circle(graph), "a circle of imports: " + " -> ".join(circle(graph))
 
 
 @pytest.mark.parametrize("path", modules(), ids=lambda p: str(p.relative_to(ROOT)))
@@ -154,7 +203,7 @@ def kernel_files() -> list[Path]:
 
 @pytest.mark.parametrize("path", kernel_files(), ids=lambda p: str(p.relative_to(KERNELS)))
 def test_kernel_files(path: Path) -> None:
-    """A comment first; includes in their direction; entry points only in stage/, motion/ and bvh/."""
+    """A comment first; includes in their direction; kernels only in stage/, motion/ and bvh/."""
     text = path.read_text(encoding="utf-8")
     assert text.startswith("/*"), "a kernel file begins with what it is for"
     folder = path.relative_to(KERNELS).parts[0]
@@ -169,3 +218,29 @@ def test_kernel_files(path: Path) -> None:
     assert "double" not in re.findall(r"\w+", code)
     in_memory = re.findall(r"global\s+(?:const\s+)?(\w+)\s*\*", code)
     assert not {"float3", "int3", "uint3", "bool", "size_t"} & set(in_memory)
+
+
+@pytest.mark.parametrize("path", kernel_files(), ids=lambda p: str(p.relative_to(KERNELS)))
+def test_comments_of_kernels_name_what_exists(path: Path) -> None:
+    """Kernel files as `folder/file.cl`, others by their path, modules by their full name."""
+    comments = " ".join(re.findall(r"/\*.*?\*/", path.read_text(encoding="utf-8"), re.DOTALL))
+    for name in re.findall(r"(?<![\w/<>*])[\w/]+\.cl\b", comments):
+        file = KERNELS / name.removeprefix("kernels/")
+        assert file.is_file() or name.startswith("generated/"), name
+    for name in re.findall(r"\b(?:clpt|tests|bench|docs)/[\w/]+\.\w+", comments):
+        assert (ROOT / name).is_file(), name
+    for name in re.findall(r"\bclpt(?:\.\w+)+", comments):
+        module = ROOT.joinpath(*name.split("."))
+        inside = module.parent.with_suffix(".py")  # of a module: the name that it must have
+        there = module.is_dir() or module.with_suffix(".py").is_file()
+        assert there or re.search(rf"\b{module.name}\b", inside.read_text("utf-8")), name
+
+
+@pytest.mark.parametrize("path", kernel_files(), ids=lambda p: str(p.relative_to(KERNELS)))
+def test_lines_of_kernels(path: Path) -> None:
+    """120 columns at most; the backslashes of a macro stand below each other."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    assert max(map(len, lines)) <= 120
+    for line, after in pairwise(lines):
+        if line.endswith("\\") and after.endswith("\\"):
+            assert len(line) == len(after), after

@@ -1,21 +1,31 @@
-"""The pages of documentation: each has its place on the site, and every link leads somewhere."""
+"""The pages of documentation: on the site, with links that lead somewhere and code that runs."""
 
 from __future__ import annotations
 
 import dataclasses
+import logging
 import re
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import clpt
+from tests import pages
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = sorted((ROOT / "docs").glob("*.md"))
+DOCS = ROOT / "docs"
+PAGES = sorted(DOCS.glob("*.md"))
 LINK = re.compile(r"\]\((?!\w+:)([^)#\s]+)(?:#[^)\s]*)?\)")
+SMALLER = {
+    "width=320, height=240": "width=40, height=30",
+    '"width": 320, "height": 240': '"width": 40, "height": 30',
+}
+
+Run = Callable[[str], dict]
 
 
 def test_every_page_is_in_the_navigation():
@@ -31,25 +41,157 @@ def test_links_lead_somewhere(page: Path):
     assert [link for link in links if not (page.parent / link).exists()] == []
 
 
-def test_the_code_of_the_page_on_embedding_runs(monkeypatch: pytest.MonkeyPatch, capsys):
-    code = re.findall(r"```python\n(.*?)```", (ROOT / "docs/embedding.md").read_text("utf-8"), re.S)
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_commands_and_options_exist(page: Path):
+    for line in pages.commands(page):
+        pages.check_command(line)
+
+
+@pytest.fixture
+def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Run]:
+    """Yield what runs a page's Python in one namespace, films small and RGB; it returns the names.
+
+    The folder looks like the repository's root, but what a page writes stays out of that.
+    """
+    for name in ("scenes", "tests"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    monkeypatch.chdir(tmp_path)
     load = clpt.load
 
     def smaller(path: str) -> clpt.Scene:
         scene = load(path)
-        scene.film = dataclasses.replace(scene.film, width=32, height=24, mode="rgb")
+        scene.film = dataclasses.replace(scene.film, width=40, height=30, mode="rgb")
         return scene
 
-    monkeypatch.chdir(ROOT)
     monkeypatch.setattr(clpt, "load", smaller)
-    names: dict = {}
-    for block in code:
-        exec(block, names)
-    assert code[0].count("\n") <= 12  # ten lines that work, and a blank one or two
-    assert names["pixels"].shape == (24, 32, 4) and 20 < names["pixels"][..., :3].mean() < 235
+
+    def run(page: str) -> dict:
+        names: dict = {}
+        for i, code in enumerate(pages.blocks(DOCS / page, "python")):
+            exec(compile(_smaller(code), f"{page}, block {i + 1}", "exec"), names)
+        return names
+
+    level = logging.getLogger("clpt").level
+    yield run
+    logging.getLogger("clpt").setLevel(level)
+
+
+def _smaller(text: str) -> str:
+    for old, new in SMALLER.items():
+        text = text.replace(old, new)
+    return text
+
+
+def test_the_code_of_the_page_on_embedding_runs(run: Run, capsys: pytest.CaptureFixture):
+    names = run("embedding.md")
+    first = pages.blocks(DOCS / "embedding.md", "python")[0]
+    assert first.count("\n") <= 12  # ten lines that work, and a blank one or two
+    assert names["pixels"].shape == (30, 40, 4) and 20 < names["pixels"][..., :3].mean() < 235
     assert 0 < names["rows"].get().min() < np.inf
     assert names["whole"] is False
     assert "must be a whole number above zero" in capsys.readouterr().out
+
+
+def test_the_tutorial(run: Run, tmp_path: Path):
+    names = run("tutorial.md")
+    final, renderer = names["image"], names["renderer"]
+    assert final.shape == (30, 40, 3) and renderer.active == 0.0 and renderer.samples > 64
+    errors = [np.abs(names[name] - final).mean() for name in ("noisy", "better")]
+    assert errors[1] < errors[0] / 2  # of sixteen times the samples
+    red = final[..., 0] > 3 * final[..., 2]
+    assert 0.05 < red.mean() < 0.3  # the pawn
+    assert clpt.read("pawn.exr") == pytest.approx(final, rel=1e-3)
+    assert clpt.read("brighter.png").mean() > clpt.read("pawn.png").mean()
+    (text,) = pages.blocks(DOCS / "tutorial.md", "json")
+    (tmp_path / "pawn.json").write_text(text, "utf-8")
+    file, scene = clpt.load("pawn.json"), names["scene"]
+    for one, other in zip([file.camera, *file.shapes], [scene.camera, *scene.shapes], strict=True):
+        assert one.kind == other.kind
+        np.testing.assert_allclose(one.to_world, other.to_world, atol=1e-12)
+    assert file.camera.fov == scene.camera.fov
+    assert [shape.material.kind for shape in file.shapes] == ["rough_plastic", *["diffuse"] * 2]
+    emitted = [each.shapes[2].emission.radiance.to_rgb("emission") for each in (file, scene)]
+    assert emitted[0] == pytest.approx(emitted[1])
+
+
+def test_how_to_light_a_scene(run: Run):
+    names = run("lighting.md")
+    luminances = [names[n].sample(np.array([560.0]))[0] for n in ("lamp_white", "lamp_bright")]
+    assert luminances == pytest.approx([1.0, 20.0], rel=0.1)
+    studio = names["studio"]
+    assert studio[10:14, 15:19].mean() > 1.5 * studio[10:14, 21:25].mean()  # key left, fill right
+    ground = names["outdoors"][-1, 0]  # in the sun, far from the ball
+    assert ground == pytest.approx([0.45, 0.47, 0.50], rel=0.05)
+    exposed = clpt.read("exposed.png")
+    assert 0.1 < exposed.mean() < 0.4
+    assert names["image_sky"].kind == "envmap"
+
+
+def test_the_code_of_the_page_on_troubleshooting(run: Run, capsys: pytest.CaptureFixture):
+    names = run("troubleshooting.md")
+    assert names["chosen"].info.label in capsys.readouterr().out
+    assert "is not there; there is [0]" in names["message"]
+    with pytest.raises(clpt.ClptError):
+        names["renderer"].run(1)  # closed
+
+
+def test_the_code_of_coming_from(run: Run):
+    names = run("coming_from.md")
+    axes = [names[name].fov_axis for name in ("like_mitsuba", "like_pbrt", "like_blender")]
+    assert axes == ["x", "smaller", "larger"]
+    assert names["scene"].integrator.max_depth > 0 and names["scene"].sampler.kind == "independent"
+
+
+def test_the_code_of_choosing(run: Run):
+    names = run("choosing.md")
+    assert 0.3 < names["direct"].mean() / names["whole"].mean() < 0.9
+    assert 16 <= names["samples"].min() <= names["samples"].max() <= 256
+
+
+def test_the_code_of_architecture(run: Run, capsys: pytest.CaptureFixture):
+    run("architecture.md")
+    assert capsys.readouterr().out == "real True\n"
+
+
+def test_the_code_of_limits(run: Run):
+    messages = run("limits.md")["messages"]
+    assert "must be 1 to 65536" in messages[0] and "are more than 64 Mi pixels" in messages[1]
+
+
+LIMITS = (  # on the page, and where the code has them
+    ("65 536 pixels", "clpt.cli.render", "LARGEST", 65536),
+    ("67 108 864 pixels", "clpt.render.lowering.checks", "LARGEST", 67108864),
+    ("| 1024 |", "clpt.scene.integrators", "MOST_BANDS", 1024),
+    ("| 4000 |", "clpt.render.lowering.settings", "DEEPEST", 4000),
+    ("715 827 882", "clpt.bvh.build", "MOST", 715827882),
+    ("| 255 |", "clpt.render.contract.custom_materials", "MOST", 255),
+    ("| 32 |", "clpt.scene.textures", "MOST_OCTAVES", 32),
+    ("| 1 GiB a file |", "clpt.formats.gzip_file", "LARGEST", 1 << 30),
+    ("| 65 536 bytes |", "clpt.formats.meshes.ply", "LONGEST_HEADER", 65536),
+    ("| 4096 corners |", "clpt.formats.meshes.ply", "MOST_CORNERS", 4096),
+    ("| 1 GiB |", "clpt.formats.meshes.strands", "LARGEST", 1 << 30),
+    ("| 2 GiB | `is larger than 2048 MiB`", "clpt.formats.mitsuba.serialized", "LARGEST", 1 << 31),
+    ("2^26 pixels each", "clpt.formats.gltf.textures", "PIXELS", 1 << 26),
+    ("2^30 together", "clpt.formats.gltf.textures", "TOGETHER", 1 << 30),
+    ("| 2 GiB | an error", "clpt.formats.gltf.accessors", "LARGEST", 1 << 31),
+    ("| 4 194 304 triangles", "clpt.formats.gltf.draco", "LARGEST", 4194304),
+    ("| 64 |", "clpt.formats.mitsuba.xml", "MAX_NESTING", 64),
+    ("| 16, 4096 files |", "clpt.formats.mitsuba.xml", "MAX_INCLUDES", 16),
+    ("| 16, 4096 files |", "clpt.formats.mitsuba.xml", "MAX_FILES", 4096),
+    ("16 777 216 characters", "clpt.formats.mitsuba.xml", "MAX_TEXT", 16777216),
+    ("1000 parts", "clpt.formats.mitsuba.values", "MAX_PARTS", 1000),
+    ("| 32, 100 000 files |", "clpt.formats.pbrt.files", "DEEPEST", 32),
+    ("| 32, 100 000 files |", "clpt.formats.pbrt.files", "MOST_FILES", 100_000),
+    ("| 4 GiB |", "clpt.formats.pbrt.files", "MOST_BYTES", 4 << 30),
+    ("10 levels", "clpt.formats.pbrt.shapes", "DEEPEST", 10),
+    ("2^23 triangles", "clpt.formats.pbrt.subdivision", "MOST_TRIANGLES", 1 << 23),
+)
+
+
+@pytest.mark.parametrize(("told", "module", "name", "value"), LIMITS, ids=lambda v: str(v)[:30])
+def test_limits_are_those_of_the_code(told: str, module: str, name: str, value: int):
+    assert told in (DOCS / "limits.md").read_text("utf-8")
+    assert getattr(pytest.importorskip(module), name) == value
 
 
 @pytest.mark.slow

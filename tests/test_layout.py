@@ -138,3 +138,47 @@ def test_rows_are_gathered(opened: device.Device, record: Record, lanes: int) ->
     found = np.zeros((record.words, lanes), np.uint32)
     run(opened, kernel, lanes, 0, rows.reshape(-1), found.reshape(-1), chosen)
     assert np.array_equal(found, rows[chosen].T)
+
+
+@pytest.mark.parametrize("lanes", [1, 8])
+def test_records_are_chosen_lane_by_lane(opened: device.Device, lanes: int) -> None:
+    """`sel` takes every member from one of two, `nothing` has the values that are declared."""
+    record = Record(
+        "OddPoint",
+        "All types that lanes have.",
+        t=("real", "", "FAR"),
+        i=("integer", "", "-1"),
+        n=("natural", ""),
+        uv=("vec2", ""),
+        p=("vec3", "", "v3(1.0f, 2.0f, 3.0f)"),
+        s=("spectrum", ""),
+    )
+    rng = np.random.default_rng(3)
+    rows = rng.integers(0, 1 << 22, (32, record.words)).astype(np.uint32)
+    lane_mask = (rng.random(lanes) < 0.5).astype(np.uint32)
+    m = "(*(global const integer *)c)" if lanes > 1 else "((integer)c[0])"
+    cast = {"integer": "as_real", "natural": "as_real"}
+    members = [f"{m.name}{c}" for m in record.members for c in TYPES[m.type][3]]
+    types = {m.name: m.type for m in record.members}
+    writes = "".join(
+        f"    block_store(b + {(where * record.words + i) * lanes}, "
+        f"{cast.get(types[name.split('.')[0]], '')}({value}.{name}));\n"
+        for where, value in enumerate(("r", "none"))
+        for i, name in enumerate(members)
+    )
+    text = (
+        f'#include "core/base.cl"\n{record.row_text()}'
+        + record.select_text().removeprefix(record.lane_text())
+        + "kernel void probe(global const uint *a, global float *b, global const uint *c)\n{\n"
+        f"    integer row = LANE_INDEX;\n    mask m = {m} != 0;\n"
+        f"    OddPoint one = odd_point_row(a, row * {record.words});\n"
+        f"    OddPoint two = odd_point_row(a, (row + 16) * {record.words});\n"
+        f"    OddPoint r = odd_point_sel(m, one, two), none = odd_point_nothing();\n{writes}}}\n"
+    )
+    found = np.zeros((2, record.words, lanes), np.uint32)
+    run(opened, text, lanes, 0, rows.reshape(-1), found.reshape(-1), lane_mask)
+    numbers = np.arange(lanes)
+    assert np.array_equal(found[0], rows[np.where(lane_mask, numbers, numbers + 16)].T)
+    nothing = np.zeros((), record.dtype)
+    nothing["t"], nothing["i"], nothing["p"] = 1e30, -1, (1, 2, 3)
+    assert np.array_equal(found[1], np.tile(nothing.reshape(1).view(np.uint32), (lanes, 1)).T)

@@ -11,13 +11,9 @@ import numpy as np
 import pytest
 
 import clpt
+from tests import pages
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
-
-
-def blocks(page: str, language: str) -> list[str]:
-    text = (DOCS / page).read_text("utf-8")
-    return re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)
 
 
 @pytest.fixture
@@ -27,7 +23,7 @@ def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
 
     def run(page: str, **edits: str) -> dict:
         name = f"page_of_{page.removesuffix('.md')}"
-        text = "\n".join(blocks(page, "python"))
+        text = "\n".join(pages.blocks(DOCS / page, "python"))
         for old, new in edits.items():
             assert old in text
             text = text.replace(old, new)
@@ -65,7 +61,7 @@ def test_the_entry_points_are_there() -> None:
 
 @pytest.mark.slow
 def test_a_material_of_ones_own(program, tmp_path: Path) -> None:
-    (source,) = blocks("custom_materials.md", "c")
+    (source,) = pages.blocks(DOCS / "custom_materials.md", "c")
     (tmp_path / "retroreflector.cl").write_text(source, "utf-8")
     fewer = {"(Retroreflector)\n": '(Retroreflector, modes=("rgb",))\n', "spp=16": "spp=1"}
     fewer["shapes=[sign]"] = "shapes=[sign], film=clpt.scene.Film(width=32, height=32, mode='rgb')"

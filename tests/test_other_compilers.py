@@ -72,8 +72,8 @@ def builders() -> list[str]:
         for layout in bvh.TREES if "generated/" in text else ("",):
             virtual = {"generated/instance_traversal.cl": ""}
             if layout:
-                every = path.stem == "query_every"
-                virtual["generated/layout.cl"] = bvh.traversal_text(layout, every)
+                all_hits = path.stem == "query_all_hits"
+                virtual["generated/layout.cl"] = bvh.traversal_text(layout, all_hits)
             made.append(device.assemble(f"bvh/{path.name}", virtual).text)
     return made
 

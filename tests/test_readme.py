@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import re
-import shlex
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import clpt
-from clpt.cli import cli
+from tests import pages
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text("utf-8")
@@ -25,7 +24,7 @@ def test_links_lead_somewhere():
 
 
 def test_the_scene_from_dataclasses_renders():
-    code = next(c for c in re.findall(r"```python\n(.*?)```", README, re.S) if "Sphere" in c)
+    code = next(c for c in pages.blocks(ROOT / "README.md", "python") if "Sphere" in c)
     names: dict = {}
     exec(code, names)
     scene = names["scene"]
@@ -37,12 +36,7 @@ def test_the_scene_from_dataclasses_renders():
 
 
 def test_commands_and_options_exist():
-    context = cli.make_context("clpt", ["devices"])
-    lines = [line for line in README.splitlines() if line.startswith("clpt ")]
+    lines = pages.commands(ROOT / "README.md")
     assert len(lines) > 5
     for line in lines:
-        _, name, *words = shlex.split(line.split("   ")[0])
-        command = cli.get_command(context, name)
-        assert command is not None, name
-        known = {option for parameter in command.params for option in parameter.opts}
-        assert {word for word in words if word.startswith("-")} <= known
+        pages.check_command(line)

@@ -6,14 +6,13 @@ the other, each as soon as it is known; one that cannot be true tells why in `re
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterator, Sequence
 
 from clpt import bvh, device
-from clpt.scene import Scene
 
-from . import bandwidth, building, rays, scenes, stages, starting
+from . import bandwidth, building, rays, stages, starting
 from .figures import Figure
+from .scenes import opened
 
 __all__ = ["PARTS", "Figure", "measure", "opened"]
 
@@ -25,23 +24,6 @@ PARTS = {
     "start": "whole processes until a first picture, with empty caches and with full ones",
 }
 START_SCENE = "cornell"  # where none is asked for
-
-
-def opened(name: str, mode: str | None = None) -> Scene:
-    """A scene that comes with the benchmark, or any file or folder that clpt loads.
-
-    mode: rgb or spectral, the scene's own by default. Raises SceneError.
-    """
-    if name in scenes.SCENES:
-        scene = scenes.made(name)
-    else:
-        from clpt.formats import load
-
-        scene = load(name)
-        scene.name = scene.name or name
-    if mode is None:
-        return scene
-    return dataclasses.replace(scene, film=dataclasses.replace(scene.film, mode=mode))
 
 
 def measure(

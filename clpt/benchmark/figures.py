@@ -48,8 +48,10 @@ class Figure:
 
     def refuse(self, *complaints: str) -> Figure:
         """The same figure, refused if any complaint is not empty."""
-        told = [self.refused, *complaints]
-        return dataclasses.replace(self, refused="; ".join(dict.fromkeys(filter(None, told))))
+        all_complaints = [self.refused, *complaints]
+        return dataclasses.replace(
+            self, refused="; ".join(dict.fromkeys(filter(None, all_complaints)))
+        )
 
     def record(self) -> dict[str, Any]:
         """What is kept of it, as JSON takes it."""

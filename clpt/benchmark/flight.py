@@ -14,7 +14,7 @@ from clpt import device
 from clpt.layout import Record
 from clpt.records import HIT, PATH, SHADOW
 from clpt.render.lowering.scene import lower
-from clpt.render.wavefront.device_scene import default_slots
+from clpt.render.wavefront.path_buffers import default_slots
 from clpt.render.wavefront.wavefront import Step, Wavefront
 from clpt.scene import Scene
 
@@ -27,7 +27,7 @@ class Flight:
     """A scene's paths in flight, a slot for about every pixel: a picture in small.
 
     slots: paths in flight, by default what a render on the device has. The other parameters are
-    those of clpt.render.wavefront.wavefront.Wavefront. Raises as that does.
+    those of clpt.render.wavefront.wavefront.Wavefront.create. Raises as that does.
     """
 
     def __init__(self, on: device.Device, scene: Scene, slots: int | None = None, **wavefront: Any):
@@ -38,14 +38,14 @@ class Flight:
         film = dataclasses.replace(scene.film, width=width, height=height, crop=None, bands=0)
         self.scene = dataclasses.replace(scene, film=film)
         self.device = on
-        self.wavefront = Wavefront(on, lower(self.scene), slots=slots, **wavefront)
-        self.slots = self.wavefront.slots
+        self.wavefront = Wavefront.create(on, lower(self.scene), slots=slots, **wavefront)
+        self.slots = self.wavefront.paths.slots
         self.restart()
 
     def restart(self) -> None:
         """Empty the film, and let every slot begin at its first sample."""
         self.wavefront.clear()
-        self.wavefront.rewind()
+        self.wavefront.paths.restart()
         self.wavefront.stages[0].bound.set_args(samples=(0, ENDLESS))
 
     def bounce(self, around: Callable[[Step, Callable[[], Any]], Any] | None = None) -> None:
@@ -73,10 +73,10 @@ class Flight:
         """A member of all slots: (slots,), or (slots, components)."""
         member = next(m for m in record.members if m.name == name)
         wave = self.wavefront
-        buffer = wave.named[f"{record.name.lower()}_words"]
+        buffer = wave.paths.arguments[f"{record.name.lower()}_words"]
         streams = np.empty((member.words, self.slots), _TYPES.get(member.type, np.float32))
         for i, stream in enumerate(streams):
-            wave.stream.read(buffer, stream, 4 * (member.word + i) * wave.stride)
+            wave.stream.read(buffer, stream, 4 * (member.word + i) * wave.paths.stride)
         return streams[0] if member.words == 1 else np.ascontiguousarray(streams.T)
 
     @property
@@ -118,7 +118,7 @@ class Flight:
         if kernel == "mix_materials":
             return int(self.met.sum())
         if kernel == "shade":
-            kinds = self.wavefront.lowered.features.materials
+            kinds = self.wavefront.features.materials
             return int((self.kinds == kinds.index(step.name.removeprefix("shade_"))).sum())
         if kernel in ("shadow", "splat"):
             return int(self.shadowed.sum())

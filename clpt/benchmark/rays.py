@@ -59,7 +59,7 @@ def sets(on: device.Device, scene: Scene, count: int | None = None) -> Sets:
     """
     count = count or (CPU_RAYS if on.info.is_cpu else GPU_RAYS)
     flight = Flight(on, scene, count)
-    vertices, faces = triangles.world(flight.wavefront.lowered)
+    vertices, faces = triangles.world(flight.wavefront.scene.lowered)
     if not len(faces):
         raise SceneError("rays are measured on triangles, and the scene has none")
     found: dict[str, Rays] = {}
@@ -102,7 +102,7 @@ def _diffuse(flight: Flight) -> Rays:
     w = np.random.default_rng(1).normal(size=n.shape)
     onward = n + 0.9999 * w / np.linalg.norm(w, axis=1, keepdims=True)
     onward /= np.linalg.norm(onward, axis=1, keepdims=True)
-    radius = float(flight.wavefront.lowered.settings["scene_radius"])
+    radius = float(flight.wavefront.scene.lowered.settings["scene_radius"])
     origins = (o + t * d + 3e-5 * radius * n).astype(np.float32)
     return Rays(origins, onward.astype(np.float32), np.full(len(o), np.inf, np.float32))
 
@@ -171,8 +171,8 @@ def measure(
                 wrong[either] = wrong.get(either) or checks.any_hit(met, hits[layout])
         first = next(iter(hits.values()))
         for layout, found in hits.items():
-            told = truth.closest(found) or checks.differ(found, first)
-            wrong[f"{layout} {name} closest"] = told
+            complaint = truth.closest(found) or checks.differ(found, first)
+            wrong[f"{layout} {name} closest"] = complaint
         for figure, each in taken.items():
             yield _figure(figure, each, wrong[figure], copying, scene.name, len(rays))
 

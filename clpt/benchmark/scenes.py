@@ -6,6 +6,7 @@ triangles and a lamp, which are met without a tree.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from typing import Any
 
@@ -111,3 +112,20 @@ def made(name: str) -> Scene:
     if name not in SCENES:
         raise UnknownKindError("scene", name, SCENES)
     return SCENES[name]()
+
+
+def opened(name: str, mode: str | None = None) -> Scene:
+    """A scene that comes with the benchmark, or any file or folder that clpt loads.
+
+    mode: rgb or spectral, the scene's own by default. Raises SceneError.
+    """
+    if name in SCENES:
+        scene = made(name)
+    else:
+        from clpt.formats import load
+
+        scene = load(name)
+        scene.name = scene.name or name
+    if mode is None:
+        return scene
+    return dataclasses.replace(scene, film=dataclasses.replace(scene.film, mode=mode))

@@ -17,7 +17,8 @@ from clpt.benchmark.traffic import traffic
 from clpt.records import SLABS
 from clpt.render.codegen import programs
 from clpt.render.wavefront import queues
-from clpt.render.wavefront.wavefront import FILM_WORDS, Step
+from clpt.render.wavefront.film import FILM_WORDS
+from clpt.render.wavefront.wavefront import Step
 from clpt.scene import Scene
 
 from .bandwidth import Copying
@@ -41,7 +42,7 @@ def measure(
     """Figures of every stage, in Mitems/s, each round a few bounces.
 
     only: names of stages, or how they begin, as `shade`; all by default.
-    wavefront: parameters of clpt.render.wavefront.wavefront.Wavefront; raises as that does.
+    wavefront: parameters of clpt.render.wavefront.wavefront.Wavefront.create; raises as that does.
     """
     flight, copying = Flight(on, scene, **wavefront), Copying(on)
     for _ in range(WARM):
@@ -58,8 +59,8 @@ def measure(
         for name, each in noted.items():
             noted[name] = [*each[:number], _whole(each[number:])]
     wave = flight.wavefront
-    features, layout = wave.lowered.features, wave.tree.layout
-    moved = traffic(features, layout, queued=wave.queued)
+    features, layout = wave.features, wave.scene.strategy.layout
+    moved = traffic(features, layout, queued=wave.scene.strategy.queued)
     for name, found in noted.items():
         if name not in QUEUEING and _asked(name, only):
             yield _figure(flight, copying, name, moved[name].total, found)
@@ -101,7 +102,7 @@ def _figure(
         "copy_gbytes": copied,
         "of_copy": gigabytes / copied,
         "lanes": flight.wavefront.lanes,
-        "layout": flight.wavefront.tree.layout,
+        "layout": flight.wavefront.scene.strategy.layout,
         "mode": flight.scene.film.mode,
     }
     figure = Figure("stages", name, "Mitems/s", speeds, flight.scene.name, more)
@@ -112,15 +113,15 @@ def _figure(
 def _queue(flight: Flight, copying: Copying, way: str, rounds: int) -> Figure:
     """All slots brought into queues by the kind of their material, looked at afterwards."""
     on, wave = flight.device, flight.wavefront
-    features = wave.lowered.features
+    features, layout = wave.features, wave.scene.strategy.layout
     kinds = len(features.materials)
     for step in wave.stages:  # so that hits wait to be shaded
         if step.bound.kernel.name == "shade" or step.name in QUEUEING:
             break
         flight.stage(step)
-    texts = programs.sources(features, wave.tree.layout, wave.lanes, queued=way)
+    texts = programs.sources(features, layout, wave.lanes, queued=way)
     program = device.build(on, texts[way])
-    named, give = {**wave.named, **queues.numbers(flight.slots)}, device.Buffers(on)
+    named, give = {**wave.arguments, **queues.numbers(flight.slots)}, device.Buffers(on)
     for name, size in queues.sizes(way, flight.slots, kinds).items():
         named[name] = give.allocate("the queues", 4 * size)
     steps = []
@@ -133,7 +134,7 @@ def _queue(flight: Flight, copying: Copying, way: str, rounds: int) -> Figure:
         wave.stream.fill(named["queue"], 0xFFFFFFFF, 0, named["queue"].size)
         taken = timed(on, lambda: [wave.stream.run(*step) for step in steps])
         found.append((flight.slots, taken))
-    nbytes = traffic(features, wave.tree.layout, queued=way)[way].total
+    nbytes = traffic(features, layout, queued=way)[way].total
     figure = _figure(flight, copying, way, nbytes, found[1:])
     queue, starts, counts = (
         give.download(named[name], (named[name].size // 4,), np.uint32)
@@ -152,9 +153,9 @@ def _accumulate(flight: Flight, copying: Copying, rounds: int) -> Figure:
     """The film made into a picture; its items are pixels."""
     wave = flight.wavefront
     size = flight.scene.film.size
-    nbytes = 4.0 * (FILM_WORDS * int(wave.lowered.settings["planes"]) + 4)
+    nbytes = 4.0 * (FILM_WORDS * int(wave.paths.settings["planes"]) + 4)
     found = []
     for _ in range(rounds + 1):
-        taken = timed(flight.device, lambda: [wave.stream.run(wave.accumulate, size)])
+        taken = timed(flight.device, lambda: [wave.accumulate_film()])
         found.append((size[0] * size[1], taken))
     return _figure(flight, copying, "accumulate", nbytes, found[1:])

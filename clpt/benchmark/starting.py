@@ -77,14 +77,14 @@ def measure(
     scene's, for the figures. Raises DeviceError if a process fails.
     """
     with tempfile.TemporaryDirectory() as folder:
-        told = Path(folder) / "told.json"
-        command = [sys.executable, "-m", __name__, str(told), scene, mode or "", str(device)]
+        report = Path(folder) / "report.json"
+        command = [sys.executable, "-m", __name__, str(report), scene, mode or "", str(device)]
         for what, times in (("cold", 1), ("warm", rounds)):
             taken, stats = [], []
             for _ in range(times):
-                told.unlink(missing_ok=True)
+                report.unlink(missing_ok=True)
                 taken.append(run(command, Path(folder) / "caches"))
-                stats.append(json.loads(told.read_text(encoding="utf-8")))
+                stats.append(json.loads(report.read_text(encoding="utf-8")))
             yield _figure(f"{what} start", taken, stats, name)
 
 
@@ -105,7 +105,7 @@ def _main(target: str, scene: str, mode: str, which: str) -> None:
     start = time.perf_counter()
     import dataclasses
 
-    from clpt.benchmark import opened
+    from clpt.benchmark.scenes import opened
     from clpt.render.renderer import Renderer
 
     plan = opened(scene, mode or None)

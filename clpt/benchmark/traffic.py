@@ -1,14 +1,15 @@
 """Memory traffic: what each stage of a bounce reads and writes of the state of a path.
 
-Counted in the text that the compiler gets, from the loads and stores of clpt/records.py that are
-left when its conditions are decided. What stages fetch from the scene's tables and trees depends on
-the rays and is not in it: figures are what must move at least.
+Counted in the text that the compiler gets: the loads and stores of the slabs of clpt/records.py
+that the text's conditions leave. What a stage fetches from the scene's tables and trees depends on
+the rays and is not counted: a figure is the least that must move.
 """
 
 from __future__ import annotations
 
+import operator
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from clpt.records import SLABS
@@ -20,6 +21,11 @@ _WORD = 4  # bytes
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 _DEFINE = re.compile(r"\s*#\s*define\s+(\w+)(?:\s+(\w+))?\s*$")
 _CONDITION = re.compile(r"\s*#\s*(if|ifdef|ifndef|elif|else|endif)\b(.*)")
+_TERM = re.compile(
+    r"(?P<not>!)?\s*(?:(?P<defined>defined)\s*\(?\s*)?(?P<left>\w+)(?P<asked>\(\w+\))?\)?"
+    r"(?:\s*(?P<compare>==|>)\s*(?P<right>\w+))?"
+)
+_COMPARE = {"==": operator.eq, ">": operator.gt}
 _CALL = re.compile(r"(?<!\w)(?P<verb>load|store)_(?P<member>\w+)\((?!Slab )")
 _QUEUED = {"sort": (0, 1), "append": (0, 1), "shade": (1, 0)}  # words read and written of a queue
 
@@ -55,7 +61,7 @@ def _moved(name: str, text: str, mode: str) -> Moved:
         for member in record.members
     }
     words: dict[str, set[str]] = {"load": set(), "store": set()}
-    for line in _kept(_COMMENT.sub("", text).splitlines()):
+    for line in kept_lines(text):
         for call in _CALL.finditer(line):
             if call["member"] in sizes:
                 words[call["verb"]].add(call["member"])
@@ -68,11 +74,11 @@ def _moved(name: str, text: str, mode: str) -> Moved:
     return Moved(_WORD * read, _WORD * written)
 
 
-def _kept(lines: list[str]) -> Iterator[str]:
-    """The lines that conditions of the preprocessor leave, of such as kernels have."""
+def kept_lines(text: str) -> Iterator[str]:
+    """Return the lines of a program, without comments, that its conditions leave."""
     defined: dict[str, str] = {}
     stack: list[tuple[bool, bool]] = []  # whether lines are kept, whether some branch was taken
-    for line in lines:
+    for line in _COMMENT.sub("", text).splitlines():
         condition = _CONDITION.match(line)
         if condition is None:
             if all(keeps for keeps, _ in stack):
@@ -82,7 +88,7 @@ def _kept(lines: list[str]) -> Iterator[str]:
             continue
         word, rest = condition[1], condition[2].strip()
         if word.startswith("if"):
-            prefix = {"ifdef": "defined ", "ifndef": "! defined "}.get(word, "")
+            prefix = {"ifdef": "defined ", "ifndef": "!defined "}.get(word, "")
             holds = _holds(prefix + rest, defined)
             stack.append((holds, holds))
         elif word == "endif":
@@ -93,11 +99,35 @@ def _kept(lines: list[str]) -> Iterator[str]:
             stack[-1] = (holds, taken or holds)
 
 
-def _holds(condition: str, defined: dict[str, str]) -> bool:
-    """Whether a condition of numbers, names, comparisons and && || ! holds."""
-    text = re.sub(r"\bdefined\s*\(?\s*(\w+)\s*\)?", lambda m: str(int(m[1] in defined)), condition)
-    text = re.sub(r"\b\w+\(\w+\)", "0", text)  # __has_attribute(...), __has_builtin(...)
+def _holds(condition: str, defined: Mapping[str, str]) -> bool:
+    """Whether a condition holds: terms that are joined by &&, and these by ||.
+
+    Raises ValueError for one of another form.
+    """
+    alternatives = [part.split("&&") for part in condition.split("||")]
+    return any(all(_term(term.strip(), defined) for term in terms) for terms in alternatives)
+
+
+def _term(term: str, defined: Mapping[str, str]) -> bool:
+    """Whether a term holds: [!]NAME, [!]defined(NAME), or two names or numbers that are compared.
+
+    What only compilers know, as __has_attribute(NAME), does not hold.
+    """
+    found = _TERM.fullmatch(term)
+    if found is None:
+        raise ValueError(f"the condition {term!r} is not of ! defined == > and names")
+    if found["defined"]:
+        holds = found["left"] in defined
+    elif found["compare"]:
+        left, right = (_number(found[side], defined) for side in ("left", "right"))
+        holds = _COMPARE[found["compare"]](left, right)
+    else:
+        holds = not found["asked"] and _number(found["left"], defined) != 0
+    return holds != bool(found["not"])
+
+
+def _number(name: str, defined: Mapping[str, str]) -> int:
+    """The number that a name stands for; 0 where it stands for nothing."""
     for _ in range(4):  # names that stand for names
-        text = re.sub(r"\b[A-Za-z_]\w*\b", lambda m: defined.get(m[0], "0") or "0", text)
-    text = text.replace("&&", " and ").replace("||", " or ")
-    return bool(eval(re.sub(r"!(?!=)", " not ", text), {"__builtins__": {}}))
+        name = defined.get(name, name)
+    return int(name) if name.isdigit() else 0

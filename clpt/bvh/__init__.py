@@ -1,4 +1,4 @@
-"""Acceleration structures: triangles and boxes to nodes, built on the device."""
+"""Acceleration structures over triangles and boxes, built on the device."""
 
 from .build import Bvh, build, build_boxes, build_parts, choose_layout, choose_tree, outgrows_caches
 from .building import Building

@@ -32,7 +32,7 @@ class Bvh:
     """An acceleration structure on a device.
 
     layout: the name of its traversal in kernels/bvh; count: triangles or boxes; buffers: by the
-    names of that traversal's arguments; parts: the trees in them, as `refit` asks for them; stats:
+    names of that traversal's arguments; parts: the trees in them, as `refit` needs them; stats:
     seconds, and for wide8 nodes, leaves, depth and cost (nodes and blocks that a random line
     through the scene is tested against).
     """
@@ -52,22 +52,22 @@ class Bvh:
 
 
 def choose_layout(device: Device, n_triangles: int) -> str:
-    """The layout that traces fastest on the device: a key of LAYOUTS."""
+    """Return the layout that traces fastest on the device: a key of LAYOUTS."""
     if n_triangles <= BRUTE_LIMIT:
         return "brute"
     return choose_tree(device)
 
 
 def choose_tree(device: Device) -> str:
-    """The layout that suits the device best among those that have a tree.
+    """Return the layout that traces fastest on the device among those that have a tree.
 
-    Measured on CPUs; for others it is what the literature finds best, see bench/NOTES.md.
+    Measured on CPUs; for other devices the literature's choice, see bench/NOTES.md.
     """
     return "wide8" if device.info.is_cpu else "compact"
 
 
 def outgrows_caches(device: Device, layout: str, n_triangles: int) -> bool:
-    """Whether rays of all directions would wait for memory, so that several in flight pay."""
+    """Return whether incoherent rays would wait for memory, so that interleaving them pays."""
     caches = device.info.cl_device.global_mem_cache_size
     return device.info.is_cpu and layout == "wide8" and WIDE8_BYTES * n_triangles > caches
 
@@ -80,15 +80,15 @@ def build(
     layout: str | None = None,
     quality: Quality = "high",
 ) -> Bvh:
-    """An acceleration structure over triangles.
+    """Build an acceleration structure over triangles.
 
     vertices: (n, 3) float32; faces: (m, 3) uint32; tags: (m,) uint32, a word for each triangle that
-    comes back in its hits (zeros if None). Buffers of these types are read in place, not checked.
+    its hits return (zeros if None). Buffers of these types are read in place, not checked.
     layout: a key of LAYOUTS; None asks `choose_layout`. quality: "fast" cuts leaves out of a
-    space-filling curve, and only what stands above them is built as in "high"; brute has no tree.
+    space-filling curve, and builds the nodes above them as "high" does; brute has no tree.
 
-    While it runs it takes up to 250 bytes a triangle on the device, beside the arrays given, of
-    which about 60 stay (binary: 130); no buffer has more than 64 bytes a triangle.
+    The build takes up to 250 bytes a triangle on the device, beside its input, of which about 60
+    stay (binary: 130); no buffer has more than 64 bytes a triangle.
     Trees are never deeper than BVH_DEPTH of kernels/bvh/node.cl: traversals cannot overflow.
 
     Raises SceneError for vertices that are not finite or beyond 1e12, for indices out of range and
@@ -107,7 +107,7 @@ def _build(
 ) -> Bvh:
     start = time.perf_counter()
     count, device = _check(vertices, faces, tags), building.device
-    if count == 0:  # one triangle that is a point: nothing hits it
+    if count == 0:  # one degenerate triangle, which no ray hits
         vertices, faces, tags = np.zeros((1, 3)), np.zeros((1, 3)), None
     if quality not in get_args(Quality):
         raise SceneError(f"a tree's quality is high or fast, not {quality!r}")
@@ -137,11 +137,11 @@ def build_parts(
     layout: str,
     quality: Quality = "high",
 ) -> tuple[Bvh, NDArray[np.uint32]]:
-    """A tree for each run of triangles, `counts` long one after the other, in shared buffers.
+    """Build a tree for each run of triangles, in shared buffers.
 
-    Triangles count from 0 in each. Returns with the trees where each of them begins, (n, 2) uint32:
-    its nodes and its leaves, in steps of 32 bytes. The other parameters are those of `build`, which
-    raises alike.
+    counts: the lengths of the runs, one after the other; triangles count from 0 in each. Returns
+    the trees, and the offsets of the nodes and leaves of each, (n, 2) uint32 [32 bytes]. The other
+    parameters are those of `build`, which raises alike.
     """
     start = time.perf_counter()
     trees, building = [], Building(device)
@@ -151,25 +151,25 @@ def build_parts(
     if len(trees) == 1:
         return trees[0], np.zeros((1, 2), np.uint32)
     sizes = np.array([[b.size for b in (t.buffers["nodes"], t.buffers["leaves"])] for t in trees])
-    begins = np.cumsum(sizes, axis=0) - sizes
+    offsets = np.cumsum(sizes, axis=0) - sizes
     buffers = {}
-    for name, begin, whole in zip(("nodes", "leaves"), begins.T, sizes.sum(axis=0), strict=True):
+    for name, own, whole in zip(("nodes", "leaves"), offsets.T, sizes.sum(axis=0), strict=True):
         buffers[name] = building.allocate(int(whole))
-        for tree_, at in zip(trees, begin, strict=True):
-            building.stream.copy(buffers[name], tree_.buffers[name], dst_offset=int(at))
+        for tree_, offset in zip(trees, own, strict=True):
+            building.stream.copy(buffers[name], tree_.buffers[name], dst_offset=int(offset))
     building.stream.wait()
     stats = {"trees": len(trees), "seconds": time.perf_counter() - start}
-    begins //= 32
+    offsets //= 32
     firsts = np.cumsum([0, *counts]).tolist()
     parts = tuple(
         replace(tree_.parts[0], nodes=nodes, leaves=leaves, first=first)
-        for tree_, (nodes, leaves), first in zip(trees, begins.tolist(), firsts, strict=False)
+        for tree_, (nodes, leaves), first in zip(trees, offsets.tolist(), firsts, strict=False)
     )
-    return Bvh(layout, sum(counts), buffers, parts, stats), begins.astype(np.uint32)
+    return Bvh(layout, sum(counts), buffers, parts, stats), offsets.astype(np.uint32)
 
 
 def build_boxes(device: Device, boxes: NDArray, layout: str = "shapes") -> Bvh:
-    """A tree over boxes, (m, 2, 3) float32 low and high corners.
+    """Build a tree over boxes, (m, 2, 3) float32 low and high corners.
 
     layout: a key of BOX_LAYOUTS. Leaves of "shapes" hold up to two boxes; those of the others
     one, and their nodes are as in the layout of that name. Raises as `build` does.
@@ -185,7 +185,7 @@ def build_boxes(device: Device, boxes: NDArray, layout: str = "shapes") -> Bvh:
 
 
 def _check(vertices: Array, faces: Array, tags: Array | None) -> int:
-    """The number of triangles, after looking at arrays for what a tree cannot hold."""
+    """The number of triangles. Raises SceneError for arrays that a tree cannot hold."""
     count = faces.size // 12 if isinstance(faces, cl.Buffer) else len(faces)
     if count > MOST:
         raise SceneError(f"{count:,} triangles are more than a tree holds, {MOST:,}")

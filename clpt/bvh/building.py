@@ -1,4 +1,4 @@
-"""One build under way: the device, the memory it takes, the kernels it runs."""
+"""What the steps of a build share: the device, memory, kernels."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from ..device import build as build_program
 
 Array: TypeAlias = NDArray | cl.Buffer
 
-_BORROWED = 1 << 16  # [bytes] of an array that is not copied, at least
+_ZERO_COPY = 1 << 16  # [bytes] of the smallest array that is not copied
 _GROUP = 8  # work-items of a group where each has one triangle or node
-_RAISED = "use fewer triangles, or a device with more memory"
+_ADVICE = "use fewer triangles, or a device with more memory"
 
 
 @functools.cache
@@ -25,9 +25,9 @@ def _source(root: str) -> Source:
 
 
 class Building:
-    """What the steps of a build share. Programs and kernels are made once in a context.
+    """A build on a device. Programs and kernels are made once in a context.
 
-    stream: what everything is enqueued on, one of its own by default.
+    stream: that everything is enqueued on, one of its own by default.
     """
 
     def __init__(self, device: Device, stream: Stream | None = None):
@@ -37,38 +37,38 @@ class Building:
         self._programs: dict[str, Program] = {}
 
     def run(self, root: str, kernel: str, n: int, **arguments: Any) -> None:
-        """Enqueue n work-items of a kernel of the program at `root`, each by itself."""
+        """Enqueue n work-items of a kernel of the program at `root`, in groups of one."""
         self._enqueue(root, kernel, n, 1, arguments)
 
     def run_each(self, root: str, kernel: str, n: int, **arguments: Any) -> None:
-        """As `run`, in groups, for kernels that are told n as `count` and leave the rest alone."""
+        """As `run`, in larger groups, for kernels whose argument `count` is n."""
         self._enqueue(root, kernel, n, _GROUP, {"count": n, **arguments})
 
     def allocate(self, nbytes: int) -> cl.Buffer:
-        """Raises MemoryBudgetError if the device has no such buffer left."""
-        return self.buffers.allocate("building the scene's tree", nbytes, _RAISED)
+        """Return a buffer. Raises MemoryBudgetError."""
+        return self.buffers.allocate("building the scene's tree", nbytes, _ADVICE)
 
     def upload(self, array: Array, dtype: DTypeLike) -> cl.Buffer:
-        """The array on the device; a buffer is taken as it is. Raises as `allocate` does."""
+        """Return a buffer with an array; a buffer as it is. Raises as `allocate` does."""
         if isinstance(array, cl.Buffer):
             return array
-        return self.buffers.upload("the scene's triangles", array, dtype, _RAISED)
+        return self.buffers.upload("the scene's triangles", array, dtype, _ADVICE)
 
     def wrap_host(self, array: Array, dtype: DTypeLike) -> cl.Buffer:
-        """As `upload`, until the build has ended: a CPU reads an array of that type where it lies.
+        """As `upload`, until the build has ended: a CPU reads an array of that type in place.
 
-        The caller keeps the array, and waits for the stream before it forgets it.
+        The caller keeps the array until the stream has ended.
         """
         if isinstance(array, cl.Buffer):
             return array
         host = np.ascontiguousarray(array, dtype)
-        if not (self.device.info.is_cpu and host.nbytes >= _BORROWED):
+        if not (self.device.info.is_cpu and host.nbytes >= _ZERO_COPY):
             return self.upload(host, dtype)
         flags = cl.mem_flags.READ_ONLY | cl.mem_flags.USE_HOST_PTR
         return cl.Buffer(self.device.context, flags, hostbuf=host)
 
     def read(self, buffer: cl.Buffer, n: int, dtype: DTypeLike) -> NDArray:
-        """The first n values of a buffer."""
+        """Return the first n values of a buffer; wait for them."""
         return self.stream.read(buffer, np.empty(n, dtype))
 
     def _enqueue(self, root: str, kernel: str, n: int, group: int, arguments: dict) -> None:

@@ -1,4 +1,4 @@
-"""Leaves cut out of a space-filling curve, for fast builds; kernels/bvh/curve.cl has the steps."""
+"""Leaves cut out of a space-filling curve, for fast builds, by kernels/bvh/curve.cl."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ _RUN = 2048  # items of the curve that one work-item cuts, and puts into the tre
 def runs(
     building: Building, count: int, items: cl.Buffer, parts: cl.Buffer, leaf_size: int
 ) -> tuple[int, cl.Buffer, cl.Buffer, cl.Buffer]:
-    """Cut items into leaves of at most `leaf_size` <= 8; waits for their number.
+    """Cut items into leaves of at most `leaf_size` <= 8; wait for the number of leaves.
 
-    Returns it, the items in the leaves' order, items that stand for leaves, and their extents.
+    Returns it, the items in the leaves' order, an item for each leaf, and the extents of these.
     """
     keys = _sorted(building, count, items, parts)
     stretches = -(-count // _RUN)
@@ -33,10 +33,10 @@ def runs(
     building.run(_CURVE, "curve_cut", stretches, **curve, **cut)
     building.run(_CURVE, "curve_scan", 1, numbers=numbers, rows=stretches, columns=1)
     n = int(building.read(numbers, stretches + 1, np.uint32)[-1])
-    found, extents = building.allocate(32 * n), building.allocate(64 * stretches)
-    made = {"numbers": numbers, "runs": found, "extents": extents}
-    building.run(_CURVE, "curve_runs", stretches, **curve, **made)
-    return n, ordered, found, extents
+    leaves, extents = building.allocate(32 * n), building.allocate(64 * stretches)
+    output = {"numbers": numbers, "runs": leaves, "extents": extents}
+    building.run(_CURVE, "curve_runs", stretches, **curve, **output)
+    return n, ordered, leaves, extents
 
 
 def _sorted(building: Building, count: int, items: cl.Buffer, parts: cl.Buffer) -> cl.Buffer:
@@ -62,10 +62,10 @@ def _sorted(building: Building, count: int, items: cl.Buffer, parts: cl.Buffer) 
 
 
 def _cells(span: NDArray[np.float32]) -> dict[str, Any]:
-    """From a doubled centroid to its code: as `curve_keys` takes it.
+    """The arguments by which `curve_keys` turns a doubled centroid into its code.
 
     span: low corner and negated high corner of the doubled centroids, (8,). A cell's longest side
-    is halved, again and again; what is halved first is the code's highest bit (Vinkler, Bittner and
+    is halved, again and again; the first halving is the code's highest bit (Vinkler, Bittner and
     Havran 2017, "Extended Morton codes").
     """
     low = span[:3].astype(float)
@@ -78,8 +78,8 @@ def _cells(span: NDArray[np.float32]) -> dict[str, Any]:
         left[axis] /= 2
         bits[axis] += 1
         halved.append((axis, bits[axis]))
-    for place, (axis, nth) in enumerate(reversed(halved)):
+    for position, (axis, nth) in enumerate(reversed(halved)):
         byte, bit = divmod(int(bits[axis] - nth), 8)
-        tables[axis, byte] |= (np.arange(256, dtype=np.uint64) >> bit & 1) << place
+        tables[axis, byte] |= (np.arange(256, dtype=np.uint64) >> bit & 1) << position
     scale = 0.999999 * 2.0**bits / np.maximum(size, 1e-30)  # finite as a float32
     return {"low": (*low, 0.0), "scale": (*scale, 0.0), "tables": tables}

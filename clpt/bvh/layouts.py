@@ -1,4 +1,4 @@
-"""The layouts: what each traversal of kernels/bvh wants in its buffers."""
+"""The layouts: the buffers of each traversal in kernels/bvh."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ class Mesh:
 
 @dataclass(frozen=True)
 class Part:
-    """One tree in buffers that several may share, as refitting asks for it.
+    """One tree in buffers that several may share, as refitting needs it.
 
-    reach: the largest coordinate that it was built with; steps: (begin, count) of what a kernel
-    takes at once, from the leaves up: wide nodes, or ranges in the heap `ranges` of a binary tree;
-    count: triangles or boxes; nodes, leaves: where its own begin, in steps of 32 bytes; first: its
-    first triangle; bounds: of the nodes of a compressed tree, before they became steps.
+    count: triangles or boxes; reach: the largest coordinate that it was built with; steps: (begin,
+    count) of each launch of a kernel, from the leaves up: of wide nodes, or of ranges in the heap
+    `ranges` of a binary tree; bounds: of the nodes of a compressed tree, in full precision; nodes,
+    leaves: offsets of its own [32 bytes]; first: its first triangle.
     """
 
     count: int
@@ -69,7 +69,7 @@ class Packed:
 
 
 def brute(building: Building, mesh: Mesh) -> Packed:
-    """Records of the triangles, on the host: so few are not worth compiling a kernel for."""
+    """Make records of the triangles, on the host: so few are not worth compiling a kernel for."""
     size = mesh.vertices.size // 12
     vertices = building.read(mesh.vertices, 3 * size, np.float32).reshape(size, 3)
     faces = building.read(mesh.faces, 3 * mesh.count, np.uint32).reshape(-1, 3)
@@ -79,13 +79,13 @@ def brute(building: Building, mesh: Mesh) -> Packed:
     words[:, 0] = np.arange(mesh.count)
     words[:, 1] = building.read(mesh.tags, mesh.count, np.uint32)
     records = np.concatenate([v0, *edges, np.cross(*edges), words.view(np.float32)], 1)
-    held = building.allocate(records.nbytes)  # refitting writes to it
-    building.stream.write(held, records.astype(np.float32))
-    return Packed({"tris": held}, Part(mesh.count))
+    buffer = building.allocate(records.nbytes)  # refitting writes to it
+    building.stream.write(buffer, records.astype(np.float32))
+    return Packed({"tris": buffer}, Part(mesh.count))
 
 
 def binary(building: Building, mesh: Mesh) -> Packed:
-    """The binary tree as it was built, and records in the order of its leaves."""
+    """Build a binary tree, and records in the order of its leaves."""
     built = _binary_tree(building, mesh, _BINARY_LEAF)
     records = building.allocate(64 * mesh.count)
     source = {"vertices": mesh.vertices, "faces": mesh.faces, "tags": mesh.tags}
@@ -95,7 +95,7 @@ def binary(building: Building, mesh: Mesh) -> Packed:
 
 
 def wide8(building: Building, mesh: Mesh) -> Packed:
-    """The binary tree made 8 wide, and blocks of 8 triangles."""
+    """Build a binary tree, make it 8 wide, and pack blocks of 8 triangles."""
     built = _binary_tree(building, mesh, _BLOCK, at_once=_BLOCK)
     wide = _wide_nodes(building, built)
     blocks = building.allocate(352 * wide.leaves)
@@ -106,7 +106,7 @@ def wide8(building: Building, mesh: Mesh) -> Packed:
 
 
 def binary_boxes(building: Building, count: int, boxes: cl.Buffer, leaf_size: int = 1) -> Packed:
-    """The binary tree over boxes (count, 2, 3), and the boxes in the order of its leaves."""
+    """Build a binary tree over boxes (count, 2, 3), and indices in the order of its leaves."""
     indices = building.allocate(4 * count)
     if count:
         items, parts = tree.items_of_boxes(building, count, boxes)
@@ -118,7 +118,7 @@ def binary_boxes(building: Building, count: int, boxes: cl.Buffer, leaf_size: in
 
 
 def wide8_boxes(building: Building, count: int, boxes: cl.Buffer) -> Packed:
-    """The binary tree over boxes (count, 2, 3) made 8 wide, and the boxes in their order."""
+    """As `binary_boxes`, with one box in a leaf, and make the tree 8 wide."""
     items, parts = tree.items_of_boxes(building, count, boxes)
     built = tree.over(building, count, items, parts, 1)
     wide = _wide_nodes(building, built)
@@ -129,33 +129,33 @@ def wide8_boxes(building: Building, count: int, boxes: cl.Buffer) -> Packed:
 
 
 def compact(building: Building, mesh: Mesh) -> Packed:
-    """The binary tree made 8 wide in compressed nodes, and records in the order of its leaves."""
+    """Build compressed 8-wide nodes, and records in the order of their leaves."""
     built = _binary_tree(building, mesh, _COMPACT_LEAF)
-    leaves = building.allocate(_whole(48 * mesh.count))
+    leaves = building.allocate(_round_up(48 * mesh.count))
     nodes, part, stats = _compact_nodes(building, built, leaves, mesh.tags)
     source = {"vertices": mesh.vertices, "faces": mesh.faces, "boxes": None, "indices": None}
-    follow(building, part, nodes=nodes, leaves=leaves, **source)
+    refit_nodes(building, part, nodes=nodes, leaves=leaves, **source)
     return Packed({"nodes": nodes, "leaves": leaves}, part, stats)
 
 
 def compact_boxes(building: Building, count: int, boxes: cl.Buffer) -> Packed:
-    """The binary tree over boxes (count, 2, 3) in compressed nodes, and their order."""
+    """As `wide8_boxes`, in compressed nodes."""
     items, parts = tree.items_of_boxes(building, count, boxes)
     built = tree.over(building, count, items, parts, 1)
     indices = building.allocate(4 * count)
     nodes, part, stats = _compact_nodes(building, built, indices, None)
     source = {"vertices": None, "faces": None, "boxes": boxes, "indices": indices}
-    follow(building, part, nodes=nodes, leaves=None, **source)
+    refit_nodes(building, part, nodes=nodes, leaves=None, **source)
     return Packed({"nodes": nodes, "indices": indices}, part, stats)
 
 
 def _compact_nodes(
     building: Building, built: tree.Tree, leaves: cl.Buffer, tags: cl.Buffer | None
 ) -> tuple[cl.Buffer, Part, dict[str, float]]:
-    """Compressed nodes that have no boxes yet, and what their leaves hold; see `follow`."""
+    """Compressed nodes that have no boxes yet, for `refit_nodes`; the leaves are filled in."""
     wide = _collapse(building, built)
     n_nodes = int(wide.stats["nodes"])
-    nodes, bounds = building.allocate(_whole(80 * n_nodes)), building.allocate(32 * n_nodes)
+    nodes, bounds = building.allocate(_round_up(80 * n_nodes)), building.allocate(32 * n_nodes)
     common = {"places": building.allocate(8 * n_nodes), "compact": nodes, "tags": tags}
     common |= {"nodes": built.nodes, "items": built.items, "leaves": leaves}
     common |= {"costs": wide.costs, "roots": wide.roots, "firsts": wide.firsts}
@@ -164,8 +164,8 @@ def _compact_nodes(
     return nodes, replace(wide.part, bounds=bounds), wide.stats
 
 
-def follow(building: Building, part: Part, **buffers: cl.Buffer | None) -> None:
-    """Enqueue that a tree in place has the boxes of what is in it, from the leaves up.
+def refit_nodes(building: Building, part: Part, **buffers: cl.Buffer | None) -> None:
+    """Enqueue that a tree in place has the boxes of its contents, from the leaves up.
 
     buffers: those of the tree, and either vertices and faces or boxes and indices, the others None.
     """
@@ -189,9 +189,9 @@ def follow(building: Building, part: Part, **buffers: cl.Buffer | None) -> None:
 
 @dataclass(frozen=True)
 class _Collapse:
-    """What becomes of a binary tree made 8 wide, as kernels/bvh/collapse.cl has it.
+    """The numbering of a binary tree made 8 wide, as in kernels/bvh/collapse.cl.
 
-    leaf_roots: the binary nodes that wide leaves were, `leaves` of them.
+    leaf_roots: the binary nodes that became wide leaves, `leaves` of them.
     """
 
     costs: cl.Buffer
@@ -218,8 +218,8 @@ def _collapse(building: Building, built: tree.Tree) -> _Collapse:
 
     roots, firsts = building.allocate(4 * n), building.allocate(8 * n)
     leaf_roots, totals = building.allocate(4 * n), building.allocate(4 * (4 + _DEEPEST))
-    places = {"roots": roots, "firsts": firsts, "leaf_roots": leaf_roots, "totals": totals}
-    building.run(_COLLAPSE, "collapse_number", 1, nodes=built.nodes, costs=costs, **places)
+    numbers = {"roots": roots, "firsts": firsts, "leaf_roots": leaf_roots, "totals": totals}
+    building.run(_COLLAPSE, "collapse_number", 1, nodes=built.nodes, costs=costs, **numbers)
     words = building.read(totals, 4 + _DEEPEST, np.uint32)
     n_nodes, n_leaves, levels = words[:3].tolist()
     starts = [*words[4 : 4 + levels].tolist(), n_nodes]
@@ -232,7 +232,7 @@ def _collapse(building: Building, built: tree.Tree) -> _Collapse:
 
 @dataclass(frozen=True)
 class _Wide:
-    """8-wide nodes, the binary nodes that their leaves were, and the number of those."""
+    """8-wide nodes, the binary nodes that became their leaves, and the number of those."""
 
     nodes: cl.Buffer
     leaf_roots: cl.Buffer
@@ -243,13 +243,13 @@ class _Wide:
 
 def _wide_nodes(building: Building, built: tree.Tree) -> _Wide:
     """The inner nodes of a binary tree made 8 wide."""
-    made = _collapse(building, built)
-    n_nodes = int(made.stats["nodes"])
+    collapse = _collapse(building, built)
+    n_nodes = int(collapse.stats["nodes"])
     wide = building.allocate(256 * n_nodes)
-    below = {"nodes": built.nodes, "costs": made.costs, "occlusion": made.occlusion}
-    numbers = {"roots": made.roots, "firsts": made.firsts}
+    below = {"nodes": built.nodes, "costs": collapse.costs, "occlusion": collapse.occlusion}
+    numbers = {"roots": collapse.roots, "firsts": collapse.firsts}
     building.run_each(_COLLAPSE, "collapse_nodes", n_nodes, wide=wide, **numbers, **below)
-    return _Wide(wide, made.leaf_roots, made.leaves, made.part, made.stats)
+    return _Wide(wide, collapse.leaf_roots, collapse.leaves, collapse.part, collapse.stats)
 
 
 LAYOUTS: dict[str, Callable[[Building, Mesh], Packed]] = {
@@ -265,20 +265,20 @@ BOX_LAYOUTS: dict[str, Callable[[Building, int, cl.Buffer], Packed]] = {
     "compact": compact_boxes,
 }
 
-TREES = tuple(name for name in LAYOUTS if name in BOX_LAYOUTS)  # what is not brute force
+TREES = tuple(name for name in LAYOUTS if name in BOX_LAYOUTS)  # all but brute force
 
 
-def traversal_text(layout: str, every: bool = False) -> str:
-    """Return the traversal of a layout, whose verbs are then LAYOUT(closest), LAYOUT(occluded).
+def traversal_text(layout: str, all_hits: bool = False) -> str:
+    """Return the text of a layout's traversal: LAYOUT(closest) and LAYOUT(occluded).
 
-    every: the one that meets all triangles of a ray instead.
+    all_hits: the traversal that finds all triangles that a ray meets instead, LAYOUT(all_hits).
     """
-    file = f"bvh/{layout}{'_every' * every}.cl"
+    file = f"bvh/{layout}{'_all_hits' * all_hits}.cl"
     return f'#include "{file}"\n#define LAYOUT(verb) {layout}_##verb\n'
 
 
 def _binary_part(building: Building, built: tree.Tree) -> Part:
-    """Its subtrees at once, then level by level what stands above them."""
+    """The refitting of a binary tree: all subtrees at once, then the levels above them."""
     steps = tuple(((1 << level) - 1, 1 << level) for level in reversed(range(built.levels + 1)))
     return Part(built.count, built.reach(building), steps, built.ranges)
 
@@ -290,6 +290,6 @@ def _binary_tree(building: Building, mesh: Mesh, leaf_size: int, at_once: int = 
     return tree.over(building, mesh.count, items, parts, leaf_size, at_once)
 
 
-def _whole(nbytes: int) -> int:
-    """As many bytes or a few more: trees that share a buffer begin in steps of 32."""
+def _round_up(nbytes: int) -> int:
+    """A size in whole steps of 32 bytes, in which trees that share a buffer begin."""
     return -(-nbytes // 32) * 32

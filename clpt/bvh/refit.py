@@ -1,8 +1,8 @@
-"""Refitting: triangles or boxes that move under a tree whose nodes and leaves stay.
+"""Refitting: triangles or boxes move, while the nodes and leaves of their tree stay.
 
-Kernels go from the leaves up, a level at a time: no work-item waits for another. A tree that was
-refitted is right whatever became of its triangles, but the farther they went from where it was
-built, the more boxes overlap and the slower rays get; then build anew.
+Kernels go from the leaves up, a level at a time: no work-item waits for another. A refitted tree is
+right wherever its triangles are, but the farther they have moved since the build, the more boxes
+overlap and the slower rays get; then build anew.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import pyopencl as cl
 from . import tree as trees
 from .build import Bvh
 from .building import Building
-from .layouts import SHAPES_LEAF, follow
+from .layouts import SHAPES_LEAF, refit_nodes
 
 _ROOT = "bvh/refit.cl"
 _NO_TRIANGLES = {"vertices": None, "faces": None, "leaves": None}
@@ -30,12 +30,11 @@ def refit(
 ) -> cl.Event | None:
     """Enqueue that a tree over triangles, in place, follows its vertices.
 
-    building: says where it runs; vertices: (n, 3) float32; faces: (m, 3) uint32, those that the
-    tree was built of; parts: which trees of `build_parts` have moved, all by default. Returns the
-    event of the last kernel.
+    building: with the stream of the kernels; vertices: (n, 3) float32; faces: (m, 3) uint32, those
+    that the tree was built of; parts: the trees of `build_parts` that have moved, all by default.
+    Returns the event of the last kernel; the host waits for nothing.
 
-    Nothing is read or waited for. A triangle with a corner that is not finite, or beyond 1e12, is
-    met by no ray until it has better ones.
+    No ray meets a triangle while it has a vertex that is not finite, or beyond 1e12.
     """
     numbers = range(len(tree.parts)) if parts is None else parts
     if tree.layout == "brute":
@@ -47,32 +46,32 @@ def refit(
     triangles = {"vertices": vertices, "faces": faces, "leaves": tree.buffers["leaves"]}
     for part in (tree.parts[number] for number in numbers):
         if part.count:
-            follow(building, part, nodes=tree.buffers["nodes"], **triangles, **_NO_BOXES)
+            refit_nodes(building, part, nodes=tree.buffers["nodes"], **triangles, **_NO_BOXES)
     return building.stream.last
 
 
 def refit_boxes(building: Building, tree: Bvh, boxes: cl.Buffer) -> cl.Event | None:
     """Enqueue that a tree over boxes, in place, follows them.
 
-    boxes: (m, 2, 3) float32 low and high corners, in the order in which the tree was given them. A
-    box that is inside out or not finite is met by no ray. For the rest see `refit`.
+    boxes: (m, 2, 3) float32 low and high corners, in the order of the build. No ray meets a box
+    that is inside out or not finite. For the rest see `refit`.
     """
     boxed = {"boxes": boxes, "indices": tree.buffers["indices"]}
     if tree.count:
         nodes = tree.buffers["nodes"]
-        follow(building, tree.parts[0], nodes=nodes, **boxed, **_NO_TRIANGLES)
+        refit_nodes(building, tree.parts[0], nodes=nodes, **boxed, **_NO_TRIANGLES)
     return building.stream.last
 
 
 def rebuild_boxes(building: Building, tree: Bvh, boxes: cl.Buffer) -> cl.Event | None:
     """Enqueue that a tree of the layout "shapes", in place, is built anew over its boxes.
 
-    boxes: as of `refit_boxes`. Takes about five times as long as that, and 160 bytes a box while
-    it runs; rays are then as fast as ever. Nothing is read or waited for.
+    boxes: as of `refit_boxes`. It takes about five times as long, and 160 bytes a box while it
+    runs; rays are then as fast as after `build_boxes`. The host waits for nothing.
     """
     part = tree.parts[0]
     if tree.count:
-        own = Building(building.device, building.stream)  # whose memory is counted by itself
+        own = Building(building.device, building.stream)  # with a memory count of its own
         items, extents = trees.items_of_boxes(own, tree.count, boxes)
         built = trees.over(own, tree.count, items, extents, SHAPES_LEAF)
         indices = tree.buffers["indices"]

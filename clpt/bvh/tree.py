@@ -21,7 +21,7 @@ class Tree:
     """A binary tree over items.
 
     items: float8, in the order of the leaves; nodes: 2 count float8; ranges: a heap of the top
-    `levels` levels and, below them, of the subtrees; extents: of those ranges.
+    `levels` levels, whose leaves are subtrees; extents: of those ranges.
     """
 
     count: int
@@ -32,7 +32,7 @@ class Tree:
     levels: int
 
     def reach(self, building: Building) -> float:
-        """The largest coordinate of all items; waits for it."""
+        """Return the largest coordinate of all items; wait for it."""
         bounds = building.read(self.extents, 8, np.float32)
         return float(np.abs(bounds[[0, 1, 2, 4, 5, 6]]).max())
 
@@ -40,12 +40,12 @@ class Tree:
 def items_of_triangles(
     building: Building, count: int, vertices: cl.Buffer, faces: cl.Buffer
 ) -> tuple[cl.Buffer, cl.Buffer]:
-    """The triangles' boxes in the caller's order, and what `over` needs beside them."""
+    """Return the triangles' boxes in the caller's order, and their bounds in parts for `over`."""
     return _items(building, "items_of_triangles", count, vertices=vertices, faces=faces)
 
 
 def items_of_boxes(building: Building, count: int, boxes: cl.Buffer) -> tuple[cl.Buffer, cl.Buffer]:
-    """The same of boxes given by a low and a high corner."""
+    """Return the same of boxes with a low and a high corner."""
     return _items(building, "items_of_boxes", count, boxes=boxes)
 
 
@@ -70,7 +70,7 @@ def over(
 ) -> Tree:
     """Build over items by the surface area heuristic; they are put in the order of the leaves.
 
-    leaf_size: items of a leaf, at most; at_once: as many cost as much to test as one.
+    leaf_size: items of a leaf, at most; at_once: items that are tested in the time of one.
     """
     return _divided(building, count, items, parts, leaf_size=leaf_size, share=1 / at_once, runs=0)
 

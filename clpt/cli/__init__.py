@@ -1,4 +1,4 @@
-"""The command line: one module a command, each named in COMMANDS and imported when it is used."""
+"""The command line: one module for each of COMMANDS, imported when it is used."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class _Commands(click.Group):
 
 
 @click.group(cls=_Commands, invoke_without_command=True)
-@click.option("-v", "--verbose", count=True, help="Tell more; twice for everything.")
+@click.option("-v", "--verbose", count=True, help="Log more; twice for everything.")
 @click.version_option(package_name="clpt")
 @click.pass_context
 def cli(ctx: click.Context, verbose: int) -> None:

@@ -20,6 +20,8 @@ from ..benchmark.comparing import Ratio
 from ..benchmark.figures import Figure
 from ..bvh import TREES
 from ..device.context import trial
+from .extras import extra
+from .output_console import output_console
 
 SLOWER = 3  # the exit status if a figure was refused, or is below --fail-below
 STAGES = (
@@ -31,7 +33,7 @@ HEADINGS = ("figure", "", "unit", "±", "GB/s", "of a copy", "")
 @click.command()
 @click.option("--scene", help="A scene's file or folder, or atrium or cornell, made from formulas.")
 @click.option(
-    "--stage", "wanted", multiple=True, metavar="NAME",
+    "--stage", "stages", multiple=True, metavar="NAME",
     help="What to measure: see --list; repeat it for several.  [default: all]",
 )  # fmt: skip
 @click.option("--layout", "layouts", multiple=True, type=click.Choice(TREES), help="Of the trees.")
@@ -45,48 +47,49 @@ HEADINGS = ("figure", "", "unit", "±", "GB/s", "of a copy", "")
     "--json", "target", type=click.Path(path_type=Path), help="Append JSON lines to a file."
 )
 @click.option(
-    "--compare", "former", type=click.Path(path_type=Path),
-    help="JSON lines to compare with, of before or of another device.",
+    "--compare", "record", type=click.Path(path_type=Path),
+    help="JSON lines to compare with, earlier ones or of another device.",
 )  # fmt: skip
 @click.option(
     "--fail-below", type=float, metavar="RATIO",
-    help="With --compare: exit with 3 if a figure is worse than that, beyond noise.",
+    help="With --compare: exit with 3 if a figure is below this ratio, beyond noise.",
 )  # fmt: skip
 @click.option(
-    "--plot", "drawing", type=click.Path(path_type=Path),
+    "--plot", "plot", type=click.Path(path_type=Path),
     help="Plot the figures to a .png, .svg or .pdf; of several devices the last one's.",
 )  # fmt: skip
-@click.option("--list", "listed", is_flag=True, help="Tell what can be measured, and where.")
+@click.option("--list", "list_all", is_flag=True, help="List what can be measured, and where.")
 def bench(
     scene: str | None,
-    wanted: tuple[str, ...],
+    stages: tuple[str, ...],
     layouts: tuple[str, ...],
     device: str | None,
     target: Path | None,
-    former: Path | None,
+    record: Path | None,
     fail_below: float | None,
-    drawing: Path | None,
-    listed: bool,
+    plot: Path | None,
+    list_all: bool,
     **settings: Any,
 ) -> int:
     """Measure rays, stages of rendering, builds and starts of an OpenCL device.
 
     Figures are medians of rounds; ± is half the distance of their quartiles. A result that cannot
-    be true (rays not traced, hits that differ from what is there, times below what memory allows)
+    be true (rays not traced, wrong hits, times below what memory allows)
     is refused: it is not recorded, and the exit status is 3.
     """
-    console = _console()
-    if listed:
+    console = output_console()
+    if list_all:
         _list(console)
         return 0
-    if fail_below is not None and former is None:
+    if fail_below is not None and record is None:
         raise click.UsageError("--fail-below compares: give --compare FILE too")
-    if drawing is not None:
-        from . import bench_plot  # not needed else, and slow to import
+    if plot is not None:
+        with extra("plot", "a plot"):
+            from . import bench_plot  # here: matplotlib is an extra, and slow to import
 
-        bench_plot.check(drawing)
-    before = None if former is None else records.read(former)
-    parts, only = _chosen(wanted)
+        bench_plot.check(plot)
+    before = None if record is None else records.read(record)
+    parts, only = _chosen(stages)
     failed = False
     for info in _infos(device):
         on = dev.Device.open(info, profiling=True)
@@ -106,16 +109,16 @@ def bench(
             ratios = comparing.against(figures, before, info.label)
             _show_ratios(console, ratios, fail_below)
             failed |= fail_below is not None and any(r.below(fail_below) for r in ratios)
-        if drawing is not None:
+        if plot is not None:
             then = {figures.index(one.figure): float(one.then["value"]) for one in ratios}
-            bench_plot.write(drawing, f"{info.label}, clpt bench", figures, then)
+            bench_plot.write(plot, f"{info.label}, clpt bench", figures, then)
     return SLOWER if failed else 0
 
 
-def _chosen(wanted: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Parts, and stages of a render if not all. Raises click.BadParameter."""
+def _chosen(names: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Return parts, and stages of a render if not all. Raises click.BadParameter."""
     parts, only = [], []
-    for name in wanted:
+    for name in names:
         if name in benchmark.PARTS:
             parts.append(name)
         elif name.split("_")[0] in STAGES:
@@ -135,7 +138,7 @@ def _infos(device: str | None) -> list[dev.DeviceInfo]:
 
 
 def _measured(console: Console, on: dev.Device, **settings: Any) -> list[Figure]:
-    """All figures, each told when it is there."""
+    """Return all figures; print each table when it is complete."""
     figures: list[Figure] = []
     table = None
     with console.status("measuring") as status:
@@ -162,10 +165,10 @@ def _table(figure: Figure) -> Table:
 
 def _cells(figure: Figure) -> list[str | Text]:
     more = figure.more
-    told = f"refused: {figure.refused}" if figure.refused else str(more.get("note", ""))
-    if not told and figure.part == "start":
-        told = f"{more['programs']} programs in {more['build_seconds']:.2f} s"
-        told += f", {more['memory'] / 2**20:.0f} MiB" if more["memory"] else ""
+    note = f"refused: {figure.refused}" if figure.refused else str(more.get("note", ""))
+    if not note and figure.part == "start":
+        note = f"{more['programs']} programs in {more['build_seconds']:.2f} s"
+        note += f", {more['memory'] / 2**20:.0f} MiB" if more["memory"] else ""
     bytes_ = (f"{more['gbytes']:.2f}", f"{more['of_copy']:.1%}") if "gbytes" in more else ("", "")
     return [
         figure.name,
@@ -173,13 +176,13 @@ def _cells(figure: Figure) -> list[str | Text]:
         figure.unit,
         f"{figure.spread:.1%}" if len(figure.rounds) > 1 else "",
         *bytes_,
-        Text(told),
+        Text(note),
     ]
 
 
 def _show_ratios(console: Console, ratios: Sequence[Ratio], limit: float | None) -> None:
     then = ratios[0].then
-    title = f"beside {then.get('device', 'a record')}, {then.get('date', '')[:10]} "
+    title = f"compared with {then.get('device', 'a record')}, {then.get('date', '')[:10]} "
     title += f"{then.get('commit') or then.get('clpt', '')}; above 1 is better now"
     table = Table(title=title, title_justify="left", box=None, pad_edge=False)
     for heading in ("figure", "now", "then", "unit", "ratio", "noise", ""):
@@ -201,20 +204,15 @@ def _show_ratios(console: Console, ratios: Sequence[Ratio], limit: float | None)
 
 
 def _list(console: Console) -> None:
-    """What --stage, --scene and --device take."""
+    """Print what --stage, --scene, --layout and --device accept."""
     rows = {**benchmark.PARTS, "a stage": "of `stages` alone: " + ", ".join(STAGES)}
-    for heading, found in (
+    for heading, names in (
         ("--stage", rows),
         ("--scene", {name: make.__doc__ for name, make in scenes.SCENES.items()}),
         ("--layout", dict.fromkeys(TREES, "")),
         ("--device", {str(info.index): info.label for info in dev.devices()}),
     ):
         table = Table(heading, "", box=None, pad_edge=False, title_justify="left")
-        for name, told in found.items():
-            table.add_row(name, told)
+        for name, meaning in names.items():
+            table.add_row(name, meaning)
         console.print(table)
-
-
-def _console() -> Console:
-    there = Console()
-    return there if there.is_terminal else Console(width=200)

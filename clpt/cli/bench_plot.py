@@ -28,14 +28,15 @@ def check(path: Path) -> None:
 def write(path: Path, title: str, figures: Sequence[Figure], then: Mapping[int, float]) -> None:
     """Plot figures to a file.
 
-    then: values to compare with, by the figures' places. Raises SceneError if it cannot be written.
+    then: values to compare with, by the indices of figures. Raises SceneError if the file cannot be
+    written.
     """
     check(path)
-    there = [(i, one) for i, one in enumerate(figures) if one.rounds and not one.refused]
+    measured = [(i, one) for i, one in enumerate(figures) if one.rounds and not one.refused]
     panels = {
-        part: [(i, figure) for i, figure in there if figure.part == part]
+        part: [(i, figure) for i, figure in measured if figure.part == part]
         for part in PARTS
-        if any(figure.part == part for _, figure in there)
+        if any(figure.part == part for _, figure in measured)
     }
     if not panels:
         raise SceneError("there is no figure to plot", file=path)
@@ -97,5 +98,5 @@ def _panel(
 
 
 def _kind(figure: Figure) -> str:
-    """What has a colour of its own in a panel."""
+    """Return what decides the colour of a figure in its panel."""
     return str(figure.more.get("layout", "")) if figure.part in ("rays", "build") else ""

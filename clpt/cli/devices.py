@@ -1,60 +1,58 @@
-"""`clpt devices`: what there is to run on, what would be taken, and why."""
+"""`clpt devices`: the OpenCL devices, the one that would be used, and why."""
 
 from __future__ import annotations
 
 import json
 
 import click
-from rich.console import Console
 from rich.table import Table
 
 from .. import device
 from ..device import runtimes
 from ..device.context import DeviceInfo, selection, trial
 from ..errors import DeviceError
+from .output_console import output_console
 
 
 @click.command()
 @click.option("--json", "as_json", is_flag=True, help="Write JSON instead of a table.")
 def devices(as_json: bool) -> None:
-    """List the OpenCL devices, with the one that would be taken and why.
+    """List the OpenCL devices, with the one that would be used and why.
 
-    Each is tried with a trivial kernel. Another one is taken with --device NAME-OR-INDEX or the
-    environment variable CLPT_DEVICE, where a part of the name is enough.
+    Each is tried with a trivial kernel. Choose another one by --device NAME-OR-INDEX or by the
+    environment variable CLPT_DEVICE; a part of the name is enough.
     """
-    there = device.devices()
-    if not there:
+    listed = device.devices()
+    if not listed:
         raise DeviceError(f"no OpenCL device: {runtimes.ADVICE}")
-    failures = {info.index: trial(info) for info in there}
+    failures = {info.index: trial(info) for info in listed}
     if as_json:
-        click.echo(json.dumps(_as_json(there, failures), indent=2))
+        click.echo(json.dumps(_as_json(listed, failures), indent=2))
         return
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=200)  # a file or a pipe has no edge to wrap at
+    console = output_console()
     try:
         choice = selection()
     except DeviceError:
-        console.print(_table(there, failures, None))
+        console.print(_table(listed, failures, None))
         raise
-    console.print(_table(there, failures, choice.info.index))
+    console.print(_table(listed, failures, choice.info.index))
     console.print(
         f"Taken: [{choice.info.index}] {choice.info.label} ({choice.reason})", markup=False
     )
 
 
-def _as_json(there: tuple[DeviceInfo, ...], failures: dict[int, str | None]) -> dict[str, object]:
+def _as_json(listed: tuple[DeviceInfo, ...], failures: dict[int, str | None]) -> dict[str, object]:
     choice = selection()
     hidden = ("cl_device",)
     rows = []
-    for info in there:
+    for info in listed:
         row = {name: value for name, value in vars(info).items() if name not in hidden}
         rows.append({**row, "lanes": info.lanes, "failure": failures[info.index]})
     return {"devices": rows, "taken": choice.info.index, "reason": choice.reason}
 
 
 def _table(
-    there: tuple[DeviceInfo, ...], failures: dict[int, str | None], taken: int | None
+    listed: tuple[DeviceInfo, ...], failures: dict[int, str | None], taken: int | None
 ) -> Table:
     table = Table(box=None, pad_edge=False)
     for heading in (
@@ -70,7 +68,7 @@ def _table(
     ):
         right = heading in ("units", "memory", "lanes")
         table.add_column(heading, justify="right" if right else "left", overflow="fold")
-    for info in there:
+    for info in listed:
         failure = failures[info.index]
         table.add_row(
             f"{'*' if info.index == taken else ' '} {info.index}",

@@ -1,4 +1,4 @@
-"""What a render shows while it runs, on stderr: a bar on a terminal, else a line now and then."""
+"""The progress of a render on stderr: a bar on a terminal, else a line every few seconds."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from ..render.renderer import Progress
+from ..render.progress import Progress
 
 EVERY = 5.0  # seconds between lines
 PATIENCE = 1.0  # seconds of reading a scene before there is a bar
@@ -18,7 +18,7 @@ REFRESH = 0.1  # seconds between changes of the bar
 
 
 def display(quiet: bool, limit: float | None) -> Display:
-    """The display for where stderr goes. limit: seconds that the render may take, or None."""
+    """Return the display that suits stderr. limit: seconds that the render may take, or None."""
     if quiet:
         return Display(limit)
     return Bar(limit) if sys.stderr.isatty() else Lines(limit)
@@ -34,27 +34,27 @@ class Display:
 
     @contextmanager
     def phase(self, text: str) -> Iterator[None]:
-        """Say what is being done meanwhile."""
+        """Show a text meanwhile."""
         yield
 
     @contextmanager
     def loading(self, name: str) -> Iterator[Callable[[float, str], None]]:
-        """What tells how much of the scene `name` is read, if that takes long."""
+        """Yield a function that shows how much of the scene `name` is read."""
         yield lambda fraction, what: None
 
     @contextmanager
     def rendering(self) -> Iterator[None]:
-        """The time in which `show` is called."""
+        """Enclose the calls of `show`."""
         yield
 
     def show(self, progress: Progress) -> None:
-        """Show how far the render is, if it is time to."""
+        """Show the progress, if it is due."""
 
     def note(self, text: str) -> None:
-        """A line that stays."""
+        """Print a line that stays."""
 
     def due(self, progress: Progress, every: float) -> bool:
-        """Whether `every` seconds are over since this last said so, or the render is."""
+        """Return whether the render ended, or `every` seconds passed since this last was true."""
         end = bool(progress.total) and progress.samples >= progress.total
         if not end and time.perf_counter() - self.last < every:
             return False
@@ -62,14 +62,14 @@ class Display:
         return True
 
     def fraction(self, progress: Progress) -> float:
-        """How much of the render is done: of its samples or of its time, whichever ends it."""
+        """Return the share of the render that is done: of its samples or time, the larger."""
         done = progress.samples / progress.total if progress.total else 0.0
         return min(1.0, max(done, progress.seconds / self.limit if self.limit else 0.0))
 
     def figures(self, progress: Progress) -> dict[str, str]:
-        """What is shown; how long is left as from the first sight of `progress`.
+        """Return what is shown; the time left is estimated from the first `progress` on.
 
-        Before that many devices make their kernels ready, which takes longer than what follows.
+        Before that many devices compile kernels, at another speed.
         """
         fraction = self.fraction(progress)
         self.since = self.since or (progress.seconds, fraction)
@@ -167,10 +167,10 @@ FIGURES = ("samples", "speed", "rays", "elapsed", "left")
 def figures(
     progress: Progress, fraction: float, since: tuple[float, float] = (0.0, 0.0)
 ) -> dict[str, str]:
-    """What is shown, by the names in FIGURES.
+    """Return what is shown, by the names in FIGURES.
 
-    fraction: of the render that is done; since: the seconds and the fraction to tell from how
-    fast it goes.
+    fraction: of the render that is done; since: the seconds and the fraction from which the speed
+    is estimated.
     """
     seconds, done = max(progress.seconds, 1e-9), fraction - since[1]
     left = f"{clock((seconds - since[0]) * (1.0 - fraction) / done)} left" if done > 0.0 else ""
@@ -186,7 +186,7 @@ def figures(
 
 
 def clock(seconds: float) -> str:
-    """A time as m:ss or h:mm:ss."""
+    """Return a time as m:ss or h:mm:ss."""
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"

@@ -10,50 +10,41 @@ from pathlib import Path
 from typing import Any
 
 import click
-from rich.console import Console
 from rich.table import Table
 
 from clpt.formats import load
 from clpt.formats.meshes import framing
-from clpt.render.lowering.geometry.shapes import triangles
+from clpt.render.lowering.geometry.triangles import triangulate
 
 from ..scene import Scene, materials, shapes, textures
 from ..scene.params import Kind
-from .variables import variables
+from .output_console import output_console
+from .scene_variables import scene_variables
 
 FLAT_TRIANGLES = {shapes.Rectangle: 2, shapes.Cube: 12}
 
 
 @click.command()
 @click.argument("scene", type=click.Path(path_type=Path))
-@click.option(
-    "-D",
-    "defines",
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="Of an .xml a $name, of glTF camera, scene, time.",
-)
+@scene_variables
 @click.option("--json", "as_json", is_flag=True, help="Write JSON instead of a table.")
-def info(scene: Path, defines: tuple[str, ...], as_json: bool) -> None:
-    """Tell what the file or folder SCENE holds, without rendering it."""
-    found = summary(load(scene, **variables(defines)))
+def info(scene: Path, variables: dict[str, Any], as_json: bool) -> None:
+    """Show what the file or folder SCENE holds, without rendering it."""
+    contents = summary(load(scene, **variables))
     if as_json:
-        click.echo(json.dumps(found, indent=2))
+        click.echo(json.dumps(contents, indent=2))
         return
     table = Table(show_header=False, title=str(scene), title_justify="left")
-    for name, value in found.items():
+    for name, value in contents.items():
         table.add_row(name.replace("_", " "), _shown(value))
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=200)  # a file or a pipe has no edge to wrap at
-    console.print(table)
+    output_console().print(table)
 
 
 def summary(scene: Scene) -> dict[str, Any]:
-    """Return what a scene's file holds; not what the studio added to it.
+    """Return what a scene's file holds, without what the studio added.
 
-    `triangles` counts those of meshes, cubes and rectangles once, `triangles_instanced` at each
-    placement; `spheres` those that are many in one shape.
+    `triangles` counts those of meshes, cubes and rectangles once, `triangles_instanced` once for
+    each instance; `spheres` counts those of shapes with many.
     """
     added = scene.extra.get("studio", {"camera": False, "shapes": 0, "lights": 0})
     own = scene.shapes[: len(scene.shapes) - added["shapes"]]
@@ -69,7 +60,7 @@ def summary(scene: Scene) -> dict[str, Any]:
     return {
         "format": scene.extra.get("format", "python"),
         "triangles": sum(counts.values()),
-        "triangles_instanced": sum(_placed_triangles(own, groups)),
+        "triangles_instanced": sum(_instanced_triangles(own, groups)),
         "spheres": sum(len(s.centers) for s in surfaces if isinstance(s, shapes.Spheres)),
         "instances": len(own) - len({_arrays(shape) for shape in plain}),
         "bounds": bounds,
@@ -84,14 +75,14 @@ def summary(scene: Scene) -> dict[str, Any]:
 
 
 def _arrays(shape: shapes.Shape) -> int:
-    """Identity of a mesh's triangles; a shape of any other kind is its own."""
+    """Return the identity of a mesh's triangles, or of any other shape."""
     return id(shape.faces) if isinstance(shape, shapes.Mesh) else id(shape)
 
 
-def _placed_triangles(
+def _instanced_triangles(
     own: Iterable[shapes.Shape], groups: dict[int, shapes.Group]
 ) -> Iterator[int]:
-    """Yield how many triangles each shape puts into the scene."""
+    """Yield the triangles that each shape adds to the scene."""
     sizes = {key: sum(map(_triangles, group.shapes)) for key, group in groups.items()}
     for shape in own:
         if isinstance(shape, shapes.Instance):
@@ -104,7 +95,7 @@ def _triangles(shape: shapes.Shape) -> int:
     if isinstance(shape, shapes.Mesh):
         return len(shape.faces)
     if isinstance(shape, shapes.Curves):
-        return len(triangles(shape)[1])
+        return len(triangulate(shape)[1])
     return FLAT_TRIANGLES.get(type(shape), 0)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -12,39 +13,33 @@ from clpt.render.lowering.scene import lower
 from ..bvh.layouts import LAYOUTS
 from ..errors import SceneError
 from ..formats import load
-from .variables import variables
+from .scene_variables import scene_variables
 
 
 @click.command()
 @click.argument("scene", type=click.Path(path_type=Path))
 @click.option(
     "-o", "--output", "folder", type=click.Path(path_type=Path), required=True,
-    help="Folder for the files; made if it is not there.",
+    help="Folder for the files; created if missing.",
 )  # fmt: skip
 @click.option(
     "--lanes", type=click.Choice(["1", "8", "16"]), default="8", show_default=True,
-    help="Paths that a work-item shades: 1 as on a GPU, 8 or 16 as on a CPU.",
+    help="Paths per work-item: 1 as on a GPU, 8 or 16 as on a CPU.",
 )  # fmt: skip
 @click.option(
     "--layout", type=click.Choice(list(LAYOUTS)), default="wide8", show_default=True,
     help="Acceleration structure of the triangles.",
 )  # fmt: skip
-@click.option("--queued", is_flag=True, help="Shade along queues that are sorted by material.")
-@click.option(
-    "-D",
-    "defines",
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="Of an .xml a $name, of glTF camera, scene, time.",
-)
+@click.option("--queued", is_flag=True, help="Shade in queues sorted by material.")
+@scene_variables
 def kernels(
-    scene: Path, folder: Path, lanes: str, layout: str, queued: bool, defines: tuple[str, ...]
+    scene: Path, folder: Path, lanes: str, layout: str, queued: bool, variables: dict[str, Any]
 ) -> None:
-    """Write the OpenCL programs that SCENE is rendered with, one file each.
+    """Write the OpenCL programs that render SCENE, one file each.
 
-    Each is a whole program: any OpenCL compiler takes it as it is. No device is needed.
+    Each is a complete program for any OpenCL compiler. No device is needed.
     """
-    features = lower(load(scene, **variables(defines))).features
+    features = lower(load(scene, **variables)).features
     made = sources(features, layout, int(lanes), queued=queued) | film_sources(features, layout)
     try:
         folder.mkdir(parents=True, exist_ok=True)

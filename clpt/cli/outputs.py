@@ -18,11 +18,11 @@ from ..scene.integrators import Aov
 from ..spectra.spaces import chromaticities
 
 AOV_FORMATS = (".exr", ".png")
-BAND_FORMATS = (".npy", ".exr")  # that hold all bands; others hold their colours
+BAND_FORMATS = (".npy", ".exr")  # with all bands; others get the colours
 
 
 def default(scene: Path) -> tuple[Path, ...]:
-    """Where to write a scene's picture if nobody says: in the current folder, by its name."""
+    """Return where a scene's picture is written by default: in this folder, by the scene's name."""
     path = scene.resolve()
     stem = path.name.removesuffix(".gz").rpartition(".")[0] or path.name
     name = path.parent.name if stem == "scene" else stem
@@ -40,7 +40,7 @@ def checked(paths: tuple[Path, ...], scene: Scene) -> list[Path]:
 
 
 def metadata(renderer: Renderer, scene: Path, seconds: float) -> dict[str, str | int | float]:
-    """What an .exr tells about how it was made. spp is the mean over all pixels."""
+    """Return the metadata of an .exr: how it was made. spp is the mean over all pixels."""
     plan = renderer.scene
     pixels = math.prod(plan.film.size) * len(renderer.wavefronts)
     return {
@@ -76,7 +76,7 @@ def write(
 
 
 def _write_bands(path: Path, renderer: Renderer, stats: dict[str, str | int | float]) -> None:
-    """All bands: an array, or a spectral .exr that shows the film's colours."""
+    """Write all bands: an array, or a spectral .exr with a preview in the film's colours."""
     if path.suffix.lower() == ".npy":
         np.save(path, renderer.image())
         return
@@ -88,7 +88,7 @@ def _write_bands(path: Path, renderer: Renderer, stats: dict[str, str | int | fl
 def _write_layers(
     path: Path, layers: dict[str, Image], stats: dict[str, str | int | float]
 ) -> None:
-    """One .exr: the first layer of colours as its picture, each layer by its name, in float."""
+    """Write one .exr: the first layer of colours as its picture, all layers by their names."""
     colours = [layer for layer in layers.values() if layer.shape[2] == 3]
     first = next(iter(layers.values()))
     picture = layers.get("albedo", colours[0] if colours else first[..., :1])

@@ -22,7 +22,7 @@ from ..spectra.sensors import OBSERVERS
 from . import outputs, report
 from .display import display
 from .rendering import render_samples
-from .variables import variables
+from .scene_variables import scene_variables
 
 INTERRUPTED = 130
 LARGEST = 65536  # pixels of a side
@@ -102,17 +102,24 @@ class White(click.ParamType):
     help="Where to write: .exr .png .hdr .pfm .npy; may be given several times."
     "  [default: the scene's name, as .exr and .png]",
 )  # fmt: skip
-@click.option("--mode", type=click.Choice(["spectral", "rgb"]), help="What light is made of.")
-@click.option("--spp", type=click.IntRange(1, 2**31 - 1), help="Samples of a pixel.")
+@click.option(
+    "--mode", type=click.Choice(["spectral", "rgb"]), help="Whether light is spectra or RGB."
+)
+@click.option("--spp", type=click.IntRange(1, 2**31 - 1), help="Samples per pixel.")
 @click.option(
     "--noise", type=click.FloatRange(0.0), metavar="SHARE",
-    help="Leave pixels with less noise, such as 0.02 of the light around; 0: leave none.",
+    help="Stop sampling pixels with less noise, such as 0.02 of their light; 0: never.",
 )  # fmt: skip
 @click.option("--time", "limit", type=Duration(), help="Stop after 30s, 5m, 1h30m of rendering.")
 @click.option("--size", type=Size(), help="Size of the picture.")
-@click.option("--seed", type=click.IntRange(0, 2**31 - 1), help="Of the random numbers.")
+@click.option("--seed", type=click.IntRange(0, 2**31 - 1), help="Seed of the random numbers.")
 @click.option("--device", metavar="NAME-OR-INDEX", help="Where to render: see `clpt devices`.")
-@click.option("--bvh", "layout", type=click.Choice([*LAYOUTS]), help="What rays go through.")
+@click.option(
+    "--bvh",
+    "layout",
+    type=click.Choice([*LAYOUTS]),
+    help="Acceleration structure of the triangles.",
+)
 @click.option(
     "--tree-quality", type=click.Choice(get_args(Quality)), default="high",
     help="fast: built sooner, a little slower to trace.",
@@ -121,23 +128,21 @@ class White(click.ParamType):
 @click.option("--max-depth", type=click.IntRange(-1, 4000), help="Longest path; -1: no limit.")
 @click.option("--sensor", type=SensorName(), help="cie1931, cie1964 or a file of three curves.")
 @click.option("--white-balance", type=White(), help="What becomes white: none, D65, 3200 or x,y.")
-@click.option("--output-space", type=click.Choice(spaces.SPACES), help="Of the picture's colours.")
-@click.option("--bands", type=click.IntRange(0), help="Of a spectral picture, for .npy and .exr.")
-@click.option("--lambda-min", type=float, help="Shortest wavelength of the light [nm].")
-@click.option("--lambda-max", type=float, help="Longest one; fluorescence asks for 300 to 830.")
-@click.option("--exposure", type=float, default=0.0, help="Brighten .png by this many stops.")
 @click.option(
-    "-D",
-    "defines",
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="Of an .xml a $name, of glTF camera, scene, time.",
+    "--output-space", type=click.Choice(spaces.SPACES), help="Colour space of the picture."
 )
+@click.option(
+    "--bands", type=click.IntRange(0), help="Bands of a spectral picture, for .npy and .exr."
+)
+@click.option("--lambda-min", type=float, help="Shortest wavelength of the light [nm].")
+@click.option("--lambda-max", type=float, help="Longest wavelength; fluorescence needs 300 to 830.")
+@click.option("--exposure", type=float, default=0.0, help="Brighten .png by this many stops.")
+@scene_variables
 @click.option(
     "--texture-budget", type=Bytes(), metavar="SIZE",
     help="Memory for images, such as 500M; larger ones are halved.  [default: half the free]",
 )  # fmt: skip
-@click.option("--verbose", is_flag=True, help="Tell of memory, trees, programs and stages.")
+@click.option("--verbose", is_flag=True, help="Print memory, trees, programs and stages.")
 @click.option("--quiet", is_flag=True, help="Show no progress and no warnings.")
 def render(
     scene: Path,
@@ -147,7 +152,7 @@ def render(
     layout: str | None,
     tree_quality: Quality,
     exposure: float,
-    defines: tuple[str, ...],
+    variables: dict[str, Any],
     texture_budget: int | None,
     verbose: bool,
     quiet: bool,
@@ -155,16 +160,16 @@ def render(
 ) -> int:
     """Render the scene file, mesh or folder SCENE.
 
-    What is not given is as the scene says. With --time or --noise but no --spp the render goes on
-    until the time is over, or the noise as low. Ctrl-C stops it within a second; what is there is
-    written all the same, and the exit status is 130.
+    The scene decides what no option sets. With --time or --noise but no --spp the render goes on
+    until the time is over, or the noise is below the limit. Ctrl-C stops it within a second; the
+    picture so far is written, and the exit status is 130.
     """
     shown = display(quiet, limit)
     began = time.perf_counter()
     with ThreadPoolExecutor(max_workers=1) as beside:
         chosen = beside.submit(dev.choose, device, profiling=verbose)
         with shown.loading(scene.name) as tell:
-            plan = changed(load(scene, progress=tell, **variables(defines)), **changes)
+            plan = changed(load(scene, progress=tell, **variables), **changes)
         loading = time.perf_counter() - began
         ends = limit is not None or bool(changes["noise"])
         spp = changes["spp"] if ends else plan.spp
@@ -206,9 +211,9 @@ def changed(
     max_depth: int | None = None,
     **film: Any,
 ) -> Scene:
-    """Return the scene with what is not None in place of its own, `film` in that of its film.
+    """Return the scene with those settings replaced that are not None; `film`: of its film.
 
-    Raises click.BadParameter, and SceneError for a film that makes no sense.
+    Raises click.BadParameter, and SceneError for an invalid film.
     """
     film = {name: value for name, value in {"mode": mode, **film}.items() if value is not None}
     film |= {} if size is None else {"width": size[0], "height": size[1]}
@@ -227,11 +232,11 @@ def changed(
     return dataclasses.replace(scene, **{k: v for k, v in given.items() if v is not None})
 
 
-def _integrator(name: str, former: Kind) -> Any:
-    """Return an integrator of another kind, with what both have in common."""
+def _integrator(name: str, old: Kind) -> Any:
+    """Return an integrator of another kind, with the parameters that both have."""
     known = kinds("integrator")
     if name not in known:
         message = f"{name!r} is none of {', '.join(known)}"
         raise click.BadParameter(message, param_hint="--integrator")
-    shared = params(known[name]).keys() & params(type(former)).keys()
-    return known[name](**{key: getattr(former, key) for key in shared})
+    shared = params(known[name]).keys() & params(type(old)).keys()
+    return known[name](**{key: getattr(old, key) for key in shared})

@@ -1,4 +1,4 @@
-"""Rendering in passes, so that a picture is complete early and can be had at any time."""
+"""Rendering in passes: the picture is complete after the first, and can be taken at any time."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-from ..render.renderer import Progress, Renderer
+from ..render.progress import Progress
+from ..render.renderer import Renderer
 
-PASS_SECONDS = 5.0  # a pass has a tail in which few paths are left: long passes make it rare
+PASS_SECONDS = 5.0  # at the end of a pass few paths are left: long passes make that rare
 GROWTH = 3  # times what has been rendered so far
 
 
@@ -23,12 +24,12 @@ def render_samples(
     show: Callable[[Progress], None],
     noise: float | None = None,
 ) -> bool:
-    """Render until every pixel has `spp` samples or `limit` [s] is over; None means without end.
+    """Render until every pixel has `spp` samples or `limit` [s] is over; None means no limit.
 
-    With `noise` it ends too when that is what is left of it.
+    With `noise` the rendering also ends when no pixel has more noise.
 
     The first pass gives every pixel a sample, whatever the limit. Ctrl-C ends the rendering within
-    a second; a second one is a KeyboardInterrupt. Returns whether it was not interrupted.
+    a second; a second Ctrl-C is a KeyboardInterrupt. Returns False if it was interrupted.
     """
     began = time.perf_counter()
 
@@ -52,14 +53,14 @@ def render_samples(
 
 
 def pass_size(samples: int, rate: float, samples_left: float, seconds_left: float) -> int:
-    """How many samples a pass takes after `samples`, at `rate` [1/s], and with that much left."""
+    """Return the samples of the next pass, after `samples`, at `rate` [1/s]."""
     in_time = int(rate * min(PASS_SECONDS, seconds_left))
     return int(max(1, min(GROWTH * samples, in_time, samples_left)))
 
 
 @contextmanager
 def _interrupts() -> Iterator[list[int]]:
-    """A list that is no longer empty once Ctrl-C was pressed; the next press acts as always."""
+    """Yield a list that Ctrl-C fills; a second Ctrl-C acts as always."""
     pressed: list[int] = []
 
     def press(number: int, frame: FrameType | None) -> None:

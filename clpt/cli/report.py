@@ -1,4 +1,4 @@
-"""What `clpt render --verbose` tells, on stderr."""
+"""What `clpt render --verbose` prints on stderr."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from ..render.renderer import Renderer
 
 
 def before(renderer: Renderer, loading: float) -> None:
-    """Tell what the scene became and what that took; `loading` is what its file did [s]."""
+    """Print what was made of the scene, and the time; loading: seconds for its file."""
     first, stats = renderer.wavefronts[0], renderer.stats
     _line("device", renderer.device.info.label)
     parts = [f"{stats.triangles:,} triangles"]
@@ -20,11 +20,11 @@ def before(renderer: Renderer, loading: float) -> None:
     _line("geometry", ", ".join(parts))
     _line("lights", f"{stats.lights:,}")
     for name, size in stats.trees.items():
-        layout = f"{first.tree.layout}, " if name == "triangles" else ""
+        layout = f"{first.scene.strategy.layout}, " if name == "triangles" else ""
         _line(f"tree {name}", layout + _bytes(size))
     for name, size in sorted(stats.tables.items(), key=lambda item: -item[1]):
         _line(f"table {name}", _bytes(size))
-    _line("paths", f"{first.slots:,} in flight, {first.lanes} to a work-item")
+    _line("paths", f"{first.paths.slots:,} in flight, {first.lanes} to a work-item")
     _line("device memory", _bytes(stats.memory))
     others = stats.programs - stats.programs_cached
     kept = f"{stats.programs_cached} from clpt's cache, {others} from the driver or its cache"
@@ -37,7 +37,7 @@ def before(renderer: Renderer, loading: float) -> None:
 
 
 def after(renderer: Renderer) -> None:
-    """Tell how long the first sample and each stage took."""
+    """Print the time of the first sample and of each stage."""
     _line("seconds until a sample", f"{renderer.stats.seconds.get('first_sample', 0.0):.2f}")
     if renderer.scene.noise is not None:
         samples = renderer.film.get()[..., 3]

@@ -1,4 +1,4 @@
-"""How to run: choosing a device, building programs, buffers and timing. Knows no scenes."""
+"""Devices of OpenCL: choosing one, building programs, buffers and timing. Knows no scenes."""
 
 from .array import DeviceArray, supersede
 from .buffers import Buffers

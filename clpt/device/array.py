@@ -1,4 +1,4 @@
-"""Arrays on a device that numpy and other libraries of arrays can take."""
+"""Arrays on a device that numpy and other array libraries can read."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from . import dlpack
 class DeviceArray(Array):
     """A `pyopencl.array.Array` with `__array__` and DLPack.
 
-    `numpy.asarray(array)` waits for the array's events and copies to the host. `__dlpack__` serves
-    numpy.from_dlpack, torch.from_dlpack, jax.dlpack.from_dlpack: where the device is a CPU, they
-    get host memory, a copy as of now unless they ask for none; elsewhere OpenCL's memory, or a copy
-    on the host if they ask for the CPU, as numpy.from_dlpack(array, device="cpu") does.
+    `numpy.asarray(array)` waits for the array's events and copies to the host. `__dlpack__` is for
+    numpy.from_dlpack, torch.from_dlpack and jax.dlpack.from_dlpack. On a CPU they get host memory:
+    a copy, unless they ask for none. On other devices they get OpenCL's memory, or a copy on the
+    host if they ask for the CPU, as numpy.from_dlpack(array, device="cpu") does.
     """
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
-        """A copy on the host; waits. Raises ValueError if no copy may be made."""
+        """Return a copy on the host; wait for it. Raises ValueError if no copy may be made."""
         if copy is False:
             raise ValueError("an array on an OpenCL device becomes one of numpy only by a copy")
         host = self.get()
@@ -29,7 +29,7 @@ class DeviceArray(Array):
 
     def __dlpack_device__(self) -> tuple[int, int]:
         """DLPack's type of the device, 1 for a CPU or 4 for OpenCL, and its number."""
-        return (dlpack.CPU, 0) if self._is_hosts else self._opencl_device
+        return (dlpack.CPU, 0) if self._in_host_memory else self._opencl_device
 
     def __dlpack__(
         self,
@@ -39,13 +39,13 @@ class DeviceArray(Array):
         dl_device: tuple[int, int] | None = None,
         copy: bool | None = None,
     ) -> Any:
-        """A DLPack capsule; waits until the array is valid.
+        """Return a DLPack capsule; wait until the array is valid.
 
-        dl_device: (1, 0), host memory; (4, number), the cl_mem itself, on a CPU too; None: as
-        `__dlpack_device__` tells. copy: False gives the memory itself. On a CPU it is mapped until
-        the consumer lets go of it, and OpenCL forbids that the device writes to it meanwhile.
+        dl_device: (1, 0) for host memory; (4, number) for the cl_mem itself, on a CPU too; None for
+        that of `__dlpack_device__`. copy: False for the memory itself. On a CPU it is mapped until
+        the consumer releases it, and OpenCL forbids that the device writes to it meanwhile.
 
-        Raises BufferError for another device, or if what is asked for needs a copy, or none.
+        Raises BufferError for another device, or where `copy` is not possible.
         """
         wanted = tuple(dl_device or self.__dlpack_device__())
         if wanted == (dlpack.CPU, 0):
@@ -61,7 +61,7 @@ class DeviceArray(Array):
         return dlpack.opencl_capsule(owner, wanted[1])
 
     @property
-    def _is_hosts(self) -> bool:
+    def _in_host_memory(self) -> bool:
         """Whether the device's memory is the host's."""
         return bool(self.queue.device.type & cl.device_type.CPU)
 
@@ -70,15 +70,15 @@ class DeviceArray(Array):
         return dlpack.OPENCL, self.context.devices.index(self.queue.device)
 
     def _mapped(self) -> NDArray[Any]:
-        if not self._is_hosts:
+        if not self._in_host_memory:
             raise BufferError("memory of this OpenCL device becomes the host's only by a copy")
         return self.map_to_host()
 
 
 def supersede(array: Array, event: cl.Event) -> None:
-    """Let an event, which came after an array's events, stand for them.
+    """Replace an array's events by one that came after them.
 
-    Those of copies to the host that are under way stay: PyOpenCL waits where it drops one.
+    Events of copies to the host that have not ended stay: PyOpenCL waits where it drops one.
     """
     done = cl.command_execution_status.COMPLETE
     copies = [e for e in array.events if isinstance(e, cl.NannyEvent)]

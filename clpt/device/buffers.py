@@ -1,8 +1,9 @@
-"""Device memory, counted: what does not fit is told before a driver fails in its own way."""
+"""Device memory, counted, so that an error comes before a driver fails in its own way."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import numpy as np
 import pyopencl as cl
@@ -19,8 +20,8 @@ class Buffers:
     """Buffers on one device within a budget.
 
     limit: bytes that all of them together may take; by default what the device has free now.
-    used: bytes given out so far. A buffer lives as long as it is referred to; `release` gives it
-    back at once.
+    used: bytes allocated and not released. A buffer lives as long as it is referred to; `release`
+    frees it at once.
     """
 
     def __init__(self, device: Device, limit: int | None = None):
@@ -30,11 +31,11 @@ class Buffers:
 
     @property
     def available(self) -> int:
-        """The largest buffer that can be had now [bytes]."""
+        """The size of the largest buffer that can be allocated now [bytes]."""
         return max(0, min(self.limit - self.used, self.device.info.max_alloc))
 
     def allocate(self, what: str, nbytes: int, advice: str = _ADVICE) -> cl.Buffer:
-        """A buffer whose content is not defined.
+        """Return a buffer whose content is undefined.
 
         what, advice: for the message of the MemoryBudgetError that is raised if it does not fit.
         """
@@ -43,7 +44,7 @@ class Buffers:
     def upload(
         self, what: str, array: ArrayLike, dtype: DTypeLike | None = None, advice: str = _ADVICE
     ) -> cl.Buffer:
-        """A copy of an array, C-contiguous; an empty one becomes a small buffer of zeros.
+        """Return a copy of an array, C-contiguous; of an empty one a small buffer of zeros.
 
         Raises MemoryBudgetError if it does not fit.
         """
@@ -55,14 +56,24 @@ class Buffers:
         return self._create(what, host.nbytes, advice, host)
 
     def download(self, buffer: cl.Buffer, shape: Sequence[int], dtype: DTypeLike) -> NDArray:
-        """A buffer's content as an array; waits for the device's queue."""
+        """Return a buffer's content as an array; wait for the device's queue."""
         host = np.empty(tuple(shape), dtype)
         if host.nbytes:
             cl.enqueue_copy(self.device.queue, host, buffer, is_blocking=True)
         return host
 
+    @contextmanager
+    def all_or_nothing(self) -> Iterator[None]:
+        """Count nothing of what is allocated inside, if an error ends it."""
+        used = self.used
+        try:
+            yield
+        except BaseException:
+            self.used = used
+            raise
+
     def release(self, *buffers: cl.Buffer) -> None:
-        """Give buffers back."""
+        """Free buffers."""
         for buffer in buffers:
             self.used -= buffer.size
             buffer.release()

@@ -1,4 +1,4 @@
-"""Which device to run on: listing, choosing, or adopting what the caller has."""
+"""Devices: listing them, choosing one, or adopting the queue of the caller."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ _TRIAL = "__kernel void trial(__global uint *out) { out[get_global_id(0)] = 7u; 
 
 @dataclass(frozen=True)
 class DeviceInfo:
-    """What a device is, before anything is created on it.
+    """A device, before anything is created on it.
 
-    index: its place in `devices()`; kind: "gpu", "accelerator" or "cpu"; memory in bytes;
+    index: in `devices()`; kind: "gpu", "accelerator" or "cpu"; memory in bytes;
     float_width: the driver's native SIMD width in floats.
     """
 
@@ -57,17 +57,17 @@ class DeviceInfo:
 
     @property
     def label(self) -> str:
-        """The text that a name is looked for in: platform, then device."""
+        """Platform and device: the text in which `choose` looks for a name."""
         return f"{self.platform} {self.name}"
 
     def free_memory(self) -> int:
-        """A guess at what may be allocated now [bytes]."""
+        """Return an estimate of what may be allocated now [bytes]."""
         return memory.free(self.cl_device, self.is_cpu, self.global_mem)
 
 
 @dataclass(frozen=True)
 class Choice:
-    """A device that was chosen, and why, as a sentence for people."""
+    """A device that was chosen, and the reason for people to read."""
 
     info: DeviceInfo
     reason: str
@@ -75,9 +75,9 @@ class Choice:
 
 @dataclass
 class Builds:
-    """What has been built so far: programs, and the seconds that took (summed over threads).
+    """The programs that have been built so far, and the seconds that took (summed over threads).
 
-    cached: how many of them came from clpt's own cache; drivers do not tell what theirs gave.
+    cached: how many of them came from clpt's own cache; drivers do not tell about theirs.
     """
 
     programs: int = 0
@@ -95,8 +95,8 @@ class Builds:
 class Device:
     """A context with a queue on one device.
 
-    Everything that clpt runs goes through one of these; `Device.adopt` makes one of a queue that
-    the caller has, whose context is then used for every buffer and program.
+    Everything that clpt runs goes through one of these. `Device.adopt` makes one of a queue of the
+    caller, whose context is then used for every buffer and program.
     """
 
     def __init__(self, context: cl.Context, queue: cl.CommandQueue, info: DeviceInfo):
@@ -106,7 +106,7 @@ class Device:
 
     @classmethod
     def open(cls, info: DeviceInfo, *, profiling: bool = False) -> Device:
-        """A new context and an in-order queue on the device. Raises DeviceError."""
+        """Return a device with a new context and an in-order queue. Raises DeviceError."""
         try:
             context = cl.Context([info.cl_device])
             return cls(context, _queue(context, info.cl_device, profiling), info)
@@ -115,9 +115,9 @@ class Device:
 
     @classmethod
     def adopt(cls, queue: cl.CommandQueue) -> Device:
-        """The device of a caller's queue, with the caller's context."""
+        """Return the device of a caller's queue, with the caller's context."""
         info = _info(-1, queue.device)
-        log.info("%s: the device of the queue that was given", info.label)
+        log.info("%s: the device of the caller's queue", info.label)
         return cls(queue.context, queue, info)
 
     @cached_property
@@ -132,9 +132,9 @@ class Device:
 
 
 def devices() -> tuple[DeviceInfo, ...]:
-    """Every device of every platform, in the order of the platforms' names.
+    """Return every device of every platform, in the order of the platforms' names.
 
-    A platform that has no devices or fails when asked is left out, with a logged warning.
+    A platform that has no devices or fails is left out, with a logged warning.
     """
     return tuple(_info(index, device) for index, device in enumerate(_cl_devices()))
 
@@ -145,7 +145,7 @@ def choose(which: str | int | None = None, *, profiling: bool = False) -> Device
     None takes the environment variable CLPT_DEVICE if it is set, and otherwise the first device
     that works: GPUs, then accelerators, then CPUs.
 
-    Raises DeviceError, telling what there is, if none matches or none works.
+    Raises DeviceError, which lists the devices, if none matches or none works.
     """
     choice = selection(which)
     log.info("%s: %s", choice.info.label, choice.reason)
@@ -153,9 +153,9 @@ def choose(which: str | int | None = None, *, profiling: bool = False) -> Device
 
 
 def selection(which: str | int | None = None) -> Choice:
-    """The device that `choose` would open, and why. Raises DeviceError."""
-    there = devices()
-    if not there:
+    """Return the device that `choose` would open, and why. Raises DeviceError."""
+    found = devices()
+    if not found:
         raise DeviceError(f"no OpenCL device: {runtimes.ADVICE}")
     if which is None and os.environ.get(ENVIRONMENT, "").strip():
         which = os.environ[ENVIRONMENT].strip()
@@ -164,25 +164,25 @@ def selection(which: str | int | None = None) -> Choice:
         asked = f"device {which!r}"
     named = which is not None
     failures: list[str] = []
-    for info in _matching(which, there) if named else by_preference(there):
+    for info in _matching(which, found) if named else by_preference(found):
         failure = trial(info)
         if failure is None:
-            reason = f"asked for by {asked}" if named else _reason(info, there)
+            reason = f"asked for by {asked}" if named else _reason(info, found)
             return Choice(info, "; ".join([reason, *(f"passed over {f}" for f in failures)]))
         log.warning("%s is passed over: %s", info.label, failure)
         failures.append(f"{info.label} ({failure})")
     if failures:
         raise DeviceError("no OpenCL device works: " + "; ".join(failures))
-    raise DeviceError(f"{asked} is not there; there is " + _listing(there))
+    raise DeviceError(f"{asked} is not there; there is " + _listing(found))
 
 
-def by_preference(there: tuple[DeviceInfo, ...]) -> list[DeviceInfo]:
-    """GPUs before accelerators before CPUs; among equals, in the order of the platforms."""
-    return sorted(there, key=lambda info: _ORDER.index(info.kind))
+def by_preference(infos: tuple[DeviceInfo, ...]) -> list[DeviceInfo]:
+    """Return GPUs before accelerators before CPUs; among equals, in the order of the platforms."""
+    return sorted(infos, key=lambda info: _ORDER.index(info.kind))
 
 
 def trial(info: DeviceInfo) -> str | None:
-    """Build and run a trivial kernel: None if it worked, else what went wrong in one line."""
+    """Build and run a trivial kernel; return None if it worked, else the error in one line."""
     try:
         context = cl.Context([info.cl_device])
         queue = _queue(context, info.cl_device, False)
@@ -197,25 +197,25 @@ def trial(info: DeviceInfo) -> str | None:
     return None if (result == 7).all() else "a trivial kernel gave a wrong result"
 
 
-def _matching(which: str | int | None, there: tuple[DeviceInfo, ...]) -> list[DeviceInfo]:
-    """The devices that an index or a part of a name means, the preferred ones first."""
+def _matching(which: str | int | None, infos: tuple[DeviceInfo, ...]) -> list[DeviceInfo]:
+    """The devices with an index or a part of a name, the preferred ones first."""
     text = str(which).strip()
     if text.isdecimal():
-        return [info for info in there if info.index == int(text)]
-    return [info for info in by_preference(there) if text.casefold() in info.label.casefold()]
+        return [info for info in infos if info.index == int(text)]
+    return [info for info in by_preference(infos) if text.casefold() in info.label.casefold()]
 
 
-def _reason(info: DeviceInfo, there: tuple[DeviceInfo, ...]) -> str:
-    if len(there) == 1:
+def _reason(info: DeviceInfo, infos: tuple[DeviceInfo, ...]) -> str:
+    if len(infos) == 1:
         return "the only device"
-    peers = [other for other in there if other.kind == info.kind]
+    peers = [other for other in infos if other.kind == info.kind]
     kind = {"gpu": "GPU", "cpu": "CPU"}.get(info.kind, info.kind)
     which = f"the only {kind}" if len(peers) == 1 else f"the first {kind}"
     return f"{which}; GPUs are preferred, then accelerators, then CPUs"
 
 
-def _listing(there: tuple[DeviceInfo, ...]) -> str:
-    return ", ".join(f"[{info.index}] {info.label}" for info in there)
+def _listing(infos: tuple[DeviceInfo, ...]) -> str:
+    return ", ".join(f"[{info.index}] {info.label}" for info in infos)
 
 
 def _cl_devices() -> Iterator[cl.Device]:

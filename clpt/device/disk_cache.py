@@ -1,4 +1,4 @@
-"""Files that clpt keeps in the user's cache folder; all of them may be deleted at any time."""
+"""Files in the user's cache folder, all of which may be deleted at any time."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ log = logging.getLogger(__name__)
 
 
 def folder() -> Path:
-    """clpt's folder in the user's cache folder."""
+    """Return clpt's folder in the user's cache folder."""
     return Path(platformdirs.user_cache_dir("clpt", appauthor=False))
 
 
@@ -34,7 +34,7 @@ def write_atomically(path: Path, content: bytes) -> None:
 
 
 def store(entry: str, header: str, binary: bytes) -> None:
-    """Keep a program's binary under a key, with a line of text; a full disk is no error."""
+    """Write a program's binary under a key, with a line of text; a full disk is no error."""
     content = header.encode() + b"\n" + binary
     check = hashlib.sha256(content).hexdigest().encode()
     try:
@@ -44,9 +44,9 @@ def store(entry: str, header: str, binary: bytes) -> None:
 
 
 def load(entry: str) -> tuple[str, bytes] | None:
-    """What `store` kept: (header, binary). None if it is not there or is damaged.
+    """Return header and binary that `store` wrote; None if they are missing or damaged.
 
-    The sum is checked here, since drivers crash on a damaged binary.
+    The checksum is needed, since drivers crash on a damaged binary.
     """
     try:
         check, _, content = (folder() / "programs" / entry).read_bytes().partition(b"\n")
@@ -59,7 +59,7 @@ def load(entry: str) -> tuple[str, bytes] | None:
 
 
 def keep_failed(source: Source) -> str | None:
-    """Write a program that did not build where it can be read; its path, or None if that fails."""
+    """Write the text of a program that did not build; return its path, None if that fails."""
     digest = hashlib.sha256(source.text.encode()).hexdigest()[:12]
     stem = source.name.replace("/", "_").removesuffix(".cl")
     path = folder() / "failed" / f"{stem}-{digest}.cl"

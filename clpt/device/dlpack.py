@@ -30,7 +30,7 @@ class _Managed(c.Structure):
     _fields_ = (("tensor", _Tensor), ("manager", c.c_void_p), ("deleter", _Deleter))
 
 
-_kept: dict[int, tuple[Any, ...]] = {}  # by the structure's address: what lives as long as it
+_owned: dict[int, tuple[Any, ...]] = {}  # by a structure's address: what it refers to
 
 _new = c.pythonapi.PyCapsule_New
 _new.restype, _new.argtypes = c.py_object, (c.c_void_p, c.c_char_p, c.c_void_p)
@@ -40,27 +40,27 @@ _valid.restype, _valid.argtypes = c.c_int, (c.py_object, c.c_char_p)
 
 @_Deleter
 def _delete(managed: int) -> None:
-    _kept.pop(managed, None)
+    _owned.pop(managed, None)
 
 
 def _sweep() -> None:
-    """Let go of what nobody took: a capsule under its first name that nobody holds but us.
+    """Free capsules that no consumer took: with their first name, and no reference but ours.
 
-    A destructor would do so at once, but Python may run it while it raises a consumer's error,
-    which a function of Python cannot stand in for.
+    A destructor of the capsule would do so at once, but Python may run it while a consumer's error
+    is being raised, and a callback in Python must not run then.
     """
-    for address, (*_, capsule) in list(_kept.items()):
-        held = sys.getrefcount(capsule) - 3  # by `_kept`, `capsule` and the call
-        if held <= 0 and _valid(capsule, _NAME):
-            _kept.pop(address, None)
+    for address, (*_, capsule) in list(_owned.items()):
+        references = sys.getrefcount(capsule) - 3  # of others than `_owned`, `capsule`, the call
+        if references <= 0 and _valid(capsule, _NAME):
+            _owned.pop(address, None)
 
 
 def opencl_capsule(array: Any, device: int) -> Any:
-    """A capsule of a `pyopencl.array.Array`, which lives until the capsule's consumer ends."""
+    """Return a capsule of a `pyopencl.array.Array`, which lives until the consumer frees it."""
     _sweep()
     dtype, ndim = np.dtype(array.dtype), array.ndim
     if dtype.kind not in _CODES:
-        raise BufferError(f"DLPack is not given arrays of {dtype}")
+        raise BufferError(f"clpt exports no arrays of {dtype} by DLPack")
     sizes = (c.c_int64 * ndim)(*array.shape)
     steps = (c.c_int64 * ndim)(*(stride // dtype.itemsize for stride in array.strides))
     managed = _Managed(
@@ -73,5 +73,5 @@ def opencl_capsule(array: Any, device: int) -> Any:
     )  # fmt: skip
     address = c.addressof(managed)
     capsule = _new(address, _NAME, None)
-    _kept[address] = managed, sizes, steps, array.base_data, capsule
+    _owned[address] = managed, sizes, steps, array.base_data, capsule
     return capsule

@@ -1,4 +1,4 @@
-"""How much memory a device has left; OpenCL itself has no question for that."""
+"""How much memory a device has left; OpenCL itself has no query for that."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _CGROUPS = (
 
 
 def free(device: cl.Device, is_cpu: bool, global_mem: int) -> int:
-    """A guess at what may be allocated on the device now [bytes]."""
+    """Return an estimate of what may be allocated on the device now [bytes]."""
     if is_cpu:
         return min(global_mem, host_available() or global_mem)
     if "cl_amd_device_attribute_query" in device.extensions:
@@ -30,7 +30,7 @@ def free(device: cl.Device, is_cpu: bool, global_mem: int) -> int:
 
 
 def host_available() -> int | None:
-    """Memory the host can still give this process [bytes]; None where the system does not tell."""
+    """Return the host memory left to this process [bytes]; None where the system does not tell."""
     amounts = []
     try:
         for row in Path("/proc/meminfo").read_text().splitlines():

@@ -1,4 +1,4 @@
-"""Programs and kernels: building, errors in our own words, arguments by name."""
+"""Programs and kernels: building, errors with our file and line, arguments by name."""
 
 from __future__ import annotations
 
@@ -57,19 +57,19 @@ class Argument:
     def by_value(self) -> bool:
         return self.space == "private" and not self.type.endswith("*")
 
-    def value(self, given: Any) -> Any:
-        """What the driver is handed for `given`: scalars and vectors in the argument's type."""
-        if not self.by_value or isinstance(given, (np.void, np.ndarray)):
-            return given
+    def value(self, value: Any) -> Any:
+        """Return a value as the driver takes it: scalars and vectors in the argument's type."""
+        if not self.by_value or isinstance(value, (np.void, np.ndarray)):
+            return value
         vector = _VECTOR.match(self.type)
         base = _SCALARS.get(vector[1] if vector else self.type)
-        if base is None:  # a struct, an image or a sampler: as it was given
-            return given
+        if base is None:  # a struct, an image or a sampler
+            return value
         if vector is None:
-            return base(given)
+            return base(value)
         length = int(vector[2])
         packed = np.zeros(4 if length == 3 else length, base)
-        packed[:length] = given
+        packed[:length] = value
         return packed
 
 
@@ -77,7 +77,7 @@ Signatures = Mapping[str, tuple[Argument, ...]]
 
 
 class _QuietWarnings:
-    """While any thread is inside, PyOpenCL does not warn of a driver's remarks: they are logged."""
+    """While any thread is inside, PyOpenCL does not warn of a build log: clpt logs it."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -107,16 +107,16 @@ _quiet_warnings = _QuietWarnings()
 class Program:
     """A built program.
 
-    signatures: kernel name -> what it takes.
+    signatures: the arguments of each kernel by name.
     """
 
     def __init__(self, name: str, cl_program: cl.Program, signatures: Signatures):
         self.name, self.cl_program, self.signatures = name, cl_program, signatures
-        self._lent: dict[str, BoundKernel] = {}
-        self._lending = threading.Lock()
+        self._borrowed: dict[str, BoundKernel] = {}
+        self._borrowing = threading.Lock()
 
     def kernel(self, name: str) -> Kernel:
-        """The kernel of that name. Raises KeyError, telling which there are."""
+        """Return the kernel of that name. Raises KeyError, which lists the kernels."""
         if name not in self.signatures:
             known = ", ".join(sorted(self.signatures)) or "no kernel"
             raise KeyError(f"program {self.name!r} has no kernel {name!r}; it has {known}")
@@ -124,17 +124,17 @@ class Program:
 
     @contextmanager
     def borrow_kernel(self, name: str, **named: Any) -> Iterator[BoundKernel]:
-        """A kernel with its arguments, to enqueue; it is made the first time only.
+        """Lend a kernel with its arguments, to enqueue; it is made the first time only.
 
-        PyOpenCL takes half a millisecond to make one. Who asks meanwhile, on another thread, waits.
-        Raises as `kernel` and `Kernel.bind` do.
+        PyOpenCL takes half a millisecond to make one. Another thread waits meanwhile. Raises as
+        `kernel` and `Kernel.bind` do.
         """
-        with self._lending:
-            bound = self._lent.get(name)
+        with self._borrowing:
+            bound = self._borrowed.get(name)
             if bound is None:
-                # of a twin, for a cycle would keep the driver's memory until it is collected
-                twin = Program(self.name, self.cl_program, self.signatures)
-                bound = self._lent[name] = twin.kernel(name).bind(**named)
+                # Of a copy: a cycle would keep the driver's memory until it is collected.
+                copy = Program(self.name, self.cl_program, self.signatures)
+                bound = self._borrowed[name] = copy.kernel(name).bind(**named)
             else:
                 bound.bind(**named)
             try:
@@ -144,17 +144,17 @@ class Program:
 
 
 class Kernel:
-    """A kernel and what it takes; `bind` gives it arguments."""
+    """A kernel and its signature; `bind` gives it arguments."""
 
     def __init__(self, program: Program, name: str):
         self.program, self.name = program, name
         self.arguments = program.signatures[name]
 
     def bind(self, **named: Any) -> BoundKernel:
-        """The kernel with every argument set, by name.
+        """Return the kernel with every argument set, by name.
 
-        Buffers for pointers (None is a null pointer), `pyopencl.LocalMemory` for local ones,
-        numbers for scalars, sequences for vectors. Two bindings do not disturb each other.
+        Pointers take buffers (None is a null pointer), local ones `pyopencl.LocalMemory`, scalars
+        numbers, vectors sequences. Two bindings are independent of each other.
 
         Raises TypeError if a name is missing or unknown, or a value does not fit.
         """
@@ -167,45 +167,47 @@ class BoundKernel:
     def __init__(self, kernel: Kernel, named: Mapping[str, Any]):
         self.kernel = kernel
         self._cl_kernel = cl.Kernel(kernel.program.cl_program, kernel.name)
-        self._places = {argument.name: (i, argument) for i, argument in enumerate(kernel.arguments)}
-        self._values: dict[str, Any] = {}
-        self._given: dict[str, Any] = {}
+        self._indices = {
+            argument.name: (i, argument) for i, argument in enumerate(kernel.arguments)
+        }
+        self._values: dict[str, Any] = {}  # as the driver has them
+        self._numbers: dict[str, Any] = {}  # as the caller gave them
         self.bind(**named)
 
     def bind(self, **named: Any) -> None:
         """Set all arguments. Raises TypeError as `Kernel.bind` does."""
-        missing = [name for name in self._places if name not in named]
+        missing = [name for name in self._indices if name not in named]
         if missing:
             raise TypeError(f"kernel {self.kernel.name!r} also takes {', '.join(missing)}")
         self.set_args(**named)
 
     def drop_buffers(self) -> None:
-        """Let go of buffers, which the driver keeps while a command of them is under way."""
+        """Forget the buffers, which the driver keeps until the commands that use them end."""
         self._values.clear()
 
     def set_args(self, **named: Any) -> None:
         """Set arguments again by name. Raises TypeError as `Kernel.bind` does."""
-        for name, given in named.items():
-            plain = isinstance(given, (int, float, tuple))
-            if plain and type(given) is type(old := self._given.get(name)) and given == old:
+        for name, new in named.items():
+            number = isinstance(new, (int, float, tuple))
+            if number and type(new) is type(old := self._numbers.get(name)) and new == old:
                 continue  # a number takes longer to set than a kernel to enqueue
-            if name not in self._places:
-                known = ", ".join(self._places) or "nothing"
+            if name not in self._indices:
+                known = ", ".join(self._indices) or "nothing"
                 raise TypeError(f"kernel {self.kernel.name!r} takes no {name!r}; it takes {known}")
-            index, argument = self._places[name]
+            index, argument = self._indices[name]
             try:
-                value = argument.value(given)
+                value = argument.value(new)
                 self._cl_kernel.set_arg(index, value)
             except (TypeError, ValueError, OverflowError, cl.Error) as error:
                 raise TypeError(
                     f"kernel {self.kernel.name!r}: {name} is {argument.type}, "
-                    f"{type(given).__name__} {given!r} does not fit: {error}"
+                    f"{type(new).__name__} {new!r} does not fit: {error}"
                 ) from error
             self._values[name] = value  # the driver does not keep buffers alive
-            if plain:
-                self._given[name] = given
+            if number:
+                self._numbers[name] = new
             else:
-                self._given.pop(name, None)
+                self._numbers.pop(name, None)
 
     def enqueue(
         self,
@@ -214,7 +216,7 @@ class BoundKernel:
         local_size: Sequence[int] | None = None,
         wait_for: Sequence[cl.Event] | None = None,
     ) -> cl.Event:
-        """Run it; sizes are (x,), (x, y) or (x, y, z). Raises DeviceError if the driver refuses."""
+        """Enqueue it; sizes are (x,), (x, y) or (x, y, z). Raises DeviceError if that fails."""
         try:
             return cl.enqueue_nd_range_kernel(
                 queue, self._cl_kernel, global_size, local_size, wait_for=wait_for
@@ -226,27 +228,27 @@ class BoundKernel:
 
 
 def build(device: Device, source: Source, options: Sequence[str] = ()) -> Program:
-    """Compile a program for the device, or take it from where it was kept.
+    """Compile a program for the device, or take it from a cache.
 
-    What was built in the context before is taken again. Else the driver's own cache is relied on
-    where it has one (PoCL, NVIDIA); for the others the binary is kept in the user's cache folder.
-    Of a context with several devices only this one gets it.
+    A program that was built in the context before is used again. For drivers that have no cache of
+    their own (all but PoCL and NVIDIA) the binary is written to the user's cache folder. In a
+    context with several devices it is built for this one only.
 
-    Raises KernelBuildError with our file and line, the log, and where the text was kept.
+    Raises KernelBuildError with our file and line, the log, and the path of the text.
     """
     flags = _flags(device, options)
-    own = not has_src_build_cache(device.info.cl_device)
-    return _once(device, source, flags, own, lambda: _from_source(device, source, flags))
+    on_disk = not has_src_build_cache(device.info.cl_device)
+    return _cached(device, source, flags, on_disk, lambda: _from_source(device, source, flags))
 
 
 def link(
     device: Device, sources: Mapping[str, Source], main: str, signatures: Signatures
 ) -> Program:
-    """Compile programs each by itself and link them; the kernels are those of the one named `main`.
+    """Compile programs and link them; the kernels are those of the one named `main`.
 
-    signatures: of its kernels, which linked ones do not tell. What comes of it is kept in the
-    user's cache folder, since drivers keep the parts at best. Raises KernelBuildError as `build`
-    does, and where the parts do not fit together.
+    signatures: of its kernels, which OpenCL does not tell of linked ones. The result is written to
+    the user's cache folder, since drivers cache the parts at best. Raises KernelBuildError as
+    `build` does, and where the parts do not fit together.
     """
     flags = _flags(device, ())
     files = dict.fromkeys(file for source in sources.values() for file in source.files)
@@ -257,14 +259,14 @@ def link(
         linked = _linked(device, sources.values(), whole, flags)
         return Program(whole.name, linked, signatures)
 
-    own = not _is_oclgrind(device)  # which has no compiled form
-    return _once(device, whole, flags, own, make)
+    on_disk = not _is_oclgrind(device)  # which has no compiled form
+    return _cached(device, whole, flags, on_disk, make)
 
 
-def _once(
-    device: Device, source: Source, flags: list[str], own: bool, make: Callable[[], Program]
+def _cached(
+    device: Device, source: Source, flags: list[str], on_disk: bool, make: Callable[[], Program]
 ) -> Program:
-    """What `make` compiles, if neither the context nor, where `own`, the cache folder has it."""
+    """A program from the context's cache or, if `on_disk`, the folder's; else `make` builds it."""
     entry = _entry(device, source, flags)
     key = (device.info.cl_device.int_ptr, entry)  # devices of one context may be alike
     program: Program | None = device.programs.find(key)
@@ -272,16 +274,16 @@ def _once(
         return program
     start = time.perf_counter()
     with _quiet_warnings:
-        program = _from_cache(device, source, flags, entry) if own else None
-        kept = program is not None
+        program = _from_cache(device, source, flags, entry) if on_disk else None
+        cached = program is not None
         if program is None:
             program = make()
-            if own:  # what comes from there is compiled to the end, what was made may not be
+            if on_disk:  # a binary is compiled to the end, a program of the driver may not be
                 disk_cache.store(entry, _encode(program.signatures), _binary(program))
                 program = _from_cache(device, source, flags, entry) or program
     seconds = time.perf_counter() - start
-    device.builds.add(seconds, kept)
-    log.debug("%s is %s in %.2f s", source.name, "loaded" if kept else "built", seconds)
+    device.builds.add(seconds, cached)
+    log.debug("%s is %s in %.2f s", source.name, "loaded" if cached else "built", seconds)
     device.programs.keep(key, program)
     return program
 
@@ -295,8 +297,8 @@ def _linked(
         try:
             part.compile(flags, only)
         except cl.Error as error:
-            told = part.get_build_info(only[0], cl.program_build_info.LOG)
-            raise _build_error(source, f"{error}\n{told}") from error
+            build_log = part.get_build_info(only[0], cl.program_build_info.LOG)
+            raise _build_error(source, f"{error}\n{build_log}") from error
         parts.append(part)
     try:
         return cl.link_program(device.context, parts, [], only)
@@ -308,8 +310,8 @@ def build_all(
     device: Device, sources: Mapping[str, Source], options: Sequence[str] = ()
 ) -> dict[str, Program]:
     """Build several programs at once, each in a thread of its own. Raises as `build` does."""
-    # Oclgrind's compiler is not safe in threads.
     start, before = time.perf_counter(), device.builds.programs
+    # Oclgrind's compiler is not safe in threads.
     threads = 1 if _is_oclgrind(device) else os.cpu_count() or 1
     with ThreadPoolExecutor(max_workers=max(1, min(len(sources), threads))) as pool:
         futures = {name: pool.submit(build, device, s, options) for name, s in sources.items()}
@@ -327,7 +329,7 @@ def _flags(device: Device, options: Sequence[str]) -> list[str]:
 
 
 def _binary(program: Program) -> bytes:
-    """What the driver compiled, for the one device of the context that it was built for."""
+    """The binary, for the one device of the context that it was built for."""
     return next(filter(None, program.cl_program.get_info(cl.program_info.BINARIES)))
 
 
@@ -358,21 +360,21 @@ def _from_source(device: Device, source: Source, flags: list[str]) -> Program:
 
 
 def _from_cache(device: Device, source: Source, flags: list[str], entry: str) -> Program | None:
-    """The program as it was kept; None if it was not, or the driver no longer takes it."""
-    kept = disk_cache.load(entry)
-    if kept is None:
+    """The program in the cache folder; None if it is missing, or the driver refuses it."""
+    stored = disk_cache.load(entry)
+    if stored is None:
         return None
     try:
-        here = [device.info.cl_device]
-        loaded = cl.Program(device.context, here, [kept[1]]).build(flags, here)
-        return Program(source.name, loaded, _decode(kept[0]))
+        only = [device.info.cl_device]
+        loaded = cl.Program(device.context, only, [stored[1]]).build(flags, only)
+        return Program(source.name, loaded, _decode(stored[0]))
     except (cl.Error, TypeError, ValueError) as error:
         log.debug("%s is built again: %s", source.name, error)
         return None
 
 
 def _entry(device: Device, source: Source, flags: list[str]) -> str:
-    """The cache's key: everything that the binary follows from."""
+    """The cache's key: a hash of everything that the binary depends on."""
     info = device.info
     parts = (source.text, *flags, info.platform, info.name, info.version, info.driver)
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()
@@ -387,11 +389,11 @@ def _decode(text: str) -> Signatures:
 
 
 def _build_error(source: Source, log: str) -> KernelBuildError:
-    """The first error row of a compiler's log, as our file and line; the text is kept on disk."""
+    """The first error of a compiler's log with our file and line; the text is written to disk."""
     names = "|".join(rf"(?:kernels/)?{re.escape(name)}" for name in source.files)
-    place = re.compile(rf"""(?<![\w/.])({names})["']?(?::|, line |\()(\d+)""")
+    location = re.compile(rf"""(?<![\w/.])({names})["']?(?::|, line |\()(\d+)""")
     rows = (row for row in log.splitlines() if re.search(r"\berror\b", row))
-    first = next(filter(None, map(place.search, rows)), None)
+    first = next(filter(None, map(location.search, rows)), None)
     file, line = (first[1], int(first[2])) if first else (None, None)
     return KernelBuildError(source.name, file, line, log, disk_cache.keep_failed(source))
 

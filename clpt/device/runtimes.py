@@ -1,4 +1,4 @@
-"""OpenCL runtimes that pip installed, told to the loader before it looks for platforms.
+"""OpenCL runtimes that pip installed, made known to the loader before it looks for platforms.
 
 The loader reads ICD files, each naming a driver's library, from /etc/OpenCL/vendors or from the
 folder in OCL_ICD_VENDORS. Intel's CPU runtime as a wheel (extra `clpt[cpu]`) brings such a file
@@ -49,7 +49,7 @@ def announce() -> None:
 
 
 def wheel_library() -> Path | None:
-    """The library of Intel's CPU runtime if its wheel is installed in this environment."""
+    """Return the library of Intel's CPU runtime if its wheel is installed in this environment."""
     try:
         files = importlib.metadata.files(_WHEEL) or []
     except importlib.metadata.PackageNotFoundError:
@@ -59,7 +59,7 @@ def wheel_library() -> Path | None:
 
 
 def icd_files(folders: Iterable[Path]) -> dict[str, str]:
-    """Name -> content of the ICD files in the folders, without those that name a missing path."""
+    """Return the ICD files in the folders by name, without those that name a missing path."""
     drivers = {}
     for folder in folders:
         for path in sorted(folder.glob("*.icd")):
@@ -73,7 +73,7 @@ def icd_files(folders: Iterable[Path]) -> dict[str, str]:
 
 
 def write_vendors(drivers: dict[str, str]) -> Path:
-    """A folder in the user's cache with these ICD files; its name follows from its content."""
+    """Return a folder in the user's cache with these ICD files, named after their content."""
     digest = hashlib.sha256(repr(sorted(drivers.items())).encode()).hexdigest()[:16]
     folder = disk_cache.folder() / "vendors" / digest
     for name, driver in drivers.items():

@@ -12,6 +12,7 @@ from typing import NoReturn
 from ..errors import KernelBuildError
 
 _INCLUDE = re.compile(r'\s*#\s*include\s+"([^"]+)"\s*(?://.*|/\*.*\*/\s*)?$')
+_WORD = re.compile(r"\w+")
 _OPEN_IF = re.compile(r"\s*#\s*if")
 _FUNCTION = re.compile(  # at the beginning of a line: type, name, and a first argument or "void"
     r"^(?!static\b|kernel\b|typedef\b|return\b|else\b|void loop_)"
@@ -35,15 +36,15 @@ class Source:
     files: tuple[str, ...]
 
     def with_private(self, prefix: str, defines: Mapping[str, str] | None = None) -> Source:
-        """The same with functions and constants that other programs do not see, to be linked.
+        """Return a source whose functions and constants other programs do not see, to be linked.
 
-        Those whose line begins with their type become static, and get names of their own by the
-        prefix, for some linkers heed nothing but names; kernels, and what a macro names, do not.
-        defines: more `#define` lines at the top.
+        The rule: a definition begins at the beginning of a line, with its type. It becomes static
+        and gets the prefix, since some linkers look at nothing but names. Kernels, and functions
+        that a macro names, stay as they are. defines: more `#define` lines at the top.
         """
         private = (_FUNCTION, _CONSTANT)
-        found = (match for pattern in private for match in pattern.finditer(self.text))
-        names = dict.fromkeys(match["name"] for match in found)
+        matches = (match for pattern in private for match in pattern.finditer(self.text))
+        names = dict.fromkeys(match["name"] for match in matches)
         renamed = {name: f"{prefix}_{name}" for name in names}
         head = [f"#define {name} {value}" for name, value in {**(defines or {}), **renamed}.items()]
         text = self.text
@@ -54,18 +55,18 @@ class Source:
 
 @dataclass(frozen=True)
 class Part:
-    """A virtual file that stands elsewhere: errors name that file, and its lines from `line`."""
+    """A virtual file whose text stands elsewhere: errors name `file`, and lines from `line` on."""
 
     text: str
     file: str
     line: int = 1
 
 
-Virtual = Mapping[str, str | Part]
+Virtual = Mapping[str, str | Part | tuple[str, ...]]
 
 
 def kernels_folder() -> Path:
-    """The folder with the kernels: inside the installed package, or beside it in a checkout."""
+    """Return the folder of the kernels: in the installed package, or beside it in a checkout."""
     package = Path(__file__).resolve().parent.parent
     installed = package / "kernels"
     return installed if installed.is_dir() else package.parent / "kernels"
@@ -76,22 +77,26 @@ def assemble(
     virtual: Virtual | None = None,
     defines: Mapping[str, str | int | float] | None = None,
 ) -> Source:
-    """The text of `root` with its includes in place, each file once.
+    """Return the text of `root` with its includes in place, each file once.
 
     root: a path under the kernels folder ("stage/shade.cl") or the name of a virtual file.
-    virtual: name -> generated text, or a Part, includable by that name; it wins over a file of that
-    name.
-    defines: written as `#define` lines at the top.
+    virtual: name -> generated text, a Part, or the names of files that stand for it, includable by
+    that name; it wins over a file of that name.
+    defines: written as `#define` lines at the top, but for those that the text does not name; so
+    programs that differ by nothing else are built once.
 
-    Every part is announced by `#line`, so that a compiler names our file and line. Includes are
-    resolved before the preprocessor runs and therefore have to stand outside of `#if`.
+    A `#line` before every part lets a compiler name our file and line. Includes are resolved before
+    the preprocessor runs, so they have to stand outside of `#if`.
 
     Raises KernelBuildError for an include that names nothing, or that stands inside an `#if`.
     """
-    head = [f"#define {name} {value}" for name, value in (defines or {}).items()]
     assembly = _Assembly(root, virtual or {}, kernels_folder())
     assembly.add(root, None, 0)
-    return Source(root, "\n".join([*head, *assembly.rows, ""]), tuple(assembly.files))
+    text = "\n".join([*assembly.rows, ""])
+    given = {name: f"#define {name} {value}\n" for name, value in (defines or {}).items()}
+    named = set(_WORD.findall(text)).union(*(_WORD.findall(row)[2:] for row in given.values()))
+    head = "".join(row for name, row in given.items() if name.partition("(")[0] in named)
+    return Source(root, head + text, tuple(assembly.files))
 
 
 @cache
@@ -144,6 +149,8 @@ class _Assembly:
     def _read(self, name: str, includer: str | None, line: int) -> Part:
         if name in self.virtual:
             given = self.virtual[name]
+            if isinstance(given, tuple):
+                given = "".join(f'#include "{file}"\n' for file in given)
             return given if isinstance(given, Part) else Part(given, name)
         try:
             return Part(_text(self.folder, name), f"kernels/{name}")

@@ -18,8 +18,8 @@ class Stream:
     """Commands of one owner on a queue: each begins when the one before it has ended.
 
     On an in-order queue that costs nothing; on an out-of-order one each command waits for the event
-    of the last. It only enqueues: no command of it waits on the host but `read` and `wait`, and
-    nothing calls clFinish, so what others have on the queue is left alone.
+    of the last. The host waits in `read` and `wait` only. Nothing calls clFinish, so that commands
+    of others on the queue are left alone.
 
     queue: the caller's; last: the event of the last command, None before the first.
     """
@@ -30,7 +30,7 @@ class Stream:
         self.ordered = not queue.properties & out_of_order
         self.last: cl.Event | None = None
         self._before: list[cl.Event] = []
-        self._copies: deque[cl.Event] = deque()  # to the host, that may not be over
+        self._copies: deque[cl.Event] = deque()  # to the host, that may not have ended
 
     def after(self, events: Events) -> None:
         """Let the next command wait for events of others too."""
@@ -53,32 +53,32 @@ class Stream:
             cl.enqueue_fill_buffer(self.queue, buffer, value, offset, nbytes, wait_for=waits)
         )
 
-    def copy(self, target: cl.Buffer, source: cl.Buffer, **places: int) -> cl.Event:
-        """Enqueue a copy on the device; places as of `pyopencl.enqueue_copy`."""
+    def copy(self, target: cl.Buffer, source: cl.Buffer, **offsets: int) -> cl.Event:
+        """Enqueue a copy on the device; offsets: as of `pyopencl.enqueue_copy`."""
         waits = self._waits()
-        return self._note(cl.enqueue_copy(self.queue, target, source, wait_for=waits, **places))
+        return self._note(cl.enqueue_copy(self.queue, target, source, wait_for=waits, **offsets))
 
     def write(self, target: cl.Buffer, source: np.ndarray, offset: int = 0) -> cl.Event:
         """Enqueue that an array goes to a buffer, from a copy of it: it may change at once."""
         # The copy is a buffer, which the driver keeps until it is read: PyOpenCL's event of a copy
         # from the host waits when nobody refers to it, and no other thread of Python runs then.
         flags = cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR
-        kept = cl.Buffer(self.queue.context, flags, hostbuf=np.ascontiguousarray(source))
-        return self.copy(target, kept, dst_offset=offset, byte_count=kept.size)
+        staged = cl.Buffer(self.queue.context, flags, hostbuf=np.ascontiguousarray(source))
+        return self.copy(target, staged, dst_offset=offset, byte_count=staged.size)
 
     def mark(self) -> cl.Event:
-        """Enqueue nothing, after what `after` was told of: an event of all before."""
+        """Return an event that ends when all commands so far, and the events of `after`, have."""
         return self._note(cl.enqueue_marker(self.queue, wait_for=self._waits()))
 
     def read(self, source: cl.Buffer, into: np.ndarray, offset: int = 0) -> np.ndarray:
-        """A buffer's content; waits for it."""
+        """Return a buffer's content in an array; wait for it."""
         if into.nbytes:
             self.read_later(source, into, offset).wait()
         return into
 
     def read_later(self, source: cl.Buffer, into: np.ndarray, offset: int = 0) -> cl.Event:
-        """Enqueue that an array is filled from a buffer; it is whole when the event is."""
-        return self._keep(
+        """Enqueue that an array is filled from a buffer; it is valid when the event has ended."""
+        return self._note_copy(
             cl.enqueue_copy(
                 self.queue, into, source, src_offset=offset, is_blocking=False,
                 wait_for=self._waits(),
@@ -91,7 +91,7 @@ class Stream:
             self.last.wait()
 
     def flush(self) -> None:
-        """Hand what was enqueued to the device."""
+        """Let the device begin what was enqueued."""
         self.queue.flush()
 
     def _waits(self) -> list[cl.Event] | None:
@@ -100,8 +100,8 @@ class Stream:
             waits = [*waits, self.last]
         return waits or None
 
-    def _keep(self, event: cl.Event) -> cl.Event:
-        """Note an event of a copy to the host, and refer to it until it is over."""
+    def _note_copy(self, event: cl.Event) -> cl.Event:
+        """Note an event of a copy to the host, and refer to it until it has ended."""
         done = cl.command_execution_status.COMPLETE
         while self._copies and self._copies[0].command_execution_status <= done:
             self._copies.popleft()

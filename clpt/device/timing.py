@@ -16,7 +16,7 @@ class Timing:
 
 
 class Timings:
-    """An accumulator: hand it every event with a name, ask for the sums at the end.
+    """Sums over the events of kernels, by name.
 
     On a queue without profiling it keeps nothing and costs nothing.
     """
@@ -27,7 +27,7 @@ class Timings:
         self._sums: dict[str, Timing] = {}
 
     def add(self, name: str, event: cl.Event) -> cl.Event:
-        """Note an event, which need not be over; the same event, for chaining."""
+        """Note an event, which may not have ended; return it."""
         if self.enabled:
             self._pending.append((name, event))
             if len(self._pending) >= 4096:  # an event that is held costs the driver memory
@@ -35,7 +35,7 @@ class Timings:
         return event
 
     def collect(self) -> dict[str, Timing]:
-        """Wait for all events so far; name -> Timing, the longest first."""
+        """Wait for all events so far; return the Timing of each name, the longest first."""
         for name, event in self._pending:
             event.wait()
             timing = self._sums.setdefault(name, Timing())

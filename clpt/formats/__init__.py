@@ -18,16 +18,17 @@ FORMATS = {  # the module whose `load` reads files of a suffix, imported when it
     ".pbrt.gz": "pbrt",
     ".glb": "gltf",
     ".gltf": "gltf",
-    ".obj": "studio",
-    ".ply": "studio",
-    ".stl": "studio",
-    ".off": "studio",
+    ".obj": "meshes.framing",
+    ".ply": "meshes.framing",
+    ".stl": "meshes.framing",
+    ".off": "meshes.framing",
 }
 WITH_VARIABLES = ("mitsuba", "gltf")
 
-IN_FOLDERS = ("scene.json", "scene.xml", "scene.pbrt", "scene-v4.pbrt")  # the first of these, or
-SCENES = (".xml", ".pbrt", ".pbrt.gz", ".glb", ".gltf")  # what is called as the folder, or alone
-NAMED = 8  # scenes of a folder that a message names
+# The scene of a folder: the first of these, else the one with the folder's name, else the only one.
+IN_FOLDERS = ("scene.json", "scene.xml", "scene.pbrt", "scene-v4.pbrt")
+SCENES = (".xml", ".pbrt", ".pbrt.gz", ".glb", ".gltf")
+MOST_NAMED = 8  # scenes of a folder that a message names
 
 __all__ = ["FORMATS", "load"]
 
@@ -44,7 +45,7 @@ def load(
 
     `kinds` are materials that are not clpt's own, of which a scene.json may speak. `variables` set
     the `$names` of Mitsuba's XML; of glTF they choose camera, scene and time. `progress` is
-    called with how much is read, from 0 to 1, and what, while files of many shapes are. Raises
+    called with the share that is read, from 0 to 1, and a text, for files of many shapes. Raises
     SceneError with the file and, where it is known, the line.
     """
     path = _existing(Path(path))
@@ -79,15 +80,15 @@ def _existing(path: Path) -> Path:
 
 
 def _inside(folder: Path) -> Path:
-    """The scene that a folder holds: scene.*, one called as the folder, or its only one."""
-    found = sorted(file for file in folder.iterdir() if file.name.lower().endswith(SCENES))
-    own = [file for file in found if file.name.split(".")[0] == folder.resolve().name]
+    """Return the scene of a folder, see IN_FOLDERS."""
+    scenes = sorted(file for file in folder.iterdir() if file.name.lower().endswith(SCENES))
+    own = [file for file in scenes if file.name.split(".")[0] == folder.resolve().name]
     named = [folder / name for name in IN_FOLDERS if (folder / name).is_file()]
-    for files in (named[:1], own, found):
+    for files in (named[:1], own, scenes):
         if len(files) == 1:
             return files[0]
-    if not found:
+    if not scenes:
         raise SceneError(f"this folder holds no scene.json and no {' '.join(SCENES)}", file=folder)
-    names = ", ".join(file.name for file in found[:NAMED])
-    more = f" and {len(found) - NAMED} more" if len(found) > NAMED else ""
+    names = ", ".join(file.name for file in scenes[:MOST_NAMED])
+    more = f" and {len(scenes) - MOST_NAMED} more" if len(scenes) > MOST_NAMED else ""
     raise SceneError(f"this folder holds several scenes, name one: {names}{more}", file=folder)

@@ -13,20 +13,20 @@ from .. import bvh
 from ..device import Events
 from ..errors import SceneError
 from . import batch
-from .arrays import Given, device_arg, on_device
+from .arrays import ArrayInput, device_arg, on_device
 from .queries import AllHits, Queries
 
 
 class Accel(Queries):
     """Triangles that rays can be sent at, on the caller's queue and in its context.
 
-    vertices: (n, 3) float32; faces: (m, 3) uint32 or int32. Arrays of numpy are copied; a PyOpenCL
-    array or buffer is read where it lies, by the constructor, which waits until that is done, and
-    is not copied: faces on the device must stay as they are for as long as `update` is called. What
-    is on the device is not checked: a face that names no vertex reads outside of its buffer.
+    vertices: (n, 3) float32; faces: (m, 3) uint32 or int32. Arrays of numpy are copied. A PyOpenCL
+    array or buffer is not: the constructor reads it in place, and waits until that is done. Faces
+    on the device must stay as they are for as long as `update` is called. Values on the device are
+    not checked: a face that names no vertex reads outside of its buffer.
     layout: "wide8", "compact" or "binary"; by default what suits the device. quality: "fast"
-    is built sooner and traced a little slower. wait_for: events that the arrays wait for; those
-    that PyOpenCL arrays know are waited for anyhow.
+    is built sooner and traced a little slower. wait_for: events that come first; those of PyOpenCL
+    arrays always do.
 
     moved: the event of the last update, None before the first.
 
@@ -37,8 +37,8 @@ class Accel(Queries):
     def __init__(
         self,
         queue: cl.CommandQueue,
-        vertices: Given,
-        faces: Given,
+        vertices: ArrayInput,
+        faces: ArrayInput,
         *,
         layout: str | None = None,
         quality: bvh.Quality = "high",
@@ -46,17 +46,17 @@ class Accel(Queries):
     ):
         super().__init__(queue, layout)
         self._stream.after(wait_for)
-        points, self.vertices = self._laid("vertices", vertices, np.float32)
-        corners, _ = self._laid("faces", faces, np.uint32, np.int32)
+        points, self.vertices = self._input("vertices", vertices, np.float32)
+        corners, _ = self._input("faces", faces, np.uint32, np.int32)
         self._stream.mark().wait()  # the build has another stream
         self.tree = bvh.build(self.device, points, corners, layout=self.layout, quality=quality)
         self._trees = self.tree.buffers
-        self._flights = bvh.outgrows_caches(self.device, self.layout, self.tree.count)
+        self._interleaved = bvh.outgrows_caches(self.device, self.layout, self.tree.count)
         self._faces = self._upload(corners, np.uint32)
         self._refitting = bvh.Building(self.device, stream=self._stream)
         self.moved: cl.Event | None = None
 
-    def update(self, vertices: Given, *, wait_for: Events = None) -> cl.Event:
+    def update(self, vertices: ArrayInput, *, wait_for: Events = None) -> cl.Event:
         """Enqueue that the triangles move: as many vertices as before, elsewhere; the faces stay.
 
         Where they went far rays get slower; then make a new one. A triangle with a vertex that is
@@ -66,7 +66,7 @@ class Accel(Queries):
         with self._lock:
             self._opened()
             self._stream.after(wait_for)
-            points, count = self._laid("vertices", vertices, np.float32)
+            points, count = self._input("vertices", vertices, np.float32)
             if count != self.vertices:
                 raise SceneError(f"there were {self.vertices}, now {count}", where="vertices")
             if not self.tree.count:
@@ -78,19 +78,19 @@ class Accel(Queries):
 
     def intersect_all(
         self,
-        origins: Given,
-        directions: Given,
-        t_min: Given = 0.0,
-        t_max: Given = math.inf,
+        origins: ArrayInput,
+        directions: ArrayInput,
+        t_min: ArrayInput = 0.0,
+        t_max: ArrayInput = math.inf,
         *,
         wait_for: Events = None,
     ) -> AllHits:
         """All that each ray meets at t_min < t < t_max, by ray and then by distance.
 
-        Each triangle is met once at most; a ray through an edge meets both triangles there. It
+        A ray meets each triangle at most once, and both triangles at an edge. The call
         waits, since the number of hits is not known before; the rays are as for `intersect`.
         """
-        rays = batch.rays(*self._where, origins, directions, t_min, t_max)
+        rays = batch.rays(*self._memory, origins, directions, t_min, t_max)
         with self._lock:
             self._opened()
             self._stream.after(wait_for)
@@ -98,51 +98,50 @@ class Accel(Queries):
             self._fill("query_count", rays, {"counts": counts})
             ends = np.cumsum(counts, dtype=np.uint64)
             total = int(ends[-1]) if rays.count else 0
-            found: dict[str, NDArray[Any]] = {
+            hits: dict[str, NDArray[Any]] = {
                 "t": np.empty(total, np.float32),
                 "primitive": np.empty(total, np.int32),
                 "barycentrics": np.empty((total, 2), np.float32),
             }
             if total:
-                self._fill("query_every", rays, {"firsts": ends - counts, **found})
+                self._fill("query_all_hits", rays, {"firsts": ends - counts, **hits})
         ray = np.repeat(np.arange(rays.count), counts)
-        order = np.lexsort((found["t"], ray))
-        return AllHits(ray=ray[order], **{name: array[order] for name, array in found.items()})
+        order = np.lexsort((hits["t"], ray))
+        return AllHits(ray=ray[order], **{name: array[order] for name, array in hits.items()})
 
     def _fill(self, kernel: str, rays: batch.Rays, arrays: dict[str, NDArray[Any]]) -> None:
         """Run a kernel on arrays of the host."""
-        context, shares = self._where
-        places = {name: batch.wrap_host(context, array, shares) for name, array in arrays.items()}
-        self._wait(kernel, rays, arrays, places)
+        context, shares = self._memory
+        outputs = {name: batch.wrap_host(context, array, shares) for name, array in arrays.items()}
+        self._wait(kernel, rays, arrays, outputs)
 
-    def _laid(self, name: str, given: Given, *kinds: type) -> tuple[Any, int]:
-        """A numpy array (n, 3), or a buffer with nothing but such an array; and n.
+    def _input(self, name: str, values: ArrayInput, *kinds: type) -> tuple[Any, int]:
+        """An array (n, 3) of the host, or a buffer that holds nothing else; and n.
 
-        The next command waits for what the array does.
+        The next command waits for the events of the array.
         """
-        if not on_device(given):
-            array = np.asarray(given)
+        if not on_device(values):
+            array = np.asarray(values)
             if array.size == 0:
                 return np.zeros((0, 3), kinds[0]), 0
             if array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in "fiu":
                 wanted = f"(n, 3) {np.dtype(kinds[0])}"
-                there = f"{array.shape} {array.dtype}"
-                raise SceneError(f"{wanted} is wanted, not {there}", where=name)
+                found = f"{array.shape} {array.dtype}"
+                raise SceneError(f"{wanted} is wanted, not {found}", where=name)
             return array, len(array)
-        found = device_arg(self.queue.context, name, given, 3, *kinds)
-        if not found.rows:
+        argument = device_arg(self.queue.context, name, values, 3, *kinds)
+        buffer, rows = argument.buffer, argument.rows
+        if not rows:
             return np.zeros((0, 3), kinds[0]), 0
-        self._stream.after(found.events)
-        plain = isinstance(found.buffer, cl.Buffer) and not found.begin
-        if plain and found.buffer.size == 12 * found.rows:
-            return found.buffer, found.rows
-        whole = cl.Buffer(self.queue.context, cl.mem_flags.READ_WRITE, 12 * found.rows)
-        places = {"src_offset": 4 * found.begin, "byte_count": 12 * found.rows}
-        self._stream.copy(whole, found.buffer, **places)
-        return whole, found.rows
+        self._stream.after(argument.events)
+        if isinstance(buffer, cl.Buffer) and not argument.offset and buffer.size == 12 * rows:
+            return buffer, rows
+        copy = cl.Buffer(self.queue.context, cl.mem_flags.READ_WRITE, 12 * rows)
+        self._stream.copy(copy, buffer, src_offset=4 * argument.offset, byte_count=12 * rows)
+        return copy, rows
 
     def _upload(self, array: Any, kind: type) -> Any:
-        """The array on the device, at once; None for no values. What is there is taken as it is."""
+        """An array on the device, None for no values; a buffer is returned as it is."""
         if not isinstance(array, np.ndarray):
             return array
         return batch.wrap_host(self.queue.context, np.ascontiguousarray(array, kind), False).buffer

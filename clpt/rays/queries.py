@@ -1,4 +1,4 @@
-"""Asking a tree: rays in, hits out, on the host or on the device."""
+"""Ray queries: rays in, hits out, on the host or on the device."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ from ..device import BoundKernel, Device, Events, Program, Stream, assemble, bui
 from ..errors import DeviceError, SceneError
 from ..records import INSTANCE
 from . import batch
-from .arrays import DeviceArg, Given
+from .arrays import ArrayInput, DeviceArg
 
 _GROUP = 64  # rays of a work-group
 _BATCH = 64  # BATCH of kernels/bvh/query_interleaved.cl
-_HITS: batch.Made = {
+_HITS: batch.Columns = {
     "t": (0, np.float32),
     "primitive": (0, np.int32),
     "barycentrics": (2, np.float32),
 }
-_ONE_BY_ONE, _FLIGHTS = "bvh/query.cl", "bvh/query_interleaved.cl"
-_PROGRAMS = {  # of a kernel: the program that has it, and whether it meets all triangles of a ray
+_ONE_BY_ONE, _INTERLEAVED = "bvh/query.cl", "bvh/query_interleaved.cl"
+_PROGRAMS = {  # of a kernel: its program, and whether it finds all triangles that a ray meets
     "query_closest": (_ONE_BY_ONE, False),
     "query_occluded": (_ONE_BY_ONE, False),
-    "query_count": ("bvh/query_every.cl", True),
-    "query_every": ("bvh/query_every.cl", True),
+    "query_count": ("bvh/query_all_hits.cl", True),
+    "query_all_hits": ("bvh/query_all_hits.cl", True),
     "place_instances": ("bvh/place.cl", False),
 }
-_LENT = ("origins", "directions", "t_mins", "t_maxs")
+_RAY_ARRAYS = ("origins", "directions", "t_mins", "t_maxs")
 _Self = TypeVar("_Self", bound="Queries")
 
 
@@ -45,8 +45,8 @@ class Hits:
 
     t: (n,) float32 in units of the direction, inf where nothing is met; primitive: (n,) int32 row
     of `faces`, -1 where nothing is met; barycentrics: (n, 2) float32 of the face's second and third
-    vertex; instance: (n,) int32, which one, or -1, and None where there are no instances; event:
-    after which they are valid.
+    vertex; instance: (n,) int32, or -1, and None for meshes without instances; event: after which
+    the arrays are valid.
     """
 
     t: Any
@@ -71,7 +71,7 @@ class AllHits:
 
 
 class Queries:
-    """What an acceleration structure can be asked.
+    """The queries of an acceleration structure.
 
     Every method may be called from any thread; calls on one object run one after the other.
     """
@@ -84,19 +84,19 @@ class Queries:
         self.layout = choose_tree(self.device) if layout is None else layout
         if self.layout not in TREES:
             raise SceneError(f"{layout!r} is none of {', '.join(TREES)}", where="layout")
-        self._where = queue.context, self.device.info.is_cpu
+        self._memory = queue.context, self.device.info.is_cpu
         self._stream = Stream(queue)
         self._lock = threading.RLock()
         self._kernels: dict[str, BoundKernel] = {}
-        self._flights = False  # whether work-items have several rays in flight
+        self._interleaved = False  # whether a work-item traces several rays at once
         self._trees: dict[str, cl.Buffer] | None = {}
 
     def intersect(
         self,
-        origins: Given,
-        directions: Given,
-        t_min: Given = 0.0,
-        t_max: Given = math.inf,
+        origins: ArrayInput,
+        directions: ArrayInput,
+        t_min: ArrayInput = 0.0,
+        t_max: ArrayInput = math.inf,
         *,
         out: Hits | None = None,
         wait_for: Events = None,
@@ -111,18 +111,18 @@ class Queries:
 
         Raises SceneError for arrays of wrong shapes or types, DeviceError when closed.
         """
-        made = {**_HITS, "instance": (0, np.int32)} if self.instanced else _HITS
+        columns = {**_HITS, "instance": (0, np.int32)} if self.instanced else _HITS
         before = {} if out is None else vars(out)
-        rays = batch.rays(*self._where, origins, directions, t_min, t_max)
-        found, event = self._run("query_closest", rays, made, before, wait_for)
-        return Hits(**{"instance": None, **found}, event=event)
+        rays = batch.rays(*self._memory, origins, directions, t_min, t_max)
+        results, event = self._run("query_closest", rays, columns, before, wait_for)
+        return Hits(**{"instance": None, **results}, event=event)
 
     def occluded(
         self,
-        origins: Given,
-        directions: Given,
-        t_min: Given = 0.0,
-        t_max: Given = math.inf,
+        origins: ArrayInput,
+        directions: ArrayInput,
+        t_min: ArrayInput = 0.0,
+        t_max: ArrayInput = math.inf,
         *,
         out: Array | None = None,
         wait_for: Events = None,
@@ -133,9 +133,9 @@ class Queries:
         of its `events` is. out: such an array to be written again.
         """
         before = {} if out is None else {"met": out}
-        rays = batch.rays(*self._where, origins, directions, t_min, t_max)
-        found, _ = self._run("query_occluded", rays, {"met": (0, np.uint8)}, before, wait_for)
-        return found["met"]
+        rays = batch.rays(*self._memory, origins, directions, t_min, t_max)
+        results, _ = self._run("query_occluded", rays, {"met": (0, np.uint8)}, before, wait_for)
+        return results["met"]
 
     @property
     def buffers(self) -> dict[str, cl.Buffer]:
@@ -169,63 +169,63 @@ class Queries:
         self,
         name: str,
         rays: batch.Rays,
-        made: batch.Made,
+        columns: batch.Columns,
         out: Mapping[str, Any],
         wait_for: Events,
     ) -> tuple[Mapping[str, Any], cl.Event]:
-        """Enqueue a kernel, on the host wait for it; what it wrote, and its event."""
+        """Enqueue a kernel, and wait for it if rays are the host's; its results and its event."""
         with self._lock:
             self._opened()
-            if rays.waits:
+            if rays.from_host:
                 if out:
                     raise SceneError("it is for rays that are on the device", where="out")
                 self._stream.after(wait_for)
-                arrays, places = batch.host_results(*self._where, rays.count, made)
-                return arrays, self._wait(name, rays, arrays, places)
-            there, places = batch.results(self.queue, rays.count, made, out)
+                arrays, outputs = batch.host_results(*self._memory, rays.count, columns)
+                return arrays, self._wait(name, rays, arrays, outputs)
+            results, outputs = batch.results(self.queue, rays.count, columns, out)
             self._stream.after(wait_for)
-            event = self._enqueue(name, rays, places)
-            for array in there.values():
+            event = self._enqueue(name, rays, outputs)
+            for array in results.values():
                 array.events[:] = [event]  # which has waited for those before
-            return there, event
+            return results, event
 
     def _wait(
         self,
         name: str,
         rays: batch.Rays,
         arrays: Mapping[str, NDArray[Any]],
-        places: Mapping[str, DeviceArg],
+        outputs: Mapping[str, DeviceArg],
     ) -> cl.Event:
         """Run a kernel that writes arrays of the host."""
-        event = self._enqueue(name, rays, places)
+        event = self._enqueue(name, rays, outputs)
         for key, array in arrays.items():
             if array.size:  # onto itself, where the device works in the host's memory
-                event = self._stream.read_later(places[key].buffer, array)
+                event = self._stream.read_later(outputs[key].buffer, array)
         event.wait()
         if rays.count:  # the kernel lets go of the host's memory
-            self._kernels[name].set_args(**dict.fromkeys([*_LENT, *places]))
+            self._kernels[name].set_args(**dict.fromkeys([*_RAY_ARRAYS, *outputs]))
         return event
 
-    def _enqueue(self, name: str, rays: batch.Rays, places: Mapping[str, DeviceArg]) -> cl.Event:
-        """Enqueue a kernel for every ray, after what its arrays wait for."""
-        parts = [*rays.device_arg, *places.values()]
-        self._stream.after([event for part in parts for event in part.events])
+    def _enqueue(self, name: str, rays: batch.Rays, outputs: Mapping[str, DeviceArg]) -> cl.Event:
+        """Enqueue a kernel for every ray, after the events of its arrays."""
+        arrays = [*rays.arrays, *outputs.values()]
+        self._stream.after([event for array in arrays for event in array.events])
         if not rays.count:
             return self._stream.mark()
         arguments = {
             **self._opened(),
-            **rays.named,
-            **{key: place.buffer for key, place in places.items()},
+            **rays.arguments,
+            **{key: output.buffer for key, output in outputs.items()},
             "count": rays.count,
-            "begins": batch.offsets(parts),
+            "begins": batch.offsets(arrays),
         }
         bound = self._bind(name, arguments)
-        if self._program_of(name) == _FLIGHTS:
+        if self._root_of(name) == _INTERLEAVED:
             return self._stream.run(bound, (-(-rays.count // _BATCH),), (1,))
         return self._stream.run(bound, (-(-rays.count // _GROUP) * _GROUP,), (_GROUP,))
 
     def _bind(self, name: str, arguments: Mapping[str, Any]) -> BoundKernel:
-        """A kernel with its arguments; the same one each time."""
+        """A kernel with its arguments, made once."""
         bound = self._kernels.get(name)
         if bound is None:
             bound = self._kernels[name] = self._program(name).kernel(name).bind(**arguments)
@@ -235,9 +235,9 @@ class Queries:
 
     def _program(self, kernel: str) -> Program:
         """The program of a kernel, for the layout."""
-        root, every = self._program_of(kernel), _PROGRAMS[kernel][1]
+        root, all_hits = self._root_of(kernel), _PROGRAMS[kernel][1]
         texts = {
-            "generated/layout.cl": traversal_text(self.layout, every),
+            "generated/layout.cl": traversal_text(self.layout, all_hits),
             "generated/instance_traversal.cl": self._instances_text(),
         }
         defines = {
@@ -247,10 +247,10 @@ class Queries:
         }
         return build(self.device, assemble(root, texts, defines))
 
-    def _program_of(self, kernel: str) -> str:
-        """The file that a kernel is taken from."""
+    def _root_of(self, kernel: str) -> str:
+        """The file of the program that has a kernel."""
         root = _PROGRAMS[kernel][0]
-        return _FLIGHTS if self._flights and root == _ONE_BY_ONE else root
+        return _INTERLEAVED if self._interleaved and root == _ONE_BY_ONE else root
 
     def _instances_text(self) -> str:
         """What traversal of instances includes."""

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 Image = NDArray[np.float32]
-COLUMNS = 4  # of the sheet
+COLUMNS = 4  # of pictures in the sheet
 
 
 def sheet(layers: Mapping[str, Image]) -> Image:
-    """All layers side by side as colours in [0, 1], (h, w, 3) float32."""
+    """Return all layers side by side as colours in [0, 1], (h, w, 3) float32."""
     shown = [viewable(name, layer) for name, layer in layers.items()]
     columns = min(COLUMNS, len(shown))
     shown += [np.zeros_like(shown[0])] * (-len(shown) % columns)
@@ -21,16 +21,16 @@ def sheet(layers: Mapping[str, Image]) -> Image:
 
 
 def viewable(name: str, layer: Image) -> Image:
-    """Values (h, w, 1 to 3) as colours in [0, 1], (h, w, 3) float32."""
+    """Return values (h, w, 1 to 3) as colours in [0, 1], (h, w, 3) float32."""
     if name == "albedo":
         return layer
     if name.endswith("_normal"):
         return layer * np.float32(0.5) + np.float32(0.5)
-    if name == "depth":  # the nearest is white, what is twice as far half as bright
+    if name == "depth":  # the nearest point is white, one twice as far half as bright
         near = np.min(layer, where=layer > 0, initial=np.inf)
         return np.repeat(np.divide(near, layer, where=layer > 0, out=np.zeros_like(layer)), 3, 2)
     if name.endswith("_id"):  # neighbours in number differ in hue
-        turns = layer * np.float32(0.618034) + np.arange(3, dtype=np.float32) / np.float32(3.0)
-        return (0.5 + 0.5 * np.cos(2 * np.pi * turns)).astype(np.float32)
-    cells = np.mod(layer, np.float32(1.0))  # positions and uv: one run of colours a unit
+        hue = layer * np.float32(0.618034) + np.arange(3, dtype=np.float32) / np.float32(3.0)
+        return (0.5 + 0.5 * np.cos(2 * np.pi * hue)).astype(np.float32)
+    cells = np.mod(layer, np.float32(1.0))  # positions and uv: the colours repeat in every unit
     return np.pad(cells, ((0, 0), (0, 0), (0, 3 - cells.shape[2])))

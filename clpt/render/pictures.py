@@ -1,8 +1,7 @@
-"""The picture that a renderer has so far, in every form in which others want it."""
+"""The picture that a renderer has so far, as arrays of the device and of the host."""
 
 from __future__ import annotations
 
-import functools
 from typing import Any
 
 import numpy as np
@@ -25,7 +24,7 @@ Image = NDArray[np.float32]
 
 
 class Pictures(DeviceOwner):
-    """Base of what renders: its picture as an array, on the device or the host.
+    """Base of renderers: their picture as an array, on the device or the host.
 
     channels: of the `aov` integrator, else none; wavefronts: one a channel, at least one.
     """
@@ -34,6 +33,7 @@ class Pictures(DeviceOwner):
     device: dev.Device
     channels: tuple[str, ...]
     wavefronts: list[Wavefront]
+    _resolve: Resolve | None = None  # built when a picture is first resolved
 
     @property
     @synchronized
@@ -44,13 +44,13 @@ class Pictures(DeviceOwner):
         has. Always the same memory, on the renderer's queue; steps wait for those of its `events`
         that readers add, as its `get_async` does. Of `aov`, the first channel.
         """
-        return self.wavefronts[0].film
+        return self.wavefronts[0].film.picture
 
     @property
     @synchronized
     def films(self) -> dict[str, dev.DeviceArray]:
         """The values of the `aov` integrator by name, as `film` has them."""
-        return {n: w.film for n, w in zip(self.channels, self.wavefronts, strict=True)}
+        return {n: w.film.picture for n, w in zip(self.channels, self.wavefronts, strict=True)}
 
     @synchronized
     def resolve(
@@ -78,15 +78,13 @@ class Pictures(DeviceOwner):
         """
         if channel is not None and channel not in self.channels:
             raise UnknownKindError("channel", channel, self.channels)
+        if self._resolve is None:
+            self._resolve = Resolve(self.device, self.wavefronts[0].stream)
         return self._resolve(
             self.films[channel] if channel else self.film, into, dtype=dtype, exposure=exposure,
             tone=tone, srgb=srgb, flip=flip, wait_for=wait_for,
             space="rec709" if self.channels else self.scene.film.output_space,
         )  # fmt: skip
-
-    @functools.cached_property
-    def _resolve(self) -> Resolve:
-        return Resolve(self.device, self.wavefronts[0].stream)
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         """`image()`, for numpy.asarray(renderer): a copy, which waits."""

@@ -19,15 +19,16 @@ from clpt.render.editing import parameter_patch, rebuild
 from clpt.render.editing.moving import Moving
 from clpt.render.editing.scene_edit import (
     MaterialKey,
-    Names,
     ShapeKey,
-    edited,
+    Successors,
+    edit_scene,
     match_replacements,
     resolve_device_arrays,
 )
 from clpt.render.locking import synchronized
 from clpt.render.lowering.scene import lower
 from clpt.render.pictures import Image, Pictures
+from clpt.render.progress import Progress
 from clpt.render.stats import RenderStats, collect
 from clpt.render.wavefront import adaptive
 from clpt.render.wavefront.wavefront import Wavefront
@@ -41,31 +42,15 @@ log = logging.getLogger(__name__)
 TEXTURE_SHARE = 0.5  # of a device's free memory, for bitmaps
 
 
-@dataclasses.dataclass(frozen=True)
-class Progress:
-    """How far a render is.
-
-    samples, total: per pixel, in the mean; paths: samples of all pixels; rays: traced so far;
-    seconds: since the first; active: the share of the pixels that are not finished.
-    """
-
-    samples: float
-    total: int
-    paths: int
-    rays: int
-    seconds: float
-    active: float = 1.0
-
-
 class Renderer(Pictures):
-    """Renders a scene; its picture can be asked for at any time.
+    """Renders a scene; its picture so far is available at any time.
 
     device: where to render, a name or index (see clpt.device.choose), or a clpt.device.Device.
-    queue: the caller's, instead; all buffers and programs are then made in its context, all
-    commands go there, and nothing else is made or changed. progress: called when a step has ended,
-    in a thread of the driver.
-    texture_budget: [bytes] that bitmaps may take, larger ones are halved; by default half of what
-    the device has free. The other parameters are those of clpt.render.wavefront.wavefront.Wavefront.
+    queue: the caller's, instead of a device; all buffers and programs are then made in its context,
+    all commands go there, and no other OpenCL object is made or changed. progress: called when a
+    step has ended, in a thread of the driver. texture_budget: [bytes] that bitmaps may take, larger
+    ones are halved; by default half of what the device has free. The other parameters are those of
+    clpt.render.wavefront.wavefront.Wavefront.create.
 
     It may be used from several threads: one method runs at a time. With `with`, `close`, or when it
     is dropped, it gives the device's memory back.
@@ -101,18 +86,20 @@ class Renderer(Pictures):
         before = device.builds.programs, device.builds.cached
         if texture_budget is None:
             texture_budget = _texture_budget(device)
-        self._texture_budget, self._names = texture_budget, Names()
+        self._texture_budget, self._successors = texture_budget, Successors()
         lowered = lower(resolve_device_arrays(scene, device.queue), texture_budget)
         self._seconds = {"lower": time.perf_counter() - self._start}
         paths = scene.spp * math.prod(scene.film.size)
         wanted = {"paths": paths, "looped": None if queue is None else True, **wavefront}
-        first = Wavefront(device, lowered, **wanted)
+        first = Wavefront.create(device, lowered, **wanted)
         self.wavefronts = [first, *(first.with_channel(channel) for channel in self.channels[1:])]
-        for front in self.wavefronts:  # so that the first samples come at once
-            _ = front.loop if front.looped else front.stages
+        for one in self.wavefronts:
+            one.prepare()
         self._built = device.builds.programs - before[0], device.builds.cached - before[1]
-        self._seconds |= {**first.seconds, "ready": time.perf_counter() - self._start}
-        self.warnings = list(self.wavefronts[0].lowered.warnings)
+        self._seconds["programs"] = sum(one.program_seconds for one in self.wavefronts)
+        self._seconds["trees"] = first.scene.trees.seconds
+        self._seconds["ready"] = time.perf_counter() - self._start
+        self.warnings = list(lowered.warnings)
         self.samples = 0
         self._progress = progress
         self._moving: Moving | None = None
@@ -140,25 +127,25 @@ class Renderer(Pictures):
         stream.flush()
         event = stream.last
         if self._progress is not None:
-            self._tell_later(event, self._progress)
+            self._report_later(event, self._progress)
         return event
 
-    def _tell_later(self, event: cl.Event, told: Callable[[Progress], Any]) -> None:
-        """Tell the caller how far the picture is, once the event has ended.
+    def _report_later(self, event: cl.Event, progress: Callable[[Progress], Any]) -> None:
+        """Call `progress` once the event has ended.
 
         What the caller then raises is logged: in a thread of the driver nobody could catch it.
         """
         samples, start = self.samples, self._start
         pixels = math.prod(self.scene.film.size) * len(self.wavefronts)
 
-        def tell(_: int) -> None:
+        def report(_: int) -> None:
             seconds = time.perf_counter() - start
             try:
-                told(Progress(samples, samples, samples * pixels, 0, seconds))
+                progress(Progress(samples, samples, samples * pixels, 0, seconds))
             except Exception:
                 log.exception("the progress callback failed at %d samples", samples)
 
-        event.set_callback(cl.command_execution_status.COMPLETE, tell)
+        event.set_callback(cl.command_execution_status.COMPLETE, report)
 
     @synchronized
     def run(
@@ -168,10 +155,11 @@ class Renderer(Pictures):
         *,
         noise: float | None = None,
     ) -> bool:
-        """Add samples to every pixel and wait; `samples` in all are kept in `self.samples`.
+        """Add samples to every pixel and wait; `self.samples` counts all so far.
 
         noise: leave pixels as soon as the noise around them is as low, relative to the picture,
-        such as 0.02; `samples` is then the most that a pixel gets. See clpt.render.wavefront.adaptive.
+        such as 0.02; `samples` is then the most that a pixel gets, see
+        clpt.render.wavefront.adaptive.
         progress: called every few milliseconds to seconds; if it returns False the run stops soon,
         as after `cancel`. Returns whether it came to its end. What progress raises, or Ctrl+C in
         it, is raised when the paths in flight have ended: the film is whole then too.
@@ -183,7 +171,7 @@ class Renderer(Pictures):
         raised: list[BaseException] = []
         self._stop.clear()
 
-        def tell(_: Any) -> bool:
+        def on_batch(_: Any) -> bool:
             counts = [w.counts for w in self.wavefronts]
             paths = sum(c.samples for c in counts)
             if paths:
@@ -199,29 +187,27 @@ class Renderer(Pictures):
                 raised.append(error)
                 return False
 
-        if not self._expose(first, end, noise, tell):
+        if not self._render_samples(first, end, noise, on_batch):
             if raised:
                 raise raised.pop()
             return False
         self.samples = end
         return True
 
-    def _expose(
-        self, first: int, end: int, noise: float | None, tell: Callable[[Any], bool]
+    def _render_samples(
+        self, first: int, end: int, noise: float | None, on_batch: Callable[[Any], bool]
     ) -> bool:
-        """Add samples to all pixels, or where there is noise; whether that came to its end."""
+        """Add samples to all pixels, or to those with noise; return whether all were added."""
         if noise is None:
-            finished = all(
-                wavefront.render_samples(first, end, tell) for wavefront in self.wavefronts
-            )
+            finished = all(one.render_samples(first, end, on_batch) for one in self.wavefronts)
             if finished and self._adaptive is not None:
                 self._adaptive.skip(end)
             return finished
-        noise = adaptive.checked(noise, self.wavefronts[0].lowered.features)
+        noise = adaptive.checked(noise, self.wavefronts[0].features)
         if self._adaptive is None:
             self._adaptive = adaptive.Adaptive(self.wavefronts[0])
             self._adaptive.skip(first)
-        return self._adaptive.run(end, noise, tell)
+        return self._adaptive.run(end, noise, on_batch)
 
     @property
     def active(self) -> float:
@@ -236,10 +222,19 @@ class Renderer(Pictures):
         self._stop.set()
 
     @synchronized
-    def reset(self, wait_for: dev.Events = None) -> cl.Event:
-        """Enqueue that the film is emptied; the next sample is number 0 again."""
+    def reset(self, wait_for: dev.Events = None, *, seed: int | None = None) -> cl.Event:
+        """Enqueue that the film is emptied; the next sample is number 0 again.
+
+        seed: of the samples from now on, which `self.scene` then has; by default as before. Raises
+        SceneError for a seed that is no whole number.
+        """
+        if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int)):
+            raise SceneError(f"must be a whole number, not {seed!r}", where="seed")
         stream = self.wavefronts[0].stream
         stream.after(wait_for)
+        if seed is not None:
+            self.scene = dataclasses.replace(self.scene, seed=seed)
+            self.wavefronts[0].paths.set_seed(seed)
         for wavefront in self.wavefronts:
             wavefront.clear()
         self.samples, self._adaptive = 0, None
@@ -254,8 +249,8 @@ class Renderer(Pictures):
         """
         with self._lock:
             self._closed = True
-            self.wavefronts, self._moving, self._adaptive = [], None, None
-            self.__dict__.pop("_resolve", None)
+            self.wavefronts = []
+            self._moving = self._adaptive = self._resolve = None
 
     def __enter__(self) -> Renderer:
         return self
@@ -276,69 +271,84 @@ class Renderer(Pictures):
     ) -> cl.Event:
         """Bring what changed to the device, and begin again at sample 0.
 
-        camera: another one; of the same kind it takes one small write. materials: by what they
-        stand for, a material of the scene or a shape's key; where only values differ a few words
-        are written. transforms: (4, 4) by shape; vertices: (n, 3) float32 by shape, of numpy or on
+        camera: another one. materials: by the material of the scene that they replace, or by a
+        shape's key. transforms: (4, 4) by shape; vertices: (n, 3) float32 by shape, of numpy or on
         the device; of `Spheres` their centres, perhaps (n, 4) with the radii. The key of a shape is
-        the shape, its name, or its place in `scene.shapes`; shapes and materials that were given at
-        first go on to name what took their place. scene: another scene of the same film, for
-        whatever else; what its shapes and lights share with the present one, the same arrays and
-        images, is not looked at again.
+        the shape, its name, or its index in `scene.shapes`. A shape or material that the renderer
+        had at first remains the key of whatever has replaced it. scene: another scene of the same
+        film, for any other change; arrays and images that it shares with the present one are taken
+        to be unchanged.
 
-        What only moves does so on the device, where trees are fitted to it, see
-        clpt.render.editing.moving; nothing is waited for. Else what the device needs is found by lowering
-        again: tables are written where they differ, trees built where triangles do, kernels built
-        where others are needed. `self.scene` is then the new scene, and the picture will be that of
-        a new renderer.
+        The first of three ways that is possible is taken:
+
+        1. Shapes that only move do so on the device, where trees are refitted to them; nothing is
+           waited for. See clpt.render.editing.moving.
+        2. A camera of the same kind, and values of materials, take a few written words.
+        3. Else the scene is lowered again: tables are written where they differ, trees are built
+           where triangles do, kernels where others are needed.
+
+        `self.scene` is then the new scene, and the picture will be that of a new renderer. At level
+        DEBUG the logger `clpt.render.renderer` says why a quicker way was not taken.
 
         Raises SceneError for what is not in the scene, or makes no sense in it, and for a film of
         another size; nothing has changed then.
         """
-        front, events = self.wavefronts[0], list(wait_for or ())
-        front.stream.after(events)
+        events = list(wait_for or ())
+        self.wavefronts[0].stream.after(events)
         moves = scene is None and bool(transforms or vertices)
         if moves and self._move(transforms or {}, vertices or {}):
             transforms = vertices = None
-            event = self.reset()  # whatever becomes of the rest
+            event = self.reset()  # also if the other changes are refused
             if materials is None and camera is None:
                 return event
         new = self.scene if scene is None else scene
-        swaps = {} if scene is None else match_replacements(self.scene, new)
+        replaced = {} if scene is None else match_replacements(self.scene, new)
         if materials or transforms or vertices:
-            new, more = edited(new, self._names, materials, transforms, vertices)
-            swaps |= more
+            new, more = edit_scene(new, self._successors, materials, transforms, vertices)
+            replaced |= more
         if camera is not None:
             new = dataclasses.replace(new, camera=camera)
-        only = scene is None and not transforms and not vertices
-        if not (only and parameter_patch.rewrite(self.wavefronts, self.scene, new)):
-            for event in events:
-                event.wait()  # arrays on the device may be read
-            self._lower_again(new, refit=scene is None)
+        parameters_only = scene is None and not transforms and not vertices
+        if not (parameters_only and self._patch(new)):
+            self._rebuild(new, events, refit=scene is None)
         self.scene = new
-        self._names.replace(swaps)
+        self._successors.note(replaced)
         return self.reset()
 
     def _move(self, transforms: Mapping[ShapeKey, Any], vertices: Mapping[ShapeKey, Any]) -> bool:
-        """Move shapes where they are; whether that could be done."""
-        front = self.wavefronts[0]
-        if self._moving is None or self._moving.lowered is not front.lowered:
-            self._moving = Moving(front, self.scene)
-        moved, swaps = edited(self.scene, self._names, None, transforms, vertices)
-        if not self._moving.move(self.scene, swaps):
+        """Move shapes on the device; return whether they could."""
+        if self._moving is None:
+            self._moving = Moving(self.wavefronts[0].scene, self.scene)
+        moved, replaced = edit_scene(self.scene, self._successors, None, transforms, vertices)
+        refusal = self._moving.move(self.scene, replaced)
+        if refusal is not None:
+            log.debug("shapes cannot move on the device: %s", refusal)
             return False
         self.scene = moved
-        self._names.replace(swaps)
+        self._successors.note(replaced)
         return True
 
-    def _lower_again(self, scene: Scene, refit: bool) -> None:
-        """Lower a scene and let it take the place of the one on the device."""
+    def _patch(self, scene: Scene) -> bool:
+        """Write the words of parameters that differ; return whether nothing else does."""
+        refusal = parameter_patch.patch(self.wavefronts[0].scene, self.scene, scene)
+        if refusal is not None:
+            log.debug("words alone do not change the scene: %s", refusal)
+        return refusal is None
+
+    def _rebuild(self, scene: Scene, events: list[cl.Event], refit: bool) -> None:
+        """Lower a scene and render it from now on; see `rebuild.take`.
+
+        events: that arrays on the device wait for, which may be read.
+        """
         if getattr(scene.integrator, "channels", ()) != self.channels:
             raise SceneError("other channels need a new Renderer", where="integrator.channels")
-        front = self.wavefronts[0]
-        lowered = lower(
-            resolve_device_arrays(scene, front.stream.queue), self._texture_budget, front.lowered
-        )
+        for event in events:
+            event.wait()
+        first = self.wavefronts[0]
+        readable = resolve_device_arrays(scene, first.stream.queue)
+        lowered = lower(readable, self._texture_budget, first.scene.lowered)
         rebuild.take(self.wavefronts, lowered, refit)
+        self._moving = None
         self.warnings = list(lowered.warnings)
 
     @property

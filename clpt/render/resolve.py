@@ -1,4 +1,4 @@
-"""From a film to a picture for a screen, on the device: exposure, tone curve, sRGB transfer."""
+"""Pictures for a screen, made from a film on the device: exposure, tone curve, sRGB transfer."""
 
 from __future__ import annotations
 
@@ -28,12 +28,16 @@ _IMAGE_TYPES: dict[Any, np.dtype] = {
 
 @dataclass(frozen=True)
 class _Target:
-    """Where a picture goes. memory: an Array, or an image or buffer of OpenCL; at [elements]."""
+    """Where a picture goes.
+
+    memory: the Array or Image that the caller gets; data: its OpenCL memory; offset: where the
+    picture begins there [elements].
+    """
 
     memory: Any
     dtype: np.dtype
     data: cl.MemoryObject
-    at: int = 0
+    offset: int = 0
 
     @property
     def is_image(self) -> bool:
@@ -46,7 +50,7 @@ class _Target:
 
 
 class Resolve:
-    """Makes pictures of films on one device, whose commands go through the given stream.
+    """Makes pictures of films on one device; stream: that their commands go through.
 
     Raises KernelBuildError.
     """
@@ -88,7 +92,7 @@ class Resolve:
             "into": target.data,
         }
         if not target.is_image:
-            named["at"] = target.at
+            named["at"] = target.offset
         bound = self._bind(target.kernel, named)
         self.stream.after(wait_for)
         if isinstance(target.memory, Array):
@@ -100,7 +104,7 @@ class Resolve:
         return target.memory
 
     def _bind(self, kernel: str, named: dict[str, Any]) -> device.BoundKernel:
-        """A kernel with its arguments; it is kept, as making one takes longer than setting them."""
+        """A kernel with its arguments. It is made once: that takes longer than to set them."""
         if kernel in self._bound:
             self._bound[kernel].set_args(**named)
         else:
@@ -108,19 +112,19 @@ class Resolve:
         return self._bound[kernel]
 
     def _target(self, film: Array, into: Any, dtype: Any) -> _Target:
-        """Where to, checked. Raises DeviceError, telling what would fit."""
-        asked = None if dtype is None else np.dtype(dtype)
-        if asked is not None and asked not in (BYTES, FLOATS):
-            raise DeviceError(f"a picture is of uint8 or float32, not {asked}")
+        """Where a picture goes. Raises DeviceError, which says what would fit."""
+        wanted = None if dtype is None else np.dtype(dtype)
+        if wanted is not None and wanted not in (BYTES, FLOATS):
+            raise DeviceError(f"a picture is of uint8 or float32, not {wanted}")
         context = self.device.context
         if into is None:
-            array = DeviceArray(context, film.shape, asked or BYTES)
+            array = DeviceArray(context, film.shape, wanted or BYTES)
             into = array.with_queue(self.stream.queue)
         if isinstance(into, Array):
             target = _Target(into, into.dtype, into.base_data, into.offset // into.dtype.itemsize)
             _check_array(into, film.shape)
         elif isinstance(into, cl.MemoryObject) and into.type == cl.mem_object_type.BUFFER:
-            target = _buffer_target(self.stream.queue, into, film.shape, asked or BYTES)
+            target = _buffer_target(self.stream.queue, into, film.shape, wanted or BYTES)
         elif isinstance(into, cl.MemoryObject) and into.type == cl.mem_object_type.IMAGE2D:
             target = _Target(into, _image_dtype(into, film.shape), into)
             if target.kernel not in self.program.signatures:
@@ -130,17 +134,17 @@ class Resolve:
             raise DeviceError(f"a picture goes into {kinds}, not {type(into).__name__}")
         if target.data.context != context:
             raise DeviceError(
-                "what the picture goes into is in another OpenCL context than the renderer; create "
-                "it in that of the renderer's queue, or give the renderer your queue"
+                "the target of the picture is in another OpenCL context than the renderer; create "
+                "it in the context of the renderer's queue, or give the renderer your queue"
             )
-        if asked is not None and asked != target.dtype:
-            raise DeviceError(f"a picture of {asked} was asked for, into what holds {target.dtype}")
+        if wanted is not None and wanted != target.dtype:
+            raise DeviceError(f"a picture of {wanted} does not go into one of {target.dtype}")
         return target
 
 
 @cache
 def _to_rec709(space: str) -> dict[str, Any]:
-    """The kernels' arguments that take colours of a space to Rec. 709."""
+    """The arguments of the kernels that convert colours of a space to Rec. 709."""
     rows = zip(("red", "green", "blue"), between(space, "rec709"), strict=True)
     return {"converted": int(space != "rec709")} | {name: (*row, 0.0) for name, row in rows}
 
@@ -166,7 +170,7 @@ def _buffer_target(
 
 
 def _image_dtype(into: Any, shape: tuple[int, ...]) -> np.dtype:
-    """What is written to an image."""
+    """The type that kernels write to an image. Raises DeviceError if the picture does not fit."""
     size, form = (into.height, into.width), into.format
     dtype = _IMAGE_TYPES.get(form.channel_data_type)
     if size != shape[:2] or dtype is None or form.channel_order not in _ORDERS:

@@ -1,4 +1,4 @@
-"""What a render took: how much of everything, how many bytes, how many seconds."""
+"""What a render took: numbers of things, bytes, seconds."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from clpt.render.wavefront.wavefront import Wavefront
 class RenderStats:
     """Figures of a renderer, for people and reports; `dataclasses.asdict` makes them JSON.
 
-    triangles: as they are held, triangles_instanced: as they are seen; analytic: shapes that rays
-    meet as they are; lights: rows to choose from. tables, trees: bytes by name; memory: bytes of
-    all buffers on the device; programs: built until samples could come, programs_cached: those of
-    them that lay in clpt's cache (a driver does not tell what it takes from its own).
-    seconds: `lower`, `trees`, `programs`, `ready` (from the start to when samples may come) and,
-    once there is one, `first_sample` (from the start likewise).
+    triangles: on the device; triangles_instanced: as many as instances show; analytic: shapes that
+    are intersected without triangles; lights: rows to choose from. tables, trees: bytes by name;
+    memory: bytes of all buffers on the device. programs: built before the first sample;
+    programs_cached: those of them that were in clpt's cache (a driver does not tell what it takes
+    from its own). seconds: of `lower`, `trees` and `programs`; from the start to `ready`, when
+    samples may begin, and, once there is one, to `first_sample`.
     """
 
     triangles: int
@@ -33,26 +33,28 @@ class RenderStats:
 
 
 def collect(
-    fronts: list[Wavefront], programs: int, kept: int, seconds: dict[str, float]
+    wavefronts: list[Wavefront], programs: int, cached: int, seconds: dict[str, float]
 ) -> RenderStats:
-    """Return the figures of a render's wavefronts, which share all but film and picture."""
-    first = fronts[0]
-    lowered, instances = first.lowered, first.lowered.instances
-    own = len(lowered.faces) - sum(instances.triangles)
-    placed = sum(instances.triangles[prototype] for prototype in instances.prototypes.tolist())
+    """Return the figures of a render's wavefronts, which share all but film and picture.
+
+    programs, cached: how many were built, and how many of them came from clpt's cache.
+    """
+    scene = wavefronts[0].scene
+    lowered, instances = scene.lowered, scene.lowered.instances
+    of_world = len(lowered.faces) - sum(instances.triangles)
+    instanced = sum(instances.triangles[prototype] for prototype in instances.prototypes.tolist())
     arrays = {**lowered.tables, "vertices": lowered.vertices, "faces": lowered.faces}
-    trees = {"triangles": first.tree, **first.box_trees}
     return RenderStats(
         triangles=len(lowered.faces),
-        triangles_instanced=own + placed,
+        triangles_instanced=of_world + instanced,
         instances=len(instances.rows),
         analytic=len(lowered.boxes),
         lights=int(lowered.settings["light_count"]),
-        # Of what a scene does not have, a word stands there.
+        # A table that the scene does not need has one word.
         tables={name: array.nbytes for name, array in arrays.items() if array.size > 1},
-        trees={name: tree.bytes for name, tree in trees.items()},
-        memory=sum(front.buffers.used for front in fronts) + sum(t.bytes for t in trees.values()),
+        trees=scene.trees.bytes,
+        memory=scene.buffers.used + sum(scene.trees.bytes.values()),
         programs=programs,
-        programs_cached=kept,
+        programs_cached=cached,
         seconds=seconds,
     )

@@ -189,10 +189,13 @@ class Film(Kind):
     width: int = host(768, "pixels")
     height: int = host(576, "pixels")
     crop: Any = host(
-        None, "part that is rendered: (x, y, width, height), from the upper left", "pixels"
+        None,
+        "part that is rendered: (x, y, width, height), from the upper left",
+        "pixels",
+        form="crop",
     )
     mode: str = choice("spectral", "what light is made of", ("spectral", "rgb"))
-    filter: Filter = host(Box(), "pixel filter")
+    filter: Filter = host(Box(), "pixel filter", form="filter")
     lambda_min: float = real(360.0, "shortest wavelength", "nm", 200.0, 2000.0)
     lambda_max: float = real(830.0, "longest wavelength", "nm", 200.0, 2000.0)
     wavelengths: str = choice(
@@ -200,10 +203,14 @@ class Film(Kind):
         "how they are drawn: as suits the scene, as the eye responds, or as lights and sensor do",
         ("auto", "visible", "scene"),
     )
-    sensor: Any = host("cie1931", "what responds: cie1931, cie1964 or a clpt.spectra.Sensor")
+    sensor: Any = host(
+        "cie1931", "what responds: cie1931, cie1964 or a clpt.spectra.Sensor", form="sensor"
+    )
     bands: int = host(0, "of a spectral picture; 0: a picture of three colours")
     white_balance: Any = host(
-        "none", "what becomes white: none, an illuminant, a colour temperature [K], or (x, y)"
+        "none",
+        "what becomes white: none, an illuminant, a colour temperature [K], or (x, y)",
+        form="white_balance",
     )
     output_space: str = choice("rec709", "colour space of the picture", spaces.SPACES)
     exposure: float = real(1.0, "factor on the picture, of bands too", low=0.0)

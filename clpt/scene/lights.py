@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -12,16 +12,26 @@ from clpt.scene.params import Kind, choice, emission, flag, host, real, reflecta
 
 RADIANCE = "W m^-2 sr^-1 nm^-1"
 SPOT_EDGES = ("linear", "smooth")
+Reach = Literal["surface", "placed", "distant", "infinite"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Light(Kind):
-    """Base of all lights."""
+    """Base of all lights.
+
+    reach: "surface" for what emits from a shape; "placed" for a light with a position; "distant"
+    for one that shines on the whole scene, and that no ray can meet; "infinite" for one that a ray
+    meets when it leaves the scene.
+    """
+
+    reach: ClassVar[Reach] = "placed"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Area(Light):
     """A surface that emits from its front side, or from both, evenly in all directions."""
+
+    reach = "surface"
 
     radiance: Any = emission(1.0, "emitted radiance", RADIANCE, textured=True)
     two_sided: bool = flag(False, "True: its back emits too")
@@ -34,6 +44,8 @@ class DirectionalArea(Light):
     Only the `particle_tracer` finds it. The camera does not see it shine.
     """
 
+    reach = "surface"
+
     irradiance: Any = emission(
         1.0, "through a surface across the beam", "W m^-2 nm^-1", textured=True
     )
@@ -45,7 +57,7 @@ class Point(Light):
 
     position: Any = host((0.0, 0.0, 0.0), "where it is", "m")
     intensity: Any = emission(1.0, "radiant intensity", "W sr^-1 nm^-1")
-    falloff: bool = host(True, "False: irradiance does not fall with the distance (not physical)")
+    falloff: bool = flag(True, "False: irradiance does not fall with the distance (not physical)")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -97,13 +109,17 @@ class Goniometric(Light):
 class Directional(Light):
     """Parallel light from infinitely far away."""
 
-    direction: Any = host((0.0, 0.0, -1.0), "in which the light travels")
+    reach = "distant"
+
+    direction: Any = host((0.0, 0.0, -1.0), "in which the light travels", form="direction")
     irradiance: Any = emission(1.0, "on a surface that faces it", "W m^-2 nm^-1")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Constant(Light):
     """The same radiance from every direction."""
+
+    reach = "infinite"
 
     radiance: Any = emission(1.0, "radiance of the surroundings", RADIANCE)
 
@@ -112,13 +128,16 @@ class Constant(Light):
 class Envmap(Light):
     """Radiance from an image in latitude and longitude around the scene.
 
-    In the light's own space +y is up, the middle of the image is +z... see kernels/light/envmap.cl.
+    In the light's own space +y is up, and the middle of the image is in the direction +z.
     """
+
+    reach = "infinite"
 
     image: Any = host(
         None,
         "path of an .exr or .hdr file, or an array (h, w, 3) float32; an .exr may hold spectra, "
         "as clpt.SpectralImage does",
+        form="image",
     )
     scale: float = real(1.0, "factor on the radiance", low=0.0)
     to_world: Any = host(np.eye(4), "rotation, (4, 4)")
@@ -128,9 +147,12 @@ class Envmap(Light):
 class CubeMap(Light):
     """Radiance from the six faces of a cube around the scene."""
 
+    reach = "infinite"
+
     image: Any = host(
         None,
         "six images +x -x +y -y +z -z (paths or arrays), or one with the faces in a 4x3 cross",
+        form="cube_images",
     )
     scale: float = real(1.0, "factor on the radiance", low=0.0)
     to_world: Any = host(np.eye(4), "rotation, (4, 4)")

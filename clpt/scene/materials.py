@@ -76,6 +76,7 @@ class Material(Kind):
     uses_lobe_sample: ClassVar[bool] = False  # `sample` uses u.z
     chromatic: ClassVar[bool] = False  # the pdf differs between wavelengths: it has `pdfs`
     disperses: ClassVar[bool] = False  # whatever its parameters, directions depend on wavelength
+    refracts: ClassVar[bool] = False  # they do so where a parameter of the role index does
     fluoresces: ClassVar[bool] = False  # light may leave at another wavelength: it has `shift`
     is_null: ClassVar[bool] = False  # light goes on as if nothing were there, to lights as well
     no_back: ClassVar[bool] = False  # its back is not there
@@ -123,6 +124,7 @@ class Dielectric(Material):
 
     delta = True
     uses_lobe_sample = True
+    refracts = True
 
     int_ior: Any = index(1.5046, "inside index, number, glass name or spectrum")
     ext_ior: Any = index(1.000277, "outside index")
@@ -158,6 +160,7 @@ class RoughDielectric(Material):
     """A rough boundary of two dielectrics (Walter et al. 2007); both sides."""
 
     uses_lobe_sample = True
+    refracts = True
     chromatic = True
 
     int_ior: Any = index(1.5046, "inside index")
@@ -258,6 +261,7 @@ class Principled(Material):
     """
 
     uses_lobe_sample = True
+    refracts = True
     chromatic = True
     tints = ("spec_tint", "sheen_tint")
 
@@ -338,6 +342,7 @@ class GltfSurface(Material):
     """
 
     uses_lobe_sample = True
+    refracts = True
     chromatic = True
     needs_wavelengths = True
 
@@ -488,15 +493,15 @@ class Null(Material):
 class TwoSided(Material):
     """Gives one-sided materials to both sides of a surface."""
 
-    front: Any = host(Diffuse(), "material of the front")
-    back: Any = host(None, "material of the back; the front's when None")
+    front: Any = host(Diffuse(), "material of the front", form="material")
+    back: Any = host(None, "material of the back; the front's when None", form="material")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Mask(Material):
     """Lets light through where `opacity` is below one."""
 
-    material: Any = host(Diffuse(), "what is there where it is opaque")
+    material: Any = host(Diffuse(), "what is there where it is opaque", form="material")
     opacity: Any = real(0.5, "share of light that meets the material", "", 0.0, 1.0, textured=True)
 
 
@@ -504,8 +509,8 @@ class Mask(Material):
 class Blend(Material):
     """A linear mixture of two materials."""
 
-    first: Any = host(Diffuse(), "material where the weight is 0")
-    second: Any = host(Diffuse(), "material where the weight is 1")
+    first: Any = host(Diffuse(), "material where the weight is 0", form="material")
+    second: Any = host(Diffuse(), "material where the weight is 1", form="material")
     weight: Any = real(0.5, "share of the second", "", 0.0, 1.0, textured=True)
 
 
@@ -513,7 +518,7 @@ class Blend(Material):
 class NormalMapped(Material):
     """Base of the maps that bend the shading normal. Their flags and defaults are Mitsuba 3's."""
 
-    material: Any = host(Diffuse(), "what is shaded with the bent normal")
+    material: Any = host(Diffuse(), "what is shaded with the bent normal", form="material")
     scale: float = real(1.0, "factor on what the map bends")
     flip_invalid: bool = flag(True, "turn a normal round that faces away from the viewer")
     shadowing: bool = flag(True, "soften the edge where the bent surface turns dark")
@@ -523,7 +528,11 @@ class NormalMapped(Material):
 class NormalMap(NormalMapped):
     """Takes the shading normal from an image, relative to that of the surface."""
 
-    map: Any = host(None, "bitmap, read raw; its colours are (x, y, z) / 2 + 1/2; None: none")
+    map: Any = host(
+        None,
+        "bitmap, read raw; its colours are (x, y, z) / 2 + 1/2; None: none",
+        form="texture",
+    )
     along_v: bool = flag(False, "y of the map goes along v even where uv are mirrored, as in glTF")
 
     def check(self) -> None:

@@ -1,8 +1,8 @@
 """How the parameters of a kind are declared.
 
-A kind is a frozen dataclass that derives from `Kind`; each field is made by one of the functions
-below, which says its role. From the role follow what a user may give for it, its form on the
-device, and its line in the documentation and the JSON schema:
+A kind is a frozen dataclass that derives from `Kind`. One of the functions below declares each
+field and gives it a role. The role decides which values it accepts, its type in the kernels, and
+its entry in the documentation and the JSON schema:
 
 =============  =====================================  ==========================  ===============
 role           accepted                               in the kernel               texture
@@ -18,7 +18,7 @@ flag           bool                                   int                       
 choice         one of the names listed                int, the name's position    no
 orders         numbers of orders -n to n              real[17], of -8 to 8        no
 layers         Layers, from the outside in            Layers                      their profile
-host           whatever the lowering needs            -                           -
+host           what the lowering needs, see HostForm  -                           -
 =============  =====================================  ==========================  ===============
 """
 
@@ -31,7 +31,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -43,13 +43,24 @@ DEVICE_ROLES = (
     "reflectance", "emission", "index", "factor", "reradiation", "real", "flag", "choice", "orders",
     "layers",
 )  # fmt: skip
+# What a host parameter holds. clpt/formats/native/forms.py reads, writes and describes each form.
+HostForm = Literal[
+    "boolean", "integer", "number", "text", "names", "numbers",
+    "vector", "direction", "matrix3", "matrix4",
+    "material", "texture", "filter", "area_light", "group",
+    "rows2", "rows3", "rows4", "triangles", "attributes", "number_or_list", "lengths",
+    "image", "cube_images", "crop", "sensor", "white_balance",
+]  # fmt: skip
 ORDERS = 8  # highest order of diffraction, see kernels/optics/diffraction.cl
 LAMBDAS = np.arange(200.0, 1201.0)  # [nm] at which a spectrum's limits are checked
 
 
 @dataclass(frozen=True)
 class Param:
-    """One parameter: role (see the table above), documentation, unit and limits."""
+    """One parameter: role (see the table above), documentation, unit, limits, form in files.
+
+    form: of a host parameter, "" where a scene file cannot hold it.
+    """
 
     role: str
     doc: str
@@ -59,6 +70,7 @@ class Param:
     choices: tuple[str, ...] = ()
     optional: bool = False
     textured: bool = False
+    form: str = ""
     lobe: bool = False  # 0 leaves a lobe out: kernels are made without it where all have 0
 
 
@@ -79,19 +91,19 @@ def emission(default: Any, doc: str, unit: str, *, textured: bool = False) -> An
 
 
 def index(default: Any, doc: str, *, textured: bool = False) -> Any:
-    """Declare a refractive index or extinction coefficient, perhaps by name, perhaps dispersive."""
+    """Declare a refractive index or extinction coefficient; may be a name or dispersive."""
     return _field(default, Param("index", doc, low=0.0, textured=textured))
 
 
 def factor(default: Any, doc: str) -> Any:
-    """Declare a spectrum without limits that others are multiplied by; may be a texture."""
+    """Declare a factor: a spectrum without limits; may be a texture."""
     return _field(default, Param("factor", doc, textured=True))
 
 
 def coefficient(default: Any, doc: str, unit: str = "1/m") -> Any:
-    """Declare a property of the inside of a body; no member of its kind's struct.
+    """Declare a property of the inside of a body; it is no member of its kind's struct.
 
-    Light meets it between surfaces: kernels/optics/medium.cl reads it from behind the kind's row.
+    It acts between surfaces: kernels/optics/medium.cl reads it after the kind's row.
     """
     return _field(default, Param("coefficient", doc, unit, low=0.0))
 
@@ -116,12 +128,12 @@ def real(
 
 
 def flag(default: bool, doc: str) -> Any:
-    """Declare a yes or no."""
+    """Declare true or false."""
     return _field(default, Param("flag", doc))
 
 
 def choice(default: str | None, doc: str, choices: Sequence[str]) -> Any:
-    """Declare one of several names, or none of them if that is the default."""
+    """Declare one of several names; with the default None, also None."""
     optional = default is None
     return _field(default, Param("choice", doc, choices=tuple(choices), optional=optional))
 
@@ -136,9 +148,24 @@ def layers(doc: str) -> Any:
     return _field((), Param("layers", doc))
 
 
-def host(default: Any, doc: str, unit: str = "") -> Any:
-    """Declare what only the host needs: geometry, matrices, nested kinds."""
-    return _field(default, Param("host", doc, unit))
+def host(default: Any, doc: str, unit: str = "", *, form: HostForm | None = None) -> Any:
+    """Declare what only the host needs: geometry, matrices, nested kinds.
+
+    form: what it holds; None for what the type of the default implies.
+    """
+    return _field(default, Param("host", doc, unit, form=form or _form_of(default)))
+
+
+def _form_of(default: Any) -> str:
+    """Return the HostForm that a default's type implies, "" where it implies none."""
+    if isinstance(default, np.ndarray) and default.shape in ((3, 3), (4, 4)):
+        return f"matrix{len(default)}"
+    if isinstance(default, tuple) and default:
+        if isinstance(default[0], str):
+            return "names"
+        return "vector" if len(default) == 3 else "numbers"
+    forms: dict[type, str] = {bool: "boolean", int: "integer", float: "number", str: "text"}
+    return forms.get(type(default), "")
 
 
 class classproperty:
@@ -153,11 +180,11 @@ class classproperty:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Kind:
-    """Base of all that can be added: its name in files and kernels follows from the class."""
+    """Base of all kinds; the class name gives the name in files and kernels."""
 
-    needs_wavelengths: ClassVar[bool] = False  # its struct in the kernels has them as `lambdas`
+    needs_wavelengths: ClassVar[bool] = False  # its struct in the kernels has `lambdas`
     tints: ClassVar[tuple[str, ...]] = ()  # where one is above 0, its struct has the `luminance`
-    # of `base_color`; its kernel file includes core/luminance.cl
+    # of `base_color`, and its kernel file includes core/luminance.cl
 
     @classproperty
     def kind(cls) -> str:
@@ -179,7 +206,7 @@ def _snake(name: str) -> str:
     return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
 
 
-@cache  # every object of a scene asks, and there are thousands
+@cache  # thousands of objects ask
 def _declared(cls: Any) -> Mapping[str, Param]:
     fields = dataclasses.fields(cls)
     return MappingProxyType({f.name: f.metadata["param"] for f in fields if "param" in f.metadata})
@@ -195,13 +222,22 @@ def params(cls: type) -> Mapping[str, Param]:
     return _declared(cls)
 
 
+def defaults(cls: type) -> dict[str, Any]:
+    """Return the defaults of a kind's declared parameters, by name."""
+    fields = {f.name: f for f in dataclasses.fields(cls) if "param" in f.metadata}
+    return {
+        name: f.default if f.default_factory is dataclasses.MISSING else f.default_factory()
+        for name, f in fields.items()
+    }
+
+
 def device_params(cls: type) -> Mapping[str, Param]:
-    """Return those parameters that the kernels see."""
+    """Return the parameters that the kernels read."""
     return _declared_of(cls, *DEVICE_ROLES)
 
 
 def interior_params(cls: type) -> Mapping[str, Param]:
-    """Return the parameters of what is inside of a body; they follow the others in its row."""
+    """Return the parameters of the inside of a body; they follow the others in its row."""
     return _declared_of(cls, "coefficient")
 
 

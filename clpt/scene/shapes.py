@@ -19,8 +19,8 @@ BASES = ("linear", "bspline", "bezier")
 class Shape(Kind):
     """Base of all shapes; placed by `to_world`."""
 
-    material: Any = host(Diffuse(), "of the surface")
-    emission: Any = host(None, "an `area` light, or None")
+    material: Any = host(Diffuse(), "of the surface", form="material")
+    emission: Any = host(None, "an `area` light, or None", form="area_light")
     to_world: Any = host(np.eye(4), "placement, (4, 4)")
     flip_normals: bool = host(False, "turn the front to the other side")
     name: str = host("", "for messages")
@@ -30,12 +30,18 @@ class Shape(Kind):
 class Mesh(Shape):
     """Triangles, counter-clockwise seen from the front."""
 
-    vertices: Any = host(None, "(n, 3) float32", "m")
-    faces: Any = host(None, "(m, 3) uint32")
-    normals: Any = host(None, "(n, 3) float32 per vertex; None: flat; 'smooth': from the triangles")
-    uvs: Any = host(None, "(n, 2) float32 per vertex, or None")
+    vertices: Any = host(None, "(n, 3) float32", "m", form="rows3")
+    faces: Any = host(None, "(m, 3) uint32", form="triangles")
+    normals: Any = host(
+        None,
+        "(n, 3) float32 per vertex; None: flat; 'smooth': from the triangles",
+        form="rows3",
+    )
+    uvs: Any = host(None, "(n, 2) float32 per vertex, or None", form="rows2")
     attributes: Any = host(
-        {}, "name -> (n, 1 or 3) float32; one row a vertex or a face, as vertex_ or face_ begins it"
+        {},
+        "name -> (n, 1 or 3) float32; one row a vertex or a face, as vertex_ or face_ begins it",
+        form="attributes",
     )
 
 
@@ -54,9 +60,15 @@ class Spheres(Shape):
     A `mesh_attribute` texture reads the attributes: the first row is the first sphere's.
     """
 
-    centers: Any = host(None, "(n, 3) float32 before `to_world`; (n, 4): with the radii", "m")
-    radii: Any = host(1.0, "(n,), or one of all; `to_world` may scale them, evenly", "m")
-    attributes: Any = host({}, "name that begins with vertex_ -> (n, 1 or 3) float32, per sphere")
+    centers: Any = host(
+        None, "(n, 3) float32 before `to_world`; (n, 4): with the radii", "m", form="rows3"
+    )
+    radii: Any = host(
+        1.0, "(n,), or one of all; `to_world` may scale them, evenly", "m", form="number_or_list"
+    )
+    attributes: Any = host(
+        {}, "name that begins with vertex_ -> (n, 1 or 3) float32, per sphere", form="attributes"
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -91,8 +103,10 @@ class Curves(Shape):
     uniform and cubic; a Bezier strand has 4, 7, 10, ... points. `to_world` scales radii too.
     """
 
-    points: Any = host(None, "(n, 4) of all strands: x y z and the radius", "m")
-    lengths: Any = host((), "points of each strand, in their order; empty: all are of one")
+    points: Any = host(None, "(n, 4) of all strands: x y z and the radius", "m", form="rows4")
+    lengths: Any = host(
+        (), "points of each strand, in their order; empty: all are of one", form="lengths"
+    )
     basis: str = choice("bspline", "what the points mean", BASES)
 
 
@@ -121,7 +135,7 @@ class Group:
 class Instance(Shape):
     """A group at a place; many share its triangles. In a mirror a front stays a front."""
 
-    group: Any = host(None, "what is placed: a name in the scene's `groups`")
+    group: Any = host(None, "what is placed: a name in the scene's `groups`", form="group")
     # The surfaces are those of the group's shapes.
     material: Any = field(default=None, init=False, repr=False)
     emission: Any = field(default=None, init=False, repr=False)

@@ -63,6 +63,7 @@ class Bitmap(Placed):
         None,
         "path of an image, or an array (h, w) or (h, w, 1|3|4), float32, or uint8 as 8-bit files "
         "have; an .exr may hold spectra, as clpt.SpectralImage does",
+        form="image",
     )
     raw: bool = host(False, "True: values as they are, without the sRGB decoding of 8-bit files")
     filter: str = choice("bilinear", "between texels", ("bilinear", "nearest"))

@@ -69,8 +69,8 @@ def lobes_are_told_truly(
     r = probe(params, wo, wi, rng.random((len(wo), 3)))
     made = r["sampled_pdf"] > 0.0
     crossed = (wo[:, 2] * r["wi"][:, 2] < 0.0)[made]
-    told = (r["lobe"][made] & TRANSMIT) != 0
-    _hold(np.array_equal(crossed, told), f"LOBE_TRANSMIT is not where wi crosses, {params}")
+    flagged = (r["lobe"][made] & TRANSMIT) != 0
+    _hold(np.array_equal(crossed, flagged), f"LOBE_TRANSMIT is not where wi crosses, {params}")
     _hold(np.all(r["eta"][made][~crossed] == 1.0), f"eta of a reflection is not 1, {params}")
     delta = made & (r["lobe"] & DELTA != 0)
     _hold(np.all(r["sampled_pdf"][delta] <= 1.0), f"a delta lobe's pdf is above 1, {params}")
@@ -84,7 +84,7 @@ def lobes_are_told_truly(
 
 
 def flags_are_told_truly(probe: Probe, params: Params, rng: Random) -> None:
-    """The class tells the kernels what it does: `uses_lobe_sample`, `delta`, `disperses`, `transmits`."""
+    """The class tells the kernels what it does: by its flags and `transmits`."""
     cls = probe.cls
     wo, u = directions(rng, 1000), rng.random((1000, 3))
     r = probe(params, wo, wo, u)
@@ -95,7 +95,7 @@ def flags_are_told_truly(probe: Probe, params: Params, rng: Random) -> None:
         _hold(same, f"sample uses u.z: set uses_lobe_sample = True, {params}")
     if cls.delta:
         _hold(np.all(r["lobe"][made] & DELTA), f"a lobe is not delta, but delta is True, {params}")
-    if cls.source is not None and not cls.disperses:
+    if not (cls.disperses or cls.refracts):
         alone = r["lobe"][made] & DISPERSE
         _hold(not np.any(alone), f"LOBE_DISPERSE is returned: set disperses = True, {params}")
     if cls.transmits is Material.transmits:

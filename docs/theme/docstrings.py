@@ -1,7 +1,7 @@
 """Docstrings as the site shows them: an extension of griffe, which reads the sources.
 
-Ours are sentences. Names of parameters that begin a paragraph or follow a semicolon become code,
-errors become links, and a kind gets the table of its parameters, from their declarations.
+Names of parameters that begin a paragraph or follow a semicolon become code, errors become links,
+and a kind gets a table of its parameters, made from their declarations.
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ ROLES = {
 
 
 class Sentences(griffe.Extension):
-    """Marks up docstrings while the sources are read."""
+    """Adds markup to docstrings while griffe reads the sources."""
 
     def on_function(self, *, func: griffe.Function, **_: Any) -> None:
-        """Names of its parameters, in its docstring."""
+        """Mark the names of parameters in a docstring."""
         _mark(func, {parameter.name for parameter in func.parameters})
 
     def on_class_members(self, *, cls: griffe.Class, **_: Any) -> None:
-        """Names of fields and of what the constructor takes; a kind's parameters as a table."""
+        """Mark the names of fields and constructor parameters; tabulate a kind's parameters."""
         names = {name for name, member in cls.members.items() if member.is_attribute}
         if (init := cls.members.get("__init__")) is not None and init.is_function:
             names |= {parameter.name for parameter in init.parameters}
@@ -74,7 +74,7 @@ def _mark(thing: griffe.Object, names: set[str]) -> None:
 
 
 def _tabulate(cls: griffe.Class, kind: type[Kind]) -> None:
-    """Add the table of parameters, and let the signature show defaults, not declarations."""
+    """Add the table of parameters; the signature shows defaults in place of declarations."""
     declared = params(kind)
     rows = ["| parameter | accepts | default | meaning |", "| --- | --- | --- | --- |"]
     for field in dataclasses.fields(kind):

@@ -1,8 +1,7 @@
 """Pages of the site that do not lie in docs/: a hook of MkDocs.
 
-What stands elsewhere in the repository (README, CONTRIBUTING, ...) becomes a page with its links
-led to the site's; the API reference is a page for each public module; the command line tells of
-itself.
+Files elsewhere in the repository (README, CONTRIBUTING, ...) become pages, their links point to the
+site's; the API reference has a page for each public module; the command line's page is its help.
 """
 
 from __future__ import annotations
@@ -65,28 +64,28 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Lead links to where their targets are on the site; those to source files become text."""
+    """Let links point to pages of the site; those to source files become text."""
     own = page.file.src_uri
     origin = next((source for source, name in ELSEWHERE.items() if name == own), f"docs/{own}")
 
-    def led(match: re.Match[str]) -> str:
+    def relinked(match: re.Match[str]) -> str:
         picture, text, target, anchor = match.groups("")
         if not target:
             return match[0]
         path = posixpath.normpath(posixpath.join(posixpath.dirname(origin), target))
-        there = ELSEWHERE.get(path, path.removeprefix("docs/"))
-        if files.get_file_from_path(there) is None:
+        page_path = ELSEWHERE.get(path, path.removeprefix("docs/"))
+        if files.get_file_from_path(page_path) is None:
             if not (ROOT / path).exists():
                 return match[0]  # a dead link: MkDocs complains
             return f"`{text}`" if "." in text and "`" not in text else text
-        relative = posixpath.relpath(there, posixpath.dirname(own) or ".")
+        relative = posixpath.relpath(page_path, posixpath.dirname(own) or ".")
         return f"{picture}[{text}]({relative}{anchor})"
 
-    return LINK.sub(led, markdown)
+    return LINK.sub(relinked, markdown)
 
 
 def names_of_clpt() -> str:
-    """Everything in `clpt.__all__`, by the module it is from: the renderer first, errors last."""
+    """Return a page of `clpt.__all__`, by module: the renderer first, errors last."""
     groups: dict[str, list[str]] = {}
     for name in clpt.__all__:
         if not name.startswith("_"):
@@ -94,8 +93,8 @@ def names_of_clpt() -> str:
     last = {"clpt.render.renderer": -1, errors.__name__: 1}
     parts = ["# `clpt`"]
     for module in sorted(groups, key=lambda module: (last.get(module, 0), module)):
-        told = (importlib.import_module(module).__doc__ or "").split("\n\n")[0]
-        parts.append(f"## {re.split('[:;]', told.rstrip('.'))[0]}")
+        summary = (importlib.import_module(module).__doc__ or "").split("\n\n")[0]
+        parts.append(f"## {re.split('[:;]', summary.rstrip('.'))[0]}")
         for name in groups[module]:
             own = f"{module}.{getattr(clpt, name).__name__}"
             options = {
@@ -111,15 +110,15 @@ def names_of_clpt() -> str:
 
 
 def _home(name: str) -> str:
-    """The module that a public name is from: a package, where that says so."""
+    """Return the module of a public name: its package, where that exports it."""
     module = getattr(clpt, name).__module__
     package = module.rpartition(".")[0]
-    told = package != "clpt" and name in getattr(sys.modules[package], "__all__", ())
-    return package if told else module
+    exported = package != "clpt" and name in getattr(sys.modules[package], "__all__", ())
+    return package if exported else module
 
 
 def command_line() -> str:
-    """What `clpt --help` says, of every command."""
+    """Return a page with the help of every command."""
     context = click.Context(cli, info_name="clpt", terminal_width=90, max_content_width=90)
     parts = ["# Command line", _help(cli, context)]
     for name in cli.list_commands(context):

@@ -1,6 +1,6 @@
 /* Smooth boundary of two dielectrics, both sides: mirror reflection and refraction by Snell's law,
  * chosen by the mean of the boundary's reflectance at the path's wavelengths. Radiance that is
- * refracted is scaled by 1 / eta^2. Thin films on the boundary bend nothing: their faces are parallel. */
+ * refracted is scaled by 1 / eta^2. Thin films on the boundary change no direction: their faces are parallel. */
 #include "optics/fresnel.cl"
 
 BsdfSample dielectric_sample(Dielectric m, vec3 wo, vec3 u)
@@ -10,10 +10,10 @@ BsdfSample dielectric_sample(Dielectric m, vec3 wo, vec3 u)
     Fresnel hero = fresnel_dielectric(wo.z, eta.x);
     Boundary b = dielectric_boundary(m.layers, wo.z, eta, m.ext_ior);
     mask reflected = u.z < b.p;
-    real bend = -1.0f / hero.eta;
-    vec3 refracted = v3(wo.x * bend, wo.y * bend, hero.cos_t);
+    real scale = -1.0f / hero.eta;
+    vec3 refracted = v3(wo.x * scale, wo.y * scale, hero.cos_t);
     Spectrum r = spectrum_mul(m.specular_reflectance, b.r);
-    Spectrum t = spectrum_scale(spectrum_mul(m.specular_transmittance, b.t), bend * bend);
+    Spectrum t = spectrum_scale(spectrum_mul(m.specular_transmittance, b.t), scale * scale);
     s.wi = sel3(reflected, reflect_z(wo), normalize3(refracted));
     real chosen = sel(reflected, b.p, 1.0f - b.p);
     s.weight = spectrum_scale(spectrum_sel(reflected, r, t), 1.0f / chosen);

@@ -2,7 +2,7 @@
  * _diffuse_transmission, _ior, _iridescence, _sheen, _specular, _transmission, _volume): from the outside
  * in a clear coat, sheen, and microfacets over a base that scatters light back, scatters it through or
  * lets it through, all mixed with a metal. A layer dims what lies under it by its directional albedo.
- * f [1/sr]. Front side; both sides where light goes through; thin: both sides are alike, light is not bent. */
+ * f [1/sr]. Front side; both sides where light goes through; thin: both sides are alike, light is not refracted. */
 #include "optics/gltf_layers.cl"
 
 /* Both directions as the lobes see them: along and across the anisotropy, thin ones' back turned up. */
@@ -48,31 +48,31 @@ inline GltfParts gltf_parts(GltfSurface m)
     p.facets = microfacets_of((integer)(0), along, alpha);
     p.roughness = sqrt(sqrt(along * alpha));
     p.eta = relative_index(m.ior, spectrum_of(1.0f));
-#define C(c)                                                                                  \
+#define C(c)                                                                                                       \
     p.base_f0.c = min_r(sqr((p.eta.c - 1.0f) / (p.eta.c + 1.0f)) * m.specular_color.c, (real)(1.0f)) * m.specular; \
-    p.f0.c = p.base_f0.c + (m.base_color.c - p.base_f0.c) * m.metallic;                       \
-    p.eta.c = max_r(p.eta.c, (real)(0.01f));                                                  \
+    p.f0.c = p.base_f0.c + (m.base_color.c - p.base_f0.c) * m.metallic;                                            \
+    p.eta.c = max_r(p.eta.c, (real)(0.01f));                                                                       \
     p.eta.c = sel(fabs(p.eta.c - 1.0f) < 1e-3f, (real)(1.001f), p.eta.c);
     SPECTRUM_EACH(C)
 #undef C
     p.base_f0 = layer_cover(p.base_f0);
     p.f90 = m.specular + (1.0f - m.specular) * m.metallic;
     p.passed = dielectric * m.transmission;
-    real rest = dielectric * (1.0f - m.transmission);
-    p.through = rest * m.diffuse_transmission;
-    p.scattered = rest - p.through;
+    real scatters = dielectric * (1.0f - m.transmission);
+    p.through = scatters * m.diffuse_transmission;
+    p.scattered = scatters - p.through;
     return p;
 }
 
-/* The cosine on the thinner side of a facet that is met at signed cosine c, where light is bent; -1 where
+/* The cosine on the thinner side of a facet that is met at signed cosine c, where light is refracted; -1 where
  * all of it is reflected. */
 inline real gltf_cosine(GltfSurface m, real c, real index)
 {
     real x = fabs(c);
-    mask bends = (m.thin == 0) & (m.transmission > 0.0f);
-    if (any(bends)) {
+    mask refracts = (m.thin == 0) & (m.transmission > 0.0f);
+    if (any(refracts)) {
         real eta = sel(c < 0.0f, 1.0f / index, index), cos2 = 1.0f - (1.0f - x * x) / (eta * eta);
-        x = sel(bends & (eta < 1.0f), sel(cos2 > 0.0f, sqrt_r(cos2), (real)(-1.0f)), x);
+        x = sel(refracts & (eta < 1.0f), sel(cos2 > 0.0f, sqrt_r(cos2), (real)(-1.0f)), x);
     }
     return x;
 }
@@ -98,26 +98,28 @@ inline Spectrum gltf_facet(GltfSurface m, Spectrum f0, real f90, real c)
 
 /* What the dielectric's facets leave to a base that scatters: (1 - E(o)) (1 - E(i)) / (1 - mean E), which
  * loses nothing; with a film the lesser of both, which loses a little. E is the directional albedo. */
-inline Spectrum gltf_under(GltfSurface m, GltfParts p, real cos_o, real cos_i, mask bent)
+inline Spectrum gltf_under(GltfSurface m, GltfParts p, real cos_o, real cos_i, mask refracted)
 {
     FacetAlbedo o = facet_albedo(cos_o, p.roughness), i = facet_albedo(cos_i, p.roughness);
     FacetAlbedo mean = facet_albedo_mean(p.roughness);
     Spectrum v;
-#define C(c)                                                                                       \
-    {                                                                                              \
-        real left_o = 1.0f - p.base_f0.c * o.a - m.specular * o.b, left_i = 1.0f - p.base_f0.c * i.a - m.specular * i.b; \
-        real left = max_r(1.0f - p.base_f0.c * mean.a - m.specular * mean.b, (real)(1e-3f));       \
-        v.c = sel(bent, left_o, left_o * left_i / left);                      \
+#define C(c)                                                                                 \
+    {                                                                                        \
+        real left_o = 1.0f - p.base_f0.c * o.a - m.specular * o.b;                           \
+        real left_i = 1.0f - p.base_f0.c * i.a - m.specular * i.b;                           \
+        real left = max_r(1.0f - p.base_f0.c * mean.a - m.specular * mean.b, (real)(1e-3f)); \
+        v.c = sel(refracted, left_o, left_o * left_i / left);                                \
     }
     SPECTRUM_EACH(C)
 #undef C
     if (any(m.iridescence > 0.0f)) {
         Spectrum film_o = layer_cover(iridescence(cos_o, p.f0, m.iridescence_ior, m.iridescence_thickness, m.lambdas));
         Spectrum film_i = layer_cover(iridescence(cos_i, p.f0, m.iridescence_ior, m.iridescence_thickness, m.lambdas));
-#define C(c)                                                                                         \
-        {                                                                                            \
-            real left = min_r(1.0f - film_o.c * (o.a + o.b), sel(bent, (real)(1.0f), 1.0f - film_i.c * (i.a + i.b))); \
-            v.c += (left - v.c) * m.iridescence;                                                     \
+#define C(c)                                                                                \
+        {                                                                                   \
+            real left = min_r(1.0f - film_o.c * (o.a + o.b),                                \
+                              sel(refracted, (real)(1.0f), 1.0f - film_i.c * (i.a + i.b))); \
+            v.c += (left - v.c) * m.iridescence;                                            \
         }
         SPECTRUM_EACH(C)
 #undef C
@@ -155,7 +157,8 @@ inline GltfLobes gltf_lobes(GltfSurface m, GltfParts p, vec3 wo)
     real rest = max_r(1.0f - l.coat - l.sheen, (real)(0.05f)), film = 0.25f * m.iridescence;
     real left = max_r(1.0f - spectrum_mean(p.base_f0) * e.a - m.specular * e.b, (real)(0.05f));
     real mirrored = spectrum_mean(p.f0) * e.a + p.f90 * e.b + film;
-    l.facets = sel(front, rest * (mirrored + left * p.passed * colour), sel(p.passed > 0.0f, (real)(1.0f), (real)(0.0f)));
+    l.facets = sel(front, rest * (mirrored + left * p.passed * colour),
+                   sel(p.passed > 0.0f, (real)(1.0f), (real)(0.0f)));
     l.scattered = sel(front, rest * left * p.scattered * colour, (real)(0.0f));
     l.through = rest * left * p.through * spectrum_mean(m.diffuse_transmission_color);
     real total = l.coat + l.sheen + l.facets + l.scattered + l.through;
@@ -220,10 +223,10 @@ inline Spectrum gltf_value(GltfSurface m, GltfParts p, vec3 wo, vec3 wi)
         }
         v = spectrum_sel(crossed, spectrum_mul(t, m.base_color), v);
     }
-    mask bent = crossed & (m.thin == 0);
+    mask refracted = crossed & (m.thin == 0);
     if (any((p.scattered > 0.0f) | (p.through > 0.0f))) {
         real entered = sel(front, cos_o, cos_i); /* the cosine on the outside, for a body */
-        Spectrum under = gltf_under(m, p, sel(bent, entered, cos_o), sel(bent, entered, cos_i), bent);
+        Spectrum under = gltf_under(m, p, sel(refracted, entered, cos_o), sel(refracted, entered, cos_i), refracted);
         real back = sel(front & reflected, p.scattered * cos_i * INV_PI, (real)(0.0f));
         v = spectrum_add(v, spectrum_scale(spectrum_mul(under, m.base_color), back));
         if (any(p.through > 0.0f)) {
@@ -255,7 +258,8 @@ inline real gltf_density(GltfSurface m, GltfParts p, GltfLobes l, vec3 wo, vec3 
 {
     mask reflected = wo.z * wi.z > 0.0f, crossed = wo.z * wi.z < 0.0f;
     RefractingFacet h = refracting_facet(wo, wi, (real)(1.0f));
-    real facets = microfacet_visible_pdf(p.facets, wo, h.h) * gltf_reflects(m, p, gltf_cosine(m, h.o, index)) * l.facets;
+    real facets = microfacet_visible_pdf(p.facets, wo, h.h) * gltf_reflects(m, p, gltf_cosine(m, h.o, index)) *
+                  l.facets;
     if (any(l.coat > 0.0f)) facets += microfacet_visible_pdf(gltf_coat_facets(m), wo, h.h) * l.coat;
     real pdf = sel(h.shading, facets * h.jacobian, (real)(0.0f));
     pdf += sel(wo.z > 0.0f, l.sheen * INV_2PI + l.scattered * cosine_hemisphere_pdf(wi.z), (real)(0.0f));
@@ -314,14 +318,15 @@ BsdfSample gltf_surface_sample(GltfSurface m, vec3 wo, vec3 u)
     }
     vec3 h = microfacet_visible(d, scale3(w.wo, sel(up, (real)(1.0f), (real)(-1.0f))), uv);
     real o = dot3(w.wo, h), thin_z = sel(m.thin != 0, (real)(-1.0f), (real)(1.0f));
-    real split = gltf_reflects(m, p, gltf_cosine(m, o, p.eta.x)), v = (u.z - before) / max_r(1.0f - before, (real)(1e-6f));
+    real split = gltf_reflects(m, p, gltf_cosine(m, o, p.eta.x));
+    real v = (u.z - before) / max_r(1.0f - before, (real)(1e-6f));
     mask passes = facets & (v >= split);
     w.wi = reflect_at(w.wo, h);
     Fresnel f = fresnel_dielectric(o, p.eta.x);
     if (any(passes)) {
-        vec3 bent = normalize3(sub3(scale3(h, o / f.eta + f.cos_t), scale3(w.wo, 1.0f / f.eta)));
+        vec3 refracted = normalize3(sub3(scale3(h, o / f.eta + f.cos_t), scale3(w.wo, 1.0f / f.eta)));
         vec3 straight = v3(w.wi.x, w.wi.y, -w.wi.z);
-        w.wi = sel3(passes, sel3(m.thin != 0, straight, bent), w.wi);
+        w.wi = sel3(passes, sel3(m.thin != 0, straight, refracted), w.wi);
     }
     vec3 even = cosine_hemisphere(uv);
     even.z *= sel(through & up, (real)(-1.0f), (real)(1.0f));

@@ -40,21 +40,23 @@ inline HairFibre hair_fibre(Hair m, vec3 wo)
     real sin_gamma = h / eta_across, cos_gamma = sqrt_r(1.0f - sin_gamma * sin_gamma);
     r.gamma_t = atan2_r(sin_gamma, cos_gamma);
     real cos_theta = sqrt_r(1.0f - sqr(r.sin_o / eta));
-    real f = fresnel_dielectric(across * sqrt_r(1.0f - h * h), eta).f, length = 2.0f * cos_gamma / cos_theta, total = 0.0f;
-#define C(c)                                                                \
-    {                                                                       \
-        real t = exp_r(-max_r(m.sigma_a.c, (real)(0.0f)) * length);         \
-        r.a[0].c = f;                                                       \
-        r.a[1].c = sqr(1.0f - f) * t;                                       \
-        r.a[2].c = r.a[1].c * t * f;                                        \
-        r.a[3].c = r.a[2].c * t * f / max_r(1.0f - t * f, (real)(1e-6f));   \
+    real f = fresnel_dielectric(across * sqrt_r(1.0f - h * h), eta).f, length = 2.0f * cos_gamma / cos_theta;
+    real total = 0.0f;
+#define C(c)                                                              \
+    {                                                                     \
+        real t = exp_r(-max_r(m.sigma_a.c, (real)(0.0f)) * length);       \
+        r.a[0].c = f;                                                     \
+        r.a[1].c = sqr(1.0f - f) * t;                                     \
+        r.a[2].c = r.a[1].c * t * f;                                      \
+        r.a[3].c = r.a[2].c * t * f / max_r(1.0f - t * f, (real)(1e-6f)); \
     }
     SPECTRUM_EACH(C)
 #undef C
     for (int p = 0; p < HAIR_LOBES; p++) total += r.p[p] = spectrum_mean(r.a[p]);
     for (int p = 0; p < HAIR_LOBES; p++) r.p[p] /= total;
 
-    real bm = max_r(m.longitudinal_roughness, (real)(HAIR_NARROWEST)), bn = max_r(m.azimuthal_roughness, (real)(HAIR_NARROWEST));
+    real bm = max_r(m.longitudinal_roughness, (real)(HAIR_NARROWEST));
+    real bn = max_r(m.azimuthal_roughness, (real)(HAIR_NARROWEST));
     r.v = sqr(0.726f * bm + 0.812f * bm * bm + 3.7f * hair_power20(bm));
     r.s = 0.626657069f * (0.265f * bn + 1.194f * bn * bn + 5.372f * bn * bn * hair_power20(bn)); /* sqrt(pi / 8) */
     real turn = m.scale_tilt * (1.0f / 360.0f);
@@ -165,7 +167,8 @@ BsdfSample hair_sample(Hair m, vec3 wo, vec3 u)
 
     /* Azimuthal: the logistic distribution's inverse between -pi and pi. */
     real last = 1.0f / (1.0f + exp_r(PI / r.s)), x = last + again * (1.0f - 2.0f * last);
-    real off = clamp_r(-r.s * log_r(max_r(1.0f / max_r(x, (real)(1e-30f)) - 1.0f, (real)(1e-30f))), (real)(-PI), (real)(PI));
+    real off = clamp_r(-r.s * log_r(max_r(1.0f / max_r(x, (real)(1e-30f)) - 1.0f, (real)(1e-30f))), (real)(-PI),
+                       (real)(PI));
     real phi = r.phi_o + sel(chosen < 3.0f, ideal + off, 2.0f * PI * again), sin_a, cos_a;
     phi *= INV_2PI;
     sincos_2pi(phi - floor(phi), &sin_a, &cos_a);

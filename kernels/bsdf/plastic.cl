@@ -17,9 +17,9 @@ inline Spectrum plastic_base(Plastic m, Spectrum eta, Spectrum f_wo)
 {
     Spectrum r;
     mask nonlinear = m.nonlinear != 0;
-#define C(c)                                                                               \
-    real CAT(inside_, c) = fresnel_diffuse(1.0f / eta.c);                                  \
-    CAT(inside_, c) *= sel(nonlinear, m.diffuse_reflectance.c, (real)(1.0f));              \
+#define C(c)                                                                  \
+    real CAT(inside_, c) = fresnel_diffuse(1.0f / eta.c);                     \
+    CAT(inside_, c) *= sel(nonlinear, m.diffuse_reflectance.c, (real)(1.0f)); \
     r.c = m.diffuse_reflectance.c * (1.0f - f_wo.c) / (eta.c * eta.c * (1.0f - CAT(inside_, c)));
     SPECTRUM_EACH(C)
 #undef C

@@ -9,7 +9,7 @@
 inline Spectrum principled_index(Principled m)
 {
     Spectrum eta = relative_index(m.eta, spectrum_of(1.0f));
-#define C(c)                              \
+#define C(c)                             \
     eta.c = max_r(eta.c, (real)(0.01f)); \
     eta.c = sel((m.spec_trans > 0.0f) & (fabs(eta.c - 1.0f) < 1e-3f), (real)(1.001f), eta.c);
     SPECTRUM_EACH(C)

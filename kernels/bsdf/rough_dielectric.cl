@@ -34,8 +34,8 @@ inline RoughDielectricPair rough_dielectric_pair(RoughDielectric m, vec3 wo, vec
     p.h = scale3(h, sel(h.z < 0.0f, (real)(-1.0f), (real)(1.0f)));
     real o = dot3(wo, p.h), i = dot3(wi, p.h);
     p.b = facet_boundary(m.layers, clamp_r(o, (real)(-1.0f), (real)(1.0f)), index, m.ext_ior);
-    real bent = sqr(eta) * fabs(i) / max_r(sqr(o + eta * i), (real)(1e-20f));
-    p.jacobian = sel(reflected, 0.25f / max_r(fabs(o), (real)(1e-20f)), bent);
+    real refracted = sqr(eta) * fabs(i) / max_r(sqr(o + eta * i), (real)(1e-20f));
+    p.jacobian = sel(reflected, 0.25f / max_r(fabs(o), (real)(1e-20f)), refracted);
     p.scale = 1.0f / sqr(eta);
     p.shading = (o * wo.z > 0.0f) & (i * wi.z > 0.0f);
     return p;

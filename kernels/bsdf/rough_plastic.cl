@@ -1,5 +1,5 @@
 /* A diffuse base under a rough dielectric coat, front side: microfacets on top (Walter et al. 2007
- * eq. 20), and below, as in plastic.cl, f = T(wo) T(wi) d / (pi eta^2 (1 - d' R)) [1/sr], with the rough
+ * eq. 20), and below, as in bsdf/plastic.cl, f = T(wo) T(wi) d / (pi eta^2 (1 - d' R)) [1/sr], with the rough
  * coat's transmittance T and inner reflectance R, d' being d or, if the colour is kept linear, 1. */
 #include "optics/fresnel.cl"
 #include "optics/microfacet.cl"
@@ -29,9 +29,9 @@ inline Spectrum rough_plastic_value(RoughPlastic m, vec3 wo, vec3 wi, Spectrum t
     Spectrum coat = spectrum_scale(spectrum_mul(m.specular_reflectance, f), v);
     Spectrum t_wi = coat_transmittance_spectrum(d, fabs(wi.z), eta), r;
     mask nonlinear = m.nonlinear != 0;
-#define C(c)                                                                                           \
-    real CAT(inside_, c) = coat_inside_reflectance(d, eta.c);                                          \
-    CAT(inside_, c) *= sel(nonlinear, m.diffuse_reflectance.c, (real)(1.0f));                          \
+#define C(c)                                                                  \
+    real CAT(inside_, c) = coat_inside_reflectance(d, eta.c);                 \
+    CAT(inside_, c) *= sel(nonlinear, m.diffuse_reflectance.c, (real)(1.0f)); \
     r.c = m.diffuse_reflectance.c * t_wo.c * t_wi.c / (eta.c * eta.c * (1.0f - CAT(inside_, c)));
     SPECTRUM_EACH(C)
 #undef C

@@ -1,6 +1,5 @@
-/* Traversal of the binary tree that build.cl makes, one ray a work-item: the readable reference, and
- * the layout for GPUs. `leaves` holds the triangle records of leaves.cl.
- */
+/* Traversal of the binary tree that bvh/build.cl makes, one ray a work-item: the readable reference. `leaves` holds
+ * the triangle records of bvh/leaves.cl. */
 #include "bvh/triangle.cl"
 
 /* The corners of the box around everything. */
@@ -11,47 +10,69 @@ inline void binary_bounds(global const float *nodes, float3 *low, float3 *high)
     *high = root.s456;
 }
 
+/* Where a ray is in a tree: at a node, which it enters at `entry` (INFINITY: it does not); farther nodes wait. */
+typedef struct {
+    float8 node;
+    float entry;
+    uint waits, waiting[BVH_DEPTH];
+    float entries[BVH_DEPTH];
+} BinaryState;
+
+inline void binary_start(global const float8 *tree, const Ray *ray, float t, BinaryState *s)
+{
+    s->waits = 0;
+    s->node = tree[0];
+    s->entry = ray_enter(ray, s->node, t);
+}
+
+/* From a node down to the nearest leaf; 0 if the ray enters no child on the way. */
+inline int binary_descend(global const float8 *tree, const Ray *ray, float t, BinaryState *s)
+{
+    while (s->entry < INFINITY && !node_is_leaf(s->node)) {
+        uint left = node_link(s->node);
+        float8 other = tree[left + 1];
+        s->node = tree[left];
+        s->entry = ray_enter(ray, s->node, t);
+        float other_entry = ray_enter(ray, other, t);
+        if (fmax(s->entry, other_entry) < INFINITY) { /* both: the farther one waits */
+            s->waiting[s->waits] = left + (other_entry >= s->entry);
+            s->entries[s->waits++] = fmax(s->entry, other_entry);
+        }
+        if (other_entry < s->entry) {
+            s->node = other;
+            s->entry = other_entry;
+        }
+    }
+    return s->entry < INFINITY;
+}
+
+/* To the last node that waits and is nearer than t; 0 if none is. */
+inline int binary_next(global const float8 *tree, float t, BinaryState *s)
+{
+    do {
+        if (!s->waits) return 0;
+        s->entry = s->entries[--s->waits];
+    } while (s->entry >= t);
+    s->node = tree[s->waiting[s->waits]];
+    return 1;
+}
+
 /* The nearest hit, or with `first_only` any. */
 inline TriHit binary_trace(global const float *nodes, global const float *leaves, Ray ray, float tmax,
                            int first_only)
 {
     Shear shear = shear_make(ray.o.x, ray.o.y, ray.o.z, ray.d.x, ray.d.y, ray.d.z);
     global const float8 *tree = (global const float8 *)nodes;
-    uint waiting[BVH_DEPTH];
-    float entries[BVH_DEPTH];
-    uint n = 0;
     TriHit hit = tri_miss(tmax);
-    float8 node = tree[0];
-    float entry = ray_enter(&ray, node, hit.t);
-    for (;;) {
-        if (entry < INFINITY && !node_is_leaf(node)) {
-            uint left = node_link(node);
-            float8 other = tree[left + 1];
-            node = tree[left];
-            entry = ray_enter(&ray, node, hit.t);
-            float other_entry = ray_enter(&ray, other, hit.t);
-            if (fmax(entry, other_entry) < INFINITY) { /* both: the farther one waits */
-                waiting[n] = left + (other_entry >= entry);
-                entries[n++] = fmax(entry, other_entry);
-            }
-            if (other_entry < entry) {
-                node = other;
-                entry = other_entry;
-            }
-            continue;
-        }
-        if (entry < INFINITY) {
-            uint begin = node_link(node), end = begin + node_count(node);
-            for (uint i = begin; i < end; i++)
-                triangle_intersect(leaves + (ulong)i * 16, &shear, ray.tmin, &hit);
-            if (first_only && hit.prim != BVH_MISS) return hit;
-        }
-        do {
-            if (!n) return hit;
-            entry = entries[--n];
-        } while (entry >= hit.t);
-        node = tree[waiting[n]];
-    }
+    BinaryState s;
+    binary_start(tree, &ray, hit.t, &s);
+    do {
+        if (!binary_descend(tree, &ray, hit.t, &s)) continue;
+        uint begin = node_link(s.node), end = begin + node_count(s.node);
+        for (uint i = begin; i < end; i++) triangle_intersect(leaves + (ulong)i * 16, &shear, ray.tmin, &hit);
+        if (first_only && hit.prim != BVH_MISS) return hit;
+    } while (binary_next(tree, hit.t, &s));
+    return hit;
 }
 
 inline TriHit binary_closest(global const float *nodes, global const float *leaves, float ox, float oy,

@@ -19,7 +19,7 @@ typedef struct {
     float reach;    /* the largest coordinate of the scene */
     uint leaf_size; /* items of a leaf, at most */
     float share;    /* of a test in one item, where several are tested at once */
-    uint runs;      /* are the items runs of curve.cl? Each is a leaf then */
+    uint runs;      /* are the items runs of bvh/curve.cl? Each is a leaf then */
 } Build;
 
 inline float build_reach(float8 scene)
@@ -162,7 +162,7 @@ inline uint build_cut(const Build *b, Range r, float8 span, Extent *left, Extent
 }
 
 /* Writes the node of a range; if it is to be divided, does so and returns 1. next: where its children
- * go, or 0: by the place of the cut. */
+ * go, or 0: by the position of the cut. */
 inline int build_range(const Build *b, Range r, Extent h, uint next, Range children[2], Extent extents[2])
 {
     if (r.count <= b->leaf_size) {
@@ -184,7 +184,7 @@ inline int build_range(const Build *b, Range r, Extent h, uint next, Range child
 }
 
 kernel NO_VECTORIZE void build_root(global const Extent *restrict parts, uint n_parts, uint count,
-                             global Range *restrict ranges, global Extent *restrict extents)
+                                    global Range *restrict ranges, global Extent *restrict extents)
 {
     Extent h = extent_empty();
     for (uint i = 0; i < n_parts; i++) {
@@ -197,8 +197,8 @@ kernel NO_VECTORIZE void build_root(global const Extent *restrict parts, uint n_
 
 /* Ranges from `begin` on in the heap, a level of it. Those with no items are no ranges. */
 kernel NO_VECTORIZE void build_level(global float8 *restrict items, global float8 *restrict nodes,
-                              global Range *restrict ranges, global Extent *restrict extents,
-                              uint begin, uint leaf_size, float share, uint runs)
+                                     global Range *restrict ranges, global Extent *restrict extents,
+                                     uint begin, uint leaf_size, float share, uint runs)
 {
     uint k = begin + get_global_id(0);
     Build b = {items, nodes, build_reach(extents[0].bounds), leaf_size, share, runs};
@@ -213,9 +213,9 @@ kernel NO_VECTORIZE void build_level(global float8 *restrict items, global float
 }
 
 kernel NO_VECTORIZE void build_subtree(global float8 *restrict items, global float8 *restrict nodes,
-                                global const Range *restrict ranges,
-                                global const Extent *restrict extents, uint begin, uint leaf_size,
-                                float share, uint runs)
+                                       global const Range *restrict ranges,
+                                       global const Extent *restrict extents, uint begin, uint leaf_size,
+                                       float share, uint runs)
 {
     Build b = {items, nodes, build_reach(extents[0].bounds), leaf_size, share, runs};
     Range waiting[BVH_DEPTH];

@@ -71,9 +71,9 @@ inline void collapse_node(global float8 *nodes, global const float8 *items, glob
 
 /* Costs below the ranges that build_subtree was given, children before parents. */
 kernel NO_VECTORIZE void collapse_subtree(global float8 *restrict nodes,
-                                   global const float8 *restrict items,
-                                   global const Range *restrict ranges, uint begin,
-                                   global float8 *restrict costs, global float *restrict occlusion)
+                                          global const float8 *restrict items,
+                                          global const Range *restrict ranges, uint begin,
+                                          global float8 *restrict costs, global float *restrict occlusion)
 {
     Range r = ranges[begin + get_global_id(0)];
     uint waiting[2 * BVH_DEPTH + 2]; /* node; with BVH_LEAF set once its children wait above it */
@@ -95,9 +95,9 @@ kernel NO_VECTORIZE void collapse_subtree(global float8 *restrict nodes,
 
 /* Costs of one level of the heap of ranges; those below it are there. */
 kernel NO_VECTORIZE void collapse_level(global float8 *restrict nodes,
-                                 global const float8 *restrict items,
-                                 global const Range *restrict ranges, uint begin,
-                                 global float8 *restrict costs, global float *restrict occlusion)
+                                        global const float8 *restrict items,
+                                        global const Range *restrict ranges, uint begin,
+                                        global float8 *restrict costs, global float *restrict occlusion)
 {
     Range r = ranges[begin + get_global_id(0)];
     if (r.count) collapse_node(nodes, items, costs, occlusion, r.node);
@@ -108,9 +108,9 @@ kernel NO_VECTORIZE void collapse_level(global float8 *restrict nodes,
  * and first block. totals: nodes, blocks, levels, as a float the tree's cost for a line that meets its
  * box, and the first node of each level. */
 kernel NO_VECTORIZE void collapse_number(global const float8 *restrict nodes,
-                                  global const float8 *restrict costs, global uint *restrict roots,
-                                  global uint2 *restrict firsts, global uint *restrict leaf_roots,
-                                  global uint *restrict totals)
+                                         global const float8 *restrict costs, global uint *restrict roots,
+                                         global uint2 *restrict firsts, global uint *restrict leaf_roots,
+                                         global uint *restrict totals)
 {
     uint children[8], n_nodes = 1, n_blocks = 0, levels = 0, below = 0;
     float area = node_half_area(nodes[0]);
@@ -146,11 +146,11 @@ inline float collapse_promise(global const float8 *nodes, global const float8 *c
 /* Writes one wide node. Children stand in ascending promise, for traversals visit the last slot
  * first. Empty slots hold what no ray meets, and lead to block 0 if one does nevertheless. */
 kernel NO_VECTORIZE void collapse_nodes(global const float8 *restrict nodes,
-                                 global const float8 *restrict costs,
-                                 global const float *restrict occlusion,
-                                 global const uint *restrict roots,
-                                 global const uint2 *restrict firsts, uint count,
-                                 global float *restrict wide)
+                                        global const float8 *restrict costs,
+                                        global const float *restrict occlusion,
+                                        global const uint *restrict roots,
+                                        global const uint2 *restrict firsts, uint count,
+                                        global float *restrict wide)
 {
     uint w = get_global_id(0);
     if (w >= count) return;
@@ -189,11 +189,11 @@ kernel NO_VECTORIZE void collapse_nodes(global const float8 *restrict nodes,
 
 /* Writes one block. */
 kernel NO_VECTORIZE void collapse_blocks(global const float8 *restrict nodes,
-                                  global const float8 *restrict items,
-                                  global const uint *restrict leaf_roots, uint count,
-                                  global const float *restrict vertices,
-                                  global const uint *restrict faces,
-                                  global const uint *restrict tags, global float *restrict blocks)
+                                         global const float8 *restrict items,
+                                         global const uint *restrict leaf_roots, uint count,
+                                         global const float *restrict vertices,
+                                         global const uint *restrict faces,
+                                         global const uint *restrict tags, global float *restrict blocks)
 {
     uint b = get_global_id(0);
     if (b >= count) return;
@@ -211,9 +211,9 @@ kernel NO_VECTORIZE void collapse_blocks(global const float8 *restrict nodes,
 
 /* The items of leaves that hold one each, by their indices. */
 kernel NO_VECTORIZE void collapse_indices(global const float8 *restrict nodes,
-                                   global const float8 *restrict items,
-                                   global const uint *restrict leaf_roots, uint count,
-                                   global uint *restrict indices)
+                                          global const float8 *restrict items,
+                                          global const uint *restrict leaf_roots, uint count,
+                                          global uint *restrict indices)
 {
     uint b = get_global_id(0);
     if (b < count) indices[b] = item_index(items[node_link(nodes[leaf_roots[b]])]);

@@ -1,4 +1,4 @@
-/* What becomes of a binary tree made 8 wide, by the choices that collapse.cl left in `costs`. */
+/* What becomes of a binary tree made 8 wide, by the choices that bvh/collapse.cl left in `costs`. */
 #include "bvh/node.cl"
 
 /* Of so many trees below a node, how many the left child gets. */

@@ -25,12 +25,13 @@ typedef struct {
     uint octants;    /* the same in every byte */
 } CompactRay;
 
-/* A ray on its way: nodes that wait, of one parent each. A group's x is the first child node of the parent; of y
- * the highest byte says which of them wait, in the ray's order, and the lowest which there are, by slot. */
+/* Where a ray is in a tree: groups of nodes that wait, each of one parent. A group's x is the first child node of the
+ * parent; of y the highest byte says which of them wait, in the ray's order, and the lowest which there are, by
+ * slot. */
 typedef struct {
     uint2 group, waiting[BVH_DEPTH];
     uint waits;
-} CompactWay;
+} CompactState;
 
 inline CompactRay compact_ray(float ox, float oy, float oz, float dx, float dy, float dz, float tmin)
 {
@@ -41,10 +42,10 @@ inline CompactRay compact_ray(float ox, float oy, float oz, float dx, float dy, 
     return r;
 }
 
-inline void compact_begin(CompactWay *way)
+inline void compact_start(CompactState *state)
 {
-    way->group = (uint2)(0u, 0x80000000u);
-    way->waits = 0;
+    state->group = (uint2)(0u, 0x80000000u);
+    state->waits = 0;
 }
 
 inline float4 compact_min(float4 a, float4 b) { return a < b ? a : b; }
@@ -94,18 +95,18 @@ inline uint compact_boxes(const CompactRay *r, float t, float3 step, float3 begi
     return bits.x | bits.y | bits.z | bits.w;
 }
 
-/* Looks into the next node on the way: the items that the ray may meet there are bits 0 to 23 of items->y,
+/* Looks into the next node: the items that the ray may meet there are bits 0 to 23 of items->y,
  * counted from items->x. Returns 0 if there was no node left. */
-inline int compact_next(global const float *nodes, const CompactRay *r, float t, CompactWay *way, uint2 *items)
+inline int compact_next(global const float *nodes, const CompactRay *r, float t, CompactState *state, uint2 *items)
 {
-    uint2 group = way->group;
+    uint2 group = state->group;
     if (group.y < 1u << 24) {
-        if (!way->waits) return 0;
-        group = way->waiting[--way->waits];
+        if (!state->waits) return 0;
+        group = state->waiting[--state->waits];
     }
     uint bit = 31 - clz(group.y);
     group.y ^= 1u << bit;
-    if (group.y >= 1u << 24) way->waiting[way->waits++] = group;
+    if (group.y >= 1u << 24) state->waiting[state->waits++] = group;
     uint slot = (bit - 24) ^ r->octant;
     uint at = group.x + popcount(group.y & ((1u << slot) - 1) & 0xffu);
 
@@ -123,7 +124,7 @@ inline int compact_next(global const float *nodes, const CompactRay *r, float t,
     near = (uint3)(x ? high.x : low.x, y ? high.y : low.y, z ? high.z : low.z);
     far = (uint3)(x ? low.x : high.x, y ? low.y : high.y, z ? low.z : high.z);
     bits |= compact_boxes(r, t, step, begin, near, far, b.w);
-    way->group = (uint2)(b.x, (bits & COMPACT_NODES) | a.w >> 24);
+    state->group = (uint2)(b.x, (bits & COMPACT_NODES) | a.w >> 24);
     *items = (uint2)(b.y, bits & ~COMPACT_NODES);
     return 1;
 }
@@ -152,12 +153,12 @@ inline TriHit compact_closest(global const float *nodes, global const float *lea
     if (!ray_finite(ox, oy, oz, dx, dy, dz)) return tri_miss(tmax);
     CompactRay r = compact_ray(ox, oy, oz, dx, dy, dz, tmin);
     Shear shear = shear_make(ox, oy, oz, dx, dy, dz);
-    CompactWay way;
+    CompactState state;
     uint2 items;
     uint best = BVH_MISS;
     float t = tmax, u = 0.0f, v = 0.0f;
-    compact_begin(&way);
-    while (compact_next(nodes, &r, t, &way, &items)) {
+    compact_start(&state);
+    while (compact_next(nodes, &r, t, &state, &items)) {
         while (items.y) {
             uint item = compact_item(&items);
             float at, b1, b2;
@@ -180,10 +181,10 @@ inline int compact_occluded(global const float *nodes, global const float *leave
     if (!ray_finite(ox, oy, oz, dx, dy, dz)) return 0;
     CompactRay r = compact_ray(ox, oy, oz, dx, dy, dz, tmin);
     Shear shear = shear_make(ox, oy, oz, dx, dy, dz);
-    CompactWay way;
+    CompactState state;
     uint2 items;
-    compact_begin(&way);
-    while (compact_next(nodes, &r, tmax, &way, &items)) {
+    compact_start(&state);
+    while (compact_next(nodes, &r, tmax, &state, &items)) {
         while (items.y) {
             float at, u, v;
             uint item = compact_item(&items);

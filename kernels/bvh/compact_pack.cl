@@ -1,14 +1,14 @@
-/* From the collapse of a binary tree to the compressed nodes of compact.cl, but for their boxes and the corners
- * of triangles: those refit.cl finds, which goes on from here.
+/* From the collapse of a binary tree to the compressed nodes of bvh/compact.cl, but for their boxes and the corners
+ * of triangles: those bvh/refit.cl finds, which goes on from here.
  *
- * Siblings change places, for they stand in the order of their slots. So `places` keeps of every node its
+ * Siblings are reordered, for they stand in the order of their slots. So `places` keeps of every node its
  * number in the collapse, and the first item of those below it: a node has its own items first, then come
  * those of its children, one after the other. */
 #include "bvh/no_vectorize.cl"
 #include "bvh/collapsed.cl"
 #include "bvh/items.cl"
 
-/* Slots for the children: the pair with the farthest way along a slot's diagonal first, and so on. */
+/* Slots for the children: the pair with the largest offset along a slot's diagonal first, and so on. */
 inline void compact_slots(global const float8 *nodes, float8 parent, const uint *children, uint found,
                           uint slots[8])
 {
@@ -21,9 +21,10 @@ inline void compact_slots(global const float8 *nodes, float8 parent, const uint 
         for (uint i = 0; i < found; i++) {
             if (slots[i] < 8) continue;
             float8 box = nodes[children[i]];
-            float4 way = box.lo + box.hi - middle;
+            float4 offset = box.lo + box.hi - middle;
             for (uint s = 0; s < 8; s++) {
-                float far = (s & 1 ? way.x : -way.x) + (s & 2 ? way.y : -way.y) + (s & 4 ? way.z : -way.z);
+                float far = (s & 1 ? offset.x : -offset.x) + (s & 2 ? offset.y : -offset.y) +
+                            (s & 4 ? offset.z : -offset.z);
                 if (!(taken >> s & 1) && far > farthest) {
                     farthest = far;
                     child = i;
@@ -39,10 +40,10 @@ inline void compact_slots(global const float8 *nodes, float8 parent, const uint 
 /* Nodes from `begin` on, a level; those above it are there. leaves: records of triangles, which get their
  * tags and the caller's numbers; or where `tags` is null the numbers alone. */
 kernel NO_VECTORIZE void compact_nodes(global const float8 *restrict nodes, global const float8 *restrict items,
-                                global const float8 *restrict costs, global const uint *restrict roots,
-                                global const uint2 *restrict firsts, uint begin, uint count,
-                                global uint2 *restrict places, global uint *restrict compact,
-                                global uint *restrict leaves, global const uint *restrict tags)
+                                       global const float8 *restrict costs, global const uint *restrict roots,
+                                       global const uint2 *restrict firsts, uint begin, uint count,
+                                       global uint2 *restrict places, global uint *restrict compact,
+                                       global uint *restrict leaves, global const uint *restrict tags)
 {
     if (get_global_id(0) >= count) return;
     uint w = begin + get_global_id(0), children[8], slots[8];

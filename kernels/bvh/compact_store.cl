@@ -1,4 +1,4 @@
-/* Boxes into a node of compact.cl, in steps of a byte: never smaller than they were.
+/* Boxes into a node of bvh/compact.cl, in steps of a byte: never smaller than they were.
  *
  * Traversals have the planes as p + byte * step, with errors of 2^-23 of the node's extent, which is 256 steps at
  * most; so boxes are larger by COMPACT_MARGIN of a step. Errors that are relative to the distance from
@@ -33,7 +33,7 @@ inline uint compact_axis(global uint *node, uint axis, float8 low, float8 high, 
     return exponent;
 }
 
-#define COMPACT_ROW(b, lane)                                                                           \
+#define COMPACT_ROW(b, lane) \
     (float8)(b[0].lane, b[1].lane, b[2].lane, b[3].lane, b[4].lane, b[5].lane, b[6].lane, b[7].lane)
 
 /* boxes: low corner and negated high corner of what is in the slots, FLT_MAX where there is nothing. */

@@ -7,7 +7,7 @@
  * boxes' areas is found by dynamic programming over its items.
  *
  * A key is Morton's code above the item's index. What stands for a run, to build a tree over, is an item
- * named after its first, with the number of items in place of the area.
+ * named after its first, with the number of items instead of the area.
  */
 #include "bvh/no_vectorize.cl"
 #include "bvh/items.cl"
@@ -17,7 +17,7 @@
 #define CURVE_SHARE 0.2f /* of the area of the last eight items: what one leaf more costs above it */
 #define CURVE_FAR 1e37f /* more than any sum of areas */
 
-/* The bits of a cell's coordinate at their places in the code, byte by byte. */
+/* The bits of a cell's coordinate at their positions in the code, byte by byte. */
 inline ulong curve_spread(global const ulong *table, int cell)
 {
     return table[cell & 255] | table[256 + (cell >> 8)];
@@ -25,7 +25,7 @@ inline ulong curve_spread(global const ulong *table, int cell)
 
 /* low, scale: from a doubled centroid to its cell; tables: of two bytes of each axis. */
 kernel NO_VECTORIZE void curve_keys(global const float8 *restrict items, uint count, float4 low, float4 scale,
-                             global const ulong *restrict tables, global ulong *restrict keys)
+                                    global const ulong *restrict tables, global ulong *restrict keys)
 {
     uint i = get_global_id(0);
     if (i >= count) return;
@@ -40,7 +40,7 @@ inline uint curve_digit(ulong key, uint shift) { return key >> shift & ((1 << CU
 
 /* How often each digit stands among `run` neighbours; one work-item has so many. */
 kernel NO_VECTORIZE void curve_count(global const ulong *restrict keys, uint count, uint run, uint shift,
-                              global uint *restrict numbers)
+                                     global uint *restrict numbers)
 {
     uint begin = get_global_id(0) * run, end = min(begin + run, count);
     numbers += get_global_id(0) << CURVE_BITS;
@@ -48,7 +48,7 @@ kernel NO_VECTORIZE void curve_count(global const ulong *restrict keys, uint cou
     for (uint i = begin; i < end; i++) numbers[curve_digit(keys[i], shift)]++;
 }
 
-/* Numbers made places: of `columns` digits, each of which has its places side by side, row after row; after
+/* Numbers made positions: of `columns` digits, each of which has its positions side by side, row after row; after
  * the last, the sum of all. */
 kernel NO_VECTORIZE void curve_scan(global uint *restrict numbers, uint rows, uint columns)
 {
@@ -62,9 +62,9 @@ kernel NO_VECTORIZE void curve_scan(global uint *restrict numbers, uint rows, ui
     numbers[rows * columns] = sum;
 }
 
-/* Moves the keys that curve_count has counted to their places. */
+/* Moves the keys that curve_count has counted to their positions. */
 kernel NO_VECTORIZE void curve_move(global const ulong *restrict keys, uint count, uint run, uint shift,
-                             global uint *restrict numbers, global ulong *restrict sorted)
+                                    global uint *restrict numbers, global ulong *restrict sorted)
 {
     uint begin = get_global_id(0) * run, end = min(begin + run, count);
     numbers += get_global_id(0) << CURVE_BITS;
@@ -88,8 +88,8 @@ inline float8 curve_reach(float8 last, float next)
 /* Puts `run` items in order and finds for each how long the run is that ends with it, if one does; numbers
  * the runs that are made of them. */
 kernel NO_VECTORIZE void curve_cut(global const float8 *restrict items, global const ulong *restrict keys,
-                            uint count, uint run, uint leaf_size, global float8 *restrict sorted,
-                            global uchar *restrict lengths, global uint *restrict numbers)
+                                   uint count, uint run, uint leaf_size, global float8 *restrict sorted,
+                                   global uchar *restrict lengths, global uint *restrict numbers)
 {
     uint begin = get_global_id(0) * run, end = min(begin + run, count);
     const int8 lanes = (int8)(0, 1, 2, 3, 4, 5, 6, 7); /* lane k: what ends with a run of k + 1 items */
@@ -123,8 +123,8 @@ kernel NO_VECTORIZE void curve_cut(global const float8 *restrict items, global c
 
 /* Writes what stands for the runs; numbers: where those of each stretch begin. */
 kernel NO_VECTORIZE void curve_runs(global const float8 *restrict sorted, uint count, uint run,
-                             global const uchar *restrict lengths, global const uint *restrict numbers,
-                             global float8 *restrict runs, global Extent *restrict extents)
+                                    global const uchar *restrict lengths, global const uint *restrict numbers,
+                                    global float8 *restrict runs, global Extent *restrict extents)
 {
     uint begin = get_global_id(0) * run, end = min(begin + run, count);
     uint at = numbers[get_global_id(0) + 1];

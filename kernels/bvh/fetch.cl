@@ -1,4 +1,4 @@
-/* FETCH(address): the line of memory there is wanted soon. Nothing where a compiler has no word for it, and
+/* FETCH(address): asks for a line of memory that is wanted soon. Nothing where a compiler has no built-in for it, and
  * under Oclgrind (NOT_INLINED), which cannot interpret it. */
 #define FETCH(address)
 #if defined(__has_builtin) && !defined(NOT_INLINED)

@@ -21,7 +21,7 @@ inline int leaf_corners(global const float *vertices, global const uint *faces, 
     return 0;
 }
 
-/* Of binary.cl, 16 floats: v0, v1, v2, n = cross(v1 - v0, v2 - v0); then prim, tag, two unused. */
+/* Of bvh/binary.cl, 16 floats: v0, v1, v2, n = cross(v1 - v0, v2 - v0); then prim, tag, two unused. */
 inline void leaf_store_record(global float *record, const float4 v[3])
 {
     float4 n = cross(v[1] - v[0], v[2] - v[0]);
@@ -30,7 +30,7 @@ inline void leaf_store_record(global float *record, const float4 v[3])
     vstore4((float4)(v[2].z, n.xyz), 2, record);
 }
 
-/* Of brute.cl, 16 floats: v0, e1, e2, n = cross(e1, e2); then prim, tag, two unused. */
+/* Of bvh/brute.cl, 16 floats: v0, e1, e2, n = cross(e1, e2); then prim, tag, two unused. */
 inline void leaf_store_brute(global float *record, const float4 v[3])
 {
     float4 e1 = v[1] - v[0], e2 = v[2] - v[0], n = cross(e1, e2);
@@ -52,10 +52,10 @@ inline float8 leaf_min(float8 a, float8 b, float8 c)
     return m < c ? m : c;
 }
 
-#define LEAF_ROW(p, axis)                                                                              \
+#define LEAF_ROW(p, axis) \
     (float8)(p[0].axis, p[1].axis, p[2].axis, p[3].axis, p[4].axis, p[5].axis, p[6].axis, p[7].axis)
 
-/* A block of wide8.cl, 11 rows of float8: v0, v1, v2 (x, y, z each), prim, tag; the last two stand there.
+/* A block of bvh/wide8.cl, 11 rows of float8: v0, v1, v2 (x, y, z each), prim, tag; the last two stand there.
  * Slots beyond its triangles have prim = BVH_MISS and hold a point. Returns low corner and negated high
  * corner, FLT_MAX where there is nothing. */
 inline float8 leaf_store_block(global float *block, global const float *vertices,

@@ -5,7 +5,7 @@
  */
 #define BVH_LEAF 0x80000000u
 #define BVH_DEPTH 48
-#define COMPACT_WORDS 20 /* of a node of compact.cl */
+#define COMPACT_WORDS 20 /* of a node of bvh/compact.cl */
 
 inline uint node_link(float8 node) { return as_uint(node.s3) & ~BVH_LEAF; }
 inline int node_is_leaf(float8 node) { return as_uint(node.s3) >= BVH_LEAF; }

@@ -1,4 +1,4 @@
-/* From triangles and boxes to items, and from items to what traversals read; leaves.cl has the forms. */
+/* From triangles and boxes to items, and from items to what traversals read; bvh/leaves.cl has the forms. */
 #include "bvh/no_vectorize.cl"
 #include "bvh/items.cl"
 #include "bvh/leaves.cl"
@@ -38,9 +38,9 @@ kernel NO_VECTORIZE void items_of_boxes(global const float *restrict boxes, uint
 }
 
 kernel NO_VECTORIZE void pack_triangles(global const float8 *restrict items, uint count,
-                                 global const float *restrict vertices,
-                                 global const uint *restrict faces,
-                                 global const uint *restrict tags, global float *restrict records)
+                                        global const float *restrict vertices,
+                                        global const uint *restrict faces,
+                                        global const uint *restrict tags, global float *restrict records)
 {
     uint i = get_global_id(0);
     if (i >= count) return;
@@ -54,7 +54,7 @@ kernel NO_VECTORIZE void pack_triangles(global const float8 *restrict items, uin
 
 /* The items' indices alone, for trees over shapes that the caller keeps. */
 kernel NO_VECTORIZE void pack_indices(global const float8 *restrict items, uint count,
-                               global uint *restrict indices)
+                                      global uint *restrict indices)
 {
     uint i = get_global_id(0);
     if (i < count) indices[i] = item_index(items[i]);

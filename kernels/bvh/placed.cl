@@ -1,6 +1,6 @@
 /* One instance by its transform: what its row of the table begins with, and its box in the world.
  *
- * A ray is turned into the group by the inverse as float has it, off by some roundings times the
+ * A ray is transformed into the group by the inverse in float, off by some roundings times the
  * matrix's condition; the box is larger by as much. A transform that is singular gives a box that is
  * not finite: trees leave it out.
  */

@@ -1,4 +1,5 @@
-/* What each of an application's rays meets first, and whether it meets anything. */
+/* The nearest hit of each of an application's rays, and whether there is any, one ray a work-item: see
+ * bvh/query_rays.cl. */
 #include "bvh/query_rays.cl"
 #include "generated/layout.cl"
 #include "generated/instance_traversal.cl"
@@ -7,7 +8,7 @@
 #define TREE_ARGS global const float *nodes, global const float *leaves, \
                   global const float *instance_nodes, global const uint *instances
 #define HIT_ARGS global float *t, global int *primitive, global float *barycentrics, global int *instance
-#define QUERY_INSTANCES(hit, first_only)                                                                 \
+#define QUERY_INSTANCES(hit, first_only) \
     query_instances(nodes, leaves, instance_nodes, instances, QUERY_ONE, hit, first_only)
 
 /* The row of the instance that is met first, with `first_only` of any; BVH_MISS if there is none. */

@@ -8,7 +8,7 @@
                  global const float *t_mins, global const float *t_maxs, float t_min, float t_max
 
 /* Ray i as o[0..2], d[0..2], from, to. */
-#define QUERY_RAY(i)                                                                                     \
-    global const float *o = origins + begins.s0 + 3 * i, *d = directions + begins.s1 + 3 * i;            \
+#define QUERY_RAY(i)                                                                          \
+    global const float *o = origins + begins.s0 + 3 * i, *d = directions + begins.s1 + 3 * i; \
     float from = t_mins ? t_mins[begins.s2 + i] : t_min, to = t_maxs ? t_maxs[begins.s3 + i] : t_max;
 #define QUERY_ONE o[0], o[1], o[2], d[0], d[1], d[2], from, to

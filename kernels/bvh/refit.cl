@@ -98,15 +98,15 @@ inline Refit refit_tree(global float *leaves, uint leaves_begin, global const fl
     return tree;
 }
 
-#define REFIT_ARGS                                                                                     \
-    global float *leaves, uint leaves_begin, global const float *restrict vertices,                    \
-        global const uint *restrict faces, uint faces_begin, global const uint *restrict indices,      \
+#define REFIT_ARGS                                                                                \
+    global float *leaves, uint leaves_begin, global const float *restrict vertices,               \
+        global const uint *restrict faces, uint faces_begin, global const uint *restrict indices, \
         global const float *restrict boxes, float reach
 #define REFIT refit_tree(leaves, leaves_begin, vertices, faces, faces_begin, indices, boxes, reach)
 
 /* Below the ranges that build_subtree was given, children before parents. */
 kernel NO_VECTORIZE void refit_subtree(global float8 *nodes, uint nodes_begin, global const Range *restrict ranges,
-                                uint begin, REFIT_ARGS)
+                                       uint begin, REFIT_ARGS)
 {
     Refit tree = REFIT;
     Range r = ranges[begin + get_global_id(0)];
@@ -130,7 +130,7 @@ kernel NO_VECTORIZE void refit_subtree(global float8 *nodes, uint nodes_begin, g
 
 /* One level of the heap of ranges; those below it are done. */
 kernel NO_VECTORIZE void refit_level(global float8 *nodes, uint nodes_begin, global const Range *restrict ranges,
-                              uint begin, REFIT_ARGS)
+                                     uint begin, REFIT_ARGS)
 {
     Range r = ranges[begin + get_global_id(0)];
     if (r.count) refit_node(nodes + nodes_begin, REFIT, r.node);
@@ -178,7 +178,7 @@ inline float8 refit_item(Refit tree, uint at)
 /* Compressed nodes from `begin` on, a level; those below it are done. bounds: of every node, as they were
  * before they became steps, so that nothing grows from level to level. */
 kernel NO_VECTORIZE void refit_compact(global float8 *nodes, uint nodes_begin, global float8 *restrict bounds,
-                                uint begin, uint count, REFIT_ARGS)
+                                       uint begin, uint count, REFIT_ARGS)
 {
     if (get_global_id(0) >= count) return;
     Refit tree = REFIT;
@@ -203,9 +203,9 @@ kernel NO_VECTORIZE void refit_compact(global float8 *nodes, uint nodes_begin, g
     compact_store(node, rows);
 }
 
-/* The records of brute.cl; prim and tag stay. */
+/* The records of bvh/brute.cl; prim and tag stay. */
 kernel NO_VECTORIZE void refit_brute(global float *restrict records, global const float *restrict vertices,
-                              global const uint *restrict faces, uint count)
+                                     global const uint *restrict faces, uint count)
 {
     uint prim = get_global_id(0);
     if (prim >= count) return;

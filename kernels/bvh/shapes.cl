@@ -3,7 +3,7 @@
  * Before this file the includer defines the type ShapeTable and
  *     int shape_intersect(ShapeTable table, uint prim, const Ray *ray, float *t)
  * which returns 1 and lowers *t if the ray meets shape `prim` between ray->tmin and *t. (bvh/ray.cl
- * declares Ray.) `indices` are those of pack.cl.
+ * declares Ray.) `indices` are those of bvh/pack.cl.
  */
 #include "bvh/hit.cl"
 #include "bvh/ray.cl"

@@ -1,4 +1,4 @@
-/* One ray against one triangle record of leaves.cl: v0, v1, v2, n, prim, tag. */
+/* One ray against one triangle record of bvh/leaves.cl: v0, v1, v2, n, prim, tag. */
 #include "bvh/hit.cl"
 #include "bvh/ray.cl"
 #include "bvh/shear.cl"

@@ -1,4 +1,4 @@
-/* Traversal of the 8-wide tree that collapse.cl writes, one ray a work-item: the layout for CPUs.
+/* Traversal of the 8-wide tree that bvh/collapse.cl makes, one ray a work-item: the layout for CPUs.
  *
  * A node's eight boxes, and a block's eight triangles, are tested at once in float8.
  */
@@ -10,7 +10,7 @@
 /* What is added to offsets for rounding. The products o * r and plane * r are wrong by 2^-24 of themselves at
  * most; they differ by the distance, errors of which RAY_WIDER looks after. */
 #define WIDE8_PRODUCTS 0x1p-22f
-#define WIDE8_STACK (7 * BVH_DEPTH + 8) /* a node on the way leaves 7 children waiting */
+#define WIDE8_STACK (7 * BVH_DEPTH + 8) /* each node above leaves 7 children waiting */
 
 typedef struct {
     float tmin;
@@ -65,7 +65,7 @@ inline float8 wide8_edge(float8 px, float8 py, float8 qx, float8 qy)
 }
 
 /* The triangles of a block that the ray meets between tmin and t; at what distances, times `det`.
- * shear.cl tells why nothing slips between two of them. */
+ * bvh/shear.cl tells why nothing slips between two of them. */
 inline Mask8 wide8_triangles(global const float *block, const Wide8Ray *r, float t, float8 *distance,
                              float8 *det)
 {

@@ -1,7 +1,6 @@
-/* Rays through the 8-wide tree with several of them in flight: each goes one node or block on in turn, and
- * what it needs next is fetched while the others move. That pays where rays of all directions wait for
- * memory, in a tree larger than the caches.
- */
+/* Rays through the 8-wide tree, several of them interleaved: each takes a step to its next node or block in turn, and
+ * what it needs there is fetched while the others step. That pays where rays of all directions wait for memory, in a
+ * tree larger than the caches. */
 #include "bvh/fetch.cl"
 #include "bvh/wide8.cl"
 
@@ -15,7 +14,7 @@ typedef struct {
     } waiting;
 } Wide8RayState;
 
-/* Whether two rays look about the same way: the squared cosine is of 13 degrees. */
+/* Whether two rays have about the same direction: the squared cosine is of 13 degrees. */
 inline int wide8_alike(float3 a, float3 b)
 {
     float along = dot(a, b);
@@ -29,60 +28,60 @@ inline void wide8_fetch(global const float *nodes, global const float *leaves, u
     for (uint line = 0; line < 5; line++) FETCH(from + 16 * line);
 }
 
-/* 0 if it is no ray, and meets nothing. */
-inline int wide8_start(Wide8RayState *f, float ox, float oy, float oz, float dx, float dy, float dz, float tmin,
-                        float tmax)
+/* Begins a ray; 0 if it is not finite and meets nothing. */
+inline int wide8_start(Wide8RayState *s, float ox, float oy, float oz, float dx, float dy, float dz, float tmin,
+                       float tmax)
 {
-    f->t = tmax;
-    f->at = f->waits = 0;
-    f->best = BVH_MISS;
+    s->t = tmax;
+    s->at = s->waits = 0;
+    s->best = BVH_MISS;
     if (!ray_finite(ox, oy, oz, dx, dy, dz)) return 0;
-    f->ray = wide8_ray(ox, oy, oz, dx, dy, dz, tmin);
+    s->ray = wide8_ray(ox, oy, oz, dx, dy, dz, tmin);
     return 1;
 }
 
-/* One node or block on, of a ray that looks for the nearest hit; 0 at the end, where wide8_finish tells it. */
-inline int wide8_step(global const float *nodes, global const float *leaves, Wide8RayState *f)
+/* The next node or block of a ray that looks for the nearest hit; 0 at the end, where wide8_finish returns it. */
+inline int wide8_step(global const float *nodes, global const float *leaves, Wide8RayState *s)
 {
-    uint at = f->at;
+    uint at = s->at;
     Mask8 m = 0;
     if (at & BVH_LEAF) {
-        wide8_nearer(leaves, at & ~BVH_LEAF, &f->ray, &f->t, &f->best);
+        wide8_nearer(leaves, at & ~BVH_LEAF, &s->ray, &s->t, &s->best);
     } else {
         union { float8 v; uint at[8]; } entry;
         global const float *node = nodes + (ulong)at * 64;
-        m = wide8_boxes(node, &f->ray, f->t, &entry.v);
+        m = wide8_boxes(node, &s->ray, s->t, &entry.v);
         if (m)
-            at = wide8_nearest((global const uint *)(node + 48), entry.at, m, f->waiting.nearest, &f->waits);
+            at = wide8_nearest((global const uint *)(node + 48), entry.at, m, s->waiting.nearest, &s->waits);
     }
-    if (!m && !wide8_next(f->waiting.nearest, &f->waits, f->t, &at)) return 0;
-    f->at = at;
+    if (!m && !wide8_next(s->waiting.nearest, &s->waits, s->t, &at)) return 0;
+    s->at = at;
     wide8_fetch(nodes, leaves, at);
     return 1;
 }
 
-inline TriHit wide8_finish(global const float *leaves, const Wide8RayState *f)
+inline TriHit wide8_finish(global const float *leaves, const Wide8RayState *s)
 {
-    return f->best == BVH_MISS ? tri_miss(f->t) : wide8_hit(leaves, f->best, f->t, &f->ray);
+    return s->best == BVH_MISS ? tri_miss(s->t) : wide8_hit(leaves, s->best, s->t, &s->ray);
 }
 
-/* One node or block on, of a ray that looks for any hit; 0 at the end, where `best` is not BVH_MISS if there
- * is one. */
-inline int wide8_step_any(global const float *nodes, global const float *leaves, Wide8RayState *f)
+/* The next node or block of a ray that looks for any hit; 0 at the end, where `best` is not BVH_MISS if there is
+ * one. */
+inline int wide8_step_any(global const float *nodes, global const float *leaves, Wide8RayState *s)
 {
-    uint at = f->at;
+    uint at = s->at;
     Mask8 m = 0;
     float8 unused[2];
     if (at & BVH_LEAF) {
         uint block = at & ~BVH_LEAF;
-        if (wide8_triangles(leaves + (ulong)block * 88, &f->ray, f->t, &unused[0], &unused[1])) {
-            f->best = block;
+        if (wide8_triangles(leaves + (ulong)block * 88, &s->ray, s->t, &unused[0], &unused[1])) {
+            s->best = block;
             return 0;
         }
     } else {
-        m = wide8_boxes(nodes + (ulong)at * 64, &f->ray, f->t, &unused[0]);
+        m = wide8_boxes(nodes + (ulong)at * 64, &s->ray, s->t, &unused[0]);
     }
-    if (!wide8_last(nodes, at, m, f->waiting.last.nodes, f->waiting.last.sets, &f->waits, &f->at)) return 0;
-    wide8_fetch(nodes, leaves, f->at);
+    if (!wide8_last(nodes, at, m, s->waiting.last.nodes, s->waiting.last.sets, &s->waits, &s->at)) return 0;
+    wide8_fetch(nodes, leaves, s->at);
     return 1;
 }

@@ -1,4 +1,4 @@
-/* Rays from the near plane through the inverse of an OpenGL projection and view (clip y points up). */
+/* Rays from the near plane [m] through the inverse of an OpenGL projection and view (clip y points up). */
 CameraRay matrix_ray(global const MatrixCamera *camera, vec2 film, vec2 lens)
 {
     real x = 2.0f * film.x - 1.0f, y = 1.0f - 2.0f * film.y;

@@ -1,4 +1,4 @@
-/* Parallel rays along +z; the film spans [-1, 1] in x before `to_world`, which may scale it. */
+/* Parallel rays along +z; the film spans [-1, 1] m in x before `to_world`, which may scale it. */
 CameraRay orthographic_ray(global const OrthographicCamera *camera, vec2 film, vec2 lens)
 {
     real x = 1.0f - 2.0f * film.x, y = (1.0f - 2.0f * film.y) * camera->aspect, z = 0.0f;

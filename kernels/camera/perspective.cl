@@ -1,4 +1,5 @@
-/* A pinhole: every ray passes the camera's origin. */
+/* A pinhole: every ray's line goes through the camera's origin. extent: of the film on the plane at distance 1;
+ * offset: of its centre, in shares of it. */
 CameraRay perspective_ray(global const PerspectiveCamera *camera, vec2 film, vec2 lens)
 {
     vec3 d = normalize3(v3((0.5f - film.x - camera->offset[0]) * camera->extent[0],

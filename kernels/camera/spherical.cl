@@ -1,4 +1,4 @@
-/* All directions around a point: longitude along x with +z in the middle and +x (left) at a quarter,
+/* All directions from a point: longitude along x with +z in the middle and +x (left) at a quarter,
  * colatitude from +y down along y. What lies beyond the film's edges wraps round. */
 CameraRay spherical_ray(global const SphericalCamera *camera, vec2 film, vec2 lens)
 {

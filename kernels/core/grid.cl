@@ -67,7 +67,8 @@ inline GridPoint grid_sample(Scene scene, Grid g, vec2 u)
     real w[4];
     grid_weights(scene, g, p.row, p.column, w);
     p.at.y = linear_sample(grid_rest(scene, g.marginal, p.row, u.y), w[0] + w[1], w[2] + w[3]);
-    p.at.x = linear_sample(grid_rest(scene, first, p.column, u.x), w[0] + p.at.y * (w[2] - w[0]), w[1] + p.at.y * (w[3] - w[1]));
+    p.at.x = linear_sample(grid_rest(scene, first, p.column, u.x), w[0] + p.at.y * (w[2] - w[0]),
+                           w[1] + p.at.y * (w[3] - w[1]));
     p.pdf = grid_density(g, w, p.at);
     return p;
 }

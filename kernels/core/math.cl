@@ -29,8 +29,10 @@ inline real safe_div(real a, real b) { return a / sel(b == 0.0f, (real)(1.0f), b
 inline void sincos_2pi(real u, real *s, real *c)
 {
     real x = u - 0.5f, y = x * x; /* half angles of 2 pi (u - 1/2), turned back by the double angle */
-    real a = x * (3.14159265f + y * (-5.16771278f + y * (2.55016404f + y * (-0.59926453f + y * (0.08214589f - y * 0.00737043f)))));
-    real b = 1.0f + y * (-4.93480220f + y * (4.05871213f + y * (-1.33526277f + y * (0.23533063f + y * (-0.02580689f + y * 0.00192957f)))));
+    real a = x * (3.14159265f + y * (-5.16771278f + y * (2.55016404f +
+                  y * (-0.59926453f + y * (0.08214589f - y * 0.00737043f)))));
+    real b = 1.0f + y * (-4.93480220f + y * (4.05871213f + y * (-1.33526277f +
+                    y * (0.23533063f + y * (-0.02580689f + y * 0.00192957f)))));
     *s = -2.0f * a * b;
     *c = (a - b) * (a + b);
 }
@@ -41,8 +43,9 @@ inline real log2_r(real x)
     natural bits = as_natural(x) - 0x3f3504f3u; /* mantissa in [sqrt(1/2), sqrt(2)) */
     integer e = as_integer(bits) >> 23;
     real f = as_real((bits & 0x007fffffu) + 0x3f3504f3u) - 1.0f, y = f * f;
-    real p = f * (f * (f * (f * (f * (f * (f * (f * 7.0376836292e-2f - 1.1514610310e-1f) + 1.1676998740e-1f) - 1.2420140846e-1f)
-             + 1.4249322787e-1f) - 1.6668057665e-1f) + 2.0000714765e-1f) - 2.4999993993e-1f) + 3.3333331174e-1f;
+    real p = f * (f * (f * (f * (f * (f * (f * (f * 7.0376836292e-2f - 1.1514610310e-1f) + 1.1676998740e-1f)
+             - 1.2420140846e-1f) + 1.4249322787e-1f) - 1.6668057665e-1f) + 2.0000714765e-1f) - 2.4999993993e-1f)
+             + 3.3333331174e-1f;
     return (f - 0.5f * y + f * y * p) * 1.44269504f + to_real(e);
 }
 inline real log_r(real x) { return log2_r(x) * 0.693147181f; }
@@ -52,7 +55,8 @@ inline real exp2_r(real x)
 {
     x = clamp_r(x, (real)(-126.0f), (real)(127.0f));
     real i = floor(x + 0.5f), f = x - i;
-    real p = 1.0f + f * (0.693147182f + f * (0.240226462f + f * (0.0555041886f + f * (0.00961814f + f * (0.00133336f + f * 0.000154148f)))));
+    real p = 1.0f + f * (0.693147182f + f * (0.240226462f + f * (0.0555041886f +
+                    f * (0.00961814f + f * (0.00133336f + f * 0.000154148f)))));
     return as_real(as_integer(p) + (to_integer(i) << 23));
 }
 inline real exp_r(real x) { return exp2_r(x * 1.44269504f); }
@@ -75,7 +79,8 @@ inline real atan2_r(real y, real x)
     real t = lo / max_r(hi, (real)(1e-37f));
     mask big = t > 0.41421356f; /* beyond tan(pi/8): turn by pi/4 */
     real z = sel(big, (t - 1.0f) / (t + 1.0f), t), q = z * z;
-    real r = z + z * q * (-3.33329491539e-1f + q * (1.99777106478e-1f + q * (-1.38776856032e-1f + q * 8.05374449538e-2f)));
+    real r = z + z * q * (-3.33329491539e-1f + q * (1.99777106478e-1f +
+                        q * (-1.38776856032e-1f + q * 8.05374449538e-2f)));
     r = sel(big, r + 0.785398163f, r);
     r = sel(ay > ax, 1.57079633f - r, r);
     r = sel(x < 0.0f, PI - r, r);

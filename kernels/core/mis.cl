@@ -1,4 +1,5 @@
-/* Multiple importance sampling, power heuristic with exponent 2 (Veach 1997 eq. 9.13). */
+/* Multiple importance sampling: the weight of the first of two densities, both [1/sr], by the power heuristic with
+ * exponent 2 (Veach 1997 eq. 9.13). */
 inline real mis_weight(real pdf_a, real pdf_b)
 {
     /* in the quotient, so that large pdfs do not overflow when squared */

@@ -1,4 +1,4 @@
-/* Hashes of counters; there is no state. */
+/* Random numbers as hashes of counters: a number depends on its arguments only, there is no state. */
 
 /* PCG's output permutation (Jarzynski and Olano 2020). */
 inline natural hash_natural(natural x)

@@ -1,4 +1,4 @@
-/* A point of an open tube. */
+/* A point of an open tube as a light, evenly over its area [m]: see interface/emission.cl. */
 SurfacePoint cylinder_point(Cylinder s, vec2 u)
 {
     real sine, cosine;

@@ -1,4 +1,4 @@
-/* A point of a disk or ellipse. */
+/* A point of a disk or ellipse as a light, evenly over its area [m]: see interface/emission.cl. */
 SurfacePoint disk_point(Disk s, vec2 u)
 {
     vec2 b = disk_of(u);

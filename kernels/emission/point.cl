@@ -5,6 +5,6 @@ LightRay point_emit(Point l, Scene scene, vec2 u, vec2 v, Wavelengths lambdas)
     r.o = l.position;
     r.d = uniform_sphere(v);
     r.n = r.d;
-    r.power = spectrum_scale(emission_load(scene, l.radiance, texture_point_nowhere(), lambdas), 4.0f * PI);
+    r.power = spectrum_scale(emission_load(scene, l.intensity, texture_point_nowhere(), lambdas), 4.0f * PI);
     return r;
 }

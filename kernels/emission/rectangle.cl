@@ -1,4 +1,4 @@
-/* A point of a rectangle. */
+/* A point of a rectangle as a light, evenly over its area [m]: see interface/emission.cl. */
 SurfacePoint rectangle_point(Rectangle s, vec2 u)
 {
     vec3 quarter = cross3(s.s, s.t);

@@ -1,4 +1,4 @@
-/* A point of a sphere. */
+/* A point of a sphere as a light, evenly over its area [m]: see interface/emission.cl. */
 SurfacePoint sphere_point(Sphere s, vec2 u)
 {
     vec3 outward = uniform_sphere(u);

@@ -1,4 +1,5 @@
-/* A point of a triangle; uv are barycentrics, which the caller turns into the mesh's. */
+/* A point of a triangle as a light, evenly over its area [m]: see interface/emission.cl. uv are the barycentrics of
+ * vertices 1 and 2, which the caller makes the mesh's. */
 SurfacePoint triangle_point(Triangle s, vec2 u)
 {
     vec2 b = uniform_triangle(u);

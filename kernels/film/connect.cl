@@ -1,6 +1,7 @@
-/* The way from a point of the scene to the camera, for integrators that start at lights:
+/* The ray from the camera to a point of the scene, for integrators that start at lights:
  *
- *   CameraPoint <kind>_connect(global const <Kind>Camera *camera, global const Settings *settings, vec3 p, mask away, vec2 lens);
+ *   CameraPoint <kind>_connect(global const <Kind>Camera *camera, global const Settings *settings, vec3 p, mask away,
+ *                              vec2 lens);
  *
  * p: the point, or where `away` the unit direction to a point at infinity; lens: a point of the unit
  * square. A sample of a pixel is the mean of radiance L over the pixel's share of the film; for light
@@ -10,12 +11,13 @@
  * `film` is what the picture covers there (Pharr et al. 2023, 5.4 on We; for a point at infinity t = 1).
  */
 #include "core/warp.cl"
+#include "film/film.cl"
 
 typedef struct {
     vec3 o;         /* where the camera's ray begins, on the near plane [m] */
     vec3 d;         /* from there to the point, unit length */
     real t;         /* distance to it [m]; FAR at infinity */
-    integer pixel;  /* place of the film; -1: it is not in view */
+    integer pixel;  /* where the film stores the pixel that sees it; -1: it is not in view */
     real importance; /* see above [1/m^2] */
 } CameraPoint;
 
@@ -30,22 +32,22 @@ inline CameraPoint camera_nowhere(void)
     return c;
 }
 
-/* The place at a position of the whole film in [0, 1), x and y; -1 outside of the picture. */
-inline integer film_place(global const Settings *settings, real x, real y)
+/* Where the pixel at a position of the whole film, x and y in [0, 1), is stored; -1 outside of the picture. */
+inline integer film_index_at(global const Settings *settings, real x, real y)
 {
     x = x * (float)settings->film_width - (float)settings->crop_x;
     y = y * (float)settings->film_height - (float)settings->crop_y;
     mask inside = (x >= 0.0f) & (x < (float)settings->width) & (y >= 0.0f) & (y < (float)settings->height);
     integer i = min_i(to_integer(sel(inside, x, (real)(0.0f))), (integer)(settings->width - 1));
     integer j = min_i(to_integer(sel(inside, y, (real)(0.0f))), (integer)(settings->height - 1));
-    integer pixel_index = ((j >> 2) * settings->tiles_x + (i >> 2)) * 16 + (j & 3) * 4 + (i & 3);
-    return sel_i(inside, pixel_index, (integer)(-1));
+    return sel_i(inside, film_pixel_index(settings, i, j), (integer)(-1));
 }
 
 /* A pinhole, or a lens on which the light arrives at (a, b): the plane at distance `focus` is sharp. The
  * matrix is rigid, so its transpose leads back to the camera's space. */
 inline CameraPoint pinhole_connect(global const Settings *settings, global const float *m, global const float *extent,
-                                   global const float *offset, float near, float far, float focus, vec2 lens, vec3 p, mask away)
+                                   global const float *offset, float near, float far, float focus, vec2 lens, vec3 p,
+                                   mask away)
 {
     vec3 to = sel3(away, p, sub3(p, v3((real)(m[3]), (real)(m[7]), (real)(m[11]))));
     vec3 d = v3(m[0] * to.x + m[4] * to.y + m[8] * to.z, m[1] * to.x + m[5] * to.y + m[9] * to.z,
@@ -60,7 +62,7 @@ inline CameraPoint pinhole_connect(global const Settings *settings, global const
     c.o = matrix_point(m, lens.x + d.x * start, lens.y + d.y * start, (real)(near));
     c.d = normalize3(matrix_vector(m, d.x, d.y, d.z));
     c.t = sel(away, (real)(FAR), length * (1.0f - start));
-    c.pixel = sel_i(seen, film_place(settings, x, y), (integer)(-1));
+    c.pixel = sel_i(seen, film_index_at(settings, x, y), (integer)(-1));
     float cropped = ((float)settings->film_width * (float)settings->film_height) /
                     ((float)settings->width * (float)settings->height);
     c.importance = length * cropped / (z * z * z * (extent[0] * extent[1]));

@@ -1,8 +1,15 @@
-/* The film while it is being exposed: places (pixels in the order of 4x4 tiles), planes, counters.
- * A slot owns its place, so nothing here is atomic but the counters. */
-#define FILM_WORDS 7 /* sum and rest of three channels, and how many samples; a stream of `places` per word and plane */
+/* The film while it is being exposed. A film is FILM_WORDS streams of `padded_pixels` floats per plane; pixels are
+ * stored in 4x4 tiles, row by row in a tile and tile by tile in a row of them. A slot owns the pixel of its plane
+ * that it renders, so nothing here is atomic but the counters. */
+#define FILM_WORDS 7 /* sums of three channels, their compensations, and the number of samples */
 
-/* The pixel of a place: x and y, whole numbers. */
+/* Where the pixel (x, y) of the picture is stored. */
+inline integer film_pixel_index(global const Settings *settings, integer x, integer y)
+{
+    return ((y >> 2) * settings->tiles_x + (x >> 2)) * 16 + (y & 3) * 4 + (x & 3);
+}
+
+/* The pixel that is stored at an index: x and y, whole numbers. */
 inline vec2 pixel_of_index(global const Settings *settings, integer pixel_index)
 {
     integer tile = pixel_index >> 4, row = divide(tile, settings->tiles_x), column = tile - row * settings->tiles_x;
@@ -18,14 +25,10 @@ inline vec2 film_position(global const Settings *settings, vec2 pixel, vec2 offs
     return p;
 }
 
-/* The first sample at or after `first` that belongs to a plane. */
-inline integer plane_sample(integer plane, int planes, int first)
-{
-    integer ahead = plane - first % planes;
-    return first + sel_i(ahead < 0, ahead + planes, ahead);
-}
+/* Whether the film takes a value: neither NaN nor so large that sums would overflow. */
+inline mask film_accepts(vec3 value) { return fabs(value.x) + fabs(value.y) + fabs(value.z) < 1e30f; }
 
-/* Compensated addition (Neumaier 1974): what rounding takes from the sum is kept in `rest`. */
+/* Compensated addition (Neumaier 1974): `compensation` gathers what rounding takes from `sum`. */
 inline void sum_add(real *sum, real *compensation, real v)
 {
     real total = *sum + v;
@@ -33,56 +36,48 @@ inline void sum_add(real *sum, real *compensation, real v)
     *sum = total;
 }
 
-/* A slot's walk. `walk` holds for each place the one after it in its slot's list, then for each place the sample
- * before which it is left, then where the slots of a plane begin; a place outside the film ends a list. */
-inline integer work_list_end(global const Settings *settings, global const uint *work_list, integer pixel_index, int end)
-{
-    return min_i(gather_i(work_list, pixel_index + settings->padded_pixels), (integer)(end));
-}
-
-/* The place after `place`, or the first one of a slot that has not `begun`, where a sample from `start` on is wanted. */
-inline integer work_list_next(global const Settings *settings, global const uint *work_list, mask turn, mask begun, integer pixel_index,
-                         integer index, integer start, int end)
-{
-    int padded_pixels = settings->padded_pixels;
-    integer next = gather_i(work_list, sel_i(begun, pixel_index, index + 2 * padded_pixels));
-    for (;;) {
-        mask there = turn & (next < padded_pixels);
-        integer at = sel_i(there, next, (integer)(0));
-        mask idle = there & (start >= work_list_end(settings, work_list, at, end));
-        if (!any(idle)) return next;
-        next = sel_i(idle, gather_i(work_list, at), next);
-    }
-}
-
+/* What a pixel of one plane holds. */
 typedef struct {
     vec3 sum, compensation;
     real samples;
 } Exposure;
 
-inline Exposure film_load(global const Settings *settings, global const float *film, mask m, integer plane, integer pixel_index)
+inline Exposure film_load(global const Settings *settings, global const float *film, mask m, integer plane,
+                          integer pixel_index)
 {
-    integer padded_pixels = settings->padded_pixels, at = plane * FILM_WORDS * padded_pixels + sel_i(m, pixel_index, (integer)(0));
+    integer stream = settings->padded_pixels, at = plane * FILM_WORDS * stream + sel_i(m, pixel_index, (integer)(0));
     Exposure e;
-    e.sum = v3(gather(film, at), gather(film, at + padded_pixels), gather(film, at + 2 * padded_pixels));
-    e.compensation = v3(gather(film, at + 3 * padded_pixels), gather(film, at + 4 * padded_pixels), gather(film, at + 5 * padded_pixels));
-    e.samples = gather(film, at + 6 * padded_pixels);
+    e.sum = v3(gather(film, at), gather(film, at + stream), gather(film, at + 2 * stream));
+    e.compensation = v3(gather(film, at + 3 * stream), gather(film, at + 4 * stream), gather(film, at + 5 * stream));
+    e.samples = gather(film, at + 6 * stream);
     return e;
 }
-inline void film_store(global const Settings *settings, global float *film, mask m, integer plane, integer pixel_index, Exposure e)
+
+inline void film_store(global const Settings *settings, global float *film, mask m, integer plane, integer pixel_index,
+                       Exposure e)
 {
-    integer padded_pixels = settings->padded_pixels, at = plane * FILM_WORDS * padded_pixels + pixel_index;
+    integer stream = settings->padded_pixels, at = plane * FILM_WORDS * stream + pixel_index;
     scatter_if(film, at, m, e.sum.x);
-    scatter_if(film, at + padded_pixels, m, e.sum.y);
-    scatter_if(film, at + 2 * padded_pixels, m, e.sum.z);
-    scatter_if(film, at + 3 * padded_pixels, m, e.compensation.x);
-    scatter_if(film, at + 4 * padded_pixels, m, e.compensation.y);
-    scatter_if(film, at + 5 * padded_pixels, m, e.compensation.z);
-    scatter_if(film, at + 6 * padded_pixels, m, e.samples);
+    scatter_if(film, at + stream, m, e.sum.y);
+    scatter_if(film, at + 2 * stream, m, e.sum.z);
+    scatter_if(film, at + 3 * stream, m, e.compensation.x);
+    scatter_if(film, at + 4 * stream, m, e.compensation.y);
+    scatter_if(film, at + 5 * stream, m, e.compensation.z);
+    scatter_if(film, at + 6 * stream, m, e.samples);
+}
+
+/* Sums `words` words of a pixel over the planes, from the first plane on. */
+inline void film_sum(global const Settings *settings, global const float *film, int pixel_index, int first, int words,
+                     float *sums)
+{
+    int stream = settings->padded_pixels;
+    for (int i = 0; i < words; i++) sums[i] = 0.0f;
+    for (int plane = 0; plane < settings->planes; plane++)
+        for (int i = 0; i < words; i++) sums[i] += film[(plane * FILM_WORDS + first + i) * stream + pixel_index];
 }
 
 /* Counters that the host reads while it enqueues. */
-#define COUNTER_DONE 0     /* slots that have walked their list */
+#define COUNTER_DONE 0     /* slots that have come to the end of their work list */
 #define COUNTER_SAMPLES 1  /* paths put on the film */
 #define COUNTER_CLOSEST 2  /* rays of them */
 #define COUNTER_SHADOW 3   /* shadow rays of them */

@@ -1,4 +1,5 @@
-/* Arbitrary output values of the first surface, in three channels; CHANNEL says which. */
+/* Arbitrary output values of the first surface, in three channels; CHANNEL says which. Depth along the ray and position
+ * in metres. */
 #define CHANNEL_DEPTH 0
 #define CHANNEL_POSITION 1
 #define CHANNEL_GEOMETRIC_NORMAL 2
@@ -38,7 +39,8 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
 #endif
     v.x = to_real(number);
 #elif CHANNEL == CHANNEL_PRIMITIVE_ID
-    v.x = sel((shape.kind == 0) | ((shape.flags & SHAPE_MANY) != 0), to_real(load_hit_prim(hit, at) - shape.prim), (real)(0.0f));
+    v.x = sel((shape.kind == 0) | ((shape.flags & SHAPE_MANY) != 0), to_real(load_hit_prim(hit, at) - shape.prim),
+              (real)(0.0f));
 #endif
     Spectrum value = {v.x, v.y, v.z};
     store_path_radiance(path, at, active, value);

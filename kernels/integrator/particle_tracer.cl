@@ -1,8 +1,8 @@
 /* One vertex of a path that comes from a light: it is joined to the camera, and goes on.
  *
- * f is asked for as radiance flows, from the light to the camera, and light that is carried takes it with
- * the geometric cosine of the side where it leaves (Veach 1997, 5.3.2): what bsdf_sample gives for the
- * opposite flow lacks, where light is refracted, eta^2, and where normals are smoothed, the quotient
+ * f is asked for as radiance flows, from the light to the camera, and light that is carried takes it with the
+ * geometric cosine of the side where it leaves (Veach 1997, 5.3.2): what bsdf_sample gives for the opposite flow
+ * lacks, where light is refracted, eta^2, and where normals are smoothed, the quotient
  * |wo . ns| |wi . n| / (|wo . n| |wi . ns|), wo being the side where the light came from. */
 #include "interface/camera.cl"
 #include "generated/camera.cl"
@@ -15,62 +15,53 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     global const Settings *settings = scene.settings;
     Vertex v = vertex_load(scene, path, hit, at, active);
     Surface s = v.s;
-    Wavelengths lambdas = v.lambdas;
     Spectrum beta = v.beta, ratio = hero_ratio(path, at);
     integer state = v.state, depth = v.depth;
 
     Sampler sampler = light_path_sampler(settings, load_path_pixel_index(path, at), load_path_sample(path, at));
-    natural dimension = as_natural(DIMENSION_VERTEX + depth * DIMENSIONS_A_VERTEX);
-    vec2 choice = {0.0f, 0.0f};
-#if USES_CHOICE
-    choice = sampler_pair(sampler, dimension + DIMENSION_CHOICE);
-#endif
-    Bsdf m = bsdf_load(scene, v.row, surface_texture_point(s), lambdas);
-    ShadingFrame shading = shading_frame_load(scene, v.row, s, v.d, lambdas);
-    Frame frame = shading.frame;
-    vec3 wo = to_local(frame, neg3(v.d));
+    Scattering scatter = vertex_scattering(scene, path, at, active, v, sampler);
+    Bsdf m = scatter.bsdf;
+    Frame frame = scatter.shading.frame;
+    vec3 wo = scatter.wo;
     real arrives = 1.0f / max_r(fabs(dot3(s.n, v.d)), (real)(1e-6f));
 
 #if !BSDF_DELTA
     /* To the camera. */
-    CameraPoint c = camera_connect(scene, s.p, mask_of(0), sampler_pair(sampler, dimension + DIMENSION_LIGHT));
+    CameraPoint c = camera_connect(scene, s.p, mask_of(0), sampler_pair(sampler, scatter.dimension + DIMENSION_LIGHT));
     Spectrum f = bsdf_eval(m, to_local(frame, neg3(c.d)), wo);
     mask shine = active & (c.pixel >= 0) & (spectrum_max(f) > 0.0f);
-    real turned = fabs(dot3(s.n, c.d)) * arrives * c.importance * shading_frame_share(shading, neg3(v.d));
-    Spectrum value = spectrum_scale(spectrum_mul(beta, f), turned);
-    value = vertex_beyond(scene, v, neg3(c.d), c.t, lambdas, value);
+    real carries = fabs(dot3(s.n, c.d)) * arrives * c.importance * shading_frame_share(scatter.shading, neg3(v.d));
+    Spectrum value = spectrum_scale(spectrum_mul(beta, f), carries);
+    value = vertex_beyond(scene, v, neg3(c.d), c.t, v.lambdas, value);
     connect_camera(shadow, at, active, shine, s, c, value);
     state += sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
 #endif
 
     /* The next direction. */
-    vec2 uv = sampler_pair(sampler, dimension + DIMENSION_BSDF);
-    BsdfSample bs = hero_sample(m, wo, v3(uv.x, uv.y, choice.y), &ratio);
+    vec2 uv = sampler_pair(sampler, scatter.dimension + DIMENSION_BSDF);
+    BsdfSample bs = hero_sample(m, wo, v3(uv.x, uv.y, scatter.choice.y), &ratio);
     mask next = active & (bs.pdf > 0.0f) & (depth + 1 < settings->max_depth);
     vec3 onward = normalize3(to_world(frame, bs.wi));
     real leaves = fabs(dot3(s.n, onward)) * arrives;
-    real bent = bs.eta * bs.eta * leaves * fabs(wo.z) / max_r(fabs(bs.wi.z), (real)(1e-6f));
-    Spectrum carried = spectrum_scale(bs.weight, bent);
+    real adjoint = bs.eta * bs.eta * leaves * fabs(wo.z) / max_r(fabs(bs.wi.z), (real)(1e-6f));
+    Spectrum carried = spectrum_scale(bs.weight, adjoint);
 #if BSDF_CHROMATIC /* eta differs between the wavelengths */
     mask spread = next & ((bs.lobe & LOBE_DELTA) == 0);
     Spectrum exact = spectrum_scale(bsdf_eval(m, bs.wi, wo), leaves / sel(spread, bs.pdf, (real)(1.0f)));
     carried = spectrum_sel(spread, exact, carried);
 #endif
-    beta = spectrum_scale(spectrum_mul(beta, carried), shading_frame_share(shading, neg3(v.d)));
+    beta = spectrum_scale(spectrum_mul(beta, carried), shading_frame_share(scatter.shading, neg3(v.d)));
 
     /* Russian roulette, on what is left of what the light gave. */
-    integer survivor = depth >= settings->rr_depth;
+    mask play = depth >= settings->rr_depth;
     real strength = spectrum_max(beta) * load_path_weight(path, at);
     next = next & (strength > 0.0f);
-    if (any(next & survivor)) {
-        real q = roulette_chance(strength);
-        vec2 u = sampler_pair(sampler, dimension + DIMENSION_ROULETTE);
-        next = next & (!survivor | (u.x < q));
-        beta = spectrum_scale(beta, sel(survivor, 1.0f / max_r(q, (real)(1e-6f)), (real)(1.0f)));
+    if (any(next & play)) {
+        vec2 u = sampler_pair(sampler, scatter.dimension + DIMENSION_ROULETTE);
+        next = roulette(next, play, strength, u.x, &beta);
     }
 
     vertex_leave(path, at, next, v, onward, beta);
     hero_keep(path, at, next, ratio);
-    state = sel_i(next, state, state - (state & PATH_ALIVE)) + sel_i(active, (integer)(1), (integer)(0));
-    store_path_state(path, at, active, state);
+    vertex_end(path, at, active, next, state);
 }

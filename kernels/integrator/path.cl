@@ -1,11 +1,11 @@
-/* One vertex of a path: the light that is met, next-event estimation, and the direction to go on.
- * Both ways of finding light are weighted by the power heuristic (Veach 1997, 9.2.4). */
+/* One vertex of a path from the camera: the light that is met, next-event estimation, and the direction to go on.
+ * Light is found both by meeting it and by choosing it; the two are weighted by the power heuristic (Veach 1997,
+ * 9.2.4). */
 void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mask active)
 {
     global const Settings *settings = scene.settings;
     Vertex v = vertex_load(scene, path, hit, at, active);
     Surface s = v.s;
-    Wavelengths lambdas = v.lambdas;
     Spectrum beta = v.beta, ratio = hero_ratio(path, at);
     integer state = v.state, depth = v.depth;
 
@@ -23,74 +23,63 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
         real pdf = load_path_pdf(path, at), null_distance = path_null_distance(path, at);
         real other = light_pdf(scene, light, madd3(v.d, -null_distance, v.o), v.d, v.t + null_distance, s.n);
         real w = sel(pdf < 0.0f, (real)(1.0f), mis_weight(pdf, other));
-        Spectrum le = emission_load(scene, light_at(scene, light).radiance, surface_texture_point(s), lambdas);
+        Spectrum le = emission_load(scene, light_at(scene, light).radiance, surface_texture_point(s), v.lambdas);
         le = spectrum_scale(spectrum_mul(beta, le), w);
         store_path_radiance(path, at, lit, spectrum_add(load_path_radiance(path, at), le));
     }
 #endif
-    mask next = active & !hidden & (depth + 1 < settings->max_depth);
+    mask met = active & !hidden, next = met & (depth + 1 < settings->max_depth);
 
     Sampler sampler = pixel_sampler(settings, load_path_pixel_index(path, at), load_path_sample(path, at));
-    natural dimension = as_natural(DIMENSION_VERTEX + depth * DIMENSIONS_A_VERTEX);
-    vec2 choice = {0.0f, 0.0f};
-#if USES_CHOICE
-    choice = sampler_pair(sampler, dimension + DIMENSION_CHOICE);
-#endif
-    Bsdf m = bsdf_load(scene, v.row, surface_texture_point(s), lambdas);
-#if BSDF_FLUORESCES
-    lambdas = bsdf_shift(scene, v.row, m, lambdas, choice.y, depth); /* from here on, those by which light comes */
-    store_path_lambdas(path, at, active & !hidden, lambdas);
-#endif
-    ShadingFrame shading = shading_frame_load(scene, v.row, s, v.d, lambdas);
-    Frame frame = shading.frame;
-    vec3 wo = to_local(frame, neg3(v.d));
+    Scattering scatter = vertex_scattering(scene, path, at, met, v, sampler);
+    Bsdf m = scatter.bsdf;
+    Frame frame = scatter.shading.frame;
+    vec3 wo = scatter.wo;
 
 #if USES_LIGHTS && !BSDF_DELTA
     /* Next-event estimation. */
-    vec3 side = vertex_side(frame, wo);
-    LightSample ls = light_sample(scene, s.p, side, choice.x, sampler_pair(sampler, dimension + DIMENSION_LIGHT), lambdas);
+    vec3 hemisphere = vertex_hemisphere(frame, wo);
+    vec2 point = sampler_pair(sampler, scatter.dimension + DIMENSION_LIGHT);
+    LightSample ls = light_sample(scene, s.p, hemisphere, scatter.choice.x, point, scatter.lambdas);
     vec3 wi = to_local(frame, ls.wi);
-    Spectrum f = spectrum_scale(bsdf_eval(m, wo, wi), shading_frame_share(shading, ls.wi));
+    Spectrum f = spectrum_scale(bsdf_eval(m, wo, wi), shading_frame_share(scatter.shading, ls.wi));
     real w = sel(ls.pdf < 0.0f, (real)(1.0f), mis_weight(ls.pdf, hero_pdf(m, wo, wi, ratio)));
     mask shine = next & (ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
-    Spectrum value = spectrum_scale(spectrum_mul(spectrum_mul(beta, f), ls.radiance), w / sel(shine, fabs(ls.pdf), (real)(1.0f)));
-    value = vertex_beyond(scene, v, ls.wi, ls.t, lambdas, value);
+    w = w / sel(shine, fabs(ls.pdf), (real)(1.0f));
+    Spectrum value = spectrum_scale(spectrum_mul(spectrum_mul(beta, f), ls.radiance), w);
+    value = vertex_beyond(scene, v, ls.wi, ls.t, scatter.lambdas, value);
     shadow_toward(shadow, at, active, shine, s, ls, value);
     state += sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
 #endif
 
     /* The next direction. */
-    vec2 uv = sampler_pair(sampler, dimension + DIMENSION_BSDF);
-    BsdfSample bs = hero_sample(m, wo, v3(uv.x, uv.y, choice.y), &ratio);
+    vec2 uv = sampler_pair(sampler, scatter.dimension + DIMENSION_BSDF);
+    BsdfSample bs = hero_sample(m, wo, v3(uv.x, uv.y, scatter.choice.y), &ratio);
     next = next & (bs.pdf > 0.0f);
     vec3 onward = normalize3(to_world(frame, bs.wi));
-    beta = spectrum_scale(spectrum_mul(beta, bs.weight), shading_frame_share(shading, onward));
+    beta = spectrum_scale(spectrum_mul(beta, bs.weight), shading_frame_share(scatter.shading, onward));
     real eta = load_path_eta(path, at) * bs.eta;
 
     /* Russian roulette. */
-    integer survivor = depth + 1 >= settings->rr_depth;
+    mask play = depth + 1 >= settings->rr_depth;
     real strength = spectrum_max(beta);
     next = next & (strength > 0.0f);
-    if (any(next & survivor)) {
-        real q = roulette_chance(strength * eta * eta);
-        vec2 u = sampler_pair(sampler, dimension + DIMENSION_ROULETTE);
-        next = next & (!survivor | (u.x < q));
-        beta = spectrum_scale(beta, sel(survivor, 1.0f / max_r(q, (real)(1e-6f)), (real)(1.0f)));
+    if (any(next & play)) {
+        vec2 u = sampler_pair(sampler, scatter.dimension + DIMENSION_ROULETTE);
+        next = roulette(next, play, strength * eta * eta, u.x, &beta);
     }
 
     vertex_leave(path, at, next, v, onward, beta);
 #if BSDF_IS_NULL /* for weighing a light that is met further on, nothing has happened */
     store_path_null_distance(path, at, next, load_path_null_distance(path, at) + v.t);
 #else
-    path_turned(path, at, next);
+    path_scattered(path, at, next);
     store_path_pdf(path, at, next, sel((bs.lobe & LOBE_DELTA) != 0, (real)(-1.0f), bs.pdf));
 #if USES_INFINITE && !BSDF_DELTA
-    store_path_sampled_hemisphere(path, at, next, side);
+    store_path_sampled_hemisphere(path, at, next, hemisphere);
 #endif
 #endif
     store_path_eta(path, at, next, eta);
     hero_keep(path, at, next, ratio);
-    mask met = active & !hidden;
-    state = sel_i(next, state, state - (state & PATH_ALIVE)) + sel_i(met, (integer)(1), (integer)(0));
-    store_path_state(path, at, met, state);
+    vertex_end(path, at, met, next, state);
 }

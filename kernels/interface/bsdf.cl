@@ -4,7 +4,7 @@
  *   Spectrum   <kind>_eval  (<Kind> m, vec3 wo, vec3 wi);    f |cos|, of the lobes that are not delta
  *   real       <kind>_pdf   (<Kind> m, vec3 wo, vec3 wi);    [1/sr], likewise
  *   Spectrum   <kind>_albedo(<Kind> m);                      the colour a person would name
- *   Spectrum   <kind>_pdfs  (<Kind> m, vec3 wo, vec3 wi);    only of `chromatic` kinds: pdf, were each wavelength the hero
+ *   Spectrum   <kind>_pdfs  (<Kind> m, vec3 wo, vec3 wi);    of `chromatic` kinds: pdf, were each wavelength the hero
  *
  * wo points to the viewer, wi to the light, both away from the surface, in the local frame whose z is
  * the shading normal, on the front's side: wo.z < 0 is a look at the back. The struct <Kind> is
@@ -20,7 +20,7 @@
 #define LOBE_TRANSMIT 2
 #define LOBE_DELTA 4    /* a direction out of finitely many; pdf is then a probability */
 #define LOBE_DISPERSE 8 /* the direction holds for the hero wavelength only */
-#define LOBE_NULL 16    /* passed as if nothing were there */
+#define LOBE_NULL 16    /* it goes on as if nothing were there */
 
 typedef struct {
     vec3 wi;

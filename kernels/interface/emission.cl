@@ -1,5 +1,5 @@
 /* Light as it leaves a light, for integrators that start there: kernels/emission/<kind>.cl has, for
- * lamps that stand somewhere,
+ * lights at a point,
  *
  *   LightRay <kind>_emit(<Kind> l, Scene scene, vec2 u, vec2 v, Wavelengths lambdas);
  *
@@ -7,63 +7,12 @@
  *
  *   SurfacePoint <kind>_point(<Kind> s, vec2 u);      a point of its surface, evenly over the area
  *
- * u: a point of the unit square for the place; v: for the direction. Light from infinity needs no more
- * than the <kind>_sample of interface/light.cl, see `distant_emit`.
+ * u: a point of the unit square for the position; v: for the direction. Light from infinity needs no more
+ * than the <kind>_sample of interface/light.cl, see `distant_emit`. LightRay and SurfacePoint are Records in
+ * clpt/render/contract.
  */
-typedef struct {
-    vec3 o, d;      /* where it starts [m], and in which direction, unit length */
-    vec3 n;         /* unit normal of the surface there; d off all surfaces */
-    Spectrum power; /* radiance |cos| over the pdf of o and d [W/nm] */
-    Spectrum seen;  /* radiance over the pdf of o, or from infinity of d: what a camera may gather; 0: a delta light */
-    mask away;      /* it comes from infinity */
-} LightRay;
-
-typedef struct {
-    vec3 p, n; /* [m]; unit normal toward the front */
-    vec2 uv;
-    real area; /* of the shape [m^2] */
-} SurfacePoint;
-
-inline LightRay light_ray_nothing(void)
-{
-    LightRay r;
-    r.o = v3(0.0f, 0.0f, 0.0f);
-    r.d = v3(0.0f, 0.0f, 1.0f);
-    r.n = r.d;
-    r.power = spectrum_of(0.0f);
-    r.seen = r.power;
-    r.away = 0;
-    return r;
-}
-inline LightRay light_ray_sel(mask m, LightRay a, LightRay b)
-{
-    a.o = sel3(m, a.o, b.o);
-    a.d = sel3(m, a.d, b.d);
-    a.n = sel3(m, a.n, b.n);
-    a.power = spectrum_sel(m, a.power, b.power);
-    a.seen = spectrum_sel(m, a.seen, b.seen);
-    a.away = sel_i(m, a.away, b.away);
-    return a;
-}
-inline SurfacePoint surface_point_nothing(void)
-{
-    SurfacePoint q;
-    q.p = v3(0.0f, 0.0f, 0.0f);
-    q.n = v3(0.0f, 0.0f, 1.0f);
-    q.uv.x = 0.0f;
-    q.uv.y = 0.0f;
-    q.area = 0.0f;
-    return q;
-}
-inline SurfacePoint surface_point_sel(mask m, SurfacePoint a, SurfacePoint b)
-{
-    a.p = sel3(m, a.p, b.p);
-    a.n = sel3(m, a.n, b.n);
-    a.uv.x = sel(m, a.uv.x, b.uv.x);
-    a.uv.y = sel(m, a.uv.y, b.uv.y);
-    a.area = sel(m, a.area, b.area);
-    return a;
-}
+#include "generated/light_ray.cl"
+#include "generated/surface_point.cl"
 
 /* A point of a light that emits from both sides: it leaves one of them, as *v says, for the two. */
 inline SurfacePoint surface_point_turned(SurfacePoint q, mask both, vec2 *v)
@@ -102,7 +51,8 @@ inline LightRay distant_emit(Scene scene, LightSample s, vec2 v)
     vec3 center = v3((real)(settings->center[0]), (real)(settings->center[1]), (real)(settings->center[2]));
     r.o = add3(center, to_world(f, v3(q.x * radius, q.y * radius, (real)(-radius))));
     r.n = r.d;
-    r.seen = spectrum_sel(s.pdf > 0.0f, spectrum_scale(s.radiance, 1.0f / max_r(s.pdf, (real)(1e-30f))), spectrum_of(0.0f));
+    r.seen = spectrum_sel(s.pdf > 0.0f, spectrum_scale(s.radiance, 1.0f / max_r(s.pdf, (real)(1e-30f))),
+                          spectrum_of(0.0f));
     r.power = spectrum_scale(spectrum_sel(s.pdf > 0.0f, r.seen, s.radiance), PI * radius * radius);
     r.away = mask_of(1);
     return r;

@@ -4,8 +4,8 @@
  *   Spectrum <kind>_emission   (<Kind> t, Scene scene, TexturePoint point, Wavelengths lambdas);
  *   real     <kind>_real       (<Kind> t, Scene scene, TexturePoint point);
  *
- * The struct <Kind> is a Record in clpt/render/lowering/textures/textures.py whose rows lie in `textures`. What combines
- * others is no kind here but a program of them: texture/program.cl.
+ * The struct <Kind> is a Record in clpt/render/contract/texture_records.py whose rows lie in `textures`. What
+ * combines others is no kind here but a program of them: texture/program.cl.
  */
 
 /* A colour or spectrum that stands in `textures` in the five words that parameters have. */
@@ -17,7 +17,7 @@ inline Spectrum texture_constant(Scene scene, integer at, Wavelengths lambdas)
     return value;
 }
 
-/* A place of the world in a texture's space; `place`: the first of twelve words, three rows of a matrix. */
+/* A point of the world in a texture's space; transform: the first of twelve words, three rows of a matrix. */
 inline vec3 texture_transformed(Scene scene, integer transform, vec3 p)
 {
     real r[3];
@@ -30,7 +30,7 @@ inline vec3 texture_transformed(Scene scene, integer transform, vec3 p)
 }
 
 #if USES_ATTRIBUTES
-/* A number that a mesh has per vertex, linear over a triangle; `number`: its place in directories. */
+/* A number that a mesh has per vertex, linear over a triangle; number: its index in the meshes' directories. */
 inline real texture_vertex_number(Scene scene, TexturePoint point, integer number)
 {
     integer entry = point.attributes + 2 * number;
@@ -45,8 +45,8 @@ inline real texture_vertex_number(Scene scene, TexturePoint point, integer numbe
 }
 #endif
 
-/* u, v and 1: of the surface, or of a place in a texture's space by one of the mappings that pbrt has, or a mesh's second set.
- * USES_MAPPINGS: some texture asks for one of these. */
+/* u, v and 1: of the surface, or of a point in a texture's space by one of the mappings that pbrt has, or a mesh's
+ * second set. USES_MAPPINGS: some texture asks for one of these. */
 inline vec3 texture_uv(Scene scene, integer mapping, integer transform, TexturePoint point)
 {
     vec3 uv = v3(point.uv.x, point.uv.y, (real)(1.0f));

@@ -17,7 +17,7 @@ inline LightSample area_sample(ShapeSample q, Spectrum radiance)
     return s;
 }
 
-/* What textures see at uv of the sphere that row `row` of `lights` stands for, but for the place in the
+/* What textures see at uv of the sphere that row `row` of `lights` stands for, but for the point of the
  * world. */
 inline TexturePoint area_sphere_point(Scene scene, ShapeRow shape, integer row, vec2 uv)
 {
@@ -25,13 +25,14 @@ inline TexturePoint area_sphere_point(Scene scene, ShapeRow shape, integer row, 
 #if USES_ATTRIBUTES
     mask many = (shape.flags & SHAPE_MANY) != 0;
     t.attributes = shape.attributes;
-    t.face = sel_i(many, texture_face_of_sphere(shape.prim + row - shape.light - scene.settings->single_count), (integer)(0));
+    t.face = sel_i(many, texture_face_of_sphere(shape.prim + row - shape.light - scene.settings->single_count),
+                   (integer)(0));
 #endif
     return t;
 }
 
 /* What textures see at barycentrics b of the triangle that row `row` of `lights` stands for, but for the
- * place in the world: the mesh's uv, or the barycentrics themselves where it has none. */
+ * point of the world: the mesh's uv, or the barycentrics themselves where it has none. */
 inline TexturePoint area_triangle_point(Scene scene, ShapeRow shape, integer row, vec2 b)
 {
     integer face = shape.prim + row - shape.light, corner = 3 * face;
@@ -41,7 +42,8 @@ inline TexturePoint area_triangle_point(Scene scene, ShapeRow shape, integer row
     real b0 = 1.0f - b.x - b.y;
     vec2 uv;
     uv.x = sel(mapped, gather(scene.uvs, i0) * b0 + gather(scene.uvs, i1) * b.x + gather(scene.uvs, i2) * b.y, b.x);
-    uv.y = sel(mapped, gather(scene.uvs, i0 + 1) * b0 + gather(scene.uvs, i1 + 1) * b.x + gather(scene.uvs, i2 + 1) * b.y, b.y);
+    uv.y = sel(mapped,
+               gather(scene.uvs, i0 + 1) * b0 + gather(scene.uvs, i1 + 1) * b.x + gather(scene.uvs, i2 + 1) * b.y, b.y);
     TexturePoint t = texture_point(uv, v3(0.0f, 0.0f, 0.0f));
 #if USES_ATTRIBUTES
     t.attributes = shape.attributes;

@@ -17,7 +17,8 @@ inline CubePoint cube_map_point(CubeMap l, vec3 d)
     mask back = major < 0.0f;
     real sign = sel(back, (real)(-1.0f), (real)(1.0f)), over = 1.0f / size;
     CubePoint p;
-    p.face = sel_i(on_x, (integer)(0), sel_i(on_y, (integer)(2), (integer)(4))) + sel_i(back, (integer)(1), (integer)(0));
+    p.face = sel_i(on_x, (integer)(0), sel_i(on_y, (integer)(2), (integer)(4))) +
+             sel_i(back, (integer)(1), (integer)(0));
     p.a = sel(on_x, -z * sign, sel(on_y, x, x * sign)) * over;
     p.b = sel(on_y, z * sign, -y) * over;
     real r2 = 1.0f + p.a * p.a + p.b * p.b;
@@ -45,7 +46,7 @@ Spectrum cube_map_radiance(CubeMap l, Scene scene, vec3 d, Wavelengths lambdas)
     return cube_map_between(l, scene, cube_map_point(l, d), lambdas);
 }
 
-real cube_map_pdf(CubeMap l, Scene scene, vec3 side, vec3 d)
+real cube_map_pdf(CubeMap l, Scene scene, vec3 hemisphere, vec3 d)
 {
     CubePoint p = cube_map_point(l, d);
     real cells = to_real(l.width * 2), column = (p.a + 1.0f) * 0.5f * cells, row = (p.b + 1.0f) * 0.5f * cells;
@@ -55,7 +56,7 @@ real cube_map_pdf(CubeMap l, Scene scene, vec3 side, vec3 d)
     return pdf * sqr(to_real(l.width)) * p.jacobian;
 }
 
-LightSample cube_map_sample(CubeMap l, Scene scene, vec3 side, vec2 u, Wavelengths lambdas)
+LightSample cube_map_sample(CubeMap l, Scene scene, vec3 hemisphere, vec2 u, Wavelengths lambdas)
 {
     GridPoint g = grid_sample(scene, cube_map_grid(l), u);
     real step = 1.0f / to_real(l.width);

@@ -4,7 +4,7 @@ LightSample directional_sample(Directional l, Scene scene, vec3 p, vec2 u, Wavel
     LightSample s;
     s.wi = neg3(l.direction);
     s.t = FAR;
-    s.radiance = emission_load(scene, l.radiance, texture_point_nowhere(), lambdas);
+    s.radiance = emission_load(scene, l.irradiance, texture_point_nowhere(), lambdas);
     s.pdf = -1.0f;
     return s;
 }

@@ -1,7 +1,7 @@
 /* An image in latitude and longitude, as Mitsuba's envmap: +y is up, the image's middle lies at +z, its
  * left and right edges at -z, and +x a quarter from the left. Rows run from pole to pole, the first and the
  * last one on the poles; columns wrap. Radiance is bilinear between texels in both modes, while Mitsuba's
- * spectral variants interpolate a spectrum's shape and its factor apart. */
+ * spectral variants interpolate a spectrum's shape and its factor separately. */
 #include "core/grid.cl"
 
 inline Grid envmap_grid(Envmap l)
@@ -53,7 +53,7 @@ Spectrum envmap_radiance(Envmap l, Scene scene, vec3 d, Wavelengths lambdas)
     return envmap_between(l, scene, p.row, p.column, p.at, lambdas);
 }
 
-real envmap_pdf(Envmap l, Scene scene, vec3 side, vec3 d)
+real envmap_pdf(Envmap l, Scene scene, vec3 hemisphere, vec3 d)
 {
     EnvmapPoint p = envmap_point(l, d);
     return envmap_solid_angle_pdf(l, grid_pdf(scene, envmap_grid(l), p.row, p.column, p.at), p.sin_t);
@@ -74,7 +74,7 @@ inline LightSample envmap_direction(Envmap l, GridPoint g)
     return s;
 }
 
-LightSample envmap_sample(Envmap l, Scene scene, vec3 side, vec2 u, Wavelengths lambdas)
+LightSample envmap_sample(Envmap l, Scene scene, vec3 hemisphere, vec2 u, Wavelengths lambdas)
 {
     GridPoint g = grid_sample(scene, envmap_grid(l), u);
     LightSample s = envmap_direction(l, g);

@@ -1,6 +1,6 @@
 /* A point whose intensity is that of an image in latitude and longitude, its directions as in
- * envmap.cl, its texels' centres off the poles as in bitmap.cl. Irradiance falls with the square of the
- * distance. */
+ * light/envmap.cl, its texels' centres off the poles as in texture/bitmap.cl. Irradiance falls with the square of
+ * the distance. */
 inline Spectrum goniometric_intensity(Goniometric l, Scene scene, vec3 d, Wavelengths lambdas)
 {
     real x = dot3(d, l.x), y = dot3(d, l.y), z = dot3(d, l.z);

@@ -6,7 +6,8 @@ LightSample point_sample(Point l, Scene scene, vec3 p, vec2 u, Wavelengths lambd
     LightSample s;
     s.wi = scale3(to, 1.0f / t);
     s.t = t;
-    s.radiance = spectrum_scale(emission_load(scene, l.radiance, texture_point_nowhere(), lambdas), sel(l.falloff > 0.5f, 1.0f / t2, (real)(1.0f)));
+    s.radiance = spectrum_scale(emission_load(scene, l.intensity, texture_point_nowhere(), lambdas),
+                                sel(l.falloff != 0, 1.0f / t2, (real)(1.0f)));
     s.pdf = -1.0f;
     return s;
 }

@@ -1,6 +1,6 @@
 /* A pinhole camera in reverse (Mitsuba's projector): the image that stands a metre before it, seen from
  * behind, with x to the left and y up. `irradiance` times the image is what arrives there in the middle. */
-inline mask projector_place(Projector l, vec3 d, real *z, vec2 *uv)
+inline mask projector_uv(Projector l, vec3 d, real *z, vec2 *uv)
 {
     mask before = dot3(d, l.z) > 0.0f;
     *z = sel(before, dot3(d, l.z), (real)(1.0f));
@@ -25,7 +25,7 @@ LightSample projector_sample(Projector l, Scene scene, vec3 p, vec2 u, Wavelengt
     LightSample s;
     s.wi = scale3(to, 1.0f / t);
     s.t = t;
-    mask shone = projector_place(l, neg3(s.wi), &z, &uv);
+    mask shone = projector_uv(l, neg3(s.wi), &z, &uv);
     Spectrum value = projector_irradiance(l, scene, uv, lambdas);
     s.radiance = spectrum_scale(value, 1.0f / (z * z * z * t2)); /* even over a plane across the axis: 1 / cos^3 */
     s.pdf = sel(shone, (real)(-1.0f), (real)(0.0f));

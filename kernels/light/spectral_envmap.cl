@@ -1,5 +1,5 @@
-/* An environment of spectra: the directions of envmap.cl, with `bands` values in every texel. It is chosen
- * by its luminance and, a little, by all its light. */
+/* An environment of spectra: the directions of light/envmap.cl, with `bands` values in every texel. Its texels are
+ * chosen by their luminance and, a little, by all their light. */
 #include "texturing/band_texels.cl"
 
 inline Envmap spectral_envmap_image(SpectralEnvmap l)
@@ -8,16 +8,18 @@ inline Envmap spectral_envmap_image(SpectralEnvmap l)
     return e;
 }
 
-inline Spectrum spectral_envmap_between(SpectralEnvmap l, Scene scene, integer row, integer column, vec2 at, Wavelengths lambdas)
+inline Spectrum spectral_envmap_between(SpectralEnvmap l, Scene scene, integer row, integer column, vec2 at,
+                                        Wavelengths lambdas)
 {
-    integer right = sel_i(column + 1 == l.width, (integer)(0), column + 1), left = row * l.width, below = left + l.width;
-    Spectrum place = spectra_row(scene, l.number, lambdas), sum = spectrum_of(0.0f);
+    integer right = sel_i(column + 1 == l.width, (integer)(0), column + 1), left = row * l.width;
+    integer below = left + l.width;
+    Spectrum numbers = spectra_row(scene, l.number, lambdas), sum = spectrum_of(0.0f);
     for (int corner = 0; corner < 4; corner++) {
         integer texel = ((corner >> 1) ? below : left) + ((corner & 1) ? right : column);
         real weight = ((corner & 1) ? at.x : 1.0f - at.x) * ((corner >> 1) ? at.y : 1.0f - at.y);
-        sum = spectrum_madd(bands_texel(scene, l.texels + l.bands * texel, l.bands, place), weight, sum);
+        sum = spectrum_madd(bands_texel(scene, l.texels + l.bands * texel, l.bands, numbers), weight, sum);
     }
-    return bands_lit(sum, l.bands, place);
+    return bands_lit(sum, l.bands, numbers);
 }
 
 Spectrum spectral_envmap_radiance(SpectralEnvmap l, Scene scene, vec3 d, Wavelengths lambdas)
@@ -26,9 +28,12 @@ Spectrum spectral_envmap_radiance(SpectralEnvmap l, Scene scene, vec3 d, Wavelen
     return spectral_envmap_between(l, scene, p.row, p.column, p.at, lambdas);
 }
 
-real spectral_envmap_pdf(SpectralEnvmap l, Scene scene, vec3 side, vec3 d) { return envmap_pdf(spectral_envmap_image(l), scene, side, d); }
+real spectral_envmap_pdf(SpectralEnvmap l, Scene scene, vec3 hemisphere, vec3 d)
+{
+    return envmap_pdf(spectral_envmap_image(l), scene, hemisphere, d);
+}
 
-LightSample spectral_envmap_sample(SpectralEnvmap l, Scene scene, vec3 side, vec2 u, Wavelengths lambdas)
+LightSample spectral_envmap_sample(SpectralEnvmap l, Scene scene, vec3 hemisphere, vec2 u, Wavelengths lambdas)
 {
     Envmap image = spectral_envmap_image(l);
     GridPoint g = grid_sample(scene, envmap_grid(image), u);

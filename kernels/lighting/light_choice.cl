@@ -1,4 +1,4 @@
-/* Choosing one row of `lights`. */
+/* Choosing one row of `lights`, by the alias method (Walker 1977). */
 inline LightRow light_at(Scene scene, integer row)
 {
     return light_row_row(scene.lights, row * LIGHT_ROW_WORDS);
@@ -10,8 +10,8 @@ inline LightRow light_at(Scene scene, integer row)
 #define FEW_LIGHTS 0
 #endif
 
-/* A row by the alias method (Walker 1977): *u chooses a place, its rest whether to stay; what is left
- * of it is uniform in [0, 1) again. */
+/* A row of `lights`: *u chooses a row, and by its fraction either that row or its alias; what is left of it is uniform
+ * in [0, 1) again. */
 inline integer light_pick(Scene scene, real *u)
 {
     int count = scene.settings->light_count;
@@ -32,35 +32,5 @@ inline LightSample light_chosen(LightSample s, real pmf)
     mask delta = s.pdf < 0.0f;
     s.radiance = spectrum_scale(s.radiance, sel(delta, 1.0f / max_r(pmf, (real)(1e-30f)), (real)(1.0f)));
     s.pdf = sel(delta, s.pdf, s.pdf * pmf);
-    return s;
-}
-
-inline LightSample light_sel(mask m, LightSample a, LightSample b)
-{
-    a.wi = sel3(m, a.wi, b.wi);
-    a.t = sel(m, a.t, b.t);
-    a.radiance = spectrum_sel(m, a.radiance, b.radiance);
-    a.pdf = sel(m, a.pdf, b.pdf);
-    return a;
-}
-inline ShapeSample shape_sample_sel(mask m, ShapeSample a, ShapeSample b)
-{
-    a.wi = sel3(m, a.wi, b.wi);
-    a.t = sel(m, a.t, b.t);
-    a.n = sel3(m, a.n, b.n);
-    a.uv.x = sel(m, a.uv.x, b.uv.x);
-    a.uv.y = sel(m, a.uv.y, b.uv.y);
-    a.pdf = sel(m, a.pdf, b.pdf);
-    return a;
-}
-inline ShapeSample shape_sample_nothing(void)
-{
-    ShapeSample s;
-    s.wi = v3(0.0f, 0.0f, 1.0f);
-    s.t = FAR;
-    s.n = s.wi;
-    s.uv.x = 0.0f;
-    s.uv.y = 0.0f;
-    s.pdf = 0.0f;
     return s;
 }

@@ -1,7 +1,7 @@
 /* What a path from a light needs besides a path from the camera. */
 
-/* Its numbers: the places of one pass over the film are the points of one sequence, so that a pass
- * spreads its paths evenly over the lights. */
+/* The random numbers of a path from a light. Its "pixel" only counts paths: those of one sample number are the points
+ * of one sequence, so that they spread evenly over the lights. */
 inline Sampler light_path_sampler(global const Settings *settings, integer pixel_index, integer sample)
 {
     return sampler_start(settings->seed, as_natural(sample), as_natural(pixel_index));

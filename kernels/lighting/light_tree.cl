@@ -1,6 +1,7 @@
 /* Choosing a light in proportion to what it may send to a point, by a tree over all lights (Conty Estevez
- * and Kulla 2018; its nodes' importance after pbrt-v4, 12.6.3). Behind the rows in `lights` lies a trail of
- * bits for every row, the way down to it, and then the nodes, see clpt/render/lowering/lights/light_tree.py. */
+ * and Kulla 2018; its nodes' importance after pbrt-v4, 12.6.3). Behind the rows in `lights` lie a word for every row,
+ * whose bits say which child leads to it at each level, and then the nodes: see
+ * clpt/render/lowering/lights/light_tree.py. */
 #define LIGHT_TREE_SLACK 1e-3f /* of a cosine, so that rounding hides no light */
 
 /* cos and sin of max(a - b, 0) for angles in [0, pi]. */
@@ -11,7 +12,10 @@ inline void light_tree_minus(real cos_a, real sin_a, real cos_b, real sin_b, rea
     *s = sel(below, (real)(0.0f), sin_a * cos_b - cos_a * sin_b);
 }
 
-inline real light_tree_16(natural word, int shift) { return to_real(as_integer((word >> shift) & 0xffffu)) * (2.0f / 65535.0f) - 1.0f; }
+inline real light_tree_16(natural word, int shift)
+{
+    return to_real(as_integer((word >> shift) & 0xffffu)) * (2.0f / 65535.0f) - 1.0f;
+}
 
 inline vec3 light_tree_axis(natural word)
 {
@@ -67,7 +71,8 @@ inline integer light_tree_pick(Scene scene, vec3 p, real *u, real *pmf)
     while (any(open)) {
         real chance = light_tree_chance(scene, sel_i(open, at, (integer)(1)), p, &first, &second);
         mask left = *u < chance;
-        real share = sel(left, chance, 1.0f - chance), remainder = sel(left, *u, *u - chance) / max_r(share, (real)(1e-20f));
+        real share = sel(left, chance, 1.0f - chance);
+        real remainder = sel(left, *u, *u - chance) / max_r(share, (real)(1e-20f));
         *u = sel(open, clamp_r(remainder, (real)(0.0f), (real)(0.99999994f)), *u);
         *pmf *= sel(open, share, (real)(1.0f));
         at = sel_i(open, sel_i(left, first, second), at);

@@ -1,3 +1,5 @@
+/* Rays to lights, and what weighing a light that was met needs to know of the path. */
+
 /* Puts a shadow ray into its slab, for the lanes that `shine`; the other active ones have none. It goes
  * from off the surface to the point on the light: along ls.wi it would meet another one, and a light
  * seen at a grazing angle would shade itself. */
@@ -12,12 +14,12 @@ inline void shadow_toward(Slab shadow, At at, mask active, mask shine, Surface s
     store_shadow_value(shadow, at, shine, value);
 }
 
-/* Where a light is weighed that a ray has met, what counts is the pdf with which its direction was chosen,
- * and from where: further back than where the ray begins if it has passed null boundaries since. */
+/* To weigh a light that a ray has met, the pdf of the ray's direction counts, and the point where it was chosen: that
+ * lies `null_distance` [m] before the ray's origin if the path has crossed null boundaries since. */
 #if USES_NULL_SURFACES
 #define path_null_distance(path, at) load_path_null_distance(path, at)
-#define path_turned(path, at, m) store_path_null_distance(path, at, m, (real)(0.0f))
+#define path_scattered(path, at, m) store_path_null_distance(path, at, m, (real)(0.0f))
 #else
 #define path_null_distance(path, at) ((real)(0.0f))
-#define path_turned(path, at, m)
+#define path_scattered(path, at, m)
 #endif

@@ -2,7 +2,8 @@
  * around each to where the tree over shapes is fitted to. One work-item a sphere.
  *
  * A row of `source` is x y z, or x y z and the radius, before `matrix`: its first three rows, which take it
- * to the world; `scale` is by how much it enlarges. padding: see clpt.render.lowering.geometry.shapes.
+ * to the world [m]; `scale` is by how much it enlarges. padding: of a box, relative, see
+ * clpt.render.lowering.geometry.shapes.
  */
 #define FARTHEST 1e12f /* so that products of three coordinates stay inside a float */
 

@@ -1,7 +1,7 @@
-/* Shapes that move: their vertices and normals are written anew into the scene's tables.
+/* Shapes that move: their vertices [m] and normals are written anew into the scene's tables.
  *
- * A matrix is 16 floats, row after row, that take a shape's own space to the world; `begin` is the first
- * element of a thing in its buffer. Vertices `first` to first + count - 1 of the table are the shape's.
+ * A matrix is 16 floats, row after row, that take a shape's own space to the world; `<name>_begin` is the first element
+ * of `name` in its buffer. Vertices `first` to first + count - 1 of the table are the shape's.
  */
 #include "bvh/placed.cl"
 
@@ -62,9 +62,9 @@ kernel void smooth_normals(global const float *restrict vertices, global const u
 }
 
 /* One instance, whose row begins at word `at`; see bvh/placed.cl. */
-kernel void place_instance(global const float *restrict matrix, uint matrix_begin, float4 middle, float4 low,
+kernel void place_instance(global const float *restrict matrix, uint matrix_begin, float4 centre, float4 low,
                            float4 high, uint at, uint number, global uint *restrict instances,
                            global float *restrict boxes)
 {
-    placed_write(matrix + matrix_begin, middle.xyz, low.xyz, high.xyz, instances + at, boxes + 6 * number);
+    placed_write(matrix + matrix_begin, centre.xyz, low.xyz, high.xyz, instances + at, boxes + 6 * number);
 }

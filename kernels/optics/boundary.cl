@@ -1,11 +1,11 @@
 /* The contract of a boundary between two media, with or without thin films on it: optics/boundary_bare.cl,
- * boundary_film.cl and boundary_table.cl have the same functions, and one of them is chosen. */
+ * optics/boundary_film.cl and optics/boundary_table.cl have the same functions, and one of them is chosen. */
 typedef struct {
     Spectrum r, t; /* shares of unpolarised light that are reflected and let through; the rest is absorbed */
     real p;        /* probability to choose reflection, symmetric in the wavelengths */
 } Boundary;
 
-/* By the amplitudes: a film reflects little, and is there for what it reflects, often a lamp. */
+/* By the amplitudes: a film reflects little, and is there for what it reflects, often a bright light. */
 inline real reflection_probability(Spectrum r, Spectrum t)
 {
     Spectrum p;

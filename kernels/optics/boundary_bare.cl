@@ -1,5 +1,5 @@
 /* What a boundary does with light where no material of the kind has layers: Fresnel's equations alone.
- * The same functions stand in boundary_film.cl and boundary_table.cl. */
+ * The same functions stand in optics/boundary_film.cl and optics/boundary_table.cl. */
 #include "optics/fresnel.cl"
 #include "optics/boundary.cl"
 

@@ -1,22 +1,24 @@
-/* What a boundary with thin films does with light in RGB mode: the colours of what it reflects and lets
- * through under D65, which the host has summed over the wavelengths (clpt/render/lowering/materials/thin_films.py). A table has
- * up to three parts: light from outside, from inside, and from the denser side beyond the critical angle.
- * Each holds six numbers, r and t in linear Rec. 709, by profile and by the cosine on the less dense side,
- * where both sides' light agrees; beyond the critical angle by that cosine's imaginary part. */
+/* What a boundary with thin films does with light in RGB mode: the colours of what it reflects and lets through under
+ * D65, which the host has summed over the wavelengths (clpt/render/lowering/materials/thin_films.py). A table has up
+ * to three parts: light from outside, from inside, and from the denser side beyond the critical angle. Each holds six
+ * numbers, r and t in linear Rec. 709, by profile and by the cosine on the less dense side, where both sides' light
+ * agrees; beyond the critical angle by that cosine's imaginary part. */
 #include "optics/fresnel.cl"
 #include "optics/boundary.cl"
 
 /* One of the corners that are interpolated, weighted. */
 inline Boundary film_corner(Layers layers, integer at, real weight, Boundary sum)
 {
-    Spectrum r = {gather(layers.scene.spectra, at), gather(layers.scene.spectra, at + 1), gather(layers.scene.spectra, at + 2)};
-    Spectrum t = {gather(layers.scene.spectra, at + 3), gather(layers.scene.spectra, at + 4), gather(layers.scene.spectra, at + 5)};
+    Spectrum r = {gather(layers.scene.spectra, at), gather(layers.scene.spectra, at + 1),
+                  gather(layers.scene.spectra, at + 2)};
+    Spectrum t = {gather(layers.scene.spectra, at + 3), gather(layers.scene.spectra, at + 4),
+                  gather(layers.scene.spectra, at + 5)};
     sum.r = spectrum_madd(r, weight, sum.r);
     sum.t = spectrum_madd(t, weight, sum.t);
     return sum;
 }
 
-/* Bilinear look-up; where there are no layers, garbage from valid places. eta: index of the inside over
+/* Bilinear look-up; where there are no layers, garbage from valid words. eta: index of the inside over
  * the outside; of a metal 1. */
 inline Boundary film_look_up(Layers layers, real cos_i, real eta)
 {
@@ -60,5 +62,6 @@ inline Boundary facet_boundary(Layers layers, real cos_i, real eta, Spectrum out
 }
 inline Spectrum conductor_boundary(Layers layers, real cos_i, Spectrum eta, Spectrum k)
 {
-    return spectrum_sel(layers.count > 0, film_look_up(layers, cos_i, (real)(1.0f)).r, fresnel_conductor(cos_i, eta, k));
+    return spectrum_sel(layers.count > 0, film_look_up(layers, cos_i, (real)(1.0f)).r,
+                        fresnel_conductor(cos_i, eta, k));
 }

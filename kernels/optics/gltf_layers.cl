@@ -94,11 +94,11 @@ inline Spectrum film_colours(FilmSeries f, real path, Spectrum lambdas)
         real d = (float)m * path, d2 = d * d, s;
         Spectrum xyz, red;
         order = spectrum_mul(order, f.r);
-#define WAVE(value, at, centre, fall, height)                                      \
-        {                                                                          \
-            real turns = d * centre + (float)m * f.shift.at;                       \
-            sincos_2pi(turns - floor(turns), &s, &value);                          \
-            value *= height * exp_r(-fall * d2);                                   \
+#define WAVE(value, at, centre, fall, height)                \
+        {                                                    \
+            real turns = d * centre + (float)m * f.shift.at; \
+            sincos_2pi(turns - floor(turns), &s, &value);    \
+            value *= height * exp_r(-fall * d2);             \
         }
         WAVE(xyz.x, x, 1.6810e-3f, 1.708547e-7f, 0.8465900f)
         WAVE(red.x, x, 2.2399e-3f, 1.787662e-7f, 0.1538683f)
@@ -111,12 +111,12 @@ inline Spectrum film_colours(FilmSeries f, real path, Spectrum lambdas)
         v.z += 2.0f * order.z * (0.0556434f * xyz.x - 0.2040259f * xyz.y + 1.0572252f * xyz.z);
     }
 #else
-#define C(c)                                                                                        \
-    {                                                                                               \
-        real turns = path / lambdas.c + f.shift.c, s, wave;                                         \
-        sincos_2pi(turns - floor(turns), &s, &wave);                                                \
-        real low = 1.0f - 2.0f * f.r.c * wave + f.r.c * f.r.c;                                      \
-        v.c = f.dc.c + 2.0f * f.cm.c * (f.r.c * wave - f.r.c * f.r.c) / max_r(low, (real)(1e-4f));  \
+#define C(c)                                                                                       \
+    {                                                                                              \
+        real turns = path / lambdas.c + f.shift.c, s, wave;                                        \
+        sincos_2pi(turns - floor(turns), &s, &wave);                                               \
+        real low = 1.0f - 2.0f * f.r.c * wave + f.r.c * f.r.c;                                     \
+        v.c = f.dc.c + 2.0f * f.cm.c * (f.r.c * wave - f.r.c * f.r.c) / max_r(low, (real)(1e-4f)); \
     }
     SPECTRUM_EACH(C)
 #undef C
@@ -130,16 +130,16 @@ inline Spectrum iridescence(real c, Spectrum f0, real film, real thickness, Spec
     real grazing = w2 * w2 * w2 * w2 * w2;
     FilmSeries f;
     Spectrum v;
-#define C(c)                                                                                     \
-    {                                                                                            \
+#define C(c)                                                                                            \
+    {                                                                                                   \
         real root = sqrt_r(min_r(f0.c + 1e-4f, (real)(0.9998f))), base = (1.0f + root) / (1.0f - root); \
-        real r1 = sqr((base - film) / (base + film)), r23 = r1 + (1.0f - r1) * grazing;          \
-        real both = clamp_r(r12 * r23, (real)(1e-5f), (real)(0.9999f));                          \
-        real rs = t * t * r23 / (1.0f - both);                                                   \
-        f.dc.c = r12 + rs;                                                                       \
-        f.cm.c = rs - t;                                                                         \
-        f.r.c = sqrt(both);                                                                      \
-        f.shift.c = 0.5f + sel(base < film, (real)(0.5f), (real)(0.0f));                         \
+        real r1 = sqr((base - film) / (base + film)), r23 = r1 + (1.0f - r1) * grazing;                 \
+        real both = clamp_r(r12 * r23, (real)(1e-5f), (real)(0.9999f));                                 \
+        real rs = t * t * r23 / (1.0f - both);                                                          \
+        f.dc.c = r12 + rs;                                                                              \
+        f.cm.c = rs - t;                                                                                \
+        f.r.c = sqrt(both);                                                                             \
+        f.shift.c = 0.5f + sel(base < film, (real)(0.5f), (real)(0.0f));                                \
     }
     SPECTRUM_EACH(C)
 #undef C

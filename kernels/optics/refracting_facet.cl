@@ -15,8 +15,8 @@ inline RefractingFacet refracting_facet(vec3 wo, vec3 wi, real eta)
     p.h = scale3(h, sel(h.z < 0.0f, (real)(-1.0f), (real)(1.0f)));
     p.o = clamp_r(dot3(wo, p.h), (real)(-1.0f), (real)(1.0f));
     p.i = clamp_r(dot3(wi, p.h), (real)(-1.0f), (real)(1.0f));
-    real bent = sqr(eta) * fabs(p.i) / max_r(sqr(p.o + eta * p.i), (real)(1e-20f));
-    p.jacobian = sel(reflected, 0.25f / max_r(fabs(p.o), (real)(1e-20f)), bent);
+    real refracted = sqr(eta) * fabs(p.i) / max_r(sqr(p.o + eta * p.i), (real)(1e-20f));
+    p.jacobian = sel(reflected, 0.25f / max_r(fabs(p.o), (real)(1e-20f)), refracted);
     p.shading = (p.o * wo.z > 0.0f) & (p.i * wi.z > 0.0f);
     return p;
 }

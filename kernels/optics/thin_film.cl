@@ -135,12 +135,12 @@ inline Boundary thin_film(Layers layers, mask outward, real cos_i, Spectrum from
 #undef C
     }
     Boundary b;
-#define C(c)                                                                                         \
-    {                                                                                                \
-        Medium outer = medium_of(from.c, (real)(0.0f), from.c, c_i);                                 \
-        Stack whole = stack_cross(CAT(stack_, c), outer);                                            \
-        b.r.c = min_r(0.5f * (complex_norm(whole.s.r) + complex_norm(whole.p.r)), (real)(1.0f));     \
-        b.t.c = min_r(0.5f * (whole.s.t + whole.p.t), 1.0f - b.r.c);                                 \
+#define C(c)                                                                                     \
+    {                                                                                            \
+        Medium outer = medium_of(from.c, (real)(0.0f), from.c, c_i);                             \
+        Stack whole = stack_cross(CAT(stack_, c), outer);                                        \
+        b.r.c = min_r(0.5f * (complex_norm(whole.s.r) + complex_norm(whole.p.r)), (real)(1.0f)); \
+        b.t.c = min_r(0.5f * (whole.s.t + whole.p.t), 1.0f - b.r.c);                             \
     }
     SPECTRUM_EACH(C)
 #undef C

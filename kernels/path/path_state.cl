@@ -1,8 +1,9 @@
-/* Path.state: depth in bits 0 to 11, flags, and the number of shadow rays from bit 16 up. */
+/* What Path.state holds: depth in bits 0 to 11, flags, and the number of shadow rays from bit 16 up; and the dimensions
+ * of a sample. */
 #define PATH_DEPTH 0x0fff
 #define PATH_ALIVE 0x1000 /* a ray is in flight */
 #define PATH_FRESH 0x2000 /* no sample has been begun: there is nothing to deposit */
-#define PATH_DONE 0x4000  /* the slot has walked its whole list */
+#define PATH_DONE 0x4000  /* the slot is at the end of its work list */
 #define PATH_SHADOW 0x10000
 
 /* Dimensions of a sample, in pairs: film, lens, wavelength, then DIMENSIONS_A_VERTEX per vertex. */

@@ -1,4 +1,4 @@
-/* The numbers of a sample of a place of the film, along the Z curve: x and y by turns (Morton 1966). */
+/* The random numbers of a sample of a pixel, pixels along the Z curve: bits of x and y alternate (Morton 1966). */
 inline natural spread_bits(natural x) /* of 16 to every other one of 32 */
 {
     x = (x | (x << 8u)) & 0x00ff00ffu;
@@ -11,5 +11,6 @@ inline Sampler pixel_sampler(global const Settings *settings, integer pixel_inde
 {
     integer tile = pixel_index >> 4, row = divide(tile, settings->tiles_x), column = tile - row * settings->tiles_x;
     natural x = as_natural(column * 4 + (pixel_index & 3)), y = as_natural(row * 4 + ((pixel_index >> 2) & 3));
-    return zsobol_start(settings->seed, (uint)settings->sample_bits, spread_bits(x) | (spread_bits(y) << 1u), as_natural(sample));
+    return zsobol_start(settings->seed, (uint)settings->sample_bits, spread_bits(x) | (spread_bits(y) << 1u),
+                        as_natural(sample));
 }

@@ -1,7 +1,17 @@
-/* Russian roulette: the chance that a path goes on, by its throughput over what it began with. Where paths
- * end only by chance (a share of 1 each time), a little less than 1 brings them to an end; a path that has
- * still a third of its light is worth its time. Both were measured, see bench/NOTES.md. */
+/* Russian roulette: the chance that a path goes on, by its throughput over what it began with. Where paths end only by
+ * chance (1 after surfaces that absorb nothing), a little less than 1 brings them to an end; a path that still has a
+ * third of its light is worth its time. Both numbers were measured, see bench/NOTES.md. */
 #define ROULETTE_FREE 3.0f
 #define ROULETTE_MOST 0.98f
 
 inline real roulette_chance(real strength) { return min_r(ROULETTE_FREE * strength, (real)(ROULETTE_MOST)); }
+
+/* Which of the `next` paths go on: those that do not `play`, and the winners, whose throughput makes up for the
+ * others. strength: of the throughput, over what it began with; u: uniform in [0, 1). */
+inline mask roulette(mask next, mask play, real strength, real u, Spectrum *beta)
+{
+    real q = roulette_chance(strength);
+    next = next & (!play | (u < q));
+    *beta = spectrum_scale(*beta, sel(play, 1.0f / max_r(q, (real)(1e-6f)), (real)(1.0f)));
+    return next;
+}

@@ -1,4 +1,4 @@
-/* The frame in which a surface is shaded, where nothing bends it. */
+/* The frame in which a surface is shaded, where no map perturbs it. */
 typedef struct { Frame frame; } ShadingFrame;
 
 inline ShadingFrame shading_frame_load(Scene scene, integer row, Surface s, vec3 d, Wavelengths lambdas)

@@ -1,18 +1,18 @@
-/* The frame in which a surface is shaded, bent by a normal map (Cohen et al. 1998) or a bump map (Blinn
+/* The frame in which a surface is shaded, perturbed by a normal map (Cohen et al. 1998) or a bump map (Blinn
  * 1978) where its material has one. NORMAL_MAP_WORDS words before a material's row say so: flags, what scales
  * the normal map, what scales the bump map, then reals of two words each: x, y and z of the normal, 0 to 1,
  * and the height. normal_map_real is generated.
  *
  * A normal that faces away from the viewer is turned about the one of the surface (Schuessler et al. 2017).
- * The edge where a bent surface turns dark is softened as Estevez et al. 2019 do, "A Microfacet-Based
+ * The edge where a perturbed surface turns dark is softened as Estevez et al. 2019 do, "A Microfacet-Based
  * Shadowing Function to Solve the Bump Terminator Problem". Both as Mitsuba 3 has them. */
-#define BEND_INSIDE 1     /* of a two-sided material, rather than around it */
-#define BEND_ALONG_V 2    /* y of the normal goes along v even where uv is mirrored */
-#define BEND_AS_IT_IS 4   /* even a normal that faces away from the viewer */
-#define BEND_UNSHADED 8   /* the edge is not softened */
-#define BEND_NORMAL 16    /* there is a normal map */
-#define BEND_HEIGHT 32    /* there is a bump map */
-#define BEND_STEP 1e-4f   /* of uv, over which heights are compared */
+#define PERTURB_INSIDE 1     /* of a two-sided material, rather than around it */
+#define PERTURB_ALONG_V 2    /* y of the normal goes along v even where uv is mirrored */
+#define PERTURB_AS_IT_IS 4   /* even a normal that faces away from the viewer */
+#define PERTURB_UNSHADED 8   /* the edge is not softened */
+#define PERTURB_NORMAL 16    /* there is a normal map */
+#define PERTURB_HEIGHT 32    /* there is a bump map */
+#define PERTURB_STEP 1e-4f   /* of uv, over which heights are compared */
 
 typedef struct {
     Frame frame;
@@ -20,7 +20,8 @@ typedef struct {
     real alpha2; /* roughness of the softened edge, squared */
 } ShadingFrame;
 
-inline real bend_height(Scene scene, integer at, TexturePoint point, Surface s, real u, real v, Wavelengths lambdas)
+inline real perturbed_height(Scene scene, integer at, TexturePoint point, Surface s, real u, real v,
+                             Wavelengths lambdas)
 {
     point.uv.x += u;
     point.uv.y += v;
@@ -35,51 +36,52 @@ inline ShadingFrame shading_frame_load(Scene scene, integer row, Surface s, vec3
     TexturePoint point = surface_texture_point(s);
     integer at = max_i(row - NORMAL_MAP_WORDS, (integer)(0)), flags = gather_i(scene.materials, at);
     vec3 n = v3(0.0f, 0.0f, 1.0f);
-    mask inside = (flags & BEND_INSIDE) != 0;
-    mask bumpy = (flags & BEND_HEIGHT) != 0;
+    mask inside = (flags & PERTURB_INSIDE) != 0;
+    mask bumpy = (flags & PERTURB_HEIGHT) != 0;
     if (any(bumpy)) {
-        real h = bend_height(scene, at + 9, point, s, (real)(0.0f), (real)(0.0f), lambdas);
-        real hu = bend_height(scene, at + 9, point, s, (real)(BEND_STEP), (real)(0.0f), lambdas);
-        real hv = bend_height(scene, at + 9, point, s, (real)(0.0f), (real)(BEND_STEP), lambdas);
-        real slope = gather_w(scene.materials, at + 2) * (1.0f / BEND_STEP);
+        real h = perturbed_height(scene, at + 9, point, s, (real)(0.0f), (real)(0.0f), lambdas);
+        real hu = perturbed_height(scene, at + 9, point, s, (real)(PERTURB_STEP), (real)(0.0f), lambdas);
+        real hv = perturbed_height(scene, at + 9, point, s, (real)(0.0f), (real)(PERTURB_STEP), lambdas);
+        real slope = gather_w(scene.materials, at + 2) * (1.0f / PERTURB_STEP);
         /* From behind what rises sinks; a map inside of a two-sided material rises on both sides. */
-        slope = sel(s.turned & !inside, -slope, slope);
+        slope = sel(s.flipped & !inside, -slope, slope);
         vec3 u = madd3(s.ns, (hu - h) * slope - dot3(s.ns, s.dpdu), s.dpdu);
         vec3 v = madd3(s.ns, (hv - h) * slope - dot3(s.ns, s.dpdv), s.dpdv);
         vec3 across = to_local(f.base, cross3(u, v));
         mask usable = bumpy & (fabs(across.z) > 1e-20f);
         n = sel3(usable, scale3(across, sel(across.z < 0.0f, (real)(-1.0f), (real)(1.0f))), n);
     }
-    mask mapped = (flags & BEND_NORMAL) != 0;
+    mask mapped = (flags & PERTURB_NORMAL) != 0;
     if (any(mapped)) {
         real scale = gather_w(scene.materials, at + 1) * 2.0f;
         real x = (normal_map_real(scene, at + 3, point, lambdas) - 0.5f) * scale;
         real y = (normal_map_real(scene, at + 5, point, lambdas) - 0.5f) * scale;
         real z = normal_map_real(scene, at + 7, point, lambdas) * 2.0f - 1.0f;
-        mask mirrored = ((flags & BEND_ALONG_V) != 0) & (dot3(f.base.t, s.dpdv) < 0.0f) & !s.turned;
-        mask behind = ((flags & BEND_ALONG_V) != 0) & (dot3(f.base.t, s.dpdv) > 0.0f) & s.turned;
-        x = sel(s.turned & !inside, -x, x);
-        y = sel((s.turned & inside) != (mirrored | behind), -y, y);
+        mask mirrored = ((flags & PERTURB_ALONG_V) != 0) & (dot3(f.base.t, s.dpdv) < 0.0f) & !s.flipped;
+        mask behind = ((flags & PERTURB_ALONG_V) != 0) & (dot3(f.base.t, s.dpdv) > 0.0f) & s.flipped;
+        x = sel(s.flipped & !inside, -x, x);
+        y = sel((s.flipped & inside) != (mirrored | behind), -y, y);
         vec3 m = v3(x, y, z);
         n = sel3(mapped & (dot3(m, m) > 1e-12f), m, n);
     }
     vec3 wo = to_local(f.base, neg3(d));
-    mask away = (wo.z * dot3(wo, n) <= 0.0f) & ((flags & BEND_AS_IT_IS) == 0);
+    mask away = (wo.z * dot3(wo, n) <= 0.0f) & ((flags & PERTURB_AS_IT_IS) == 0);
     n = normalize3(v3(sel(away, -n.x, n.x), sel(away, -n.y, n.y), n.z));
     vec3 along = normalize3(v3(1.0f - n.x * n.x, -n.x * n.y, -n.x * n.z));
     f.frame.n = to_world(f.base, n);
     f.frame.s = to_world(f.base, along);
     f.frame.t = cross3(f.frame.n, f.frame.s);
     real tan2 = 1.0f / max_r(n.z * n.z, (real)(1e-12f)) - 1.0f;
-    f.alpha2 = sel((flags & BEND_UNSHADED) != 0, (real)(0.0f), clamp_r(0.125f * tan2, (real)(0.0f), (real)(1.0f)));
+    f.alpha2 = sel((flags & PERTURB_UNSHADED) != 0, (real)(0.0f), clamp_r(0.125f * tan2, (real)(0.0f), (real)(1.0f)));
     return f;
 }
 
-/* What is left of light toward or from `w`: none where the bent surface and the real one disagree on the side. */
+/* What is left of light toward or from `w`: none where the
+ * perturbed surface and the real one disagree on the side. */
 inline real shading_frame_share(ShadingFrame f, vec3 w)
 {
-    real z = dot3(f.base.n, w), bent = dot3(f.frame.n, w);
+    real z = dot3(f.base.n, w), perturbed = dot3(f.frame.n, w);
     real tan2 = 1.0f / max_r(z * z, (real)(1e-12f)) - 1.0f;
     real share = 2.0f / (1.0f + sqrt(1.0f + f.alpha2 * max_r(tan2, (real)(0.0f))));
-    return sel(z * bent > 0.0f, share, (real)(0.0f));
+    return sel(z * perturbed > 0.0f, share, (real)(0.0f));
 }

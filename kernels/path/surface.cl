@@ -1,4 +1,4 @@
-/* Where a path is: the point that a ray hit, with all that shading asks for. */
+/* The point of a surface that a ray hit, with all that shading asks for. */
 #include "path/surface_flags.cl"
 #include "tracing/trace_hit.cl"
 #include "generated/instances.cl"
@@ -10,7 +10,7 @@ typedef struct {
     vec3 dpdu;    /* along the surface's u; not normalised, may be zero */
     vec3 dpdv;    /* and along v */
     vec2 uv;
-    mask turned;  /* the back of a two-sided surface: ns has been turned round */
+    mask flipped; /* the back of a two-sided surface was hit, and ns negated */
     integer light; /* row in `lights`, -1: does not emit */
 #if USES_ATTRIBUTES
     integer attributes, face; /* of triangles, see texturing/texture_point.cl */
@@ -30,7 +30,7 @@ inline vec2 vertex_vec2(global const float *table, integer vertex)
 }
 
 /* The surface where the ray from `o` along `d` ends. `front` tells which side was hit. A two-sided
- * back is turned round, so that the BSDF sees a front. USES_NORMALS, USES_UVS and USES_TANGENTS say
+ * back has its normals negated, so that the BSDF sees a front. USES_NORMALS, USES_UVS and USES_TANGENTS say
  * what the scene needs; dpdu_of_shape and dpdv_of_shape are generated for its analytic shapes. */
 inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, mask *front)
 {
@@ -66,7 +66,8 @@ inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, 
 #if USES_NORMALS || USES_UVS || USES_TANGENTS
     mask triangle = active & (shape.kind == 0);
     integer corner = sel_i(triangle, prim, (integer)(0)) * 3;
-    integer a = gather_i(scene.faces, corner), b = gather_i(scene.faces, corner + 1), c = gather_i(scene.faces, corner + 2);
+    integer a = gather_i(scene.faces, corner), b = gather_i(scene.faces, corner + 1);
+    integer c = gather_i(scene.faces, corner + 2);
     real u = s.uv.x, v = s.uv.y, w = 1.0f - u - v;
 #endif
 #if USES_NORMALS
@@ -114,9 +115,9 @@ inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, 
     /* Each normal is turned to the viewer by itself: where they disagree, as at the silhouette of a coarse
      * mesh, a BSDF that saw its back would be black. */
     mask both = (shape.flags & SHAPE_TWO_SIDED) != 0;
-    s.turned = both & (dot3(s.ns, d) > 0.0f);
+    s.flipped = both & (dot3(s.ns, d) > 0.0f);
     s.n = sel3(both & !*front, neg3(s.n), s.n);
-    s.ns = sel3(s.turned, neg3(s.ns), s.ns);
+    s.ns = sel3(s.flipped, neg3(s.ns), s.ns);
     return s;
 }
 

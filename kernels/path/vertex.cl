@@ -1,5 +1,5 @@
-/* What every integrator begins with at a vertex: the path that arrives, the surface that it meets, and
- * what has absorbed of it on the way. */
+/* What integrators share at a vertex of a path: the ray that arrives, the surface that it meets, how the material
+ * scatters there, and how the path goes on. The ray's throughput has been dimmed by what absorbs along it. */
 typedef struct {
     vec3 o, d;            /* the ray that arrives; d of unit length */
     real t;               /* and its length [m] */
@@ -7,13 +7,24 @@ typedef struct {
     Spectrum beta;        /* throughput, here */
     integer state, depth; /* see path/path_state.cl */
     Surface s;
-    mask front;           /* which side was hit */
+    mask front;           /* the front was hit */
     integer row;          /* of the material */
 #if USES_ABSORPTION
     integer medium;       /* that the ray has come through */
     integer inside;       /* what is behind the surface */
 #endif
 } Vertex;
+
+/* The material at a vertex, and the random numbers of the vertex. */
+typedef struct {
+    Sampler sampler;
+    natural dimension;     /* the first of the vertex */
+    vec2 choice;           /* chooses a light, and a lobe; 0 where there is nothing to choose */
+    Wavelengths lambdas;   /* by which light comes: others than the vertex's where it fluoresces */
+    Bsdf bsdf;
+    ShadingFrame shading;
+    vec3 wo;               /* to where the ray comes from, in shading.frame */
+} Scattering;
 
 inline Vertex vertex_load(Scene scene, Slab path, Slab hit, At at, mask active)
 {
@@ -35,8 +46,30 @@ inline Vertex vertex_load(Scene scene, Slab path, Slab hit, At at, mask active)
     return v;
 }
 
-/* The side of the surface to which the material sends light, for interface/light.cl. */
-inline vec3 vertex_side(Frame frame, vec3 wo)
+/* Loads the material. Where it fluoresces, the `active` paths take the wavelengths by which light comes. */
+inline Scattering vertex_scattering(Scene scene, Slab path, At at, mask active, Vertex v, Sampler sampler)
+{
+    Scattering scatter;
+    scatter.sampler = sampler;
+    scatter.dimension = as_natural(DIMENSION_VERTEX + v.depth * DIMENSIONS_A_VERTEX);
+    scatter.choice.x = 0.0f;
+    scatter.choice.y = 0.0f;
+#if USES_CHOICE
+    scatter.choice = sampler_pair(sampler, scatter.dimension + DIMENSION_CHOICE);
+#endif
+    scatter.lambdas = v.lambdas;
+    scatter.bsdf = bsdf_load(scene, v.row, surface_texture_point(v.s), v.lambdas);
+#if BSDF_FLUORESCES
+    scatter.lambdas = bsdf_shift(scene, v.row, scatter.bsdf, v.lambdas, scatter.choice.y, v.depth);
+    store_path_lambdas(path, at, active, scatter.lambdas);
+#endif
+    scatter.shading = shading_frame_load(scene, v.row, v.s, v.d, scatter.lambdas);
+    scatter.wo = to_local(scatter.shading.frame, neg3(v.d));
+    return scatter;
+}
+
+/* The normal of the hemisphere to which the material sends light, 0 if to the whole sphere: for interface/light.cl. */
+inline vec3 vertex_hemisphere(Frame frame, vec3 wo)
 {
     real sign = BSDF_TRANSMITS ? (real)(0.0f) : sel(wo.z < 0.0f, (real)(-1.0f), (real)(1.0f));
     return scale3(frame.n, sign);
@@ -52,7 +85,7 @@ inline Spectrum vertex_beyond(Scene scene, Vertex v, vec3 w, real t, Wavelengths
     return value;
 }
 
-/* The path goes on from here, along d. */
+/* The `next` paths go on from here, along d. */
 inline void vertex_leave(Slab path, At at, mask next, Vertex v, vec3 d, Spectrum beta)
 {
     store_path_o(path, at, next, surface_offset(v.s, d));
@@ -61,4 +94,11 @@ inline void vertex_leave(Slab path, At at, mask next, Vertex v, vec3 d, Spectrum
 #if USES_ABSORPTION
     store_path_medium(path, at, next, medium_beyond(v.medium, v.inside, v.front, dot3(v.s.n, d) < 0.0f));
 #endif
+}
+
+/* The `active` paths are a vertex longer; those that do not go on are no longer alive. */
+inline void vertex_end(Slab path, At at, mask active, mask next, integer state)
+{
+    state = sel_i(next, state, state - (state & PATH_ALIVE)) + sel_i(active, (integer)(1), (integer)(0));
+    store_path_state(path, at, active, state);
 }

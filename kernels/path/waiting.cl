@@ -1,4 +1,4 @@
-/* Which kind of material a slot waits to be shaded by. */
+/* Which kind of material is to shade the path of a slot, for the stages that sort slots by it. */
 #include "path/surface_flags.cl"
 
 /* The kind, or -1. */

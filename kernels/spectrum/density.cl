@@ -1,7 +1,8 @@
-/* Wavelengths by a tabulated density, linear between nodes of equal distance (clpt/render/lowering/camera/wavelengths.py).
+/* Wavelengths by a tabulated density, linear between nodes of equal distance
+ * (clpt/render/lowering/camera/wavelengths.py).
  * At settings->density in `distributions`: the number of cells n, the first node and the distance
  * [nm], n + 1 cumulative shares, n + 1 densities [1/nm], and the cells in which the shares i / GUIDES
- * lie, for i from 0 to GUIDES. Same functions in visible.cl. */
+ * lie, for i from 0 to GUIDES. Same functions in spectrum/visible.cl. */
 #define GUIDES 1024 /* a power of two, so that u * GUIDES is exact; as in clpt/render/lowering/camera/wavelengths.py */
 
 /* The wavelength below which a share u of the density lies [nm]. */
@@ -37,11 +38,11 @@ inline Wavelengths wavelengths_sample(Scene scene, real u)
 {
     real offset = 0.0f;
     Wavelengths r;
-#define C(c)                                        \
-    {                                               \
-        real v = u + offset;                        \
-        r.c = density_invert(scene, v - floor(v));  \
-        offset += 0.25f;                            \
+#define C(c)                                       \
+    {                                              \
+        real v = u + offset;                       \
+        r.c = density_invert(scene, v - floor(v)); \
+        offset += 0.25f;                           \
     }
     SPECTRUM_EACH(C)
 #undef C
@@ -56,7 +57,7 @@ inline Spectrum wavelengths_weigh(Scene scene, Spectrum radiance, Wavelengths la
 #undef C
     return r;
 }
-/* What a film place adds for a sample; rows 1 to 3 hold the sensor's curves. */
+/* What a sample adds to a pixel; rows 1 to 3 hold the sensor's curves. */
 inline vec3 film_value(Scene scene, Spectrum radiance, Wavelengths lambdas)
 {
     Spectrum weighed = wavelengths_weigh(scene, radiance, lambdas);

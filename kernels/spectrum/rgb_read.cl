@@ -1,4 +1,4 @@
-/* Reading spectra from tables, and from light to film, in RGB mode. Same functions in spectral_read.cl. */
+/* Reading spectra from tables, and from light to film, in RGB mode. Same functions in spectrum/spectral_read.cl. */
 typedef Spectrum Wavelengths;
 
 /* A value that stands in the row itself: linear rgb. */
@@ -35,7 +35,8 @@ inline Spectrum spectrum_light_texel_at(Scene scene, global const uint *table, i
     return spectrum_texel_at(table, at, lambdas);
 }
 /* And for a texel that takes a word: a byte a channel, whose meaning stands in 256 words from `decode`. */
-inline Spectrum spectrum_packed_texel(global const uint *table, integer first, integer index, integer decode, Wavelengths lambdas)
+inline Spectrum spectrum_packed_texel(global const uint *table, integer first, integer index, integer decode,
+                                      Wavelengths lambdas)
 {
     integer word = gather_i(table, first + index);
     Spectrum r = {gather_w(table, decode + (word & 255)), gather_w(table, decode + ((word >> 8) & 255)),
@@ -48,7 +49,7 @@ inline Wavelengths wavelengths_sample(Scene scene, real u)
 {
     return spectrum_of(0.0f);
 }
-/* What a film place adds for a sample: rgb. */
+/* What a sample adds to a pixel: rgb. */
 inline vec3 film_value(Scene scene, Spectrum radiance, Wavelengths lambdas)
 {
     return v3(radiance.x, radiance.y, radiance.z);

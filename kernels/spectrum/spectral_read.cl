@@ -1,4 +1,5 @@
-/* Reading spectra at a path's wavelengths, and from light to film. Same functions in rgb_read.cl.
+/* Reading spectra at a path's wavelengths, and from light to film. Same functions in
+ * spectrum/rgb_read.cl.
  * Tables lie on a grid of SPECTRA_STEP nm from settings->lambda_min; row 0 is D65, then the sensor. */
 typedef Spectrum Wavelengths;
 
@@ -8,12 +9,12 @@ inline Spectrum spectra_row(Scene scene, integer row, Wavelengths lambdas)
     integer first = row * SPECTRA_SIZE;
     real lo = scene.settings->lambda_min;
     Spectrum r;
-#define C(c)                                                                                    \
-    {                                                                                           \
+#define C(c)                                                                                                     \
+    {                                                                                                            \
         real x = clamp_r((lambdas.c - lo) * (1.0f / SPECTRA_STEP), (real)(0.0f), (real)(SPECTRA_SIZE - 1.001f)); \
-        integer i = to_integer(x);                                                              \
-        real a = gather(scene.spectra, first + i), b = gather(scene.spectra, first + i + 1);    \
-        r.c = a + (x - to_real(i)) * (b - a);                                                   \
+        integer i = to_integer(x);                                                                               \
+        real a = gather(scene.spectra, first + i), b = gather(scene.spectra, first + i + 1);                     \
+        r.c = a + (x - to_real(i)) * (b - a);                                                                    \
     }
     SPECTRUM_EACH(C)
 #undef C
@@ -23,10 +24,10 @@ inline Spectrum spectra_row(Scene scene, integer row, Wavelengths lambdas)
 inline Spectrum sigmoid_spectrum(real c0, real c1, real c2, real w, Wavelengths lambdas)
 {
     Spectrum r;
-#define C(c)                                                    \
-    {                                                           \
-        real x = (c0 * lambdas.c + c1) * lambdas.c + c2;        \
-        r.c = w * (0.5f + 0.5f * x / sqrt(1.0f + x * x));       \
+#define C(c)                                              \
+    {                                                     \
+        real x = (c0 * lambdas.c + c1) * lambdas.c + c2;  \
+        r.c = w * (0.5f + 0.5f * x / sqrt(1.0f + x * x)); \
     }
     SPECTRUM_EACH(C)
 #undef C
@@ -70,17 +71,18 @@ inline Spectrum spectrum_grey_light(Scene scene, real value, Wavelengths lambdas
 }
 /* And for a texel of two words: a sigmoid's argument at 400, 550 and 700 nm, as floats of 21 bits, two in
  * the words' upper bits, the third in what is left. In between it is the parabola through them. */
-inline Spectrum spectrum_packed_texel(global const uint *table, integer first, integer index, integer decode, Wavelengths lambdas)
+inline Spectrum spectrum_packed_texel(global const uint *table, integer first, integer index, integer decode,
+                                      Wavelengths lambdas)
 {
     integer at = first + 2 * index, p = gather_i(table, at), q = gather_i(table, at + 1);
     real a = as_real(p & ~0x7ff), b = as_real(q & ~0x7ff);
     real c = as_real(((p & 0x7ff) << 21) | ((q & 0x3ff) << 11));
     Spectrum r;
-#define C(c_)                                                                                        \
-    {                                                                                                \
-        real u = (lambdas.c_ - 400.0f) * (1.0f / 150.0f), v = u - 1.0f, w = u - 2.0f;                 \
-        real x = 0.5f * (a * v * w + c * u * v) - b * u * w;                                         \
-        r.c_ = 0.5f + 0.5f * x / sqrt(1.0f + x * x);                                                 \
+#define C(c_)                                                                         \
+    {                                                                                 \
+        real u = (lambdas.c_ - 400.0f) * (1.0f / 150.0f), v = u - 1.0f, w = u - 2.0f; \
+        real x = 0.5f * (a * v * w + c * u * v) - b * u * w;                          \
+        r.c_ = 0.5f + 0.5f * x / sqrt(1.0f + x * x);                                  \
     }
     SPECTRUM_EACH(C)
 #undef C

@@ -1,9 +1,10 @@
-/* Sums the planes of the film into a picture, pixel by pixel, and takes it to the output space by the
- * matrix in the settings; the fourth value of a pixel is its number of samples. Planes are added in a fixed order, so a picture does not depend on timing. */
+/* Sums the planes of the film into a picture, pixel by pixel, and takes it to the output space by the matrix in the
+ * settings; the fourth value of a pixel is its number of samples. Planes are added in a fixed order, so a picture
+ * does not depend on timing. */
 #include "core/base.cl"
 #include "film/film.cl"
 
-#ifdef LIGHT_PATHS /* how many there were per pixel; they leave something anywhere */
+#ifdef LIGHT_PATHS /* the host says how many light paths there were per pixel: each may have lit any pixel */
 #define SAMPLES_ARG , float samples
 #define SAMPLES(own) samples
 #else
@@ -13,13 +14,10 @@
 
 kernel void accumulate(global const Settings *settings, global const float *film, global float *image SAMPLES_ARG)
 {
-    int x = get_global_id(0), y = get_global_id(1), padded_pixels = settings->padded_pixels;
+    int x = get_global_id(0), y = get_global_id(1);
     if (x < settings->width && y < settings->height) {
-        int pixel_index = ((y >> 2) * settings->tiles_x + (x >> 2)) * 16 + (y & 3) * 4 + (x & 3);
         float v[FILM_WORDS];
-        for (int i = 0; i < FILM_WORDS; i++) v[i] = 0.0f;
-        for (int plane = 0; plane < settings->planes; plane++)
-            for (int i = 0; i < FILM_WORDS; i++) v[i] += film[(plane * FILM_WORDS + i) * padded_pixels + pixel_index];
+        film_sum(settings, film, film_pixel_index(settings, x, y), 0, FILM_WORDS, v);
         float scale = SAMPLES(v[6]) > 0.0f ? 1.0f / SAMPLES(v[6]) : 1.0f;
         float a = (v[0] + v[3]) * scale, b = (v[1] + v[4]) * scale, c = (v[2] + v[5]) * scale;
         global float *pixel = image + 4 * ((size_t)y * settings->width + x);

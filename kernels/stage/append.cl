@@ -1,6 +1,6 @@
-/* Gathers the paths that met a surface by the kind of its material, a queue for each, `slots` words apart. A
- * group of work-items counts in local memory what it has of each kind, and takes places for all of them
- * with one addition to a kind's count. In what order groups come does not matter to the picture. */
+/* Gathers the paths that met a surface by the kind of its material, a queue for each, `slots` words each. A
+ * group of work-items counts in local memory what it has of each kind, and reserves room for all of
+ * them with one addition to a kind's count. The order of the groups does not matter to the picture. */
 #include "core/base.cl"
 #include "path/waiting.cl"
 

@@ -18,20 +18,23 @@ STAGE(mix_materials)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
     SCENE
     STAGE_AT
     integer state = load_path_state(path, at), word = load_hit_material(hit, at);
-    mask active = ((state & PATH_ALIVE) != 0) & (load_hit_prim(hit, at) >= 0), open = active & (MATERIAL_KIND(word) == MIXTURE);
+    mask active = ((state & PATH_ALIVE) != 0) & (load_hit_prim(hit, at) >= 0);
+    mask open = active & (MATERIAL_KIND(word) == MIXTURE);
     if (any(open)) {
         mask front, chosen = open;
         Surface s = surface_load(scene, hit, at, open, load_path_o(path, at), load_path_d(path, at), &front);
         Wavelengths lambdas = load_path_lambdas(path, at);
         Sampler sampler = pixel_sampler(scene.settings, load_path_pixel_index(path, at), load_path_sample(path, at));
-        natural dimension = as_natural(DIMENSION_VERTEX + (state & PATH_DEPTH) * DIMENSIONS_A_VERTEX + DIMENSION_ROULETTE);
+        natural dimension = as_natural(DIMENSION_VERTEX + (state & PATH_DEPTH) * DIMENSIONS_A_VERTEX +
+                                       DIMENSION_ROULETTE);
         real u = sampler_pair(sampler, dimension).y;
         for (; any(open); open = open & (MATERIAL_KIND(word) == MIXTURE)) {
             integer row = sel_i(open, MATERIAL_ROW(word), (integer)(0));
             real w = mixture_weight(scene, row, surface_texture_point(s), lambdas);
             mask second = u < w;
             /* What is left of u is as good as new. */
-            u = min_r(sel(second, u / max_r(w, (real)(1e-20f)), (u - w) / max_r(1.0f - w, (real)(1e-20f))), (real)(0.9999999f));
+            u = min_r(sel(second, u / max_r(w, (real)(1e-20f)), (u - w) / max_r(1.0f - w, (real)(1e-20f))),
+                      (real)(0.9999999f));
             integer next = sel_i(second, gather_i(scene.mixtures, row + 3), gather_i(scene.mixtures, row + 2));
             word = sel_i(open, next, word);
         }

@@ -1,16 +1,19 @@
-/* How much the film has changed since it was looked at last, for adaptive sampling (clpt/render/wavefront/adaptive.py).
- * If a pixel's mean was a after n samples and is b after m, (b - a)^2 n / (m - n) is an estimate of the variance
- * of b, without bias where samples are independent; of points that are spread evenly it is above the variance. A
- * work-item takes a 4x4 tile, whose pixels count apart by the two colours of a chessboard. */
+/* How much the film has changed since it was measured last, for adaptive sampling
+ * (clpt/render/wavefront/adaptive.py). If a pixel's mean was a after n samples and is b after m, (b - a)^2 n / (m - n)
+ * is an estimate of the variance of b, without bias where samples are independent; for samples that are spread evenly
+ * it is above the variance. A work-item takes a 4x4 tile; the pixels of the two colours of a chessboard are summed
+ * separately. */
 #include "core/base.cl"
 #include "film/film.cl"
 
-/* side: pixels of the cells' squares; asked: whether a cell is to be looked at, a square's two colours after
- * each other; former: luminance and samples of every place then; found: three sums per tile and colour. */
+/* A cell is the pixels of one colour in a square of `side` times `side` pixels. active_cells: which cells to measure,
+ * a square's two colours after each other; previous_mean: luminance of every pixel when it was measured last, then
+ * the samples that it had; noise_sums: variance, luminance and number of pixels, per tile and colour. */
 kernel void noise(global const Settings *settings, global const float *film, global const uint *active_cells,
                   global float *previous_mean, global float *noise_sums, int side)
 {
-    int tile = get_global_id(0), padded_pixels = settings->padded_pixels, squares = (settings->width + side - 1) / side;
+    int tile = get_global_id(0), padded_pixels = settings->padded_pixels;
+    int squares = (settings->width + side - 1) / side;
     int row = tile / settings->tiles_x, column = tile - row * settings->tiles_x;
     int square = row * 4 / side * squares + column * 4 / side;
     for (int colour = 0; colour < 2; colour++) {
@@ -18,12 +21,10 @@ kernel void noise(global const Settings *settings, global const float *film, glo
         for (int i = 0; i < 16 && active_cells[2 * square + colour]; i++) {
             int x = column * 4 + (i & 3), y = row * 4 + (i >> 2), pixel_index = tile * 16 + i;
             if (((x + y) & 1) != colour || x >= settings->width || y >= settings->height) continue;
-            float v[3] = {0.0f, 0.0f, 0.0f}, samples = 0.0f;
-            for (int plane = 0; plane < settings->planes; plane++) {
-                global const float *at = film + plane * FILM_WORDS * padded_pixels + pixel_index;
-                for (int k = 0; k < 3; k++) v[k] += at[k * padded_pixels] + at[(k + 3) * padded_pixels];
-                samples += at[6 * padded_pixels];
-            }
+            float w[FILM_WORDS], v[3];
+            film_sum(settings, film, pixel_index, 0, FILM_WORDS, w);
+            float samples = w[6];
+            for (int k = 0; k < 3; k++) v[k] = w[k] + w[k + 3];
 #if SPECTRUM_SIZE == 3
             float now = (0.2126f * v[0] + 0.7152f * v[1] + 0.0722f * v[2]) / fmax(samples, 1.0f);
 #else

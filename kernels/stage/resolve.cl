@@ -58,12 +58,12 @@ inline float4 as_floats(float4 v, int encoded)
     return v;
 }
 
-#define PICTURE_ARGS \
+#define PICTURE_ARGS                                                                                            \
     global const float4 *film, global const float *steps, int converted, float4 red, float4 green, float4 blue, \
     float scale, int tone, int encoded, int flip
-#define PICTURE_PIXEL \
+#define PICTURE_PIXEL                                                                               \
     int x = get_global_id(0), y = get_global_id(1), w = get_global_size(0), h = get_global_size(1); \
-    int row = flip ? h - 1 - y : y; \
+    int row = flip ? h - 1 - y : y;                                                                 \
     float4 v = shown(film[(size_t)y * w + x], converted, red, green, blue, scale, tone)
 
 /* at: where the picture begins in `into` [elements]. */

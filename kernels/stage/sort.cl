@@ -1,6 +1,6 @@
 /* Sorts the paths that met a surface by the kind of its material: a stable counting sort of slot
- * indices, so that a kind's indices ascend. Every work-item counts, and later places, a chunk of
- * neighbouring slots; in between, one work-item sums. No atomics, no barriers. */
+ * indices, so that a kind's indices ascend. Every work-item counts a chunk of neighbouring
+ * slots and later puts them into the queue; in between, one work-item sums. No atomics, no barriers. */
 #include "core/base.cl"
 #include "path/waiting.cl"
 
@@ -17,7 +17,7 @@ kernel void sort_count(SLAB_ARGS, global uint *counts, uint chunk, uint slots)
     for (int k = 0; k < BSDF_COUNT; k++) counts[k * chunks + id] = tally[k];
 }
 
-/* Turns counts into places in the queue, and tells where each kind begins and how long it is. */
+/* Turns counts into positions in the queue, and tells where each kind begins and how long it is. */
 kernel void sort_scan(global uint *counts, global uint *queue_starts, global uint *queue_counts, uint chunks)
 {
     uint total = 0;

@@ -1,9 +1,7 @@
-/* Tests the rays that wait to reach the camera, and adds what they carry to the pixel that sees them. */
+/* Tests the rays that wait to reach the camera, and adds what arrives of what they carry to the pixel that sees it. */
 #include "core/base.cl"
-#include "interface/shape.cl"
-#include "generated/trace.cl"
-#include "generated/transmittance.cl"
 #include "interface/stage.cl"
+#include "path/shadow_ray.cl"
 #include "film/film.cl"
 #include "film/splat.cl"
 
@@ -15,15 +13,13 @@ STAGE(splat)(SLAB_ARGS, SCENE_ARGS, JOIN_ARGS STAGE_AT_ARG)
     real t = load_shadow_t(shadow, at);
     mask active = t > 0.0f;
     if (any(active)) {
-        vec3 o = load_shadow_o(shadow, at), d = load_shadow_d(shadow, at);
+        real transmittance = shadow_ray_transmittance(TRACE_PASSED, scene, path, shadow, at, t, active);
+        mask arrives = active & (transmittance > 0.0f);
         Wavelengths lambdas = load_path_lambdas(path, at);
-        real share = trace_transmittance(TRACE_PASSED, scene, o, d, t, lambdas, active);
-        mask open = active & (share > 0.0f);
-        vec3 value = film_value(scene, spectrum_scale(load_shadow_value(shadow, at), share), lambdas);
-        mask sane = open & (fabs(value.x) + fabs(value.y) + fabs(value.z) < 1e30f); /* false for NaN */
+        vec3 value = film_value(scene, spectrum_scale(load_shadow_value(shadow, at), transmittance), lambdas);
+        mask accepted = arrives & film_accepts(value);
         integer plane = divide(LANE_INDEX + (int)at, settings->per_plane);
-        film_splat(settings, film, sane, plane, load_shadow_pixel(shadow, at), value);
-        count(counters, COUNTER_REJECTED, open & !sane, (integer)(1));
-        store_shadow_t(shadow, at, active, (real)(-1.0f));
+        film_splat(settings, film, accepted, plane, load_shadow_pixel(shadow, at), value);
+        count(counters, COUNTER_REJECTED, arrives & !accepted, (integer)(1));
     }
 }

@@ -4,7 +4,7 @@
 typedef struct {
     integer x0, x1, y0, y1; /* columns and rows of the four texels, inside the image */
     real u0, u1, v0, v1;    /* their weights */
-} BitmapPlace;
+} BitmapTexels;
 
 inline integer bitmap_wrap(integer i, integer size, integer wrap)
 {
@@ -14,7 +14,7 @@ inline integer bitmap_wrap(integer i, integer size, integer wrap)
     return min_i(max_i(i, (integer)(0)), size - 1);
 }
 
-/* One axis: two places, and their weights; what lies outside weighs nothing where the wrap is zero. A
+/* One axis: two texels, and their weights; what lies outside weighs nothing where the wrap is zero. A
  * coordinate that is huge or not a number still ends inside the image. */
 inline void bitmap_axis(real x, integer size, integer wrap, mask smooth, integer *i0, integer *i1, real *w0, real *w1)
 {
@@ -31,18 +31,18 @@ inline void bitmap_axis(real x, integer size, integer wrap, mask smooth, integer
     *i1 = bitmap_wrap(second, size, wrap);
 }
 
-inline BitmapPlace bitmap_place(Bitmap t, Scene scene, TexturePoint point)
+inline BitmapTexels bitmap_texels(Bitmap t, Scene scene, TexturePoint point)
 {
     vec3 p = texture_uv(scene, t.mapping, t.transform, point);
     mask smooth = t.filter == BITMAP_FILTER_BILINEAR;
-    BitmapPlace b;
+    BitmapTexels b;
     bitmap_axis(dot3(t.to_u, p), t.width, t.wrap_u, smooth, &b.x0, &b.x1, &b.u0, &b.u1);
     bitmap_axis(dot3(t.to_v, p), t.height, t.wrap_v, smooth, &b.y0, &b.y1, &b.v0, &b.v1);
     return b;
 }
 
 /* One of the four texels: its index in the image, and its weight. */
-inline integer bitmap_corner(Bitmap t, BitmapPlace b, int corner, real *weight)
+inline integer bitmap_corner(Bitmap t, BitmapTexels b, int corner, real *weight)
 {
     int right = corner & 1, next = corner >> 1;
     *weight = (right ? b.u1 : b.u0) * (next ? b.v1 : b.v0);
@@ -51,7 +51,7 @@ inline integer bitmap_corner(Bitmap t, BitmapPlace b, int corner, real *weight)
 
 Spectrum bitmap_reflectance(Bitmap t, Scene scene, TexturePoint point, Wavelengths lambdas)
 {
-    BitmapPlace b = bitmap_place(t, scene, point);
+    BitmapTexels b = bitmap_texels(t, scene, point);
     Spectrum sum = spectrum_of(0.0f);
     for (int corner = 0; corner < 4; corner++) {
         real weight;
@@ -64,7 +64,7 @@ Spectrum bitmap_reflectance(Bitmap t, Scene scene, TexturePoint point, Wavelengt
 
 Spectrum bitmap_emission(Bitmap t, Scene scene, TexturePoint point, Wavelengths lambdas)
 {
-    BitmapPlace b = bitmap_place(t, scene, point);
+    BitmapTexels b = bitmap_texels(t, scene, point);
     Spectrum sum = spectrum_of(0.0f);
     for (int corner = 0; corner < 4; corner++) {
         real weight;
@@ -77,7 +77,7 @@ Spectrum bitmap_emission(Bitmap t, Scene scene, TexturePoint point, Wavelengths 
 
 real bitmap_real(Bitmap t, Scene scene, TexturePoint point)
 {
-    BitmapPlace b = bitmap_place(t, scene, point);
+    BitmapTexels b = bitmap_texels(t, scene, point);
     real sum = 0.0f;
     for (int corner = 0; corner < 4; corner++) {
         real weight;

@@ -35,7 +35,8 @@ Spectrum marble_reflectance(Marble t, Scene scene, TexturePoint point, Wavelengt
 
 Spectrum marble_emission(Marble t, Scene scene, TexturePoint point, Wavelengths lambdas)
 {
-    return spectrum_mul(marble_reflectance(t, scene, point, lambdas), spectrum_grey_light(scene, (real)(1.0f), lambdas));
+    return spectrum_mul(marble_reflectance(t, scene, point, lambdas),
+                        spectrum_grey_light(scene, (real)(1.0f), lambdas));
 }
 
 /* Its luminance: here the first of a colour's words is a number. */

@@ -1,12 +1,13 @@
-/* Values that a mesh has per vertex or face, linear between the vertices of a triangle, and spheres for each. Spectra are
- * interpolated as evaluated, not by their coefficients, as bitmap.cl does between texels. Where a shape
- * has no such values the entry of its table is zero, and every index ends at its first word. */
+/* Values that a mesh has per vertex or face, linear between the vertices of a triangle, or the shape `spheres` per
+ * sphere. Spectra are interpolated as evaluated, not by their coefficients, as texture/bitmap.cl does between texels.
+ * Where a shape has no such values the entry of its table is zero, and every index ends at its first word. */
 inline integer mesh_attribute_at(MeshAttribute t, Scene scene, TexturePoint point, int corner, real *weight)
 {
     integer entry = point.attributes + 2 * t.number, first = gather_i(scene.attributes, entry);
     integer vertex = texture_corner(scene, point, corner);
     *weight = corner == 0 ? 1.0f - point.b.x - point.b.y : corner == 1 ? point.b.x : point.b.y;
-    return first + gather_i(scene.attributes, entry + 1) * sel_i((t.per_face != 0) & (point.face >= 0), point.face, vertex);
+    return first + gather_i(scene.attributes, entry + 1) *
+           sel_i((t.per_face != 0) & (point.face >= 0), point.face, vertex);
 }
 
 Spectrum mesh_attribute_reflectance(MeshAttribute t, Scene scene, TexturePoint point, Wavelengths lambdas)
@@ -16,7 +17,8 @@ Spectrum mesh_attribute_reflectance(MeshAttribute t, Scene scene, TexturePoint p
         real weight;
         integer at = mesh_attribute_at(t, scene, point, corner, &weight);
         Spectrum value = spectrum_texel(gather_w(scene.attributes, at), gather_w(scene.attributes, at + 1),
-                                        gather_w(scene.attributes, at + 2), gather_w(scene.attributes, at + 3), lambdas);
+                                        gather_w(scene.attributes, at + 2),
+                                        gather_w(scene.attributes, at + 3), lambdas);
         sum = spectrum_madd(value, weight, sum);
     }
     return sum;
@@ -29,7 +31,8 @@ Spectrum mesh_attribute_emission(MeshAttribute t, Scene scene, TexturePoint poin
         real weight;
         integer at = mesh_attribute_at(t, scene, point, corner, &weight);
         Spectrum value = spectrum_light_texel(scene, gather_w(scene.attributes, at), gather_w(scene.attributes, at + 1),
-                                              gather_w(scene.attributes, at + 2), gather_w(scene.attributes, at + 3), lambdas);
+                                              gather_w(scene.attributes, at + 2),
+                                              gather_w(scene.attributes, at + 3), lambdas);
         sum = spectrum_madd(value, weight, sum);
     }
     return sum;

@@ -7,7 +7,8 @@ inline real noise_value(Noise t, Scene scene, TexturePoint point)
 {
     vec3 p = texture_transformed(scene, t.transform, point.p);
     mask windy = t.pattern == NOISE_PATTERN_WINDY, wrinkled = t.pattern == NOISE_PATTERN_WRINKLED;
-    real value = fractal_noise(scene, p, sel_i(windy, (integer)(6), t.octaves), sel(windy, (real)(0.5f), t.roughness), wrinkled);
+    real value = fractal_noise(scene, p, sel_i(windy, (integer)(6), t.octaves), sel(windy, (real)(0.5f), t.roughness),
+                               wrinkled);
     if (any(windy)) {
         real gusts = fractal_noise(scene, scale3(p, 0.1f), (integer)(3), (real)(0.5f), mask_of(0));
         value = sel(windy, fabs(gusts) * value, value);

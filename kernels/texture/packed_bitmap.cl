@@ -1,15 +1,16 @@
-/* An image of 8 bits a channel, placed as bitmap.cl places it, in fewer bytes: a number takes one, a colour
+/* An image of 8 bits a channel, placed on uv as in texture/bitmap.cl, in fewer bytes: a number takes one, a colour
  * four, or eight as a spectrum (spectrum_packed_texel). `decode` is the first of 256 values that bytes mean. */
 inline Bitmap packed_bitmap_image(PackedBitmap t)
 {
-    Bitmap b = {t.kind, t.to_u, t.to_v, t.mapping, t.transform, t.width, t.height, t.first, t.filter, t.wrap_u, t.wrap_v, t.decode};
+    Bitmap b = {t.kind, t.to_u, t.to_v, t.mapping, t.transform, t.width, t.height, t.first, t.filter, t.wrap_u,
+                t.wrap_v, t.decode};
     return b;
 }
 
 Spectrum packed_bitmap_reflectance(PackedBitmap t, Scene scene, TexturePoint point, Wavelengths lambdas)
 {
     Bitmap image = packed_bitmap_image(t);
-    BitmapPlace b = bitmap_place(image, scene, point);
+    BitmapTexels b = bitmap_texels(image, scene, point);
     Spectrum sum = spectrum_of(0.0f);
     for (int corner = 0; corner < 4; corner++) {
         real weight;
@@ -29,7 +30,7 @@ Spectrum packed_bitmap_emission(PackedBitmap t, Scene scene, TexturePoint point,
 real packed_bitmap_real(PackedBitmap t, Scene scene, TexturePoint point)
 {
     Bitmap image = packed_bitmap_image(t);
-    BitmapPlace b = bitmap_place(image, scene, point);
+    BitmapTexels b = bitmap_texels(image, scene, point);
     real sum = 0.0f;
     for (int corner = 0; corner < 4; corner++) {
         real weight;

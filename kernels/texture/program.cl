@@ -2,12 +2,13 @@
  * copy of every look-up for each level of a tree would take minutes to build. An instruction is two words:
  * what to do, and an argument. It takes an operand (what is looked up, or if none the top of the stack),
  * and pushes it, multiplies the top by it, or mixes the two topmost values by it. All lanes go through the
- * loop together, each along its own program. clpt/render/lowering/textures/texture_programs.py writes programs and generates
- * the names of their codes, TEXTURE_DEPTH, how deep they go, and `texture_operand`. */
+ * loop together, each along its own program. clpt/render/lowering/textures/texture_programs.py writes programs;
+ * generated are the names of their codes, TEXTURE_DEPTH, how deep they go, and `texture_operand`. */
 #define OPERAND_OF(code) ((code) & 7)
 #define OPERATION_OF(code) ((code) & 24)
 
-inline Spectrum texture_program(Scene scene, int role, integer row, mask running, TexturePoint point, Wavelengths lambdas)
+inline Spectrum texture_program(Scene scene, int role, integer row, mask running, TexturePoint point,
+                                Wavelengths lambdas)
 {
     Spectrum stack[TEXTURE_DEPTH + 1];
     for (int i = 0; i <= TEXTURE_DEPTH; i++) stack[i] = spectrum_of(0.0f);

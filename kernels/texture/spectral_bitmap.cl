@@ -1,22 +1,23 @@
-/* An image with a spectrum in every texel, placed on uv as bitmap.cl places its colours. A reflectance
+/* An image with a spectrum in every texel, placed on uv as in texture/bitmap.cl. A reflectance
  * goes on beyond its first and last band as it is there, light ends. */
 #include "texturing/band_texels.cl"
 
 inline Bitmap spectral_bitmap_image(SpectralBitmap t)
 {
-    Bitmap b = {t.kind, t.to_u, t.to_v, t.mapping, t.transform, t.width, t.height, t.first, t.filter, t.wrap_u, t.wrap_v, t.decode};
+    Bitmap b = {t.kind, t.to_u, t.to_v, t.mapping, t.transform, t.width, t.height, t.first, t.filter, t.wrap_u,
+                t.wrap_v, t.decode};
     return b;
 }
 
-inline Spectrum spectral_bitmap_at(SpectralBitmap t, Scene scene, TexturePoint point, Spectrum transform)
+inline Spectrum spectral_bitmap_at(SpectralBitmap t, Scene scene, TexturePoint point, Spectrum numbers)
 {
     Bitmap image = spectral_bitmap_image(t);
-    BitmapPlace b = bitmap_place(image, scene, point);
+    BitmapTexels b = bitmap_texels(image, scene, point);
     Spectrum sum = spectrum_of(0.0f);
     for (int corner = 0; corner < 4; corner++) {
         real weight;
         integer at = t.first + t.bands * bitmap_corner(image, b, corner, &weight);
-        sum = spectrum_madd(bands_texel(scene, at, t.bands, transform), weight, sum);
+        sum = spectrum_madd(bands_texel(scene, at, t.bands, numbers), weight, sum);
     }
     return sum;
 }
@@ -28,6 +29,6 @@ Spectrum spectral_bitmap_reflectance(SpectralBitmap t, Scene scene, TexturePoint
 
 Spectrum spectral_bitmap_emission(SpectralBitmap t, Scene scene, TexturePoint point, Wavelengths lambdas)
 {
-    Spectrum transform = spectra_row(scene, t.number, lambdas);
-    return bands_lit(spectral_bitmap_at(t, scene, point, transform), t.bands, transform);
+    Spectrum numbers = spectra_row(scene, t.number, lambdas);
+    return bands_lit(spectral_bitmap_at(t, scene, point, numbers), t.bands, numbers);
 }

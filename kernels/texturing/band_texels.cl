@@ -1,15 +1,15 @@
 /* Images of spectra: a texel is `bands` values at ascending wavelengths, linear in between. Which band a
- * wavelength lies at is tabulated in a row of `spectra`: `place` holds its number at each wavelength of
+ * wavelength lies at is tabulated in a row of `spectra`: `numbers` holds its number at each wavelength of
  * the path, whole at a band, below 0 or above bands - 1 beyond the ends, where values stay as they are. */
-inline Spectrum bands_texel(Scene scene, integer first, integer bands, Spectrum place)
+inline Spectrum bands_texel(Scene scene, integer first, integer bands, Spectrum numbers)
 {
     Spectrum r;
-#define C(c)                                                                          \
-    {                                                                                 \
-        real x = clamp_r(place.c, (real)(0.0f), to_real(bands - 1));                  \
-        integer i = max_i(min_i(to_integer(x), bands - 2), (integer)(0));             \
+#define C(c)                                                                               \
+    {                                                                                      \
+        real x = clamp_r(numbers.c, (real)(0.0f), to_real(bands - 1));                     \
+        integer i = max_i(min_i(to_integer(x), bands - 2), (integer)(0));                  \
         real a = gather(scene.texels, first + i), b = gather(scene.texels, first + i + 1); \
-        r.c = a + (x - to_real(i)) * (b - a);                                         \
+        r.c = a + (x - to_real(i)) * (b - a);                                              \
     }
     SPECTRUM_EACH(C)
 #undef C
@@ -17,10 +17,10 @@ inline Spectrum bands_texel(Scene scene, integer first, integer bands, Spectrum 
 }
 
 /* The same where there is light at the bands' wavelengths only: dark beyond the ends. */
-inline Spectrum bands_lit(Spectrum value, integer bands, Spectrum place)
+inline Spectrum bands_lit(Spectrum value, integer bands, Spectrum numbers)
 {
     Spectrum r;
-#define C(c) r.c = sel((place.c >= 0.0f) & (place.c <= to_real(bands - 1)), value.c, (real)(0.0f));
+#define C(c) r.c = sel((numbers.c >= 0.0f) & (numbers.c <= to_real(bands - 1)), value.c, (real)(0.0f));
     SPECTRUM_EACH(C)
 #undef C
     return r;

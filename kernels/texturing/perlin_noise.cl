@@ -12,7 +12,7 @@ inline real noise_gradient(Scene scene, integer x, integer y, integer z, real dx
     return sel((h & 1) != 0, -u, u) + sel((h & 2) != 0, -v, v);
 }
 inline real noise_weight(real t) { return t * t * t * (10.0f + t * (6.0f * t - 15.0f)); }
-/* The cell of a coordinate, 0 to 255 as the noise repeats, and the place in it. */
+/* The cell of a coordinate, 0 to 255 as the noise repeats, and the offset in it. */
 inline integer noise_cell(real x, real *t)
 {
     real below = floor(x);

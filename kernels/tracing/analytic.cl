@@ -1,4 +1,4 @@
-/* For shapes that rays meet as they are. */
+/* What shapes share that rays meet as they are, not as triangles. Lengths in metres. */
 
 /* What float32 rounds when a ray's origin is put on a surface, relative to the coordinates. */
 #define SURFACE_ROUNDING 3e-7f

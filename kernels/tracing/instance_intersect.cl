@@ -1,4 +1,4 @@
-/* One ray and one instance: the ray is turned into the group's space and goes through its tree by
+/* One ray and one instance: the ray is transformed into the group's space and goes through its tree by
  * LAYOUT(verb). Its direction keeps the length that it gets, so that t is the world's. */
 #include "tracing/instances.cl"
 

@@ -1,5 +1,5 @@
-/* From the space of a group to the world, by an InstanceRow, whose x, y and z are the rows of the
- * matrix the other way. They are scaled first, so that neither tiny nor huge instances leave float. */
+/* From the space of a group to the world, by an InstanceRow, whose x, y and z are the rows of the inverse: of the
+ * matrix from the world to the group. They are scaled first, so that neither tiny nor huge instances leave float. */
 typedef struct { vec3 x, y, z; real scale; } InstanceFrame;
 
 inline real instance_size(vec3 v) { return fabs(v.x) + fabs(v.y) + fabs(v.z); }

@@ -8,17 +8,17 @@ inline uint instances_trace(global const float *nodes, global const float *leave
                             TriHit *hit, int first_only)
 {
     CompactRay ray = compact_ray(o.x, o.y, o.z, d.x, d.y, d.z, tmin);
-    CompactWay way;
+    CompactState state;
     uint2 items;
-    uint noise_sums = BVH_MISS;
-    compact_begin(&way);
-    while (compact_next(instance_nodes, &ray, hit->t, &way, &items)) {
+    uint nearest = BVH_MISS;
+    compact_start(&state);
+    while (compact_next(instance_nodes, &ray, hit->t, &state, &items)) {
         while (items.y) {
             uint row = compact_item(&items);
             if (!instance_meet(nodes, leaves, scene, row, o, d, tmin, hit, first_only)) continue;
-            noise_sums = row;
-            if (first_only) return noise_sums;
+            nearest = row;
+            if (first_only) return nearest;
         }
     }
-    return noise_sums;
+    return nearest;
 }

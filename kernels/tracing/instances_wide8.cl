@@ -9,17 +9,13 @@ inline uint instances_trace(global const float *nodes, global const float *leave
 {
     Wide8Ray ray = wide8_ray(o.x, o.y, o.z, d.x, d.y, d.z, tmin);
     ulong waiting[WIDE8_STACK];
-    uint n = 0, at = 0, noise_sums = BVH_MISS;
-    for (;;) {
+    uint n = 0, at = 0, nearest = BVH_MISS;
+    do {
         at = wide8_descend(instance_nodes, &ray, hit->t, at, waiting, &n);
-        if (at & BVH_LEAF && instance_meet(nodes, leaves, scene, at & ~BVH_LEAF, o, d, tmin, hit, first_only)) {
-            noise_sums = at & ~BVH_LEAF;
-            if (first_only) return noise_sums;
-        }
-        do {
-            if (!n) return noise_sums;
-            n--;
-        } while (as_float((uint)(waiting[n] >> 32)) >= hit->t);
-        at = (uint)waiting[n];
-    }
+        uint row = at & ~BVH_LEAF;
+        if (!(at & BVH_LEAF) || !instance_meet(nodes, leaves, scene, row, o, d, tmin, hit, first_only)) continue;
+        nearest = row;
+        if (first_only) return nearest;
+    } while (wide8_next(waiting, &n, hit->t, &at));
+    return nearest;
 }

@@ -1,6 +1,6 @@
-/* Tracing the rays of a work-item's lanes through the 8-wide tree, all of them in flight, for a tree of
- * nothing but triangles that is larger than a processor's caches. Where most look the way of their neighbours,
- * one after another: see bvh/query_interleaved.cl. */
+/* Tracing the rays of a work-item's lanes through the 8-wide tree, interleaved, for a tree of
+ * nothing but triangles that is larger than a processor's caches. Where most rays have about the direction of the one
+ * before, they are traced one after another: see bvh/query_interleaved.cl. */
 #include "tracing/trace.cl"
 #include "bvh/wide8_interleaved.cl"
 #include "generated/trace_args.cl"
@@ -22,7 +22,7 @@ inline uint trace_active(mask active, uint *rays)
     return n;
 }
 
-/* Whether three quarters of the rays look the way of the one before. */
+/* Whether three quarters of the rays have about the direction of the one before. */
 inline int trace_alike(const TraceRays *r, const uint *rays, uint count)
 {
     uint alike = 0;
@@ -46,21 +46,21 @@ inline void trace_put(TraceHits *h, uint i, TriHit hit)
     h->tag.at[i] = as_int(hit.tag);
 }
 
-/* Each ray a node or block on in turn, till all have arrived. */
+/* Steps every ray in turn, until all have finished. */
 inline void trace_step_all(global const float *nodes, global const float *leaves, const TraceRays *r, uint *rays,
-                      uint active, TraceHits *h)
+                           uint active, TraceHits *h)
 {
     Wide8RayState states[LANES];
     for (int started = 0; active; started = 1) {
         uint left = 0;
         for (uint k = 0; k < active; k++) {
             uint i = rays[k];
-            Wide8RayState *f = states + i;
-            int goes = started || wide8_start(f, TRACE_RAY(r, i));
-            if (goes && wide8_step(nodes, leaves, f))
+            Wide8RayState *s = states + i;
+            int goes = started || wide8_start(s, TRACE_RAY(r, i));
+            if (goes && wide8_step(nodes, leaves, s))
                 rays[left++] = i;
             else
-                trace_put(h, i, wide8_finish(leaves, f));
+                trace_put(h, i, wide8_finish(leaves, s));
         }
         active = left;
     }

@@ -1,5 +1,5 @@
-/* How much of the light between two points passes, where some surfaces let a part of it through, as if
- * nothing were there: masks, and null boundaries. Each is met in turn, and its share multiplied. */
+/* How much of the light between two points passes, 0 to 1, where some surfaces transmit a part of it as if nothing
+ * were there: masks, and null boundaries. Each is met in turn, and its transmittance multiplied. */
 #include "interface/shape.cl"
 #include "generated/textures.cl"
 #include "generated/mixture.cl"
@@ -11,7 +11,7 @@
 
 inline real trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real t, Wavelengths lambdas, mask active)
 {
-    real share = 1.0f;
+    real transmittance = 1.0f;
     int surfaces = 0;
     while (any(active)) {
         TraceHit h = trace_closest(TRACE_PASSED, scene, o, d, t, active);
@@ -21,9 +21,10 @@ inline real trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real t,
             mask front;
             Surface s = surface_at(scene, h, active, o, d, &front);
             integer word = sel_i(active, sel_i(front, shape.front, shape.back), (integer)(0));
-            real passes = null_transmittance(scene, word, surface_texture_point(s), lambdas) * (surfaces < MOST_SURFACES ? 1.0f : 0.0f);
-            share = sel(active, share * passes, share);
-            active = active & (passes > 0.0f);
+            real own = null_transmittance(scene, word, surface_texture_point(s), lambdas) *
+                       (surfaces < MOST_SURFACES ? 1.0f : 0.0f);
+            transmittance = sel(active, transmittance * own, transmittance);
+            active = active & (own > 0.0f);
             /* On along d: beside it, the ray would miss its end, and a round light would shade itself. */
             real on = h.t + surface_step(s) / max_r(fabs(dot3(s.n, d)), (real)(0.1f));
             o = sel3(active, madd3(d, on, o), o);
@@ -31,5 +32,5 @@ inline real trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real t,
             surfaces++;
         }
     }
-    return share;
+    return transmittance;
 }

@@ -160,7 +160,7 @@ def test_state_is_read_as_it_lies(on: device.Device, scene: Scene) -> None:
     d = flight.read(PATH, "d")
     assert d.shape == (flight.slots, 3)
     np.testing.assert_allclose(np.linalg.norm(d[alive], axis=1), 1.0, atol=1e-5)
-    assert len(set(flight.read(PATH, "place")[alive].tolist())) == alive.sum()
+    assert len(set(flight.read(PATH, "pixel_index")[alive].tolist())) == alive.sum()
 
 
 def test_builds_and_copies(on: device.Device, scene: Scene) -> None:

@@ -12,14 +12,14 @@ from clpt import device as dev
 TREE = """
 #include "bvh/{layout}.cl"
 #define RAY r.s0, r.s1, r.s2, r.s4, r.s5, r.s6, r.s3, r.s7
-kernel APART void closest(global const float *nodes, global const float *leaves,
-                    global const float8 *rays, global TriHit *hits)
+kernel NO_VECTORIZE void closest(global const float *nodes, global const float *leaves,
+                                 global const float8 *rays, global TriHit *hits)
 {{
     float8 r = rays[get_global_id(0)];
     hits[get_global_id(0)] = {layout}_closest(nodes, leaves, RAY);
 }}
-kernel APART void occluded(global const float *nodes, global const float *leaves,
-                     global const float8 *rays, global int *hits)
+kernel NO_VECTORIZE void occluded(global const float *nodes, global const float *leaves,
+                                  global const float8 *rays, global int *hits)
 {{
     float8 r = rays[get_global_id(0)];
     hits[get_global_id(0)] = {layout}_occluded(nodes, leaves, RAY);
@@ -30,8 +30,8 @@ BRUTE = """
 #define AT ((integer)((int)get_global_id(0) * LANES) + LANE_INDEX)
 #define RAY(k) gather(rays, AT * 8 + k)
 #define EVERY ((mask)(1) == (mask)(1))
-kernel APART void closest(global const float *tris, uint count, global const float *rays,
-                    global float *hits)
+kernel NO_VECTORIZE void closest(global const float *tris, uint count, global const float *rays,
+                                 global float *hits)
 {
     vec3 o = {RAY(0), RAY(1), RAY(2)}, d = {RAY(4), RAY(5), RAY(6)};
     BruteHit h = brute_closest(tris, count, o, d, RAY(3), RAY(7), EVERY);
@@ -44,8 +44,8 @@ kernel APART void closest(global const float *tris, uint count, global const flo
     scatter_if(hits, AT * 8 + 6, EVERY, h.n.y);
     scatter_if(hits, AT * 8 + 7, EVERY, h.n.z);
 }
-kernel APART void occluded(global const float *tris, uint count, global const float *rays,
-                     global float *hits)
+kernel NO_VECTORIZE void occluded(global const float *tris, uint count, global const float *rays,
+                                  global float *hits)
 {
     vec3 o = {RAY(0), RAY(1), RAY(2)}, d = {RAY(4), RAY(5), RAY(6)};
     mask met = brute_occluded(tris, count, o, d, RAY(3), RAY(7), EVERY);

@@ -11,12 +11,20 @@ import trimesh
 from clpt import bvh
 from clpt import device as dev
 from clpt.errors import MemoryBudgetError, SceneError
+from tests.rotation import rotating
 
 LEAF = 0x80000000
 MISS = 0xFFFFFFFF
 QUALITIES = get_args(bvh.Quality)
 DEPTH = 48  # BVH_DEPTH of kernels/bvh/node.cl
-LAYOUTS = [("brute", 1), ("brute", 8), ("brute", 16), ("binary", 1), ("wide8", 1), ("compact", 1)]
+LAYOUTS = [
+    pytest.param("brute", 1, marks=pytest.mark.slow),
+    ("brute", 8),
+    pytest.param("brute", 16, marks=pytest.mark.slow),
+    ("binary", 1),
+    ("wide8", 1),
+    ("compact", 1),
+]
 
 
 def mesh(triangles):
@@ -59,8 +67,7 @@ SHAPES = {
 }
 
 
-@pytest.mark.parametrize("quality", QUALITIES)
-@pytest.mark.parametrize("shape", SHAPES)
+@rotating("shape, quality", tuple(SHAPES), QUALITIES)
 def test_binary_tree_holds_everything_once(device, shape, quality):
     triangles = SHAPES[shape](np.random.default_rng(3))
     tree = bvh.build(device, *mesh(triangles), layout="binary", quality=quality)
@@ -88,8 +95,7 @@ def test_binary_tree_holds_everything_once(device, shape, quality):
     assert deepest <= DEPTH
 
 
-@pytest.mark.parametrize("quality", QUALITIES)
-@pytest.mark.parametrize("shape", SHAPES)
+@rotating("shape, quality", tuple(SHAPES), QUALITIES, turn=1)
 def test_wide_tree_holds_everything_once(device, shape, quality):
     triangles = SHAPES[shape](np.random.default_rng(3))
     tree = bvh.build(device, *mesh(triangles), layout="wide8", quality=quality)

@@ -8,7 +8,28 @@ from clpt import bvh
 from clpt import device as dev
 
 MISS = 0xFFFFFFFF
-LAYOUTS = [("brute", 1), ("brute", 8), ("brute", 16), ("binary", 1), ("wide8", 1), ("compact", 1)]
+LAYOUTS = [
+    pytest.param("brute", 1, marks=pytest.mark.slow),
+    ("brute", 8),
+    pytest.param("brute", 16, marks=pytest.mark.slow),
+    ("binary", 1),
+    ("wide8", 1),
+    ("compact", 1),
+]
+COUNTS = [1, 2, 3, 8, 9, 50, 1000]
+# brute force: each number of triangles at one number of lanes; trees: at one layout, many at all
+COUNTED = [
+    pytest.param(
+        *(layout, lanes, count),
+        marks=() if i % 3 == k or (layout != "brute" and count == 1000) else pytest.mark.slow,
+    )
+    for i, count in enumerate(COUNTS)
+    for group in (
+        [("brute", 1), ("brute", 8), ("brute", 16)],
+        [("binary", 1), ("wide8", 1), ("compact", 1)],
+    )
+    for k, (layout, lanes) in enumerate(group)
+]
 
 
 def mesh(triangles):
@@ -31,8 +52,7 @@ def rays_at(rng, points, tmin=1e-4, tmax=np.inf):
     return np.concatenate([o, ends[0], d, ends[1]], 1).astype(np.float32)
 
 
-@pytest.mark.parametrize(("layout", "lanes"), LAYOUTS)
-@pytest.mark.parametrize("count", [1, 2, 3, 8, 9, 50, 1000])
+@pytest.mark.parametrize(("layout", "lanes", "count"), COUNTED)
 def test_agrees_with_reference(device, trace, reference, layout, lanes, count):
     rng = np.random.default_rng(count)
     triangles = soup(rng, count, 0.4 / count ** (1 / 3))
@@ -125,9 +145,10 @@ def test_rays_along_an_axis(device, trace, layout, lanes, axis):
     ("layout", "lanes", "level", "count"),
     [
         ("brute", 8, 1, 200_000),
-        ("brute", 16, 1, 200_000),
+        pytest.param("brute", 16, 1, 200_000, marks=pytest.mark.slow),
         ("binary", 1, 5, 500_000),
-        ("wide8", 1, 5, 2_000_000),
+        ("wide8", 1, 5, 500_000),
+        pytest.param("wide8", 1, 5, 2_000_000, marks=pytest.mark.slow),
         ("compact", 1, 5, 500_000),
     ],
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 
 import numpy as np
 import pytest
@@ -111,3 +112,15 @@ def test_the_strip_is_a_rainbow():
     colours = strip(np.array([360.0, 450.0, 530.0, 640.0, 800.0]))[0].astype(int)
     assert colours[[0, 4]].max() < 30
     assert [int(np.argmax(c)) for c in colours[1:4]] == [2, 1, 0]
+
+
+def test_without_matplotlib_the_extra_is_named(here, capsys, monkeypatch):
+    """The values are printed all the same."""
+    spectral_exr.write("a.exr", SpectralImage(VALUES, NM))
+    monkeypatch.delitem(sys.modules, "clpt.cli.plots")
+    monkeypatch.delattr("clpt.cli.plots")
+    monkeypatch.setitem(sys.modules, "matplotlib.axes", None)
+    assert run(["inspect", "a.exr", "--at", "0,0"]) == 2
+    out, err = capsys.readouterr()
+    assert "400 nm" in out
+    assert 'a plot needs matplotlib: install it by pip install "clpt[plot]"' in err

@@ -13,7 +13,7 @@ from rich.console import Console
 from clpt.cli import rendering
 from clpt.cli.display import Bar, Lines, clock, figures
 from clpt.cli.rendering import pass_size, render_samples
-from clpt.render.renderer import Progress
+from clpt.render.progress import Progress
 
 
 class Counting:

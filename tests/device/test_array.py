@@ -71,7 +71,7 @@ def test_dlpack_of_a_cpu_is_numpys(array, opened):
 
 def test_dlpack_of_another_device_is_opencls(array, monkeypatch):
     """As a GPU has it: its memory for who knows OpenCL, a copy for who asks for the CPU."""
-    monkeypatch.setattr(DeviceArray, "_is_hosts", False)
+    monkeypatch.setattr(DeviceArray, "_in_host_memory", False)
     assert array.__dlpack_device__()[0] == dlpack.OPENCL
     assert taken(array.__dlpack__()).tensor.device_type == dlpack.OPENCL
     with pytest.raises((BufferError, RuntimeError)):
@@ -93,23 +93,23 @@ def test_dlpack_of_opencl_memory(array, opened):
     assert tensor.strides[: tensor.ndim] == [12, 4, 1]
     del array, capsule
     gc.collect()
-    assert address in dlpack._kept
+    assert address in dlpack._owned
     buffer = cl.Buffer.from_int_ptr(tensor.data, True)
     host = np.empty_like(VALUES)
     cl.enqueue_copy(opened.queue, host, buffer)
     np.testing.assert_array_equal(host, VALUES)
     managed.deleter(address)
-    assert address not in dlpack._kept
+    assert address not in dlpack._owned
 
 
 def test_capsules_that_nobody_takes_keep_nothing(array):
     """One may wait for the next that is made, however many there were."""
-    before = len(dlpack._kept)
+    before = len(dlpack._owned)
     for _ in range(5):
         array.__dlpack__(dl_device=array._opencl_device, copy=True)
-    assert len(dlpack._kept) <= before + 1
+    assert len(dlpack._owned) <= before + 1
     held = [array.__dlpack__(dl_device=array._opencl_device) for _ in range(5)]
-    assert len(dlpack._kept) >= len(held)
+    assert len(dlpack._owned) >= len(held)
 
 
 def test_dlpack_refuses_other_devices(array):

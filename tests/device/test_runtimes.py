@@ -57,6 +57,6 @@ def test_nothing_without_the_wheel(wheel, monkeypatch):
 
 def test_an_unwritable_cache_is_a_warning(wheel, monkeypatch, tmp_path, caplog):
     (tmp_path / "file").touch()
-    monkeypatch.setattr(runtimes.cache, "folder", lambda: tmp_path / "file")
+    monkeypatch.setattr(runtimes.disk_cache, "folder", lambda: tmp_path / "file")
     assert not announce()
     assert "cannot be made known" in caplog.text

@@ -9,7 +9,7 @@ from clpt.errors import KernelBuildError
 
 
 def test_the_kernels_are_found():
-    assert (kernels_folder() / "lib").is_dir()
+    assert (kernels_folder() / "core").is_dir()
 
 
 def test_a_kernel_file_is_named_by_its_path():
@@ -42,9 +42,10 @@ def test_lines_are_counted_past_an_include():
     assert places["five"] == ('"a"', 5)
 
 
-def test_defines_come_first():
-    text = assemble("a", {"a": "int x = N;"}, {"N": 3, "M": "uint"}).text
-    assert text.startswith('#define N 3\n#define M uint\n#line 1 "a"\n')
+def test_defines_come_first_if_the_text_names_them():
+    defines = {"N": "K", "K": 3, "M": "uint", "NONE": 0}
+    text = assemble("a", {"a": "M x = N;"}, defines).text
+    assert text == '#define N K\n#define K 3\n#define M uint\n#line 1 "a"\nM x = N;\n'
 
 
 def test_a_generated_file_wins_over_one_on_disk():

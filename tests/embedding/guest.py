@@ -29,7 +29,7 @@ NAMES = (
     "clReleaseMemObject",
 )  # fmt: skip
 LIBRARY = ctypes.CDLL(None)
-told: dict[str, dict[str, int]] = {}
+report: dict[str, dict[str, int]] = {}
 
 
 def counts() -> dict[str, int]:
@@ -42,7 +42,7 @@ def told_as(what: str) -> Iterator[None]:
     before = counts()
     yield
     after = counts()
-    told[what] = {name: after[name] - before[name] for name in NAMES}
+    report[what] = {name: after[name] - before[name] for name in NAMES}
 
 
 def buffers() -> int:
@@ -56,12 +56,12 @@ def main(scene_file: str) -> None:
     queue = cl.CommandQueue(cl.Context([cl.get_platforms()[0].get_devices()[0]]))
     scene = with_film(clpt.load(scene_file), mode="rgb", width=24, height=20)
     render(queue, scene)
-    told["left"] = {"buffers": buffers()}
+    report["left"] = {"buffers": buffers()}
     with told_as("another"):
         clpt.Renderer(scene, queue=queue, slots=1024)
     accel(queue)
-    told["left by queries"] = {"buffers": buffers()}
-    json.dump(told, sys.stdout)
+    report["left by queries"] = {"buffers": buffers()}
+    json.dump(report, sys.stdout)
 
 
 def render(queue: cl.CommandQueue, scene: clpt.Scene) -> None:

@@ -31,7 +31,7 @@ def main(scene_file: str) -> None:
             built.append(max(len([b for b in several if b]) for several in binaries))
         tree = clpt.Accel(queue, vertices, np.arange(300, dtype=np.uint32).reshape(100, 3))
         hits.append(np.asarray(tree.intersect(*rays).primitive).tolist())
-    told = {
+    report = {
         "devices": len(there),
         "same pictures": all(np.array_equal(pictures[0], other) for other in pictures),
         "mean": float(np.mean(pictures[0])),
@@ -39,7 +39,7 @@ def main(scene_file: str) -> None:
         "hits": sum(primitive >= 0 for primitive in hits[0]),
         "built for": max(built),
     }
-    json.dump(told, sys.stdout)
+    json.dump(report, sys.stdout)
 
 
 if __name__ == "__main__":

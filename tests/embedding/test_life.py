@@ -118,10 +118,10 @@ def test_what_the_callback_of_a_run_raises_comes_through(made: clpt.Renderer) ->
 def test_what_the_callback_of_a_step_raises_is_logged(
     scene: clpt.Scene, queue: cl.CommandQueue, picture: np.ndarray, caplog
 ) -> None:
-    told: list[clpt.Progress] = []
+    calls: list[clpt.Progress] = []
 
     def progress(now: clpt.Progress) -> None:
-        told.append(now)
+        calls.append(now)
         raise ValueError("the host's own mistake")
 
     with clpt.Renderer(scene, queue=queue, slots=SLOTS, progress=progress) as renderer:
@@ -129,10 +129,10 @@ def test_what_the_callback_of_a_step_raises_is_logged(
             for _ in range(4):
                 renderer.step(1).wait()
             for _ in range(500):
-                if len(told) == 4:
+                if len(calls) == 4:
                     break
                 time.sleep(0.01)
-        assert sorted(now.samples for now in told) == [1, 2, 3, 4]
+        assert sorted(now.samples for now in calls) == [1, 2, 3, 4]
         assert "the host's own mistake" in caplog.text
         assert np.array_equal(renderer.image(), picture)
 

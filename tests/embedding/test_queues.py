@@ -154,12 +154,12 @@ def test_a_context_of_several_devices(scenes: Path) -> None:
         cwd=root, capture_output=True, text=True, timeout=300,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    told = json.loads(done.stdout)
-    if told["devices"] < 2:
+    report = json.loads(done.stdout)
+    if report["devices"] < 2:
         pytest.skip("the platform shows one device")
-    assert told["same pictures"] and told["mean"] > 0.05
-    assert told["same hits"] and told["hits"] > 10
-    assert told["built for"] == 1, "programs were built for the other device too"
+    assert report["same pictures"] and report["mean"] > 0.05
+    assert report["same hits"] and report["hits"] > 10
+    assert report["built for"] == 1, "programs were built for the other device too"
 
 
 FACE = np.array([[0, 1, 2]], np.uint32)

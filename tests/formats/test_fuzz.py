@@ -6,58 +6,26 @@ import json
 
 import pytest
 
-from clpt.errors import SceneError
 from clpt.formats import load, native
-
-hypothesis = pytest.importorskip("hypothesis")
-st = hypothesis.strategies
-
-FEW = hypothesis.settings(
-    max_examples=80,
-    deadline=None,
-    derandomize=True,
-    database=None,
-    suppress_health_check=list(hypothesis.HealthCheck),
+from tests.formats.fuzzing import (
+    check,
+    damaged,
+    hypothesis,
+    json_paths,
+    json_values,
+    replace,
+    settings,
+    st,
 )
+
+FEW = settings(80)
 WORDS = st.sampled_from(
     "type value name id filename sphere mesh cube diffuse twosided path perspective rgb float "  # noqa: SIM905
     "to_world reflectance radiance area constant 1 -1 0 nan 1e999 $x true # , : [ ] { } < > & ; / "
     "\\".split()
 )
-VALUES = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats() | WORDS | st.text(max_size=5),
-    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(WORDS, inner, max_size=4),
-    max_leaves=8,
-)
-
-
-def check(path, content: bytes) -> None:
-    path.write_bytes(content)
-    try:
-        load(path)
-    except SceneError as error:
-        assert "\n" not in str(error)
-
-
-def damaged(source: bytes):
-    """The source with some of it cut out, doubled, or overwritten by words."""
-
-    @st.composite
-    def of(draw):
-        text = source
-        for _ in range(draw(st.integers(1, 3))):
-            a = draw(st.integers(0, len(text)))
-            b = min(len(text), a + draw(st.integers(0, 30)))
-            new = draw(
-                st.just(b"")
-                | st.just(text[a:b] * 2)
-                | WORDS.map(str.encode)
-                | st.binary(max_size=4)
-            )
-            text = text[:a] + new + text[b:]
-        return text
-
-    return of()
+SCALARS = st.none() | st.booleans() | st.integers() | st.floats() | WORDS | st.text(max_size=5)
+VALUES = json_values(SCALARS, WORDS)
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +40,7 @@ def folder(tmp_path_factory, scenes):
 @pytest.mark.parametrize("name", ["cornell.xml", "plastic.xml", "textures.xml"])
 def test_damaged_xml(folder, scenes, name):
     @FEW
-    @hypothesis.given(damaged((scenes / name).read_bytes()))
+    @hypothesis.given(damaged((scenes / name).read_bytes(), WORDS))
     def run(content):
         check(folder / "damaged.xml", content)
 
@@ -81,7 +49,7 @@ def test_damaged_xml(folder, scenes, name):
 
 def test_damaged_json(folder):
     @FEW
-    @hypothesis.given(damaged((folder / "plastic.json").read_bytes()))
+    @hypothesis.given(damaged((folder / "plastic.json").read_bytes(), WORDS))
     def run(content):
         check(folder / "damaged.json", content)
 
@@ -90,28 +58,16 @@ def test_damaged_json(folder):
 
 def test_json_with_one_value_replaced(folder):
     source = (folder / "plastic.json").read_text()
-    places = list(_places(json.loads(source)))
+    paths = list(json_paths(json.loads(source)))
 
     @FEW
-    @hypothesis.given(st.sampled_from(places), VALUES)
-    def run(place, value):
+    @hypothesis.given(st.sampled_from(paths), VALUES)
+    def run(path, value):
         document = json.loads(source)
-        inner = document
-        for key in place[:-1]:
-            inner = inner[key]
-        inner[place[-1]] = value
+        replace(document, path, value)
         check(folder / "replaced.json", json.dumps(document).encode("utf-8", "surrogatepass"))
 
     run()
-
-
-def _places(value, path=()):
-    keys = (
-        value if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()
-    )
-    for key in keys:
-        yield (*path, key)
-        yield from _places(value[key], (*path, key))
 
 
 @pytest.mark.parametrize("suffix", [".obj", ".ply", ".stl", ".off", ".glb"])
@@ -121,7 +77,7 @@ def test_damaged_meshes(folder, suffix):
     trimesh.creation.icosphere(subdivisions=0).export(folder / f"ball{suffix}")
 
     @FEW
-    @hypothesis.given(damaged((folder / f"ball{suffix}").read_bytes()))
+    @hypothesis.given(damaged((folder / f"ball{suffix}").read_bytes(), WORDS))
     def run(content):
         check(folder / f"damaged{suffix}", content)
 

@@ -7,15 +7,31 @@ from functools import cache
 import numpy as np
 
 from clpt import device, testing
-from clpt.scene.materials import Material
+from clpt.scene.materials import LEAVES, Material
 from clpt.testing import probe
-from clpt.testing.probe import NOTHING, root_text
+from clpt.testing.probe import COMPONENTS, NOTHING, root_text
+
+MODES = tuple(COMPONENTS)
 
 
 @cache
 def opened() -> device.Device:
     """The device that the kernel tests run on."""
     return device.choose()
+
+
+def quick_mode(cls: type[Material]) -> int:
+    """The mode, of MODES, that quick tests of a kind share, so that they compile one program.
+
+    Spectral where wavelengths part; by turns elsewhere.
+    """
+    parts = cls.chromatic or cls.disperses or cls.fluoresces or cls.needs_wavelengths
+    return 1 if parts else LEAVES.index(cls) % 2
+
+
+def other_mode(cls: type[Material]) -> int:
+    """The mode, of MODES, that few quick tests of a kind compile."""
+    return 1 - quick_mode(cls)
 
 
 class Probe(testing.Probe):

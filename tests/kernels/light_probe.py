@@ -17,9 +17,10 @@ from clpt.render.codegen import shapes as shape_text
 from clpt.render.codegen import textures as texture_text
 from clpt.render.codegen.signatures import scene_text
 from clpt.render.contract import shape_records
-from clpt.render.lowering.geometry import shapes
+from clpt.render.lowering.encoder import Encoder
+from clpt.render.lowering.geometry import analytic, triangles
 from clpt.render.lowering.lights import lights
-from clpt.render.lowering.tables import STEP, Tables
+from clpt.render.lowering.spectra_table import STEP
 from tests.kernels.harness import opened
 
 LAMBDAS = (450.0, 520.0, 580.0, 640.0)  # of the spectral mode's probes [nm]
@@ -30,7 +31,7 @@ INCLUDES = ("core/base.cl", "interface/shape.cl", "interface/light.cl", "generat
 class Lit:
     """A scene of lights alone: its tables, and what `light_rows` gave."""
 
-    tables: Tables
+    encoder: Encoder
     rows: lights.LightRows
     files: tuple[str, ...] = ()
     radius: float = 1.0
@@ -45,10 +46,16 @@ class Lit:
         out = np.empty((results, padded), np.float32)
         dev, flags = opened(), cl.mem_flags
         if not self.buffers:
-            arrays = {**self.tables.arrays(), "settings": self._settings()}
+            arrays = {**self.encoder.store.arrays(), "settings": self._settings()}
             self.buffers = {name: self._buffer(values) for name, values in arrays.items()}
         program = _program(
-            self.tables.mode, self._text(), body, given.shape[0], results, self.files, lanes
+            self.encoder.spectra.mode,
+            self._text(),
+            body,
+            given.shape[0],
+            results,
+            self.files,
+            lanes,
         )
         target = cl.Buffer(dev.context, flags.WRITE_ONLY, out.nbytes)
         there = {"in": self._buffer(data), "out": target, "n": padded, **self.buffers}
@@ -59,15 +66,19 @@ class Lit:
 
     def _text(self) -> str:
         """The lights' functions, with the look-ups of textures where there are any."""
-        tables, sources = self.tables, self.tables.sources
-        found = frozenset(sources["emission"]["value"] or {"constant"})
+        encoder, sources = self.encoder, self.encoder.sources
+        found, factors = (
+            frozenset(source for kind, _, source in sources if kind == wanted)
+            for wanted in ("emission", "factor")
+        )
+        found = found or frozenset({"constant"})
         text = ""
-        if tables.texture_roles:
-            used = {kind for kind, _ in tables.texture_roles}
-            text += texture_text.dispatch_text(used, tables.texture_roles)
+        if encoder.textures.roles:
+            used = {kind for kind, _ in encoder.textures.roles}
+            text += texture_text.dispatch_text(used, encoder.textures.roles)
         text += parameters.emission_text(found)
-        if sources["factor"]["value"]:
-            text += parameters.factor_text(frozenset(sources["factor"]["value"]))
+        if factors:
+            text += parameters.factor_text(factors)
         rows = self.rows
         tree = rows.tree is not None
         return text + light_dispatch.dispatch_text(
@@ -113,7 +124,7 @@ def _program(
         "generated/lights.cl": light_text,
     }
     defines = {"LANES": lanes, "QUEUED": 0, "SPECTRA_STEP": f"{STEP}f"}
-    defines["SPECTRA_SIZE"] = Tables("spectral").spectra_size
+    defines["SPECTRA_SIZE"] = Encoder("spectral").spectra.samples
     return device.build(opened(), device.assemble("probe.cl", virtual, defines))
 
 
@@ -126,35 +137,35 @@ def lit(
     tree: bool = False,
 ) -> Lit:
     """A scene of lamps and emissive shapes; `files` are further includes; `tree` chooses lights."""
-    tables = Tables(mode)
+    encoder = Encoder(mode)
     made, first = [], 0
     for number, shape in enumerate(emitters):
         row = np.zeros(1, SHAPE.dtype)
         row["prim"] = first
         vertices = faces = uvs = None
         if shape.kind not in shape_records.ANALYTIC:
-            vertices, faces, _, uvs = shapes.triangles(shape)
-            base = tables.size("uvs") // 2
-            tables.append("faces", faces + np.uint32(base))
-            tables.append_floats("uvs", np.zeros((len(vertices), 2)) if uvs is None else uvs)
+            vertices, faces, _, uvs = triangles.triangulate(shape)
+            base = encoder.store.size("uvs") // 2
+            encoder.store.append("faces", faces + np.uint32(base))
+            encoder.store.append_floats("uvs", np.zeros((len(vertices), 2)) if uvs is None else uvs)
             row["flags"] = 0 if uvs is None else 2
             first += len(faces)
         made.append((row, lights.Emitter(shape, number, vertices, faces, uvs)))
     emitting = [emitter for _, emitter in made]
-    rows = lights.light_rows(lamps, emitting, tables, radius, 1 if tree else None)
+    rows = lights.light_rows(lamps, emitting, encoder, radius, 1 if tree else None)
     for (row, _), at in zip(made, rows.first, strict=True):
         row["light"] = at
-        tables.append("shapes", row.view(np.uint32))
-    tables.append("lights", rows.rows.view(np.uint32))
-    tables.finish()
+        encoder.store.append("shapes", row.view(np.uint32))
+    encoder.store.append("lights", rows.rows.view(np.uint32))
+    encoder.textures.finish()
     if rows.tree is not None:
-        tables.append("lights", rows.tree)
-    return Lit(tables, rows, tuple(files), radius)
+        encoder.store.append("lights", rows.tree)
+    return Lit(encoder, rows, tuple(files), radius)
 
 
 def shape_probe(shape) -> Lit:
     """A scene whose `geometry` holds one shape, and the kind's functions."""
-    tables = Tables("rgb")
-    tables.append("geometry", shapes.row(shape))
-    none = lights.light_rows((), (), tables, 1.0)
-    return Lit(tables, none, (f"generated/shape/{shape.kind}.cl",))
+    encoder = Encoder("rgb")
+    encoder.store.append("geometry", analytic.row(shape))
+    none = lights.light_rows((), (), encoder, 1.0)
+    return Lit(encoder, none, (f"generated/shape/{shape.kind}.cl",))

@@ -8,11 +8,10 @@ import pytest
 from clpt.scene import materials as m
 from clpt.scene.materials import LEAVES
 from clpt.testing import checks
-from clpt.testing.probe import COMPONENTS
 from clpt.testing.settings import settings, white
-from tests.kernels.harness import Probe
+from tests.kernels.harness import MODES, Probe, other_mode, quick_mode
+from tests.rotation import rotating
 
-MODES = tuple(COMPONENTS)
 # How much more light than comes may leave. The coat of RoughPlastic has a transmittance from
 # twelve nodes: .2% at most, but 2.1% where it is thinner to light than what is outside, which no
 # plastic is. The principled base makes light, as Mitsuba's does: it lies under the reflection
@@ -20,12 +19,10 @@ MODES = tuple(COMPONENTS)
 # adds up to .1, clearcoat .025, and the flat look is up to .61 too much. Metal, glass make none.
 TOLERANCE = {m.RoughPlastic: 0.025, m.Principled: 0.75, m.PrincipledThin: 0.65}
 
-kinds = pytest.mark.parametrize("cls", LEAVES, ids=lambda cls: cls.kind)
-modes = pytest.mark.parametrize("mode", MODES)
+kinds = rotating("cls, mode", LEAVES, MODES, turn=quick_mode)
 
 
 @kinds
-@modes
 def test_energy_is_not_made(cls, mode):
     rng, probe = np.random.default_rng(11), Probe(cls, mode)
     for params in settings(cls, mode, rng, 6, **white(cls)):
@@ -60,8 +57,7 @@ LOSSLESS = {
 }
 
 
-@pytest.mark.parametrize("cls", LOSSLESS, ids=lambda cls: cls.kind)
-@modes
+@rotating("cls, mode", tuple(LOSSLESS), MODES, turn=quick_mode)
 def test_white_furnace(cls, mode):
     fixed, angles = LOSSLESS[cls]
     rng, probe = np.random.default_rng(12), Probe(cls, mode)
@@ -71,7 +67,6 @@ def test_white_furnace(cls, mode):
 
 
 @kinds
-@modes
 def test_delta_lobes_keep_energy(cls, mode):
     rng, probe = np.random.default_rng(13), Probe(cls, mode)
     for params in settings(cls, mode, rng, 4):
@@ -79,7 +74,6 @@ def test_delta_lobes_keep_energy(cls, mode):
 
 
 @kinds
-@modes
 def test_reciprocity(cls, mode):
     if cls is m.Hair:
         pytest.skip("where light meets a fibre is told by wo alone")
@@ -102,7 +96,6 @@ def test_reciprocity(cls, mode):
         np.testing.assert_allclose(there, back, rtol=5e-3, atol=1e-4)
 
 
-@kinds
-@modes
+@rotating("cls, mode", LEAVES, MODES, turn=other_mode)
 def test_extremes_are_finite(cls, mode):
     checks.extremes_are_finite(Probe(cls, mode), np.random.default_rng(15))

@@ -11,22 +11,24 @@ from scipy.stats import chi2
 
 from clpt.scene.materials import LEAVES
 from clpt.testing import checks
-from clpt.testing.probe import COMPONENTS
 from clpt.testing.settings import settings
-from tests.kernels.harness import Probe
+from tests.kernels.harness import MODES, Probe, other_mode, quick_mode
+from tests.rotation import rotating
 
-MODES = tuple(COMPONENTS)
 SETTINGS = 4
 # chance that any one of all chi-square tests fails where all is right: 1e-3 (Sidak)
 TESTS = len(LEAVES) * len(MODES) * SETTINGS * len(checks.ANGLES)
 SIGNIFICANCE = 1.0 - (1.0 - 1e-3) ** (1.0 / TESTS)
 
-kinds = pytest.mark.parametrize("cls", LEAVES, ids=lambda cls: cls.kind)
-modes = pytest.mark.parametrize("mode", MODES)
+kinds = rotating("cls, mode", LEAVES, MODES, turn=quick_mode)
+
+
+def other_mode_and_lanes(cls):
+    """Which of MODES x lanes: lanes take turns."""
+    return 2 * other_mode(cls) + LEAVES.index(cls) // 2 % 2
 
 
 @kinds
-@modes
 def test_samples_follow_the_pdf(cls, mode):
     rng, probe = np.random.default_rng(17), Probe(cls, mode)
     for params in settings(cls, mode, rng, SETTINGS):
@@ -34,7 +36,6 @@ def test_samples_follow_the_pdf(cls, mode):
 
 
 @kinds
-@modes
 def test_weight_is_eval_over_pdf(cls, mode):
     rng, probe = np.random.default_rng(3), Probe(cls, mode)
     for params in settings(cls, mode, rng, SETTINGS):
@@ -42,7 +43,6 @@ def test_weight_is_eval_over_pdf(cls, mode):
 
 
 @kinds
-@modes
 def test_lobes_are_told_truly(cls, mode):
     rng, probe = np.random.default_rng(4), Probe(cls, mode)
     for i, params in enumerate(settings(cls, mode, rng, SETTINGS)):
@@ -50,10 +50,8 @@ def test_lobes_are_told_truly(cls, mode):
         checks.flags_are_told_truly(probe, params, rng)
 
 
-@kinds
-@pytest.mark.parametrize("lanes", [1, 8])
-@modes
-def test_lanes_agree(cls, lanes, mode):
+@rotating("cls, mode, lanes", LEAVES, MODES, [1, 8], turn=other_mode_and_lanes)
+def test_lanes_agree(cls, mode, lanes):
     rng = np.random.default_rng(8)
     (params,) = settings(cls, mode, rng, 1)
     checks.lanes_agree(Probe(cls, mode), Probe(cls, mode, lanes), params, rng)

@@ -11,7 +11,7 @@ from scipy.stats import chi2
 from clpt import transforms as T
 from clpt.errors import SceneError
 from clpt.render.contract import light_records
-from clpt.render.lowering.geometry import shapes
+from clpt.render.lowering.geometry import triangles
 from clpt.render.lowering.lights import image_lights, lights
 from clpt.render.lowering.lights.image_lights import face_coordinates, face_directions
 from clpt.scene.lights import (
@@ -258,7 +258,24 @@ def skies(seed: int = 3):
         "envmap": Envmap(image=wide, to_world=TURNED),
         "cube_map": CubeMap(image=faces, to_world=TURNED @ T.scale([-1, 1, 1])),
         "one_row": Envmap(image=wide[:1]),
+        **{
+            f"default {kind}": cls()
+            for kind, cls in light_records.DECLARED.items()
+            if cls.reach == "infinite" and cls is not Constant
+        },
     }
+
+
+@pytest.mark.parametrize("kind", light_records.DECLARED)
+def test_samples_of_declared_lights(kind):
+    """Unit directions, and finite light that is there or not."""
+    lamp = light_records.DECLARED[kind]()
+    r = samples(lit([lamp]), (0.3, -0.4, 0.5), 512)
+    shines = r[4] != 0.0
+    assert np.isfinite(r).all() and (r[3] > 0.0).all() and (r[5:] >= 0.0).all() and shines.any()
+    np.testing.assert_allclose(np.linalg.norm(r[:3], axis=0), 1.0, atol=1e-5)
+    if lamp.reach == "infinite":
+        assert (r[4] > 0.0).all()
 
 
 @pytest.mark.parametrize("name", skies())
@@ -314,7 +331,7 @@ def test_images_are_chosen_by_what_they_send(name):
     value = r[5] / r[4]
     assert (r[4] > 0.0).all()
     assert value.std() < 0.1 * value.mean()
-    _, mean = image_lights.lower_image(lamp, scene.tables)
+    _, mean = image_lights.lower_image(lamp, scene.encoder)
     assert value.mean() == pytest.approx(4.0 * np.pi * mean, rel=0.02)
 
 
@@ -560,7 +577,7 @@ def test_uv_on_a_mesh():
         r[0] = uv.x; r[1] = uv.y;
     """
     given = np.array([[first, first + 1], [0.25, 0.5], [0.125, 0.25]])
-    _, faces, _, _ = shapes.triangles(mesh)
+    _, faces, _, _ = triangles.triangulate(mesh)
     weights = np.stack([1.0 - given[1] - given[2], given[1], given[2]], axis=1)
     expected = [w @ uvs[f] for w, f in zip(weights, faces, strict=True)]
     np.testing.assert_allclose(scene(body, given, 2).T, expected, atol=1e-6)

@@ -7,7 +7,7 @@ import pytest
 
 from clpt import spectra
 from clpt.render.codegen.parameters import medium_text
-from clpt.render.lowering.tables import Tables
+from clpt.render.lowering.encoder import Encoder
 from tests.kernels.scene_harness import SceneProbe
 
 FAR = 1e30
@@ -21,10 +21,10 @@ LAW = """
 
 def transmittance(lanes: int, medium: np.ndarray, t: np.ndarray, lambdas: np.ndarray) -> np.ndarray:
     """medium_transmittance in spectral mode; the media: 1 the dye, 6 a constant 2.5, 11 none."""
-    tables = Tables("spectral")
-    words = [tables.spectrum_words(s, "coefficient")[0] for s in (DYE, spectra.Constant(2.5))]
-    words.append(tables.spectrum_words(spectra.Constant(0.0), "coefficient")[0])
-    tables.append("materials", np.concatenate(words))
+    encoder = Encoder("spectral")
+    words = [encoder.spectra.words(s, "coefficient")[0] for s in (DYE, spectra.Constant(2.5))]
+    words.append(encoder.spectra.words(spectra.Constant(0.0), "coefficient")[0])
+    encoder.store.append("materials", np.concatenate(words))
     probe = SceneProbe(
         LAW,
         3,
@@ -36,7 +36,7 @@ def transmittance(lanes: int, medium: np.ndarray, t: np.ndarray, lambdas: np.nda
             "generated/medium.cl": medium_text(frozenset({"constant", "table"}))
             + '#include "optics/medium.cl"\n'
         },
-        tables=tables.arrays(),
+        tables=encoder.store.arrays(),
         settings={"lambda_min": 360.0, "lambda_max": 830.0},
     )
     return probe(medium, t, lambdas)[0]

@@ -9,6 +9,7 @@ from scipy.stats import chi2
 from clpt import transforms as T
 from clpt.errors import SceneError
 from clpt.render.contract import shape_records
+from clpt.render.lowering.geometry import analytic, triangles
 from clpt.render.lowering.geometry import shapes as rs
 from clpt.scene.shapes import Cube, Cylinder, Disk, Mesh, Rectangle, Sphere
 from tests.kernels.light_probe import shape_probe
@@ -109,7 +110,7 @@ def test_samples_follow_the_pdf(name, p):
     mean = wi.mean(axis=1)
     whole = np.linalg.norm(mean) < 0.8
     axis = np.array([0.0, 0.0, 1.0]) if whole else mean / np.linalg.norm(mean)
-    s, t = rs.across(axis)
+    s, t = analytic.across(axis)
     frame = np.stack([axis, s, t])
     local = frame @ wi
     z, phi = local[2], np.arctan2(local[1], local[0])
@@ -160,7 +161,7 @@ def test_samples_lie_on_the_shape(name, p):
     assert steep.mean() > 0.8
     assert (nearest[steep] <= 2e-5 * (t[steep] + 1.0) / cos[steep]).all()
     if shape.kind != "sphere" or p is NEAR:
-        exact = t * t / (rs.area(shape) * cos)
+        exact = t * t / (analytic.area(shape) * cos)
         np.testing.assert_allclose(pdf[steep], exact[steep], rtol=1e-3)
 
 
@@ -182,7 +183,7 @@ def test_a_small_far_sphere_is_sampled_as_a_disk():
 def test_intersection_agrees_with_float64(name):
     shape, n = SHAPES[name], 20_000
     rng = np.random.default_rng(5)
-    lo, hi = (np.array(b, np.float64) for b in rs.bounds(shape))
+    lo, hi = (np.array(b, np.float64) for b in analytic.bounds(shape))
     o = (rng.random((3, n)) * 6.0 - 3.0).astype(np.float32).astype(np.float64)
     d = lo[:, None] + rng.random((3, n)) * (hi - lo)[:, None] - o
     d = (d / np.linalg.norm(d, axis=0)).astype(np.float32).astype(np.float64)
@@ -229,7 +230,7 @@ def test_a_ray_does_not_meet_the_surface_it_starts_on(name):
 @pytest.mark.parametrize("name", ANALYTIC)
 def test_hits_lie_between_tmin_and_tmax(name):
     shape = SHAPES[name]
-    center = np.mean(rs.bounds(shape), axis=0)[:, None]
+    center = np.mean(analytic.bounds(shape), axis=0)[:, None]
     d = directions(4000, 4)
     o = center - 5.0 * d + 0.2 * directions(4000, 6)
     t = met(shape, o, d)[0]
@@ -276,7 +277,7 @@ def test_normals_and_uv_are_mitsuba_s(name, flip):
     shape = type(base)(to_world=base.to_world, flip_normals=flip, **placement)
     scene = mitsuba_shape(mi, shape)
     d = directions(400, 21)
-    o = np.mean(rs.bounds(shape), axis=0)[:, None] - 4.0 * d + 0.5 * directions(400, 22)
+    o = np.mean(analytic.bounds(shape), axis=0)[:, None] - 4.0 * d + 0.5 * directions(400, 22)
     ours, count = met(shape, o, d), 0
     for i in range(o.shape[1]):
         si = scene.ray_intersect(mi.Ray3f(list(map(float, o[:, i])), list(map(float, d[:, i]))))
@@ -301,7 +302,7 @@ def test_triangles_have_mitsuba_s_normals_and_uv(cls):
     mi.set_variant("scalar_rgb")
     shape = cls(to_world=STRETCHED)
     scene = mitsuba_shape(mi, shape)
-    vertices, faces, _, uvs = rs.triangles(shape)
+    vertices, faces, _, uvs = triangles.triangulate(shape)
     rng = np.random.default_rng(3)
     for face in faces:
         b = rng.dirichlet(np.ones(3))
@@ -328,12 +329,12 @@ def test_the_front_stays_the_front(mirror, flip):
     """A mirror does not turn a shape inside out, `flip_normals` does."""
     place = T.translate([1, 2, 3]) @ T.rotate([1, 1, 0], 30) @ T.scale([mirror, 2.0, 1.0])
     front = 1.0 if not flip else -1.0
-    vertices, faces, _, _ = rs.triangles(Cube(to_world=place, flip_normals=flip))
+    vertices, faces, _, _ = triangles.triangulate(Cube(to_world=place, flip_normals=flip))
     outward = vertices[faces].mean(axis=1) - vertices.mean(axis=0)
     assert ((crosses(vertices, faces) * outward).sum(axis=1) * front > 0.0).all()
     shape = Rectangle(to_world=place, flip_normals=flip)
     normal = T.transform_normals(place, [0, 0, front])
-    vertices, faces, _, _ = rs.triangles(shape)
+    vertices, faces, _, _ = triangles.triangulate(shape)
     assert (crosses(vertices, faces) @ normal > 0.0).all()
     np.testing.assert_allclose(rs._members(shape)["n"], normal, atol=1e-6)
 
@@ -343,7 +344,7 @@ def test_normals_turn_with_the_mesh():
         vertices=np.eye(3, dtype=np.float32), faces=np.array([[0, 1, 2]]),
         normals=np.full((3, 3), 3**-0.5, np.float32), to_world=T.scale([1.0, 1.0, 4.0]),
     )  # fmt: skip
-    _, _, normals, uvs = rs.triangles(mesh)
+    _, _, normals, uvs = triangles.triangulate(mesh)
     expected = np.array([1.0, 1.0, 0.25]) / np.linalg.norm([1.0, 1.0, 0.25])
     np.testing.assert_allclose(normals, np.tile(expected, (3, 1)), atol=1e-6)
     assert uvs is None
@@ -354,7 +355,7 @@ def test_bounds_and_area(name):
     shape, p = SHAPES[name], np.array(NEAR)
     r = sampled(shape, NEAR, 20_000, seed=12)
     points = p + (r[:3] * r[3]).T
-    lo, hi = rs.bounds(shape)
+    lo, hi = analytic.bounds(shape)
     assert (points >= lo - 1e-6).all() and (points <= hi + 1e-6).all()
     assert (points.min(0) - lo < 0.03).all() and (hi - points.max(0) < 0.03).all()
     known = {
@@ -364,19 +365,21 @@ def test_bounds_and_area(name):
         "rectangle": 4 * 0.49 * 0.75,
         "cylinder": 2 * np.pi * 0.42 * 0.7 * np.linalg.norm([-0.3, 0.3, 1.3]),
     }
-    assert rs.area(shape) == pytest.approx(known[name], rel=1e-5)
+    assert analytic.area(shape) == pytest.approx(known[name], rel=1e-5)
 
 
 def test_triangles_without_an_area_are_left_out():
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [2, 0, 0]], np.float32)
-    flat: list[rs.Flat] = []
+    flat: list[triangles.Flat] = []
     mesh = Mesh(vertices=vertices, faces=np.array([[0, 1, 2], [0, 1, 3], [1, 1, 2]]), name="leaf")
-    _, faces, _, _ = rs.triangles(mesh, flat)
+    _, faces, _, _ = triangles.triangulate(mesh, flat)
     assert faces.tolist() == [[0, 1, 2]]
-    assert rs.told([]) == []
-    assert rs.told(flat) == ["mesh 'leaf': 2 of 3 triangles have no area, left out"]
-    more = [*flat, rs.Flat("mesh", 1200, 9000), rs.Flat("mesh", 1, 2)]
-    assert rs.told(more)[0].endswith("left out; with those of 2 more shapes 1,203 in all")
+    assert triangles.warnings_of([]) == []
+    assert triangles.warnings_of(flat) == ["mesh 'leaf': 2 of 3 triangles have no area, left out"]
+    more = [*flat, triangles.Flat("mesh", 1200, 9000), triangles.Flat("mesh", 1, 2)]
+    assert triangles.warnings_of(more)[0].endswith(
+        "left out; with those of 2 more shapes 1,203 in all"
+    )
 
 
 GOOD = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
@@ -406,6 +409,6 @@ FACE = np.array([[0, 1, 2]])
 )
 def test_bad_shapes_are_named(shape, words):
     with pytest.raises(SceneError) as caught:
-        rs.bounds(shape)
+        analytic.bounds(shape)
     assert words in str(caught.value)
     assert str(caught.value).startswith(shape.kind)

@@ -8,8 +8,8 @@ import pytest
 from clpt import spectra
 from clpt.errors import SceneError
 from clpt.render.codegen.textures import dispatch_text
-from clpt.render.lowering.tables import Tables
-from clpt.render.lowering.textures import noise, textures
+from clpt.render.lowering.encoder import Encoder
+from clpt.render.lowering.textures import noise
 from clpt.scene import textures as scene
 from clpt.spectra.spectrum import d65
 from tests.kernels.scene_harness import SceneProbe
@@ -25,9 +25,9 @@ IMAGE = np.random.default_rng(4).random((5, 7, 3)).astype(np.float32)
 
 def look_up(made, role, places=PLACES, mode="rgb", lanes=8):
     """Values of textures, one after the other, at places: (n, 3 or 4) or (n,)."""
-    tables = Tables(mode)
-    words = np.array([tables.param_words(t, role)[0][-1] - 1 for t in made])
-    tables.finish()
+    encoder = Encoder(mode)
+    words = np.array([encoder.param_words(t, role)[0][-1] - 1 for t in made])
+    encoder.textures.finish()
     components = "x" if role == "real" else "xyzw" if mode == "spectral" else "xyz"
     body = "TexturePoint point = texture_point_nowhere(); Wavelengths lambdas;"
     body += "point.p = v3(x[1], x[2], x[3]); point.uv.x = x[1]; point.uv.y = x[2];"
@@ -38,10 +38,10 @@ def look_up(made, role, places=PLACES, mode="rgb", lanes=8):
     parts = ["s"] if role == "real" else [f"s.{c}" for c in components]
     body += "".join(f"r[{i}] = {part};" for i, part in enumerate(parts))
     text = dispatch_text(
-        {kind for kind, _ in tables.texture_roles},
-        tables.texture_roles,
-        tables.texture_depth,
-        tables.texture_mappings,
+        {kind for kind, _ in encoder.textures.roles},
+        encoder.textures.roles,
+        encoder.textures.depth,
+        encoder.textures.mappings,
     )
     probe = SceneProbe(
         body,
@@ -51,8 +51,8 @@ def look_up(made, role, places=PLACES, mode="rgb", lanes=8):
         mode=mode,
         lanes=lanes,
         virtual={FILE: text},
-        defines={"SPECTRA_SIZE": tables.spectra_size},
-        tables=tables.arrays(),
+        defines={"SPECTRA_SIZE": encoder.spectra.samples},
+        tables=encoder.store.arrays(),
         settings={"lambda_min": 360.0, "lambda_max": 830.0},
     )
     which = words[np.arange(len(places)) % len(made)]
@@ -177,4 +177,4 @@ def test_a_projection_is_refused():
     matrix = np.eye(4)
     matrix[3, 2] = 1.0
     with pytest.raises(SceneError, match="0 0 0 1"):
-        textures.lower_texture(scene.Noise(to_texture=matrix), "real", Tables("rgb"))
+        Encoder("rgb").textures.row(scene.Noise(to_texture=matrix), "real")

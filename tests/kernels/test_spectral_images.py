@@ -7,9 +7,8 @@ import pytest
 
 from clpt.errors import SceneError
 from clpt.render.codegen.textures import dispatch_text
-from clpt.render.lowering.tables import Tables
+from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.textures.texels import FAR, bands
-from clpt.render.lowering.textures.textures import lower_texture
 from clpt.scene import textures as scene
 from clpt.scene.lights import Constant, CubeMap, Envmap
 from clpt.spectra import Tabulated, luminance
@@ -103,18 +102,18 @@ def test_only_the_bands_of_the_film_s_range_are_kept():
     assert values.shape == (1, 32)  # 395 to 705 nm
     np.testing.assert_allclose(number.sample([395.0, 400.0, 705.0]), [0.0, 0.5, 31.0])
     assert number.values[0] == -FAR
-    tables = Tables("spectral", 400.0, 700.0)
-    lower_texture(scene.Bitmap(image=made), "emission", tables)
-    assert tables.size("texels") == 4 + 32
+    encoder = Encoder("spectral", 400.0, 700.0)
+    encoder.textures.row(scene.Bitmap(image=made), "emission")
+    assert encoder.store.size("texels") == 4 + 32
     for lo, hi in ((1.0, 2.0), (3000.0, 4000.0)):
         assert bands(made, lo, hi)[0].shape == (1, 2)
 
 
 def test_scenes_without_spectral_images_do_not_hold_their_text():
-    tables = Tables("spectral")
-    lower_texture(scene.Bitmap(image=np.zeros((2, 2, 3))), "reflectance", tables)
-    tables.finish()
-    text = dispatch_text({kind for kind, _ in tables.texture_roles}, tables.texture_roles)
+    encoder = Encoder("spectral")
+    encoder.textures.row(scene.Bitmap(image=np.zeros((2, 2, 3))), "reflectance")
+    encoder.textures.finish()
+    text = dispatch_text({kind for kind, _ in encoder.textures.roles}, encoder.textures.roles)
     assert "pectral" not in text.replace("spectrum", "")
     assert "bands" not in text
 
@@ -125,9 +124,9 @@ def test_a_role_needs_its_kind_of_spectra():
         ("emission", False, "holds reflectances .* where light"),
     ):
         with pytest.raises(SceneError, match=words):
-            lower_texture(scene.Bitmap(image=image(emissive=emissive)), role, Tables("spectral"))
+            Encoder("spectral").textures.row(scene.Bitmap(image=image(emissive=emissive)), role)
     with pytest.raises(SceneError, match="two wavelengths"):
-        lower_texture(scene.Bitmap(image=image(ODD[:1])), "reflectance", Tables("spectral"))
+        Encoder("spectral").textures.row(scene.Bitmap(image=image(ODD[:1])), "reflectance")
     with pytest.raises(SceneError, match="envmap only"):
         lit([CubeMap(image=[image(emissive=True, size=(4, 4))] * 6)])
     with pytest.raises(SceneError, match="holds reflectances"):

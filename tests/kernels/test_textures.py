@@ -11,8 +11,7 @@ from PIL import Image
 from clpt import images, spectra
 from clpt.errors import SceneError
 from clpt.render.codegen.textures import dispatch_text
-from clpt.render.lowering.tables import Tables
-from clpt.render.lowering.textures import textures
+from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.textures.bitmaps import NODES, pack
 from clpt.render.lowering.textures.texels import texels
 from clpt.render.lowering.textures.texture_programs import folded
@@ -53,9 +52,9 @@ def _body(role, mode):
 
 def look_up(made, role, uv, mode="rgb", lanes=8, rows=None):
     """Values (n, 3 or 4) or (n,) of textures in a role; rows: which of them each uv reads."""
-    tables = Tables(mode)
-    words = np.array([tables.param_words(t, role)[0][-1] - 1 for t in made])
-    tables.finish()
+    encoder = Encoder(mode)
+    words = np.array([encoder.param_words(t, role)[0][-1] - 1 for t in made])
+    encoder.textures.finish()
     which = words[np.zeros(len(uv), int) if rows is None else rows]
     body, components = _body(role, mode)
     probe = SceneProbe(
@@ -65,9 +64,9 @@ def look_up(made, role, uv, mode="rgb", lanes=8, rows=None):
         files=(FILE,),
         mode=mode,
         lanes=lanes,
-        virtual={FILE: _dispatch(frozenset(tables.texture_roles))},
-        defines={"SPECTRA_SIZE": tables.spectra_size},
-        tables=tables.arrays(),
+        virtual={FILE: _dispatch(frozenset(encoder.textures.roles))},
+        defines={"SPECTRA_SIZE": encoder.spectra.samples},
+        tables=encoder.store.arrays(),
         settings={"lambda_min": 360.0, "lambda_max": 830.0},
     )
     out = probe(which, *np.asarray(uv, np.float32).T).T
@@ -330,15 +329,15 @@ def test_packed_spectra_show_the_same_colours():
 def test_a_budget_halves_the_largest():
     """Means of linear light, odd edges repeated; each image that shrinks is told of."""
     large, small = BYTES[:, :, :3], COLOURS[:2, :2]
-    tables = Tables("rgb", texture_budget=100)
+    encoder = Encoder("rgb", texture_budget=100)
     for image in (large, small):
-        textures.lower_texture(scene.Bitmap(image=image), "reflectance", tables)
-    notes = tables.finish()
+        encoder.textures.row(scene.Bitmap(image=image), "reflectance")
+    notes = encoder.textures.finish()
     assert len(notes) == 1
     assert "5 x 6 texels made 3 x 3" in notes[0]
     decoded = np.pad(images.Stored(large, True).decoded(), ((0, 0), (0, 1), (0, 0)), "edge")
     means = decoded.reshape(3, 2, 3, 2, 3).mean(axis=(1, 3))
-    words = tables.arrays()["images"][4 + 256 :][:9].reshape(3, 3)
+    words = encoder.store.arrays()["images"][4 + 256 :][:9].reshape(3, 3)
     shown = np.stack([words & 255, words >> 8 & 255, words >> 16 & 255], axis=2)
     np.testing.assert_allclose(shown, images.linear_to_srgb(means) * 255.0, atol=0.51)
 
@@ -444,23 +443,23 @@ LOADERS = """
 
 def test_parameters_that_are_textures():
     """As the generated loaders read them; lanes without a texture read something unused."""
-    tables, uv = Tables("rgb"), _uvs(32)
+    encoder, uv = Encoder("rgb"), _uvs(32)
     colour = scene.Bitmap(image=COLOURS)
     words = [
-        *tables.param_words(spectra.Constant(0.5), "reflectance")[0],
-        *tables.param_words(0.5, "real")[0],
-        *tables.param_words(colour, "reflectance")[0],
-        *tables.param_words(colour, "real")[0],
+        *encoder.param_words(spectra.Constant(0.5), "reflectance")[0],
+        *encoder.param_words(0.5, "real")[0],
+        *encoder.param_words(colour, "reflectance")[0],
+        *encoder.param_words(colour, "real")[0],
     ]
-    tables.append("materials", words)
-    tables.finish()
+    encoder.store.append("materials", words)
+    encoder.textures.finish()
     probe = SceneProbe(
         LOADERS,
         3,
         4,
         files=(FILE,),
-        virtual={FILE: _dispatch(frozenset(tables.texture_roles))},
-        tables=tables.arrays(),
+        virtual={FILE: _dispatch(frozenset(encoder.textures.roles))},
+        tables=encoder.store.arrays(),
     )
     textured = np.arange(len(uv)) % 2 == 1
     found = probe(np.where(textured, 7, 0), *uv.T).T[textured]
@@ -471,19 +470,16 @@ def test_parameters_that_are_textures():
 def test_a_texture_is_put_in_once(tmp_path):
     path = tmp_path / "a.png"
     Image.fromarray(np.zeros((3, 4, 3), np.uint8)).save(path)
-    tables = Tables("rgb")
+    encoder = Encoder("rgb")
     board, file = scene.Checkerboard(), scene.Bitmap(image=path)
-    first = [textures.lower_texture(t, "reflectance", tables) for t in (board, file)]
-    sizes = tables.size("textures")
-    again = [
-        textures.lower_texture(t, "reflectance", tables)
-        for t in (board, scene.Bitmap(image=str(path)))
-    ]
+    first = [encoder.textures.row(t, "reflectance") for t in (board, file)]
+    sizes = encoder.store.size("textures")
+    again = [encoder.textures.row(t, "reflectance") for t in (board, scene.Bitmap(image=str(path)))]
     assert first == again
-    assert sizes == tables.size("textures")
-    assert textures.lower_texture(file, "real", tables) not in first
-    tables.finish()
-    assert tables.texture_roles == {
+    assert sizes == encoder.store.size("textures")
+    assert encoder.textures.row(file, "real") not in first
+    encoder.textures.finish()
+    assert encoder.textures.roles == {
         ("checkerboard", "reflectance"),
         ("packed_bitmap", "reflectance"),
         ("bitmap", "real"),
@@ -507,9 +503,9 @@ def test_no_textures_no_text():
 )
 def test_unusable_textures(texture, part):
     with pytest.raises(SceneError, match=part):
-        tables = Tables("rgb")
-        textures.lower_texture(texture, "reflectance", tables)
-        tables.finish()
+        encoder = Encoder("rgb")
+        encoder.textures.row(texture, "reflectance")
+        encoder.textures.finish()
 
 
 def test_texels_that_are_not_finite_are_black():

@@ -15,7 +15,8 @@ from clpt import spectra
 from clpt.scene import materials as m
 from clpt.testing.probe import root_text
 from clpt.testing.settings import directions, settings
-from tests.kernels.harness import Probe, run
+from tests.kernels.harness import MODES, Probe, other_mode, quick_mode, run
+from tests.rotation import rotating
 
 ANGLES = np.arange(0.0, 89.5)
 LAMBDAS = np.arange(360.0, 830.5, 5.0)
@@ -214,11 +215,9 @@ LAYERS = (
     (m.Layer(eta=0.05, k=4.0, thickness=1e4), m.Layer(eta=2.5, thickness=80.0, profile=0.0)),
     (m.Layer(eta=1.5, k=0.1, thickness=500.0),),
 )
-coated = pytest.mark.parametrize("cls", COATED, ids=lambda cls: cls.kind)
 
 
-@coated
-@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+@rotating("cls, mode", COATED, MODES, turn=quick_mode)
 def test_extreme_layers_are_finite_and_make_no_light(cls, mode):
     rng, probe = np.random.default_rng(31), Probe(cls, mode)
     wo = np.concatenate(
@@ -237,8 +236,7 @@ def test_extreme_layers_are_finite_and_make_no_light(cls, mode):
         assert np.all(energy[delta] <= 1.0 + 1e-5)
 
 
-@coated
-@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+@rotating("cls, mode", COATED, MODES, turn=other_mode)
 def test_coated_lanes_agree(cls, mode):
     rng = np.random.default_rng(32)
     params = settings(cls, mode, rng, 2)[1]

@@ -173,25 +173,25 @@ def test_what_is_refused(queue, soup, rays):
     vertices, faces = soup
     o, d = rays
     other = cl.CommandQueue(cl.Context([queue.device]))
-    for arguments, told in (
+    for arguments, message in (
         ((vertices[:, :2], faces), r"vertices: .*\(900, 2\)"),
         ((vertices, faces + 1), "a face names vertex 900 of 900"),
         ((vertices, to_device(queue, faces.astype(np.uint64))), "faces: .*uint64"),
         ((to_device(other, vertices), faces), "vertices: .*another context"),
     ):
-        with pytest.raises(clpt.SceneError, match=told):
+        with pytest.raises(clpt.SceneError, match=message):
             clpt.Accel(queue, *arguments)
     with pytest.raises(clpt.SceneError, match=r"layout: .*brute"):
         clpt.Accel(queue, vertices, faces, layout="brute")
     accel, there = clpt.Accel(queue, vertices, faces), to_device(queue, d)
-    for arguments, told in (
+    for arguments, message in (
         ((o[:, :2], d), r"origins: .*\(1000, 2\)"),
         ((o[:3], d), "3 origins have 1000 directions"),
         ((o, to_device(queue, d.astype(np.float64))), "directions: .*float32 is wanted.*float64"),
         ((o, there[:, :2]), r"directions: .*\(1000, 2\)"),
         ((o, d, 0.0, [1.0, 2.0]), "t_max: 1000 rays have 2"),
     ):
-        with pytest.raises(clpt.SceneError, match=told):
+        with pytest.raises(clpt.SceneError, match=message):
             accel.intersect(*arguments)
     with pytest.raises(clpt.SceneError, match="out: 1000 rays have 10 t"):
         accel.intersect(there, there, out=accel.intersect(there[:10], there[:10]))

@@ -92,14 +92,14 @@ def test_what_is_refused(queue, small, transforms):
     which = np.zeros(COUNT, int)
     flat = transforms.copy()
     flat[3, :3, :3] = 1
-    for arguments, told in (
+    for arguments, message in (
         ((which + 1, transforms), "prototypes: 1 is none of 1 meshes"),
         (([], transforms[:0]), "prototypes: one whole number or more"),
         ((which, transforms[:3]), "transforms: 40 instances have 3"),
         ((which, transforms[:, :3]), r"transforms: .*\(40, 3, 4\)"),
         ((which, flat), "transforms: instance 3 is singular"),
     ):
-        with pytest.raises(clpt.SceneError, match=told):
+        with pytest.raises(clpt.SceneError, match=message):
             clpt.InstancedAccel(queue, [mesh], *arguments)
     other = clpt.Accel(queue, *small, layout="binary" if mesh.layout == "wide8" else "wide8")
     with pytest.raises(clpt.SceneError, match=r"accels\[1\]: it has another layout"):

@@ -6,7 +6,6 @@ import dataclasses
 from typing import Any
 
 import numpy as np
-import pyopencl as cl
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
@@ -33,17 +32,13 @@ def with_path(scene: Scene, **changes: Any) -> Scene:
 def exposures(scene: Scene, count: int, spp: int, first_seed: int = 1, **wavefront: Any) -> Values:
     """Render `count` times with different seeds: (count, h, w, 3) float64."""
     renderer = clpt.Renderer(scene, **wavefront)
-    (front,) = renderer.wavefronts
-    settings = front.lowered.settings
-    made = []
+    images = []
     for seed in range(first_seed, first_seed + count):
-        settings["seed"] = seed
-        cl.enqueue_copy(renderer.device.queue, front.named["settings"], settings.reshape(1))
-        front.clear()
-        assert front.render_samples(0, spp)
-        assert front.counts.rejected == 0, "samples were not finite"
-        made.append(renderer.image().astype(np.float64))
-    return np.array(made)
+        renderer.reset(seed=seed)
+        assert renderer.run(spp)
+        assert renderer.wavefronts[0].counts.rejected == 0, "samples were not finite"
+        images.append(renderer.image().astype(np.float64))
+    return np.array(images)
 
 
 def blocks(images: ArrayLike, size: int = 4) -> Values:

@@ -31,7 +31,6 @@ from tests.renders.builders import (
 from tests.renders.support import assert_mean, exposures
 
 MODES = ("rgb", "spectral")
-QUICK = ("disk", "point", "envmap")  # on a surface, in a point, around all
 COLOUR = {"rgb": 2e-4, "spectral": 1e-3}  # what uplifting a colour may change
 
 
@@ -40,9 +39,8 @@ def test_light_on_a_plane_in_rgb(kind: str) -> None:
     assert_light(kind, "rgb")
 
 
-@pytest.mark.parametrize(
-    "kind", [pytest.param(k, marks=() if k in QUICK else pytest.mark.slow) for k in EXPECTED]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", EXPECTED)
 def test_light_on_a_plane_of_wavelengths(kind: str) -> None:
     assert_light(kind, "spectral")
 
@@ -97,7 +95,7 @@ def test_light_leaves_the_front_only() -> None:
     assert exposures(scene, 2, 16).max() == 0.0
 
 
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("mode", [pytest.param("rgb", marks=pytest.mark.slow), "spectral"])
 @pytest.mark.parametrize("albedo", [0.0, 0.3, 0.8])
 def test_sphere_in_a_furnace(albedo: float, mode: str) -> None:
     """A convex diffuse body in even light shows its albedo."""

@@ -10,7 +10,7 @@ import pytest
 
 import clpt
 from clpt import device as dev
-from clpt.render.wavefront.device_scene import MOST_SLOTS, UNIT_SLOTS, default_slots
+from clpt.render.wavefront.path_buffers import MOST_SLOTS, UNIT_SLOTS, default_slots
 from tests.renders.support import with_film
 
 
@@ -27,10 +27,11 @@ def test_forms(gpu: dev.Device, scenes: Path) -> None:
     scene = with_film(clpt.load(scenes / "instances.xml"), mode="rgb")
     renderer = clpt.Renderer(scene, gpu, queued=True)  # one kind: it would not be asked for
     front = renderer.wavefronts[0]
-    assert (front.lanes, front.tree.layout, front.queued) == (1, "compact", "append")
-    assert UNIT_SLOTS < front.slots <= 2 * UNIT_SLOTS  # whole pictures
+    slots, strategy = front.paths.slots, front.scene.strategy
+    assert (front.lanes, strategy.layout, strategy.queued) == (1, "compact", "append")
+    assert UNIT_SLOTS < slots <= 2 * UNIT_SLOTS  # whole pictures
     renderer.run(2)
-    image, plain = renderer.image(), clpt.render(scene, 2, slots=front.slots)
+    image, plain = renderer.image(), clpt.render(scene, 2, slots=slots)
     off = np.abs(image - plain).max(axis=2) > 1e-3 * (1e-2 + np.abs(plain).max(axis=2))
     assert off.mean() < 0.005
     np.testing.assert_allclose(image.mean(), plain.mean(), rtol=2e-3)

@@ -110,6 +110,11 @@ def test_seeds_differ(scenes: Path, once: np.ndarray) -> None:
     other = clpt.render(scene, SPP)
     assert not np.array_equal(other, once)
     np.testing.assert_allclose(other.mean(), once.mean(), rtol=0.05)
+    renderer = clpt.Renderer(cornell(scenes))
+    renderer.reset(seed=1)
+    renderer.run(SPP)
+    assert renderer.scene.seed == 1
+    np.testing.assert_array_equal(renderer.image(), other)
 
 
 def test_a_stopped_step_leaves_a_valid_picture(scenes: Path) -> None:

@@ -33,6 +33,7 @@ CASES.remove(("thrown_images", "spectral"))  # of a projector Mitsuba does not t
 CASES.remove(("spectra", "rgb"))  # of black bodies Mitsuba has no colour
 # The rest is left to the sweep of many samples.
 LEFT = [(name, "rgb") for name in ("plastic", "textures", "orthographic", "principled_thin")]
+LEFT += [("principled", "rgb")]  # tests/kernels/test_bsdf_mitsuba.py compares the material
 LEFT += [(name, "spectral") for name in ("plastic", "instances", "principled", "principled_thin")]
 LEFT += [(name, "spectral") for name in ("glass_metal", "thin_lens", "light_tracing")]
 LEFT += [(name, "rgb") for name in ("light_tracing", "thrown_images", "thin_lens")]

@@ -26,7 +26,11 @@ SCREENS = [  # materials between the ground and the light, and what they let thr
     m.Mask(material=BLACK, opacity=Checkerboard(color0=0.5, color1=0.5)),
 ]
 PASSED = 0.75 * 1.0 * 0.75 * 0.75 * 0.5
-LAYOUTS = ("brute", "binary", "wide8", pytest.param("compact", marks=pytest.mark.slow))
+LAYOUTS = (
+    "brute",
+    "wide8",
+    *(pytest.param(n, marks=pytest.mark.slow) for n in ("binary", "compact")),
+)
 
 
 def screened(lights: list, emitters: list[Shape], mode: str) -> Scene:

@@ -49,7 +49,7 @@ def test_observers(name: str, light: Tabulated) -> None:
 
 @pytest.mark.parametrize("mode", ["spectral", "rgb"])
 def test_white_balance_makes_white(mode: str) -> None:
-    """A light of that colour is (1, 1, 1) (tests/render/test_colour.py: in every space)."""
+    """A light of that colour is (1, 1, 1) (in every space: see test_colour.py)."""
     light = spectra.illuminant("A")
     images = exposures(sky(light, mode=mode, white_balance="A", output_space="acescg"), 24, 64)
     assert_mean(images, np.ones(3), 0.01, 1e-3)
@@ -111,9 +111,7 @@ def test_bands_do_not_depend_on_passes() -> None:
     for samples in (1, 4, 7):
         passes.run(samples)
     np.testing.assert_allclose(passes.image(), whole.image(), rtol=1e-6, atol=1e-9)
-    for wavefront in passes.wavefronts:
-        wavefront.clear()
-    passes.samples = 0
+    passes.reset()
     passes.run(12)
     assert np.array_equal(passes.image(), whole.image())
 
@@ -132,7 +130,7 @@ def test_a_wide_range_changes_no_colour(film: dict) -> None:
     made = sky(light, output_space="xyz", sampler=Independent(), **film)
     renderer, found = clpt.Renderer(made), []
     for i in range(16):
-        renderer.wavefronts[0].clear()
+        renderer.reset()
         renderer.samples = 64 * i  # independent samples of one sequence
         renderer.run(64)
         found.append(renderer.colours())

@@ -164,7 +164,7 @@ def test_from_a_scene_file(tmp_path):
     }
     (tmp_path / "scene.json").write_text(json.dumps(text))
     renderer = clpt.Renderer(clpt.load(tmp_path / "scene.json"))
-    features = renderer.wavefronts[0].lowered.features
+    features = renderer.wavefronts[0].features
     assert features.textures == ("spectral_bitmap",)
     assert features.lights == ("spectral_envmap",)
     renderer.run(1)

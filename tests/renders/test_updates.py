@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import pyopencl as cl
 import pyopencl.array as cl_array
 import pytest
 
@@ -135,30 +136,43 @@ def test_values_are_a_few_words(
     monkeypatch.setattr(
         stream, "write", lambda b, a, *more: (written.append(a.nbytes), write(b, a, *more))[1]
     )
-    monkeypatch.setattr(renderer, "_lower_again", None)
-    buffers, used = dict(renderer.wavefronts[0].named), renderer.wavefronts[0].buffers.used
+    monkeypatch.setattr(renderer, "_rebuild", None)
+    buffers, used = renderer.wavefronts[0].arguments, renderer.wavefronts[0].buffers.used
     with caplog.at_level(logging.INFO, "clpt"):
         renderer.update(materials={RED: m.Diffuse(reflectance=(0.1, 0.2, 0.3))})
         assert 4 <= sum(written) <= 12
         renderer.update(camera=dataclasses.replace(CAMERA, fov=30.0))
         assert sum(written) < 200
     assert not caplog.records
-    assert renderer.wavefronts[0].named == buffers
+    assert renderer.wavefronts[0].arguments == buffers
     assert renderer.wavefronts[0].buffers.used == used
     check(renderer)
+
+
+def test_the_log_says_why_an_update_was_slow(
+    renderer: clpt.Renderer, caplog: pytest.LogCaptureFixture
+) -> None:
+    renderer.update(scene=scene())
+    with caplog.at_level(logging.DEBUG, "clpt.render.renderer"):
+        renderer.update(transforms={LAMP: tf.translate([0, 3, 0.5])})
+        renderer.update(materials={"wall": m.RoughConductor()})
+    assert [r.message for r in caplog.records] == [
+        "shapes cannot move on the device: rectangle emits light: lights follow from it",
+        "words alone do not change the scene: a material is of another kind or structure",
+    ]
 
 
 def test_what_cannot_be_changes_nothing(renderer: clpt.Renderer) -> None:
     renderer.update(scene=scene())
     before, now = picture(renderer), renderer.scene
     wide = dataclasses.replace(now, film=Film(width=40, height=16, mode="rgb"))
-    for edit, told in (
+    for edit, message in (
         ({"scene": wide}, "make a new Renderer"),
         ({"transforms": {"wall": np.zeros((4, 4))}}, "rectangle 'wall': .*singular"),
         ({"vertices": {"floor": CORNERS[:2]}}, "a face names vertex 3, there are 2"),
         ({"materials": {RED: 3}}, "3 is not a material"),
     ):
-        with pytest.raises(SceneError, match=told):
+        with pytest.raises(SceneError, match=message):
             renderer.update(**edit)
         assert renderer.scene is now
     buffers = renderer.wavefronts[0].buffers
@@ -201,8 +215,8 @@ def test_arrays_of_the_device(renderer: clpt.Renderer) -> None:
 
 
 def test_arrays_of_another_context(renderer: clpt.Renderer) -> None:
-    other = device.choose()
-    floor = dataclasses.replace(FLOOR, vertices=cl_array.to_device(other.queue, CORNERS))
+    other = cl.CommandQueue(cl.Context([renderer.device.info.cl_device]))
+    floor = dataclasses.replace(FLOOR, vertices=cl_array.to_device(other, CORNERS))
     with pytest.raises(SceneError, match="mesh 'floor': vertices lie in another OpenCL context"):
         renderer.update(scene=scene(shapes=[floor]))
 
@@ -211,14 +225,14 @@ def test_arrays_of_another_context(renderer: clpt.Renderer) -> None:
 def test_trees_are_fitted_or_built(caplog: pytest.LogCaptureFixture) -> None:
     """A lamp that moves is lowered again and its tree fitted; a scene that is given is built."""
     own = clpt.Renderer(scene(), device.choose(), layout="wide8")
-    tree = own.wavefronts[0].tree
+    tree = own.wavefronts[0].scene.trees.triangles
     own.update(transforms={LAMP: tf.translate([0.3, 2.8, 0.5]) @ LAMP.to_world, FLOOR: tf.scale(2)})
-    assert own.wavefronts[0].tree is tree
+    assert own.wavefronts[0].scene.trees.triangles is tree
     fresh = picture(clpt.Renderer(own.scene, own.device, layout="wide8"))
     np.testing.assert_allclose(picture(own), fresh, atol=1e-5)
     with caplog.at_level(logging.INFO, "clpt.render.editing.rebuild"):
         own.update(scene=own.scene)
-    assert own.wavefronts[0].tree is not tree
+    assert own.wavefronts[0].scene.trees.triangles is not tree
     assert [r.message for r in caplog.records] == ["trees are built over triangles and boxes"]
     np.testing.assert_array_equal(picture(own), fresh)
 

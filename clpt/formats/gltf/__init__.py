@@ -36,11 +36,11 @@ __all__ = ["load", "read_mesh"]
 
 
 def load(path: Path, /, **variables: Any) -> Scene:
-    """Read a glTF file; what it has no camera or no light for comes from the studio.
+    """Read a glTF file; a camera or light that it lacks is added, as for a bare mesh.
 
     variables: `time` [s] of an animation (the first, or the `animation` of that number or name);
-    without it nodes are as they stand. `camera` and `scene` choose by number or name. Raises
-    SceneError with the JSON path of what is wrong.
+    without it nodes have their own transforms. `camera` and `scene` choose by number or name.
+    Raises SceneError with the JSON path of what is wrong.
     """
     document, graph = _open(path, variables)
     chosen = cameras.chosen(graph, _text(variables.get("camera")))
@@ -50,11 +50,11 @@ def load(path: Path, /, **variables: Any) -> Scene:
     scene = framing.show(
         shapes,
         camera=chosen[0] if chosen else None,
-        given_lights=lights.placed(graph),
+        own_lights=lights.lights_of(graph),
         file=path,
     )
-    scene.warnings = document.notes
-    scene.extra["cameras"] = [camera.text("type") for _, camera in cameras.placed(graph)]
+    scene.warnings = document.warnings
+    scene.extra["cameras"] = [camera.text("type") for _, camera in cameras.cameras_of(graph)]
     if chosen:
         width, height = chosen[1]
         scene.film = dataclasses.replace(scene.film, width=width, height=height)
@@ -64,10 +64,10 @@ def load(path: Path, /, **variables: Any) -> Scene:
 def read_mesh(path: Path) -> MeshFile:
     """Return the meshes of a file as its scene shows them. Raises SceneError if there are none."""
     document, graph = _open(path, {})
-    found = meshes.shapes(graph, instances=False)
-    if not found:
+    shapes = meshes.shapes(graph, instances=False)
+    if not shapes:
         raise SceneError("holds no triangles", file=path)
-    return MeshFile([part for part in found if isinstance(part, Mesh)], document.notes)
+    return MeshFile([part for part in shapes if isinstance(part, Mesh)], document.warnings)
 
 
 def _open(path: Path, variables: dict[str, Any]) -> tuple[Document, nodes.Graph]:
@@ -86,7 +86,7 @@ def _open(path: Path, variables: dict[str, Any]) -> tuple[Document, nodes.Graph]
 
 
 def _check_extensions(document: Document) -> None:
-    """Refuse extensions that are required and not known; note the others."""
+    """Refuse unknown extensions that are required; warn of the others."""
     required = document.root.texts("extensionsRequired")
     for number, name in enumerate(required):
         if name not in (*SUPPORTED, VARIANTS):
@@ -94,7 +94,7 @@ def _check_extensions(document: Document) -> None:
             raise document.root.error(message, f"extensionsRequired[{number}]")
     for name in [*document.root.texts("extensionsUsed"), *required]:
         if name == VARIANTS:
-            document.warn("of its variants of materials the default one is shown")
+            document.warn("only the default one of its material variants is shown")
         elif name not in SUPPORTED:
             document.warn(f"extension {name} is not supported and left out")
 

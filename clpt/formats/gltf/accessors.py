@@ -1,4 +1,4 @@
-"""Accessors as arrays: every component type, strides, sparse values, normalised integers."""
+"""Accessors as arrays: all component types, strides, sparse values, normalised integers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ COMPONENTS: dict[int, np.dtype[Any]] = {
 }  # fmt: skip
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 INDEX_TYPES = (5121, 5123, 5125)
-LARGEST = 1 << 31  # bytes of an array that has no data of its own and is all zero
+LARGEST = 1 << 31  # bytes of an array without data, which is all zero
 
 
 def integers(element: Element, key: str) -> NDArray[np.uint32]:
@@ -33,7 +33,7 @@ def integers(element: Element, key: str) -> NDArray[np.uint32]:
 def floats(accessor: Element, types: tuple[str, ...]) -> NDArray[np.float32]:
     """Return an accessor's values (n, width) float32; normalised integers in [0, 1] or [-1, 1].
 
-    Raises SceneError for a type other than `types`, data that are not there, and numbers that are
+    Raises SceneError for a type other than `types`, missing data, and numbers that are
     not finite.
     """
     key = ("floats", accessor.path)
@@ -57,7 +57,7 @@ def width(accessor: Element, types: tuple[str, ...]) -> int:
 
 
 def stored(accessor: Element, types: tuple[str, ...]) -> NDArray[Any]:
-    """Return an accessor's values (n, width) as they are stored, sparse ones put in."""
+    """Return an accessor's values (n, width) as they are stored, with the sparse ones."""
     width(accessor, types)
     form = _form(accessor)
     sparse = accessor.child("sparse")
@@ -72,7 +72,7 @@ def stored(accessor: Element, types: tuple[str, ...]) -> NDArray[Any]:
 
 
 def check(accessor: Element) -> None:
-    """Raise SceneError for an accessor that reaches out of its buffer view, or is none."""
+    """Raise SceneError for an invalid accessor, or one that exceeds its buffer view."""
     form = _form(accessor)
     sparse = accessor.child("sparse")
     if sparse is not None:
@@ -85,11 +85,13 @@ def check(accessor: Element) -> None:
 
 
 def view(element: Element, key: str = "bufferView") -> tuple[Any, Element]:
-    """Return the bytes of the buffer view that is named under a key, and its element."""
-    place = element.entry(key, "bufferViews")
-    if place is None:
+    """Return the bytes of the buffer view under a key, and its element."""
+    buffer_view = element.entry(key, "bufferViews")
+    if buffer_view is None:
         raise element.error(f"{key!r} is missing")
-    return element.document.once(("view", place.path), lambda: _view(place)), place
+    return element.document.once(
+        ("view", buffer_view.path), lambda: _view(buffer_view)
+    ), buffer_view
 
 
 def _floats(accessor: Element, types: tuple[str, ...]) -> NDArray[np.float32]:
@@ -102,30 +104,30 @@ def _floats(accessor: Element, types: tuple[str, ...]) -> NDArray[np.float32]:
     return values
 
 
-def _view(place: Element) -> memoryview:
-    compressed = meshopt.extension(place)
+def _view(buffer_view: Element) -> memoryview:
+    compressed = meshopt.extension(buffer_view)
     if compressed is not None:
         return memoryview(
-            meshopt.decode(compressed, _slice(compressed), place.integer("byteLength"))
+            meshopt.decode(compressed, _slice(compressed), buffer_view.integer("byteLength"))
         )
-    return _slice(place)
+    return _slice(buffer_view)
 
 
-def _slice(place: Element) -> memoryview:
+def _slice(buffer_view: Element) -> memoryview:
     """The bytes that byteOffset and byteLength cut out of a buffer."""
-    document: Document = place.document
-    buffer = document.buffer(place.index("buffer", "buffers"))
-    offset, length = place.integer("byteOffset", 0), place.integer("byteLength", low=1)
+    document: Document = buffer_view.document
+    buffer = document.buffer(buffer_view.index("buffer", "buffers"))
+    offset, length = buffer_view.integer("byteOffset", 0), buffer_view.integer("byteLength", low=1)
     if offset + length > len(buffer):
         message = f"bytes {offset} to {offset + length} lie outside of the buffer's {len(buffer)}"
-        raise place.error(message)
+        raise buffer_view.error(message)
     return memoryview(buffer)[offset : offset + length]
 
 
 def _length(view: int, owner: Element) -> int:
     """The declared length of a buffer view."""
-    place = owner.document.entry("bufferViews", view)
-    return place.integer("byteLength", low=1)
+    buffer_view = owner.document.entry("bufferViews", view)
+    return buffer_view.integer("byteLength", low=1)
 
 
 @dataclass(frozen=True)
@@ -165,14 +167,14 @@ def _form(accessor: Element) -> _Form:
     rows = int(type_[3:]) if type_.startswith("MAT") else 1
     gap = -(rows * dtype.itemsize) % 4 if rows > 1 else 0
     made = _Form(dtype, count, columns, rows, gap, offset, 0)
-    place = accessor.entry("bufferView", "bufferViews")
-    if place is None:
+    buffer_view = accessor.entry("bufferView", "bufferViews")
+    if buffer_view is None:
         return made
-    compressed = meshopt.extension(place)
-    stride = (compressed or place).integer("byteStride", made.size)
+    compressed = meshopt.extension(buffer_view)
+    stride = (compressed or buffer_view).integer("byteStride", made.size)
     if stride < made.size:
-        raise place.error(f"{stride} bytes hold no element of {made.size}", "byteStride")
-    length = place.integer("byteLength", low=1)
+        raise buffer_view.error(f"{stride} bytes hold no element of {made.size}", "byteStride")
+    length = buffer_view.integer("byteLength", low=1)
     if offset + (count - 1) * stride + made.size - gap > length:
         message = f"{count} elements of {stride} bytes from {offset} lie outside of {length}"
         raise accessor.error(message, "count")

@@ -1,4 +1,4 @@
-"""Cameras: the first one that the scene shows, or the one that is asked for."""
+"""Cameras: the first one of the scene, or a chosen one."""
 
 from __future__ import annotations
 
@@ -13,41 +13,41 @@ from clpt.scene.cameras import Camera, Orthographic, Perspective
 from clpt.scene.integrators import Film
 
 Size = tuple[int, int]
-TURNED = np.diag([-1.0, 1.0, -1.0, 1.0])  # glTF looks along -z with +x to the right
+FROM_GLTF = np.diag([-1.0, 1.0, -1.0, 1.0])  # glTF looks along -z with +x to the right
 HEIGHT = Film().height
-FAR = 1e30  # where a file sets no far plane
-WIDEST = 16.0  # of a film's sides, one over the other
+FAR = 1e30  # [m] without a far plane
+LARGEST_ASPECT = 16.0  # of a film, and of its inverse
 
 
-def placed(graph: Graph) -> list[tuple[int, Element]]:
-    """Return (node, camera) of every camera that the scene shows, in order."""
-    found = [(i, graph.node(i).entry("camera", "cameras")) for i in graph.shown]
-    return [(node, camera) for node, camera in found if camera is not None]
+def cameras_of(graph: Graph) -> list[tuple[int, Element]]:
+    """Return (node, camera) of every camera in the scene, in order."""
+    pairs = [(i, graph.node(i).entry("camera", "cameras")) for i in graph.shown]
+    return [(node, camera) for node, camera in pairs if camera is not None]
 
 
 def chosen(graph: Graph, name: str | None) -> tuple[Camera, Size] | None:
-    """Return a camera and the size of a film of its shape, or None where the scene shows no camera.
+    """Return a camera and the size of its film, or None where the scene has no camera.
 
-    name: its number among those shown, its own name or its node's; the first one if None. Raises
-    SceneError if there is no such one.
+    name: its number in the scene, its own name or its node's; None for the first one. Raises
+    SceneError where there is none of that name.
     """
-    every = placed(graph)
+    cameras = cameras_of(graph)
     if name is None:
-        if not every:
+        if not cameras:
             return None
-        return camera(every[0][1], graph.to_world[every[0][0]])
-    for number, (node, element) in enumerate(every):
+        return camera(cameras[0][1], graph.to_world[cameras[0][0]])
+    for number, (node, element) in enumerate(cameras):
         if name in (str(number), element.text("name", None), graph.node(node).text("name", None)):
             return camera(element, graph.to_world[node])
-    names = ", ".join(c.text("name", str(i)) for i, (_, c) in enumerate(every)) or "none"
+    names = ", ".join(c.text("name", str(i)) for i, (_, c) in enumerate(cameras)) or "none"
     raise graph.document.root.error(f"shows no camera {name!r}; it shows: {names}")
 
 
 def camera(element: Element, node: Matrix) -> tuple[Camera, Size]:
-    """Return one camera and the size of its film; a node's scale does not count."""
+    """Return a camera and the size of its film; the node's scale does not count."""
     kind = element.text("type", choices=("perspective", "orthographic"))
     lens = element.needed(kind)
-    to_world = rigid(lens, node) @ TURNED
+    to_world = rigid(lens, node) @ FROM_GLTF
     if kind == "orthographic":
         x, y = (abs(lens.number(key)) for key in ("xmag", "ymag"))
         if not (x > 0.0 and y > 0.0):
@@ -62,13 +62,13 @@ def camera(element: Element, node: Matrix) -> tuple[Camera, Size]:
 
 
 def size(aspect: float) -> Size:
-    """Return the width and height of a film of the usual height, as wide as the ratio says."""
-    aspect = min(max(aspect, 1.0 / WIDEST), WIDEST)
+    """Return the width and height of a film of the default height and that aspect ratio."""
+    aspect = min(max(aspect, 1.0 / LARGEST_ASPECT), LARGEST_ASPECT)
     return max(round(HEIGHT * aspect), 1), HEIGHT
 
 
 def rigid(element: Element, node: Matrix) -> Matrix:
-    """Return a node's placement without its scale: the nearest rotation, and the translation."""
+    """Return a node's transform without its scale: the nearest rotation, and the translation."""
     if transforms.is_singular(node):
         raise element.error("its node's transform flattens space")
     u, _, v = np.linalg.svd(node[:3, :3])

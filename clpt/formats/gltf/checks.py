@@ -11,8 +11,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from clpt.formats.gltf import accessors, cameras, lights, primitives
+from clpt.formats.gltf import accessors, cameras, lights
 from clpt.formats.gltf.document import Document, Element
+from clpt.formats.gltf.geometry import types
 
 DEEPEST = 32  # of textures within a material
 FLOAT = 5126
@@ -78,8 +79,8 @@ def _mesh(mesh: Element) -> None:
                 number = attributes.index(name, "accessors")
                 accessor = attributes.document.entry("accessors", number)
                 counts.add(accessor.integer("count"))
-                if primitives.wanted(name):
-                    accessor.text("type", choices=primitives.TYPES[name.partition("_")[0]])
+                if types(name):
+                    accessor.text("type", choices=types(name))
                 if name not in base:
                     raise attributes.error("moves an attribute that the primitive has not", name)
         if len(counts) > 1:

@@ -1,4 +1,4 @@
-"""A glTF 2.0 file: its JSON with the place of every value, and its buffers.
+"""A glTF 2.0 file: its JSON, every value with its JSON path, and its buffers.
 
 Accessors are read by numpy straight from the buffers: of the readers in use, trimesh passes over
 skins, morph targets, lights, fans and instances, and pygltflib checks nothing of what it hands on.
@@ -27,7 +27,7 @@ DATA_URI = re.compile(r"data:([^,;]*)((?:;[^,;]*)*),", re.ASCII)
 
 
 class Element:
-    """An object in the JSON, and where it stands; what is asked of it is checked."""
+    """An object in the JSON with its path; every value is checked as it is read."""
 
     __slots__ = ("document", "path", "value")
 
@@ -39,17 +39,17 @@ class Element:
     def __contains__(self, key: str) -> bool:
         return key in self.value
 
-    def place(self, key: str | None = None) -> str:
-        """Return the JSON path of this element, or of what stands under `key` in it."""
+    def json_path(self, key: str | None = None) -> str:
+        """Return the path of this element, or of the value of one of its keys."""
         return ".".join(part for part in (self.path, key) if part)
 
     def error(self, message: str, key: str | None = None) -> SceneError:
-        """Return an error that names the file and the place."""
-        return SceneError(message, file=self.document.file, where=self.place(key) or None)
+        """Return an error that names the file and the JSON path."""
+        return SceneError(message, file=self.document.file, where=self.json_path(key) or None)
 
     def warn(self, message: str, key: str | None = None) -> None:
-        """Note what had to be passed over, once for each text."""
-        self.document.warn(f"{self.place(key)}: {message}")
+        """Warn of what is left out, once for each text."""
+        self.document.warn(f"{self.json_path(key)}: {message}")
 
     def integer(self, key: str, default: Any = REQUIRED, low: int = 0, high: int = LARGEST) -> int:
         """Return a whole number in [low, high]."""
@@ -115,12 +115,12 @@ class Element:
 
     def child(self, key: str) -> Element | None:
         """Return the object under a key, or None."""
-        return Element(self.document, self.place(key), self.value[key]) if key in self else None
+        return Element(self.document, self.json_path(key), self.value[key]) if key in self else None
 
     def needed(self, key: str) -> Element:
         """Return the object under a key that must be there."""
         self._get(key, REQUIRED)
-        return Element(self.document, self.place(key), self.value[key])
+        return Element(self.document, self.json_path(key), self.value[key])
 
     def count(self, key: str) -> int:
         """Return the length of the list under a key; 0 where there is none."""
@@ -132,29 +132,29 @@ class Element:
     def children(self, key: str) -> list[Element]:
         """Return the objects of the list under a key."""
         self.count(key)
-        path = self.place(key)
+        path = self.json_path(key)
         values = self.value.get(key, [])
         return [Element(self.document, f"{path}[{i}]", value) for i, value in enumerate(values)]
 
     def index(self, key: str, table: str, default: Any = REQUIRED) -> int:
-        """Return a position in one of the document's lists, such as "accessors"."""
+        """Return an index into one of the document's lists, such as "accessors"."""
         value = self.integer(key, default)
         return value if value is default else self._in_table(value, key, table)
 
     def indices(self, key: str, table: str) -> list[int]:
-        """Return a list of positions in one of the document's lists."""
+        """Return a list of indices into one of the document's lists."""
         self.count(key)
-        found = []
+        indices = []
         for i, value in enumerate(self.value.get(key, [])):
             if isinstance(value, bool) or not isinstance(value, int):
                 raise self.error(f"must be a whole number, not {_shown(value)}", f"{key}[{i}]")
-            found.append(self._in_table(value, f"{key}[{i}]", table))
-        return found
+            indices.append(self._in_table(value, f"{key}[{i}]", table))
+        return indices
 
     def entry(self, key: str, table: str) -> Element | None:
-        """Return what a position under `key` refers to, or None where there is no such key."""
-        at = self.index(key, table, None)
-        return None if at is None else self.document.entry(table, at)
+        """Return the object that the index under `key` refers to, or None without that key."""
+        index = self.index(key, table, None)
+        return None if index is None else self.document.entry(table, index)
 
     def extension(self, name: str) -> Element | None:
         """Return an extension's object, or None."""
@@ -185,12 +185,12 @@ class Element:
 
 
 class Document:
-    """A parsed file: `root` is its JSON, `notes` what was passed over."""
+    """A parsed file: `root` is its JSON; `warnings` say what was left out."""
 
     def __init__(self, file: Path):
         self.file = file
-        self.notes: list[str] = []
-        self.uv_sets: list[int] = []  # those that textures made since it was cleared look up
+        self.warnings: list[str] = []
+        self.uv_sets: list[int] = []  # of the textures that were made since it was cleared
         self._made: dict[Any, Any] = {}
         data = _read(file)
         text, self.chunk = _split(file, data) if data[:4] == b"glTF" else (data, None)
@@ -198,16 +198,16 @@ class Document:
         self._check_version()
 
     def warn(self, text: str) -> None:
-        """Note what had to be passed over, once for each text."""
-        if text not in self.notes:
-            self.notes.append(text)
+        """Warn of what is left out, once for each text."""
+        if text not in self.warnings:
+            self.warnings.append(text)
 
     def entry(self, table: str, index: int) -> Element:
         """Return an object of one of the lists at the top, such as meshes[2]."""
         return Element(self, f"{table}[{index}]", self.root.value[table][index])
 
     def once(self, key: Any, make: Callable[[], T]) -> T:
-        """Return what `make` gave when this key was asked for first."""
+        """Return make(), called once for each key."""
         if key not in self._made:
             self._made[key] = make()
         return self._made[key]
@@ -229,7 +229,7 @@ class Document:
             raise element.error(message, key) from None
 
     def beside(self, element: Element, key: str = "uri") -> Path:
-        """Return the file that a relative URI names. Raises SceneError for every other place."""
+        """Return the file that a relative URI names. Raises SceneError for any other URI."""
         uri = element.text(key)
         name = unquote(uri)
         parts = PurePosixPath(name).parts
@@ -239,10 +239,10 @@ class Document:
             raise element.error(message, key)
         path = self.file.parent.joinpath(*parts)
         try:
-            found = path.is_file()
+            exists = path.is_file()
         except (OSError, ValueError):  # too long, or with a zero in it
-            found = False
-        if not found:
+            exists = False
+        if not exists:
             raise element.error(f"there is no file {_shown(name)}", key)
         return path
 
@@ -265,10 +265,10 @@ class Document:
             raise self.root.error("is not glTF 2.0: it has no 'asset'")
         for key in ("version", "minVersion"):
             version = asset.text(key, "2.0" if key == "minVersion" else REQUIRED)
-            found = re.fullmatch(r"(\d+)\.(\d+)", version)
-            if found is None:
+            match = re.fullmatch(r"(\d+)\.(\d+)", version)
+            if match is None:
                 raise asset.error(f"{_shown(version)} is no version", key)
-            if int(found[1]) != 2 or (key == "minVersion" and int(found[2]) > 0):
+            if int(match[1]) != 2 or (key == "minVersion" and int(match[2]) > 0):
                 raise asset.error(f"glTF {version} is not supported, only 2.0", key)
 
 

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from clpt.formats.gltf import accessors, primitives
+from clpt.formats.gltf import accessors
 from clpt.formats.gltf.document import Element
+from clpt.formats.gltf.geometry import Geometry, attribute, types
 
 NAME = "KHR_draco_mesh_compression"
 HEADER = b"DRACO"
@@ -15,7 +16,7 @@ EDGEBREAKER, METADATA = 1, 0x8000
 LARGEST, RATIO = 1 << 22, 256  # triangles that are believed in, and those for each byte
 
 
-def attributes(primitive: Element, compressed: Element) -> primitives.Geometry:
+def attributes(primitive: Element, compressed: Element) -> Geometry:
     """Return the triangles and attributes of a compressed primitive.
 
     Raises SceneError for data that Draco does not decode and for counts that differ from the
@@ -25,27 +26,26 @@ def attributes(primitive: Element, compressed: Element) -> primitives.Geometry:
     faces = np.asarray(mesh.faces, np.int64).reshape(-1, 3)
     ids, declared = compressed.needed("attributes"), primitive.needed("attributes")
     arrays = {}
-    for name in filter(primitives.wanted, declared.value):
+    for name in filter(types, declared.value):
         accessor = declared.entry(name, "accessors")
         if accessor is None:
             continue
-        types = primitives.TYPES[name.partition("_")[0]]
         if name not in ids:
-            arrays[name] = accessors.floats(accessor, types)
+            arrays[name] = accessors.floats(accessor, types(name))
             continue
         found = mesh.get_attribute_by_unique_id(ids.integer(name, high=2**32 - 1))
         if found is None:
             raise ids.error("the compressed data has no such attribute", name)
         values = np.asarray(found["data"])
-        columns = accessors.width(accessor, types)
+        columns = accessors.width(accessor, types(name))
         if values.ndim != 2 or values.shape[1] != columns:
             raise ids.error(f"holds {values.shape[1:]} numbers a vertex, not {columns}", name)
-        arrays[name] = primitives.attribute(name, values, accessor)
+        arrays[name] = attribute(name, values, accessor)
         if not np.isfinite(arrays[name]).all():
             raise ids.error("holds a number that is not finite", name)
     if "POSITION" not in arrays:
         raise ids.error("'POSITION' is missing")
-    return primitives.Geometry(faces, arrays)
+    return Geometry(faces, arrays)
 
 
 def _decoded(compressed: Element) -> Any:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from clpt.formats.gltf.cameras import TURNED, rigid
+from clpt.formats.gltf.cameras import FROM_GLTF, rigid
 from clpt.formats.gltf.document import Element
 from clpt.formats.gltf.nodes import Graph, Matrix
 from clpt.scene.lights import Directional, Light, Point, Spot
@@ -17,31 +17,31 @@ from clpt.spectra import RGBIlluminant
 NAME = "KHR_lights_punctual"
 
 
-def placed(graph: Graph) -> list[Light]:
-    """Return the lights that the scene shows."""
+def lights_of(graph: Graph) -> list[Light]:
+    """Return the lights of the scene."""
     extension = graph.document.root.extension(NAME)
-    lights = [] if extension is None else extension.children("lights")
-    found = []
+    elements = [] if extension is None else extension.children("lights")
+    lights = []
     for index in graph.shown:
         own = graph.node(index).extension(NAME)
         if own is None:
             continue
         number = own.integer("light")
-        if number >= len(lights):
-            raise own.error(f"there is no light {number}; the file has {len(lights)}", "light")
-        found.append(light(lights[number], graph.to_world[index]))
-    return found
+        if number >= len(elements):
+            raise own.error(f"there is no light {number}; the file has {len(elements)}", "light")
+        lights.append(light(elements[number], graph.to_world[index]))
+    return lights
 
 
 def light(element: Element, to_world: Matrix) -> Light:
-    """Return one light, placed by its node."""
+    """Return a light; to_world: of its node."""
     colour = element.numbers("color", 3, (1.0, 1.0, 1.0), low=0.0)
     strength = element.number("intensity", 1.0, low=0.0)
     emitted = RGBIlluminant(*(strength * value for value in colour))
     kind = element.text("type", choices=("directional", "point", "spot"))
     if kind == "point":
         return Point(position=tuple(to_world[:3, 3]), intensity=emitted)
-    to_world = rigid(element, to_world) @ TURNED
+    to_world = rigid(element, to_world) @ FROM_GLTF
     if kind == "directional":
         return Directional(direction=tuple(to_world[:3, 2]), irradiance=emitted)
     cone = element.needed("spot")

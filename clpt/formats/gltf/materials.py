@@ -1,4 +1,4 @@
-"""Materials: the surface, where it is cut out, how its normals are bent, and what it emits."""
+"""Materials: the surface, its opacity, its normal map, and what it emits."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def material(element: Element | None, *, colours: bool = False) -> tuple[Materia
         inner = surface.surface(element, colours)
         emission = _emission(element, both)
     if inner.kind == GltfSurface.kind:
-        inner = _bent(element, inner)
+        inner = _with_normal_map(element, inner)
     leaf = inner.material if isinstance(inner, NormalMap) else inner
     opacity = _opacity(element, colours)
     if opacity is not None:
@@ -64,14 +64,14 @@ def material(element: Element | None, *, colours: bool = False) -> tuple[Materia
     return TwoSided(front=inner, back=None if both else ONE_SIDE), emission
 
 
-def _bent(element: Element, inner: Material) -> Material:
-    """The material with its normal map."""
+def _with_normal_map(element: Element, inner: Material) -> Material:
+    """Return the material with its normal map, if it has one."""
     info = element.child("normalTexture")
     if info is None:
         return inner
     coat = element.extension(surface.CLEARCOAT)
     if coat is not None and surface.NORMAL not in coat:
-        coat.warn("the coat has the base's normals, which a map bends")
+        coat.warn("the coat has the base's normals, those of the normal map")
     scale = info.number("scale", 1.0)
     return NormalMap(material=inner, map=texture(info, raw=True), scale=scale, along_v=True)
 

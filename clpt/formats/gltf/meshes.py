@@ -1,4 +1,4 @@
-"""Meshes of nodes: morphed, skinned, dressed, and placed once for each node or instance."""
+"""Meshes of nodes: morphed, skinned, with materials, once for each node or instance."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ from clpt import transforms
 from clpt.formats.gltf import materials, skins
 from clpt.formats.gltf.accessors import floats
 from clpt.formats.gltf.document import Element
+from clpt.formats.gltf.geometry import Geometry
 from clpt.formats.gltf.nodes import Graph, Matrix, compose
-from clpt.formats.gltf.primitives import Geometry, geometry
+from clpt.formats.gltf.primitives import geometry
 from clpt.formats.meshes.mesh import checked
 from clpt.scene.lights import Area
 from clpt.scene.materials import Material
@@ -23,7 +24,7 @@ from clpt.scene.textures import SECOND_UV
 
 FLIPPED = np.array([1, -1], np.float32)
 INSTANCING = "EXT_mesh_gpu_instancing"
-INSTANCED = 20_000  # triangles that copies would add; fewer are met sooner as copies
+INSTANCED = 20_000  # triangles that copies would add; fewer are traced faster as copies
 
 
 @dataclass(frozen=True)
@@ -37,16 +38,16 @@ class Surface:
 
 @dataclass
 class Posed:
-    """A mesh's primitives in one pose, and the nodes and places where they are shown."""
+    """A mesh's primitives in one pose, and each node that shows them, with its transform."""
 
     parts: list[Mesh]
-    places: list[tuple[Element, Matrix]] = field(default_factory=list)
+    copies: list[tuple[Element, Matrix]] = field(default_factory=list)
 
 
 def shapes(graph: Graph, *, instances: bool = True) -> list[Shape]:
     """Return the shapes that the scene shows, a mesh's copies beside each other.
 
-    Many copies of many triangles are instances of a group, where these are asked for; others are
+    With `instances`, many copies of many triangles are instances of a group. All other copies are
     meshes that share their arrays.
     """
     posed: dict[Any, Posed] = {}
@@ -62,37 +63,37 @@ def shapes(graph: Graph, *, instances: bool = True) -> list[Shape]:
             joints = None if skin is None else skins.matrices(skin, graph.to_world)
             posed[key] = Posed(_parts(mesh, weights, joints))
         own = np.eye(4) if skin is not None else graph.to_world[index]
-        posed[key].places += [(node, matrix) for matrix in _placements(node, own)]
-    return [shape for one in posed.values() for shape in _copies(one, instances)]
+        posed[key].copies += [(node, matrix) for matrix in _transforms(node, own)]
+    return [shape for each in posed.values() for shape in _shapes(each, instances)]
 
 
-def _copies(posed: Posed, instances: bool) -> list[Shape]:
-    """The shapes that show a mesh at all its places."""
+def _shapes(posed: Posed, instances: bool) -> list[Shape]:
+    """Return the shapes that show all copies of a mesh."""
     triangles = sum(len(part.faces) for part in posed.parts)
-    if not instances or triangles * (len(posed.places) - 1) < INSTANCED:
-        placed = [_placed(part, *place) for place in posed.places for part in posed.parts]
-        return [part for part in placed if part is not None]
+    if not instances or triangles * (len(posed.copies) - 1) < INSTANCED:
+        meshes = [_transformed(part, *copy) for copy in posed.copies for part in posed.parts]
+        return [mesh for mesh in meshes if mesh is not None]
     group = Group(tuple(posed.parts), posed.parts[0].name)
-    found: list[Shape] = []
-    flat = _singular(np.stack([to_world for _, to_world in posed.places]))
-    for (node, to_world), is_flat in zip(posed.places, flat.tolist(), strict=True):
+    result: list[Shape] = []
+    flat = _singular(np.stack([to_world for _, to_world in posed.copies]))
+    for (node, to_world), is_flat in zip(posed.copies, flat.tolist(), strict=True):
         if is_flat:
-            placed = [_placed(part, node, to_world) for part in posed.parts]
-            found += [part for part in placed if part is not None]
+            meshes = [_transformed(part, node, to_world) for part in posed.parts]
+            result += [mesh for mesh in meshes if mesh is not None]
         else:
-            found.append(Instance(group=group, to_world=to_world))
-    return found
+            result.append(Instance(group=group, to_world=to_world))
+    return result
 
 
 def _singular(matrices: Matrix) -> NDArray[np.bool_]:
-    """Which of affine matrices (n, 4, 4) flatten space, see `transforms.is_singular`."""
+    """Return which affine matrices (n, 4, 4) flatten space, as `transforms.is_singular`."""
     lengths = np.linalg.norm(matrices[:, :3, :3], axis=1, keepdims=True)
     unit = matrices[:, :3, :3] / np.where(lengths > 0.0, lengths, 1.0)
     return np.abs(np.linalg.det(unit)) < transforms.SINGULAR_BELOW
 
 
 def _weights(graph: Graph, index: int, node: Element, mesh: Element) -> tuple[float, ...]:
-    """The weights of a node's morph targets: animated, its own, or the mesh's."""
+    """Return the weights of a node's morph targets: animated, its own, or the mesh's."""
     animated = graph.pose.get((index, "weights"))
     if animated is not None:
         return tuple(map(float, animated))
@@ -100,8 +101,8 @@ def _weights(graph: Graph, index: int, node: Element, mesh: Element) -> tuple[fl
     return own if own is not None else mesh.numbers("weights", None, ())
 
 
-def _placements(node: Element, to_world: Matrix) -> list[Matrix]:
-    """A node's placement, or those of its instances."""
+def _transforms(node: Element, to_world: Matrix) -> list[Matrix]:
+    """Return a node's transform to the world, or those of its instances."""
     extension = node.extension(INSTANCING)
     if extension is None:
         return [to_world]
@@ -120,14 +121,14 @@ def _placements(node: Element, to_world: Matrix) -> list[Matrix]:
     t, r, s = (np.asarray(values.get(n, [rows[n][1]] * count), np.float64) for n in rows)
     length = np.linalg.norm(r, axis=1, keepdims=True)
     if not length.all():
-        raise attributes.error("a quaternion of no length turns nowhere", "ROTATION")
+        raise attributes.error("a quaternion of length 0 is no rotation", "ROTATION")
     return list(to_world @ compose(t, r / length, s))
 
 
 def _parts(
     mesh: Element, weights: tuple[float, ...], joints: NDArray[np.float64] | None
 ) -> list[Mesh]:
-    """A mesh's primitives, not yet placed; in world space where it is skinned."""
+    """Return a mesh's primitives in the node's space, or in world space where it is skinned."""
     parts = []
     for primitive in mesh.children("primitives"):
         made = geometry(primitive)
@@ -142,7 +143,7 @@ def _parts(
 
 
 def _morph(primitive: Element, made: Geometry, weights: tuple[float, ...]) -> None:
-    """Add the targets' displacements, each times its weight."""
+    """Add the displacements of the targets, each times its weight."""
     for weight, target in zip(weights, made.targets, strict=False):
         for name, change in target.items():
             if weight != 0.0 and name in made.attributes:
@@ -168,7 +169,7 @@ def _mesh(owner: Element, primitive: Element, made: Geometry) -> Mesh | None:
         made.faces,
         arrays.get("NORMAL"),
         uvs,
-        primitive.document.notes,
+        primitive.document.warnings,
         _attributes(colours, second, surface, len(arrays["POSITION"])),
     )
     if not len(values["faces"]):
@@ -177,7 +178,7 @@ def _mesh(owner: Element, primitive: Element, made: Geometry) -> Mesh | None:
 
 
 def _surface(primitive: Element, colours: bool) -> Surface:
-    """The primitive's material, made once for all that have it."""
+    """Return the primitive's material, made once for all primitives that have it."""
     document = primitive.document
     element = primitive.entry("material", "materials")
 
@@ -190,25 +191,27 @@ def _surface(primitive: Element, colours: bool) -> Surface:
 
 
 def _uvs(primitive: Element, made: Geometry, surface: Surface) -> list[NDArray[np.float32] | None]:
-    """The two sets of texture coordinates that the material looks up, v upward as clpt has it."""
-    wanted = surface.uv_sets or (0,)
-    if len(wanted) > 2:
-        message = f"textures use more than two TEXCOORD sets; TEXCOORD_{wanted[0]} stands for them"
+    """Return the two uv sets that the material looks up, with v upward, as clpt has it."""
+    sets = surface.uv_sets or (0,)
+    if len(sets) > 2:
+        message = (
+            f"textures use more than two TEXCOORD sets; TEXCOORD_{sets[0]} replaces the others"
+        )
         primitive.warn(message, "material")
-    found: list[NDArray[np.float32] | None] = []
-    for number in wanted[:2]:
+    result: list[NDArray[np.float32] | None] = []
+    for number in sets[:2]:
         uvs = made.attributes.get(f"TEXCOORD_{number}")
         if uvs is None and surface.uv_sets:
             primitive.warn(f"its textures need TEXCOORD_{number}, which is missing", "material")
         upward = None if uvs is None else uvs * FLIPPED + np.array([0, 1], np.float32)
-        found.append(upward)
-    return [*found, None][:2]
+        result.append(upward)
+    return [*result, None][:2]
 
 
 def _attributes(
     colours: NDArray[Any] | None, second: NDArray[np.float32] | None, surface: Surface, count: int
 ) -> dict[str, NDArray[np.float32]]:
-    """What the material asks of the vertices: colours, alpha, and a second set of uv."""
+    """Return the attributes that the material reads: colours, alpha, and a second uv set."""
     made = {} if colours is None else _colour_attributes(colours)
     if len(surface.uv_sets) > 1:
         uvs = np.zeros((count, 2), np.float32) if second is None else second
@@ -217,18 +220,18 @@ def _attributes(
 
 
 def _colour_attributes(colours: NDArray[Any]) -> dict[str, NDArray[np.float32]]:
-    """Colours of vertices, and their alpha, which is 1 by default."""
+    """Return the colours of vertices, and their alpha, which is 1 by default."""
     rgba = np.ones((len(colours), 4), np.float32)
     rgba[:, : colours.shape[1]] = np.clip(colours, 0.0, 1.0)
     return {"vertex_color": rgba[:, :3], "vertex_alpha": rgba[:, 3:]}
 
 
-def _placed(part: Mesh, node: Element, to_world: Matrix) -> Mesh | None:
+def _transformed(part: Mesh, node: Element, to_world: Matrix) -> Mesh | None:
     if np.array_equal(to_world, np.eye(4)):
         return part
     if not transforms.is_singular(to_world):
         return dataclasses.replace(part, to_world=to_world)
-    # A node may be flat, or scaled to nothing so that it does not show.
+    # A node may be flat, or scaled to zero to hide it.
     moved = transforms.transform_points(to_world, part.vertices).astype(np.float32)
     corners = moved[part.faces].astype(np.float64)
     solid = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).any(axis=1)

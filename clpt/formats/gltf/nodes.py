@@ -1,4 +1,4 @@
-"""The scene graph: which nodes are shown, and where."""
+"""The scene graph: which nodes are shown, and their transforms."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from clpt.formats.gltf.document import Document, Element
 
 Matrix = NDArray[np.float64]
-# What a node that does not say has: together ten numbers.
+# The defaults of a node, ten numbers in all.
 TRS: dict[str, tuple[float, ...]] = {
     "translation": (0.0, 0.0, 0.0),
     "rotation": (0.0, 0.0, 0.0, 1.0),
@@ -21,7 +21,7 @@ Pose = dict[tuple[int, str], NDArray[np.float64]]
 
 @dataclass
 class Graph:
-    """All nodes' places (n, 4, 4) in the world, and the nodes that the scene shows, in order."""
+    """The transforms of all nodes to the world (n, 4, 4), and the nodes of the scene, in order."""
 
     document: Document
     to_world: Matrix
@@ -34,10 +34,10 @@ class Graph:
 
 
 def graph(document: Document, chosen: str | None, pose: Pose) -> Graph:
-    """Place the nodes of the chosen scene, or of the default one; `pose` overrides transforms.
+    """Return the nodes of the chosen scene, or of the default one; `pose` overrides transforms.
 
     Without any scene all nodes are shown. Raises SceneError for a node that has two parents or is
-    its own ancestor, and for a transform that is none.
+    its own ancestor, and for an invalid transform.
     """
     nodes = document.root.children("nodes")
     children = [node.indices("children", "nodes") for node in nodes]
@@ -47,12 +47,12 @@ def graph(document: Document, chosen: str | None, pose: Pose) -> Graph:
     if len(order) < len(nodes):
         looping = sorted(set(range(len(nodes))) - set(order))[0]
         raise nodes[looping].error("is its own ancestor", "children")
-    placed = _locals(nodes, pose)
+    to_world = _locals(nodes, pose)
     with np.errstate(over="ignore", invalid="ignore"):
         for i in order:
             if parents[i] >= 0:
-                placed[i] = placed[parents[i]] @ placed[i]
-    finite = np.isfinite(placed).all(axis=(1, 2))
+                to_world[i] = to_world[parents[i]] @ to_world[i]
+    finite = np.isfinite(to_world).all(axis=(1, 2))
     if not finite.all():
         raise nodes[int(np.argmin(finite))].error("its transform is too large")
     scene = _scene(document, chosen)
@@ -61,7 +61,7 @@ def graph(document: Document, chosen: str | None, pose: Pose) -> Graph:
         raise scene.error("names a node that is another's child", "nodes")
     if scene is not None and len(set(starts)) < len(starts):
         raise scene.error("names a node twice", "nodes")
-    return Graph(document, placed, _descendants(starts, children), pose)
+    return Graph(document, to_world, _descendants(starts, children), pose)
 
 
 def compose(translation: Matrix, rotation: Matrix, scale: Matrix) -> Matrix:
@@ -104,7 +104,7 @@ def _parents(document: Document, children: list[list[int]]) -> list[int]:
 
 
 def _descendants(roots: list[int], children: list[list[int]]) -> list[int]:
-    """Roots and all below them, parents before children; no recursion, graphs can be deep."""
+    """Return roots and all below them, parents first; without recursion: graphs can be deep."""
     order, open_ = [], list(reversed(roots))
     seen = set()
     while open_:
@@ -117,7 +117,7 @@ def _descendants(roots: list[int], children: list[list[int]]) -> list[int]:
 
 
 def _locals(nodes: list[Element], pose: Pose) -> Matrix:
-    """The nodes' own transforms (n, 4, 4), those of `pose` where it has any."""
+    """Return the nodes' own transforms (n, 4, 4), with the values of `pose` where it has any."""
     values = np.zeros((len(nodes), 10))
     for i, node in enumerate(nodes):
         values[i] = [
@@ -129,8 +129,9 @@ def _locals(nodes: list[Element], pose: Pose) -> Matrix:
             values[i, (0, 3, 7)[first] : (3, 7, 10)[first]] = value
     length = np.linalg.norm(values[:, 3:7], axis=1, keepdims=True)
     if (length < 1e-6).any():
-        nowhere = nodes[int(np.argmin(length))]
-        raise nowhere.error("a quaternion of no length turns nowhere", "rotation")
+        raise nodes[int(np.argmin(length))].error(
+            "a quaternion of length 0 is no rotation", "rotation"
+        )
     made = compose(values[:, :3], values[:, 3:7] / length, values[:, 7:])
     for i, node in enumerate(nodes):
         if "matrix" in node:

@@ -1,36 +1,19 @@
-"""Primitives: their triangles and what their vertices carry, as arrays."""
+"""Primitives: their triangles and the attributes of their vertices, as arrays."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from clpt.formats.gltf import draco
-from clpt.formats.gltf.accessors import COMPONENTS, floats, integers, normalised, stored
+from clpt.formats.gltf.accessors import COMPONENTS, floats, integers, stored
 from clpt.formats.gltf.document import Element
+from clpt.formats.gltf.geometry import Floats, Geometry, types
 
-Floats = NDArray[np.float32]
 POINTS, TRIANGLES, STRIP, FAN = 0, 4, 5, 6
 NOT_DRAWN = {0: "points", 1: "lines", 2: "a line loop", 3: "a line strip"}
-TYPES = {
-    "POSITION": ("VEC3",), "NORMAL": ("VEC3",), "TEXCOORD": ("VEC2",), "COLOR": ("VEC3", "VEC4"),
-    "JOINTS": ("VEC4",), "WEIGHTS": ("VEC4",),
-}  # fmt: skip
-
-
-@dataclass
-class Geometry:
-    """A primitive's triangles (m, 3), and by attribute, such as TEXCOORD_0, arrays (n, width).
-
-    targets: for each morph target, displacements by attribute.
-    """
-
-    faces: NDArray[np.int64]
-    attributes: dict[str, NDArray[Any]]
-    targets: list[dict[str, Floats]] = field(default_factory=list)
 
 
 def geometry(primitive: Element) -> Geometry | None:
@@ -73,29 +56,18 @@ def triangles(order: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
     return order[np.stack([i + 1, i + 2, np.zeros_like(i)], axis=1)]
 
 
-def wanted(name: str) -> bool:
-    """Whether an attribute is one that is read."""
-    return name.partition("_")[0] in TYPES
-
-
-def attribute(name: str, values: NDArray[Any], accessor: Element) -> NDArray[Any]:
-    """Return an attribute's stored values as floats; joints stay whole numbers."""
-    return values if name.startswith("JOINTS_") else normalised(values, accessor)
-
-
 def _plain(attributes: Element) -> Geometry:
     arrays: dict[str, NDArray[Any]] = {}
-    for name in filter(wanted, attributes.value):
+    for name in filter(types, attributes.value):
         accessor = attributes.entry(name, "accessors")
         if accessor is None:
             continue
-        types = TYPES[name.partition("_")[0]]
         if name.startswith("JOINTS_"):
             if COMPONENTS.get(accessor.integer("componentType"), np.dtype("f4")).kind != "u":
                 raise accessor.error("joints must be unsigned integers", "componentType")
-            arrays[name] = stored(accessor, types)
+            arrays[name] = stored(accessor, types(name))
         else:
-            arrays[name] = floats(accessor, types)
+            arrays[name] = floats(accessor, types(name))
     return Geometry(np.zeros((0, 3), np.int64), arrays)
 
 
@@ -108,11 +80,11 @@ def _check_indices(primitive: Element, faces: NDArray[np.int64], vertices: int) 
 
 def _target(target: Element, vertices: int) -> dict[str, Floats]:
     found = {}
-    for name in filter(wanted, target.value):
+    for name in filter(types, target.value):
         accessor = target.entry(name, "accessors")
         if accessor is None:
             continue
-        found[name] = floats(accessor, TYPES[name.partition("_")[0]])
+        found[name] = floats(accessor, types(name))
         if len(found[name]) != vertices:
             raise target.error(f"has {len(found[name])} elements, not {vertices}", name)
     return found

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from clpt.formats.gltf.accessors import floats
 from clpt.formats.gltf.document import Element
-from clpt.formats.gltf.primitives import Geometry
+from clpt.formats.gltf.geometry import Geometry
 
 CHUNK = 1 << 16  # vertices at a time: each takes a matrix
 
@@ -17,15 +17,15 @@ def matrices(skin: Element, to_world: NDArray[np.float64]) -> NDArray[np.float64
     joints = skin.indices("joints", "nodes")
     if not joints:
         raise skin.error("has no joints")
-    placed = to_world[joints]
+    posed = to_world[joints]
     accessor = skin.entry("inverseBindMatrices", "accessors")
     if accessor is None:
-        return placed
+        return posed
     inverse = floats(accessor, ("MAT4",)).astype(np.float64)
     if len(inverse) < len(joints):
         message = f"has {len(inverse)} matrices for {len(joints)} joints"
         raise skin.error(message, "inverseBindMatrices")
-    return placed @ inverse[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
+    return posed @ inverse[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
 
 
 def apply(primitive: Element, made: Geometry, joints: NDArray[np.float64]) -> None:

@@ -22,7 +22,7 @@ DIFFUSE_TRANSMISSION = "KHR_materials_diffuse_transmission"
 GLOSSINESS = "KHR_materials_pbrSpecularGlossiness"
 NORMAL = "clearcoatNormalTexture"
 WHITE = (1.0, 1.0, 1.0)
-DARKEST = 1e-4  # attenuation colour: what is black after a distance is clear before it
+DARKEST = 1e-4  # attenuation colour: black would absorb all at once
 DENSEST = 1e6  # [1/m]
 LEAST_ABBE = 1.0  # of any glass is above 9
 
@@ -60,27 +60,27 @@ def colour(
     owner: Element, factor: str, info: str, default: tuple[float, ...], count: int = 3
 ) -> Any:
     """Return a factor, times the texture where there is one; of four numbers the first three."""
-    given = owner.numbers(factor, count, (*default, 1.0)[:count], low=0.0)[:3]
+    rgb = owner.numbers(factor, count, (*default, 1.0)[:count], low=0.0)[:3]
     child = owner.child(info)
     if child is None:
-        return given
+        return rgb
     image = texture(child)
-    return image if given == WHITE else Product(first=image, second=unbounded(given))
+    return image if rgb == WHITE else Product(first=image, second=unbounded(rgb))
 
 
 def number(owner: Element, factor: str, info: str, channel: str, default: float) -> Any:
     """Return a factor in [0, 1], times a texture's channel where there is one."""
-    given = owner.number(factor, default, low=0.0, high=1.0)
+    value = owner.number(factor, default, low=0.0, high=1.0)
     child = owner.child(info)
     if child is None:
-        return given
+        return value
     image = texture(child, raw=True, channel=channel)
-    return image if given == 1.0 else Product(first=image, second=given)
+    return image if value == 1.0 else Product(first=image, second=value)
 
 
-def unbounded(given: tuple[float, ...]) -> Any:
+def unbounded(rgb: tuple[float, ...]) -> Any:
     """Return a colour as a factor that may exceed one."""
-    return RGBUnbounded(*given) if max(given) > 1.0 else given
+    return RGBUnbounded(*rgb) if max(rgb) > 1.0 else rgb
 
 
 def _rough(element: Element) -> dict[str, Any]:
@@ -207,7 +207,7 @@ EXTENSIONS = {
 
 
 def _body(element: Element, values: dict[str, Any]) -> None:
-    """Sheet or body: a volume of some thickness makes it one, which absorbs and disperses."""
+    """Tell a thin sheet from a body: one with a thickness, which absorbs and disperses."""
     lets_through = any(values.get(k, 0.0) != 0.0 for k in ("transmission", "diffuse_transmission"))
     volume = element.extension("KHR_materials_volume")
     thin = volume is None or volume.number("thicknessFactor", 0.0, low=0.0) == 0.0
@@ -230,16 +230,16 @@ def _body(element: Element, values: dict[str, Any]) -> None:
 
 
 def _specular_color(element: Element, values: dict[str, Any]) -> None:
-    """Factors above one go into the index, where nothing is bent by it."""
-    given = values.get("specular_color")
-    if not isinstance(given, tuple) or max(given) <= 1.0:
+    """Move factors above one into the index of refraction, where nothing is refracted."""
+    rgb = values.get("specular_color")
+    if not isinstance(rgb, tuple) or max(rgb) <= 1.0:
         return
     ior = values.get("ior", 1.5)
     if isinstance(ior, float) and (values["thin"] or not values.get("transmission", 0.0)):
-        f0 = min(((ior - 1.0) / (ior + 1.0)) ** 2 * max(given), 1.0)
+        f0 = min(((ior - 1.0) / (ior + 1.0)) ** 2 * max(rgb), 1.0)
         root = math.sqrt(f0)
         values["ior"] = 0.0 if f0 == 1.0 else (1.0 + root) / (1.0 - root)
     else:
         element.warn("specularColorFactor above 1 is cut off where light is refracted")
-    most = max(given) if values.get("ior") != 0.0 else 1.0
-    values["specular_color"] = tuple(min(v / most, 1.0) for v in given)
+    scale = max(rgb) if values.get("ior") != 0.0 else 1.0
+    values["specular_color"] = tuple(min(v / scale, 1.0) for v in rgb)

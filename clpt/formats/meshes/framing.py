@@ -1,6 +1,6 @@
-"""A place to show what comes without one: a camera that frames it, a ground and a soft light.
+"""The studio of a bare mesh: a camera that frames it, a ground and a soft light.
 
-Up is +z for .stl, where printers and CAD have it, and +y for every other format.
+Up is +z for .stl, as in CAD, and +y for every other format.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from clpt.scene.materials import Diffuse
 from clpt.spectra import RGBIlluminant
 
 FOV = 35.0
-EXACT = 1 << 25  # points of instances to place; of more, boxes are
-CHUNK = 1 << 18  # of them at a time
+EXACT = 1 << 25  # points of instances that are transformed; of more, corners of boxes
+CHUNK = 1 << 18  # points at a time
 MARGIN = 1.05
-BELOW = 1e-3  # radii from what is shown to the ground, so that flat things do not lie in it
-FROM = (0.4, 0.35, 1.0)  # the camera, seen from the middle of the scene, +y up
+BELOW = 1e-3  # radii from the shapes down to the ground: flat shapes do not lie in it
+FROM = (0.4, 0.35, 1.0)  # direction from the centre of the scene to the camera, +y up
 KEY_FROM = (-0.8, 1.3, 0.7)  # the key light, likewise
 Z_UP = transforms.rotate([1.0, 0.0, 0.0], 90.0)
 
 
 def load(path: Path) -> Scene:
-    """Read a bare mesh and put it into the studio, whatever its size and place."""
+    """Read a bare mesh and put it into the studio, whatever its size and position."""
     file = mesh.read_mesh(path)
     if not any(mesh.has_area(part) for part in file.meshes):
         raise SceneError("none of its triangles has an area", file=path)
@@ -45,38 +45,42 @@ def show(
     *,
     file: Path,
     camera: cameras.Camera | None = None,
-    given_lights: Sequence[lights.Light] = (),
+    own_lights: Sequence[lights.Light] = (),
     up: transforms.Matrix = transforms.IDENTITY,
 ) -> Scene:
-    """Return a scene of shapes, with the camera and the lights that are missing.
+    """Return a scene of shapes; the studio adds a camera or lights that are missing.
 
-    Without any light there is one all around and a key light: a square, above a ground, where the
-    camera is ours too; else one from afar, which nothing hides and no camera sees.
-    `extra["studio"]` counts what was added. Raises SceneError for shapes too large to be framed.
+    Without lights it adds a constant light and a key light. The key light is a square above a
+    ground if the camera is the studio's too, else a directional light. `extra["studio"]` counts
+    what was added. Raises SceneError for shapes too large to be framed.
     """
     low, high = world_bounds(things)
-    middle, radius = (low + high) / 2.0, _radius(low, high)
+    centre, radius = (low + high) / 2.0, _radius(low, high)
     if not np.isfinite(radius):
         raise SceneError("is too large to be framed", file=file)
-    furniture: list[shapes.Shape] = []
-    lit: list[lights.Light] = []
-    if not given_lights:
-        lit = [lights.Constant(radiance=RGBIlluminant(0.35, 0.35, 0.35))]
+    extra_shapes: list[shapes.Shape] = []
+    extra_lights: list[lights.Light] = []
+    if not own_lights:
+        extra_lights = [lights.Constant(radiance=RGBIlluminant(0.35, 0.35, 0.35))]
         if camera is None:
-            floor, axis = middle.copy(), int(np.argmax(up[:3, 1]))
+            floor, axis = centre.copy(), int(np.argmax(up[:3, 1]))
             floor[axis] = low[axis] - BELOW * radius
-            furniture = [_ground(floor, radius, up), _key(middle, radius, up)]
+            extra_shapes = [_ground(floor, radius, up), _key(centre, radius, up)]
         else:
-            lit.append(_distant_key(up))
+            extra_lights.append(_distant_key(up))
     return Scene(
         camera=camera or framing_camera(things, up),
-        shapes=[*things, *furniture],
-        lights=[*given_lights, *lit],
+        shapes=[*things, *extra_shapes],
+        lights=[*own_lights, *extra_lights],
         film=integrators.Film(filter=integrators.Gaussian()),
         name=file.stem,
         extra={
             "format": file.suffix.lower()[1:],
-            "studio": {"camera": camera is None, "shapes": len(furniture), "lights": len(lit)},
+            "studio": {
+                "camera": camera is None,
+                "shapes": len(extra_shapes),
+                "lights": len(extra_lights),
+            },
         },
     )
 
@@ -84,18 +88,18 @@ def show(
 def framing_camera(
     things: Sequence[shapes.Shape], up: transforms.Matrix = transforms.IDENTITY
 ) -> Perspective:
-    """Return a camera from the front and above, whose shorter side all shapes together fill."""
+    """Return a camera from the front and above; all shapes together fill its shorter side."""
     low, high = world_bounds(things)
-    middle, radius = (low + high) / 2.0, _radius(low, high)
+    centre, radius = (low + high) / 2.0, _radius(low, high)
     view = transforms.look_at(_direction(FROM, up), np.zeros(3), up[:3, 1])[:3, :3]
     distance = 1.5 * radius
     for points in _outlines(things):
-        seen = (points - middle) @ view
-        aside = np.abs(seen[:, :2]).max(axis=1) / np.tan(np.radians(FOV / 2.0))
-        distance = max(distance, MARGIN * float(np.max(aside - seen[:, 2])))
-    origin = middle + distance * _direction(FROM, up)
+        local = (points - centre) @ view
+        aside = np.abs(local[:, :2]).max(axis=1) / np.tan(np.radians(FOV / 2.0))
+        distance = max(distance, MARGIN * float(np.max(aside - local[:, 2])))
+    origin = centre + distance * _direction(FROM, up)
     return Perspective(
-        to_world=transforms.look_at(origin, middle, up[:3, 1]),
+        to_world=transforms.look_at(origin, centre, up[:3, 1]),
         fov=FOV,
         fov_axis="smaller",
         near=1e-3 * distance,
@@ -106,19 +110,19 @@ def framing_camera(
 def world_bounds(
     things: Sequence[shapes.Shape],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Least and largest corner (3,) of all shapes in world space; a unit box where there are none.
+    """Return the least and largest corner (3,) of all shapes in world space; a box for no shapes.
 
-    Of very many instances the corners of their groups' boxes count.
+    For very many instances these are of their groups' boxes.
     """
     boxes = [shape_bounds(thing) for thing in things if not isinstance(thing, shapes.Instance)]
-    boxes += [(points.min(axis=0), points.max(axis=0)) for points in _placed_points(things)]
+    boxes += [(points.min(axis=0), points.max(axis=0)) for points in _instance_points(things)]
     if not boxes:
         boxes = [(-np.ones(3), np.ones(3))]
     return np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)
 
 
 def shape_bounds(thing: shapes.Shape) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Least and largest corner (3,) of a shape in world space."""
+    """Return the least and largest corner (3,) of a shape in world space."""
     matrix = np.asarray(thing.to_world, np.float64)
     linear = matrix[:3, :3]
     if isinstance(thing, shapes.Sphere):
@@ -146,22 +150,22 @@ def shape_bounds(thing: shapes.Shape) -> tuple[NDArray[np.float64], NDArray[np.f
 
 
 def _outlines(things: Sequence[shapes.Shape]) -> Iterator[NDArray[np.float64]]:
-    """Points (n, 3) in world space whose hull holds a shape, for each."""
+    """Yield for each shape points (n, 3) in world space whose hull contains it."""
     for thing in things:
         if isinstance(thing, shapes.Mesh):
             yield transforms.transform_points(thing.to_world, thing.vertices)
         elif not isinstance(thing, shapes.Instance):
             yield _box_corners(*shape_bounds(thing))
-    yield from _placed_points(things)
+    yield from _instance_points(things)
 
 
-def _placed_points(things: Sequence[shapes.Shape]) -> Iterator[NDArray[np.float64]]:
-    """Points (n, 3) around instances: those of groups, or the corners of boxes for very many."""
-    placed: dict[int, list[shapes.Instance]] = {}
+def _instance_points(things: Sequence[shapes.Shape]) -> Iterator[NDArray[np.float64]]:
+    """Yield points (n, 3) whose hull contains instances: of groups, or of boxes for very many."""
+    instances: dict[int, list[shapes.Instance]] = {}
     for thing in things:
         if isinstance(thing, shapes.Instance) and thing.group.shapes:
-            placed.setdefault(id(thing.group), []).append(thing)
-    for own in placed.values():
+            instances.setdefault(id(thing.group), []).append(thing)
+    for own in instances.values():
         matrices = np.stack([np.asarray(thing.to_world, np.float64)[:3] for thing in own])
         points = np.concatenate(list(_outlines(own[0].group.shapes)))
         if len(points) * len(matrices) > EXACT:
@@ -184,7 +188,7 @@ def _corners(thing: shapes.Shape) -> NDArray[np.float64]:
 
 
 def _radius(low: NDArray[np.float64], high: NDArray[np.float64]) -> float:
-    """Radius of the sphere around a box; one that is not zero, even around a point."""
+    """Return the radius of the sphere around a box; above zero, even around a point."""
     radius = float(np.linalg.norm(high - low)) / 2.0
     return radius if radius > 0.0 else max(1.0, float(np.abs(low).max()))
 
@@ -201,16 +205,16 @@ def _ground(floor: NDArray[np.float64], radius: float, up: transforms.Matrix) ->
 
 
 def _distant_key(up: transforms.Matrix) -> lights.Light:
-    """About as bright as the square one, from the same side."""
+    """Return a light about as bright as the square one, from the same side."""
     return lights.Directional(
         direction=tuple(-_direction(KEY_FROM, up)), irradiance=RGBIlluminant(4.0, 4.0, 4.0)
     )
 
 
-def _key(middle: NDArray[np.float64], radius: float, up: transforms.Matrix) -> shapes.Shape:
-    """A square light of 3 radii, 4 radii away, that shines on the middle."""
-    origin = middle + 4.0 * radius * _direction(KEY_FROM, up)
-    to_world = transforms.look_at(origin, middle, up[:3, 1]) @ transforms.scale(1.5 * radius)
+def _key(centre: NDArray[np.float64], radius: float, up: transforms.Matrix) -> shapes.Shape:
+    """Return a square light of 3 radii, 4 radii away from the centre, that faces it."""
+    origin = centre + 4.0 * radius * _direction(KEY_FROM, up)
+    to_world = transforms.look_at(origin, centre, up[:3, 1]) @ transforms.scale(1.5 * radius)
     return shapes.Rectangle(
         to_world=to_world,
         material=Diffuse(reflectance=0.0),

@@ -1,18 +1,18 @@
 """Triangle meshes from .ply, and through trimesh from .obj, .stl and .off files.
 
-Normals and texture coordinates are kept where the file has them. Of materials, base colours are
-taken.
+Normals and texture coordinates are kept where the file has them. Of a material only the base colour
+is read.
 """
 
 from __future__ import annotations
 
 import io
 import re
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from warnings import catch_warnings, simplefilter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +38,7 @@ GREY = TwoSided(front=Diffuse(reflectance=0.6, name="grey"))
 
 @dataclass
 class MeshFile:
-    """The meshes of a file, and what had to be passed over."""
+    """The meshes of a file, and warnings of what was left out."""
 
     meshes: list[Mesh]
     warnings: list[str] = field(default_factory=list)
@@ -50,15 +50,15 @@ def read_mesh(path: Path, *, materials: bool = True) -> MeshFile:
     Raises SceneError for a file that is missing, broken or without triangles, for vertices that are
     not finite and for faces that name vertices which are not there.
     """
-    notes: list[str] = []
+    warnings: list[str] = []
     if path.suffix.lower() == ".ply":
-        return MeshFile([_ply(path, materials, notes)], notes)
+        return MeshFile([_ply(path, materials, warnings)], warnings)
     scene = _open(path, materials)
-    read = [_mesh(path, key, part, materials, notes) for key, part in scene.geometry.items()]
-    meshes = [mesh for mesh in read if mesh is not None]
+    parts = [_mesh(path, key, part, materials, warnings) for key, part in scene.geometry.items()]
+    meshes = [mesh for mesh in parts if mesh is not None]
     if not meshes:
         raise SceneError("holds no triangles", file=path)
-    return MeshFile(meshes, list(dict.fromkeys(notes)))
+    return MeshFile(meshes, list(dict.fromkeys(warnings)))
 
 
 def join(meshes: list[Mesh]) -> Mesh:
@@ -88,7 +88,7 @@ def join(meshes: list[Mesh]) -> Mesh:
 
 
 def has_area(mesh: Mesh) -> bool:
-    """Whether one of its triangles has an area."""
+    """Return whether one of a mesh's triangles has an area."""
     for first in range(0, len(mesh.faces), CHUNK):
         corners = mesh.vertices[mesh.faces[first : first + CHUNK]].astype(np.float64)
         if np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).any():
@@ -97,7 +97,7 @@ def has_area(mesh: Mesh) -> bool:
 
 
 def smooth_normals(vertices: NDArray[Any], faces: NDArray[Any]) -> NDArray[np.float32]:
-    """Vertex normals (n, 3): those of the faces, weighted by angle (Thuermer, Wuethrich 1998)."""
+    """Return vertex normals (n, 3): of the faces, weighted by angle (Thuermer, Wuethrich 1998)."""
     total = np.zeros((len(vertices), 3))
     for first in range(0, len(faces), SUMMED):
         _add_normals(total, vertices, faces[first : first + SUMMED])
@@ -123,10 +123,10 @@ def checked(
     faces: NDArray[Any],
     normals: NDArray[Any] | None,
     uvs: NDArray[Any] | None,
-    notes: list[str],
+    warnings: list[str],
     attributes: Mapping[str, NDArray[Any]] | None = None,
 ) -> dict[str, Any]:
-    """Return a mesh's arrays without unused vertices; notes tell what else went.
+    """Return a mesh's arrays without unused vertices; `warnings` get what else was left out.
 
     Triangles without an area stay: lowering leaves them out. attributes: further arrays (n, width),
     one row a vertex, or a face where face_ begins the name.
@@ -157,7 +157,7 @@ def checked(
     if normals is not None:
         arrays["normals"] = _usable_normals(arrays["vertices"], faces, normals)
     if uvs is not None and not np.isfinite(uvs).all():
-        notes.append(f"{name or 'mesh'}: left out texture coordinates that are not finite")
+        warnings.append(f"{name or 'mesh'}: left out texture coordinates that are not finite")
         arrays["uvs"] = None
     whole = {**arrays, "faces": np.ascontiguousarray(faces, np.uint32)}
     return whole if attributes is None else {**whole, "attributes": own}
@@ -168,8 +168,8 @@ def _open(path: Path, materials: bool) -> trimesh.Scene:
 
     suffix = path.suffix.lower()
     try:
-        with warnings.catch_warnings(), np.errstate(all="ignore"):
-            warnings.simplefilter("ignore")
+        with catch_warnings(), np.errstate(all="ignore"):
+            simplefilter("ignore")
             if suffix == ".obj" and not materials:
                 # In one piece: trimesh cuts the mesh, and its normals, where the material changes.
                 text = io.BytesIO(USEMTL.sub(b"", path.read_bytes()))
@@ -180,58 +180,68 @@ def _open(path: Path, materials: bool) -> trimesh.Scene:
         raise SceneError(f"cannot be read as a {suffix} mesh: {reason}", file=path) from None
 
 
-def _ply(path: Path, materials: bool, notes: list[str]) -> Mesh:
-    """The mesh of a PLY file, which trimesh would take ten times as long for."""
-    read = ply.read(path)
-    notes += read.notes
-    own = _attributes(read.columns, len(read.vertices), len(read.faces), notes)
-    arrays = checked(path, path.name, read.vertices, read.faces, read.normals, read.uvs, notes, own)
+def _ply(path: Path, materials: bool, warnings: list[str]) -> Mesh:
+    """Read a PLY file; trimesh would take ten times as long."""
+    triangles = ply.read(path)
+    warnings += triangles.warnings
+    own = _attributes(triangles, warnings)
+    arrays = checked(
+        path,
+        path.name,
+        triangles.vertices,
+        triangles.faces,
+        triangles.normals,
+        triangles.uvs,
+        warnings,
+        own,
+    )
     if not len(arrays["faces"]):
         raise SceneError("holds no triangles", file=path)
     return Mesh(name=path.name, material=_coloured(own) if materials else GREY, **arrays)
 
 
-def _mesh(path: Path, name: str, geometry: Any, materials: bool, notes: list[str]) -> Mesh | None:
+def _mesh(
+    path: Path, name: str, geometry: Any, materials: bool, warnings: list[str]
+) -> Mesh | None:
     from trimesh import Trimesh
 
     if not isinstance(geometry, Trimesh):
-        notes.append(f"{name}: left out, since it has no triangles")
+        warnings.append(f"{name}: left out, since it has no triangles")
         return None
     vertices = np.asarray(geometry.vertices).reshape(-1, 3)
     faces = np.asarray(geometry.faces, np.int64).reshape(-1, 3)
     # Asking for `vertex_normals` would compute them; the file's own wait in the cache.
     normals = _per_vertex(geometry._cache.cache.get("vertex_normals"), vertices, 3)
     uvs = _per_vertex(getattr(geometry.visual, "uv", None), vertices, 2)
-    arrays = checked(path, name, vertices, faces, normals, uvs, notes)
+    arrays = checked(path, name, vertices, faces, normals, uvs, warnings)
     if not len(arrays["faces"]):
         return None
-    material = _material(geometry.visual, notes) if materials else GREY
+    material = _material(geometry.visual, warnings) if materials else GREY
     return Mesh(name=name, material=material, **arrays)
 
 
-def _attributes(
-    table: Mapping[str, dict[str, NDArray[Any]]], vertices: int, faces: int, notes: list[str]
-) -> dict[str, NDArray[np.float32]]:
-    """Colours and other numbers of a PLY file per vertex and face, by the names that Mitsuba has.
+def _attributes(triangles: ply.Triangles, warnings: list[str]) -> dict[str, NDArray[np.float32]]:
+    """Return colours and other numbers of a PLY file per vertex and face, by Mitsuba's names.
 
     r, g, b or red, green, blue are vertex_color or face_color, bytes decoded from sRGB; x_0, x_1,
     x_2 or x_r, x_g, x_b are vertex_x.
     """
-    found: dict[str, NDArray[np.float32]] = {}
-    for element, count in (("vertex", vertices), ("face", faces)):
-        for name, parts in _grouped(table[element]).items():
+    attributes: dict[str, NDArray[np.float32]] = {}
+    counts = {"vertex": len(triangles.vertices), "face": len(triangles.faces)}
+    for element, count in counts.items():
+        for name, parts in _grouped(triangles.columns[element]).items():
             values = np.column_stack(parts)
             if len(values) != count:
-                notes.append(f"{element}_{name} left out: the file's polygons are no triangles")
+                warnings.append(f"{element}_{name} left out: the file's polygons are no triangles")
             elif values.shape[1] in (1, 3):
                 scaled = values.dtype == np.uint8
                 linear = images.srgb_to_linear(values / np.float32(255.0)) if scaled else values
-                found[f"{element}_{name}"] = linear.astype(np.float32)
-    return found
+                attributes[f"{element}_{name}"] = linear.astype(np.float32)
+    return attributes
 
 
 def _grouped(columns: dict[str, NDArray[Any]]) -> dict[str, list[NDArray[Any]]]:
-    """Columns of one attribute by its name."""
+    """Return the columns of each attribute by its name."""
     groups: dict[str, list[NDArray[Any]]] = {}
     for name, values in columns.items():
         head, _, tail = name.rpartition("_")
@@ -252,7 +262,7 @@ def _per_vertex(values: Any, vertices: NDArray[Any], width: int) -> NDArray[np.f
 def _usable_normals(
     vertices: NDArray[Any], faces: NDArray[Any], normals: NDArray[Any]
 ) -> NDArray[np.float32]:
-    """Normals of length one; where the file's are zero or not finite, those of the faces around."""
+    """Return unit normals; those of adjacent faces where the file's are zero or not finite."""
     length = np.linalg.norm(normals.astype(np.float64), axis=1, keepdims=True)
     bad = ~(np.isfinite(length) & (length > 0.0))[:, 0]
     # What is of length one stays as it is to the last bit, so that a saved mesh is read unchanged.
@@ -270,18 +280,18 @@ def _unit(vectors: NDArray[Any]) -> NDArray[Any]:
 
 
 def _coloured(attributes: Mapping[str, Any]) -> Material:
-    """The colours of a file that names no material."""
+    """Return the material that shows the colours of a file without materials."""
     name = next((name for name in COLOURS if name in attributes), None)
     if name is None:
         return GREY
     return TwoSided(front=Diffuse(reflectance=MeshAttribute(name=name), name=name))
 
 
-def _material(visual: Any, notes: list[str]) -> Material:
+def _material(visual: Any, warnings: list[str]) -> Material:
     material = getattr(visual, "material", None)
-    if material is None or _made_up(material):
+    if material is None or _is_default(material):
         if getattr(visual, "kind", None) in ("vertex", "face"):
-            notes.append("vertex colours left out")
+            warnings.append("vertex colours left out")
         return GREY
     colour, image = _base_colour(material)
     if image is None:
@@ -291,8 +301,8 @@ def _material(visual: Any, notes: list[str]) -> Material:
     return TwoSided(front=Diffuse(reflectance=texture, name=material.name or ""))
 
 
-def _made_up(material: Any) -> bool:
-    """Whether trimesh put this material where the file has texture coordinates but names none."""
+def _is_default(material: Any) -> bool:
+    """Return whether trimesh made this material, for uv of a file that names no material."""
     from trimesh.visual.material import SimpleMaterial
 
     simple = isinstance(material, SimpleMaterial)

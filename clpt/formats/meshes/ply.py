@@ -30,7 +30,7 @@ MOST_CORNERS = 1 << 12  # of one polygon
 
 @dataclass
 class Property:
-    """A column of an element: a number in each row, or a list with the type of its length."""
+    """A column of an element: a number in each row, or a list, with the type of its length."""
 
     name: str
     type: str
@@ -58,7 +58,7 @@ class Triangles:
     normals: NDArray[np.float32] | None
     uvs: NDArray[np.float32] | None
     columns: dict[str, dict[str, NDArray[Any]]]
-    notes: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
 
 
 def read(path: Path) -> Triangles:
@@ -105,7 +105,7 @@ def _header(data: bytes) -> tuple[str, list[Element], int]:
 def _binary(
     data: bytes, elements: list[Element], start: int, order: str
 ) -> dict[str, dict[str, Any]]:
-    """Every table as {column: values}; a list column as the lengths and all values in a row."""
+    """Return every table as {column: values}; a list column as lengths and all values in a row."""
     tables: dict[str, dict[str, Any]] = {}
     for element in elements:
         rows, used = _even_rows(data, element, start, order)
@@ -119,7 +119,7 @@ def _binary(
 def _even_rows(
     data: bytes, element: Element, start: int, order: str
 ) -> tuple[dict[str, Any] | None, int]:
-    """The columns of a table whose lists have the lengths that the first row has, or None."""
+    """Return the columns of a table and its bytes; None where lists differ in length."""
     fields: list[Any] = []
     at = start
     for column in element.properties:
@@ -137,16 +137,16 @@ def _even_rows(
             return None, 0
         raise SceneError(f"it ends within {element.count} rows of {element.name[:40]!r}")
     rows = np.frombuffer(data, dtype, element.count, start)
-    found: dict[str, Any] = {}
+    result: dict[str, Any] = {}
     for column in element.properties:
         if column.length:
             lengths = rows[f"{column.name} n"]
             if element.count and (lengths != lengths[0]).any():
                 return None, 0
-            found[column.name] = lengths, rows[column.name].reshape(-1)
+            result[column.name] = lengths, rows[column.name].reshape(-1)
         else:
-            found[column.name] = rows[column.name]
-    return found, size
+            result[column.name] = rows[column.name]
+    return result, size
 
 
 def _number(data: bytes, at: int, dtype: str) -> int:
@@ -161,8 +161,8 @@ def _number(data: bytes, at: int, dtype: str) -> int:
 def _uneven_rows(
     data: bytes, element: Element, start: int, order: str
 ) -> tuple[dict[str, Any], int]:
-    """The list columns of a table, row by row; others are passed over."""
-    found: dict[str, Any] = {c.name: ([], []) for c in element.properties if c.length}
+    """The list columns of a table, row by row; other columns are skipped."""
+    result: dict[str, Any] = {c.name: ([], []) for c in element.properties if c.length}
     columns = [
         (c.name, c.length and order + c.length, order + c.type, np.dtype(c.type).itemsize)
         for c in element.properties
@@ -177,18 +177,18 @@ def _uneven_rows(
             at += np.dtype(length).itemsize
             if at + count * size > len(data):
                 raise SceneError(f"it ends within {element.count} rows of {element.name[:40]!r}")
-            lengths, values = found[name]
+            lengths, values = result[name]
             lengths.append(count)
             values.append(np.frombuffer(data, type, count, at))
             at += count * size
         if at > len(data):
             raise SceneError(f"it ends within {element.count} rows of {element.name[:40]!r}")
-    joined = {k: (np.array(n, np.int64), np.concatenate(v)) for k, (n, v) in found.items()}
-    return joined, at - start
+    lists = {k: (np.array(n, np.int64), np.concatenate(v)) for k, (n, v) in result.items()}
+    return lists, at - start
 
 
 def _ascii(data: bytes, elements: list[Element], start: int) -> dict[str, dict[str, Any]]:
-    """As `_binary`, of a file in which numbers are words."""
+    """As `_binary`, of an ascii file."""
     try:
         words = np.array(data[start:].split(), np.float64)
     except ValueError:
@@ -209,7 +209,7 @@ def _ascii_rows(words: NDArray[np.float64], element: Element) -> tuple[dict[str,
             raise short
         rows = words[: width * element.count].reshape(-1, width)
         return {c.name: _typed(rows[:, i], c) for i, c in enumerate(element.properties)}, rows.size
-    found: dict[str, Any] = {c.name: ([], []) for c in element.properties if c.length}
+    result: dict[str, Any] = {c.name: ([], []) for c in element.properties if c.length}
     at = 0
     for _ in range(element.count):
         for column in element.properties:
@@ -219,19 +219,19 @@ def _ascii_rows(words: NDArray[np.float64], element: Element) -> tuple[dict[str,
                 count = words[at]
                 if not (0 <= count <= MOST_CORNERS and count == int(count)):
                     raise SceneError(f"a list has {count:g} values")
-                found[column.name][0].append(int(count))
-                found[column.name][1].append(words[at + 1 : at + 1 + int(count)])
+                result[column.name][0].append(int(count))
+                result[column.name][1].append(words[at + 1 : at + 1 + int(count)])
                 at += int(count)
             at += 1
         if at > len(words):
             raise short
     none = [np.zeros(0)]
-    joined = {k: (np.array(n, np.int64), np.concatenate(v or none)) for k, (n, v) in found.items()}
-    return joined, at
+    lists = {k: (np.array(n, np.int64), np.concatenate(v or none)) for k, (n, v) in result.items()}
+    return lists, at
 
 
 def _typed(values: NDArray[np.float64], column: Property) -> NDArray[Any]:
-    """Bytes as such: as colours they mean other values than floats."""
+    """Return values of the type uchar as bytes: as colours they mean other values than floats."""
     if column.type != "u1":
         return values
     return np.clip(np.nan_to_num(values), 0, 255).astype(np.uint8)
@@ -254,12 +254,12 @@ def _triangles(tables: dict[str, dict[str, Any]]) -> Triangles:
         normals=None if normals is None else _columns(vertex, normals),
         uvs=None if uvs is None else _columns(vertex, uvs),
         columns={"vertex": further, "face": _plain(face)},
-        notes=["texture coordinates of faces left out"] if "texcoord" in face else [],
+        warnings=["texture coordinates of faces left out"] if "texcoord" in face else [],
     )
 
 
 def _plain(table: dict[str, Any]) -> dict[str, NDArray[Any]]:
-    """The columns that are no lists."""
+    """Return the columns that are no lists."""
     return {name: values for name, values in table.items() if isinstance(values, np.ndarray)}
 
 
@@ -269,7 +269,7 @@ def _columns(table: dict[str, Any], names: Any) -> NDArray[np.float32]:
 
 
 def _fans(lengths: NDArray[Any], corners: NDArray[Any]) -> NDArray[np.int64]:
-    """Polygons as triangles around their first corners."""
+    """Return polygons as triangles around their first corners."""
     lengths, corners = lengths.astype(np.int64), corners.astype(np.int64)
     if len(lengths) and (lengths == 3).all():
         return corners.reshape(-1, 3)

@@ -38,7 +38,7 @@ def read(path: Path) -> dict[str, Any]:
         raise SceneError("is not all numbers", file=path, line=_wrong(rows)) from None
     starts = np.flatnonzero(given & ~np.r_[False, given[:-1]])
     ends = np.flatnonzero(given & ~np.r_[given[1:], False])
-    with np.errstate(over="ignore"):  # what is not finite is told later
+    with np.errstate(over="ignore"):  # lowering refuses what is not finite
         return {"points": points.astype(np.float32), "lengths": ends - starts + 1}
 
 
@@ -51,7 +51,7 @@ def write(path: Path, points: Any, lengths: Any) -> None:
 
 
 def _wrong(rows: list[list[bytes]]) -> int:
-    """The first line with a word among its first four that is no number."""
+    """Return the first line with a word among its first four that is no number."""
     for line, row in enumerate(rows, 1):
         for word in row[:4]:
             try:

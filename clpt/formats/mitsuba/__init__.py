@@ -1,7 +1,7 @@
 """Scenes in Mitsuba 3's XML; names of Mitsuba 0.6 and 2 in camel case are read as well.
 
-What is not supported, and a parameter that nothing asks for, is an error that names the element,
-the file and the line; so a picture is never silently a different one.
+An unsupported element or an unknown parameter is an error that names the element, the file and the
+line; so a picture is never silently a different one.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from clpt.scene import Scene, integrators
 
 __all__ = ["load"]
 
-# What may stand in the scene itself for others to refer to; by itself it shows nothing.
+# What may stand in the scene itself only for others to refer to.
 REFERENCED = ("spectrum", "volume", "film", "sampler", "rfilter", "medium", "phase")
 
 
@@ -34,8 +34,8 @@ def load(path: Path, /, **variables: object) -> Scene:
     context = Context(document)
     props = Properties(document.root, context)
     shapes = shapes_of(props.objects("shape"), context)
-    found = [emitter(element, context) for element in props.objects("emitter")]
-    lights = [light for light in found if light is not None]
+    emitters = [emitter(element, context) for element in props.objects("emitter")]
+    lights = [light for light in emitters if light is not None]
     for element in props.objects("bsdf"):
         bsdf(element, context)
     for element in _textures(props):
@@ -43,18 +43,18 @@ def load(path: Path, /, **variables: object) -> Scene:
     for tag in REFERENCED:
         props.objects(tag)
     integrator = props.object("integrator")
-    seen = _first_sensor(props, context)
+    first = _first_sensor(props, context)
     props.finish()
-    camera = framing_camera(shapes) if seen is None else seen.camera
+    camera = framing_camera(shapes) if first is None else first.camera
     return Scene(
         camera=camera,
         shapes=shapes,
         lights=lights,
         integrator=_default() if integrator is None else sensors.integrator(integrator, context),
-        sampler=integrators.Independent() if seen is None else seen.sampler,
-        film=sensors.default_film() if seen is None else seen.film,
-        spp=4 if seen is None else seen.spp,
-        seed=0 if seen is None else seen.seed,
+        sampler=integrators.Independent() if first is None else first.sampler,
+        film=sensors.default_film() if first is None else first.film,
+        spp=4 if first is None else first.spp,
+        seed=0 if first is None else first.seed,
         name=path.stem,
         warnings=context.warnings,
         extra={"format": "mitsuba"},
@@ -74,9 +74,9 @@ def _textures(props: Properties) -> list[Element]:
 
 
 def _first_sensor(props: Properties, context: Context) -> sensors.Sensor | None:
-    found = [sensor(element, context) for element in props.objects("sensor")]
-    if len(found) > 1:
-        context.warn(props.element, f"only the first of {len(found)} sensors is used")
-    if not found:
+    all_sensors = [sensor(element, context) for element in props.objects("sensor")]
+    if len(all_sensors) > 1:
+        context.warn(props.element, f"only the first of {len(all_sensors)} sensors is used")
+    if not all_sensors:
         context.warn(props.element, "has no sensor; a camera that sees everything is used")
-    return found[0] if found else None
+    return all_sensors[0] if all_sensors else None

@@ -9,7 +9,7 @@ from clpt import spectra
 from clpt.formats.mitsuba.fluorescence import fluorescent
 from clpt.formats.mitsuba.hair import hair
 from clpt.formats.mitsuba.principled import principled, principled_thin
-from clpt.formats.mitsuba.properties import Context, Properties, numbers, placed, unknown
+from clpt.formats.mitsuba.properties import Context, Properties, numbers, unknown
 from clpt.formats.mitsuba.spectra import coefficient, index, ior, real, reflectance, texture
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene import materials
@@ -31,7 +31,7 @@ def _bsdf(element: Element, context: Context) -> Material:
         raise unknown(element, PLUGINS)
     cls, read = PLUGINS[element.type]
     props = Properties(element, context)
-    with placed(element):
+    with element.locating():
         made = cls(name=element.attributes.get("id", ""), **read(props))
     props.finish()
     return made
@@ -78,7 +78,7 @@ def _metal(props: Properties) -> Parameters:
         raise props.element.error("give either 'material' or 'eta' and 'k', not both")
     child = props.take("material")
     if child is not None:
-        with placed(child):
+        with child.locating():
             eta, k = spectra.metal(child.attribute("value"))
     else:
         eta, k = index(props, "eta", 0.0), index(props, "k", 1.0)
@@ -107,7 +107,7 @@ def _layer(element: Element, context: Context) -> materials.Layer:
         raise element.error("only a <bsdf> of the type 'layer' can stand here")
     props = Properties(element, context)
     given = props.named.get("eta")
-    with placed(element):
+    with element.locating():
         if given is not None and given.tag == "string":
             eta = spectra.glass(props.text("eta", ""))
         else:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from clpt import images
-from clpt.formats.mitsuba.properties import Context, Properties, placed, unknown
+from clpt.formats.mitsuba.properties import Context, Properties, unknown
 from clpt.formats.mitsuba.sensors import from_focal_length
 from clpt.formats.mitsuba.spectra import TOP_DOWN, emission, reflectance
 from clpt.formats.mitsuba.xml import Element
@@ -48,7 +48,7 @@ def _make(
 ) -> Light:
     props = Properties(element, context)
     props.ignore("sampling_weight")
-    with placed(element):
+    with element.locating():
         made = cls(**read(props))
     props.finish()
     return made

@@ -1,11 +1,11 @@
-"""Our own plugin `fluorescent`: paint that glows; Mitsuba has none like it."""
+"""The plugin `fluorescent`, clpt's own: Mitsuba has no fluorescent material."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from clpt import spectra
-from clpt.formats.mitsuba.properties import Properties, placed
+from clpt.formats.mitsuba.properties import Properties
 from clpt.formats.mitsuba.spectra import real, reflectance
 from clpt.spectra import Constant, Spectrum
 
@@ -16,7 +16,7 @@ def fluorescent(props: Properties) -> dict[str, Any]:
     own = reflectance(props, "reflectance", 0.5) if "reflectance" in props.named else None
     if "filename" in props.named:
         child, path = props.named["filename"], props.file()
-        with placed(child):
+        with child.locating():
             made["reradiation"] = spectra.read_reradiation(path)
             if own is None and path.suffix.lower() == ".bfc":
                 own = spectra.read_bispectral(path)[0]

@@ -8,7 +8,7 @@ from typing import Any
 from clpt.formats.mitsuba.properties import Properties
 from clpt.formats.mitsuba.spectra import index, real, reflectance
 
-LEAST_SPECULAR, LEAST_ETA = 1e-3, 1.001  # Mitsuba's, of what lets light through
+LEAST_SPECULAR, LEAST_ETA = 1e-3, 1.001  # Mitsuba's, of what transmits light
 SHARED = (
     "anisotropic", "spec_trans", "spec_tint", "sheen", "sheen_tint", "flatness",
 )  # fmt: skip
@@ -17,16 +17,16 @@ SAMPLING = "sampling_rate"  # such parameters change how lobes are chosen, but n
 
 def principled(props: Properties) -> dict[str, Any]:
     """Take the parameters of `principled`."""
-    given = _shared(props)
+    values = _shared(props)
     for name in ("metallic", "clearcoat", "clearcoat_gloss"):
-        given[name] = real(props, name, 0.0)
-    return {**given, "eta": _eta(props, passes=given["spec_trans"] != 0.0)}
+        values[name] = real(props, name, 0.0)
+    return {**values, "eta": _eta(props, transmits=values["spec_trans"] != 0.0)}
 
 
 def principled_thin(props: Properties) -> dict[str, Any]:
     """Take the parameters of `principledthin`."""
-    given = _shared(props)
-    return {**given, "diff_trans": real(props, "diff_trans", 0.0), "eta": index(props, "eta", 1.5)}
+    values = _shared(props)
+    return {**values, "diff_trans": real(props, "diff_trans", 0.0), "eta": index(props, "eta", 1.5)}
 
 
 def _shared(props: Properties) -> dict[str, Any]:
@@ -38,19 +38,19 @@ def _shared(props: Properties) -> dict[str, Any]:
     }
 
 
-def _eta(props: Properties, *, passes: bool) -> Any:
-    """Take the index, which Mitsuba's `specular` is another name for.
+def _eta(props: Properties, *, transmits: bool) -> Any:
+    """Take the index of refraction, by itself or as Mitsuba's `specular`.
 
-    passes: whether light is let through; then an index of one would refract nothing.
+    transmits: whether light is refracted; an index of one would refract nothing.
     """
     if "eta" in props.named and "specular" in props.named:
         raise props.element.error("give either 'eta' or 'specular', not both")
     if "eta" in props.named:
         eta = index(props, "eta", 1.5)
-        return LEAST_ETA if passes and eta == 1.0 else eta
+        return LEAST_ETA if transmits and eta == 1.0 else eta
     specular = props.number("specular", 0.5)
     if not 0.0 <= specular <= 1.0:
         raise props.element.error(f"specular must be from 0 to 1, not {specular:g}")
-    if passes:
+    if transmits:
         specular = specular or LEAST_SPECULAR
     return 2.0 / (1.0 - math.sqrt(0.08 * specular)) - 1.0

@@ -1,11 +1,10 @@
-"""The parameters of an object of a Mitsuba scene: typed, with defaults, each taken once."""
+"""The parameters of an object of a Mitsuba scene: typed, with defaults, each read once."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -34,28 +33,16 @@ LARGEST_INTEGER = 2**31 - 1
 MAX_PARTS = 1000  # of one material or texture
 
 
-@contextmanager
-def placed(element: Element) -> Iterator[None]:
-    """Give errors that know no file the place of `element`."""
-    try:
-        yield
-    except SceneError as error:
-        if error.file is not None:
-            raise
-        where = f"{error.where}: " if error.where else ""
-        raise element.error(where + error.message) from None
-
-
 class Context:
-    """What all parts of the loader share: the document, its ids, objects already made, warnings."""
+    """What all parts of the loader share: the document, its ids, the objects made, warnings."""
 
     def __init__(self, document: Document):
         self.document = document
         self.warnings: list[str] = []
         self.ids: dict[str, Element] = {}
         self._made: dict[int, Any] = {}
-        self._sizes: dict[int, int] = {}  # of what is made: its parts, counted at every use
-        self._open = [0]  # likewise of what is being made, from the outside in
+        self._sizes: dict[int, int] = {}  # parts of each object that is made, counted at every use
+        self._open = [0]  # the same of objects that are being made, the outermost first
         for element in document.root.walk():
             name = element.attributes.get("as" if element.tag == "alias" else "id")
             if name is not None and element.tag != "ref":
@@ -64,9 +51,9 @@ class Context:
                 self.ids[name] = self.resolve(element)
 
     def resolve(self, element: Element) -> Element:
-        """Follow a <ref> to the object that it names; anything else is returned as it is.
+        """Return the object that a <ref> names; any other element is returned as it is.
 
-        An <alias> names one too, which stands before it.
+        An <alias> names an object too, which stands before it.
         """
         if element.tag not in ("ref", "alias"):
             return element
@@ -78,7 +65,7 @@ class Context:
     def once(self, element: Element, make: Any) -> Any:
         """Return make(element), the same object for every reference to the element.
 
-        Raises SceneError where it refers to itself, or to what is nested too deep or too often.
+        Raises SceneError where it refers to itself, or is nested too deep or too often.
         """
         key = id(element)
         if key not in self._made:
@@ -96,18 +83,18 @@ class Context:
         return self._made[key]
 
     def warn(self, element: Element, message: str) -> None:
-        """Remember what the picture will lack."""
+        """Warn of what the picture will lack."""
         self.warnings.append(f"{element.file.name}:{element.line}: {element.label()}: {message}")
 
 
 class Properties:
-    """The children of an object element; `finish` refuses those that nothing asked for."""
+    """The children of an object element; `finish` refuses those that nothing has read."""
 
     def __init__(self, element: Element, context: Context):
         self.element, self.context = element, context
         self.named: dict[str, Element] = {}
         self.nested: list[Element] = []
-        self.asked: list[str] = []
+        self.read: list[str] = []
         for child in element.children:
             if child.tag == "alias":
                 continue
@@ -124,7 +111,7 @@ class Properties:
 
     def take(self, name: str) -> Element | None:
         """Take a parameter's element, or None where it is not given."""
-        self.asked.append(name)
+        self.read.append(name)
         return self.named.pop(name, None)
 
     def objects(self, tag: str) -> list[Element]:
@@ -132,22 +119,22 @@ class Properties:
         for name, child in list(self.named.items()):
             if child.tag == "ref" and self.context.resolve(child).tag == tag:
                 self.nested.append(self.named.pop(name))
-        found, rest = [], []
+        matching, rest = [], []
         for child in self.nested:
             target = self.context.resolve(child)
             if target.tag == tag:
-                found.append(target)
+                matching.append(target)
             else:
                 rest.append(child)
         self.nested = rest
-        return found
+        return matching
 
     def object(self, tag: str) -> Element | None:
         """Take the one nested object of a tag, or None."""
-        found = self.objects(tag)
-        if len(found) > 1:
+        objects = self.objects(tag)
+        if len(objects) > 1:
             raise self.element.error(f"holds more than one <{tag}>")
-        return found[0] if found else None
+        return objects[0] if objects else None
 
     def number(self, name: str, default: float) -> float:
         """Take a finite number."""
@@ -226,7 +213,7 @@ class Properties:
             axis = triple(step, "value", 0.0) if step.tag == "rotate" else (1.0, 0.0, 0.0)
             if abs(np.linalg.norm(axis) - 1.0) > 1e-3:
                 self.context.warn(
-                    step, "its axis has not unit length; Mitsuba 3 shears by that, here it turns"
+                    step, "its axis is not of unit length: a shear in Mitsuba 3, a rotation here"
                 )
         return transform(child)
 
@@ -239,13 +226,13 @@ class Properties:
         return matrix
 
     def finish(self) -> None:
-        """Raise UnusedParameterError or SceneError for what nothing asked for."""
+        """Raise UnusedParameterError or SceneError for what nothing has read."""
         label = f"{self.element.tag} {self.element.type!r}".replace(" ''", "")
         for child in (*self.named.values(), *self.nested):
             if self.context.resolve(child).tag in ("medium", "phase"):
                 raise child.error("is not supported: clpt has no participating media")
         for name, child in self.named.items():
-            raise UnusedParameterError(label, name, set(self.asked), **child.place())
+            raise UnusedParameterError(label, name, set(self.read), **child.location())
         for child in self.nested:
             self.context.resolve(child)
             raise child.error(f"cannot stand in {label}")
@@ -259,7 +246,7 @@ def unknown(element: Element, known: Iterable[str]) -> SceneError:
     """Return the error for a plugin that is none of the `known` ones."""
     if element.type in UNSUPPORTED:
         return element.error("is a plugin of Mitsuba that is not supported")
-    return UnknownKindError(element.tag, element.type, known, **element.place())
+    return UnknownKindError(element.tag, element.type, known, **element.location())
 
 
 def number(child: Element) -> float:
@@ -301,7 +288,7 @@ def transform(element: Element) -> transforms.Matrix:
     """Return the product of a <transform>'s steps, (4, 4); the first is applied first."""
     matrix = np.eye(4)
     for step in element.children:
-        with placed(step):
+        with step.locating():
             matrix = _step(step) @ matrix
     if not np.isfinite(matrix).all():
         raise element.error("the transform is not finite")
@@ -313,7 +300,7 @@ def _look_at(step: Element) -> transforms.Matrix:
     if "up" in step.attributes and any(above := numbers(step, "up", 3)):
         return transforms.look_at(origin, target, above)
     x, y, z = np.subtract(target, origin) / max(math.dist(target, origin), 1e-30)
-    sign = math.copysign(1.0, z)  # any direction across will do: that of Duff et al. 2017
+    sign = math.copysign(1.0, z)  # any perpendicular direction, here that of Duff et al. 2017
     up = [1.0 - x * x / (1.0 + abs(z)), -x * y / (1.0 + abs(z)), -sign * x]
     return transforms.look_at(origin, target, up)
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from clpt.errors import UnknownKindError
-from clpt.formats.mitsuba.properties import Context, Properties, placed, unknown
+from clpt.formats.mitsuba.properties import Context, Properties, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene import cameras, integrators
 from clpt.scene.integrators import Film, Filter, Integrator, Sampler
@@ -34,7 +34,7 @@ CHANNELS = {
 
 @dataclass
 class Sensor:
-    """What a <sensor> and its children say."""
+    """What a <sensor> and its children describe."""
 
     camera: cameras.Camera
     film: Film
@@ -53,7 +53,7 @@ def sensor(element: Element, context: Context) -> Sensor:
     props.ignore("shutter_open", "shutter_close")
     if element.type != "thinlens":
         props.ignore("focus_distance")
-    with placed(element):
+    with element.locating():
         camera = CAMERAS[element.type](props, film)
     props.finish()
     return Sensor(camera, film, sampler, spp, seed)
@@ -82,15 +82,15 @@ def _thin_lens(props: Properties, film: Film) -> cameras.Camera:
 
 def _glass(props: Properties) -> dict[str, Any]:
     """Ours, see docs/mitsuba_plugins.md: what a lens that disperses is made of."""
-    given: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     child = props.take("glass")
     if child is not None:
         if child.tag != "string":
             raise child.error("must be a <string> with the name of a glass")
-        given["glass"] = child.attribute("value")
+        values["glass"] = child.attribute("value")
     if "lens_focal_length" in props.named:
-        given["focal_length"] = props.number("lens_focal_length", 0.0)
-    return given
+        values["focal_length"] = props.number("lens_focal_length", 0.0)
+    return values
 
 
 def _orthographic(props: Properties, _: Film) -> cameras.Camera:
@@ -130,7 +130,7 @@ def _clip(props: Properties) -> tuple[float, float]:
 
 
 def _field_of_view(props: Properties, film: Film) -> tuple[float, str]:
-    """Return the angle [degrees] and its axis; a diagonal one is turned into that along x."""
+    """Return the angle [degrees] and its axis; a diagonal angle becomes that along x."""
     axes = ("x", "y", "diagonal", "smaller", "larger")
     axis = props.text("fov_axis", "x", axes)
     if "fov" in props.named:
@@ -167,7 +167,7 @@ def _film(element: Element, context: Context) -> Film:
     props.ignore("banner")
     child = props.object("rfilter")
     width, height = props.integer("width", 768, 1), props.integer("height", 576, 1)
-    with placed(element):
+    with element.locating():
         film = Film(
             width=width,
             height=height,
@@ -214,7 +214,7 @@ def _filter(element: Element, context: Context) -> Filter:
     }
     if element.type not in makers:
         raise unknown(element, makers)
-    with placed(element):
+    with element.locating():
         made = makers[element.type]()
     props.finish()
     return made
@@ -256,18 +256,22 @@ def _integrator(element: Element, context: Context) -> Integrator:
         raise unknown(element, INTEGRATORS)
     props = Properties(element, context)
     props.ignore("block_size", "samples_per_pass", "timeout")
-    with placed(element):
+    with element.locating():
         made = INTEGRATORS[element.type](props)
     props.finish()
     return made
 
 
+def _depths(props: Properties) -> dict[str, Any]:
+    return {
+        "max_depth": props.integer("max_depth", -1, -1),
+        "rr_depth": props.integer("rr_depth", integrators.Path.rr_depth, 1),
+        "hide_lights": props.flag("hide_emitters", False),
+    }
+
+
 def _path(props: Properties) -> Integrator:
-    return integrators.Path(
-        max_depth=props.integer("max_depth", -1, -1),
-        rr_depth=props.integer("rr_depth", integrators.Path.rr_depth, 1),
-        hide_lights=props.flag("hide_emitters", False),
-    )
+    return integrators.Path(**_depths(props))
 
 
 def _direct(props: Properties) -> Integrator:
@@ -280,11 +284,7 @@ def _direct(props: Properties) -> Integrator:
 
 
 def _particle_tracer(props: Properties) -> Integrator:
-    return integrators.ParticleTracer(
-        max_depth=props.integer("max_depth", -1, -1),
-        rr_depth=props.integer("rr_depth", integrators.Path.rr_depth, 1),
-        hide_lights=props.flag("hide_emitters", False),
-    )
+    return integrators.ParticleTracer(**_depths(props))
 
 
 def _volume_path(props: Properties) -> Integrator:
@@ -294,7 +294,7 @@ def _volume_path(props: Properties) -> Integrator:
 
 
 def _aov(props: Properties) -> Integrator:
-    """What is nested makes the picture, as in Mitsuba; without it the values are rendered."""
+    """A nested integrator makes the picture, as in Mitsuba; without one the values do."""
     nested = props.object("integrator")
     names = props.text("aovs", "")
     if nested is not None:
@@ -305,7 +305,7 @@ def _aov(props: Properties) -> Integrator:
     for entry in names.split(","):
         kind = entry.strip().rpartition(":")[2]
         if kind not in CHANNELS:
-            raise UnknownKindError("aov", kind, CHANNELS, **props.element.place())
+            raise UnknownKindError("aov", kind, CHANNELS, **props.element.location())
         channels.append(CHANNELS[kind])
     return integrators.Aov(channels=tuple(dict.fromkeys(channels)))
 

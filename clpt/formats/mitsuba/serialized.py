@@ -24,14 +24,14 @@ LARGEST = 1 << 31  # bytes of a file
 
 
 class _Stream:
-    """The unpacked bytes of one mesh, read in their order."""
+    """The decompressed bytes of one mesh, read in their order."""
 
     def __init__(self, path: Path, packed: bytes):
         self.path, self.packed, self.inflate = path, packed, zlib.decompressobj()
-        self.most = 1032 * len(packed)  # what deflate can pack at best
+        self.most = 1032 * len(packed)  # bytes: the limit of deflate
 
     def take(self, size: int) -> bytes:
-        """Return the next bytes. Raises SceneError where they end before."""
+        """Return the next bytes. Raises SceneError where there are fewer."""
         if size > self.most:
             raise SceneError("names more vertices or triangles than it can hold", file=self.path)
         parts = []
@@ -52,13 +52,13 @@ class _Stream:
         return np.frombuffer(data, dtype).reshape(rows, columns)
 
     def text(self) -> str:
-        """Text that a zero byte ends."""
-        made = bytearray()
+        """Return the text up to a zero byte."""
+        characters = bytearray()
         while (byte := self.take(1)) != b"\0":
-            made += byte
-            if len(made) > 4096:
+            characters += byte
+            if len(characters) > 4096:
                 raise SceneError("a mesh's name has no end", file=self.path)
-        return made.decode("utf-8", "replace")
+        return characters.decode("utf-8", "replace")
 
 
 def read(path: Path, index: int) -> tuple[Mesh, bool, list[str]]:
@@ -67,7 +67,7 @@ def read(path: Path, index: int) -> tuple[Mesh, bool, list[str]]:
     Raises SceneError for a file that is missing or broken, or has no such mesh.
     """
     data = _bytes(path)
-    first, end, version = _place(path, data, index)
+    first, end, version = _mesh_range(path, data, index)
     stream = _Stream(path, data[first + 4 : end])
     (flags,) = struct.unpack("<I", stream.take(4))
     name = stream.text() if version == 4 else path.name
@@ -79,11 +79,11 @@ def read(path: Path, index: int) -> tuple[Mesh, bool, list[str]]:
     own = {"vertex_color": stream.array(n_vertices, 3, real)} if flags & COLOURS else {}
     wide = "<u8" if n_vertices > 0xFFFFFFFF else "<u4"
     faces = stream.array(n_faces, 3, wide)
-    notes: list[str] = []
-    arrays = mesh.checked(path, name, vertices, faces, normals, uvs, notes, own)
+    warnings: list[str] = []
+    arrays = mesh.checked(path, name, vertices, faces, normals, uvs, warnings, own)
     if not len(arrays["faces"]):
         raise SceneError("holds no triangles", file=path)
-    return Mesh(name=name, **arrays), bool(flags & FLAT), notes
+    return Mesh(name=name, **arrays), bool(flags & FLAT), warnings
 
 
 def _bytes(path: Path) -> bytes:
@@ -95,8 +95,8 @@ def _bytes(path: Path) -> bytes:
         raise SceneError(f"cannot be read: {error.strerror}", file=path) from None
 
 
-def _place(path: Path, data: bytes, index: int) -> tuple[int, int, int]:
-    """Where a mesh begins and ends, by the table at the file's end; and the version."""
+def _mesh_range(path: Path, data: bytes, index: int) -> tuple[int, int, int]:
+    """Return where a mesh begins and ends, by the table at the file's end, and the version."""
     if len(data) < 12 or struct.unpack_from("<H", data)[0] != MAGIC:
         raise SceneError("is not a .serialized file", file=path)
     (version,) = struct.unpack_from("<H", data, 2)
@@ -109,8 +109,8 @@ def _place(path: Path, data: bytes, index: int) -> tuple[int, int, int]:
         raise SceneError("has a broken table of meshes", file=path)
     if index >= count:
         raise SceneError(f"has no mesh {index}: it holds {count}", file=path)
-    places = [*np.frombuffer(data, f"<u{width}", count, table).tolist(), table]
-    first, end = places[index], places[index + 1]
+    offsets = [*np.frombuffer(data, f"<u{width}", count, table).tolist(), table]
+    first, end = offsets[index], offsets[index + 1]
     if not first + 4 <= end <= table or struct.unpack_from("<H", data, first)[0] != MAGIC:
         raise SceneError(f"has a broken mesh {index}", file=path)
     return first, end, version

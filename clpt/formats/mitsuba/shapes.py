@@ -13,20 +13,20 @@ from clpt.formats.meshes import mesh, strands
 from clpt.formats.mitsuba import serialized
 from clpt.formats.mitsuba.bsdfs import bsdf
 from clpt.formats.mitsuba.emitters import area
-from clpt.formats.mitsuba.properties import Context, Properties, placed, unknown
+from clpt.formats.mitsuba.properties import Context, Properties, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene import shapes
 from clpt.scene.materials import Diffuse
 from clpt.scene.shapes import Group, Instance, Shape
 
 Parameters = dict[str, Any]
-UNEVEN = 1e-3  # relative; how far a transform may stretch what is round
+UNEVEN = 1e-3  # relative stretch of round shapes that a transform may have
 
 
 def shapes_of(elements: Iterable[Element], context: Context) -> list[Shape]:
-    """Make what a scene's <shape> elements describe; a shapegroup is only looked at.
+    """Make the shapes that <shape> elements describe; a shapegroup makes none, but is checked.
 
-    What stands in a <shape type="merge"> is as if it stood beside it.
+    The shapes in a <shape type="merge"> are made as if they stood beside it.
     """
     made: list[Shape] = []
     for element in elements:
@@ -60,7 +60,7 @@ def shape(element: Element, context: Context) -> Shape:
     props.ignore("silhouette_sampling_weight")
     material, emitter = props.object("bsdf"), props.object("emitter")
     parameters: Parameters = {
-        "material": _plain(emitter) if material is None else bsdf(material, context),
+        "material": _default_material(emitter) if material is None else bsdf(material, context),
         "emission": None if emitter is None else area(emitter, context),
         "flip_normals": props.flag("flip_normals", False),
         "name": element.attributes.get("id", ""),
@@ -69,7 +69,7 @@ def shape(element: Element, context: Context) -> Shape:
     if cls is shapes.Sphere and transforms.flips_handedness(parameters["to_world"]):
         # A mirror turns Mitsuba's spheres inside out, and no other shape.
         parameters["flip_normals"] = not parameters["flip_normals"]
-    with placed(element):
+    with element.locating():
         made = cls(**parameters)
     props.finish()
     return made
@@ -77,18 +77,18 @@ def shape(element: Element, context: Context) -> Shape:
 
 def _instance(element: Element, context: Context) -> Shape:
     props = Properties(element, context)
-    found = props.object("shape")
-    if found is None or found.type != "shapegroup":
+    group = props.object("shape")
+    if group is None or group.type != "shapegroup":
         raise element.error('needs a <shape type="shapegroup">, or a <ref> to one')
     name = element.attributes.get("id", "")
-    with placed(element):
-        made = Instance(group=_group(found, context), to_world=props.placement(), name=name)
+    with element.locating():
+        made = Instance(group=_group(group, context), to_world=props.placement(), name=name)
     props.finish()
     return made
 
 
 def _group(element: Element, context: Context) -> Group:
-    """The group that an element describes, the same for every instance of it."""
+    """Return the group that an element describes, one for all its instances."""
 
     def make(element: Element) -> Group:
         props = Properties(element, context)
@@ -103,12 +103,12 @@ def _group(element: Element, context: Context) -> Group:
     return context.once(element, make)
 
 
-def _plain(emitter: Element | None) -> Diffuse:
-    """What a shape without a bsdf is made of: grey, but black where it emits."""
+def _default_material(emitter: Element | None) -> Diffuse:
+    """Return the material of a shape without a bsdf: grey, but black where it emits."""
     return Diffuse() if emitter is None else Diffuse(reflectance=0.0)
 
 
-def _placed_only(props: Properties) -> Parameters:
+def _transform_only(props: Properties) -> Parameters:
     return {"to_world": props.placement()}
 
 
@@ -129,9 +129,9 @@ def _cylinder(props: Properties) -> Parameters:
 
 
 def _round(props: Properties, axis: Any) -> transforms.Matrix:
-    """Take a transform under which what is round about an axis, or about a point, remains so.
+    """Take a transform that keeps a shape round about an axis, or about a point.
 
-    Mitsuba warns of any other, and then renders something round.
+    Mitsuba warns of any other transform, and renders a round shape.
     """
     child = props.named.get("to_world")
     to_world = props.placement()
@@ -173,15 +173,15 @@ def _mesh(props: Properties, suffix: str, *, flip_v: bool) -> Parameters:
         raise props.element.error(f"{path.name!r} is not a {suffix} file")
     try:
         if suffix == ".serialized":
-            whole, own_flat, notes = serialized.read(path, props.integer("shape_index", 0))
+            whole, own_flat, warnings = serialized.read(path, props.integer("shape_index", 0))
             flat |= own_flat
         else:
             loaded = mesh.read_mesh(path, materials=False)
-            whole, notes = mesh.join(loaded.meshes), loaded.warnings
+            whole, warnings = mesh.join(loaded.meshes), loaded.warnings
     except SceneError as error:
         raise props.element.error(f"{path.name}: {error.message}") from None
-    for note in notes:
-        props.context.warn(props.element, f"{path.name}: {note}")
+    for warning in warnings:
+        props.context.warn(props.element, f"{path.name}: {warning}")
     vertices = transforms.transform_points(to_world, whole.vertices).astype(np.float32)
     uvs = whole.uvs
     if uvs is not None and flip_v:
@@ -192,7 +192,7 @@ def _mesh(props: Properties, suffix: str, *, flip_v: bool) -> Parameters:
     elif not flat:
         normals = transforms.transform_normals(to_world, whole.normals).astype(np.float32)
         if transforms.flips_handedness(to_world):
-            faces = faces[:, ::-1].copy()  # the file's normals tell the front, not the winding
+            faces = faces[:, ::-1].copy()  # the file's normals decide the front, not the winding
     return {
         "vertices": vertices,
         "faces": faces,
@@ -214,13 +214,13 @@ def _curves(props: Properties) -> Parameters:
     """Read strands; `to_world` moves their points and, as in Mitsuba, leaves their radii."""
     path, to_world = props.file(), props.placement()
     try:
-        given = strands.read(path)
+        arrays = strands.read(path)
     except SceneError as error:
         line = f":{error.line}" if error.line else ""
         raise props.element.error(f"{path.name}{line}: {error.message}") from None
-    points = given["points"]
+    points = arrays["points"]
     points[:, :3] = transforms.transform_points(to_world, points[:, :3])
-    return given
+    return arrays
 
 
 PLUGINS: dict[str, tuple[type[Shape], Callable[[Properties], Parameters]]] = {
@@ -228,9 +228,9 @@ PLUGINS: dict[str, tuple[type[Shape], Callable[[Properties], Parameters]]] = {
     "ply": (shapes.Mesh, _ply),
     "serialized": (shapes.Mesh, _serialized),
     "sphere": (shapes.Sphere, _sphere),
-    "rectangle": (shapes.Rectangle, _placed_only),
-    "disk": (shapes.Disk, _placed_only),
-    "cube": (shapes.Cube, _placed_only),
+    "rectangle": (shapes.Rectangle, _transform_only),
+    "disk": (shapes.Disk, _transform_only),
+    "cube": (shapes.Cube, _transform_only),
     "cylinder": (shapes.Cylinder, _cylinder),
     "bsplinecurve": (shapes.Curves, _bspline_curve),
     "linearcurve": (shapes.Curves, _linear_curve),

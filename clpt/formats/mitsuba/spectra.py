@@ -1,7 +1,7 @@
 """Colours, spectra and textures of a Mitsuba scene.
 
 An <rgb> or a number in an emitter is a multiple of D65; a <spectrum> there is taken as it is.
-Mitsuba's bitmaps have v = 0 in their top row, ours in the bottom row, which `to_uv` makes up for.
+Mitsuba's bitmaps have v = 0 in their top row, ours in the bottom row; `to_uv` flips them.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 from clpt import spectra
 from clpt.formats.colour import colour
-from clpt.formats.mitsuba.properties import Context, Properties, number, numbers, placed, unknown
+from clpt.formats.mitsuba.properties import Context, Properties, number, numbers, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene.textures import ATTRIBUTES, Bitmap, Checkerboard, MeshAttribute, Product, Texture
 from clpt.spectra import (
@@ -30,7 +30,7 @@ from clpt.spectra import (
     Tabulated,
 )
 
-LUMINANCE = (0.212671, 0.715160, 0.072169)  # of Rec. 709: what Mitsuba makes one number of
+LUMINANCE = (0.212671, 0.715160, 0.072169)  # of Rec. 709, as Mitsuba has it
 TOP_DOWN = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
 
 
@@ -71,10 +71,10 @@ def ior(props: Properties, name: str, default: str) -> Any:
     if child is None:
         return spectra.glass(default, dispersion=False)
     if child.tag == "spectrum":
-        with placed(child):
+        with child.locating():
             return _spectrum(child, "index", props, name)
     if child.tag == "string":
-        with placed(child):
+        with child.locating():
             return spectra.glass(child.attribute("value"), dispersion=False)
     return number(child)
 
@@ -85,15 +85,15 @@ def real(props: Properties, name: str, default: float) -> float | Texture:
     if child is None:
         return default
     target = props.context.resolve(child)
-    with placed(target):
-        made = _made(target, "factor", props, name)
+    with target.locating():
+        made = _value(target, "factor", props, name)
     if isinstance(made, Constant):
         return made.value
     if isinstance(made, RGBUnbounded):
         return float(np.dot(LUMINANCE, (made.r, made.g, made.b)))
     if not isinstance(made, (float, Texture)):
         raise target.error("must be a number or a texture")
-    if isinstance(made, Checkerboard):  # whose colours Mitsuba swaps where it asks for a number
+    if isinstance(made, Checkerboard):  # Mitsuba swaps its colours where it reads numbers
         return replace(made, color0=made.color1, color1=made.color0)
     return made
 
@@ -103,12 +103,12 @@ def _take(props: Properties, name: str, role: str, default: Any) -> Any:
     if child is None:
         return default
     target = props.context.resolve(child)
-    with placed(target):
-        return _made(target, role, props, name)
+    with target.locating():
+        return _value(target, role, props, name)
 
 
-def _made(element: Element, role: str, props: Properties, name: str) -> Any:
-    """Make a colour, a spectrum or a texture; to Mitsuba's plugins the last two are one kind."""
+def _value(element: Element, role: str, props: Properties, name: str) -> Any:
+    """Make a colour, a spectrum or a texture; Mitsuba writes the last two alike."""
     if element.type == "volume":
         return _volume(element, role, props.context)
     if element.type in TEXTURES or (element.tag == "texture" and element.type not in PLUGINS):
@@ -117,7 +117,7 @@ def _made(element: Element, role: str, props: Properties, name: str) -> Any:
 
 
 def _volume(element: Element, role: str, context: Context) -> Any:
-    """Make what a volume holds that is the same everywhere."""
+    """Make the value of a constant volume."""
     outer = Properties(element, context)
     child = outer.take("volume")
     outer.finish()
@@ -295,7 +295,7 @@ def _texture(element: Element, outer: Properties) -> Texture:
     if element.type not in TEXTURES:
         raise unknown(element, TEXTURES)
     props = Properties(element, outer.context)
-    with placed(element):
+    with element.locating():
         made = TEXTURES[element.type](props)
     props.finish()
     return made

@@ -14,10 +14,11 @@ from typing import Any
 from xml.parsers import expat
 
 from clpt.errors import SceneError
+from clpt.formats.located import Located
 
 MAX_NESTING = 64
 MAX_INCLUDES = 16  # of files inside each other
-MAX_FILES = 4096  # that are read for one scene
+MAX_FILES = 4096  # of one scene
 MAX_TEXT = 1 << 24  # characters of an attribute after its variables
 VARIABLE = re.compile(r"\\\$|\$(?:\{(\w+)\}|(\w*))")
 # Before Mitsuba 2, names were written in camel case.
@@ -26,8 +27,8 @@ RENAMED = {"lookAt": "lookat"}
 
 
 @dataclass(eq=False)
-class Element:
-    """One XML element: tag, attributes, children, and where it stands."""
+class Element(Located):
+    """One XML element: tag, attributes, children, and its location."""
 
     tag: str
     attributes: dict[str, str]
@@ -46,17 +47,12 @@ class Element:
         return HUMP.sub("_", self.attributes.get("name", "")).lower()
 
     def label(self) -> str:
-        """What messages call it: <bsdf type="diffuse">."""
+        """Return its name in messages: <bsdf type="diffuse">."""
         shown = next((k for k in ("type", "name", "id") if k in self.attributes), None)
         return f'<{self.tag} {shown}="{self.attributes[shown]}">' if shown else f"<{self.tag}>"
 
-    def place(self) -> dict[str, Any]:
-        """Keyword arguments that tell an exception where it happened."""
+    def location(self) -> dict[str, Any]:
         return {"file": self.file, "line": self.line, "where": self.label()}
-
-    def error(self, message: str) -> SceneError:
-        """Return an exception that names this element."""
-        return SceneError(message, **self.place())
 
     def attribute(self, name: str) -> str:
         """Return an attribute that must be there."""
@@ -158,8 +154,7 @@ class _Expander:
     """Walks a document in its order and resolves default, $name, include and path."""
 
     def __init__(self, path: Path, variables: Mapping[str, object]):
-        self.given = {name: _as_text(value) for name, value in variables.items()}
-        self.values = dict(self.given)
+        self.values = {name: _as_text(value) for name, value in variables.items()}
         self.used: set[str] = set()
         self.folders = [path.parent]
         self.files = 1
@@ -199,7 +194,7 @@ class _Expander:
         return VARIABLE.sub(value, text)
 
     def prefix(self, word: str) -> str:
-        """The longest variable that a word begins with, as Mitsuba finds them; or ""."""
+        """Return the longest variable that a word begins with, as Mitsuba does; or ""."""
         ends = range(len(word), 0, -1)
         return next((word[:end] for end in ends if word[:end] in self.values), "")
 
@@ -210,10 +205,10 @@ class _Expander:
     def add_folder(self, element: Element) -> None:
         folder = element.file.parent / element.attribute("value")
         try:
-            found = folder.is_dir()
+            exists = folder.is_dir()
         except (OSError, ValueError):
-            found = False
-        if not found:
+            exists = False
+        if not exists:
             raise element.error(f"there is no folder {element.attribute('value')!r}")
         self.folders.append(folder)
 

@@ -1,6 +1,6 @@
-"""Values of a JSON file that know where they stand: "shapes[3].material.alpha_u", file and line.
+"""Values of a JSON file that know their location: "shapes[3].material.alpha_u", file and line.
 
-The values come from the standard library's parser; the line is looked for only when a message needs
+The standard library parses the file. The line of a value is searched for only when a message needs
 it, by walking the text along the value's path.
 """
 
@@ -9,12 +9,13 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from clpt.errors import SceneError
+from clpt.errors import SceneError, UnusedParameterError
+from clpt.formats.located import Located
 
 LARGEST_INTEGER = 2**31 - 1
 SKIPPED = re.compile(r"[\s,:]*")
@@ -32,7 +33,7 @@ class DuplicateKey:
 
 
 @dataclass(frozen=True)
-class Cursor:
+class Cursor(Located):
     """A value of a JSON file and the keys that lead to it."""
 
     value: Any
@@ -40,15 +41,25 @@ class Cursor:
     text: str
     path: tuple[str | int, ...] = ()
 
-    def place(self) -> dict[str, Any]:
-        """Keyword arguments that tell an exception where it happened."""
+    def location(self) -> dict[str, Any]:
         where = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in self.path)
         line = _line(self.text, self.path)
         return {"file": self.file, "line": line, "where": where.removeprefix(".") or None}
 
-    def error(self, message: str) -> SceneError:
-        """Return an exception that names this value."""
-        return SceneError(message, **self.place())
+    def relocated(self, error: SceneError) -> SceneError:
+        """Return an error at this value, or at that of its keys that `error` names."""
+        key = (error.where or "").rpartition(".")[2]
+        named = isinstance(self.value, dict) and key in self.value
+        return (self.at(key) if named else self).error(error.message)
+
+    def check_keys(self, kind: str, known: Collection[str], needed: Collection[str] = ()) -> None:
+        """Raise UnusedParameterError for a key that is not known, SceneError for one missing."""
+        for key in self.expect(dict):
+            if key not in known:
+                raise UnusedParameterError(kind, key, known, **self.at(key).location())
+        for key in needed:
+            if key not in self.value:
+                raise self.error(f"needs the parameter {key!r}")
 
     def expect(self, kind: type, what: str = "") -> Any:
         """Return the value, which must be of a type."""
@@ -130,7 +141,7 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any] | DuplicateKey:
 
 
 def _line(text: str, path: tuple[str | int, ...]) -> int:
-    """Line on which the value at `path` starts, in a text that is known to be JSON."""
+    """Return the line on which the value at `path` begins, in a text that is valid JSON."""
     decoder = json.JSONDecoder()
     at = _skip(text, 0)
     for wanted in path:
@@ -149,15 +160,3 @@ def _line(text: str, path: tuple[str | int, ...]) -> int:
 def _skip(text: str, at: int) -> int:
     match = SKIPPED.match(text, at)
     return match.end() if match else at
-
-
-def placed(cursor: Cursor, make: Callable[[], Any]) -> Any:
-    """Return make(); errors that know no line get the cursor's, or that of the key they name."""
-    try:
-        return make()
-    except SceneError as error:
-        if error.line is not None:
-            raise
-        key = (error.where or "").rpartition(".")[2]
-        inner = isinstance(cursor.value, dict) and key in cursor.value
-        raise (cursor.at(key) if inner else cursor).error(error.message) from None

@@ -11,61 +11,30 @@ import numpy as np
 
 from clpt import spectra
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
-from clpt.formats.meshes import mesh, particles, strands
-from clpt.formats.native import reradiation
-from clpt.formats.native import spectra as json_spectra
-from clpt.formats.native.cursor import Cursor, parse, placed
+from clpt.formats.native import forms, shape_files
+from clpt.formats.native.cursor import Cursor, parse
 from clpt.formats.native.spectra import find_file, kind_name
-from clpt.formats.native.transforms import matrix
-from clpt.scene import Scene, cameras, check_noise, integrators, kinds, lights, materials, shapes
-from clpt.scene.params import SPECTRUM_ROLES, Kind, Param, params
-from clpt.scene.textures import ATTRIBUTES
+from clpt.scene import Scene, check_noise, integrators, kinds, lights, materials, shapes
+from clpt.scene.params import Kind, params
 
 ON_SHAPES = tuple(cls.kind for cls in lights.ON_SHAPES)
 KEYS = (
     "$schema", "name", "camera", "film", "integrator", "sampler", "materials", "groups", "shapes",
     "lights", "spp", "noise", "seed",
 )  # fmt: skip
-# A mesh's arrays: numbers in a row, and of what type.
-ARRAYS = {
-    "vertices": (3, "number"),
-    "faces": (3, "integer"),
-    "normals": (3, "number"),
-    "uvs": (2, "number"),
-}
-# Shapes whose arrays may stand in a file: what is there, and who reads it.
-IN_FILES: dict[type[shapes.Shape], tuple[tuple[str, ...], Callable[[Path], dict[str, Any]]]] = {
-    shapes.Curves: (("points", "lengths"), strands.read),
-    shapes.Spheres: (("centers", "radii", "attributes"), particles.read),
-}
-BASES: dict[str, type[Kind]] = {
-    "material": materials.Material,
-    "light": lights.Light,
-    "shape": shapes.Shape,
-    "camera": cameras.Camera,
-    "integrator": integrators.Integrator,
-    "sampler": integrators.Sampler,
-    "filter": integrators.Filter,
-}
 
 
 def load(path: Path, outside: Iterable[type[materials.Material]] = ()) -> Scene:
     """Read a scene.json.
 
     outside: material kinds that are not clpt's own. Raises SceneError, UnknownKindError and
-    UnusedParameterError with file, line and place.
+    UnusedParameterError with file, line and path of the value.
     """
     return _Reader(parse(path), outside).scene()
 
 
-def default(field: dataclasses.Field[Any]) -> Any:
-    """Return the default of a dataclass's field."""
-    made = field.default_factory
-    return field.default if made is dataclasses.MISSING else made()
-
-
 class _Reader:
-    """Reads one file; keeps the materials by name so that they are shared."""
+    """Reads one file; keeps materials and groups by name, so that shapes share them."""
 
     def __init__(self, root: Cursor, outside: Iterable[type[materials.Material]]):
         self.root = root
@@ -74,134 +43,75 @@ class _Reader:
             if cls.kind in {**kinds("material"), **self.outside}:
                 raise SceneError(f"there are two kinds of materials {cls.kind!r}; rename yours")
             self.outside[cls.kind] = cls
+        # None while one is being read: it refers to itself then
         self.materials: dict[str, materials.Material | None] = {}
         self.groups: dict[str, shapes.Group | None] = {}
         self.warnings: list[str] = []
-        self.special: dict[str, Callable[[Cursor], Any]] = {
-            "back": self.material,
-            "crop": lambda c: tuple(entry.integer() for entry in c.entries()),
-            "map": lambda c: self.kind(c, "texture"),
-            "emission": self.emission,
-            "group": self.group,
-            "image": _image,
-            "sensor": json_spectra.read_sensor,
-            "white_balance": lambda c: (
-                tuple(c.numbers(2)) if isinstance(c.value, list) else c.value
-            ),
-            "attributes": _attributes,
-            "points": _array_reader(4, "number"),
-            "centers": _array_reader(3, "number"),
-            "radii": lambda c: c.numbers() if isinstance(c.value, list) else c.number(),
-            "lengths": lambda c: tuple(entry.integer() for entry in c.entries()),
-            **{name: _array_reader(*form) for name, form in ARRAYS.items()},
-        }
 
     def scene(self) -> Scene:
+        """Read the whole file."""
         root = self.root
-        for key in root.value:
-            if key not in KEYS:
-                raise UnusedParameterError("a scene", key, KEYS, **root.at(key).place())
+        root.check_keys("a scene", KEYS)
         if "camera" not in root.value:
             raise root.error("needs a 'camera'")
-        given: dict[str, Any] = {}
         readers: dict[str, Callable[[Cursor], Any]] = {
             "camera": lambda c: self.kind(c, "camera"),
-            "film": lambda c: self.make(c, integrators.Film, ()),
+            "film": lambda c: self.object_of(c, integrators.Film),
             "integrator": lambda c: self.kind(c, "integrator"),
             "sampler": lambda c: self.kind(c, "sampler"),
             "lights": lambda c: [self.light(entry) for entry in c.entries()],
-            "shapes": lambda c: [made for entry in c.entries() for made in self.shape(entry)],
+            "shapes": lambda c: [shape for entry in c.entries() for shape in self.shape(entry)],
             "spp": Cursor.integer,
             "noise": _noise,
             "seed": Cursor.integer,
             "name": lambda c: c.expect(str),
         }
-        for key, read in readers.items():
-            if key in root.value:
-                given[key] = read(root.at(key))
-        if "materials" in root.value:
-            for _, cursor in root.at("materials").items():
-                self.material(cursor)
+        parts = {key: read(root.at(key)) for key, read in readers.items() if key in root.value}
+        for _, cursor in root.at("materials").items() if "materials" in root.value else ():
+            self.material(cursor)
         for name, cursor in root.at("groups").items() if "groups" in root.value else ():
             self.named_group(name, cursor)
-        given.setdefault("name", root.file.stem)
-        with_place = root.at("spp") if "spp" in root.value else root
-        return placed(
-            with_place,
-            lambda: Scene(**given, warnings=self.warnings, extra={"format": "native"}),
-        )
+        parts.setdefault("name", root.file.stem)
+        with root.locating():
+            return Scene(**parts, warnings=self.warnings, extra={"format": "native"})
 
     def kind(self, cursor: Cursor, category: str) -> Any:
         """Read an object of one of a category's kinds."""
         table = kinds(category)
         if category == "material":
             table |= self.outside
-        return self.make(cursor, table[kind_name(cursor, category, table)], ("type",))
+        return self.object_of(cursor, table[kind_name(cursor, category, table)], ("type",))
 
-    def make(self, cursor: Cursor, cls: type[Kind], more: tuple[str, ...]) -> Any:
-        """Read an object of a kind; `more` are keys that are no parameters."""
+    def object_of(self, cursor: Cursor, cls: type[Kind], other_keys: tuple[str, ...] = ()) -> Any:
+        """Read an object of a kind; `other_keys` are no parameters, and are not read."""
         declared = params(cls)
         shortcut = ("metal",) if {"eta", "k"} <= declared.keys() else ()
-        defaults = {field.name: default(field) for field in dataclasses.fields(cls)}
-        given: dict[str, Any] = {}
+        values: dict[str, Any] = {}
         for key, child in cursor.items():
             if key in declared:
-                given[key] = self.parameter(child, key, declared[key], defaults[key])
-            elif key not in (*more, *shortcut):
+                values[key] = forms.read(child, declared[key], self)
+            elif key not in (*other_keys, *shortcut):
                 known = (*declared, *shortcut)
-                raise UnusedParameterError(cls.kind, key, known, **child.place())
+                raise UnusedParameterError(cls.kind, key, known, **child.location())
         if shortcut and "metal" in cursor.value:
-            if "eta" in given or "k" in given:
+            if "eta" in values or "k" in values:
                 raise cursor.at("metal").error("stands for 'eta' and 'k'; give either")
-            given["eta"], given["k"] = _metal(cursor.at("metal"))
-        return placed(cursor, lambda: cls(**given))
+            values["eta"], values["k"] = _metal(cursor.at("metal"))
+        with cursor.locating():
+            return cls(**values)
 
-    def parameter(self, cursor: Cursor, name: str, param: Param, value: Any) -> Any:
-        """Read one parameter by its role, or what only the host needs by its name or default."""
-        if param.role in ("flag", "choice"):
-            return cursor.value
-        if param.textured and isinstance(cursor.value, dict) and "type" in cursor.value:
-            known = {**kinds("texture"), **json_spectra.SPECTRA}
-            if kind_name(cursor, "texture or spectrum", known) in kinds("texture"):
-                return self.kind(cursor, "texture")
-        if param.role == "reradiation":
-            return reradiation.read(cursor)
-        if param.role in SPECTRUM_ROLES:
-            return json_spectra.read(cursor, param.role, name)
-        if param.role == "real":
-            return cursor.number()
-        if param.role == "orders":
-            return tuple(cursor.numbers())
-        if param.role == "layers":
-            return [self.make(entry, materials.Layer, ()) for entry in cursor.entries()]
-        return self.special[name](cursor) if name in self.special else self.plain(cursor, value)
-
-    def plain(self, cursor: Cursor, value: Any) -> Any:
-        """Read what has the type of a default."""
-        if isinstance(value, materials.Material):
-            return self.material(cursor)
-        if isinstance(value, Kind):
-            return self.kind(
-                cursor, next(c for c, base in BASES.items() if isinstance(value, base))
-            )
-        if isinstance(value, np.ndarray):
-            return matrix(cursor, len(value))
-        if isinstance(value, (bool, str)):
-            return cursor.expect(type(value))
-        if isinstance(value, int):
-            return cursor.integer()
-        if isinstance(value, float):
-            return cursor.number()
-        if isinstance(value, tuple) and value and isinstance(value[0], str):
-            return tuple(entry.expect(str) for entry in cursor.entries())
-        return tuple(cursor.numbers(len(value)))
+    def layer(self, cursor: Cursor) -> Any:
+        """Read a thin film."""
+        return self.object_of(cursor, materials.Layer)
 
     def light(self, cursor: Cursor) -> Any:
+        """Read a light that is not a shape's."""
         if kind_name(cursor, "light", kinds("light")) in ON_SHAPES:
             raise cursor.error("an area light stands in a shape's 'emission'")
         return self.kind(cursor, "light")
 
-    def emission(self, cursor: Cursor) -> Any:
+    def area_light(self, cursor: Cursor) -> Any:
+        """Read the light of a shape; null is none."""
         if cursor.value is None:
             return None
         if kind_name(cursor, "light", kinds("light")) not in ON_SHAPES:
@@ -209,129 +119,96 @@ class _Reader:
         return self.kind(cursor, "light")
 
     def material(self, cursor: Cursor) -> Any:
-        """Read a material, or find the one of that name."""
-        if cursor.value is None or isinstance(cursor.value, dict):
-            in_table = len(cursor.path) == 2 and cursor.path[0] == "materials"
-            if in_table:
-                return self.named(str(cursor.path[1]), cursor)
-            return self.kind(cursor, "material") if cursor.value is not None else None
-        return self.named(cursor.expect(str, "a material or its name"), cursor)
+        """Read a material, or find the one of that name; null is none."""
+        if cursor.value is None:
+            return None
+        if not isinstance(cursor.value, dict):
+            return self.named_material(cursor.expect(str, "a material or its name"), cursor)
+        if len(cursor.path) == 2 and cursor.path[0] == "materials":
+            return self.named_material(str(cursor.path[1]), cursor)
+        return self.kind(cursor, "material")
 
-    def named(self, name: str, asked_by: Cursor) -> Any:
+    def named_material(self, name: str, referrer: Cursor) -> Any:
+        """Read the material of that name, once."""
         if name not in self.materials:
-            table = self.root.value.get("materials", {})
-            if not isinstance(table, dict) or name not in table:
-                known = table if isinstance(table, dict) else ()
-                raise UnknownKindError("material name", name, known, **asked_by.place())
-            cursor = self.root.at("materials").at(name)
+            cursor = self._entry("materials", "material name", name, referrer)
             self.materials[name] = None
-            made = self.kind(cursor, "material")
-            self.materials[name] = made if made.name else dataclasses.replace(made, name=name)
+            material = self.kind(cursor, "material")
+            named = material if material.name else dataclasses.replace(material, name=name)
+            self.materials[name] = named
         if self.materials[name] is None:
-            raise asked_by.error(f"the material {name!r} refers to itself")
+            raise referrer.error(f"the material {name!r} refers to itself")
         return self.materials[name]
 
     def group(self, cursor: Cursor) -> shapes.Group:
+        """Find the group of a name."""
         return self.named_group(cursor.expect(str, "a group's name"), cursor)
 
-    def named_group(self, name: str, asked_by: Cursor) -> shapes.Group:
+    def named_group(self, name: str, referrer: Cursor) -> shapes.Group:
         """Read the group of that name, once."""
         if name not in self.groups:
-            table = self.root.value.get("groups", {})
-            if not isinstance(table, dict) or name not in table:
-                known = table if isinstance(table, dict) else ()
-                raise UnknownKindError("group name", name, known, **asked_by.place())
+            entries = self._entry("groups", "group name", name, referrer).entries()
             self.groups[name] = None
-            entries = self.root.at("groups").at(name).entries()
-            found = [(entry, made) for entry in entries for made in self.shape(entry)]
-            for entry, made in found:
-                if isinstance(made, shapes.Instance):
+            members = [(entry, shape) for entry in entries for shape in self.shape(entry)]
+            for entry, shape in members:
+                if isinstance(shape, shapes.Instance):
                     raise entry.error("an instance cannot stand in a group")
-            self.groups[name] = shapes.Group(tuple(made for _, made in found), name)
+            self.groups[name] = shapes.Group(tuple(shape for _, shape in members), name)
         group = self.groups[name]
         if group is None:
-            raise asked_by.error(f"the group {name!r} holds itself")
+            raise referrer.error(f"the group {name!r} contains itself")
         return group
 
-    def instances(self, cursor: Cursor) -> list[shapes.Shape]:
-        """Read an instance, or one for each matrix of a file."""
-        if "group" not in cursor.value:
-            raise cursor.error("needs a 'group'")
-        if "file" not in cursor.value:
-            return [self.kind(cursor, "shape")]
-        first = self.make(cursor, shapes.Instance, ("type", "file"))
-        placements = _placements(cursor.at("file"))
-        return [
-            dataclasses.replace(first, to_world=np.asarray(first.to_world) @ matrix)
-            for matrix in placements
-        ]
-
-    def in_file(self, cursor: Cursor, cls: type[shapes.Shape]) -> shapes.Shape:
-        """Read a shape whose arrays are in a file."""
-        arrays, read = IN_FILES[cls]
-        _only_in_file(cursor, arrays)
-        made = self.make(cursor, cls, ("type", "file"))
-        child = cursor.at("file")
-        return dataclasses.replace(made, **placed(child, lambda: read(find_file(child))))
+    def _entry(self, table: str, what: str, name: str, referrer: Cursor) -> Cursor:
+        """Return the entry of a table of the scene. Raises UnknownKindError."""
+        entries = self.root.value.get(table, {})
+        known = entries if isinstance(entries, dict) else ()
+        if name not in known:
+            raise UnknownKindError(what, name, known, **referrer.location())
+        return self.root.at(table).at(name)
 
     def shape(self, cursor: Cursor) -> list[shapes.Shape]:
-        """Read a shape; a mesh file may hold several, with materials of their own."""
-        kind = kind_name(cursor, "shape", kinds("shape"))
-        if kind == "instance":
-            return self.instances(cursor)
-        cls = kinds("shape")[kind]
-        if cls in IN_FILES and "file" in cursor.value:
-            return [self.in_file(cursor, cls)]
-        if kind != "mesh" or "file" not in cursor.value:
-            made = self.kind(cursor, "shape")
-            return [_checked_mesh(cursor, made, self.warnings)] if kind == "mesh" else [made]
-        _only_in_file(cursor, ARRAYS)
-        frame = self.make(cursor, shapes.Mesh, ("type", "file"))
-        child = cursor.at("file")
-        loaded = placed(child, lambda: _meshes(find_file(child)))
-        self.warnings += [f"{child.value}: {note}" for note in loaded.warnings]
-        dressed, several = "material" in cursor.value, len(loaded.meshes) > 1
-        return [_in_frame(part, frame, dressed, several) for part in loaded.meshes]
+        """Read a shape; a file may hold several, meshes with materials of their own."""
+        cls = kinds("shape")[kind_name(cursor, "shape", kinds("shape"))]
+        if cls is shapes.Instance and "group" not in cursor.value:
+            raise cursor.error("needs a 'group'")
+        if cls in shape_files.FILES and "file" in cursor.value:
+            return self._from_file(cursor, cls)
+        shape = self.object_of(cursor, cls, ("type",))
+        if cls is shapes.Mesh:
+            shape = shape_files.checked_arrays(cursor, shape, self.warnings)
+        return [shape]
+
+    def _from_file(self, cursor: Cursor, cls: type[Kind]) -> list[shapes.Shape]:
+        """Read a shape whose file holds its arrays, several meshes, or transforms of instances."""
+        shape_files.check_only_in_file(cursor, cls)
+        shape = self.object_of(cursor, cls, ("type", "file"))
+        file = cursor.at("file")
+        if cls is shapes.Instance:
+            return [
+                dataclasses.replace(shape, to_world=np.asarray(shape.to_world) @ matrix)
+                for matrix in shape_files.read_transforms(file)
+            ]
+        path = find_file(file)
+        with file.locating():
+            if (read := shape_files.FILES[cls].read) is not None:
+                return [dataclasses.replace(shape, **read(path))]
+            contents = shape_files.read_meshes(path)
+        self.warnings += [f"{file.value}: {warning}" for warning in contents.warnings]
+        own_material, several = "material" in cursor.value, len(contents.meshes) > 1
+        return [_merged(part, shape, own_material, several) for part in contents.meshes]
 
 
-def _only_in_file(cursor: Cursor, keys: Iterable[str]) -> None:
-    """Raise SceneError where an entry with a file has its arrays too."""
-    for key in keys:
-        if key in cursor.value:
-            raise cursor.at(key).error("stands in the 'file' already; give either")
-
-
-def _meshes(path: Path) -> mesh.MeshFile:
-    if path.suffix.lower() not in (".glb", ".gltf"):
-        return mesh.read_mesh(path)
-    from clpt.formats import gltf  # here: most scenes have no use for it
-
-    return gltf.read_mesh(path)
-
-
-def _placements(cursor: Cursor) -> np.ndarray:
-    """Read the matrices (n, 3, 4) of a .npy; return them as (n, 4, 4) float64."""
-    path = find_file(cursor)
-    try:
-        rows = np.load(path, mmap_mode="r")  # a wrong header claims no memory
-    except (OSError, ValueError, EOFError) as error:
-        raise cursor.error(f"is no .npy file: {error}") from None
-    good = isinstance(rows, np.ndarray) and rows.dtype.kind == "f" and rows.shape[1:] == (3, 4)
-    if not good:
-        raise cursor.error("must hold matrices, (n, 3, 4) of float")
-    matrices = np.tile(np.eye(4), (len(rows), 1, 1))
-    matrices[:, :3] = rows
-    return matrices
-
-
-def _in_frame(part: shapes.Mesh, frame: shapes.Mesh, dressed: bool, several: bool) -> shapes.Mesh:
-    """Return a part of a file, placed and dressed as the scene says."""
+def _merged(
+    part: shapes.Mesh, entry: shapes.Mesh, own_material: bool, several: bool
+) -> shapes.Mesh:
+    """Return a mesh of a file with the transform, material and light that its entry gives it."""
     return dataclasses.replace(
-        frame,
-        material=frame.material if dressed else part.material,
-        emission=frame.emission or (None if dressed else part.emission),
-        to_world=np.asarray(frame.to_world) @ part.to_world,
-        name=frame.name or (part.name if several else ""),
+        entry,
+        material=entry.material if own_material else part.material,
+        emission=entry.emission or (None if own_material else part.emission),
+        to_world=np.asarray(entry.to_world) @ part.to_world,
+        name=entry.name or (part.name if several else ""),
         vertices=part.vertices,
         faces=part.faces,
         normals=part.normals,
@@ -340,81 +217,22 @@ def _in_frame(part: shapes.Mesh, frame: shapes.Mesh, dressed: bool, several: boo
     )
 
 
-def _checked_mesh(cursor: Cursor, made: shapes.Mesh, notes: list[str]) -> shapes.Mesh:
-    """Check the arrays of a mesh that is given in the JSON itself."""
-    if made.vertices is None or made.faces is None:
-        raise cursor.error("a mesh needs a 'file', or 'vertices' and 'faces'")
-    for name in ("normals", "uvs"):
-        values = getattr(made, name)
-        if values is not None and len(values) != len(made.vertices):
-            raise cursor.at(name).error(f"must be one for each of {len(made.vertices)} vertices")
-    for name, values in made.attributes.items():
-        count = len(made.faces if name.startswith("face_") else made.vertices)
-        if len(values) != count:
-            raise cursor.at("attributes").at(name).error(f"must be {count} rows")
-    faces = made.faces.astype(np.int64)
-    arrays = placed(
-        cursor,
-        lambda: mesh.checked(
-            None, "", made.vertices, faces, made.normals, made.uvs, notes, made.attributes
-        ),
-    )
-    if not len(arrays["faces"]):
-        raise cursor.error("holds no triangles")
-    return dataclasses.replace(made, **arrays)
-
-
 def _metal(cursor: Cursor) -> tuple[spectra.Spectrum, spectra.Spectrum]:
+    """Read eta and k of a metal, by its name or from a file."""
     if isinstance(cursor.value, dict):
         if list(cursor.value) != ["file"]:
             raise cursor.error("a metal is a name, or an object with the key 'file' alone")
         path = find_file(cursor.at("file"))
-        return placed(cursor, lambda: spectra.read_refractive_index(path))
+        with cursor.locating():
+            return spectra.read_refractive_index(path)
     name = cursor.expect(str)
     if name not in spectra.metals():
-        raise UnknownKindError("metal", name, spectra.metals(), **cursor.place())
+        raise UnknownKindError("metal", name, spectra.metals(), **cursor.location())
     return spectra.metal(name)
-
-
-def _image(cursor: Cursor) -> Any:
-    if isinstance(cursor.value, list):
-        return [find_file(entry) for entry in cursor.entries(6)]
-    return find_file(cursor)
-
-
-def _attributes(cursor: Cursor) -> dict[str, np.ndarray]:
-    """Rows of 1 or 3 numbers by their attribute's name."""
-    found = {}
-    for name, child in cursor.items():
-        if not name.startswith(ATTRIBUTES):
-            raise child.error(f"the name must begin with {' or '.join(ATTRIBUTES)}")
-        rows = child.expect(list)
-        wide = len(rows[0]) if rows and isinstance(rows[0], list) else 3
-        found[name] = _array(child, 1 if wide == 1 else 3, np.float32)
-    return {name: values for name, values in found.items() if values is not None}
-
-
-def _array_reader(width: int, item: str) -> Callable[[Cursor], np.ndarray | None]:
-    return lambda cursor: _array(cursor, width, np.uint32 if item == "integer" else np.float32)
-
-
-def _array(cursor: Cursor, width: int, dtype: type) -> np.ndarray | None:
-    if cursor.value is None:
-        return None
-    rows = cursor.expect(list)
-    try:
-        values = np.asarray(rows, np.float64).reshape(-1, width)
-        valid = len(values) == len(rows) and not any(isinstance(row, (int, float)) for row in rows)
-    except (ValueError, TypeError, OverflowError):
-        valid = False
-    if not valid:
-        raise cursor.error(f"must be a list of rows of {width} numbers")
-    if dtype is np.uint32 and not ((values >= 0) & (values < 2**31) & (values % 1 == 0)).all():
-        raise cursor.error("must be whole numbers from zero")
-    return values.astype(dtype)
 
 
 def _noise(cursor: Cursor) -> float:
     noise = cursor.number()
-    placed(cursor, lambda: check_noise(noise))
+    with cursor.locating():
+        check_noise(noise)
     return noise

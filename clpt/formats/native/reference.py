@@ -8,7 +8,6 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import json
-import math
 import sys
 from functools import cache
 from pathlib import Path
@@ -17,17 +16,18 @@ from typing import Any
 import numpy as np
 
 from clpt import spectra
-from clpt.formats.native.read import ARRAYS, default
+from clpt.formats.native import forms
 from clpt.formats.native.reradiation import RERADIATIONS
+from clpt.formats.native.shape_files import FILES
 from clpt.formats.native.spectra import SPECTRA
 from clpt.scene import KINDS, integrators, materials
-from clpt.scene.params import Kind, Param, params
+from clpt.scene.params import Kind, defaults, params
 
 INTRODUCTION = """# scene.json
 
-This page is made by `python -m clpt.formats.native.reference` from the dataclasses in `clpt/scene`: a name
-here is the class's name there, and every parameter is one of its fields. `scenes/schema.json` says
-the same to an editor: begin a file with `"$schema": "../schema.json"`.
+`python -m clpt.formats.native.reference` makes this page from the dataclasses in `clpt/scene`: a
+name here is the class's name there, and every parameter is one of its fields. `scenes/schema.json`
+says the same to an editor: begin a file with `"$schema": "../schema.json"`.
 
 ```json
 {
@@ -59,8 +59,8 @@ the same to an editor: begin a file with `"$schema": "../schema.json"`.
 | `name` | for people, and for the names of pictures |
 
 Lengths are in metres, angles in degrees, wavelengths in nm. Names of files are relative to the
-scene file. A key that means nothing is an error, and so is a number outside its limits: the message
-names file, line and place.
+scene file. An unknown key is an error, and so is a number outside its limits: the message
+names file, line and path of the value.
 
 ## Values
 
@@ -86,18 +86,6 @@ HEADINGS = {
     "camera": "Cameras", "shape": "Shapes", "material": "Materials", "texture": "Textures",
     "light": "Lights", "integrator": "Integrators", "sampler": "Samplers", "filter": "Filters",
 }  # fmt: skip
-ROLES = {
-    "reflectance": "reflectance",
-    "emission": "emission",
-    "index": "index",
-    "factor": "factor",
-    "coefficient": "coefficient",
-    "real": "number",
-    "flag": "true or false",
-    "reradiation": "[re-radiation](#re-radiation)",
-    "orders": "list of numbers",
-    "layers": "list of [layers](#layers)",
-}
 
 
 def text() -> str:
@@ -130,8 +118,10 @@ def _spectra() -> list[str]:
         "Glasses and liquids": spectra.glasses(),
         'Metals (`"metal": name` or `{"file": name}` in place of `eta` and `k`)': spectra.metals(),
     }
-    told = [f"{what}: {', '.join(f'`{name}`' for name in known)}." for what, known in names.items()]
-    return ["\n".join(rows) + "\n", "\n\n".join(told) + "\n", *_reradiations()]
+    lists = [
+        f"{what}: {', '.join(f'`{name}`' for name in known)}." for what, known in names.items()
+    ]
+    return ["\n".join(rows) + "\n", "\n\n".join(lists) + "\n", *_reradiations()]
 
 
 def _reradiations() -> list[str]:
@@ -177,80 +167,18 @@ def _first_line(cls: type) -> str:
 
 
 def _table(cls: type[Kind]) -> str:
-    defaults = {field.name: default(field) for field in dataclasses.fields(cls)}
-    declared = params(cls)
+    """The parameters of a kind."""
+    default, declared = defaults(cls), params(cls)
     if not declared:
         return "It has no parameters.\n"
     rows = ["| parameter | accepts | default | meaning |", "| --- | --- | --- | --- |"]
-    if issubclass(cls, KINDS["shape"][0]):
-        rows.append("| `file` | name of a mesh file | - | in place of the arrays below |")
-    if "points" in declared:
-        rows_of = "lines of x y z radius, blank ones between strands"
-        rows.append(f"| `file` | name of a text file | - | {rows_of}, in place of both below |")
-    if "centers" in declared:
-        arrays = "arrays of these names, and attributes by theirs"
-        rows.append(f"| `file` | name of a .npz file | - | {arrays}, in place of all three |")
-    if "group" in declared:
-        several = "matrices (n, 3, 4), an instance for each"
-        rows.append(f"| `file` | name of a .npy file | - | {several} |")
+    if (file := FILES.get(cls)) is not None:
+        rows.append(f"| `file` | {file.accepts} | - | {file.meaning} |")
     for name, param in declared.items():
         unit = f" [{param.unit}]" if param.unit else ""
-        shown = _shown(defaults[name])
-        rows.append(
-            f"| `{name}` | {_accepts(name, param, defaults[name])} | {shown} | {param.doc}{unit} |"
-        )
+        shown = _shown(default[name])
+        rows.append(f"| `{name}` | {forms.words(param)} | {shown} | {param.doc}{unit} |")
     return "\n".join(rows) + "\n"
-
-
-def _accepts(name: str, param: Param, value: Any) -> str:
-    if param.role == "choice":
-        return ", ".join([f"`{c}`" for c in param.choices] + ["none"] * param.optional)
-    if param.role == "host":
-        return _host(name, value)
-    limits = _limits(param) if param.role == "real" else ""
-    return ROLES[param.role] + limits + (" or texture" if param.textured else "")
-
-
-def _limits(param: Param) -> str:
-    low, high = math.isfinite(param.low), math.isfinite(param.high)
-    if low and high:
-        return f" {param.low:g} to {param.high:g}"
-    return f" from {param.low:g}" if low else ""
-
-
-def _host(name: str, value: Any) -> str:
-    """What only the host needs, by its name or by the type of its default."""
-    if name in ARRAYS:
-        width, item = ARRAYS[name]
-        return f"rows of {width} {item}s"
-    special = {
-        "image": "name of an image file",
-        "attributes": "object of rows of 1 or 3 numbers by name",
-        "emission": "`area` or `directional_area` light",
-        "back": "material",
-        "crop": "four whole numbers",
-        "map": "`bitmap` texture",
-        "points": "rows of 4 numbers",
-        "centers": "rows of 3 numbers",
-        "radii": "number, or a list of them",
-        "lengths": "whole numbers",
-        "group": "a name in `groups`",
-        "sensor": '`cie1931`, `cie1964`, `{"file": name}` or `{"curves": [three spectra]}`,'
-        " the latter two perhaps with a `matrix`",
-        "white_balance": "`none`, an illuminant, a number [K] or `[x, y]`",
-    }
-    if name in special:
-        return special[name]
-    if isinstance(value, materials.Material):
-        return "material, or its name"
-    if isinstance(value, Kind):
-        return "object with a `type`"
-    if isinstance(value, np.ndarray):
-        return "transform"
-    if isinstance(value, tuple):
-        return "list of names" if value and isinstance(value[0], str) else "three numbers"
-    names = {bool: "true or false", int: "whole number", float: "number", str: "text"}
-    return names[type(value)]
 
 
 def _shown(value: Any) -> str:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from clpt import spectra
-from clpt.errors import UnusedParameterError
 from clpt.formats.native import spectra as json_spectra
-from clpt.formats.native.cursor import Cursor, placed
+from clpt.formats.native.cursor import Cursor
 from clpt.formats.native.spectra import find_file, kind_name
 from clpt.spectra import Constant, Donaldson, Fluorophore, Reradiation, Spectrum
 
@@ -19,33 +18,28 @@ def read(cursor: Cursor) -> Reradiation | None:
     if cursor.value is None:
         return None
     if "file" in cursor.expect(dict):
-        _check(cursor, ("file",), ())
+        cursor.check_keys("re-radiation", ("file",))
         path = find_file(cursor.at("file"))
-        return placed(cursor, lambda: spectra.read_reradiation(path))
+        with cursor.locating():
+            return spectra.read_reradiation(path)
     if kind_name(cursor, "re-radiation", RERADIATIONS) == "donaldson":
-        _check(cursor, ("type", "out", "into", "rows"), ("out", "into", "rows"))
+        fields = ("out", "into", "rows")
+        cursor.check_keys("re-radiation", ("type", *fields), fields)
         out, into = (tuple(cursor.at(name).numbers()) for name in ("out", "into"))
         rows = tuple(tuple(row.numbers(len(into))) for row in cursor.at("rows").entries())
-        return placed(cursor, lambda: Donaldson(out, into, rows))
+        with cursor.locating():
+            return Donaldson(out, into, rows)
     shapes = ("absorption", "emission")
-    _check(cursor, ("type", *shapes, "quantum_yield"), shapes)
-    absorption, emission = (_spectrum(cursor.at(name), name) for name in shapes)
+    cursor.check_keys("re-radiation", ("type", *shapes, "quantum_yield"), shapes)
+    absorption, emission = (_spectrum(cursor.at(name)) for name in shapes)
     share = cursor.at("quantum_yield").number() if "quantum_yield" in cursor.value else 1.0
-    return placed(cursor, lambda: Fluorophore(absorption, emission, share))
+    with cursor.locating():
+        return Fluorophore(absorption, emission, share)
 
 
-def _spectrum(cursor: Cursor, name: str) -> Spectrum:
-    value = json_spectra.read(cursor, "reflectance", name)
+def _spectrum(cursor: Cursor) -> Spectrum:
+    value = json_spectra.read(cursor, "reflectance")
     return Constant(value) if isinstance(value, float) else value
-
-
-def _check(cursor: Cursor, known: tuple[str, ...], needed: tuple[str, ...]) -> None:
-    for key in cursor.value:
-        if key not in known:
-            raise UnusedParameterError("re-radiation", key, known, **cursor.at(key).place())
-    for key in needed:
-        if key not in cursor.value:
-            raise cursor.error(f"needs the parameter {key!r}")
 
 
 def write(value: Reradiation | None) -> Any:

@@ -11,11 +11,10 @@ import dataclasses
 from typing import Any
 
 from clpt import spectra
-from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
+from clpt.errors import UnknownKindError
 from clpt.formats.colour import COLOURS, colour
-from clpt.formats.native.cursor import Cursor, placed
-from clpt.spectra import Sensor, Spectrum
-from clpt.spectra import read_sensor as read_sensor_file
+from clpt.formats.native.cursor import Cursor
+from clpt.spectra import Spectrum
 
 SPECTRA: dict[str, type[Spectrum]] = {
     "constant": spectra.Constant,
@@ -32,21 +31,17 @@ SPECTRA: dict[str, type[Spectrum]] = {
 }
 
 
-def read(cursor: Cursor, role: str, name: str) -> Any:
-    """Return what stands for the parameter `name` of a role; a glass stays a name."""
-    try:
-        return _read(cursor, role, name)
-    except SceneError as error:
-        if error.file is not None:
-            raise
-        raise cursor.error(error.message) from None
+def read(cursor: Cursor, role: str) -> Any:
+    """Return the value of a parameter of a role; the name of a glass stays a name."""
+    with cursor.locating():
+        return _read(cursor, role)
 
 
-def _read(cursor: Cursor, role: str, name: str) -> Any:
+def _read(cursor: Cursor, role: str) -> Any:
     value = cursor.value
     if isinstance(value, str) and role == "index":
         if value.lower() not in spectra.glasses():
-            raise UnknownKindError("glass", value, spectra.glasses(), **cursor.place())
+            raise UnknownKindError("glass", value, spectra.glasses(), **cursor.location())
         return value
     if isinstance(value, str) and role == "emission":
         return spectra.illuminant(value)
@@ -57,9 +52,9 @@ def _read(cursor: Cursor, role: str, name: str) -> Any:
     cursor.expect(dict, "a number, [r, g, b] or a spectrum")
     outside: Any = "hold" if role in ("index", "coefficient") else "zero"
     if "file" in value:
-        return _from_file(cursor, role, outside, name)
+        return _from_file(cursor, role, outside)
     if "values" in value and "type" not in value:
-        _refuse(cursor, "spectrum", ("values",))
+        cursor.check_keys("spectrum", ("values",))
         rows = [row.numbers(2) for row in cursor.at("values").entries()]
         if not rows:
             raise cursor.error("a spectrum needs at least one [nm, value]")
@@ -68,10 +63,11 @@ def _read(cursor: Cursor, role: str, name: str) -> Any:
     return _typed(cursor)
 
 
-def _from_file(cursor: Cursor, role: str, outside: Any, name: str) -> Spectrum:
-    _refuse(cursor, "spectrum", ("file",))
+def _from_file(cursor: Cursor, role: str, outside: Any) -> Spectrum:
+    cursor.check_keys("spectrum", ("file",))
     path = find_file(cursor.at("file"))
     if role == "index":
+        name = str(cursor.path[-1])  # of the parameter: eta, k, ext_k, ...
         return spectra.read_index(path, "k" if name.split("_")[-1] == "k" else "eta")
     if role == "coefficient":
         return spectra.read_absorption(path)
@@ -83,56 +79,22 @@ def _from_file(cursor: Cursor, role: str, outside: Any, name: str) -> Spectrum:
 def _typed(cursor: Cursor) -> Spectrum:
     cls = SPECTRA[kind_name(cursor, "spectrum", SPECTRA)]
     fields = {field.name: field for field in dataclasses.fields(cls)}  # type: ignore[arg-type]
-    _refuse(cursor, cursor.value["type"], ("type", *fields))
-    given: dict[str, Any] = {}
-    for name in fields:
-        if name in cursor.value:
-            child = cursor.at(name)
-            if isinstance(child.value, list):
-                given[name] = tuple(child.numbers())
-            elif fields[name].type == "bool":
-                given[name] = child.expect(bool)
-            else:
-                given[name] = child.value if isinstance(child.value, str) else child.number()
-        elif fields[name].default is dataclasses.MISSING:
-            raise cursor.error(f"needs the parameter {name!r}")
+    needed = [name for name, field in fields.items() if field.default is dataclasses.MISSING]
+    cursor.check_keys(cursor.value["type"], ("type", *fields), needed)
+    values: dict[str, Any] = {}
+    for name, child in cursor.items():
+        if name == "type":
+            continue
+        if isinstance(child.value, list):
+            values[name] = tuple(child.numbers())
+        elif fields[name].type == "bool":
+            values[name] = child.expect(bool)
+        else:
+            values[name] = child.value if isinstance(child.value, str) else child.number()
     try:
-        return cls(**given)
+        return cls(**values)
     except (TypeError, ValueError) as error:
         raise cursor.error(f"does not make a spectrum: {error}") from None
-
-
-def read_sensor(cursor: Cursor) -> Any:
-    """Return a film's sensor: a name, a file of its curves, or `curves` and perhaps a `matrix`."""
-    if isinstance(cursor.value, str):
-        return cursor.value
-    cursor.expect(dict, "a name or a sensor")
-    _refuse(cursor, "sensor", ("file", "curves", "matrix"))
-    if ("file" in cursor.value) == ("curves" in cursor.value):
-        raise cursor.error("a sensor has either a 'file' or 'curves'")
-    if "file" in cursor.value:
-        sensor = read_sensor_file(find_file(cursor.at("file")))
-        curves = sensor.curves
-    else:
-        entries = cursor.at("curves").entries(3)
-        red, green, blue = (_curve(read(entry, "curve", "curves")) for entry in entries)
-        curves = (red, green, blue)
-    matrix = None
-    if "matrix" in cursor.value:
-        matrix = tuple(tuple(row.numbers(3)) for row in cursor.at("matrix").entries(3))
-    return placed(cursor, lambda: Sensor(curves, matrix))
-
-
-def _curve(value: Any) -> Spectrum:
-    return value if isinstance(value, Spectrum) else spectra.Constant(value)
-
-
-def write_sensor(sensor: Sensor | str) -> Any:
-    """Return what stands for a film's sensor in JSON, such that `read_sensor` gives it back."""
-    if isinstance(sensor, str):
-        return sensor
-    written: dict[str, Any] = {"curves": [write(curve, "curve") for curve in sensor.curves]}
-    return written if sensor.matrix is None else {**written, "matrix": sensor.matrix}
 
 
 def write(spectrum: Spectrum | str, role: str) -> Any:
@@ -149,12 +111,12 @@ def write(spectrum: Spectrum | str, role: str) -> Any:
 
 
 def kind_name(cursor: Cursor, category: str, known: Any) -> str:
-    """Return the `type` of an object. Raises SceneError where there is none, UnknownKindError."""
+    """Return the `type` of an object. Raises SceneError, UnknownKindError."""
     if "type" not in cursor.expect(dict):
         raise cursor.error("needs the key 'type'")
     child = cursor.at("type")
     if child.expect(str) not in known:
-        raise UnknownKindError(category, child.value, known, **child.place())
+        raise UnknownKindError(category, child.value, known, **child.location())
     return child.value
 
 
@@ -167,9 +129,3 @@ def find_file(cursor: Cursor) -> Any:
     except (OSError, ValueError):
         pass
     raise cursor.error(f"there is no file {cursor.value!r}")
-
-
-def _refuse(cursor: Cursor, kind: str, known: Any) -> None:
-    for key in cursor.expect(dict):
-        if key not in known:
-            raise UnusedParameterError(kind, key, known, **cursor.at(key).place())

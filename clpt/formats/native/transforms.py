@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from clpt import transforms
-from clpt.errors import UnknownKindError, UnusedParameterError
-from clpt.formats.native.cursor import Cursor, placed
+from clpt.errors import UnknownKindError
+from clpt.formats.native.cursor import Cursor
 
 STEPS: dict[str, Callable[[Cursor], transforms.Matrix]] = {
     "translate": lambda c: transforms.translate(c.numbers(3)),
@@ -35,8 +34,9 @@ def matrix(cursor: Cursor, size: int) -> transforms.Matrix:
     for step in steps:
         for name, child in step.items():
             if name not in STEPS or len(step.value) != 1:
-                raise UnknownKindError("transform", name, STEPS, **child.place())
-            product = placed(child, partial(STEPS[name], child)) @ product
+                raise UnknownKindError("transform", name, STEPS, **child.location())
+            with child.locating():
+                product = STEPS[name](child) @ product
     return _regular(cursor, product) if size == 4 else product[np.ix_([0, 1, 3], [0, 1, 3])]
 
 
@@ -47,11 +47,6 @@ def _regular(cursor: Cursor, product: transforms.Matrix) -> transforms.Matrix:
 
 
 def _fields(cursor: Cursor, **readers: Callable[[Cursor], Any]) -> list[Any]:
-    """Read an object that must have exactly these keys."""
-    for key in cursor.expect(dict):
-        if key not in readers:
-            raise UnusedParameterError(str(cursor.path[-1]), key, readers, **cursor.at(key).place())
-    missing = [key for key in readers if key not in cursor.value]
-    if missing:
-        raise cursor.error(f"needs {missing[0]!r}")
+    """Return the values of an object that must have exactly these keys."""
+    cursor.check_keys(str(cursor.path[-1]), readers, readers)
     return [read(cursor.at(key)) for key, read in readers.items()]

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import os
 import re
-from collections.abc import Container, Sequence
+from collections.abc import Callable, Container, Sequence
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -17,18 +16,17 @@ from clpt import images, spectral_exr
 from clpt.errors import SceneError
 from clpt.formats.meshes import particles, strands
 from clpt.formats.meshes.mesh import smooth_normals
-from clpt.formats.native import reradiation as json_reradiation
-from clpt.formats.native import spectra as json_spectra
-from clpt.formats.native.read import ARRAYS, default
+from clpt.formats.native import forms
+from clpt.formats.native.shape_files import FILES, MESH_ARRAYS
 from clpt.scene import Scene, materials, shapes
-from clpt.scene.params import SPECTRUM_ROLES, Kind, Param, params
+from clpt.scene.params import Kind, defaults, params
 
-MANY = 16  # instances in a row, from which on their matrices are a file
+MANY = 16  # from so many instances in a row on, a file holds their matrices
 NUMBERS = re.compile(r"\[\s+([^\[\]{}\"]*?)\s+\]")
 
 
 def save(scene: Scene, path: str | Path) -> None:
-    """Write a scene such that `load` gives the same content back; its folder must exist.
+    """Write a scene such that `load` gives the same content back; the folder must exist.
 
     Raises SceneError where a file cannot be written.
     """
@@ -42,23 +40,27 @@ def save(scene: Scene, path: str | Path) -> None:
 
 
 class _Writer:
-    """Writes one scene; what several shapes share is written once."""
+    """Writes one scene; materials, groups and arrays that several shapes share are written once."""
 
     def __init__(self, path: Path):
         self.path = path
+        self.array_files: dict[type[Kind], Callable[[Any], str]] = {
+            shapes.Mesh: self.mesh,
+            shapes.Curves: self.curves,
+            shapes.Spheres: self.spheres,
+        }
         self.materials: dict[str, Any] = {}
         self.names: dict[int, str] = {}
         self.groups: dict[str, Any] = {}
         self.group_names: dict[int, str] = {}
-        self.files: dict[Any, str] = {}
+        self.files: dict[Any, str] = {}  # names by what they hold
 
     def scene(self, scene: Scene) -> dict[str, Any]:
+        """Write the whole file."""
         document: dict[str, Any] = {"name": scene.name} if scene.name else {}
-        film = self.kind(scene.film)
-        del film["type"]
         document |= {
             "camera": self.kind(scene.camera),
-            "film": film,
+            "film": self.untyped(scene.film),
             "integrator": self.kind(scene.integrator),
             "sampler": self.kind(scene.sampler),
             "spp": scene.spp,
@@ -73,22 +75,21 @@ class _Writer:
             del document["groups"]
         return document
 
-    def entries(self, things: Sequence[shapes.Shape]) -> list[dict[str, Any]]:
+    def entries(self, members: Sequence[shapes.Shape]) -> list[dict[str, Any]]:
         """Write shapes; a run of nameless instances of a group has its matrices in a file."""
         written: list[dict[str, Any]] = []
-        for key, members in groupby(things, _run):
-            run = list(members)
-            if key is None or len(run) < MANY:
+        for group, instances in groupby(members, _group_of_run):
+            run = list(instances)
+            if group is None or len(run) < MANY:
                 written += [self.kind(shape) for shape in run]
             else:
-                written.append(self.placements(run))
+                written.append(self.instances(run))
         return written
 
-    def placements(self, run: Sequence[Any]) -> dict[str, Any]:
+    def instances(self, run: Sequence[Any]) -> dict[str, Any]:
         """Write instances of one group, their matrices as .npy."""
         group = self.group(run[0].group)
-        label = re.sub(r"\W+", "_", group)
-        name = f"{self.path.stem}.{label}{len(self.files)}.npy"
+        name = self.file_name(group, "npy")
         matrices = np.stack([np.asarray(one.to_world, np.float64)[:3] for one in run])
         np.save(self.path.parent / name, matrices)
         self.files[name] = name
@@ -97,66 +98,46 @@ class _Writer:
     def group(self, group: shapes.Group) -> str:
         """Return a group's name in the table of groups, where it is written once."""
         if id(group) not in self.group_names:
-            key = free_name(group.name or "group", self.groups)
+            key = unused_name(group.name or "group", self.groups)
             self.group_names[id(group)] = key
             self.groups[key] = [self.kind(shape) for shape in group.shapes]
         return self.group_names[id(group)]
 
     def kind(self, thing: Kind) -> dict[str, Any]:
-        """Return the object that stands for a thing; what has its default is left out."""
-        given: dict[str, Any] = {"type": thing.kind}
-        plain = type(thing)
-        declared = params(plain)
-        in_file: tuple[str, ...] = ()
-        if isinstance(thing, shapes.Mesh):
-            given["file"], in_file = self.mesh(thing), (*ARRAYS, "attributes")
-        if isinstance(thing, shapes.Curves):
-            given["file"], in_file = self.curves(thing), ("points", "lengths")
-        if isinstance(thing, shapes.Spheres):
-            given["file"], in_file = self.spheres(thing), ("centers", "radii", "attributes")
-        declared = {name: p for name, p in declared.items() if name not in in_file}
-        defaults = {field.name: default(field) for field in dataclasses.fields(plain)}
-        for name, param in declared.items():
-            written = self.parameter(name, getattr(thing, name), param)
-            file = name == "image" and param.role == "host"
-            implied = None if file else self.parameter(name, defaults[name], param)
-            if name == "material" or written != implied:
-                given[name] = written
-        return given
+        """Return the object that stands for a thing; parameters with their defaults are left out.
 
-    def parameter(self, name: str, value: Any, param: Param) -> Any:
-        if name == "image" and param.role == "host":
-            six = isinstance(value, (list, tuple))
-            return [self.image(face) for face in value] if six else self.image(value)
-        if name == "sensor":
-            return json_spectra.write_sensor(value)
-        if isinstance(value, materials.Material):
-            return self.material(value)
-        if isinstance(value, shapes.Group):
-            return self.group(value)
-        if isinstance(value, Kind):
-            return self.kind(value)
-        if param.role == "reradiation":
-            return json_reradiation.write(value)
-        if param.role in SPECTRUM_ROLES and not isinstance(value, (int, float, tuple)):
-            return json_spectra.write(value, param.role)
-        if param.role == "layers":
-            return [self.layer(layer) for layer in value]
-        if isinstance(value, np.ndarray):
-            return value.tolist()
-        return list(value) if isinstance(value, tuple) else value
+        The material of a shape is always written: without one a mesh has that of its file.
+        """
+        cls = type(thing)
+        written: dict[str, Any] = {"type": thing.kind}
+        in_file: tuple[str, ...] = ()
+        if cls in self.array_files:
+            written["file"], in_file = self.array_files[cls](thing), FILES[cls].replaces
+        default = defaults(cls)
+        for name, param in params(cls).items():
+            if name in in_file:
+                continue
+            value = forms.write(getattr(thing, name), param, self)
+            if name == "material" or value != forms.write(default[name], param, self):
+                written[name] = value
+        return written
+
+    def untyped(self, thing: Kind) -> dict[str, Any]:
+        """Return the object that stands for a thing where only one kind can stand."""
+        written = self.kind(thing)
+        del written["type"]
+        return written
 
     def layer(self, layer: materials.Layer) -> dict[str, Any]:
-        given = self.kind(layer)
-        del given["type"]
-        return given
+        """Return the object that stands for a thin film."""
+        return self.untyped(layer)
 
     def material(self, material: materials.Material) -> Any:
         """Return a material, or its name in the table of named ones."""
         if not material.name:
             return self.kind(material)
         if id(material) not in self.names:
-            key = free_name(material.name, self.materials)
+            key = unused_name(material.name, self.materials)
             self.names[id(material)] = key
             self.materials[key] = None
             written = self.kind(material)
@@ -165,15 +146,20 @@ class _Writer:
             self.materials[key] = written
         return self.names[id(material)]
 
+    def file_name(self, label: str, suffix: str) -> str:
+        """Return the name of a new file beside the scene's."""
+        label = re.sub(r"\W+", "_", label)
+        return f"{self.path.stem}.{label}{len(self.files)}.{suffix}"
+
     def image(self, image: Any) -> str:
-        """Return the name of an image's file, which is written if there is none."""
+        """Return the name of an image's file; an array is written to one."""
         spectral = isinstance(image, spectral_exr.SpectralImage)
         if not spectral and not isinstance(image, np.ndarray):
             return os.path.relpath(image, self.path.parent)
         if id(image) not in self.files:
             bytes_ = not spectral and image.dtype == np.uint8
             suffix = "exr" if spectral else "png" if bytes_ else "npy"
-            name = f"{self.path.stem}.image{len(self.files)}.{suffix}"
+            name = self.file_name("image", suffix)
             if spectral:
                 spectral_exr.write(self.path.parent / name, image)
             elif bytes_:
@@ -187,42 +173,39 @@ class _Writer:
         """Write strands, unless another shape shares them; return the file's name."""
         key = id(curves.points), id(curves.lengths)
         if key not in self.files:
-            label = re.sub(r"\W+", "_", curves.name) or "curves"
-            name = f"{self.path.stem}.{label}{len(self.files)}.txt"
+            name = self.file_name(curves.name or "curves", "txt")
             strands.write(self.path.parent / name, curves.points, curves.lengths)
             self.files[key] = name
         return self.files[key]
 
     def spheres(self, spheres: shapes.Spheres) -> str:
         """Write centres, radii and attributes; return the file's name."""
-        label = re.sub(r"\W+", "_", spheres.name) or "spheres"
-        name = f"{self.path.stem}.{label}{len(self.files)}.npz"
+        name = self.file_name(spheres.name or "spheres", "npz")
         particles.write(self.path.parent / name, spheres)
         self.files[name] = name
         return name
 
     def mesh(self, mesh: shapes.Mesh) -> str:
         """Write a mesh's arrays, unless another shape shares them; return the file's name."""
-        key = tuple(id(getattr(mesh, name)) for name in ARRAYS)
+        key = tuple(id(getattr(mesh, name)) for name in MESH_ARRAYS)
         if key not in self.files:
-            label = re.sub(r"\W+", "_", mesh.name) or "mesh"
-            name = f"{self.path.stem}.{label}{len(self.files)}.ply"
+            name = self.file_name(mesh.name or "mesh", "ply")
             (self.path.parent / name).write_bytes(_ply(mesh))
             self.files[key] = name
         return self.files[key]
 
 
-def free_name(wanted: str, taken: Container[str]) -> str:
-    """Return a name, with a number behind it if it is taken."""
-    name, count = wanted, 1
-    while name in taken:
+def unused_name(name: str, used: Container[str]) -> str:
+    """Return a name, with a number behind it if it is used already."""
+    free, count = name, 1
+    while free in used:
         count += 1
-        name = f"{wanted} {count}"
-    return name
+        free = f"{name} {count}"
+    return free
 
 
-def _run(shape: shapes.Shape) -> int | None:
-    """What instances that may share a file of matrices have in common."""
+def _group_of_run(shape: shapes.Shape) -> int | None:
+    """Return the identity of a nameless instance's group; None for any other shape."""
     return id(shape.group) if isinstance(shape, shapes.Instance) and not shape.name else None
 
 
@@ -231,7 +214,7 @@ def _on_one_line(match: re.Match) -> str:
 
 
 def _ply(mesh: shapes.Mesh) -> bytes:
-    """The arrays of a mesh as a binary PLY file, attributes by the names that Mitsuba has."""
+    """Return the arrays of a mesh as a binary PLY file, attributes by Mitsuba's names."""
     normals, uvs = mesh.normals, mesh.uvs
     if isinstance(normals, str):
         normals = smooth_normals(np.asarray(mesh.vertices), np.asarray(mesh.faces))

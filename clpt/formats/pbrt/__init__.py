@@ -1,7 +1,7 @@
 """Scenes in PBRT version 4's format.
 
 What is not supported is an error or a warning that names the file, the line and the directive.
-docs/pbrt.md tells what is read and how.
+docs/pbrt.md says what is read and how.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ __all__ = ["load"]
 def load(path: Path, progress: Progress | None = None) -> Scene:
     """Read a .pbrt file, packed by gzip or not.
 
-    progress: is called with how much is done, from 0 to 1, and what. Raises SceneError with file,
-    line and directive for anything broken or not supported.
+    progress: called with the share that is done, from 0 to 1, and a text. Raises SceneError with
+    file, line and directive for anything broken or not supported.
     """
     contents = reader.read(path)
     shared = contents.shared
-    shared.make_material = build_scene.named
+    shared.make_material = build_scene.make_material
     options = contents.options
-    seen = options.get("Camera") or _default_camera(path, contents)
-    exposure = camera_film.exposure_time(seen.params)
+    camera = options.get("Camera") or _default_camera(path, contents)
+    exposure = camera_film.exposure_time(camera.params)
     film = films.film(options.get("Film"), options.get("PixelFilter"), exposure)
     sampler, spp, seed = films.sampler(options.get("Sampler"))
     scene = Scene(
-        camera=camera_film.camera(seen, film),
+        camera=camera_film.camera(camera, film),
         shapes=build_scene.shapes(contents, progress),
         lights=build_scene.lights(contents),
         integrator=films.integrator(options.get("Integrator")),
@@ -44,9 +44,9 @@ def load(path: Path, progress: Progress | None = None) -> Scene:
         name=path.name.partition(".pbrt")[0],
         extra={"format": "pbrt"},
     )
-    build_scene.remaining(contents)
-    build_scene.report([found for name, found in options.items() if name != "Accelerator"])
-    scene.warnings = build_scene.folded(shared.warnings)
+    build_scene.check_unused_materials(contents)
+    build_scene.check_options([one for name, one in options.items() if name != "Accelerator"])
+    scene.warnings = build_scene.deduplicated(shared.warnings)
     return scene
 
 

@@ -17,7 +17,8 @@ from clpt.formats.pbrt.state import Definition, State, nearest
 from clpt.formats.pbrt.textures import textured
 from clpt.scene.lights import Light
 from clpt.scene.materials import Diffuse, Mask, Material, TwoSided
-from clpt.scene.params import Kind, params
+from clpt.scene.params import Kind
+from clpt.scene.params import params as declared_params
 from clpt.scene.shapes import Curves, Group, Instance, Shape
 
 Progress = Callable[[float, str], None]
@@ -28,151 +29,152 @@ def shapes(contents: Contents, progress: Progress | None) -> list[Shape]:
     """Make all shapes, those of objects as instances. Raises SceneError."""
     used = {use.kind for use in contents.uses}
     parts = [contents.shapes, *(part for name, part in contents.objects.items() if name in used)]
-    flat = [found for part in parts for found in part]
-    made = dict(zip(map(id, flat), _all(flat, progress), strict=True))
+    definitions = [definition for part in parts for definition in part]
+    made = dict(zip(map(id, definitions), _make_all(definitions, progress), strict=True))
     groups = {
-        name: Group(shapes=tuple(joined(_present(made, found))), name=name)
-        for name, found in contents.objects.items()
+        name: Group(shapes=tuple(joined(_of(definitions, made))), name=name)
+        for name, definitions in contents.objects.items()
         if name in used
     }
-    whole = list(joined(_present(made, contents.shapes)))
+    result = list(joined(_of(contents.shapes, made)))
     for use in contents.uses:
         if use.kind not in groups:
             hint = nearest(use.kind, contents.objects)
             raise use.params.error(f"there is no object {use.kind!r}{hint}")
         if groups[use.kind].shapes:
-            with use.params.placed():
-                whole.append(Instance(group=groups[use.kind], to_world=use.state.ctm))
-    return whole
+            with use.params.locating():
+                result.append(Instance(group=groups[use.kind], to_world=use.state.ctm))
+    return result
 
 
-def _present(made: dict[int, Shape | None], found: Sequence[Definition]) -> Iterator[Shape]:
-    return (shape for one in found if (shape := made[id(one)]) is not None)
+def _of(definitions: Sequence[Definition], made: dict[int, Shape | None]) -> Iterator[Shape]:
+    """Yield the shapes of definitions, but for those that are empty."""
+    return (shape for each in definitions if (shape := made[id(each)]) is not None)
 
 
-def _all(found: list[Definition], progress: Progress | None) -> list[Shape | None]:
-    """The shapes of definitions: geometry side by side, then materials one after the other."""
+def _make_all(definitions: list[Definition], progress: Progress | None) -> list[Shape | None]:
+    """Make the shapes of definitions: geometry in threads, materials one after the other."""
     made: list[Shape | None] = []
     workers = min(8, os.cpu_count() or 1)
     with ThreadPoolExecutor(workers) as pool:
         try:
-            for one, read in zip(found, pool.map(geometry, found), strict=True):
-                made.append(_shape(one, read))
+            geometries = pool.map(geometry, definitions)
+            for definition, body in zip(definitions, geometries, strict=True):
+                made.append(_shape(definition, body))
                 if progress is not None:
-                    progress(len(made) / len(found), f"{len(made)} of {len(found)} shapes")
+                    count = len(definitions)
+                    progress(len(made) / count, f"{len(made)} of {count} shapes")
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
     return made
 
 
-def _shape(found: Definition, read: Geometry | None) -> Shape | None:
-    given, state = found.params, found.state
-    opacity = textured(given, "alpha", "real", state, 1.0)
-    _report(given, state)
-    if read is None:
-        state.warn(given, "left out, since it has no area")
+def _shape(definition: Definition, body: Geometry | None) -> Shape | None:
+    params, state = definition.params, definition.state
+    opacity = textured(params, "alpha", "real", state, 1.0)
+    _warn_of_unused(params, state)
+    if body is None:
+        state.warn(params, "left out, since it has no area")
         return None
-    for note in read.notes:
-        state.warn(given, note)
-    surface = _material(given, state)
-    emission = _emission(state, read)
+    for warning in body.warnings:
+        state.warn(params, warning)
+    surface = _material(params, state)
+    emission = _emission(state, body)
     if not isinstance(opacity, float) or opacity < 1.0:
         surface = Mask(material=surface, opacity=opacity)
         if emission is not None:
-            state.warn(given, "'alpha' hides its surface, but not its light")
+            state.warn(params, "'alpha' hides its surface, but not its light")
     if _has_texture(surface) or _has_texture(emission):
-        if read.kind is Curves:
-            state.warn(given, "textures run around and along curves, not along and across")
-        read = with_uvs(read)
-    with given.placed():
-        return read.made(material=surface, emission=emission)
+        if body.kind is Curves:
+            state.warn(params, "textures run around and along curves, not along and across")
+        body = with_uvs(body)
+    with params.locating():
+        return body.made(material=surface, emission=emission)
 
 
-def _material(place: Parameters, state: State) -> Material:
-    """The material that the state names, made once."""
+def _material(source: Parameters, state: State) -> Material:
+    """Return the material of the state, made once for all shapes."""
     current = state.material
     if current is None:
         return GREY
     if isinstance(current, str):
-        return state.named_material(current, place)
-    return _made(current)
-
-
-def _made(found: Definition) -> Material:
-    made: Material = found.state.shared.once(
-        found, found.params, lambda: named(found.kind, found.params, found.state, "")
+        return state.named_material(current, source)
+    kind, params, defined_in = current.kind, current.params, current.state
+    made: Material = state.shared.once(
+        current, params, lambda: make_material(kind, params, defined_in, "")
     )
     return made
 
 
-def named(kind: str, given: Parameters, state: State, name: str) -> Material:
-    """Make a material, and tell which of its parameters mean nothing to it."""
-    made = material(kind, given, state, name)
-    _report(given, state)
+def make_material(kind: str, params: Parameters, state: State, name: str) -> Material:
+    """Make a material, and warn of parameters that it does not have."""
+    made = material(kind, params, state, name)
+    _warn_of_unused(params, state)
     return made
 
 
-def _emission(state: State, read: Geometry) -> Light | None:
-    """The light of the state on a shape: one for all shapes, but where its power is given."""
-    found = state.area_light
-    if found is None:
+def _emission(state: State, body: Geometry) -> Light | None:
+    """Return the light of the state: one for all shapes, but one a shape where it has a power."""
+    definition = state.area_light
+    if definition is None:
         return None
-    area = read.area() if "power" in found.params else 0.0
+    kind, params, defined_in = definition.kind, definition.params, definition.state
+    area = body.area() if "power" in params else 0.0
 
     def make() -> Light:
-        made = area_light(found.kind, found.params, found.state, area)
-        _report(found.params, found.state)
+        made = area_light(kind, params, defined_in, area)
+        _warn_of_unused(params, defined_in)
         return made
 
-    made: Light = state.shared.once((found, area), found.params, make)
+    made: Light = state.shared.once((definition, area), params, make)
     return made
 
 
 def lights(contents: Contents) -> list[Light]:
     """Make all lights that are on no shape. Raises SceneError."""
     made = []
-    for found in contents.lights:
-        made.append(light(found.kind, found.params, found.state))
-        _report(found.params, found.state)
+    for each in contents.lights:
+        made.append(light(each.kind, each.params, each.state))
+        _warn_of_unused(each.params, each.state)
     return made
 
 
-def remaining(contents: Contents) -> None:
-    """Make the named materials that no shape has, so that their errors are told too."""
-    for name, found in contents.shared.materials.items():
-        found.state.named_material(name, found.params)
+def check_unused_materials(contents: Contents) -> None:
+    """Make the named materials that no shape has, for their errors and warnings."""
+    for name, definition in contents.shared.materials.items():
+        definition.state.named_material(name, definition.params)
 
 
-def report(options: Sequence[Definition]) -> None:
-    """Tell which parameters of camera, film and the like mean nothing."""
-    for found in options:
-        _report(found.params, found.state)
+def check_options(options: Sequence[Definition]) -> None:
+    """Warn of parameters that camera, film and the like do not have."""
+    for option in options:
+        _warn_of_unused(option.params, option.state)
 
 
-def _report(given: Parameters, state: State) -> None:
-    for extra in given.unused():
-        extra.used = True
-        hint = nearest(extra.name, given.asked)
-        state.warn(extra, f"means nothing here{hint}")
+def _warn_of_unused(params: Parameters, state: State) -> None:
+    for parameter in params.unused():
+        parameter.used = True
+        hint = nearest(parameter.name, params.asked)
+        state.warn(parameter, f"is not known here and is left out{hint}")
 
 
 def _has_texture(thing: Any) -> bool:
-    """Whether a material or light, or one inside it, varies with uv."""
+    """Whether a material or light, or one inside it, has a texture."""
     if getattr(thing, "is_texture", False):
         return True
     if not isinstance(thing, Kind):
         return False
-    return any(_has_texture(getattr(thing, name)) for name in params(type(thing)))
+    return any(_has_texture(getattr(thing, name)) for name in declared_params(type(thing)))
 
 
-def folded(warnings: Sequence[str]) -> list[str]:
-    """Warnings of which those that say the same of many places stand once, with their number."""
+def deduplicated(warnings: Sequence[str]) -> list[str]:
+    """Return each warning once, at its first location, with the number of all its locations."""
     first: dict[str, str] = {}
     count: dict[str, int] = {}
     for warning in warnings:
-        said = warning.partition(": ")[2]
-        first.setdefault(said, warning)
-        count[said] = count.get(said, 0) + 1
-    more = {said: f" (in {n} places)" if n > 1 else "" for said, n in count.items()}
-    return [text + more[said] for said, text in first.items()]
+        text = warning.partition(": ")[2]
+        first.setdefault(text, warning)
+        count[text] = count.get(text, 0) + 1
+    numbers = {text: f" (in {n} places)" if n > 1 else "" for text, n in count.items()}
+    return [warning + numbers[text] for text, warning in first.items()]

@@ -25,14 +25,14 @@ FARTHEST = 1e20  # [m], pbrt cuts nothing off; below the FAR of rays that meet n
 ROUND = np.array([[0.0, 0, -1, 0], [0, 1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
 
 
-def camera(found: Definition, film: Film) -> cameras.Camera:
+def camera(definition: Definition, film: Film) -> cameras.Camera:
     """Make the camera that a Camera directive describes. Raises SceneError."""
-    if found.kind not in CAMERAS:
-        raise UnknownKindError("camera", found.kind, CAMERAS, **found.params.place)
-    params, state = found.params, found.state
+    if definition.kind not in CAMERAS:
+        raise UnknownKindError("camera", definition.kind, CAMERAS, **definition.params.location())
+    params, state = definition.params, definition.state
     exposure_time(params)
-    with params.placed():
-        return CAMERAS[found.kind](params, state, film)
+    with params.locating():
+        return CAMERAS[definition.kind](params, state, film)
 
 
 def exposure_time(params: Parameters) -> float:

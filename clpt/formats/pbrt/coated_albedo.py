@@ -1,7 +1,7 @@
 """What lies below a dielectric boundary: pbrt's coats and its scattering bodies, as diffuse bases.
 
 Our plastics reflect (1 - F(wi)) (1 - F(wo)) r / (pi eta^2 (1 - f r)) from a base of albedo r, f
-being the share that the boundary turns back inside. These functions give r.
+being the share that the boundary reflects back inside. These functions give r.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 Values = Any  # a number or an array
 
 COSINES = (np.arange(1024) + 0.5) / 1024.0
-EVEN = 2.0 * COSINES / len(COSINES)  # what a diffuse base sends between these cosines
+EVEN = 2.0 * COSINES / len(COSINES)  # shares of diffuse light at these cosines
 
 # Reduced scattering and absorption [1/mm] for red, green and blue (Jensen et al. 2001, figure 5).
 MEDIA = {
@@ -33,7 +33,7 @@ MEDIA = {
 }
 
 
-def turned_back(ior: float) -> np.ndarray:
+def internal_fresnel(ior: float) -> np.ndarray:
     """Fresnel's reflectance of unpolarised light from inside, at COSINES; (n,) float64."""
     sin2 = ior**2 * (1.0 - COSINES**2)
     out = np.sqrt(np.maximum(1.0 - sin2, 0.0))
@@ -43,15 +43,15 @@ def turned_back(ior: float) -> np.ndarray:
 
 
 def under_coat(ior: float, thickness: float) -> Callable[[Values], Values]:
-    """How a base of albedo r looks below a coat of `thickness` mean free paths that only absorb.
+    """Return how a base of albedo r looks below an absorbing coat, `thickness` in mean free paths.
 
     pbrt's coats let exp(-thickness / cos) through even where nothing scatters. With f_d the share
-    that is turned back after two passes, and t the mean of one pass for what is refracted:
+    that is reflected back after two passes, and t the mean of one pass for what is refracted:
     r' / (1 - f r') = t^2 r / (1 - f_d r).
     """
-    fresnel, passes = turned_back(ior), np.exp(-thickness / COSINES)
+    fresnel, passes = internal_fresnel(ior), np.exp(-thickness / COSINES)
     inside, damped = float(EVEN @ fresnel), float(EVEN @ (fresnel * passes**2))
-    twice = let_through(ior, thickness) ** 2
+    twice = transmitted(ior, thickness) ** 2
 
     def looks(r: Values) -> Values:
         seen = twice * r / (1.0 - damped * r)
@@ -60,15 +60,15 @@ def under_coat(ior: float, thickness: float) -> Callable[[Values], Values]:
     return looks
 
 
-def let_through(ior: float, thickness: float) -> float:
+def transmitted(ior: float, thickness: float) -> float:
     """The share of even light, refracted into a coat, that arrives at its other side."""
-    refracted = EVEN * (1.0 - turned_back(ior))
+    refracted = EVEN * (1.0 - internal_fresnel(ior))
     return float(refracted @ np.exp(-thickness / COSINES) / max(refracted.sum(), 1e-9))
 
 
 def from_body_reflectance(ior: float) -> Callable[[Values], Values]:
-    """The base for a scattering body of which pbrt is told the reflectance below its boundary."""
-    inside = float(EVEN @ turned_back(ior))
+    """Return how the reflectance of a body below its boundary, as pbrt has it, makes a base."""
+    inside = float(EVEN @ internal_fresnel(ior))
     return lambda r: r / (1.0 - inside * (1.0 - r))
 
 

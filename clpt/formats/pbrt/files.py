@@ -1,14 +1,13 @@
-"""Going through a PBRT file and those that it includes, within limits."""
+"""Reading a PBRT file and those that it includes, within limits."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Iterator
-from contextlib import contextmanager
+from abc import abstractmethod
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
-from clpt.errors import SceneError
+from clpt.formats.located import Located
 from clpt.formats.pbrt.lexer import Lexer
 from clpt.formats.pbrt.state import Definition, Shared, State
 
@@ -30,8 +29,8 @@ class Contents:
     seed: int | None = None
 
 
-class Files(ABC):
-    """Goes through the files; `state` is the graphics state at the place it has come to."""
+class Files(Located):
+    """Reads the files; `state` is the graphics state at the directive that is being read."""
 
     def __init__(self, path: Path):
         self.path = path
@@ -39,16 +38,16 @@ class Files(ABC):
         self.state = State(self.contents.shared, path.parent)
         self.files: list[Path] = []
         self.count = self.bytes = 0
-        self.told: set[str] = set()
+        self.warned: set[str] = set()
         self.lexer: Lexer
         self.name = ""
 
     @abstractmethod
     def directive(self) -> None:
-        """Take the next directive and do what it says."""
+        """Take the next directive and carry it out."""
 
     def go_through(self, path: Path) -> None:
-        """Go through a file, which an Include may have named."""
+        """Read a file, which an Include may have named."""
         real = path.resolve()
         if real in self.files:
             raise self.lexer.error(f"{path.name} includes itself")
@@ -68,24 +67,16 @@ class Files(ABC):
         if outer is not None:
             self.lexer = outer
 
-    @contextmanager
-    def placed(self) -> Iterator[None]:
-        """Give errors that know no file the place of the directive."""
-        try:
-            yield
-        except SceneError as error:
-            if error.file is not None:
-                raise
-            file, line = self.lexer.path, self.lexer.line
-            raise SceneError(error.message, file=file, line=line, where=self.name) from None
+    def location(self) -> dict[str, Any]:
+        return {"file": self.lexer.path, "line": self.lexer.line, "where": self.name}
 
     def warn(self, text: str) -> None:
-        """Remember what the picture will lack, with this place."""
-        place = f"{self.lexer.path.name}:{self.lexer.line}: {self.name}"
-        self.contents.shared.warnings.append(f"{place}: {text}")
+        """Warn of what the picture will lack, with this location."""
+        location = f"{self.lexer.path.name}:{self.lexer.line}: {self.name}"
+        self.contents.shared.warnings.append(f"{location}: {text}")
 
     def warn_once(self, text: str) -> None:
-        """The same, for the first time that it is said."""
-        if text not in self.told:
-            self.told.add(text)
+        """Warn, but only once of the same."""
+        if text not in self.warned:
+            self.warned.add(text)
             self.warn(text)

@@ -23,28 +23,28 @@ SIZE = (("xresolution", 1280), ("yresolution", 720))
 DAYLIGHT = 6500.0  # [K], what pbrt takes a measured sensor's white to be
 
 
-def film(found: Definition | None, filter: Definition | None, exposure: float) -> Film:
+def film(definition: Definition | None, filter: Definition | None, exposure: float) -> Film:
     """Make the film; `exposure` is how long the shutter is open [s]. Raises SceneError."""
     made = _filter(filter)
-    if found is None:
+    if definition is None:
         return Film(width=1280, height=720, filter=made)
-    params, state = found.params, found.state
-    if found.kind == "image":
+    params, state = definition.params, definition.state
+    if definition.kind == "image":
         raise params.error("the film 'image' is PBRT version 3's; convert the file by --upgrade")
-    if found.kind not in FILMS:
-        raise UnknownKindError("film", found.kind, FILMS, **params.place)
+    if definition.kind not in FILMS:
+        raise UnknownKindError("film", definition.kind, FILMS, **params.location())
     params.ignore(*STORED)
-    if found.kind == "gbuffer":
+    if definition.kind == "gbuffer":
         params.ignore("coordinatesystem")
     width, height = (params.one(name, "integer", n) for name, n in SIZE)
-    with params.placed():
+    with params.locating():
         made_film = Film(
             width=width,
             height=height,
             filter=made,
             crop=_crop(params, width, height),
             **_colour(params, state, exposure),
-            **(_bands(params) if found.kind == "spectral" else {}),
+            **(_bands(params) if definition.kind == "spectral" else {}),
         )
     if params.one("maxcomponentvalue", "float", math.inf) < math.inf:
         state.warn(params, "'maxcomponentvalue' is left out: bright samples are kept as they are")
@@ -57,7 +57,7 @@ def _colour(params: Parameters, state: State, exposure: float) -> dict[str, Any]
     balance = params.one("whitebalance", "float", 0.0)
     given: dict[str, Any] = {"exposure": exposure * params.above_zero("iso", 100.0) / 100.0}
     if sensor != "cie1931":
-        state.warn(params, f"the sensor {sensor!r} is not known: cie1931 takes its place")
+        state.warn(params, f"the sensor {sensor!r} is not known: cie1931 is used")
         balance = balance or DAYLIGHT
     if balance > 0.0:
         given["white_balance"] = balance
@@ -82,9 +82,9 @@ def _crop(params: Parameters, width: int, height: int) -> tuple[int, int, int, i
     A `cropwindow` counts before `pixelbounds`; both give left, right, top, bottom.
     """
     bounds, window = params.several("pixelbounds", "integer"), params.several("cropwindow", "float")
-    for name, found in (("pixelbounds", bounds), ("cropwindow", window)):
-        if found is not None and len(found) != 4:
-            raise params.error(f"{name!r} must be 4 numbers, not {len(found)}")
+    for name, values in (("pixelbounds", bounds), ("cropwindow", window)):
+        if values is not None and len(values) != 4:
+            raise params.error(f"{name!r} must be 4 numbers, not {len(values)}")
     if window is not None:
         x, y = np.sort(np.clip(window[:2], 0, 1)), np.sort(np.clip(window[2:], 0, 1))
         x, y = np.ceil(width * x), np.ceil(height * y)
@@ -97,20 +97,20 @@ def _crop(params: Parameters, width: int, height: int) -> tuple[int, int, int, i
     return int(x[0]), int(y[0]), int(x[1] - x[0]), int(y[1] - y[0])
 
 
-def _filter(found: Definition | None) -> Filter:
-    if found is None:
+def _filter(definition: Definition | None) -> Filter:
+    if definition is None:
         return integrators.Gaussian()
-    if found.kind not in FILTERS:
-        raise UnknownKindError("filter", found.kind, FILTERS, **found.params.place)
-    with found.params.placed():
-        return FILTERS[found.kind](found.params, found.state)
+    if definition.kind not in FILTERS:
+        raise UnknownKindError("filter", definition.kind, FILTERS, **definition.params.location())
+    with definition.params.locating():
+        return FILTERS[definition.kind](definition.params, definition.state)
 
 
 def _radius(params: Parameters, state: State, default: float) -> float:
     """Take the radii [pixels], which are one here."""
     x, y = (params.above_zero(name, default) for name in ("xradius", "yradius"))
     if x != y:
-        state.warn(params, f"one radius of {math.sqrt(x * y):.3g} pixels takes the place of two")
+        state.warn(params, f"one radius of {math.sqrt(x * y):.3g} pixels replaces two")
     return math.sqrt(x * y)
 
 
@@ -146,14 +146,14 @@ FILTERS: dict[str, Callable[[Parameters, State], Filter]] = {
 }
 
 
-def sampler(found: Definition | None) -> tuple[Sampler, int, int | None]:
+def sampler(definition: Definition | None) -> tuple[Sampler, int, int | None]:
     """Return the sampler, the samples of a pixel, and the seed if it is given."""
-    if found is None:
+    if definition is None:
         return integrators.Sobol(), 16, None
-    params = found.params
-    if found.kind not in SAMPLERS:
-        raise UnknownKindError("sampler", found.kind, SAMPLERS, **params.place)
-    if found.kind == "stratified":
+    params = definition.params
+    if definition.kind not in SAMPLERS:
+        raise UnknownKindError("sampler", definition.kind, SAMPLERS, **params.location())
+    if definition.kind == "stratified":
         params.ignore("jitter")
         spp = math.prod(params.one(name, "integer", 4) for name in ("xsamples", "ysamples"))
     else:
@@ -163,7 +163,7 @@ def sampler(found: Definition | None) -> tuple[Sampler, int, int | None]:
     if not 0 < spp < 2**31:
         raise params.error(f"there must be at least one sample in a pixel, not {spp}")
     own = {"zsobol": integrators.Zsobol(), **dict.fromkeys(RANDOM, integrators.Independent())}
-    made: Sampler = own.get(found.kind, integrators.Sobol())
+    made: Sampler = own.get(definition.kind, integrators.Sobol())
     return made, spp, None if seed is None else seed % 2**31
 
 
@@ -180,18 +180,20 @@ IGNORED = ("regularize", "lightsampler", "rrthreshold", "samplelights", "sampleb
 MOST_DEPTH = 2**31 - 2
 
 
-def integrator(found: Definition | None) -> Integrator:
+def integrator(definition: Definition | None) -> Integrator:
     """Make the path tracer that stands for pbrt's integrator; its depth counts one less."""
-    if found is None:
+    if definition is None:
         return integrators.Path(max_depth=6)
-    params, state = found.params, found.state
-    if found.kind in ("ao", "function"):
+    params, state = definition.params, definition.state
+    if definition.kind in ("ao", "function"):
         raise params.error("this integrator shows no light; use 'path'")
-    if found.kind not in (*LIGHT_PATHS, *OTHERS):
-        raise UnknownKindError("integrator", found.kind, (*LIGHT_PATHS, *OTHERS), **params.place)
-    if found.kind in OTHERS:
+    if definition.kind not in (*LIGHT_PATHS, *OTHERS):
+        raise UnknownKindError(
+            "integrator", definition.kind, (*LIGHT_PATHS, *OTHERS), **params.location()
+        )
+    if definition.kind in OTHERS:
         state.warn(params, "paths are traced from the camera instead: the same light, other noise")
-    params.ignore(*IGNORED, *OTHERS.get(found.kind, ()))
+    params.ignore(*IGNORED, *OTHERS.get(definition.kind, ()))
     depth = params.one("maxdepth", "integer", 5)
     if depth < 0:
         raise params.error(f"'maxdepth' cannot be negative: {depth}")

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from clpt.errors import SceneError
-from clpt.formats.pbrt.map_values import mapped
+from clpt.formats.pbrt.map_values import map_values
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.state import State
 from clpt.formats.pbrt.textures import textured
@@ -40,7 +40,7 @@ def _absorption(params: Parameters, state: State, around: Any) -> Any:
     if colour is not None:
         if not isinstance(around, float):
             raise SceneError("with 'reflectance', 'beta_n' must be a number")
-        return mapped(colour, lambda c: _of_colour(c, around))
+        return map_values(colour, lambda c: _of_colour(c, around))
     if names:
         return pigment(*(params.one(n, "float", 0.0) for n in ("eumelanin", "pheomelanin")))
     return pigment(1.3, 0.0)

@@ -14,7 +14,7 @@ import numpy as np
 from clpt import spectra
 from clpt.errors import SceneError, UnknownKindError
 from clpt.formats.pbrt import coated_albedo
-from clpt.formats.pbrt.map_values import mapped
+from clpt.formats.pbrt.map_values import map_values
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.roughness import alphas, isotropic, rough, smooth
 from clpt.formats.pbrt.spectra import spectrum
@@ -36,9 +36,9 @@ def coated_diffuse(params: Parameters, state: State) -> Material:
     base = textured(params, "reflectance", "reflectance", state, 0.5)
     thickness = coat(params, state)
     if thickness > 0.0:
-        looks = coated_albedo.under_coat(middle(eta), thickness)
-        key = ("coat", base, middle(eta), thickness)
-        base = state.shared.once(key, params, partial(mapped, base, looks, bytes_stay=True))
+        looks = coated_albedo.under_coat(index_at_550(eta), thickness)
+        key = ("coat", base, index_at_550(eta), thickness)
+        base = state.shared.once(key, params, partial(map_values, base, looks, bytes_stay=True))
     return plastic(base, eta, isotropic(alphas(params, state), params, state))
 
 
@@ -46,7 +46,7 @@ def coat(params: Parameters, state: State) -> float:
     """Take what a coat is made of: its thickness. What scatters in it is left out, warned of."""
     albedo = textured(params, "albedo", "reflectance", state, 0.0)
     params.ignore("g", "maxdepth", "nsamples")
-    if isinstance(albedo, Texture) or np.any(mapped(albedo, abs)):
+    if isinstance(albedo, Texture) or np.any(map_values(albedo, abs)):
         state.warn(params, "'albedo' of the coat is taken as 0: it absorbs and does not scatter")
     thickness = textured(params, "thickness", "real", state, THICKNESS)
     if isinstance(thickness, Texture):
@@ -62,8 +62,8 @@ def plastic(base: Any, eta: Any, alpha: Any) -> Material:
     return both(materials.RoughPlastic(alpha=rough(alpha), **given))
 
 
-def middle(eta: Any) -> float:
-    """An index at 550 nm."""
+def index_at_550(eta: Any) -> float:
+    """Return an index at 550 nm."""
     return float(spectra.index(eta).sample(550.0)) if not isinstance(eta, float) else eta
 
 
@@ -91,8 +91,8 @@ def subsurface(params: Parameters, state: State) -> Material:
     if scattering is not None:
         base = _albedo(scattering, absorption, g)
     else:
-        looks = coated_albedo.from_body_reflectance(middle(eta))
-        base = mapped(given["reflectance"], looks, bytes_stay=True)
+        looks = coated_albedo.from_body_reflectance(index_at_550(eta))
+        base = map_values(given["reflectance"], looks, bytes_stay=True)
     state.warn(
         params, "light leaves a 'subsurface' body where it entered: a diffuse base of its albedo"
     )
@@ -107,5 +107,5 @@ def _albedo(scattering: Any, absorption: Any, g: float) -> Any:
 def _colour(value: Any) -> Any:
     if isinstance(value, Texture):
         raise SceneError("'sigma_a' and 'sigma_s' cannot be textures")
-    found = value.to_rgb("unbounded") if isinstance(value, spectra.Spectrum) else value
-    return np.broadcast_to(found, 3)
+    rgb = value.to_rgb("unbounded") if isinstance(value, spectra.Spectrum) else value
+    return np.broadcast_to(rgb, 3)

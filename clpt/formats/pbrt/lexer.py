@@ -1,7 +1,7 @@
 """The words of a PBRT file: directives, strings, and runs of numbers, which may be long.
 
-A file is kept as bytes and looked at once. The numbers between brackets, which are nearly all of a
-large file, are read in one go.
+A file is kept as bytes and scanned once. The numbers between brackets, nearly all of a large file,
+are parsed at once.
 """
 
 from __future__ import annotations
@@ -27,32 +27,32 @@ UPGRADE = "PBRT version 3's; convert the file by pbrt-v4's --upgrade"
 class Lexer:
     """The words of one file, in order; `line` is that of the word last taken.
 
-    Raises SceneError with the file and line for whatever is no word.
+    Raises SceneError with the file and line for an invalid word.
     """
 
     def __init__(self, path: Path):
         self.path, self.data = path, read_bytes(path)
-        self.at = 0  # behind the blanks before a word that has been looked at
+        self.at = 0  # after the blanks before the next word
         self._ahead: bytes | None = None
         self._counted, self._line = 0, 1
 
     @property
     def line(self) -> int:
-        """The line of the place up to which words have been taken."""
+        """The line up to which words have been taken."""
         self._line += self.data.count(b"\n", self._counted, self.at)
         self._counted = self.at
         return self._line
 
     def error(self, message: str) -> SceneError:
-        """Return the error that says `message` about this place."""
+        """Return an error at this line."""
         return SceneError(message, file=self.path, line=self.line)
 
     def peek(self) -> bytes:
         """The next word, or nothing at the end of the file."""
         if self._ahead is None:
-            found = WORD.match(self.data, self.at)
-            word = found.group(1) if found else None
-            self.at = (found.end() if found else self.at) - len(word or b"")
+            match = WORD.match(self.data, self.at)
+            word = match.group(1) if match else None
+            self.at = (match.end() if match else self.at) - len(word or b"")
             if word is None and self.at < len(self.data):
                 raise self.error("a string in quotes does not end on its line")
             self._ahead = word or b""
@@ -87,10 +87,10 @@ class Lexer:
 
     def parameters(self, where: str) -> list[Parameter]:
         """Take the parameters that follow a directive; `where` is its name for messages."""
-        found: list[Parameter] = []
+        parameters: list[Parameter] = []
         while self.peek().startswith(b'"'):
-            found.append(self._parameter(where))
-        return found
+            parameters.append(self._parameter(where))
+        return parameters
 
     def _parameter(self, where: str) -> Parameter:
         declaration = self.string("a parameter").split()

@@ -30,8 +30,8 @@ SWAP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])  # y is up 
 def light(kind: str, params: Parameters, state: State) -> Light:
     """Make what a `LightSource` directive describes. Raises SceneError."""
     if kind not in MAKERS:
-        raise UnknownKindError("light", kind, MAKERS, **params.place)
-    with params.placed():
+        raise UnknownKindError("light", kind, MAKERS, **params.location())
+    with params.locating():
         return MAKERS[kind](params, state)
 
 
@@ -42,8 +42,8 @@ def area_light(kind: str, params: Parameters, state: State, area: float = 0.0) -
     triangles, since pbrt makes each of them a light of that power. Raises SceneError.
     """
     if kind != "diffuse":
-        raise UnknownKindError("area light", kind, ("diffuse",), **params.place)
-    with params.placed():
+        raise UnknownKindError("area light", kind, ("diffuse",), **params.location())
+    with params.locating():
         two_sided = params.one("twosided", "bool", False)
         file = params.one("filename", "string", "")
         given = spectrum(params, "L", "emission", state)
@@ -152,10 +152,10 @@ def _upward(image: np.ndarray) -> float:
     """
     centres = (np.arange(len(image)) + 0.5) / len(image)
     cosine = octahedral.to_sphere(np.stack(np.meshgrid(centres, centres), axis=-1))[..., 2]
-    found = 2.0 * np.pi * float((luminance(image) * np.maximum(cosine, 0.0)).mean())
-    if not found > 0.0:
+    lux = 2.0 * np.pi * float((luminance(image) * np.maximum(cosine, 0.0)).mean())
+    if not lux > 0.0:
         raise SceneError("the upper half of the image is dark, so it has no 'illuminance'")
-    return found
+    return lux
 
 
 def _goniometric(params: Parameters, state: State) -> Light:

@@ -1,4 +1,4 @@
-"""Functions of what a parameter has been given, whatever it is."""
+"""A function applied to the value of a parameter, whatever stands for it."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from clpt.scene.textures import Bitmap, Checkerboard, Mix, Product, Texture
 from clpt.spectra import RGB, Constant, RGBUnbounded, Spectrum, Tabulated, cie
 
 
-def mapped(value: Any, function: Callable[[Any], Any], *, bytes_stay: bool = False) -> Any:
-    """A function of what a parameter has been given: of a number, a colour, a spectrum, a texture.
+def map_values(value: Any, function: Callable[[Any], Any], *, bytes_stay: bool = False) -> Any:
+    """Apply a function to a number, a colour, a spectrum or a texture.
 
-    Of a mixture and of a pattern of numbers it is taken at both ends, of a product of both factors,
-    which is right for powers. bytes_stay: images of 8 bits in sRGB remain such, a quarter as large
-    as floats; the function must not leave [0, 1].
+    It is applied to both ends of a mixture and of a pattern of numbers, and to both factors of a
+    product, which is right for powers. bytes_stay: keep sRGB images of 8 bits as such, a quarter as
+    large as floats; the function must not leave [0, 1].
     """
     if isinstance(value, tuple):
         return tuple(float(function(v)) for v in value)
@@ -35,7 +35,7 @@ def mapped(value: Any, function: Callable[[Any], Any], *, bytes_stay: bool = Fal
         return Mix(first=float(function(0.0)), second=float(function(1.0)), amount=value)
     if isinstance(value, Texture):
         names = ENDS[type(value)]
-        ends = [mapped(getattr(value, name), function, bytes_stay=bytes_stay) for name in names]
+        ends = [map_values(getattr(value, name), function, bytes_stay=bytes_stay) for name in names]
         return replace(value, **dict(zip(names, ends, strict=True)))
     return float(function(value))
 

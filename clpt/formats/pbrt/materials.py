@@ -11,8 +11,8 @@ import numpy as np
 from clpt.errors import SceneError, UnknownKindError
 from clpt.formats.pbrt import coated_albedo
 from clpt.formats.pbrt.hair import hair
-from clpt.formats.pbrt.layered import both, coat, coated_diffuse, middle, subsurface
-from clpt.formats.pbrt.map_values import mapped
+from clpt.formats.pbrt.layered import both, coat, coated_diffuse, index_at_550, subsurface
+from clpt.formats.pbrt.map_values import map_values
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.roughness import alphas, isotropic, rough, smooth, stretched
 from clpt.formats.pbrt.spectra import named, spectrum
@@ -41,8 +41,8 @@ def material(kind: str, params: Parameters, state: State, name: str = "") -> Mat
             f"{kind!r} is a material of pbrt-v3; pbrt --upgrade converts it to {OLD[kind]!r}"
         )
     if kind not in MAKERS:
-        raise UnknownKindError("material", kind, MAKERS, **params.place)
-    with params.placed():
+        raise UnknownKindError("material", kind, MAKERS, **params.location())
+    with params.locating():
         return replace(_bumped(MAKERS[kind](params, state), params, state), name=name)
 
 
@@ -78,7 +78,7 @@ def _times(value: Any, scale: float) -> Any:
         return value
     if isinstance(value, Texture) and scale < 1.0:
         return Product(first=value, second=scale)
-    return mapped(value, lambda v: np.minimum(scale * v, 1.0))
+    return map_values(value, lambda v: np.minimum(scale * v, 1.0))
 
 
 def _conductor(params: Parameters, state: State) -> Material:
@@ -99,12 +99,12 @@ def _metal(params: Parameters, state: State, prefix: str) -> dict[str, Any]:
         return {"eta": copper["eta"] if eta is None else eta, "k": copper["k"] if k is None else k}
     if eta is not None or k is not None:
         raise SceneError("give either 'reflectance' or 'eta' and 'k', not both")
-    return {"eta": 1.0, "k": mapped(reflectance, _extinction)}
+    return {"eta": 1.0, "k": map_values(reflectance, _extinction)}
 
 
 def _damped(metal: dict[str, Any], ior: float, thickness: float) -> dict[str, Any]:
     """A metal under a coat that absorbs, which is a factor on its reflection."""
-    return {**metal, "specular_reflectance": coated_albedo.let_through(ior, thickness) ** 2}
+    return {**metal, "specular_reflectance": coated_albedo.transmitted(ior, thickness) ** 2}
 
 
 def _extinction(r: Any) -> Any:
@@ -122,7 +122,7 @@ def _coated_conductor(params: Parameters, state: State) -> Material:
             ext_ior=1.0,
             coat_alpha=rough(outer),
             **stretched(alpha_u, alpha_v),
-            **_damped(_metal(params, state, "conductor."), middle(ior), coat(params, state)),
+            **_damped(_metal(params, state, "conductor."), index_at_550(ior), coat(params, state)),
         )
     )
 

@@ -1,10 +1,9 @@
-"""The parameters of a directive: typed values by name, each with the place that it stands in."""
+"""The parameters of a directive: typed values by name, each with its file and line."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.errors import SceneError
+from clpt.formats.located import Located
 
 SIZES = {  # how many numbers one value of a type has
     "integer": 1, "float": 1, "blackbody": 1, "point2": 2, "vector2": 2, "point3": 3,
@@ -24,20 +23,8 @@ TYPES = (*SIZES, *ALIASES, *TEXTS, "bool", "spectrum")
 LARGEST_INTEGER = 2**31 - 1
 
 
-@contextmanager
-def placed(place: Parameter | Parameters) -> Iterator[None]:
-    """Give errors that know no file the place of a parameter or of a directive."""
-    try:
-        yield
-    except SceneError as error:
-        if error.file is not None:
-            raise
-        where = f"{error.where}: " if error.where else ""
-        raise place.error(where + error.message) from None
-
-
 @dataclass(eq=False)
-class Parameter:
+class Parameter(Located):
     """One `"type name" [values]`; `values` are float64 numbers, texts, or truths."""
 
     type: str
@@ -48,14 +35,8 @@ class Parameter:
     where: str = ""
     used: bool = False
 
-    @property
-    def place(self) -> dict[str, Any]:
-        """File, line and element, as errors take them."""
+    def location(self) -> dict[str, Any]:
         return {"file": self.file, "line": self.line, "where": f"{self.where}: {self.name!r}"}
-
-    def error(self, message: str) -> SceneError:
-        """Return the error that says `message` about this parameter."""
-        return SceneError(message, **self.place)
 
     @property
     def is_text(self) -> bool:
@@ -117,14 +98,10 @@ class Parameter:
             raise self.error(f"has {len(values)} numbers, which is no multiple of {size}")
         return values if size == 1 else values.reshape(-1, size)
 
-    def placed(self) -> Any:
-        """Context in which errors without a place get this one."""
-        return placed(self)
-
 
 @dataclass(eq=False)
-class Parameters:
-    """All parameters of a directive; what nothing asked for is left in `unused`.
+class Parameters(Located):
+    """All parameters of a directive; `unused` has those that nothing has read.
 
     `label` names the directive for messages: `Shape "sphere"`. `defaults` are those that an
     `Attribute` directive gave for the target; they count where the directive has none of that name,
@@ -147,66 +124,56 @@ class Parameters:
             own.add(parameter.name)
             self._named[parameter.name] = parameter
 
-    @property
-    def place(self) -> dict[str, Any]:
-        """File, line and element, as errors take them."""
+    def location(self) -> dict[str, Any]:
         return {"file": self.file, "line": self.line, "where": self.label}
-
-    def error(self, message: str) -> SceneError:
-        """Return the error that says `message` about the directive."""
-        return SceneError(message, **self.place)
-
-    def placed(self) -> Any:
-        """Context in which errors without a place get this one."""
-        return placed(self)
 
     def __contains__(self, name: str) -> bool:
         return name in self._named
 
     def find(self, name: str, *types: str) -> Parameter | None:
-        """Take a parameter of one of the types, or None; an integer counts as a float.
+        """Take a parameter of one of the types, None without it; an integer counts as a float.
 
         Raises SceneError where it has another type.
         """
         self._asked.add(name)
-        found = self._named.get(name)
-        if found is None:
+        parameter = self._named.get(name)
+        if parameter is None:
             return None
-        found.used = True
-        as_float = found.type == "integer" and "float" in types
-        if types and found.type not in types and not as_float:
-            raise found.error(f"must be of the type {' or '.join(types)}, not {found.type}")
-        return found
+        parameter.used = True
+        as_float = parameter.type == "integer" and "float" in types
+        if types and parameter.type not in types and not as_float:
+            raise parameter.error(f"must be of the type {' or '.join(types)}, not {parameter.type}")
+        return parameter
 
     def one(self, name: str, type: str, default: Any) -> Any:
         """Take one value, or `default`: a float, int, bool, str, or an array (2,) or (3,)."""
-        found = self.find(name, type)
-        if found is None:
+        parameter = self.find(name, type)
+        if parameter is None:
             return default
         if type == "bool":
-            return found.truth()
+            return parameter.truth()
         if type in TEXTS:
-            return found.text()
+            return parameter.text()
         size = SIZES[type]
         if type == "integer":
-            whole = found.whole()
+            whole = parameter.whole()
             if len(whole) != 1:
-                raise found.error(f"must be one whole number, not {len(whole)}")
+                raise parameter.error(f"must be one whole number, not {len(whole)}")
             return int(whole[0])
-        values = found.numbers(size)
+        values = parameter.numbers(size)
         return values[0] if size == 1 else np.array(values)
 
     def several(self, name: str, type: str) -> Any:
         """Take all values, or None: (n,), (n, 2) or (n, 3) as the type has it, or a list of str."""
-        found = self.find(name, type)
-        return None if found is None else found.rows()
+        parameter = self.find(name, type)
+        return None if parameter is None else parameter.rows()
 
     def choice(self, name: str, default: str, choices: Iterable[str]) -> str:
         """Take a string that is one of `choices`."""
         value = self.one(name, "string", default)
         if value not in choices:
-            found = self._named.get(name, self)
-            raise found.error(f"{value[:40]!r} is none of {', '.join(choices)}")
+            source: Located = self._named.get(name, self)
+            raise source.error(f"{value[:40]!r} is none of {', '.join(choices)}")
         return str(value)
 
     def above_zero(self, name: str, default: float) -> float:

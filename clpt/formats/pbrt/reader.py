@@ -1,4 +1,4 @@
-"""The directives of a PBRT file: what each changes, and the definitions that come of them."""
+"""The directives of a PBRT file: what each changes or defines."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from clpt.formats.pbrt.files import Contents
 from clpt.formats.pbrt.lexer import UPGRADE
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.state import TARGETS, Definition, State, nearest
-from clpt.formats.pbrt.transforms import Placing
+from clpt.formats.pbrt.transforms import TransformDirectives
 
 COLOUR_SPACES = ("srgb", "rec2020", "aces2065-1", "dci-p3")
 OPTIONS = ("Camera", "Film", "PixelFilter", "Sampler", "Integrator", "Accelerator")
@@ -26,20 +26,22 @@ def read(path: Path) -> Contents:
     return _Reader(path).run()
 
 
-class _Reader(Placing):
-    """What each directive does but for transforms."""
+class _Reader(TransformDirectives):
+    """All directives but those of transforms."""
 
     def __init__(self, path: Path):
         super().__init__(path)
-        self.stack: list[tuple[str, State, str]] = []  # what began, the state before it, and where
+        self.stack: list[
+            tuple[str, State, str]
+        ] = []  # what began, the state before it, and its location
         self.in_world = False
         self.object: list[Definition] | None = None
 
     def run(self) -> Contents:
         self.go_through(self.path)
         if self.stack:
-            what, _, place = self.stack[-1]
-            raise SceneError(f"the {what}Begin at {place} has no end", file=self.path)
+            what, _, location = self.stack[-1]
+            raise SceneError(f"the {what}Begin at {location} has no end", file=self.path)
         if not self.in_world:
             raise SceneError("has no WorldBegin, so it holds no scene", file=self.path)
         return self.contents
@@ -50,7 +52,7 @@ class _Reader(Placing):
         action = DIRECTIVES.get(self.name)
         if action is None:
             raise self._unknown()
-        with self.placed():
+        with self.locating():
             action(self)
 
     def _unknown(self) -> SceneError:
@@ -61,7 +63,7 @@ class _Reader(Placing):
             return self.lexer.error(f"expected a directive, found {name[:40]!r}")
         return self.lexer.error(f"unknown directive {name[:40]!r}{nearest(name, DIRECTIVES)}")
 
-    # What stands before and after WorldBegin
+    # Before and after WorldBegin
 
     def only(self, in_world: bool) -> None:
         """Refuse a directive that belongs to the other part of the file."""
@@ -107,16 +109,16 @@ class _Reader(Placing):
 
     def _begin(self, what: str) -> None:
         self.only(True)
-        place = f"{self.lexer.path.name}:{self.lexer.line}"
-        self.stack.append((what, self.state, place))
+        location = f"{self.lexer.path.name}:{self.lexer.line}"
+        self.stack.append((what, self.state, location))
         self.state = self.state.copy()
 
     def _end(self, what: str) -> None:
         if not self.stack:
             raise SceneError(f"no {what}Begin stands before it")
-        began, state, place = self.stack.pop()
+        began, state, location = self.stack.pop()
         if began != what:
-            raise SceneError(f"the {began}Begin at {place} must end first")
+            raise SceneError(f"the {began}Begin at {location} must end first")
         state.file_folder = self.state.file_folder
         self.state = state
 
@@ -145,7 +147,7 @@ class _Reader(Placing):
         self.go_through(self._named_file())
 
     def import_file(self) -> None:
-        """Like an Include, but what it changes in the state stays in it."""
+        """As an Include, but the state is as before at its end."""
         self.only(True)
         path, before, open_scopes = self._named_file(), self.state, len(self.stack)
         self.state = before.copy()
@@ -175,11 +177,11 @@ class _Reader(Placing):
         return Definition(kind, params, self.state.copy())
 
     def attribute(self) -> None:
-        found = self._definition('Attribute "{}"')
-        if found.kind not in TARGETS:
-            raise UnknownKindError("target", found.kind, TARGETS)
-        before = self.state.defaults.get(found.kind, ())
-        added = {found.kind: (*before, *found.params.given)}
+        definition = self._definition('Attribute "{}"')
+        if definition.kind not in TARGETS:
+            raise UnknownKindError("target", definition.kind, TARGETS)
+        before = self.state.defaults.get(definition.kind, ())
+        added = {definition.kind: (*before, *definition.params.given)}
         self.state.defaults = self.state.defaults | added
 
     def colour_space(self) -> None:
@@ -191,11 +193,13 @@ class _Reader(Placing):
     def shape(self) -> None:
         self.only(True)
         shapes = self.contents.shapes if self.object is None else self.object
-        found = self._definition('Shape "{}"', "shape")
-        if self.object is not None and found.state.area_light is not None:
-            self.warn_once("shapes of an object emit no light in pbrt: an AreaLightSource is idle")
-            found.state.area_light = None
-        shapes.append(found)
+        definition = self._definition('Shape "{}"', "shape")
+        if self.object is not None and definition.state.area_light is not None:
+            self.warn_once(
+                "shapes of an object emit no light in pbrt: its AreaLightSource is ignored"
+            )
+            definition.state.area_light = None
+        shapes.append(definition)
 
     def light_source(self) -> None:
         self.only(True)
@@ -211,14 +215,14 @@ class _Reader(Placing):
 
     def make_named_material(self) -> None:
         self.only(True)
-        found = self._definition('MakeNamedMaterial "{}"', "material", "a name")
-        name, materials = found.kind, self.contents.shared.materials
+        definition = self._definition('MakeNamedMaterial "{}"', "material", "a name")
+        name, materials = definition.kind, self.contents.shared.materials
         if name in materials:
-            raise found.params.error("is already defined")
-        kind = found.params.one("type", "string", None)
+            raise definition.params.error("is already defined")
+        kind = definition.params.one("type", "string", None)
         if kind is None:
-            raise found.params.error("needs the parameter 'string type'")
-        materials[name] = Definition(kind, found.params, found.state)
+            raise definition.params.error("needs the parameter 'string type'")
+        materials[name] = Definition(kind, definition.params, definition.state)
 
     def named_material(self) -> None:
         self.only(True)
@@ -232,15 +236,15 @@ class _Reader(Placing):
             raise SceneError(f"a texture of the type color is {UPGRADE}")
         if values not in ("float", "spectrum"):
             raise SceneError(f"a texture has values float or spectrum, not {values[:40]!r}")
-        found = self._definition(f'Texture "{name}" "{{}}"', "texture")
+        definition = self._definition(f'Texture "{name}" "{{}}"', "texture")
         textures = self.contents.shared.textures
         if (values, name) in textures:
-            raise found.params.error("is already defined")
-        textures[values, name] = found
+            raise definition.params.error("is already defined")
+        textures[values, name] = definition
 
     def make_named_medium(self) -> None:
-        found = self._definition('MakeNamedMedium "{}"', "medium", "a name")
-        self.contents.shared.media[found.kind] = found.params
+        definition = self._definition('MakeNamedMedium "{}"', "medium", "a name")
+        self.contents.shared.media[definition.kind] = definition.params
 
     def medium_interface(self) -> None:
         inside = self.lexer.string("the name of a medium")

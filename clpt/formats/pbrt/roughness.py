@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from clpt.errors import SceneError
-from clpt.formats.pbrt.map_values import mapped
+from clpt.formats.pbrt.map_values import map_values
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.state import State
 from clpt.formats.pbrt.textures import textured
@@ -28,7 +28,7 @@ def alphas(params: Parameters, state: State, prefix: str = "") -> tuple[Any, Any
 
 def _alpha(roughness: Any, remap: bool) -> Any:
     if isinstance(roughness, Texture):
-        return mapped(roughness, lambda r: np.clip(np.sqrt(r) if remap else r, SMOOTHEST, 1.0))
+        return map_values(roughness, lambda r: np.clip(np.sqrt(r) if remap else r, SMOOTHEST, 1.0))
     if roughness < 0.0:
         raise SceneError(f"a roughness cannot be negative: {roughness:g}")
     return roughness**0.5 if remap else roughness

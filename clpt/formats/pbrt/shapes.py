@@ -34,11 +34,11 @@ DEEPEST = 10  # levels of subdivision
 
 @dataclass(eq=False)
 class Geometry:
-    """A kind of ours and its parameters but for material and light, and what was passed over."""
+    """A kind of ours, its parameters but for material and light, and warnings."""
 
     kind: type[Shape]
     parts: Parts
-    notes: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
 
     def area(self) -> float:
         """The mean area of a mesh's triangles, else the whole [m^2], in the world."""
@@ -55,21 +55,21 @@ class Geometry:
         return self.kind(**self.parts, **more)
 
 
-def geometry(found: Definition) -> Geometry | None:
-    """Read what a Shape directive describes; None where nothing is left. Raises SceneError."""
-    params, kind = found.params, found.kind
+def geometry(definition: Definition) -> Geometry | None:
+    """Read what a Shape directive describes; None where it is empty. Raises SceneError."""
+    params, kind, state = definition.params, definition.kind, definition.state
     if kind in OLD:
         raise params.error(f"the shape {kind!r} is PBRT version 3's; use a mesh")
     if kind not in SHAPES:
-        raise UnknownKindError("shape", kind, SHAPES, **params.place)
-    with params.placed():
-        if transforms.is_singular(found.state.ctm):
+        raise UnknownKindError("shape", kind, SHAPES, **params.location())
+    with params.locating():
+        if transforms.is_singular(state.ctm):
             raise SceneError("its transform flattens space")
-        made = SHAPES[kind](params, found.state)
+        made = SHAPES[kind](params, state)
         if made is not None:
-            turned = kind in QUADRICS and transforms.flips_handedness(found.state.ctm)
-            made.parts.setdefault("to_world", found.state.ctm)
-            reverse = found.state.reverse and kind != "curve"  # a tube is seen from outside
+            turned = kind in QUADRICS and transforms.flips_handedness(state.ctm)
+            made.parts.setdefault("to_world", state.ctm)
+            reverse = state.reverse and kind != "curve"  # a tube is seen from outside
             made.parts["flip_normals"] = reverse != turned
     return made
 
@@ -95,18 +95,18 @@ def _uvs(params: Parameters, points: NDArray[Any]) -> Any:
 
 
 def _per_vertex(params: Parameters, name: str, type: str, points: NDArray[Any]) -> Any:
-    found = params.several(name, type)
-    if found is not None and len(found) != len(points):
-        raise SceneError(f"{name!r} has {len(found)} values for {len(points)} vertices")
-    return found
+    values = params.several(name, type)
+    if values is not None and len(values) != len(points):
+        raise SceneError(f"{name!r} has {len(values)} values for {len(points)} vertices")
+    return values
 
 
 def _mesh(
-    points: NDArray[Any], faces: NDArray[Any], normals: Any, uvs: Any, notes: Any = ()
+    points: NDArray[Any], faces: NDArray[Any], normals: Any, uvs: Any, warnings: Any = ()
 ) -> Geometry | None:
     """A mesh whose triangles turn their front to where the normals point, if it has any."""
-    told = list(notes)
-    arrays = mesh.checked(None, "", points, faces, normals, uvs, told)
+    warnings = list(warnings)
+    arrays = mesh.checked(None, "", points, faces, normals, uvs, warnings)
     if not len(arrays["faces"]):
         return None
     for name in ("vertices", "normals", "uvs"):
@@ -114,7 +114,7 @@ def _mesh(
             arrays[name] = np.ascontiguousarray(arrays[name], np.float32)
     if arrays["normals"] is not None:
         arrays["faces"] = _toward_normals(arrays)
-    return Geometry(shapes.Mesh, arrays, told)
+    return Geometry(shapes.Mesh, arrays, warnings)
 
 
 def _toward_normals(arrays: Parts) -> NDArray[np.uint32]:
@@ -133,11 +133,13 @@ def with_uvs(made: Geometry) -> Geometry:
     """The geometry with pbrt's uv where it has others or none, for textures."""
     parts = dict(made.parts)
     if made.kind is shapes.Disk:
-        return Geometry(shapes.Mesh, parts | surfaces.disk_mesh(1.0, 0.0, 0.0, 360.0), made.notes)
+        return Geometry(
+            shapes.Mesh, parts | surfaces.disk_mesh(1.0, 0.0, 0.0, 360.0), made.warnings
+        )
     if made.kind is shapes.Cylinder:
         ends = parts.pop("p0")[2], parts.pop("p1")[2]
         tube = surfaces.cylinder_mesh(parts.pop("radius"), *ends, 360.0)
-        return Geometry(shapes.Mesh, parts | tube, made.notes)
+        return Geometry(shapes.Mesh, parts | tube, made.warnings)
     if made.kind is not shapes.Mesh or parts["uvs"] is not None:
         return made
     faces = parts["faces"]
@@ -145,7 +147,7 @@ def with_uvs(made: Geometry) -> Geometry:
         parts[name] = None if parts[name] is None else parts[name][faces.reshape(-1)]
     parts["uvs"] = np.tile(CORNERS, (len(faces), 1)).astype(np.float32)
     parts["faces"] = np.arange(3 * len(faces), dtype=np.uint32).reshape(-1, 3)
-    return Geometry(shapes.Mesh, parts, made.notes)
+    return Geometry(shapes.Mesh, parts, made.warnings)
 
 
 def _ply(params: Parameters, state: State) -> Geometry | None:
@@ -159,7 +161,7 @@ def _ply(params: Parameters, state: State) -> Geometry | None:
         raise SceneError(f"there is no file {name!r}")
     try:
         arrays = ply.read(path)
-        return _mesh(arrays.vertices, arrays.faces, arrays.normals, arrays.uvs, arrays.notes)
+        return _mesh(arrays.vertices, arrays.faces, arrays.normals, arrays.uvs, arrays.warnings)
     except SceneError as error:
         raise SceneError(f"{path.name}: {error.message}") from None
 
@@ -196,9 +198,9 @@ def _patches(params: Parameters, state: State) -> Geometry | None:
     params.ignore("faceIndices")
     normals, uvs = _per_vertex(params, "N", "normal", points), _uvs(params, points)
     corners = corners.reshape(-1, 4)
-    bent = np.abs(points[corners] @ np.eye(3)).max(initial=1.0) * 1e-5
+    tolerance = np.abs(points[corners] @ np.eye(3)).max(initial=1.0) * 1e-5
     twist = points[corners[:, 0]] - points[corners[:, 1]] - points[corners[:, 2]]
-    plain = bool((np.abs(twist + points[corners[:, 3]]) <= bent).all())
+    plain = bool((np.abs(twist + points[corners[:, 3]]) <= tolerance).all())
     u, v, faces = surfaces.grid(*([1, 1] if plain else [PATCH, PATCH]))
     return _mesh(*_over_patches(u, v, faces, corners, (points, normals, uvs), plain))
 
@@ -243,8 +245,8 @@ def _disk(params: Parameters, state: State) -> Geometry | None:
     radius, turn = params.above_zero("radius", 1.0), surfaces.phi_max(params)
     height, inner = params.one("height", "float", 0.0), params.one("innerradius", "float", 0.0)
     if inner == 0.0 and turn == 360.0:
-        placed = transforms.translate([0.0, 0.0, height]) @ transforms.scale([radius, radius, 1.0])
-        return Geometry(shapes.Disk, {"to_world": state.ctm @ placed})
+        own = transforms.translate([0.0, 0.0, height]) @ transforms.scale([radius, radius, 1.0])
+        return Geometry(shapes.Disk, {"to_world": state.ctm @ own})
     if not 0.0 <= inner < radius:
         raise SceneError(f"'innerradius' must be below the radius, not {inner:g}")
     return Geometry(shapes.Mesh, surfaces.disk_mesh(radius, inner, height, turn))
@@ -265,10 +267,10 @@ def _curve(params: Parameters, state: State) -> Geometry | None:
     kind, parts = curves.curve(params)
     if kind is None:
         return _mesh(parts["points"], parts["faces"], parts["normals"], parts["uvs"])
-    named = state.material
-    found = state.shared.materials.get(named) if isinstance(named, str) else named
+    current = state.material
+    material = state.shared.materials.get(current) if isinstance(current, str) else current
     flat = params.one("type", "string", "flat") == "flat"
-    if not flat or (found is not None and found.kind == "hair"):  # which makes no difference
+    if not flat or (material is not None and material.kind == "hair"):  # there is no difference
         return Geometry(kind, parts)
     return Geometry(kind, parts, ["a flat curve is shaded as a round one"])
 

@@ -49,12 +49,12 @@ def spectrum(params: Parameters, name: str, role: str, state: State, default: An
     """Take a number or a spectrum in the role of a parameter of ours; `default` where not given.
 
     role: "reflectance", "index", "coefficient", "texture" (what a texture is made of), "emission",
-    which then has luminance 1, or that of its colour. Raises SceneError with the place.
+    which then has luminance 1, or that of its colour. Raises SceneError with the location.
     """
     given = params.find(name, "float", *SPECTRUM_TYPES)
     if given is None:
         return default
-    with given.placed():
+    with given.locating():
         return value_of(given, role, state)
 
 
@@ -128,9 +128,9 @@ def _outside(role: str) -> Any:
 
 
 def _named(text: str, role: str, state: State) -> Spectrum:
-    found = named(text)
-    if found is not None:
-        return found
+    known = named(text)
+    if known is not None:
+        return known
     path = state.file(text)
     if not path.is_file():
         raise UnknownKindError("spectrum (and no file)", text, names())

@@ -1,4 +1,4 @@
-"""What a PBRT file has said so far: the graphics state, and what all of its parts share."""
+"""What a PBRT file has set so far: the graphics state, and what all of its parts share."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Definition:
 
 @dataclass(eq=False)
 class Shared:
-    """What is the same in all states of a file and of those that it includes."""
+    """What all states of a file, and of those that it includes, have in common."""
 
     folder: Path
     warnings: list[str] = field(default_factory=list)
@@ -44,19 +44,19 @@ class Shared:
     made: dict[Any, Any] = field(default_factory=dict)
     make_material: Callable[..., Material] | None = None
 
-    def once(self, key: Any, place: Parameters | Parameter, make: Callable[[], Any]) -> Any:
-        """Return make(), the same object each time for a key. What needs itself is an error."""
+    def once(self, key: Any, source: Parameters | Parameter, make: Callable[[], Any]) -> Any:
+        """Return make(), called once for each key. Raises SceneError where it needs itself."""
         if key not in self.made:
             self.made[key] = None
             self.made[key] = make()
         if self.made[key] is None:
-            raise place.error("refers to itself")
+            raise source.error("refers to itself")
         return self.made[key]
 
 
 @dataclass(eq=False)
 class State:
-    """The graphics state at a place in a file; `copy` is what AttributeBegin keeps.
+    """The graphics state at a point of a file; AttributeBegin keeps a `copy`.
 
     ctm: object to world. colour_space: "srgb", "rec2020", "aces2065-1" or "dci-p3".
     material: that of shapes to come, or its name; None for pbrt's grey.
@@ -75,18 +75,18 @@ class State:
     defaults: dict[str, tuple[Parameter, ...]] = field(default_factory=dict)
 
     def copy(self) -> State:
-        """A state that changes by itself; definitions are shared."""
+        """Return a state of its own, which shares the definitions."""
         return copy(self)
 
-    def warn(self, place: Parameters | Parameter, text: str) -> None:
-        """Remember what the picture will lack, with the file and line."""
-        where = place.place["where"]
-        self.shared.warnings.append(f"{place.file.name}:{place.line}: {where}: {text}")
+    def warn(self, source: Parameters | Parameter, text: str) -> None:
+        """Warn of what the picture will lack, with the file and line."""
+        where = source.location()["where"]
+        self.shared.warnings.append(f"{source.file.name}:{source.line}: {where}: {text}")
 
     def file(self, name: str) -> Path:
-        """The path that a file name means: beside the scene, else beside the file that names it.
+        """Return the path that a file name means: beside the scene, else beside the naming file.
 
-        It need not exist. Raises SceneError for what can be no file's name.
+        It need not exist. Raises SceneError for an invalid name.
         """
         if not name or "\0" in name or len(name) > 4096:
             raise SceneError(f"{name[:40]!r} is no name of a file")
@@ -97,21 +97,21 @@ class State:
         except OSError as error:
             raise SceneError(f"{name[:40]!r}: {error.strerror}") from None
 
-    def texture(self, values: str, name: str, place: Parameters | Parameter) -> Definition:
-        """The definition of a texture of "float" or "spectrum" values. Raises SceneError."""
-        found = self.shared.textures.get((values, name))
-        if found is None:
+    def texture(self, values: str, name: str, source: Parameters | Parameter) -> Definition:
+        """Return the definition of a texture of "float" or "spectrum" values. Raises SceneError."""
+        definition = self.shared.textures.get((values, name))
+        if definition is None:
             names = [known for kind, known in self.shared.textures if kind == values]
-            raise place.error(f"there is no {values} texture {name!r}{nearest(name, names)}")
-        return found
+            raise source.error(f"there is no {values} texture {name!r}{nearest(name, names)}")
+        return definition
 
-    def named_material(self, name: str, place: Parameters | Parameter) -> Material:
-        """The material of a name, made once. Raises SceneError."""
-        found, make = self.shared.materials.get(name), self.shared.make_material
-        if found is None or make is None:
+    def named_material(self, name: str, source: Parameters | Parameter) -> Material:
+        """Return the material of a name, made once. Raises SceneError."""
+        definition, make = self.shared.materials.get(name), self.shared.make_material
+        if definition is None or make is None:
             hint = nearest(name, self.shared.materials)
-            raise place.error(f"there is no material {name!r}{hint}")
-        kind, params, state = found.kind, found.params, found.state
+            raise source.error(f"there is no material {name!r}{hint}")
+        kind, params, state = definition.kind, definition.params, definition.state
         made: Material = self.shared.once(
             ("material", name), params, lambda: make(kind, params, state, name)
         )
@@ -119,6 +119,6 @@ class State:
 
 
 def nearest(name: str, known: Any) -> str:
-    """The end of a message about an unknown name."""
+    """Return the end of a message about an unknown name: the nearest known ones."""
     near = difflib.get_close_matches(name, sorted(known), n=3, cutoff=0.5)
     return "; did you mean " + " or ".join(map(repr, near)) + "?" if near else ""

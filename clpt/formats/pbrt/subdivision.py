@@ -88,7 +88,7 @@ def _finer(points: Points, faces: Faces) -> tuple[Points, Faces]:
 
 
 def _limit(points: Points, edges: _Edges) -> Points:
-    """Where vertices come to lie in the limit."""
+    """Return the limit positions of vertices."""
     gamma = 1.0 / (edges.valence + 3.0 / (8.0 * _beta(edges.valence)))
     gamma = gamma[:, None]
     inside = (1.0 - edges.valence[:, None] * gamma) * points + gamma * edges.ring(points)
@@ -101,8 +101,8 @@ def _normals(points: Points, faces: Faces, edges: _Edges) -> Points:
     start, onward = _rings(faces, edges)
     s, t = np.zeros_like(points), np.zeros_like(points)
     at, vertex = start, np.arange(len(points))
-    for place in range(int(edges.valence.max(initial=0))):
-        across, along = _tangent_weights(edges, place)
+    for position in range(int(edges.valence.max(initial=0))):
+        across, along = _tangent_weights(edges, position)
         s += across[:, None] * points[at]
         t += along[:, None] * points[at]
         at = onward(vertex, at)
@@ -128,8 +128,8 @@ def _rings(faces: Faces, edges: _Edges) -> tuple[NDArray[np.int64], Any]:
 
     def onward(vertex: Any, neighbour: Any) -> Any:
         key = vertex * edges.count + neighbour
-        found = np.minimum(np.searchsorted(keys, key), len(keys) - 1)
-        return np.where(keys[found] == key, targets[found], neighbour)
+        index = np.minimum(np.searchsorted(keys, key), len(keys) - 1)
+        return np.where(keys[index] == key, targets[index], neighbour)
 
     start = np.zeros(edges.count, np.int64)
     start[vertex] = after
@@ -138,21 +138,21 @@ def _rings(faces: Faces, edges: _Edges) -> tuple[NDArray[np.int64], Any]:
     return start, onward
 
 
-def _tangent_weights(edges: _Edges, place: int) -> tuple[Points, Points]:
-    """Weights (n,) of the neighbour at a place in its vertex's ring, for two tangents."""
+def _tangent_weights(edges: _Edges, position: int) -> tuple[Points, Points]:
+    """Weights (n,) of the neighbour at a position of its vertex's ring, for two tangents."""
     n = edges.valence
-    angle = 2.0 * np.pi * place / np.maximum(n, 1)
+    angle = 2.0 * np.pi * position / np.maximum(n, 1)
     step = np.pi / np.maximum(n - 1, 1)
-    end = (place == 0) | (place == n - 1)
-    general = np.where(end, -np.sin(step), (2.0 - 2.0 * np.cos(step)) * np.sin(place * step))
+    end = (position == 0) | (position == n - 1)
+    general = np.where(end, -np.sin(step), (2.0 - 2.0 * np.cos(step)) * np.sin(position * step))
     four = np.where(end, -1.0, 2.0)
-    three = np.where(place == 1, 1.0, 0.0)
+    three = np.where(position == 1, 1.0, 0.0)
     across = np.select([n == 2, n == 3, n == 4], [np.ones(len(n)), three, four], general)
-    along = np.where(place == 0, -1.0, 0.0) + np.where(place == n - 1, 1.0, 0.0)
-    there = place < n
+    along = np.where(position == 0, -1.0, 0.0) + np.where(position == n - 1, 1.0, 0.0)
+    valid = position < n
     return (
-        np.where(there, np.where(edges.on_border, across, np.cos(angle)), 0.0),
-        np.where(there, np.where(edges.on_border, along, np.sin(angle)), 0.0),
+        np.where(valid, np.where(edges.on_border, across, np.cos(angle)), 0.0),
+        np.where(valid, np.where(edges.on_border, along, np.sin(angle)), 0.0),
     )
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from clpt import transforms
 from clpt.errors import SceneError, UnknownKindError
-from clpt.formats.pbrt.map_values import mapped
+from clpt.formats.pbrt.map_values import map_values
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.spectra import SPECTRUM_TYPES, spectrum, value_of
 from clpt.formats.pbrt.state import Definition, State
@@ -42,27 +42,27 @@ FILTERS = {"point": "nearest", **dict.fromkeys(("bilinear", "trilinear", "ewa"),
 def textured(params: Parameters, name: str, role: str, state: State, default: Any = None) -> Any:
     """Take a value or a texture in a role of ours; a "real" is a number or a float texture.
 
-    A texture is made once for all that name it. Raises SceneError with the place.
+    A texture is made once for all parameters that name it. Raises SceneError with the location.
     """
     form = "float" if role == "real" else "spectrum"
     given = params.find(name, "texture", "float", *(SPECTRUM_TYPES if form == "spectrum" else ()))
     if given is None:
         return default
     if given.type != "texture":
-        with given.placed():
+        with given.locating():
             return value_of(given, role, state)
-    found = state.texture(form, given.text(), given)
-    return state.shared.once(found, given, lambda: _texture(form, found))
+    definition = state.texture(form, given.text(), given)
+    return state.shared.once(definition, given, lambda: _texture(form, definition))
 
 
-def _texture(form: str, found: Definition) -> Any:
-    kind, params, state = found.kind, found.params, found.state
+def _texture(form: str, definition: Definition) -> Any:
+    kind, params, state = definition.kind, definition.params, definition.state
     if kind not in MAKERS:
-        raise UnknownKindError("texture", kind, MAKERS, **params.place)
-    with params.placed():
+        raise UnknownKindError("texture", kind, MAKERS, **params.location())
+    with params.locating():
         made = MAKERS[kind](form, params, state)
     for extra in params.unused():
-        state.warn(extra, "is not known here and is passed over")
+        state.warn(extra, "is not known here and is left out")
     return made
 
 
@@ -85,7 +85,7 @@ def _scale(form: str, params: Parameters, state: State) -> Any:
     first = _argument(form, params, "tex", state, 1.0)
     second = textured(params, "scale", "real", state, 1.0)
     if not isinstance(first, Texture) and not isinstance(second, Texture):
-        return mapped(first, lambda v: v * second)
+        return map_values(first, lambda v: v * second)
     return first if second == 1.0 else Product(first=first, second=second)
 
 
@@ -122,7 +122,7 @@ def _bilerp(form: str, params: Parameters, state: State) -> Any:
         image=np.array([top, bottom], np.float32),
         raw=True,
         wrap="clamp",
-        **_placed(params, state, centres),
+        **_mapping(params, state, centres),
     )
 
 
@@ -137,7 +137,7 @@ def _checkerboard(form: str, params: Parameters, state: State) -> Any:
     return Checkerboard(
         color0=_argument(form, params, "tex1", state, 1.0),
         color1=_argument(form, params, "tex2", state, 0.0),
-        **_placed(params, state, halved),
+        **_mapping(params, state, halved),
     )
 
 
@@ -154,15 +154,15 @@ def _imagemap(form: str, params: Parameters, state: State) -> Any:
         filter=FILTERS[params.choice("filter", "bilinear", FILTERS)],
         wrap=WRAPS[wrap],
         channel="r" if form == "float" else "luminance",
-        **_placed(params, state),
+        **_mapping(params, state),
     )
     encoding = params.one("encoding", "string", "sRGB")
-    if file.suffix.lower() == ".png":  # of other files pbrt passes over the encoding
+    if file.suffix.lower() == ".png":  # pbrt ignores the encoding of other files
         made = _decoded(made, encoding)
     scale, invert = params.one("scale", "float", 1.0), params.one("invert", "bool", False)
     if scale == 1.0 and not invert:
         return made
-    return mapped(made, lambda v: np.maximum(1.0 - scale * v if invert else scale * v, 0.0))
+    return map_values(made, lambda v: np.maximum(1.0 - scale * v if invert else scale * v, 0.0))
 
 
 def _decoded(bitmap: Bitmap, encoding: str) -> Bitmap:
@@ -174,14 +174,14 @@ def _decoded(bitmap: Bitmap, encoding: str) -> Bitmap:
     gamma = re.fullmatch(r"gamma\s+([\d.]+)", encoding)
     if gamma is None:
         raise SceneError(f"encoding must be sRGB, linear or 'gamma 2.2', not {encoding!r}")
-    return mapped(bitmap, lambda v: v ** float(gamma[1]))
+    return map_values(bitmap, lambda v: v ** float(gamma[1]))
 
 
 def _dots(form: str, params: Parameters, state: State) -> Any:
     return Mix(
         first=_argument(form, params, "outside", state, 0.0),
         second=_argument(form, params, "inside", state, 1.0),
-        amount=Dots(**_placed(params, state)),
+        amount=Dots(**_mapping(params, state)),
     )
 
 
@@ -218,10 +218,10 @@ def _ptex(form: str, params: Parameters, state: State) -> Any:
     raise params.error(f"Ptex textures are not supported: {params.one('filename', 'string', '')!r}")
 
 
-def _placed(params: Parameters, state: State, before: Any = IDENTITY_UV) -> dict[str, Any]:
-    """Where a texture on uv gets them; `before`: what is done to pbrt's uv, (3, 3)."""
+def _mapping(params: Parameters, state: State, before: Any = IDENTITY_UV) -> dict[str, Any]:
+    """Take a texture's mapping; `before`: transform (3, 3) of pbrt's uv."""
     mapping = params.choice("mapping", "uv", MAPPINGS)
-    to_uv, place = np.eye(3), np.eye(4)
+    to_uv, plane = np.eye(3), np.eye(4)
     if mapping in ("uv", "planar"):
         to_uv[:2, 2] = [params.one(name, "float", 0.0) for name in ("udelta", "vdelta")]
     if mapping == "uv":
@@ -229,9 +229,9 @@ def _placed(params: Parameters, state: State, before: Any = IDENTITY_UV) -> dict
         to_uv[0, 0], to_uv[1, 1] = scales
         return {"to_uv": before @ to_uv}
     if mapping == "planar":
-        place[0, :3] = params.one("v1", "vector3", (1.0, 0.0, 0.0))
-        place[1, :3] = params.one("v2", "vector3", (0.0, 1.0, 0.0))
-    to_texture = place @ transforms.inverse(state.ctm)
+        plane[0, :3] = params.one("v1", "vector3", (1.0, 0.0, 0.0))
+        plane[1, :3] = params.one("v2", "vector3", (0.0, 1.0, 0.0))
+    to_texture = plane @ transforms.inverse(state.ctm)
     return {"to_uv": before @ to_uv, "mapping": mapping, "to_texture": to_texture}
 
 

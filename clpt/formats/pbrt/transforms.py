@@ -1,4 +1,4 @@
-"""Transforms and coordinate systems of a PBRT file: what they make of the current transform."""
+"""The directives of a PBRT file that change the current transform, and coordinate systems."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from clpt.formats.pbrt.files import Files
 from clpt.formats.pbrt.state import nearest
 
 
-class Placing(Files):
+class TransformDirectives(Files):
     """The directives that change `state.ctm`."""
 
     def _concat(self, matrix: transforms.Matrix) -> None:
-        self._place(self.state.ctm @ matrix)
+        self._set(self.state.ctm @ matrix)
 
-    def _place(self, matrix: transforms.Matrix) -> None:
+    def _set(self, matrix: transforms.Matrix) -> None:
         if not np.isfinite(matrix).all():
             raise SceneError("the transform is not finite any more")
         if self.state.active:
             self.state.ctm = matrix
 
     def identity(self) -> None:
-        self._place(np.eye(4))
+        self._set(np.eye(4))
 
     def translate(self) -> None:
         self._concat(transforms.translate(self.lexer.numbers(3, "Translate")))
@@ -40,7 +40,7 @@ class Placing(Files):
         self._concat(transforms.inverse(transforms.look_at(values[:3], values[3:6], values[6:])))
 
     def transform(self) -> None:
-        self._place(self._matrix())
+        self._set(self._matrix())
 
     def concat_transform(self) -> None:
         self._concat(self._matrix())

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from clpt.render.codegen.lights import case_text, point_text, row_text
+from clpt.render.codegen.dispatch import Case, choose, function
+from clpt.render.codegen.lights import kind_test, point_text, row_text
 from clpt.render.contract import shape_records
 from clpt.render.contract.light_records import ALONG, BASES, BOTH, KINDS, PLACED, RECORDS
 
@@ -20,29 +21,26 @@ def dispatch_text(kinds: Iterable[str], textured: bool, two_sided: bool = False)
     surfaces = [kind for kind in present if kind in shape_records.RECORDS]
     needed = {*present, *(BASES[kind] for kind in present if kind in BASES)}
     files = [k for k in KINDS if k in needed and (k in PLACED or k in shape_records.RECORDS)]
-    lines = ['#include "interface/emission.cl"', *(f'#include "emission/{k}.cl"' for k in files)]
+    includes = ['#include "interface/emission.cl"', *(f'#include "emission/{k}.cl"' for k in files)]
     head = "LightRay light_emit(Scene scene, real pick, vec2 u, vec2 v, Wavelengths lambdas)"
     if not present:
-        return "\n".join([*lines, f"inline {head} {{ return light_ray_nothing(); }}", ""])
-    lines += [
-        f"inline {head}",
-        "{",
-        "    integer row = light_pick(scene, &pick);",
-        "    LightRow l = light_at(scene, row);",
-        "    LightRay r = light_ray_nothing();",
+        return "\n".join([*includes, function(head, "return light_ray_nothing();")])
+    rows = [
+        "integer row = light_pick(scene, &pick);",
+        "LightRow l = light_at(scene, row);",
+        "LightRay r = light_ray_nothing();",
     ]
-    for kind in others:
-        lines += case_text(kind, len(present) == 1, [f"r = light_ray_sel(m, {_lamp(kind)}, r);"])
+    cases = [Case(kind_test(kind, present), _lamp(kind)) for kind in others]
+    rows += choose("r", "LightRay", *cases)
     if surfaces:
-        lines += _surfaces_text(surfaces, len(present) == 1, textured, two_sided)
-    lines += [
-        "    real share = 1.0f / max_r(l.pmf, (real)(1e-30f));",
-        "    r.power = spectrum_scale(r.power, share);",
-        "    r.seen = spectrum_scale(r.seen, share);",
-        "    return r;",
-        "}",
+        rows += _surfaces_text(surfaces, present, textured, two_sided)
+    rows += [
+        "real share = 1.0f / max_r(l.pmf, (real)(1e-30f));",
+        "r.power = spectrum_scale(r.power, share);",
+        "r.seen = spectrum_scale(r.seen, share);",
+        "return r;",
     ]
-    return "\n".join([*lines, ""])
+    return "\n".join([*includes, function(head, *rows)])
 
 
 def _lamp(kind: str) -> str:
@@ -54,22 +52,24 @@ def _lamp(kind: str) -> str:
     return f"distant_emit(scene, {sample}, v)"
 
 
-def _surfaces_text(kinds: list[str], only: bool, textured: bool, two_sided: bool) -> list[str]:
+def _surfaces_text(
+    kinds: list[str], present: list[str], textured: bool, two_sided: bool
+) -> list[str]:
     """A point of the shape, its emission there, and the ray from it."""
-    lines = [
-        "    SurfacePoint q = surface_point_nothing();",
-        "    TexturePoint point = texture_point_nowhere();",
+    rows = [
+        "SurfacePoint q = surface_point_nothing();",
+        "TexturePoint point = texture_point_nowhere();",
     ]
     for kind in kinds:
-        body = [f"SurfacePoint p = {kind}_point({row_text(kind)}, u);"]
-        body += point_text(kind, "p.uv") if textured else []
-        lines += case_text(kind, only, [*body, "q = surface_point_sel(m, p, q);"])
+        chosen = f"SurfacePoint p = {kind}_point({row_text(kind)}, u);"
+        point = point_text(kind, "p.uv") if textured else ()
+        rows += choose("q", "SurfacePoint", Case(kind_test(kind, present), "p", (chosen, *point)))
     if two_sided:
-        lines.append(f"    q = surface_point_turned(q, l.way == {BOTH}, &v);")
+        rows.append(f"q = surface_point_turned(q, l.emission_mode == {BOTH}, &v);")
     return [
-        *lines,
-        "    point.p = q.p;",
-        "    Spectrum value = emission_load(scene, l.radiance, point, lambdas);",
-        f"    LightRay s = surface_emit(q, l.way == {ALONG}, value, v);",
-        "    r = light_ray_sel(l.shape >= 0, s, r);",
+        *rows,
+        "point.p = q.p;",
+        "Spectrum value = emission_load(scene, l.radiance, point, lambdas);",
+        f"LightRay s = surface_emit(q, l.emission_mode == {ALONG}, value, v);",
+        "r = light_ray_sel(l.shape >= 0, s, r);",
     ]

@@ -54,15 +54,15 @@ def kernel_source(
     for name, (given, known) in options.items():
         if given not in known:
             raise SceneError(f"{given!r} is none of {', '.join(map(str, known))}", where=name)
-    virtual: dict[str, str | device.Part] = {
-        "generated/spectrum.cl": f'#include "spectrum/{mode}.cl"\n',
-        "generated/sampler.cl": f'#include "sampler/{sampler}.cl"\n',
+    virtual: dict[str, str | device.Part | tuple[str, ...]] = {
+        "generated/spectrum.cl": (f"spectrum/{mode}.cl",),
+        "generated/sampler.cl": (f"sampler/{sampler}.cl",),
         "generated/layout.cl": bvh.traversal_text(layout),
     }
     files: list[str] = []
     for part in parts:
         files += PARTS[part] if part in PARTS else _bsdf(part, mode, virtual)
-    virtual["library"] = "\n".join(f'#include "{name}"' for name in files)
+    virtual["library"] = tuple(files)
     text = device.assemble("library", virtual, {"LANES": lanes}).text
     if lines:
         return text + '#line 1 "program"\n'
@@ -79,5 +79,5 @@ def _bsdf(part: str | type[Material], mode: str, virtual: dict) -> tuple[str, ..
     if part not in LEAVES:
         custom_materials.check(part)
         virtual[f"bsdf/{part.kind}.cl"] = custom_materials.text(part)
-    virtual[f"generated/{part.kind}.cl"] = functions_text(part, mode, {})
+    virtual[f"generated/{part.kind}.cl"] = functions_text(part, mode)
     return (*BSDF, f"generated/{part.kind}.cl")

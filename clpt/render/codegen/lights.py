@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 from clpt.records import LIGHT, SHAPE
+from clpt.render.codegen.dispatch import Case, Function, active, choose, function, masked
 from clpt.render.contract import light_records, shape_records
-from clpt.render.contract.light_records import BASES, BOTH, INFINITE, KINDS, RECORDS
+from clpt.render.contract.light_records import BASES, BOTH, INFINITE, KINDS, RECORDS, VALUES
 
 
 def virtual_files() -> dict[str, str]:
-    """Return generated/light/<kind>.cl per kind: its struct, its loader and its functions."""
-    made = {
-        f"generated/light/{kind}.cl": f'{record.row_text()}#include "light/{kind}.cl"\n'
-        for kind, record in RECORDS.items()
-    }
-    for kind, base in BASES.items():
-        name = f"generated/light/{kind}.cl"
-        made[name] = f'#include "generated/light/{base}.cl"\n{made[name]}'
-    return made
+    """Return what lights give, and generated/light/<kind>.cl: struct, loader and functions."""
+    files = {f"generated/{record.snake_name}.cl": record.select_text() for record in VALUES}
+    for kind, record in RECORDS.items():
+        base = f'#include "generated/light/{BASES[kind]}.cl"\n' if kind in BASES else ""
+        own = f'{record.row_text()}#include "light/{kind}.cl"\n'
+        files[f"generated/light/{kind}.cl"] = base + own
+    return files
 
 
 def dispatch_text(
@@ -28,7 +27,7 @@ def dispatch_text(
 
     textured: some emission is a texture, so that triangles need the uv of their mesh; two_sided:
     some shape emits from its back too; tree: the rows are followed by a tree that chooses among
-    them. It includes the files of `virtual_files`, here and in clpt.render.lowering.geometry.shapes.
+    them. It includes the files of `virtual_files`, here and in clpt.render.codegen.shapes.
 
     light_sample(scene, p, side, pick, u, lambdas)  chooses a light and a direction to it
     light_pdf(scene, row, p, wi, t, n)              of it, [1/sr], for a ray that met a shape
@@ -49,37 +48,33 @@ def dispatch_text(
     parts += [f'#include "{name}"' for name in includes]
     parts += _tree_text() if tree else []
     parts.append(_sides_text(two_sided))
-    parts += _sample_text(others, surfaces, textured, two_sided, tree)
-    parts += _pdf_text(surfaces, tree)
+    parts.append(_sample_text(others, surfaces, textured, two_sided, tree))
+    parts.append(_pdf_text(surfaces, tree))
     parts += _infinite_text([kind for kind in others if kind in INFINITE])
     return "\n".join(parts) + "\n"
 
 
-def case_text(kind: str, only: bool, body: Sequence[str]) -> list[str]:
-    """Lines that do `body` where the light `l` is of a kind, under the mask `m`; `only`: always."""
-    if only:
-        rows = ["mask m = (integer)(-1);", *body]
-        return ["    {", *(f"        {line}" for line in rows), "    }"]
-    head = ["    {", f"        mask m = l.kind == LIGHT_{kind.upper()};", "        if (any(m)) {"]
-    return [*head, *(f"            {line}" for line in body), "        }", "    }"]
+def kind_test(kind: str, kinds: Iterable[str]) -> str:
+    """Return the test whether the light `l` is of a kind; "": it always is, no other occurs."""
+    return "" if {*kinds} == {kind} else f"l.kind == LIGHT_{kind.upper()}"
 
 
 def row_text(kind: str) -> str:
     """The kind's parameters of the light `l`; other lanes read the first row, see `blank_row`."""
     table = "light_params" if kind in RECORDS else "geometry"
-    return f"{kind}_row(scene.{table}, sel_i(m, l.params, (integer)(0)))"
+    return f"{kind}_row(scene.{table}, {active('l.params')})"
 
 
 def point_text(kind: str, uv: str) -> list[str]:
     """Lines that set `point`, what a texture sees, where the light `l` is a shape of a kind."""
     if kind not in ("triangle", "sphere"):
-        place = "v3(0.0f, 0.0f, 0.0f)"
-        return [f"point = texture_point_sel(m, texture_point({uv}, {place}), point);"]
-    made = f"area_{kind}_point(scene, shape, sel_i(m, row, shape.light), {uv})"
+        nowhere = "v3(0.0f, 0.0f, 0.0f)"
+        return [f"point = texture_point_sel(m, texture_point({uv}, {nowhere}), point);"]
+    seen = f"area_{kind}_point(scene, shape, sel_i(m, row, shape.light), {uv})"
     return [
-        "integer at = sel_i(m, l.shape, (integer)(0)) * SHAPE_ROW_WORDS;",
+        f"integer at = {active('l.shape')} * SHAPE_ROW_WORDS;",
         "ShapeRow shape = shape_row_row(scene.shapes, at);",
-        f"point = texture_point_sel(m, {made}, point);",
+        f"point = texture_point_sel(m, {seen}, point);",
     ]
 
 
@@ -99,89 +94,83 @@ def _sides_text(two_sided: bool) -> str:
     """Whether the side of a shape that a ray met emits; most scenes need not look at the row."""
     if not two_sided:
         return "#define light_shows(scene, row, front) (front)"
-    return (
-        "inline mask light_shows(Scene scene, integer row, mask front)\n{\n"
-        f"    return front | (light_at(scene, max_i(row, (integer)(0))).way == {BOTH});\n}}"
-    )
+    mode = "light_at(scene, max_i(row, (integer)(0))).emission_mode"
+    head = "mask light_shows(Scene scene, integer row, mask front)"
+    return function(head, f"return front | ({mode} == {BOTH});")
 
 
 def _sample_text(
     others: list[str], surfaces: list[str], textured: bool, two_sided: bool, tree: bool
-) -> list[str]:
-    only = len(others) + len(surfaces) == 1
+) -> str:
+    kinds = [*others, *surfaces]
     head = (
         "LightSample light_sample(Scene scene, vec3 p, vec3 side, real pick, vec2 u, "
         "Wavelengths lambdas)"
     )
-    if not others and not surfaces:
-        return [f"inline {head} {{ return light_nothing(); }}"]
+    if not kinds:
+        return function(head, "return light_sample_nothing();")
     number = "FEW_LIGHTS ? &u.x : &pick"
     if tree:
-        chosen = ["real pmf;", f"integer row = light_tree_pick(scene, p, {number}, &pmf);"]
+        rows = ["real pmf;", f"integer row = light_tree_pick(scene, p, {number}, &pmf);"]
     else:
-        chosen = [f"integer row = light_pick(scene, {number});"]
-    lines = [
-        f"inline {head}",
-        "{",
-        *(f"    {line}" for line in chosen),
-        "    LightRow l = light_at(scene, row);",
-        "    LightSample s = light_nothing();",
-    ]
+        rows = [f"integer row = light_pick(scene, {number});"]
+    rows += ["LightRow l = light_at(scene, row);", "LightSample s = light_sample_nothing();"]
     for kind in others:
         seen = "side" if kind in INFINITE else "p"
         sampled = f"{kind}_sample({row_text(kind)}, scene, {seen}, u, lambdas)"
-        lines += case_text(kind, only, [f"s = light_sel(m, {sampled}, s);"])
+        rows += choose("s", "LightSample", Case(kind_test(kind, kinds), sampled))
     if surfaces:
-        lines += [
-            "    ShapeSample q = shape_sample_nothing();",
-            "    TexturePoint point = texture_point_nowhere();",
+        rows += [
+            "ShapeSample q = shape_sample_nothing();",
+            "TexturePoint point = texture_point_nowhere();",
         ]
     for kind in surfaces:
-        body = [f"ShapeSample r = {kind}_sample({row_text(kind)}, p, u);"]
-        body += point_text(kind, "r.uv") if textured else []
-        lines += case_text(kind, only, [*body, "q = shape_sample_sel(m, r, q);"])
+        sampled = f"ShapeSample r = {kind}_sample({row_text(kind)}, p, u);"
+        point = point_text(kind, "r.uv") if textured else ()
+        rows += choose("q", "ShapeSample", Case(kind_test(kind, kinds), "r", (sampled, *point)))
     if two_sided:
-        lines.append(f"    q = area_turned(q, l.way == {BOTH});")
+        rows.append(f"q = area_turned(q, l.emission_mode == {BOTH});")
     if surfaces:
-        lines += [
-            "    point.p = madd3(q.wi, q.t, p);",
-            "    Spectrum le = emission_load(scene, l.radiance, point, lambdas);",
-            "    s = light_sel(l.shape >= 0, area_sample(q, le), s);",
+        rows += [
+            "point.p = madd3(q.wi, q.t, p);",
+            "Spectrum le = emission_load(scene, l.radiance, point, lambdas);",
+            "s = light_sample_sel(l.shape >= 0, area_sample(q, le), s);",
         ]
-    return [*lines, f"    return light_chosen(s, {'pmf' if tree else 'l.pmf'});", "}"]
+    return function(head, *rows, f"return light_chosen(s, {'pmf' if tree else 'l.pmf'});")
 
 
-def _pdf_text(surfaces: list[str], tree: bool) -> list[str]:
-    lines = [
-        "inline real light_pdf(Scene scene, integer row, vec3 p, vec3 wi, real t, vec3 n)",
-        "{",
-        "    LightRow l = light_at(scene, row);",
-        "    real pdf = 0.0f;",
-    ]
-    for kind in surfaces:
-        body = f"pdf = sel(m, {kind}_pdf({row_text(kind)}, p, wi, t, n), pdf);"
-        lines += case_text(kind, len(surfaces) == 1, [body])
+def _pdf_text(surfaces: list[str], tree: bool) -> str:
     pmf = "light_tree_pmf(scene, row, p)" if tree else "l.pmf"
-    return [*lines, f"    return pdf * {pmf};", "}"]
+    return Function(
+        "real light_pdf(Scene scene, integer row, vec3 p, vec3 wi, real t, vec3 n)",
+        "0.0f",
+        [
+            Case(kind_test(kind, surfaces), f"{kind}_pdf({row_text(kind)}, p, wi, t, n)")
+            for kind in surfaces
+        ],
+        ("LightRow l = light_at(scene, row);",),
+        f"value * {pmf}",
+    ).text()
 
 
 def _infinite_text(kinds: list[str]) -> list[str]:
     """`row` is the same in all lanes."""
     if not kinds:
         return []
-    lines = [
-        "inline void infinite_light(Scene scene, int row, vec3 side, vec3 d, Wavelengths lambdas,",
-        "                           Spectrum *radiance, real *pdf)",
-        "{",
-        "    LightRow l = light_at(scene, (integer)(row));",
-        "    *radiance = spectrum_of(0.0f);",
-        "    *pdf = 0.0f;",
+    rows = [
+        "LightRow l = light_at(scene, (integer)(row));",
+        "*radiance = spectrum_of(0.0f);",
+        "*pdf = 0.0f;",
     ]
     for kind in kinds:
-        body = [
+        rows += masked(
+            kind_test(kind, kinds),
             f"{RECORDS[kind].name} light = {row_text(kind)};",
             f"*radiance = spectrum_sel(m, {kind}_radiance(light, scene, d, lambdas), *radiance);",
             f"*pdf = sel(m, {kind}_pdf(light, scene, side, d) * l.pmf, *pdf);",
-        ]
-        lines += case_text(kind, len(kinds) == 1, body)
-    return [*lines, "}", '#include "lighting/infinite.cl"']
+        )
+    head = (
+        "void infinite_light(Scene scene, int row, vec3 side, vec3 d, Wavelengths lambdas, "
+        "Spectrum *radiance, real *pdf)"
+    )
+    return [function(head, *rows), '#include "lighting/infinite.cl"']

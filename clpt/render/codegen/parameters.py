@@ -1,21 +1,27 @@
-"""Kernel text of the kinds: structs, loaders, dispatch. The physics is always in a file."""
+"""Kernel text of the parameters of kinds: structs, and the loaders that fill them.
+
+A parameter's sources are where its values in a scene come from: "none" (0, which leaves a lobe
+out), "constant", "table" (a tabulated spectrum), "texture", "layers". A loader reads from those
+that occur.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
+from clpt.render.codegen.dispatch import Case, choose, function, indented
+from clpt.render.contract.features import Features
 from clpt.render.contract.parameter_words import (
+    NORMAL_MAP_WORDS,
     ORDERS_WORDS,
     REAL_WORDS,
     SPECTRAL,
     SPECTRUM_WORDS,
     words,
 )
-from clpt.scene.params import (
-    Kind,
-    Param,
-    device_params,
-)
+from clpt.scene.params import Kind, Param, device_params
+
+_LOADED = "(Scene scene, integer at, TexturePoint point, Wavelengths lambdas)"
 
 
 def lane_type(param: Param) -> str:
@@ -45,125 +51,121 @@ def struct_text(cls: type[Kind]) -> str:
     return "\n".join(["typedef struct {", *rows, f"}} {cls.__name__};", ""])
 
 
+def word_before(cls: type[Kind], name: str) -> int:
+    """Return where in a kind's row its parameter `name` begins."""
+    declared = device_params(cls)
+    return sum(words(declared[one]) for one in [*declared][: [*declared].index(name)])
+
+
 def load_text(cls: type[Kind], sources: Mapping[str, frozenset[str]], table: str) -> str:
     """Return `kind_load(scene, row, point, lambdas)`, which reads a row at the path's wavelengths.
 
-    sources: per parameter, where the values in this scene come from: "none" (0 leaves a lobe out),
-    "constant", "table" (a tabulated spectrum), "texture", "layers". Text is made only for what is
-    there.
+    sources: of each parameter; of one that is not there, "constant".
     """
-    body, at = [], 0
+    rows = [f"{cls.__name__} r;"]
     for name, param in device_params(cls).items():
-        found = sources.get(name) or frozenset({"constant"})
-        kind = lane_type(param).lower()
-        if array_size(param) > 1:
-            body += [
-                f"    for (int i = 0; i < {array_size(param)}; i++)",
-                f"        r.{name}[i] = gather_w(scene.{table}, row + {at} + i);",
+        at = f"row + {word_before(cls, name)}"
+        if (size := array_size(param)) > 1:
+            rows += [
+                f"for (int i = 0; i < {size}; i++)",
+                f"    r.{name}[i] = gather_w(scene.{table}, {at} + i);",
             ]
         else:
-            body += _member(name, param, kind, f"row + {at}", found, table)
-        at += words(param)
+            rows += _member(f"r.{name}", param, at, sources.get(name), table)
+    before = ""
+    if cls.tints:
+        before = value_text(
+            f"{cls.kind}_colour", device_params(cls)["base_color"], sources.get("base_color"), table
+        )
+        rows += _luminance(cls)
+    if cls.needs_wavelengths:
+        rows.append("r.lambdas = lambdas;")
+    if len(rows) == 1:
+        rows.append("r.unused = 0;")
     head = (
-        f"inline {cls.__name__} {cls.kind}_load"
+        f"{cls.__name__} {cls.kind}_load"
         "(Scene scene, integer row, TexturePoint point, Wavelengths lambdas)"
     )
-    if cls.tints:
-        before, lines = _luminance(cls, sources, table)
-        head, body = f"{before}{head}", [*body, lines]
-    if cls.needs_wavelengths:
-        body.append("    r.lambdas = lambdas;")
-    body = body or ["    r.unused = 0;"]
-    return "\n".join([head, "{", f"    {cls.__name__} r;", *body, "    return r;", "}", ""])
+    return before + function(head, *rows, "return r;")
 
 
-def _luminance(
-    cls: type[Kind], sources: Mapping[str, frozenset[str]], table: str
-) -> tuple[str, str]:
-    """What loads `base_color` alone, and the lines that ask it at luminance's own wavelengths."""
-    declared = device_params(cls)
-    at = sum(words(declared[name]) for name in [*declared][: [*declared].index("base_color")])
-    found = sources.get("base_color") or frozenset({"constant"})
+def _luminance(cls: type[Kind]) -> list[str]:
+    """Set `luminance`: of base_color, at wavelengths of its own, where a lane has a tint."""
     tests = " | ".join(f"(r.{name} > 0.0f)" for name in cls.tints)
-    return value_text(f"{cls.kind}_colour", declared["base_color"], found, table), "\n".join(
-        [
-            "    r.luminance = 1.0f;",
-            f"    if (any({tests}))",
-            f"        r.luminance = luminance_of({cls.kind}_colour"
-            f"(scene, row + {at}, point, luminance_lambdas()));",
-        ]
-    )
+    row = f"row + {word_before(cls, 'base_color')}"
+    colour = f"{cls.kind}_colour(scene, {row}, point, luminance_lambdas())"
+    return [
+        "r.luminance = 1.0f;",
+        f"if (any({tests}))",
+        *indented(f"r.luminance = luminance_of({colour});"),
+    ]
 
 
 def _member(
-    name: str, param: Param, kind: str, at: str, found: frozenset[str], table: str
+    target: str, param: Param, at: str, sources: frozenset[str] | None, table: str
 ) -> list[str]:
-    """The lines that load one member from the sources that occur."""
-    if kind == "integer":
-        return [f"    r.{name} = gather_i(scene.{table}, {at});"]
-    if kind == "layers":
-        made = f"layers_load(scene, {at}, point, lambdas)" if "layers" in found else "layers_none()"
-        return [f"    r.{name} = {made};"]
-    if found == {"none"}:
-        return [f"    r.{name} = {'spectrum_of(0.0f)' if kind == 'spectrum' else '(real)(0.0f)'};"]
-    found = found if "none" not in found else found - {"none"} | {"constant"}
-    forms = {
-        "constant": f"{kind}_constant(scene.{table}, {at}, lambdas)",
-        "table": f"{kind}_table(scene, scene.{table}, {at}, lambdas)",
-        "texture": f"{kind}_texture_{param.role}(scene, scene.{table}, {at}, point, lambdas)",
+    """Set a member from the sources that occur; a lane's word after the value says from which."""
+    form, present = lane_type(param), sources or frozenset({"constant"})
+    if form == "integer":
+        return [f"{target} = gather_i(scene.{table}, {at});"]
+    if form == "Layers":
+        loaded = f"layers_load(scene, {at}, point, lambdas)"
+        return [f"{target} = {loaded if 'layers' in present else 'layers_none()'};"]
+    if present == {"none"}:
+        return [f"{target} = {'spectrum_of(0.0f)' if form == 'Spectrum' else '(real)(0.0f)'};"]
+    if "none" in present:
+        present |= {"constant"}
+    prefix = form.lower()
+    source = f"{at} + {(SPECTRUM_WORDS if form == 'Spectrum' else REAL_WORDS) - 1}"
+    loads = {
+        "constant": ("", f"{prefix}_constant(scene.{table}, {at}, lambdas)"),
+        "table": ("< 0", f"{prefix}_table(scene, scene.{table}, {at}, lambdas)"),
+        "texture": (
+            "> 0",
+            f"{prefix}_texture_{param.role}(scene, scene.{table}, {at}, point, lambdas)",
+        ),
     }
-    present = [form for form in forms if form in found]
-    lines = [f"    r.{name} = {forms[present[0]]};"]
-    source = f"{at} + {(SPECTRUM_WORDS if kind == 'spectrum' else REAL_WORDS) - 1}"
-    choose = "spectrum_sel" if kind == "spectrum" else "sel"
-    for form in present[1:]:
-        test = "< 0" if form == "table" else "> 0"
-        lines += [
-            "    {",
-            f"        mask m = gather_i(scene.{table}, {source}) {test};",
-            f"        if (any(m)) r.{name} = {choose}(m, {forms[form]}, r.{name});",
-            "    }",
-        ]
-    return lines
+    (_, first), *others = [load for name, load in loads.items() if name in present]
+    cases = [Case(f"gather_i(scene.{table}, {source}) {test}", value) for test, value in others]
+    return [f"{target} = {first};", *choose(target, form, *cases)]
 
 
-def emission_text(found: frozenset[str]) -> str:
-    """Return `emission_load(scene, at, point, lambdas)`, which reads five words of `light_params`."""
-    return value_text("emission_load", Param("emission", "", textured=True), found, "light_params")
-
-
-def factor_text(found: frozenset[str]) -> str:
-    """Return `factor_load(scene, at, point, lambdas)`, which reads five words of `light_params`."""
-    return value_text("factor_load", Param("reflectance", "", textured=True), found, "light_params")
-
-
-def mixture_text(found: frozenset[str]) -> str:
-    """Return `mixture_weight(scene, at, point, lambdas)`, which reads two words of `mixtures`."""
-    return value_text("mixture_weight", Param("real", "", textured=True), found, "mixtures")
-
-
-def medium_text(found: frozenset[str]) -> str:
-    """Return `medium_absorption(scene, at, point, lambdas)`: five words of `materials`."""
-    return value_text("medium_absorption", Param("coefficient", ""), found)
-
-
-def value_text(name: str, param: Param, found: frozenset[str], table: str = "materials") -> str:
-    """Return `name(scene, at, point, lambdas)`, which loads a single parameter."""
+def value_text(
+    name: str, param: Param, sources: frozenset[str] | None, table: str = "materials"
+) -> str:
+    """Return `name(scene, at, point, lambdas)`, which loads a single parameter from `table`."""
     form = lane_type(param)
-    return "\n".join(
-        [
-            f"inline {form} {name}"
-            "(Scene scene, integer at, TexturePoint point, Wavelengths lambdas)",
-            "{",
-            f"    struct {{ {form} value; }} r;",
-            *_member("value", param, form.lower(), "at", found, table),
-            "    return r.value;",
-            "}",
-            "",
-        ]
+    rows = [f"{form} value;", *_member("value", param, "at", sources, table)]
+    return function(f"{form} {name}{_LOADED}", *rows, "return value;")
+
+
+def emission_text(sources: frozenset[str]) -> str:
+    """Return `emission_load(scene, at, point, lambdas)`: five words of `light_params`."""
+    emission = Param("emission", "", textured=True)
+    return value_text("emission_load", emission, sources, "light_params")
+
+
+def factor_text(sources: frozenset[str]) -> str:
+    """Return `factor_load(scene, at, point, lambdas)`: five words of `light_params`."""
+    return value_text(
+        "factor_load", Param("reflectance", "", textured=True), sources, "light_params"
     )
 
 
-def normal_map_text(found: frozenset[str]) -> str:
-    """Return `bend_real(scene, at, point, lambdas)`, which reads two words of `materials`."""
-    return value_text("bend_real", Param("real", "", textured=True), found, "materials")
+def medium_text(sources: frozenset[str]) -> str:
+    """Return `medium_absorption(scene, at, point, lambdas)`: five words of `materials`."""
+    return value_text("medium_absorption", Param("coefficient", ""), sources)
+
+
+def virtual_files(features: Features) -> dict[str, str]:
+    """Return the loaders of what surfaces have besides their materials' own parameters."""
+    absorptions = {source for _, name, source in features.sources if name == "absorption"}
+    weights = features.sources_of("mixture").get("weight")
+    maps = features.sources_of("perturbation").get("value")
+    real = Param("real", "", textured=True)
+    return {
+        "generated/medium_absorption.cl": medium_text(frozenset(absorptions)),
+        "generated/mixture.cl": value_text("mixture_weight", real, weights, "mixtures"),
+        "generated/normal_map.cl": f"#define NORMAL_MAP_WORDS {NORMAL_MAP_WORDS}\n"
+        + value_text("bend_real", real, maps),
+    }

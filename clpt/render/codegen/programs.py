@@ -9,72 +9,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from clpt import bvh, device
-from clpt.render.codegen import emission, lights, shapes, signatures, stages, textures
-from clpt.render.contract import custom_materials, shape_records
+from clpt.render.codegen import (
+    choices,
+    emission,
+    flags,
+    lights,
+    parameters,
+    shapes,
+    signatures,
+    stages,
+    textures,
+)
+from clpt.render.contract import custom_materials
 from clpt.render.contract.features import Features
-from clpt.render.contract.parameter_words import RERADIATION_STEP
 
-
-def sources(
-    features: Features, layout: str, lanes: int, *, queued: bool | str, interleaved: bool = False
-) -> dict[str, device.Source]:
-    """Return the text of every program of a bounce, by program name.
-
-    layout: of the triangles, a name in clpt.bvh.LAYOUTS; lanes: paths that a work-item shades;
-    queued: whether shading goes along queues, or how: one of clpt.render.wavefront.queues.WAYS; "sort" if
-    True; flights: whether `intersect` has the rays of several paths in flight, see `flies`.
-    """
-    trace_lanes = lanes if layout == "brute" else 1
-    shared = _shared(features, layout)
-    common = _defines(features)
-    begin, test = ends(features)
-    made = {
-        begin: _source(begin, shared, common, lanes),
-        "intersect": _source(
-            "intersect",
-            {**shared, "generated/trace.cl": stages.trace_text(layout, interleaved)},
-            common,
-            lanes if interleaved else trace_lanes,
-        ),
-        test: _source(test, shared, common, trace_lanes),
-    }
-    if features.mixtures:
-        made["mix"] = _source("mix", shared, common, lanes)
-    if queued:
-        way = "sort" if queued is True else queued
-        made[way] = _source(way, shared, common, 1)
-    for number, cls in enumerate(features.leaves):
-        own: dict[str, str | device.Part] = {
-            **shared,
-            "generated/bsdf.cl": stages.bsdf_text(features, cls),
-        }
-        if cls.source is not None:
-            own[f"bsdf/{cls.kind}.cl"] = custom_materials.text(cls)
-        defines = {
-            **common,
-            "BSDF_KIND": number,
-            "BSDF_DELTA": int(cls.delta),
-            "BSDF_TRANSMITS": int(cls.kind in features.transmitting),
-            "BSDF_CHROMATIC": int(cls.chromatic),
-            "BSDF_FLUORESCES": int(stages.fluoresces(features, cls)),
-            "BSDF_IS_NULL": int(cls.is_null and features.is_null),
-            "USES_CHOICE": int(cls.uses_lobe_sample or cls.fluoresces or features.many_lights),
-            "QUEUED": int(bool(queued)),
-        }
-        made[f"shade_{cls.kind}"] = _source("shade", own, defines, lanes)
-    return made
-
-
-def film_sources(features: Features, layout: str) -> dict[str, device.Source]:
-    """Return the texts of what makes pictures of a film, by program name."""
-    shared, common = _shared(features, layout), _defines(features)
-    names = ["accumulate", *(["bands"] if features.bands else [])]
-    return {name: _source(name, shared, common, 1) for name in names}
-
-
-def noise_sources(features: Features, layout: str) -> dict[str, device.Source]:
-    """Return the text of what tells a film's noise, by program name."""
-    return {"noise": _source("noise", _shared(features, layout), _defines(features), 1)}
+Files = dict[str, str | device.Part | tuple[str, ...]]
 
 
 @dataclass(frozen=True)
@@ -86,20 +35,66 @@ class Stage:
     lanes: int
 
 
+def sources(
+    features: Features, layout: str, lanes: int, *, queued: bool | str, interleaved: bool = False
+) -> dict[str, device.Source]:
+    """Return the text of every program of a bounce, by program name.
+
+    layout: of the triangles, a name in clpt.bvh.LAYOUTS; lanes: paths that a work-item shades;
+    queued: whether shading goes along queues, or how: one of clpt.render.wavefront.queues.WAYS,
+    "sort" if True; interleaved: a work-item of `intersect` has the rays of `lanes` paths in flight.
+    """
+    files, defines = _shared(features, layout), flags.defines(flags.SCENE, features)
+    begin, join = begin_and_join(features)
+    trace_lanes = _trace_lanes(layout, lanes)
+    rays: Files = {}
+    if interleaved and layout != "brute":
+        rays["generated/trace.cl"] = ("tracing/trace_interleaved.cl",)
+    texts = {
+        begin: _source(begin, files, defines, lanes),
+        "intersect": _source(
+            "intersect", {**files, **rays}, defines, lanes if interleaved else trace_lanes
+        ),
+        join: _source(join, files, defines, trace_lanes),
+    }
+    if features.mixtures:
+        texts["mix"] = _source("mix", files, defines, lanes)
+    if queued:
+        way = "sort" if queued is True else queued
+        texts[way] = _source(way, files, defines, 1)
+    for cls in features.leaves:
+        own = {**files, "generated/bsdf.cl": stages.bsdf_text(features, cls)}
+        if cls.source is not None:
+            own[f"bsdf/{cls.kind}.cl"] = custom_materials.text(cls)
+        kind = {**flags.defines(flags.MATERIAL, features, cls), "QUEUED": int(bool(queued))}
+        texts[f"shade_{cls.kind}"] = _source("shade", own, {**defines, **kind}, lanes)
+    return texts
+
+
+def film_sources(features: Features, layout: str) -> dict[str, device.Source]:
+    """Return the texts of what makes pictures of a film, by program name."""
+    return _alone(features, layout, "accumulate", *(["bands"] if features.bands else []))
+
+
+def noise_sources(features: Features, layout: str) -> dict[str, device.Source]:
+    """Return the text of what tells a film's noise, by program name."""
+    return _alone(features, layout, "noise")
+
+
 def order(features: Features, layout: str, lanes: int, interleaved: bool = False) -> list[Stage]:
     """Return the stages of a bounce in their order, but for sorting."""
-    trace_lanes = lanes if layout == "brute" else 1
-    begin, test = ends(features)
-    made = [Stage(begin, begin, lanes)]
+    trace_lanes = _trace_lanes(layout, lanes)
+    begin, join = begin_and_join(features)
+    bounce = [Stage(begin, begin, lanes)]
     if features.light_paths and features.visible_lights:
-        made.append(Stage(test, test, trace_lanes))
-    made.append(Stage("intersect", "intersect", lanes if interleaved else trace_lanes))
+        bounce.append(Stage(join, join, trace_lanes))
+    bounce.append(Stage("intersect", "intersect", lanes if interleaved else trace_lanes))
     if features.mixtures:
-        made.append(Stage("mix", "mix_materials", lanes))
-    made += [Stage(f"shade_{kind}", "shade", lanes) for kind in features.materials]
+        bounce.append(Stage("mix", "mix_materials", lanes))
+    bounce += [Stage(f"shade_{kind}", "shade", lanes) for kind in features.materials]
     if any(not cls.delta for cls in features.leaves):
-        made.append(Stage(test, test, trace_lanes))
-    return made
+        bounce.append(Stage(join, join, trace_lanes))
+    return bounce
 
 
 def loop_sources(
@@ -109,19 +104,19 @@ def loop_sources(
 
     "loop" holds the kernel; the others are the stages as functions, see kernels/interface/stage.cl.
     """
-    made = sources(features, layout, lanes, queued=False, interleaved=interleaved)
+    texts = sources(features, layout, lanes, queued=False, interleaved=interleaved)
     bounce = order(features, layout, lanes, interleaved)
     names = dict.fromkeys(stage.program for stage in bounce)
-    parts = {name: made[name].with_private(name, {"PART": f"loop_{name}"}) for name in names}
-    shared = {**_shared(features, layout), "generated/loop.cl": _loop_text(features, bounce)}
-    loop = _source("loop", shared, _defines(features), lanes)
+    parts = {name: texts[name].with_private(name, {"PART": f"loop_{name}"}) for name in names}
+    files = {**_shared(features, layout), "generated/loop.cl": _loop_text(features, bounce)}
+    loop = _source("loop", files, flags.defines(flags.SCENE, features), lanes)
     return {**parts, "loop": loop.with_private("loop")}
 
 
 def _loop_text(features: Features, bounce: list[Stage]) -> str:
     """What loop.cl calls: `loop_begin`, and `loop_bounce`, all other stages in their order."""
-    begin, test = ends(features)
-    extra = {begin: ["BEGIN"], "intersect": ["TRACE"], test: ["JOIN"]}
+    begin, join = begin_and_join(features)
+    extra = {begin: ["BEGIN"], "intersect": ["TRACE"], join: ["JOIN"]}
     groups = {s.program: ["SLAB", "SCENE", *extra.get(s.program, ())] for s in bounce}
     lines = [
         f"void loop_{name}({', '.join(f'{group}_ARGS' for group in own)}, uint at);"
@@ -141,66 +136,42 @@ def _loop_text(features: Features, bounce: list[Stage]) -> str:
     return "\n".join([*lines, "}", ""])
 
 
-def ends(features: Features) -> tuple[str, str]:
-    """Return the stage that begins paths, and the one that tests what waits to be joined."""
+def begin_and_join(features: Features) -> tuple[str, str]:
+    """Return the stage that begins paths, and the one that tests the rays that join them to a light
+    or, of paths that start at lights, to the camera."""
     return ("emit", "splat") if features.light_paths else ("generate", "shadow")
 
 
-def _source(stage: str, virtual: device.Virtual, defines: dict, lanes: int) -> device.Source:
+def _trace_lanes(layout: str, lanes: int) -> int:
+    """How many rays a work-item traces: those of one path, but where there is no tree."""
+    return lanes if layout == "brute" else 1
+
+
+def _alone(features: Features, layout: str, *names: str) -> dict[str, device.Source]:
+    """The texts of programs whose work-items serve a pixel each."""
+    files, defines = _shared(features, layout), flags.defines(flags.SCENE, features)
+    return {name: _source(name, files, defines, 1) for name in names}
+
+
+def _source(
+    stage: str, virtual: device.Virtual, defines: flags.Defines, lanes: int
+) -> device.Source:
     return device.assemble(f"stage/{stage}.cl", virtual, {"LANES": lanes, "QUEUED": 0, **defines})
 
 
-def _defines(features: Features) -> dict[str, str | int | float]:
-    made: dict[str, str | int | float] = {
-        "BSDF_COUNT": len(features.materials),
-        "USES_NORMALS": int(features.normals),
-        "USES_UVS": int(features.uvs),
-        "USES_TANGENTS": int(features.tangents),
-        "USES_ATTRIBUTES": int(features.attributes),
-        "USES_ANALYTIC": int(bool(features.analytic)),
-        "USES_INFINITE": int(features.infinite),
-        "USES_DISPERSION": int(features.dispersion and features.mode == "spectral"),
-        "CAMERA_DISPERSES": int(features.glass_lens),
-        "USES_FLUORESCENCE": int(any(stages.fluoresces(features, cls) for cls in features.leaves)),
-        "SPECTRA_SIZE": features.spectra_size,
-        "SHIFT_STEP": RERADIATION_STEP,
-        "SPECTRA_STEP": f"{features.spectra_step}f",
-        "FEW_LIGHTS": int(not features.many_lights),
-        "USES_LIGHTS": int(bool(features.lights)),
-        "USES_SURFACE_LIGHTS": int(bool(set(features.lights) & set(shape_records.RECORDS))),
-    }
-    if features.absorption:
-        made["USES_ABSORPTION"] = 1
-    if features.is_null:
-        made["USES_NULL_SURFACES"] = 1
-    if features.filter == "box":
-        made["FILTER_BOX"] = 1
-    if features.light_paths:
-        made["LIGHT_PATHS"] = 1
-        made["USES_VISIBLE_LIGHTS"] = int(features.visible_lights)
-    if features.channel:
-        made["CHANNEL"] = f"CHANNEL_{features.channel.upper()}"
-    if features.bands:
-        made["USES_BANDS"] = 1
-    if features.instances:
-        made["USES_INSTANCES"] = 1
-    return made
-
-
-def _shared(features: Features, layout: str) -> dict[str, str]:
+def _shared(features: Features, layout: str) -> Files:
     """The generated files that are the same for all programs of a scene."""
+    textured = "texture" in stages.emission_sources(features)
     return {
         **shapes.virtual_files(),
         **lights.virtual_files(),
         **signatures.virtual_files(features, layout),
-        "generated/spectrum.cl": f'#include "spectrum/{features.mode}.cl"\n',
-        "generated/spectrum_read.cl": stages.spectrum_text(features),
-        "generated/bands.cl": '#include "film/bands.cl"\n' if features.bands else "",
-        "generated/sampler.cl": stages.sampler_text(features.sampler),
+        **parameters.virtual_files(features),
+        **choices.virtual_files(features, layout),
         "generated/camera.cl": stages.camera_text(features.camera, features.glass_lens),
         "generated/connect.cl": stages.connect_text(features.camera),
         "generated/emission.cl": emission.dispatch_text(
-            features.lights, stages.emits_textures(features), features.two_sided_lights
+            features.lights, textured, features.two_sided_lights
         ),
         "generated/textures.cl": textures.dispatch_text(
             features.textures,
@@ -209,21 +180,8 @@ def _shared(features: Features, layout: str) -> dict[str, str]:
             features.texture_mappings,
         ),
         "generated/lights.cl": stages.lights_text(features),
-        "generated/mixture.cl": stages.mixture_text(features),
-        "generated/shading_frame.cl": stages.shading_frame_text(features),
-        "generated/transmittance.cl": stages.transmittance_text(features),
         "generated/null_transmittance.cl": stages.null_transmittance_text(features),
-        "generated/medium.cl": stages.medium_text(features),
-        "generated/shapes.cl": stages.tangents_text(features),
-        "generated/trace.cl": stages.trace_text(layout),
+        "generated/shapes.cl": shapes.tangents_text(features),
+        "generated/shape_tree.cl": shapes.hit_text(features),
         "generated/layout.cl": bvh.traversal_text(layout),
-        "generated/shape_tree.cl": stages.shape_tree_text(features),
-        "generated/shape_traversal.cl": '#include "bvh/shapes.cl"\n' if features.analytic else "",
-        "generated/instances.cl": '#include "tracing/instances.cl"\n' if features.instances else "",
-        "generated/instance_traversal.cl": (
-            f'#include "tracing/instances_{layout}.cl"\n#include "tracing/trace_instances.cl"\n'
-            if features.instances
-            else ""
-        ),
-        "generated/integrator.cl": f'#include "integrator/{features.integrator}.cl"\n',
     }

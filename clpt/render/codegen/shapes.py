@@ -1,15 +1,82 @@
-"""Kernel text of the shapes."""
+"""Kernel text of the shapes: their structs, and how rays meet those that are no triangles."""
 
 from __future__ import annotations
 
-from clpt.render.contract.shape_records import ONE_OF, RECORDS
+from clpt.records import SHAPE
+from clpt.render.codegen.dispatch import Case, Function, active, function
+from clpt.render.contract.features import Features
+from clpt.render.contract.shape_records import ANALYTIC, ONE_OF, RECORDS, VALUES
 
 
 def virtual_files() -> dict[str, str]:
-    """Return generated/shape/<kind>.cl per kind: its struct, its loader and its functions."""
-    made = {kind: record.row_text() for kind, record in RECORDS.items()}
-    made |= {kind: f'#include "generated/shape/{one}.cl"\n' for kind, one in ONE_OF.items()}
-    return {
-        f"generated/shape/{kind}.cl": f'{text}#include "shape/{kind}.cl"\n'
-        for kind, text in made.items()
-    }
+    """Return what shapes give, and generated/shape/<kind>.cl: struct, loader and functions."""
+    files = {f"generated/{record.snake_name}.cl": record.select_text() for record in VALUES}
+    structs = {kind: record.row_text() for kind, record in RECORDS.items()}
+    structs |= {kind: f'#include "generated/shape/{one}.cl"\n' for kind, one in ONE_OF.items()}
+    for kind, struct in structs.items():
+        files[f"generated/shape/{kind}.cl"] = f'{struct}#include "shape/{kind}.cl"\n'
+    return files
+
+
+def hit_text(features: Features) -> str:
+    """Return `shape_hit`: meeting one analytic shape, which is the same for all lanes."""
+    if not features.analytic:
+        return ""
+    word = {member.name: member.word for member in SHAPE.members}
+    cases = [
+        f"if (kind == {_number(kind)}) return {ONE_OF.get(kind, kind)}_intersect("
+        f"{_row_text(kind, 'params')}, o, d, tmin, tmax);"
+        for kind in features.analytic
+    ]
+    rows = "single" if ONE_OF.keys().isdisjoint(features.analytic) else "many"
+    signature = (
+        "ShapeHit shape_hit(Scene scene, int prim, int row, vec3 o, vec3 d, real tmin, real tmax)"
+    )
+    body = [
+        "global const uint *shape = scene.shapes + row * SHAPE_ROW_WORDS;",
+        f"int kind = (int)shape[{word['kind']}];",
+        f"integer params = (int)shape[{word['params']}];",
+        *cases,
+        "ShapeHit none = {FAR, {0.0f, 0.0f, 1.0f}, {0.0f, 0.0f}};",
+        "return none;",
+    ]
+    files = f'#include "tracing/shape_rows_{rows}.cl"\n'
+    return _includes(features) + files + function(signature, *body)
+
+
+def tangents_text(features: Features) -> str:
+    """Return `dpdu_of_shape` and `dpdv_of_shape` of analytic shapes, in lanes."""
+    if not (features.analytic and features.tangents):
+        return ""
+    tangents = [
+        Function(
+            f"vec3 {tangent}_of_shape(Scene scene, ShapeRow shape, integer prim, vec3 p, vec2 uv)",
+            "v3(0.0f, 0.0f, 0.0f)",
+            [
+                Case(
+                    f"shape.kind == {_number(kind)}",
+                    f"{ONE_OF.get(kind, kind)}_{tangent}"
+                    f"({_row_text(kind, active('shape.params'), 'm')}, p, uv)",
+                )
+                for kind in features.analytic
+            ],
+        ).text()
+        for tangent in ("dpdu", "dpdv")
+    ]
+    return _includes(features) + "".join(tangents)
+
+
+def _includes(features: Features) -> str:
+    return "".join(f'#include "generated/shape/{kind}.cl"\n' for kind in features.analytic)
+
+
+def _number(kind: str) -> int:
+    """What ShapeRow.kind is for an analytic shape."""
+    return 1 + ANALYTIC.index(kind)
+
+
+def _row_text(kind: str, params: str, mask: str = "mask_of(1)") -> str:
+    """The parameters of primitive `prim`, which lie at `params` or, of many in one, beside it."""
+    if kind in ONE_OF:
+        return f"{kind}_one(scene, {params}, prim, {mask})"
+    return f"{kind}_row(scene.geometry, {params})"

@@ -1,6 +1,7 @@
 """What kernels take, as macros: records, tables and slabs; trees; film and counters.
 
-Every list stands here once: as it is declared, as it is passed on, and as the host binds it.
+Each group of arguments is declared here once. From it follow the macro that declares it in a
+kernel, the one that passes it on, and what the host binds.
 """
 
 from __future__ import annotations
@@ -16,22 +17,22 @@ SCENE_ARGS["settings"] = "global const Settings *restrict "
 
 
 def args_text(name: str, args: dict[str, str]) -> list[str]:
-    """Macros with arguments as they are declared, and as they are passed on."""
+    """Return the macro that declares a group of arguments, and the one that passes them on."""
     declared = ", ".join(f"{type_}{own}" for own, type_ in args.items())
     return [f"#define {name}_ARGS {declared}", f"#define {name}_PASSED {', '.join(args)}"]
 
 
 def virtual_files(features: Features, layout: str) -> dict[str, str]:
-    """Return the generated files with arguments."""
+    """Return the generated files that define the groups of arguments."""
     groups = {
         "trace_args": {"TRACE": trace_args(features, layout)},
         "stage_args": {"BEGIN": begin_args(features), "JOIN": join_args(features, layout)},
     }
-    made = {"generated/scene.cl": scene_text()}
+    files = {"generated/scene.cl": scene_text()}
     for file, args in groups.items():
         rows = [row for name, own in args.items() for row in args_text(name, own)]
-        made[f"generated/{file}.cl"] = "\n".join([*rows, ""])
-    return made
+        files[f"generated/{file}.cl"] = "\n".join([*rows, ""])
+    return files
 
 
 def scene_text() -> str:
@@ -69,7 +70,7 @@ def scene_text() -> str:
 
 
 def trace_args(features: Features, layout: str) -> dict[str, str]:
-    """The buffers of all trees, in which rays are traced."""
+    """Return the buffers of all trees, in which rays are traced."""
     if layout == "brute":
         return {"tris": "global const float *", "triangles": "uint "}
     trees = dict.fromkeys(("nodes", "leaves"), "global const float *")
@@ -81,21 +82,21 @@ def trace_args(features: Features, layout: str) -> dict[str, str]:
 
 
 def begin_args(features: Features) -> dict[str, str]:
-    """What the stage takes that begins paths."""
+    """Return what the stage takes that begins paths."""
     film = ["film", "bands"] if features.bands else ["film"]
     rest = {"counters": "global uint *", "work_list": "global const uint *", "samples": "int2 "}
     return {**dict.fromkeys(film, "global float *"), **rest}
 
 
 def join_args(features: Features, layout: str) -> dict[str, str]:
-    """What the stage takes that tests whether paths can be joined to a light, or the camera."""
+    """Return what the stage takes that tests rays to lights or, in `splat`, to the camera."""
     own = begin_args(features) if features.light_paths else {}
-    there = {name: type_ for name, type_ in own.items() if name in ("film", "counters")}
-    return {**trace_args(features, layout), **there}
+    splats = {name: type_ for name, type_ in own.items() if name in ("film", "counters")}
+    return {**trace_args(features, layout), **splats}
 
 
 def loop_arguments(features: Features, layout: str) -> tuple[device.Argument, ...]:
-    """Return what the kernel of stage/loop.cl takes: linked kernels do not tell it themselves."""
+    """Return what the kernel of stage/loop.cl takes: a linked kernel has no argument names."""
     args = {**SLAB_ARGS, **SCENE_ARGS, **trace_args(features, layout), **begin_args(features)}
     args |= {"bounces": "uint ", "restart": "uint "}
     return tuple(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from clpt.render.codegen.dispatch import Case, Function, active, function
 from clpt.render.contract.parameter_words import REAL_WORDS, SPECTRUM_WORDS
 from clpt.render.contract.texture_records import (
     END,
@@ -17,6 +18,8 @@ from clpt.render.contract.texture_records import (
 from clpt.scene.params import device_params
 from clpt.scene.textures import KINDS as TEXTURE_KINDS
 from clpt.scene.textures import MAPPINGS, Texture
+
+_LOOKED_UP = "(Scene scene, integer row, TexturePoint point, Wavelengths lambdas)"
 
 
 def dispatch_text(
@@ -33,17 +36,17 @@ def dispatch_text(
     spectrum_texture_<role>(scene, table, at, point, lambdas)  that the parameter at `at` names
     real_texture_real(scene, table, at, point, lambdas)        the same for a real
     """
-    pairs, found = set(roles), set(kinds)
+    pairs, used = set(roles), set(kinds)
     lines = [f"#define MAPPING_{name.upper()} {i}" for i, name in enumerate(MAPPINGS)]
     lines += [
         f"#define USES_MAPPINGS {int(mappings)}",
         f"#define TEXTURE_PERMUTATION {RECORDS['spectral_bitmap'].words}",
     ]
-    if found & {"spectral_bitmap", "packed_bitmap"}:
-        found.add("bitmap")  # which knows what lies where
-    present = [kind for kind in RECORDS if kind in found]
+    if used & {"spectral_bitmap", "packed_bitmap"}:
+        used.add("bitmap")  # whose file has their addressing
+    present = [kind for kind in RECORDS if kind in used]
     by_kind = {cls.kind: cls for cls in TEXTURE_KINDS}
-    parts = [*lines, '#include "interface/texture.cl"'] if found else []
+    parts = [*lines, '#include "interface/texture.cl"'] if used else []
     for kind in present:
         parts += _choice_lines(by_kind[kind]) if kind in by_kind else []
         parts += [RECORDS[kind].row_text(), f'#include "texture/{kind}.cl"']
@@ -53,17 +56,17 @@ def dispatch_text(
     }
     programs = [role for role in leaves if ("program", role) in pairs]
     for role, own in leaves.items():
-        parts += _look_up(role, own, "texture_leaf" if programs else "texture")
+        parts.append(_look_up(role, own, "texture_leaf" if programs else "texture"))
     if programs:
-        parts += operand_text(leaves, depth)
+        parts += _operand_text(leaves, depth)
     for role in leaves:
-        parts += _with_programs(role, role in programs) if programs else []
-        parts += _parameter(role)
+        parts += [_with_programs(role, role in programs)] if programs else []
+        parts.append(_parameter(role))
     return "\n".join([*parts, ""])
 
 
 def _choice_lines(cls: type[Texture]) -> list[str]:
-    """#define KIND_PARAMETER_CHOICE for the choices that a kind's row holds as numbers."""
+    """`#define KIND_PARAMETER_CHOICE` for the choices that a kind's row holds as numbers."""
     return [
         f"#define {f'{cls.kind}_{name}_{choice}'.upper()} {number}"
         for name, param in device_params(cls).items()
@@ -71,107 +74,78 @@ def _choice_lines(cls: type[Texture]) -> list[str]:
     ]
 
 
-def _look_up(role: str, kinds: list[str], name: str) -> list[str]:
-    """Texts of `name`_<role>, for textures that combine nothing."""
-    if role == "real":
-        type_, choose, zero, more = "real", "sel", "0.0f", ""
-    else:
-        type_, choose, more = "Spectrum", "spectrum_sel", ", lambdas"
-        zero = "spectrum_of(0.0f)"
+def _type(role: str) -> str:
+    return "real" if role == "real" else "Spectrum"
+
+
+def _look_up(role: str, kinds: list[str], name: str) -> str:
+    """`name`_<role>, for textures that combine nothing."""
+    zero, more = ("0.0f", "") if role == "real" else ("spectrum_of(0.0f)", ", lambdas")
     # Indices and factors are the same look-up, of other numbers.
     verb = "reflectance" if role in ("index", "factor") else role
-    lines = [
-        f"inline {type_} {name}_{role}"
-        "(Scene scene, integer row, TexturePoint point, Wavelengths lambdas)",
-        "{",
-        "    integer kind = gather_i(scene.textures, row);",
-        f"    {type_} value = {zero};",
+    row = active("row")
+    cases = [
+        Case(
+            f"kind == {KINDS.index(kind)}",
+            f"{kind}_{verb}({kind}_row(scene.textures, {row}), scene, point{more})",
+        )
+        for kind in kinds
     ]
-    for kind in kinds:
-        loaded = f"{kind}_row(scene.textures, sel_i(m, row, (integer)(0)))"
-        call = f"{kind}_{verb}({loaded}, scene, point{more})"
-        lines += [
-            "    {",
-            f"        mask m = kind == {KINDS.index(kind)};",
-            f"        if (any(m)) value = {choose}(m, {call}, value);",
-            "    }",
-        ]
-    return [*lines, "    return value;", "}"]
+    kind_of = "integer kind = gather_i(scene.textures, row);"
+    return Function(f"{_type(role)} {name}_{role}{_LOOKED_UP}", zero, cases, (kind_of,)).text()
 
 
-def _with_programs(role: str, some: bool) -> list[str]:
+def _with_programs(role: str, some: bool) -> str:
     """texture_<role> for all textures, where there are programs, and `some` in this role."""
     run = f"texture_program(scene, TEXTURE_ROLE_{role.upper()}, row, m, point, lambdas)"
-    type_, choose, made = "Spectrum", "spectrum_sel", run
-    if role == "real":
-        type_, choose, made = "real", "sel", f"{run}.x"
-    if role == "reflectance":
-        made = f"spectrum_clamped({run})"
-    lines = [
-        f"    mask m = gather_i(scene.textures, row) == {PROGRAM};",
-        f"    if (any(m)) value = {choose}(m, {made}, value);",
-    ]
-    return [
-        f"inline {type_} texture_{role}"
-        "(Scene scene, integer row, TexturePoint point, Wavelengths lambdas)",
-        "{",
-        f"    {type_} value = texture_leaf_{role}(scene, row, point, lambdas);",
-        *(lines if some else ()),
-        "    return value;",
-        "}",
-    ]
+    forms = {"real": f"{run}.x", "reflectance": f"spectrum_clamped({run})"}
+    case = Case(f"gather_i(scene.textures, row) == {PROGRAM}", forms.get(role, run))
+    leaf = f"texture_leaf_{role}(scene, row, point, lambdas)"
+    signature = f"{_type(role)} texture_{role}{_LOOKED_UP}"
+    return Function(signature, leaf, [case] if some else []).text()
 
 
-def _parameter(role: str) -> list[str]:
+def _parameter(role: str) -> str:
     """The texture that a parameter in a row names."""
-    form, type_ = ("real", "real") if role == "real" else ("spectrum", "Spectrum")
+    form = _type(role)
     source = (REAL_WORDS if role == "real" else SPECTRUM_WORDS) - 1
-    return [
-        f"inline {type_} {form}_texture_{role}"
+    return function(
+        f"{form} {form.lower()}_texture_{role}"
         "(Scene scene, global const uint *table, integer at,"
         " TexturePoint point, Wavelengths lambdas)",
-        "{",
-        f"    integer word = gather_i(table, at + {source}); /* 1 + the row, or no texture */",
-        f"    return texture_{role}(scene, max_i(word - 1, (integer)(0)), point, lambdas);",
-        "}",
-    ]
+        f"integer word = gather_i(table, at + {source}); /* 1 + the row, or no texture */",
+        f"return texture_{role}(scene, max_i(word - 1, (integer)(0)), point, lambdas);",
+    )
 
 
-def operand_text(kinds: dict[str, list[str]], depth: int) -> list[str]:
+def _operand_text(kinds: dict[str, list[str]], depth: int) -> list[str]:
     """Return the lines of `texture_operand`, and the look-up of programs after it.
 
     kinds: by role, the kinds of leaves that occur; depth: the most that a program stacks.
     """
-    lines = [
+    at = active("argument")
+    constant = f"texture_constant(scene, {at}, lambdas)"
+    cases = [Case("running & (operand == OPERAND_CONSTANT)", constant)]
+    for role in (role for role in ROLES if kinds.get(role)):
+        read = f"texture_leaf_{role}(scene, {at}, point, lambdas)"
+        # The role is known when the text is built: what it does not look up is dropped.
+        tests = [f"(operand == OPERAND_OWN & mask_of(role == TEXTURE_ROLE_{role.upper()}))"]
+        if role == "real":
+            read = f"spectrum_of({read})"
+            tests.append("(operand == OPERAND_REAL & mask_of(role != TEXTURE_ROLE_REAL))")
+        if role == "reflectance":
+            tests.append("(operand == OPERAND_FACTOR & mask_of(role == TEXTURE_ROLE_EMISSION))")
+        cases.append(Case(f"running & ({' | '.join(tests)})", read))
+    signature = (
+        "Spectrum texture_operand(Scene scene, int role, integer operand, integer argument,"
+        " mask running, TexturePoint point, Wavelengths lambdas)"
+    )
+    return [
         f"#define TEXTURE_DEPTH {depth}",
         *(f"#define OPERAND_{name.upper()} {i}" for i, name in enumerate(OPERANDS)),
         *(f"#define OPERATION_{name.upper()} {code}" for name, code in OPERATIONS.items()),
         f"#define PROGRAM_END {END}",
         *(f"#define TEXTURE_ROLE_{role.upper()} {i}" for i, role in enumerate(ROLES)),
-        "inline Spectrum texture_operand(Scene scene, int role, integer operand, integer argument,",
-        "                                mask active, TexturePoint point, Wavelengths lambdas)",
-        "{",
-        "    Spectrum v = spectrum_of(as_real(argument));",
-        *_case("operand == OPERAND_CONSTANT", "texture_constant(scene, at, lambdas)"),
+        Function(signature, "spectrum_of(as_real(argument))", cases).text(),
+        '#include "texture/program.cl"',
     ]
-    for role in (role for role in ROLES if kinds.get(role)):
-        read = f"texture_leaf_{role}(scene, at, point, lambdas)"
-        read = f"spectrum_of({read})" if role == "real" else read
-        # The role is known when the text is built: what it does not look up is dropped.
-        tests = [f"(operand == OPERAND_OWN & mask_of(role == TEXTURE_ROLE_{role.upper()}))"]
-        if role == "real":
-            tests.append("(operand == OPERAND_REAL & mask_of(role != TEXTURE_ROLE_REAL))")
-        if role == "reflectance":
-            tests.append("(operand == OPERAND_FACTOR & mask_of(role == TEXTURE_ROLE_EMISSION))")
-        lines += _case(" | ".join(tests), read)
-    return [*lines, "    return v;", "}", '#include "texture/program.cl"']
-
-
-def _case(test: str, read: str) -> Iterable[str]:
-    return (
-        "    {",
-        f"        mask m = active & ({test});",
-        "        integer at = sel_i(m, argument, (integer)(0));",
-        f"        if (any(m)) v = spectrum_sel(m, {read}, v);",
-        "    }",
-    )

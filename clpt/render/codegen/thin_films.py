@@ -2,67 +2,30 @@
 
 from __future__ import annotations
 
-from clpt.render.codegen import parameters
-from clpt.render.contract import parameter_words
-from clpt.render.contract.features import Sources
-from clpt.render.contract.parameter_words import FILM_COSINES
+from collections.abc import Mapping
+
+from clpt.render.codegen.parameters import load_text, struct_text, value_text
+from clpt.render.contract.parameter_words import FILM_COSINES, row_words
 from clpt.scene.materials import Layer
 from clpt.scene.params import Kind, params
 
+Sources = Mapping[str, frozenset[str]]
+_WAVES = '#include "optics/layers_waves.cl"\n#include "optics/boundary_film.cl"\n'
+_TABLE = '#include "optics/layers_table.cl"\n#include "optics/boundary_table.cl"\n'
 
-def boundary_text(cls: type[Kind], mode: str, sources: Sources) -> str:
-    """Return how a kind's boundary treats light: bare, with layers, or by the table of colours."""
-    found = [sources.get(cls.kind, {}).get(n) or () for n in _layers_params(cls)]
-    if not found:
+
+def boundary_text(cls: type[Kind], mode: str, sources: Sources, layer: Sources) -> str:
+    """Return how a kind's boundary treats light: bare, with layers, or by the table of colours.
+
+    sources: of the kind's parameters; layer: of those of the layers in the scene.
+    """
+    coated = [name for name, param in params(cls).items() if param.role == "layers"]
+    if not coated:
         return ""
-    if not any("layers" in names for names in found):
+    if not any("layers" in sources.get(name, ()) for name in coated):
         return '#include "optics/boundary_bare.cl"\n'
-    layer = sources.get("layer", {})
-    return _waves_text(layer) if mode == "spectral" else _table_text(layer)
-
-
-def _layers_params(cls: type[Kind]) -> list[str]:
-    return [name for name, param in params(cls).items() if param.role == "layers"]
-
-
-def _waves_text(sources: dict[str, frozenset[str]]) -> str:
-    """The layers of a material, which are read one by one."""
-    return f"""{parameters.struct_text(Layer)}{parameters.load_text(Layer, sources, "materials")}
-typedef struct {{
-    Scene scene;
-    integer first, count; /* rows in `materials` */
-    TexturePoint point;
-    Wavelengths lambdas;
-}} Layers;
-inline Layers layers_load(Scene scene, integer at, TexturePoint point, Wavelengths lambdas)
-{{
-    integer first = gather_i(scene.materials, at), count = gather_i(scene.materials, at + 1);
-    Layers l = {{scene, first, count, point, lambdas}};
-    return l;
-}}
-inline Layer layer_at(Layers l, integer i)
-{{
-    return layer_load(l.scene, l.first + i * {parameter_words.row_words(Layer)}, l.point, l.lambdas);
-}}
-#include "optics/boundary_film.cl"
-"""
-
-
-def _table_text(sources: dict[str, frozenset[str]]) -> str:
-    """Where in the table of colours a material's layers stand."""
-    profile = parameters.value_text("film_profile", params(Layer)["profile"], sources["profile"])
-    return f"""{profile}#define FILM_COSINES {FILM_COSINES}
-typedef struct {{
-    Scene scene;
-    integer count, table, rows; /* layers; first number in `spectra`; how many profiles it has */
-    real profile;
-}} Layers;
-inline Layers layers_load(Scene scene, integer at, TexturePoint point, Wavelengths lambdas)
-{{
-    integer row = gather_i(scene.materials, at);
-    Layers l = {{scene, gather_i(scene.materials, at + 1), gather_i(scene.materials, row),
-                gather_i(scene.materials, row + 1), film_profile(scene, row + 2, point, lambdas)}};
-    return l;
-}}
-#include "optics/boundary_table.cl"
-"""
+    if mode == "rgb":
+        profile = value_text("film_profile", params(Layer)["profile"], layer["profile"])
+        return f"{profile}#define FILM_COSINES {FILM_COSINES}\n{_TABLE}"
+    loader = load_text(Layer, layer, "materials")
+    return f"{struct_text(Layer)}{loader}#define LAYER_WORDS {row_words(Layer)}\n{_WAVES}"

@@ -16,6 +16,7 @@ from textwrap import dedent
 from clpt import device
 from clpt.errors import SceneError
 from clpt.records import INSTANCE, LIGHT, SETTINGS, SHAPE, SLABS
+from clpt.render.contract import light_records, shape_records
 from clpt.scene import KINDS
 from clpt.scene.materials import LEAVES, Material
 
@@ -26,25 +27,24 @@ VERBS = (*CONTRACT, "pdfs", "load", "colour")
 INNER = ("perturbation", "emission", "factor", "layer", "mixture")
 
 
-def ordered(found: dict[type[Material], str]) -> tuple[type[Material], ...]:
+def ordered(kinds: dict[type[Material], str]) -> tuple[type[Material], ...]:
     """Return the leaf kinds of a scene in their order: clpt's as they are listed, then the others.
 
-    found: the kinds, and where each was met. Raises SceneError for a kind that kernels cannot be
-    made of.
+    kinds: each with where the scene has it. Raises SceneError for a kind without valid kernels.
     """
-    outside = sorted(found.keys() - set(LEAVES), key=lambda cls: cls.kind)
+    outside = sorted(kinds.keys() - set(LEAVES), key=lambda cls: cls.kind)
     for cls in outside:
-        check(cls, found[cls])
+        check(cls, kinds[cls])
     for one, other in pairwise(outside):
         if one.kind == other.kind:
             raise SceneError(
                 f"two classes are called {one.__name__!r}; rename one, or, if its definition was "
                 "run twice, make the materials anew",
-                where=found[other],
+                where=kinds[other],
             )
-    if len(found) > MOST:
-        raise SceneError(f"a scene can have {MOST} kinds of materials, not {len(found)}")
-    return (*(cls for cls in LEAVES if cls in found), *outside)
+    if len(kinds) > MOST:
+        raise SceneError(f"a scene can have {MOST} kinds of materials, not {len(kinds)}")
+    return (*(cls for cls in LEAVES if cls in kinds), *outside)
 
 
 def check(cls: type[Material], where: str | None = None) -> None:
@@ -111,7 +111,8 @@ def _identifiers() -> frozenset[str]:
     """Types and functions of the kernels."""
     files = device.kernels_folder().rglob("*.cl")
     kernels = "\n".join(path.read_text(encoding="utf-8") for path in files)
-    records = (SETTINGS, *SLABS, SHAPE, INSTANCE, LIGHT)
+    records = [SETTINGS, *SLABS, SHAPE, INSTANCE, LIGHT]
+    records += [*shape_records.VALUES, *light_records.VALUES]
     return frozenset(
         [
             *(record.name for record in records),

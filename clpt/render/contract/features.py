@@ -2,11 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass
 
 from clpt.scene.materials import Material
+from clpt.scene.params import device_params
 
-Sources = dict[str, dict[str, frozenset[str]]]
+Sources = frozenset[tuple[str, str, str]]
+
+
+def disperses(leaves: Iterable[type[Material]], sources: Sources) -> bool:
+    """Whether the direction of light depends on its wavelength at some material."""
+    indices = (
+        (cls.kind, name, "table")
+        for cls in leaves
+        if cls.refracts
+        for name, param in device_params(cls).items()
+        if param.role == "index"
+    )
+    return any(cls.disperses for cls in leaves) or not sources.isdisjoint(indices)
 
 
 @dataclass(frozen=True)
@@ -14,9 +28,10 @@ class Features:
     """What occurs in a scene.
 
     leaves: classes of leaf materials in their order, a material word's upper bits count in it;
-    lights: device kinds of lights (see clpt.render.lowering.lights.lights); textures, texture_roles: kinds and
-    (kind, role) pairs; analytic: kinds of shapes that rays meet as they are; sources: see
-    clpt.render.lowering.tables.
+    lights: device kinds of lights (see clpt.render.contract.light_records); textures,
+    texture_roles: kinds and (kind, role) pairs; analytic: kinds of shapes that rays meet as they
+    are; sources: (kind, parameter, source) of all that is loaded, see
+    clpt.render.codegen.parameters.
     """
 
     mode: str
@@ -38,8 +53,8 @@ class Features:
     tangents: bool = False
     attributes: bool = False  # some texture reads what meshes say per vertex or face
     mixtures: int = 0  # how deep masks and blends nest
-    normal_maps_used: bool = False  # some material has a normal or a bump map
-    is_null: bool = False  # some surface lets light through as if it were not there
+    normal_mapped: bool = False  # some material has a normal or a bump map
+    null_surfaces: bool = False  # some surface lets light through as if it were not there
     infinite: bool = False
     light_paths: bool = False  # paths start at lights
     visible_lights: bool = False  # some light is no delta light: a camera may see it
@@ -54,12 +69,20 @@ class Features:
     tabulated_density: bool = False  # of wavelengths
     spectra_size: int = 0
     spectra_step: float = 1.0
-    sources: Sources = field(default_factory=dict)
+    sources: Sources = frozenset()
 
     @property
     def materials(self) -> tuple[str, ...]:
         """Names of the leaf materials, in their order."""
         return tuple(cls.kind for cls in self.leaves)
+
+    def sources_of(self, kind: str) -> dict[str, frozenset[str]]:
+        """Return the sources of each parameter of a kind that has some."""
+        found: dict[str, frozenset[str]] = {}
+        for owner, name, source in self.sources:
+            if owner == kind:
+                found[name] = found.get(name, frozenset()) | {source}
+        return found
 
     @property
     def costly(self) -> bool:

@@ -1,9 +1,12 @@
-"""The records of lights: what lowering writes into `lights` and `light_params`, and kernels read there."""
+"""The records of lights: their rows in `lights` and `light_params`, and what they give."""
 
 from __future__ import annotations
 
 from clpt.layout import Record
 from clpt.render.contract import shape_records
+from clpt.scene.lights import KINDS as LIGHTS
+from clpt.scene.lights import Light
+from clpt.scene.params import Param, params
 
 _IMAGE = {
     "x": ("vec3", "the light's own axes in the world, unit length"),
@@ -70,18 +73,35 @@ PROJECTED_RECORDS: dict[str, Record] = {
         factor=_FACTOR,
     ),
 }
-INFINITE = ("constant", *IMAGE_RECORDS)  # a ray that leaves the scene meets these
-PLACED = ("point", "spot", *PROJECTED_RECORDS)  # all other lamps are infinitely far away
 
 
-RECORDS: dict[str, Record] = {
-    "point": Record(
-        "Point",
-        "A point light.",
-        position=("vec3", "[m]"),
-        falloff=("real", "1: irradiance falls with the square of the distance; 0: it does not"),
-        radiance=_RADIANCE,
-    ),
+def declared_record(cls: type[Light]) -> Record:
+    """Return the record of a light whose members are its parameters, as they are declared.
+
+    An emission is the first word of its five in `light_params`; a number in degrees comes in
+    radians; a direction has unit length; `to_world` becomes position and unit axes.
+    """
+    members: dict[str, tuple[str, str]] = {}
+    for name, param in params(cls).items():
+        doc = f"{param.doc} [{param.unit}]" if param.unit else param.doc
+        members |= {member: (type_, doc) for member, type_ in _members(name, param).items()}
+    summary = (cls.__doc__ or cls.__name__).split("\n")[0]
+    return Record(cls.__name__, summary, **members)
+
+
+def _members(name: str, param: Param) -> dict[str, str]:
+    """The members of a parameter by name, with their types."""
+    if param.role == "host":
+        forms = {"vector": {name: "vec3"}, "direction": {name: "vec3"}, "matrix4": PLACEMENT}
+        if param.form not in forms:
+            raise TypeError(f"a light cannot declare {name!r} as a host parameter of this form")
+        return forms[param.form]
+    return {name: "real" if param.role == "real" else "integer"}
+
+
+PLACEMENT = {"position": "vec3", "x": "vec3", "y": "vec3", "z": "vec3"}
+# Lights whose rows the lowering computes; those of all other kinds follow from their declaration.
+COMPUTED: dict[str, Record] = {
     "spot": Record(
         "Spot",
         "A spot light.",
@@ -93,16 +113,17 @@ RECORDS: dict[str, Record] = {
         radiance=_RADIANCE,
     ),
     **PROJECTED_RECORDS,
-    "directional": Record(
-        "Directional",
-        "Parallel light.",
-        direction=("vec3", "unit vector in which it travels"),
-        radiance=_RADIANCE,
-    ),
-    "constant": Record("Constant", "Even radiance from everywhere.", radiance=_RADIANCE),
     **IMAGE_RECORDS,
 }
-FRONT, ALONG, BOTH = range(3)  # LightRow.way, see kernels/light/area.cl
+DECLARED = {cls.kind: cls for cls in LIGHTS if cls.reach != "surface" and cls.kind not in COMPUTED}
+RECORDS: dict[str, Record] = {
+    **{kind: declared_record(cls) for kind, cls in DECLARED.items()},
+    **COMPUTED,
+}
+# A ray that leaves the scene meets INFINITE lights; PLACED ones have a position.
+INFINITE = (*(cls.kind for cls in LIGHTS if cls.reach == "infinite"), "spectral_envmap")
+PLACED = (*(cls.kind for cls in LIGHTS if cls.reach == "placed"), "image_spot")
+FRONT, ALONG, BOTH = range(3)  # LightRow.emission_mode, see kernels/light/area.cl
 
 BASES = {"spectral_envmap": "envmap", "image_spot": "spot"}  # whose functions a kind uses
 
@@ -117,3 +138,31 @@ NODE = Record(
     power=("real", "of all its lights"),
     child=("integer", "the first of its children; below 0: -1 - the row in `lights`"),
 )
+
+# What the functions of lights return, see kernels/interface/light.cl and emission.cl.
+LIGHT_SAMPLE = Record(
+    "LightSample",
+    "A direction to a light, chosen as seen from some point p.",
+    wi=("vec3", "unit length, from p", "v3(0.0f, 0.0f, 1.0f)"),
+    t=("real", "distance [m]; FAR for lights at infinity", "FAR"),
+    radiance=(
+        "spectrum",
+        "what comes along it; for a delta light, irradiance on a shading surface",
+    ),
+    pdf=("real", "[1/sr]; below 0: a delta light, to be taken as it is; 0: nothing comes"),
+)
+LIGHT_RAY = Record(
+    "LightRay",
+    "A ray that leaves a light.",
+    o=("vec3", "where it starts [m]"),
+    d=("vec3", "in which direction, unit length", "v3(0.0f, 0.0f, 1.0f)"),
+    n=("vec3", "unit normal of the surface there; d off all surfaces", "v3(0.0f, 0.0f, 1.0f)"),
+    power=("spectrum", "radiance |cos| over the pdf of o and d [W/nm]"),
+    seen=(
+        "spectrum",
+        "radiance over the pdf of o, or from infinity of d: what a camera may gather; "
+        "0: a delta light",
+    ),
+    away=("integer", "a mask: it comes from infinity"),
+)
+VALUES = (LIGHT_SAMPLE, LIGHT_RAY)

@@ -11,26 +11,16 @@ from clpt.scene.params import (
     interior_params,
 )
 
-# See kernels/path/shading_frame_mapped.cl.
-NORMAL_MAP_WORDS = 11
-
-
-FILM_COSINES = 128  # of the table, from 0 to 1
-
-
+NORMAL_MAP_WORDS = 11  # before a material's row, see kernels/path/shading_frame_mapped.cl
+FILM_COSINES = 128  # of the table of a film's colours, from 0 to 1
 RERADIATION_STEP = 5  # [nm] between the nodes of a matrix
-
-
 SPECTRAL = (*SPECTRUM_ROLES, "reradiation")  # roles whose values are spectra in the kernels
 
 # How many words a parameter takes in a row of `materials`, `textures` or `light_params`.
 SPECTRUM_WORDS = 5  # x y z w and where the value comes from: 0 here, > 0 texture, < 0 table
-
 REAL_WORDS = 2  # the value, and 0 or 1 + the texture
-
 ORDERS_WORDS = 2 * ORDERS + 1
-
-LAYERS_WORDS = 2  # where the layers lie in the table, see clpt.render.lowering.materials.thin_films, and how many
+LAYERS_WORDS = 2  # where the layers lie, see clpt.render.lowering.materials.thin_films; how many
 
 
 def words(param: Param) -> int:

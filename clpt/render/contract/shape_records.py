@@ -47,3 +47,23 @@ RECORDS: dict[str, Record] = {
         y=("vec3", "unit axis where it is 90 degrees"),
     ),
 }
+
+# What the functions of shapes return, see kernels/interface/shape.cl and emission.cl.
+SHAPE_SAMPLE = Record(
+    "ShapeSample",
+    "A point of a shape, chosen as seen from some point p.",
+    wi=("vec3", "unit length, from p to the point", "v3(0.0f, 0.0f, 1.0f)"),
+    t=("real", "distance [m]", "FAR"),
+    n=("vec3", "unit normal there, toward the front", "v3(0.0f, 0.0f, 1.0f)"),
+    uv=("vec2", "there"),
+    pdf=("real", "[1/sr]; 0: nothing"),
+)
+SURFACE_POINT = Record(
+    "SurfacePoint",
+    "A point of a shape, chosen evenly over its area.",
+    p=("vec3", "[m]"),
+    n=("vec3", "unit normal, toward the front", "v3(0.0f, 0.0f, 1.0f)"),
+    uv=("vec2", "there"),
+    area=("real", "of the shape [m^2]"),
+)
+VALUES = (SHAPE_SAMPLE, SURFACE_POINT)

@@ -1,13 +1,13 @@
-"""Shapes that move where they are: tables and trees on the device follow them, nothing is rebuilt.
+"""Shapes that move on the device: kernels write their tables and refit the trees over them.
 
-What a shape of triangles has in the joined tables is written anew by kernels, from arrays that may
-lie on the device, then the tree is fitted to it.
+The vertices, normals, rows and boxes of shapes that move are written by kernels, from arrays that
+may be on the device. Nothing is lowered or built, and the host waits for nothing.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,39 +17,41 @@ from numpy.typing import NDArray
 
 from clpt import bvh, transforms
 from clpt.records import SHAPE
-from clpt.render.editing.moving_instances import Boxes, MovingInstances, Place
+from clpt.render.editing.cannot_move import CannotMove
+from clpt.render.editing.moving_instances import Boxes, Location, MovingInstances
 from clpt.render.editing.moving_spheres import MovingSpheres
+from clpt.render.editing.scene_edit import Replacements
 from clpt.render.lowering.device_arrays import on_device
-from clpt.render.lowering.geometry import shapes
+from clpt.render.lowering.geometry import analytic, shapes, triangles
 from clpt.render.lowering.geometry.tessellate import keeps_its_kind
-from clpt.render.wavefront.wavefront import Wavefront
+from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene import Scene
 from clpt.scene.shapes import Instance, Mesh, Shape, Spheres
 
 _ROOT = "motion/place_vertices.cl"
 _NORMALS = 1  # SHAPE_NORMALS of kernels/path/surface_flags.cl
-_MOVES = {"to_world", "vertices", "normals", "centers"}  # what may change in place
-ANEW = 16  # moves of spheres, which go each its own way, from one tree to the next
+_MOVABLE = {"to_world", "vertices", "normals", "centers"}  # fields that may change
+REBUILD_EVERY = 16  # moves of analytic shapes, each of which goes its own way
 
 Action = Callable[[], None]
 
 
 @dataclass(eq=False)
-class _Region:
-    """What one shape has in the tables, a run of each.
+class _Ranges:
+    """The ranges of the tables that one shape has.
 
-    row: its row of `shapes`; vertices, faces: first and number; flips: whether its faces are turned
-    round; whole: whether none was left out; own: its transform within the instance that places it.
-    Buffers are made when a move
-    first asks for them: matrix: where it is placed; local: vertices and normals before that, and
-    what they were made of; around: the triangles around each vertex, as place.cl has them.
+    row: its row of `shapes`; vertices, faces: first and number; mirrored: whether its transform
+    flips its faces; whole: whether no triangle was left out; own: its transform within its group.
+    The first move that needs a buffer makes it. matrix: its transform; local: its vertices
+    and normals before the transform, and the array of vertices that they are of; around: the
+    triangles around each vertex, for `smooth_normals` of place_vertices.cl.
     """
 
     row: NDArray[Any]
     shape: Any
     vertices: tuple[int, int]
     faces: tuple[int, int]
-    flips: bool = False
+    mirrored: bool = False
     whole: bool = True
     own: transforms.Matrix = field(default_factory=lambda: transforms.IDENTITY)
     matrix: cl.Buffer | None = None
@@ -58,287 +60,304 @@ class _Region:
 
 
 class Moving:
-    """What of a scene on the device can move, and how.
+    """The shapes of a scene on a device, and the kernels that move them.
 
-    scene: as it was lowered. Of each shape that moved without new vertices a copy of its own
-    vertices and normals stays on the device; of each smooth one whose vertices moved, 4 bytes a
-    vertex and 12 a triangle.
+    target: the scene on the device; scene: as it was lowered. A copy of the vertices and normals of
+    each shape that moved without new vertices stays on the device, and for each smooth mesh whose
+    vertices moved 4 bytes a vertex and 12 a triangle.
     """
 
-    def __init__(self, front: Wavefront, scene: Scene):
-        self.front, self.lowered = front, front.lowered
-        self.building = bvh.Building(front.device, stream=front.stream)
-        self.regions: dict[int, list[_Region]] = {}  # by the number of the scene's shape
-        self._boxes: dict[str, tuple[NDArray[np.float32], cl.Buffer]] = {}
-        self._moved: set[str] = set()
-        self._moves = 0  # of spheres
-        self._spheres = MovingSpheres(front, self.building)
-        self._instances = MovingInstances(front, self.building)
-        instances = self.lowered.instances
-        world = len(self.lowered.faces) - sum(instances.triangles)
-        for region in self._all_regions():
-            number = int(region.row["number"])
-            if region.row["kind"] == 0 and region.faces[0] >= world:
+    def __init__(self, target: DeviceScene, scene: Scene):
+        self.target = target
+        self.building = bvh.Building(target.device, stream=target.stream)
+        self.ranges: dict[int, list[_Ranges]] = {}  # by the number of the scene's shape
+        self._boxes: dict[str, Boxes] = {}
+        self._moved: set[str] = set()  # trees whose contents have moved
+        self._shape_moves = 0
+        self._spheres = MovingSpheres(target, self.building)
+        self._instances = MovingInstances(target, self.building)
+        lowered = target.lowered
+        world = len(lowered.faces) - sum(lowered.instances.triangles)
+        for ranges in self._all_ranges():
+            number = int(ranges.row["number"])
+            if ranges.row["kind"] == 0 and ranges.faces[0] >= world:
                 continue  # of a group: its instances move, not it
-            placed = scene.shapes[number]
-            if isinstance(placed, Instance):
-                outer = shapes.placement(placed)
-                region.own = transforms.inverse(outer) @ shapes.placement(region.shape)
-            self.regions.setdefault(number, []).append(region)
+            shape = scene.shapes[number]
+            if isinstance(shape, Instance):
+                outer = shapes.placement(shape)
+                ranges.own = transforms.inverse(outer) @ shapes.placement(ranges.shape)
+            self.ranges.setdefault(number, []).append(ranges)
 
-    def move(self, scene: Scene, swaps: Mapping[int, tuple[Any, Any]]) -> bool:
-        """Enqueue that shapes are where others that take their place are, and what follows.
+    def move(self, scene: Scene, replaced: Replacements) -> str | None:
+        """Enqueue that shapes have other transforms or vertices, and that trees follow.
 
-        scene: as it is; swaps: see clpt.render.editing.scene_edit. Returns False, with nothing done, where the
-        tables must be made anew: what has more than another place or other vertices, what emits, a
-        group's shapes, another number of vertices, other vertices of a mesh that has triangles
-        without an area, a shape that is mirrored, all where light is traced from lights.
+        scene: as it is; replaced: the shapes that move, and what they become. Returns None, or,
+        with nothing done, why the scene must be lowered again.
+
+        Triangles, instances, spheres, disks and cylinders can move. A shape must keep its number of
+        vertices, its orientation and its kind, and must not emit light. A mesh of which a triangle
+        without area was left out keeps its vertices. Where light is traced from lights nothing
+        moves.
 
         Raises SceneError for a transform that is singular, and arrays of the wrong shape or type.
         """
-        if self.lowered.features.light_paths:
-            return False
+        try:
+            actions = self._plan(scene, replaced)
+        except CannotMove as reason:
+            return str(reason)
+        for action in actions:
+            action()
+        self._fit_trees()
+        return None
+
+    def _plan(self, scene: Scene, replaced: Replacements) -> list[Action]:
+        """What enqueues a move. Raises CannotMove."""
+        if self.target.lowered.features.light_paths:
+            raise CannotMove("light is traced from lights, whose choice follows from the shapes")
         numbers = {id(shape): number for number, shape in enumerate(scene.shapes)}
         actions: list[Action] = []
         instances: list[tuple[int, Shape]] = []
-        places: list[Place | None] = []
-        for old, new in swaps.values():
+        matrices: list[Location | None] = []
+        for old, new in replaced.values():
             number = numbers.get(id(old))
-            if number is None or not _moves_only(old, new):
-                return False
-            place = self._floats(new.to_world, (4, 4)) if on_device(new.to_world) else None
-            if place is None and on_device(new.to_world):
-                return False
-            for region in self.regions.get(number, ()):
-                made = self._plan(region, old, new, place)
-                if made is None:
-                    return False
-                actions += made
-            rows = self._instances.rows.get(number, ())
-            instances += [(k, new) for k in rows]
-            places += [place for _ in rows]
+            if number is None:
+                raise CannotMove(f"{_name(old)} is a group, or of one")
+            _check_fields(old, new)
+            matrix = None
+            if on_device(new.to_world):
+                matrix = self._locate(new.to_world, (4, 4), f"the transform of {_name(new)}")
+            for ranges in self.ranges.get(number, ()):
+                actions += self._plan_shape(ranges, old, new, matrix)
+            own = self._instances.numbers.get(number, ())
+            instances += [(k, new) for k in own]
+            matrices += [matrix for _ in own]
         if instances:
-            act = self._instances.plan(instances, places)
-            given = self.lowered.instances.boxes
-            actions.append(lambda: act(self._boxes_of("instance", given)))
-        for action in actions:
-            action()
-        self._fit()
-        return True
+            act = self._instances.plan(instances, matrices)
+            boxes = self.target.lowered.instances.boxes
+            actions.append(lambda: act(self._boxes_of("instance", boxes)))
+        return actions
 
-    def _all_regions(self) -> list[_Region]:
-        """What every shape has in the tables, in the order of their rows."""
-        lowered = self.lowered
-        made, ends = [], (len(lowered.vertices), len(lowered.faces))
+    def _all_ranges(self) -> list[_Ranges]:
+        """The ranges of every shape, in the order of their rows."""
+        lowered = self.target.lowered
+        backwards, ends = [], (len(lowered.vertices), len(lowered.faces))
         for row, shape, vertex, face in reversed(lowered.owners):
             if row["kind"]:
-                made.append(_Region(row, shape, (0, 0), (0, 0)))
+                backwards.append(_Ranges(row, shape, (0, 0), (0, 0)))
                 continue
-            runs = (vertex, ends[0] - vertex), (face, ends[1] - face)
-            flips = transforms.flips_handedness(shapes.placement(shape))
-            whole = not isinstance(shape, Mesh) or len(shape.faces) == runs[1][1]
-            made.append(_Region(row, shape, *runs, flips, whole))
+            vertices, faces = (vertex, ends[0] - vertex), (face, ends[1] - face)
+            mirrored = transforms.flips_handedness(shapes.placement(shape))
+            whole = not isinstance(shape, Mesh) or len(shape.faces) == faces[1]
+            backwards.append(_Ranges(row, shape, vertices, faces, mirrored, whole))
             ends = vertex, face
-        return made[::-1]
+        return backwards[::-1]
 
-    def _plan(
-        self, region: _Region, old: Any, new: Any, placed: Place | None
-    ) -> list[Action] | None:
-        """What moves a region with its shape; None if nothing can."""
-        if region.shape.emission is not None:
-            return None
-        if region.row["kind"]:
-            return None if placed else self._analytic(region, new)
-        count = region.vertices[1]
-        for values in (getattr(new, name, None) for name in ("vertices", "normals")):
-            if on_device(values) and self._floats(values, (count, 3)) is None:
-                return None
+    def _plan_shape(
+        self, ranges: _Ranges, old: Any, new: Any, device_matrix: Location | None
+    ) -> list[Action]:
+        """What moves a shape. Raises CannotMove."""
+        name = _name(new)
+        if ranges.shape.emission is not None:
+            raise CannotMove(f"{name} emits light: lights follow from it")
+        if ranges.row["kind"]:
+            if device_matrix:
+                raise CannotMove(f"{name} is no triangles, and its transform is on the device")
+            return self._plan_analytic(ranges, new)
+        count = ranges.vertices[1]
+        for field_name in ("vertices", "normals"):
+            values = getattr(new, field_name, None)
+            if on_device(values):
+                self._locate(values, (count, 3), f"the {field_name} of {name}")
         matrix, points = transforms.IDENTITY, None
-        if placed is None:
-            matrix = shapes.placement(new) @ region.own
-            if transforms.flips_handedness(matrix) != region.flips:
-                return None
+        if device_matrix is None:
+            matrix = shapes.placement(new) @ ranges.own
+            if transforms.flips_handedness(matrix) != ranges.mirrored:
+                raise CannotMove(f"the transform of {name} mirrors it")
         elif isinstance(new, Instance):
-            return None
+            raise CannotMove(f"{name} is copied, not shared, and its transform is on the device")
         if getattr(new, "vertices", None) is not getattr(old, "vertices", None):
-            if not region.whole:
-                return None
+            if not ranges.whole:
+                raise CannotMove(f"{name} has triangles without an area")
             if not on_device(new.vertices):
-                points = shapes.points(new)
+                points = triangles.points(new)
                 if len(points) != count:
-                    return None
-        return [lambda: self._place(region, new, points, matrix, placed)]
+                    raise CannotMove(f"{name} has {len(points)} vertices, and had {count}")
+        return [lambda: self._move_vertices(ranges, new, points, matrix, device_matrix)]
 
-    def _analytic(self, region: _Region, new: Any) -> list[Action] | None:
-        """What moves what is no triangles; None where that is another shape then."""
-        shape = region.shape if isinstance(new, Instance) else new
-        matrix = shapes.placement(new) @ region.own
-        placed = dataclasses.replace(shape, to_world=matrix)
-        if not keeps_its_kind(placed):
-            return None
-        many = isinstance(shape, Spheres)
-        place = self._spheres.plan(region.row, shape, matrix) if many else None
-        if many and place is None:
-            return None
-        single = None if many else self._single(region, placed)
+    def _plan_analytic(self, ranges: _Ranges, new: Any) -> list[Action]:
+        """What moves an analytic shape. Raises CannotMove where that is another kind then."""
+        shape = ranges.shape if isinstance(new, Instance) else new
+        matrix = shapes.placement(new) @ ranges.own
+        in_world = dataclasses.replace(shape, to_world=matrix)
+        if not keeps_its_kind(in_world):
+            raise CannotMove(f"the transform of {_name(new)} makes triangles of it")
+        if isinstance(shape, Spheres):
+            act = self._spheres.plan(ranges.row, shape, matrix)
+        else:
+            act = self._plan_single(ranges, in_world)
 
         def move() -> None:
-            region.shape = shape
-            boxes = self._boxes_of("shape", self.lowered.boxes)
-            if place is not None:
-                place(boxes[1])
-            elif single is not None:
-                single(boxes)
-            self.front.moved |= {"geometry", "spheres"}
+            ranges.shape = shape
+            act(self._boxes_of("shape", self.target.lowered.boxes))
+            self.target.moved_tables |= {"geometry", "spheres"}
 
         return [move]
 
-    def _single(self, region: _Region, shape: Shape) -> Callable[[Boxes], None]:
-        """What enqueues that a sphere, disk or cylinder has other parameters and another box."""
-        words, box = shapes.row(shape), np.stack(shapes.bounds(shape))
-        rows = self.lowered.tables["shapes"].view(SHAPE.dtype)
-        first = int(self.lowered.settings["first_analytic"])
-        number = int(np.flatnonzero(rows["params"][first:] == region.row["params"])[0])
+    def _plan_single(self, ranges: _Ranges, shape: Shape) -> Callable[[Boxes], None]:
+        """What gives a sphere, disk or cylinder other parameters and another box."""
+        lowered, first_word = self.target.lowered, int(ranges.row["params"])
+        words, box = analytic.row(shape), np.stack(analytic.bounds(shape))
+        rows = lowered.tables["shapes"].view(SHAPE.dtype)
+        first = int(lowered.settings["first_analytic"])
+        number = int(np.flatnonzero(rows["params"][first:] == first_word)[0])
 
         def act(boxes: Boxes) -> None:
-            stream = self.front.stream
-            stream.write(self.front.named["geometry"], words, 4 * int(region.row["params"]))
+            stream = self.target.stream
+            stream.write(self.target.tables["geometry"], words, 4 * first_word)
             boxes[0][number] = box
             stream.write(boxes[1], box, box.nbytes * number)
 
         return act
 
-    def _boxes_of(self, name: str, given: NDArray[np.float32]) -> Boxes:
-        """The boxes under a tree, which will be fitted to what they are then."""
-        if name not in self._boxes:
-            host = given.copy()
-            self._boxes[name] = host, self.front.buffers.upload("boxes of what moves", host)
-        self._moved.add(name)
-        return self._boxes[name]
+    def _boxes_of(self, tree: str, lowered: NDArray[np.float32]) -> Boxes:
+        """The boxes that a tree is over, which will be fitted to them."""
+        if tree not in self._boxes:
+            host = lowered.copy()
+            self._boxes[tree] = host, self.target.buffers.upload("boxes of what moves", host)
+        self._moved.add(tree)
+        return self._boxes[tree]
 
-    def _place(
+    def _move_vertices(
         self,
-        region: _Region,
+        ranges: _Ranges,
         new: Shape,
         points: shapes.Points | None,
         matrix: transforms.Matrix,
-        placed: Place | None,
+        device_matrix: Location | None,
     ) -> None:
-        """Enqueue what a region's vertices and normals are after a move.
+        """Enqueue the vertices and normals of a shape after a move.
 
-        points: new vertices of the host; placed: where the matrix is, of one on the device.
+        points: new vertices that are on the host; matrix: the transform to the world, unless it is
+        on the device.
         """
-        front = self.front
+        target = self.target
         if not isinstance(new, Instance):
-            region.shape = new
-        table, (first, count) = front.named["vertices"], region.vertices
-        still = placed is None and np.array_equal(matrix, transforms.IDENTITY)
-        if points is not None and placed is None:
+            ranges.shape = new
+        table, (first, count) = target.tables["vertices"], ranges.vertices
+        still = device_matrix is None and np.array_equal(matrix, transforms.IDENTITY)
+        if points is not None and device_matrix is None:
             if not still:
                 points = transforms.transform_points(matrix, points).astype(np.float32)
-            front.stream.write(table, points, 12 * first)
+            target.stream.write(table, points, 12 * first)
         elif still:
-            source, begin = self._local(region, "vertices")
-            places = {"src_offset": 4 * begin, "dst_offset": 12 * first, "byte_count": 12 * count}
-            front.stream.copy(table, source, **places)
+            source, begin = self._local(ranges, "vertices")
+            offsets = {"src_offset": 4 * begin, "dst_offset": 12 * first, "byte_count": 12 * count}
+            target.stream.copy(table, source, **offsets)
         else:
-            front.stream.after(getattr(new.to_world, "events", ()) if placed else ())
-            placed = placed or self._matrix(region, matrix)
-            self._run("place_vertices", region, self._local(region, "vertices"), placed)
-        if region.row["flags"] & _NORMALS:
-            if shapes.smooth(region.shape):
-                self._smooth(region)
+            if device_matrix:
+                target.stream.after(getattr(new.to_world, "events", ()))
+            device_matrix = device_matrix or self._upload_matrix(ranges, matrix)
+            self._run("vertices", ranges, self._local(ranges, "vertices"), device_matrix)
+        if ranges.row["flags"] & _NORMALS:
+            if triangles.smooth(ranges.shape):
+                self._smooth(ranges)
             else:
-                placed = placed or self._matrix(region, matrix)
-                side = -1.0 if region.shape.flip_normals else 1.0
-                source = self._local(region, "normals")
-                self._run("place_normals", region, source, placed, side=side)
-        front.moved |= {"vertices", "normals"}
+                device_matrix = device_matrix or self._upload_matrix(ranges, matrix)
+                side = -1.0 if ranges.shape.flip_normals else 1.0
+                source = self._local(ranges, "normals")
+                self._run("normals", ranges, source, device_matrix, side=side)
+        target.moved_tables |= {"vertices", "normals"}
         self._moved.add("triangles")
 
     def _run(
-        self, kernel: str, region: _Region, source: Place, matrix: Place, **more: float
+        self, table: str, ranges: _Ranges, source: Location, matrix: Location, **more: float
     ) -> None:
-        """Enqueue a kernel of place.cl over a region's vertices."""
-        first, count = region.vertices
-        table = kernel.removeprefix("place_")
+        """Enqueue that a shape's vertices or normals are those of a source, transformed."""
+        first, count = ranges.vertices
         self.building.run_each(
-            _ROOT, kernel, count, first=first, source=source[0], source_begin=source[1],
-            matrix=matrix[0], matrix_begin=matrix[1], **{table: self.front.named[table]}, **more,
+            _ROOT, f"place_{table}", count, first=first, source=source[0], source_begin=source[1],
+            matrix=matrix[0], matrix_begin=matrix[1], **{table: self.target.tables[table]}, **more,
         )  # fmt: skip
 
-    def _matrix(self, region: _Region, matrix: transforms.Matrix) -> Place:
-        """Where a region's placement is, which is sent there."""
-        if region.matrix is None:
-            region.matrix = self.front.buffers.allocate("a shape's transform", 64)
-        self.front.stream.write(region.matrix, matrix.astype(np.float32))
-        return region.matrix, 0
+    def _upload_matrix(self, ranges: _Ranges, matrix: transforms.Matrix) -> Location:
+        """Enqueue that a shape's transform is on the device; return where."""
+        if ranges.matrix is None:
+            ranges.matrix = self.target.buffers.allocate("a shape's transform", 64)
+        self.target.stream.write(ranges.matrix, matrix.astype(np.float32))
+        return ranges.matrix, 0
 
-    def _local(self, region: _Region, name: str) -> Place:
-        """Where vertices or normals of a region's shape are, before it is placed."""
-        shape = region.shape
-        given = getattr(shape, name, None)
-        if on_device(given):
-            self.front.stream.after(getattr(given, "events", ()))
-            found = self._floats(given, (region.vertices[1], 3))
-            assert found is not None  # `_plan` has looked
-            return found
-        of = getattr(shape, "vertices", None)
-        if region.local is None or region.local[0] is not of:
-            region.local = of, {}
-        if name not in region.local[1]:
-            vertices, _, normals, _ = shapes.local(shape)
-            points: Any = vertices if name == "vertices" else normals
-            buffer = self.front.buffers.upload(f"{name} of a shape that moves", points, np.float32)
-            region.local[1][name] = buffer
-        return region.local[1][name], 0
+    def _local(self, ranges: _Ranges, name: str) -> Location:
+        """Where vertices or normals of a shape are, before its transform."""
+        shape = ranges.shape
+        values = getattr(shape, name, None)
+        if on_device(values):
+            self.target.stream.after(getattr(values, "events", ()))
+            return self._locate(values, (ranges.vertices[1], 3), name)
+        vertices = getattr(shape, "vertices", None)
+        if ranges.local is None or ranges.local[0] is not vertices:
+            ranges.local = vertices, {}
+        buffers = ranges.local[1]
+        if name not in buffers:
+            points, _, normals, _ = triangles.local(shape)
+            array: Any = points if name == "vertices" else normals
+            what = f"{name} of a shape that moves"
+            buffers[name] = self.target.buffers.upload(what, array, np.float32)
+        return buffers[name], 0
 
-    def _floats(self, values: Any, shape: tuple[int, ...]) -> Place | None:
-        """Where an array on the device begins; None for another shape, type, order or context."""
+    def _locate(self, values: Any, shape: tuple[int, ...], what: str) -> Location:
+        """Where a float32 array on the device begins. Raises CannotMove for another form."""
         if isinstance(values, cl.Buffer):
-            fits, place = values.size == 4 * np.prod(shape), (values, 0)
+            fits, location = values.size == 4 * np.prod(shape), (values, 0)
         else:
             fits = values.shape == shape and values.dtype == np.float32
             fits &= values.flags.c_contiguous
-            place = values.base_data, values.offset // 4
-        return place if fits and place[0].context == self.front.device.context else None
+            location = values.base_data, values.offset // 4
+        if not fits or location[0].context != self.target.device.context:
+            raise CannotMove(f"{what} are no {shape} float32 in a row, in the renderer's context")
+        return location
 
-    def _smooth(self, region: _Region) -> None:
-        """Enqueue that a region's normals follow from its triangles."""
-        first, count = region.vertices
-        if region.around is None:
-            begin, faces = region.faces
-            corners = self.lowered.faces[begin : begin + faces].ravel()
+    def _smooth(self, ranges: _Ranges) -> None:
+        """Enqueue that a shape's normals follow from its triangles."""
+        target, (first, count) = self.target, ranges.vertices
+        if ranges.around is None:
+            begin, faces = ranges.faces
+            corners = target.lowered.faces[begin : begin + faces].ravel()
             order = np.argsort(corners, kind="stable")
             ends = np.searchsorted(corners[order], np.arange(first, first + count + 1))
-            give = self.front.buffers
-            region.around = {
-                "around": give.upload("triangles around vertices", begin + order // 3, np.uint32),
-                "offsets": give.upload("numbers of triangles around vertices", ends, np.uint32),
+            upload = target.buffers.upload
+            ranges.around = {
+                "around": upload("triangles around vertices", begin + order // 3, np.uint32),
+                "offsets": upload("numbers of triangles around vertices", ends, np.uint32),
             }
-        named = {name: self.front.named[name] for name in ("vertices", "faces", "normals")}
+        tables = {name: target.tables[name] for name in ("vertices", "faces", "normals")}
         self.building.run_each(
-            _ROOT, "smooth_normals", count, first=first, **named, **region.around
+            _ROOT, "smooth_normals", count, first=first, **tables, **ranges.around
         )
 
-    def _fit(self) -> None:
+    def _fit_trees(self) -> None:
         """Enqueue that trees follow what has moved."""
-        front = self.front
+        target, trees = self.target, self.target.trees
         if "triangles" in self._moved:
-            named = front.named
-            bvh.refit(self.building, front.tree, named["vertices"], named["faces"], parts=[0])
-        for name in self._moved & set(front.box_trees):
-            self._moves += name == "shape"
-            anew = name == "shape" and self._moves % ANEW == 0
-            fit = bvh.rebuild_boxes if anew else bvh.refit_boxes
-            fit(self.building, front.box_trees[name], self._boxes[name][1])
+            vertices, faces = target.tables["vertices"], target.tables["faces"]
+            bvh.refit(self.building, trees.triangles, vertices, faces, parts=[0])
+        for name in self._moved & set(trees.boxes):
+            self._shape_moves += name == "shape"
+            rebuild = name == "shape" and self._shape_moves % REBUILD_EVERY == 0
+            fit = bvh.rebuild_boxes if rebuild else bvh.refit_boxes
+            fit(self.building, trees.boxes[name], self._boxes[name][1])
         if "instance" in self._moved:
-            front.moved.add("instances")
+            target.moved_tables.add("instances")
         self._moved.clear()
 
 
-def _moves_only(old: Any, new: Any) -> bool:
-    """Whether nothing but places differs between two shapes."""
+def _check_fields(old: Any, new: Any) -> None:
+    """Raise CannotMove if more than what moves differs between two shapes."""
     if not isinstance(new, Shape) or type(old) is not type(new):
-        return False
-    return {name for name, value in vars(new).items() if value is not vars(old)[name]} <= _MOVES
+        raise CannotMove(f"{_name(old)} becomes something else")
+    changed = {name for name, value in vars(new).items() if value is not vars(old)[name]}
+    if changed - _MOVABLE:
+        raise CannotMove(f"{_name(new)} has another {' and '.join(sorted(changed - _MOVABLE))}")
+
+
+def _name(thing: Any) -> str:
+    return shapes.where(thing) if isinstance(thing, Shape) else f"a {type(thing).__name__}"

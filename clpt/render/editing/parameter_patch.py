@@ -1,73 +1,83 @@
-"""Edits of values, the camera's and those of materials: a few words are written, nothing else."""
+"""Edits of parameters, the camera's and those of materials: a few words are written."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import dataclasses
 from typing import Any
 
 from clpt.render.editing.rebuild import ranges
+from clpt.render.editing.scene_edit import Replacements
 from clpt.render.lowering.camera.cameras import dispersive_glass, lower_camera
 from clpt.render.lowering.geometry.instancing import distinct
-from clpt.render.lowering.scene import CLEAR
-from clpt.render.wavefront.wavefront import Wavefront
+from clpt.render.lowering.materials.material_words import CLEAR
+from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene import Scene
 from clpt.scene.materials import COMPOSITES, Material
 from clpt.scene.params import params
 
 
-def rewrite(fronts: Sequence[Wavefront], former: Scene, scene: Scene) -> bool:
-    """Bring a scene to the device that differs from the one there in values only: a few words.
+def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> str | None:
+    """Enqueue the words in which a scene differs from the one on the device.
 
-    It may differ in its camera, which must be of the same kind, and in values of materials. Returns
-    False, with nothing changed, where more than that differs. Raises SceneError as `lower` does.
+    They may differ in the camera, which must be of the same kind, and in values of materials.
+    Returns None, or, with nothing done, why more than that differs. Raises SceneError as `lower`
+    does.
     """
-    front = fronts[0]
-    lowered, encoder = front.lowered, front.lowered.encoder
+    lowered = on_device.lowered
     pairs = [] if scene.shapes is former.shapes else _pairs(former, scene)
-    if pairs is None or (pairs and encoder is None):
-        return False
+    if pairs is None:
+        return "a material is of another kind or structure"
+    camera = None
     if scene.camera is not former.camera:
         if dispersive_glass(scene.camera) != dispersive_glass(former.camera):
-            return False
+            return "the camera's lens is of another glass"
         film, row = scene.film, lowered.glass_row
-        kind, words = lower_camera(scene.camera, film.width, film.height, row)
+        kind, camera = lower_camera(scene.camera, film.width, film.height, row)
         if kind != lowered.features.camera:
-            return False
+            return "the camera is of another kind"
     rows: list[tuple[int, Any]] = []
     for old, new in pairs:
-        found = encoder.replaced(old, new, "materials") if encoder else None
-        if found is None:
-            for one in fronts:
-                one.lowered.encoder = None  # it has been written to; the next lowering has another
-            return False
-        rows += found
-    if scene.camera is not former.camera:
-        front.stream.write(front.named["camera"], words)
-        lowered.tables["camera"] = words
-    table = lowered.tables["materials"]
-    for first, new in rows:
-        own = table[first : first + len(new)]
-        for begin, end in ranges(own, new):
-            front.stream.write(front.named["materials"], new[begin:end], 4 * (first + begin))
-        own[:] = new
-    return True
+        changed = lowered.encoder.replaced(old, new, "materials")
+        if changed is None:
+            return f"parameters of a {new.kind} come from elsewhere, such as a texture or a table"
+        rows += changed
+    _write(on_device, camera, rows)
+    return None
+
+
+def _write(on_device: DeviceScene, camera: Any, rows: list[tuple[int, Any]]) -> None:
+    """Enqueue the words of a camera, if there is one, and of rows of materials."""
+    lowered, stream = on_device.lowered, on_device.stream
+    tables = dict(lowered.tables)
+    if camera is not None:
+        stream.write(on_device.tables["camera"], camera)
+        tables["camera"] = camera
+    if rows:
+        table = tables["materials"] = tables["materials"].copy()
+        for first, new in rows:
+            own = table[first : first + len(new)]
+            for begin, end in ranges(own, new):
+                buffer = on_device.tables["materials"]
+                stream.write(buffer, new[begin:end], 4 * (first + begin))
+            own[:] = new
+    on_device.lowered = dataclasses.replace(lowered, tables=tables)
 
 
 def _pairs(former: Scene, scene: Scene) -> list[tuple[Any, Any]] | None:
-    """The leaf materials that took the places of others, None where more than values differs."""
-    found: dict[int, tuple[Any, Any]] = {}
+    """The leaf materials that replace others, None where more than values differs."""
+    pairs: Replacements = {}
     for old, new in zip(distinct(former.shapes), distinct(scene.shapes), strict=True):
-        if not _pair(old.material, new.material, found):
+        if not _pair(old.material, new.material, pairs):
             return None
-    changed = [(old, new) for old, new in found.values() if old is not new]
+    changed = [(old, new) for old, new in pairs.values() if old is not new]
     return [(old, new) for old, new in changed if not isinstance(old, COMPOSITES)]
 
 
-def _pair(old: Any, new: Any, found: dict[int, tuple[Any, Any]]) -> bool:
-    """Note what took the place of what; whether the two may differ in values only."""
-    if id(old) in found:
-        return found[id(old)][1] is new
-    found[id(old)] = old, new
+def _pair(old: Any, new: Any, pairs: Replacements) -> bool:
+    """Note which material replaces which; return whether they may differ in values only."""
+    if id(old) in pairs:
+        return pairs[id(old)][1] is new
+    pairs[id(old)] = old, new
     if old is new and not isinstance(old, COMPOSITES):
         return True
     if type(old) is not type(new):
@@ -79,7 +89,7 @@ def _pair(old: Any, new: Any, found: dict[int, tuple[Any, Any]]) -> bool:
     for name in params(type(old)):
         a, b = getattr(old, name), getattr(new, name)
         if isinstance(a, Material) and isinstance(b, Material):
-            if not _pair(a, b, found):
+            if not _pair(a, b, pairs):
                 return False
         elif a is not b and name != "name":
             return False

@@ -1,197 +1,194 @@
-"""A scene that changes while it is rendered: what differs goes to the device, the rest stays."""
+"""Another lowering of a scene that is on a device: only what differs is written or built."""
 
 from __future__ import annotations
 
-import dataclasses
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pyopencl as cl
+from numpy.typing import NDArray
 
 from clpt import bvh
 from clpt.errors import SceneError
-from clpt.records import TABLES
-from clpt.render.codegen import programs
 from clpt.render.lowering.scene import Lowered
-from clpt.render.wavefront.queues import QUEUE
-from clpt.render.wavefront.wavefront import Wavefront, use_interleaved_rays
+from clpt.render.wavefront import trees
+from clpt.render.wavefront.device_scene import UPLOADED, DeviceScene
+from clpt.render.wavefront.strategy import Strategy
+from clpt.render.wavefront.wavefront import Wavefront
 
 log = logging.getLogger(__name__)
 
 GAP = 256  # words that are written though they are the same, rather than by two commands
-PIECES = 64  # writes from which the whole range between the first and the last is one
-FITTED = "the tree"  # among what has moved: it is not that which would be built
+MOST_WRITES = 64  # beyond which the whole range between the first and the last is one write
 FIXED = ("width", "height", "crop_x", "crop_y", "film_width", "film_height", "bands")
-KEPT = ("slots", "per_plane", "planes")  # settings that follow from the film and the device
-OWN = ("film", "image", "bands", "band_image")  # buffers of one wavefront, not of all
 
 
 @dataclass(frozen=True)
 class _Changes:
-    """What becomes of kernels and trees: kernels, triangles, boxes: made anew; fit: fitted."""
+    """What another lowering needs: new kernels, new trees over triangles or boxes, or a refit."""
 
-    layout: str
-    queued: str
+    strategy: Strategy
     kernels: bool
     triangles: bool
     boxes: bool
-    fit: bool
+    refit: bool
 
 
-def take(fronts: Sequence[Wavefront], lowered: Lowered, refit: bool = False) -> None:
-    """Let another lowering take the place of the one that is rendered.
+@dataclass(frozen=True)
+class _Staged:
+    """New buffers, trees and queues for a lowering, which nothing uses yet.
 
-    fronts: all of a renderer, the first one and its siblings; refit: fit the tree over triangles
-    that only moved, which is faster, and leaves a tree that is slower where they went far. Programs
-    are built where the features differ, trees where triangles or boxes do; of tables the words that
-    differ are written. The picture is then that of a new renderer.
+    tables: those that need a new buffer, by name.
+    """
+
+    tables: dict[str, cl.Buffer]
+    trees: trees.Trees
+    queue: dict[str, Any]
+
+
+def take(wavefronts: Sequence[Wavefront], lowered: Lowered, refit: bool = False) -> None:
+    """Render another lowering from now on.
+
+    wavefronts: all of a renderer, which share their scene; refit: refit the tree over triangles
+    that only moved, which is faster to do, and slower to trace where they went far. Programs are
+    built if the features differ, trees if triangles or boxes do; of tables the words that differ
+    are written. The picture is then that of a new renderer.
 
     Raises SceneError for a film of another size, KernelBuildError, MemoryBudgetError; nothing has
     changed then.
     """
-    first = fronts[0]
-    former, known = first.lowered, first.named
-    if any(former.settings[name] != lowered.settings[name] for name in FIXED):
+    first = wavefronts[0]
+    scene, paths = first.scene, first.paths
+    if any(scene.lowered.settings[name] != lowered.settings[name] for name in FIXED):
         raise SceneError("its size and bands stay as they are; make a new Renderer", where="film")
-    for name in KEPT:
-        lowered.settings[name] = former.settings[name]
     changes = _changes(first, lowered, refit)
-    _make(first, lowered, changes)
-    moved = {name for name, now in first.named.items() if known.get(name) is not now}
-    _write_tables(first, former, moved)
-    _fit(first, changes)
-    for front in fronts:
-        if front is not first:
-            channel = front.lowered.features.channel
-            features = dataclasses.replace(lowered.features, channel=channel)
-            front.lowered = dataclasses.replace(lowered, features=features)
-            front.tree, front.box_trees, front.queued = first.tree, first.box_trees, first.queued
-            front.named = {**first.named, **{n: front.named[n] for n in OWN if n in front.named}}
-        if changes.kernels or moved:
-            front.bind_again(rebuilt=changes.kernels)
-    for name in moved & {*TABLES, *QUEUE} & known.keys() - former.zero_copy.keys():
-        first.buffers.release(known[name])
+    with scene.buffers.all_or_nothing():
+        staged = _stage(first, lowered, changes)
+    replaced = _replaced(first, staged)
+    _write_tables(scene, lowered, staged.tables)
+    paths.set_settings(lowered.settings)
+    scene.lowered, scene.strategy, scene.trees = lowered, changes.strategy, staged.trees
+    scene.tables |= staged.tables
+    paths.queue = staged.queue
+    _refit(scene, changes)
+    if changes.kernels or changes.boxes or replaced or staged.tables:
+        for wavefront in wavefronts:
+            wavefront.bind_again(rebuilt=changes.kernels)
+    scene.buffers.release(*replaced)
 
 
-def _changes(front: Wavefront, lowered: Lowered, refit: bool) -> _Changes:
+def _changes(wavefront: Wavefront, lowered: Lowered, refit: bool) -> _Changes:
     """What another lowering needs."""
-    former, moved = front.lowered, front.moved - {FITTED}
-    layout, queued = front.suited(lowered)
-    other = layout != front.tree.layout or former.instances.triangles != lowered.instances.triangles
-    other |= not (_same(former.faces, lowered.faces) and _same(former.tags, lowered.tags))
-    shifted = "vertices" in moved or not _same(former.vertices, lowered.vertices)
-    triangles = other or (not refit and (shifted or FITTED in front.moved))
+    scene = wavefront.scene
+    former, strategy = scene.lowered, wavefront.choose_strategy(lowered)
+    groups = former.instances.triangles != lowered.instances.triangles
+    faces = not (_same(former.faces, lowered.faces) and _same(former.tags, lowered.tags))
+    moved = "vertices" in scene.moved_tables or not _same(former.vertices, lowered.vertices)
+    triangles = strategy.layout != scene.strategy.layout or groups or faces
+    triangles |= not refit and (moved or scene.tree_refitted)
     parts = zip(vars(former.instances).values(), vars(lowered.instances).values(), strict=True)
-    kernels = former.features != lowered.features
-    flew = use_interleaved_rays(front.device, former, front.tree.layout)
-    kernels |= flew != use_interleaved_rays(front.device, lowered, layout)
+    instances = not all(_same(*map(np.asarray, pair)) for pair in parts)
+    boxes = instances or bool(scene.moved_tables) or not _same(former.boxes, lowered.boxes)
     return _Changes(
-        layout,
-        queued,
-        kernels=kernels or (layout, queued) != (front.tree.layout, front.queued),
+        strategy,
+        kernels=former.features != lowered.features or strategy != scene.strategy,
         triangles=triangles,
-        boxes=triangles
-        or bool(moved)
-        or not _same(former.boxes, lowered.boxes)
-        or not all(_same(*map(np.asarray, pair)) for pair in parts),
-        fit=shifted and not triangles,
+        boxes=triangles or boxes,
+        refit=moved and not triangles,
     )
 
 
-def _make(front: Wavefront, lowered: Lowered, changes: _Changes) -> None:
-    """Make kernels, buffers and trees that are new, and let them take their places.
-
-    What is on the device stays as it is; should something not fit there, all is as before.
-    """
-    before, used = dict(vars(front)), front.buffers.used
-    try:
-        if changes.kernels:
-            built = front.device.builds.programs
-            front.build_ahead(lowered, changes.layout, changes.queued)
-            built = front.device.builds.programs - built
-            log.info("the scene needs other kernels: %d programs were built", built)
-        front.named = {**front.named, **_new_tables(front, lowered, changes)}
-        front.lowered, front.queued = lowered, changes.queued
-        if changes.triangles:
-            front.build_triangles(changes.layout)
-        if changes.boxes:
-            front.build_boxes()
-            which = "triangles and boxes" if changes.triangles else "boxes"
-            log.info("trees are built over %s", which)
-        if changes.kernels:
-            front.allocate_queue()
-    except BaseException:
-        vars(front).update(before)
-        front.buffers.used = used
-        raise
+def _stage(wavefront: Wavefront, lowered: Lowered, changes: _Changes) -> _Staged:
+    """Build kernels, buffers and trees that are new; what is on the device stays as it is."""
+    scene, paths, queue = wavefront.scene, wavefront.paths, wavefront.paths.queue
+    if changes.kernels:
+        before = scene.device.builds.programs
+        wavefront.build_ahead(lowered, changes.strategy)
+        built = scene.device.builds.programs - before
+        log.info("the scene needs other kernels: %d programs were built", built)
+    tables, new_trees = _new_tables(scene, lowered, changes), scene.trees
+    if changes.boxes:
+        vertices = tables.get("vertices", scene.tables["vertices"])
+        former = None if changes.triangles else scene.trees
+        layout, quality = changes.strategy.layout, scene.tree_quality
+        new_trees = trees.build(scene.buffers, lowered, vertices, layout, quality, former)
+        which = "triangles and boxes" if changes.triangles else "boxes"
+        log.info("trees are built over %s", which)
+    if changes.kernels:
+        queue = paths.new_queue(changes.strategy.queued, len(lowered.features.materials))
+    return _Staged(tables, new_trees, queue)
 
 
-def _new_tables(front: Wavefront, lowered: Lowered, changes: _Changes) -> dict[str, cl.Buffer]:
-    """Buffers of tables of another size, and those that are lent or lent no more."""
-    former, made = front.lowered, {}
-    for name in TABLES:
+def _new_tables(scene: DeviceScene, lowered: Lowered, changes: _Changes) -> dict[str, cl.Buffer]:
+    """Buffers of tables of another size, and of those that begin or cease to be the caller's."""
+    former, tables = scene.lowered, {}
+    for name in UPLOADED:
         old, new = former.table(name), lowered.table(name)
-        zero_copy = lowered.zero_copy.get(name)
-        built = name == "vertices" and changes.triangles  # what a tree is built of is there before
-        if zero_copy is not None:
-            made[name] = zero_copy
-        elif name == "instances":
-            continue  # `build_boxes` makes it
-        elif name in former.zero_copy or old.nbytes != new.nbytes or built:
-            made[name] = front.buffers.upload(f"the table of {name}", new)
-    return made
+        of_caller = lowered.zero_copy.get(name)
+        built_of = name == "vertices" and changes.triangles  # the tree is built of a whole table
+        if of_caller is not None:
+            if scene.tables[name] is not of_caller:
+                tables[name] = of_caller
+        elif name in former.zero_copy or old.nbytes != new.nbytes or built_of:
+            tables[name] = scene.upload(name, new)
+    return tables
 
 
-def _write_tables(front: Wavefront, former: Lowered, new: set[str]) -> None:
-    """Enqueue that words of tables become what they are now, but in buffers that are new."""
-    for name in TABLES:
-        old, now = former.table(name), front.lowered.table(name)
-        if name in new or name in front.lowered.zero_copy or name == "instances":
+def _replaced(wavefront: Wavefront, staged: _Staged) -> list[cl.Buffer]:
+    """The buffers of clpt that will not be used any more."""
+    scene, queue = wavefront.scene, wavefront.paths.queue
+    of_caller = scene.lowered.zero_copy
+    buffers = [scene.tables[name] for name in staged.tables if name not in of_caller]
+    if staged.trees is not scene.trees:
+        buffers.append(scene.trees.instances)
+    if staged.queue is not queue:
+        buffers += [value for value in queue.values() if isinstance(value, cl.Buffer)]
+    return buffers
+
+
+def _write_tables(scene: DeviceScene, lowered: Lowered, new: dict[str, cl.Buffer]) -> None:
+    """Enqueue that the words of tables become those of a lowering, but in buffers that are new."""
+    for name in UPLOADED:
+        if name in new or name in lowered.zero_copy:
             continue
-        if name in front.moved:
-            front.stream.write(front.named[name], now)
-        else:
-            _write(front, name, old, now)
-    _write(front, "settings", former.settings.reshape(1), front.lowered.settings.reshape(1))
+        if name in scene.moved_tables:
+            scene.stream.write(scene.tables[name], lowered.table(name))
+            continue
+        words = _words(lowered.table(name))
+        for begin, end in ranges(_words(scene.lowered.table(name)), words):
+            scene.stream.write(scene.tables[name], words[begin:end], 4 * begin)
 
 
-def _fit(front: Wavefront, changes: _Changes) -> None:
-    """Let the tree over triangles follow them where it was not built anew."""
-    fitted = FITTED in front.moved and not changes.triangles
-    front.moved.clear()
-    if changes.fit:
-        building = bvh.Building(front.device, stream=front.stream)
-        bvh.refit(building, front.tree, front.named["vertices"], front.named["faces"])
-    if changes.fit or fitted:
-        front.moved.add(FITTED)
+def _refit(scene: DeviceScene, changes: _Changes) -> None:
+    """Refit the tree over triangles to them, if it is not a new one."""
+    if changes.refit:
+        building = bvh.Building(scene.device, stream=scene.stream)
+        triangles = scene.trees.triangles
+        bvh.refit(building, triangles, scene.tables["vertices"], scene.tables["faces"])
+    scene.tree_refitted = changes.refit or (scene.tree_refitted and not changes.triangles)
+    scene.moved_tables.clear()
 
 
-def _write(front: Wavefront, name: str, old: np.ndarray, new: np.ndarray) -> None:
-    """Enqueue that a buffer which holds old values gets the new ones where they differ."""
-    words = _words(new)
-    for begin, end in ranges(_words(old), words):
-        front.stream.write(front.named[name], words[begin:end], 4 * begin)
-
-
-def ranges(old: np.ndarray, new: np.ndarray) -> list[tuple[int, int]]:
+def ranges(old: NDArray[Any], new: NDArray[Any]) -> list[tuple[int, int]]:
     """Return the parts, begin and end, that hold all words in which two tables differ."""
     differ = np.flatnonzero(old != new)
     if not len(differ):
         return []
     far = np.flatnonzero(np.diff(differ) > GAP)
     begins, ends = differ[np.r_[0, far + 1]], differ[np.r_[far, len(differ) - 1]] + 1
-    if len(begins) > PIECES:
+    if len(begins) > MOST_WRITES:
         return [(int(begins[0]), int(ends[-1]))]
     return list(zip(begins.tolist(), ends.tolist(), strict=True))
 
 
-def _words(values: np.ndarray) -> np.ndarray:
+def _words(values: NDArray[Any]) -> NDArray[np.uint32]:
     return np.ascontiguousarray(values).reshape(-1).view(np.uint32)
 
 
-def _same(some: np.ndarray, others: np.ndarray) -> bool:
+def _same(some: NDArray[Any], others: NDArray[Any]) -> bool:
     """Whether two arrays hold the same bits."""
     if some is others:
         return True

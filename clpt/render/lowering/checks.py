@@ -33,7 +33,8 @@ def check(scene: Scene) -> None:
         _check_kind(light, Light, f"lights[{i}]")
     for i, shape in enumerate(scene.shapes):
         _check_kind(shape, Shape, f"shapes[{i}]")
-    for shape in distinct(scene.shapes):
+    shapes_ = list(distinct(scene.shapes))
+    for shape in shapes_:
         if not isinstance(shape.emission, (*ON_SHAPES, type(None))):
             names = " or ".join(f"`{cls.kind}`" for cls in ON_SHAPES)
             raise SceneError(f"its emission must be {names}", where=shapes.where(shape))
@@ -44,13 +45,13 @@ def check(scene: Scene) -> None:
     width, height = scene.film.size
     if width * height > LARGEST:
         raise SceneError(f"{width}x{height} are more than {LARGEST >> 20} Mi pixels", where="film")
-    _check_light_paths(scene)
+    _check_light_paths(scene, shapes_)
 
 
-def _check_light_paths(scene: Scene) -> None:
+def _check_light_paths(scene: Scene, shapes_: list[Shape]) -> None:
     """Raise SceneError for what only paths from lights can do, and for what they cannot."""
     if not isinstance(scene.integrator, ParticleTracer):
-        for shape in distinct(scene.shapes):
+        for shape in shapes_:
             if isinstance(shape.emission, DirectionalArea):
                 raise SceneError(
                     "only the integrator particle_tracer finds a directional_area light, "
@@ -69,7 +70,7 @@ def _check_light_paths(scene: Scene) -> None:
     for i, light in enumerate(scene.lights):
         if isinstance(light, Point) and not light.falloff:
             _refuse("a point light whose irradiance falls with distance", f"lights[{i}]")
-    for shape in distinct(scene.shapes):
+    for shape in shapes_:
         if spectral and _has(shape.material, "fluoresces"):
             _refuse("materials that keep the wavelength", shapes.where(shape))
         if _has(shape.material, "no_back"):

@@ -1,8 +1,8 @@
-"""Queues: how the slots that wait for one kind of material are brought together before shading.
+"""Queues: the slots that wait for each kind of material, brought together before shading.
 
-`sort` is a stable counting sort, in chunks that one work-item walks: for CPUs. `append` takes a
-place for a whole group of work-items at once: for devices with many of them. The picture is the
-same to the bit, since a slot's work does not depend on its place in a queue.
+`sort` is a stable counting sort, in chunks of one work-item each: for CPUs. `append` reserves
+entries for a whole group of work-items at once: for devices with many of them. The picture is the
+same to the bit, since the work of a slot does not depend on its position in a queue.
 """
 
 from __future__ import annotations

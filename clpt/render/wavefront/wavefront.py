@@ -1,4 +1,4 @@
-"""The wavefront: slabs of paths in flight, and the loop that moves them through the stages.
+"""The wavefront: the loop that moves paths in flight through the stages.
 
 A slot owns its pixels and regenerates its path as soon as that ends, so the device stays full at
 any depth. The host only enqueues; it reads the counters of an iteration while later ones run.
@@ -6,34 +6,32 @@ any depth. The host only enqueues; it reads the counters of an iteration while l
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 import pyopencl as cl
+from numpy.typing import NDArray
 
 from clpt import bvh, device
 from clpt.device.timing import Timings
-from clpt.errors import MemoryBudgetError
-from clpt.records import PATH
 from clpt.render.codegen import programs, signatures
+from clpt.render.contract.features import Features
 from clpt.render.lowering.scene import Lowered
-from clpt.render.wavefront import queues
-from clpt.render.wavefront.device_scene import COUNTERS, GROUP, DeviceScene
+from clpt.render.wavefront import queues, strategy
+from clpt.render.wavefront.device_scene import DeviceScene
+from clpt.render.wavefront.film import Film
+from clpt.render.wavefront.path_buffers import GROUP, PathBuffers, divide_film
+from clpt.render.wavefront.strategy import Strategy, Tuning
 
-FILM_WORDS = 7  # kernels/film/film.cl
-FRESH = 0x2000  # kernels/path/path_state.cl
-INTERLEAVED_TRIANGLES = 1 << 20  # from which rays in flight pay; measured, see bench/NOTES.md
-BATCH = 8  # bounces that are enqueued before counters are asked for
+BATCH = 8  # bounces that are enqueued between two reads of the counters
 CORE_BOUNCES = 1 << 16  # of all slots, that a core's part of a loop takes at once
 ENDLESS = 0xFFFFFFFF  # bounces of a loop that goes on till all paths have ended
-IDLE = {"samples": (0, 0), "bounces": 0, "restart": 0}  # of a loop that was asked for nothing
+IDLE = {"samples": (0, 0), "bounces": 0, "restart": 0}  # of a loop that has nothing to do
 
 
 @dataclass
@@ -60,190 +58,151 @@ class Step:
     group: tuple[int] | None
 
 
-def use_interleaved_rays(on: device.Device, lowered: Lowered, layout: str) -> bool:
-    """Return whether rays in flight pay: in trees of nothing but triangles, larger than the caches."""
-    features, count = lowered.features, len(lowered.faces)
-    only_triangles = not (features.instances or features.analytic)
-    large = count >= INTERLEAVED_TRIANGLES and bvh.outgrows_caches(on, layout, count)
-    return only_triangles and large
+class Wavefront:
+    """A film of a scene on a device, and `render_samples`, which runs the bounce loop.
 
+    scene, paths: which other wavefronts may share, one after the other; looped: whether a kernel
+    on the device runs the loop; channel: of the `aov` integrator, that the film holds; tuning: for
+    the strategies of other lowerings.
 
-class Wavefront(DeviceScene):
-    """The device side of a render: buffers, programs, and `expose`, which runs the bounce loop.
-
-    What is wanted of it: see `Resident`.
+    counts: of rays and samples; samples_per_pixel: in the mean.
 
     Raises MemoryBudgetError, KernelBuildError, DeviceError.
     """
 
-    def __init__(self, on: device.Device, lowered: Lowered, **wanted: Any):
-        super().__init__(on, lowered, **wanted)
-        self.lanes = on.lanes
-        self.timings = Timings(on.queue)
+    def __init__(
+        self,
+        scene: DeviceScene,
+        paths: PathBuffers,
+        looped: bool,
+        channel: str,
+        tuning: Tuning,
+    ):
+        self.device, self.stream, self.buffers = scene.device, scene.stream, scene.buffers
+        self.scene, self.paths, self.looped, self.channel = scene, paths, looped, channel
+        self._tuning = tuning
+        self.lanes = self.device.lanes
+        self.timings = Timings(self.device.queue)
+        self.program_seconds = 0.0
         self.programs: dict[str, device.Program] = {}
-        self._allocate_film()
-
-    def with_channel(self, channel: str) -> Wavefront:
-        """Another film of the same scene, for another channel of the `aov` integrator.
-
-        It shares everything on the device but the film and the picture.
-        """
-        other = copy.copy(self)
-        features = dataclasses.replace(self.lowered.features, channel=channel)
-        other.lowered = dataclasses.replace(self.lowered, features=features)
-        other.named = dict(self.named)
-        other.programs = {n: p for n, p in self.programs.items() if not n.startswith("shade_")}
-        for made in ("stages", "loop"):
-            other.__dict__.pop(made, None)
-        other._allocate_film()
-        return other
-
-    def _allocate_film(self) -> None:
-        """A film and a picture of its own, and kernels bound to them."""
-        settings = self.lowered.settings
-        self.film_bytes = 4 * FILM_WORDS * int(settings["padded_pixels"]) * int(settings["planes"])
-        pixels = int(settings["width"]) * int(settings["height"])
-        sizes = {"film": self.film_bytes, "image": 16 * pixels}
-        advice = "lower the image's size"
-        if self.lowered.features.bands:
-            bands = int(settings["bands"])
-            advice += " or the number of bands"
-            sizes["bands"] = 8 * bands * int(settings["padded_pixels"]) * int(settings["planes"])
-            sizes["band_image"] = 4 * bands * pixels
-            if sizes["bands"] // 4 >= 1 << 31:  # kernels/film/bands.cl counts words by an int
-                raise MemoryBudgetError("the film of bands", sizes["bands"], 1 << 33, advice)
-        for name, size in sizes.items():
-            self.named[name] = self.buffers.allocate(f"the {name}", size, advice)
-        self.band_bytes = sizes.get("bands", 0)
-        shape, image = (*self._size[::-1], 4), self.named["image"]
-        self.film = device.DeviceArray(self.device.queue, shape, np.float32, data=image)
-        self._pictured: cl.Event | None = None  # the event of the last command that wrote `film`
+        self._stages: list[Step] | None = None
+        self._loop: device.BoundKernel | None = None
+        self.film = Film(self.stream, self.buffers, paths.settings, self.features.bands)
         self._bind_film()
         self.clear()
 
-    def _bind_film(self) -> None:
-        """The kernels that make a picture of the film."""
-        self._build(programs.film_sources(self.lowered.features, self.tree.layout))
-        self.accumulate = self._bound("accumulate", "accumulate", samples=0.0)
-        if self.band_bytes:
-            self.accumulate_bands = self._bound("bands", "accumulate_bands")
+    @classmethod
+    def create(
+        cls,
+        on: device.Device,
+        lowered: Lowered,
+        *,
+        layout: str | None = None,
+        slots: int | None = None,
+        queued: bool | str | None = None,
+        looped: bool | None = None,
+        paths: int = 0,
+        tree_quality: bvh.Quality = "high",
+    ) -> Wavefront:
+        """Return a wavefront of a lowered scene, which others may render too.
+
+        layout: of the trees over triangles, a name in clpt.bvh.LAYOUTS; slots: paths in flight;
+        queued: whether slots are queued by material before they are shaded, or how, see
+        clpt.render.wavefront.queues.WAYS; looped: whether a kernel on the device runs all bounces.
+        Each is chosen to suit the device and the scene where it is None. paths: how many will be
+        rendered; tree_quality: see clpt.bvh.build.
+
+        Raises as `Wavefront` does, SceneError for a layout that cannot hold the scene.
+        """
+        tuning = Tuning(layout, queued)
+        chosen = strategy.choose(on, lowered, tuning)
+        if looped is None:
+            looped = strategy.use_loop(on, chosen.queued, paths)
+        stream, buffers = device.Stream(on.queue), device.Buffers(on)
+        settings, kinds = lowered.settings, len(lowered.features.materials)
+        padded_pixels = int(settings["padded_pixels"])
+        divided = divide_film(on.info, padded_pixels, buffers.limit, slots, looped)
+        scene = DeviceScene(stream, buffers, lowered, chosen, tree_quality)
+        in_flight = PathBuffers(stream, buffers, settings, divided, chosen.queued, kinds)
+        return cls(scene, in_flight, looped, lowered.features.channel, tuning)
+
+    def with_channel(self, channel: str) -> Wavefront:
+        """Return a wavefront with another film of the same scene, for a channel of `aov`."""
+        return Wavefront(self.scene, self.paths, self.looped, channel, self._tuning)
+
+    @property
+    def features(self) -> Features:
+        """The features of the scene, for the channel of this film."""
+        return self._features_of(self.scene.lowered)
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """The arguments of all kernels by name: of the scene, the paths and the film."""
+        return {**self.scene.arguments, **self.paths.arguments, **self.film.arguments}
+
+    def choose_strategy(self, lowered: Lowered) -> Strategy:
+        """Return how another lowering would be rendered. Raises SceneError as `create` does."""
+        return strategy.choose(self.device, lowered, self._tuning)
+
+    def prepare(self) -> None:
+        """Build what `render_samples` runs, so that its first samples come at once."""
+        _ = self.loop if self.looped else self.stages
+
+    def build_ahead(self, lowered: Lowered, chosen: Strategy) -> None:
+        """Build the programs that are in use for another lowering, so that no later build fails."""
+        texts = programs.film_sources(self._features_of(lowered), chosen.layout)
+        if self._stages is not None:
+            texts |= self._stage_texts(lowered, chosen)
+        device.build_all(self.device, texts)
+        if self._loop is not None:
+            self._link(lowered, chosen)
 
     def bind_again(self, rebuilt: bool) -> None:
-        """Give all kernels the buffers of `named` once more; rebuilt: other programs have them."""
-        made = {name: vars(self).pop(name) for name in ("stages", "loop") if name in vars(self)}
+        """Bind all kernels to the present buffers; rebuilt: build their programs again too."""
+        has_stages, has_loop = self._stages is not None, self._loop is not None
+        self._stages = self._loop = None
         if rebuilt:
             self.programs = {}
-        elif "loop" in made:
-            self.loop = self._bind(made["loop"].kernel, **IDLE)
         self._bind_film()
-        for name in made:
-            getattr(self, name)
+        if has_stages:
+            _ = self.stages
+        if has_loop:
+            _ = self.loop
 
-    def _build(self, texts: dict[str, device.Source]) -> None:
-        """Build the programs of these that are not there yet."""
-        start = time.perf_counter()
-        missing = {n: text for n, text in texts.items() if n not in self.programs}
-        self.programs |= device.build_all(self.device, missing)
-        self.seconds["programs"] += time.perf_counter() - start
-
-    def _texts(self, lowered: Lowered, layout: str, queued: str) -> dict[str, device.Source]:
-        interleaved = use_interleaved_rays(self.device, lowered, layout)
-        return programs.sources(
-            lowered.features, layout, self.lanes, queued=queued, interleaved=interleaved
-        )
-
-    @cached_property
+    @property
     def stages(self) -> list[Step]:
         """The kernels of a bounce in their order, for a host that enqueues bounce after bounce."""
-        features, layout = self.lowered.features, self.tree.layout
-        self._build(self._texts(self.lowered, layout, self.queued))
-        interleaved = use_interleaved_rays(self.device, self.lowered, layout)
-        made: list[Step] = []
-        for stage in programs.order(features, layout, self.lanes, interleaved):
-            if self.queued and stage.kernel == "shade" and made[-1].bound.kernel.name != "shade":
-                kinds = len(features.materials)
-                for name, size, group in queues.steps(self.queued, self.slots, kinds):
-                    bound = self._bound(self.queued, name)
-                    made.append(Step(name, bound, (size,), (group,) if group else None))
-            given = {"samples": (0, 0)} if not made else {}
-            bound = self._bound(stage.program, stage.kernel, **given)
-            made.append(Step(stage.program, bound, *self._sizes(stage.lanes)))
-        return made
+        if self._stages is None:
+            self._stages = self._bind_stages()
+        return self._stages
 
-    @cached_property
+    @property
     def loop(self) -> device.BoundKernel:
         """The kernel of the bounce loop on the device, for a host that does not wait."""
-        start = time.perf_counter()
-        kernel = self._link(self.lowered, self.tree.layout).kernel("loop")
-        self.seconds["programs"] += time.perf_counter() - start
-        return self._bind(kernel, **IDLE)
-
-    def _link(self, lowered: Lowered, layout: str) -> device.Program:
-        features, interleaved = (
-            lowered.features,
-            use_interleaved_rays(self.device, lowered, layout),
-        )
-        texts = programs.loop_sources(features, layout, self.lanes, interleaved)
-        known = {"loop": signatures.loop_arguments(features, layout)}
-        return device.link(self.device, texts, "loop", known)
-
-    def build_ahead(self, lowered: Lowered, layout: str, queued: str) -> None:
-        """Build for another scene the programs that are in use, so that it fails here or never."""
-        device.build_all(self.device, programs.film_sources(lowered.features, layout))
-        if "loop" in vars(self):
-            self._link(lowered, layout)
-        if "stages" in vars(self):
-            device.build_all(self.device, self._texts(lowered, layout, queued))
-
-    @property
-    def _round(self) -> list[Step]:
-        """What `expose` enqueues between two looks at the counters."""
-        if self.looped:
-            return [Step("loop", self.loop, *self._sizes(self.lanes))]
-        return self.stages * BATCH
+        if self._loop is None:
+            if "loop" not in self.programs:
+                start = time.perf_counter()
+                self.programs["loop"] = self._link(self.scene.lowered, self.scene.strategy)
+                self.program_seconds += time.perf_counter() - start
+            self._loop = self._bind("loop", "loop", **IDLE)
+        return self._loop
 
     def auxiliary_kernel(
-        self, texts: dict[str, device.Source], name: str, **given: Any
+        self, texts: dict[str, device.Source], name: str, **more: Any
     ) -> device.BoundKernel:
-        """A kernel beside the bounce, of the program of its name in `texts`, with its arguments."""
+        """Return a kernel beside the bounce, of the program of its name, with its own arguments."""
         self._build(texts)
-        return self._bound(name, name, **given)
-
-    @property
-    def _bounces(self) -> int:
-        """Bounces of a loop between two looks at the counters: some hundredths of a second."""
-        info = self.device.info
-        return max(BATCH, CORE_BOUNCES * info.compute_units // self.slots) if info.is_cpu else BATCH
-
-    def _bound(self, program: str, name: str, **given: Any) -> device.BoundKernel:
-        return self._bind(self.programs[program].kernel(name), **given)
-
-    def _bind(self, kernel: device.Kernel, **given: Any) -> device.BoundKernel:
-        """A kernel with its arguments, which are told by their names in its signature."""
-        named = {**self.named, **given}
-        return kernel.bind(**{a.name: named[a.name] for a in kernel.arguments})
-
-    def _sizes(self, lanes: int) -> tuple[tuple[int], tuple[int]]:
-        """How many work-items serve all slots, `lanes` each, and how many of them are a group."""
-        return (self.slots // lanes,), (GROUP // lanes,) if lanes > 1 else (GROUP,)
+        return self._bind(name, name, **more)
 
     def clear(self) -> None:
-        """Empty the film and begin again at sample 0."""
-        self.counts, self._seen = Counts(), np.zeros(len(COUNTERS), np.uint32)
-        self.samples_per_pixel = 0.0  # paths per pixel
-        self._fill("counters", 0, 0, 4 * len(COUNTERS))
-        self._fill("film", 0, 0, self.film_bytes)
-        self.stream.after(self.film.events)
-        event = self.stream.fill(self.named["image"], 0, 0, self.named["image"].size)
-        device.supersede(self.film, event)
-        if self.band_bytes:
-            self._fill("bands", 0, 0, self.band_bytes)
-
-    def _fill(self, name: str, value: int, offset: int, size: int) -> None:
-        self.stream.fill(self.named[name], value, offset, size)
+        """Enqueue that the film is empty; the next sample is number 0."""
+        self.counts = Counts()
+        self.samples_per_pixel = 0.0
+        self.paths.clear_counters()
+        self.film.clear()
 
     def enqueue(self, first: int, end: int) -> None:
-        """Enqueue that samples first to end - 1 of every pixel are added; nothing is waited for."""
+        """Enqueue that samples first to end - 1 of every pixel are added; wait for nothing."""
         samples = np.array([first, end], np.int32)
         self.loop.set_args(samples=samples, bounces=ENDLESS, restart=1)
         size, group = self._sizes(self.lanes)
@@ -257,78 +216,130 @@ class Wavefront(DeviceScene):
         """Add samples first to end - 1 of every pixel to the film, and wait.
 
         on_batch is called every few iterations with the counts; if it returns False, every path is
-        brought to its end and the exposure stops: a valid film, whose pixels differ in their number
-        of samples. Returns whether it ran to its end.
+        brought to its end and no other begins: a valid film, whose pixels differ in their number of
+        samples. Returns whether all samples were added.
         """
-        steps = self._round
+        steps = self._batch()
         begin = steps[0].bound
-        self.rewind()
+        self.paths.restart()
         begin.set_args(samples=(first, end))
         if self.looped:
-            begin.set_args(bounces=self._bounces, restart=0)
+            begin.set_args(bounces=self._loop_bounces(), restart=0)
         before, finished = self.counts.samples, True
-        reads: deque[tuple[np.ndarray, cl.Event]] = deque()
+        reads: deque[tuple[NDArray[np.uint32], cl.Event]] = deque()
         while True:
             for step in steps:
                 self.timings.add(step.name, self.stream.run(step.bound, step.size, step.group))
-            host = np.zeros(len(COUNTERS), np.uint32)
-            event = self.stream.read_later(self.named["counters"], host)
+            reads.append(self.paths.read_counters())
             self.stream.flush()
-            reads.append((host, event))
             if len(reads) < 2:
                 continue
-            now, event = reads.popleft()
+            counters, event = reads.popleft()
             event.wait()
-            self._count(now)
+            self._count(counters)
             if on_batch and finished and not on_batch(self.counts):
                 begin.set_args(samples=(first, first))
                 finished = False
-            if now[0] >= self.slots:
+            if counters[0] >= self.paths.slots:
                 break
         for _, event in reads:
             event.wait()
-        width, height = self._size
-        new = (self.counts.samples - before) / (width * height)
-        self.samples_per_pixel += end - first if finished else new
+        width, height = self.film.size
+        added = (self.counts.samples - before) / (width * height)
+        self.samples_per_pixel += end - first if finished else added
         self.accumulate_film()
         return finished
 
-    def rewind(self) -> None:
-        """Let every slot begin its list again."""
-        word = next(m.word for m in PATH.members if m.name == "state")
-        self._fill("path_words", FRESH, 4 * word * self.stride, 4 * self.slots)
-        self._fill("counters", 0, 0, 4)
+    def accumulate_film(self) -> cl.Event:
+        """Enqueue that the film's picture becomes that of the samples so far; return the event."""
+        if self.features.light_paths:
+            self._accumulate.set_args(samples=self.samples_per_pixel)
+        return self.film.accumulate(self._accumulate)
 
-    def _count(self, now: np.ndarray) -> None:
+    def image(self) -> NDArray[np.float32]:
+        """Return the picture so far, (h, w, 3) float32 in the film's output space; wait for it."""
+        return self.film.colours()
+
+    def bands(self) -> NDArray[np.float32]:
+        """Return the mean radiance in each band so far, (h, w, bands) float32; wait for it."""
+        assert self._accumulate_bands is not None, "the film has no bands"
+        return self.film.bands(self._accumulate_bands)
+
+    def _features_of(self, lowered: Lowered) -> Features:
+        if lowered.features.channel == self.channel:
+            return lowered.features
+        return dataclasses.replace(lowered.features, channel=self.channel)
+
+    def _bind_film(self) -> None:
+        """Bind the kernels that make a picture of the film."""
+        self._build(programs.film_sources(self.features, self.scene.strategy.layout))
+        self._accumulate = self._bind("accumulate", "accumulate", samples=0.0)
+        self._accumulate_bands = (
+            self._bind("bands", "accumulate_bands") if self.film.has_bands else None
+        )
+
+    def _bind_stages(self) -> list[Step]:
+        features, chosen = self.features, self.scene.strategy
+        self._build(self._stage_texts(self.scene.lowered, chosen))
+        steps: list[Step] = []
+        for stage in programs.order(features, chosen.layout, self.lanes, chosen.interleaved):
+            if stage.kernel == "shade" and steps[-1].bound.kernel.name != "shade":
+                steps += self._bind_queues(chosen.queued, len(features.materials))
+            samples = {} if steps else {"samples": (0, 0)}
+            bound = self._bind(stage.program, stage.kernel, **samples)
+            steps.append(Step(stage.program, bound, *self._sizes(stage.lanes)))
+        return steps
+
+    def _bind_queues(self, queued: str, kinds: int) -> list[Step]:
+        """The kernels that queue slots by material, none where they are not queued."""
+        if not queued:
+            return []
+        return [
+            Step(name, self._bind(queued, name), (size,), (group,) if group else None)
+            for name, size, group in queues.steps(queued, self.paths.slots, kinds)
+        ]
+
+    def _stage_texts(self, lowered: Lowered, chosen: Strategy) -> dict[str, device.Source]:
+        return programs.sources(
+            self._features_of(lowered), chosen.layout, self.lanes,
+            queued=chosen.queued, interleaved=chosen.interleaved,
+        )  # fmt: skip
+
+    def _link(self, lowered: Lowered, chosen: Strategy) -> device.Program:
+        features, layout = self._features_of(lowered), chosen.layout
+        texts = programs.loop_sources(features, layout, self.lanes, chosen.interleaved)
+        known = {"loop": signatures.loop_arguments(features, layout)}
+        return device.link(self.device, texts, "loop", known)
+
+    def _build(self, texts: dict[str, device.Source]) -> None:
+        """Build those programs that are not built yet."""
+        start = time.perf_counter()
+        missing = {n: text for n, text in texts.items() if n not in self.programs}
+        self.programs |= device.build_all(self.device, missing)
+        self.program_seconds += time.perf_counter() - start
+
+    def _bind(self, program: str, name: str, **more: Any) -> device.BoundKernel:
+        """A kernel of a program with its arguments, by the names in its signature."""
+        kernel = self.programs[program].kernel(name)
+        arguments = {**self.arguments, **more}
+        return kernel.bind(**{a.name: arguments[a.name] for a in kernel.arguments})
+
+    def _batch(self) -> list[Step]:
+        """What `render_samples` enqueues between two reads of the counters."""
+        if self.looped:
+            return [Step("loop", self.loop, *self._sizes(self.lanes))]
+        return self.stages * BATCH
+
+    def _loop_bounces(self) -> int:
+        """Bounces of a loop between two reads of the counters: some hundredths of a second."""
+        info, slots = self.device.info, self.paths.slots
+        return max(BATCH, CORE_BOUNCES * info.compute_units // slots) if info.is_cpu else BATCH
+
+    def _sizes(self, lanes: int) -> tuple[tuple[int], tuple[int]]:
+        """How many work-items serve all slots, `lanes` each, and how many of them are a group."""
+        return (self.paths.slots // lanes,), (GROUP // lanes,) if lanes > 1 else (GROUP,)
+
+    def _count(self, counters: NDArray[np.uint32]) -> None:
         """Add what the counters have gained since they were read last."""
-        new = now - self._seen  # unsigned: right even after they wrapped around
-        self._seen = now
-        for name, n in zip(COUNTERS[1:], new[1:].tolist(), strict=True):
+        for name, n in self.paths.gained(counters).items():
             setattr(self.counts, name, getattr(self.counts, name) + n)
-
-    def accumulate_film(self) -> None:
-        """Enqueue that `film` becomes the picture of what was exposed."""
-        if self.lowered.features.light_paths:
-            self.accumulate.set_args(samples=self.samples_per_pixel)
-        others = [e for e in self.film.events if e is not self._pictured]  # of who reads it
-        self.stream.after(others)
-        self._pictured = self.stream.run(self.accumulate, self._size)
-        device.supersede(self.film, self._pictured)
-
-    def image(self) -> np.ndarray:
-        """The picture so far, (h, w, 3) float32 in the film's output space; waits for it."""
-        width, height = self._size
-        whole = self.stream.read(self.named["image"], np.empty((height, width, 4), np.float32))
-        return np.ascontiguousarray(whole[:, :, :3])
-
-    def bands(self) -> np.ndarray:
-        """The mean radiance in each band so far, (h, w, bands) float32, of a film with bands."""
-        width, height = self._size
-        self.stream.run(self.accumulate_bands, (width, height))
-        shape = (height, width, int(self.lowered.settings["bands"]))
-        return self.stream.read(self.named["band_image"], np.empty(shape, np.float32))
-
-    @cached_property
-    def _size(self) -> tuple[int, int]:
-        """Width and height of the film [pixels]."""
-        return int(self.lowered.settings["width"]), int(self.lowered.settings["height"])

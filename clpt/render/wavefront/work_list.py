@@ -1,4 +1,4 @@
-"""Walks: which places of the film the slots of a plane take, one after the other, and how far."""
+"""The work list: which pixels of the film each slot of a plane samples, in what order, how far."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from numpy.typing import NDArray
 
 FOREVER = np.iinfo(np.int32).max  # an end that no sample reaches
 
-PixelIndices = NDArray[np.int64]
+PixelIndices = NDArray[np.int64]  # of padded pixels, in the order of 4x4 tiles, see film/film.cl
 
 
 def pixels(settings: NDArray[np.void]) -> tuple[PixelIndices, PixelIndices]:
-    """x and y of the pixel of every place (places,), in the order of 4x4 tiles, see film/film.cl."""
-    place = np.arange(int(settings["padded_pixels"]))
-    row, column = np.divmod(place >> 4, int(settings["tiles_x"]))
-    return column * 4 + (place & 3), row * 4 + (place >> 2 & 3)
+    """Return x and y of every padded pixel, (padded_pixels,) each."""
+    index = np.arange(int(settings["padded_pixels"]))
+    row, column = np.divmod(index >> 4, int(settings["tiles_x"]))
+    return column * 4 + (index & 3), row * 4 + (index >> 2 & 3)
 
 
 def inside(settings: NDArray[np.void]) -> PixelIndices:
-    """The places that lie in the picture, ascending: its sides need not be multiples of four."""
+    """Return the pixels in the picture, ascending: its sides need not be multiples of four."""
     x, y = pixels(settings)
     return np.flatnonzero((x < settings["width"]) & (y < settings["height"]))
 
@@ -26,16 +26,17 @@ def inside(settings: NDArray[np.void]) -> PixelIndices:
 def table(
     settings: NDArray[np.void], order: PixelIndices, ends: PixelIndices | None = None
 ) -> NDArray[np.uint32]:
-    """Deal places to the slots of a plane by turns; what kernels/film/film.cl calls `walk`.
+    """Deal pixels in turn to the slots of a plane; return `work_list` of kernels/film/film.cl.
 
-    order: which places, and in what order; ends: the sample before which each of them is left, by
-    default where the exposure ends. (2 * places + per_plane,) uint32.
+    order: which pixels, and in what order; ends: the sample before which each of them is left, by
+    default where the render ends. (2 * padded_pixels + per_plane,) uint32: the pixel that follows
+    each pixel, the end of each, and the first pixel of each slot; padded_pixels stands for none.
     """
     padded_pixels, slots = int(settings["padded_pixels"]), int(settings["per_plane"])
-    made = np.full(2 * padded_pixels + slots, padded_pixels, np.uint32)
-    made[order[:-slots]] = order[slots:]
-    made[padded_pixels : 2 * padded_pixels] = FOREVER
+    words = np.full(2 * padded_pixels + slots, padded_pixels, np.uint32)
+    words[order[:-slots]] = order[slots:]
+    words[padded_pixels : 2 * padded_pixels] = FOREVER
     if ends is not None:
-        made[padded_pixels + order] = ends
-    made[2 * padded_pixels :][: len(order)] = order[:slots]
-    return made
+        words[padded_pixels + order] = ends
+    words[2 * padded_pixels :][: len(order)] = order[:slots]
+    return words

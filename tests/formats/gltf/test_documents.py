@@ -60,7 +60,7 @@ CHANGES = {
     "nodes[0].mesh": (4, r"nodes\[0\].mesh: there is no meshes\[4\]; the file has 1"),
     "nodes[0].children": ([0], r"nodes\[0\].children: is its own ancestor"),
     "nodes[0].matrix": ([1.0] * 15, "must be 16 numbers"),
-    "nodes[0].rotation": ([0, 0, 0, 0], "turns nowhere"),
+    "nodes[0].rotation": ([0, 0, 0, 0], "is no rotation"),
     "nodes[0].scale": ([1e300, 1, 1], "too large"),
     "nodes[0].translation": ([True, 0, 0], "must be a number, not true"),
     "scene": (3, "there is no scenes"),

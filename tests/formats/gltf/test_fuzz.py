@@ -2,34 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import json
 
 import numpy as np
 import pytest
 
-from clpt.errors import SceneError
 from clpt.formats import load
+from tests.formats.fuzzing import check, hypothesis, json_paths, json_values, replace, settings, st
 
-hypothesis = pytest.importorskip("hypothesis")
-st = hypothesis.strategies
-
-FEW = hypothesis.settings(
-    max_examples=150,
-    deadline=None,
-    derandomize=True,
-    database=None,
-    suppress_health_check=list(hypothesis.HealthCheck),
-)
+FEW = settings(150)
 WORDS = st.sampled_from(
     ["mesh", "VEC3", "MAT4", "LINEAR", "data:,", "../a", "perspective", "", "é"]
 )
 NUMBERS = st.sampled_from([-1, 0, 1, 2, 3, 7, 5121, 5126, 2**31, 2**32 - 1, 10**30, 0.5, -1e308])
-VALUES = st.recursive(
-    st.none() | st.booleans() | NUMBERS | WORDS,
-    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(WORDS, inner, max_size=3),
-    max_leaves=6,
-)
+VALUES = json_values(st.none() | st.booleans() | NUMBERS | WORDS, WORDS)
 
 
 def rich(build):
@@ -64,23 +52,6 @@ def rich(build):
     return made
 
 
-def check(path, content: bytes) -> None:
-    path.write_bytes(content)
-    try:
-        load(path, time=0.5)
-    except SceneError as error:
-        assert "\n" not in str(error) and len(str(error)) < 500
-
-
-def places(value, path=()):
-    """Every place in a JSON document."""
-    inner = value.items() if isinstance(value, dict) else enumerate(value)
-    for key, child in inner:
-        yield (*path, key)
-        if isinstance(child, (dict, list)):
-            yield from places(child, (*path, key))
-
-
 def test_the_whole_document_is_read(tmp_path, build):
     (tmp_path / "a.gltf").write_text(rich(build).text())
     assert not load(tmp_path / "a.gltf", time=0.5).warnings
@@ -88,23 +59,16 @@ def test_the_whole_document_is_read(tmp_path, build):
 
 def test_values_replaced(tmp_path, build):
     document = json.loads(rich(build).text())
-    everywhere = list(places(document))
+    paths = list(json_paths(document))
 
     @FEW
-    @hypothesis.given(
-        st.lists(st.tuples(st.sampled_from(everywhere), VALUES), min_size=1, max_size=3)
-    )
+    @hypothesis.given(st.lists(st.tuples(st.sampled_from(paths), VALUES), min_size=1, max_size=3))
     def run(changes):
         changed = copy.deepcopy(document)
-        for place, value in changes:
-            inner = changed
-            try:
-                for key in place[:-1]:
-                    inner = inner[key]
-                inner[place[-1]] = value
-            except (KeyError, IndexError, TypeError):
-                continue  # an earlier change took the place away
-        check(tmp_path / "replaced.gltf", json.dumps(changed).encode())
+        for path, value in changes:
+            with contextlib.suppress(KeyError, IndexError, TypeError):  # an earlier change cut it
+                replace(changed, path, value)
+        check(tmp_path / "replaced.gltf", json.dumps(changed).encode(), time=0.5)
 
     run()
 
@@ -121,7 +85,7 @@ def test_bytes_replaced(tmp_path, build):
         data = bytearray(whole)
         for at, new in changes:
             data[at : at + len(new)] = new
-        check(tmp_path / "damaged.glb", bytes(data[: end if end % 5 == 0 else len(data)]))
+        check(tmp_path / "damaged.glb", bytes(data[: end if end % 5 == 0 else len(data)]), time=0.5)
 
     run()
 
@@ -147,9 +111,9 @@ def test_compressed_bytes_replaced(tmp_path, assets, name):
             at %= len(data)
             data[at : at + len(new)] = new
         if target is None:
-            check(tmp_path / source.name, bytes(data[: len(stored)]))
+            check(tmp_path / source.name, bytes(data[: len(stored)]), time=0.5)
         else:
             target.write_bytes(data)
-            check(tmp_path / source.name, whole)
+            check(tmp_path / source.name, whole, time=0.5)
 
     run()

@@ -1,4 +1,4 @@
-"""scene.json: what may be written, every error with its place, the round trip, the schema."""
+"""scene.json: what may be written, every error with its location, the round trip, the schema."""
 
 from __future__ import annotations
 
@@ -239,12 +239,17 @@ ERRORS = [
      "lights[0].radiance.normalised", "must be true or false"),
     ({"materials": {"a": {"type": "conductor", "metal": {"name": "Au"}}}},
      "materials.a.metal", "the key 'file' alone"),
+    ({"shapes": [{"type": "mesh", "file": "t.ply", "attributes": {}}]},
+     "shapes[0].attributes", "in the 'file' already"),
+    ({"materials": {"a": {"type": "diffuse", "reflectance":
+      {"type": "bitmap", "image": ["t.png"] * 6}}}},
+     "materials.a.reflectance.image", "must be a string"),
     ({"gravity": 1}, "gravity", "a scene has no parameter 'gravity'"),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(("content", "where", "message"), ERRORS)
-def test_errors_tell_the_place(scene, content, where, message):
+def test_errors_name_the_location(scene, content, where, message):
     with pytest.raises(SceneError) as caught:
         scene(content)
     error = caught.value

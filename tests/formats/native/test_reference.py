@@ -1,12 +1,13 @@
-"""The reference of scene.json is the one that the dataclasses give."""
+"""The reference of scene.json follows from the dataclasses; each form of a parameter is known."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import get_args
 
-from clpt.formats.native import reference
-from clpt.scene import KINDS
-from clpt.scene.params import params
+from clpt.formats.native import forms, reference
+from clpt.scene import KINDS, integrators, materials
+from clpt.scene.params import HostForm, params
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -17,7 +18,21 @@ def test_the_page_is_up_to_date():
     )
 
 
-def test_every_kind_and_parameter_is_told():
+def test_every_form_is_read_and_written():
+    """The table has all forms; every host parameter of ours has one; none is left over."""
+    classes = [cls for of_category in KINDS.values() for cls in of_category]
+    declared = [
+        (cls, name, param)
+        for cls in (*classes, integrators.Film, materials.Layer)
+        for name, param in params(cls).items()
+    ]
+    assert set(get_args(HostForm)) < forms.FORMS.keys()
+    assert not [(cls, name) for cls, name, p in declared if p.role == "host" and not p.form]
+    unused = forms.FORMS.keys() - {param.form or param.role for *_, param in declared}
+    assert unused <= {"host", "numbers"}, "only a kind of a user's own may need these"
+
+
+def test_every_kind_and_parameter_is_in_the_reference():
     page = reference.text()
     for classes in KINDS.values():
         for cls in classes:

@@ -4,20 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from clpt.errors import SceneError
-from clpt.formats import load
 from clpt.formats.meshes import ply
+from tests.formats.fuzzing import check, damaged, hypothesis, settings, st
 
-hypothesis = pytest.importorskip("hypothesis")
-st = hypothesis.strategies
-
-FEW = hypothesis.settings(
-    max_examples=150,
-    deadline=None,
-    derandomize=True,
-    database=None,
-    suppress_health_check=list(hypothesis.HealthCheck),
-)
+FEW = settings(150)
 WORDS = st.sampled_from(
     'Shape "sphere" "disk" "loopsubdiv" "plymesh" "float radius" "integer levels" "point3 P" '  # noqa: SIM905
     '"integer indices" [ ] 0 1 -1 1e30 nan 1e999 99999999999 # " true Scale Rotate Transform '
@@ -25,14 +15,6 @@ WORDS = st.sampled_from(
     '"fuzz.pbrt" Import WorldBegin Material "diffuse" NamedMaterial "mix" "string type" Texture '
     '"float alpha" "texture alpha" LightSource "infinite" AreaLightSource "float scale" \\'.split()
 )
-
-
-def check(path, content: bytes) -> None:
-    path.write_bytes(content)
-    try:
-        load(path)
-    except SceneError as error:
-        assert "\n" not in str(error)
 
 
 def test_heaps_of_words(tmp_path):
@@ -51,15 +33,9 @@ def source(scenes):
 
 def test_damaged_files(tmp_path, source):
     @FEW
-    @hypothesis.given(st.data())
-    def run(data):
-        text = source
-        for _ in range(data.draw(st.integers(1, 3))):
-            a = data.draw(st.integers(0, len(text)))
-            b = min(len(text), a + data.draw(st.integers(0, 40)))
-            new = data.draw(st.just(b"") | WORDS.map(str.encode) | st.binary(max_size=4))
-            text = text[:a] + new + text[b:]
-        check(tmp_path / "fuzz.pbrt", text)
+    @hypothesis.given(damaged(source, WORDS))
+    def run(content):
+        check(tmp_path / "fuzz.pbrt", content)
 
     run()
 
@@ -77,11 +53,7 @@ def test_damaged_meshes(tmp_path):
     def run(data):
         at = data.draw(st.integers(0, len(source)))
         new = data.draw(st.binary(max_size=6))
-        path = tmp_path / "a.ply"
-        path.write_bytes(source[:at] + new + source[at + data.draw(st.integers(0, 6)) :])
-        try:
-            ply.read(path)
-        except SceneError as error:
-            assert "\n" not in str(error)
+        end = at + data.draw(st.integers(0, 6))
+        check(tmp_path / "a.ply", source[:at] + new + source[end:], ply.read)
 
     run()

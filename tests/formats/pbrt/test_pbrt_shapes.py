@@ -9,7 +9,7 @@ from clpt import transforms
 from clpt.errors import SceneError
 from clpt.formats import load
 from clpt.formats.pbrt import subdivision
-from clpt.render.lowering.geometry import shapes as lowering
+from clpt.render.lowering.geometry import triangles
 from clpt.scene import shapes
 from clpt.scene.materials import Mask, Null, TwoSided
 
@@ -38,15 +38,15 @@ def one(scene):
 
 def fronts(shape):
     """Middles and unit normals of a mesh's triangles in the world, as the device gets them."""
-    vertices, faces, _, _ = lowering.triangles(shape)
+    vertices, faces, _, _ = triangles.triangulate(shape)
     a, b, c = (vertices[faces[:, i]].astype(np.float64) for i in range(3))
     normals = np.cross(b - a, c - a)
     return (a + b + c) / 3, normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
 def area(shape):
-    vertices, faces, _, _ = lowering.triangles(shape)
-    return lowering.triangle_areas(vertices, faces).sum()
+    vertices, faces, _, _ = triangles.triangulate(shape)
+    return triangles.triangle_areas(vertices, faces).sum()
 
 
 @pytest.mark.parametrize(
@@ -68,7 +68,7 @@ def test_a_mesh_faces_where_its_normals_point(one, text, toward):
     made = one(f'{text}Shape "trianglemesh" {QUAD} "normal N" [0 0 -1 0 0 -1 0 0 -1 0 0 -1]')
     _, normals = fronts(made)
     assert normals[:, 2] == pytest.approx([toward, toward])
-    _, _, shading, _ = lowering.triangles(made)
+    _, _, shading, _ = triangles.triangulate(made)
     assert shading[:, 2] == pytest.approx([toward] * 4)
 
 
@@ -255,9 +255,9 @@ def test_broken_shapes_say_where(scene, text, message):
     assert "a.pbrt:2: Shape" in str(caught.value)
 
 
-def test_what_is_passed_over_is_told_once(scene):
+def test_what_is_left_out_is_warned_of_once(scene):
     found = scene('Shape "sphere" "float raduis" 2\n' + 'Shape "sphere" "float zmin" 1\n' * 3)
-    unknown = "a.pbrt:2: Shape \"sphere\": 'raduis': means nothing here; did you mean 'radius'?"
-    assert unknown in found.warnings
+    unknown = "'raduis': is not known here and is left out; did you mean 'radius'?"
+    assert f'a.pbrt:2: Shape "sphere": {unknown}' in found.warnings
     assert scene('Shape "sphere" "float zmin" 1').shapes == []
     assert next(text for text in found.warnings if "no area" in text).endswith("(in 3 places)")

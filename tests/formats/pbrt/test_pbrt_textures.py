@@ -8,7 +8,7 @@ from PIL import Image
 
 from clpt import transforms
 from clpt.errors import SceneError
-from clpt.formats.pbrt.map_values import mapped
+from clpt.formats.pbrt.map_values import map_values
 from clpt.formats.pbrt.textures import textured
 from clpt.scene.textures import Bitmap, Checkerboard, Checkers, Dots, Mix, Noise, Product
 from tests.formats.pbrt.directives import define, params, state
@@ -101,16 +101,17 @@ def test_encodings_scale_and_invert(images):
 
 def test_functions_of_textures(images):
     bitmap = Bitmap(image=images / "a.png", raw=True)
-    assert mapped(bitmap, np.sqrt).image[..., 0] == pytest.approx(np.sqrt(STORED / 255.0))
-    coded = mapped(Bitmap(image=images / "a.png"), lambda v: 0.9 * v, bytes_stay=True)
+    assert map_values(bitmap, np.sqrt).image[..., 0] == pytest.approx(np.sqrt(STORED / 255.0))
+    coded = map_values(Bitmap(image=images / "a.png"), lambda v: 0.9 * v, bytes_stay=True)
     assert coded.image.dtype == np.uint8 and coded.image.shape == (2, 2, 3) and not coded.raw
     levels = [srgb(image / 255.0) for image in (coded.image[..., 0], STORED)]
     assert levels[0] == pytest.approx(0.9 * levels[1], abs=5e-3)
     board = Checkerboard(color0=0.25, color1=(0.25, 0.16, 0.04))
-    made = mapped(Product(first=board, second=0.5), np.sqrt)
+    made = map_values(Product(first=board, second=0.5), np.sqrt)
     assert made.first.color0.value == pytest.approx(0.5)
     assert made.first.color1.to_rgb() == pytest.approx([0.5, 0.4, 0.2])
-    assert mapped(0.25, np.sqrt) == 0.5 and mapped((0.25, 0.0, 1.0), np.sqrt) == (0.5, 0.0, 1.0)
+    assert map_values(0.25, np.sqrt) == 0.5
+    assert map_values((0.25, 0.0, 1.0), np.sqrt) == (0.5, 0.0, 1.0)
 
 
 def test_patterns_are_placed_by_the_texture_space():
@@ -143,7 +144,7 @@ def test_mappings():
 
 
 def test_functions_of_patterns_run_between_their_ends():
-    made = mapped(Noise(), lambda v: 1.0 - v / 2.0)
+    made = map_values(Noise(), lambda v: 1.0 - v / 2.0)
     assert (made.first.value, made.second.value) == (1.0, 0.5) and isinstance(made.amount, Noise)
 
 

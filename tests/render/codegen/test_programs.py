@@ -19,6 +19,7 @@ from clpt.scene.params import SPECTRUM_ROLES, device_params
 from clpt.scene.shapes import Cube, Rectangle, Sphere
 from clpt.spectra import Fluorophore, Tabulated
 
+QUICK_TO_COMPILE = ("-cl-opt-disable",)  # here programs are built, not run
 GREY = Tabulated((400.0, 700.0), (0.2, 0.8))
 
 
@@ -55,7 +56,7 @@ def test_loaders_of_materials_build(cls: type[m.Material], mode: str) -> None:
     """The loader of a kind with constants, tables and textures, eight lanes wide."""
     features = lowered([textured(cls), plain(cls)], mode).features
     texts = programs.sources(features, "wide8", 8, queued=False)
-    device.build(device.choose(), texts[f"shade_{cls.kind}"])
+    device.build(device.choose(), texts[f"shade_{cls.kind}"], QUICK_TO_COMPILE)
 
 
 @pytest.mark.parametrize("lanes", [1, 8, 16])
@@ -68,7 +69,7 @@ def test_stages_build(lanes: int, queued: bool) -> None:
     texts |= programs.film_sources(features, "binary")
     assert {"mix", "shade_diffuse", "shade_null"} <= set(texts)
     assert ("sort" in texts) == queued
-    device.build_all(device.choose(), texts)
+    device.build_all(device.choose(), texts, QUICK_TO_COMPILE)
 
 
 @pytest.mark.parametrize("lanes", [1, 8, 16])
@@ -79,7 +80,8 @@ def test_stages_of_a_spectral_film_build(lanes: int) -> None:
     banded = lower(Scene(camera=Perspective(), lights=[Constant()], film=film)).features
     texts = programs.sources(banded, "brute", lanes, queued=False)
     texts |= programs.film_sources(banded, "brute")
-    device.build_all(device.choose(), {name: texts[name] for name in ("generate", "bands")})
+    built = {name: texts[name] for name in ("generate", "bands")}
+    device.build_all(device.choose(), built, QUICK_TO_COMPILE)
     others = programs.sources(plain_, "brute", lanes, queued=False)
     others |= programs.film_sources(plain_, "brute")
     assert "bands" not in others and "wavelengths_weigh" in texts["generate"].text
@@ -106,7 +108,7 @@ def test_only_what_absorbs_is_asked_for_a_medium(mode: str) -> None:
             assert ("inline Spectrum medium_transmittance(" in text) == there
             assert ("#define USES_ABSORPTION 1" in text) == there
         assert ("inline integer medium_beyond(" in texts["shade_diffuse"].text) == there
-        device.build(device.choose(), texts["shade_rough_dielectric"])
+        device.build(device.choose(), texts["shade_rough_dielectric"], QUICK_TO_COMPILE)
 
 
 def test_only_what_fluoresces_shifts_wavelengths() -> None:
@@ -118,7 +120,7 @@ def test_only_what_fluoresces_shifts_wavelengths() -> None:
     ):
         texts = programs.sources(lowered(materials, mode).features, "wide8", 8, queued=False)
         there = len(materials) > 1 and mode == "spectral"
-        assert ("#define USES_SHIFTS 1" in texts["generate"].text) == there
+        assert ("#define USES_FLUORESCENCE 1" in texts["generate"].text) == there
         for name, source in texts.items():
             shifts = there and name == "shade_fluorescent"
             assert ("inline Wavelengths reradiation_shift(" in source.text) == shifts

@@ -143,10 +143,10 @@ def test_its_functions_and_constants_are_its_own() -> None:
 
 def test_a_file_is_found_beside_the_class(tmp_path: Path) -> None:
     """And text that stands nowhere is told by the name of its class."""
-    kind = type("Filed", (m.Material,), {"source": Path("test_outside.py")})
+    kind = type("Filed", (m.Material,), {"source": Path("test_custom_materials.py")})
     assert custom_materials.text(kind).text == inspect.getsource(inspect.getmodule(Paint))
     assert Path(custom_materials.text(kind).file).samefile(__file__)
-    assert custom_materials.text(Paint).file == "test_outside.py:source"
+    assert custom_materials.text(Paint).file == "test_custom_materials.py:source"
     nowhere = type("Nowhere", (Paint,), {"source": "int x() {}", "__module__": "nowhere"})
     assert custom_materials.text(nowhere).file == "Nowhere.source"
     for source in (tmp_path / "none.cl", "velvet.cl"):

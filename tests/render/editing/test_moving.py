@@ -79,7 +79,7 @@ def bent(amount: float) -> np.ndarray:
 
 def fresh(renderer: Renderer) -> np.ndarray:
     """What a new renderer makes of the scene as it is now."""
-    layout = renderer.wavefronts[0].tree.layout
+    layout = renderer.wavefronts[0].scene.strategy.layout
     return picture(Renderer(renderer.scene, renderer.device, layout=layout))
 
 
@@ -151,8 +151,30 @@ def test_what_cannot_be_is_told(renderer: Renderer) -> None:
 
 
 def test_where_light_is_traced_from_lights_nothing_moves_in_place(renderer: Renderer) -> None:
-    moving = Moving(renderer.wavefronts[0], renderer.scene)
-    assert moving.move(renderer.scene, {})
-    features = dataclasses.replace(moving.lowered.features, light_paths=True)
-    moving.lowered = dataclasses.replace(moving.lowered, features=features)
-    assert not moving.move(renderer.scene, {})
+    target = renderer.wavefronts[0].scene
+    moving, lowered = Moving(target, renderer.scene), target.lowered
+    assert moving.move(renderer.scene, {}) is None
+    features = dataclasses.replace(lowered.features, light_paths=True)
+    target.lowered = dataclasses.replace(lowered, features=features)
+    assert "traced from lights" in (moving.move(renderer.scene, {}) or "")
+    target.lowered = lowered
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "reason"),
+    [
+        ("lamp", {"to_world": tf.translate([0, 5, 1])}, "rectangle 'lamp' emits light"),
+        ("ball", {"to_world": tf.scale([-1, 1, 1])}, "the transform of mesh 'ball' mirrors it"),
+        ("ball", {"vertices": VERTICES[:-1]}, "mesh 'ball' has 161 vertices, and had 162"),
+        ("ball", {"flip_normals": True}, "mesh 'ball' has another flip_normals"),
+        ("bead", {"to_world": tf.scale([1, 2, 1])}, "sphere 'bead' makes triangles of it"),
+    ],
+)
+def test_the_reason_why_a_shape_does_not_move(
+    renderer: Renderer, name: str, changes: dict[str, Any], reason: str
+) -> None:
+    scene_ = scene()
+    moving = Moving(renderer.wavefronts[0].scene, scene_)
+    old = next(shape for shape in scene_.shapes if shape.name == name)
+    refusal = moving.move(scene_, {id(old): (old, dataclasses.replace(old, **changes))})
+    assert refusal is not None and reason in refusal

@@ -12,7 +12,7 @@ import pytest
 from clpt import device
 from clpt import transforms as tf
 from clpt.errors import SceneError
-from clpt.render.editing.scene_edit import Names, edited, resolve_device_arrays
+from clpt.render.editing.scene_edit import Successors, edit_scene, resolve_device_arrays
 from clpt.render.lowering.scene import Lowered, lower
 from clpt.scene import Scene
 from clpt.scene import materials as m
@@ -76,9 +76,9 @@ def test_a_lowering_takes_up_the_one_before() -> None:
 
 
 def test_edits_replace_only_what_they_touch() -> None:
-    first, names = scene(), Names()
-    new, swaps = edited(first, names, materials={RED: BLUE, "ball": RED})
-    names.replace(swaps)
+    first, successors = scene(), Successors()
+    new, replaced = edit_scene(first, successors, materials={RED: BLUE, "ball": RED})
+    successors.note(replaced)
     sheet, lamp, ball, one, other = new.shapes
     assert sheet.material.front is BLUE and ball.material is RED
     assert lamp is first.shapes[1]
@@ -86,10 +86,10 @@ def test_edits_replace_only_what_they_touch() -> None:
     assert one.group.shapes[1] is first.shapes[3].group.shapes[1]
     assert first.shapes[0].material.front is RED, "the scene that was given stays as it was"
     # what was given at first still names its place
-    newer, _ = edited(new, names, transforms={first.shapes[2]: np.diag([2, 2, 2, 1.0])})
+    newer, _ = edit_scene(new, successors, transforms={first.shapes[2]: np.diag([2, 2, 2, 1.0])})
     assert newer.shapes[2].material is RED and newer.shapes[2].to_world[0, 0] == 2.0
     points = np.zeros((40, 3), np.float32)
-    moved, _ = edited(new, names, vertices={0: points, "pebble": points})
+    moved, _ = edit_scene(new, successors, vertices={0: points, "pebble": points})
     assert not moved.shapes[0].vertices.any() and moved.shapes[0].vertices is not points
     assert not moved.shapes[4].group.shapes[0].vertices.any()
 
@@ -116,7 +116,7 @@ def test_what_is_used_in_place() -> None:
     ):
         found = lower(
             resolve_device_arrays(dataclasses.replace(scene(), shapes=shapes), queue)
-        ).lent
+        ).zero_copy
         assert found == lent
     with pytest.raises(SceneError, match="uvs must be rows of 8 bytes, found a buffer of 156"):
         odd = dataclasses.replace(there, uvs=made["faces"].data)
@@ -124,7 +124,7 @@ def test_what_is_used_in_place() -> None:
 
 
 @pytest.mark.parametrize(
-    ("edit", "told"),
+    ("edit", "message"),
     [
         ({"materials": {m.Diffuse(): RED}}, "not in the scene"),
         ({"materials": {"ball": 3}}, "3 is not a material"),
@@ -136,6 +136,6 @@ def test_what_is_used_in_place() -> None:
         ({"transforms": {"": np.eye(4)}}, "3 shapes have the name ''"),
     ],
 )
-def test_keys_that_mean_nothing(edit: dict[str, Any], told: str) -> None:
-    with pytest.raises(SceneError, match=told):
-        edited(scene(), Names(), **edit)
+def test_keys_that_mean_nothing(edit: dict[str, Any], message: str) -> None:
+    with pytest.raises(SceneError, match=message):
+        edit_scene(scene(), Successors(), **edit)

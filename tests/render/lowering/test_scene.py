@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import sys
 
 import numpy as np
@@ -11,14 +10,11 @@ import pytest
 import clpt
 from clpt.errors import SceneError
 from clpt.records import SETTINGS, SHAPE, TABLES
-from clpt.render.lowering.scene import (
-    DEEPEST,
-    MIXTURE,
-    SHAPE_NORMALS,
-    SHAPE_TWO_SIDED,
-    SHAPE_UVS,
-    lower,
-)
+from clpt.render.lowering.geometry import geometry
+from clpt.render.lowering.geometry.geometry import SHAPE_NORMALS, SHAPE_TWO_SIDED, SHAPE_UVS
+from clpt.render.lowering.materials.material_words import MIXTURE
+from clpt.render.lowering.scene import lower
+from clpt.render.lowering.settings import DEEPEST
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m
 from clpt.scene.cameras import Perspective
@@ -183,7 +179,7 @@ def test_what_is_costly_to_shade() -> None:
 
 
 def test_more_triangles_than_kernels_count(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(importlib.import_module("clpt.render.lowering.scene"), "MOST", 12)
+    monkeypatch.setattr(geometry, "MOST", 12)
     assert len(lower(scene(Rectangle())).faces) == 2
     with pytest.raises(SceneError, match="use instances"):
         lower(scene(Cube(), Rectangle()))

@@ -147,7 +147,7 @@ def test_cancel(renderer):
     assert not renderer.run(4096, lambda p: p.samples < 16, noise=1e-6)
     assert np.isfinite(renderer.image()).all()
     again(renderer, 3)
-    assert renderer.run(16)  # the walk is whole again
+    assert renderer.run(16)  # the work list is whole again
     assert (renderer.film.get()[..., 3] == 16).all()
 
 
@@ -170,19 +170,19 @@ def test_refused_where_pixels_share_points():
         checked(0.1, features)
 
 
-def test_walk():
-    """Every place of the picture is dealt once, and the others to nobody."""
+def test_work_list():
+    """Every pixel of the picture is dealt once, and the padding to nobody."""
     settings = {"width": 10, "height": 7, "tiles_x": 3, "padded_pixels": 96, "per_plane": 32}
     order = inside(settings)
     x, y = pixels(settings)
     assert {*zip(x[order], y[order], strict=True)} == {(i, j) for i in range(10) for j in range(7)}
     work_list = table(settings, order, order + 1000)
-    met = []
+    dealt = []
     for slot in range(32):
-        place = work_list[2 * 96 + slot]
-        while place < 96:
-            met.append(place)
-            place = work_list[place]
-    assert sorted(met) == list(order)
+        pixel = work_list[2 * 96 + slot]
+        while pixel < 96:
+            dealt.append(pixel)
+            pixel = work_list[pixel]
+    assert sorted(dealt) == list(order)
     assert (work_list[96:192][order] == order + 1000).all()
     assert (table(settings, order)[96:192] == FOREVER).all()

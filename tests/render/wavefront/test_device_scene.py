@@ -1,56 +1,89 @@
-"""What is decided about a scene before anything of it is compiled: slots, planes, the loop."""
+"""What several renderers share: a lowered scene is data, and nobody writes to it."""
 
 from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from typing import Any
 
+import numpy as np
 import pytest
 
 import clpt
 from clpt import device
+from clpt.render.editing import parameter_patch, rebuild
 from clpt.render.lowering.scene import lower
-from clpt.render.wavefront.device_scene import (
-    CPU_SLOTS,
-    GROUP,
-    LOOP_PATHS,
-    LOOP_SLOTS,
-    DeviceScene,
-)
+from clpt.render.wavefront.wavefront import Wavefront
+from clpt.scene import Scene
+from clpt.scene.integrators import Aov
+from clpt.scene.materials import Diffuse
 
 
 @pytest.fixture(scope="module")
-def on() -> device.Device:
-    return device.choose()
-
-
-def resident(on: device.Device, scenes: Path, size: int = 24, **wanted: Any) -> DeviceScene:
+def cornell(scenes: Path) -> Scene:
     scene = clpt.load(scenes / "cornell.xml")
-    film = dataclasses.replace(scene.film, mode="rgb", width=size, height=size)
-    return DeviceScene(on, lower(dataclasses.replace(scene, film=film)), **wanted)
+    film = dataclasses.replace(scene.film, mode="rgb", width=24, height=20)
+    return coloured(dataclasses.replace(scene, film=film), (0.5, 0.4, 0.3))
 
 
-def test_the_loop_is_taken_where_it_pays(on: device.Device, scenes: Path) -> None:
-    """On a CPU, for many paths, where nothing is to be sorted; or where it is asked for."""
-    cpu = on.info.is_cpu
-    assert resident(on, scenes, paths=LOOP_PATHS).looped == cpu
-    assert not resident(on, scenes, paths=LOOP_PATHS - 1).looped
-    assert not resident(on, scenes, paths=LOOP_PATHS, queued=True).looped
-    assert not resident(on, scenes, paths=LOOP_PATHS, looped=False).looped
-    assert resident(on, scenes, looped=True).looped
+def picture(wavefront: Wavefront) -> np.ndarray:
+    wavefront.clear()
+    assert wavefront.render_samples(0, 2)
+    return wavefront.image()
 
 
-@pytest.mark.parametrize("size", [24, 64, 160])
-def test_planes_are_those_of_the_stages(on: device.Device, scenes: Path, size: int) -> None:
-    """Since sums follow from them, and a picture is the same to the bit whoever makes it."""
-    if not on.info.is_cpu:
-        pytest.skip("only CPUs take fewer slots for the loop")
-    stages = resident(on, scenes, size, looped=False)
-    loop = resident(on, scenes, size, looped=True)
-    assert loop.lowered.settings["planes"] == stages.lowered.settings["planes"]
-    assert stages.slots <= CPU_SLOTS
-    least = GROUP * int(loop.lowered.settings["planes"])
-    assert loop.slots <= max(least, LOOP_SLOTS * on.info.compute_units)
-    assert loop.slots % GROUP == 0 and loop.slots == loop.lowered.settings["slots"]
-    assert resident(on, scenes, size, looped=True, slots=CPU_SLOTS).slots == stages.slots
+def coloured(scene: Scene, colour: tuple[float, float, float]) -> Scene:
+    """The scene with a material of its own on its first shape."""
+    first = dataclasses.replace(scene.shapes[0], material=Diffuse(reflectance=colour))
+    return dataclasses.replace(scene, shapes=[first, *scene.shapes[1:]])
+
+
+def test_nobody_can_write_to_a_lowered_scene(cornell: Scene) -> None:
+    lowered = lower(cornell)
+    arrays = [lowered.vertices, lowered.faces, lowered.tags, lowered.boxes]
+    for array in (*arrays, *lowered.tables.values(), lowered.instances.rows):
+        with pytest.raises(ValueError, match="read-only"):
+            array[...] = 0
+    with pytest.raises(ValueError, match="read-only"):
+        lowered.settings["seed"] = 1
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        lowered.glass_row = 1  # type: ignore[misc]
+
+
+def test_channels_share_a_scene_and_count_by_themselves(cornell: Scene) -> None:
+    views = dataclasses.replace(cornell, integrator=Aov(channels=("depth", "albedo")))
+    with clpt.Renderer(views) as renderer:
+        depth, albedo = renderer.wavefronts
+        assert depth.scene is albedo.scene and depth.paths is albedo.paths
+        for samples in (2, 4):
+            renderer.run(2)
+            assert depth.counts.samples == albedo.counts.samples == samples * 24 * 20
+
+
+def test_two_wavefronts_share_a_lowered_scene(cornell: Scene) -> None:
+    """With other slots, layouts and seeds, while one of them is edited and rebuilt."""
+    on, lowered = device.choose(), lower(cornell)
+    one = Wavefront.create(on, lowered, layout="wide8", looped=False)
+    other = Wavefront.create(on, lowered, layout="binary", slots=64, looped=False)
+    assert one.scene.lowered is other.scene.lowered is lowered
+    assert one.paths.slots != other.paths.slots
+    first, second = picture(one), picture(other)
+
+    one.paths.set_seed(9)
+    assert not np.array_equal(picture(one), first)
+    one.paths.set_seed(cornell.seed)
+    np.testing.assert_array_equal(picture(one), first)
+
+    edited = coloured(cornell, (0.1, 0.2, 0.9))
+    assert parameter_patch.patch(one.scene, cornell, edited) is None
+    patched = picture(one)
+    assert not np.array_equal(patched, first)
+    rebuild.take([one], lower(coloured(cornell, (0.1, 0.2, 0.9)), former=one.scene.lowered))
+    np.testing.assert_array_equal(picture(one), patched)
+
+    assert other.scene.lowered is lowered
+    np.testing.assert_array_equal(picture(other), second)
+    # What one has edited the other edits by itself, if need be by lowering again.
+    if parameter_patch.patch(other.scene, cornell, edited) is not None:
+        rebuild.take([other], lower(edited, former=other.scene.lowered))
+    new = Wavefront.create(on, lower(edited), layout="binary", slots=64, looped=False)
+    np.testing.assert_array_equal(picture(other), picture(new))

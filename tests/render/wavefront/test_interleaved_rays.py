@@ -7,8 +7,9 @@ import pytest
 
 import clpt
 from clpt import device
-from clpt.render.wavefront import wavefront
-from clpt.render.lowering.scene import lower
+from clpt.render.lowering.scene import Lowered, lower
+from clpt.render.wavefront import strategy
+from clpt.render.wavefront.strategy import Tuning
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Perspective
 from clpt.scene.lights import Constant
@@ -31,7 +32,7 @@ def scene(*more) -> Scene:
 
 @pytest.mark.parametrize("looped", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_the_same_picture(monkeypatch: pytest.MonkeyPatch, looped: bool) -> None:
-    monkeypatch.setattr(wavefront, "INTERLEAVED_TRIANGLES", 0)
+    monkeypatch.setattr(strategy, "INTERLEAVED_TRIANGLES", 0)
     pictures = []
     for larger in (False, True):
         monkeypatch.setattr(
@@ -39,22 +40,24 @@ def test_the_same_picture(monkeypatch: pytest.MonkeyPatch, looped: bool) -> None
             lambda *of, larger=larger: larger,
         )
         with clpt.Renderer(scene(), layout="wide8", looped=looped) as renderer:
-            front = renderer.wavefronts[0]
-            assert wavefront.use_interleaved_rays(front.device, front.lowered, "wide8") == larger
+            wavefront = renderer.wavefronts[0]
+            assert wavefront.scene.strategy.interleaved == larger
             renderer.run(16)
             pictures.append(np.array(renderer.image()))
-            assert front.counts.closest > 1.2 * front.counts.samples
+            assert wavefront.counts.closest > 1.2 * wavefront.counts.samples
     assert pictures[0].std() > 0
     np.testing.assert_array_equal(*pictures)
 
 
 def test_only_large_trees_of_triangles(monkeypatch: pytest.MonkeyPatch) -> None:
     on, plain, ball = device.choose(), lower(scene()), lower(scene(Sphere()))
-    monkeypatch.setattr(wavefront, "INTERLEAVED_TRIANGLES", 400)
-    assert not wavefront.use_interleaved_rays(on, plain, "wide8")
+
+    def interleaved(lowered: Lowered) -> bool:
+        return strategy.choose(on, lowered, Tuning(layout="wide8")).interleaved
+
+    monkeypatch.setattr(strategy, "INTERLEAVED_TRIANGLES", 400)
+    assert not interleaved(plain)
     monkeypatch.setattr("clpt.bvh.outgrows_caches", lambda *of: True)
-    assert wavefront.use_interleaved_rays(
-        on, plain, "wide8"
-    ) and not wavefront.use_interleaved_rays(on, ball, "wide8")
-    monkeypatch.setattr(wavefront, "INTERLEAVED_TRIANGLES", 401)
-    assert not wavefront.use_interleaved_rays(on, plain, "wide8")
+    assert interleaved(plain) and not interleaved(ball)
+    monkeypatch.setattr(strategy, "INTERLEAVED_TRIANGLES", 401)
+    assert not interleaved(plain)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt.errors import SceneError
+from clpt.render.lowering.tables import TableStore
 from clpt.scene.integrators import (
     BlackmanHarris,
     Box,
@@ -26,18 +26,12 @@ STEPS = 1 << 16  # in which a filter is integrated
 CUT = 4.0  # standard deviations at which a Gaussian ends that has no radius
 
 
-class Sink(Protocol):
-    """What is needed of clpt.render.lowering.tables.Tables."""
-
-    def append_floats(self, name: str, values: ArrayLike) -> int: ...
-
-
-def lower_filter(chosen: Filter, tables: Sink) -> None:
+def lower_filter(chosen: Filter, store: TableStore) -> None:
     """Put a filter's table into `distributions`, where the kernels expect it to be the first.
 
     Raises SceneError if something stands there already, and as `table` does.
     """
-    if tables.append_floats("distributions", table(chosen)) != 0:
+    if store.append_floats("distributions", table(chosen)) != 0:
         raise SceneError("the pixel filter has to be lowered first")
 
 

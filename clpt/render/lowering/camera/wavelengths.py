@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt import spectra, spectral_exr
 from clpt.render.lowering.camera.colour import sensor
-from clpt.scene import Scene
+from clpt.render.lowering.index import SceneIndex
 from clpt.scene.integrators import Film
 from clpt.scene.materials import Material
 from clpt.scene.params import params
@@ -74,17 +74,17 @@ class Density:
         return np.concatenate([head, sums, self.values, guide]).astype(np.float32)
 
 
-def density(scene: Scene) -> Density:
+def density(index: SceneIndex) -> Density:
     """The density that suits a scene in spectral mode, or the one that its film asks for."""
-    film = scene.film
+    film = index.scene.film
     lo, hi = _support(film)
     visible = Density(lo, hi)
     nodes = np.linspace(lo, hi, int(np.ceil((hi - lo) / STEP - 1e-9)) + 1)
     if film.wavelengths == "visible":
         return Density(lo, hi, _normalised(visible.pdf(nodes), nodes)) if film.bands else visible
     response = np.ones_like(nodes) if film.bands else np.abs(sensor(film).sample(nodes)).sum(axis=1)
-    glow = _glow(scene, nodes)
-    emitted = [(light.sample(nodes) + glow(light)) * response for light in emissions(scene)]
+    glow = _glow(index, nodes)
+    emitted = [(light.sample(nodes) + glow(light)) * response for light in emissions(index)]
     emitted = [light for light in emitted if light.any()]
     shares = [(1.0 - LIGHTS - SENSOR, np.ones_like(nodes))]
     shares += [(SENSOR, response)] if response.any() else []
@@ -124,11 +124,11 @@ def _normalised(values: Values, nodes: Values) -> Values:
     return values / _integral(values, nodes)
 
 
-def _glow(scene: Scene, nodes: Values) -> Callable[[Spectrum], Values]:
+def _glow(index: SceneIndex, nodes: Values) -> Callable[[Spectrum], Values]:
     """What fluorescent materials give out at nodes [nm] under a light: all of them together."""
-    film = scene.film
+    film = index.scene.film
     into = np.arange(film.lambda_min, film.lambda_max, STEP)
-    found = {id(m): m for shape in scene.shapes for m in _fluorescent(shape.material)}
+    found = {id(m): m for shape in index.shapes for m in _fluorescent(shape.material)}
     whole = np.zeros((len(nodes), len(into)))
     for matrix in found.values():
         whole += STEP * matrix.sample(nodes[:, None], into[None, :])
@@ -146,9 +146,10 @@ def _fluorescent(material: Any) -> Iterator[Reradiation]:
             yield from _fluorescent(value)
 
 
-def emissions(scene: Scene) -> Iterator[Spectrum]:
+def emissions(index: SceneIndex) -> Iterator[Spectrum]:
     """What the lights of a scene emit; an image of colours stands for D65."""
-    sources = [*scene.lights, *(shape.emission for shape in scene.shapes), scene.integrator]
+    scene = index.scene
+    sources = [*scene.lights, *(shape.emission for shape in index.shapes), scene.integrator]
     for source in sources:
         if source is None:
             continue

@@ -19,7 +19,7 @@ from clpt.errors import SceneError
 from clpt.records import INSTANCE
 from clpt.render.contract import shape_records
 from clpt.render.lowering.device_arrays import on_host
-from clpt.render.lowering.geometry import shapes
+from clpt.render.lowering.geometry import analytic, shapes
 from clpt.render.lowering.geometry.tessellate import keeps_its_kind, tessellate
 from clpt.scene.shapes import Group, Instance, Shape
 
@@ -166,7 +166,7 @@ def _analytic(
         return copies
     count = int(stretched.sum())
     if shape.kind in shape_records.ONE_OF:
-        shapes.row(next(copy.shape for copy, bad in zip(copies, stretched, strict=True) if bad))
+        analytic.row(next(copy.shape for copy, bad in zip(copies, stretched, strict=True) if bad))
     warnings.append(
         f"{shapes.where(shape)}: {count} of {len(copies)} instances stretch it; "
         "they are met as triangles"

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.errors import SceneError
 from clpt.render.lowering.device_arrays import on_host
-from clpt.render.lowering.geometry import shapes
+from clpt.render.lowering.geometry import analytic, shapes
 from clpt.scene.shapes import Shape, Spheres
 
 Balls = NDArray[np.float32]  # (n, 4): centre and radius
@@ -27,7 +27,7 @@ def balls(shape: Spheres) -> Balls:
     Raises SceneError for arrays of other shapes, values that are not finite, radii not above zero,
     or a transform that stretches.
     """
-    scale = float(common(shape).view(np.float32)[shapes.member("sphere", "radius")])
+    scale = float(common(shape).view(np.float32)[analytic.member("sphere", "radius")])
     matrix = shapes.placement(shape)
     centers = _numbers(shape, "centers")
     if centers.ndim != 2 or centers.shape[1] not in (3, 4) or not len(centers):
@@ -49,13 +49,13 @@ def balls(shape: Spheres) -> Balls:
 
 def common(shape: Shape) -> shapes.Words:
     """Return the row of `geometry` of all: a sphere of radius 1 before `to_world`."""
-    return shapes.row(shape)
+    return analytic.row(shape)
 
 
 def rows(shape: Shape, placed: Balls) -> shapes.Words:
     """Return a row of `geometry` for each of the balls of a shape, (n, words) uint32."""
     made = np.tile(common(shape), (len(placed), 1))
-    center, radius = (shapes.member("sphere", name) for name in ("center", "radius"))
+    center, radius = (analytic.member("sphere", name) for name in ("center", "radius"))
     made[:, center : center + 3] = placed[:, :3].view(np.uint32)
     made[:, radius] = placed[:, 3].view(np.uint32)
     return made
@@ -66,7 +66,7 @@ def boxes(placed: Sequence[Balls]) -> NDArray[np.float32]:
     whole = np.concatenate([np.zeros((0, 4), np.float32), *placed])
     centers, radii = whole[:, :3], whole[:, 3]
     reach = np.maximum(2.0 * radii, np.abs(centers).max(axis=1, initial=0.0) + radii)
-    reach = (radii + np.float32(shapes.PADDING) * reach)[:, None]
+    reach = (radii + np.float32(analytic.PADDING) * reach)[:, None]
     made = np.empty((len(whole), 2, 3), np.float32)
     np.subtract(centers, reach, out=made[:, 0])
     np.add(centers, reach, out=made[:, 1])

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from clpt import images, spectral_exr, transforms
 from clpt.errors import SceneError
 from clpt.render.lowering.device_arrays import on_host
+from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.textures.texels import bands, texels
 from clpt.scene.lights import CubeMap, Envmap
 from clpt.spectra import Tabulated, luminance
@@ -50,7 +51,7 @@ class _Content(NamedTuple):
     number: Tabulated | None = None
 
 
-def lower_image(lamp: Envmap | CubeMap, tables: Any) -> tuple[dict[str, ArrayLike], float]:
+def lower_image(lamp: Envmap | CubeMap, encoder: Encoder) -> tuple[dict[str, ArrayLike], float]:
     """Put an image light's texels and grid into the tables; its members, and its mean radiance.
 
     Those of a spectral image have `bands`. Raises SceneError for what is no image, or a transform
@@ -59,24 +60,24 @@ def lower_image(lamp: Envmap | CubeMap, tables: Any) -> tuple[dict[str, ArrayLik
     axes = _axes(lamp)
     made: _Content
     if isinstance(lamp, Envmap):
-        ends = tables.lambda_min, tables.lambda_max
-        made = tables.cache(_sphere, lamp.image, lamp.scale, tables.spectral, *ends)
+        ends = encoder.spectra.range
+        made = encoder.cache(_sphere, lamp.image, lamp.scale, encoder.spectra.spectral, *ends)
         cell = np.pi / (made.height - 1) * 2.0 * np.pi / made.width
     else:
-        made = tables.cache(_cube, lamp.image, lamp.scale, tables.spectral)
+        made = encoder.cache(_cube, lamp.image, lamp.scale, encoder.spectra.spectral)
         cell = made.width**-2.0
     members: dict[str, ArrayLike] = {name: axes[:, i] for i, name in enumerate("xyz")}
     members |= {
         "width": made.width,
         "height": made.height,
-        "texels": tables.append_floats("texels", made.texels),
-        "corners": tables.append_floats("distributions", made.corners),
-        "marginal": tables.append_floats("distributions", made.marginal),
-        "conditional": tables.append_floats("distributions", made.conditional),
+        "texels": encoder.store.append_floats("texels", made.texels),
+        "corners": encoder.store.append_floats("distributions", made.corners),
+        "marginal": encoder.store.append_floats("distributions", made.marginal),
+        "conditional": encoder.store.append_floats("distributions", made.conditional),
         "norm": 1.0 / made.total if made.total > 0.0 else 0.0,
     }
     if made.number is not None:
-        members |= {"bands": made.bands, "number": tables.spectra_row(made.number)}
+        members |= {"bands": made.bands, "number": encoder.spectra.row(made.number)}
     return members, made.total * cell / (4.0 * np.pi)
 
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt.render.lowering.geometry import shapes
+from clpt.render.lowering.geometry import analytic, shapes
 from clpt.scene import lights
 from clpt.scene.lights import Light
 from clpt.scene.shapes import Shape
@@ -61,15 +62,19 @@ def of_lamp(lamp: Light) -> Bounds:
         if isinstance(lamp, lights.Projector):
             return _one(place, axis, np.pi / 2.0, NARROW)
         return _one(place)
+    if lamp.reach == "placed" and not isinstance(lamp, lights.Point):
+        own: Any = lamp
+        position = own.to_world[:3, 3] if hasattr(lamp, "to_world") else own.position
+        return _one(np.asarray(position, np.float64))
     return _one(np.zeros(3), placed=False)
 
 
 def of_shape(shape: Shape, two_sided: bool) -> Bounds:
     """Return the bounds (1) of a shape that is sampled as a whole."""
-    low, high = (np.asarray(corner, np.float64) for corner in shapes.bounds(shape))
+    low, high = (np.asarray(corner, np.float64) for corner in analytic.bounds(shape))
     if shape.kind in ("sphere", "cylinder"):
         return _one(low, high=high)
-    axis = shapes.facing(shape)
+    axis = analytic.facing(shape)
     return _one(low, axis, 0.0, np.pi / 2.0, high=high, both=two_sided)
 
 

@@ -17,9 +17,10 @@ from clpt.errors import SceneError
 from clpt.records import LIGHT
 from clpt.render.contract import shape_records
 from clpt.render.contract.light_records import ALONG, BOTH, FRONT, INFINITE, KINDS
-from clpt.render.lowering.geometry import shapes, spheres
+from clpt.render.lowering.encoder import Encoder
+from clpt.render.lowering.geometry import analytic, shapes, spheres, triangles
 from clpt.render.lowering.lights import light_bounds, light_tree
-from clpt.render.lowering.lights.non_shape_lights import Sink, blank_row, brightness, lower_lamp
+from clpt.render.lowering.lights.non_shape_lights import blank_row, brightness, lower_lamp
 from clpt.render.lowering.lights.triangle_means import triangle_means
 from clpt.render.lowering.lowering_cache import content
 from clpt.scene.lights import DirectionalArea, Light
@@ -78,34 +79,34 @@ class Block(NamedTuple):
 def light_rows(
     lamps: Sequence[Light],
     emitters: Sequence[Emitter],
-    tables: Sink,
+    encoder: Encoder,
     scene_radius: float,
     tree_from: int | None = None,
 ) -> LightRows:
     """Put the parameters of all lights into the tables, and make the rows of `lights`.
 
     scene_radius: of a sphere around the scene [m]; tree_from: the number of rows from which a tree
-    chooses among them, or 1 / PLACED_LIGHT_WEIGHT of it of lights at places. Raises SceneError for a light that
-    has no place.
+    chooses among them, or 1 / PLACED_LIGHT_WEIGHT of it of lights at places. Raises SceneError for
+    a light that has no place.
     """
-    if tables.append("light_params", blank_row()) != 0:
+    if encoder.store.append("light_params", blank_row()) != 0:
         raise ValueError("`light_params` must be empty before the lights are put in")
     ordered = sorted(lamps, key=lambda lamp: lamp.kind not in INFINITE)
     infinite = sum(lamp.kind in INFINITE for lamp in ordered)
-    blocks = [_lamp_block(lamp, tables, scene_radius) for lamp in ordered]
-    blocks += [_emitter_block(emitter, tables) for emitter in emitters]
+    blocks = [_lamp_block(lamp, encoder, scene_radius) for lamp in ordered]
+    blocks += [_emitter_block(emitter, encoder) for emitter in emitters]
     first = np.cumsum([0, *(len(block.rows) for block in blocks)])[len(ordered) : -1]
     rows = np.concatenate([np.zeros(0, LIGHT.dtype), *(block.rows for block in blocks)])
     tree = None
     if len(rows):
         weights = _shared(np.concatenate([block.power for block in blocks]), infinite)
         same = content(weights)
-        rows["pmf"], rows["keep"], rows["alias"] = tables.cache(alias_table, weights, by=(same,))
+        rows["pmf"], rows["keep"], rows["alias"] = encoder.cache(alias_table, weights, by=(same,))
         apart = sum(bool(block.bounds.placed.any()) for block in blocks)
         if tree_from is not None and max(len(rows), PLACED_LIGHT_WEIGHT * apart) >= tree_from:
             bounds = light_bounds.concatenated([block.bounds for block in blocks])
             by = same, content(*vars(bounds).values())
-            tree = tables.cache(_tree_words, bounds, weights / weights.sum(), by=by)
+            tree = encoder.cache(_tree_words, bounds, weights / weights.sum(), by=by)
     kinds = tuple(KINDS[i] for i in np.unique(rows["kind"]))
     return LightRows(
         rows=rows,
@@ -136,52 +137,52 @@ def _block(count: int, kind: str, params: ArrayLike, radiance: int, shape_row: i
     return rows
 
 
-def _lamp_block(lamp: Light, tables: Sink, scene_radius: float) -> Block:
+def _lamp_block(lamp: Light, encoder: Encoder, scene_radius: float) -> Block:
     """The row of a light that is not on a shape."""
-    kind, at, radiance, power = lower_lamp(lamp, tables, scene_radius)
+    kind, at, radiance, power = lower_lamp(lamp, encoder, scene_radius)
     row = _block(1, kind, at, radiance, -1)
     return Block(row, np.array([power]), light_bounds.of_lamp(lamp))
 
 
-def _emitter_block(emitter: Emitter, tables: Sink) -> Block:
+def _emitter_block(emitter: Emitter, encoder: Encoder) -> Block:
     """The rows of a shape that emits."""
     shape = emitter.shape
     emission = shape.emission
     along = isinstance(emission, DirectionalArea)
     emission_mode = ALONG if along else BOTH if emission.two_sided else FRONT
     value = emission.irradiance if along else emission.radiance
-    radiance = tables.append("light_params", tables.emission_words(value))
+    radiance = encoder.store.append("light_params", encoder.emission_words(value))
     strength = {FRONT: np.pi, ALONG: 1.0, BOTH: 2.0 * np.pi}[emission_mode]
     if _whole(shape):
-        at = tables.append("geometry", shapes.row(shape))
+        at = encoder.store.append("geometry", analytic.row(shape))
         rows = _block(1, shape.kind, at, radiance, emitter.shape_row)
         rows["emission_mode"] = emission_mode
         bounds = light_bounds.of_shape(shape, emission_mode == BOTH)
-        return Block(rows, np.array([strength * shapes.area(shape) * brightness(value)]), bounds)
+        return Block(rows, np.array([strength * analytic.area(shape) * brightness(value)]), bounds)
     if shape.kind in shape_records.ONE_OF:
-        return _balls_block(emitter, tables, emission_mode, radiance, strength * brightness(value))
+        return _balls_block(emitter, encoder, emission_mode, radiance, strength * brightness(value))
     if emitter.vertices is None or emitter.faces is None:
         raise SceneError("its triangles are missing", where=shapes.where(shape))
-    cache, corners = tables.cache, (emitter.vertices, emitter.faces)
-    geometry = cache(shapes.triangle_rows, *corners)
+    cache, corners = encoder.cache, (emitter.vertices, emitter.faces)
+    geometry = cache(triangles.triangle_rows, *corners)
     count, words = geometry.shape
-    at = tables.append("geometry", geometry) + words * np.arange(count)
+    at = encoder.store.append("geometry", geometry) + words * np.arange(count)
     rows = _block(count, "triangle", at, radiance, emitter.shape_row)
     rows["emission_mode"] = emission_mode
     bounds = cache(light_bounds.of_triangles, *corners, emission_mode == BOTH)
     bright = cache(triangle_means, value, emitter.uvs, emitter.faces)
-    areas = cache(shapes.triangle_areas, *corners)
+    areas = cache(triangles.triangle_areas, *corners)
     return Block(rows, strength * areas * bright, bounds)
 
 
 def _balls_block(
-    emitter: Emitter, tables: Sink, emission_mode: int, radiance: int, strength: float
+    emitter: Emitter, encoder: Encoder, emission_mode: int, radiance: int, strength: float
 ) -> Block:
     """A row for each of many spheres; strength: what a square metre of them emits."""
     placed: Any = emitter.vertices
     geometry = spheres.rows(emitter.shape, placed)
     count, words = geometry.shape
-    at = tables.append("geometry", geometry) + words * np.arange(count)
+    at = encoder.store.append("geometry", geometry) + words * np.arange(count)
     rows = _block(count, "sphere", at, radiance, emitter.shape_row)
     rows["emission_mode"] = emission_mode
     areas = 4.0 * np.pi * placed[:, 3].astype(np.float64) ** 2

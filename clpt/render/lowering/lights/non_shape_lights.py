@@ -1,8 +1,8 @@
-"""Lights off all shapes on their way to the device: their rows in `light_params`, and their power."""
+"""Lights that are not on shapes: their rows in `light_params`, and their power."""
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,27 +11,13 @@ from clpt import transforms
 from clpt.errors import SceneError
 from clpt.render.contract import light_records
 from clpt.render.contract.light_records import RECORDS
+from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.lights import image_lights, projected
-from clpt.render.lowering.lowering_cache import LoweringCache
 from clpt.render.lowering.textures.texels import pixels
 from clpt.scene import lights
 from clpt.scene.lights import Light
+from clpt.scene.params import params
 from clpt.scene.textures import Bitmap, Checkerboard, Dots, MeshAttribute, Mix, Product, Solid
-
-
-class Sink(Protocol):
-    """What is needed of clpt.render.lowering.tables.Tables."""
-
-    cache: LoweringCache
-
-    def append(self, name: str, words: ArrayLike) -> int: ...
-    def append_floats(self, name: str, values: ArrayLike) -> int: ...
-    def emission_words(self, value: Any) -> NDArray[np.uint32]: ...
-    def factor_words(self, value: Any) -> NDArray[np.uint32]: ...
-
-    def spectra_row(self, spectrum: Any) -> int: ...
-    @property
-    def spectral(self) -> bool: ...
 
 
 def blank_row() -> NDArray[np.uint32]:
@@ -39,73 +25,88 @@ def blank_row() -> NDArray[np.uint32]:
 
     It is what idle lanes read; an image light's smallest size keeps them inside its tables.
     """
-    words = np.zeros(1, RECORDS["spectral_envmap"].dtype)  # the longest
+    words = np.zeros(1, RECORDS["spectral_envmap"].dtype)
     words["width"], words["height"] = 1, 2
-    return words.view(np.uint32)
+    longest = max(record.words for record in RECORDS.values())
+    return np.pad(words.view(np.uint32), (0, longest - RECORDS["spectral_envmap"].words))
 
 
-def lower_lamp(lamp: Light, tables: Sink, scene_radius: float) -> tuple[str, int, int, float]:
-    """Put a light into the tables; its record, its row and emission in `light_params`, its power [W/nm].
+def lower_lamp(lamp: Light, encoder: Encoder, scene_radius: float) -> tuple[str, int, int, float]:
+    """Put a light into the tables.
 
-    The power is an estimate, the mean of channels; scene_radius: of a sphere around the scene [m].
-    Raises SceneError for a light that has no place or no direction.
+    Return its record's name, its row and its emission in `light_params`, and its power [W/nm]: an
+    estimate, the mean of channels. scene_radius: of a sphere around the scene [m]. Raises
+    SceneError for a light that has no position or no direction.
     """
     if lamp.kind not in RECORDS:
         raise SceneError(f"a light of kind {lamp.kind!r} is a shape's `emission`", where="lights")
-    kind = projected.kind_of(lamp)
+    kind, radiance = projected.kind_of(lamp), 0
     if isinstance(lamp, (lights.Envmap, lights.CubeMap)):
-        members, strength = image_lights.lower_image(lamp, tables)
+        members, strength = image_lights.lower_image(lamp, encoder)
         kind = "spectral_envmap" if "bands" in members else kind
-        radiance = 0
     else:
-        radiance = tables.append("light_params", tables.emission_words(_emitted(lamp)))
-        own = (
-            projected.members(lamp, tables)
-            if kind in light_records.PROJECTED_RECORDS
-            else _members(lamp)
-        )
-        members = {**own, "radiance": radiance}
-        strength = brightness(_emitted(lamp))
+        emissions = _emissions(lamp)
+        rows = {
+            name: encoder.store.append("light_params", encoder.emission_words(value))
+            for name, value in emissions.items()
+        }
+        radiance = next(iter(rows.values()))
+        if kind in light_records.DECLARED:
+            members = {**_declared_members(lamp), **rows}
+        else:
+            members = {**_computed_members(kind, lamp, encoder), "radiance": radiance}
+        strength = float(np.mean([brightness(value) for value in emissions.values()]))
     words = np.zeros(1, RECORDS[kind].dtype)
     for name, value in members.items():
         words[name] = value
-    at = tables.append("light_params", words.view(np.uint32))
+    at = encoder.store.append("light_params", words.view(np.uint32))
     return kind, at, radiance, power(lamp, strength, scene_radius)
 
 
-def _emitted(lamp: Light) -> Any:
-    """The value of a light's one emission parameter, whatever its name."""
-    names = {
-        "point": "intensity", "spot": "intensity", "goniometric": "intensity",
-        "directional": "irradiance", "projector": "irradiance",
-    }  # fmt: skip
-    return getattr(lamp, names.get(lamp.kind, "radiance"))
+def _emissions(lamp: Light) -> dict[str, Any]:
+    """The values of a light's emission parameters."""
+    declared = params(type(lamp)).items()
+    return {name: getattr(lamp, name) for name, param in declared if param.role == "emission"}
 
 
-def _members(lamp: Light) -> dict[str, ArrayLike]:
-    """The members of a light's record but for its radiance."""
-    if isinstance(lamp, lights.Point):
-        return {"position": _three(lamp.position, "point.position"), "falloff": lamp.falloff}
-    if isinstance(lamp, lights.Directional):
-        return {"direction": _unit(lamp.direction, "directional.direction")}
-    if isinstance(lamp, lights.Spot):
-        matrix = _matrix(lamp)
-        return {
-            "position": matrix[:3, 3],
-            "axis": _unit(matrix[:3, 2], "spot.to_world"),
-            "cutoff": np.radians(lamp.cutoff),
-            "beam_width": np.radians(min(lamp.beam_width, lamp.cutoff)),
-            "smooth": lights.SPOT_EDGES.index(lamp.edge),
-        }
-    return {}
+def _declared_members(lamp: Light) -> dict[str, ArrayLike]:
+    """The members of a declared light's record but for its emissions, see `declared_record`."""
+    members: dict[str, ArrayLike] = {}
+    for name, param in params(type(lamp)).items():
+        value, where = getattr(lamp, name), f"{lamp.kind}.{name}"
+        if param.form == "matrix4":
+            members |= _placement(value, where)
+        elif param.role == "host":
+            members[name] = (_unit if param.form == "direction" else _three)(value, where)
+        elif param.role == "choice":
+            members[name] = param.choices.index(value)
+        elif param.role != "emission":
+            members[name] = np.radians(value) if param.unit == "degrees" else value
+    return members
 
 
-def _matrix(lamp: lights.Spot) -> NDArray[np.float64]:
-    """A light's transform. Raises SceneError where it cannot be inverted."""
-    matrix = np.asarray(lamp.to_world, np.float64)
+def _computed_members(kind: str, lamp: Light, encoder: Encoder) -> dict[str, ArrayLike]:
+    """The members of another light's record but for its radiance."""
+    if kind in light_records.PROJECTED_RECORDS:
+        return projected.members(lamp, encoder)
+    assert isinstance(lamp, lights.Spot)
+    placement = _placement(lamp.to_world, "spot.to_world")
+    return {
+        "position": placement["position"],
+        "axis": placement["z"],
+        "cutoff": np.radians(lamp.cutoff),
+        "beam_width": np.radians(min(lamp.beam_width, lamp.cutoff)),
+        "smooth": lights.SPOT_EDGES.index(lamp.edge),
+    }
+
+
+def _placement(to_world: ArrayLike, where: str) -> dict[str, ArrayLike]:
+    """A light's position and unit axes. Raises SceneError for a matrix without an inverse."""
+    matrix = np.asarray(to_world, np.float64)
     if matrix.shape != (4, 4) or transforms.is_singular(matrix):
-        raise SceneError("must be an invertible (4, 4) matrix", where="spot.to_world")
-    return matrix
+        raise SceneError("must be an invertible (4, 4) matrix", where=where)
+    axes = {axis: _unit(matrix[:3, i], where) for i, axis in enumerate("xyz")}
+    return {"position": matrix[:3, 3], **axes}
 
 
 def _three(value: ArrayLike, where: str) -> NDArray[np.float64]:
@@ -126,11 +127,9 @@ def _unit(value: ArrayLike, where: str) -> NDArray[np.float64]:
 def power(lamp: Light, strength: float, scene_radius: float) -> float:
     """Estimate what a light off all shapes sends into the scene, mean of channels [W/nm].
 
-    strength: the mean of its intensity, irradiance or radiance.
+    strength: the mean of its intensity, irradiance or radiance. A light of which nothing more is
+    known shines to all sides, or on the whole disk of the scene.
     """
-    disk = np.pi * scene_radius**2
-    if isinstance(lamp, lights.Point):
-        return 4.0 * np.pi * strength
     if isinstance(lamp, lights.Goniometric):
         return 4.0 * np.pi * strength * brightness(lamp.image)
     if isinstance(lamp, lights.Projector):
@@ -138,9 +137,10 @@ def power(lamp: Light, strength: float, scene_radius: float) -> float:
     if isinstance(lamp, lights.Spot):
         edge = np.radians([min(lamp.beam_width, lamp.cutoff), lamp.cutoff])
         return 2.0 * np.pi * (1.0 - float(np.cos(edge).mean())) * strength
-    if isinstance(lamp, lights.Directional):
-        return disk * strength
-    return 4.0 * np.pi * disk * strength
+    if lamp.reach == "placed":
+        return 4.0 * np.pi * strength
+    disk = np.pi * scene_radius**2
+    return disk * strength if lamp.reach == "distant" else 4.0 * np.pi * disk * strength
 
 
 def brightness(value: Any) -> float:

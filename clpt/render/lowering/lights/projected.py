@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt import transforms
 from clpt.errors import SceneError
+from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.textures.texels import pixels, spectral_image
 from clpt.scene.lights import SPOT_EDGES, Goniometric, Light, Projector, Spot
 from clpt.scene.textures import Bitmap
@@ -21,7 +22,7 @@ def kind_of(lamp: Light) -> str:
     return "image_spot" if plain else lamp.kind
 
 
-def members(lamp: Light, tables: Any) -> dict[str, ArrayLike]:
+def members(lamp: Light, encoder: Encoder) -> dict[str, ArrayLike]:
     """Return the members of a light's record but for `radiance`.
 
     Raises SceneError for a transform that shears, or an image that cannot be used.
@@ -29,9 +30,9 @@ def members(lamp: Light, tables: Any) -> dict[str, ArrayLike]:
     if isinstance(lamp, Projector):
         half = float(np.tan(np.radians(lamp.fov) / 2.0))
         axes = _place(lamp.to_world, "projector.to_world", half, half / _aspect(lamp))
-        return {**axes, **_image(lamp.image, tables)}
+        return {**axes, **_image(lamp.image, encoder)}
     if isinstance(lamp, Goniometric):
-        return {**_place(lamp.to_world, "goniometric.to_world"), **_image(lamp.image, tables)}
+        return {**_place(lamp.to_world, "goniometric.to_world"), **_image(lamp.image, encoder)}
     assert isinstance(lamp, Spot)
     half = float(np.tan(np.radians(lamp.cutoff)))
     return {
@@ -39,7 +40,7 @@ def members(lamp: Light, tables: Any) -> dict[str, ArrayLike]:
         "cutoff": np.radians(lamp.cutoff),
         "beam_width": np.radians(min(lamp.beam_width, lamp.cutoff)),
         "smooth": SPOT_EDGES.index(lamp.edge),
-        "factor": tables.append("light_params", tables.factor_words(lamp.image)),
+        "factor": encoder.store.append("light_params", encoder.factor_words(lamp.image)),
     }
 
 
@@ -56,14 +57,17 @@ def _aspect(lamp: Projector) -> float:
     return width / height
 
 
-def _image(image: Any, tables: Any) -> dict[str, ArrayLike]:
+def _image(image: Any, encoder: Encoder) -> dict[str, ArrayLike]:
     """The members of an image whose values are brought below 1, as those of a reflectance are."""
     scale = 1.0
     if isinstance(image, Bitmap) and spectral_image(image, "reflectance") is None:
         values = pixels(image, "reflectance")
         scale = max(float(values.max()), 0.0) or 1.0
         image = dataclasses.replace(image, image=values / np.float32(scale), raw=True)
-    return {"scale": scale, "factor": tables.append("light_params", tables.factor_words(image))}
+    return {
+        "scale": scale,
+        "factor": encoder.store.append("light_params", encoder.factor_words(image)),
+    }
 
 
 def _place(

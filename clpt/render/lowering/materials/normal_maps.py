@@ -4,30 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from clpt.errors import SceneError
 from clpt.render.contract.parameter_words import NORMAL_MAP_WORDS
+from clpt.render.lowering.encoder import Encoder
+from clpt.render.lowering.tables import Words
 from clpt.scene.materials import BumpMap, NormalMap
 from clpt.scene.textures import Bitmap
 
 INSIDE, ALONG_V, AS_IT_IS, UNSHADED, NORMAL, HEIGHT = (1 << i for i in range(6))
 
 Map: TypeAlias = NormalMap | BumpMap
-Words = NDArray[np.uint32]
-
-
-class Sink(Protocol):
-    """What is needed of clpt.render.lowering.tables.Tables."""
-
-    sources: Any
-
-    def param_words(
-        self, value: Any, role: str, choices: tuple[str, ...] = ()
-    ) -> tuple[Words, str]: ...
 
 
 @dataclass(frozen=True)
@@ -53,7 +43,7 @@ class NormalPerturbation:
         """What makes two the same."""
         return id(self.normal), id(self.bump), self.inside
 
-    def words(self, tables: Sink) -> Words:
+    def words(self, encoder: Encoder) -> Words:
         """Return the NORMAL_MAP_WORDS words, and put the textures into the tables."""
         made = np.zeros(NORMAL_MAP_WORDS, np.uint32)
         flags = INSIDE if self.inside else 0
@@ -62,19 +52,17 @@ class NormalPerturbation:
             made[1] = np.float32(self.normal.scale).view(np.uint32)
             for i, channel in enumerate("rgb"):
                 image = _channel(self.normal.map, channel)
-                made[3 + 2 * i : 5 + 2 * i] = _real(image, tables)
+                made[3 + 2 * i : 5 + 2 * i] = _real(image, encoder)
         if self.bump is not None:
             flags |= HEIGHT | _flags(self.bump)
             made[2] = np.float32(self.bump.scale).view(np.uint32)
-            made[9:11] = _real(self.bump.height, tables)
+            made[9:11] = _real(self.bump.height, encoder)
         made[0] = flags
         return made
 
 
-def _real(value: Any, tables: Sink) -> Words:
-    words, source = tables.param_words(value, "real")
-    tables.sources["perturbation"]["value"].add(source)
-    return words
+def _real(value: Any, encoder: Encoder) -> Words:
+    return encoder.named_words("perturbation", "value", value, "real")[0]
 
 
 def _flags(outer: Map) -> int:

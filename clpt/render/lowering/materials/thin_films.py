@@ -1,32 +1,28 @@
-"""Thin films on their way to the device: rows of layers, or in RGB mode a table of colours.
+"""Thin films in RGB mode: a table of the colours that they reflect and let through.
 
-In spectral mode the kernels sum the waves themselves (kernels/optics/thin_film.cl). In RGB mode there
-are no waves to sum: the host does it for every angle, and thickness where a texture varies it, and
-integrates what is reflected and what goes through over the wavelengths of D65, as an RGB renderer
-sees all reflectances. Belcour and Barla 2017 integrate on the device, by a Fourier series of the
-observer; a table is exact, and as fast.
+In spectral mode the kernels sum the waves themselves (kernels/optics/thin_film.cl). In RGB mode
+there are no waves to sum: the host does it for every angle, and thickness where a texture varies
+it, and integrates what is reflected and what goes through over the wavelengths of D65, as an RGB
+renderer sees all reflectances. Belcour and Barla 2017 integrate on the device, by a Fourier series
+of the observer; a table is exact, and as fast.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from clpt import spectra
 from clpt.errors import SceneError
-from clpt.render.contract import parameter_words
 from clpt.render.contract.parameter_words import FILM_COSINES
 from clpt.scene.materials import Layer
 from clpt.scene.params import Kind, params
 from clpt.spectra import cie
 from clpt.spectra.spectrum import d65
-
-if TYPE_CHECKING:
-    from clpt.render.lowering.tables import Tables
 
 THICKNESS_STEP = 4.0  # [nm] of the table, where a texture varies the thickness
 MOST_ROWS = 1024
@@ -35,38 +31,12 @@ Array = NDArray[Any]
 _ZERO = spectra.Constant(0.0)
 
 
-def layers_words(material: Kind, tables: Tables) -> tuple[NDArray[np.uint32], str]:
-    """Put a material's layers into the tables; return their two words, and "constant" if none.
-
-    Raises SceneError for layers whose thicknesses vary each in its own way, in RGB mode.
-    """
-    layers: tuple[Layer, ...] = material.layers  # type: ignore[attr-defined]
-    if not layers:
-        return np.zeros(parameter_words.LAYERS_WORDS, np.uint32), "constant"
-    for name in ("eta", "k"):
-        if getattr(getattr(material, name, None), "is_texture", False) and not tables.spectral:
-            raise SceneError(
-                "below layers it cannot be a texture in RGB mode; give a spectrum, or render in "
-                'the mode "spectral"',
-                where=f"{material.kind}.{name}",
-            )
-    if tables.spectral:
-        rows = np.concatenate([tables.kind_words(layer) for layer in layers])
-    else:
-        colours = film_colours(material)
-        table = tables.append_floats("spectra", colours)
-        profile, source = tables.param_words(_profile(material), "real")
-        tables.sources["layer"]["profile"].add(source)
-        rows = np.array([table, colours.shape[1], *profile], np.uint32)
-    return np.array([tables.append("materials", rows), len(layers)], np.uint32), "layers"
-
-
 def film_colours(material: Kind) -> NDArray[np.float32]:
     """Return what a material's layers reflect and let through under D65, linear Rec. 709.
 
     (parts, profiles, FILM_COSINES, 6) float32: r and t; the parts are those of
-    kernels/optics/boundary_table.cl, a metal has only the first. Profiles and cosines are even from 0
-    to 1; where no texture varies the thickness there is one profile.
+    kernels/optics/boundary_table.cl, a metal has only the first. Profiles and cosines are even from
+    0 to 1; where no texture varies the thickness there is one profile.
     """
     layers: tuple[Layer, ...] = material.layers  # type: ignore[attr-defined]
     textured = [layer for layer in layers if _textured(layer)]
@@ -137,8 +107,11 @@ def _textured(layer: Layer) -> bool:
     return getattr(layer.profile, "is_texture", False)
 
 
-def _profile(material: Kind) -> Any:
-    """The texture by which a material's layers vary, or 1."""
+def profile(material: Kind) -> Any:
+    """Return the texture by which the thickness of a material's layers varies, or 1.
+
+    Raises SceneError for layers whose thicknesses vary each in its own way.
+    """
     layers: tuple[Layer, ...] = material.layers  # type: ignore[attr-defined]
     found = {id(layer.profile): layer.profile for layer in layers if _textured(layer)}
     if len(found) > 1:

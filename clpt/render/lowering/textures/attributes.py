@@ -1,4 +1,4 @@
-"""What meshes say per vertex or face, on its way to the device: the table `attributes`.
+"""What meshes say per vertex or face: the table `attributes`.
 
 It begins with a directory of zeros, for what has no attributes. A mesh has a directory of its own:
 per (name, role) that textures ask for, where its values would begin for vertex or face 0 of the
@@ -8,59 +8,54 @@ scene, and how many words each takes. A colour takes four words, as a texel does
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from clpt import spectra
 from clpt.errors import SceneError
 from clpt.render.contract import shape_records
-from clpt.render.lowering.geometry import shapes
+from clpt.render.lowering.geometry import shapes, triangles
+from clpt.render.lowering.lowering_cache import LoweringCache
 from clpt.render.lowering.textures.texels import texels
+from clpt.render.lowering.textures.textures import TextureTable, per_face
 from clpt.scene.shapes import Shape
 from clpt.scene.textures import SECOND_UV, MeshAttribute, textures_in
 
-if TYPE_CHECKING:
-    from clpt.render.lowering.tables import Tables
-
 COLOUR_WORDS = 4
-Placed = tuple[np.ndarray, Shape, int, int]  # a row of `shapes`, its shape, first vertex and face
+Owner = tuple[np.ndarray, Shape, int, int]  # a row of `shapes`, its shape, first vertex and face
 
 
-def lower_attributes(placed: Iterable[Placed], tables: Tables, single_count: int = 0) -> None:
-    """Put what the textures of shapes ask of them into the tables, and its place into their rows.
+def lower_attributes(
+    owners: Iterable[Owner], textures: TextureTable, cache: LoweringCache, single_count: int = 0
+) -> None:
+    """Put what the textures of shapes ask of them into the tables, and its index into their rows.
 
     single_count: see clpt.records.SETTINGS.
 
     Raises SceneError for a shape that lacks what its material or light asks for.
     """
-    if not tables.attributes:
+    if not textures.attributes:
         return
-    count = len(tables.attributes)
-    if tables.append("attributes", np.zeros(2 * count, np.uint32)) != 0:
+    store, count = textures.store, len(textures.attributes)
+    if store.append("attributes", np.zeros(2 * count, np.uint32)) != 0:
         raise ValueError("`attributes` must be empty before those of the meshes are put in")
-    for row, shape, first_vertex, first_face in placed:
+    for row, shape, first_vertex, first_face in owners:
         names = _names(shape)
         if not names:
             continue
         directory = np.zeros((count, 2), np.int32)
-        for (name, role), number in tables.attributes.items():
+        for (name, role), number in textures.attributes.items():
             if name in names:
                 words = 1 if role == "real" else COLOUR_WORDS
                 first = first_face if per_face(name) else first_vertex
                 if shape.kind in shape_records.ONE_OF:
                     first = int(row["prim"]) - single_count
-                given = (shape, name, role, tables.spectral)
+                given = (shape, name, role, textures.spectra.spectral)
                 value = getattr(shape, "attributes", {})[name]
                 own = (*shapes.geometry(shape), value, *given[1:])
-                at = tables.append("attributes", tables.cache(_words, *given, by=own))
+                at = store.append("attributes", cache(_words, *given, by=own))
                 directory[number] = at - words * first, words
-        row["attributes"] = tables.append("attributes", directory.view(np.uint32))
-
-
-def per_face(name: str) -> bool:
-    """Whether an attribute has a value for each face, by its name."""
-    return name.startswith("face_")
+        row["attributes"] = store.append("attributes", directory.view(np.uint32))
 
 
 def _names(shape: Shape) -> set[str]:
@@ -81,7 +76,7 @@ def _names(shape: Shape) -> set[str]:
 
 
 def _words(shape: Shape, name: str, role: str, spectral: bool) -> np.ndarray:
-    values: np.ndarray = shapes.attribute(shape, name)
+    values: np.ndarray = triangles.attribute(shape, name)
     if role == "real" and values.shape[1] == 3:
         values = spectra.luminance(values)[:, None]
     return texels(values[:, None].astype(np.float32), role, spectral).view(np.uint32)

@@ -20,15 +20,16 @@ from numpy.typing import NDArray
 from clpt import images, spectra
 from clpt.errors import SceneError
 from clpt.images import Stored
+from clpt.render.contract.texture_records import KINDS
 from clpt.render.lowering.device_arrays import on_host
 from clpt.render.lowering.lowering_cache import LoweringCache
+from clpt.render.lowering.tables import TableStore, Words
 from clpt.render.lowering.textures.texels import channel, spectral_image, texels
 from clpt.scene.textures import Bitmap
 
 NODES = np.array([400.0, 550.0, 700.0])  # [nm] of packed spectra, as in spectral_read.cl
 LARGEST = 2**31 - 1  # words in `images` that an index reaches
 THREADS = 8
-Words = NDArray[np.uint32]
 
 
 @dataclass
@@ -45,7 +46,7 @@ class _Image:
 class Images:
     """The images of a scene, each in the roles that it has; `finish` puts them into the tables.
 
-    budget: [bytes] that they may take, None for any number; memo: of what is decoded and packed.
+    budget: [bytes] that they may take, None for any number; cache: of what is decoded and packed.
     """
 
     def __init__(
@@ -57,7 +58,7 @@ class Images:
         self._spectra: dict[bool, _Spectra] = defaultdict(_Spectra)
 
     def add(self, texture: Bitmap, role: str, row: np.ndarray) -> None:
-        """Ask for an image; its place will be written into the texture's row.
+        """Ask for an image; where it lies will be written into the texture's row.
 
         Raises SceneError for what is no image.
         """
@@ -68,10 +69,11 @@ class Images:
             self._wanted[key] = _Image(texture, role, self._read(image))
         self._wanted[key].rows.append(row)
 
-    def finish(self, tables: Any, kinds: tuple[str, ...]) -> list[str]:
-        """Put the images that were asked for into `tables`; return warnings.
+    def finish(self, store: TableStore, roles: set[tuple[str, str]]) -> list[str]:
+        """Put the images that were asked for into the tables; return warnings.
 
-        kinds: the table of texture kinds. Raises SceneError for files that cannot be read.
+        roles: gets the (kind, role) pairs of the images. Raises SceneError for files that cannot be
+        read.
         """
         wanted, self._wanted = list(self._wanted.values()), {}
         notes = self._fit(wanted)
@@ -82,16 +84,16 @@ class Images:
             by = (named(texture), texture.raw, image.role, texture.channel, halvings, self.spectral)
             words, (height, width) = self.cache(Images._words, self, stored, image, by=by)
             kind = "packed_bitmap" if packed else "bitmap"
-            if tables.size("images") + words.size > LARGEST:
+            if store.size("images") + words.size > LARGEST:
                 raise SceneError("all images together have too many texels", where="bitmap.image")
             curved = stored.encoded and not image.texture.raw and not _is_alpha(image)
             for row in image.rows:
-                row["kind"], row["width"], row["height"] = kinds.index(kind), width, height
-                row["decode"] = self._decode(curved, tables) if packed else 0
-            first = tables.append("images", words)
+                row["kind"], row["width"], row["height"] = KINDS.index(kind), width, height
+                row["decode"] = self._decode(curved, store) if packed else 0
+            first = store.append("images", words)
             for row in image.rows:
                 row["first"] = first
-            tables.texture_roles.add((kind, image.role))
+            roles.add((kind, image.role))
         return notes
 
     def _words(self, stored: Stored, image: _Image) -> tuple[Words, tuple[int, ...]]:
@@ -126,10 +128,10 @@ class Images:
         made.set_result(_array(image))
         return made
 
-    def _decode(self, curved: bool, tables: Any) -> int:
+    def _decode(self, curved: bool, store: TableStore) -> int:
         """The first of 256 words that say what bytes mean."""
         if curved not in self._decoding:
-            self._decoding[curved] = tables.append("images", _meaning(curved).view(np.uint32))
+            self._decoding[curved] = store.append("images", _meaning(curved).view(np.uint32))
         return self._decoding[curved]
 
     def _fit(self, wanted: list[_Image]) -> list[str]:

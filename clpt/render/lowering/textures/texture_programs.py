@@ -10,16 +10,16 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from clpt import spectra
 from clpt.render.contract.parameter_words import SPECTRUM_WORDS
 from clpt.render.contract.texture_records import END, OPERANDS, OPERATIONS
+from clpt.render.lowering.spectra_table import SpectraTable
+from clpt.render.lowering.tables import TableStore, Words
 from clpt.scene.textures import Checkerboard, Mix, Product, Texture
 from clpt.spectra import RGB, Constant, RGBUnbounded
 
 Code = list[tuple[int, int]]
-Words = NDArray[np.uint32]
 Lower = Callable[[Texture, str], int]
 
 
@@ -80,13 +80,15 @@ def _textured(value: Any) -> bool:
     return isinstance(value, Texture)
 
 
-def program(value: Texture, role: str, tables: Any, lower: Lower) -> tuple[Words, int]:
+def program(
+    value: Texture, role: str, store: TableStore, spectra_: SpectraTable, lower: Lower
+) -> tuple[Words, int]:
     """Return the instructions of a composite in a role, and how many values they stack.
 
     value: as `folded` gave it; lower: puts a texture that combines nothing into the tables and
     returns its row.
     """
-    code, depth = _Writer(role, tables, lower).code(value, "own")
+    code, depth = _Writer(role, store, spectra_, lower).code(value, "own")
     last, argument = code[-1]
     return np.array([*code[:-1], (last | END, argument)], np.uint32).reshape(-1), depth
 
@@ -94,11 +96,11 @@ def program(value: Texture, role: str, tables: Any, lower: Lower) -> tuple[Words
 class _Writer:
     """Writes one program."""
 
-    def __init__(self, role: str, tables: Any, lower: Lower):
-        self.role, self.tables, self.lower = role, tables, lower
+    def __init__(self, role: str, store: TableStore, spectra_: SpectraTable, lower: Lower):
+        self.role, self.store, self.spectra, self.lower = role, store, spectra_, lower
 
     def code(self, value: Any, use: str) -> tuple[Code, int]:
-        """Instructions that push a value, and how many places they need; use: an operand's name."""
+        """Instructions that push a value, and how many they stack; use: an operand's name."""
         if isinstance(value, Product):
             second = "factor" if use == "own" and self.role == "emission" else use
             return self._joined([(value.first, use)], (value.second, second), "multiply")
@@ -111,9 +113,9 @@ class _Writer:
     def _joined(self, pushed: list, last: tuple[Any, str], operation: str) -> tuple[Code, int]:
         made: Code = []
         depth = 0
-        for place, (value, use) in enumerate(pushed):
+        for below, (value, use) in enumerate(pushed):
             code, needed = self.code(value, use)
-            made, depth = made + code, max(depth, place + needed)
+            made, depth = made + code, max(depth, below + needed)
         value, use = last
         if isinstance(value, (Product, Mix)):
             code, needed = self.code(value, use)
@@ -133,18 +135,18 @@ class _Writer:
         if number is not None and role != "emission":
             word = np.float32(number).view(np.uint32)
             return OPERANDS.index("number"), int(word)
-        return OPERANDS.index("constant"), self.tables.append("textures", self._words(value, role))
+        return OPERANDS.index("constant"), self.store.append("textures", self._words(value, role))
 
     def _words(self, value: Any, role: str) -> Words:
         """A colour or spectrum as five words; colours may exceed one."""
         if role in ("reflectance", "index") and type(value) in (RGB, RGBUnbounded):
             rgb = (value.r, value.g, value.b)
             words = np.zeros(SPECTRUM_WORDS, np.float32)
-            if self.tables.spectral:
+            if self.spectra.spectral:
                 words[3], words[:3] = spectra.unbounded(rgb)
             else:
                 words[:3] = rgb
             return words.view(np.uint32)
         if type(value) is RGBUnbounded:
             value = RGB(value.r, value.g, value.b)
-        return self.tables.spectrum_words(value, "factor" if role == "reflectance" else role)[0]
+        return self.spectra.words(value, "factor" if role == "reflectance" else role)[0]

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from clpt import spectra
-from clpt.render.lowering.camera.wavelengths import Density, density
+from clpt.render.lowering.camera import wavelengths
+from clpt.render.lowering.camera.wavelengths import Density
+from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.scene import lower
 from clpt.scene import Film, Scene, lights
 from clpt.scene.cameras import Perspective
@@ -22,6 +24,10 @@ def scene(*emitted: object, **film: object) -> Scene:
     """A scene with lights that emit these."""
     made = [lights.Constant(radiance=value) for value in emitted]
     return Scene(camera=Perspective(), lights=made, film=Film(width=4, height=4, **film))
+
+
+def density(scene: Scene) -> Density:
+    return wavelengths.density(SceneIndex.of(scene))
 
 
 @pytest.mark.parametrize("light", ["A", "D50", "D65", "E", "F2"])

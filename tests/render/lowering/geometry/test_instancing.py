@@ -16,8 +16,8 @@ from clpt.errors import SceneError
 from clpt.formats.native import save
 from clpt.records import INSTANCE, SHAPE
 from clpt.render.lowering.geometry import instancing
-from clpt.render.lowering.geometry.shapes import triangles
 from clpt.render.lowering.geometry.tessellate import tessellate
+from clpt.render.lowering.geometry.triangles import triangulate
 from clpt.render.lowering.scene import lower
 from clpt.scene import Scene
 from clpt.scene.cameras import Perspective
@@ -80,7 +80,7 @@ def test_lights_and_analytic_shapes_are_placed_one_by_one() -> None:
     assert sorted(rows["number"][rows["kind"] != 0]) == [0, 1, 2]
     assert (rows["light"] >= 0).sum() == 3
     np.testing.assert_allclose(made.boxes[2, 1, 0], 2.0 + 3 * 0.5, rtol=1e-4)
-    assert made.warnings == []
+    assert made.warnings == ()
 
 
 def test_a_stretched_sphere_becomes_triangles() -> None:
@@ -98,7 +98,7 @@ def test_a_stretched_sphere_becomes_triangles() -> None:
     [(Sphere(radius=2.0), 16 * np.pi), (Cylinder(p1=(0, 1, 2)), 2 * np.pi * np.sqrt(5.0))],
 )
 def test_tessellated_shapes_face_outward(shape: Sphere | Cylinder, area: float) -> None:
-    vertices, faces, normals, uvs = triangles(tessellate(shape))
+    vertices, faces, normals, uvs = triangulate(tessellate(shape))
     v0, v1, v2 = vertices[faces].astype(np.float64).transpose(1, 0, 2)
     crosses = np.cross(v1 - v0, v2 - v0)
     assert ((crosses * normals[faces].mean(axis=1)).sum(axis=1) > 0.0).all()

@@ -1,9 +1,9 @@
-/* Every hit of a ray by the binary tree; their number is returned. A triangle is in one leaf only, so that
+/* All hits of a ray by the binary tree; their number is returned. A triangle is in one leaf only, so that
  * none is met twice. */
 #include "bvh/binary.cl"
-#include "bvh/every.cl"
+#include "bvh/hit_list.cl"
 
-inline uint binary_every(global const float *nodes, global const float *leaves, Every every, float ox,
+inline uint binary_all_hits(global const float *nodes, global const float *leaves, HitList list, float ox,
                          float oy, float oz, float dx, float dy, float dz, float tmin, float tmax)
 {
     if (!ray_finite(ox, oy, oz, dx, dy, dz)) return 0;
@@ -24,7 +24,7 @@ inline uint binary_every(global const float *nodes, global const float *leaves, 
         }
         for (uint i = link; i < link + node_count(node); i++) {
             TriHit hit = tri_miss(tmax);
-            if (triangle_intersect(leaves + (ulong)i * 16, &shear, tmin, &hit)) every_put(every, found++, hit);
+            if (triangle_intersect(leaves + (ulong)i * 16, &shear, tmin, &hit)) hit_list_put(list, found++, hit);
         }
     }
     return found;

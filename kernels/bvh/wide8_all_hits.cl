@@ -1,9 +1,9 @@
-/* Every hit of a ray by the 8-wide tree; their number is returned. A triangle is in one block only, so that
+/* All hits of a ray by the 8-wide tree; their number is returned. A triangle is in one block only, so that
  * none is met twice. */
 #include "bvh/wide8.cl"
-#include "bvh/every.cl"
+#include "bvh/hit_list.cl"
 
-inline uint wide8_every(global const float *nodes, global const float *leaves, Every every, float ox,
+inline uint wide8_all_hits(global const float *nodes, global const float *leaves, HitList list, float ox,
                         float oy, float oz, float dx, float dy, float dz, float tmin, float tmax)
 {
     if (!ray_finite(ox, oy, oz, dx, dy, dz)) return 0;
@@ -21,7 +21,7 @@ inline uint wide8_every(global const float *nodes, global const float *leaves, E
             q.v /= det;
             for (; m; m &= m - 1) {
                 uint i = mask8_first(m);
-                every_put(every, found++, wide8_hit(leaves, block * 8 + i, q.at[i], &r));
+                hit_list_put(list, found++, wide8_hit(leaves, block * 8 + i, q.at[i], &r));
             }
         } else {
             global const float *node = nodes + (ulong)at * 64;

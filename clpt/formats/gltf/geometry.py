@@ -1,0 +1,40 @@
+"""What is read of a primitive: its triangles, and the attributes of its vertices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.formats.gltf.accessors import normalised
+from clpt.formats.gltf.document import Element
+
+Floats = NDArray[np.float32]
+TYPES = {  # of the accessors of an attribute, by what its name begins with
+    "POSITION": ("VEC3",), "NORMAL": ("VEC3",), "TEXCOORD": ("VEC2",), "COLOR": ("VEC3", "VEC4"),
+    "JOINTS": ("VEC4",), "WEIGHTS": ("VEC4",),
+}  # fmt: skip
+
+
+@dataclass
+class Geometry:
+    """A primitive's triangles (m, 3), and by attribute, such as TEXCOORD_0, arrays (n, width).
+
+    targets: for each morph target, displacements by attribute.
+    """
+
+    faces: NDArray[np.int64]
+    attributes: dict[str, NDArray[Any]]
+    targets: list[dict[str, Floats]] = field(default_factory=list)
+
+
+def types(name: str) -> tuple[str, ...]:
+    """Return the accessor types that an attribute may have; none if it is not read."""
+    return TYPES.get(name.partition("_")[0], ())
+
+
+def attribute(name: str, values: NDArray[Any], accessor: Element) -> NDArray[Any]:
+    """Return an attribute's stored values as floats; joints stay whole numbers."""
+    return values if name.startswith("JOINTS_") else normalised(values, accessor)

@@ -1,0 +1,35 @@
+"""The parts that the schema of scene.json is made of."""
+
+from __future__ import annotations
+
+from typing import Any
+
+Schema = dict[str, Any]
+
+STRING: Schema = {"type": "string"}
+NUMBER: Schema = {"type": "number"}
+NUMBERS: Schema = {"type": "array", "items": NUMBER}
+TRIPLE: Schema = {**NUMBERS, "minItems": 3, "maxItems": 3}
+
+
+def ref(name: str) -> Schema:
+    """Return a reference to one of the schema's definitions."""
+    return {"$ref": f"#/$defs/{name}"}
+
+
+def rows(width: int, item: str = "number", count: int = 0) -> Schema:
+    """Return an array of rows of numbers, of `count` rows unless that is 0."""
+    row = {"type": "array", "items": {"type": item}, "minItems": width, "maxItems": width}
+    exact = {"minItems": count, "maxItems": count} if count else {}
+    return {"type": "array", "items": row, **exact}
+
+
+def object_of(properties: Schema, required: list[str], description: str = "") -> Schema:
+    """Return an object that has these properties and no others."""
+    return {
+        "type": "object",
+        **({"description": description} if description else {}),
+        "properties": properties,
+        "required": required,
+        "additionalProperties": False,
+    }

@@ -1,0 +1,114 @@
+"""Files that a shape of scene.json names in place of its arrays."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from clpt.formats.meshes import mesh, particles, strands
+from clpt.formats.native.cursor import Cursor
+from clpt.formats.native.spectra import find_file
+from clpt.scene import shapes
+from clpt.scene.params import Kind
+
+MESH_ARRAYS = ("vertices", "faces", "normals", "uvs")
+
+
+@dataclass(frozen=True)
+class ShapeFile:
+    """What the key `file` means for a shape.
+
+    accepts, meaning: for the schema and the reference; replaces: the parameters that the file
+    holds; read: returns these, None where one file makes several shapes.
+    """
+
+    accepts: str
+    meaning: str
+    replaces: tuple[str, ...] = ()
+    read: Callable[[Path], dict[str, Any]] | None = None
+
+
+FILES: dict[type[Kind], ShapeFile] = {
+    shapes.Mesh: ShapeFile(
+        "name of a mesh file", "in place of the arrays", (*MESH_ARRAYS, "attributes")
+    ),
+    shapes.Curves: ShapeFile(
+        "name of a text file",
+        "lines of x y z radius, blank ones between strands, in place of points and lengths",
+        ("points", "lengths"),
+        strands.read,
+    ),
+    shapes.Spheres: ShapeFile(
+        "name of a .npz file",
+        "centers, radii and attributes by their names, in place of those",
+        ("centers", "radii", "attributes"),
+        particles.read,
+    ),
+    shapes.Instance: ShapeFile(
+        "name of a .npy file", "matrices (n, 3, 4): an instance for each, before `to_world`"
+    ),
+}
+
+
+def check_only_in_file(cursor: Cursor, cls: type[Kind]) -> None:
+    """Raise SceneError where a shape with a file has the file's parameters too."""
+    for key in FILES[cls].replaces:
+        if key in cursor.value:
+            raise cursor.at(key).error("stands in the 'file' already; give either")
+
+
+def read_meshes(path: Path) -> mesh.MeshFile:
+    """Read a file of meshes, glTF included. Raises SceneError."""
+    if path.suffix.lower() not in (".glb", ".gltf"):
+        return mesh.read_mesh(path)
+    from clpt.formats import gltf  # here: most scenes have no use for it
+
+    return gltf.read_mesh(path)
+
+
+def read_transforms(cursor: Cursor) -> np.ndarray:
+    """Read the matrices (n, 3, 4) of a .npy; return them as (n, 4, 4) float64."""
+    path = find_file(cursor)
+    try:
+        rows = np.load(path, mmap_mode="r")  # a wrong header claims no memory
+    except (OSError, ValueError, EOFError) as error:
+        raise cursor.error(f"is no .npy file: {error}") from None
+    valid = isinstance(rows, np.ndarray) and rows.dtype.kind == "f" and rows.shape[1:] == (3, 4)
+    if not valid:
+        raise cursor.error("must hold matrices, (n, 3, 4) of float")
+    matrices = np.tile(np.eye(4), (len(rows), 1, 1))
+    matrices[:, :3] = rows
+    return matrices
+
+
+def checked_arrays(cursor: Cursor, shape: shapes.Mesh, warnings: list[str]) -> shapes.Mesh:
+    """Check the arrays of a mesh that is given in the JSON itself."""
+    if shape.vertices is None or shape.faces is None:
+        raise cursor.error("a mesh needs a 'file', or 'vertices' and 'faces'")
+    for name in ("normals", "uvs"):
+        values = getattr(shape, name)
+        if values is not None and len(values) != len(shape.vertices):
+            raise cursor.at(name).error(f"must be one for each of {len(shape.vertices)} vertices")
+    for name, values in shape.attributes.items():
+        count = len(shape.faces if name.startswith("face_") else shape.vertices)
+        if len(values) != count:
+            raise cursor.at("attributes").at(name).error(f"must be {count} rows")
+    with cursor.locating():
+        arrays = mesh.checked(
+            None,
+            "",
+            shape.vertices,
+            shape.faces.astype(np.int64),
+            shape.normals,
+            shape.uvs,
+            warnings,
+            shape.attributes,
+        )
+    if not len(arrays["faces"]):
+        raise cursor.error("holds no triangles")
+    return dataclasses.replace(shape, **arrays)

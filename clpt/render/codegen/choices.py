@@ -1,0 +1,50 @@
+"""Choices: the virtual files that only choose which files of the kernels folder a scene needs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from clpt.render.contract.features import Features
+
+# name: the files that stand for it, for a scene's features and the layout of its triangles
+CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
+    "generated/spectrum.cl": lambda f, _: (f"spectrum/{f.mode}.cl",),
+    "generated/spectrum_read.cl": lambda f, _: _spectrum_read(f),
+    "generated/sampler.cl": lambda f, _: (
+        f"sampler/{f.sampler}.cl",
+        f"path/pixel_sampler{'_z' * (f.sampler == 'zsobol')}.cl",
+    ),
+    "generated/bands.cl": lambda f, _: ("film/bands.cl",) * f.bands,
+    "generated/integrator.cl": lambda f, _: (f"integrator/{f.integrator}.cl",),
+    "generated/medium.cl": lambda f, _: (
+        ("generated/medium_absorption.cl", "optics/medium.cl") if f.absorption else ()
+    ),
+    "generated/shading_frame.cl": lambda f, _: (
+        ("generated/normal_map.cl", "path/shading_frame_mapped.cl")
+        if f.normal_mapped
+        else ("path/shading_frame.cl",)
+    ),
+    "generated/transmittance.cl": lambda f, _: (
+        f"tracing/transmittance{'' if f.null_surfaces else '_opaque'}.cl",
+    ),
+    "generated/trace.cl": lambda _, layout: (
+        f"tracing/trace_{'lanes' if layout == 'brute' else 'one'}.cl",
+    ),
+    "generated/shape_traversal.cl": lambda f, _: ("bvh/shapes.cl",) * bool(f.analytic),
+    "generated/instances.cl": lambda f, _: ("tracing/instances.cl",) * f.instances,
+    "generated/instance_traversal.cl": lambda f, layout: (
+        (f"tracing/instances_{layout}.cl", "tracing/trace_instances.cl") * f.instances
+    ),
+}
+
+
+def _spectrum_read(features: Features) -> tuple[str, ...]:
+    """The look-up of spectra, and in spectral mode how the camera draws wavelengths."""
+    read = f"spectrum/{features.mode}_read.cl"
+    drawn = f"spectrum/{'density' if features.tabulated_density else 'visible'}.cl"
+    return (read, drawn) if features.mode == "spectral" else (read,)
+
+
+def virtual_files(features: Features, layout: str) -> dict[str, tuple[str, ...]]:
+    """Return the files that stand for each name in CHOICES."""
+    return {name: choose(features, layout) for name, choose in CHOICES.items()}

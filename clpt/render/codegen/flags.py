@@ -1,0 +1,72 @@
+"""Flags: the macros by which kernels ask what a scene has, each with its condition.
+
+A flag that holds is 1. One that does not hold is not defined: `#if` takes it for 0, and a text has
+no line for what its scene has not. Numbers and names are defined as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from clpt.render.contract import shape_records
+from clpt.render.contract.features import Features
+from clpt.render.contract.parameter_words import RERADIATION_STEP
+from clpt.scene.materials import Material
+
+Defines = dict[str, str | int]
+
+
+def fluoresces(features: Features, cls: type[Material]) -> bool:
+    """Whether light may leave a material at another wavelength than it came."""
+    return cls.fluoresces and features.mode == "spectral"
+
+
+# name: its value, of a scene's features
+SCENE: dict[str, Callable[[Features], str | int]] = {
+    "BSDF_COUNT": lambda f: len(f.materials),
+    "USES_NORMALS": lambda f: f.normals,
+    "USES_UVS": lambda f: f.uvs,
+    "USES_TANGENTS": lambda f: f.tangents,
+    "USES_ATTRIBUTES": lambda f: f.attributes,
+    "USES_ANALYTIC": lambda f: bool(f.analytic),
+    "USES_INSTANCES": lambda f: f.instances,
+    "USES_NULL_SURFACES": lambda f: f.null_surfaces,
+    "USES_ABSORPTION": lambda f: f.absorption,
+    "USES_DISPERSION": lambda f: f.dispersion and f.mode == "spectral",
+    "USES_FLUORESCENCE": lambda f: any(fluoresces(f, cls) for cls in f.leaves),
+    "USES_BANDS": lambda f: f.bands,
+    "USES_INFINITE": lambda f: f.infinite,
+    "USES_LIGHTS": lambda f: bool(f.lights),
+    "USES_SURFACE_LIGHTS": lambda f: not shape_records.RECORDS.keys().isdisjoint(f.lights),
+    "USES_VISIBLE_LIGHTS": lambda f: f.light_paths and f.visible_lights,
+    "FEW_LIGHTS": lambda f: not f.many_lights,
+    "LIGHT_PATHS": lambda f: f.light_paths,
+    "CAMERA_DISPERSES": lambda f: f.glass_lens,
+    "FILTER_BOX": lambda f: f.filter == "box",
+    "CHANNEL": lambda f: bool(f.channel) and f"CHANNEL_{f.channel.upper()}",
+    "SPECTRA_SIZE": lambda f: f.spectra_size,
+    "SPECTRA_STEP": lambda f: f"{f.spectra_step}f",
+    "RERADIATION_STEP": lambda f: RERADIATION_STEP,
+}
+
+# likewise, of the features and the kind of material that a program shades
+MATERIAL: dict[str, Callable[[Features, type[Material]], str | int]] = {
+    "BSDF_KIND": lambda f, cls: f.leaves.index(cls),
+    "BSDF_DELTA": lambda f, cls: cls.delta,
+    "BSDF_TRANSMITS": lambda f, cls: int(cls.kind in f.transmitting),  # kernels calculate with it
+    "BSDF_CHROMATIC": lambda f, cls: cls.chromatic,
+    "BSDF_FLUORESCES": fluoresces,
+    "BSDF_IS_NULL": lambda f, cls: cls.is_null and f.null_surfaces,
+    "USES_CHOICE": lambda f, cls: cls.uses_lobe_sample or cls.fluoresces or f.many_lights,
+}
+
+
+def defines(table: Mapping[str, Callable[..., str | int]], *given: Any) -> Defines:
+    """Return the macros of SCENE for its features, or of MATERIAL for features and a class."""
+    values = {name: value(*given) for name, value in table.items()}
+    return {
+        name: int(value) if isinstance(value, bool) else value
+        for name, value in values.items()
+        if value is not False
+    }

@@ -1,0 +1,8 @@
+"""Why shapes cannot move on the device."""
+
+
+class CannotMove(Exception):
+    """A change that the kernels of clpt.render.editing.moving cannot make; its text says why.
+
+    It never leaves clpt: the scene is lowered again then, and the reason is logged.
+    """

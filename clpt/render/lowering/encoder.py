@@ -1,0 +1,193 @@
+"""The encoder: parameters of materials, lights and layers as the words that kernels read."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from typing import Any
+
+import numpy as np
+
+from clpt.errors import SceneError
+from clpt.render.contract.features import Sources
+from clpt.render.contract.parameter_words import (
+    LAYERS_WORDS,
+    ORDERS_WORDS,
+    REAL_WORDS,
+    SPECTRUM_WORDS,
+)
+from clpt.render.lowering.camera.wavelengths import Density
+from clpt.render.lowering.lowering_cache import LoweringCache
+from clpt.render.lowering.materials import thin_films
+from clpt.render.lowering.spectra_table import SpectraTable
+from clpt.render.lowering.tables import TableStore, Words, as_words
+from clpt.render.lowering.textures.bitmaps import Images
+from clpt.render.lowering.textures.textures import TextureTable
+from clpt.scene.params import Kind, device_params, interior_params
+from clpt.spectra import RGB, Constant, Sensor
+
+BLACK = (Constant(0.0), RGB(0.0, 0.0, 0.0))
+
+
+class Encoder:
+    """Encodes parameters, and puts what they refer to into the tables.
+
+    mode, lambda_min, lambda_max, sensor, density: see `SpectraTable`; texture_budget: [bytes] for
+    images, None for any number; cache: of costly pieces.
+    """
+
+    def __init__(
+        self,
+        mode: str,
+        lambda_min: float = 360.0,
+        lambda_max: float = 830.0,
+        sensor: Sensor | None = None,
+        density: Density | None = None,
+        texture_budget: int | None = None,
+        cache: LoweringCache | None = None,
+    ):
+        self.cache = cache or LoweringCache()
+        self.store = TableStore()
+        self.spectra = SpectraTable(self.store, mode, lambda_min, lambda_max, sensor, density)
+        images = Images(self.spectra.spectral, texture_budget, self.cache)
+        self.textures = TextureTable(self.store, self.spectra, images)
+        self._sources: dict[str, dict[str, set[str]]] = _no_sources()
+        self._rows: dict[tuple[int, str, bytes], tuple[int, Kind]] = {}
+        self._spent = False  # whether it knows of words that no device has
+
+    @property
+    def sources(self) -> Sources:
+        """Where values come from: (kind, parameter, source).
+
+        A source is "none" (the share of a lobe is 0), "constant", "table", "texture" or "layers".
+        """
+        return frozenset(
+            (kind, name, source)
+            for kind, params in self._sources.items()
+            for name, sources in params.items()
+            for source in sources
+        )
+
+    def row(self, kind: Kind, table: str, before: Words | None = None) -> int:
+        """Append what the kernels read of a kind to a table; return its first word.
+
+        before: words that stand in front of it. The same object after the same words is put in
+        once.
+        """
+        key = (id(kind), table, b"" if before is None else before.tobytes())
+        if key not in self._rows:
+            if before is not None:
+                self.store.append(table, before)
+            self._rows[key] = self.store.append(table, self.kind_words(kind)), kind
+        return self._rows[key][0]
+
+    def replaced(self, old: Kind, new: Kind, table: str) -> list[tuple[int, Words]] | None:
+        """Put a kind in the rows of another whose values differ, after the arrays were taken.
+
+        Return the first word of each row and its new words. Return None, from then on for all
+        kinds, where more than values differs: the tables must be made again.
+        """
+        if self._spent:
+            return None
+        owned = [key for key in self._rows if key[:2] == (id(old), table)]
+        known = any(key[:2] == (id(new), table) for key in self._rows)
+        if known or not owned:
+            return None
+        self._spent = True
+        sizes, kept = self.store.sizes, self._sources
+        sources = []
+        for kind in (old, new):
+            self._sources = _no_sources()
+            words = self.kind_words(kind)
+            sources.append(self._sources)
+        self._sources = kept
+        if sources[0] != sources[1] or sizes != self.store.sizes:
+            return None
+        self._spent = False
+        rows = [self._rows.pop(key)[0] for key in owned]
+        for key, row in zip(owned, rows, strict=True):
+            self._rows[id(new), key[1], key[2]] = row, new
+        return [(row, words) for row in rows]
+
+    def kind_words(self, kind: Kind) -> Words:
+        """Return the words of what the kernels read of a kind."""
+        words: list[Words] = []
+        read = {**device_params(type(kind)), **interior_params(type(kind))}
+        for name, param in read.items():
+            if param.role == "layers":
+                value, source = self._layers_words(kind)
+            else:
+                value, source = self.param_words(getattr(kind, name), param.role, param.choices)
+                if param.lobe and getattr(kind, name) in (0.0, *BLACK):
+                    source = "none"
+            words.append(value)
+            self._sources[kind.kind][name].add(source)
+        return np.concatenate(words) if words else np.zeros(1, np.uint32)
+
+    def param_words(
+        self, value: Any, role: str, choices: tuple[str, ...] = ()
+    ) -> tuple[Words, str]:
+        """Return the words of one parameter and where its value comes from."""
+        if getattr(value, "is_texture", False):
+            value = self.textures.folded(value, role)
+        if getattr(value, "is_texture", False):
+            words = np.zeros(REAL_WORDS if role == "real" else SPECTRUM_WORDS, np.uint32)
+            words[-1] = 1 + self.textures.row(value, role)
+            return words, "texture"
+        if role in ("flag", "choice"):
+            number = choices.index(value) if choices else int(value)
+            return np.array([number], np.uint32), "constant"
+        if role == "real":
+            plain = value.value if isinstance(value, Constant) else value
+            return np.array([as_words([plain])[0], 0], np.uint32), "constant"
+        if role == "orders":
+            beyond = (ORDERS_WORDS - len(value)) // 2
+            return as_words(np.pad(value, beyond)), "constant"
+        if role == "reradiation":
+            return self.spectra.reradiation_words(value)
+        return self.spectra.words(value, role)
+
+    def named_words(self, kind: str, name: str, value: Any, role: str) -> tuple[Words, str]:
+        """Return the words of a value that belongs to no kind, and note its source by a name."""
+        words, source = self.param_words(value, role)
+        self._sources[kind][name].add(source)
+        return words, source
+
+    def emission_words(self, value: Any) -> Words:
+        """Return the five words that `emission_load` reads: a spectrum or a texture."""
+        return self.named_words("emission", "value", value, "emission")[0]
+
+    def factor_words(self, value: Any) -> Words:
+        """Return the five words that `factor_load` reads: a reflectance, perhaps a texture."""
+        return self.named_words("factor", "value", value, "reflectance")[0]
+
+    def _layers_words(self, material: Any) -> tuple[Words, str]:
+        """The two words of a material's thin films, and "constant" if there are none.
+
+        In spectral mode they are a row for each layer; in RGB mode a table of colours.
+        """
+        if not material.layers:
+            return np.zeros(LAYERS_WORDS, np.uint32), "constant"
+        if self.spectra.spectral:
+            rows = np.concatenate([self.kind_words(layer) for layer in material.layers])
+        else:
+            self._refuse_textured_metal(material)
+            colours = thin_films.film_colours(material)
+            table = self.store.append_floats("spectra", colours)
+            profile, _ = self.named_words("layer", "profile", thin_films.profile(material), "real")
+            rows = np.array([table, colours.shape[1], *profile], np.uint32)
+        first = self.store.append("materials", rows)
+        return np.array([first, len(material.layers)], np.uint32), "layers"
+
+    @staticmethod
+    def _refuse_textured_metal(material: Any) -> None:
+        for name in ("eta", "k"):
+            if getattr(getattr(material, name, None), "is_texture", False):
+                raise SceneError(
+                    "below layers it cannot be a texture in RGB mode; give a spectrum, or render "
+                    'in the mode "spectral"',
+                    where=f"{material.kind}.{name}",
+                )
+
+
+def _no_sources() -> dict[str, dict[str, set[str]]]:
+    return defaultdict(lambda: defaultdict(set))

@@ -1,0 +1,70 @@
+"""The features of a lowered scene: what it needs of the kernels."""
+
+from __future__ import annotations
+
+from clpt.render.contract import shape_records
+from clpt.render.contract.features import Features, disperses
+from clpt.render.lowering.camera.cameras import dispersive_glass
+from clpt.render.lowering.encoder import Encoder
+from clpt.render.lowering.geometry.geometry import Geometry
+from clpt.render.lowering.index import SceneIndex
+from clpt.render.lowering.lights.lights import LightRows
+from clpt.render.lowering.materials.material_words import MaterialWords
+from clpt.render.lowering.spectra_table import STEP
+
+FEW_LIGHTS = 256  # up to which one random number chooses a light and a point on it
+INTEGRATORS = {"direct": "path"}  # kinds that have the kernels of another one
+
+
+def features_of(
+    index: SceneIndex,
+    encoder: Encoder,
+    materials: MaterialWords,
+    geometry: Geometry,
+    lights: LightRows,
+    tabulated_density: bool,
+) -> Features:
+    """Return the features of a scene, from what each step of its lowering has met."""
+    scene, textures, channels = index.scene, encoder.textures, index.channels
+    sources = encoder.sources
+    tangents = materials.tangents or index.normal_mapped
+    uvs = materials.uvs or geometry.uvs or tangents or "uv" in channels
+    glass_lens = index.spectral and bool(dispersive_glass(scene.camera))
+    return Features(
+        mode=index.mode,
+        camera=scene.camera.kind,
+        sampler=scene.sampler.kind,
+        filter=scene.film.filter.kind,
+        integrator=INTEGRATORS.get(scene.integrator.kind, scene.integrator.kind),
+        leaves=index.leaves,
+        transmitting=tuple(sorted(materials.transmitting)),
+        lights=lights.kinds,
+        textures=tuple(sorted({kind for kind, _ in textures.roles})),
+        texture_roles=tuple(sorted(textures.roles)),
+        texture_depth=textures.depth,
+        texture_mappings=textures.mappings,
+        attributes=bool(textures.attributes),
+        analytic=tuple(kind for kind in shape_records.ANALYTIC if kind in geometry.analytic),
+        instances=bool(index.prototypes),
+        normals=geometry.normals,
+        uvs=uvs,
+        tangents=tangents,
+        mixtures=materials.mixture_depth,
+        normal_mapped=index.normal_mapped and not channels,
+        null_surfaces=any(cls.is_null for cls in index.leaves) and not channels,
+        infinite=lights.infinite > 0 and not channels,
+        light_paths=index.light_paths,
+        visible_lights=lights.visible,
+        two_sided_lights=lights.two_sided,
+        light_tree=lights.tree is not None,
+        many_lights=len(lights.rows) > FEW_LIGHTS,
+        absorption=materials.absorption and not channels,
+        dispersion=glass_lens or disperses(index.leaves, sources),
+        glass_lens=glass_lens,
+        channel=channels[0] if channels else "",
+        bands=bool(scene.film.bands) and not channels,
+        tabulated_density=tabulated_density,
+        spectra_size=encoder.spectra.samples,
+        spectra_step=STEP,
+        sources=sources,
+    )

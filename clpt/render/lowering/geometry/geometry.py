@@ -1,0 +1,214 @@
+"""The shapes of a scene as the device has them: rows, triangles, boxes and instances."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.bvh.build import MOST
+from clpt.errors import SceneError
+from clpt.records import SHAPE
+from clpt.render.contract import shape_records
+from clpt.render.lowering.encoder import Encoder
+from clpt.render.lowering.geometry import analytic, instancing, shapes, spheres, triangles
+from clpt.render.lowering.geometry.instancing import Instances, Placed, Prototype
+from clpt.render.lowering.index import SceneIndex
+from clpt.render.lowering.lights.lights import Emitter
+from clpt.render.lowering.materials.material_words import MaterialWords
+from clpt.render.lowering.textures.attributes import Owner
+
+SHAPE_NORMALS, SHAPE_UVS, SHAPE_TWO_SIDED, SHAPE_ONE_LIGHT, SHAPE_MANY = 1, 2, 4, 8, 16
+
+Triangles = tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.uint32]]
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """What the shapes of a scene became.
+
+    rows: of `shapes`, those of analytic shapes last; owners: of each row, with its first vertex and
+    face; vertices (n, 3) float32, faces (m, 3) uint32 and tags (m,) uint32, the shape of each
+    triangle: the world's before those of groups; boxes (k, 2, 3) float32: of analytic shapes;
+    world_vertices: how many vertices are not a group's; first_analytic: a row; single_count:
+    analytic shapes that are one each; analytic: their kinds; normals, uvs: whether a shape needs
+    them.
+    """
+
+    rows: tuple[np.ndarray, ...]
+    owners: tuple[Owner, ...]
+    vertices: NDArray[np.float32]
+    faces: NDArray[np.uint32]
+    tags: NDArray[np.uint32]
+    boxes: NDArray[np.float32]
+    instances: Instances
+    emitters: tuple[Emitter, ...]
+    world_vertices: int
+    first_analytic: int
+    single_count: int
+    analytic: frozenset[str]
+    normals: bool
+    uvs: bool
+    warnings: tuple[str, ...]
+
+    def bounding_sphere(self) -> tuple[NDArray[np.float64], float]:
+        """Return centre and radius of a sphere around the scene; a unit one if it is empty."""
+        vertices = self.vertices[: self.world_vertices]
+        boxes = [box for box in (self.boxes, self.instances.boxes) if len(box)]
+        lows = [vertices.min(axis=0)] if len(vertices) else []
+        highs = [vertices.max(axis=0)] if len(vertices) else []
+        lows += [box[:, 0].min(axis=0) for box in boxes]
+        highs += [box[:, 1].max(axis=0) for box in boxes]
+        if not lows:
+            return np.zeros(3), 1.0
+        low, high = np.min(lows, axis=0), np.max(highs, axis=0)
+        return (low + high) / 2, max(float(np.linalg.norm(high - low)) / 2, 1e-3)
+
+
+def lower_geometry(index: SceneIndex, encoder: Encoder, materials: MaterialWords) -> Geometry:
+    """Put the shapes of a scene into the tables.
+
+    Raises SceneError for a shape that makes no sense, and for more triangles than a tree can hold.
+    """
+    kinds = shape_records.ANALYTIC
+    meshes = [one for one in index.placed if one.shape.kind not in kinds]
+    others = [one for one in index.placed if one.shape.kind in kinds]
+    others.sort(key=lambda one: one.shape.kind in shape_records.ONE_OF)
+    single = [one for one in others if one.shape.kind not in shape_records.ONE_OF]
+    builder = _Builder(encoder, materials, len(single))
+    for one in meshes:
+        builder.add(one)
+    world_vertices = builder.vertex_count
+    instances = instancing.concatenated([builder.share(p) for p in index.prototypes])
+    encoder.store.append("instances", instances.rows.view(np.uint32))
+    first_analytic = len(builder.rows)
+    for one in others:
+        builder.add(one)
+    boxes = [analytic.bounds(one.shape) for one in single]
+    vertices, faces, tags = builder.concatenated()
+    return Geometry(
+        rows=tuple(builder.rows),
+        owners=tuple(builder.owners),
+        vertices=vertices,
+        faces=faces,
+        tags=tags,
+        boxes=np.concatenate(
+            [np.array(boxes, np.float32).reshape(-1, 2, 3), spheres.boxes(builder.balls)]
+        ),
+        instances=instances,
+        emitters=tuple(builder.emitters),
+        world_vertices=world_vertices,
+        first_analytic=first_analytic,
+        single_count=len(single),
+        analytic=frozenset(one.shape.kind for one in others),
+        normals=builder.normals,
+        uvs=builder.uvs,
+        warnings=tuple(triangles.warnings_of(builder.flat)),
+    )
+
+
+@dataclass
+class _Builder:
+    """What `lower_geometry` has put into the tables so far."""
+
+    encoder: Encoder
+    materials: MaterialWords
+    single_count: int
+    rows: list[np.ndarray] = field(default_factory=list)
+    owners: list[Owner] = field(default_factory=list)
+    emitters: list[Emitter] = field(default_factory=list)
+    parts: list[tuple[np.ndarray, np.ndarray, int]] = field(default_factory=list)
+    flat: list[triangles.Flat] = field(default_factory=list)
+    balls: list[spheres.Balls] = field(default_factory=list)
+    vertex_count: int = 0
+    face_count: int = 0
+    normals: bool = False
+    uvs: bool = False
+
+    def add(self, one: Placed) -> None:
+        """Append a shape's row; its triangles, or its parameters, go into the tables."""
+        shape: Any = one.shape
+        row = np.zeros((), SHAPE.dtype)
+        row["number"], row["light"] = one.number, -1
+        front, back, two_sided = self.materials.sides(shape)
+        row["front"], row["back"] = np.array([front, back], np.uint32).view(np.int32)
+        row["flags"] = SHAPE_TWO_SIDED if two_sided else 0
+        self.owners.append((row, shape, self.vertex_count, self.face_count))
+        if shape.kind not in shape_records.ANALYTIC:
+            corners = self._add_triangles(shape, row)
+        else:
+            row["kind"] = 1 + shape_records.ANALYTIC.index(shape.kind)
+            row["params"] = self.encoder.store.append("geometry", analytic.row(shape))
+            many = shape.kind in shape_records.ONE_OF
+            corners = self._add_balls(shape, row) if many else (None, None, None)
+        if shape.emission is not None:
+            self.emitters.append(Emitter(shape, len(self.rows), *corners))
+            values = vars(shape.emission).values()
+            self.uvs |= any(getattr(value, "is_texture", False) for value in values)
+        self.rows.append(row)
+
+    def _add_balls(self, shape: Any, row: np.ndarray) -> tuple[Any, Any, Any]:
+        """Append many spheres; return them in the place of vertices."""
+        row["prim"] = self.single_count + sum(map(len, self.balls))
+        row["flags"] |= SHAPE_MANY
+        balls = self.encoder.cache(spheres.balls, shape, by=shapes.geometry(shape))
+        self.balls.append(balls)
+        self.encoder.store.append_floats("spheres", balls)
+        return balls, None, None
+
+    def _add_triangles(self, shape: Any, row: np.ndarray) -> tuple[Any, Any, Any]:
+        """Append a shape's triangles; return their vertices, faces and uvs."""
+        made = self.encoder.cache(triangles.counted, shape, by=shapes.geometry(shape))
+        vertices, faces, normals, uvs, flat = made
+        self.flat += flat
+        row["prim"] = self.face_count
+        row["flags"] |= SHAPE_NORMALS if normals is not None else 0
+        row["flags"] |= SHAPE_UVS if uvs is not None else 0
+        zeros = np.zeros_like(vertices)
+        self.encoder.store.append_floats("normals", zeros if normals is None else normals)
+        self.encoder.store.append_floats("uvs", zeros[:, :2] if uvs is None else uvs)
+        self.normals |= normals is not None
+        moved = faces + np.uint32(self.vertex_count)
+        self.parts.append((vertices, moved, len(self.rows)))
+        self.vertex_count += len(vertices)
+        self.face_count += len(faces)
+        return vertices, faces, uvs
+
+    def share(self, prototype: Prototype) -> instancing.Shared:
+        """Append the rows of shapes that instances share, and their triangles once."""
+        before, first = len(self.parts), self.face_count
+        for shape in prototype.shapes:
+            self.add(Placed(shape, 0))
+        own = self.parts[before:]
+        whole, centre = instancing.centred(np.concatenate([v for v, _, _ in own]))
+        points = instancing.hull_points(whole)
+        placed, boxes = instancing.place(prototype.to_world, prototype.numbers, points, centre)
+        ends = np.cumsum([len(v) for v, _, _ in own])[:-1]
+        self.parts[before:] = [
+            (moved, faces, number)
+            for moved, (_, faces, number) in zip(np.split(whole, ends), own, strict=True)
+        ]
+        placed["prim"] = first
+        return instancing.Shared(placed, boxes, self.face_count - first, centre)
+
+    def concatenated(self) -> Triangles:
+        """Return all vertices, faces and tags."""
+        if max(self.vertex_count, self.face_count) > MOST:
+            raise SceneError(
+                f"{self.face_count:,} triangles with {self.vertex_count:,} vertices: of either "
+                f"there may be {MOST:,}; use instances for what repeats"
+            )
+        if not self.parts:
+            return np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint32), np.zeros(0, np.uint32)
+        vertices, faces, numbers = zip(*self.parts, strict=True)
+        self.parts.clear()
+        tags = [np.full(len(f), n, np.uint32) for f, n in zip(faces, numbers, strict=True)]
+        return np.concatenate(vertices), np.concatenate(faces), np.concatenate(tags)
+
+
+def shape_words(rows: Sequence[np.ndarray]) -> NDArray[np.uint32]:
+    """Return rows of `shapes` as words."""
+    return np.concatenate([np.zeros(0, SHAPE.dtype), *map(np.atleast_1d, rows)]).view(np.uint32)

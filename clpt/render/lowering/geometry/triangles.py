@@ -1,0 +1,252 @@
+"""Shapes of triangles: rectangles, cubes, meshes and curves in world space."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import transforms
+from clpt.errors import SceneError
+from clpt.render.contract.shape_records import ONE_OF
+from clpt.render.lowering.device_arrays import on_host
+from clpt.render.lowering.geometry.shapes import Faces, Points, Words, placement, where
+from clpt.render.lowering.geometry.tubes import tubes
+from clpt.scene import shapes
+from clpt.scene.shapes import Shape
+
+SUMMED = 1 << 20  # triangles whose normals are summed at a time
+
+CHUNK = 1 << 16  # triangles that are looked at at a time: what is made of them stays in the cache
+
+# Corners of the cube's sides in the order of _CORNER_UVS, as Mitsuba has them.
+_CUBE = (
+    "+-- +-+ --+ ---",
+    "++- -+- -++ +++",
+    "+-- ++- +++ +-+",
+    "+-+ +++ -++ --+",
+    "--+ -++ -+- ---",
+    "++- +-- --- -+-",
+)
+
+_CORNER_UVS = ((0, 1), (1, 1), (1, 0), (0, 0))
+
+_CORNER_FACES = ((0, 1, 2), (3, 0, 2))
+
+
+@dataclass(frozen=True)
+class Flat:
+    """How many of a shape's triangles have no area."""
+
+    where: str
+    count: int
+    of: int
+
+
+def triangulate(
+    shape: Shape, flat: list[Flat] | None = None
+) -> tuple[Points, Faces, Points | None, Points | None]:
+    """Return a rectangle, cube, mesh or curves in world space: vertices, faces, normals and uvs.
+
+    vertices (n, 3) float32 [m], faces (m, 3) uint32 counter-clockwise seen from the front, normals
+    (n, 3) float32 or None, uvs (n, 2) float32 or None. Triangles without an area are left out, and
+    counted in `flat`.
+
+    Raises SceneError for a mesh that is empty, not finite or inconsistent, or a singular transform.
+    """
+    vertices, faces, normals, uvs = _in_world(shape)
+    solid = _solid(vertices, faces)
+    warnings_of = not isinstance(shape, shapes.Curves)  # a tube may shrink to a line
+    if warnings_of and not solid.all() and flat is not None:
+        flat.append(Flat(where(shape), int(len(solid) - solid.sum()), len(solid)))
+    faces = faces if solid.all() else faces[solid]
+    return vertices, np.ascontiguousarray(faces), normals, uvs
+
+
+def counted(
+    shape: Shape,
+) -> tuple[Points, Faces, Points | None, Points | None, tuple[Flat, ...]]:
+    """Return what `triangulate` does, and whether it left some out."""
+    flat: list[Flat] = []
+    return *triangulate(shape, flat), tuple(flat)
+
+
+def warnings_of(flat: Sequence[Flat]) -> list[str]:
+    """Return one warning about the triangles that were left out, or none."""
+    if not flat:
+        return []
+    head = flat[0]
+    of = "all" if head.count == head.of else f"{head.count} of {head.of}"
+    first = f"{head.where}: {of} triangles have no area, left out"
+    if len(flat) == 1:
+        return [first]
+    total = sum(one.count for one in flat)
+    return [f"{first}; with those of {len(flat) - 1} more shapes {total:,} in all"]
+
+
+def attribute(shape: Shape, name: str) -> Points:
+    """Return an attribute of a mesh, (n, 1 or 3) float32 per vertex, or per face of `triangulate`.
+
+    Raises SceneError for one that has another shape, or values that are not finite.
+    """
+    per_face = name.startswith("face_")
+    if shape.kind in ONE_OF:
+        count = len(shape.centers)  # type: ignore[attr-defined]
+        if per_face:
+            message = f"attribute {name!r}: spheres have no faces, its name must begin with vertex_"
+            raise SceneError(message, where=where(shape))
+    else:
+        vertices, faces, _, _ = _in_world(shape)
+        count = len(faces) if per_face else len(vertices)
+    given: Any = shape.attributes[name]  # type: ignore[attr-defined]
+    values = np.asarray(on_host(given), np.float32)
+    values = values[:, None] if values.ndim == 1 else values
+    if values.shape not in ((count, 1), (count, 3)):
+        message = f"attribute {name!r} must be ({count}, 1 or 3), found {values.shape}"
+        raise SceneError(message, where=where(shape))
+    if not np.isfinite(values).all():
+        raise SceneError(f"attribute {name!r} is not finite", where=where(shape))
+    return values[_solid(vertices, faces)] if per_face else values
+
+
+def _in_world(shape: Shape) -> tuple[Points, Faces, Points | None, Points | None]:
+    """Vertices, faces, normals and uvs after the transform."""
+    matrix = placement(shape)
+    vertices, faces, normals, uvs = local(shape)
+    if not np.array_equal(matrix, transforms.IDENTITY):
+        vertices = transforms.transform_points(matrix, vertices).astype(np.float32)
+        if not np.isfinite(vertices).all():
+            raise SceneError("its transform moves vertices out of float32", where=where(shape))
+        if normals is not None:
+            normals = transforms.transform_normals(matrix, normals).astype(np.float32)
+    if normals is not None and shape.flip_normals:
+        normals = -normals
+    if transforms.flips_handedness(matrix) != shape.flip_normals:
+        faces = faces[:, ::-1]
+    return vertices, faces, normals, uvs
+
+
+def _solid(vertices: Points, faces: Faces) -> NDArray[np.bool_]:
+    """Which faces have a cross product that is not zero in float32."""
+    found = np.empty(len(faces), np.bool_)
+    for first in range(0, len(faces), CHUNK):
+        crosses = _crosses(vertices, faces[first : first + CHUNK])
+        found[first : first + CHUNK] = (crosses * crosses > 0.0).any(axis=1)
+    return found
+
+
+def _crosses(vertices: NDArray[Any], faces: Faces) -> NDArray[Any]:
+    """Cross products of the edges at each triangle's first vertex, (m, 3) like the vertices."""
+    v0, v1, v2 = (vertices[faces[:, i]] for i in range(3))
+    (ax, ay, az), (bx, by, bz) = (v1 - v0).T, (v2 - v0).T
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
+
+
+def triangle_areas(vertices: Points, faces: Faces) -> NDArray[np.float64]:
+    """Return the area of every triangle [m^2], (m,) float64."""
+    return 0.5 * np.linalg.norm(_crosses(vertices, faces).astype(np.float64), axis=1)
+
+
+def triangle_rows(vertices: Points, faces: Faces) -> Words:
+    """Return a row of `Triangle` per face, (m, 10) uint32; the front is on the winding's side."""
+    v0, v1, v2 = (vertices[faces[:, i]] for i in range(3))
+    side = np.ones((len(faces), 1), np.float32)
+    return np.ascontiguousarray(np.hstack([v0, v1 - v0, v2 - v0, side])).view(np.uint32)
+
+
+def local(shape: Shape) -> tuple[Points, Faces, Points | None, Points | None]:
+    """Return vertices, faces, normals and uvs before the transform, as `triangulate` does."""
+    if isinstance(shape, shapes.Mesh):
+        return _mesh(shape)
+    if isinstance(shape, shapes.Curves):
+        return tubes(shape, where(shape))
+    if shape.kind == "rectangle":
+        square = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], np.float32)
+        halves = np.array([(0, 1, 2), (0, 2, 3)], np.uint32)
+        return square, halves, None, (square[:, :2] + np.float32(1.0)) * np.float32(0.5)
+    corners, faces, uvs = _cube()
+    return corners.copy(), faces.copy(), None, uvs.copy()
+
+
+@cache
+def _cube() -> tuple[Points, Faces, Points]:
+    """Vertices, faces and uvs of a cube from -1 to 1."""
+    corners = [[{"+": 1, "-": -1}[c] for c in v] for side in _CUBE for v in side.split()]
+    faces = 4 * np.arange(6)[:, None, None] + np.array(_CORNER_FACES)
+    uvs = np.tile(np.array(_CORNER_UVS, np.float32), (6, 1))
+    return np.array(corners, np.float32), faces.reshape(-1, 3).astype(np.uint32), uvs
+
+
+def _mesh(shape: shapes.Mesh) -> tuple[Points, Faces, Points | None, Points | None]:
+    if shape.vertices is None or shape.faces is None:
+        raise SceneError("a mesh needs vertices and faces", where=where(shape))
+    vertices = _array(shape, "vertices", 3)
+    faces = np.asarray(on_host(shape.faces))
+    if faces.size == 0 or len(vertices) == 0:
+        raise SceneError("the mesh is empty: it has no triangle", where=where(shape))
+    if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iu":
+        found = f"{faces.shape} {faces.dtype}"
+        raise SceneError(f"faces must be (m, 3) whole numbers, found {found}", where=where(shape))
+    lowest, highest = int(faces.min()), int(faces.max())
+    if lowest < 0 or highest >= len(vertices):
+        wrong = lowest if lowest < 0 else highest
+        raise SceneError(
+            f"a face names vertex {wrong}, there are {len(vertices)}", where=where(shape)
+        )
+    normals = _normals(shape, vertices, faces)
+    uvs = None if shape.uvs is None else _array(shape, "uvs", 2, len(vertices))
+    return vertices, faces.astype(np.uint32, copy=False), normals, uvs
+
+
+def _normals(shape: shapes.Mesh, vertices: Points, faces: NDArray[Any]) -> Points | None:
+    """A mesh's normals as they were given, or the means of its triangles' by their areas."""
+    if not smooth(shape):
+        return None if shape.normals is None else _array(shape, "normals", 3, len(vertices))
+    sums = np.zeros((len(vertices), 3))
+    points = vertices.astype(np.float64)
+    for first in range(0, len(faces), SUMMED):
+        some = faces[first : first + SUMMED]
+        crosses = _crosses(points, some)
+        for axis in range(3):
+            for corner in some.T:
+                sums[:, axis] += np.bincount(corner, crosses[:, axis], len(vertices))
+    lengths = np.linalg.norm(sums, axis=1, keepdims=True)
+    return (sums / np.where(lengths > 0.0, lengths, 1.0)).astype(np.float32)
+
+
+def points(shape: Shape) -> Points:
+    """Return a mesh's vertices before the transform, (n, 3) float32.
+
+    Raises SceneError for a wrong shape or values that are not finite.
+    """
+    return _array(shape, "vertices", 3)
+
+
+def smooth(shape: Shape) -> bool:
+    """Return whether a shape's normals follow from its triangles."""
+    normals = getattr(shape, "normals", None)
+    return isinstance(normals, str) and normals == shapes.SMOOTH
+
+
+def _array(shape: Shape, name: str, columns: int, rows: int | None = None) -> Points:
+    """A mesh's array as float32. Raises SceneError for a wrong shape or values not finite."""
+    try:
+        values = np.asarray(on_host(getattr(shape, name)), np.float32)
+    except (TypeError, ValueError) as error:
+        raise SceneError(f"{name} are not numbers: {error}", where=where(shape)) from error
+    wanted = f"({'n' if rows is None else rows}, {columns})"
+    if values.size == 0 and rows is None:
+        raise SceneError(f"the mesh is empty: it has no {name}", where=where(shape))
+    if values.ndim != 2 or values.shape[1] != columns or rows not in (None, len(values)):
+        raise SceneError(f"{name} must be {wanted}, found {values.shape}", where=where(shape))
+    wrong = ~np.isfinite(values).all(axis=1)
+    if wrong.any():
+        first = int(np.argmax(wrong))
+        raise SceneError(
+            f"{name}[{first}] is not finite: {values[first].tolist()}", where=where(shape)
+        )
+    return values

@@ -1,0 +1,94 @@
+"""The index of a scene: what its steps of lowering ask for, found once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from clpt.errors import SceneError
+from clpt.render.contract import custom_materials
+from clpt.render.lowering.geometry import instancing, shapes
+from clpt.render.lowering.geometry.instancing import Placed, Prototype
+from clpt.scene import Scene
+from clpt.scene import materials as mt
+from clpt.scene.integrators import ParticleTracer
+from clpt.scene.shapes import Shape
+
+
+@dataclass(frozen=True)
+class SceneIndex:
+    """A scene with what is in it.
+
+    shapes: every shape once, those of groups as the group has them; placed: shapes that are lowered
+    as they are; prototypes: shapes that instances share; leaves: classes of leaf materials, in the
+    order that material words count; normal_mapped: whether a material has a normal or a bump map;
+    warnings: of instances that became triangles.
+    """
+
+    scene: Scene
+    shapes: tuple[Shape, ...]
+    placed: tuple[Placed, ...]
+    prototypes: tuple[Prototype, ...]
+    leaves: tuple[type[mt.Material], ...]
+    normal_mapped: bool
+    warnings: tuple[str, ...]
+
+    @classmethod
+    def of(cls, scene: Scene) -> SceneIndex:
+        """Look through a scene that clpt.render.lowering.checks accepts.
+
+        Raises SceneError for an instance that cannot be placed, and for what is not a material.
+        """
+        warnings: list[str] = []
+        placed, prototypes = instancing.sort(scene.shapes, warnings)
+        distinct = tuple(instancing.distinct(scene.shapes))
+        return cls(
+            scene=scene,
+            shapes=distinct,
+            placed=tuple(placed),
+            prototypes=tuple(prototypes),
+            leaves=_leaf_kinds(distinct),
+            normal_mapped=any(any_of(shape.material, mt.NormalMapped) for shape in distinct),
+            warnings=tuple(warnings),
+        )
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The channels of the `aov` integrator; of others none."""
+        return getattr(self.scene.integrator, "channels", ())
+
+    @property
+    def light_paths(self) -> bool:
+        """Whether paths start at lights."""
+        return isinstance(self.scene.integrator, ParticleTracer)
+
+    @property
+    def mode(self) -> str:
+        """The mode of the kernels: channels are no light, and need no wavelengths."""
+        return "rgb" if self.channels else self.scene.film.mode
+
+    @property
+    def spectral(self) -> bool:
+        return self.mode == "spectral"
+
+
+def any_of(material: Any, classes: Any) -> bool:
+    """Return whether a material, or one inside it, is of these classes."""
+    return any(isinstance(part, classes) for part in mt.parts(material))
+
+
+def _leaf_kinds(shapes_: tuple[Shape, ...]) -> tuple[type[mt.Material], ...]:
+    """The leaf kinds of a scene, in the order of their table; custom kinds follow."""
+    found: dict[type[mt.Material], str] = {}
+    for shape in shapes_:
+        where = shapes.where(shape)
+        if not isinstance(shape.material, mt.Material):
+            raise SceneError(f"{shape.material!r} is not a material", where=where)
+        for material in mt.parts(shape.material):
+            if isinstance(material, mt.Mask) or material.no_back:
+                found.setdefault(mt.Null, where)
+            if not isinstance(material, mt.COMPOSITES):
+                found.setdefault(type(material), where)
+        if any_of(shape.material, mt.TwoSided) and not isinstance(shape.material, mt.TwoSided):
+            found.setdefault(mt.Diffuse, where)  # the black back of a part that is not two-sided
+    return custom_materials.ordered(found) or (mt.Diffuse,)

@@ -1,0 +1,126 @@
+"""Material words: what a hit finds its material by, for each side of a shape.
+
+The upper 8 bits of a word are the number of a leaf kind, or MIXTURE; the lower 24 bits are the
+first word of a row in `materials`, or in `mixtures`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+from clpt.errors import SceneError
+from clpt.render.lowering.encoder import Encoder
+from clpt.render.lowering.geometry import shapes
+from clpt.render.lowering.index import any_of
+from clpt.render.lowering.materials.normal_maps import NormalPerturbation
+from clpt.scene import materials as mt
+from clpt.scene.params import device_params
+from clpt.scene.shapes import Shape
+from clpt.spectra import Constant
+
+MIXTURE = 0xFF
+CLEAR = Constant(0.0)  # absorption of what absorbs nothing
+_NULL, _BLACK = mt.Null(), mt.Diffuse(reflectance=0.0)
+
+
+@dataclass(frozen=True)
+class _Side:
+    """A side of a surface, and what stands around the material that is looked at.
+
+    two_sided: the back of the surface is shaded like a front; inside: below a TwoSided.
+    """
+
+    front: bool
+    two_sided: bool
+    inside: bool = False
+    perturbation: NormalPerturbation = NormalPerturbation()
+
+    @property
+    def key(self) -> tuple[Any, ...]:
+        """What makes two the same."""
+        return self.front, self.two_sided, self.inside, self.perturbation.key
+
+
+class MaterialWords:
+    """Makes material words, and notes what the materials that it has met need of the kernels.
+
+    uvs, tangents, absorption: whether a material needs them; transmitting: kinds of leaves of which
+    some let light through; mixture_depth: how deep masks and blends nest.
+    """
+
+    def __init__(
+        self, encoder: Encoder, leaves: tuple[type[mt.Material], ...], normal_mapped: bool
+    ):
+        self._encoder, self._leaves, self._normal_mapped = encoder, leaves, normal_mapped
+        self._words: dict[tuple[int, tuple[Any, ...]], int] = {}
+        self._depths: dict[int, int] = {}  # of mixtures, by their words
+        self.uvs = self.tangents = self.absorption = False
+        self.transmitting: set[str] = set()
+
+    @property
+    def mixture_depth(self) -> int:
+        return max(self._depths.values(), default=0)
+
+    def sides(self, shape: Shape) -> tuple[int, int, bool]:
+        """Return the words of a shape's front and back, and whether it is two-sided."""
+        two_sided = any_of(shape.material, mt.TwoSided)
+        if two_sided and any(part.transmits for part in mt.parts(shape.material)):
+            raise SceneError(
+                "a transmissive material cannot be mixed with a two-sided one",
+                where=shapes.where(shape),
+            )
+        front = self._word(shape.material, _Side(front=True, two_sided=two_sided))
+        back = self._word(shape.material, _Side(front=False, two_sided=two_sided))
+        return front, back, two_sided
+
+    def _word(self, material: Any, side: _Side) -> int:
+        """The word of a material on a side; the same pair has the same word."""
+        key = (id(material), side.key)
+        if key not in self._words:
+            self._words[key] = self._new_word(material, side)
+        return self._words[key]
+
+    def _new_word(self, material: Any, side: _Side) -> int:
+        if isinstance(material, mt.TwoSided):
+            chosen = material.front if side.front or material.back is None else material.back
+            return self._word(chosen, dataclasses.replace(side, inside=True))
+        if isinstance(material, (mt.NormalMap, mt.BumpMap)):
+            within = side.perturbation.within(material, side.inside)
+            return self._word(material.material, dataclasses.replace(side, perturbation=within))
+        if isinstance(material, mt.Mask):
+            return self._mixture(material.opacity, _NULL, material.material, side)
+        if isinstance(material, mt.Blend):
+            return self._mixture(material.weight, material.first, material.second, side)
+        one_sided = not side.inside and not isinstance(material, mt.Null)
+        if side.two_sided and not side.front and one_sided:
+            material = _BLACK  # the back of a one-sided part of a two-sided surface
+        if material.no_back and not side.front:
+            material = _NULL
+        return self._leaf(material, side)
+
+    def _leaf(self, material: Any, side: _Side) -> int:
+        before = side.perturbation.words(self._encoder) if self._normal_mapped else None
+        row = self._encoder.row(material, "materials", before)
+        if row >= 1 << 24:
+            raise SceneError("the scene has more than 16 million words of material parameters")
+        self.uvs |= any(map(_has_textures, (material, *getattr(material, "layers", ()))))
+        self.tangents |= material.uses_tangents
+        self.absorption |= getattr(material, "absorption", CLEAR) != CLEAR
+        if material.transmits:
+            self.transmitting.add(material.kind)
+        return self._leaves.index(type(material)) << 24 | row
+
+    def _mixture(self, weight: Any, first: Any, second: Any, side: _Side) -> int:
+        words, source = self._encoder.named_words("mixture", "weight", weight, "real")
+        self.uvs |= source == "texture"
+        children = [self._word(material, side) for material in (first, second)]
+        word = MIXTURE << 24 | self._encoder.store.append("mixtures", [*words, *children])
+        self._depths[word] = 1 + max(self._depths.get(child, 0) for child in children)
+        return word
+
+
+def _has_textures(kind: Any) -> bool:
+    """Whether a parameter of a kind is a texture."""
+    return any(getattr(getattr(kind, n), "is_texture", False) for n in device_params(type(kind)))

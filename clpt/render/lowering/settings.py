@@ -1,0 +1,63 @@
+"""The settings of a lowered scene: what holds for a whole render, whatever the device."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.records import SETTINGS
+from clpt.render.lowering.camera.colour import output_matrix
+from clpt.render.lowering.camera.wavelengths import Density
+from clpt.render.lowering.geometry.geometry import Geometry
+from clpt.render.lowering.index import SceneIndex
+from clpt.render.lowering.lights.lights import LightRows
+from clpt.spectra.cie import tanh_ends
+
+MOST_SAMPLE_BITS = 16  # of a zsobol pixel's part of its sequence
+DEEPEST = 4000  # path state has 12 bits for the depth
+DEPTHS = {"direct": 2, "aov": 1}  # of integrators without the parameter
+
+
+def settings_of(
+    index: SceneIndex,
+    geometry: Geometry,
+    lights: LightRows,
+    density: Density,
+    density_row: int,
+    ambient_row: int,
+    sphere: tuple[NDArray[np.float64], float],
+) -> NDArray[np.void]:
+    """Return the record SETTINGS of a scene; the wavefront adds what depends on the device.
+
+    density_row: where the table of `density` begins in `distributions`; ambient_row: in
+    `light_params`; sphere: centre and radius of one around the scene [m].
+    """
+    scene, film, integrator = index.scene, index.scene.film, index.scene.integrator
+    settings = np.zeros((), SETTINGS.dtype)
+    width, height = film.size
+    settings["width"], settings["height"] = width, height
+    settings["crop_x"], settings["crop_y"] = (0, 0) if film.crop is None else film.crop[:2]
+    settings["film_width"], settings["film_height"] = film.width, film.height
+    settings["tiles_x"] = -(-width // 4)
+    settings["padded_pixels"] = 16 * settings["tiles_x"] * -(-height // 4)
+    settings["seed"] = scene.seed % 2**32
+    settings["sample_bits"] = min((max(scene.spp, 1) - 1).bit_length(), MOST_SAMPLE_BITS)
+    depth: int = DEPTHS.get(integrator.kind, 0) or getattr(integrator, "max_depth", -1)
+    settings["max_depth"] = DEEPEST if depth < 0 else min(depth, DEEPEST)
+    settings["rr_depth"] = min(getattr(integrator, "rr_depth", DEEPEST), DEEPEST)
+    settings["hide_lights"] = getattr(integrator, "hide_lights", False)
+    settings["light_count"] = len(lights.rows)
+    settings["infinite_count"] = lights.infinite
+    settings["ambient"] = ambient_row
+    settings["first_analytic"] = geometry.first_analytic
+    settings["analytic_count"] = len(geometry.boxes)
+    settings["single_count"] = geometry.single_count
+    settings["shape_count"] = len(geometry.rows)
+    settings["lambda_min"], settings["lambda_max"] = film.lambda_min, film.lambda_max
+    settings["tanh_min"], settings["tanh_max"] = tanh_ends(density.lo, density.hi)
+    settings["bands"] = film.bands
+    settings["density"] = density_row
+    matrix = np.eye(3) if index.channels else output_matrix(film, index.mode)
+    settings["to_first"], settings["to_second"], settings["to_third"] = matrix
+    settings["center"], settings["scene_radius"] = sphere
+    return settings

@@ -1,0 +1,155 @@
+"""Spectra as kernels read them: colours as words, tabulated spectra as rows of `spectra`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import spectra
+from clpt.render.contract.parameter_words import SPECTRUM_WORDS
+from clpt.render.lowering.camera.wavelengths import Density
+from clpt.render.lowering.materials import reradiation
+from clpt.render.lowering.tables import TableStore, Words, as_words
+from clpt.spectra import (
+    RGB,
+    Constant,
+    Reradiation,
+    RGBIlluminant,
+    Sensor,
+    Spectrum,
+    Tabulated,
+    observer,
+)
+from clpt.spectra.spectrum import Role, d65, on_grid
+
+STEP = 1.0  # [nm] of the tabulated spectra
+ONE = 1e4  # sigmoid coefficient at which it is 1 in float32
+# How a spectrum is turned to rgb, by the role of the parameter (see clpt.spectra.spectrum).
+RGB_ROLES: dict[str, Role] = {
+    "reflectance": "reflectance",
+    "emission": "emission",
+    "index": "unbounded",
+    "factor": "unbounded",
+    "coefficient": "unbounded",
+}
+
+
+@lru_cache(maxsize=1 << 16)
+def _uplifted(value: RGB) -> tuple[float, ...]:
+    """The coefficients of a colour; scenes of many materials have few."""
+    return tuple(spectra.uplift(value.to_rgb()).tolist())
+
+
+class SpectraTable:
+    """The table `spectra` of a scene, and the words of a spectrum in a parameter's row.
+
+    mode: "spectral" or "rgb"; lambda_min, lambda_max: the film's range [nm]; sensor: what the film
+    records with, by default cie1931; density: of its wavelengths, by default visible importance.
+    """
+
+    def __init__(
+        self,
+        store: TableStore,
+        mode: str,
+        lambda_min: float = 360.0,
+        lambda_max: float = 830.0,
+        sensor: Sensor | None = None,
+        density: Density | None = None,
+    ):
+        self._store = store
+        self.mode, self.lambda_min, self.lambda_max = mode, lambda_min, lambda_max
+        self._rows: dict[Any, int] = {}
+        self._expected_light: NDArray[np.float64] | None = None
+        if self.spectral:
+            self._add_sensor(sensor or observer("cie1931"), density or Density(*self.range))
+
+    @property
+    def spectral(self) -> bool:
+        return self.mode == "spectral"
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """The film's range of wavelengths [nm]."""
+        return self.lambda_min, self.lambda_max
+
+    @property
+    def samples(self) -> int:
+        """The number of samples in a row of `spectra`."""
+        return int(np.ceil((self.lambda_max - self.lambda_min) / STEP - 1e-9)) + 1
+
+    def row(self, spectrum: Spectrum) -> int:
+        """Tabulate a spectrum on the common grid; return its row in `spectra`."""
+        if spectrum not in self._rows:
+            values = on_grid(spectrum, self.lambda_min, self.lambda_max, STEP)
+            self._rows[spectrum] = self._store.append_floats("spectra", values) // self.samples
+        return self._rows[spectrum]
+
+    def _add_sensor(self, sensor: Sensor, density: Density) -> None:
+        """Rows 0 to 3: D65, and the sensor's curves, scaled so that Y of 1 is 1.
+
+        Where visible importance is the density, the curves are divided by it, as it is smooth.
+        """
+        self.row(d65())
+        lambdas = self.lambda_min + STEP * np.arange(self.samples)
+        inside = np.minimum(lambdas, self.lambda_max)  # the last sample may lie past the end
+        curves = sensor.sample(inside)
+        if density.values is None:
+            pdf = density.pdf(inside)
+            curves = np.where(
+                pdf[:, None] > 0.0, curves / np.where(pdf > 0.0, pdf, 1.0)[:, None], 0
+            )
+        self._store.append_floats("spectra", (curves / spectra.CIE_Y_INTEGRAL).T)
+
+    def words(self, value: Spectrum | str, role: str) -> tuple[Words, str]:
+        """Return the five words of a spectrum and its source: "constant" or "table".
+
+        role: one of SPECTRUM_ROLES in clpt.scene.params; an index may be a glass's name.
+        """
+        if isinstance(value, str) or role in ("index", "coefficient"):
+            value = spectra.index(value)
+        if role == "emission" and isinstance(value, RGB):
+            value = RGBIlluminant(value.r, value.g, value.b)
+        words = np.zeros(SPECTRUM_WORDS, np.uint32)
+        if not self.spectral:
+            words[:3] = as_words(value.to_rgb(RGB_ROLES[role]))
+            return words, "constant"
+        if isinstance(value, Constant):
+            words[:4] = as_words([0.0, 0.0, ONE, value.value])
+        elif type(value) is RGB:
+            words[:4] = as_words([*_uplifted(value), 1.0])
+        else:
+            return self._table_words(value), "table"
+        return words, "constant"
+
+    def _table_words(self, spectrum: Spectrum) -> Words:
+        """Five words: a factor of 1, and -1 - the row in `spectra`."""
+        words = np.zeros(SPECTRUM_WORDS, np.uint32)
+        words[3] = as_words([1.0])[0]
+        words[4] = np.int32(-1 - self.row(spectrum)).view(np.uint32)
+        return words
+
+    def expect_light(self, lights: Iterable[Spectrum]) -> None:
+        """Note what light fluorescent materials will meet; see `reradiation.expected`."""
+        self._expected_light = reradiation.expected(lights, reradiation.nodes(*self.range))
+
+    def reradiation_words(self, value: Reradiation | None) -> tuple[Words, str]:
+        """Return the words of a matrix: of the sum of its rows; the first says where it lies.
+
+        In RGB mode they hold the colour that is given out under D65.
+        """
+        if not self.spectral:
+            words = np.zeros(SPECTRUM_WORDS, np.uint32)
+            if value is not None:
+                words[:3] = as_words(value.to_rgb(*self.range))
+            return words, "constant"
+        nodes = reradiation.nodes(*self.range)
+        light = np.ones_like(nodes) if self._expected_light is None else self._expected_light
+        values, sums = reradiation.table(value, nodes, light)
+        first = self._store.append_floats("distributions", values)
+        words = self._table_words(Tabulated(nodes, sums, "hold"))
+        words[0] = first
+        return words, "table"

@@ -1,0 +1,179 @@
+"""The memory of paths in flight: slots, slabs of path state, queues, counters, the work list."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pyopencl as cl
+from numpy.typing import NDArray
+
+from clpt import device
+from clpt.device.buffers import Buffers
+from clpt.errors import MemoryBudgetError
+from clpt.records import PATH, SLABS
+from clpt.render.wavefront import queues, work_list
+
+COUNTERS = ("done", "samples", "closest", "shadow", "rejected")  # kernels/film/film.cl
+PADDING = 80  # words between streams: powers of two collide in a cache
+GROUP = 64  # slots are a multiple of it, and it is the local size of one-lane kernels
+FRESH = 0x2000  # kernels/path/path_state.cl
+CPU_SLOTS = 1 << 14
+UNIT_SLOTS = 1 << 14  # of a GPU's compute unit, which runs about an eighth of them at once
+MOST_SLOTS = 1 << 22  # kernels/core/math.cl divides them as floats
+# A work-item of the loop keeps its paths in the first cache, and waits the less for the longest of
+# them the more samples each slot has to take: few slots, measured on CPUs.
+LOOP_SLOTS = 1 << 10  # of a core
+WORDS = sum(record.words for record in SLABS) + 2  # of a slot, with those of queues
+LARGEST = max(record.words for record in SLABS)
+
+
+@dataclass(frozen=True)
+class Slots:
+    """The number of paths in flight: slots of each film plane, and planes."""
+
+    per_plane: int
+    planes: int
+
+    @property
+    def total(self) -> int:
+        return self.per_plane * self.planes
+
+
+def default_slots(info: device.DeviceInfo) -> int:
+    """Return how many paths in flight suit a device: more for one with more compute units.
+
+    A CPU gets as many as its cache holds. Any other device gets several times as many as it runs at
+    once, so that no unit is idle while the last work-items of a queue run.
+    """
+    if info.is_cpu:
+        return CPU_SLOTS
+    return min(info.compute_units * UNIT_SLOTS, MOST_SLOTS)
+
+
+def divide_film(
+    info: device.DeviceInfo, padded_pixels: int, memory: int, slots: int | None, looped: bool
+) -> Slots:
+    """Return how a film is divided among slots: as many as are wanted, or as memory allows.
+
+    memory: that buffers may take [bytes], of which slots get half; slots: wanted, None for what
+    suits the device. A film with fewer pixels than slots gets several planes. Sums, and so the bits
+    of a picture, follow from the number of planes; a loop changes that of slots only.
+
+    Raises MemoryBudgetError.
+    """
+    room = min(memory // 2 // (4 * WORDS), info.max_alloc // 4 // LARGEST)
+    wanted = min(slots or default_slots(info), int(room) - PADDING)
+    if wanted < GROUP:
+        advice = "close other programs or choose another device"
+        raise MemoryBudgetError("the least number of paths", 4 * WORDS * GROUP, memory, advice)
+    film = -(-padded_pixels // GROUP) * GROUP
+    per_plane = min(wanted // GROUP * GROUP, film)
+    planes = max(1, wanted // film) if per_plane == film else 1
+    if slots is None and looped and info.is_cpu:
+        fewer = max(LOOP_SLOTS * info.compute_units // planes // GROUP, 1) * GROUP
+        per_plane = min(fewer, per_plane)
+    return Slots(per_plane, planes)
+
+
+class PathBuffers:
+    """The state of the paths in flight on a device.
+
+    settings: those of the lowered scene, of which this is a copy, with the numbers of slots and
+    planes and the seed of the samples; stride: words from one stream of a slab to the next.
+
+    Raises MemoryBudgetError.
+    """
+
+    def __init__(
+        self,
+        stream: device.Stream,
+        buffers: Buffers,
+        settings: NDArray[np.void],
+        slots: Slots,
+        queued: str,
+        kinds: int,
+    ):
+        self.stream, self.buffers = stream, buffers
+        self._slots, self.slots, self.stride = slots, slots.total, slots.total + PADDING
+        self.settings = self._with_slots(settings)
+        self._read = np.zeros(len(COUNTERS), np.uint32)
+        self._fixed: dict[str, Any] = {"stride": self.stride}
+        for record in SLABS:
+            name, size = f"{record.name.lower()}_words", 4 * record.words * self.stride
+            buffer = buffers.allocate(name, size, "lower the number of slots")
+            stream.fill(buffer, 0, 0, size)
+            self._fixed[name] = buffer
+        self._fixed["counters"] = buffers.allocate("the counters", 4 * len(COUNTERS))
+        self._fixed["settings"] = buffers.upload("the settings", self._setting_words)
+        every_pixel = work_list.table(self.settings, work_list.inside(self.settings))
+        self._fixed["work_list"] = buffers.upload("the work list", every_pixel)
+        self.queue = self.new_queue(queued, kinds)
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """The kernels' arguments by name."""
+        return {**self._fixed, **self.queue}
+
+    def new_queue(self, queued: str, kinds: int) -> dict[str, Any]:
+        """Return the arguments of the kernels that queue slots by material, with new buffers."""
+        if not queued:
+            return {}
+        sizes = queues.sizes(queued, self.slots, kinds)
+        buffers = {name: self.buffers.allocate("the queues", 4 * n) for name, n in sizes.items()}
+        return {**buffers, **queues.numbers(self.slots)}
+
+    def set_work_list(
+        self, padded_pixels: work_list.PixelIndices, ends: work_list.PixelIndices | None = None
+    ) -> None:
+        """Enqueue that slots sample these pixels from now on, each up to its own end."""
+        table = work_list.table(self.settings, padded_pixels, ends)
+        self.stream.write(self._fixed["work_list"], table)
+
+    def set_seed(self, seed: int) -> None:
+        """Enqueue that samples are those of a seed from now on."""
+        changed = self.settings.copy()
+        changed["seed"] = seed % 2**32
+        self._set(changed)
+
+    def set_settings(self, settings: NDArray[np.void]) -> None:
+        """Enqueue the settings of another lowering, of a film of the same size."""
+        self._set(self._with_slots(settings))
+
+    def restart(self) -> None:
+        """Enqueue that every slot begins its list of pixels again."""
+        word = next(m.word for m in PATH.members if m.name == "state")
+        self.stream.fill(self._fixed["path_words"], FRESH, 4 * word * self.stride, 4 * self.slots)
+        self.stream.fill(self._fixed["counters"], 0, 0, 4)
+
+    def clear_counters(self) -> None:
+        """Enqueue that every counter is zero."""
+        self._read = np.zeros(len(COUNTERS), np.uint32)
+        self.stream.fill(self._fixed["counters"], 0, 0, 4 * len(COUNTERS))
+
+    def read_counters(self) -> tuple[NDArray[np.uint32], cl.Event]:
+        """Enqueue that the counters are read; return where to, and the event."""
+        host = np.zeros(len(COUNTERS), np.uint32)
+        return host, self.stream.read_later(self._fixed["counters"], host)
+
+    def gained(self, counters: NDArray[np.uint32]) -> dict[str, int]:
+        """Return what counters, just read, have gained since they were read last, by name."""
+        gain = counters - self._read  # unsigned: right even after they wrapped around
+        self._read = counters
+        return dict(zip(COUNTERS[1:], gain[1:].tolist(), strict=True))
+
+    @property
+    def _setting_words(self) -> NDArray[np.uint32]:
+        return self.settings.reshape(1).view(np.uint32)
+
+    def _with_slots(self, settings: NDArray[np.void]) -> NDArray[np.void]:
+        changed = settings.copy()
+        changed["per_plane"], changed["planes"] = self._slots.per_plane, self._slots.planes
+        changed["slots"] = self._slots.total
+        return changed
+
+    def _set(self, settings: NDArray[np.void]) -> None:
+        if settings != self.settings:
+            self.settings = settings
+            self.stream.write(self._fixed["settings"], self._setting_words)

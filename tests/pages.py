@@ -1,0 +1,37 @@
+"""What pages of documentation say in code: their blocks, and commands that must exist."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+from clpt.cli import cli
+
+FENCED = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    """Return the fenced blocks of a language, in their order."""
+    found = FENCED.findall(page.read_text("utf-8"))
+    return [text for name, text in found if name == language]
+
+
+def commands(page: Path) -> list[str]:
+    """Return the lines of plain and shell blocks that call clpt, without what is said of them."""
+    lines = "\n".join([*blocks(page, ""), *blocks(page, "sh")]).splitlines()
+    return [line.split("   ")[0] for line in lines if line.startswith("clpt ")]
+
+
+def check_command(line: str) -> None:
+    """Assert that a command exists, and every option that a line gives it."""
+    context = cli.make_context("clpt", ["devices"])
+    _, name, *words = shlex.split(line, comments=True)
+    if name == "--version":
+        return
+    command = cli.get_command(context, name)
+    assert command is not None, line
+    known = {option for parameter in command.params for option in parameter.opts}
+    given = {word for word in words if re.match(r"-{1,2}[A-Za-z]", word)}  # not a number below zero
+    unknown = given - known
+    assert not unknown, f"{line}: {unknown}"

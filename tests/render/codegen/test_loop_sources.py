@@ -1,0 +1,98 @@
+"""Programs that are linked to the loop: nothing but the stages is seen outside of its program.
+
+`Source.with_private` finds definitions by how they are written; this test finds them by braces.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import clpt
+from clpt.benchmark.traffic import kept_lines
+from clpt.device import Source
+from clpt.render.codegen import programs
+from clpt.render.contract.features import Features
+from clpt.render.lowering.scene import lower
+
+ROOT = Path(__file__).resolve().parents[3]
+SCENES = [
+    "scenes/cornell_box/scene.json",
+    "scenes/oil_film/scene.json",
+    "scenes/fluorescent_paint/scene.json",
+    "scenes/rainbow/scene.json",
+    "tests/scenes/instances.xml",
+    "tests/scenes/light_tracing.xml",
+    "tests/scenes/textures.xml",
+    "tests/scenes/principled.xml",
+    "tests/scenes/thrown_images.xml",
+]
+WAYS = [("brute", 8, False), ("wide8", 8, True), ("compact", 1, False), ("binary", 16, False)]
+DIRECTIVE = re.compile(r"^[ \t]*#(?:[^\n]*\\\n)*[^\n]*", re.MULTILINE)
+
+
+def definitions(source: Source) -> Iterator[tuple[str, str]]:
+    """What stands before the braces of each function and constant, and its name."""
+    depth, begin, head = 0, 0, ""
+    text = DIRECTIVE.sub("", "\n".join(kept_lines(source.text)))
+    for match in re.finditer(r"[{};]", text):
+        if match[0] == "{":
+            head = head if depth else text[begin : match.start()].strip()
+            depth += 1
+        elif match[0] == "}":
+            depth -= 1
+            ends = depth == 0 and not head.endswith("=") and not head.startswith("typedef")
+            if ends and "(" in head:
+                yield head, re.split(r"\W", head.split("(")[0].strip())[-1]
+        if match[0] != "{" and depth == 0:
+            if match[0] == ";" and head.endswith("="):
+                yield head, re.search(r"(\w+)\s*(\[[^=]*)?=$", head)[1]
+            if match[0] == ";" or "(" in head:
+                begin, head = match.end(), ""
+    assert depth == 0
+
+
+def features_of(name: str) -> Features:
+    return lower(clpt.load(ROOT / name)).features
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_only_stages_are_seen_outside(name: str) -> None:
+    features = features_of(name)
+    for layout, lanes, interleaved in WAYS:
+        outside: list[str] = []
+        for program, source in programs.loop_sources(features, layout, lanes, interleaved).items():
+            private = dict(re.findall(r"^#define (\w+) (\w+)$", source.text, re.MULTILINE))
+            found = list(definitions(source))
+            assert len(found) > 50, "definitions are found at all"
+            for head, own in found:
+                if head.startswith("static "):
+                    assert private[own] == f"{program}_{own}", head
+                elif head.startswith("STAGE("):
+                    outside.append(private["PART"])
+                else:
+                    assert head.startswith("kernel "), f"{program}: {head} is not private"
+                    outside.append(own)
+        bounce = {stage.program for stage in programs.order(features, layout, lanes, interleaved)}
+        assert sorted(outside) == sorted({"loop", *(f"loop_{stage}" for stage in bounce)})
+
+
+def test_definitions_are_found_by_their_braces() -> None:
+    text = """
+        /* real commented(real x) { } */
+        #define MACRO(x) \\
+            real in_macro(real x) { return x; }
+        typedef struct { real x; } Pair;
+        constant float table[2] = {1.0f, 2.0f};
+        real declared(real x);
+        static inline real one(real x) { if (x) { x = 1.0f; } return x; }
+        Pair *two(void)
+        {
+            Pair p = {1.0f};
+            return &p;
+        }
+    """
+    assert [name for _, name in definitions(Source("text", text, ()))] == ["table", "one", "two"]
