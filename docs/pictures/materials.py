@@ -287,7 +287,7 @@ MATERIALS = {
     ),
     "normal_map": three(
         "`scale` 0.3, 0.7 and 1 on a map of round studs.",
-        *each(NormalMap, "scale", (0.3, 0.7, 1.0), map=studs(),
+        *each(NormalMap, "scale", (0.3, 0.7, 1.0), map=studs(), along_v=True,
               material=RoughPlastic(diffuse_reflectance=GREEN)),
     ),
     "bump_map": three(

@@ -167,5 +167,5 @@ def virtual_files(features: Features) -> dict[str, str]:
         "generated/medium_absorption.cl": medium_text(frozenset(absorptions)),
         "generated/mixture.cl": value_text("mixture_weight", real, weights, "mixtures"),
         "generated/normal_map.cl": f"#define NORMAL_MAP_WORDS {NORMAL_MAP_WORDS}\n"
-        + value_text("bend_real", real, maps),
+        + value_text("normal_map_real", real, maps),
     }
