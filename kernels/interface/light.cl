@@ -9,8 +9,9 @@
  *   real     <kind>_pdf(<Kind> l, Scene scene, vec3 hemisphere, vec3 d);                  of sample, [1/sr]
  *
  * where `hemisphere` is the unit normal of the hemisphere to which the surface sends light, 0 if to the sphere.
- * The struct <Kind> is declared as a Record in clpt/render/contract/light_records.py; its rows lie in `light_params`.
- * LightSample is one too.
+ * The struct <Kind> is made from the dataclass (clpt/render/contract/light_records.py, where lights with images have
+ * Records of their own, and LightSample too); its rows lie in `light_params`. `emission_load` reads an emission;
+ * `texture_point_nowhere` stands for the point of a light that has no texture.
  */
 #include "generated/light_sample.cl"
 

@@ -373,6 +373,19 @@ def test_the_sky_over_a_side_is_sampled_by_the_cosine():
     np.testing.assert_allclose(r[7], r[4])
 
 
+@pytest.mark.parametrize(
+    "kind", [kind for kind, cls in light_records.DECLARED.items() if cls.reach == "infinite"]
+)
+def test_a_hemisphere_of_declared_lights(kind):
+    """Over a side the pdf is that of the samples: the mean of cosine over pdf is pi."""
+    side, n = directions(1, 8), 20_000
+    given = np.vstack([np.tile(side, n), np.random.default_rng(9).random((2, n))])
+    r = lit([light_records.DECLARED[kind]()])(SIDED, given, 9).astype(float)
+    np.testing.assert_allclose(r[8], r[3], rtol=1e-5)  # what a ray that meets it is told
+    value = np.maximum((side * r[:3]).sum(axis=0), 0.0) / r[3]
+    assert abs(value.mean() - np.pi) < SIGMAS * value.std() / np.sqrt(n) + 1e-3
+
+
 # ---- images
 
 
