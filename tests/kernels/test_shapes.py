@@ -10,7 +10,6 @@ from clpt import transforms as T
 from clpt.errors import SceneError
 from clpt.render.contract import shape_records
 from clpt.render.lowering.geometry import analytic, triangles
-from clpt.render.lowering.geometry import shapes as rs
 from clpt.scene.shapes import Cube, Cylinder, Disk, Mesh, Rectangle, Sphere
 from tests.kernels.light_probe import shape_probe
 
@@ -70,7 +69,7 @@ def met(shape, o, d, tmin=0.0, tmax=1e30, lanes: int = 8) -> np.ndarray:
 
 def reference(shape, o, d) -> list[tuple[np.ndarray, np.ndarray]]:
     """The crossings of lines with a shape in float64: (t, normal) each, t nan where none is."""
-    row = rs._members(shape)
+    row = analytic.members_of(shape)
     if shape.kind in ("disk", "rectangle"):
         n = row["n"][:, None]
         t = ((row["center"][:, None] - o) * n).sum(0) / (d * n).sum(0)
@@ -209,7 +208,7 @@ def test_a_ray_does_not_meet_the_surface_it_starts_on(name):
     on = sampled(shape, NEAR, n, seed=8)
     p = np.array(NEAR)[:, None] + on[3] * on[:3]
     # In float64 onto the surface, and then as near as float32 comes.
-    row = rs._members(shape)
+    row = analytic.members_of(shape)
     if shape.kind == "disk":
         p -= row["n"][:, None] * (row["n"] @ (p - row["center"][:, None]))
     else:
@@ -336,7 +335,7 @@ def test_the_front_stays_the_front(mirror, flip):
     normal = T.transform_normals(place, [0, 0, front])
     vertices, faces, _, _ = triangles.triangulate(shape)
     assert (crosses(vertices, faces) @ normal > 0.0).all()
-    np.testing.assert_allclose(rs._members(shape)["n"], normal, atol=1e-6)
+    np.testing.assert_allclose(analytic.members_of(shape)["n"], normal, atol=1e-6)
 
 
 def test_normals_turn_with_the_mesh():

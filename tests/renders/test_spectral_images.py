@@ -12,7 +12,8 @@ import clpt
 from clpt import spectra
 from clpt import transforms as tf
 from clpt.formats.native.write import save
-from clpt.render.lowering.camera.wavelengths import density
+from clpt.render.lowering.camera.wavelengths import Density, density
+from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.scene import lower
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Orthographic
@@ -67,6 +68,10 @@ def macbeth(assets):
 def middles(image: SpectralImage) -> np.ndarray:
     """The spectra (4, 6, n) in the middles of the patches of 100 x 100 texels."""
     return image.values[55::100, 55::100]
+
+
+def density_of(scene: Scene) -> Density:
+    return density(SceneIndex.of(scene))
 
 
 @pytest.mark.parametrize("lamp", ["D65", "A"])
@@ -124,10 +129,10 @@ def test_wavelengths_are_drawn_where_an_image_shines():
     blank = Bitmap(image=np.ones((2, 2, 3)))
     glow = Bitmap(image=sky)
     scenes = [chart(blank, False, Envmap(image=sky)), chart(glow, True)]
-    expected = density(chart(blank, False, Constant(radiance=line))).values
+    expected = density_of(chart(blank, False, Constant(radiance=line))).values
     assert expected is not None
     for scene in scenes:
-        np.testing.assert_allclose(density(scene).values, expected, rtol=1e-6)
+        np.testing.assert_allclose(density_of(scene).values, expected, rtol=1e-6)
 
 
 def test_daylight_hides_what_an_amber_lamp_shows():

@@ -120,7 +120,7 @@ def area(shape: Shape) -> float:
     if shape.kind not in RECORDS:
         vertices, faces, _, _ = triangulate(shape)
         return float(triangle_areas(vertices, faces).sum())
-    row_ = _members(shape)
+    row_ = members_of(shape)
     if shape.kind == "sphere":
         return float(4.0 * np.pi * row_["radius"] ** 2)
     if shape.kind == "cylinder":
@@ -134,7 +134,7 @@ def bounds(shape: Shape) -> tuple[Points, Points]:
     if shape.kind not in ANALYTIC:
         vertices = triangulate(shape)[0]
         return vertices.min(axis=0), vertices.max(axis=0)
-    row_ = _members(shape)
+    row_ = members_of(shape)
     if shape.kind == "sphere":
         ends, reach = row_["center"][None], np.full(3, row_["radius"])
     elif shape.kind == "disk":
@@ -147,8 +147,8 @@ def bounds(shape: Shape) -> tuple[Points, Points]:
     return (lo - pad).astype(np.float32), (hi + pad).astype(np.float32)
 
 
-def _members(shape: Shape) -> dict[str, NDArray[np.float64]]:
-    """The members of a shape's row as float64."""
+def members_of(shape: Shape) -> dict[str, NDArray[np.float64]]:
+    """Return the members of a shape's row by name, as float64."""
     record = RECORDS[shape.kind]
     values = row(shape).view(record.dtype)[0]
     return {m.name: np.asarray(values[m.name], np.float64) for m in record.members}

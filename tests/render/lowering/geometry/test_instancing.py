@@ -200,7 +200,7 @@ ERRORS = {
     '{"type": "instance", "group": "set", "file": "flat.npy"}': r"matrices, \(n, 3, 4\)",
     '{"type": "instance", "group": "set", "file": "text.npy"}': "no .npy",
     '{"type": "instance", "group": "nested"}': "cannot stand in a group",
-    '{"type": "instance", "group": "self"}': "holds itself",
+    '{"type": "instance", "group": "self"}': "contains itself",
 }
 
 
