@@ -69,9 +69,9 @@ def null_transmittance_text(features: Features) -> str:
     passing = [f"(MATERIAL_KIND(word) == {i})" for i, cls in leaves if cls.is_null]
     arguments = "(Scene scene, integer word, TexturePoint point, Wavelengths lambdas)"
     passes = f"sel({' | '.join(passing) or 'mask_of(0)'}, (real)(1.0f), (real)(0.0f))"
-    parts = [function(f"real null_share_0{arguments}", f"return {passes};")]
+    parts = [function(f"real null_transmittance_0{arguments}", f"return {passes};")]
     for level in range(1, features.mixtures + 1):
-        below = f"null_share_{level - 1}"
+        below = f"null_transmittance_{level - 1}"
         children = (
             f"integer row = {active('MATERIAL_ROW(word)')};",
             "real w = mixture_weight(scene, row, point, lambdas);",
@@ -80,8 +80,8 @@ def null_transmittance_text(features: Features) -> str:
         )
         mixed = Case("MATERIAL_KIND(word) == 0xff", "first + w * (second - first)", children)
         leaf = f"{below}(scene, word, point, lambdas)"
-        parts.append(Function(f"real null_share_{level}{arguments}", leaf, [mixed]).text())
-    return "".join([*parts, f"#define null_transmittance null_share_{features.mixtures}\n"])
+        parts.append(Function(f"real null_transmittance_{level}{arguments}", leaf, [mixed]).text())
+    return "".join([*parts, f"#define null_transmittance null_transmittance_{features.mixtures}\n"])
 
 
 def functions_text(cls: type[Material], mode: str, features: Features | None = None) -> str:
