@@ -21,7 +21,7 @@ from bench import machine, report
 PARTS: dict[str, tuple[str, ...]] = {
     "device": (),
     "traversal": ("--layout", "wide8"),
-    "building": (),
+    "builders": (),
     "queries": (),
     "renders": (),
     "spectral": (),
