@@ -255,8 +255,10 @@ FORMS: dict[str, Form] = {
         lambda cursor: tuple(entry.expect(str) for entry in cursor.entries()),
     ),
     "numbers": _of_cursor("list of numbers", NUMBERS, _numbers),
-    "vector": _of_cursor("three numbers", TRIPLE, lambda cursor: tuple(cursor.numbers(3))),
-    "direction": _of_cursor("three numbers", TRIPLE, lambda cursor: tuple(cursor.numbers(3))),
+    **dict.fromkeys(
+        ("vector", "direction"),
+        _of_cursor("three numbers", TRIPLE, lambda cursor: tuple(cursor.numbers(3))),
+    ),
     "matrix3": _of_cursor("transform", ref("transform"), lambda cursor: matrix(cursor, 3)),
     "matrix4": _of_cursor("transform", ref("transform"), lambda cursor: matrix(cursor, 4)),
     "number_or_list": _of_cursor(

@@ -29,11 +29,11 @@ def dispatch_text(
     some shape emits from its back too; tree: the rows are followed by a tree that chooses among
     them. It includes the files of `virtual_files`, here and in clpt.render.codegen.shapes.
 
-    light_sample(scene, p, side, pick, u, lambdas)  chooses a light and a direction to it
-    light_pdf(scene, row, p, wi, t, n)              of it, [1/sr], for a ray that met a shape
-    light_shows(scene, row, front)                  whether the side of a shape that was met emits
-    infinite_light(scene, row, side, d, lambdas, ...)  radiance and pdf of one infinite light
-    infinite_gather(scene, side, d, pdf, lambdas)   what they all add to a path that left the scene
+    light_sample(scene, p, hemisphere, pick, u, lambdas): chooses a light and a direction to it
+    light_pdf(scene, row, p, wi, t, n): of it, [1/sr], for a ray that met a shape
+    light_shows(scene, row, front): whether the side of a shape that was met emits
+    infinite_light(scene, row, hemisphere, d, lambdas, ...): radiance and pdf of one infinite light
+    infinite_gather(scene, hemisphere, d, pdf, lambdas): what they add to a path that left the scene
     """
     present = [kind for kind in KINDS if kind in set(kinds)]
     others = [kind for kind in present if kind in RECORDS]
@@ -104,7 +104,7 @@ def _sample_text(
 ) -> str:
     kinds = [*others, *surfaces]
     head = (
-        "LightSample light_sample(Scene scene, vec3 p, vec3 side, real pick, vec2 u, "
+        "LightSample light_sample(Scene scene, vec3 p, vec3 hemisphere, real pick, vec2 u, "
         "Wavelengths lambdas)"
     )
     if not kinds:
@@ -116,7 +116,7 @@ def _sample_text(
         rows = [f"integer row = light_pick(scene, {number});"]
     rows += ["LightRow l = light_at(scene, row);", "LightSample s = light_sample_nothing();"]
     for kind in others:
-        seen = "side" if kind in INFINITE else "p"
+        seen = "hemisphere" if kind in INFINITE else "p"
         sampled = f"{kind}_sample({row_text(kind)}, scene, {seen}, u, lambdas)"
         rows += choose("s", "LightSample", Case(kind_test(kind, kinds), sampled))
     if surfaces:
@@ -167,10 +167,10 @@ def _infinite_text(kinds: list[str]) -> list[str]:
             kind_test(kind, kinds),
             f"{RECORDS[kind].name} light = {row_text(kind)};",
             f"*radiance = spectrum_sel(m, {kind}_radiance(light, scene, d, lambdas), *radiance);",
-            f"*pdf = sel(m, {kind}_pdf(light, scene, side, d) * l.pmf, *pdf);",
+            f"*pdf = sel(m, {kind}_pdf(light, scene, hemisphere, d) * l.pmf, *pdf);",
         )
     head = (
-        "void infinite_light(Scene scene, int row, vec3 side, vec3 d, Wavelengths lambdas, "
+        "void infinite_light(Scene scene, int row, vec3 hemisphere, vec3 d, Wavelengths lambdas, "
         "Spectrum *radiance, real *pdf)"
     )
     return [function(head, *rows), '#include "lighting/infinite.cl"']

@@ -39,11 +39,14 @@ _PLACEMENT = {
     "z": ("vec3", "unit length"),
 }
 
+_CONE = {
+    "cutoff": ("real", "half angle beyond which it is dark [rad]"),
+    "beam_width": ("real", "half angle of full intensity [rad]"),
+    "smooth": ("integer", "1: it falls off smoothly in the cosine; 0: linearly in the angle"),
+}
 _RADIANCE = ("integer", "first word of the emission parameter in `light_params`")
-
 _SCALE = ("real", "what the image's values were divided by")
-
-_FACTOR = ("integer", "first word in `light_params` of what it is multiplied by")
+_FACTOR = ("integer", "first word of its factor in `light_params`")
 
 PROJECTED_RECORDS: dict[str, Record] = {
     "projector": Record(
@@ -58,9 +61,7 @@ PROJECTED_RECORDS: dict[str, Record] = {
         "ImageSpot",
         "A spot light with an image; x and y are over half its size at a metre.",
         **_PLACEMENT,
-        cutoff=("real", "half angle beyond which it is dark [rad]"),
-        beam_width=("real", "half angle of full intensity [rad]"),
-        smooth=("integer", "1: it falls off smoothly in the cosine; 0: linearly in the angle"),
+        **_CONE,
         radiance=_RADIANCE,
         factor=_FACTOR,
     ),
@@ -92,14 +93,14 @@ def declared_record(cls: type[Light]) -> Record:
 def _members(name: str, param: Param) -> dict[str, str]:
     """The members of a parameter by name, with their types."""
     if param.role == "host":
-        forms = {"vector": {name: "vec3"}, "direction": {name: "vec3"}, "matrix4": PLACEMENT}
+        placement = {member: type_ for member, (type_, _) in _PLACEMENT.items()}
+        forms = {"vector": {name: "vec3"}, "direction": {name: "vec3"}, "matrix4": placement}
         if param.form not in forms:
             raise TypeError(f"a light cannot declare {name!r} as a host parameter of this form")
         return forms[param.form]
     return {name: "real" if param.role == "real" else "integer"}
 
 
-PLACEMENT = {"position": "vec3", "x": "vec3", "y": "vec3", "z": "vec3"}
 # Lights whose rows the lowering computes; those of all other kinds follow from their declaration.
 COMPUTED: dict[str, Record] = {
     "spot": Record(
@@ -107,9 +108,7 @@ COMPUTED: dict[str, Record] = {
         "A spot light.",
         position=("vec3", "[m]"),
         axis=("vec3", "unit vector in which it shines"),
-        cutoff=("real", "half angle beyond which it is dark [rad]"),
-        beam_width=("real", "half angle of full intensity [rad]"),
-        smooth=("integer", "1: it falls off smoothly in the cosine; 0: linearly in the angle"),
+        **_CONE,
         radiance=_RADIANCE,
     ),
     **PROJECTED_RECORDS,

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt import transforms
 from clpt.errors import SceneError
 from clpt.render.contract import light_records
 from clpt.render.contract.light_records import RECORDS
@@ -102,9 +101,7 @@ def _computed_members(kind: str, lamp: Light, encoder: Encoder) -> dict[str, Arr
 
 def _placement(to_world: ArrayLike, where: str) -> dict[str, ArrayLike]:
     """A light's position and unit axes. Raises SceneError for a matrix without an inverse."""
-    matrix = np.asarray(to_world, np.float64)
-    if matrix.shape != (4, 4) or transforms.is_singular(matrix):
-        raise SceneError("must be an invertible (4, 4) matrix", where=where)
+    matrix = projected.invertible(to_world, where)
     axes = {axis: _unit(matrix[:3, i], where) for i, axis in enumerate("xyz")}
     return {"position": matrix[:3, 3], **axes}
 

@@ -44,6 +44,14 @@ def members(lamp: Light, encoder: Encoder) -> dict[str, ArrayLike]:
     }
 
 
+def invertible(to_world: ArrayLike, where: str) -> NDArray[np.float64]:
+    """Return a light's transform. Raises SceneError for a matrix without an inverse."""
+    matrix = np.asarray(to_world, np.float64)
+    if matrix.shape != (4, 4) or transforms.is_singular(matrix):
+        raise SceneError("must be an invertible (4, 4) matrix", where=where)
+    return matrix
+
+
 def image_area(lamp: Projector) -> float:
     """Return the area of a projector's image a metre before it [m^2]."""
     half = float(np.tan(np.radians(lamp.fov) / 2.0))
@@ -74,9 +82,7 @@ def _place(
     to_world: ArrayLike, where: str, half_x: float = 1.0, half_y: float = 1.0
 ) -> dict[str, NDArray[np.float64]]:
     """Position and axes; x and y over half the image's size, along rows (1, 1) of unit length."""
-    matrix = np.asarray(to_world, np.float64)
-    if matrix.shape != (4, 4) or transforms.is_singular(matrix):
-        raise SceneError("must be an invertible (4, 4) matrix", where=where)
+    matrix = invertible(to_world, where)
     axes = matrix[:3, :3] / np.linalg.norm(matrix[:3, :3], axis=0)
     if np.abs(axes.T @ axes - np.eye(3)).max() > 1e-5:
         raise SceneError("must not shear", where=where)
