@@ -24,6 +24,7 @@ from clpt.rays import Accel, AllHits, Hits, InstancedAccel
 from clpt.render.codegen.library import kernel_source
 from clpt.render.progress import Progress
 from clpt.render.renderer import Renderer, render
+from clpt.render.wavefront.film_state import FilmState
 from clpt.scene import Scene
 from clpt.spectral_exr import SpectralImage
 from clpt.spectral_exr import read as read_spectral
@@ -41,6 +42,7 @@ __all__ = [
     "AllHits",
     "ClptError",
     "DeviceError",
+    "FilmState",
     "Hits",
     "InstancedAccel",
     "KernelBuildError",
