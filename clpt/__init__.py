@@ -3,7 +3,7 @@
 >>> import clpt
 >>> scene = clpt.load("scenes/cornell_box")
 >>> image = clpt.render(scene, spp=64)
->>> clpt.write("out.exr", image)
+>>> clpt.write_image("out.exr", image)
 """
 
 import logging
@@ -19,7 +19,8 @@ from clpt.errors import (
     UnusedParameterError,
 )
 from clpt.formats import load
-from clpt.images import read, write
+from clpt.images import read as read_image
+from clpt.images import write as write_image
 from clpt.rays import Accel, AllHits, Hits, InstancedAccel
 from clpt.render.codegen.library import kernel_source
 from clpt.render.progress import Progress
@@ -55,9 +56,9 @@ __all__ = [
     "__version__",
     "kernel_source",
     "load",
-    "read",
+    "read_image",
     "read_spectral",
     "render",
-    "write",
+    "write_image",
     "write_spectral",
 ]

@@ -74,6 +74,8 @@ def _existing(path: Path) -> Path:
             return _inside(path)
         if path.is_file():
             return path
+    except SceneError:
+        raise
     except (OSError, ValueError) as error:
         raise SceneError(f"cannot be read: {error}", file=path) from None
     raise SceneError("there is no such file", file=path)

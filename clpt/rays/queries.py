@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pyopencl.array import Array
 
 from ..bvh import TREES, choose_tree, traversal_text
-from ..device import BoundKernel, Device, Events, Program, Stream, assemble, build
+from ..device import BoundKernel, Device, Events, Program, Stream, assemble, build, wait
 from ..errors import DeviceError, SceneError
 from ..records import INSTANCE
 from . import batch
@@ -201,7 +201,7 @@ class Queries:
         for key, array in arrays.items():
             if array.size:  # onto itself, where the device works in the host's memory
                 event = self._stream.read_later(outputs[key].buffer, array)
-        event.wait()
+        wait(event)
         if rays.count:  # the kernel lets go of the host's memory
             self._kernels[name].set_args(**dict.fromkeys([*_RAY_ARRAYS, *outputs]))
         return event

@@ -343,7 +343,7 @@ class Renderer(Pictures):
         if getattr(scene.integrator, "channels", ()) != self.channels:
             raise SceneError("other channels need a new Renderer", where="integrator.channels")
         for event in events:
-            event.wait()
+            dev.wait(event)
         first = self.wavefronts[0]
         readable = resolve_device_arrays(scene, first.stream.queue)
         lowered = lower(readable, self._texture_budget, first.scene.lowered)

@@ -235,7 +235,7 @@ class Wavefront:
             if len(reads) < 2:
                 continue
             counters, event = reads.popleft()
-            event.wait()
+            device.wait(event)
             self._count(counters)
             if on_batch and finished and not on_batch(self.counts):
                 begin.set_args(samples=(first, first))
@@ -243,7 +243,7 @@ class Wavefront:
             if counters[0] >= self.paths.slots:
                 break
         for _, event in reads:
-            event.wait()
+            device.wait(event)
         width, height = self.film.size
         added = (self.counts.samples - before) / (width * height)
         self.samples_per_pixel += end - first if finished else added
