@@ -18,7 +18,7 @@ from clpt.errors import (
     UnknownKindError,
     UnusedParameterError,
 )
-from clpt.formats import load
+from clpt.formats import load, save
 from clpt.images import read as read_image
 from clpt.images import write as write_image
 from clpt.rays import Accel, AllHits, Hits, InstancedAccel
@@ -59,6 +59,7 @@ __all__ = [
     "read_image",
     "read_spectral",
     "render",
+    "save",
     "write_image",
     "write_spectral",
 ]

@@ -63,7 +63,11 @@ class Buffers:
         return self._create(what, max(nbytes, _SMALLEST), advice, None)
 
     def upload(
-        self, what: str, array: ArrayLike, dtype: DTypeLike | None = None, advice: str = MEMORY_ADVICE
+        self,
+        what: str,
+        array: ArrayLike,
+        dtype: DTypeLike | None = None,
+        advice: str = MEMORY_ADVICE,
     ) -> cl.Buffer:
         """Return a copy of an array, C-contiguous; of an empty one a small buffer of zeros.
 

@@ -11,8 +11,8 @@ MEMORY_ADVICE = "lower the size of the image or simplify the scene, or choose an
 _code = cl.status_code
 _NO_MEMORY = (_code.MEM_OBJECT_ALLOCATION_FAILURE, _code.OUT_OF_HOST_MEMORY)
 _ADVICE = {
-    _code.OUT_OF_RESOURCES: "the device has no resources left, or its driver stopped a kernel that "
-    "took too long: make the picture smaller or take fewer slots, and begin again with a new object",
+    _code.OUT_OF_RESOURCES: "the device has no resources left, or its driver stopped a kernel "
+    "that took too long: take a smaller picture or fewer slots, and make a new object",
     **dict.fromkeys(
         (_code.DEVICE_NOT_AVAILABLE, _code.INVALID_COMMAND_QUEUE, _code.INVALID_CONTEXT),
         "the device was reset or removed: open it again in a new process; if that fails too, the "

@@ -79,9 +79,11 @@ class Stream:
 
     def read_later(self, source: cl.Buffer, into: np.ndarray, offset: int = 0) -> cl.Event:
         """Enqueue that an array is filled from a buffer; it is valid when the event has ended."""
-        where: dict[str, Any] = {"src_offset": offset, "is_blocking": False}
-        copy = cl.enqueue_copy
-        return self._keep(self._enqueue("a copy to the host", into.nbytes, copy, into, source, **where))
+        options = {"src_offset": offset, "is_blocking": False}
+        event = self._enqueue(
+            "a copy to the host", into.nbytes, cl.enqueue_copy, into, source, **options
+        )
+        return self._keep(event)
 
     def wait(self) -> None:
         """Wait until the last command has ended."""

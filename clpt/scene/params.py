@@ -48,7 +48,7 @@ HostForm = Literal[
     "boolean", "integer", "number", "text", "names", "numbers",
     "vector", "direction", "matrix3", "matrix4",
     "material", "texture", "filter", "area_light", "group",
-    "rows2", "rows3", "rows4", "triangles", "attributes", "number_or_list", "lengths",
+    "rows2", "rows3", "rows4", "normals", "triangles", "attributes", "number_or_list", "lengths",
     "image", "cube_images", "crop", "sensor", "white_balance",
 ]  # fmt: skip
 ORDERS = 8  # highest order of diffraction, see kernels/optics/diffraction.cl

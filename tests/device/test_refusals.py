@@ -75,7 +75,7 @@ def test_waiting_and_flushing():
 
 def test_a_command_that_the_driver_refuses_in_earnest(stream, device):
     buffer = Buffers(device).allocate("one", 64)
-    with pytest.raises(DeviceError, match="a fill failed: .*INVALID_VALUE"):
+    with pytest.raises(DeviceError, match=r"a fill failed: .*INVALID_VALUE"):
         stream.fill(buffer, 7, 4096, 64)
 
 
