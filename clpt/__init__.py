@@ -23,6 +23,7 @@ from clpt.images import read as read_image
 from clpt.images import write as write_image
 from clpt.rays import Accel, AllHits, Hits, InstancedAccel
 from clpt.render.codegen.library import kernel_source
+from clpt.render.options import RenderOptions
 from clpt.render.progress import Progress
 from clpt.render.renderer import Renderer, render
 from clpt.scene import Scene
@@ -47,6 +48,7 @@ __all__ = [
     "KernelBuildError",
     "MemoryBudgetError",
     "Progress",
+    "RenderOptions",
     "Renderer",
     "Scene",
     "SceneError",

@@ -50,7 +50,8 @@ class SceneError(ClptError, ValueError):
         super().__init__(": ".join(part for part in (place, where, message) if part))
 
 
-def _nearest(name: str, known: Iterable[str]) -> str:
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Return the end of a message: the known names that are near a name, or else all of them."""
     known = sorted(known)
     near = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
     if near:
@@ -62,14 +63,14 @@ class UnknownKindError(SceneError):
     """A `type` that is not in the table of kinds."""
 
     def __init__(self, category: str, name: str, known: Iterable[str], **place: Any):
-        super().__init__(f"unknown {category} {name!r}" + _nearest(name, known), **place)
+        super().__init__(f"unknown {category} {name!r}" + nearest(name, known), **place)
 
 
 class UnusedParameterError(SceneError):
     """A parameter that the kind does not have."""
 
     def __init__(self, kind: str, name: str, known: Iterable[str], **place: Any):
-        super().__init__(f"{kind} has no parameter {name!r}" + _nearest(name, known), **place)
+        super().__init__(f"{kind} has no parameter {name!r}" + nearest(name, known), **place)
 
 
 class DeviceError(ClptError, RuntimeError):

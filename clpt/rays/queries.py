@@ -78,6 +78,15 @@ class Queries:
 
     instanced = False
 
+    def __new__(cls, queue: Any = None, *_: Any, **__: Any) -> Queries:
+        if not isinstance(queue, cl.CommandQueue):  # before Python counts the other arguments
+            found = f"its first argument is a pyopencl.CommandQueue, not {type(queue).__name__}"
+            advice = "clpt.device.choose().queue is one"
+            if hasattr(queue, "vertices") and hasattr(queue, "faces"):
+                advice += f"; of a mesh, {cls.__name__}(queue, mesh.vertices, mesh.faces)"
+            raise TypeError(f"{cls.__name__}: {found}; {advice}")
+        return super().__new__(cls)
+
     def __init__(self, queue: cl.CommandQueue, layout: str | None):
         self.queue = queue
         self.device = Device.adopt(queue)

@@ -8,7 +8,7 @@ import math
 import threading
 import time
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyopencl as cl
@@ -27,6 +27,7 @@ from clpt.render.editing.scene_edit import (
 )
 from clpt.render.locking import synchronized
 from clpt.render.lowering.scene import lower
+from clpt.render.options import RenderOptions, check_changes, check_options, check_scene
 from clpt.render.pictures import Image, Pictures
 from clpt.render.progress import Progress
 from clpt.render.stats import RenderStats, collect
@@ -37,6 +38,9 @@ from clpt.scene.cameras import Camera
 from clpt.scene.integrators import Aov
 from clpt.scene.materials import Material
 
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
 log = logging.getLogger(__name__)
 
 TEXTURE_SHARE = 0.5  # of a device's free memory, for bitmaps
@@ -46,16 +50,13 @@ class Renderer(Pictures):
     """Renders a scene; its picture so far is available at any time.
 
     device: where to render, a name or index (see clpt.device.choose), or a clpt.device.Device.
-    queue: the caller's, instead of a device; all buffers and programs are then made in its context,
-    all commands go there, and no other OpenCL object is made or changed. progress: called when a
-    step has ended, in a thread of the driver. texture_budget: [bytes] that bitmaps may take, larger
-    ones are halved; by default half of what the device has free. The other parameters are those of
-    clpt.render.wavefront.wavefront.Wavefront.create.
+    progress: called when a step has ended, in a thread of the driver. options: see `RenderOptions`.
 
     It may be used from several threads: one method runs at a time. With `with`, `close`, or when it
     is dropped, it gives the device's memory back.
 
-    Raises SceneError for a scene that makes no sense, DeviceError, MemoryBudgetError.
+    Raises TypeError for what is no scene, queue or option; SceneError for a scene or an option that
+    makes no sense; DeviceError, MemoryBudgetError, KernelBuildError.
     """
 
     def __init__(
@@ -63,35 +64,43 @@ class Renderer(Pictures):
         scene: Scene,
         device: dev.Device | str | int | None = None,
         *,
-        queue: cl.CommandQueue | None = None,
         progress: Callable[[Progress], Any] | None = None,
-        profiling: bool = False,
-        texture_budget: int | None = None,
-        **wavefront: Any,
+        **options: Unpack[RenderOptions],
     ):
         super().__init__()
+        check_scene(scene)
+        check_options(scene, options)
         self._stop = threading.Event()
         self.scene = scene
+        queue = options.get("queue")
         if queue is not None:
             if device is not None:
                 raise DeviceError("give a device or a queue; a queue has its device")
             device = dev.Device.adopt(queue)
         elif not isinstance(device, dev.Device):
-            device = dev.choose(device, profiling=profiling)
+            device = dev.choose(device, profiling=options.get("profiling", False))
         self.device = device
         self.channels: tuple[str, ...] = ()
         if isinstance(scene.integrator, Aov):
             self.channels = scene.integrator.channels
         self._start = time.perf_counter()
         before = device.builds.programs, device.builds.cached
+        texture_budget = options.get("texture_budget")
         if texture_budget is None:
             texture_budget = _texture_budget(device)
         self._texture_budget, self._successors = texture_budget, Successors()
         lowered = lower(resolve_device_arrays(scene, device.queue), texture_budget)
         self._seconds = {"lower": time.perf_counter() - self._start}
-        paths = scene.spp * math.prod(scene.film.size)
-        wanted = {"paths": paths, "looped": None if queue is None else True, **wavefront}
-        first = Wavefront.create(device, lowered, **wanted)
+        first = Wavefront.create(
+            device,
+            lowered,
+            layout=options.get("layout"),
+            slots=options.get("slots"),
+            queued=options.get("queued"),
+            looped=options.get("looped", None if queue is None else True),
+            paths=scene.spp * math.prod(scene.film.size),
+            tree_quality=options.get("tree_quality", "high"),
+        )
         self.wavefronts = [first, *(first.with_channel(channel) for channel in self.channels[1:])]
         for one in self.wavefronts:
             one.prepare()
@@ -291,8 +300,12 @@ class Renderer(Pictures):
         DEBUG the logger `clpt.render.renderer` says why a quicker way was not taken.
 
         Raises SceneError for what is not in the scene, or makes no sense in it, and for a film of
-        another size; nothing has changed then.
+        another size, TypeError for a scene that is none; nothing has changed then. Raises
+        MemoryBudgetError and KernelBuildError where the device cannot do what the new scene needs.
         """
+        if scene is not None:
+            check_scene(scene)
+        check_changes(camera, materials=materials, transforms=transforms, vertices=vertices)
         events = list(wait_for or ())
         self.wavefronts[0].stream.after(events)
         moves = scene is None and bool(transforms or vertices)
@@ -377,14 +390,15 @@ def render(
     device: dev.Device | str | int | None = None,
     progress: Callable[[Progress], bool] | None = None,
     noise: float | None = None,
-    **wavefront: Any,
+    **options: Unpack[RenderOptions],
 ) -> Image:
     """Render a scene: (h, w, 3) float32 linear Rec. 709; else see `Renderer.image`.
 
-    spp: samples per pixel, noise: see `Renderer.run`; the scene's own by default. Raises as
-    `Renderer` does.
+    spp: samples per pixel, noise and progress: see `Renderer.run`; spp and noise are the scene's
+    own by default. device: see `Renderer`; options: see `RenderOptions`. Raises as `Renderer` does.
     """
+    check_scene(scene)
     spp = _whole(scene.spp if spp is None else spp)
-    renderer = Renderer(dataclasses.replace(scene, spp=spp), device, **wavefront)
+    renderer = Renderer(dataclasses.replace(scene, spp=spp), device, **options)
     renderer.run(spp, progress, noise=scene.noise if noise is None else noise)
     return renderer.image()

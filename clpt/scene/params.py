@@ -36,7 +36,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from clpt.errors import SceneError
-from clpt.spectra import RGB, Constant, Reradiation, RGBUnbounded, Spectrum
+from clpt.spectra import RGB, Constant, Reradiation, RGBUnbounded, Spectrum, illuminants
 
 SPECTRUM_ROLES = ("reflectance", "emission", "index", "factor", "coefficient")
 DEVICE_ROLES = (
@@ -311,4 +311,7 @@ def _spectrum(value: Any, param: Param, where: str) -> Any:
         return made(*(_number(v, param, where) for v in value))
     if isinstance(value, (int, float, np.number)):
         return Constant(_number(value, param, where))
-    raise SceneError(f"must be a number, three numbers or a spectrum, not {value!r}", where=where)
+    message = f"must be a number, three numbers or a spectrum, not {value!r}"
+    if isinstance(value, str) and value in illuminants():
+        message += f"; give clpt.spectra.illuminant({value!r})"
+    raise SceneError(message, where=where)
