@@ -133,6 +133,8 @@ def write(
             _write_pfm(path, pixels)
         else:
             np.save(path, pixels)
+    except SceneError:
+        raise
     except (OSError, RuntimeError, ValueError) as error:
         raise SceneError(f"cannot be written: {error}", file=path) from error
 

@@ -125,7 +125,9 @@ class White(click.ParamType):
     help="fast: built sooner, a little slower to trace.",
 )  # fmt: skip
 @click.option("--integrator", metavar="NAME", help=f"One of {', '.join(kinds('integrator'))}.")
-@click.option("--max-depth", type=click.IntRange(-1, 4000), help="Longest path; -1: no limit.")
+@click.option(
+    "--max-depth", type=click.IntRange(-1), help="Longest path, at most 4000; -1: no limit."
+)
 @click.option("--sensor", type=SensorName(), help="cie1931, cie1964 or a file of three curves.")
 @click.option("--white-balance", type=White(), help="What becomes white: none, D65, 3200 or x,y.")
 @click.option(

@@ -26,6 +26,8 @@ def read_bytes(path: Path) -> bytes:
                     message = f"is larger than {LARGEST >> 20} MiB"
                     raise SceneError(message + (" when unpacked" if packed else ""), file=path)
         return b"".join(parts)
+    except SceneError:
+        raise
     except (OSError, EOFError, ValueError, zlib.error) as error:
         reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
         raise SceneError(f"cannot be read: {reason}", file=path) from None

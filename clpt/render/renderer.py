@@ -8,7 +8,7 @@ import math
 import threading
 import time
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyopencl as cl
@@ -27,6 +27,7 @@ from clpt.render.editing.scene_edit import (
 )
 from clpt.render.locking import synchronized
 from clpt.render.lowering.scene import lower
+from clpt.render.options import RenderOptions, check_changes, check_options, check_scene
 from clpt.render.pictures import Image, Pictures
 from clpt.render.progress import Progress
 from clpt.render.stats import RenderStats, collect
@@ -38,6 +39,9 @@ from clpt.scene.cameras import Camera
 from clpt.scene.integrators import Aov
 from clpt.scene.materials import Material
 
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
 log = logging.getLogger(__name__)
 
 MOST_SAMPLES = 2**31 - 1
@@ -48,17 +52,13 @@ class Renderer(Pictures):
     """Renders a scene; its picture so far is available at any time.
 
     device: where to render, a name or index (see clpt.device.choose), or a clpt.device.Device.
-    queue: the caller's, instead of a device; all buffers and programs are then made in its context,
-    all commands go there, and no other OpenCL object is made or changed. progress: called when a
-    step has ended, in a thread of the driver. texture_budget: [bytes] that bitmaps may take, larger
-    ones are halved; by default half of what the device has free. first_sample: the number of the
-    first sample; renderers that take other numbers have other samples, and their films merge. The
-    other parameters are those of clpt.render.wavefront.wavefront.Wavefront.create.
+    progress: called when a step has ended, in a thread of the driver. options: see `RenderOptions`.
 
     It may be used from several threads: one method runs at a time. With `with`, `close`, or when it
     is dropped, it gives the device's memory back.
 
-    Raises SceneError for a scene that makes no sense, DeviceError, MemoryBudgetError.
+    Raises TypeError for what is no scene, queue or option; SceneError for a scene or an option that
+    makes no sense; DeviceError, MemoryBudgetError, KernelBuildError.
     """
 
     def __init__(
@@ -66,36 +66,44 @@ class Renderer(Pictures):
         scene: Scene,
         device: dev.Device | str | int | None = None,
         *,
-        queue: cl.CommandQueue | None = None,
         progress: Callable[[Progress], Any] | None = None,
-        profiling: bool = False,
-        texture_budget: int | None = None,
-        first_sample: int = 0,
-        **wavefront: Any,
+        **options: Unpack[RenderOptions],
     ):
         super().__init__()
+        check_scene(scene)
+        check_options(scene, options)
         self._stop = threading.Event()
         self.scene = scene
+        queue = options.get("queue")
         if queue is not None:
             if device is not None:
                 raise DeviceError("give a device or a queue; a queue has its device")
             device = dev.Device.adopt(queue)
         elif not isinstance(device, dev.Device):
-            device = dev.choose(device, profiling=profiling)
+            device = dev.choose(device, profiling=options.get("profiling", False))
         self.device = device
         self.channels: tuple[str, ...] = ()
         if isinstance(scene.integrator, Aov):
             self.channels = scene.integrator.channels
         self._start = time.perf_counter()
         before = device.builds.programs, device.builds.cached
+        texture_budget = options.get("texture_budget")
         if texture_budget is None:
             texture_budget = _texture_budget(device)
         self._texture_budget, self._successors = texture_budget, Successors()
         lowered = lower(resolve_device_arrays(scene, device.queue), texture_budget)
         self._seconds = {"lower": time.perf_counter() - self._start}
-        paths = scene.spp * math.prod(scene.film.size)
-        wanted = {"paths": paths, "looped": None if queue is None else True, **wavefront}
-        first = Wavefront.create(device, lowered, **wanted)
+        first = Wavefront.create(
+            device,
+            lowered,
+            layout=options.get("layout"),
+            slots=options.get("slots"),
+            queued=options.get("queued"),
+            looped=options.get("looped", None if queue is None else True),
+            paths=scene.spp * math.prod(scene.film.size),
+            tree_quality=options.get("tree_quality", "high"),
+            halves=options.get("halves", False),
+        )
         self.wavefronts = [first, *(first.with_channel(channel) for channel in self.channels[1:])]
         for one in self.wavefronts:
             one.prepare()
@@ -104,7 +112,7 @@ class Renderer(Pictures):
         self._seconds["trees"] = first.scene.trees.seconds
         self._seconds["ready"] = time.perf_counter() - self._start
         self.warnings = list(lowered.warnings)
-        self._first_sample = _sample_number(first_sample)
+        self._first_sample = _sample_number(options.get("first_sample", 0))
         self._taken: Ranges = ()
         self._progress = progress
         self._moving: Moving | None = None
@@ -346,8 +354,12 @@ class Renderer(Pictures):
         DEBUG the logger `clpt.render.renderer` says why a quicker way was not taken.
 
         Raises SceneError for what is not in the scene, or makes no sense in it, and for a film of
-        another size; nothing has changed then.
+        another size, TypeError for a scene that is none; nothing has changed then. Raises
+        MemoryBudgetError and KernelBuildError where the device cannot do what the new scene needs.
         """
+        if scene is not None:
+            check_scene(scene)
+        check_changes(camera, materials=materials, transforms=transforms, vertices=vertices)
         events = list(wait_for or ())
         self.wavefronts[0].stream.after(events)
         moves = scene is None and bool(transforms or vertices)
@@ -398,7 +410,7 @@ class Renderer(Pictures):
         if getattr(scene.integrator, "channels", ()) != self.channels:
             raise SceneError("other channels need a new Renderer", where="integrator.channels")
         for event in events:
-            event.wait()
+            dev.wait(event)
         first = self.wavefronts[0]
         readable = resolve_device_arrays(scene, first.stream.queue)
         lowered = lower(readable, self._texture_budget, first.scene.lowered)
@@ -414,12 +426,10 @@ class Renderer(Pictures):
 
 
 def _sample_number(number: int) -> int:
-    """A sample's number. Raises SceneError for one that is none."""
-    if isinstance(number, bool) or not isinstance(number, (int, np.integer)) or number < 0:
-        raise SceneError(f"must be a whole number, 0 or more, not {number!r}", where="first_sample")
+    """A sample's number. Raises SceneError for one that is too large."""
     if number > MOST_SAMPLES:
         raise SceneError(f"a pixel cannot have more than {MOST_SAMPLES} samples", where="samples")
-    return int(number)
+    return number
 
 
 def _whole(samples: int) -> int:
@@ -441,14 +451,15 @@ def render(
     device: dev.Device | str | int | None = None,
     progress: Callable[[Progress], bool | None] | None = None,
     noise: float | None = None,
-    **wavefront: Any,
+    **options: Unpack[RenderOptions],
 ) -> Image:
     """Render a scene: (h, w, 3) float32 linear Rec. 709; else see `Renderer.image`.
 
-    spp: samples per pixel, noise: see `Renderer.run`; the scene's own by default. Raises as
-    `Renderer` does.
+    spp: samples per pixel, noise and progress: see `Renderer.run`; spp and noise are the scene's
+    own by default. device: see `Renderer`; options: see `RenderOptions`. Raises as `Renderer` does.
     """
+    check_scene(scene)
     spp = _whole(scene.spp if spp is None else spp)
-    renderer = Renderer(dataclasses.replace(scene, spp=spp), device, **wavefront)
+    renderer = Renderer(dataclasses.replace(scene, spp=spp), device, **options)
     renderer.run(spp, progress, noise=scene.noise if noise is None else noise)
     return renderer.image()

@@ -36,7 +36,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from clpt.errors import SceneError
-from clpt.spectra import RGB, Constant, Reradiation, RGBUnbounded, Spectrum
+from clpt.spectra import RGB, Constant, Reradiation, RGBUnbounded, Spectrum, illuminants
 
 SPECTRUM_ROLES = ("reflectance", "emission", "index", "factor", "coefficient")
 DEVICE_ROLES = (
@@ -48,7 +48,7 @@ HostForm = Literal[
     "boolean", "integer", "number", "text", "names", "numbers",
     "vector", "direction", "matrix3", "matrix4",
     "material", "texture", "filter", "area_light", "group",
-    "rows2", "rows3", "rows4", "triangles", "attributes", "number_or_list", "lengths",
+    "rows2", "rows3", "rows4", "normals", "triangles", "attributes", "number_or_list", "lengths",
     "image", "cube_images", "crop", "sensor", "white_balance",
 ]  # fmt: skip
 ORDERS = 8  # highest order of diffraction, see kernels/optics/diffraction.cl
@@ -311,4 +311,7 @@ def _spectrum(value: Any, param: Param, where: str) -> Any:
         return made(*(_number(v, param, where) for v in value))
     if isinstance(value, (int, float, np.number)):
         return Constant(_number(value, param, where))
-    raise SceneError(f"must be a number, three numbers or a spectrum, not {value!r}", where=where)
+    message = f"must be a number, three numbers or a spectrum, not {value!r}"
+    if isinstance(value, str) and value in illuminants():
+        message += f"; give clpt.spectra.illuminant({value!r})"
+    raise SceneError(message, where=where)

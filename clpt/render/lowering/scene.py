@@ -31,7 +31,7 @@ from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.lights.lights import LightRows, light_rows
 from clpt.render.lowering.lowering_cache import LoweringCache
 from clpt.render.lowering.materials.material_words import MaterialWords
-from clpt.render.lowering.settings import settings_of
+from clpt.render.lowering.settings import DEEPEST, settings_of
 from clpt.render.lowering.textures.attributes import Owner, lower_attributes
 from clpt.scene import Scene
 from clpt.scene import materials as mt
@@ -195,6 +195,9 @@ def _warnings(index: SceneIndex) -> list[str]:
         warnings.append("film.filter is passed over: particle_tracer has a box of one pixel")
     if index.mode == "rgb" and not index.channels and cameras.dispersive_glass(scene.camera):
         warnings.append("thin_lens.glass: in RGB mode all wavelengths have one focus")
+    depth = getattr(scene.integrator, "max_depth", -1)
+    if depth > DEEPEST:
+        warnings.append(f"integrator.max_depth: {depth} counts as {DEEPEST}, the longest path")
     if film.mode == "rgb" and mt.Fluorescent in index.leaves:
         warnings.append("in rgb mode fluorescent paint has its colour under D65, at most white")
     return warnings

@@ -244,7 +244,7 @@ class Wavefront:
             if len(reads) < 2:
                 continue
             counters, event = reads.popleft()
-            event.wait()
+            device.wait(event)
             self._count(counters)
             if on_batch and finished and not on_batch(self.counts):
                 begin.set_args(samples=(first, first))
@@ -252,7 +252,7 @@ class Wavefront:
             if counters[0] >= self.paths.slots:
                 break
         for _, event in reads:
-            event.wait()
+            device.wait(event)
         if finished:
             self._note_paths(first, end)
         else:
