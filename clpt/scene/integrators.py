@@ -75,7 +75,7 @@ class ParticleTracer(Integrator):
 
     Finds caustics, also of the smallest lights; what the camera would see through glass and in
     mirrors stays black. A sample per pixel is one light path for every pixel of the film.
-    The camera must be `perspective` or `thin_lens`; the film's filter is a box of one pixel.
+    The camera must be `perspective` or `thin_lens`.
     """
 
     max_depth: int = host(8, "longest path, as of `path`; -1: no limit")

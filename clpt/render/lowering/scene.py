@@ -136,7 +136,8 @@ def _lower_film(index: SceneIndex, encoder: Encoder, wavelengths: Density) -> tu
 
     Return where the density would begin in `distributions`, and whether it is there.
     """
-    filters.lower_filter(index.scene.film.filter, encoder.store)  # first in its table
+    # first in its table
+    filters.lower_filter(index.scene.film.filter, encoder.store, index.light_paths)
     density_row = encoder.store.size("distributions")
     tabulated = index.spectral and wavelengths.values is not None
     if tabulated:
@@ -191,8 +192,6 @@ def _warnings(index: SceneIndex) -> list[str]:
     """What of the scene is not rendered as it says."""
     scene, film = index.scene, index.scene.film
     warnings = list(index.warnings)
-    if index.light_paths and (film.filter.kind != "box" or filters.radius(film.filter) != 0.5):
-        warnings.append("film.filter is passed over: particle_tracer has a box of one pixel")
     if index.mode == "rgb" and not index.channels and cameras.dispersive_glass(scene.camera):
         warnings.append("thin_lens.glass: in RGB mode all wavelengths have one focus")
     depth = getattr(scene.integrator, "max_depth", -1)
