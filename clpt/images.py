@@ -18,6 +18,7 @@ import numpy as np
 import OpenEXR
 from numpy.typing import ArrayLike, NDArray
 
+from . import output_files
 from .errors import SceneError
 from .spectra.spaces import between, chromaticities
 
@@ -132,14 +133,29 @@ def write(
         elif suffix == ".pfm":
             _write_pfm(path, pixels)
         else:
-            np.save(path, pixels)
+            write_npy(path, pixels)
     except (OSError, RuntimeError, ValueError) as error:
         raise SceneError(f"cannot be written: {error}", file=path) from error
 
 
 def write_stored(path: Path, values: NDArray[np.uint8]) -> None:
     """Write (h, w) or (h, w, 1, 3 or 4) as the bytes of a .png."""
-    path.write_bytes(png(values))
+    output_files.write(path, png(values))
+
+
+def write_npy(path: Path, array: NDArray[Any]) -> None:
+    """Write an array of any shape as .npy."""
+    with output_files.replacing(path) as partial, partial.open("wb") as file:
+        np.save(file, array)
+
+
+def write_channels(
+    path: Path, metadata: Mapping[str, Any], channels: Mapping[str, NDArray[Any]]
+) -> None:
+    """Write channels (h, w) by name, and attributes, as an .exr."""
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    with output_files.replacing(path) as partial:
+        OpenEXR.File({**metadata, **header}, dict(channels)).write(str(partial))
 
 
 def png(values: NDArray[np.uint8]) -> bytes:
@@ -287,8 +303,7 @@ def _write_exr(
         stored = np.clip(layer, -_HALF_MAX, _HALF_MAX).astype(np.float16) if half else layer
         for index, letter in enumerate(letters):
             channels[name + letter] = np.ascontiguousarray(stored[..., index])
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    OpenEXR.File({**dict(metadata), **header}, channels).write(str(path))
+    write_channels(path, metadata, channels)
 
 
 def _read_npy(path: Path) -> Array:
@@ -316,7 +331,7 @@ def _write_pfm(path: Path, pixels: Array) -> None:
     pixels = pixels[..., :3]
     kind = "PF" if pixels.shape[2] == 3 else "Pf"
     head = f"{kind}\n{pixels.shape[1]} {pixels.shape[0]}\n-1.0\n"
-    path.write_bytes(head.encode() + pixels[::-1].astype("<f4").tobytes())
+    output_files.write(path, head.encode() + pixels[::-1].astype("<f4").tobytes())
 
 
 def _read_hdr(path: Path) -> Array:
@@ -371,7 +386,7 @@ def _write_hdr(path: Path, pixels: Array) -> None:
     rgbe[..., :3] = np.clip(np.round(colour * scale[..., None]), 0, 255)
     rgbe[..., 3] = np.where((mantissa > 0) & (exponent > -128), np.clip(exponent + 128, 0, 255), 0)
     head = f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {pixels.shape[0]} +X {pixels.shape[1]}\n"
-    path.write_bytes(head.encode() + rgbe.tobytes())
+    output_files.write(path, head.encode() + rgbe.tobytes())
 
 
 READERS = {

@@ -19,6 +19,7 @@ import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
+from clpt import images
 from clpt.errors import SceneError
 from clpt.spectra import Tabulated, cie
 from clpt.spectra.spectrum import d65
@@ -188,9 +189,8 @@ def write(
         if curve is not None:
             points = zip(curve.lambdas, curve.values, strict=True)
             header[name] = "".join(f"{nm!r}nm:{value!r};" for nm, value in points)
-    layout = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     try:
-        OpenEXR.File({**header, **layout}, stored).write(str(path))
+        images.write_channels(path, header, stored)
     except (OSError, RuntimeError, ValueError) as error:
         raise SceneError(f"cannot be written: {error}", file=path) from error
 

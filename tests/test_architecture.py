@@ -15,7 +15,10 @@ import clpt
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE, KERNELS = ROOT / "clpt", ROOT / "kernels"
 
-BASE = {"errors", "layout", "records", "transforms", "images", "spectra", "spectral_exr"}
+BASE = {
+    "errors", "layout", "records", "transforms", "images", "output_files", "spectra",
+    "spectral_exr",
+}  # fmt: skip
 # What a part may import of the others; itself always.
 MAY_IMPORT = {
     **dict.fromkeys(BASE, BASE),

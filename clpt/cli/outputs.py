@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-import numpy as np
-
 from clpt.render.aov_preview import sheet
 
 from .. import __version__, images, spectral_exr
@@ -78,7 +76,7 @@ def write(
 def _write_bands(path: Path, renderer: Renderer, stats: dict[str, str | int | float]) -> None:
     """Write all bands: an array, or a spectral .exr with a preview in the film's colours."""
     if path.suffix.lower() == ".npy":
-        np.save(path, renderer.image())
+        images.write_npy(path, renderer.image())
         return
     stated = {**stats, "chromaticities": chromaticities(renderer.scene.film.output_space)}
     preview = renderer.colours()
