@@ -6,6 +6,7 @@ EXR through the OpenEXR package; Radiance HDR and PFM are small enough to stand 
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -149,13 +150,18 @@ def write_npy(path: Path, array: NDArray[Any]) -> None:
         np.save(file, array)
 
 
+def exr_name(path: str | Path) -> str:
+    """A path as OpenEXR takes it: bytes of UTF-8, whatever the locale. Raises ValueError."""
+    return os.fsencode(path).decode("utf-8")
+
+
 def write_channels(
     path: Path, metadata: Mapping[str, Any], channels: Mapping[str, NDArray[Any]]
 ) -> None:
     """Write channels (h, w) by name, and attributes, as an .exr."""
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     with output_files.replacing(path) as partial:
-        OpenEXR.File({**metadata, **header}, dict(channels)).write(str(partial))
+        OpenEXR.File({**metadata, **header}, dict(channels)).write(exr_name(partial))
 
 
 def png(values: NDArray[np.uint8]) -> bytes:
@@ -184,7 +190,7 @@ def read_layers(path: str | Path) -> dict[str, Array]:
     if not path.is_file():
         _fail(path, "no such image file")
     try:
-        with OpenEXR.File(str(path), separate_channels=True) as file:
+        with OpenEXR.File(exr_name(path), separate_channels=True) as file:
             channels = file.channels()
             return {name: np.asarray(c.pixels, np.float32) for name, c in channels.items()}
     except (OSError, RuntimeError, ValueError) as error:

@@ -113,7 +113,7 @@ def is_spectral(path: str | Path) -> bool:
     if Path(path).suffix.lower() != ".exr" or not Path(path).is_file():
         return False
     try:
-        with OpenEXR.File(str(path), header_only=True) as file:
+        with OpenEXR.File(images.exr_name(path), header_only=True) as file:
             names = [channel.name for channel in file.header()["channels"]]
     except Exception:  # whoever reads it tells what is wrong
         return False
@@ -204,7 +204,7 @@ def _contents(path: Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
     if not path.is_file():
         _fail(path, "no such image file")
     try:
-        with OpenEXR.File(str(path), separate_channels=True) as file:
+        with OpenEXR.File(images.exr_name(path), separate_channels=True) as file:
             header = dict(file.header())  # a copy: closing the file empties it
             return header, {name: channel.pixels for name, channel in file.channels().items()}
     except Exception as error:  # the library raises its own, from RuntimeError to MemoryError

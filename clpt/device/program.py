@@ -264,7 +264,7 @@ def _linked(
     parts, only = [], [device.info.cl_device]
     for source in sources:
         try:
-            parts.append(native_programs.compile_part(device.context, *only, source.text, flags))
+            parts.append(native_programs.compile_part(device.context, only[0], source.text, flags))
         except cl.Error as error:
             raise _build_error(source, str(error)) from error
     try:
