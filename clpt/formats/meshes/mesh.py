@@ -12,7 +12,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from warnings import catch_warnings, simplefilter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -168,8 +167,7 @@ def _open(path: Path, materials: bool) -> trimesh.Scene:
 
     suffix = path.suffix.lower()
     try:
-        with catch_warnings(), np.errstate(all="ignore"):
-            simplefilter("ignore")
+        with np.errstate(all="ignore"):
             if suffix == ".obj" and not materials:
                 # In one piece: trimesh cuts the mesh, and its normals, where the material changes.
                 text = io.BytesIO(USEMTL.sub(b"", path.read_bytes()))
