@@ -29,6 +29,7 @@ if TYPE_CHECKING:  # else imported where it is used, for many pictures are EXR o
 Array = NDArray[np.float32]
 Metadata = Mapping[str, str | int | float | tuple[float, ...]]
 
+LARGEST = 1 << 29  # pixels of an image that is read
 _HALF_MAX = 65504.0
 _PILLOW = (".png", ".jpg", ".jpeg", ".tga", ".bmp", ".webp", ".gif", ".tif", ".tiff")
 
@@ -190,11 +191,21 @@ def read_layers(path: str | Path) -> dict[str, Array]:
     if not path.is_file():
         _fail(path, "no such image file")
     try:
+        check_exr(path)
         with OpenEXR.File(exr_name(path), separate_channels=True) as file:
             channels = file.channels()
             return {name: np.asarray(c.pixels, np.float32) for name, c in channels.items()}
+    except SceneError:
+        raise
     except (OSError, RuntimeError, ValueError) as error:
         raise SceneError(f"not a readable image: {error}", file=path) from error
+
+
+def check_exr(path: Path) -> None:
+    """Raise SceneError for an EXR file of more pixels than are read."""
+    with OpenEXR.File(exr_name(path), header_only=True) as file:
+        low, high = file.header()["dataWindow"]
+    check_size(path, *(int(last) - int(first) + 1 for first, last in zip(low, high, strict=True)))
 
 
 def from_pillow(image: Image.Image, *, linear: bool = True) -> Array:
@@ -265,14 +276,24 @@ def _fail(path: Path, message: str) -> NoReturn:
     raise SceneError(message, file=path)
 
 
+def check_size(path: Path, width: int, height: int) -> None:
+    """Raise SceneError for an image of more pixels than are read."""
+    if width * height > LARGEST:
+        _fail(path, f"has {width}x{height} pixels, more than the {LARGEST} that are read")
+
+
 def _read_pillow(path: Path) -> Stored:
     from PIL import Image, UnidentifiedImageError
 
     try:
         with Image.open(path) as image:
+            check_size(path, image.width, image.height)
             return stored_from_pillow(image)
     except UnidentifiedImageError:
         _fail(path, "not an image")
+    except Image.DecompressionBombError:
+        most = 2 * (Image.MAX_IMAGE_PIXELS or 0)  # Pillow's rule
+        _fail(path, f"has more than the {most} pixels that are read of {path.suffix} images")
 
 
 def _read_exr(path: Path) -> Array:
@@ -313,10 +334,12 @@ def _write_exr(
 
 
 def _read_npy(path: Path) -> Array:
-    array = np.load(path, allow_pickle=False)
+    array = np.load(path, "r" if path.stat().st_size > 4096 else None, allow_pickle=False)
+    if array.ndim > 1:
+        check_size(path, *array.shape[1::-1])
     if array.ndim not in (2, 3) or array.dtype.kind not in "fiu":
         _fail(path, f"not an image: an array of {array.dtype}, shape {array.shape}")
-    return np.asarray(array if array.ndim == 3 else array[..., None], np.float32)
+    return np.array(array if array.ndim == 3 else array[..., None], np.float32)
 
 
 def _read_pfm(path: Path) -> Array:
@@ -325,6 +348,7 @@ def _read_pfm(path: Path) -> Array:
     if header is None:
         _fail(path, "not a PFM image: its header is not 'PF' or 'Pf', width, height, scale")
     width, height, scale = int(header[2]), int(header[3]), float(header[4])
+    check_size(path, width, height)
     channels = 3 if header[1] == b"PF" else 1
     count = width * height * channels
     if len(data) - header.end() < 4 * count:
@@ -349,6 +373,7 @@ def _read_hdr(path: Path) -> Array:
     if b"FORMAT=32-bit_rle_xyze" in data[: size.start()]:
         _fail(path, "XYZE colours are not supported; save it as RGBE")
     height, width = int(size[1]), int(size[2])
+    check_size(path, width, height)
     rgbe, at = np.empty((height, width, 4), np.uint8), size.end()
     try:
         for y in range(height):

@@ -204,9 +204,12 @@ def _contents(path: Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
     if not path.is_file():
         _fail(path, "no such image file")
     try:
+        images.check_exr(path)
         with OpenEXR.File(images.exr_name(path), separate_channels=True) as file:
             header = dict(file.header())  # a copy: closing the file empties it
             return header, {name: channel.pixels for name, channel in file.channels().items()}
+    except SceneError:
+        raise
     except Exception as error:  # the library raises its own, from RuntimeError to MemoryError
         message = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise SceneError(f"not a readable image: {message}", file=path) from error

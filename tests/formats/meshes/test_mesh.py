@@ -236,3 +236,19 @@ def test_a_million_triangles_take_seconds(tmp_path):
     start = time.perf_counter()
     assert len(load(tmp_path / "ball.ply").shapes[0].faces) == 1_310_720
     assert time.perf_counter() - start < 20.0
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (bytes(80) + (100).to_bytes(4, "little") + bytes(500), "holds 10 of 100 triangles"),
+        (b"solid x".ljust(80) + (3).to_bytes(4, "little") + bytes(100), "holds 2 of 3 triangles"),
+        (bytes(range(256))[:60], "ends within its header"),
+        (bytes(range(200, 256)) * 4, "triangles"),
+    ],
+)
+def test_stl_files_that_are_cut_off(tmp_path, data, message):
+    path = tmp_path / "a.stl"
+    path.write_bytes(data)
+    with pytest.raises(SceneError, match=message):
+        load(path)
