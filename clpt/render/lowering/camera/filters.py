@@ -30,7 +30,8 @@ CUT = 4.0  # standard deviations at which a Gaussian ends that has no radius
 def lower_filter(chosen: Filter, store: TableStore, light_paths: bool) -> None:
     """Put a filter's table into `distributions`, where the kernels expect it to be the first.
 
-    light_paths: whether points choose pixels; then the filter's values follow. Raises SceneError if something stands there already, and as `table` does.
+    light_paths: whether points choose pixels; then the filter's values follow. Raises SceneError if
+    something stands there already, and as `table` does.
     """
     if store.append_floats("distributions", table(chosen)) != 0:
         raise SceneError("the pixel filter has to be lowered first")
