@@ -41,7 +41,7 @@ def table(value: Reradiation | None, at: Values, light: Values) -> tuple[Values,
     """
     rows = np.zeros((len(at), len(at)))
     if value is not None:
-        rows = value.sample(at[:, None], at)
+        rows = value.on_nodes(at)
     running = _running(rows * light)
     shares = running / np.maximum(running[:, -1:], 1e-30)
     flat = np.concatenate([light, running[:, -1], np.hstack([rows, shares]).ravel()])
