@@ -112,7 +112,7 @@ class White(click.ParamType):
     "--noise", type=click.FloatRange(0.0), metavar="SHARE",
     help="Stop sampling pixels with less noise, such as 0.02 of their light; 0: never.",
 )  # fmt: skip
-@click.option("--time", "limit", type=Duration(), help="Stop after 30s, 5m, 1h30m of rendering.")
+@click.option("--time", "limit", type=Duration(), help="Stop after 30s, 5m, 1h30m.")
 @click.option("--size", type=Size(), help="Size of the picture.")
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), help="Seed of the random numbers.")
 @click.option("--device", metavar="NAME-OR-INDEX", help="Where to render: see `clpt devices`.")
@@ -165,7 +165,8 @@ def render(
     """Render the scene file, mesh or folder SCENE.
 
     The scene decides what no option sets. With --time or --noise but no --spp the render goes on
-    until the time is over, or the noise is below the limit. Ctrl-C stops it within a second; the
+    until the time is over, or the noise is below the limit. The time counts from the command's
+    start, kernels included. Ctrl-C stops it within a second; the
     picture so far is written, and the exit status is 130. SIGTERM and SIGHUP do the same, with the
     statuses 143 and 129.
     """
@@ -192,15 +193,22 @@ def render(
         shown.note(f"clpt: warning: {warning}")
     if verbose:
         report.before(renderer, loading)
-    began = time.perf_counter()
+    ready = time.perf_counter()
+    left = shown.limit = None if limit is None else max(began + limit - ready, 0.0)
     with stops() as stopped:
         with shown.rendering():
-            render_samples(renderer, spp, limit, shown.show, plan.noise, stopped)
-        stats = outputs.metadata(renderer, scene, time.perf_counter() - began)
+            render_samples(renderer, spp, left, shown.show, plan.noise, stopped)
+        stats = outputs.metadata(renderer, scene, time.perf_counter() - ready)
         outputs.write_all(targets, renderer, stats, exposure, shown.note)
+    if stats["spp"] < 1.0:
+        shown.note(
+            f"clpt: warning: only {stats['spp']:.1%} of the pixels have a sample; others are black"
+        )
     rejected = sum(wavefront.counts.rejected for wavefront in renderer.wavefronts)
     if rejected:
         shown.note(f"clpt: warning: {rejected} samples were not finite and count as black")
+    if any(wavefront.counts.full for wavefront in renderer.wavefronts):
+        shown.note("clpt: warning: pixels are too bright for the film: scale the lights down")
     if verbose:
         report.after(renderer)
     return STATUS + stopped[0] if stopped else 0

@@ -109,7 +109,10 @@ def lower(
     encoder.store.append("shapes", shape_words(geometry.rows))
     glass_row = _lower_camera(index, encoder)
     ambient_row = _lower_ambient(index, encoder)
-    warnings = *_warnings(index), *geometry.warnings, *encoder.textures.finish()
+    warnings = (
+        *_warnings(index), *sorted(encoder.warnings), *geometry.warnings,
+        *encoder.textures.finish(),
+    )  # fmt: skip
     features = features_of(index, encoder, materials, geometry, lights, tabulated)
     settings = settings_of(index, geometry, lights, wavelengths, density_row, ambient_row, sphere)
     cache.settle()
@@ -174,6 +177,8 @@ def _lower_camera(index: SceneIndex, encoder: Encoder) -> int:
     """Append the camera; return the row in `spectra` of its glass, 0 if none disperses."""
     camera, film = index.scene.camera, index.scene.film
     glass = cameras.dispersive_glass(camera)
+    if glass:
+        encoder.spectra.check_index(glass, f"{camera.kind}.glass")
     glass_row = encoder.spectra.row(glass) if glass and index.spectral else 0
     _, words = cameras.lower_camera(camera, film.width, film.height, glass_row)
     encoder.store.append_floats("camera", words)
