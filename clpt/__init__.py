@@ -26,6 +26,7 @@ from clpt.render.codegen.library import kernel_source
 from clpt.render.options import RenderOptions
 from clpt.render.progress import Progress
 from clpt.render.renderer import Renderer, render
+from clpt.render.wavefront.film_state import FilmState
 from clpt.scene import Scene
 from clpt.spectral_exr import SpectralImage
 from clpt.spectral_exr import read as read_spectral
@@ -43,6 +44,7 @@ __all__ = [
     "AllHits",
     "ClptError",
     "DeviceError",
+    "FilmState",
     "Hits",
     "InstancedAccel",
     "KernelBuildError",

@@ -29,6 +29,9 @@ class RenderOptions(TypedDict, total=False):
     queued: whether slots are queued by material before they are shaded, or how, a name in
     clpt.render.wavefront.queues.WAYS.
     looped: whether a kernel on the device runs all bounces.
+    first_sample: the number of the first sample, 0 to 2^31 - 1, by default 0. Renderers that take
+    other numbers have other samples, and their films merge, see `Renderer.merge`.
+    halves: whether even and odd samples are kept apart, for `Renderer.halves`.
 
     What is left out, or None, is chosen to suit the device and the scene.
     """
@@ -41,6 +44,8 @@ class RenderOptions(TypedDict, total=False):
     slots: int | None
     queued: bool | str | None
     looped: bool | None
+    first_sample: int
+    halves: bool
 
 
 def check_scene(scene: Any) -> None:
@@ -70,7 +75,7 @@ def check_options(scene: Scene, options: Mapping[str, Any]) -> None:
     quality = options.get("tree_quality", "high")
     if quality not in get_args(bvh.Quality):
         raise UnknownKindError("quality", str(quality), get_args(bvh.Quality), where="tree_quality")
-    for name, least in (("slots", 1), ("texture_budget", 0)):
+    for name, least in (("slots", 1), ("texture_budget", 0), ("first_sample", 0)):
         number = options.get(name)
         whole = isinstance(number, int) and not isinstance(number, bool)
         if number is not None and not (whole and number >= least):

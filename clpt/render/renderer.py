@@ -32,6 +32,7 @@ from clpt.render.pictures import Image, Pictures
 from clpt.render.progress import Progress
 from clpt.render.stats import RenderStats, collect
 from clpt.render.wavefront import adaptive
+from clpt.render.wavefront.film_state import FilmState, Ranges, join_ranges
 from clpt.render.wavefront.wavefront import Wavefront
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
+MOST_SAMPLES = 2**31 - 1
 TEXTURE_SHARE = 0.5  # of a device's free memory, for bitmaps
 
 
@@ -100,6 +102,7 @@ class Renderer(Pictures):
             looped=options.get("looped", None if queue is None else True),
             paths=scene.spp * math.prod(scene.film.size),
             tree_quality=options.get("tree_quality", "high"),
+            halves=options.get("halves", False),
         )
         self.wavefronts = [first, *(first.with_channel(channel) for channel in self.channels[1:])]
         for one in self.wavefronts:
@@ -109,7 +112,8 @@ class Renderer(Pictures):
         self._seconds["trees"] = first.scene.trees.seconds
         self._seconds["ready"] = time.perf_counter() - self._start
         self.warnings = list(lowered.warnings)
-        self.samples = 0
+        self._first_sample = _sample_number(options.get("first_sample", 0))
+        self._taken: Ranges = ()
         self._progress = progress
         self._moving: Moving | None = None
         self._adaptive: adaptive.Adaptive | None = None
@@ -117,7 +121,7 @@ class Renderer(Pictures):
 
     @synchronized
     def step(self, samples: int = 1, wait_for: dev.Events = None) -> cl.Event:
-        """Enqueue that every pixel gets `samples` more; `self.samples` tells how many it then has.
+        """Enqueue `samples` more of every pixel; `self.samples` is then the next one's number.
 
         Nothing is waited for or read: when the event that is returned has ended, `film` holds the
         picture. wait_for: events of the caller that come first. On an in-order queue whatever the
@@ -125,12 +129,12 @@ class Renderer(Pictures):
 
         Raises SceneError for a number that is none, DeviceError if the driver refuses.
         """
-        first, end = self.samples, self.samples + _whole(samples)
+        first, end = self._next_range(samples)
         stream = self.wavefronts[0].stream
         stream.after(wait_for)
         for wavefront in self.wavefronts:
             wavefront.enqueue(first, end)
-        self.samples = end
+        self._taken = join_ranges(self._taken, ((first, end),))
         if self._adaptive is not None:
             self._adaptive.skip(end)
         stream.flush()
@@ -160,25 +164,26 @@ class Renderer(Pictures):
     def run(
         self,
         samples: int,
-        progress: Callable[[Progress], bool] | None = None,
+        progress: Callable[[Progress], bool | None] | None = None,
         *,
         noise: float | None = None,
     ) -> bool:
-        """Add samples to every pixel and wait; `self.samples` counts all so far.
+        """Add samples to every pixel and wait; `self.samples` is then the next one's number.
 
         noise: leave pixels as soon as the noise around them is as low, relative to the picture,
         such as 0.02; `samples` is then the most that a pixel gets, see
         clpt.render.wavefront.adaptive.
         progress: called every few milliseconds to seconds; if it returns False the run stops soon,
         as after `cancel`. Returns whether it came to its end. What progress raises, or Ctrl+C in
-        it, is raised when the paths in flight have ended: the film is whole then too.
+        it, is raised when the paths in flight have ended. The film is whole after a stop too: its
+        pixels have fewer samples, and the numbers of those that were left out are not used again.
 
-        Raises SceneError for noise that makes no sense with the scene.
+        Raises SceneError for noise that makes no sense with the scene, and for more than 2^31 - 1
+        samples.
         """
         start = time.perf_counter()
-        first, end = self.samples, self.samples + _whole(samples)
+        first, end = self._next_range(samples)
         raised: list[BaseException] = []
-        self._stop.clear()
 
         def on_batch(_: Any) -> bool:
             counts = [w.counts for w in self.wavefronts]
@@ -191,17 +196,23 @@ class Renderer(Pictures):
             if self._stop.is_set() or progress is None:
                 return not self._stop.is_set()
             try:
-                return progress(Progress(paths / pixels, end, paths, rays, seconds, self.active))
+                told = Progress(paths / pixels, end, paths, rays, seconds, self.active)
+                return progress(told) is not False
             except BaseException as error:
                 raised.append(error)
                 return False
 
-        if not self._render_samples(first, end, noise, on_batch):
-            if raised:
-                raise raised.pop()
+        if self._stop.is_set():  # before it began: nothing is taken
+            self._stop.clear()
             return False
-        self.samples = end
-        return True
+        try:
+            finished = self._render_samples(first, end, noise, on_batch)
+            self._taken = join_ranges(self._taken, ((first, end),))
+        finally:
+            self._stop.clear()
+        if raised:
+            raise raised.pop()
+        return finished
 
     def _render_samples(
         self, first: int, end: int, noise: float | None, on_batch: Callable[[Any], bool]
@@ -224,15 +235,16 @@ class Renderer(Pictures):
         return 1.0 if self._adaptive is None else self._adaptive.active
 
     def cancel(self) -> None:
-        """Let the `run` of another thread stop soon; it then returns False. A step is not stopped.
+        """Let the `run` of another thread, or else the next one, stop soon and return False.
 
-        It may be called from anywhere, also from a signal's handler, and waits for nothing.
+        A step is not stopped. It may be called from anywhere, also from a signal's handler, and
+        waits for nothing.
         """
         self._stop.set()
 
     @synchronized
     def reset(self, wait_for: dev.Events = None, *, seed: int | None = None) -> cl.Event:
-        """Enqueue that the film is emptied; the next sample is number 0 again.
+        """Enqueue that the film is emptied; the next sample is the first one again.
 
         seed: of the samples from now on, which `self.scene` then has; by default as before. Raises
         SceneError for a seed that is no whole number.
@@ -246,9 +258,51 @@ class Renderer(Pictures):
             self.wavefronts[0].paths.set_seed(seed)
         for wavefront in self.wavefronts:
             wavefront.clear()
-        self.samples, self._adaptive = 0, None
+        self._taken, self._adaptive = (), None
         stream.flush()
         return stream.last
+
+    @property
+    def samples(self) -> int:
+        """The number of the next sample: of all so far, where they began at number 0."""
+        return self._taken[-1][1] if self._taken else self._first_sample
+
+    @synchronized
+    def film_state(self) -> FilmState:
+        """Return what the film holds, as whole numbers on the host; wait for it."""
+        films, bands = zip(*(one.film.words() for one in self.wavefronts), strict=True)
+        return FilmState(np.stack(films), bands[0], self._taken)
+
+    @synchronized
+    def merge(self, state: FilmState) -> None:
+        """Add the samples of another film of the same scene to this one, and wait.
+
+        The picture is then that of one renderer that took them all, to the bit. To go on where a
+        state was taken, merge it into a new renderer. `self.samples` is then after the last one.
+
+        Raises SceneError if the film has another form, or a sample is in both: nothing has changed.
+        """
+        merged = self.film_state().merged(state)
+        for one, words in zip(self.wavefronts, state.words, strict=True):
+            one.add_words(words, state.bands)
+        self._taken, self._adaptive = merged.taken, None
+
+    @synchronized
+    def halves(self) -> tuple[Image, Image]:
+        """Return two independent pictures, of the even and of the odd samples; wait for them.
+
+        (h, w, 3) float32 each, in the film's output space, of a Renderer with `halves=True`. Their
+        mean, weighted by numbers of samples, is the whole picture. Raises SceneError without.
+        """
+        first = self.wavefronts[0]
+        if first.film.halves != 2:
+            raise SceneError("even and odd samples are not kept apart; give Renderer halves=True")
+        return first.half(0), first.half(1)
+
+    def _next_range(self, samples: int) -> tuple[int, int]:
+        """The numbers of the next samples, first and end. Raises SceneError."""
+        first = self.samples
+        return first, _sample_number(first + _whole(samples))
 
     def close(self) -> None:
         """Give the device's memory back; the renderer is of no use afterwards.
@@ -371,6 +425,13 @@ class Renderer(Pictures):
         return collect(self.wavefronts, *self._built, dict(self._seconds))
 
 
+def _sample_number(number: int) -> int:
+    """A sample's number. Raises SceneError for one that is too large."""
+    if number > MOST_SAMPLES:
+        raise SceneError(f"a pixel cannot have more than {MOST_SAMPLES} samples", where="samples")
+    return number
+
+
 def _whole(samples: int) -> int:
     """A number of samples. Raises SceneError for one that is none."""
     if isinstance(samples, bool) or not isinstance(samples, (int, np.integer)) or samples < 1:
@@ -388,7 +449,7 @@ def render(
     spp: int | None = None,
     *,
     device: dev.Device | str | int | None = None,
-    progress: Callable[[Progress], bool] | None = None,
+    progress: Callable[[Progress], bool | None] | None = None,
     noise: float | None = None,
     **options: Unpack[RenderOptions],
 ) -> Image:
