@@ -215,6 +215,13 @@ class Kind:
         """Raise SceneError where the parameters contradict each other."""
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Texture(Kind):
+    """Base of all textures."""
+
+    is_texture = True
+
+
 @cache
 def _snake(name: str) -> str:
     return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()

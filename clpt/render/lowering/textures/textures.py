@@ -121,7 +121,8 @@ def _identity(texture: Texture) -> Any:
     """What makes two textures the same: of bitmaps their parameters, else being one object."""
     if isinstance(texture, Bitmap):
         values = (getattr(texture, name) for name in ("raw", "filter", "wrap", "wrap_v", "channel"))
-        placed = (texture.to_uv.tobytes(), texture.mapping, texture.to_texture.tobytes())
+        to_texture = np.asarray(texture.to_texture).tobytes()
+        placed = (texture.to_uv.tobytes(), texture.mapping, to_texture)
         return (identity(texture), *values, *placed)
     return id(texture)
 
@@ -150,10 +151,10 @@ def _second_uv(table: TextureTable) -> int:
 
 def _transform(texture: Placed | Solid, table: TextureTable) -> int:
     """Append the rows of `to_texture`. Raises SceneError for a projection."""
-    if not np.allclose(texture.to_texture[3], [0.0, 0.0, 0.0, 1.0]):
+    matrix = np.asarray(texture.to_texture, np.float32)
+    if not np.allclose(matrix[3], [0.0, 0.0, 0.0, 1.0]):
         raise SceneError("its last row must be 0 0 0 1", where=f"{texture.kind}.to_texture")
-    rows = texture.to_texture[:3].astype(np.float32)
-    return table.store.append("textures", np.ascontiguousarray(rows).view(np.uint32))
+    return table.store.append("textures", np.ascontiguousarray(matrix[:3]).view(np.uint32))
 
 
 def _checkerboard(
