@@ -3,7 +3,7 @@
 >>> import clpt
 >>> scene = clpt.load("scenes/cornell_box")
 >>> image = clpt.render(scene, spp=64)
->>> clpt.write("out.exr", image)
+>>> clpt.write_image("out.exr", image)
 """
 
 import logging
@@ -18,12 +18,15 @@ from clpt.errors import (
     UnknownKindError,
     UnusedParameterError,
 )
-from clpt.formats import load
-from clpt.images import read, write
+from clpt.formats import load, save
+from clpt.images import read as read_image
+from clpt.images import write as write_image
 from clpt.rays import Accel, AllHits, Hits, InstancedAccel
 from clpt.render.codegen.library import kernel_source
+from clpt.render.options import RenderOptions
 from clpt.render.progress import Progress
 from clpt.render.renderer import Renderer, render
+from clpt.render.wavefront.film_state import FilmState
 from clpt.scene import Scene
 from clpt.spectral_exr import SpectralImage
 from clpt.spectral_exr import read as read_spectral
@@ -41,11 +44,13 @@ __all__ = [
     "AllHits",
     "ClptError",
     "DeviceError",
+    "FilmState",
     "Hits",
     "InstancedAccel",
     "KernelBuildError",
     "MemoryBudgetError",
     "Progress",
+    "RenderOptions",
     "Renderer",
     "Scene",
     "SceneError",
@@ -55,9 +60,10 @@ __all__ = [
     "__version__",
     "kernel_source",
     "load",
-    "read",
+    "read_image",
     "read_spectral",
     "render",
-    "write",
+    "save",
+    "write_image",
     "write_spectral",
 ]

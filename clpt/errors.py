@@ -1,12 +1,14 @@
 """What can go wrong, told to a person: what is wrong, where, and what to do.
 
 ClptError
-├── SceneError              a scene, mesh or image file, or a scene built in Python
+├── SceneError              a ValueError: a scene, mesh or image file, or a scene built in Python
 │   ├── UnknownKindError    a name that no kind has; tells the nearest ones
 │   └── UnusedParameterError  a parameter that the kind does not have
-├── DeviceError             no OpenCL device, or one that cannot do what is asked
-│   └── MemoryBudgetError   asked, available, what to lower
-└── KernelBuildError        a kernel did not compile: stage, file, line, log
+├── DeviceError             a RuntimeError: no OpenCL device, or one that cannot do what is asked
+│   └── MemoryBudgetError   a MemoryError too: asked, available, what to lower
+└── KernelBuildError        a RuntimeError: a kernel did not compile: stage, file, line, log
+
+All of them can be pickled, with their attributes: an error of a worker reaches its parent whole.
 """
 
 from __future__ import annotations
@@ -20,8 +22,17 @@ from typing import Any
 class ClptError(Exception):
     """Base of everything that clpt raises on purpose."""
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Python would call the class with the message, which is not what the class takes.
+        return _restored, (type(self), self.args), self.__dict__
 
-class SceneError(ClptError):
+
+def _restored(cls: type[ClptError], args: tuple[Any, ...]) -> ClptError:
+    """Return an error without calling its constructor; its attributes follow."""
+    return cls.__new__(cls, *args)
+
+
+class SceneError(ClptError, ValueError):
     """Bad input, with the file, line and element it stands in where these are known."""
 
     def __init__(
@@ -39,7 +50,8 @@ class SceneError(ClptError):
         super().__init__(": ".join(part for part in (place, where, message) if part))
 
 
-def _nearest(name: str, known: Iterable[str]) -> str:
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Return the end of a message: the known names that are near a name, or else all of them."""
     known = sorted(known)
     near = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
     if near:
@@ -51,35 +63,34 @@ class UnknownKindError(SceneError):
     """A `type` that is not in the table of kinds."""
 
     def __init__(self, category: str, name: str, known: Iterable[str], **place: Any):
-        super().__init__(f"unknown {category} {name!r}" + _nearest(name, known), **place)
+        super().__init__(f"unknown {category} {name!r}" + nearest(name, known), **place)
 
 
 class UnusedParameterError(SceneError):
     """A parameter that the kind does not have."""
 
     def __init__(self, kind: str, name: str, known: Iterable[str], **place: Any):
-        super().__init__(f"{kind} has no parameter {name!r}" + _nearest(name, known), **place)
+        super().__init__(f"{kind} has no parameter {name!r}" + nearest(name, known), **place)
 
 
-class DeviceError(ClptError):
+class DeviceError(ClptError, RuntimeError):
     """No device, or one that cannot do what is asked."""
 
 
-class MemoryBudgetError(DeviceError):
+class MemoryBudgetError(DeviceError, MemoryError):
     """More device memory is needed than there is.
 
-    asked, available: bytes.
+    asked, available: bytes; None where the driver does not tell.
     """
 
-    def __init__(self, what: str, asked: int, available: int, advice: str):
+    def __init__(self, what: str, asked: int | None, available: int | None, advice: str):
         self.asked, self.available = asked, available
-        super().__init__(
-            f"{what} needs {asked / 2**20:.0f} MiB, the device has {available / 2**20:.0f} MiB: "
-            f"{advice}"
-        )
+        needs = "more memory" if asked is None else f"{asked / 2**20:.0f} MiB"
+        has = "no more" if available is None else f"{available / 2**20:.0f} MiB"
+        super().__init__(f"{what} needs {needs}, the device has {has}: {advice}")
 
 
-class KernelBuildError(ClptError):
+class KernelBuildError(ClptError, RuntimeError):
     """A kernel did not compile: our file and line, the compiler's log, where the text was kept."""
 
     def __init__(self, stage: str, file: str | None, line: int | None, log: str, kept: str | None):

@@ -136,6 +136,8 @@ def write(
             _write_pfm(path, pixels)
         else:
             write_npy(path, pixels)
+    except SceneError:
+        raise
     except (OSError, RuntimeError, ValueError) as error:
         raise SceneError(f"cannot be written: {error}", file=path) from error
 

@@ -25,10 +25,12 @@ TYPES: dict[str, tuple[int, str, str, tuple[str, ...]]] = {
     "natural": (1, "uint", "natural", ("",)),
     "vec2": (2, "float", "vec2", (".x", ".y")),
     "vec3": (3, "float", "vec3", _XYZ),
+    "fixed": (3, "uint", "Fixed", (".low", ".middle", ".high")),
     "spectrum": (4, "float", "Spectrum", (*_XYZ, ".w")),
     "matrix": (16, "float", "", ()),
 }
-_NUMPY = {"real": "f4", "integer": "i4", "natural": "u4"}
+_NUMPY = {"real": "f4", "integer": "i4", "natural": "u4", "fixed": "u4"}
+_CASTS = {"integer": "as_integer", "natural": "as_natural", "fixed": "as_natural"}
 _SELECT = {"real": "sel", "integer": "sel_i", "natural": "sel_n", "vec3": "sel3"}
 _ZERO = {
     "integer": "0", "natural": "0", "vec3": "v3(0.0f, 0.0f, 0.0f)", "Spectrum": "spectrum_of(0.0f)",
@@ -156,7 +158,7 @@ class Record:
         parts = [f"#define {lower.upper()}_WORDS {self.words}"]
         for m in self.members:
             lane = TYPES[m.type][2]
-            cast = {"integer": "as_integer", "natural": "as_natural"}.get(m.type, "")
+            cast = _CASTS.get(m.type, "")
             load, store = [], []
             for i, component in enumerate(TYPES[m.type][3]):
                 read = f"    r{component} = {cast}(slab_read(s, {m.word + i}, at));"

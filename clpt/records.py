@@ -37,9 +37,10 @@ PATH = Record(
     state=("integer", "PATH_ bits and depth, see kernels/path/path_state.cl"),
     pixel_index=("integer", "where the film stores the path's pixel, see kernels/film/film.cl"),
     sample=("integer", "number of the path's sample in its pixel"),
-    sum=("vec3", "sum of the pixel's samples so far: xyz, or rgb in RGB mode"),
-    compensation=("vec3", "what rounding took from `sum` (Neumaier)"),
-    samples=("real", "number of samples in `sum`"),
+    first=("fixed", "sum of the pixel's samples so far, first channel: x, or red in RGB mode"),
+    second=("fixed", "the same of the second channel"),
+    third=("fixed", "the same of the third channel"),
+    samples=("natural", "number of samples in these sums"),
 )
 
 HIT = Record(
@@ -78,7 +79,11 @@ SETTINGS = Record(
     padded_pixels=("integer", "16 times the number of 4x4 tiles that cover the picture"),
     slots=("integer", "number of slots: paths that are traced at once"),
     per_plane=("integer", "slots that share a film plane"),
-    planes=("integer", "film planes; slots of different planes may render the same pixel"),
+    planes=("integer", "planes of slots; those of different ones may render the same pixel"),
+    halves=(
+        "integer",
+        "2: even and odd samples have films of their own, and planes are even; else 1",
+    ),
     seed=("natural", "seed of the sampler"),
     sample_bits=("integer", "base-2 logarithm of the samples of a pixel; zsobol"),
     max_depth=("integer", "most surfaces of a path, that of the light counted"),

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -25,12 +24,6 @@ GRAZING = 1e-9  # cosine below which the plane of a triangle does not locate a h
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
-
-
-@functools.cache
-def _default_queue() -> Any:
-    """The queue of all intersectors that were made without one."""
-    return device.choose().queue
 
 
 @dataclass(frozen=True)
@@ -125,7 +118,7 @@ class RayMeshIntersector:
         scale = 2.0 ** -round(math.log2(size)) if 0 < size < math.inf else 1.0
         centre = np.zeros(3) if empty else np.mean(self.mesh.bounds, axis=0)
         vertices = (np.asarray(self.mesh.vertices, np.float64) - centre) * scale
-        queue = _default_queue() if self.queue is None else self.queue
+        queue = device.choose().queue if self.queue is None else self.queue
         return _DeviceMesh(Accel(queue, vertices, np.asarray(self.mesh.faces)), centre, scale)
 
     def _scaled(self, origins: Floats, directions: Floats) -> tuple[Floats, Floats]:

@@ -75,4 +75,4 @@ def scene() -> clpt.Scene:
 
 if __name__ == "__main__":
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
-    clpt.write(folder / "custom_material.png", clpt.render(scene(), spp=64))
+    clpt.write_image(folder / "custom_material.png", clpt.render(scene(), spp=64))

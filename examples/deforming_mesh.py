@@ -73,4 +73,4 @@ with clpt.Renderer(scene(mesh), queue=queue) as renderer:
         renderer.update(vertices={"blob": moved})
         renderer.step(SAMPLES)
         frames.append(renderer.film.get()[:, :, :3])  # waits for the picture
-clpt.write(str(folder / "deforming_mesh.png"), np.hstack(frames))
+clpt.write_image(str(folder / "deforming_mesh.png"), np.hstack(frames))

@@ -76,4 +76,4 @@ for _ in range(FRAMES):
     for _ in range(STEPS):
         advance(queue, now.shape[:1], None, now.data, np.float32(DT), then.data, speed.data)
         now, then = then, now
-clpt.write(Path(sys.argv[1] if len(sys.argv) > 1 else ".") / "nbody.png", np.hstack(pictures))
+clpt.write_image(Path(sys.argv[1] if len(sys.argv) > 1 else ".") / "nbody.png", np.hstack(pictures))

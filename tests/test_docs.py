@@ -100,8 +100,8 @@ def test_the_tutorial(run: Run, tmp_path: Path):
     assert errors[1] < errors[0] / 2  # of sixteen times the samples
     red = final[..., 0] > 3 * final[..., 2]
     assert 0.05 < red.mean() < 0.3  # the pawn
-    assert clpt.read("pawn.exr") == pytest.approx(final, rel=1e-3)
-    assert clpt.read("brighter.png").mean() > clpt.read("pawn.png").mean()
+    assert clpt.read_image("pawn.exr") == pytest.approx(final, rel=1e-3)
+    assert clpt.read_image("brighter.png").mean() > clpt.read_image("pawn.png").mean()
     (text,) = pages.blocks(DOCS / "tutorial.md", "json")
     (tmp_path / "pawn.json").write_text(text, "utf-8")
     file, scene = clpt.load("pawn.json"), names["scene"]
@@ -122,7 +122,7 @@ def test_how_to_light_a_scene(run: Run):
     assert studio[10:14, 15:19].mean() > 1.5 * studio[10:14, 21:25].mean()  # key left, fill right
     ground = names["outdoors"][-1, 0]  # in the sun, far from the ball
     assert ground == pytest.approx([0.45, 0.47, 0.50], rel=0.05)
-    exposed = clpt.read("exposed.png")
+    exposed = clpt.read_image("exposed.png")
     assert 0.1 < exposed.mean() < 0.4
     assert names["image_sky"].kind == "envmap"
 

@@ -25,7 +25,7 @@ def test_it_writes_a_picture(
 ):
     monkeypatch.setattr(sys, "argv", [str(example), str(tmp_path)])
     runpy.run_path(str(example), run_name="__main__")
-    picture = clpt.read(tmp_path / f"{example.stem}.png")
+    picture = clpt.read_image(tmp_path / f"{example.stem}.png")
     assert picture.shape[0] >= 100 and picture.shape[1] >= 100
     assert 0.02 < picture.mean() < 0.98 and picture.std() > 0.02  # neither black, white nor flat
 

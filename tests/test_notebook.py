@@ -63,7 +63,7 @@ def test_it_shows_a_live_picture(shown, tmp_path, monkeypatch, capsys):
     assert all(max(p.getextrema())[1] > 200 for p in shown[1:9])
     assert len({p.tobytes() for p in shown}) >= 16  # each shows something new
     assert sum(hasattr(result, "_repr_png_") for result in results) >= 2
-    picture = clpt.read("live_notebook.png")
+    picture = clpt.read_image("live_notebook.png")
     assert 0.02 < picture.mean() < 0.98 and picture.std() > 0.02
     assert "samples in every pixel" in capsys.readouterr().out
 

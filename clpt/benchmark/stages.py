@@ -17,7 +17,7 @@ from clpt.benchmark.traffic import traffic
 from clpt.records import SLABS
 from clpt.render.codegen import programs
 from clpt.render.wavefront import queues
-from clpt.render.wavefront.film import FILM_WORDS
+from clpt.render.wavefront.film_state import FILM_WORDS
 from clpt.render.wavefront.wavefront import Step
 from clpt.scene import Scene
 
@@ -153,7 +153,7 @@ def _accumulate(flight: Flight, copying: Copying, rounds: int) -> Figure:
     """The film made into a picture; its items are pixels."""
     wave = flight.wavefront
     size = flight.scene.film.size
-    nbytes = 4.0 * (FILM_WORDS * int(wave.paths.settings["planes"]) + 4)
+    nbytes = 4.0 * (FILM_WORDS + 4)
     found = []
     for _ in range(rounds + 1):
         taken = timed(flight.device, lambda: [wave.accumulate_film()])

@@ -9,7 +9,7 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import DTypeLike, NDArray
 
-from ..device import Buffers, Device, Program, Source, Stream, assemble
+from ..device import Buffers, Device, Program, Source, Stream, assemble, host_buffer
 from ..device import build as build_program
 
 Array: TypeAlias = NDArray | cl.Buffer
@@ -65,7 +65,7 @@ class Building:
         if not (self.device.info.is_cpu and host.nbytes >= _ZERO_COPY):
             return self.upload(host, dtype)
         flags = cl.mem_flags.READ_ONLY | cl.mem_flags.USE_HOST_PTR
-        return cl.Buffer(self.device.context, flags, hostbuf=host)
+        return host_buffer(self.device.context, flags, host)
 
     def read(self, buffer: cl.Buffer, n: int, dtype: DTypeLike) -> NDArray:
         """Return the first n values of a buffer; wait for them."""

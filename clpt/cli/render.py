@@ -112,7 +112,7 @@ class White(click.ParamType):
     "--noise", type=click.FloatRange(0.0), metavar="SHARE",
     help="Stop sampling pixels with less noise, such as 0.02 of their light; 0: never.",
 )  # fmt: skip
-@click.option("--time", "limit", type=Duration(), help="Stop after 30s, 5m, 1h30m of rendering.")
+@click.option("--time", "limit", type=Duration(), help="Stop after 30s, 5m, 1h30m.")
 @click.option("--size", type=Size(), help="Size of the picture.")
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), help="Seed of the random numbers.")
 @click.option("--device", metavar="NAME-OR-INDEX", help="Where to render: see `clpt devices`.")
@@ -127,7 +127,9 @@ class White(click.ParamType):
     help="fast: built sooner, a little slower to trace.",
 )  # fmt: skip
 @click.option("--integrator", metavar="NAME", help=f"One of {', '.join(kinds('integrator'))}.")
-@click.option("--max-depth", type=click.IntRange(-1, 4000), help="Longest path; -1: no limit.")
+@click.option(
+    "--max-depth", type=click.IntRange(-1), help="Longest path, at most 4000; -1: no limit."
+)
 @click.option("--sensor", type=SensorName(), help="cie1931, cie1964 or a file of three curves.")
 @click.option("--white-balance", type=White(), help="What becomes white: none, D65, 3200 or x,y.")
 @click.option(
@@ -163,7 +165,8 @@ def render(
     """Render the scene file, mesh or folder SCENE.
 
     The scene decides what no option sets. With --time or --noise but no --spp the render goes on
-    until the time is over, or the noise is below the limit. Ctrl-C stops it within a second; the
+    until the time is over, or the noise is below the limit. The time counts from the command's
+    start, kernels included. Ctrl-C stops it within a second; the
     picture so far is written, and the exit status is 130. SIGTERM and SIGHUP do the same, with the
     statuses 143 and 129.
     """
@@ -190,15 +193,22 @@ def render(
         shown.note(f"clpt: warning: {warning}")
     if verbose:
         report.before(renderer, loading)
-    began = time.perf_counter()
+    ready = time.perf_counter()
+    left = shown.limit = None if limit is None else max(began + limit - ready, 0.0)
     with stops() as stopped:
         with shown.rendering():
-            render_samples(renderer, spp, limit, shown.show, plan.noise, stopped)
-        stats = outputs.metadata(renderer, scene, time.perf_counter() - began)
+            render_samples(renderer, spp, left, shown.show, plan.noise, stopped)
+        stats = outputs.metadata(renderer, scene, time.perf_counter() - ready)
         outputs.write_all(targets, renderer, stats, exposure, shown.note)
+    if stats["spp"] < 1.0:
+        shown.note(
+            f"clpt: warning: only {stats['spp']:.1%} of the pixels have a sample; others are black"
+        )
     rejected = sum(wavefront.counts.rejected for wavefront in renderer.wavefronts)
     if rejected:
         shown.note(f"clpt: warning: {rejected} samples were not finite and count as black")
+    if any(wavefront.counts.full for wavefront in renderer.wavefronts):
+        shown.note("clpt: warning: pixels are too bright for the film: scale the lights down")
     if verbose:
         report.after(renderer)
     return STATUS + stopped[0] if stopped else 0

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Sequence
 
 from ..render.progress import Progress
-from ..render.renderer import Renderer
+from ..render.renderer import MOST_SAMPLES, Renderer
 
 PASS_SECONDS = 5.0  # at the end of a pass few paths are left: long passes make that rare
 GROWTH = 3  # times what has been rendered so far
@@ -26,7 +26,7 @@ def render_samples(
 
     With `noise` the rendering also ends when no pixel has more noise.
 
-    The first pass gives every pixel a sample, whatever the limit. It ends within a second when
+    It ends soon after the limit, perhaps before every pixel has a sample, and within a second when
     `stopped` gets an entry, see clpt.cli.stopping.
     """
     began = time.perf_counter()
@@ -34,14 +34,14 @@ def render_samples(
     def tell(progress: Progress) -> bool:
         seconds = time.perf_counter() - began
         show(dataclasses.replace(progress, total=spp or 0, seconds=seconds))
-        over = limit is not None and seconds >= limit and renderer.samples > 0
+        over = limit is not None and seconds >= limit
         return not (stopped or over)
 
     size, end = 1, began
     while renderer.run(size, tell, noise=noise):
         start, end = end, time.perf_counter()
         seconds_left = math.inf if limit is None else began + limit - end
-        samples_left = math.inf if spp is None else spp - renderer.samples
+        samples_left = (spp or MOST_SAMPLES) - renderer.samples
         if samples_left <= 0 or seconds_left <= 0 or renderer.active == 0.0:
             break
         rate = size / max(end - start, 1e-9)

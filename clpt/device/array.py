@@ -9,6 +9,7 @@ from numpy.typing import DTypeLike, NDArray
 from pyopencl.array import Array
 
 from . import dlpack
+from .refusals import refused, wait
 
 
 class DeviceArray(Array):
@@ -57,7 +58,8 @@ class DeviceArray(Array):
                 f"DLPack's device of the array is {self._opencl_device}, not {wanted}"
             )
         owner = self.copy() if copy else self
-        cl.wait_for_events(owner.events)
+        for event in owner.events:
+            wait(event)
         return dlpack.opencl_capsule(owner, wanted[1])
 
     @property
@@ -72,7 +74,10 @@ class DeviceArray(Array):
     def _mapped(self) -> NDArray[Any]:
         if not self._in_host_memory:
             raise BufferError("memory of this OpenCL device becomes the host's only by a copy")
-        return self.map_to_host()
+        try:
+            return self.map_to_host()
+        except cl.Error as error:
+            raise refused("a mapping of an array", error, self.nbytes) from error
 
 
 def supersede(array: Array, event: cl.Event) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
@@ -11,30 +12,50 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from ..errors import MemoryBudgetError
 from .context import Device
+from .refusals import MEMORY_ADVICE, refused
 
 _SMALLEST = 64  # [bytes] OpenCL has no empty buffer, and kernels want something to point at
-_ADVICE = "lower the size of the image or simplify the scene, or choose another device"
+
+
+class CountedBuffer(cl.Buffer):
+    """A buffer that takes weak references, as PyOpenCL's own does not."""
+
+
+def host_buffer(context: cl.Context, flags: int, array: NDArray) -> cl.Buffer:
+    """Return a buffer of an array of the host, which is C-contiguous and not empty.
+
+    flags: of `pyopencl.mem_flags`; they tell whether it is a copy. Raises MemoryBudgetError,
+    DeviceError.
+    """
+    try:
+        return cl.Buffer(context, flags, hostbuf=array)
+    except cl.Error as error:
+        raise refused("a buffer", error, array.nbytes) from error
 
 
 class Buffers:
     """Buffers on one device within a budget.
 
     limit: bytes that all of them together may take; by default what the device has free now.
-    used: bytes allocated and not released. A buffer lives as long as it is referred to; `release`
-    frees it at once.
+    A buffer lives, and counts, as long as it is referred to; `release` frees it at once.
     """
 
     def __init__(self, device: Device, limit: int | None = None):
         self.device = device
         self.limit = device.free_memory() if limit is None else limit
-        self.used = 0
+        self._live: weakref.WeakSet[CountedBuffer] = weakref.WeakSet()
+
+    @property
+    def used(self) -> int:
+        """The size of all buffers that live [bytes]."""
+        return sum(buffer.size for buffer in self._live)
 
     @property
     def available(self) -> int:
         """The size of the largest buffer that can be allocated now [bytes]."""
         return max(0, min(self.limit - self.used, self.device.info.max_alloc))
 
-    def allocate(self, what: str, nbytes: int, advice: str = _ADVICE) -> cl.Buffer:
+    def allocate(self, what: str, nbytes: int, advice: str = MEMORY_ADVICE) -> cl.Buffer:
         """Return a buffer whose content is undefined.
 
         what, advice: for the message of the MemoryBudgetError that is raised if it does not fit.
@@ -42,7 +63,11 @@ class Buffers:
         return self._create(what, max(nbytes, _SMALLEST), advice, None)
 
     def upload(
-        self, what: str, array: ArrayLike, dtype: DTypeLike | None = None, advice: str = _ADVICE
+        self,
+        what: str,
+        array: ArrayLike,
+        dtype: DTypeLike | None = None,
+        advice: str = MEMORY_ADVICE,
     ) -> cl.Buffer:
         """Return a copy of an array, C-contiguous; of an empty one a small buffer of zeros.
 
@@ -56,26 +81,32 @@ class Buffers:
         return self._create(what, host.nbytes, advice, host)
 
     def download(self, buffer: cl.Buffer, shape: Sequence[int], dtype: DTypeLike) -> NDArray:
-        """Return a buffer's content as an array; wait for the device's queue."""
+        """Return a buffer's content as an array; wait for the device's queue.
+
+        Raises DeviceError if the driver refuses it.
+        """
         host = np.empty(tuple(shape), dtype)
         if host.nbytes:
-            cl.enqueue_copy(self.device.queue, host, buffer, is_blocking=True)
+            try:
+                cl.enqueue_copy(self.device.queue, host, buffer, is_blocking=True)
+            except cl.Error as error:
+                raise refused("a copy to the host", error, host.nbytes) from error
         return host
 
     @contextmanager
     def all_or_nothing(self) -> Iterator[None]:
-        """Count nothing of what is allocated inside, if an error ends it."""
-        used = self.used
+        """Free what is allocated inside, if an error ends it."""
+        before = set(self._live)
         try:
             yield
         except BaseException:
-            self.used = used
+            self.release(*(set(self._live) - before))
             raise
 
     def release(self, *buffers: cl.Buffer) -> None:
         """Free buffers."""
         for buffer in buffers:
-            self.used -= buffer.size
+            self._live.discard(buffer)
             buffer.release()
 
     def _create(self, what: str, nbytes: int, advice: str, host: NDArray | None) -> cl.Buffer:
@@ -85,10 +116,10 @@ class Buffers:
         if host is not None:
             access |= cl.mem_flags.COPY_HOST_PTR
         try:
-            buffer = cl.Buffer(
+            buffer = CountedBuffer(
                 self.device.context, access, size=0 if host is not None else nbytes, hostbuf=host
             )
-        except (cl.MemoryError, cl.RuntimeError) as error:
-            raise MemoryBudgetError(what, nbytes, self.available, f"{advice} ({error})") from error
-        self.used += nbytes
+        except cl.Error as error:
+            raise refused(what, error, nbytes, self.available, advice) from error
+        self._live.add(buffer)
         return buffer

@@ -105,10 +105,15 @@ class Device:
         self.programs = program_cache.of(queue)
 
     @classmethod
-    def open(cls, info: DeviceInfo, *, profiling: bool = False) -> Device:
-        """Return a device with a new context and an in-order queue. Raises DeviceError."""
+    def open(
+        cls, info: DeviceInfo, *, profiling: bool = False, context: cl.Context | None = None
+    ) -> Device:
+        """Return a device with a new in-order queue. Raises DeviceError.
+
+        context: that of the queue; None for a new one.
+        """
         try:
-            context = cl.Context([info.cl_device])
+            context = context or cl.Context([info.cl_device])
             return cls(context, _queue(context, info.cl_device, profiling), info)
         except cl.Error as error:
             raise DeviceError(f"{info.label} cannot be opened: {error}") from error
@@ -131,6 +136,9 @@ class Device:
         return f"Device({self.info.label!r})"
 
 
+_opened: dict[tuple[int, DeviceInfo], Device] = {}  # by the process, whose contexts these are
+
+
 def devices() -> tuple[DeviceInfo, ...]:
     """Return every device of every platform, in the order of the platforms' names.
 
@@ -144,6 +152,9 @@ def choose(which: str | int | None = None, *, profiling: bool = False) -> Device
 
     Its names are the platform's, its own and that in its version, such as "pocl".
 
+    It has a queue of its own. Its context is that of the process, in which programs are built once;
+    a process that was forked has another one.
+
     None takes the environment variable CLPT_DEVICE if it is set, and otherwise the first device
     that works: GPUs, then accelerators, then CPUs.
 
@@ -151,7 +162,11 @@ def choose(which: str | int | None = None, *, profiling: bool = False) -> Device
     """
     choice = selection(which)
     log.info("%s: %s", choice.info.label, choice.reason)
-    return Device.open(choice.info, profiling=profiling)
+    key = os.getpid(), choice.info
+    # Of two threads at once both open a context, and the first is kept: a lock might be held by
+    # another thread when the process is forked.
+    first = _opened.get(key) or _opened.setdefault(key, Device.open(choice.info))
+    return Device.open(choice.info, profiling=profiling, context=first.context)
 
 
 def selection(which: str | int | None = None) -> Choice:
@@ -167,7 +182,7 @@ def selection(which: str | int | None = None) -> Choice:
     named = which is not None
     failures: list[str] = []
     for info in _matching(which, found) if named else by_preference(found):
-        failure = trial(info)
+        failure = None if (os.getpid(), info) in _opened else trial(info)
         if failure is None:
             reason = f"asked for by {asked}" if named else _reason(info, found)
             return Choice(info, "; ".join([reason, *(f"passed over {f}" for f in failures)]))

@@ -23,6 +23,7 @@ from clpt.device import disk_cache, native_programs
 
 from ..errors import DeviceError, KernelBuildError
 from .context import Device
+from .refusals import refused
 from .source import Source
 
 log = logging.getLogger(__name__)
@@ -187,15 +188,17 @@ class BoundKernel:
         local_size: Sequence[int] | None = None,
         wait_for: Sequence[cl.Event] | None = None,
     ) -> cl.Event:
-        """Enqueue it; sizes are (x,), (x, y) or (x, y, z). Raises DeviceError if that fails."""
+        """Enqueue it; sizes are (x,), (x, y) or (x, y, z).
+
+        Raises DeviceError if the driver refuses it, MemoryBudgetError if memory has run out.
+        """
         try:
             return cl.enqueue_nd_range_kernel(
                 queue, self._cl_kernel, global_size, local_size, wait_for=wait_for
             )
         except cl.Error as error:
-            raise DeviceError(
-                f"kernel {self.kernel.name!r} cannot run at {global_size}, {local_size}: {error}"
-            ) from error
+            where = f"kernel {self.kernel.name!r} at {global_size}, {local_size}"
+            raise refused(where, error) from error
 
 
 def build(device: Device, source: Source, options: Sequence[str] = ()) -> Program:

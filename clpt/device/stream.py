@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
 import pyopencl as cl
 
+from .buffers import host_buffer
 from .program import BoundKernel
+from .refusals import refused, wait
 
 Events = Iterable[cl.Event] | None  # as `wait_for` takes them
 
@@ -19,7 +21,8 @@ class Stream:
 
     On an in-order queue that costs nothing; on an out-of-order one each command waits for the event
     of the last. The host waits in `read` and `wait` only. Nothing calls clFinish, so that commands
-    of others on the queue are left alone.
+    of others on the queue are left alone. What the driver refuses is raised as DeviceError, or as
+    MemoryBudgetError where memory has run out.
 
     queue: the caller's; last: the event of the last command, None before the first.
     """
@@ -43,56 +46,56 @@ class Stream:
         local_size: Sequence[int] | None = None,
     ) -> cl.Event:
         """Enqueue a kernel. Raises DeviceError if the driver refuses it."""
-        return self._note(bound.enqueue(self.queue, global_size, local_size, self._waits()))
+        self.last = bound.enqueue(self.queue, global_size, local_size, self._waits())
+        return self.last
 
     def fill(self, buffer: cl.Buffer, word: int, offset: int, nbytes: int) -> cl.Event:
         """Enqueue that a range of a buffer becomes one repeated word."""
-        value = np.uint32(word)
-        waits = self._waits()
-        return self._note(
-            cl.enqueue_fill_buffer(self.queue, buffer, value, offset, nbytes, wait_for=waits)
-        )
+        command = cl.enqueue_fill_buffer
+        return self._enqueue("a fill", nbytes, command, buffer, np.uint32(word), offset, nbytes)
 
     def copy(self, target: cl.Buffer, source: cl.Buffer, **offsets: int) -> cl.Event:
         """Enqueue a copy on the device; offsets: as of `pyopencl.enqueue_copy`."""
-        waits = self._waits()
-        return self._note(cl.enqueue_copy(self.queue, target, source, wait_for=waits, **offsets))
+        size = offsets.get("byte_count", source.size)
+        return self._enqueue("a copy", size, cl.enqueue_copy, target, source, **offsets)
 
     def write(self, target: cl.Buffer, source: np.ndarray, offset: int = 0) -> cl.Event:
         """Enqueue that an array goes to a buffer, from a copy of it: it may change at once."""
         # The copy is a buffer, which the driver keeps until it is read: PyOpenCL's event of a copy
         # from the host waits when nobody refers to it, and no other thread of Python runs then.
         flags = cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR
-        staged = cl.Buffer(self.queue.context, flags, hostbuf=np.ascontiguousarray(source))
+        staged = host_buffer(self.queue.context, flags, np.ascontiguousarray(source))
         return self.copy(target, staged, dst_offset=offset, byte_count=staged.size)
 
     def mark(self) -> cl.Event:
         """Return an event that ends when all commands so far, and the events of `after`, have."""
-        return self._note(cl.enqueue_marker(self.queue, wait_for=self._waits()))
+        return self._enqueue("a marker", None, cl.enqueue_marker)
 
     def read(self, source: cl.Buffer, into: np.ndarray, offset: int = 0) -> np.ndarray:
         """Return a buffer's content in an array; wait for it."""
         if into.nbytes:
-            self.read_later(source, into, offset).wait()
+            wait(self.read_later(source, into, offset), "a copy to the host")
         return into
 
     def read_later(self, source: cl.Buffer, into: np.ndarray, offset: int = 0) -> cl.Event:
         """Enqueue that an array is filled from a buffer; it is valid when the event has ended."""
-        return self._note_copy(
-            cl.enqueue_copy(
-                self.queue, into, source, src_offset=offset, is_blocking=False,
-                wait_for=self._waits(),
-            )
-        )  # fmt: skip
+        options = {"src_offset": offset, "is_blocking": False}
+        event = self._enqueue(
+            "a copy to the host", into.nbytes, cl.enqueue_copy, into, source, **options
+        )
+        return self._keep(event)
 
     def wait(self) -> None:
         """Wait until the last command has ended."""
         if self.last is not None:
-            self.last.wait()
+            wait(self.last)
 
     def flush(self) -> None:
         """Let the device begin what was enqueued."""
-        self.queue.flush()
+        try:
+            self.queue.flush()
+        except cl.Error as error:
+            raise refused("a flush of the queue", error) from error
 
     def _waits(self) -> list[cl.Event] | None:
         waits, self._before = self._before, []
@@ -100,14 +103,21 @@ class Stream:
             waits = [*waits, self.last]
         return waits or None
 
-    def _note_copy(self, event: cl.Event) -> cl.Event:
-        """Note an event of a copy to the host, and refer to it until it has ended."""
+    def _enqueue(
+        self, what: str, nbytes: int | None, command: Callable[..., Any], *args: Any, **named: Any
+    ) -> cl.Event:
+        """Enqueue one of OpenCL's commands; what, nbytes: see `refused`."""
+        waits = self._waits()
+        try:
+            self.last = command(self.queue, *args, wait_for=waits, **named)
+        except cl.Error as error:
+            raise refused(what, error, nbytes) from error
+        return self.last
+
+    def _keep(self, event: cl.Event) -> cl.Event:
+        """Refer to an event of a copy to the host until it has ended."""
         done = cl.command_execution_status.COMPLETE
         while self._copies and self._copies[0].command_execution_status <= done:
             self._copies.popleft()
         self._copies.append(event)
-        return self._note(event)
-
-    def _note(self, event: Any) -> cl.Event:
-        self.last = event
         return event

@@ -1,4 +1,4 @@
-"""Scene files: `load(path)` returns the plain-data Scene that a file of any format describes."""
+"""Scene files: `load` reads a Scene from a file of any format, `save` writes it as scene.json."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ IN_FOLDERS = ("scene.json", "scene.xml", "scene.pbrt", "scene-v4.pbrt")
 SCENES = (".xml", ".pbrt", ".pbrt.gz", ".glb", ".gltf")
 MOST_NAMED = 8  # scenes of a folder that a message names
 
-__all__ = ["FORMATS", "load"]
+__all__ = ["FORMATS", "load", "save"]
 
 
 def load(
@@ -68,12 +68,35 @@ def load(
     return loader(path, **variables)
 
 
+def save(scene: Scene, path: str | Path, /) -> None:
+    """Write a scene such that `load` gives the same content back.
+
+    path: of a new .json, or of a folder that gets a scene.json; an existing file is replaced. The
+    arrays of shapes and images lie in files beside it, which begin with its name: meshes as .ply,
+    curves as .txt, spheres as .npz, images as .npy, .png or .exr, transforms of many instances as
+    .npy. An image that the scene has by its path is named, not copied. Colours of meshes keep
+    their float32. `warnings` and `extra` are not written.
+
+    Raises SceneError for another suffix, and where a file cannot be written.
+    """
+    path = Path(path)
+    if not isinstance(scene, Scene):
+        raise TypeError(f"clpt.save writes a clpt.Scene, not {type(scene).__name__}")
+    if path.is_dir():
+        path = path / IN_FOLDERS[0]
+    if path.suffix.lower() != ".json":
+        raise SceneError(f"a scene is saved as .json, not {path.suffix!r}", file=path)
+    importlib.import_module("clpt.formats.native").save(scene, path)
+
+
 def _existing(path: Path) -> Path:
     try:
         if path.is_dir():
             return _inside(path)
         if path.is_file():
             return path
+    except SceneError:
+        raise
     except (OSError, ValueError) as error:
         raise SceneError(f"cannot be read: {error}", file=path) from None
     raise SceneError("there is no such file", file=path)

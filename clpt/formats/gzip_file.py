@@ -31,6 +31,8 @@ def read_bytes(path: Path, largest: int = LARGEST) -> bytes:
                     message = f"is larger than {largest >> 20} MiB when unpacked; unpack it first"
                     raise SceneError(message, file=path)
         return b"".join(parts)
+    except SceneError:
+        raise
     except (OSError, EOFError, ValueError, zlib.error) as error:
         reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
         raise SceneError(f"cannot be read: {reason}", file=path) from None

@@ -10,7 +10,7 @@ import pyopencl as cl
 from numpy.typing import NDArray
 
 from .. import bvh
-from ..device import Events
+from ..device import Buffers, Events, wait
 from ..errors import SceneError
 from . import batch
 from .arrays import ArrayInput, device_arg, on_device
@@ -48,7 +48,7 @@ class Accel(Queries):
         self._stream.after(wait_for)
         points, self.vertices = self._input("vertices", vertices, np.float32)
         corners, _ = self._input("faces", faces, np.uint32, np.int32)
-        self._stream.mark().wait()  # the build has another stream
+        wait(self._stream.mark())  # the build has another stream
         self.tree = bvh.build(self.device, points, corners, layout=self.layout, quality=quality)
         self._trees = self.tree.buffers
         self._interleaved = bvh.outgrows_caches(self.device, self.layout, self.tree.count)
@@ -136,7 +136,7 @@ class Accel(Queries):
         self._stream.after(argument.events)
         if isinstance(buffer, cl.Buffer) and not argument.offset and buffer.size == 12 * rows:
             return buffer, rows
-        copy = cl.Buffer(self.queue.context, cl.mem_flags.READ_WRITE, 12 * rows)
+        copy = Buffers(self.device).allocate(f"a copy of the {name}", 12 * rows)
         self._stream.copy(copy, buffer, src_offset=4 * argument.offset, byte_count=12 * rows)
         return copy, rows
 

@@ -11,6 +11,7 @@ import pyopencl as cl
 from numpy.typing import NDArray
 from pyopencl.array import Array
 
+from ..device import host_buffer
 from ..errors import SceneError
 from .arrays import ArrayInput, DeviceArg, device_arg, on_device, vectors
 
@@ -96,7 +97,7 @@ def wrap_host(context: cl.Context, array: NDArray[Any], shared: bool) -> DeviceA
     flags = cl.mem_flags
     access = flags.READ_WRITE if array.flags.writeable else flags.READ_ONLY
     memory = flags.USE_HOST_PTR if shared else flags.COPY_HOST_PTR
-    return DeviceArg(cl.Buffer(context, access | memory, hostbuf=array), len(array))
+    return DeviceArg(host_buffer(context, access | memory, array), len(array))
 
 
 def results(

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pyopencl.array import Array
 
 from ..bvh import TREES, choose_tree, traversal_text
-from ..device import BoundKernel, Device, Events, Program, Stream, assemble, build
+from ..device import BoundKernel, Device, Events, Program, Stream, assemble, build, wait
 from ..errors import DeviceError, SceneError
 from ..records import INSTANCE
 from . import batch
@@ -77,6 +77,15 @@ class Queries:
     """
 
     instanced = False
+
+    def __new__(cls, queue: Any = None, *_: Any, **__: Any) -> Queries:
+        if not isinstance(queue, cl.CommandQueue):  # before Python counts the other arguments
+            found = f"its first argument is a pyopencl.CommandQueue, not {type(queue).__name__}"
+            advice = "clpt.device.choose().queue is one"
+            if hasattr(queue, "vertices") and hasattr(queue, "faces"):
+                advice += f"; of a mesh, {cls.__name__}(queue, mesh.vertices, mesh.faces)"
+            raise TypeError(f"{cls.__name__}: {found}; {advice}")
+        return super().__new__(cls)
 
     def __init__(self, queue: cl.CommandQueue, layout: str | None):
         self.queue = queue
@@ -201,7 +210,7 @@ class Queries:
         for key, array in arrays.items():
             if array.size:  # onto itself, where the device works in the host's memory
                 event = self._stream.read_later(outputs[key].buffer, array)
-        event.wait()
+        wait(event)
         if rays.count:  # the kernel lets go of the host's memory
             self._kernels[name].set_args(**dict.fromkeys([*_RAY_ARRAYS, *outputs]))
         return event

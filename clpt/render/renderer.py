@@ -8,7 +8,7 @@ import math
 import threading
 import time
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyopencl as cl
@@ -27,18 +27,24 @@ from clpt.render.editing.scene_edit import (
 )
 from clpt.render.locking import synchronized
 from clpt.render.lowering.scene import lower
+from clpt.render.options import RenderOptions, check_changes, check_options, check_scene
 from clpt.render.pictures import Image, Pictures
 from clpt.render.progress import Progress
 from clpt.render.stats import RenderStats, collect
 from clpt.render.wavefront import adaptive
+from clpt.render.wavefront.film_state import FilmState, Ranges, join_ranges
 from clpt.render.wavefront.wavefront import Wavefront
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
 from clpt.scene.integrators import Aov
 from clpt.scene.materials import Material
 
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
 log = logging.getLogger(__name__)
 
+MOST_SAMPLES = 2**31 - 1
 TEXTURE_SHARE = 0.5  # of a device's free memory, for bitmaps
 
 
@@ -46,16 +52,13 @@ class Renderer(Pictures):
     """Renders a scene; its picture so far is available at any time.
 
     device: where to render, a name or index (see clpt.device.choose), or a clpt.device.Device.
-    queue: the caller's, instead of a device; all buffers and programs are then made in its context,
-    all commands go there, and no other OpenCL object is made or changed. progress: called when a
-    step has ended, in a thread of the driver. texture_budget: [bytes] that bitmaps may take, larger
-    ones are halved; by default half of what the device has free. The other parameters are those of
-    clpt.render.wavefront.wavefront.Wavefront.create.
+    progress: called when a step has ended, in a thread of the driver. options: see `RenderOptions`.
 
     It may be used from several threads: one method runs at a time. With `with`, `close`, or when it
     is dropped, it gives the device's memory back.
 
-    Raises SceneError for a scene that makes no sense, DeviceError, MemoryBudgetError.
+    Raises TypeError for what is no scene, queue or option; SceneError for a scene or an option that
+    makes no sense; DeviceError, MemoryBudgetError, KernelBuildError.
     """
 
     def __init__(
@@ -63,35 +66,44 @@ class Renderer(Pictures):
         scene: Scene,
         device: dev.Device | str | int | None = None,
         *,
-        queue: cl.CommandQueue | None = None,
         progress: Callable[[Progress], Any] | None = None,
-        profiling: bool = False,
-        texture_budget: int | None = None,
-        **wavefront: Any,
+        **options: Unpack[RenderOptions],
     ):
         super().__init__()
+        check_scene(scene)
+        check_options(scene, options)
         self._stop = threading.Event()
         self.scene = scene
+        queue = options.get("queue")
         if queue is not None:
             if device is not None:
                 raise DeviceError("give a device or a queue; a queue has its device")
             device = dev.Device.adopt(queue)
         elif not isinstance(device, dev.Device):
-            device = dev.choose(device, profiling=profiling)
+            device = dev.choose(device, profiling=options.get("profiling", False))
         self.device = device
         self.channels: tuple[str, ...] = ()
         if isinstance(scene.integrator, Aov):
             self.channels = scene.integrator.channels
         self._start = time.perf_counter()
         before = device.builds.programs, device.builds.cached
+        texture_budget = options.get("texture_budget")
         if texture_budget is None:
             texture_budget = _texture_budget(device)
         self._texture_budget, self._successors = texture_budget, Successors()
         lowered = lower(resolve_device_arrays(scene, device.queue), texture_budget)
         self._seconds = {"lower": time.perf_counter() - self._start}
-        paths = scene.spp * math.prod(scene.film.size)
-        wanted = {"paths": paths, "looped": None if queue is None else True, **wavefront}
-        first = Wavefront.create(device, lowered, **wanted)
+        first = Wavefront.create(
+            device,
+            lowered,
+            layout=options.get("layout"),
+            slots=options.get("slots"),
+            queued=options.get("queued"),
+            looped=options.get("looped", None if queue is None else True),
+            paths=scene.spp * math.prod(scene.film.size),
+            tree_quality=options.get("tree_quality", "high"),
+            halves=options.get("halves", False),
+        )
         self.wavefronts = [first, *(first.with_channel(channel) for channel in self.channels[1:])]
         for one in self.wavefronts:
             one.prepare()
@@ -100,7 +112,8 @@ class Renderer(Pictures):
         self._seconds["trees"] = first.scene.trees.seconds
         self._seconds["ready"] = time.perf_counter() - self._start
         self.warnings = list(lowered.warnings)
-        self.samples = 0
+        self._first_sample = _sample_number(options.get("first_sample", 0))
+        self._taken: Ranges = ()
         self._progress = progress
         self._moving: Moving | None = None
         self._adaptive: adaptive.Adaptive | None = None
@@ -108,7 +121,7 @@ class Renderer(Pictures):
 
     @synchronized
     def step(self, samples: int = 1, wait_for: dev.Events = None) -> cl.Event:
-        """Enqueue that every pixel gets `samples` more; `self.samples` tells how many it then has.
+        """Enqueue `samples` more of every pixel; `self.samples` is then the next one's number.
 
         Nothing is waited for or read: when the event that is returned has ended, `film` holds the
         picture. wait_for: events of the caller that come first. On an in-order queue whatever the
@@ -116,12 +129,12 @@ class Renderer(Pictures):
 
         Raises SceneError for a number that is none, DeviceError if the driver refuses.
         """
-        first, end = self.samples, self.samples + _whole(samples)
+        first, end = self._next_range(samples)
         stream = self.wavefronts[0].stream
         stream.after(wait_for)
         for wavefront in self.wavefronts:
             wavefront.enqueue(first, end)
-        self.samples = end
+        self._taken = join_ranges(self._taken, ((first, end),))
         if self._adaptive is not None:
             self._adaptive.skip(end)
         stream.flush()
@@ -151,25 +164,26 @@ class Renderer(Pictures):
     def run(
         self,
         samples: int,
-        progress: Callable[[Progress], bool] | None = None,
+        progress: Callable[[Progress], bool | None] | None = None,
         *,
         noise: float | None = None,
     ) -> bool:
-        """Add samples to every pixel and wait; `self.samples` counts all so far.
+        """Add samples to every pixel and wait; `self.samples` is then the next one's number.
 
         noise: leave pixels as soon as the noise around them is as low, relative to the picture,
         such as 0.02; `samples` is then the most that a pixel gets, see
         clpt.render.wavefront.adaptive.
         progress: called every few milliseconds to seconds; if it returns False the run stops soon,
         as after `cancel`. Returns whether it came to its end. What progress raises, or Ctrl+C in
-        it, is raised when the paths in flight have ended: the film is whole then too.
+        it, is raised when the paths in flight have ended. The film is whole after a stop too: its
+        pixels have fewer samples, and the numbers of those that were left out are not used again.
 
-        Raises SceneError for noise that makes no sense with the scene.
+        Raises SceneError for noise that makes no sense with the scene, and for more than 2^31 - 1
+        samples.
         """
         start = time.perf_counter()
-        first, end = self.samples, self.samples + _whole(samples)
+        first, end = self._next_range(samples)
         raised: list[BaseException] = []
-        self._stop.clear()
 
         def on_batch(_: Any) -> bool:
             counts = [w.counts for w in self.wavefronts]
@@ -182,17 +196,23 @@ class Renderer(Pictures):
             if self._stop.is_set() or progress is None:
                 return not self._stop.is_set()
             try:
-                return progress(Progress(paths / pixels, end, paths, rays, seconds, self.active))
+                told = Progress(paths / pixels, end, paths, rays, seconds, self.active)
+                return progress(told) is not False
             except BaseException as error:
                 raised.append(error)
                 return False
 
-        if not self._render_samples(first, end, noise, on_batch):
-            if raised:
-                raise raised.pop()
+        if self._stop.is_set():  # before it began: nothing is taken
+            self._stop.clear()
             return False
-        self.samples = end
-        return True
+        try:
+            finished = self._render_samples(first, end, noise, on_batch)
+            self._taken = join_ranges(self._taken, ((first, end),))
+        finally:
+            self._stop.clear()
+        if raised:
+            raise raised.pop()
+        return finished
 
     def _render_samples(
         self, first: int, end: int, noise: float | None, on_batch: Callable[[Any], bool]
@@ -215,15 +235,16 @@ class Renderer(Pictures):
         return 1.0 if self._adaptive is None else self._adaptive.active
 
     def cancel(self) -> None:
-        """Let the `run` of another thread stop soon; it then returns False. A step is not stopped.
+        """Let the `run` of another thread, or else the next one, stop soon and return False.
 
-        It may be called from anywhere, also from a signal's handler, and waits for nothing.
+        A step is not stopped. It may be called from anywhere, also from a signal's handler, and
+        waits for nothing.
         """
         self._stop.set()
 
     @synchronized
     def reset(self, wait_for: dev.Events = None, *, seed: int | None = None) -> cl.Event:
-        """Enqueue that the film is emptied; the next sample is number 0 again.
+        """Enqueue that the film is emptied; the next sample is the first one again.
 
         seed: of the samples from now on, which `self.scene` then has; by default as before. Raises
         SceneError for a seed that is no whole number.
@@ -237,9 +258,51 @@ class Renderer(Pictures):
             self.wavefronts[0].paths.set_seed(seed)
         for wavefront in self.wavefronts:
             wavefront.clear()
-        self.samples, self._adaptive = 0, None
+        self._taken, self._adaptive = (), None
         stream.flush()
         return stream.last
+
+    @property
+    def samples(self) -> int:
+        """The number of the next sample: of all so far, where they began at number 0."""
+        return self._taken[-1][1] if self._taken else self._first_sample
+
+    @synchronized
+    def film_state(self) -> FilmState:
+        """Return what the film holds, as whole numbers on the host; wait for it."""
+        films, bands = zip(*(one.film.words() for one in self.wavefronts), strict=True)
+        return FilmState(np.stack(films), bands[0], self._taken)
+
+    @synchronized
+    def merge(self, state: FilmState) -> None:
+        """Add the samples of another film of the same scene to this one, and wait.
+
+        The picture is then that of one renderer that took them all, to the bit. To go on where a
+        state was taken, merge it into a new renderer. `self.samples` is then after the last one.
+
+        Raises SceneError if the film has another form, or a sample is in both: nothing has changed.
+        """
+        merged = self.film_state().merged(state)
+        for one, words in zip(self.wavefronts, state.words, strict=True):
+            one.add_words(words, state.bands)
+        self._taken, self._adaptive = merged.taken, None
+
+    @synchronized
+    def halves(self) -> tuple[Image, Image]:
+        """Return two independent pictures, of the even and of the odd samples; wait for them.
+
+        (h, w, 3) float32 each, in the film's output space, of a Renderer with `halves=True`. Their
+        mean, weighted by numbers of samples, is the whole picture. Raises SceneError without.
+        """
+        first = self.wavefronts[0]
+        if first.film.halves != 2:
+            raise SceneError("even and odd samples are not kept apart; give Renderer halves=True")
+        return first.half(0), first.half(1)
+
+    def _next_range(self, samples: int) -> tuple[int, int]:
+        """The numbers of the next samples, first and end. Raises SceneError."""
+        first = self.samples
+        return first, _sample_number(first + _whole(samples))
 
     def close(self) -> None:
         """Give the device's memory back; the renderer is of no use afterwards.
@@ -291,8 +354,12 @@ class Renderer(Pictures):
         DEBUG the logger `clpt.render.renderer` says why a quicker way was not taken.
 
         Raises SceneError for what is not in the scene, or makes no sense in it, and for a film of
-        another size; nothing has changed then.
+        another size, TypeError for a scene that is none; nothing has changed then. Raises
+        MemoryBudgetError and KernelBuildError where the device cannot do what the new scene needs.
         """
+        if scene is not None:
+            check_scene(scene)
+        check_changes(camera, materials=materials, transforms=transforms, vertices=vertices)
         events = list(wait_for or ())
         self.wavefronts[0].stream.after(events)
         moves = scene is None and bool(transforms or vertices)
@@ -343,7 +410,7 @@ class Renderer(Pictures):
         if getattr(scene.integrator, "channels", ()) != self.channels:
             raise SceneError("other channels need a new Renderer", where="integrator.channels")
         for event in events:
-            event.wait()
+            dev.wait(event)
         first = self.wavefronts[0]
         readable = resolve_device_arrays(scene, first.stream.queue)
         lowered = lower(readable, self._texture_budget, first.scene.lowered)
@@ -356,6 +423,13 @@ class Renderer(Pictures):
     def stats(self) -> RenderStats:
         """What the render took so far: numbers of things, bytes by table and tree, seconds."""
         return collect(self.wavefronts, *self._built, dict(self._seconds))
+
+
+def _sample_number(number: int) -> int:
+    """A sample's number. Raises SceneError for one that is too large."""
+    if number > MOST_SAMPLES:
+        raise SceneError(f"a pixel cannot have more than {MOST_SAMPLES} samples", where="samples")
+    return number
 
 
 def _whole(samples: int) -> int:
@@ -375,16 +449,17 @@ def render(
     spp: int | None = None,
     *,
     device: dev.Device | str | int | None = None,
-    progress: Callable[[Progress], bool] | None = None,
+    progress: Callable[[Progress], bool | None] | None = None,
     noise: float | None = None,
-    **wavefront: Any,
+    **options: Unpack[RenderOptions],
 ) -> Image:
     """Render a scene: (h, w, 3) float32 linear Rec. 709; else see `Renderer.image`.
 
-    spp: samples per pixel, noise: see `Renderer.run`; the scene's own by default. Raises as
-    `Renderer` does.
+    spp: samples per pixel, noise and progress: see `Renderer.run`; spp and noise are the scene's
+    own by default. device: see `Renderer`; options: see `RenderOptions`. Raises as `Renderer` does.
     """
+    check_scene(scene)
     spp = _whole(scene.spp if spp is None else spp)
-    renderer = Renderer(dataclasses.replace(scene, spp=spp), device, **wavefront)
+    renderer = Renderer(dataclasses.replace(scene, spp=spp), device, **options)
     renderer.run(spp, progress, noise=scene.noise if noise is None else noise)
     return renderer.image()

@@ -58,7 +58,7 @@ class Layer(Kind):
     """
 
     eta: Any = index("water", "index of refraction")
-    k: Any = index(0.0, "extinction coefficient; above 0 it absorbs")
+    k: Any = index(0.0, "extinction coefficient; above 0 it absorbs", zero=True)
     thickness: float = real(400.0, "where it is thickest", "nm", low=0.0, high=1e5)
     profile: Any = real(1.0, "share of that thickness that is there", "", 0.0, 1.0, textured=True)
 
@@ -184,8 +184,8 @@ class Conductor(Material):
 
     delta = True
 
-    eta: Any = index(0.0, "index of refraction", textured=True)
-    k: Any = index(1.0, "extinction coefficient", textured=True)
+    eta: Any = index(0.0, "index of refraction", zero=True, textured=True)
+    k: Any = index(1.0, "extinction coefficient", zero=True, textured=True)
     specular_reflectance: Any = reflectance(1.0, "factor on reflection; 1 is physical")
     layers: tuple[Layer, ...] = layers(FILMS)
 
@@ -194,8 +194,8 @@ class Conductor(Material):
 class RoughConductor(Material):
     """A rough metal of microfacets (Cook and Torrance; Heitz 2018 visible normals); front side."""
 
-    eta: Any = index(0.0, "index of refraction", textured=True)
-    k: Any = index(1.0, "extinction coefficient", textured=True)
+    eta: Any = index(0.0, "index of refraction", zero=True, textured=True)
+    k: Any = index(1.0, "extinction coefficient", zero=True, textured=True)
     distribution: str = choice("ggx", "of the microfacet normals", DISTRIBUTIONS)
     alpha_u: Any = real(0.1, "roughness along the tangent", low=1e-4, high=1.0, textured=True)
     alpha_v: Any = real(0.1, "roughness across it", low=1e-4, high=1.0, textured=True)
@@ -244,9 +244,12 @@ class CoatedConductor(Material):
     ext_ior: Any = index(1.000277, "index outside")
     coat_alpha: Any = real(0.01, "roughness of the coat", low=1e-4, high=1.0, textured=True)
     eta: Any = index(
-        0.0, "index of refraction of the metal; the default is a perfect mirror", textured=True
+        0.0,
+        "index of refraction of the metal; the default is a perfect mirror",
+        zero=True,
+        textured=True,
     )
-    k: Any = index(1.0, "extinction coefficient of the metal", textured=True)
+    k: Any = index(1.0, "extinction coefficient of the metal", zero=True, textured=True)
     distribution: str = choice("ggx", "of both their microfacet normals", DISTRIBUTIONS)
     alpha_u: Any = real(0.1, "the metal's roughness along tangents", "", 1e-4, 1.0, textured=True)
     alpha_v: Any = real(0.1, "the metal's roughness across it", "", 1e-4, 1.0, textured=True)
@@ -349,7 +352,9 @@ class GltfSurface(Material):
     base_color: Any = reflectance(1.0, "colour of base, metal, and of what is let through")
     metallic: Any = _share(0.0, "share of the metal", lobe=True)
     roughness: Any = _share(1.0, "of reflection and of what is let through")
-    ior: Any = index(1.5, "index of the dielectric; 0: it reflects all but for `specular_color`")
+    ior: Any = index(
+        1.5, "index of the dielectric; 0: it reflects all but for `specular_color`", zero=True
+    )
     specular: Any = _share(1.0, "strength of the dielectric's reflection")
     specular_color: Any = reflectance(1.0, "factor on it at normal incidence")
     anisotropy: Any = _share(0.0, "how much rougher the tangent's direction is", lobe=True)
@@ -407,9 +412,12 @@ class Grating(Material):
     efficiencies: Any = per_order((1.0, 1.0, 1.0), "how strong orders -n to n are, explicitly")
     ior: Any = index(1.5, "index of a transmissive plate")
     eta: Any = index(
-        0.0, "index of refraction of the metal; the default is a perfect mirror", textured=True
+        0.0,
+        "index of refraction of the metal; the default is a perfect mirror",
+        zero=True,
+        textured=True,
     )
-    k: Any = index(1.0, "extinction coefficient of the metal", textured=True)
+    k: Any = index(1.0, "extinction coefficient of the metal", zero=True, textured=True)
     reflectance: Any = reflectance(1.0, "factor on the light of all orders; 1 is physical")
 
     @property

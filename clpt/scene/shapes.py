@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from clpt import images
 from clpt.errors import SceneError
-from clpt.scene.materials import Diffuse
+from clpt.scene.materials import Diffuse, TwoSided
 from clpt.scene.params import Kind, choice, host
+from clpt.scene.textures import MeshAttribute
 
 SMOOTH = "smooth"  # normals of a mesh: the means of the triangles around a vertex, by their areas
 BASES = ("linear", "bspline", "bezier")
@@ -35,7 +37,7 @@ class Mesh(Shape):
     normals: Any = host(
         None,
         "(n, 3) float32 per vertex; None: flat; 'smooth': from the triangles",
-        form="rows3",
+        form="normals",
     )
     uvs: Any = host(None, "(n, 2) float32 per vertex, or None", form="rows2")
     attributes: Any = host(
@@ -43,6 +45,39 @@ class Mesh(Shape):
         "name -> (n, 1 or 3) float32; one row a vertex or a face, as vertex_ or face_ begins it",
         form="attributes",
     )
+
+    @classmethod
+    def from_trimesh(cls, geometry: Any, **parameters: Any) -> Mesh:
+        """Return a `trimesh.Trimesh` as a mesh: its vertices, faces, uvs and colours.
+
+        geometry: its arrays are shared where they have clpt's types already. Colours of vertices
+        or faces, 8-bit sRGB, become the linear attribute `vertex_color` or `face_color`, which the
+        material shows if none is given. Its material is not read.
+        parameters: further ones of the mesh, such as material, to_world, name, or normals="smooth";
+        without normals the triangles are flat.
+
+        Raises SceneError for what is no Trimesh.
+        """
+        if not (hasattr(geometry, "faces") and hasattr(geometry, "vertices")):
+            message = f"must be a trimesh.Trimesh, not {type(geometry).__name__}; "
+            raise SceneError(message + "a trimesh.Scene gives one by its to_mesh()", where="mesh")
+        visual, given = getattr(geometry, "visual", None), dict(parameters)
+        uvs = getattr(visual, "uv", None)
+        if uvs is not None:
+            given.setdefault("uvs", np.ascontiguousarray(uvs, np.float32))
+        kind = getattr(visual, "kind", None)
+        if kind in ("vertex", "face"):
+            levels = np.asarray(getattr(visual, f"{kind}_colors"))[:, :3]
+            colours = images.srgb_to_linear(levels.astype(np.float32) / np.float32(255.0))
+            name = f"{kind}_color"
+            given["attributes"] = {name: colours, **given.get("attributes", {})}
+            shown = Diffuse(reflectance=MeshAttribute(name=name), name=name)
+            given.setdefault("material", TwoSided(front=shown))
+        return cls(
+            vertices=np.ascontiguousarray(geometry.vertices, np.float32),
+            faces=np.ascontiguousarray(geometry.faces, np.uint32),
+            **given,
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -7,6 +7,7 @@
 #include "core/mis.cl"
 #include "generated/spectrum.cl"
 #include "core/spectrum.cl"
+#include "core/fixed.cl"
 #include "core/slab.cl"
 #include "path/path_state.cl"
 #include "generated/scene.cl"

@@ -1,88 +1,88 @@
-/* The film while it is being exposed. A film is FILM_WORDS streams of `padded_pixels` floats per plane; pixels are
- * stored in 4x4 tiles, row by row in a tile and tile by tile in a row of them. A slot owns the pixel of its plane
- * that it renders, so nothing here is atomic but the counters. */
-#define FILM_WORDS 7 /* sums of three channels, their compensations, and the number of samples */
-
-/* Where the pixel (x, y) of the picture is stored. */
-inline integer film_pixel_index(global const Settings *settings, integer x, integer y)
-{
-    return ((y >> 2) * settings->tiles_x + (x >> 2)) * 16 + (y & 3) * 4 + (x & 3);
-}
-
-/* The pixel that is stored at an index: x and y, whole numbers. */
-inline vec2 pixel_of_index(global const Settings *settings, integer pixel_index)
-{
-    integer tile = pixel_index >> 4, row = divide(tile, settings->tiles_x), column = tile - row * settings->tiles_x;
-    vec2 p = {to_real(column * 4 + (pixel_index & 3)), to_real(row * 4 + ((pixel_index >> 2) & 3))};
-    return p;
-}
-
-/* A point of the whole film, 0 to 1: `offset` [pixels] from the centre of a pixel of the picture. */
-inline vec2 film_position(global const Settings *settings, vec2 pixel, vec2 offset)
-{
-    vec2 p = {(pixel.x + (settings->crop_x + 0.5f) + offset.x) / (float)settings->film_width,
-              (pixel.y + (settings->crop_y + 0.5f) + offset.y) / (float)settings->film_height};
-    return p;
-}
+/* The film while it is being exposed. A film is FILM_WORDS streams of `padded_pixels` words, or, where even and odd
+ * samples are kept apart, two times as many. Slots of several planes may render the same pixel: it is added to by
+ * atomics. */
+#include "film/pixel.cl"
+#include "film/sums.cl"
+#define FILM_WORDS 10 /* sums of three channels, three words each, and the number of samples */
 
 /* Whether the film takes a value: neither NaN nor so large that sums would overflow. */
-inline mask film_accepts(vec3 value) { return fabs(value.x) + fabs(value.y) + fabs(value.z) < 1e30f; }
+inline mask film_accepts(vec3 value) { return fabs(value.x) + fabs(value.y) + fabs(value.z) < FIXED_LARGEST; }
 
-/* Compensated addition (Neumaier 1974): `compensation` gathers what rounding takes from `sum`. */
-inline void sum_add(real *sum, real *compensation, real v)
-{
-    real total = *sum + v;
-    *compensation += sel(fabs(*sum) >= fabs(v), (*sum - total) + v, (v - total) + *sum);
-    *sum = total;
-}
-
-/* What a pixel of one plane holds. */
+/* What a slot has summed of a pixel: three channels, and the number of samples. */
 typedef struct {
-    vec3 sum, compensation;
-    real samples;
+    Fixed first, second, third;
+    natural samples;
 } Exposure;
 
-inline Exposure film_load(global const Settings *settings, global const float *film, mask m, integer plane,
-                          integer pixel_index)
+inline Exposure exposure_sel(mask m, Exposure a, Exposure b)
 {
-    integer stream = settings->padded_pixels, at = plane * FILM_WORDS * stream + sel_i(m, pixel_index, (integer)(0));
-    Exposure e;
-    e.sum = v3(gather(film, at), gather(film, at + stream), gather(film, at + 2 * stream));
-    e.compensation = v3(gather(film, at + 3 * stream), gather(film, at + 4 * stream), gather(film, at + 5 * stream));
-    e.samples = gather(film, at + 6 * stream);
+    Exposure e = {fixed_sel(m, a.first, b.first), fixed_sel(m, a.second, b.second), fixed_sel(m, a.third, b.third),
+                  sel_n(m, a.samples, b.samples)};
     return e;
 }
 
-inline void film_store(global const Settings *settings, global float *film, mask m, integer plane, integer pixel_index,
-                       Exposure e)
+inline Exposure exposure_none(void)
 {
-    integer stream = settings->padded_pixels, at = plane * FILM_WORDS * stream + pixel_index;
-    scatter_if(film, at, m, e.sum.x);
-    scatter_if(film, at + stream, m, e.sum.y);
-    scatter_if(film, at + 2 * stream, m, e.sum.z);
-    scatter_if(film, at + 3 * stream, m, e.compensation.x);
-    scatter_if(film, at + 4 * stream, m, e.compensation.y);
-    scatter_if(film, at + 5 * stream, m, e.compensation.z);
-    scatter_if(film, at + 6 * stream, m, e.samples);
+    Exposure e = {fixed_zero(), fixed_zero(), fixed_zero(), (natural)(0u)};
+    return e;
 }
 
-/* Sums `words` words of a pixel over the planes, from the first plane on. */
-inline void film_sum(global const Settings *settings, global const float *film, int pixel_index, int first, int words,
-                     float *sums)
+inline Exposure exposure_add(Exposure e, vec3 value)
 {
-    int stream = settings->padded_pixels;
-    for (int i = 0; i < words; i++) sums[i] = 0.0f;
-    for (int plane = 0; plane < settings->planes; plane++)
-        for (int i = 0; i < words; i++) sums[i] += film[(plane * FILM_WORDS + first + i) * stream + pixel_index];
+    e.first = fixed_add(e.first, fixed_of(value.x));
+    e.second = fixed_add(e.second, fixed_of(value.y));
+    e.third = fixed_add(e.third, fixed_of(value.z));
+    e.samples += 1u;
+    return e;
 }
 
-/* Counters that the host reads while it enqueues. */
+inline mask exposure_is_full(Exposure e)
+{
+    return fixed_is_full(e.first) | fixed_is_full(e.second) | fixed_is_full(e.third);
+}
+
+/* The first word of a pixel in the half of the film that a plane's samples go to: even or odd ones, where these are
+ * kept apart and planes are an even number; else the only one. */
+inline size_t film_at(global const Settings *settings, int plane, int pixel_index)
+{
+    int half_film = plane & (settings->halves - 1);
+    return (size_t)half_film * FILM_WORDS * settings->padded_pixels + pixel_index;
+}
+
+/* Adds what slots have summed to their pixels. Returns how many sums are full, lane by lane. */
+inline integer film_add(global const Settings *settings, global uint *film, mask m, integer plane,
+                        integer pixel_index, Exposure e)
+{
+    size_t stream = settings->padded_pixels;
+    integer full = 0;
+#define ADD(i)                                                                                                           if (LANE(m, i)) {                                                                                                        global uint *at = film + film_at(settings, LANE(plane, i), LANE(pixel_index, i));                                    LANE(full, i) = sums_add(at, stream, LANE(e.first.low, i), LANE(e.first.middle, i), LANE(e.first.high, i));          at += 3 * stream;                                                                                                    LANE(full, i) += sums_add(at, stream, LANE(e.second.low, i), LANE(e.second.middle, i),                                                         LANE(e.second.high, i));                                                                   at += 3 * stream;                                                                                                    LANE(full, i) += sums_add(at, stream, LANE(e.third.low, i), LANE(e.third.middle, i), LANE(e.third.high, i));         atomic_add((volatile global uint *)(at + 3 * stream), LANE(e.samples, i));                                       }
+    FOR_LANES(ADD)
+#undef ADD
+    return full;
+}
+
+/* Counts a sample in each pixel where something else adds its value. */
+inline void film_count(global const Settings *settings, global uint *film, mask m, integer plane, integer pixel_index)
+{
+    size_t samples = (size_t)9 * settings->padded_pixels;
+#define ADD(i)                                                                                        \
+    if (LANE(m, i)) {                                                                                 \
+        size_t at = film_at(settings, LANE(plane, i), LANE(pixel_index, i));                          \
+        atomic_inc((volatile global uint *)(film + at + samples));                                    \
+    }
+    FOR_LANES(ADD)
+#undef ADD
+}
+
+/* Counters that the host reads while it enqueues, two words each, the lower first. */
 #define COUNTER_DONE 0     /* slots that have come to the end of their work list */
 #define COUNTER_SAMPLES 1  /* paths put on the film */
 #define COUNTER_CLOSEST 2  /* rays of them */
 #define COUNTER_SHADOW 3   /* shadow rays of them */
-#define COUNTER_REJECTED 4 /* samples that were not finite and count as black */
+#define COUNTER_REJECTED 4 /* samples that were not finite, or too bright, and count as black */
+#define COUNTER_FULL 5     /* times when a sum was found near the end of its range */
 inline void count(global uint *counters, int which, mask m, integer v)
 {
-    if (any(m)) atomic_add(&counters[which], (uint)sum_lanes(sel_i(m, v, (integer)(0))));
+    if (any(m) && sums_add_word(counters + 2 * which, (uint)sum_lanes(sel_i(m, v, (integer)(0)))))
+        atomic_inc((volatile global uint *)(counters + 2 * which + 1));
 }

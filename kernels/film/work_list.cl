@@ -5,11 +5,11 @@
  * sample before which each pixel is left; then the first pixel of each slot of a plane. An index that is not below
  * `padded_pixels` ends a list. The samples of a pixel are dealt out to the planes in turn. */
 
-/* The first sample at or after `first` that belongs to a plane. */
-inline integer plane_sample(integer plane, int planes, int first)
+/* How far after `first` the first sample is that belongs to a plane. */
+inline integer plane_ahead(integer plane, int planes, int first)
 {
     integer ahead = plane - first % planes;
-    return first + sel_i(ahead < 0, ahead + planes, ahead);
+    return sel_i(ahead < 0, ahead + planes, ahead);
 }
 
 /* The sample before which a pixel is left, `end` at most. */
@@ -19,17 +19,17 @@ inline integer work_list_end(global const Settings *settings, global const uint 
     return min_i(gather_i(work_list, pixel_index + settings->padded_pixels), (integer)(end));
 }
 
-/* The pixel after `pixel_index`, or the first one of a slot that has not `begun`, of which a sample from `start` on
- * is wanted. slot: of its plane. */
+/* The pixel after `pixel_index`, or the first one of a slot that has not `begun`, of which a sample is wanted that is
+ * `ahead` of the first one. slot: of its plane. */
 inline integer work_list_next(global const Settings *settings, global const uint *work_list, mask leaves, mask begun,
-                              integer pixel_index, integer slot, integer start, int end)
+                              integer pixel_index, integer slot, integer ahead, int2 samples)
 {
     int padded_pixels = settings->padded_pixels;
     integer next = gather_i(work_list, sel_i(begun, pixel_index, slot + 2 * padded_pixels));
     for (;;) {
         mask there = leaves & (next < padded_pixels);
         integer at = sel_i(there, next, (integer)(0));
-        mask idle = there & (start >= work_list_end(settings, work_list, at, end));
+        mask idle = there & (work_list_end(settings, work_list, at, samples.y) - samples.x <= ahead);
         if (!any(idle)) return next;
         next = sel_i(idle, gather_i(work_list, at), next);
     }
@@ -48,15 +48,16 @@ inline NextSample next_sample(global const Settings *settings, global const uint
                               integer slot, mask ended, mask begun, integer pixel_index, integer sample)
 {
     int planes = settings->planes, per_plane = settings->per_plane;
-    integer plane = divide(slot, per_plane), start = plane_sample(plane, planes, samples.x);
+    integer plane = divide(slot, per_plane), ahead = plane_ahead(plane, planes, samples.x);
     NextSample n = {plane, pixel_index, sample + planes, (integer)(0), (integer)(0)};
-    n.leaves = ended & (!begun | (n.sample >= work_list_end(settings, work_list, pixel_index, samples.y)));
+    integer left = work_list_end(settings, work_list, pixel_index, samples.y) - sample; /* sums may leave an int */
+    n.leaves = ended & (!begun | (left <= planes));
     if (any(n.leaves)) {
-        integer next = work_list_next(settings, work_list, n.leaves, begun, pixel_index, slot - plane * per_plane,
-                                      start, samples.y);
+        integer next = work_list_next(settings, work_list, n.leaves, begun, pixel_index, slot - plane * per_plane, ahead,
+                                      samples);
         n.done = n.leaves & (next >= settings->padded_pixels);
         n.pixel_index = sel_i(n.leaves & !n.done, next, pixel_index);
-        n.sample = sel_i(n.leaves & !n.done, start, n.sample);
+        n.sample = sel_i(n.leaves & !n.done, ahead + samples.x, n.sample);
     }
     return n;
 }

@@ -1,4 +1,6 @@
 /* The random numbers of a sample of a pixel, pixels along the Z curve: bits of x and y alternate (Morton 1966). */
+#include "film/pixel.cl"
+
 inline natural spread_bits(natural x) /* of 16 to every other one of 32 */
 {
     x = (x | (x << 8u)) & 0x00ff00ffu;
@@ -9,8 +11,8 @@ inline natural spread_bits(natural x) /* of 16 to every other one of 32 */
 
 inline Sampler pixel_sampler(global const Settings *settings, integer pixel_index, integer sample)
 {
-    integer tile = pixel_index >> 4, row = divide(tile, settings->tiles_x), column = tile - row * settings->tiles_x;
-    natural x = as_natural(column * 4 + (pixel_index & 3)), y = as_natural(row * 4 + ((pixel_index >> 2) & 3));
+    vec2 p = pixel_of_index(settings, pixel_index);
+    natural x = to_natural(p.x) + (uint)settings->crop_x, y = to_natural(p.y) + (uint)settings->crop_y;
     return zsobol_start(settings->seed, (uint)settings->sample_bits, spread_bits(x) | (spread_bits(y) << 1u),
                         as_natural(sample));
 }

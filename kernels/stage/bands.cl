@@ -1,26 +1,28 @@
-/* Sums the planes of a spectral film into a picture of settings->bands values a pixel [W m^-2 sr^-1 nm^-1]. */
+/* Makes a picture of a spectral film: settings->bands values a pixel [W m^-2 sr^-1 nm^-1]. halves: see
+ * film/picture.cl. */
 #include "core/base.cl"
-#include "film/film.cl"
+#include "film/picture.cl"
 #include "film/bands.cl"
 
-kernel void accumulate_bands(global const Settings *settings, global const float *film, global const float *bands,
-                             global float *band_image)
+#ifdef LIGHT_PATHS /* see stage/accumulate.cl */
+#define SAMPLES_ARG , float samples
+#define SAMPLES samples
+#else
+#define SAMPLES_ARG
+#define SAMPLES (float)film_samples(settings, film, pixel_index, halves)
+#endif
+
+kernel void accumulate_bands(global const Settings *settings, global const uint *film, global const uint *bands,
+                             global float *band_image, int2 halves SAMPLES_ARG)
 {
-    int x = get_global_id(0), y = get_global_id(1), padded_pixels = settings->padded_pixels, count = settings->bands;
+    int x = get_global_id(0), y = get_global_id(1), count = settings->bands;
     if (x < settings->width && y < settings->height) {
         int pixel_index = film_pixel_index(settings, x, y);
-        float samples;
-        film_sum(settings, film, pixel_index, FILM_WORDS - 1, 1, &samples);
-        float scale = 1.0f / fmax(samples, 1.0f);
+        size_t stream = settings->padded_pixels;
+        float scale = 1.0f / fmax(SAMPLES, 1e-30f);
         global float *pixel = band_image + (size_t)count * ((size_t)y * settings->width + x);
-        for (int band = 0; band < count; band++) {
-            float sum = 0.0f, compensation = 0.0f;
-            for (int plane = 0; plane < settings->planes; plane++) {
-                global const float *first = bands + 2 * (plane * count + band) * padded_pixels + pixel_index;
-                sum += first[0];
-                compensation += first[padded_pixels];
-            }
-            pixel[band] = (sum + compensation) * scale;
-        }
+        for (int band = 0; band < count; band++)
+            pixel[band] = halves_sum(bands + bands_at(settings, 0, band, pixel_index), stream, 3 * stream * count,
+                                     halves) * scale;
     }
 }

@@ -42,40 +42,37 @@ inline Exposure add_sample(Scene scene, Slab path, At at, BEGIN_ARGS, PathEnd en
 {
     Wavelengths lambdas = load_path_lambdas(path, at);
     Spectrum radiance = path_radiance(scene, path, at, end, lambdas);
-    Exposure e = {load_path_sum(path, at), load_path_compensation(path, at), load_path_samples(path, at)};
     mask finished = end.ended & end.begun;
 #if USES_FLUORESCENCE /* the film sees the camera's wavelengths, not those by which the light came */
     Sampler begun_with = pixel_sampler(scene.settings, pixel_index, sample);
     lambdas = wavelengths_sample(scene, sampler_pair(begun_with, (natural)(DIMENSION_WAVELENGTH)).x);
 #endif
-    vec3 value = film_value(scene, radiance, lambdas);
     real weight = load_path_weight(path, at);
+    vec3 value = scale3(film_value(scene, radiance, lambdas), weight);
     mask accepted = finished & film_accepts(value);
-    weight = sel(accepted, weight, (real)(0.0f));
-    value = sel3(accepted, value, v3(0.0f, 0.0f, 0.0f));
-    sum_add(&e.sum.x, &e.compensation.x, value.x * weight);
-    sum_add(&e.sum.y, &e.compensation.y, value.y * weight);
-    sum_add(&e.sum.z, &e.compensation.z, value.z * weight);
-    e.samples += 1.0f;
+    Exposure before = {load_path_first(path, at), load_path_second(path, at), load_path_third(path, at),
+                       load_path_samples(path, at)};
+    Exposure e = exposure_add(before, sel3(accepted, value, v3(0.0f, 0.0f, 0.0f)));
+    integer full = sel_i(exposure_is_full(e), (integer)(1), (integer)(0));
 #if USES_BANDS
-    bands_add(scene, bands, accepted, divide(slot, scene.settings->per_plane), pixel_index, radiance, lambdas, weight);
+    full += bands_add(scene, bands, accepted, divide(slot, scene.settings->per_plane), pixel_index, radiance, lambdas,
+                      weight);
 #endif
     path_end_count(counters, end, end.depth);
     count(counters, COUNTER_REJECTED, finished & !accepted, (integer)(1));
+    count(counters, COUNTER_FULL, finished & (full > 0), full);
     return e;
 }
 
-/* Where a slot leaves a pixel, the film takes what was summed of it, and the sum of the next pixel is read. */
-inline Exposure change_pixel(Scene scene, global float *film, PathEnd end, NextSample next, integer pixel_index,
-                             Exposure e)
+/* Where a slot leaves a pixel, the film takes what was summed of it. */
+inline Exposure change_pixel(Scene scene, global uint *film, global uint *counters, PathEnd end, NextSample next,
+                             integer pixel_index, Exposure e)
 {
-    mask enters = next.leaves & !next.done;
-    if (any(next.leaves)) film_store(scene.settings, film, next.leaves & end.begun, next.plane, pixel_index, e);
-    if (any(enters)) {
-        Exposure entered = film_load(scene.settings, film, enters, next.plane, next.pixel_index);
-        e.sum = sel3(enters, entered.sum, e.sum);
-        e.compensation = sel3(enters, entered.compensation, e.compensation);
-        e.samples = sel(enters, entered.samples, e.samples);
+    if (any(next.leaves)) {
+        mask leaves = next.leaves & end.begun;
+        integer full = film_add(scene.settings, film, leaves, next.plane, pixel_index, e);
+        count(counters, COUNTER_FULL, leaves & (full > 0), full);
+        e = exposure_sel(next.leaves, exposure_none(), e);
     }
     return e;
 }
@@ -119,13 +116,14 @@ STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
         integer pixel_index = load_path_pixel_index(path, at), sample = load_path_sample(path, at);
         Exposure e = add_sample(scene, path, at, BEGIN_PASSED, end, slot, pixel_index, sample);
         NextSample next = next_sample(settings, work_list, samples, slot, end.ended, end.begun, pixel_index, sample);
-        e = change_pixel(scene, film, end, next, pixel_index, e);
+        e = change_pixel(scene, film, counters, end, next, pixel_index, e);
         count(counters, COUNTER_DONE, next.done, (integer)(1));
         mask go = end.ended & !next.done;
         store_path_pixel_index(path, at, next.leaves & go, next.pixel_index);
         store_path_sample(path, at, go, next.sample);
-        store_path_sum(path, at, go, e.sum);
-        store_path_compensation(path, at, go, e.compensation);
+        store_path_first(path, at, go, e.first);
+        store_path_second(path, at, go, e.second);
+        store_path_third(path, at, go, e.third);
         store_path_samples(path, at, go, e.samples);
         begin_path(scene, path, at, go, next.pixel_index, next.sample);
         store_path_state(path, at, end.ended, sel_i(next.done, (integer)(PATH_DONE), (integer)(PATH_ALIVE)));

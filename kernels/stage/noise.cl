@@ -4,12 +4,12 @@
  * it is above the variance. A work-item takes a 4x4 tile; the pixels of the two colours of a chessboard are summed
  * separately. */
 #include "core/base.cl"
-#include "film/film.cl"
+#include "film/picture.cl"
 
 /* A cell is the pixels of one colour in a square of `side` times `side` pixels. active_cells: which cells to measure,
  * a square's two colours after each other; previous_mean: luminance of every pixel when it was measured last, then
  * the samples that it had; noise_sums: variance, luminance and number of pixels, per tile and colour. */
-kernel void noise(global const Settings *settings, global const float *film, global const uint *active_cells,
+kernel void noise(global const Settings *settings, global const uint *film, global const uint *active_cells,
                   global float *previous_mean, global float *noise_sums, int side)
 {
     int tile = get_global_id(0), padded_pixels = settings->padded_pixels;
@@ -21,14 +21,13 @@ kernel void noise(global const Settings *settings, global const float *film, glo
         for (int i = 0; i < 16 && active_cells[2 * square + colour]; i++) {
             int x = column * 4 + (i & 3), y = row * 4 + (i >> 2), pixel_index = tile * 16 + i;
             if (((x + y) & 1) != colour || x >= settings->width || y >= settings->height) continue;
-            float w[FILM_WORDS], v[3];
-            film_sum(settings, film, pixel_index, 0, FILM_WORDS, w);
-            float samples = w[6];
-            for (int k = 0; k < 3; k++) v[k] = w[k] + w[k + 3];
+            int2 halves = (int2)(0, settings->halves);
+            float samples = (float)film_samples(settings, film, pixel_index, halves);
+            vec3 v = scale3(film_sum(settings, film, pixel_index, halves), 1.0f / fmax(samples, 1.0f));
 #if SPECTRUM_SIZE == 3
-            float now = (0.2126f * v[0] + 0.7152f * v[1] + 0.0722f * v[2]) / fmax(samples, 1.0f);
+            float now = 0.2126f * v.x + 0.7152f * v.y + 0.0722f * v.z;
 #else
-            float now = v[1] / fmax(samples, 1.0f);
+            float now = v.y;
 #endif
             float change = now - previous_mean[pixel_index], before = previous_mean[padded_pixels + pixel_index];
             if (samples > before) variance += change * change * before / (samples - before);

@@ -2,8 +2,8 @@
 #include "core/base.cl"
 #include "interface/stage.cl"
 #include "path/shadow_ray.cl"
-#include "film/film.cl"
 #include "film/splat.cl"
+#include "generated/bands.cl"
 
 STAGE(splat)(SLAB_ARGS, SCENE_ARGS, JOIN_ARGS STAGE_AT_ARG)
 {
@@ -16,10 +16,15 @@ STAGE(splat)(SLAB_ARGS, SCENE_ARGS, JOIN_ARGS STAGE_AT_ARG)
         real transmittance = shadow_ray_transmittance(TRACE_PASSED, scene, path, shadow, at, t, active);
         mask arrives = active & (transmittance > 0.0f);
         Wavelengths lambdas = load_path_lambdas(path, at);
-        vec3 value = film_value(scene, spectrum_scale(load_shadow_value(shadow, at), transmittance), lambdas);
-        mask accepted = arrives & film_accepts(value);
-        integer plane = divide(LANE_INDEX + (int)at, settings->per_plane);
-        film_splat(settings, film, accepted, plane, load_shadow_pixel(shadow, at), value);
+        Spectrum value = spectrum_scale(load_shadow_value(shadow, at), transmittance);
+        vec3 colour = film_value(scene, value, lambdas);
+        mask accepted = arrives & film_accepts(colour);
+        integer plane = divide(LANE_INDEX + (int)at, settings->per_plane), pixel_index = load_shadow_pixel(shadow, at);
+        integer full = film_splat(settings, film, accepted, plane, pixel_index, colour);
+#if USES_BANDS
+        full += bands_add(scene, bands, accepted, plane, pixel_index, value, lambdas, (real)(1.0f));
+#endif
         count(counters, COUNTER_REJECTED, arrives & !accepted, (integer)(1));
+        count(counters, COUNTER_FULL, accepted & (full > 0), full);
     }
 }

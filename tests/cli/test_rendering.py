@@ -47,10 +47,10 @@ def test_noise_ends_it():
     assert renderer.passes == [1, 3, 12, 48, 192]
 
 
-def test_the_limit_ends_a_pass_but_not_the_first():
+def test_the_limit_ends_a_pass():
     renderer = Counting(0.05)
     render_samples(renderer, None, 0.01, lambda progress: None)
-    assert renderer.samples == 1
+    assert renderer.passes == [1] and renderer.samples == 0
     renderer = Counting(0.01)
     began = time.perf_counter()
     render_samples(renderer, None, 0.3, lambda progress: None)

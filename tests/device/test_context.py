@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import logging
+import os
+from concurrent.futures import ThreadPoolExecutor
 
 import pyopencl as cl
 import pytest
@@ -27,6 +29,7 @@ def machine(monkeypatch, device):
         for i, (kind, platform, name, version) in enumerate(kinds)
     )
     monkeypatch.setattr(context, "devices", lambda: there)
+    monkeypatch.setattr(context, "_opened", {})
     monkeypatch.delenv("CLPT_DEVICE", raising=False)
     return there
 
@@ -137,3 +140,26 @@ def test_adopting_a_queue(device):
     assert adopted.queue is queue
     assert adopted.context == device.context
     assert adopted.info.label == device.info.label
+
+
+def test_a_process_has_one_context(device):
+    """Two devices of the same name share it, and what is built in it; each has its own queue."""
+    first, second = choose(device.info.index), choose(device.info.index)
+    assert first.context == second.context
+    assert first.programs is second.programs
+    assert first.queue != second.queue
+
+
+def test_threads_share_the_context(device, monkeypatch):
+    monkeypatch.setattr(context, "_opened", {})
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(lambda _: choose(device.info.index), range(8)))
+    assert len({one.context.int_ptr for one in found}) == 1
+
+
+def test_a_forked_process_has_its_own(device, monkeypatch):
+    """What a parent has opened is not used in the child: its driver's threads are gone there."""
+    monkeypatch.setattr(context, "_opened", {})
+    first = choose(device.info.index)
+    monkeypatch.setattr(os, "getpid", lambda: -1)
+    assert choose(device.info.index).context != first.context

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import images
+from clpt.errors import SceneError
 from clpt.formats.gltf import accessors
 from clpt.formats.gltf.document import Document, Element
 from clpt.scene.textures import Bitmap
@@ -107,6 +108,8 @@ def _decoded(source: Element, budget: _Budget) -> images.Stored:
         with Image.open(io.BytesIO(data), formats=FORMATS) as image:
             budget.spend(source, image.width, image.height)
             return images.stored_from_pillow(image)
+    except SceneError:
+        raise
     except (Image.DecompressionBombError, Image.DecompressionBombWarning):
         raise source.error(f"has more than the {PIXELS} pixels that are read") from None
     except UnidentifiedImageError:

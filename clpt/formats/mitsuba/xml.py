@@ -143,6 +143,8 @@ def _read(path: Path) -> Element:
     except expat.ExpatError as error:
         reason = expat.errors.messages.get(error.code, "not XML")
         raise SceneError(f"broken XML: {reason}", file=path, line=error.lineno) from None
+    except SceneError:
+        raise
     except (LookupError, ValueError) as error:
         raise SceneError(f"broken XML: {error}", file=path, line=1) from None
     except OSError as error:

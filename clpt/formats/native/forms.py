@@ -21,6 +21,7 @@ from clpt.formats.native.spectra import find_file, kind_name
 from clpt.formats.native.transforms import matrix
 from clpt.scene import kinds
 from clpt.scene.params import ORDERS, SPECTRUM_ROLES, Kind, Param
+from clpt.scene.shapes import SMOOTH
 from clpt.scene.textures import ATTRIBUTES, Texture
 from clpt.spectra.spaces import TEMPERATURES
 
@@ -146,6 +147,10 @@ def array(cursor: Cursor, width: int, dtype: type) -> np.ndarray | None:
     if dtype is np.uint32 and not ((values >= 0) & (values < 2**31) & (values % 1 == 0)).all():
         raise cursor.error("must be whole numbers from zero")
     return values.astype(dtype)
+
+
+def _normals(cursor: Cursor) -> Any:
+    return SMOOTH if cursor.value == SMOOTH else array(cursor, 3, np.float32)
 
 
 def _attributes(cursor: Cursor) -> dict[str, np.ndarray]:
@@ -275,6 +280,11 @@ FORMS: dict[str, Form] = {
     "rows2": _rows(2),
     "rows3": _rows(3),
     "rows4": _rows(4),
+    "normals": _of_cursor(
+        f"rows of 3 numbers, or `{SMOOTH}`",
+        {"anyOf": [json_schema.rows(3), {"const": SMOOTH}]},
+        _normals,
+    ),
     "triangles": _rows(3, "integer"),
     "attributes": _of_cursor(
         "object of rows of 1 or 3 numbers by name",

@@ -211,7 +211,7 @@ def _merged(
         name=entry.name or (part.name if several else ""),
         vertices=part.vertices,
         faces=part.faces,
-        normals=part.normals,
+        normals=part.normals if entry.normals is None else entry.normals,
         uvs=part.uvs,
         attributes=part.attributes,
     )

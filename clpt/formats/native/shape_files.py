@@ -55,10 +55,15 @@ FILES: dict[type[Kind], ShapeFile] = {
 }
 
 
+def in_file(cls: type[Kind], name: str, value: Any) -> bool:
+    """Return whether a shape's file holds a parameter; the word `smooth` is not in a file."""
+    return name in FILES[cls].replaces and not isinstance(value, str)
+
+
 def check_only_in_file(cursor: Cursor, cls: type[Kind]) -> None:
     """Raise SceneError where a shape with a file has the file's parameters too."""
-    for key in FILES[cls].replaces:
-        if key in cursor.value:
+    for key, value in cursor.value.items():
+        if in_file(cls, key, value):
             raise cursor.at(key).error("stands in the 'file' already; give either")
 
 
@@ -92,7 +97,8 @@ def checked_arrays(cursor: Cursor, shape: shapes.Mesh, warnings: list[str]) -> s
         raise cursor.error("a mesh needs a 'file', or 'vertices' and 'faces'")
     for name in ("normals", "uvs"):
         values = getattr(shape, name)
-        if values is not None and len(values) != len(shape.vertices):
+        is_array = values is not None and not isinstance(values, str)
+        if is_array and len(values) != len(shape.vertices):
             raise cursor.at(name).error(f"must be one for each of {len(shape.vertices)} vertices")
     for name, values in shape.attributes.items():
         count = len(shape.faces if name.startswith("face_") else shape.vertices)
@@ -104,11 +110,13 @@ def checked_arrays(cursor: Cursor, shape: shapes.Mesh, warnings: list[str]) -> s
             "",
             shape.vertices,
             shape.faces.astype(np.int64),
-            shape.normals,
+            None if isinstance(shape.normals, str) else shape.normals,
             shape.uvs,
             warnings,
             shape.attributes,
         )
+    if isinstance(shape.normals, str):
+        arrays["normals"] = shape.normals
     if not len(arrays["faces"]):
         raise cursor.error("holds no triangles")
     return dataclasses.replace(shape, **arrays)

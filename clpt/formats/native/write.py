@@ -15,9 +15,8 @@ import numpy as np
 from clpt import images, output_files, spectral_exr
 from clpt.errors import SceneError
 from clpt.formats.meshes import particles, strands
-from clpt.formats.meshes.mesh import smooth_normals
 from clpt.formats.native import forms
-from clpt.formats.native.shape_files import FILES, MESH_ARRAYS
+from clpt.formats.native.shape_files import MESH_ARRAYS, in_file
 from clpt.scene import Scene, materials, shapes
 from clpt.scene.params import Kind, defaults, params
 
@@ -26,10 +25,7 @@ NUMBERS = re.compile(r"\[\s+([^\[\]{}\"]*?)\s+\]")
 
 
 def save(scene: Scene, path: str | Path) -> None:
-    """Write a scene such that `load` gives the same content back; the folder must exist.
-
-    Raises SceneError where a file cannot be written.
-    """
+    """Write a scene as `clpt.save` does, to the .json at `path`. Raises SceneError."""
     path = Path(path)
     writer = _Writer(path)
     try:
@@ -110,14 +106,14 @@ class _Writer:
         """
         cls = type(thing)
         written: dict[str, Any] = {"type": thing.kind}
-        in_file: tuple[str, ...] = ()
         if cls in self.array_files:
-            written["file"], in_file = self.array_files[cls](thing), FILES[cls].replaces
+            written["file"] = self.array_files[cls](thing)
         default = defaults(cls)
         for name, param in params(cls).items():
-            if name in in_file:
+            given = getattr(thing, name)
+            if "file" in written and in_file(cls, name, given):
                 continue
-            value = forms.write(getattr(thing, name), param, self)
+            value = forms.write(given, param, self)
             if name == "material" or value != forms.write(default[name], param, self):
                 written[name] = value
         return written
@@ -216,8 +212,8 @@ def _on_one_line(match: re.Match) -> str:
 def _ply(mesh: shapes.Mesh) -> bytes:
     """Return the arrays of a mesh as a binary PLY file, attributes by Mitsuba's names."""
     normals, uvs = mesh.normals, mesh.uvs
-    if isinstance(normals, str):
-        normals = smooth_normals(np.asarray(mesh.vertices), np.asarray(mesh.faces))
+    if isinstance(normals, str):  # the scene's file says so
+        normals = None
     vertex: list[Any] = [("x", "y", "z", mesh.vertices)]
     vertex += [] if normals is None else [("nx", "ny", "nz", normals)]
     vertex += [] if uvs is None else [("s", "t", uvs)]

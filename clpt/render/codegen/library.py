@@ -26,6 +26,13 @@ PARTS: dict[str, tuple[str, ...]] = {
     "microfacet": (*_MATH, "optics/microfacet.cl"),
     "bvh": ("bvh/library.cl",),
 }
+_INLINE = """\
+#ifdef NOT_INLINED
+#define CLPT_INLINE inline
+#else
+#define CLPT_INLINE __attribute__((always_inline)) inline
+#endif
+"""
 BSDF = (*_SPECTRUM, "core/frame.cl", "core/warp.cl", "interface/bsdf.cl")
 
 
@@ -48,6 +55,8 @@ def kernel_source(
 
     Raises SceneError for an option that is not there, UnknownKindError for such a part.
     """
+    if not parts:
+        raise SceneError(f"name a part, such as {', '.join(map(repr, PARTS))}", where="parts")
     options = {"mode": (mode, ("rgb", "spectral")), "lanes": (lanes, LANES)}
     options |= {"layout": (layout, bvh.TREES)}
     options |= {"sampler": (sampler, tuple(cls.kind for cls in PIXELWISE))}
@@ -63,10 +72,19 @@ def kernel_source(
     for part in parts:
         files += PARTS[part] if part in PARTS else _bsdf(part, mode, virtual)
     virtual["library"] = tuple(files)
-    text = device.assemble("library", virtual, {"LANES": lanes}).text
+    text = _own_inline(device.assemble("library", virtual, {"LANES": lanes}).text)
     if lines:
         return text + '#line 1 "program"\n'
     return re.sub(r"^#line .*\n", "", text, flags=re.MULTILINE)
+
+
+def _own_inline(text: str) -> str:
+    """Return the text with a macro of clpt's name where it redefines `inline` for itself.
+
+    The application's own `inline` then stays what its compiler takes it for.
+    """
+    text = re.sub(r"^#define inline .*", "", text, flags=re.MULTILINE)
+    return _INLINE + re.sub(r"^inline\b", "CLPT_INLINE", text, flags=re.MULTILINE)
 
 
 def _bsdf(part: str | type[Material], mode: str, virtual: dict) -> tuple[str, ...]:

@@ -85,13 +85,13 @@ def begin_args(features: Features) -> dict[str, str]:
     """Return what the stage takes that begins paths."""
     film = ["film", "bands"] if features.bands else ["film"]
     rest = {"counters": "global uint *", "work_list": "global const uint *", "samples": "int2 "}
-    return {**dict.fromkeys(film, "global float *"), **rest}
+    return {**dict.fromkeys(film, "global uint *"), **rest}
 
 
 def join_args(features: Features, layout: str) -> dict[str, str]:
     """Return what the stage takes that tests rays to lights or, in `splat`, to the camera."""
     own = begin_args(features) if features.light_paths else {}
-    splats = {name: type_ for name, type_ in own.items() if name in ("film", "counters")}
+    splats = {n: type_ for n, type_ in own.items() if n in ("film", "bands", "counters")}
     return {**trace_args(features, layout), **splats}
 
 

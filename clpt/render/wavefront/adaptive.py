@@ -58,8 +58,8 @@ def checked(noise: float, features: Features) -> float:
 class Adaptive:
     """The noise in a wavefront's film, and how many samples each cell gets.
 
-    Cells are (2 * squares,): a square's two colours after each other, so that a cell's partner is
-    its number with the last bit changed.
+    Cells are (2 * squares,): a square's two colours after each other. A cell's partner is the other
+    colour of its square or, where that has no pixel, of a square beside it.
 
     noise: the limit; next: (cells,) the first sample that a cell's pixels do not have;
     stop: (cells,) how many samples they will have.
@@ -73,8 +73,8 @@ class Adaptive:
         across, down = (-(-int(settings[name]) // SIDE) for name in ("width", "height"))
         self._cell = 2 * (y // SIDE * across + x // SIDE) + (x + y) % 2  # of each padded pixel
         count = 2 * across * down
-        self._partner = np.arange(count) ^ 1
         self._pixels = np.bincount(self._cell[self._inside], minlength=count)  # of each cell
+        self._partner = _partners(self._pixels, across, down)
         self.noise = 0.0
         self.next = np.zeros(count, np.int64)
         self.stop = np.full(count, OPEN)
@@ -119,7 +119,7 @@ class Adaptive:
         """
         if noise != self.noise:
             self.noise = noise
-            self.stop[:] = OPEN
+            self.stop[:] = np.where(self._pixels > 0, OPEN, 0)
             self._decide()
         try:
             while (self.next < np.minimum(self.stop, end)).any():
@@ -133,13 +133,15 @@ class Adaptive:
         """Sample up to the next look or to `end`, look, and decide; return whether to go on."""
         look = self._next_look()
         ends = np.minimum(self.stop, min(look, end))
-        if not self._sample(ends, on_batch):
+        finished = self._sample(ends, on_batch)
+        self.next = np.maximum(self.next, ends)  # after a stop too: numbers are not used again
+        if not finished:
             return False
-        self.next = np.maximum(self.next, ends)
         if end < look:
             return True
         self._level = look
-        guide_cells = self.stop[self._partner] == OPEN
+        guide_cells = np.zeros(len(self.stop), bool)
+        guide_cells[self._partner[(self.stop == OPEN) & (self._pixels > 0)]] = True
         overrun = guide_cells & (self.next < look)  # finished, and still a guide
         with self._film_restored(bool(overrun.any())):
             if not self._sample(np.where(overrun, look, 0), on_batch):
@@ -194,7 +196,7 @@ class Adaptive:
         """Decide how many samples cells get whose partners know it closely enough."""
         measured_at = self._measured_at[self._partner]
         needed = self._variance[self._partner] / self.noise**2
-        sure = (self.stop == OPEN) & (needed <= AHEAD * measured_at)
+        sure = (self.stop == OPEN) & (needed <= AHEAD * measured_at) & (self._pixels > 0)
         step = np.maximum(measured_at // STEPS, 1)
         wanted = np.ceil(np.where(sure, needed, 0.0) / step) * step
         self.stop[sure] = np.maximum(wanted, measured_at)[sure]
@@ -217,6 +219,23 @@ class Adaptive:
             for name, sums in film.sums.items():
                 stream.copy(sums, self._film_copies[name])
             self.wavefront.accumulate_film()
+
+
+def _partners(pixels: Cells, across: int, down: int) -> Cells:
+    """Return the cell that decides about each cell: of the other colour, with pixels.
+
+    pixels: of each cell. In a film of one pixel there is none: its cell is its own partner, and its
+    mean has a bias, of the order of 1 over its samples.
+    """
+    cells = np.arange(len(pixels))
+    partner = cells ^ 1
+    row, column = np.divmod(cells // 2, across)
+    for rows, columns in ((0, -1), (-1, 0)):  # only the last square may have one pixel
+        beside = (row + rows) * across + column + columns
+        usable = (row + rows >= 0) & (column + columns >= 0)
+        other = np.where(usable, 2 * beside + 1 - cells % 2, partner)
+        partner = np.where((pixels[partner] == 0) & (pixels[other] > 0), other, partner)
+    return np.where(pixels[partner] == 0, cells, partner)
 
 
 def _divide(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""A film on a device: sums of samples by pixel and plane, and the picture of them."""
+"""A film on a device: sums of samples by pixel, and the picture of them."""
 
 from __future__ import annotations
 
@@ -11,15 +11,14 @@ from numpy.typing import NDArray
 
 from clpt import device
 from clpt.device.buffers import Buffers
-from clpt.errors import MemoryBudgetError
-
-FILM_WORDS = 7  # of a pixel and plane, kernels/film/film.cl
+from clpt.render.wavefront import work_list
+from clpt.render.wavefront.film_state import FILM_WORDS, SUM_WORDS, Words
 
 
 class Film:
     """The film of a wavefront.
 
-    settings: of the paths, which say the film's size and planes; bands: whether it has any.
+    settings: of the paths, which say the film's size and halves; bands: whether it has any.
     size: width and height [pixels]; sums: the buffers that samples are added to, by the names of
     the kernels' arguments; picture: (h, w, 4) float32, always the same memory.
 
@@ -29,18 +28,21 @@ class Film:
     def __init__(
         self, stream: device.Stream, buffers: Buffers, settings: NDArray[np.void], bands: bool
     ):
-        self.stream, self.has_bands = stream, bands
+        self.stream, self.has_bands, self._buffers = stream, bands, buffers
         self.size = int(settings["width"]), int(settings["height"])
-        self.band_count = int(settings["bands"])
-        samples = int(settings["padded_pixels"]) * int(settings["planes"])
+        self.band_count = int(settings["bands"]) if bands else 0
+        self.halves = int(settings["halves"])
+        self._padded_pixels = int(settings["padded_pixels"])
+        x, y = work_list.pixels(settings)
+        self._inside = work_list.inside(settings)
+        self._at = (y * self.size[0] + x)[self._inside]  # in a picture, of each of these
+        words = 4 * self._padded_pixels * self.halves
         pixels, advice = math.prod(self.size), "lower the image's size"
-        sums, images = {"film": 4 * FILM_WORDS * samples}, {"image": 16 * pixels}
+        sums, images = {"film": FILM_WORDS * words}, {"image": 16 * pixels}
         if bands:
             advice += " or the number of bands"
-            sums["bands"] = 8 * self.band_count * samples
+            sums["bands"] = SUM_WORDS * self.band_count * words
             images["band_image"] = 4 * self.band_count * pixels
-            if sums["bands"] // 4 >= 1 << 31:  # kernels/film/bands.cl counts words by an int
-                raise MemoryBudgetError("the film of bands", sums["bands"], 1 << 33, advice)
         self.sums, self._images = (
             {name: buffers.allocate(f"the {name}", size, advice) for name, size in sizes.items()}
             for sizes in (sums, images)
@@ -74,12 +76,50 @@ class Film:
 
     def colours(self) -> NDArray[np.float32]:
         """Return the picture, (h, w, 3) float32 in the film's output space; wait for it."""
-        whole = np.empty((*self.size[::-1], 4), np.float32)
-        whole = self.stream.read(self._images["image"], whole)
-        return np.ascontiguousarray(whole[:, :, :3])
+        return self._read_colours(self._images["image"])
+
+    def colours_of(self, kernel: device.BoundKernel) -> NDArray[np.float32]:
+        """Return the picture that a kernel makes, as `colours` does, and leave this film's own."""
+        image = self._buffers.allocate("a half's image", self._images["image"].size)
+        kernel.set_args(image=image)
+        self.stream.run(kernel, self.size)
+        return self._read_colours(image)
 
     def bands(self, kernel: device.BoundKernel) -> NDArray[np.float32]:
         """Return the mean radiance in each band, (h, w, bands) float32; wait for it."""
         self.stream.run(kernel, self.size)
         values = np.empty((*self.size[::-1], self.band_count), np.float32)
         return self.stream.read(self._images["band_image"], values)
+
+    def words(self) -> tuple[Words, Words]:
+        """Return what the film holds: (halves, 10, h, w) uint32, and of bands (halves, bands, 3,
+        h, w); wait for it."""
+        width, height = self.size
+        found = []
+        for name, each in (("film", FILM_WORDS), ("bands", SUM_WORDS * self.band_count)):
+            streams = np.zeros((self.halves * each, self._padded_pixels), np.uint32)
+            if each:
+                streams = self.stream.read(self.sums[name], streams)
+            pixels = np.empty((len(streams), width * height), np.uint32)
+            pixels[:, self._at] = streams[:, self._inside]
+            found.append(pixels.reshape(self.halves, -1, height, width))
+        film, bands = found
+        return film, bands.reshape(self.halves, self.band_count, SUM_WORDS, height, width)
+
+    def set_words(self, film: Words, bands: Words) -> None:
+        """Enqueue that the film holds these words, of the form that `words` returns."""
+        for name, values in (("film", film), ("bands", bands)):
+            if values.size:
+                pixels = values.reshape(-1, math.prod(self.size))
+                streams = np.zeros((len(pixels), self._padded_pixels), np.uint32)
+                streams[:, self._inside] = pixels[:, self._at]
+                self.stream.write(self.sums[name], streams)
+
+    def count_samples(self) -> list[int]:
+        """Return how many samples the film has, in each half; wait for it."""
+        film, _ = self.words()
+        return [int(half[FILM_WORDS - 1].sum(dtype=np.uint64)) for half in film]
+
+    def _read_colours(self, image: cl.Buffer) -> NDArray[np.float32]:
+        whole = self.stream.read(image, np.empty((*self.size[::-1], 4), np.float32))
+        return np.ascontiguousarray(whole[:, :, :3])

@@ -15,7 +15,7 @@ from clpt.errors import MemoryBudgetError
 from clpt.records import PATH, SLABS
 from clpt.render.wavefront import queues, work_list
 
-COUNTERS = ("done", "samples", "closest", "shadow", "rejected")  # kernels/film/film.cl
+COUNTERS = ("done", "samples", "closest", "shadow", "rejected", "full")  # kernels/film/film.cl
 PADDING = 80  # words between streams: powers of two collide in a cache
 GROUP = 64  # slots are a multiple of it, and it is the local size of one-lane kernels
 FRESH = 0x2000  # kernels/path/path_state.cl
@@ -31,10 +31,15 @@ LARGEST = max(record.words for record in SLABS)
 
 @dataclass(frozen=True)
 class Slots:
-    """The number of paths in flight: slots of each film plane, and planes."""
+    """The number of paths in flight: slots of each plane, and planes.
+
+    The slots of a plane share the pixels of the film; planes share the samples of a pixel. halves:
+    2 where even and odd samples are kept apart, and planes are an even number; else 1.
+    """
 
     per_plane: int
     planes: int
+    halves: int = 1
 
     @property
     def total(self) -> int:
@@ -53,13 +58,18 @@ def default_slots(info: device.DeviceInfo) -> int:
 
 
 def divide_film(
-    info: device.DeviceInfo, padded_pixels: int, memory: int, slots: int | None, looped: bool
+    info: device.DeviceInfo,
+    padded_pixels: int,
+    memory: int,
+    slots: int | None,
+    looped: bool,
+    halves: bool = False,
 ) -> Slots:
     """Return how a film is divided among slots: as many as are wanted, or as memory allows.
 
     memory: that buffers may take [bytes], of which slots get half; slots: wanted, None for what
-    suits the device. A film with fewer pixels than slots gets several planes. Sums, and so the bits
-    of a picture, follow from the number of planes; a loop changes that of slots only.
+    suits the device. A film with fewer pixels than slots gets several planes; one whose even and
+    odd samples are kept apart (halves) an even number of them. The picture does not depend on it.
 
     Raises MemoryBudgetError.
     """
@@ -71,10 +81,13 @@ def divide_film(
     film = -(-padded_pixels // GROUP) * GROUP
     per_plane = min(wanted // GROUP * GROUP, film)
     planes = max(1, wanted // film) if per_plane == film else 1
+    if halves and planes % 2:
+        planes += 1
+        per_plane = max(wanted // planes // GROUP, 1) * GROUP
     if slots is None and looped and info.is_cpu:
         fewer = max(LOOP_SLOTS * info.compute_units // planes // GROUP, 1) * GROUP
         per_plane = min(fewer, per_plane)
-    return Slots(per_plane, planes)
+    return Slots(per_plane, planes, 2 if halves else 1)
 
 
 class PathBuffers:
@@ -98,14 +111,14 @@ class PathBuffers:
         self.stream, self.buffers = stream, buffers
         self._slots, self.slots, self.stride = slots, slots.total, slots.total + PADDING
         self.settings = self._with_slots(settings)
-        self._read = np.zeros(len(COUNTERS), np.uint32)
+        self._read = np.zeros(len(COUNTERS), np.uint64)
         self._fixed: dict[str, Any] = {"stride": self.stride}
         for record in SLABS:
             name, size = f"{record.name.lower()}_words", 4 * record.words * self.stride
             buffer = buffers.allocate(name, size, "lower the number of slots")
             stream.fill(buffer, 0, 0, size)
             self._fixed[name] = buffer
-        self._fixed["counters"] = buffers.allocate("the counters", 4 * len(COUNTERS))
+        self._fixed["counters"] = buffers.allocate("the counters", 8 * len(COUNTERS))
         self._fixed["settings"] = buffers.upload("the settings", self._setting_words)
         every_pixel = work_list.table(self.settings, work_list.inside(self.settings))
         self._fixed["work_list"] = buffers.upload("the work list", every_pixel)
@@ -145,21 +158,21 @@ class PathBuffers:
         """Enqueue that every slot begins its list of pixels again."""
         word = next(m.word for m in PATH.members if m.name == "state")
         self.stream.fill(self._fixed["path_words"], FRESH, 4 * word * self.stride, 4 * self.slots)
-        self.stream.fill(self._fixed["counters"], 0, 0, 4)
+        self.stream.fill(self._fixed["counters"], 0, 0, 8)
 
     def clear_counters(self) -> None:
         """Enqueue that every counter is zero."""
-        self._read = np.zeros(len(COUNTERS), np.uint32)
-        self.stream.fill(self._fixed["counters"], 0, 0, 4 * len(COUNTERS))
+        self._read = np.zeros(len(COUNTERS), np.uint64)
+        self.stream.fill(self._fixed["counters"], 0, 0, 8 * len(COUNTERS))
 
-    def read_counters(self) -> tuple[NDArray[np.uint32], cl.Event]:
+    def read_counters(self) -> tuple[NDArray[np.uint64], cl.Event]:
         """Enqueue that the counters are read; return where to, and the event."""
-        host = np.zeros(len(COUNTERS), np.uint32)
+        host = np.zeros(len(COUNTERS), np.uint64)
         return host, self.stream.read_later(self._fixed["counters"], host)
 
-    def gained(self, counters: NDArray[np.uint32]) -> dict[str, int]:
+    def gained(self, counters: NDArray[np.uint64]) -> dict[str, int]:
         """Return what counters, just read, have gained since they were read last, by name."""
-        gain = counters - self._read  # unsigned: right even after they wrapped around
+        gain = counters - self._read
         self._read = counters
         return dict(zip(COUNTERS[1:], gain[1:].tolist(), strict=True))
 
@@ -170,7 +183,7 @@ class PathBuffers:
     def _with_slots(self, settings: NDArray[np.void]) -> NDArray[np.void]:
         changed = settings.copy()
         changed["per_plane"], changed["planes"] = self._slots.per_plane, self._slots.planes
-        changed["slots"] = self._slots.total
+        changed["slots"], changed["halves"] = self._slots.total, self._slots.halves
         return changed
 
     def _set(self, settings: NDArray[np.void]) -> None:

@@ -7,6 +7,7 @@ any depth. The host only enqueues; it reads the counters of an iteration while l
 from __future__ import annotations
 
 import dataclasses
+import math
 import time
 from collections import deque
 from collections.abc import Callable
@@ -25,6 +26,7 @@ from clpt.render.lowering.scene import Lowered
 from clpt.render.wavefront import queues, strategy
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.render.wavefront.film import Film
+from clpt.render.wavefront.film_state import Words, add_films, add_sums
 from clpt.render.wavefront.path_buffers import GROUP, PathBuffers, divide_film
 from clpt.render.wavefront.strategy import Strategy, Tuning
 
@@ -36,12 +38,17 @@ IDLE = {"samples": (0, 0), "bounces": 0, "restart": 0}  # of a loop that has not
 
 @dataclass
 class Counts:
-    """What has happened so far: samples on the film, rays traced, samples that were not finite."""
+    """What has happened so far: samples put on the film, rays traced, what the film refused.
+
+    rejected: samples that were not finite, or brighter than a film takes; full: how often a sum of
+    a pixel was found near the end of its range.
+    """
 
     samples: int = 0
     closest: int = 0
     shadow: int = 0
     rejected: int = 0
+    full: int = 0
 
     @property
     def rays(self) -> int:
@@ -65,7 +72,7 @@ class Wavefront:
     on the device runs the loop; channel: of the `aov` integrator, that the film holds; tuning: for
     the strategies of other lowerings.
 
-    counts: of rays and samples; samples_per_pixel: in the mean.
+    counts: of rays and samples.
 
     Raises MemoryBudgetError, KernelBuildError, DeviceError.
     """
@@ -103,6 +110,7 @@ class Wavefront:
         looped: bool | None = None,
         paths: int = 0,
         tree_quality: bvh.Quality = "high",
+        halves: bool = False,
     ) -> Wavefront:
         """Return a wavefront of a lowered scene, which others may render too.
 
@@ -110,7 +118,8 @@ class Wavefront:
         queued: whether slots are queued by material before they are shaded, or how, see
         clpt.render.wavefront.queues.WAYS; looped: whether a kernel on the device runs all bounces.
         Each is chosen to suit the device and the scene where it is None. paths: how many will be
-        rendered; tree_quality: see clpt.bvh.build.
+        rendered; tree_quality: see clpt.bvh.build; halves: whether even and odd samples are kept
+        apart.
 
         Raises as `Wavefront` does, SceneError for a layout that cannot hold the scene.
         """
@@ -121,7 +130,7 @@ class Wavefront:
         stream, buffers = device.Stream(on.queue), device.Buffers(on)
         settings, kinds = lowered.settings, len(lowered.features.materials)
         padded_pixels = int(settings["padded_pixels"])
-        divided = divide_film(on.info, padded_pixels, buffers.limit, slots, looped)
+        divided = divide_film(on.info, padded_pixels, buffers.limit, slots, looped, halves)
         scene = DeviceScene(stream, buffers, lowered, chosen, tree_quality)
         in_flight = PathBuffers(stream, buffers, settings, divided, chosen.queued, kinds)
         return cls(scene, in_flight, looped, lowered.features.channel, tuning)
@@ -197,7 +206,7 @@ class Wavefront:
     def clear(self) -> None:
         """Enqueue that the film is empty; the next sample is number 0."""
         self.counts = Counts()
-        self.samples_per_pixel = 0.0
+        self._paths = [0] * self.film.halves  # that began at lights, in each half of the film
         self.paths.clear_counters()
         self.film.clear()
 
@@ -207,7 +216,7 @@ class Wavefront:
         self.loop.set_args(samples=samples, bounces=ENDLESS, restart=1)
         size, group = self._sizes(self.lanes)
         self.timings.add("loop", self.stream.run(self.loop, size, group))
-        self.samples_per_pixel += end - first
+        self._note_paths(first, end)
         self.accumulate_film()
 
     def render_samples(
@@ -225,8 +234,8 @@ class Wavefront:
         begin.set_args(samples=(first, end))
         if self.looped:
             begin.set_args(bounces=self._loop_bounces(), restart=0)
-        before, finished = self.counts.samples, True
-        reads: deque[tuple[NDArray[np.uint32], cl.Event]] = deque()
+        finished = True
+        reads: deque[tuple[NDArray[np.uint64], cl.Event]] = deque()
         while True:
             for step in steps:
                 self.timings.add(step.name, self.stream.run(step.bound, step.size, step.group))
@@ -235,7 +244,7 @@ class Wavefront:
             if len(reads) < 2:
                 continue
             counters, event = reads.popleft()
-            event.wait()
+            device.wait(event)
             self._count(counters)
             if on_batch and finished and not on_batch(self.counts):
                 begin.set_args(samples=(first, first))
@@ -243,27 +252,41 @@ class Wavefront:
             if counters[0] >= self.paths.slots:
                 break
         for _, event in reads:
-            event.wait()
-        width, height = self.film.size
-        added = (self.counts.samples - before) / (width * height)
-        self.samples_per_pixel += end - first if finished else added
+            device.wait(event)
+        if finished:
+            self._note_paths(first, end)
+        else:
+            self._paths = self.film.count_samples()
         self.accumulate_film()
         return finished
 
     def accumulate_film(self) -> cl.Event:
         """Enqueue that the film's picture becomes that of the samples so far; return the event."""
-        if self.features.light_paths:
-            self._accumulate.set_args(samples=self.samples_per_pixel)
+        self._accumulate.set_args(**self._samples(0, self.film.halves))
         return self.film.accumulate(self._accumulate)
 
     def image(self) -> NDArray[np.float32]:
         """Return the picture so far, (h, w, 3) float32 in the film's output space; wait for it."""
         return self.film.colours()
 
+    def half(self, which: int) -> NDArray[np.float32]:
+        """Return the picture of the even (0) or odd (1) samples, as `image` does."""
+        halves = (which, which + 1)
+        own = {"halves": halves, "samples": 0.0, **self._samples(*halves)}
+        return self.film.colours_of(self._bind("accumulate", "accumulate", **own))
+
     def bands(self) -> NDArray[np.float32]:
         """Return the mean radiance in each band so far, (h, w, bands) float32; wait for it."""
         assert self._accumulate_bands is not None, "the film has no bands"
+        self._accumulate_bands.set_args(**self._samples(0, self.film.halves))
         return self.film.bands(self._accumulate_bands)
+
+    def add_words(self, film: Words, bands: Words) -> None:
+        """Add to the film what another one holds, in the form of `Film.words`; wait for it."""
+        own_film, own_bands = self.film.words()
+        self.film.set_words(add_films(own_film, film), add_sums(own_bands, bands))
+        self._paths = self.film.count_samples()
+        self.accumulate_film()
 
     def _features_of(self, lowered: Lowered) -> Features:
         if lowered.features.channel == self.channel:
@@ -273,10 +296,24 @@ class Wavefront:
     def _bind_film(self) -> None:
         """Bind the kernels that make a picture of the film."""
         self._build(programs.film_sources(self.features, self.scene.strategy.layout))
-        self._accumulate = self._bind("accumulate", "accumulate", samples=0.0)
+        whole = {"halves": (0, self.film.halves), "samples": 0.0}
+        self._accumulate = self._bind("accumulate", "accumulate", **whole)
         self._accumulate_bands = (
-            self._bind("bands", "accumulate_bands") if self.film.has_bands else None
+            self._bind("bands", "accumulate_bands", **whole) if self.film.has_bands else None
         )
+
+    def _note_paths(self, first: int, end: int) -> None:
+        """Count the paths of sample numbers first to end - 1, which are in the film by now."""
+        pixels = math.prod(self.film.size)
+        for half in range(len(self._paths)):
+            of_half = len(range(first + (first + half) % len(self._paths), end, len(self._paths)))
+            self._paths[half] += of_half * pixels
+
+    def _samples(self, first: int, end: int) -> dict[str, float]:
+        """The argument `samples` of pictures of halves, where paths began at lights."""
+        if not self.features.light_paths:
+            return {}
+        return {"samples": sum(self._paths[first:end]) / math.prod(self.film.size)}
 
     def _bind_stages(self) -> list[Step]:
         features, chosen = self.features, self.scene.strategy
@@ -339,7 +376,7 @@ class Wavefront:
         """How many work-items serve all slots, `lanes` each, and how many of them are a group."""
         return (self.paths.slots // lanes,), (GROUP // lanes,) if lanes > 1 else (GROUP,)
 
-    def _count(self, counters: NDArray[np.uint32]) -> None:
+    def _count(self, counters: NDArray[np.uint64]) -> None:
         """Add what the counters have gained since they were read last."""
         for name, n in self.paths.gained(counters).items():
             setattr(self.counts, name, getattr(self.counts, name) + n)

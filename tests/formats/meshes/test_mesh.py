@@ -13,7 +13,7 @@ from clpt import transforms
 from clpt.errors import SceneError
 from clpt.formats import load
 from clpt.formats.meshes import framing, mesh
-from clpt.scene import shapes
+from clpt.scene import materials, shapes
 
 OBJ = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 PLY = """ply
@@ -236,6 +236,30 @@ def test_a_million_triangles_take_seconds(tmp_path):
     start = time.perf_counter()
     assert len(load(tmp_path / "ball.ply").shapes[0].faces) == 1_310_720
     assert time.perf_counter() - start < 20.0
+
+
+def test_a_mesh_of_trimesh():
+    """Its arrays, uvs and colours; a material of the caller's comes first."""
+    box = trimesh.creation.box()
+    made = shapes.Mesh.from_trimesh(box, name="box", normals="smooth")
+    np.testing.assert_array_equal(made.vertices, box.vertices)
+    np.testing.assert_array_equal(made.faces, box.faces)
+    assert (made.vertices.dtype, made.faces.dtype) == (np.float32, np.uint32)
+    assert (made.name, made.normals, made.uvs, made.material.kind) == (
+        "box", "smooth", None, "diffuse",
+    )  # fmt: skip
+
+    box.visual.face_colors = np.full((12, 4), [255, 0, 188, 255], np.uint8)
+    made = shapes.Mesh.from_trimesh(box)
+    np.testing.assert_allclose(made.attributes["face_color"][3], [1, 0, 0.5029], atol=1e-4)
+    assert made.material.front.reflectance.name == "face_color"
+    assert shapes.Mesh.from_trimesh(box, material=materials.Diffuse()).material.kind == "diffuse"
+
+    uv = np.arange(16).reshape(8, 2) / 16
+    box.visual = trimesh.visual.TextureVisuals(uv=uv)
+    np.testing.assert_array_equal(shapes.Mesh.from_trimesh(box).uvs, np.float32(uv))
+    with pytest.raises(SceneError, match=r"must be a trimesh\.Trimesh, not Scene; .* to_mesh"):
+        shapes.Mesh.from_trimesh(trimesh.Scene(box))
 
 
 @pytest.mark.parametrize(

@@ -119,11 +119,27 @@ def test_text_of_every_kind_together_says_all_it_needs() -> None:
     names = [f"bsdf/{cls.kind}" for cls in LEAVES]
     for mode, lanes in (("rgb", 1), ("spectral", 16)):
         text = clpt.kernel_source(*names, *PARTS, mode=mode, lanes=lanes)
-        assert text.startswith(f"#define LANES {lanes}\n")
+        assert f"\n#define LANES {lanes}\n" in text
         assert text.count('#line 1 "kernels/core/lanes.cl"') == 1
         assert all(f"{cls.kind}_sample(" in text for cls in LEAVES)
         assert "Scene scene" not in text
     assert all((device.kernels_folder() / name).is_file() for name in BSDF if "gen" not in name)
+
+
+@pytest.mark.parametrize("part", ["bvh", "random", "bsdf/diffuse"])
+def test_the_applications_inline_stays_its_own(theirs: cl.CommandQueue, part: str) -> None:
+    text = clpt.kernel_source(part)
+    assert "#define inline" not in text
+    own = "static inline float twice(float a) { return 2 * a; }\n"
+    own += "kernel void k(global float *out) { out[0] = twice(1.0f); }"
+    program = cl.Program(theirs.context, text + own).build(cache_dir=False)
+    log = program.get_build_info(theirs.device, cl.program_build_info.LOG)
+    assert "inline" not in log
+
+
+def test_no_parts_are_an_error() -> None:
+    with pytest.raises(clpt.SceneError, match="parts: name a part, such as 'lanes', 'math'"):
+        clpt.kernel_source()
 
 
 def test_faults_of_the_applications_are_its_own(theirs: cl.CommandQueue) -> None:

@@ -165,11 +165,12 @@ def identity(texture: Bitmap) -> Any:
 
 
 def _read_later(file: str) -> Future[Stored]:
-    return _pool().submit(images.read_stored, file)
+    return _pool(os.getpid()).submit(images.read_stored, file)
 
 
 @cache
-def _pool() -> ThreadPoolExecutor:
+def _pool(process: int) -> ThreadPoolExecutor:
+    """The threads of a process, by its id: those of a parent do not come along when it forks."""
     return ThreadPoolExecutor(min(THREADS, os.cpu_count() or 1), "clpt-images")
 
 

@@ -1,0 +1,52 @@
+"""What a driver refuses, as an error of clpt that says what to do."""
+
+from __future__ import annotations
+
+import pyopencl as cl
+
+from ..errors import DeviceError, MemoryBudgetError
+
+MEMORY_ADVICE = "lower the size of the image or simplify the scene, or choose another device"
+
+_code = cl.status_code
+_NO_MEMORY = (_code.MEM_OBJECT_ALLOCATION_FAILURE, _code.OUT_OF_HOST_MEMORY)
+_ADVICE = {
+    _code.OUT_OF_RESOURCES: "the device has no resources left, or its driver stopped a kernel "
+    "that took too long: take a smaller picture or fewer slots, and make a new object",
+    **dict.fromkeys(
+        (_code.DEVICE_NOT_AVAILABLE, _code.INVALID_COMMAND_QUEUE, _code.INVALID_CONTEXT),
+        "the device was reset or removed: open it again in a new process; if that fails too, the "
+        "system's log may tell why",
+    ),
+    _code.EXEC_STATUS_ERROR_FOR_EVENTS_IN_WAIT_LIST: "a command or an event that it waits for "
+    "failed before it: look at that one",
+}  # fmt: skip
+
+
+def refused(
+    what: str,
+    error: cl.Error,
+    nbytes: int | None = None,
+    available: int | None = None,
+    advice: str = MEMORY_ADVICE,
+) -> DeviceError:
+    """Return the error of clpt that stands for one of the driver.
+
+    It is a MemoryBudgetError where the device's memory or the host's has run out. Drivers of GPUs
+    allocate late, so any command may find that.
+
+    what: the subject of the message, such as "a copy"; nbytes: how much it needs, available: how
+    much there is, as far as that is known; advice: what to do if memory is missing.
+    """
+    if error.code in _NO_MEMORY or isinstance(error, cl.MemoryError):
+        return MemoryBudgetError(what, nbytes, available, f"{advice} ({error})")
+    known = _ADVICE.get(error.code)
+    return DeviceError(f"{what} failed: {f'{known} ({error})' if known else error}")
+
+
+def wait(event: cl.Event, what: str = "a command") -> None:
+    """Wait until an event has ended. Raises DeviceError, MemoryBudgetError."""
+    try:
+        event.wait()
+    except cl.Error as error:
+        raise refused(what, error) from error

@@ -1,0 +1,109 @@
+"""How a scene is rendered: what `clpt.render` and `Renderer` take beside the scene and a device."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any, TypedDict, get_args
+
+import pyopencl as cl
+
+from clpt import bvh
+from clpt.errors import SceneError, UnknownKindError, nearest
+from clpt.scene import Film, Scene
+from clpt.scene.cameras import Camera
+from clpt.scene.params import params
+
+
+class RenderOptions(TypedDict, total=False):
+    """Named arguments of `clpt.render` and `clpt.Renderer`. No one needs them for a right picture.
+
+    queue: a `pyopencl.CommandQueue` of the caller, instead of a device: all buffers and programs
+    are made in its context, all commands go there, and no other OpenCL object is made or changed.
+    profiling: whether the queue that is made measures times, for `Renderer.stats`.
+    texture_budget: [bytes] that bitmaps may take; larger ones are halved. By default half of what
+    the device has free.
+    layout: of the trees over triangles, a name in clpt.bvh.LAYOUTS.
+    tree_quality: "high", or "fast", which is built sooner and traced a little slower.
+    slots: paths in flight.
+    queued: whether slots are queued by material before they are shaded, or how, a name in
+    clpt.render.wavefront.queues.WAYS.
+    looped: whether a kernel on the device runs all bounces.
+    first_sample: the number of the first sample, 0 to 2^31 - 1, by default 0. Renderers that take
+    other numbers have other samples, and their films merge, see `Renderer.merge`.
+    halves: whether even and odd samples are kept apart, for `Renderer.halves`.
+
+    What is left out, or None, is chosen to suit the device and the scene.
+    """
+
+    queue: cl.CommandQueue | None
+    profiling: bool
+    texture_budget: int | None
+    layout: str | None
+    tree_quality: bvh.Quality
+    slots: int | None
+    queued: bool | str | None
+    looped: bool | None
+    first_sample: int
+    halves: bool
+
+
+def check_scene(scene: Any) -> None:
+    """Raise TypeError for what is no scene."""
+    if isinstance(scene, Scene):
+        return
+    found = f"{scene!r}" if isinstance(scene, str) else type(scene).__name__
+    advice = f"clpt.load({scene!r}) reads one" if isinstance(scene, str) else "clpt.load reads one"
+    raise TypeError(f"the scene must be a clpt.Scene, not {found}; {advice} from a file")
+
+
+def check_options(scene: Scene, options: Mapping[str, Any]) -> None:
+    """Check the names and values of options.
+
+    Raises TypeError for a name that is no option, and says where such a value belongs; TypeError
+    for a queue that is none; SceneError, UnknownKindError for other values.
+    """
+    for name in options:
+        if name not in RenderOptions.__annotations__:
+            raise TypeError(f"there is no option {name!r}{_cure(scene, name)}")
+    queue, layout = options.get("queue"), options.get("layout")
+    if queue is not None and not isinstance(queue, cl.CommandQueue):
+        found = f"queue must be a pyopencl.CommandQueue, not {type(queue).__name__}"
+        raise TypeError(f"{found}; a device is chosen by its name or index: device={queue!r}")
+    if layout is not None and layout not in bvh.LAYOUTS:
+        raise UnknownKindError("layout", str(layout), bvh.LAYOUTS, where="layout")
+    quality = options.get("tree_quality", "high")
+    if quality not in get_args(bvh.Quality):
+        raise UnknownKindError("quality", str(quality), get_args(bvh.Quality), where="tree_quality")
+    for name, least in (("slots", 1), ("texture_budget", 0), ("first_sample", 0)):
+        number = options.get(name)
+        whole = isinstance(number, int) and not isinstance(number, bool)
+        if number is not None and not (whole and number >= least):
+            message = f"must be a whole number from {least}, not {number!r}"
+            raise SceneError(message, where=name)
+
+
+def check_changes(camera: Any, **by_key: Any) -> None:
+    """Raise SceneError for what `Renderer.update` cannot take as a camera or as changes by key."""
+    if camera is not None and not isinstance(camera, Camera):
+        message = f"must be a camera, such as clpt.scene.cameras.Perspective, not {camera!r}"
+        raise SceneError(message, where="camera")
+    for name, changes in by_key.items():
+        if changes is not None and not isinstance(changes, Mapping):
+            message = f"must be a dict by shape, as {name}={{scene.shapes[0]: ..}}, not {changes!r}"
+            raise SceneError(message, where=name)
+
+
+def _cure(scene: Scene, name: str) -> str:
+    """Return what to write for an option that is not there."""
+    if name == "size":
+        return (
+            "; it is the film's: scene.film = dataclasses.replace(scene.film, width=.., height=..)"
+        )
+    if name in {field.name for field in dataclasses.fields(Scene)}:
+        return f"; it is the scene's: scene.{name} = .."
+    for owner, cls in (("film", Film), ("integrator", type(scene.integrator))):
+        if name in params(cls):
+            replaced = f"dataclasses.replace(scene.{owner}, {name}=..)"
+            return f"; it is the {owner}'s: scene.{owner} = {replaced}"
+    return nearest(name, RenderOptions.__annotations__)

@@ -1,0 +1,94 @@
+"""What a film holds, on the host: sums of samples that add to the bit, and their numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.errors import SceneError
+
+FILM_WORDS = 10  # of a pixel: three sums of three words, and the number of samples
+SUM_WORDS = 3  # kernels/core/fixed.cl
+
+Words = NDArray[np.uint32]
+Ranges = tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class FilmState:
+    """The film of a renderer as whole numbers, from `Renderer.film_state`.
+
+    A sum is 96 bits in two's complement, three words with the lowest first, in units of 2^-48. So
+    two states of different samples merge to the state of one run, to the bit, in any order.
+
+    words: (films, halves, 10, h, w) uint32, one film, or one for each channel of `aov`; of each
+    pixel three sums, and the number of its samples. halves: 2 where even and odd samples are kept
+    apart, else 1. bands: (halves, bands, 3, h, w) uint32, a sum for each band; bands may be 0.
+    taken: first and end of each range of sample numbers that were taken, ascending and apart.
+    """
+
+    words: Words
+    bands: Words
+    taken: Ranges
+
+    @property
+    def samples(self) -> NDArray[np.uint32]:
+        """How many samples each pixel has, (h, w) uint32."""
+        counts: NDArray[np.uint32] = self.words[0, :, FILM_WORDS - 1].sum(axis=0, dtype=np.uint32)
+        return counts
+
+    def merged(self, other: FilmState) -> FilmState:
+        """Return the film of the samples of both.
+
+        Raises SceneError where films differ in their form, or a sample is in both.
+        """
+        for name in ("words", "bands"):
+            own, given = getattr(self, name).shape, getattr(other, name).shape
+            if own != given:
+                raise SceneError(
+                    f"films of another form cannot be merged: {name} are {own} and {given}"
+                )
+        taken = join_ranges(self.taken, other.taken)
+        return FilmState(
+            add_films(self.words, other.words), add_sums(self.bands, other.bands), taken
+        )
+
+
+def add_films(a: Words, b: Words) -> Words:
+    """Return the sums and numbers of samples, (..., 10, h, w) each, of two films."""
+    total = np.empty_like(a)
+    for first in range(0, FILM_WORDS - 1, SUM_WORDS):
+        part = np.s_[..., first : first + SUM_WORDS, :, :]
+        total[part] = add_sums(a[part], b[part])
+    total[..., -1, :, :] = a[..., -1, :, :] + b[..., -1, :, :]
+    return total
+
+
+def add_sums(a: Words, b: Words) -> Words:
+    """Return the sums of 96-bit numbers, (..., 3, h, w) each."""
+    total = np.empty_like(a)
+    carry = np.zeros((), np.uint64)
+    for i in range(SUM_WORDS):
+        word = a[..., i, :, :].astype(np.uint64) + b[..., i, :, :] + carry
+        total[..., i, :, :] = word & 0xFFFFFFFF
+        carry = word >> np.uint64(32)
+    return total
+
+
+def join_ranges(a: Ranges, b: Ranges) -> Ranges:
+    """Return two sets of ranges as one; neighbours become one range.
+
+    Raises SceneError if a number is in both.
+    """
+    joined: list[tuple[int, int]] = []
+    for first, end in sorted([*a, *b]):
+        if joined and first < joined[-1][1]:
+            last = min(end, joined[-1][1]) - 1
+            raise SceneError(f"samples {first} to {last} would be taken twice", where="samples")
+        if joined and first == joined[-1][1]:
+            joined[-1] = joined[-1][0], end
+        elif end > first:
+            joined.append((first, end))
+    return tuple(joined)

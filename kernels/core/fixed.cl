@@ -1,0 +1,48 @@
+/* Sums of pixels are whole numbers of 96 bits, in units of 2^-48, two's complement: they do not depend on the order
+ * of their terms, so that a film is the same however its samples are divided, and films add without a rounding. */
+typedef struct { natural low, middle, high; } Fixed;
+
+#define FIXED_UNIT 0x1p-48f
+#define FIXED_LARGEST 0x1p44f /* of one term */
+
+inline Fixed fixed_zero(void)
+{
+    Fixed f = {(natural)(0u), (natural)(0u), (natural)(0u)};
+    return f;
+}
+
+inline Fixed fixed_sel(mask m, Fixed a, Fixed b)
+{
+    Fixed f = {sel_n(m, a.low, b.low), sel_n(m, a.middle, b.middle), sel_n(m, a.high, b.high)};
+    return f;
+}
+
+/* 1 where the sum of two words, one of which is `term`, left its 32 bits. */
+inline natural fixed_carry(natural sum, natural term) { return sel_n(sum < term, (natural)(1u), (natural)(0u)); }
+
+inline Fixed fixed_add(Fixed a, Fixed b)
+{
+    Fixed f;
+    f.low = a.low + b.low;
+    natural carry = fixed_carry(f.low, b.low), middle = a.middle + carry;
+    f.middle = middle + b.middle;
+    f.high = a.high + b.high + fixed_carry(middle, carry) + fixed_carry(f.middle, b.middle);
+    return f;
+}
+
+/* v in units, what is below one cut off; |v| is FIXED_LARGEST at most. Every step but the last is exact. */
+inline Fixed fixed_of(real v)
+{
+    real rest = fabs(v);
+    natural high = to_natural(rest * 0x1p-16f);
+    rest -= to_real(high) * 0x1p16f;
+    natural middle = to_natural(rest * 0x1p16f);
+    rest -= to_real(middle) * 0x1p-16f;
+    natural low = to_natural(rest * 0x1p48f), negative = as_natural(as_integer(v) >> 31);
+    Fixed f = {low ^ negative, middle ^ negative, high ^ negative}, one = fixed_zero();
+    one.low = negative & 1u;
+    return fixed_add(f, one);
+}
+
+/* Where a sum is so large, or so far below 0, that another term might leave the 96 bits. */
+inline mask fixed_is_full(Fixed f) { return f.high + 0x40000000u >= 0x80000000u; }

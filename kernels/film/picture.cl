@@ -1,0 +1,33 @@
+/* What pictures read of a film: its sums as numbers. Halves: the films of even and of odd samples, from the first one
+ * that is wanted to the one before `end`; a film that is not divided is one half. For work-items of one lane. */
+#include "film/film.cl"
+
+/* One sum over halves, as a number. sum: its first word in the first half; size: words of a half. */
+inline float halves_sum(global const uint *sum, size_t stream, size_t size, int2 halves)
+{
+    Fixed total = fixed_zero();
+    for (int i = halves.x; i < halves.y; i++) {
+        global const uint *word = sum + i * size;
+        Fixed f = {word[0], word[stream], word[2 * stream]};
+        total = fixed_add(total, f);
+    }
+    return sums_float(total.low, total.middle, total.high);
+}
+
+/* A pixel's three sums. */
+inline vec3 film_sum(global const Settings *settings, global const uint *film, int pixel_index, int2 halves)
+{
+    size_t stream = settings->padded_pixels, size = FILM_WORDS * stream;
+    global const uint *first = film + pixel_index;
+    return v3(halves_sum(first, stream, size, halves), halves_sum(first + 3 * stream, stream, size, halves),
+              halves_sum(first + 6 * stream, stream, size, halves));
+}
+
+/* How many samples a pixel has. */
+inline uint film_samples(global const Settings *settings, global const uint *film, int pixel_index, int2 halves)
+{
+    size_t stream = settings->padded_pixels;
+    uint samples = 0;
+    for (int i = halves.x; i < halves.y; i++) samples += film[(i * FILM_WORDS + 9) * stream + pixel_index];
+    return samples;
+}

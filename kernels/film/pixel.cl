@@ -1,0 +1,32 @@
+/* Pixels: where each is stored, where it lies on the film, and how it is known. They are stored in 4x4 tiles, row by row
+ * in a tile and tile by tile in a row of them. */
+
+/* Where the pixel (x, y) of the picture is stored. */
+inline integer film_pixel_index(global const Settings *settings, integer x, integer y)
+{
+    return ((y >> 2) * settings->tiles_x + (x >> 2)) * 16 + (y & 3) * 4 + (x & 3);
+}
+
+/* The pixel that is stored at an index: x and y, whole numbers. */
+inline vec2 pixel_of_index(global const Settings *settings, integer pixel_index)
+{
+    integer tile = pixel_index >> 4, row = divide(tile, settings->tiles_x), column = tile - row * settings->tiles_x;
+    vec2 p = {to_real(column * 4 + (pixel_index & 3)), to_real(row * 4 + ((pixel_index >> 2) & 3))};
+    return p;
+}
+
+/* A point of the whole film, 0 to 1: `offset` [pixels] from the centre of a pixel of the picture. */
+inline vec2 film_position(global const Settings *settings, vec2 pixel, vec2 offset)
+{
+    vec2 p = {(pixel.x + (settings->crop_x + 0.5f) + offset.x) / (float)settings->film_width,
+              (pixel.y + (settings->crop_y + 0.5f) + offset.y) / (float)settings->film_height};
+    return p;
+}
+
+/* The pixel's number in the whole film, by which its samples are drawn: a crop has those of the whole picture. */
+inline natural pixel_key(global const Settings *settings, integer pixel_index)
+{
+    vec2 p = pixel_of_index(settings, pixel_index);
+    natural x = to_natural(p.x) + (uint)settings->crop_x, y = to_natural(p.y) + (uint)settings->crop_y;
+    return y * (uint)settings->film_width + x;
+}

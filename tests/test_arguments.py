@@ -1,0 +1,106 @@
+"""Wrong arguments of public functions: the message says what is wrong, and names the cure."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import clpt
+from clpt.errors import SceneError, UnknownKindError
+from clpt.render.lowering.scene import lower
+from clpt.render.options import RenderOptions
+from clpt.scene import Film, Scene, cameras, integrators, lights, materials
+
+SCENE = Scene(camera=cameras.Perspective(), film=Film(width=4, height=4, mode="rgb"))
+
+
+class Mesh:
+    vertices, faces = np.zeros((3, 3)), np.zeros((1, 3))
+
+
+@pytest.mark.parametrize("function", [clpt.render, clpt.Renderer])
+@pytest.mark.parametrize(
+    ("scene", "message"),
+    [
+        ("scenes/x", r"must be a clpt\.Scene, not 'scenes/x'; clpt\.load\('scenes/x'\) reads one"),
+        (3, r"must be a clpt\.Scene, not int; clpt\.load"),
+        (Scene, r"must be a clpt\.Scene, not type"),
+    ],
+)
+def test_what_is_no_scene(function: Any, scene: Any, message: str) -> None:
+    with pytest.raises(TypeError, match=message):
+        function(scene)
+
+
+@pytest.mark.parametrize("function", [clpt.render, clpt.Renderer])
+@pytest.mark.parametrize(
+    ("options", "error", "message"),
+    [
+        ({"size": (4, 4)}, TypeError, r"no option 'size'; it is the film's: scene\.film = "),
+        ({"width": 4}, TypeError, r"film's: .*dataclasses\.replace\(scene\.film, width=\.\.\)"),
+        ({"seed": 1}, TypeError, r"no option 'seed'; it is the scene's: scene\.seed = \.\."),
+        ({"max_depth": 4}, TypeError, r"replace\(scene\.integrator, max_depth=\.\.\)"),
+        ({"layuot": "wide8"}, TypeError, "no option 'layuot'; did you mean 'layout'"),
+        ({"queue": 1}, TypeError, r"a pyopencl\.CommandQueue, not int; .* device=1"),
+        ({"layout": "wide9"}, UnknownKindError, "unknown layout 'wide9'; did you mean 'wide8'"),
+        ({"tree_quality": "best"}, UnknownKindError, "unknown quality 'best'"),
+        ({"queued": "no"}, SceneError, "queued: 'no' is none of sort, append"),
+        ({"slots": 0}, SceneError, "slots: must be a whole number from 1, not 0"),
+        ({"slots": 1.5}, SceneError, "slots: must be a whole number from 1"),
+        ({"texture_budget": -1}, SceneError, "texture_budget: must be a whole number from 0"),
+    ],
+)
+def test_options(function: Any, options: dict[str, Any], error: type, message: str) -> None:
+    with pytest.raises(error, match=message):
+        function(SCENE, **options)
+
+
+def test_all_options_are_described() -> None:
+    for name in RenderOptions.__annotations__:
+        assert f"{name}: " in (RenderOptions.__doc__ or ""), name
+
+
+@pytest.fixture(scope="module")
+def renderer(one_context: None) -> clpt.Renderer:
+    return clpt.Renderer(SCENE)
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "message"),
+    [
+        ({"camera": 1}, SceneError, r"camera: must be a camera, such as .*Perspective, not 1"),
+        ({"scene": "x"}, TypeError, r"clpt\.load\('x'\)"),
+        ({"materials": materials.Diffuse()}, SceneError, r"materials: must be a dict by shape"),
+        ({"transforms": np.eye(4)}, SceneError, r"transforms=\{scene\.shapes\[0\]: \.\.\}"),
+    ],
+)
+def test_update(renderer: clpt.Renderer, change: Any, error: type, message: str) -> None:
+    with pytest.raises(error, match=message):
+        renderer.update(**change)
+    assert renderer.scene is SCENE
+
+
+@pytest.mark.parametrize("cls", [clpt.Accel, clpt.InstancedAccel])
+def test_an_accel_needs_a_queue(cls: type) -> None:
+    with pytest.raises(TypeError, match=r"first argument is a pyopencl\.CommandQueue, not int"):
+        cls(1)
+    with pytest.raises(TypeError, match=rf"{cls.__name__}\(queue, mesh\.vertices, mesh\.faces\)"):
+        cls(Mesh())
+
+
+def test_a_name_of_light_says_how_to_give_it() -> None:
+    with pytest.raises(SceneError, match=r"give clpt\.spectra\.illuminant\('D65'\)"):
+        lights.Constant(radiance="D65")
+    with pytest.raises(SceneError, match="three numbers or a spectrum, not 'red'"):
+        lights.Constant(radiance="red")
+
+
+@pytest.mark.parametrize(("depth", "told"), [(-1, False), (4000, False), (4001, True)])
+def test_the_longest_path_is_limited_with_a_word(depth: int, told: bool) -> None:
+    scene = Scene(camera=cameras.Perspective(), integrator=integrators.Path(max_depth=depth))
+    lowered = lower(scene)
+    assert lowered.settings["max_depth"] == 4000
+    expected = "integrator.max_depth: 4001 counts as 4000, the longest path"
+    assert (expected in lowered.warnings) == told
