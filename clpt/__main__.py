@@ -10,6 +10,7 @@ from pathlib import Path
 import click
 import platformdirs
 
+from . import output_files
 from .cli import cli, stopping, streams
 from .errors import ClptError
 
@@ -54,7 +55,7 @@ def _keep_traceback() -> str:
     path = Path(platformdirs.user_log_dir("clpt", appauthor=False)) / "traceback.txt"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(traceback.format_exc(), encoding="utf-8")
+        output_files.write_text(path, traceback.format_exc())
     except OSError:
         return ""
     return f" (a fault of clpt; please report it with {path})"

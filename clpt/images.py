@@ -203,10 +203,15 @@ def read_layers(path: str | Path) -> dict[str, Array]:
         raise SceneError(f"not a readable image: {error}", file=path) from error
 
 
+def attributes(path: Path) -> dict[str, Any]:
+    """The attributes of an EXR file by name."""
+    with OpenEXR.File(exr_name(path), header_only=True) as file:
+        return dict(file.header())
+
+
 def check_exr(path: Path) -> None:
     """Raise SceneError for an EXR file of more pixels than are read."""
-    with OpenEXR.File(exr_name(path), header_only=True) as file:
-        low, high = file.header()["dataWindow"]
+    low, high = attributes(path)["dataWindow"]
     check_size(path, *(int(last) - int(first) + 1 for first, last in zip(low, high, strict=True)))
 
 

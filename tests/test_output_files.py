@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -50,6 +51,18 @@ def write(path: Path) -> None:
         images.write_npy(path, noise)
     else:
         images.write(path, noise)
+
+
+WRITES = re.compile(r"\.(write_text|write_bytes|savefig)\(|np\.savez?\(")
+THROUGH = re.compile(r"output_files\.|partial|\(file, ")
+
+
+def test_nobody_writes_in_another_way() -> None:
+    for path in (ROOT / "clpt").rglob("*.py"):
+        if path.name == "output_files.py" or path.name.startswith("make_"):
+            continue
+        for line in path.read_text("utf-8").splitlines():
+            assert not WRITES.search(line) or THROUGH.search(line), f"{path}: {line.strip()}"
 
 
 @posix

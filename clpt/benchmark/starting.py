@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from clpt import output_files
 from clpt.errors import DeviceError
 
 from .figures import SECONDS, Figure
@@ -124,7 +125,7 @@ def _main(target: str, scene: str, mode: str, which: str) -> None:
         "mean": mean if mean < float("inf") else 0.0,
         "memory": _peak(),
     }
-    Path(target).write_text(json.dumps(stats), encoding="utf-8")
+    output_files.write_text(target, json.dumps(stats))
 
 
 def _peak() -> int:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +13,10 @@ from .. import images, spectral_exr
 from ..errors import SceneError
 
 Pixel = tuple[int, int]  # x, y from the top left
+LAYOUT = (
+    "pixelAspectRatio", "screenWindowWidth", "name", "view", "chunkCount", "version",
+    "spectralLayoutVersion", "emissiveUnits", "EV", "cameraResponse", "lensTransmission",
+)  # fmt: skip
 LETTERS = {1: "Y", 2: "YA", 3: "RGB", 4: "RGBA"}
 
 
@@ -51,7 +57,22 @@ class ImageContents:
 
 
 def read_contents(path: Path) -> ImageContents:
-    """Read any image file. Raises SceneError."""
+    """Read any image file; an .exr tells how it was made. Raises SceneError."""
+    image = _read(path)
+    if path.suffix.lower() != ".exr":
+        return image
+    return dataclasses.replace(image, facts=image.facts | _provenance(images.attributes(path)))
+
+
+def _provenance(attributes: dict[str, Any]) -> dict[str, str]:
+    """What whoever wrote the file says of it, without what the layout needs."""
+    plain = {k: v for k, v in attributes.items() if isinstance(v, (str, int, float))}
+    return {
+        k: f"{v:g}" if isinstance(v, float) else str(v) for k, v in plain.items() if k not in LAYOUT
+    }
+
+
+def _read(path: Path) -> ImageContents:
     if spectral_exr.is_spectral(path):
         return _spectral(path)
     if path.suffix.lower() == ".exr":
@@ -68,7 +89,7 @@ def read_contents(path: Path) -> ImageContents:
     colours = values[..., :3] if labels[:3] == tuple("RGB") else None
     if labels[0] == "Y":
         colours = np.repeat(values[..., :1], 3, axis=2)
-    facts = {"size": _size(values), "channels": str(len(labels))}
+    facts = {"size": _size(values), "channels": ", ".join(labels)}
     return ImageContents(path, values, labels, None, colours, "value (linear)", facts)
 
 

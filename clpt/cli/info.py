@@ -69,7 +69,11 @@ def summary(scene: Scene) -> dict[str, Any]:
         "lights": dict(Counter(lights)),
         "materials": _by_kind(kinds, materials.Material),
         "textures": _by_kind(kinds, textures.Texture),
+        "animations": scene.extra.get("animations", []),
         "film": _film(scene),
+        "spp": scene.spp,
+        "integrator": scene.integrator.kind,
+        "sampler": scene.sampler.kind,
         "warnings": scene.warnings,
     }
 

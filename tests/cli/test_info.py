@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import base64
 import json
 
+import numpy as np
 import pytest
 
 from clpt.__main__ import run
@@ -18,6 +20,8 @@ def test_the_cornell_box(scenes, capsys):
     assert found["shapes"] == {"rectangle": 6, "cube": 2}
     assert found["triangles"] == found["triangles_instanced"] == 6 * 2 + 2 * 12
     assert found["cameras"] == ["perspective"]
+    assert (found["spp"], found["integrator"], found["sampler"]) == (16, "path", "independent")
+    assert found["animations"] == []
     assert found["lights"] == {"area": 1}
     assert found["materials"] == {"diffuse": 3}
     assert found["film"] == {"width": 9, "height": 9, "mode": "spectral", "filter": "box"}
@@ -54,3 +58,32 @@ def test_bad_input_is_one_line(scenes, monkeypatch, capsys, arguments):
     assert run(["info", *arguments]) == 2
     error = capsys.readouterr().err
     assert error.startswith("clpt: error: ") and error.count("\n") == 1
+
+
+def test_all_cameras(scenes, tmp_path):
+    text = (scenes / "cornell.xml").read_text()
+    second = '<sensor type="orthographic"/></scene>'
+    (tmp_path / "two.xml").write_text(text.replace("</scene>", second))
+    assert summary(load(tmp_path / "two.xml"))["cameras"] == ["perspective", "orthographic"]
+
+
+def test_animations(tmp_path):
+    triangle = base64.b64encode(np.float32([0, 0, 0, 1, 0, 0, 0, 1, 0]).tobytes()).decode()
+    document = {
+        "asset": {"version": "2.0"},
+        "buffers": [
+            {"byteLength": 36, "uri": f"data:application/octet-stream;base64,{triangle}"}
+        ],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
+             "min": [0, 0, 0], "max": [1, 1, 0]}
+        ],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "nodes": [{"mesh": 0}],
+        "scenes": [{"nodes": [0]}],
+        "animations": [{"name": "walk", "channels": [], "samplers": []},
+                       {"channels": [], "samplers": []}],
+    }  # fmt: skip
+    (tmp_path / "a.gltf").write_text(json.dumps(document))
+    assert summary(load(tmp_path / "a.gltf"))["animations"] == ["walk", "1"]

@@ -124,3 +124,20 @@ def test_without_matplotlib_the_extra_is_named(here, capsys, monkeypatch):
     out, err = capsys.readouterr()
     assert "400 nm" in out
     assert 'a plot needs matplotlib: install it by pip install "clpt[plot]"' in err
+
+
+@pytest.mark.parametrize("spectral", [False, True])
+def test_channels_and_how_it_was_made(here, capsys, spectral):
+    metadata = {"software": "clpt 1", "scene": "box.xml", "spp": 21.5, "seed": 7}
+    if spectral:
+        spectral_exr.write("a.exr", SpectralImage(VALUES, NM, True), metadata=metadata)
+    else:
+        images.write(
+            "a.exr", VALUES[..., :3], metadata=metadata, layers={"samples": VALUES[..., 0]}
+        )
+    assert run(["inspect", "a.exr"]) == 0
+    told = capsys.readouterr().out
+    words = {"clpt 1", "box.xml", "21.5", "seed", "700 nm" if spectral else "R, G, B, samples"}
+    assert all(word in told for word in words)
+    for word in ("pixelAspectRatio", "spectralLayoutVersion", "chunkCount"):
+        assert word not in told

@@ -173,6 +173,16 @@ def test_closed_streams(tmp_path, streams):
     assert images.read(tmp_path / "out.png").shape == (8, 8, 3)
 
 
+def test_warnings_of_a_file_come_before_kernels_are_built(tmp_path, capsys):
+    path = tmp_path / "a.pbrt"
+    path.write_text('Integrator "bdpt"\nWorldBegin\nLightSource "infinite"\nShape "sphere"\n')
+    common = ["-o", str(tmp_path / "a.png"), "--size", "8x8", "--spp", "1"]
+    assert run(["render", str(path), *common]) == 0
+    told = capsys.readouterr().err
+    assert told.count("is missing") == 1
+    assert told.index("is missing") < told.index("building kernels")
+
+
 def test_verbose_before_and_behind_the_command(tmp_path, capsys):
     path = tmp_path / "out.png"
     arguments = [CORNELL, "-o", str(path), "--size", "8x8", "--spp", "1", "--mode", "rgb"]
@@ -286,6 +296,7 @@ def test_changes_of_a_scene():
         (["--size", "0x5"], "1 to 65536"),
         (["--size", "100000x10"], "1 to 65536"),
         (["--size", "large"], "640x480"),
+        (["--size", "65536x65536"], "64 Mi pixels"),
         (["--spp", "0"], "--spp"),
         (["--time", "soon"], "30s"),
         (["--time", "0s"], "no time"),
@@ -298,8 +309,8 @@ def test_changes_of_a_scene():
         (["--integrator", "aov", "-o", "a.hdr"], ".exr and .png"),
         (["-D", "spp=3"], "only .xml"),
         (["--sensor", "no.csv"], "no.csv"),
-        (["--sensor", "cie1964", "--mode", "rgb", "--quiet"], "film.sensor"),
-        (["--bands", "4", "--mode", "rgb", "--quiet"], "film.bands"),
+        (["--sensor", "cie1964", "--mode", "rgb"], "film.sensor"),
+        (["--bands", "4", "--mode", "rgb"], "film.bands"),
         (["--bands", "-3"], "--bands"),
         (["--white-balance", "D66"], "D66"),
         (["--white-balance", "1,1"], "chromaticity"),

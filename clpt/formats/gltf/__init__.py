@@ -55,6 +55,8 @@ def load(path: Path, /, **variables: Any) -> Scene:
     )
     scene.warnings = document.warnings
     scene.extra["cameras"] = [camera.text("type") for _, camera in cameras.cameras_of(graph)]
+    animations = document.root.children("animations")
+    scene.extra["animations"] = [a.text("name", str(i)) for i, a in enumerate(animations)]
     if chosen:
         width, height = chosen[1]
         scene.film = dataclasses.replace(scene.film, width=width, height=height)

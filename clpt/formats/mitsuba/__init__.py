@@ -43,7 +43,8 @@ def load(path: Path, /, **variables: object) -> Scene:
     for tag in REFERENCED:
         props.objects(tag)
     integrator = props.object("integrator")
-    first = _first_sensor(props, context)
+    all_sensors = _sensors(props, context)
+    first = all_sensors[0] if all_sensors else None
     props.finish()
     camera = framing_camera(shapes) if first is None else first.camera
     return Scene(
@@ -57,7 +58,7 @@ def load(path: Path, /, **variables: object) -> Scene:
         seed=0 if first is None else first.seed,
         name=path.stem,
         warnings=context.warnings,
-        extra={"format": "mitsuba"},
+        extra={"format": "mitsuba", "cameras": [one.camera.kind for one in all_sensors]},
     )
 
 
@@ -73,10 +74,10 @@ def _textures(props: Properties) -> list[Element]:
     )
 
 
-def _first_sensor(props: Properties, context: Context) -> sensors.Sensor | None:
+def _sensors(props: Properties, context: Context) -> list[sensors.Sensor]:
     all_sensors = [sensor(element, context) for element in props.objects("sensor")]
     if len(all_sensors) > 1:
         context.warn(props.element, f"only the first of {len(all_sensors)} sensors is used")
     if not all_sensors:
         context.warn(props.element, "has no sensor; a camera that sees everything is used")
-    return all_sensors[0] if all_sensors else None
+    return all_sensors

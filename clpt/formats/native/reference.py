@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from clpt import spectra
+from clpt import output_files, spectra
 from clpt.formats.native import forms
 from clpt.formats.native.reradiation import RERADIATIONS
 from clpt.formats.native.shape_files import FILES
@@ -197,4 +197,4 @@ def _shown(value: Any) -> str:
 
 if __name__ == "__main__":
     target = Path(sys.argv[1] if len(sys.argv) > 1 else "docs/scene_format.md")
-    target.write_text(text(), "utf-8")
+    output_files.write_text(target, text())

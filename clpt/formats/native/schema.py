@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from clpt import spectra
+from clpt import output_files, spectra
 from clpt.formats.native import forms
 from clpt.formats.native.json_schema import (
     NUMBER,
@@ -187,4 +187,4 @@ def text() -> str:
 
 if __name__ == "__main__":
     target = Path(sys.argv[1] if len(sys.argv) > 1 else "scenes/schema.json")
-    target.write_text(text(), "utf-8")
+    output_files.write_text(target, text())
