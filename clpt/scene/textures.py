@@ -83,6 +83,9 @@ class Product(Texture):
 
     first: Textured = factor(1.0, "one of them")
     second: Textured = factor(1.0, "the other")
+    rgb: bool = host(
+        False, "True: colours are multiplied as linear Rec. 709, and the product made a spectrum"
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -99,6 +102,9 @@ class MeshAttribute(Texture):
     """What a mesh says per vertex or face: its `attributes` of that name."""
 
     name: str = host("vertex_color", "begins with vertex_ or face_")
+    channel: str = choice(
+        "luminance", "of a colour, where a number is asked for", ("luminance", *"rgb")
+    )
 
     def check(self) -> None:
         if not str(self.name).startswith(ATTRIBUTES):
