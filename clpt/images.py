@@ -271,6 +271,17 @@ def to_srgb8(image: Array, exposure: float = 0.0) -> NDArray[np.uint8]:
     return np.concatenate([codes, stored], axis=2).astype(np.uint8)
 
 
+def straight(image: Array) -> Array:
+    """Colours (h, w, 4) over nothing as those of what covers: divided by alpha, as a .png has them.
+
+    Images of other shapes are returned as they are; so are colours where nothing covers.
+    """
+    if image.shape[2] != 4:
+        return image
+    alpha = image[..., 3:]
+    return np.concatenate([image[..., :3] / np.where(alpha > 0, alpha, 1), alpha], axis=2)
+
+
 def _to_rec709(pixels: Array, space: str) -> Array:
     """Colours (h, w, 3 or 4) of a space in linear Rec. 709, white to white; alpha stays."""
     if space == "rec709" or pixels.shape[2] == 1:

@@ -42,6 +42,7 @@ PATH = Record(
     first=("fixed", "sum of the pixel's samples so far, first channel: x, or red in RGB mode"),
     second=("fixed", "the same of the second channel"),
     third=("fixed", "the same of the third channel"),
+    covered=("fixed", "weights of those samples that met a surface; of a film with alpha"),
     samples=("natural", "number of samples in these sums"),
 )
 
@@ -93,6 +94,7 @@ SETTINGS = Record(
     max_depth=("integer", "most surfaces of a path, that of the light counted"),
     rr_depth=("integer", "depth from which Russian roulette is played"),
     hide_lights=("integer", "1: the camera does not see lights"),
+    alpha=("integer", "1: the film has a channel of what is covered; the camera sees no sky"),
     light_count=("integer", "rows in `lights`"),
     ambient=(
         "integer",

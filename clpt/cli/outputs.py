@@ -108,7 +108,9 @@ def write(
     if film.bands and path.suffix.lower() in BAND_FORMATS and not renderer.channels:
         _write_bands(path, renderer, stats)
     elif not renderer.channels:
-        picture = renderer.colours()
+        picture = renderer.colours() if film.bands else renderer.image()
+        if path.suffix.lower() == ".png":
+            picture = images.straight(picture)
         layers = {} if renderer.scene.noise is None else {"samples": renderer.film.get()[..., 3]}
         images.write(
             path, picture, metadata=stats, exposure=exposure, layers=layers, space=film.output_space

@@ -140,6 +140,9 @@ class White(click.ParamType):
 )
 @click.option("--lambda-min", type=float, help="Shortest wavelength of the light [nm].")
 @click.option("--lambda-max", type=float, help="Longest wavelength; fluorescence needs 300 to 830.")
+@click.option(
+    "--alpha", is_flag=True, default=None, help="Leave the sky out, and write what is covered."
+)
 @click.option("--exposure", type=float, default=0.0, help="Brighten .png by this many stops.")
 @scene_variables
 @click.option(

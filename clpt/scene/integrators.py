@@ -219,6 +219,9 @@ class Film(Kind):
     )
     output_space: str = choice("rec709", "colour space of the picture", spaces.SPACES)
     exposure: float = real(1.0, "factor on the picture, of bands too", low=0.0)
+    alpha: bool = host(
+        False, "transparent: the camera sees no sky, and a fourth channel tells what is covered"
+    )
 
     @property
     def size(self) -> tuple[int, int]:

@@ -3,27 +3,42 @@
  * atomics. */
 #include "film/pixel.cl"
 #include "film/sums.cl"
-#define FILM_WORDS 10 /* sums of three channels, three words each, and the number of samples */
+#define FILM_SAMPLES 9 /* after the sums of three channels, three words each: the number of samples */
+#if USES_ALPHA
+#define FILM_ALPHA 10 /* then the sum of what is covered */
+#define FILM_WORDS 13
+#else
+#define FILM_WORDS 10
+#endif
 
 /* Whether the film takes a value: neither NaN nor so large that sums would overflow. */
 inline mask film_accepts(vec3 value) { return fabs(value.x) + fabs(value.y) + fabs(value.z) < FIXED_LARGEST; }
 
-/* What a slot has summed of a pixel: three channels, and the number of samples. */
+/* What a slot has summed of a pixel: three channels, the number of samples, and what is covered. */
 typedef struct {
     Fixed first, second, third;
     natural samples;
+#if USES_ALPHA
+    Fixed covered;
+#endif
 } Exposure;
 
 inline Exposure exposure_sel(mask m, Exposure a, Exposure b)
 {
     Exposure e = {fixed_sel(m, a.first, b.first), fixed_sel(m, a.second, b.second), fixed_sel(m, a.third, b.third),
                   sel_n(m, a.samples, b.samples)};
+#if USES_ALPHA
+    e.covered = fixed_sel(m, a.covered, b.covered);
+#endif
     return e;
 }
 
 inline Exposure exposure_none(void)
 {
     Exposure e = {fixed_zero(), fixed_zero(), fixed_zero(), (natural)(0u)};
+#if USES_ALPHA
+    e.covered = fixed_zero();
+#endif
     return e;
 }
 
@@ -55,16 +70,33 @@ inline integer film_add(global const Settings *settings, global uint *film, mask
 {
     size_t stream = settings->padded_pixels;
     integer full = 0;
-#define ADD(i)                                                                                                           if (LANE(m, i)) {                                                                                                        global uint *at = film + film_at(settings, LANE(plane, i), LANE(pixel_index, i));                                    LANE(full, i) = sums_add(at, stream, LANE(e.first.low, i), LANE(e.first.middle, i), LANE(e.first.high, i));          at += 3 * stream;                                                                                                    LANE(full, i) += sums_add(at, stream, LANE(e.second.low, i), LANE(e.second.middle, i),                                                         LANE(e.second.high, i));                                                                   at += 3 * stream;                                                                                                    LANE(full, i) += sums_add(at, stream, LANE(e.third.low, i), LANE(e.third.middle, i), LANE(e.third.high, i));         atomic_add((volatile global uint *)(at + 3 * stream), LANE(e.samples, i));                                       }
+#define SUM(i, word, f) \
+    LANE(full, i) += sums_add(at + (word) * stream, stream, LANE((f).low, i), LANE((f).middle, i), LANE((f).high, i))
+#if USES_ALPHA
+#define ADD_ALPHA(i) SUM(i, FILM_ALPHA, e.covered);
+#else
+#define ADD_ALPHA(i)
+#endif
+#define ADD(i)                                                                                \
+    if (LANE(m, i)) {                                                                         \
+        global uint *at = film + film_at(settings, LANE(plane, i), LANE(pixel_index, i));     \
+        SUM(i, 0, e.first);                                                                   \
+        SUM(i, 3, e.second);                                                                  \
+        SUM(i, 6, e.third);                                                                   \
+        atomic_add((volatile global uint *)(at + FILM_SAMPLES * stream), LANE(e.samples, i)); \
+        ADD_ALPHA(i)                                                                          \
+    }
     FOR_LANES(ADD)
 #undef ADD
+#undef ADD_ALPHA
+#undef SUM
     return full;
 }
 
 /* Counts a sample in each pixel where something else adds its value. */
 inline void film_count(global const Settings *settings, global uint *film, mask m, integer plane, integer pixel_index)
 {
-    size_t samples = (size_t)9 * settings->padded_pixels;
+    size_t samples = (size_t)FILM_SAMPLES * settings->padded_pixels;
 #define ADD(i)                                                                                        \
     if (LANE(m, i)) {                                                                                 \
         size_t at = film_at(settings, LANE(plane, i), LANE(pixel_index, i));                          \

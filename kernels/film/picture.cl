@@ -28,6 +28,6 @@ inline uint film_samples(global const Settings *settings, global const uint *fil
 {
     size_t stream = settings->padded_pixels;
     uint samples = 0;
-    for (int i = halves.x; i < halves.y; i++) samples += film[(i * FILM_WORDS + 9) * stream + pixel_index];
+    for (int i = halves.x; i < halves.y; i++) samples += film[(i * FILM_WORDS + FILM_SAMPLES) * stream + pixel_index];
     return samples;
 }

@@ -26,3 +26,18 @@ kernel void accumulate(global const Settings *settings, global const uint *film,
         pixel[3] = count;
     }
 }
+
+#if USES_ALPHA
+/* How much of each pixel is covered. */
+kernel void accumulate_alpha(global const Settings *settings, global const uint *film, global float *alpha, int2 halves)
+{
+    int x = get_global_id(0), y = get_global_id(1);
+    if (x < settings->width && y < settings->height) {
+        size_t stream = settings->padded_pixels;
+        int pixel_index = film_pixel_index(settings, x, y);
+        float sum = halves_sum(film + FILM_ALPHA * stream + pixel_index, stream, FILM_WORDS * stream, halves);
+        float samples = (float)film_samples(settings, film, pixel_index, halves);
+        alpha[(size_t)y * settings->width + x] = sum / fmax(samples, 1.0f);
+    }
+}
+#endif

@@ -21,7 +21,7 @@ inline Spectrum path_radiance(Scene scene, Slab path, At at, PathEnd end, Wavele
 {
     Spectrum radiance = load_path_radiance(path, at);
 #if USES_INFINITE
-    mask sky = end.missed & ((end.depth > 0) | mask_of(scene.settings->hide_lights == 0));
+    mask sky = end.missed & ((end.depth > 0) | mask_of(scene.settings->hide_lights + scene.settings->alpha == 0));
     if (any(sky)) {
         real pdf = load_path_pdf(path, at);
         vec3 d = sel3(sky, load_path_d(path, at), v3(0.0f, 0.0f, 1.0f)); /* a slot without a pixel has none */
@@ -52,6 +52,10 @@ inline Exposure add_sample(Scene scene, Slab path, At at, BEGIN_ARGS, PathEnd en
     mask accepted = finished & film_accepts(value);
     Exposure before = {load_path_first(path, at), load_path_second(path, at), load_path_third(path, at),
                        load_path_samples(path, at)};
+#if USES_ALPHA
+    mask covers = finished & !(end.missed & (end.depth == 0));
+    before.covered = fixed_add(load_path_covered(path, at), fixed_of(sel(covers, weight, (real)(0.0f))));
+#endif
     Exposure e = exposure_add(before, sel3(accepted, value, v3(0.0f, 0.0f, 0.0f)));
     integer full = sel_i(exposure_is_full(e), (integer)(1), (integer)(0));
 #if USES_BANDS
@@ -130,6 +134,9 @@ STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
         store_path_second(path, at, go, e.second);
         store_path_third(path, at, go, e.third);
         store_path_samples(path, at, go, e.samples);
+#if USES_ALPHA
+        store_path_covered(path, at, go, e.covered);
+#endif
         begin_path(scene, path, at, go, next.pixel_index, next.sample);
         store_path_state(path, at, end.ended, sel_i(next.done, (integer)(PATH_DONE), (integer)(PATH_ALIVE)));
     }

@@ -93,7 +93,7 @@ def test_halves(scene, whole):
         assert not np.array_equal(even, odd)
         if not scene.film.bands:
             np.testing.assert_allclose(0.5 * (even + odd), whole[1], rtol=1e-5, atol=1e-6)
-        assert (state.words[0, :, FILM_WORDS - 1].sum(axis=(1, 2)) == SPP / 2 * 26 * 18).all()
+        assert (state.words[0, :, SAMPLES_WORD].sum(axis=(1, 2)) == SPP / 2 * 26 * 18).all()
 
 
 def test_halves_of_a_whole_film(scene, whole):

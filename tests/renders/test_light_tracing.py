@@ -283,6 +283,7 @@ BEAM = Rectangle(emission=DirectionalArea(), name="beam")
         ({"camera": Orthographic()}, "camera: .*perspective and thin_lens, not orthographic"),
         ({"camera": ThinLens(glass="sf11")}, "camera.glass: .*does not disperse"),
         ({"lights": [Point(falloff=False)]}, r"lights\[0\]: .*falls with distance"),
+        ({"film": Film(alpha=True)}, "film.alpha: .*without alpha"),
         ({"integrator": Path(), "shapes": [BEAM]}, "rectangle 'beam': only .*particle_tracer"),
     ],
 )

@@ -36,6 +36,7 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "USES_DISPERSION": lambda f: f.dispersion and f.mode == "spectral",
     "USES_FLUORESCENCE": lambda f: any(fluoresces(f, cls) for cls in f.leaves),
     "USES_BANDS": lambda f: f.bands,
+    "USES_ALPHA": lambda f: f.alpha,
     "USES_INFINITE": lambda f: f.infinite,
     "USES_LIGHTS": lambda f: bool(f.lights),
     "USES_SURFACE_LIGHTS": lambda f: not shape_records.RECORDS.keys().isdisjoint(f.lights),

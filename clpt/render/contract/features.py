@@ -66,6 +66,7 @@ class Features:
     glass_lens: bool = False  # of a glass that disperses
     channel: str = ""
     bands: bool = False  # a spectral film
+    alpha: bool = False  # a film that tells what is covered
     tabulated_density: bool = False  # of wavelengths
     spectra_size: int = 0
     spectra_step: float = 1.0

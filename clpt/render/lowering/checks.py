@@ -63,6 +63,8 @@ def _check_light_paths(scene: Scene, shapes_: list[Shape]) -> None:
     if scene.camera.kind not in CONNECTED:
         names = " and ".join(CONNECTED)
         _refuse(f"the cameras {names}, not {scene.camera.kind}", "camera")
+    if scene.film.alpha:
+        _refuse("a film without alpha", "film.alpha")
     if spectral and dispersive_glass(scene.camera) is not None:
         _refuse("a lens whose glass does not disperse", "camera.glass")
     for i, light in enumerate(scene.lights):

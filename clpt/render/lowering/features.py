@@ -62,6 +62,7 @@ def features_of(
         glass_lens=glass_lens,
         channel=channels[0] if channels else "",
         bands=bool(scene.film.bands) and not channels,
+        alpha=index.alpha,
         tabulated_density=tabulated_density,
         spectra_size=encoder.spectra.samples,
         spectra_step=encoder.spectra.step,

@@ -63,6 +63,11 @@ class SceneIndex:
         return isinstance(self.scene.integrator, ParticleTracer)
 
     @property
+    def alpha(self) -> bool:
+        """Whether the film tells what is covered."""
+        return self.scene.film.alpha and not self.channels
+
+    @property
     def mode(self) -> str:
         """The mode of the kernels: channels are no light, and need no wavelengths."""
         return "rgb" if self.channels else self.scene.film.mode

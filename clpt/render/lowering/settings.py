@@ -46,6 +46,7 @@ def settings_of(
     settings["max_depth"] = DEEPEST if depth < 0 else min(depth, DEEPEST)
     settings["rr_depth"] = min(getattr(integrator, "rr_depth", DEEPEST), DEEPEST)
     settings["hide_lights"] = getattr(integrator, "hide_lights", False)
+    settings["alpha"] = index.alpha
     settings["light_count"] = len(lights.rows)
     settings["infinite_count"] = lights.infinite
     settings["ambient"] = ambient_row

@@ -12,23 +12,29 @@ from numpy.typing import NDArray
 from clpt import device
 from clpt.device.buffers import Buffers
 from clpt.render.wavefront import work_list
-from clpt.render.wavefront.film_state import FILM_WORDS, SUM_WORDS, Words
+from clpt.render.wavefront.film_state import FILM_WORDS, SAMPLES_WORD, SUM_WORDS, Words
 
 
 class Film:
     """The film of a wavefront.
 
-    settings: of the paths, which say the film's size and halves; bands: whether it has any.
-    size: width and height [pixels]; sums: the buffers that samples are added to, by the names of
+    settings: of the paths, which say the film's size and halves; bands: whether it has any;
+    alpha: whether it tells what is covered. size: width and height [pixels]; sums: the buffers that samples are added to, by the names of
     the kernels' arguments; picture: (h, w, 4) float32, always the same memory.
 
     Raises MemoryBudgetError.
     """
 
     def __init__(
-        self, stream: device.Stream, buffers: Buffers, settings: NDArray[np.void], bands: bool
+        self,
+        stream: device.Stream,
+        buffers: Buffers,
+        settings: NDArray[np.void],
+        bands: bool,
+        alpha: bool,
     ):
         self.stream, self.has_bands, self._buffers = stream, bands, buffers
+        self._words = FILM_WORDS + SUM_WORDS * alpha  # of a pixel
         self.size = int(settings["width"]), int(settings["height"])
         self.band_count = int(settings["bands"]) if bands else 0
         self.halves = int(settings["halves"])
@@ -38,7 +44,7 @@ class Film:
         self._at = (y * self.size[0] + x)[self._inside]  # in a picture, of each of these
         words = 4 * self._padded_pixels * self.halves
         pixels, advice = math.prod(self.size), "lower the image's size"
-        sums, images = {"film": FILM_WORDS * words}, {"image": 16 * pixels}
+        sums, images = {"film": self._words * words}, {"image": 16 * pixels}
         if bands:
             advice += " or the number of bands"
             sums["bands"] = SUM_WORDS * self.band_count * words
@@ -85,6 +91,14 @@ class Film:
         self.stream.run(kernel, self.size)
         return self._read_colours(image)
 
+    def alpha(self, kernel: device.BoundKernel) -> NDArray[np.float32]:
+        """Return how much of each pixel is covered, (h, w) float32; wait for it."""
+        values = np.empty(self.size[::-1], np.float32)
+        buffer = self._buffers.allocate("the alpha", values.nbytes)
+        kernel.set_args(alpha=buffer)
+        self.stream.run(kernel, self.size)
+        return self.stream.read(buffer, values)
+
     def bands(self, kernel: device.BoundKernel) -> NDArray[np.float32]:
         """Return the mean radiance in each band, (h, w, bands) float32; wait for it."""
         self.stream.run(kernel, self.size)
@@ -92,11 +106,11 @@ class Film:
         return self.stream.read(self._images["band_image"], values)
 
     def words(self) -> tuple[Words, Words]:
-        """Return what the film holds: (halves, 10, h, w) uint32, and of bands (halves, bands, 3,
-        h, w); wait for it."""
+        """Return what the film holds: (halves, 10 or 13, h, w) uint32, and of bands (halves, bands,
+        3, h, w); wait for it."""
         width, height = self.size
         found = []
-        for name, each in (("film", FILM_WORDS), ("bands", SUM_WORDS * self.band_count)):
+        for name, each in (("film", self._words), ("bands", SUM_WORDS * self.band_count)):
             streams = np.zeros((self.halves * each, self._padded_pixels), np.uint32)
             if each:
                 streams = self.stream.read(self.sums[name], streams)
@@ -118,7 +132,7 @@ class Film:
     def count_samples(self) -> list[int]:
         """Return how many samples the film has, in each half; wait for it."""
         film, _ = self.words()
-        return [int(half[FILM_WORDS - 1].sum(dtype=np.uint64)) for half in film]
+        return [int(half[SAMPLES_WORD].sum(dtype=np.uint64)) for half in film]
 
     def _read_colours(self, image: cl.Buffer) -> NDArray[np.float32]:
         whole = self.stream.read(image, np.empty((*self.size[::-1], 4), np.float32))

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from clpt.errors import SceneError
 
-FILM_WORDS = 10  # of a pixel: three sums of three words, and the number of samples
 SUM_WORDS = 3  # kernels/core/fixed.cl
+SAMPLES_WORD = 3 * SUM_WORDS  # after three sums, kernels/film/film.cl
+FILM_WORDS = SAMPLES_WORD + 1  # of a pixel; a film with alpha has another sum
 
 Words = NDArray[np.uint32]
 Ranges = tuple[tuple[int, int], ...]
@@ -24,7 +25,7 @@ class FilmState:
     two states of different samples merge to the state of one run, to the bit, in any order.
 
     words: (films, halves, 10, h, w) uint32, one film, or one for each channel of `aov`; of each
-    pixel three sums, and the number of its samples. halves: 2 where even and odd samples are kept
+    pixel three sums, and the number of its samples; with alpha 13, a sum of what is covered. halves: 2 where even and odd samples are kept
     apart, else 1. bands: (halves, bands, 3, h, w) uint32, a sum for each band; bands may be 0.
     taken: first and end of each range of sample numbers that were taken, ascending and apart.
     """
@@ -36,7 +37,7 @@ class FilmState:
     @property
     def samples(self) -> NDArray[np.uint32]:
         """How many samples each pixel has, (h, w) uint32."""
-        counts: NDArray[np.uint32] = self.words[0, :, FILM_WORDS - 1].sum(axis=0, dtype=np.uint32)
+        counts: NDArray[np.uint32] = self.words[0, :, SAMPLES_WORD].sum(axis=0, dtype=np.uint32)
         return counts
 
     def merged(self, other: FilmState) -> FilmState:
@@ -57,12 +58,12 @@ class FilmState:
 
 
 def add_films(a: Words, b: Words) -> Words:
-    """Return the sums and numbers of samples, (..., 10, h, w) each, of two films."""
-    total = np.empty_like(a)
-    for first in range(0, FILM_WORDS - 1, SUM_WORDS):
+    """Return the sums and numbers of samples, (..., 10 or 13, h, w) each, of two films."""
+    total = a + b
+    for first in (0, SUM_WORDS, 2 * SUM_WORDS, FILM_WORDS):
         part = np.s_[..., first : first + SUM_WORDS, :, :]
-        total[part] = add_sums(a[part], b[part])
-    total[..., -1, :, :] = a[..., -1, :, :] + b[..., -1, :, :]
+        if first < a.shape[-3]:
+            total[part] = add_sums(a[part], b[part])
     return total
 
 

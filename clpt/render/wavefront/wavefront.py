@@ -94,7 +94,8 @@ class Wavefront:
         self.programs: dict[str, device.Program] = {}
         self._stages: list[Step] | None = None
         self._loop: device.BoundKernel | None = None
-        self.film = Film(self.stream, self.buffers, paths.settings, self.features.bands)
+        features = self.features
+        self.film = Film(self.stream, self.buffers, paths.settings, features.bands, features.alpha)
         self._bind_film()
         self.clear()
 
@@ -274,6 +275,13 @@ class Wavefront:
         halves = (which, which + 1)
         own = {"halves": halves, "samples": 0.0, **self._samples(*halves)}
         return self.film.colours_of(self._bind("accumulate", "accumulate", **own))
+
+    def alpha(self) -> NDArray[np.float32]:
+        """Return how much of each pixel is covered so far, (h, w) float32; wait for it."""
+        halves = (0, self.film.halves)
+        # Any buffer will do for `alpha`, which the film replaces.
+        own = {"halves": halves, "alpha": self.film.sums["film"]}
+        return self.film.alpha(self._bind("accumulate", "accumulate_alpha", **own))
 
     def bands(self) -> NDArray[np.float32]:
         """Return the mean radiance in each band so far, (h, w, bands) float32; wait for it."""
