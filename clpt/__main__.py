@@ -10,29 +10,36 @@ from pathlib import Path
 import click
 import platformdirs
 
+from .cli import cli, stopping, streams
 from .errors import ClptError
 
-BAD_INPUT, BUG, INTERRUPTED = 2, 1, 130
+BAD_INPUT, BUG = 2, 1
 
 
 def main() -> None:
     """Run the command line and leave with its exit status."""
+    streams.make_safe()
+    stopping.raise_at_signals()
     sys.exit(run(sys.argv[1:]))
 
 
 def run(arguments: Sequence[str]) -> int:
-    """Run the command line: 0 success, 2 bad input, 130 interrupted, 1 a fault of clpt's own."""
-    try:
-        from .cli import cli
+    """Run the command line and return its exit status.
 
+    0 success, 2 bad input, 1 a fault of clpt's own, 128 + number where a signal ended it: 130 is
+    Ctrl-C.
+    """
+    try:
         status = cli.main(args=list(arguments), prog_name="clpt", standalone_mode=False)
         return status if isinstance(status, int) else 0
     except ClptError as error:
         return _complain(str(error), BAD_INPUT)
     except click.ClickException as error:
         return _complain(error.format_message(), BAD_INPUT)
-    except (click.Abort, KeyboardInterrupt):
-        return _complain("interrupted", INTERRUPTED)
+    except KeyboardInterrupt as error:
+        return _complain("interrupted", stopping.status(error))
+    except click.Abort as error:
+        return _complain("interrupted", stopping.status(error.__cause__))
     except Exception as error:
         return _complain(f"{type(error).__name__}: {error}{_keep_traceback()}", BUG)
 

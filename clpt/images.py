@@ -6,6 +6,7 @@ EXR through the OpenEXR package; Radiance HDR and PFM are small enough to stand 
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ import numpy as np
 import OpenEXR
 from numpy.typing import ArrayLike, NDArray
 
+from . import output_files
 from .errors import SceneError
 from .spectra.spaces import between, chromaticities
 
@@ -27,6 +29,7 @@ if TYPE_CHECKING:  # else imported where it is used, for many pictures are EXR o
 Array = NDArray[np.float32]
 Metadata = Mapping[str, str | int | float | tuple[float, ...]]
 
+LARGEST = 1 << 29  # pixels of an image that is read
 _HALF_MAX = 65504.0
 _PILLOW = (".png", ".jpg", ".jpeg", ".tga", ".bmp", ".webp", ".gif", ".tif", ".tiff")
 
@@ -132,7 +135,7 @@ def write(
         elif suffix == ".pfm":
             _write_pfm(path, pixels)
         else:
-            np.save(path, pixels)
+            write_npy(path, pixels)
     except SceneError:
         raise
     except (OSError, RuntimeError, ValueError) as error:
@@ -141,7 +144,27 @@ def write(
 
 def write_stored(path: Path, values: NDArray[np.uint8]) -> None:
     """Write (h, w) or (h, w, 1, 3 or 4) as the bytes of a .png."""
-    path.write_bytes(png(values))
+    output_files.write(path, png(values))
+
+
+def write_npy(path: Path, array: NDArray[Any]) -> None:
+    """Write an array of any shape as .npy."""
+    with output_files.replacing(path) as partial, partial.open("wb") as file:
+        np.save(file, array)
+
+
+def exr_name(path: str | Path) -> str:
+    """A path as OpenEXR takes it: bytes of UTF-8, whatever the locale. Raises ValueError."""
+    return os.fsencode(path).decode("utf-8")
+
+
+def write_channels(
+    path: Path, metadata: Mapping[str, Any], channels: Mapping[str, NDArray[Any]]
+) -> None:
+    """Write channels (h, w) by name, and attributes, as an .exr."""
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    with output_files.replacing(path) as partial:
+        OpenEXR.File({**metadata, **header}, dict(channels)).write(exr_name(partial))
 
 
 def png(values: NDArray[np.uint8]) -> bytes:
@@ -170,11 +193,21 @@ def read_layers(path: str | Path) -> dict[str, Array]:
     if not path.is_file():
         _fail(path, "no such image file")
     try:
-        with OpenEXR.File(str(path), separate_channels=True) as file:
+        check_exr(path)
+        with OpenEXR.File(exr_name(path), separate_channels=True) as file:
             channels = file.channels()
             return {name: np.asarray(c.pixels, np.float32) for name, c in channels.items()}
+    except SceneError:
+        raise
     except (OSError, RuntimeError, ValueError) as error:
         raise SceneError(f"not a readable image: {error}", file=path) from error
+
+
+def check_exr(path: Path) -> None:
+    """Raise SceneError for an EXR file of more pixels than are read."""
+    with OpenEXR.File(exr_name(path), header_only=True) as file:
+        low, high = file.header()["dataWindow"]
+    check_size(path, *(int(last) - int(first) + 1 for first, last in zip(low, high, strict=True)))
 
 
 def from_pillow(image: Image.Image, *, linear: bool = True) -> Array:
@@ -245,14 +278,24 @@ def _fail(path: Path, message: str) -> NoReturn:
     raise SceneError(message, file=path)
 
 
+def check_size(path: Path, width: int, height: int) -> None:
+    """Raise SceneError for an image of more pixels than are read."""
+    if width * height > LARGEST:
+        _fail(path, f"has {width}x{height} pixels, more than the {LARGEST} that are read")
+
+
 def _read_pillow(path: Path) -> Stored:
     from PIL import Image, UnidentifiedImageError
 
     try:
         with Image.open(path) as image:
+            check_size(path, image.width, image.height)
             return stored_from_pillow(image)
     except UnidentifiedImageError:
         _fail(path, "not an image")
+    except Image.DecompressionBombError:
+        most = 2 * (Image.MAX_IMAGE_PIXELS or 0)  # Pillow's rule
+        _fail(path, f"has more than the {most} pixels that are read of {path.suffix} images")
 
 
 def _read_exr(path: Path) -> Array:
@@ -289,15 +332,16 @@ def _write_exr(
         stored = np.clip(layer, -_HALF_MAX, _HALF_MAX).astype(np.float16) if half else layer
         for index, letter in enumerate(letters):
             channels[name + letter] = np.ascontiguousarray(stored[..., index])
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    OpenEXR.File({**dict(metadata), **header}, channels).write(str(path))
+    write_channels(path, metadata, channels)
 
 
 def _read_npy(path: Path) -> Array:
-    array = np.load(path, allow_pickle=False)
+    array = np.load(path, "r" if path.stat().st_size > 4096 else None, allow_pickle=False)
+    if array.ndim > 1:
+        check_size(path, *array.shape[1::-1])
     if array.ndim not in (2, 3) or array.dtype.kind not in "fiu":
         _fail(path, f"not an image: an array of {array.dtype}, shape {array.shape}")
-    return np.asarray(array if array.ndim == 3 else array[..., None], np.float32)
+    return np.array(array if array.ndim == 3 else array[..., None], np.float32)
 
 
 def _read_pfm(path: Path) -> Array:
@@ -306,6 +350,7 @@ def _read_pfm(path: Path) -> Array:
     if header is None:
         _fail(path, "not a PFM image: its header is not 'PF' or 'Pf', width, height, scale")
     width, height, scale = int(header[2]), int(header[3]), float(header[4])
+    check_size(path, width, height)
     channels = 3 if header[1] == b"PF" else 1
     count = width * height * channels
     if len(data) - header.end() < 4 * count:
@@ -318,7 +363,7 @@ def _write_pfm(path: Path, pixels: Array) -> None:
     pixels = pixels[..., :3]
     kind = "PF" if pixels.shape[2] == 3 else "Pf"
     head = f"{kind}\n{pixels.shape[1]} {pixels.shape[0]}\n-1.0\n"
-    path.write_bytes(head.encode() + pixels[::-1].astype("<f4").tobytes())
+    output_files.write(path, head.encode() + pixels[::-1].astype("<f4").tobytes())
 
 
 def _read_hdr(path: Path) -> Array:
@@ -330,6 +375,7 @@ def _read_hdr(path: Path) -> Array:
     if b"FORMAT=32-bit_rle_xyze" in data[: size.start()]:
         _fail(path, "XYZE colours are not supported; save it as RGBE")
     height, width = int(size[1]), int(size[2])
+    check_size(path, width, height)
     rgbe, at = np.empty((height, width, 4), np.uint8), size.end()
     try:
         for y in range(height):
@@ -373,7 +419,7 @@ def _write_hdr(path: Path, pixels: Array) -> None:
     rgbe[..., :3] = np.clip(np.round(colour * scale[..., None]), 0, 255)
     rgbe[..., 3] = np.where((mantissa > 0) & (exponent > -128), np.clip(exponent + 128, 0, 255), 0)
     head = f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {pixels.shape[0]} +X {pixels.shape[1]}\n"
-    path.write_bytes(head.encode() + rgbe.tobytes())
+    output_files.write(path, head.encode() + rgbe.tobytes())
 
 
 READERS = {

@@ -19,6 +19,7 @@ import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
+from clpt import images
 from clpt.errors import SceneError
 from clpt.spectra import Tabulated, cie
 from clpt.spectra.spectrum import d65
@@ -112,7 +113,7 @@ def is_spectral(path: str | Path) -> bool:
     if Path(path).suffix.lower() != ".exr" or not Path(path).is_file():
         return False
     try:
-        with OpenEXR.File(str(path), header_only=True) as file:
+        with OpenEXR.File(images.exr_name(path), header_only=True) as file:
             names = [channel.name for channel in file.header()["channels"]]
     except Exception:  # whoever reads it tells what is wrong
         return False
@@ -188,9 +189,8 @@ def write(
         if curve is not None:
             points = zip(curve.lambdas, curve.values, strict=True)
             header[name] = "".join(f"{nm!r}nm:{value!r};" for nm, value in points)
-    layout = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     try:
-        OpenEXR.File({**header, **layout}, stored).write(str(path))
+        images.write_channels(path, header, stored)
     except (OSError, RuntimeError, ValueError) as error:
         raise SceneError(f"cannot be written: {error}", file=path) from error
 
@@ -204,9 +204,12 @@ def _contents(path: Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
     if not path.is_file():
         _fail(path, "no such image file")
     try:
-        with OpenEXR.File(str(path), separate_channels=True) as file:
+        images.check_exr(path)
+        with OpenEXR.File(images.exr_name(path), separate_channels=True) as file:
             header = dict(file.header())  # a copy: closing the file empties it
             return header, {name: channel.pixels for name, channel in file.channels().items()}
+    except SceneError:
+        raise
     except Exception as error:  # the library raises its own, from RuntimeError to MemoryError
         message = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise SceneError(f"not a readable image: {message}", file=path) from error

@@ -15,7 +15,10 @@ import clpt
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE, KERNELS = ROOT / "clpt", ROOT / "kernels"
 
-BASE = {"errors", "layout", "records", "transforms", "images", "spectra", "spectral_exr"}
+BASE = {
+    "errors", "layout", "records", "transforms", "images", "output_files", "spectra",
+    "spectral_exr",
+}  # fmt: skip
 # What a part may import of the others; itself always.
 MAY_IMPORT = {
     **dict.fromkeys(BASE, BASE),
@@ -244,3 +247,9 @@ def test_lines_of_kernels(path: Path) -> None:
     for line, after in pairwise(lines):
         if line.endswith("\\") and after.endswith("\\"):
             assert len(line) == len(after), after
+
+
+@pytest.mark.parametrize("path", modules(), ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_nobody_changes_the_filters_of_warnings(path: Path) -> None:
+    """They belong to the whole process: another thread's warning would become an error."""
+    assert "warnings" not in imports(path)

@@ -171,6 +171,7 @@ LIMITS = (  # on the page, and where the code has them
     ("| 4096 corners |", "clpt.formats.meshes.ply", "MOST_CORNERS", 4096),
     ("| 1 GiB |", "clpt.formats.meshes.strands", "LARGEST", 1 << 30),
     ("| 2 GiB | `is larger than 2048 MiB`", "clpt.formats.mitsuba.serialized", "LARGEST", 1 << 31),
+    ("2^29 pixels", "clpt.images", "LARGEST", 1 << 29),
     ("2^26 pixels each", "clpt.formats.gltf.textures", "PIXELS", 1 << 26),
     ("2^30 together", "clpt.formats.gltf.textures", "TOGETHER", 1 << 30),
     ("| 2 GiB | an error", "clpt.formats.gltf.accessors", "LARGEST", 1 << 31),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from clpt import images
+from clpt import images, spectral_exr
 from clpt.errors import SceneError
 from clpt.spectra import spaces
 
@@ -232,3 +232,23 @@ def test_missing_and_unknown(tmp_path):
 def test_transfer_is_its_own_inverse():
     x = np.linspace(0, 1, 1001, dtype=np.float32)
     np.testing.assert_allclose(images.srgb_to_linear(images.linear_to_srgb(x)), x, atol=1e-6)
+
+
+def test_images_of_too_many_pixels(tmp_path, monkeypatch):
+    """By what the file's beginning says, before memory is taken."""
+    whole = np.zeros((20, 30, 3), np.float32)
+    paths = [tmp_path / f"a{suffix}" for suffix in images.WRITABLE]
+    for path in paths:
+        images.write(path, whole)
+    spectral = tmp_path / "bands.exr"
+    spectral_exr.write(spectral, spectral_exr.SpectralImage(whole, [400.0, 500.0, 600.0], True))
+    monkeypatch.setattr(images, "LARGEST", 600)
+    assert all(images.read(path).shape == whole.shape for path in paths)
+    monkeypatch.setattr(images, "LARGEST", 599)
+    for path in [*paths, spectral]:
+        with pytest.raises(SceneError, match=r"has 30x20 pixels, more than the 599 that") as raised:
+            (spectral_exr if path == spectral else images).read(path)
+        assert str(raised.value).startswith(f"{path}: has")
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 100)
+    with pytest.raises(SceneError, match=r"more than the 200 pixels that are read of \.png"):
+        images.read(tmp_path / "a.png")

@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
 import click
 import pytest
 
@@ -31,6 +37,7 @@ def failing(monkeypatch):
         (SceneError("two\nlines"), 2, "clpt: error: two lines\n"),
         (click.UsageError("what?"), 2, "clpt: error: what?\n"),
         (KeyboardInterrupt(), 130, "clpt: error: interrupted\n"),
+        (KeyboardInterrupt(signal.SIGTERM), 143, "clpt: error: interrupted\n"),
     ],
 )
 def test_status_and_line(failing, capsys, error, status, line):
@@ -56,3 +63,25 @@ def test_help_and_unknown_commands(capsys):
     assert capsys.readouterr().err == "clpt: error: No such command 'unknown'.\n"
     assert entry.run(["devices", "--colour"]) == 2
     assert "--colour" in capsys.readouterr().err
+
+
+IMPORTING = """
+import signal, sys
+import clpt_command
+class Presses:
+    def find_spec(self, name, path=None, target=None):
+        if name == "clpt.images":
+            signal.raise_signal(signal.SIGINT)
+sys.meta_path.insert(0, Presses())
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.argv[1:] = ["devices"]
+clpt_command.main()
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+def test_ctrl_c_while_everything_is_imported():
+    root = Path(__file__).resolve().parents[1]
+    command = [sys.executable, "-c", IMPORTING]
+    done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")

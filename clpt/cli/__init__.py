@@ -7,6 +7,8 @@ import logging
 
 import click
 
+from .verbosity import verbose_option
+
 COMMANDS = ("render", "devices", "info", "inspect", "kernels", "bench")
 
 
@@ -23,13 +25,11 @@ class _Commands(click.Group):
 
 
 @click.group(cls=_Commands, invoke_without_command=True)
-@click.option("-v", "--verbose", count=True, help="Log more; twice for everything.")
+@verbose_option("Log more; twice for everything.")
 @click.version_option(package_name="clpt")
 @click.pass_context
 def cli(ctx: click.Context, verbose: int) -> None:
     """clpt, a spectral path tracer in OpenCL."""
-    level = (logging.WARNING, logging.INFO, logging.DEBUG)[min(verbose, 2)]
     logging.basicConfig(format="clpt: %(levelname)s: %(message)s")
-    logging.getLogger("clpt").setLevel(level)
     if ctx.invoked_subcommand is None:
         click.echo(ctx.get_help())

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Sheet
 from matplotlib.lines import Line2D
 
+from .. import output_files
 from ..benchmark import PARTS
 from ..benchmark.figures import SECONDS, Figure
 from ..errors import SceneError
@@ -53,7 +54,8 @@ def write(path: Path, title: str, figures: Sequence[Figure], then: Mapping[int, 
             loc="outside lower right",
         )  # fmt: skip
     try:
-        sheet.savefig(path)
+        with output_files.replacing(path) as partial:
+            sheet.savefig(partial)
     except OSError as error:
         raise SceneError(f"cannot be written: {error}", file=path) from error
 

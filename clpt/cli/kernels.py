@@ -10,6 +10,7 @@ import click
 from clpt.render.codegen.programs import film_sources, sources
 from clpt.render.lowering.scene import lower
 
+from .. import output_files
 from ..bvh.layouts import LAYOUTS
 from ..errors import SceneError
 from ..formats import load
@@ -44,7 +45,7 @@ def kernels(
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, source in made.items():
-            (folder / f"{name}.cl").write_text(source.text, encoding="utf-8")
+            output_files.write_text(folder / f"{name}.cl", source.text)
     except OSError as error:
         raise SceneError(f"cannot be written: {error}", file=folder) from error
     for name, source in made.items():

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+import os
+import secrets
+import tempfile
+from collections.abc import Callable
 from pathlib import Path
-
-import numpy as np
 
 from clpt.render.aov_preview import sheet
 
-from .. import __version__, images, spectral_exr
+from .. import __version__, images, output_files, spectral_exr
 from ..errors import SceneError
 from ..render.pictures import Image
 from ..render.renderer import Renderer
@@ -29,14 +31,23 @@ def default(scene: Path) -> tuple[Path, ...]:
     return Path(f"{name}.exr"), Path(f"{name}.png")
 
 
-def checked(paths: tuple[Path, ...], scene: Scene) -> list[Path]:
-    """Return the paths if the scene's picture can be written there. Raises SceneError."""
+def checked(paths: tuple[Path, ...]) -> tuple[Path, ...]:
+    """Return the paths if files of these names can be written there. Raises SceneError."""
     for path in paths:
         images.check_output(path)
+        try:
+            output_files.check_writable(path)
+        except OSError as error:
+            raise SceneError(f"cannot be written: {error}", file=path) from error
+    return paths
+
+
+def check_contents(paths: tuple[Path, ...], scene: Scene) -> None:
+    """Raise SceneError for a path whose format cannot hold what the scene is rendered to."""
+    for path in paths:
         if isinstance(scene.integrator, Aov) and path.suffix.lower() not in AOV_FORMATS:
             formats = " and ".join(AOV_FORMATS)
             raise SceneError(f"the integrator aov is written to {formats}", file=path)
-    return list(paths)
 
 
 def metadata(renderer: Renderer, scene: Path, seconds: float) -> dict[str, str | int | float]:
@@ -45,7 +56,7 @@ def metadata(renderer: Renderer, scene: Path, seconds: float) -> dict[str, str |
     pixels = math.prod(plan.film.size) * len(renderer.wavefronts)
     return {
         "software": f"clpt {__version__}",
-        "scene": str(scene),
+        "scene": os.fsencode(scene).decode("utf-8", "replace"),
         "mode": plan.film.mode,
         "integrator": plan.integrator.kind,
         "sampler": plan.sampler.kind,
@@ -56,10 +67,43 @@ def metadata(renderer: Renderer, scene: Path, seconds: float) -> dict[str, str |
     }
 
 
+def write_all(
+    paths: tuple[Path, ...],
+    renderer: Renderer,
+    stats: dict[str, str | int | float],
+    exposure: float,
+    tell: Callable[[str], None],
+) -> None:
+    """Write the picture so far to every path, and tell of each.
+
+    A picture that cannot be written goes to the temporary folder. Raises SceneError at the end,
+    which says where it is.
+    """
+    failures = []
+    for path in paths:
+        try:
+            write(path, renderer, stats, exposure)
+            tell(f"{path}  {stats['spp']:.4g} spp, {stats['seconds']:.1f} s")
+        except (SceneError, OSError) as error:
+            other = Path(tempfile.gettempdir()) / f"{path.stem}-{secrets.token_hex(4)}{path.suffix}"
+            try:
+                write(other, renderer, stats, exposure)
+                failures.append(f"{_named(path, error)}; the picture is in {other}")
+            except (SceneError, OSError) as second:
+                failures.append(f"{_named(path, error)}; nor can {_named(other, second)}")
+    if failures:
+        raise SceneError("; ".join(failures))
+
+
+def _named(path: Path, error: Exception) -> str:
+    """Return a message that names its file."""
+    return str(error) if isinstance(error, SceneError) else f"{path}: cannot be written: {error}"
+
+
 def write(
     path: Path, renderer: Renderer, stats: dict[str, str | int | float], exposure: float
 ) -> None:
-    """Write the picture so far. Raises SceneError."""
+    """Write the picture so far. Raises SceneError, OSError."""
     film = renderer.scene.film
     if film.bands and path.suffix.lower() in BAND_FORMATS and not renderer.channels:
         _write_bands(path, renderer, stats)
@@ -78,7 +122,7 @@ def write(
 def _write_bands(path: Path, renderer: Renderer, stats: dict[str, str | int | float]) -> None:
     """Write all bands: an array, or a spectral .exr with a preview in the film's colours."""
     if path.suffix.lower() == ".npy":
-        np.save(path, renderer.image())
+        images.write_npy(path, renderer.image())
         return
     stated = {**stats, "chromaticities": chromaticities(renderer.scene.film.output_space)}
     preview = renderer.colours()

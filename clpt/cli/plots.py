@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.legend_handler import HandlerTuple
 from matplotlib.patches import Patch
 
+from .. import output_files
 from ..errors import SceneError
 from ..images import to_srgb8
 from ..spectra import cie_xyz, xyz_to_rgb
@@ -36,7 +37,8 @@ def write(path: Path, image: ImageContents, values: dict[Pixel, np.ndarray]) -> 
     (_spectra if image.lambdas is not None else _bars)(figure, image, values)
     figure.suptitle(image.path.name, x=0.012, ha="left", color=INK, weight="bold", size=11)
     try:
-        figure.savefig(path)
+        with output_files.replacing(path) as partial:
+            figure.savefig(partial)
     except OSError as error:
         raise SceneError(f"cannot be written: {error}", file=path) from error
 

@@ -14,6 +14,7 @@ import click
 from .. import device as dev
 from ..bvh import LAYOUTS, Quality
 from ..formats import load
+from ..render.lowering.checks import check
 from ..render.renderer import Renderer
 from ..scene import Scene, kinds
 from ..scene.params import Kind, params
@@ -23,8 +24,9 @@ from . import outputs, report
 from .display import display
 from .rendering import render_samples
 from .scene_variables import scene_variables
+from .stopping import STATUS, stops
+from .verbosity import verbose_option
 
-INTERRUPTED = 130
 LARGEST = 65536  # pixels of a side
 
 
@@ -110,7 +112,7 @@ class White(click.ParamType):
     "--noise", type=click.FloatRange(0.0), metavar="SHARE",
     help="Stop sampling pixels with less noise, such as 0.02 of their light; 0: never.",
 )  # fmt: skip
-@click.option("--time", "limit", type=Duration(), help="Stop after 30s, 5m, 1h30m of rendering.")
+@click.option("--time", "limit", type=Duration(), help="Stop after 30s, 5m, 1h30m.")
 @click.option("--size", type=Size(), help="Size of the picture.")
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), help="Seed of the random numbers.")
 @click.option("--device", metavar="NAME-OR-INDEX", help="Where to render: see `clpt devices`.")
@@ -144,7 +146,7 @@ class White(click.ParamType):
     "--texture-budget", type=Bytes(), metavar="SIZE",
     help="Memory for images, such as 500M; larger ones are halved.  [default: half the free]",
 )  # fmt: skip
-@click.option("--verbose", is_flag=True, help="Print memory, trees, programs and stages.")
+@verbose_option("Print memory, trees, programs and stages; log more, twice for everything.")
 @click.option("--quiet", is_flag=True, help="Show no progress and no warnings.")
 def render(
     scene: Path,
@@ -156,49 +158,60 @@ def render(
     exposure: float,
     variables: dict[str, Any],
     texture_budget: int | None,
-    verbose: bool,
+    verbose: int,
     quiet: bool,
     **changes: Any,
 ) -> int:
     """Render the scene file, mesh or folder SCENE.
 
     The scene decides what no option sets. With --time or --noise but no --spp the render goes on
-    until the time is over, or the noise is below the limit. Ctrl-C stops it within a second; the
-    picture so far is written, and the exit status is 130.
+    until the time is over, or the noise is below the limit. The time counts from the command's
+    start, kernels included. Ctrl-C stops it within a second; the
+    picture so far is written, and the exit status is 130. SIGTERM and SIGHUP do the same, with the
+    statuses 143 and 129.
     """
+    targets = outputs.checked(paths or outputs.default(scene))
     shown = display(quiet, limit)
     began = time.perf_counter()
     with ThreadPoolExecutor(max_workers=1) as beside:
-        chosen = beside.submit(dev.choose, device, profiling=verbose)
+        chosen = beside.submit(dev.choose, device, profiling=bool(verbose))
         with shown.loading(scene.name) as tell:
             plan = changed(load(scene, progress=tell, **variables), **changes)
         loading = time.perf_counter() - began
         ends = limit is not None or bool(changes["noise"])
         spp = changes["spp"] if ends else plan.spp
-        targets = outputs.checked(paths or outputs.default(scene), plan)
+        outputs.check_contents(targets, plan)
+        check(plan)
         on = chosen.result()
+    for warning in plan.warnings:
+        shown.note(f"clpt: warning: {warning}")
     with shown.phase(f"building kernels for {on.info.name}"):
         renderer = Renderer(
             plan, on, texture_budget=texture_budget, layout=layout, tree_quality=tree_quality
         )
-    for warning in [*plan.warnings, *renderer.warnings]:
+    for warning in renderer.warnings:
         shown.note(f"clpt: warning: {warning}")
     if verbose:
         report.before(renderer, loading)
-    began = time.perf_counter()
-    with shown.rendering():
-        finished = render_samples(renderer, spp, limit, shown.show, plan.noise)
-    seconds = time.perf_counter() - began
+    ready = time.perf_counter()
+    left = shown.limit = None if limit is None else max(began + limit - ready, 0.0)
+    with stops() as stopped:
+        with shown.rendering():
+            render_samples(renderer, spp, left, shown.show, plan.noise, stopped)
+        stats = outputs.metadata(renderer, scene, time.perf_counter() - ready)
+        outputs.write_all(targets, renderer, stats, exposure, shown.note)
+    if float(stats["spp"]) < 1.0:
+        shown.note(
+            f"clpt: warning: only {float(stats['spp']):.1%} of the pixels have a sample; others are black"
+        )
     rejected = sum(wavefront.counts.rejected for wavefront in renderer.wavefronts)
     if rejected:
         shown.note(f"clpt: warning: {rejected} samples were not finite and count as black")
-    stats = outputs.metadata(renderer, scene, seconds)
-    for target in targets:
-        outputs.write(target, renderer, stats, exposure)
-        shown.note(f"{target}  {stats['spp']:.4g} spp, {seconds:.1f} s")
+    if any(wavefront.counts.full for wavefront in renderer.wavefronts):
+        shown.note("clpt: warning: pixels are too bright for the film: scale the lights down")
     if verbose:
         report.after(renderer)
-    return 0 if finished else INTERRUPTED
+    return STATUS + stopped[0] if stopped else 0
 
 
 def changed(

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import signal
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from types import FrameType
+from collections.abc import Callable, Sequence
 
 from ..render.progress import Progress
-from ..render.renderer import Renderer
+from ..render.renderer import MOST_SAMPLES, Renderer
 
 PASS_SECONDS = 5.0  # at the end of a pass few paths are left: long passes make that rare
 GROWTH = 3  # times what has been rendered so far
@@ -23,52 +20,35 @@ def render_samples(
     limit: float | None,
     show: Callable[[Progress], None],
     noise: float | None = None,
-) -> bool:
+    stopped: Sequence[int] = (),
+) -> None:
     """Render until every pixel has `spp` samples or `limit` [s] is over; None means no limit.
 
     With `noise` the rendering also ends when no pixel has more noise.
 
-    The first pass gives every pixel a sample, whatever the limit. Ctrl-C ends the rendering within
-    a second; a second Ctrl-C is a KeyboardInterrupt. Returns False if it was interrupted.
+    It ends soon after the limit, perhaps before every pixel has a sample, and within a second when
+    `stopped` gets an entry, see clpt.cli.stopping.
     """
     began = time.perf_counter()
 
     def tell(progress: Progress) -> bool:
         seconds = time.perf_counter() - began
         show(dataclasses.replace(progress, total=spp or 0, seconds=seconds))
-        over = limit is not None and seconds >= limit and renderer.samples > 0
-        return not (interrupted or over)
+        over = limit is not None and seconds >= limit
+        return not (stopped or over)
 
     size, end = 1, began
-    with _interrupts() as interrupted:
-        while renderer.run(size, tell, noise=noise):
-            start, end = end, time.perf_counter()
-            seconds_left = math.inf if limit is None else began + limit - end
-            samples_left = math.inf if spp is None else spp - renderer.samples
-            if samples_left <= 0 or seconds_left <= 0 or renderer.active == 0.0:
-                break
-            rate = size / max(end - start, 1e-9)
-            size = pass_size(renderer.samples, rate, samples_left, seconds_left)
-        return not interrupted
+    while renderer.run(size, tell, noise=noise):
+        start, end = end, time.perf_counter()
+        seconds_left = math.inf if limit is None else began + limit - end
+        samples_left = (spp or MOST_SAMPLES) - renderer.samples
+        if samples_left <= 0 or seconds_left <= 0 or renderer.active == 0.0:
+            break
+        rate = size / max(end - start, 1e-9)
+        size = pass_size(renderer.samples, rate, samples_left, seconds_left)
 
 
 def pass_size(samples: int, rate: float, samples_left: float, seconds_left: float) -> int:
     """Return the samples of the next pass, after `samples`, at `rate` [1/s]."""
     in_time = int(rate * min(PASS_SECONDS, seconds_left))
     return int(max(1, min(GROWTH * samples, in_time, samples_left)))
-
-
-@contextmanager
-def _interrupts() -> Iterator[list[int]]:
-    """Yield a list that Ctrl-C fills; a second Ctrl-C acts as always."""
-    pressed: list[int] = []
-
-    def press(number: int, frame: FrameType | None) -> None:
-        pressed.append(number)
-        signal.signal(signal.SIGINT, before)
-
-    before = signal.signal(signal.SIGINT, press)
-    try:
-        yield pressed
-    finally:
-        signal.signal(signal.SIGINT, before)

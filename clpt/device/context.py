@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 import pyopencl as cl
 
-from clpt.device import memory, program_cache, runtimes
+from clpt.device import memory, native_programs, program_cache, runtimes
 
 from ..errors import DeviceError
 
@@ -57,7 +57,7 @@ class DeviceInfo:
 
     @property
     def label(self) -> str:
-        """Platform and device: the text in which `choose` looks for a name."""
+        """Platform and device, for people to read."""
         return f"{self.platform} {self.name}"
 
     def free_memory(self) -> int:
@@ -148,7 +148,9 @@ def devices() -> tuple[DeviceInfo, ...]:
 
 
 def choose(which: str | int | None = None, *, profiling: bool = False) -> Device:
-    """Open the device named by an index, or by a part of "platform device" in any case.
+    """Open the device named by an index, or by a part of its names in any case.
+
+    Its names are the platform's, its own and that in its version, such as "pocl".
 
     It has a queue of its own. Its context is that of the process, in which programs are built once;
     a process that was forked has another one.
@@ -201,7 +203,7 @@ def trial(info: DeviceInfo) -> str | None:
     try:
         context = cl.Context([info.cl_device])
         queue = _queue(context, info.cl_device, False)
-        kernel = cl.Kernel(cl.Program(context, _TRIAL).build(cache_dir=False), "trial")
+        kernel = cl.Kernel(native_programs.build(context, info.cl_device, _TRIAL), "trial")
         result = np.zeros(4, np.uint32)
         buffer = cl.Buffer(context, cl.mem_flags.WRITE_ONLY, result.nbytes)
         kernel(queue, result.shape, None, buffer)
@@ -213,11 +215,15 @@ def trial(info: DeviceInfo) -> str | None:
 
 
 def _matching(which: str | int | None, infos: tuple[DeviceInfo, ...]) -> list[DeviceInfo]:
-    """The devices with an index or a part of a name, the preferred ones first."""
+    """The devices with an index or a part of a name, the preferred ones first.
+
+    PoCL calls its platform "Portable Computing Language"; only versions say "PoCL".
+    """
     text = str(which).strip()
     if text.isdecimal():
         return [info for info in infos if info.index == int(text)]
-    return [info for info in by_preference(infos) if text.casefold() in info.label.casefold()]
+    names = {info: f"{info.label} {info.version}".casefold() for info in by_preference(infos)}
+    return [info for info in names if text.casefold() in names[info]]
 
 
 def _reason(info: DeviceInfo, infos: tuple[DeviceInfo, ...]) -> str:
@@ -234,7 +240,7 @@ def _listing(infos: tuple[DeviceInfo, ...]) -> str:
 
 
 def _cl_devices() -> Iterator[cl.Device]:
-    runtimes.announce()
+    runtimes.prepare()
     try:
         platforms = cl.get_platforms()
     except cl.Error as error:
@@ -247,7 +253,7 @@ def _cl_devices() -> Iterator[cl.Device]:
             log.warning("platform %s is passed over: %s", platform.name, error)
             continue
         if not found:
-            log.warning("platform %s has no devices", platform.name)
+            log.debug("platform %s has no devices", platform.name)
         yield from found
 
 

@@ -1,36 +1,80 @@
-"""Files in the user's cache folder, all of which may be deleted at any time."""
+"""Files in the user's cache folder, all of which may be deleted at any time.
+
+Several processes may use the folder at once: each file is written whole or not at all, and a file
+that another process has deleted is one that is missing. The files that were used longest ago are
+deleted where all together take more than LIMIT.
+"""
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import logging
 import os
 import tempfile
+import threading
+import time
 from pathlib import Path
 
 import platformdirs
+
+from clpt import output_files
 
 from .source import Source
 
 log = logging.getLogger(__name__)
 
+LIMIT = 2**30  # bytes
+_PARTS = ("programs", "failed")  # the folders that are kept within LIMIT
+_STEP = LIMIT // 16  # bytes that a process writes before it looks at the folder's size again
+_STALE = 3600.0  # [s] after which a file that is not complete belongs to a process that has died
+
+_lock = threading.Lock()
+_written = _STEP  # bytes since the folder's size was looked at: a process looks at its first file
+
 
 def folder() -> Path:
-    """Return clpt's folder in the user's cache folder."""
-    return Path(platformdirs.user_cache_dir("clpt", appauthor=False))
+    """Return clpt's folder in the user's cache folder, or a temporary one in its place.
+
+    The user's folder is passed over, with one warning, where it cannot be written, or where others
+    can write: a driver runs what the folder holds.
+    """
+    return private_folder(platformdirs.user_cache_path("clpt", appauthor=False))
 
 
-def write_atomically(path: Path, content: bytes) -> None:
-    """Write a file that other processes see whole or not at all. Raises OSError."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, partial = tempfile.mkstemp(dir=path.parent, prefix=path.name)
+@functools.cache
+def private_folder(wanted: Path) -> Path:
+    """Return `wanted`, made where it is missing, or a temporary folder if it cannot be used."""
+    reason = _unfit(wanted)
+    if reason is None:
+        return wanted
+    other = temporary_folder() / wanted.name
+    log.warning("the cache folder %s %s; %s is used instead", wanted, reason, other)
+    return other
+
+
+@functools.cache
+def temporary_folder() -> Path:
+    """Return a temporary folder for caches, which only this user can write."""
+    user = os.getuid() if hasattr(os, "getuid") else "user"
+    wanted = Path(tempfile.gettempdir()) / f"clpt-{user}"
+    return wanted if _unfit(wanted) is None else Path(tempfile.mkdtemp(prefix="clpt-"))
+
+
+def _unfit(path: Path) -> str | None:
+    """Return why a folder cannot hold a cache; None if it can. It is made where it is missing."""
     try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        os.replace(partial, path)
-    except BaseException:
-        Path(partial).unlink(missing_ok=True)
-        raise
+        path.mkdir(mode=0o700, parents=True, exist_ok=True)
+        output_files.check_writable(path / "trial")
+        for part in (path, *(path / name for name in _PARTS)):
+            if part.exists() and os.name == "posix":
+                if {part.lstat().st_uid, part.stat().st_uid} != {os.getuid()}:
+                    return "belongs to another user"
+                if part.stat().st_mode & 0o022:
+                    return f"can be written by others (see: chmod go-w {part})"
+    except OSError as error:
+        return f"cannot be written ({error.strerror or error})"
+    return None
 
 
 def store(entry: str, header: str, binary: bytes) -> None:
@@ -38,7 +82,7 @@ def store(entry: str, header: str, binary: bytes) -> None:
     content = header.encode() + b"\n" + binary
     check = hashlib.sha256(content).hexdigest().encode()
     try:
-        write_atomically(folder() / "programs" / entry, check + b"\n" + content)
+        _write(folder() / "programs" / entry, check + b"\n" + content)
     except OSError as error:
         log.debug("the cache cannot be written: %s", error)
 
@@ -48,8 +92,10 @@ def load(entry: str) -> tuple[str, bytes] | None:
 
     The checksum is needed, since drivers crash on a damaged binary.
     """
+    path = folder() / "programs" / entry
     try:
-        check, _, content = (folder() / "programs" / entry).read_bytes().partition(b"\n")
+        check, _, content = path.read_bytes().partition(b"\n")
+        os.utime(path)  # it was used now; many systems do not note that
     except OSError:
         return None
     if hashlib.sha256(content).hexdigest().encode() != check:
@@ -64,7 +110,47 @@ def keep_failed(source: Source) -> str | None:
     stem = source.name.replace("/", "_").removesuffix(".cl")
     path = folder() / "failed" / f"{stem}-{digest}.cl"
     try:
-        write_atomically(path, source.text.encode())
+        _write(path, source.text.encode())
     except OSError:
         return None
     return str(path)
+
+
+def prune(root: Path, limit: int = LIMIT) -> None:
+    """Delete the files that were used longest ago, until all take at most `limit` bytes.
+
+    What processes that have died left behind is deleted too.
+    """
+    found, now = [], time.time()
+    for path in (path for part in _PARTS for path in (root / part).glob("*")):
+        try:
+            facts = path.stat()
+            if not path.name.startswith(output_files.PARTIAL):
+                found.append((facts.st_mtime, facts.st_size, path))
+            elif now - facts.st_mtime > _STALE:
+                path.unlink()
+        except OSError:  # another process has deleted it
+            continue
+    used = sum(size for _, size, _ in found)
+    for _, size, path in sorted(found):
+        if used <= limit:
+            break
+        try:
+            path.unlink(missing_ok=True)
+        except OSError as error:  # on Windows a file that is open stays
+            log.debug("%s stays in the cache: %s", path, error)
+            continue
+        used -= size
+
+
+def _write(path: Path, content: bytes) -> None:
+    """Write a file of the cache, and keep the cache within its limit."""
+    global _written
+    path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    output_files.write(path, content)
+    with _lock:
+        _written += len(content)
+        due = _written >= _STEP
+        _written = 0 if due else _written
+    if due:
+        prune(path.parent.parent)

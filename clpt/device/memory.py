@@ -7,12 +7,11 @@ from pathlib import Path
 import pyopencl as cl
 
 _GPU_SHARE = 0.85  # a desktop and other programs keep some of a GPU's memory
+# Files of a control group, versions 2 and 1: the limit, what is used, and the pages of files that
+# nobody has used of late. These count as used, but the kernel gives them up first.
 _CGROUPS = (
-    ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
-    (
-        "/sys/fs/cgroup/memory/memory.limit_in_bytes",
-        "/sys/fs/cgroup/memory/memory.usage_in_bytes",
-    ),
+    ("memory.max", "memory.current", "inactive_file"),
+    ("memory/memory.limit_in_bytes", "memory/memory.usage_in_bytes", "total_inactive_file"),
 )
 
 
@@ -29,8 +28,11 @@ def free(device: cl.Device, is_cpu: bool, global_mem: int) -> int:
     return int(_GPU_SHARE * global_mem)
 
 
-def host_available() -> int | None:
-    """Return the host memory left to this process [bytes]; None where the system does not tell."""
+def host_available(root: Path = Path("/sys/fs/cgroup")) -> int | None:
+    """Return the host memory left to this process [bytes]; None where the system does not tell.
+
+    root: the folder of the process's control group, whose limit counts too.
+    """
     amounts = []
     try:
         for row in Path("/proc/meminfo").read_text().splitlines():
@@ -38,9 +40,12 @@ def host_available() -> int | None:
                 amounts.append(int(row.split()[1]) * 1024)
     except OSError:
         pass
-    for limit, usage in _CGROUPS:
+    for limit, usage, files in _CGROUPS:
         try:
-            amounts.append(int(Path(limit).read_text()) - int(Path(usage).read_text()))
+            left = int((root / limit).read_text()) - int((root / usage).read_text())
+            stat = (root / usage).with_name("memory.stat").read_text().splitlines()
+            inactive = dict(row.split() for row in stat).get(files, 0)
+            amounts.append(left + int(inactive))
         except (OSError, ValueError):  # no cgroup of that version, or the limit is "max"
             continue
     return max(0, min(amounts)) if amounts else None

@@ -9,7 +9,6 @@ import os
 import re
 import threading
 import time
-import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -20,7 +19,7 @@ import numpy as np
 import pyopencl as cl
 from pyopencl.characterize import has_src_build_cache
 
-from clpt.device import disk_cache
+from clpt.device import disk_cache, native_programs
 
 from ..errors import DeviceError, KernelBuildError
 from .context import Device
@@ -75,34 +74,6 @@ class Argument:
 
 
 Signatures = Mapping[str, tuple[Argument, ...]]
-
-
-class _QuietWarnings:
-    """While any thread is inside, PyOpenCL does not warn of a build log: clpt logs it."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._inside = 0
-        self._filters = warnings.catch_warnings()
-
-    def __enter__(self) -> None:
-        with self._lock:
-            if self._inside == 0:
-                self._filters = warnings.catch_warnings()
-                self._filters.__enter__()
-                warnings.simplefilter("ignore", cl.CompilerWarning)
-                # of `compile`, whose results clpt keeps itself
-                warnings.filterwarnings("ignore", "Pre-build attribute access", UserWarning)
-            self._inside += 1
-
-    def __exit__(self, *error: object) -> None:
-        with self._lock:
-            self._inside -= 1
-            if self._inside == 0:
-                self._filters.__exit__(None, None, None)
-
-
-_quiet_warnings = _QuietWarnings()
 
 
 class Program:
@@ -276,14 +247,13 @@ def _cached(
     if program is not None:
         return program
     start = time.perf_counter()
-    with _quiet_warnings:
-        program = _from_cache(device, source, flags, entry) if on_disk else None
-        cached = program is not None
-        if program is None:
-            program = make()
-            if on_disk:  # a binary is compiled to the end, a program of the driver may not be
-                disk_cache.store(entry, _encode(program.signatures), _binary(program))
-                program = _from_cache(device, source, flags, entry) or program
+    program = _from_cache(device, source, flags, entry) if on_disk else None
+    cached = program is not None
+    if program is None:
+        program = make()
+        if on_disk:  # a binary is compiled to the end, a program of the driver may not be
+            disk_cache.store(entry, _encode(program.signatures), _binary(program))
+            program = _from_cache(device, source, flags, entry) or program
     seconds = time.perf_counter() - start
     device.builds.add(seconds, cached)
     log.debug("%s is %s in %.2f s", source.name, "loaded" if cached else "built", seconds)
@@ -296,13 +266,10 @@ def _linked(
 ) -> cl.Program:
     parts, only = [], [device.info.cl_device]
     for source in sources:
-        part = cl.Program(device.context, source.text)
         try:
-            part.compile(flags, only)
+            parts.append(native_programs.compile_part(device.context, only[0], source.text, flags))
         except cl.Error as error:
-            build_log = part.get_build_info(only[0], cl.program_build_info.LOG)
-            raise _build_error(source, f"{error}\n{build_log}") from error
-        parts.append(part)
+            raise _build_error(source, str(error)) from error
     try:
         return cl.link_program(device.context, parts, [], only)
     except cl.Error as error:
@@ -342,15 +309,9 @@ def _is_oclgrind(device: Device) -> bool:
 
 def _from_source(device: Device, source: Source, flags: list[str]) -> Program:
     try:
-        # cache_dir=False: PyOpenCL's own cache would lose the names of the arguments
-        built = cl.Program(device.context, source.text).build(
-            flags, [device.info.cl_device], cache_dir=False
-        )
+        built = native_programs.build(device.context, device.info.cl_device, source.text, flags)
     except cl.Error as error:
         raise _build_error(source, str(error)) from error
-    remarks = built.get_build_info(device.info.cl_device, cl.program_build_info.LOG).strip()
-    if remarks:
-        log.debug("%s: %s", source.name, remarks)
     try:
         return Program(
             source.name, built, {k.function_name: _signature(k) for k in _kernels(built)}
@@ -368,8 +329,7 @@ def _from_cache(device: Device, source: Source, flags: list[str], entry: str) ->
     if stored is None:
         return None
     try:
-        only = [device.info.cl_device]
-        loaded = cl.Program(device.context, only, [stored[1]]).build(flags, only)
+        loaded = native_programs.build(device.context, device.info.cl_device, stored[1], flags)
         return Program(source.name, loaded, _decode(stored[0]))
     except (cl.Error, TypeError, ValueError) as error:
         log.debug("%s is built again: %s", source.name, error)

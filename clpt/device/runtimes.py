@@ -1,4 +1,6 @@
-"""OpenCL runtimes that pip installed, made known to the loader before it looks for platforms.
+"""What OpenCL's runtimes need before the loader looks for platforms.
+
+Runtimes that pip installed are made known to the loader.
 
 The loader reads ICD files, each naming a driver's library, from /etc/OpenCL/vendors or from the
 folder in OCL_ICD_VENDORS. Intel's CPU runtime as a wheel (extra `clpt[cpu]`) brings such a file
@@ -6,6 +8,9 @@ with a placeholder for a path, in a folder that no loader reads. So clpt writes 
 that names the library where it is, repeats every ICD file of the system, and points
 OCL_ICD_VENDORS there. Where the user has set OCL_ICD_VENDORS, it stays as it is: whoever sets it
 wants exactly those drivers.
+
+Where the user's caches cannot be written, PoCL lists no device, and PyOpenCL runs no kernel. clpt
+then gives its process a temporary folder for caches.
 """
 
 from __future__ import annotations
@@ -16,9 +21,13 @@ import importlib.metadata
 import logging
 import os
 import sys
+import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
+import platformdirs
+
+from clpt import output_files
 from clpt.device import disk_cache
 
 log = logging.getLogger(__name__)
@@ -33,8 +42,13 @@ _WHEEL, _LIBRARY = "intel-opencl-rt", "libintelocl.so"
 
 
 @functools.cache
-def announce() -> None:
-    """Make the runtimes of this Python environment known to the OpenCL loader, once."""
+def prepare() -> None:
+    """Set the variables that the OpenCL loader and its runtimes read, once a process."""
+    _make_wheel_known()
+    _make_caches_writable()
+
+
+def _make_wheel_known() -> None:
     library = wheel_library()
     if library is None or os.environ.get(VARIABLE) or not sys.platform.startswith("linux"):
         return
@@ -46,6 +60,21 @@ def announce() -> None:
         os.environ[VARIABLE] = str(write_vendors(drivers))
     except OSError as error:
         log.warning("%s cannot be made known to the OpenCL loader: %s", library, error)
+
+
+def _make_caches_writable() -> None:
+    for variable, wanted in (
+        ("XDG_CACHE_HOME", platformdirs.user_cache_path()),
+        ("POCL_CACHE_DIR", Path(os.environ.get("POCL_CACHE_DIR", tempfile.gettempdir()))),
+    ):
+        nearest = next(path for path in (wanted, *wanted.parents) if path.exists())
+        try:
+            output_files.check_writable(nearest / "trial")
+        except OSError as error:
+            other = disk_cache.temporary_folder() / variable.partition("_")[0].lower()
+            os.environ[variable] = str(other)
+            message = "the cache folder %s cannot be written (%s); %s is used instead"
+            log.warning(message, wanted, error, other)
 
 
 def wheel_library() -> Path | None:
@@ -76,7 +105,8 @@ def write_vendors(drivers: dict[str, str]) -> Path:
     """Return a folder in the user's cache with these ICD files, named after their content."""
     digest = hashlib.sha256(repr(sorted(drivers.items())).encode()).hexdigest()[:16]
     folder = disk_cache.folder() / "vendors" / digest
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     for name, driver in drivers.items():
         if not (folder / name).is_file():
-            disk_cache.write_atomically(folder / name, driver.encode())
+            output_files.write_text(folder / name, driver)
     return folder

@@ -1,4 +1,4 @@
-"""Files that may be packed by gzip, read whole and not beyond a limit."""
+"""Files that may be packed by gzip, read whole; what is packed has a limit."""
 
 from __future__ import annotations
 
@@ -12,19 +12,24 @@ LARGEST = 1 << 30  # bytes of a file, unpacked
 CHUNK = 1 << 22
 
 
-def read_bytes(path: Path) -> bytes:
-    """Read a file, unpacked if it is gzip's; at most LARGEST bytes. Raises SceneError."""
+def read_bytes(path: Path, largest: int = LARGEST) -> bytes:
+    """Read a file, unpacked if it is gzip's: a small file may become at most `largest` bytes then.
+
+    Raises SceneError.
+    """
     try:
         with path.open("rb") as file:
-            packed = file.read(2) == b"\x1f\x8b"
-        with gzip.open(path, "rb") if packed else path.open("rb") as stream:
+            if file.read(2) != b"\x1f\x8b":
+                file.seek(0)
+                return file.read()
+        with gzip.open(path, "rb") as stream:
             parts, size = [], 0
             while part := stream.read(CHUNK):
                 parts.append(part)
                 size += len(part)
-                if size > LARGEST:
-                    message = f"is larger than {LARGEST >> 20} MiB"
-                    raise SceneError(message + (" when unpacked" if packed else ""), file=path)
+                if size > largest:
+                    message = f"is larger than {largest >> 20} MiB when unpacked; unpack it first"
+                    raise SceneError(message, file=path)
         return b"".join(parts)
     except SceneError:
         raise

@@ -13,6 +13,7 @@ from clpt.scene.values import SpectrumLike
 from clpt.spectra import Sensor, illuminants, spaces
 from clpt.spectra.sensors import OBSERVERS
 from clpt.spectra.spaces import TEMPERATURES
+from clpt.spectra.spectrum import LONGEST, SHORTEST
 
 CHANNELS = {  # of the aov integrator: how many values each has
     "depth": 1,
@@ -27,6 +28,7 @@ CHANNELS = {  # of the aov integrator: how many values each has
 
 
 MOST_BANDS = 1024
+NARROWEST = 0.01  # [nm], a range of wavelengths
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -78,7 +80,7 @@ class ParticleTracer(Integrator):
 
     Finds caustics, also of the smallest lights; what the camera would see through glass and in
     mirrors stays black. A sample per pixel is one light path for every pixel of the film.
-    The camera must be `perspective` or `thin_lens`; the film's filter is a box of one pixel.
+    The camera must be `perspective` or `thin_lens`.
     """
 
     max_depth: int = host(8, "longest path, as of `path`; -1: no limit")
@@ -199,8 +201,8 @@ class Film(Kind):
     )
     mode: str = choice("spectral", "what light is made of", ("spectral", "rgb"))
     filter: Filter = host(Box(), "pixel filter", form="filter")
-    lambda_min: float = real(360.0, "shortest wavelength", "nm", 200.0, 2000.0)
-    lambda_max: float = real(830.0, "longest wavelength", "nm", 200.0, 2000.0)
+    lambda_min: float = real(360.0, "shortest wavelength", "nm", SHORTEST, LONGEST)
+    lambda_max: float = real(830.0, "longest wavelength", "nm", SHORTEST, LONGEST)
     wavelengths: str = choice(
         "auto",
         "how they are drawn: as suits the scene, as the eye responds, or as lights and sensor do",
@@ -238,6 +240,11 @@ class Film(Kind):
             object.__setattr__(self, "crop", self._checked_crop())
         if self.lambda_min >= self.lambda_max:
             raise SceneError("must be below lambda_max", where="film.lambda_min")
+        if self.lambda_max - self.lambda_min < NARROWEST:
+            raise SceneError(
+                f"must be {NARROWEST:g} nm or more below lambda_max, as wavelengths are float32",
+                where="film.lambda_min",
+            )
         whole = isinstance(self.bands, int) and not isinstance(self.bands, bool)
         if not whole or not 0 <= self.bands <= MOST_BANDS:
             message = f"must be a whole number from 0 to {MOST_BANDS}, not {self.bands!r}"

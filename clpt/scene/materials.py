@@ -61,7 +61,7 @@ class Layer(Kind):
     """
 
     eta: IndexLike = index("water", "index of refraction")
-    k: IndexLike = index(0.0, "extinction coefficient; above 0 it absorbs")
+    k: IndexLike = index(0.0, "extinction coefficient; above 0 it absorbs", zero=True)
     thickness: float = real(400.0, "where it is thickest", "nm", low=0.0, high=1e5)
     profile: TexturedNumber = real(
         1.0, "share of that thickness that is there", "", 0.0, 1.0, textured=True
@@ -191,8 +191,8 @@ class Conductor(Material):
 
     delta = True
 
-    eta: IndexLike | Texture = index(0.0, "index of refraction", textured=True)
-    k: IndexLike | Texture = index(1.0, "extinction coefficient", textured=True)
+    eta: IndexLike | Texture = index(0.0, "index of refraction", zero=True, textured=True)
+    k: IndexLike | Texture = index(1.0, "extinction coefficient", zero=True, textured=True)
     specular_reflectance: Textured = reflectance(1.0, "factor on reflection; 1 is physical")
     layers: tuple[Layer, ...] = layers(FILMS)
 
@@ -201,8 +201,8 @@ class Conductor(Material):
 class RoughConductor(Material):
     """A rough metal of microfacets (Cook and Torrance; Heitz 2018 visible normals); front side."""
 
-    eta: IndexLike | Texture = index(0.0, "index of refraction", textured=True)
-    k: IndexLike | Texture = index(1.0, "extinction coefficient", textured=True)
+    eta: IndexLike | Texture = index(0.0, "index of refraction", zero=True, textured=True)
+    k: IndexLike | Texture = index(1.0, "extinction coefficient", zero=True, textured=True)
     distribution: str = choice("ggx", "of the microfacet normals", DISTRIBUTIONS)
     alpha_u: TexturedNumber = real(
         0.1, "roughness along the tangent", low=1e-4, high=1.0, textured=True
@@ -259,9 +259,14 @@ class CoatedConductor(Material):
         0.01, "roughness of the coat", low=1e-4, high=1.0, textured=True
     )
     eta: IndexLike | Texture = index(
-        0.0, "index of refraction of the metal; the default is a perfect mirror", textured=True
+        0.0,
+        "index of refraction of the metal; the default is a perfect mirror",
+        zero=True,
+        textured=True,
     )
-    k: IndexLike | Texture = index(1.0, "extinction coefficient of the metal", textured=True)
+    k: IndexLike | Texture = index(
+        1.0, "extinction coefficient of the metal", zero=True, textured=True
+    )
     distribution: str = choice("ggx", "of both their microfacet normals", DISTRIBUTIONS)
     alpha_u: TexturedNumber = real(
         0.1, "the metal's roughness along tangents", "", 1e-4, 1.0, textured=True
@@ -379,7 +384,7 @@ class GltfSurface(Material):
     metallic: TexturedNumber = _share(0.0, "share of the metal", lobe=True)
     roughness: TexturedNumber = _share(1.0, "of reflection and of what is let through")
     ior: IndexLike = index(
-        1.5, "index of the dielectric; 0: it reflects all but for `specular_color`"
+        1.5, "index of the dielectric; 0: it reflects all but for `specular_color`", zero=True
     )
     specular: TexturedNumber = _share(1.0, "strength of the dielectric's reflection")
     specular_color: Textured = reflectance(1.0, "factor on it at normal incidence")
@@ -448,9 +453,14 @@ class Grating(Material):
     )
     ior: IndexLike = index(1.5, "index of a transmissive plate")
     eta: IndexLike | Texture = index(
-        0.0, "index of refraction of the metal; the default is a perfect mirror", textured=True
+        0.0,
+        "index of refraction of the metal; the default is a perfect mirror",
+        zero=True,
+        textured=True,
     )
-    k: IndexLike | Texture = index(1.0, "extinction coefficient of the metal", textured=True)
+    k: IndexLike | Texture = index(
+        1.0, "extinction coefficient of the metal", zero=True, textured=True
+    )
     reflectance: Textured = reflectance(1.0, "factor on the light of all orders; 1 is physical")
 
     @property

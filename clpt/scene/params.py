@@ -36,7 +36,17 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from clpt.errors import SceneError
-from clpt.spectra import RGB, Constant, Reradiation, RGBUnbounded, Spectrum, illuminants
+from clpt.spectra import (
+    RGB,
+    Constant,
+    Reradiation,
+    RGBUnbounded,
+    Spectrum,
+    Tabulated,
+    illuminants,
+)
+from clpt.spectra import index as index_of
+from clpt.spectra.spectrum import LONGEST, SHORTEST, extremes
 
 SPECTRUM_ROLES = ("reflectance", "emission", "index", "factor", "coefficient")
 DEVICE_ROLES = (
@@ -52,7 +62,7 @@ HostForm = Literal[
     "image", "cube_images", "crop", "sensor", "white_balance",
 ]  # fmt: skip
 ORDERS = 8  # highest order of diffraction, see kernels/optics/diffraction.cl
-LAMBDAS = np.arange(200.0, 1201.0)  # [nm] at which a spectrum's limits are checked
+ROUNDING = 1e-6  # by which a spectrum may be beyond its limits
 
 
 @dataclass(frozen=True)
@@ -72,6 +82,7 @@ class Param:
     textured: bool = False
     form: str = ""
     lobe: bool = False  # 0 leaves a lobe out: kernels are made without it where all have 0
+    positive: bool = False  # it cannot be 0 either, at any wavelength of the film
 
 
 def _field(default: Any, param: Param) -> Any:
@@ -90,9 +101,12 @@ def emission(default: Any, doc: str, unit: str, *, textured: bool = False) -> An
     return _field(default, Param("emission", doc, unit, low=0.0, textured=textured))
 
 
-def index(default: Any, doc: str, *, textured: bool = False) -> Any:
-    """Declare a refractive index or extinction coefficient; may be a name or dispersive."""
-    return _field(default, Param("index", doc, low=0.0, textured=textured))
+def index(default: Any, doc: str, *, zero: bool = False, textured: bool = False) -> Any:
+    """Declare a refractive index or extinction coefficient; may be a name or dispersive.
+
+    zero: it may be 0, as a metal's eta and k may.
+    """
+    return _field(default, Param("index", doc, low=0.0, textured=textured, positive=not zero))
 
 
 def factor(default: Any, doc: str) -> Any:
@@ -292,6 +306,8 @@ def _number(value: Any, param: Param, where: str) -> float:
         raise SceneError(f"must be finite, not {value}", where=where)
     if not param.low <= value <= param.high:
         raise SceneError(f"{value} is outside [{param.low:g}, {param.high:g}]", where=where)
+    if param.positive and value == 0.0:
+        raise SceneError("must be above 0", where=where)
     return float(value)
 
 
@@ -310,8 +326,7 @@ def _spectrum(value: Any, param: Param, where: str) -> Any:
     if isinstance(value, str) and param.role == "index":
         return value
     if isinstance(value, Spectrum):
-        if param.role == "coefficient" and value.sample(LAMBDAS).min() < 0.0:
-            raise SceneError("cannot be negative at any wavelength", where=where)
+        _check_spectrum(value, param, where)
         return value
     if isinstance(value, (list, tuple, np.ndarray)) and len(value) == 3:
         made = RGBUnbounded if param.role == "factor" else RGB
@@ -322,3 +337,23 @@ def _spectrum(value: Any, param: Param, where: str) -> Any:
     if isinstance(value, str) and value in illuminants():
         message += f"; give clpt.spectra.illuminant({value!r})"
     raise SceneError(message, where=where)
+
+
+def _check_spectrum(value: Spectrum, param: Param, where: str) -> None:
+    """Raise SceneError for a spectrum beyond its limits, or a table that no film can reach."""
+    if isinstance(value, Tabulated) and (
+        value.lambdas[-1] < SHORTEST or value.lambdas[0] > LONGEST
+    ):
+        raise SceneError(
+            f"its table goes from {value.lambdas[0]:g} to {value.lambdas[-1]:g}, and films lie"
+            f" within {SHORTEST:g} to {LONGEST:g} nm; give wavelengths in nm",
+            where=where,
+        )
+    if math.isinf(param.low) and math.isinf(param.high):
+        return
+    meant = index_of(value) if param.role in ("index", "coefficient") else value
+    for found, at in extremes(meant):
+        if not param.low - ROUNDING <= found <= param.high + ROUNDING:
+            raise SceneError(
+                f"{found:g} at {at:g} nm is outside [{param.low:g}, {param.high:g}]", where=where
+            )

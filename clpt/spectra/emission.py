@@ -49,8 +49,8 @@ class Blackbody(Spectrum):
 class Lines(Spectrum):
     """Spectral lines: `powers` [W m^-2 sr^-1] at `wavelengths` [nm], each a triangle `width` wide.
 
-    The width [nm] is at half the height and a whole number: samples 1 nm apart then add up to the
-    powers exactly, wherever the lines lie between them. Raises SceneError.
+    The width [nm] is at half the height and a whole number: samples 1 nm apart add up to the powers
+    exactly, wherever the lines lie between them. Raises SceneError.
     """
 
     wavelengths: tuple[float, ...]
@@ -80,6 +80,12 @@ class Lines(Spectrum):
         _check_scale(self.scale)
         if not (self.width >= 1.0 and self.width.is_integer()):
             raise SceneError(f"the width of lines is a whole number of nm, not {self.width:g}")
+
+    @property
+    def knots(self) -> tuple[Samples, Samples]:
+        """The feet and the tops of its lines."""
+        at = np.unique(np.add.outer(self.wavelengths, [-self.width, 0.0, self.width]))
+        return at, self.sample(at)
 
     def sample(self, lambdas: ArrayLike) -> Samples:
         off = np.abs(np.asarray(lambdas, np.float64)[..., None] - np.array(self.wavelengths))
@@ -123,6 +129,12 @@ class Illuminant(Spectrum):
 
     def sample(self, lambdas: ArrayLike) -> Samples:
         return self.scale * _of_luminance_one(self.name).sample(lambdas)
+
+    @property
+    def knots(self) -> tuple[Samples, Samples] | None:
+        """Those of the table or the lines that it stands for."""
+        known = _of_luminance_one(self.name).knots
+        return None if known is None else (known[0], self.scale * known[1])
 
 
 def illuminants() -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -55,10 +56,12 @@ def glass(name: str, dispersion: bool = True) -> Constant | Sellmeier:
 def index(value: Spectrum | str) -> Spectrum:
     """What an index or a coefficient means: a glass by its name, or a colour that may exceed 1.
 
-    Raises UnknownKindError.
+    A table holds its end values, as nothing has an index of 0. Raises UnknownKindError.
     """
     if isinstance(value, str):
         return glass(value)
+    if isinstance(value, Tabulated):
+        return replace(value, outside="hold")
     return RGBUnbounded(value.r, value.g, value.b) if isinstance(value, RGB) else value
 
 

@@ -2,7 +2,9 @@
 
 A re-radiation matrix Phi(out, in) [1/nm] (Donaldson 1954) is the share of the energy that arrives
 at `in` and leaves again per nm at `out`. It holds fluorescence only; what keeps its wavelength is
-an ordinary reflectance. Light is never given out at a shorter wavelength than it had (Stokes 1852).
+an ordinary reflectance. Light is never given out at a shorter wavelength than it had (Stokes
+1852), but for the steps of a table: between two of its wavelengths what comes at one may leave at
+the other.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt.errors import SceneError
 from clpt.spectra import cie
-from clpt.spectra.spectrum import Spectrum, d65
+from clpt.spectra.spectrum import Spectrum, Tabulated, d65, extremes, gridded
 
 Matrix = NDArray[np.float64]
 
@@ -41,6 +43,15 @@ class Reradiation(ABC):
         near = values[i, j] * (1.0 - t) + values[i, j + 1] * t
         far = values[i + 1, j] * (1.0 - t) + values[i + 1, j + 1] * t
         return np.where(inside & among, near * (1.0 - s) + far * s, 0.0)
+
+    def on_nodes(self, nodes: Matrix) -> Matrix:
+        """Phi (n, n) [1/nm] at even wavelengths (n,) [nm], of which all that lies between is kept.
+
+        Rows are wavelengths out. See `clpt.spectra.spectrum.gridded`.
+        """
+        rows, columns, values = self.table
+        out = np.stack([gridded(Tabulated(rows, column), nodes) for column in values.T], axis=-1)
+        return np.stack([gridded(Tabulated(columns, row), nodes) for row in out])
 
     def emitted(self, into: ArrayLike) -> Matrix:
         """Share of the energy that arrives at `into` [nm] and is given out, at any wavelength."""
@@ -97,7 +108,8 @@ class Fluorophore(Reradiation):
     photon's energy falls with its wavelength, so energy is lost where `out` is longer than `in`.
     absorption: share of the light in [0, 1]; emission: relative radiance per nm, of any scale; it
     keeps its shape whatever excites it (Vavilov 1927; Kasha 1950), but for what would come out at
-    less than `in`, which is left out, and the rest scaled up so that the yield holds.
+    less than `in`, which is left out, and the rest scaled up so that the yield holds. Both are
+    averaged around wavelengths 5 nm apart, from 250 to 900 nm; narrow lines keep their area.
     Raises SceneError for numbers outside their limits.
     """
 
@@ -108,20 +120,39 @@ class Fluorophore(Reradiation):
     def __post_init__(self) -> None:
         if not 0.0 <= self.quantum_yield <= 1.0:
             raise SceneError(f"a quantum yield lies in [0, 1], not {self.quantum_yield}")
-        absorbed, emitted = self.absorption.sample(GRID), self.emission.sample(GRID)
-        if not ((absorbed >= 0.0) & (absorbed <= 1.0 + 1e-9)).all():
+        (least, _), (most, _) = extremes(self.absorption)
+        if not (least >= 0.0 and most <= 1.0 + 1e-6):
             raise SceneError("an absorption must lie in [0, 1]")
-        if not (emitted >= 0.0).all() or not emitted.any():
-            raise SceneError("an emission must not be negative, nor zero everywhere")
+        (least, _), _ = extremes(self.emission)
+        if not least >= 0.0 or not gridded(self.emission, GRID).any():
+            raise SceneError(
+                f"an emission must not be negative, nor zero from {GRID[0]:g} to {GRID[-1]:g} nm"
+            )
 
     @cached_property
     def table(self) -> tuple[Matrix, Matrix, Matrix]:
-        absorbed, emitted = self.absorption.sample(GRID), self.emission.sample(GRID)
-        stokes = np.where(GRID[:, None] > GRID, emitted[:, None], 0.0)
-        photons = (_weights(GRID) * GRID) @ stokes
-        enough = photons > LEAST_REST * ((_weights(GRID) * GRID) @ emitted)
-        scale = np.divide(GRID, photons, out=np.zeros(GRID.shape), where=enough)
-        return GRID, GRID, self.quantum_yield * absorbed * scale * stokes
+        return GRID, GRID, self._matrix(GRID)
+
+    def on_nodes(self, nodes: Matrix) -> Matrix:
+        """Phi (n, n) [1/nm] at even wavelengths (n,) [nm]; the yield counts what leaves beyond."""
+        step = nodes[1] - nodes[0]
+        before = max(int(np.ceil((nodes[0] - GRID[0]) / step)), 0)
+        after = max(int(np.ceil((GRID[-1] - nodes[-1]) / step)), 0)
+        grid = nodes[0] + step * np.arange(-before, len(nodes) + after)
+        inside = slice(before, before + len(nodes))
+        return self._matrix(grid)[inside, inside]
+
+    def _matrix(self, grid: Matrix) -> Matrix:
+        """Phi (n, n) at even wavelengths that cover GRID; nothing happens outside of GRID."""
+        known = (grid >= GRID[0]) & (grid <= GRID[-1])
+        absorbed, emitted = (
+            np.where(known, gridded(part, grid), 0.0) for part in (self.absorption, self.emission)
+        )
+        stokes = np.where(grid[:, None] > grid, emitted[:, None], 0.0)
+        photons = (_weights(grid) * grid) @ stokes
+        enough = photons > LEAST_REST * ((_weights(grid) * grid) @ emitted)
+        scale = np.divide(grid, photons, out=np.zeros(grid.shape), where=enough)
+        return self.quantum_yield * absorbed * scale * stokes
 
 
 def _weights(nodes: Matrix) -> Matrix:

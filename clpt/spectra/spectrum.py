@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from typing import Literal
 
 import numpy as np
@@ -23,6 +23,9 @@ Role = Literal["reflectance", "unbounded", "emission"]
 Outside = Literal["zero", "hold"]
 Samples = NDArray[np.float64]
 
+SHORTEST, LONGEST = 200.0, 2000.0  # [nm], the ends of the widest range that a film can have
+WIDEST = np.arange(SHORTEST, LONGEST + 0.5)  # that range, whole nanometres
+
 
 class Spectrum(ABC):
     """A function of the wavelength."""
@@ -31,9 +34,18 @@ class Spectrum(ABC):
     def sample(self, lambdas: ArrayLike) -> Samples:
         """Values at `lambdas` [nm], of the same shape, float64."""
 
+    @property
+    def knots(self) -> tuple[Samples, Samples] | None:
+        """Wavelengths [nm] and values (n,) of a spectrum that is linear between them; else None.
+
+        The wavelengths ascend; where one stands twice is a step. The first and the last value hold
+        beyond the ends.
+        """
+        return None
+
     def to_rgb(self, role: Role = "reflectance") -> Samples:
         """Linear Rec.709 stand-in (3,) float64 for the given role; never negative."""
-        values = self.sample(cie.GRID)
+        values = gridded(self, cie.GRID)
         if role == "emission":
             return np.maximum(cie.xyz_to_rgb(cie.spectrum_to_xyz(values)), 0.0)
         rgb = cie.xyz_to_rgb(cie.spectrum_to_xyz(values * d65().sample(cie.GRID)))
@@ -82,6 +94,14 @@ class Tabulated(Spectrum):
             raise SceneError("the wavelengths of a spectrum must ascend")
         if outside not in ("zero", "hold"):
             raise SceneError(f"outside its points a spectrum is zero or holds, not {outside!r}")
+
+    @property
+    def knots(self) -> tuple[Samples, Samples]:
+        """Its points, and a step at each end if it is zero outside."""
+        lambdas, values = np.array(self.lambdas), np.array(self.values)
+        if self.outside == "hold":
+            return lambdas, values
+        return np.pad(lambdas, 1, "edge"), np.pad(values, 1)
 
     def sample(self, lambdas: ArrayLike) -> Samples:
         end = 0.0 if self.outside == "zero" else None
@@ -166,11 +186,32 @@ class Cauchy(Spectrum):
 def absorption(k: Spectrum) -> Spectrum:
     """Absorption coefficient [1/m] where the extinction coefficient is k: 4 pi k / lambda.
 
-    Born and Wolf, Principles of Optics, 7th ed., 14.1 eq. 19. Whole nanometres, 200 to 1200.
+    Born and Wolf, Principles of Optics, 7th ed., 14.1 eq. 19. Whole nanometres, 200 to 2000.
     """
-    lambdas = np.arange(200.0, 1201.0)
-    values = 4e9 * np.pi * k.sample(lambdas) / lambdas
-    return Tabulated(lambdas, values, "hold") if values.any() else Constant(0.0)
+    values = 4e9 * np.pi * k.sample(WIDEST) / WIDEST
+    return Tabulated(WIDEST, values, "hold") if values.any() else Constant(0.0)
+
+
+@lru_cache(maxsize=4096)
+def extremes(
+    spectrum: Spectrum, low: float = SHORTEST, high: float = LONGEST
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """The least and the largest value from `low` to `high` [nm], each with its wavelength [nm].
+
+    Of a table they are exact; of a formula they are those at whole nanometres and at the ends. A
+    value that is not a number counts as both.
+    """
+    points = [low, *np.arange(np.ceil(low), high), high]
+    if spectrum.knots is not None:
+        points += [at for at in spectrum.knots[0] if low < at < high]
+    lambdas = np.array(points)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        values = spectrum.sample(lambdas)
+    least, largest = int(np.argmin(values)), int(np.argmax(values))
+    return (
+        (float(values[least]), float(lambdas[least])),
+        (float(values[largest]), float(lambdas[largest])),
+    )
 
 
 @cache
@@ -186,11 +227,53 @@ def with_luminance_one(rows: Samples) -> Tabulated:
 
 
 def on_grid(spectrum: Spectrum, lo: float, hi: float, step: float = 1.0) -> NDArray[np.float32]:
-    """Samples at lo, lo + step, ... up to the first one at or past hi [nm], float32."""
+    """Values at lo, lo + step, ... up to the first one at or past hi [nm], float32.
+
+    They are what `gridded` gives. Raises SceneError for a range or a step that is none.
+    """
     if not (0.0 < lo < hi and step > 0.0):
         raise SceneError(f"cannot tabulate a spectrum over [{lo}, {hi}] nm in steps of {step}")
     count = int(np.ceil((hi - lo) / step - 1e-9)) + 1
-    return spectrum.sample(lo + step * np.arange(count)).astype(np.float32)
+    grid = lo + step * np.arange(count, dtype=np.float64)
+    return gridded(spectrum, grid).astype(np.float32)
+
+
+def gridded(spectrum: Spectrum, grid: Samples) -> Samples:
+    """The spectrum at the nodes of an even grid (n,) [nm], float64; linear between, it keeps power.
+
+    A spectrum of `knots` that are not all nodes is averaged around each node, see `hat_means`:
+    lines that lie between the nodes are kept. Any other is sampled.
+    """
+    if spectrum.knots is None:
+        return spectrum.sample(grid)
+    at, values = spectrum.knots
+    within = at[(at > grid[0]) & (at < grid[-1])]
+    steps = (within - grid[0]) / (grid[1] - grid[0])
+    if np.abs(steps - np.rint(steps)).max(initial=0.0) < 1e-9:
+        return spectrum.sample(grid)
+    return hat_means(at, values, grid)
+
+
+def hat_means(at: Samples, values: Samples, grid: Samples) -> Samples:
+    """Means around the nodes of an even grid (n,), of what is linear between the points `at` (m,).
+
+    Weights fall linearly to 0 at the next nodes ("hats"). So the integral of what is linear between
+    the means is that of `values` (m,), from the first node to the last.
+    """
+    points = np.union1d(grid, at[(at > grid[0]) & (at < grid[-1])])
+    near, far = points[:-1], points[1:]
+    width, step = far - near, grid[1] - grid[0]
+    # Ends of each piece from two values inside, as a step may stand at either end.
+    p, q = (np.interp(near + share * width, at, values) for share in (0.25, 0.75))
+    first, last = 1.5 * p - 0.5 * q, 1.5 * q - 0.5 * p
+    cell = np.searchsorted(grid, near + 0.5 * width) - 1
+    s, t = (near - grid[cell]) / step, (far - grid[cell]) / step
+    right = width / 6.0 * (first * (2.0 * s + t) + last * (s + 2.0 * t))
+    left = width / 2.0 * (first + last) - right
+    sums = np.bincount(cell, left, len(grid)) + np.bincount(cell + 1, right, len(grid))
+    weights = np.full(len(grid), step)
+    weights[[0, -1]] = 0.5 * step
+    return np.asarray(sums / weights)
 
 
 def _floats(values: Iterable[float]) -> tuple[float, ...]:

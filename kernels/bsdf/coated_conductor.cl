@@ -4,16 +4,15 @@
  * light by (1 - 1/eta) times its slopes: their variance, times that squared and a factor of 2.5, fitted
  * to random walks (tests/kernels/test_coated.py), is added to the metal's. What the coat throws back
  * inside is summed as a geometric series: along the mirror direction as between smooth boundaries, or,
- * the rougher the metal, as a diffuse light like plastic's. Of a coat that disperses, only the reflection
- * does; what it refracts goes by the mean index. */
+ * the rougher the metal, as a diffuse light like plastic's. A coat that disperses bends each wavelength by
+ * its own index; directions are sampled by the mean of the four. */
 #include "optics/fresnel.cl"
 #include "optics/microfacet.cl"
 #include "optics/rough_coat.cl"
 
 typedef struct {
     Microfacets coat, metal;
-    Spectrum eta;      /* of the coat over what is outside */
-    real mean_eta;     /* their mean */
+    real eta;          /* of the coat over what is outside */
     real lost;         /* share of a bounce off the metal that the coat throws back */
     Spectrum again;    /* what comes of that, as a diffuse albedo below the coat */
     real between;      /* share of it that stays in the mirror direction instead */
@@ -52,20 +51,19 @@ inline vec2 coated_conductor_bounce(Microfacets d, real alpha, real cos_i, real 
     return sum;
 }
 
-inline CoatedMetal coated_metal_of(CoatedConductor m)
+inline CoatedMetal coated_metal_of(CoatedConductor m, real eta)
 {
     CoatedMetal c;
-    c.eta = relative_index(m.coat_ior, m.ext_ior);
-    c.mean_eta = spectrum_mean(c.eta);
+    c.eta = eta;
     c.coat = microfacets_of(m.distribution, m.coat_alpha, m.coat_alpha);
-    real spread = 2.5f * sqr((1.0f - 1.0f / c.mean_eta) * m.coat_alpha);
+    real spread = 2.5f * sqr((1.0f - 1.0f / c.eta) * m.coat_alpha);
     real u = sqrt_r(sqr(m.alpha_u) + spread), v = sqrt_r(sqr(m.alpha_v) + spread);
     c.metal = microfacets_of(m.distribution, u, v);
-    vec2 bounce = coated_conductor_bounce(c.metal, sqrt_r(u * v), (real)(0.77f), c.mean_eta);
+    vec2 bounce = coated_conductor_bounce(c.metal, sqrt_r(u * v), (real)(0.77f), c.eta);
     c.lost = bounce.y / max_r(bounce.x, (real)(1e-20f));
     c.between = 0.04f / (0.04f + u * v);
     Spectrum f = coated_conductor_fresnel(m, (real)(0.8f));
-    real inside = coat_inside_reflectance(c.coat, c.mean_eta);
+    real inside = coat_inside_reflectance(c.coat, c.eta);
 #define C(x_)                                                           \
     c.again.x_ = (1.0f - c.between) * f.x_ * bounce.y * f.x_ * bounce.x \
                / (1.0f - min_r(inside * f.x_ * bounce.x, (real)(0.999f)));
@@ -77,7 +75,7 @@ inline CoatedMetal coated_metal_of(CoatedConductor m)
 /* w within the coat. */
 inline vec3 coated_metal_refracted(CoatedMetal c, vec3 w)
 {
-    real inv = 1.0f / c.mean_eta, x = w.x * inv, y = w.y * inv;
+    real inv = 1.0f / c.eta, x = w.x * inv, y = w.y * inv;
     return v3(x, y, sqrt_r(1.0f - x * x - y * y));
 }
 
@@ -95,32 +93,57 @@ inline real coated_conductor_lobe(CoatedMetal c, vec3 inner_o, vec3 inner_i, vec
 {
     real inner = microfacet_visible_pdf(c.metal, inner_o, h) / max_r(4.0f * dot3(inner_o, h), (real)(1e-20f));
     mask reached = inner_i.z > 1e-4f;
-    return sel(reached, inner * cos_i / (sqr(c.mean_eta) * max_r(inner_i.z, (real)(1e-4f))), (real)(0.0f));
+    return sel(reached, inner * cos_i / (sqr(c.eta) * max_r(inner_i.z, (real)(1e-4f))), (real)(0.0f));
 }
 
-/* eval and pdf, given T(wo). */
-inline Spectrum coated_conductor_value(CoatedConductor m, CoatedMetal c, vec3 wo, vec3 wi, real t_wo)
+/* eval at the wavelengths whose index c has, given T(wo). */
+inline Spectrum coated_conductor_at(CoatedConductor m, CoatedMetal c, vec3 wo, vec3 wi, real t_wo)
 {
     vec3 h = normalize3(add3(wo, wi));
     real g = microfacet_g1(c.coat, wo, h) * microfacet_g1(c.coat, wi, h);
     real coat = microfacet_d(c.coat, h) * g / max_r(4.0f * wo.z, (real)(1e-20f));
-    Spectrum f = fresnel_spectrum(clamp_r(dot3(wo, h), (real)(0.0f), (real)(1.0f)), c.eta);
-    real t = t_wo * coat_transmittance(c.coat, fabs(wi.z), c.mean_eta);
+    real f = fresnel_dielectric(clamp_r(dot3(wo, h), (real)(0.0f), (real)(1.0f)), c.eta).f;
+    real t = t_wo * coat_transmittance(c.coat, fabs(wi.z), c.eta);
 
     vec3 inner_o = coated_metal_refracted(c, wo), inner_i = coated_metal_refracted(c, wi);
     vec3 inner_h = normalize3(add3(inner_o, inner_i));
     real cos_h = clamp_r(dot3(inner_o, inner_h), (real)(0.0f), (real)(1.0f));
     real lobe = coated_conductor_lobe(c, inner_o, inner_i, inner_h, wi.z) * microfacet_g1(c.metal, inner_i, inner_h);
     Spectrum metal = coated_conductor_fresnel(m, cos_h), r;
-    real thrown = fresnel_dielectric(-cos_h, c.mean_eta).f, diffuse = wi.z * INV_PI / sqr(c.mean_eta);
+    real thrown = fresnel_dielectric(-cos_h, c.eta).f, diffuse = wi.z * INV_PI / sqr(c.eta);
 #define C(x_)                                                                                         \
     real CAT(echo_, x_) = thrown * metal.x_;                                                          \
     CAT(echo_, x_) = 1.0f + c.between * CAT(echo_, x_) / max_r(1.0f - CAT(echo_, x_), (real)(1e-3f)); \
-    r.x_ = coat * f.x_ + t * (lobe * metal.x_ * CAT(echo_, x_) + diffuse * c.again.x_);
+    r.x_ = coat * f + t * (lobe * metal.x_ * CAT(echo_, x_) + diffuse * c.again.x_);
     SPECTRUM_EACH(C)
 #undef C
     return spectrum_sel((wo.z > 0.0f) & (wi.z > 0.0f), r, spectrum_of(0.0f));
 }
+/* eval; c and T(wo) are of the mean index. Where the coat disperses, each wavelength has a pass of the
+ * loop, so that what comes out at one does not depend on the others. */
+inline Spectrum coated_conductor_value(CoatedConductor m, CoatedMetal c, vec3 wo, vec3 wi, real t_wo)
+{
+    Spectrum eta = relative_index(m.coat_ior, m.ext_ior), r = spectrum_of(0.0f);
+    int passes = any(spectrum_varies(eta)) ? SPECTRUM_SIZE : 1;
+    for (int i = 0; i < passes; ++i) {
+        int at = 0;
+        if (passes > 1) {
+#define C(x_) c.eta = i == at++ ? eta.x_ : c.eta;
+            SPECTRUM_EACH(C)
+#undef C
+            c = coated_metal_of(m, c.eta);
+            t_wo = coat_transmittance(c.coat, fabs(wo.z), c.eta);
+        }
+        Spectrum f = coated_conductor_at(m, c, wo, wi, t_wo);
+        at = 0;
+#define C(x_) r.x_ = i == 0 || i == at ? f.x_ : r.x_; ++at;
+        SPECTRUM_EACH(C)
+#undef C
+    }
+    return r;
+}
+
+/* pdf, likewise. */
 inline real coated_conductor_density(CoatedConductor m, CoatedMetal c, vec3 wo, vec3 wi, real t_wo)
 {
     vec3 h = normalize3(add3(wo, wi));
@@ -134,21 +157,21 @@ inline real coated_conductor_density(CoatedConductor m, CoatedMetal c, vec3 wo, 
 
 Spectrum coated_conductor_eval(CoatedConductor m, vec3 wo, vec3 wi)
 {
-    CoatedMetal c = coated_metal_of(m);
-    return coated_conductor_value(m, c, wo, wi, coat_transmittance(c.coat, fabs(wo.z), c.mean_eta));
+    CoatedMetal c = coated_metal_of(m, spectrum_mean(relative_index(m.coat_ior, m.ext_ior)));
+    return coated_conductor_value(m, c, wo, wi, coat_transmittance(c.coat, fabs(wo.z), c.eta));
 }
 
 real coated_conductor_pdf(CoatedConductor m, vec3 wo, vec3 wi)
 {
-    CoatedMetal c = coated_metal_of(m);
-    return coated_conductor_density(m, c, wo, wi, coat_transmittance(c.coat, fabs(wo.z), c.mean_eta));
+    CoatedMetal c = coated_metal_of(m, spectrum_mean(relative_index(m.coat_ior, m.ext_ior)));
+    return coated_conductor_density(m, c, wo, wi, coat_transmittance(c.coat, fabs(wo.z), c.eta));
 }
 
 BsdfSample coated_conductor_sample(CoatedConductor m, vec3 wo, vec3 u)
 {
     BsdfSample s = bsdf_nothing();
-    CoatedMetal c = coated_metal_of(m);
-    real t = coat_transmittance(c.coat, fabs(wo.z), c.mean_eta);
+    CoatedMetal c = coated_metal_of(m, spectrum_mean(relative_index(m.coat_ior, m.ext_ior)));
+    real t = coat_transmittance(c.coat, fabs(wo.z), c.eta);
     vec2 uv = {u.x, u.y}, p = coated_conductor_lobes(m, c, t);
     mask coat = u.z < p.x, metal = !coat & (u.z < p.x + p.y), kept = wo.z > 0.0f;
     vec3 from = sel3(coat, wo, coated_metal_refracted(c, wo));
@@ -156,7 +179,7 @@ BsdfSample coated_conductor_sample(CoatedConductor m, vec3 wo, vec3 u)
     d.alpha_u = sel(coat, c.coat.alpha_u, d.alpha_u);
     d.alpha_v = sel(coat, c.coat.alpha_v, d.alpha_v);
     s.wi = reflect_at(from, microfacet_visible(d, from, uv));
-    real x = s.wi.x * c.mean_eta, y = s.wi.y * c.mean_eta, z2 = 1.0f - x * x - y * y;
+    real x = s.wi.x * c.eta, y = s.wi.y * c.eta, z2 = 1.0f - x * x - y * y;
     kept = kept & (!metal | ((s.wi.z > 0.0f) & (z2 > 0.0f)));
     s.wi = sel3(metal, normalize3(v3(x, y, sqrt_r(z2))), s.wi);
     s.wi = sel3(coat | metal, s.wi, cosine_hemisphere(uv));

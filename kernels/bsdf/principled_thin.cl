@@ -1,19 +1,19 @@
 /* The principled model of thin sheets, as Mitsuba 3 defines it (Burley 2015): diffuse reflection and
  * transmission, and a rough dielectric slab that does not bend light; both sides alike. f [1/sr]. What
  * passes the slab is a reflection, turned to the other side, of facets whose roughness grows with the
- * index (Burley 2015, fig. 15). */
+ * index (Burley 2015, fig. 15); directions are sampled by the mean index. */
 #include "optics/principled.cl"
 
 /* A pair of directions, turned so that wo is on the front. */
 typedef struct {
     vec3 wo, wi, h; /* h: of wo and of wi, or wi's mirror image on the front */
-    Microfacets d;  /* those that light meets on its way between them */
     mask crossed, shading;
 } ThinPair;
 
-inline Microfacets principled_thin_facets(PrincipledThin m, mask crossed)
+/* Those that light meets, by the index of the slab. */
+inline Microfacets principled_thin_facets(PrincipledThin m, mask crossed, real eta)
 {
-    real scale = 0.65f * spectrum_mean(m.eta) - 0.35f;
+    real scale = 0.65f * eta - 0.35f;
     return principled_facets(m.roughness * sel(crossed, scale, (real)(1.0f)), m.anisotropic);
 }
 inline ThinPair principled_thin_pair(PrincipledThin m, vec3 wo, vec3 wi)
@@ -24,23 +24,35 @@ inline ThinPair principled_thin_pair(PrincipledThin m, vec3 wo, vec3 wi)
     p.wi = scale3(wi, side);
     p.crossed = p.wi.z < 0.0f;
     p.h = normalize3(add3(p.wo, v3(p.wi.x, p.wi.y, fabs(p.wi.z))));
-    p.d = principled_thin_facets(m, p.crossed);
     p.shading = (dot3(p.wo, p.h) > 0.0f) & (dot3(p.wi, p.h) * p.wi.z > 0.0f);
     return p;
 }
 
 /* Density of wi as a microfacet's reflection, perhaps turned. */
-inline real principled_thin_lobe(ThinPair p)
+inline real principled_thin_lobe(ThinPair p, Microfacets d)
 {
-    real v = microfacet_visible_pdf(p.d, p.wo, p.h) / max_r(4.0f * dot3(p.wo, p.h), (real)(1e-20f));
+    real v = microfacet_visible_pdf(d, p.wo, p.h) / max_r(4.0f * dot3(p.wo, p.h), (real)(1e-20f));
     return sel(p.shading, v, (real)(0.0f));
+}
+
+/* The slab's f |cos| where its facets reflect all. */
+inline real principled_thin_slab(PrincipledThin m, ThinPair p, real eta)
+{
+    Microfacets d = principled_thin_facets(m, p.crossed, eta);
+    return principled_thin_lobe(p, d) * microfacet_g1(d, p.wi, p.h) * m.spec_trans;
 }
 
 Spectrum principled_thin_eval(PrincipledThin m, vec3 wo, vec3 wi)
 {
     ThinPair p = principled_thin_pair(m, wo, wi);
     real through = 0.5f * m.diff_trans, cos_o = p.wo.z, cos_i = fabs(p.wi.z);
-    real c = dot3(p.h, p.wo), lobe = principled_thin_lobe(p) * microfacet_g1(p.d, p.wi, p.h) * m.spec_trans;
+    real c = dot3(p.h, p.wo);
+    Spectrum lobe = spectrum_of(principled_thin_slab(m, p, m.eta.x));
+    if (any(spectrum_varies(m.eta))) {
+#define C(c_) lobe.c_ = principled_thin_slab(m, p, m.eta.c_);
+        SPECTRUM_EACH(C)
+#undef C
+    }
     Spectrum f = fresnel_spectrum(min_r(c, (real)(1.0f)), m.eta), weight, slab, base;
     Spectrum tint = principled_tint(m.base_color, m.luminance), one = spectrum_of(1.0f);
 #define C(c_) weight.c_ = schlick_boundary(c, max_r(m.eta.c_, (real)(0.01f)));
@@ -53,16 +65,17 @@ Spectrum principled_thin_eval(PrincipledThin m, vec3 wo, vec3 wi)
     real sheen = sel(p.crossed, (real)(0.0f), m.sheen * (1.0f - through));
     base = spectrum_madd(principled_sheen(tint, m.sheen_tint, c), sheen, base);
     mask usable = (cos_o > 0.0f) & (cos_i > 0.0f);
-    base = spectrum_madd(slab, lobe, spectrum_scale(base, (1.0f - m.spec_trans) * cos_i));
+    base = spectrum_add(spectrum_mul(slab, lobe), spectrum_scale(base, (1.0f - m.spec_trans) * cos_i));
     return spectrum_sel(usable, base, spectrum_of(0.0f));
 }
 
 real principled_thin_pdf(PrincipledThin m, vec3 wo, vec3 wi)
 {
     ThinPair p = principled_thin_pair(m, wo, wi);
+    Microfacets d = principled_thin_facets(m, p.crossed, spectrum_mean(m.eta));
     real through = 0.5f * m.diff_trans, cos_i = fabs(p.wi.z);
     real diffuse = sel(p.crossed, through, 1.0f - through) * cosine_hemisphere_pdf(cos_i);
-    real pdf = diffuse * (1.0f - m.spec_trans) + principled_thin_lobe(p) * 0.5f * m.spec_trans;
+    real pdf = diffuse * (1.0f - m.spec_trans) + principled_thin_lobe(p, d) * 0.5f * m.spec_trans;
     return sel((p.wo.z > 0.0f) & (cos_i > 0.0f), pdf, (real)(0.0f));
 }
 
@@ -76,7 +89,8 @@ BsdfSample principled_thin_sample(PrincipledThin m, vec3 wo, vec3 u)
     mask crossed = (specular & (u.z >= half_spec)) | (!specular & (u.z >= diffuse));
     s.wi = cosine_hemisphere(uv);
     if (any(specular)) {
-        vec3 front = scale3(wo, side), h = microfacet_visible(principled_thin_facets(m, crossed), front, uv);
+        Microfacets d = principled_thin_facets(m, crossed, spectrum_mean(m.eta));
+        vec3 front = scale3(wo, side), h = microfacet_visible(d, front, uv);
         s.wi = sel3(specular, reflect_at(front, h), s.wi);
     }
     mask kept = s.wi.z > 0.0f;

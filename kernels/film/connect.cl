@@ -12,12 +12,14 @@
  */
 #include "core/warp.cl"
 #include "film/film.cl"
+#include "film/spread.cl"
 
 typedef struct {
     vec3 o;         /* where the camera's ray begins, on the near plane [m] */
     vec3 d;         /* from there to the point, unit length */
     real t;         /* distance to it [m]; FAR at infinity */
-    integer pixel;  /* where the film stores the pixel that sees it; -1: it is not in view */
+    vec2 film;      /* where it is seen, from the corner of the picture [pixels] */
+    integer pixel;  /* where the film stores the pixel that gets it; -1: none does, or it is not in view */
     real importance; /* see above [1/m^2] */
 } CameraPoint;
 
@@ -27,20 +29,10 @@ inline CameraPoint camera_nowhere(void)
     c.o = v3(0.0f, 0.0f, 0.0f);
     c.d = v3(0.0f, 0.0f, 1.0f);
     c.t = FAR;
+    c.film.x = c.film.y = 0.0f;
     c.pixel = -1;
     c.importance = 0.0f;
     return c;
-}
-
-/* Where the pixel at a position of the whole film, x and y in [0, 1), is stored; -1 outside of the picture. */
-inline integer film_index_at(global const Settings *settings, real x, real y)
-{
-    x = x * (float)settings->film_width - (float)settings->crop_x;
-    y = y * (float)settings->film_height - (float)settings->crop_y;
-    mask inside = (x >= 0.0f) & (x < (float)settings->width) & (y >= 0.0f) & (y < (float)settings->height);
-    integer i = min_i(to_integer(sel(inside, x, (real)(0.0f))), (integer)(settings->width - 1));
-    integer j = min_i(to_integer(sel(inside, y, (real)(0.0f))), (integer)(settings->height - 1));
-    return sel_i(inside, film_pixel_index(settings, i, j), (integer)(-1));
 }
 
 /* A pinhole, or a lens on which the light arrives at (a, b): the plane at distance `focus` is sharp. The
@@ -62,9 +54,23 @@ inline CameraPoint pinhole_connect(global const Settings *settings, global const
     c.o = matrix_point(m, lens.x + d.x * start, lens.y + d.y * start, (real)(near));
     c.d = normalize3(matrix_vector(m, d.x, d.y, d.z));
     c.t = sel(away, (real)(FAR), length * (1.0f - start));
-    c.pixel = sel_i(seen, film_index_at(settings, x, y), (integer)(-1));
+    c.film.x = x * (float)settings->film_width - (float)settings->crop_x;
+    c.film.y = y * (float)settings->film_height - (float)settings->crop_y;
+    c.pixel = sel_i(seen, (integer)(0), (integer)(-1));
     float cropped = ((float)settings->film_width * (float)settings->film_height) /
                     ((float)settings->width * (float)settings->height);
     c.importance = length * cropped / (z * z * z * (extent[0] * extent[1]));
+    return c;
+}
+
+/* The pixel that gets a point in view, chosen by the pixel filter with the number u. */
+inline CameraPoint camera_pixel(Scene scene, CameraPoint c, real u)
+{
+    global const Settings *settings = scene.settings;
+    mask seen = (c.pixel >= 0) & (fabs(c.film.x) < 1e6f) & (fabs(c.film.y) < 1e6f);
+    integer x = spread_axis(scene, sel(seen, c.film.x, (real)(0.0f)), &u, &c.importance);
+    integer y = spread_axis(scene, sel(seen, c.film.y, (real)(0.0f)), &u, &c.importance);
+    seen = seen & (x >= 0) & (x < settings->width) & (y >= 0) & (y < settings->height);
+    c.pixel = sel_i(seen, film_pixel_index(settings, x, y), (integer)(-1));
     return c;
 }

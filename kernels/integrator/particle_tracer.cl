@@ -27,7 +27,9 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
 
 #if !BSDF_DELTA
     /* To the camera. */
-    CameraPoint c = camera_connect(scene, s.p, mask_of(0), sampler_pair(sampler, scatter.dimension + DIMENSION_LIGHT));
+    vec2 lens = sampler_pair(sampler, scatter.dimension + DIMENSION_LIGHT);
+    real pixel = sampler_pair(sampler, scatter.dimension + DIMENSION_CHOICE).x;
+    CameraPoint c = camera_connect(scene, s.p, mask_of(0), lens, pixel);
     Spectrum f = bsdf_eval(m, to_local(frame, neg3(c.d)), wo);
     mask shine = active & (c.pixel >= 0) & (spectrum_max(f) > 0.0f);
     real carries = fabs(dot3(s.n, c.d)) * arrives * c.importance * shading_frame_share(scatter.shading, neg3(v.d));

@@ -3,7 +3,7 @@
  * (clpt/render/lowering/materials/reradiation.py): at each node how much light to expect, then the integral of each
  * row times that, then of each row its values [1/nm] and the normalised running integral of the product. */
 #include "core/grid.cl"
-#define SHIFT_CELLS ((SPECTRA_SIZE - 1 + RERADIATION_STEP - 1) / RERADIATION_STEP)
+#define SHIFT_CELLS ((int)((SPECTRA_SIZE - 1) * SPECTRA_STEP + (RERADIATION_STEP - 1e-3f)) / RERADIATION_STEP)
 #define SHIFT_ROW (2 * SHIFT_CELLS + 1)
 
 /* A cell of the grid, and how far along it: [0, 1). */

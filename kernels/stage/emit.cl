@@ -50,7 +50,8 @@ inline integer begin_light_path(Scene scene, Slab path, Slab shadow, At at, mask
     integer state = sel_i(alive, (integer)(PATH_ALIVE), (integer)(0));
 #if USES_VISIBLE_LIGHTS
     vec2 lens = sampler_pair(sampler, (natural)(DIMENSION_VERTEX + DIMENSION_LIGHT));
-    CameraPoint c = camera_connect(scene, sel3(r.away, neg3(r.d), r.o), r.away, lens);
+    real pixel = sampler_pair(sampler, (natural)(DIMENSION_VERTEX + DIMENSION_CHOICE)).x;
+    CameraPoint c = camera_connect(scene, sel3(r.away, neg3(r.d), r.o), r.away, lens, pixel);
     real cosine = sel(r.away, (real)(1.0f), -dot3(r.n, c.d));
     mask seen = go & (c.pixel >= 0) & (cosine > 0.0f) & (spectrum_max(r.seen) > 0.0f);
     mask shine = seen & mask_of(settings->hide_lights == 0);

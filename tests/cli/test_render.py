@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import logging
+import os
+import shlex
 import shutil
 import signal
 import subprocess
@@ -14,7 +17,7 @@ import pytest
 
 from clpt import __version__, images, spectral_exr
 from clpt.__main__ import run
-from clpt.cli import outputs
+from clpt.cli import outputs, stopping
 from clpt.cli.render import changed
 from clpt.errors import SceneError
 from clpt.formats import load
@@ -71,19 +74,114 @@ def test_a_limit_of_time_leaves_a_whole_picture(tmp_path, capsys):
     assert "building kernels" in capsys.readouterr().err
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT for other processes")
-def test_ctrl_c_writes_what_is_there(tmp_path):
+@pytest.mark.skipif(sys.platform == "win32", reason="no signals for other processes")
+@pytest.mark.parametrize("number", [signal.SIGINT, *stopping.ENDING], ids=lambda n: n.name)
+def test_a_signal_writes_what_is_there(tmp_path, number):
     path = tmp_path / "out.npy"
     command = [sys.executable, "-m", "clpt", "render", CORNELL, "-o", str(path), "--time", "1h"]
-    with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) as process:
+    common = ["--size", "32x32", "--mode", "rgb"]
+    listening = {} if sys.platform == "win32" else {"preexec_fn": listen}
+    with subprocess.Popen(
+        command + common, cwd=ROOT, stderr=subprocess.PIPE, text=True, **listening
+    ) as process:
         assert process.stderr is not None
         lines = iter(process.stderr.readline, "")
         assert any("Msamples/s" in line for line in lines)
-        process.send_signal(signal.SIGINT)
+        process.send_signal(number)
         rest = process.stderr.read()
-        assert process.wait(20) == 130
+        assert process.wait(20) == 128 + number
     assert str(path) in rest and "Traceback" not in rest
     assert np.isfinite(np.load(path)).all()
+
+
+def listen() -> None:
+    """Have signals as a terminal gives them, whatever the tests run under."""
+    for number in (signal.SIGINT, *stopping.ENDING):
+        signal.signal(number, signal.SIG_DFL)
+
+
+def test_targets_are_tried_before_anything_is_read(tmp_path, monkeypatch, capsys):
+    """A folder, no folder, a folder without a right to write, a file without one."""
+
+    def refuse(*_, **__):
+        raise AssertionError("the scene is read")
+
+    monkeypatch.setattr(sys.modules["clpt.cli.render"], "load", refuse)
+    targets = {tmp_path / "no" / "a.png": "its folder does not exist"}
+    (tmp_path / "folder.png").mkdir()
+    targets[tmp_path / "folder.png"] = "it is a folder"
+    if sys.platform == "linux":
+        targets[Path("/proc/a.exr")] = "no file can be made there"
+    for target, told in targets.items():
+        given = ["-o", str(tmp_path / "fine.png"), "-o", str(target)]
+        assert run(["render", CORNELL, *given]) == 2
+        error = capsys.readouterr().err
+        assert error.startswith(f"clpt: error: {target}: ") and told in error
+        assert error.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["folder.png"]
+
+
+def test_a_target_that_fails_at_the_end(tmp_path, monkeypatch, capsys):
+    """The others are written, this one goes to the temporary folder, and the message says where."""
+    monkeypatch.setattr(outputs.tempfile, "tempdir", str(tmp_path / "temporary"))
+    (tmp_path / "temporary").mkdir()
+    fine, full = tmp_path / "fine.png", tmp_path / "full.exr"
+    write_channels = images.write_channels
+
+    def write(path, *rest):
+        if path == full:
+            raise OSError(28, "No space left on device")
+        write_channels(path, *rest)
+
+    monkeypatch.setattr(images, "write_channels", write)
+    common = ["--size", "8x8", "--spp", "1", "--mode", "rgb"]
+    assert run(["render", CORNELL, "-o", str(full), "-o", str(fine), *common]) == 2
+    error = capsys.readouterr().err.splitlines()[-1]
+    (rescued,) = (tmp_path / "temporary").iterdir()
+    assert f"{full}: cannot be written: " in error and "No space left" in error
+    assert f"the picture is in {rescued}" in error
+    assert images.read(rescued).shape == images.read(fine).shape == (8, 8, 3)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="bytes in file names")
+def test_names_that_the_locale_cannot_spell(tmp_path):
+    scene = tmp_path / "caf\u00e9.obj"
+    shutil.copy(ROOT / "tests" / "scenes" / "bowl.obj", scene)
+    plain = {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0", "PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-m", "clpt", "render", str(scene), "--size", "8x8", "--spp", "1"]
+    done = subprocess.run(
+        command, cwd=tmp_path, env={**os.environ, **plain}, capture_output=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert b"Traceback" not in done.stderr
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "caf\u00e9.obj", "caf\u00e9.exr", "caf\u00e9.png"
+    }  # fmt: skip
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="closes streams by the shell")
+@pytest.mark.parametrize("streams", ["2>&- >&- <&-", "2>/dev/full"])
+def test_closed_streams(tmp_path, streams):
+    words = [sys.executable, "-m", "clpt", "render", CORNELL, "-o", str(tmp_path / "out.png")]
+    words += ["--size", "8x8", "--spp", "1", "--mode", "rgb"]
+    if "full" in streams and not Path("/dev/full").exists():
+        pytest.skip("no /dev/full")
+    done = subprocess.run(
+        f"{shlex.join(words)} {streams}", shell=True, cwd=ROOT, capture_output=True, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, b"", b"")
+    assert images.read(tmp_path / "out.png").shape == (8, 8, 3)
+
+
+def test_verbose_before_and_behind_the_command(tmp_path, capsys):
+    path = tmp_path / "out.png"
+    arguments = [CORNELL, "-o", str(path), "--size", "8x8", "--spp", "1", "--mode", "rgb"]
+    for words in (["-v", "render"], ["render", "-v"]):
+        assert run([*words, *arguments]) == 0
+        assert "36 triangles" in capsys.readouterr().err
+        assert logging.getLogger("clpt").level == logging.INFO
+    assert run(["-v", "render", "-v", *arguments]) == 0
+    assert logging.getLogger("clpt").level == logging.DEBUG
 
 
 def test_quiet_says_nothing(tmp_path, capfd):

@@ -10,7 +10,7 @@ import time
 import pytest
 from rich.console import Console
 
-from clpt.cli import rendering
+from clpt.cli import rendering, stopping
 from clpt.cli.display import Bar, Lines, clock, figures
 from clpt.cli.rendering import pass_size, render_samples
 from clpt.render.progress import Progress
@@ -37,57 +37,70 @@ class Counting:
 
 def test_passes_grow_and_end_at_the_last_sample():
     renderer = Counting()
-    assert render_samples(renderer, 100, None, lambda progress: None)
+    render_samples(renderer, 100, None, lambda progress: None)
     assert renderer.passes == [1, 3, 12, 48, 36]
 
 
 def test_noise_ends_it():
     renderer = Counting()
-    assert render_samples(renderer, None, None, lambda progress: None, noise=1.0)
+    render_samples(renderer, None, None, lambda progress: None, noise=1.0)
     assert renderer.passes == [1, 3, 12, 48, 192]
 
 
-def test_the_limit_ends_a_pass_but_not_the_first():
+def test_the_limit_ends_a_pass():
     renderer = Counting(0.05)
-    assert render_samples(renderer, None, 0.01, lambda progress: None)
-    assert renderer.samples == 1
+    render_samples(renderer, None, 0.01, lambda progress: None)
+    assert renderer.passes == [1] and renderer.samples == 0
     renderer = Counting(0.01)
     began = time.perf_counter()
-    assert render_samples(renderer, None, 0.3, lambda progress: None)
+    render_samples(renderer, None, 0.3, lambda progress: None)
     assert 0.3 <= time.perf_counter() - began < 30.0
 
 
 @pytest.fixture
 def listening():
-    """Ctrl-C as Python starts with, though a shell ignores it in what runs in the background."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    """Signals as the command sets them, though a shell ignores Ctrl-C in the background."""
+    numbers = (signal.SIGINT, *stopping.ENDING)
+    before = {number: signal.signal(number, signal.SIG_DFL) for number in numbers}
+    stopping.raise_at_signals()
     yield
-    signal.signal(signal.SIGINT, before)
+    for number, action in before.items():
+        signal.signal(number, action)
 
 
 @pytest.mark.skipif(
     threading.current_thread() is not threading.main_thread(), reason="signals need it"
 )
-def test_ctrl_c_ends_the_rendering_and_a_second_one_the_program(listening):
+@pytest.mark.parametrize("number", [signal.SIGINT, *stopping.ENDING], ids=lambda n: n.name)
+def test_a_signal_ends_the_rendering_and_a_second_one_the_program(listening, number):
     shown = []
 
     def press(progress):
         shown.append(progress)
         if len(shown) == 9:
-            signal.raise_signal(signal.SIGINT)
+            signal.raise_signal(number)
 
-    before = signal.getsignal(signal.SIGINT)
-    assert not render_samples(Counting(), 1000, None, press)
-    assert len(shown) == 9
-    assert signal.getsignal(signal.SIGINT) is before
+    before = signal.getsignal(number)
+    with stopping.stops() as stopped:
+        render_samples(Counting(), 1000, None, press, stopped=stopped)
+    assert len(shown) == 9 and stopped == [number]
+    assert signal.getsignal(number) is before
 
-    def press_twice(progress):
-        signal.raise_signal(signal.SIGINT)
-        signal.raise_signal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt) as raised, stopping.stops():
+        signal.raise_signal(number)
+        signal.raise_signal(number)
+    assert stopping.status(raised.value) == 128 + number
+    assert signal.getsignal(number) is before
 
-    with pytest.raises(KeyboardInterrupt):
-        render_samples(Counting(), 1000, None, press_twice)
-    assert signal.getsignal(signal.SIGINT) is before
+
+def test_a_signal_that_is_ignored_stays_ignored(listening):
+    """As of nohup."""
+    for number in stopping.ENDING:
+        signal.signal(number, signal.SIG_IGN)
+        stopping.raise_at_signals()
+        with stopping.stops() as stopped:
+            signal.raise_signal(number)
+        assert not stopped and signal.getsignal(number) is signal.SIG_IGN
 
 
 def test_size_of_a_pass():

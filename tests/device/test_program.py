@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 import warnings
 import weakref
@@ -9,8 +10,20 @@ import weakref
 import numpy as np
 import pyopencl as cl
 import pytest
+from pyopencl import _cl
 
-from clpt.device import Buffers, Device, assemble, build, build_all, disk_cache, program
+from clpt.device import (
+    Buffers,
+    Device,
+    assemble,
+    build,
+    build_all,
+    context,
+    disk_cache,
+    link,
+    native_programs,
+    program,
+)
 from clpt.errors import KernelBuildError
 
 TEXT = """
@@ -187,19 +200,23 @@ def test_a_context_keeps_its_programs(device):
     assert gone() is None, "at once, without the collector of cycles"
 
 
-def test_remarks_of_a_driver_are_no_warnings(device, monkeypatch):
-    """PyOpenCL would warn of them; whoever uses clpt has their own filters back afterwards."""
-    from_source = program._from_source
+def test_remarks_of_a_driver_are_no_warnings(device, cache_folder, monkeypatch, caplog):
+    """Intel's runtime remarks on every kernel. A user who makes warnings errors sees none."""
 
-    def remarking(*a):
-        warnings.warn("remark", cl.CompilerWarning, stacklevel=1)
-        return from_source(*a)
+    class Remarking(_cl._Program):
+        def get_build_info(self, *of):
+            return super().get_build_info(*of) + "kernel was vectorised"
 
-    monkeypatch.setattr(program, "_from_source", remarking)
-    opened = Device.open(device.info)
-    with warnings.catch_warnings(record=True) as seen:
-        warnings.simplefilter("always")
+    monkeypatch.setattr(native_programs._cl, "_Program", Remarking)
+    monkeypatch.setattr(program, "has_src_build_cache", lambda device: False)
+    with warnings.catch_warnings(), caplog.at_level(logging.DEBUG, "clpt"):
+        warnings.simplefilter("error")
         before = list(warnings.filters)
+        with pytest.raises(Warning, match="Non-empty compiler output"):  # what PyOpenCL does
+            Remarking(device.context, TEXT).build(b"", [device.info.cl_device])
+        assert context.trial(device.info) is None
+        opened = Device.open(device.info)
         build_all(opened, {name: source(TEXT + f"/* {name} */") for name in "abc"})
-        assert not seen
+        link(opened, {"main": source()}, "main", build(opened, source()).signatures)
         assert warnings.filters == before
+    assert "kernel was vectorised" in caplog.text

@@ -28,7 +28,7 @@ def wheel(tmp_path, monkeypatch, cache_folder):
 
 
 def announce() -> str | None:
-    runtimes.announce.__wrapped__()
+    runtimes._make_wheel_known()
     return os.environ.get(runtimes.VARIABLE)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from clpt import spectra
+from clpt.errors import SceneError
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Orthographic
 from clpt.scene.lights import Constant
@@ -51,3 +52,18 @@ def test_lamps_in_rgb_mode() -> None:
     image = exposures(with_film(scene, mode="rgb"), 2, 1).mean(axis=(0, 1, 2))
     expected = np.maximum(spectra.XYZ_TO_REC709 @ xyz_of(lamp), 0.0)
     np.testing.assert_allclose(image, expected, rtol=2e-3, atol=1e-6)
+
+
+@pytest.mark.parametrize(("lo", "hi"), [(588.9, 589.7), (550.0, 550.02)])
+def test_narrow_films_are_exact_at_their_ends(lo: float, hi: float) -> None:
+    """The mean of a band of sodium's lines, and of a grey; float32 has 6e-5 nm at 550 nm."""
+    for lamp in (LAMPS["sodium"], spectra.Constant(0.5)):
+        film = Film(width=16, height=16, lambda_min=lo, lambda_max=hi, bands=1)
+        scene = Scene(camera=Orthographic(), lights=[Constant(radiance=lamp)], film=film)
+        fine = np.linspace(lo, hi, 10_001)
+        assert_mean(exposures(scene, 4, 16), [lamp.sample(fine).mean()], 0.02, 2e-3)
+
+
+def test_films_too_narrow_for_float32_are_refused() -> None:
+    with pytest.raises(SceneError, match=r"film\.lambda_min: must be 0\.01 nm or more below"):
+        Film(lambda_min=550.0, lambda_max=550.001)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
+from typing import Any
 
 import pytest
 
@@ -12,6 +12,7 @@ from clpt.scene import Film, Scene, materials
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Path
 from clpt.scene.lights import Area, Constant
+from clpt.scene.params import params
 from clpt.scene.shapes import Rectangle, Sphere
 from clpt.spectra import Spectrum, Tabulated
 from tests.renders.builders import BLACK, UP
@@ -20,6 +21,13 @@ from tests.renders.support import assert_agree, blocks, exposures
 SHORT, LONG = (1.35, 1.8)  # the index below and above EDGE
 EDGE, GAP = 550.0, 2.0  # [nm]; there is no light nearer to the edge than GAP
 STEP = Tabulated((EDGE - 1.0, EDGE + 1.0), (SHORT, LONG), "hold")
+
+
+# What shows that light is bent, and hides nothing of it.
+LOOK = {
+    "ext_ior": 1.0, "roughness": 0.4, "spec_trans": 0.7, "transmission": 0.7, "coat_alpha": 0.3,
+    "mode": "transmissive", "profile": "explicit",
+}  # fmt: skip
 
 
 def band(lo: float, hi: float) -> Tabulated:
@@ -36,8 +44,9 @@ def ball(
     kind: type[materials.Material], index: Spectrum | float, light: Tabulated, alpha: float = 0.3
 ) -> Scene:
     """A ball of a material under a lamp and a dim sky of one spectrum, over a grey table."""
-    rough = {"alpha_u": alpha, "alpha_v": alpha} if kind is materials.RoughDielectric else {}
-    material = kind(int_ior=index, ext_ior=1.0, **rough)
+    given: dict[str, Any] = {name: value for name, value in LOOK.items() if name in params(kind)}
+    given |= {name: alpha for name in ("alpha_u", "alpha_v") if name in params(kind)}
+    material = kind(**{**given, str(bending(kind)): index})
     scaled = Tabulated(light.lambdas, [8.0 * v for v in light.values])
     lamp = tf.translate([0.5, 2.0, 0.0]) @ tf.rotate([1, 0, 0], 90) @ tf.scale(0.7)
     return Scene(
@@ -56,15 +65,19 @@ def ball(
     )
 
 
-KINDS = [k for k in materials.LEAVES if "int_ior" in {f.name for f in dataclasses.fields(k)}]
+def bending(kind: type[materials.Material]) -> str | None:
+    """The parameter that bends light; None of a kind that has none. A metal's may be textured."""
+    indices = [name for name, p in params(kind).items() if p.role == "index" and not p.textured]
+    return indices[0] if indices else None
+
+
+KINDS = [kind for kind in materials.LEAVES if bending(kind)]
+QUICK = (materials.RoughDielectric, materials.CoatedConductor)
 
 
 @pytest.mark.parametrize(
     "kind",
-    [
-        pytest.param(kind, marks=() if kind is materials.RoughDielectric else pytest.mark.slow)
-        for kind in KINDS
-    ],
+    [pytest.param(kind, marks=() if kind in QUICK else pytest.mark.slow) for kind in KINDS],
     ids=lambda kind: kind.kind,
 )
 def test_a_step_in_the_index_is_two_indices(kind: type[materials.Material]) -> None:

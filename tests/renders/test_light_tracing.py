@@ -19,10 +19,10 @@ from clpt import transforms as tf
 from clpt.device import choose
 from clpt.errors import SceneError
 from clpt.render.lowering.scene import lower
-from clpt.scene import Film, Scene
+from clpt.scene import Film, Scene, kinds
 from clpt.scene import materials as m
 from clpt.scene.cameras import Camera, Orthographic, Perspective, ThinLens
-from clpt.scene.integrators import Gaussian, ParticleTracer, Path
+from clpt.scene.integrators import Box, Filter, Lanczos, ParticleTracer, Path
 from clpt.scene.lights import (
     Area,
     Constant,
@@ -283,7 +283,6 @@ BEAM = Rectangle(emission=DirectionalArea(), name="beam")
         ({"camera": Orthographic()}, "camera: .*perspective and thin_lens, not orthographic"),
         ({"camera": ThinLens(glass="sf11")}, "camera.glass: .*does not disperse"),
         ({"lights": [Point(falloff=False)]}, r"lights\[0\]: .*falls with distance"),
-        ({"film": Film(bands=8)}, "film.bands: .*without bands"),
         ({"integrator": Path(), "shapes": [BEAM]}, "rectangle 'beam': only .*particle_tracer"),
     ],
 )
@@ -293,29 +292,40 @@ def test_what_it_cannot_do_is_refused(changes: dict[str, Any], message: str) -> 
         lower(Scene(**{**given, **changes}))
 
 
-def test_filter_that_is_passed_over() -> None:
-    film = Film(filter=Gaussian())
-    lowered = lower(Scene(camera=Perspective(), integrator=ParticleTracer(), film=film))
-    assert "film.filter" in lowered.warnings[0]
+FILTERS = [*(cls() for cls in kinds("filter").values()), Box(radius=0.8), Lanczos(radius=2.5)]
+
+
+@pytest.mark.parametrize("chosen", FILTERS, ids=lambda f: f"{f.kind}_{getattr(f, 'radius', 0)}")
+def test_every_filter(chosen: Filter) -> None:
+    """A small lamp in view, pixel by pixel: light from it is spread as pixels gather it."""
+    turned = tf.translate([0.03, 0.02, 0]) @ tf.rotate([0, 0, 1], 20) @ tf.scale([0.15, 0.1, 1.0])
+    lamp = Rectangle(to_world=turned, emission=Area(radiance=(4.0, 2.0, 1.0)), material=BLACK)
+    view = tf.look_at([0.0, 0.0, 1.0], [0.0, 0.0, 0.0], UP)
+    film = Film(width=11, height=9, mode="rgb", filter=chosen)
+    scene = Scene(camera=Perspective(to_world=view, fov=40), shapes=[lamp], film=film)
+    from_camera = dataclasses.replace(scene, integrator=Path(max_depth=1))
+    from_lights = dataclasses.replace(scene, integrator=ParticleTracer(max_depth=1))
+    reference = exposures(from_camera, 12, 512)
+    assert_agree(exposures(from_lights, 12, 2048), reference, chosen.kind)
+
+
+def test_bands() -> None:
+    """A film of bands gets what the camera's paths bring."""
+    scene = with_film(still_life("spectral", {"disk": 10.0}), bands=3, width=8, height=8)
+    both(scene, 512, "bands", many=4, depth=3)
 
 
 @pytest.mark.slow
-def test_lanes_slots_and_steps_differ_only_in_rounding() -> None:
-    """The same paths however the work is cut up; only the order of the sums is open."""
+def test_lanes() -> None:
+    """The same paths in every number of lanes."""
     scene = beam_through(m.Dielectric(int_ior="sf11"), "spectral")
-    once = clpt.render(scene, 32)
-    pictures = [clpt.render(scene, 32, slots=slots) for slots in (64, 1 << 12)]
-    renderer = clpt.Renderer(scene)
-    for step in (1, 7, 24):
-        assert renderer.run(step)
-    assert renderer.wavefronts[0].counts.samples == 32 * 64
-    pictures.append(renderer.image())
+    pictures = []
     for lanes in (1, 8, 16):
         device = choose()
         device.lanes = lanes
         pictures.append(clpt.render(scene, 32, device=device))
-    for picture in pictures:
-        np.testing.assert_allclose(picture, once, rtol=1e-4, atol=1e-5)
+    for picture in pictures[1:]:
+        np.testing.assert_allclose(picture, pictures[0], rtol=1e-4, atol=1e-5)
 
 
 @pytest.mark.parametrize("size", [(1, 1), (3, 5), (17, 9)])

@@ -10,6 +10,7 @@ import pytest
 from clpt.errors import SceneError
 from clpt.scene.materials import Fluorescent
 from clpt.spectra import (
+    LED,
     Constant,
     Donaldson,
     Fluorophore,
@@ -60,6 +61,45 @@ def test_nothing_leaves_at_a_shorter_wavelength() -> None:
     kept = (dye.sample(FINE, 560.0) * FINE / 560.0).sum() * 0.5  # half of the emission is left out
     assert kept == pytest.approx(0.5, rel=2e-3)
     assert dye.emitted(700.0) == 0.0
+
+
+def triangle(at: float, half: float) -> Tabulated:
+    return Tabulated((at - half, at, at + half), (0.0, 1.0, 0.0))
+
+
+@pytest.mark.parametrize("first", [250.0, 360.0, 362.5, 401.3])
+@pytest.mark.parametrize("absorbed", [463.0, 464.0, 465.0])
+@pytest.mark.parametrize("emitted", [(612.0, 2.2), (612.5, 1.5)])
+def test_narrow_lines_keep_their_photons(
+    first: float, absorbed: float, emitted: tuple[float, float]
+) -> None:
+    """Rare earths: out come as many photons as are absorbed of a lamp, wherever the nodes are."""
+    dye = Fluorophore(triangle(absorbed, 2.0), triangle(*emitted))
+    lamp = LED(465.0, 60.0)  # narrower ones are blurred by the hats, at 20 nm by 7 %
+    nodes = np.arange(first, 905.0, 5.0)
+    taken = np.trapezoid(lamp.sample(FINE) * dye.absorption.sample(FINE) * FINE, FINE)
+    arriving = lamp.sample(FINE)[:, None] * np.maximum(1 - np.abs(FINE[:, None] - nodes) / 5, 0)
+    for matrix in (dye.on_nodes(nodes), dye.sample(nodes[:, None], nodes)):
+        given = (matrix * nodes[:, None]) @ (arriving.sum(axis=0) * 0.5) * 5.0
+        assert given.sum() == pytest.approx(taken, rel=0.02)
+
+
+@pytest.mark.parametrize("first", [250.0, 362.5])
+def test_the_yield_holds_in_a_dye_s_tail(first: float) -> None:
+    """Where a dye is excited within its own emission, no more comes out than went in."""
+    dye = Fluorophore(Constant(1.0), GREEN)
+    nodes = np.arange(first, 905.0, 5.0)
+    photons = (dye.on_nodes(nodes) * nodes[:, None] / nodes).sum(axis=0) * 5.0
+    assert photons.max() == pytest.approx(1.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("first", [390.0, 392.5])
+def test_a_matrix_keeps_what_lies_between_the_nodes(first: float) -> None:
+    nodes = np.arange(first, 545.0, 5.0)
+    rows = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))
+    between = Donaldson((500.0, 502.0, 504.0), (401.0, 402.0, 404.0), rows)
+    whole = 1.0 * 1.0 + 2.0 * 1.5 + 1.0 * 0.5  # by the trapezoid rule on its own wavelengths
+    assert between.on_nodes(nodes).sum() * 25.0 == pytest.approx(whole, rel=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ import pytest
 from clpt import spectra
 from clpt.errors import SceneError
 from clpt.spectra import cie
+from clpt.spectra.spectrum import gridded, hat_means
 
 ANY = np.array([300.0, 361.0, 555.5, 829.0, 1200.0])
 
@@ -160,3 +161,44 @@ def test_absorption_of_an_extinction_coefficient() -> None:
     np.testing.assert_allclose(a.sample([550.0]), 0.04478, rtol=1e-3)
     np.testing.assert_allclose(a.sample([400.0]) / a.sample([800.0]), 2.0)
     assert spectra.absorption(spectra.Constant(0.0)) == spectra.Constant(0.0)
+
+
+GRID = np.arange(360.0, 831.0)
+
+
+@pytest.mark.parametrize("fwhm", [0.3, 0.5, 1.0, 5.0])
+@pytest.mark.parametrize("at", [546.0, 546.25, 546.5])
+def test_a_fine_table_keeps_its_power_on_a_coarse_grid(fwhm, at):
+    fine = np.arange(5300.0, 5601.0) / 10.0
+    line = np.exp(-4.0 * np.log(2.0) * ((fine - at) / fwhm) ** 2)
+    lamp = spectra.Tabulated(fine, line)
+    power = np.trapezoid(line, fine)
+    assert np.trapezoid(gridded(lamp, GRID), GRID) == pytest.approx(power, rel=1e-9)
+    xyz = np.trapezoid(spectra.cie_xyz(fine) * line[:, None], fine, axis=0) / spectra.CIE_Y_INTEGRAL
+    expected = np.maximum(spectra.xyz_to_rgb(xyz), 0.0)
+    np.testing.assert_allclose(lamp.to_rgb("emission"), expected, rtol=5e-3, atol=1e-9)
+
+
+@pytest.mark.parametrize("lo, hi", [(588.9, 589.7), (589.0, 590.0), (360.0, 830.0)])
+@pytest.mark.parametrize("lamp", [spectra.illuminant("sodium"), spectra.Lines([359.6], [1.0])])
+def test_the_ends_of_a_grid_are_exact(lo, hi, lamp):
+    grid = np.linspace(lo, hi, max(101, round(hi - lo) + 1))
+    fine = np.linspace(lo, hi, 470_001)
+    expected = np.trapezoid(lamp.sample(fine), fine)
+    found = np.trapezoid(gridded(lamp, grid), grid)
+    assert found == pytest.approx(expected, rel=1e-6, abs=1e-12)
+
+
+def test_tables_are_sampled_where_the_grid_has_all_their_points():
+    table = spectra.Tabulated([400, 500, 700], [1, 3, 2])
+    np.testing.assert_array_equal(gridded(table, GRID), table.sample(GRID))
+
+
+def test_means_stay_within_the_limits_of_a_table():
+    """A table of random steps between 0 and 1; between the ends straight lines stay."""
+    rng = np.random.default_rng(1)
+    at = np.sort(rng.uniform(340.0, 850.0, 3000))
+    means = hat_means(at, rng.integers(0, 2, 3000).astype(float), GRID)
+    assert means.min() >= -1e-12 and means.max() <= 1.0 + 1e-12
+    line = hat_means(at, 2.0 * at - 3.0, GRID)
+    np.testing.assert_allclose(line[1:-1], 2.0 * GRID[1:-1] - 3.0, rtol=1e-9)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import math
 import os
-import warnings
 from concurrent.futures import Future, ThreadPoolExecutor
 from threading import Lock
 from typing import Any
@@ -77,13 +76,10 @@ def _image(texture: Element, raw: bool) -> NDArray[Any]:
 
 def _all(document: Document) -> dict[str, Future[images.Stored]]:
     """The images of all textures, decoded side by side; one that fails does where it is used."""
-    from PIL import Image  # Pillow is not imported before there is an image
-
     sources = [_source(texture) for texture in document.root.children("textures")]
     distinct = {source.path: source for source in sources if source is not None}
     budget = _Budget()
-    with warnings.catch_warnings(), ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         return {path: pool.submit(_decoded, one, budget) for path, one in distinct.items()}
 
 
@@ -104,7 +100,7 @@ class _Budget:
 
 
 def _decoded(source: Element, budget: _Budget) -> images.Stored:
-    from PIL import Image, UnidentifiedImageError
+    from PIL import Image, UnidentifiedImageError  # not imported before there is an image
 
     inside = "uri" not in source
     data = bytes(accessors.view(source)[0]) if inside else source.document.resource(source)
@@ -114,7 +110,7 @@ def _decoded(source: Element, budget: _Budget) -> images.Stored:
             return images.stored_from_pillow(image)
     except SceneError:
         raise
-    except Image.DecompressionBombError:
+    except (Image.DecompressionBombError, Image.DecompressionBombWarning):
         raise source.error(f"has more than the {PIXELS} pixels that are read") from None
     except UnidentifiedImageError:
         raise source.error("is no PNG, JPEG or WebP image") from None

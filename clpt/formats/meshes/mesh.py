@@ -12,7 +12,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from warnings import catch_warnings, simplefilter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -168,8 +167,9 @@ def _open(path: Path, materials: bool) -> trimesh.Scene:
 
     suffix = path.suffix.lower()
     try:
-        with catch_warnings(), np.errstate(all="ignore"):
-            simplefilter("ignore")
+        if suffix == ".stl":
+            _check_stl(path.read_bytes())
+        with np.errstate(all="ignore"):
             if suffix == ".obj" and not materials:
                 # In one piece: trimesh cuts the mesh, and its normals, where the material changes.
                 text = io.BytesIO(USEMTL.sub(b"", path.read_bytes()))
@@ -178,6 +178,17 @@ def _open(path: Path, materials: bool) -> trimesh.Scene:
     except Exception as error:  # trimesh's readers raise whatever their parsing runs into
         reason = str(error).splitlines()[0][:100] if str(error) else type(error).__name__
         raise SceneError(f"cannot be read as a {suffix} mesh: {reason}", file=path) from None
+
+
+def _check_stl(data: bytes) -> None:
+    """Raise ValueError for a binary file that is cut off, which trimesh would take for a text."""
+    if data.lstrip().startswith(b"solid") and b"\0" not in data[:1024]:
+        return
+    if len(data) < 84:
+        raise ValueError("it ends within its header")
+    count, held = int.from_bytes(data[80:84], "little"), (len(data) - 84) // 50
+    if held < count:
+        raise ValueError(f"it ends early: it holds {held} of {count} triangles")
 
 
 def _ply(path: Path, materials: bool, warnings: list[str]) -> Mesh:

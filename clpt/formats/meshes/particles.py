@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from clpt import output_files
 from clpt.errors import SceneError
 from clpt.scene.shapes import Spheres
 from clpt.scene.textures import ATTRIBUTES
@@ -36,4 +37,5 @@ def read(path: Path) -> dict[str, Any]:
 
 def write(path: Path, spheres: Spheres) -> None:
     """Write what `read` returns of spheres. Raises OSError."""
-    np.savez(path, centers=spheres.centers, radii=spheres.radii, **spheres.attributes)
+    with output_files.replacing(path) as partial:
+        np.savez(partial, centers=spheres.centers, radii=spheres.radii, **spheres.attributes)

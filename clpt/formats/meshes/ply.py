@@ -5,6 +5,8 @@ Rows of the same length are read in one go; polygons become fans.
 
 from __future__ import annotations
 
+import dataclasses
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.errors import SceneError
-from clpt.formats.gzip_file import read_bytes
+from clpt.formats.gzip_file import LARGEST, read_bytes
 
 TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2",
@@ -61,9 +63,12 @@ class Triangles:
     warnings: list[str] = field(default_factory=list)
 
 
-def read(path: Path) -> Triangles:
-    """Read a file. Raises SceneError for one that is broken or has no vertices or faces."""
-    data = read_bytes(path)
+def read(path: Path, largest: int = LARGEST) -> Triangles:
+    """Read a file; largest: bytes that one of gzip may have, unpacked.
+
+    Raises SceneError for one that is larger, broken, or has no vertices or faces.
+    """
+    data = read_bytes(path, largest)
     try:
         order, elements, start = _header(data)
         if not order:
@@ -75,9 +80,10 @@ def read(path: Path) -> Triangles:
 
 def _header(data: bytes) -> tuple[str, list[Element], int]:
     end = data.find(b"end_header", 0, LONGEST_HEADER)
-    stop = data.find(b"\n", end)
-    if not data.startswith(b"ply") or end < 0:
+    line_end = re.match(rb"ply[ \t]*(\r\n|\n|\r)", data)
+    if line_end is None or end < 0:
         raise SceneError("it has no header")
+    stop = data.find(line_end[1], end)
     order, elements = None, []
     for line in data[:end].decode("latin-1").splitlines()[1:]:
         match line.split():
@@ -99,7 +105,7 @@ def _header(data: bytes) -> tuple[str, list[Element], int]:
         names = [column.name for column in element.properties]
         if len(set(names)) < len(names) or (element.count and not names):
             raise SceneError(f"its element {element.name[:40]!r} has no columns, or one twice")
-    return order, elements, stop + 1 if stop >= 0 else len(data)
+    return order, elements, stop + len(line_end[1]) if stop >= 0 else len(data)
 
 
 def _binary(
@@ -188,17 +194,46 @@ def _uneven_rows(
 
 
 def _ascii(data: bytes, elements: list[Element], start: int) -> dict[str, dict[str, Any]]:
-    """As `_binary`, of an ascii file."""
+    """As `_binary`, of an ascii file.
+
+    Rows may have more words than the header tells, if each row is a line; the first words count.
+    """
     try:
         words = np.array(data[start:].split(), np.float64)
     except ValueError:
         raise SceneError("it holds words that are no numbers") from None
+    lines = [line for line in data[start:].splitlines() if line.strip()]
+    if len(lines) != sum(element.count for element in elements):
+        return _ascii_tables(words, elements)
+    try:
+        return _ascii_tables(words, elements, to_the_end=True)
+    except SceneError:
+        return _ascii_tables(_told_words(lines, elements), elements)
+
+
+def _ascii_tables(
+    words: NDArray[np.float64], elements: list[Element], to_the_end: bool = False
+) -> dict[str, dict[str, Any]]:
     tables: dict[str, dict[str, Any]] = {}
     at = 0
     for element in elements:
         tables[element.name], used = _ascii_rows(words[at:], element)
         at += used
+    if to_the_end and at < len(words):
+        raise SceneError("it holds more words than its header tells")
     return tables
+
+
+def _told_words(lines: list[bytes], elements: list[Element]) -> NDArray[np.float64]:
+    """Return the words of each line that the header tells of."""
+    words, at = [], 0
+    for element in elements:
+        row = dataclasses.replace(element, count=1)
+        for line in lines[at : at + element.count]:
+            own = np.array(line.split(), np.float64)
+            words.append(own[: _ascii_rows(own, row)[1]])
+        at += element.count
+    return np.concatenate([*words, np.zeros(0)])
 
 
 def _ascii_rows(words: NDArray[np.float64], element: Element) -> tuple[dict[str, Any], int]:

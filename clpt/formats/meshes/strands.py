@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from clpt import output_files
 from clpt.errors import SceneError
 
 LARGEST = 1 << 30  # [bytes] of a file
@@ -47,7 +48,7 @@ def write(path: Path, points: Any, lengths: Any) -> None:
     rows = [" ".join(f"{x:.9g}" for x in row) for row in np.asarray(points, np.float32).tolist()]
     ends = np.cumsum(lengths if len(lengths) else [len(rows)])
     strands = ["\n".join(rows[a:b]) for a, b in zip([0, *ends], ends, strict=False)]
-    path.write_text("\n\n".join(strands) + "\n", "ascii")
+    output_files.write_text(path, "\n\n".join(strands) + "\n")
 
 
 def _wrong(rows: list[list[bytes]]) -> int:

@@ -21,6 +21,8 @@ MAGIC = 0x041C
 VERSIONS = (3, 4)
 NORMALS, UVS, COLOURS, FLAT, DOUBLE = 0x0001, 0x0002, 0x0008, 0x0010, 0x2000
 LARGEST = 1 << 31  # bytes of a file
+UNPACKED = 1 << 30  # bytes of a mesh, or RATIO times what it is packed to, if that is more
+RATIO = 16  # meshes are packed to a half or a fifth; deflate reaches 1032
 
 
 class _Stream:
@@ -28,12 +30,13 @@ class _Stream:
 
     def __init__(self, path: Path, packed: bytes):
         self.path, self.packed, self.inflate = path, packed, zlib.decompressobj()
-        self.most = 1032 * len(packed)  # bytes: the limit of deflate
+        self.left = min(1032 * len(packed), max(UNPACKED, RATIO * len(packed)))
 
     def take(self, size: int) -> bytes:
         """Return the next bytes. Raises SceneError where there are fewer."""
-        if size > self.most:
+        if size > self.left:
             raise SceneError("names more vertices or triangles than it can hold", file=self.path)
+        self.left -= size
         parts = []
         while size > 0:
             try:
@@ -45,7 +48,7 @@ class _Stream:
                 raise SceneError("ends too early", file=self.path)
             parts.append(part)
             size -= len(part)
-        return b"".join(parts)
+        return parts[0] if len(parts) == 1 else b"".join(parts)
 
     def array(self, rows: int, columns: int, dtype: str) -> NDArray[Any]:
         data = self.take(rows * columns * np.dtype(dtype).itemsize)

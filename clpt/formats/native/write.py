@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from clpt import images, spectral_exr
+from clpt import images, output_files, spectral_exr
 from clpt.errors import SceneError
 from clpt.formats.meshes import particles, strands
 from clpt.formats.native import forms
@@ -31,7 +31,7 @@ def save(scene: Scene, path: str | Path) -> None:
     writer = _Writer(path)
     try:
         text = json.dumps(writer.scene(scene), indent=2)
-        path.write_text(NUMBERS.sub(_on_one_line, text) + "\n", "utf-8")
+        output_files.write_text(path, NUMBERS.sub(_on_one_line, text) + "\n")
     except OSError as error:
         raise SceneError(f"cannot be written: {error.strerror}", file=path) from None
 
@@ -88,7 +88,7 @@ class _Writer:
         group = self.group(run[0].group)
         name = self.file_name(group, "npy")
         matrices = np.stack([np.asarray(one.to_world, np.float64)[:3] for one in run])
-        np.save(self.path.parent / name, matrices)
+        images.write_npy(self.path.parent / name, matrices)
         self.files[name] = name
         return {"type": "instance", "group": group, "file": name}
 
@@ -162,7 +162,7 @@ class _Writer:
             elif bytes_:
                 images.write_stored(self.path.parent / name, image)
             else:
-                np.save(self.path.parent / name, np.asarray(image, np.float32))
+                images.write_npy(self.path.parent / name, np.asarray(image, np.float32))
             self.files[id(image)] = name
         return self.files[id(image)]
 
@@ -187,7 +187,7 @@ class _Writer:
         key = tuple(id(getattr(mesh, name)) for name in MESH_ARRAYS)
         if key not in self.files:
             name = self.file_name(mesh.name or "mesh", "ply")
-            (self.path.parent / name).write_bytes(_ply(mesh))
+            output_files.write(self.path.parent / name, _ply(mesh))
             self.files[key] = name
         return self.files[key]
 

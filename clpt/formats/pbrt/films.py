@@ -168,7 +168,7 @@ def sampler(definition: Definition | None) -> tuple[Sampler, int, int | None]:
 
 
 LIGHT_PATHS = ("path", "volpath", "simplepath", "simplevolpath", "randomwalk")
-OTHERS = {  # what finds the same light by other ways
+OTHERS = {  # what finds light in other ways than from the camera alone
     "bdpt": ("visualizestrategies", "visualizeweights"),
     "mlt": (
         "bootstrapsamples", "chains", "mutationsperpixel", "largestepprobability", "sigma",
@@ -176,6 +176,11 @@ OTHERS = {  # what finds the same light by other ways
     "sppm": ("photonsperiteration", "radius", "seed"),
     "lightpath": (),
 }  # fmt: skip
+CAUSTICS = (
+    "paths are traced from the camera instead: light of a point, spot or distant light that comes "
+    "through smooth glass or from a mirror is missing, and caustics of small lamps are noisy; "
+    "--integrator particle_tracer finds both"
+)
 IGNORED = ("regularize", "lightsampler", "rrthreshold", "samplelights", "samplebsdf")
 MOST_DEPTH = 2**31 - 2
 
@@ -192,7 +197,7 @@ def integrator(definition: Definition | None) -> Integrator:
             "integrator", definition.kind, (*LIGHT_PATHS, *OTHERS), **params.location()
         )
     if definition.kind in OTHERS:
-        state.warn(params, "paths are traced from the camera instead: the same light, other noise")
+        state.warn(params, CAUSTICS)
     params.ignore(*IGNORED, *OTHERS.get(definition.kind, ()))
     depth = params.one("maxdepth", "integer", 5)
     if depth < 0:

@@ -7,7 +7,6 @@ are parsed at once.
 from __future__ import annotations
 
 import re
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -149,14 +148,10 @@ class Lexer:
 
 def _floats(text: bytes) -> NDArray[np.float64] | None:
     """The numbers of a text, or None where it holds anything else."""
-    if not text.strip():
-        return np.zeros(0)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        try:
-            return np.fromstring(text, np.float64, sep=" ")
-        except (DeprecationWarning, ValueError):
-            return None
+    try:
+        return np.array(text.split(), np.float64)
+    except ValueError:
+        return None
 
 
 def _text(word: bytes) -> str:

@@ -208,7 +208,7 @@ def _projection(params: Parameters, state: State) -> Light:
 
 def _image(file: str, state: State) -> Any:
     """The colours (h, w, 3) float32 of a light's image, none of them negative."""
-    image = images.read(state.file(file))
+    image = images.read(state.existing_file(file))
     if not np.isfinite(image).all():
         raise SceneError(f"{file!r} has values that are not finite, so it cannot be a light")
     if image.shape[2] not in (1, 3, 4):

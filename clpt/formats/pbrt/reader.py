@@ -158,10 +158,7 @@ class _Reader(TransformDirectives):
 
     def _named_file(self) -> Path:
         name = self.lexer.string("a file name")
-        path = self.state.file(name)
-        if not path.is_file():
-            raise SceneError(f"there is no file {name!r}")
-        return path
+        return self.state.existing_file(name)
 
     def reverse_orientation(self) -> None:
         self.state.reverse = not self.state.reverse
@@ -174,7 +171,11 @@ class _Reader(TransformDirectives):
         given = self.lexer.parameters(label)
         defaults = self.state.defaults.get(target, ())
         params = Parameters(label, self.lexer.path, line, given, defaults)
-        return Definition(kind, params, self.state.copy())
+        state = self.state.copy()
+        for parameter in given:
+            if parameter.name == "filename" and parameter.is_text:
+                self.contents.shared.files.update(dict.fromkeys(parameter.texts(), state))
+        return Definition(kind, params, state)
 
     def attribute(self) -> None:
         definition = self._definition('Attribute "{}"')

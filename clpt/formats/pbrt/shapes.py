@@ -69,6 +69,7 @@ def geometry(definition: Definition) -> Geometry | None:
         if made is not None:
             turned = kind in QUADRICS and transforms.flips_handedness(state.ctm)
             made.parts.setdefault("to_world", state.ctm)
+            made.parts["name"] = f"{params.file.name}:{params.line}"
             reverse = state.reverse and kind != "curve"  # a tube is seen from outside
             made.parts["flip_normals"] = reverse != turned
     return made
@@ -152,13 +153,11 @@ def with_uvs(made: Geometry) -> Geometry:
 
 def _ply(params: Parameters, state: State) -> Geometry | None:
     name = params.one("filename", "string", "")
-    path = state.file(name)
+    path = state.existing_file(name)
     if "displacement" in params:
         params.ignore("displacement", "edgelength", "uvscale")
         state.warn(params, "'displacement' is left out: the mesh stays as it is in its file")
     params.ignore("edgelength")
-    if not path.is_file():
-        raise SceneError(f"there is no file {name!r}")
     try:
         arrays = ply.read(path)
         return _mesh(arrays.vertices, arrays.faces, arrays.normals, arrays.uvs, arrays.warnings)

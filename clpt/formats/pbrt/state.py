@@ -41,6 +41,7 @@ class Shared:
     materials: dict[str, Definition] = field(default_factory=dict)
     media: dict[str, Parameters] = field(default_factory=dict)
     systems: dict[str, transforms.Matrix] = field(default_factory=dict)
+    files: dict[str, State] = field(default_factory=dict)  # the names, and where each stands
     made: dict[Any, Any] = field(default_factory=dict)
     make_material: Callable[..., Material] | None = None
 
@@ -96,6 +97,16 @@ class State:
             return other if not beside.exists() and other.exists() else beside
         except OSError as error:
             raise SceneError(f"{name[:40]!r}: {error.strerror}") from None
+
+    def existing_file(self, name: str) -> Path:
+        """Return `file(name)`. Raises SceneError if it is missing, with all others that are."""
+        path = self.file(name)
+        if path.is_file():
+            return path
+        named = self.shared.files.items()
+        missing = [n for n, state in named if n != name and not state.file(n).is_file()]
+        nor = f"; nor are there {', '.join(map(repr, missing))}" if missing else ""
+        raise SceneError(f"there is no file {name!r}{nor}")
 
     def texture(self, values: str, name: str, source: Parameters | Parameter) -> Definition:
         """Return the definition of a texture of "float" or "spectrum" values. Raises SceneError."""

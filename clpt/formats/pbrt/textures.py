@@ -142,9 +142,7 @@ def _checkerboard(form: str, params: Parameters, state: State) -> Any:
 
 
 def _imagemap(form: str, params: Parameters, state: State) -> Any:
-    file = state.file(params.one("filename", "string", ""))
-    if not file.is_file():
-        raise SceneError(f"there is no image {str(file.name)!r}")
+    file = state.existing_file(params.one("filename", "string", ""))
     wrap = params.choice("wrap", "repeat", WRAPS)
     if wrap == "octahedralsphere":
         state.warn(params, "wrap 'octahedralsphere' is taken as 'clamp'")

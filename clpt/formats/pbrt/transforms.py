@@ -64,7 +64,7 @@ class TransformDirectives(Files):
         if which not in ("All", "StartTime", "EndTime"):
             raise SceneError(f"{which[:40]!r} is none of All, StartTime, EndTime")
         self.state.active = which != "EndTime"
-        if which == "EndTime":
+        if which != "All":
             self.warn_once("motion is left out: all stands as when the shutter opens")
 
     def transform_times(self) -> None:

@@ -65,8 +65,6 @@ def _check_light_paths(scene: Scene, shapes_: list[Shape]) -> None:
         _refuse(f"the cameras {names}, not {scene.camera.kind}", "camera")
     if spectral and dispersive_glass(scene.camera) is not None:
         _refuse("a lens whose glass does not disperse", "camera.glass")
-    if scene.film.bands:
-        _refuse("a film without bands", "film.bands")
     for i, light in enumerate(scene.lights):
         if isinstance(light, Point) and not light.falloff:
             _refuse("a point light whose irradiance falls with distance", f"lights[{i}]")

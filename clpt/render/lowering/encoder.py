@@ -22,8 +22,8 @@ from clpt.render.lowering.spectra_table import SpectraTable
 from clpt.render.lowering.tables import TableStore, Words, as_words
 from clpt.render.lowering.textures.bitmaps import Images
 from clpt.render.lowering.textures.textures import TextureTable
-from clpt.scene.params import Kind, device_params, interior_params
-from clpt.spectra import RGB, Constant, Sensor
+from clpt.scene.params import Kind, Param, device_params, interior_params, params
+from clpt.spectra import RGB, Constant, Sensor, Tabulated
 
 BLACK = (Constant(0.0), RGB(0.0, 0.0, 0.0))
 
@@ -52,6 +52,7 @@ class Encoder:
         self.textures = TextureTable(self.store, self.spectra, images)
         self._sources: dict[str, dict[str, set[str]]] = _no_sources()
         self._rows: dict[tuple[int, str, bytes], tuple[int, Kind]] = {}
+        self.warnings: set[str] = set()  # of tables that the film does not reach
         self._spent = False  # whether it knows of words that no device has
 
     @property
@@ -116,12 +117,25 @@ class Encoder:
             if param.role == "layers":
                 value, source = self._layers_words(kind)
             else:
-                value, source = self.param_words(getattr(kind, name), param.role, param.choices)
-                if param.lobe and getattr(kind, name) in (0.0, *BLACK):
+                given = getattr(kind, name)
+                self._check(given, param, _where(kind, name))
+                value, source = self.param_words(given, param.role, param.choices)
+                if param.lobe and given in (0.0, *BLACK):
                     source = "none"
             words.append(value)
             self._sources[kind.kind][name].add(source)
         return np.concatenate(words) if words else np.zeros(1, np.uint32)
+
+    def _check(self, value: Any, param: Param, where: str) -> None:
+        """Raise SceneError for an index of 0; note a table that the film does not reach."""
+        if param.positive:
+            self.spectra.check_index(value, where)
+        if isinstance(value, Tabulated) and not self.spectra.reaches(value):
+            low, high = self.spectra.range
+            self.warnings.add(
+                f"{where}: its table from {value.lambdas[0]:g} to {value.lambdas[-1]:g} nm has"
+                f" nothing within the film's {low:g} to {high:g} nm"
+            )
 
     def param_words(
         self, value: Any, role: str, choices: tuple[str, ...] = ()
@@ -171,6 +185,9 @@ class Encoder:
             rows = np.concatenate([self.kind_words(layer) for layer in material.layers])
         else:
             self._refuse_textured_metal(material)
+            for layer in material.layers:
+                for name, param in params(type(layer)).items():
+                    self._check(getattr(layer, name), param, _where(layer, name))
             colours = thin_films.film_colours(material)
             table = self.store.append_floats("spectra", colours)
             profile, _ = self.named_words("layer", "profile", thin_films.profile(material), "real")
@@ -187,6 +204,12 @@ class Encoder:
                     'in the mode "spectral"',
                     where=f"{material.kind}.{name}",
                 )
+
+
+def _where(kind: Kind, name: str) -> str:
+    """How a message names a parameter of a kind, and of which material it is."""
+    named = getattr(kind, "name", "")
+    return f"{kind.kind}.{name}" + (f" of {named!r}" if named else "")
 
 
 def _no_sources() -> dict[str, dict[str, set[str]]]:

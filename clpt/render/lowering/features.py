@@ -10,7 +10,6 @@ from clpt.render.lowering.geometry.geometry import Geometry
 from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.lights.lights import LightRows
 from clpt.render.lowering.materials.material_words import MaterialWords
-from clpt.render.lowering.spectra_table import STEP
 
 FEW_LIGHTS = 256  # up to which one random number chooses a light and a point on it
 INTEGRATORS = {"direct": "path"}  # kinds that have the kernels of another one
@@ -65,6 +64,6 @@ def features_of(
         bands=bool(scene.film.bands) and not channels,
         tabulated_density=tabulated_density,
         spectra_size=encoder.spectra.samples,
-        spectra_step=STEP,
+        spectra_step=encoder.spectra.step,
         sources=sources,
     )

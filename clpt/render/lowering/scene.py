@@ -109,7 +109,10 @@ def lower(
     encoder.store.append("shapes", shape_words(geometry.rows))
     glass_row = _lower_camera(index, encoder)
     ambient_row = _lower_ambient(index, encoder)
-    warnings = *_warnings(index), *geometry.warnings, *encoder.textures.finish()
+    warnings = (
+        *_warnings(index), *sorted(encoder.warnings), *geometry.warnings,
+        *encoder.textures.finish(),
+    )  # fmt: skip
     features = features_of(index, encoder, materials, geometry, lights, tabulated)
     settings = settings_of(index, geometry, lights, wavelengths, density_row, ambient_row, sphere)
     cache.settle()
@@ -136,7 +139,8 @@ def _lower_film(index: SceneIndex, encoder: Encoder, wavelengths: Density) -> tu
 
     Return where the density would begin in `distributions`, and whether it is there.
     """
-    filters.lower_filter(index.scene.film.filter, encoder.store)  # first in its table
+    # first in its table
+    filters.lower_filter(index.scene.film.filter, encoder.store, index.light_paths)
     density_row = encoder.store.size("distributions")
     tabulated = index.spectral and wavelengths.values is not None
     if tabulated:
@@ -173,6 +177,8 @@ def _lower_camera(index: SceneIndex, encoder: Encoder) -> int:
     """Append the camera; return the row in `spectra` of its glass, 0 if none disperses."""
     camera, film = index.scene.camera, index.scene.film
     glass = cameras.dispersive_glass(camera)
+    if glass:
+        encoder.spectra.check_index(glass, f"{camera.kind}.glass")
     glass_row = encoder.spectra.row(glass) if glass and index.spectral else 0
     _, words = cameras.lower_camera(camera, film.width, film.height, glass_row)
     encoder.store.append_floats("camera", words)
@@ -191,8 +197,6 @@ def _warnings(index: SceneIndex) -> list[str]:
     """What of the scene is not rendered as it says."""
     scene, film = index.scene, index.scene.film
     warnings = list(index.warnings)
-    if index.light_paths and (film.filter.kind != "box" or filters.radius(film.filter) != 0.5):
-        warnings.append("film.filter is passed over: particle_tracer has a box of one pixel")
     if index.mode == "rgb" and not index.channels and cameras.dispersive_glass(scene.camera):
         warnings.append("thin_lens.glass: in RGB mode all wavelengths have one focus")
     depth = getattr(scene.integrator, "max_depth", -1)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import spectra
+from clpt.errors import SceneError
 from clpt.render.contract.parameter_words import SPECTRUM_WORDS
 from clpt.render.lowering.camera.wavelengths import Density
 from clpt.render.lowering.materials import reradiation
@@ -24,9 +25,10 @@ from clpt.spectra import (
     Tabulated,
     observer,
 )
-from clpt.spectra.spectrum import Role, d65, on_grid
+from clpt.spectra.spectrum import Role, d65, extremes, gridded
 
-STEP = 1.0  # [nm] of the tabulated spectra
+STEP = 1.0  # [nm] at most, between the nodes of tabulated spectra
+FEWEST = 100  # cells between the nodes, however narrow the film's range is
 ONE = 1e4  # sigmoid coefficient at which it is 1 in float32
 # How a spectrum is turned to rgb, by the role of the parameter (see clpt.spectra.spectrum).
 RGB_ROLES: dict[str, Role] = {
@@ -79,12 +81,23 @@ class SpectraTable:
     @property
     def samples(self) -> int:
         """The number of samples in a row of `spectra`."""
-        return int(np.ceil((self.lambda_max - self.lambda_min) / STEP - 1e-9)) + 1
+        cells = int(np.ceil((self.lambda_max - self.lambda_min) / STEP - 1e-9))
+        return max(cells, FEWEST) + 1
+
+    @property
+    def grid(self) -> NDArray[np.float64]:
+        """The wavelengths (samples,) [nm] of tabulated spectra; the ends are the film's."""
+        return np.linspace(*self.range, self.samples)
+
+    @property
+    def step(self) -> float:
+        """The distance [nm] of two nodes of the grid."""
+        return (self.lambda_max - self.lambda_min) / (self.samples - 1)
 
     def row(self, spectrum: Spectrum) -> int:
         """Tabulate a spectrum on the common grid; return its row in `spectra`."""
         if spectrum not in self._rows:
-            values = on_grid(spectrum, self.lambda_min, self.lambda_max, STEP)
+            values = gridded(spectrum, self.grid)
             self._rows[spectrum] = self._store.append_floats("spectra", values) // self.samples
         return self._rows[spectrum]
 
@@ -94,15 +107,28 @@ class SpectraTable:
         Where visible importance is the density, the curves are divided by it, as it is smooth.
         """
         self.row(d65())
-        lambdas = self.lambda_min + STEP * np.arange(self.samples)
-        inside = np.minimum(lambdas, self.lambda_max)  # the last sample may lie past the end
-        curves = sensor.sample(inside)
+        curves = sensor.sample(self.grid)
         if density.values is None:
-            pdf = density.pdf(inside)
+            pdf = density.pdf(self.grid)
             curves = np.where(
                 pdf[:, None] > 0.0, curves / np.where(pdf > 0.0, pdf, 1.0)[:, None], 0
             )
         self._store.append_floats("spectra", (curves / spectra.CIE_Y_INTEGRAL).T)
+
+    def reaches(self, table: Tabulated) -> bool:
+        """Whether the points of a table overlap with the film's range."""
+        return table.lambdas[0] <= self.lambda_max and table.lambdas[-1] >= self.lambda_min
+
+    def check_index(self, value: Spectrum | str, where: str) -> None:
+        """Raise SceneError for an index that is not above 0 at every wavelength of the film."""
+        for found, at in extremes(spectra.index(value), *self.range):
+            if not 0.0 < found < np.inf:
+                raise SceneError(
+                    f"an index of {found:g} at {at:g} nm, but it must be above 0 within the film's"
+                    f" {self.lambda_min:g} to {self.lambda_max:g} nm; narrow that range, or give"
+                    " the index there",
+                    where=where,
+                )
 
     def words(self, value: Spectrum | str, role: str) -> tuple[Words, str]:
         """Return the five words of a spectrum and its source: "constant" or "table".

@@ -260,3 +260,19 @@ def test_a_mesh_of_trimesh():
     np.testing.assert_array_equal(shapes.Mesh.from_trimesh(box).uvs, np.float32(uv))
     with pytest.raises(SceneError, match=r"must be a trimesh\.Trimesh, not Scene; .* to_mesh"):
         shapes.Mesh.from_trimesh(trimesh.Scene(box))
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (bytes(80) + (100).to_bytes(4, "little") + bytes(500), "holds 10 of 100 triangles"),
+        (b"solid x".ljust(80) + (3).to_bytes(4, "little") + bytes(100), "holds 2 of 3 triangles"),
+        (bytes(range(256))[:60], "ends within its header"),
+        (bytes(range(200, 256)) * 4, "triangles"),
+    ],
+)
+def test_stl_files_that_are_cut_off(tmp_path, data, message):
+    path = tmp_path / "a.stl"
+    path.write_bytes(data)
+    with pytest.raises(SceneError, match=message):
+        load(path)

@@ -69,6 +69,40 @@ def test_forms(tmp_path, form, name, packed):
     assert (made.columns["vertex"]["red"] == 9).all()
 
 
+@pytest.mark.parametrize("ends", ["\r\n", "\r"], ids=["CRLF", "CR"])
+@pytest.mark.parametrize("form", FORMS)
+def test_other_ends_of_lines(tmp_path, form, ends):
+    path = tmp_path / "a.ply"
+    data = content(form, MIXED)
+    path.write_bytes(data)
+    plain = ply.read(path)
+    head, mark, body = data.partition(b"end_header\n")
+    body = body.replace(b"\n", ends.encode()) if form == "ascii" else body
+    path.write_bytes((head + mark).replace(b"\n", ends.encode()) + body)
+    made = ply.read(path)
+    assert (made.vertices == plain.vertices).all() and (made.faces == plain.faces).all()
+
+
+def test_rows_that_are_longer_than_the_header_tells(tmp_path):
+    """As of vertices with colours that the header does not name; trimesh reads them too."""
+    path = tmp_path / "a.ply"
+    head = HEADER.format("ascii", len(MIXED), "uchar")
+    points = [f"{x} {y} {z} 9 0.5 0.5 255 128 0" for x, y, z in POINTS]
+    faces = [f"7 {len(face)} {' '.join(map(str, face))} 1 2" for face in MIXED]
+    path.write_text(head + "\n".join([*points, *faces]) + "\n\n")
+    made = ply.read(path)
+    assert made.vertices.tolist() == [list(point) for point in POINTS]
+    assert made.faces.tolist() == [list(face) for face in FANS["mixed"]]
+
+
+def test_what_is_packed_has_a_limit(tmp_path):
+    path = tmp_path / "a.ply"
+    path.write_bytes(gzip.compress(content("ascii", MIXED) + b"\n" * (1 << 21)))
+    assert len(ply.read(path).faces)
+    with pytest.raises(SceneError, match="larger than 1 MiB when unpacked"):
+        ply.read(path, largest=1 << 20)
+
+
 @pytest.mark.parametrize("form", FORMS)
 def test_cut_files_are_refused(tmp_path, form):
     data = content(form, MIXED)

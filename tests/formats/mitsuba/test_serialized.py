@@ -11,6 +11,7 @@ import pytest
 
 import clpt
 from clpt.errors import SceneError
+from clpt.formats.mitsuba import serialized
 
 VERTICES = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0.5), (0, 1, 0)])
 FACES = np.array([(0, 1, 2), (0, 2, 3)], np.uint32)
@@ -91,3 +92,13 @@ def test_broken_files(tmp_path: Path) -> None:
     good.write_bytes(whole)
     with pytest.raises(SceneError, match="has no mesh 3: it holds 1"):
         clpt.load(scene(good, 3))
+
+
+def test_a_small_file_cannot_ask_for_much_memory(tmp_path: Path, monkeypatch) -> None:
+    """Zeros shrink to a thousandth; a mesh does not."""
+    monkeypatch.setattr(serialized, "UNPACKED", 1 << 16)
+    body = struct.pack("<I", 0x1000) + b"a mesh\0" + struct.pack("<QQ", 10_000, 1)
+    mesh = struct.pack("<HH", 0x041C, 4) + zlib.compress(body + bytes(132_000))
+    path = file(tmp_path / "zeros.serialized", [mesh], 4)
+    with pytest.raises(SceneError, match="more vertices or triangles than it can hold"):
+        serialized.read(path, 0)

@@ -10,7 +10,7 @@ import pytest
 
 from clpt import transforms
 from clpt.errors import SceneError
-from clpt.formats import load
+from clpt.formats import gzip_file, load
 from clpt.formats.pbrt import files, reader
 from clpt.formats.pbrt.lexer import Lexer
 
@@ -128,6 +128,12 @@ def test_the_state_ends_with_its_scope(read):
     assert found.shapes[1].params.one("radius", "float", 1.0) == 1.0
 
 
+@pytest.mark.parametrize("which", ["StartTime", "EndTime"])
+def test_motion_is_told(read, which):
+    found = read(f"ActiveTransform {which}\nTranslate 1 0 0\nActiveTransform All")
+    assert len([text for text in found.shared.warnings if "motion" in text]) == 1
+
+
 def test_motion_begins_where_it_stands(read):
     found = read('ActiveTransform EndTime\nTranslate 1 0 0\nActiveTransform All\nShape "sphere"')
     assert (found.shapes[0].state.ctm == np.eye(4)).all()
@@ -185,7 +191,7 @@ def test_what_must_be_in_the_world(write):
 
 
 def test_gzip_bombs_and_doubling_includes_end(write, monkeypatch):
-    monkeypatch.setattr("clpt.formats.gzip_file.LARGEST", 1 << 20)
+    monkeypatch.setattr(gzip_file.read_bytes, "__defaults__", (1 << 20,))
     bomb = write(gzip.compress(b" " * (2 << 20)), "bomb.pbrt.gz")
     with pytest.raises(SceneError, match="larger than"):
         load(bomb)
@@ -211,3 +217,35 @@ def test_progress(write):
     load(path, progress=lambda fraction, what: told.append((fraction, what)))
     assert [fraction for fraction, _ in told] == [0.25, 0.5, 0.75, 1.0]
     assert told[1][1] == "2 of 4 shapes"
+
+
+MISSING = {
+    "a texture": 'Texture "t" "spectrum" "imagemap" "string filename" "t.png"\n'
+    'Material "diffuse" "texture reflectance" "t"\nShape "sphere"',
+    "a mesh": 'Shape "plymesh" "string filename" "m.ply"',
+    "a sky": 'LightSource "infinite" "string filename" "sky.exr"',
+    "a lamp": 'LightSource "goniometric" "string filename" "lamp.exr"',
+}
+
+
+@pytest.mark.parametrize("first", MISSING)
+def test_all_missing_files_are_named(tmp_path, first):
+    """At the place of one of them."""
+    path = tmp_path / "scene.pbrt"
+    path.write_text(f"WorldBegin\n{MISSING[first]}\n")
+    with pytest.raises(SceneError, match=r"scene\.pbrt:2: .*there is no file '[a-z.]*'$"):
+        load(path)
+    path.write_text("WorldBegin\n" + "\n".join(MISSING.values()))
+    with pytest.raises(SceneError, match=r"scene\.pbrt:\d: .*there is no file") as raised:
+        load(path)
+    for name in ("t.png", "m.ply", "sky.exr", "lamp.exr"):
+        assert str(raised.value).count(f"'{name}'") == 1
+
+
+def test_meshes_have_names(tmp_path):
+    """The file and the line, for warnings of what is found when the scene is rendered."""
+    path = tmp_path / "scene.pbrt"
+    path.write_text(
+        'WorldBegin\nShape "sphere"\nShape "trianglemesh" "point3 P" [0 0 0 1 0 0 0 1 0]'
+    )
+    assert [shape.name for shape in load(path).shapes] == ["scene.pbrt:2", "scene.pbrt:3"]

@@ -160,13 +160,21 @@ def test_filters(scene, text, expected):
     assert type(made) is type(expected) and vars(made) == vars(expected)
 
 
+@pytest.mark.parametrize("kind", ["bdpt", "mlt", "sppm", "lightpath"])
+def test_what_a_path_tracer_misses_is_told(scene, kind):
+    made = scene(f'Integrator "{kind}"')
+    (warning,) = made.warnings
+    assert kind in warning and type(made.integrator) is integrators.Path
+    for word in ("point, spot or distant light", "smooth glass", "is missing", "particle_tracer"):
+        assert word in warning
+
+
 def test_samplers_and_integrators(scene):
     made = scene('Sampler "stratified" "integer xsamples" 3 "integer ysamples" 5\nOption "seed" 7')
     assert (made.spp, made.seed, type(made.sampler)) == (15, 7, integrators.Sobol)
-    made = scene('Sampler "independent" "integer pixelsamples" 9\nIntegrator "bdpt"')
+    made = scene('Sampler "independent" "integer pixelsamples" 9')
     assert (made.spp, type(made.sampler)) == (9, integrators.Independent)
     assert made.integrator.max_depth == 6
-    assert any("bdpt" in text for text in made.warnings)
     assert scene('Integrator "volpath" "integer maxdepth" 65').integrator.max_depth == 66
 
 

@@ -12,18 +12,14 @@ from clpt import spectra, transforms
 from clpt.errors import SceneError
 from clpt.render.contract.camera_records import RECORDS
 from clpt.scene.cameras import Camera, Matrix, Orthographic, Perspective, Spherical, ThinLens
-from clpt.spectra import RGB, Constant, RGBUnbounded, Spectrum
+from clpt.spectra import Constant, Spectrum
 
 DESIGN_WAVELENGTH = 587.56  # [nm], the helium line d, at which a lens's focal length is given
 
 
 def dispersive_glass(camera: Camera) -> Spectrum | None:
     """Return the index of a lens's glass, or None where it is the same at all wavelengths."""
-    index = getattr(camera, "glass", Constant(1.0))
-    if isinstance(index, str):
-        index = spectra.glass(index)
-    if type(index) is RGB:
-        index = RGBUnbounded(index.r, index.g, index.b)
+    index = spectra.index(getattr(camera, "glass", Constant(1.0)))
     return None if isinstance(index, Constant) else index
 
 

@@ -23,16 +23,20 @@ Values = NDArray[np.float64]
 
 CELLS = 1024  # of equal probability, on one side
 STEPS = 1 << 16  # in which a filter is integrated
+PROFILE = 256  # steps of a filter's values
 CUT = 4.0  # standard deviations at which a Gaussian ends that has no radius
 
 
-def lower_filter(chosen: Filter, store: TableStore) -> None:
+def lower_filter(chosen: Filter, store: TableStore, light_paths: bool) -> None:
     """Put a filter's table into `distributions`, where the kernels expect it to be the first.
 
-    Raises SceneError if something stands there already, and as `table` does.
+    light_paths: whether points choose pixels; then the filter's values follow. Raises SceneError if
+    something stands there already, and as `table` does.
     """
     if store.append_floats("distributions", table(chosen)) != 0:
         raise SceneError("the pixel filter has to be lowered first")
+    if light_paths and not isinstance(chosen, Box):
+        store.append_floats("distributions", profile(chosen))
 
 
 def radius(chosen: Filter) -> float:
@@ -70,6 +74,17 @@ def table(chosen: Filter) -> NDArray[np.float32]:
     distances = np.interp(np.linspace(0.0, absolute[-1], CELLS + 1), absolute, edges)
     weights = np.diff(np.interp(distances, edges, signed)) * CELLS / signed[-1]
     return np.concatenate([[CELLS], distances, weights]).astype(np.float32)
+
+
+def profile(chosen: Filter) -> NDArray[np.float32]:
+    """Return the radius, n, and n + 1 values from the centre to there: see kernels/film/spread.cl.
+
+    The integral of the filter, over both sides, is 1.
+    """
+    distances = np.linspace(0.0, radius(chosen), PROFILE + 1)
+    values = value(chosen, distances)
+    area = 2.0 * np.sum((values[1:] + values[:-1]) / 2.0) * radius(chosen) / PROFILE
+    return np.concatenate([[radius(chosen), PROFILE], values / area]).astype(np.float32)
 
 
 def _tent(chosen: Tent, x: Values) -> Values:

@@ -22,7 +22,7 @@ from clpt.scene.materials import Material
 from clpt.scene.params import params
 from clpt.spectra import RGB, RGBIlluminant, Spectrum
 from clpt.spectra.reradiation import Reradiation
-from clpt.spectra.spectrum import d65
+from clpt.spectra.spectrum import d65, gridded
 
 Values = NDArray[np.float64]
 
@@ -84,7 +84,7 @@ def density(index: SceneIndex) -> Density:
         return Density(lo, hi, _normalised(visible.pdf(nodes), nodes)) if film.bands else visible
     response = np.ones_like(nodes) if film.bands else np.abs(sensor(film).sample(nodes)).sum(axis=1)
     glow = _glow(index, nodes)
-    emitted = [(light.sample(nodes) + glow(light)) * response for light in emissions(index)]
+    emitted = [(gridded(light, nodes) + glow(light)) * response for light in emissions(index)]
     emitted = [light for light in emitted if light.any()]
     shares = [(1.0 - LIGHTS - SENSOR, np.ones_like(nodes))]
     shares += [(SENSOR, response)] if response.any() else []
@@ -127,12 +127,13 @@ def _normalised(values: Values, nodes: Values) -> Values:
 def _glow(index: SceneIndex, nodes: Values) -> Callable[[Spectrum], Values]:
     """What fluorescent materials give out at nodes [nm] under a light: all of them together."""
     film = index.scene.film
-    into = np.arange(film.lambda_min, film.lambda_max, STEP)
+    cells = int(np.ceil((film.lambda_max - film.lambda_min) / STEP - 1e-9))
+    into = np.linspace(film.lambda_min, film.lambda_max, cells + 1)
     found = {id(m): m for shape in index.shapes for m in _fluorescent(shape.material)}
     whole = np.zeros((len(nodes), len(into)))
     for matrix in found.values():
-        whole += STEP * matrix.sample(nodes[:, None], into[None, :])
-    return lambda light: whole @ light.sample(into)
+        whole += (into[1] - into[0]) * matrix.sample(nodes[:, None], into[None, :])
+    return lambda light: whole @ gridded(light, into)
 
 
 def _fluorescent(material: Any) -> Iterator[Reradiation]:

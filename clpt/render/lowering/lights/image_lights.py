@@ -18,6 +18,7 @@ from clpt import images, spectral_exr, transforms
 from clpt.errors import SceneError
 from clpt.render.lowering.device_arrays import on_host
 from clpt.render.lowering.encoder import Encoder
+from clpt.render.lowering.lowering_cache import version
 from clpt.render.lowering.textures.texels import bands, texels
 from clpt.scene.lights import CubeMap, Envmap
 from clpt.spectra import Tabulated, luminance
@@ -59,12 +60,14 @@ def lower_image(lamp: Envmap | CubeMap, encoder: Encoder) -> tuple[dict[str, Arr
     """
     axes = _axes(lamp)
     made: _Content
+    given = lamp.image, lamp.scale, encoder.spectra.spectral
+    by = version(lamp.image), *given[1:]
     if isinstance(lamp, Envmap):
         ends = encoder.spectra.range
-        made = encoder.cache(_sphere, lamp.image, lamp.scale, encoder.spectra.spectral, *ends)
+        made = encoder.cache(_sphere, *given, *ends, by=(*by, *ends))
         cell = np.pi / (made.height - 1) * 2.0 * np.pi / made.width
     else:
-        made = encoder.cache(_cube, lamp.image, lamp.scale, encoder.spectra.spectral)
+        made = encoder.cache(_cube, *given, by=by)
         cell = made.width**-2.0
     members: dict[str, ArrayLike] = {name: axes[:, i] for i, name in enumerate("xyz")}
     members |= {

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from clpt.render.contract.parameter_words import RERADIATION_STEP
 from clpt.spectra import Reradiation, Spectrum
+from clpt.spectra.spectrum import gridded
 
 EVEN = 0.25  # share of the light to expect that is the same at all wavelengths
 
@@ -26,9 +27,9 @@ def expected(lights: Iterable[Spectrum], at: Values) -> Values:
 
     Every light counts the same, whatever its power: which one a surface sees is not known here.
     """
-    fine = np.arange(at[0], at[-1] + 1e-6)
+    fine = np.linspace(at[0], at[-1], RERADIATION_STEP * (len(at) - 1) + 1)
     hats = np.maximum(1.0 - np.abs(fine[:, None] - at) / RERADIATION_STEP, 0.0)
-    found = [light.sample(fine) @ hats for light in lights]
+    found = [gridded(light, fine) @ hats for light in lights]
     found = [values / values.mean() for values in found if values.mean() > 0.0]
     return EVEN + (1.0 - EVEN) * (np.mean(found, axis=0) if found else np.ones_like(at))
 
@@ -40,7 +41,7 @@ def table(value: Reradiation | None, at: Values, light: Values) -> tuple[Values,
     """
     rows = np.zeros((len(at), len(at)))
     if value is not None:
-        rows = value.sample(at[:, None], at)
+        rows = value.on_nodes(at)
     running = _running(rows * light)
     shares = running / np.maximum(running[:, -1:], 1e-30)
     flat = np.concatenate([light, running[:, -1], np.hstack([rows, shares]).ravel()])

@@ -22,7 +22,7 @@ from clpt.errors import SceneError
 from clpt.images import Stored
 from clpt.render.contract.texture_records import KINDS
 from clpt.render.lowering.device_arrays import on_host
-from clpt.render.lowering.lowering_cache import LoweringCache
+from clpt.render.lowering.lowering_cache import LoweringCache, version
 from clpt.render.lowering.tables import TableStore, Words
 from clpt.render.lowering.textures.texels import channel, spectral_image, texels
 from clpt.scene.textures import Bitmap
@@ -81,7 +81,14 @@ class Images:
             stored = image.stored.result()
             packed = _packs(stored, image, self.spectral)
             texture, halvings = image.texture, image.halvings
-            by = (named(texture), texture.raw, image.role, texture.channel, halvings, self.spectral)
+            by = (
+                version(texture.image),
+                texture.raw,
+                image.role,
+                texture.channel,
+                halvings,
+                self.spectral,
+            )
             words, (height, width) = self.cache(Images._words, self, stored, image, by=by)
             kind = "packed_bitmap" if packed else "bitmap"
             if store.size("images") + words.size > LARGEST:
@@ -123,7 +130,7 @@ class Images:
     def _read(self, image: Any) -> Future[Stored]:
         """An image, or the promise of a file's, of which each is decoded once."""
         if isinstance(image, (str, Path)):
-            return self.cache(_read_later, str(image))
+            return self.cache(_read_later, str(image), by=(version(image),))
         made: Future[Stored] = Future()
         made.set_result(_array(image))
         return made
@@ -151,15 +158,10 @@ class Images:
         return [_note(image) for image in wanted if image.halvings]
 
 
-def named(texture: Bitmap) -> Any:
-    """A texture's image; of a file its name."""
-    return str(texture.image) if isinstance(texture.image, (str, Path)) else texture.image
-
-
 def identity(texture: Bitmap) -> Any:
     """What makes two images the same: the file's name, or being one object."""
-    image = named(texture)
-    return image if isinstance(image, str) else id(image)
+    image = texture.image
+    return str(image) if isinstance(image, (str, Path)) else id(image)
 
 
 def _read_later(file: str) -> Future[Stored]:

@@ -1,0 +1,25 @@
+"""The option -v, which is the same before and behind a command's name."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import click
+
+LEVELS = (logging.WARNING, logging.INFO, logging.DEBUG)
+_COUNT = "clpt.verbosity"  # in what nested contexts share
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+def verbose_option(text: str) -> Callable[[Command], Command]:
+    """Return the option, with its help; the command gets how often it was given in all."""
+    return click.option("-v", "--verbose", count=True, callback=_add, help=text)
+
+
+def _add(ctx: click.Context, param: click.Parameter, value: int) -> int:
+    count = ctx.meta[_COUNT] = ctx.meta.get(_COUNT, 0) + value
+    logging.getLogger("clpt").setLevel(LEVELS[min(count, len(LEVELS) - 1)])
+    return count

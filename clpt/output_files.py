@@ -1,0 +1,86 @@
+"""Files that other processes see whole or not at all: the one way in which clpt writes a file."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+PARTIAL = ".clpt-partial-"  # begins the name of a file that is not complete
+
+
+@contextmanager
+def replacing(path: str | Path) -> Iterator[Path]:
+    """Yield the path of a new, empty file, which takes the place of `path` afterwards.
+
+    The new file is in the same folder, and its content is on the disk before the old file goes. So
+    an error, a full disk or a killed process leaves the old file as it was. A link stays a link:
+    the file that it names is replaced. What is no regular file, such as a pipe, is yielded itself.
+    Raises OSError.
+    """
+    path = Path(os.path.realpath(path))
+    if path.exists() and not path.is_file():
+        yield path
+        return
+    partial = _new_file(path)
+    try:
+        yield partial
+        with partial.open("rb") as file:
+            os.fsync(file.fileno())
+        os.replace(partial, path)
+    except BaseException:
+        partial.unlink(missing_ok=True)
+        raise
+    _sync_folder(path.parent)
+
+
+def write(path: str | Path, content: bytes) -> None:
+    """Write a file as `replacing` does. Raises OSError."""
+    with replacing(path) as partial:
+        partial.write_bytes(content)
+
+
+def write_text(path: str | Path, text: str) -> None:
+    """Write a text in UTF-8 as `replacing` does. Raises OSError."""
+    write(path, text.encode())
+
+
+def check_writable(path: str | Path) -> None:
+    """Try whether `write` can write this file, and leave nothing behind. Raises OSError."""
+    path = Path(os.path.realpath(path))
+    if path.is_dir():
+        raise IsADirectoryError("it is a folder")
+    if path.exists() and not os.access(path, os.W_OK):
+        raise PermissionError("the file is read-only")
+    if not path.parent.is_dir():
+        raise FileNotFoundError("its folder does not exist")
+    if not path.exists() or path.is_file():
+        try:
+            _new_file(path).unlink()
+        except OSError as error:
+            message = f"no file can be made there: {error.strerror}"
+            raise PermissionError(message) from error
+
+
+def _new_file(path: Path) -> Path:
+    """Make an empty file beside `path`, with its suffix and with its permissions if it exists."""
+    partial = path.with_name(f"{PARTIAL}{secrets.token_hex(6)}{path.suffix}")
+    os.close(os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
+    if path.exists():
+        partial.chmod(path.stat().st_mode & 0o777)
+    return partial
+
+
+def _sync_folder(folder: Path) -> None:
+    """Bring a folder's new names to the disk, where the system can do that."""
+    if os.name != "posix":
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    except OSError:  # some network file systems refuse it; the file itself is safe
+        pass
+    finally:
+        os.close(handle)
