@@ -77,7 +77,8 @@ def save(scene: Scene, path: str | Path, /) -> None:
     .npy. An image that the scene has by its path is named, not copied. Colours of meshes keep
     their float32. `warnings` and `extra` are not written.
 
-    Raises SceneError for another suffix, and where a file cannot be written.
+    Raises TypeError for what is no scene; SceneError for another suffix, for a buffer on a device,
+    and where a file cannot be written.
     """
     path = Path(path)
     if not isinstance(scene, Scene):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import re
@@ -104,7 +105,7 @@ class _Writer:
 
         The material of a shape is always written: without one a mesh has that of its file.
         """
-        cls = type(thing)
+        cls, thing = type(thing), _on_host(thing)
         written: dict[str, Any] = {"type": thing.kind}
         if cls in self.array_files:
             written["file"] = self.array_files[cls](thing)
@@ -198,6 +199,18 @@ def unused_name(name: str, used: Container[str]) -> str:
         count += 1
         free = f"{name} {count}"
     return free
+
+
+def _on_host(thing: Kind) -> Kind:
+    """Return a thing whose arrays on a device are copied to the host. Raises SceneError."""
+    named = {name: getattr(thing, name) for name in params(type(thing))}
+    on_device = {name: value for name, value in named.items() if hasattr(value, "context")}
+    for name, value in on_device.items():
+        if not hasattr(value, "get"):
+            message = "a buffer has no shape: give a pyopencl.array.Array"
+            raise SceneError(message, where=f"{thing.kind}.{name}")
+        on_device[name] = value.get()
+    return dataclasses.replace(thing, **on_device) if on_device else thing
 
 
 def _group_of_run(shape: shapes.Shape) -> int | None:

@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyopencl.array as cl_array
 import pytest
 
 import clpt
-from clpt import spectra
+from clpt import device, spectra
 from clpt.errors import SceneError
 from clpt.scene import KINDS, Scene, cameras, integrators, lights, materials, shapes, textures
 from clpt.scene.params import Kind, Param, defaults, params
@@ -150,6 +151,19 @@ def test_every_parameter_of_every_kind(tmp_path: Path, category: str, cls: type[
         assert not found.warnings
         for part in ("camera", "film", "integrator", "sampler", "shapes", "lights"):
             assert same(getattr(found, part), getattr(made, part)), (part, one)
+
+
+def test_arrays_on_a_device_come_to_the_host(tmp_path: Path) -> None:
+    queue = device.choose().queue
+    points = cl_array.to_device(queue, POINTS)
+    mesh = shapes.Mesh(vertices=points, faces=cl_array.to_device(queue, ROWS))
+    clpt.save(Scene(camera=cameras.Perspective(), shapes=[mesh]), tmp_path)
+    (found,) = clpt.load(tmp_path).shapes
+    assert np.array_equal(found.vertices, POINTS)
+    assert np.array_equal(found.faces, ROWS)
+    buffer = shapes.Mesh(vertices=points.data, faces=ROWS)
+    with pytest.raises(SceneError, match=r"mesh\.vertices: a buffer has no shape"):
+        clpt.save(Scene(camera=cameras.Perspective(), shapes=[buffer]), tmp_path)
 
 
 def test_numbers_of_the_scene(tmp_path: Path) -> None:
