@@ -176,6 +176,7 @@ TABLES: dict[str, Callable[[Sequence[Row]], str]] = {
     "queries": queries,
     "instancing": plain,
     "embedding": plain,
+    "soak": plain,
     "startup": startup,
     "traversal": plain,
     "building": plain,

@@ -92,6 +92,13 @@ def test_the_code_of_the_page_on_embedding_runs(run: Run, capsys: pytest.Capture
     assert "must be a whole number above zero" in capsys.readouterr().out
 
 
+def test_the_page_on_films(run: Run):
+    names = run("films.md")
+    first, later = names["first"], names["later"]
+    np.testing.assert_array_equal(names["image"], clpt.render(first.scene, 128))
+    assert (first.samples, later.samples) == (128, 256)
+
+
 def test_the_tutorial(run: Run, tmp_path: Path):
     names = run("tutorial.md")
     final, renderer = names["image"], names["renderer"]

@@ -9,7 +9,10 @@ from pyopencl.array import Array
 from typing_extensions import assert_type
 
 import clpt
-from clpt.scene import cameras, materials
+from clpt import spectra
+from clpt import transforms as tf
+from clpt.scene import cameras, lights, materials, shapes, textures
+from clpt.scene.values import Matrix4, SpectrumLike, Textured
 
 
 def pictures(queue: cl.CommandQueue) -> None:
@@ -38,3 +41,27 @@ def rays(queue: cl.CommandQueue, points: Array, directions: Array) -> None:
     hits = accel.intersect(points, directions)
     assert_type(hits, clpt.Hits)
     assert_type(hits.event, cl.Event)
+
+
+def scenes() -> None:
+    """A program that makes a scene: what its parameters accept."""
+    red: Textured = (0.8, 0.1, 0.1)
+    light: SpectrumLike = spectra.illuminant("D65")
+    place: Matrix4 = tf.translate([0, 1, 0])
+    metal = materials.RoughConductor(eta=1.5, k=spectra.metal("Au")[1], alpha_u=0.1)
+    paper = materials.Diffuse(reflectance=textures.Checkerboard(color0=0.2, color1=red))
+    ball = shapes.Sphere(material=metal, emission=lights.Area(radiance=light), to_world=place)
+    sheet = shapes.Rectangle(material=materials.TwoSided(front=paper))
+    scene = clpt.Scene(camera=cameras.ThinLens(glass="BK7"), shapes=[ball, sheet])
+    clpt.save(scene, "scene.json")
+    assert_type(clpt.read_image("a.png"), NDArray[np.float32])
+
+    # What a type checker refuses; --strict tells if it does not.
+    materials.Diffuse(reflectance="red")  # type: ignore[arg-type]
+    materials.Dielectric(int_ior=textures.Dots())  # type: ignore[arg-type]
+    lights.Point(intensity=textures.Dots())  # type: ignore[arg-type]
+    shapes.Sphere(to_world=1.0)  # type: ignore[arg-type]
+    clpt.Renderer(scene, layuot="wide8")  # type: ignore[call-arg]
+    clpt.render(scene, slots="many")  # type: ignore[arg-type]
+    options: clpt.RenderOptions = {"layout": "wide8", "slots": 1024}
+    clpt.render(scene, 16, **options)

@@ -75,10 +75,14 @@ def brute(building: Building, mesh: Mesh) -> Packed:
     faces = building.read(mesh.faces, 3 * mesh.count, np.uint32).reshape(-1, 3)
     v0, v1, v2 = vertices[faces].transpose(1, 0, 2)
     edges = [v1 - v0, v2 - v0]
-    words = np.zeros((mesh.count, 4), np.uint32)
+    normals = np.cross(*edges)
+    words = np.empty((mesh.count, 2), np.uint32)
     words[:, 0] = np.arange(mesh.count)
     words[:, 1] = building.read(mesh.tags, mesh.count, np.uint32)
-    records = np.concatenate([v0, *edges, np.cross(*edges), words.view(np.float32)], 1)
+    planes = np.einsum("ij,ij->i", normals, v0)
+    sides = np.abs(np.concatenate(edges, 1)).max(axis=1)
+    ends = np.stack([planes, sides], 1)
+    records = np.concatenate([v0, *edges, normals, words.view(np.float32), ends], 1)
     buffer = building.allocate(records.nbytes)  # refitting writes to it
     building.stream.write(buffer, records.astype(np.float32))
     return Packed({"tris": buffer}, Part(mesh.count))

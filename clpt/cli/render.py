@@ -200,9 +200,9 @@ def render(
             render_samples(renderer, spp, left, shown.show, plan.noise, stopped)
         stats = outputs.metadata(renderer, scene, time.perf_counter() - ready)
         outputs.write_all(targets, renderer, stats, exposure, shown.note)
-    if float(stats["spp"]) < 1.0:
-        share = f"{float(stats['spp']):.1%}"
-        shown.note(f"clpt: warning: only {share} of the pixels have a sample; others are black")
+    share = float(stats["spp"])
+    if share < 1.0:
+        shown.note(f"clpt: warning: only {share:.1%} of the pixels have a sample; others are black")
     rejected = sum(wavefront.counts.rejected for wavefront in renderer.wavefronts)
     if rejected:
         shown.note(f"clpt: warning: {rejected} samples were not finite and count as black")

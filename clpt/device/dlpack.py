@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import ctypes as c
 import sys
+from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -49,10 +51,17 @@ def _sweep() -> None:
     A destructor of the capsule would do so at once, but Python may run it while a consumer's error
     is being raised, and a callback in Python must not run then.
     """
-    for address, (*_, capsule) in list(_owned.items()):
-        references = sys.getrefcount(capsule) - 3  # of others than `_owned`, `capsule`, the call
-        if references <= 0 and _valid(capsule, _NAME):
-            _owned.pop(address, None)
+    # How many references Python counts here beside those of others differs between its versions.
+    alone = _references({0: (object(),)}, 0)
+    for address in list(_owned):
+        with suppress(KeyError):  # a consumer in another thread has freed it meanwhile
+            if _references(_owned, address) <= alone and _valid(_owned[address][-1], _NAME):
+                _owned.pop(address, None)
+
+
+def _references(owned: Mapping[int, tuple[Any, ...]], address: int) -> int:
+    """Return the references to the last object of an entry, with those of this call."""
+    return sys.getrefcount(owned[address][-1])
 
 
 def opencl_capsule(array: Any, device: int) -> Any:

@@ -27,6 +27,9 @@ class ProgramCache:
         self._programs: OrderedDict[Hashable, Any] = OrderedDict()
         self._lock = threading.Lock()
 
+    def __len__(self) -> int:
+        return len(self._programs)
+
     def find(self, key: Hashable) -> Any:
         """Return a program, None if there is none."""
         with self._lock:

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from clpt.scene.params import Kind, choice, host, index, real
+from clpt.scene.values import IndexLike, Matrix4
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Camera(Kind):
     """Base of all cameras."""
 
-    to_world: Any = host(np.eye(4), "camera to world, (4, 4)")
+    to_world: Matrix4 = host(np.eye(4), "camera to world, (4, 4)")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -38,7 +38,9 @@ class ThinLens(Perspective):
 
     aperture_radius: float = real(0.1, "of the lens", "m", low=0.0)
     focus_distance: float = real(1.0, "of the plane in focus", "m", low=1e-6)
-    glass: Any = index(1.5, "of the lens; one that disperses focuses each wavelength elsewhere")
+    glass: IndexLike = index(
+        1.5, "of the lens; one that disperses focuses each wavelength elsewhere"
+    )
     focal_length: float = real(0.05, "of the lens at 587.56 nm; matters to `glass`", "m", low=1e-6)
 
 
@@ -63,8 +65,8 @@ class Matrix(Camera):
     `to_world` is not used.
     """
 
-    view: Any = host(np.eye(4), "world to eye, (4, 4), eye space looks along -z")
-    projection: Any = host(np.eye(4), "eye to clip, (4, 4)")
+    view: Matrix4 = host(np.eye(4), "world to eye, (4, 4), eye space looks along -z")
+    projection: Matrix4 = host(np.eye(4), "eye to clip, (4, 4)")
 
 
 KINDS = (Perspective, ThinLens, Orthographic, Spherical, Matrix)

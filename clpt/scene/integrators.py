@@ -9,6 +9,7 @@ import numpy as np
 
 from clpt.errors import SceneError, UnknownKindError
 from clpt.scene.params import Kind, choice, emission, flag, host, real
+from clpt.scene.values import SpectrumLike
 from clpt.spectra import Sensor, illuminants, spaces
 from clpt.spectra.sensors import OBSERVERS
 from clpt.spectra.spaces import TEMPERATURES
@@ -68,7 +69,9 @@ class Whitted(Integrator):
     """The classic ray tracer (Whitted 1980): ambient, diffuse, highlight, hard shadows, mirrors."""
 
     max_depth: int = host(5, "most mirror reflections and the first hit")
-    ambient: Any = emission(0.05, "radiance that reaches every surface", "W m^-2 sr^-1 nm^-1")
+    ambient: SpectrumLike = emission(
+        0.05, "radiance that reaches every surface", "W m^-2 sr^-1 nm^-1"
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -190,7 +193,7 @@ class Film(Kind):
 
     width: int = host(768, "pixels")
     height: int = host(576, "pixels")
-    crop: Any = host(
+    crop: tuple[int, int, int, int] | None = host(
         None,
         "part that is rendered: (x, y, width, height), from the upper left",
         "pixels",
@@ -205,11 +208,11 @@ class Film(Kind):
         "how they are drawn: as suits the scene, as the eye responds, or as lights and sensor do",
         ("auto", "visible", "scene"),
     )
-    sensor: Any = host(
+    sensor: str | Sensor = host(
         "cie1931", "what responds: cie1931, cie1964 or a clpt.spectra.Sensor", form="sensor"
     )
     bands: int = host(0, "of a spectral picture; 0: a picture of three colours")
-    white_balance: Any = host(
+    white_balance: str | float | tuple[float, float] = host(
         "none",
         "what becomes white: none, an illuminant, a colour temperature [K], or (x, y)",
         form="white_balance",
@@ -254,7 +257,8 @@ class Film(Kind):
 
     def _checked_crop(self) -> tuple[int, int, int, int]:
         """The crop as whole numbers. Raises SceneError where it does not lie in the film."""
-        given = tuple(self.crop)
+        crop: Any = self.crop
+        given = tuple(crop)
         if len(given) != 4 or any(isinstance(n, bool) or not isinstance(n, int) for n in given):
             raise SceneError(f"must be four whole numbers, not {self.crop!r}", where="film.crop")
         x, y, width, height = given

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from clpt.errors import SceneError
 from clpt.scene.params import Kind, choice, emission, flag, host, real, reflectance
+from clpt.scene.values import ImageLike, Matrix4, SpectrumLike, Textured, Vector3
 
 RADIANCE = "W m^-2 sr^-1 nm^-1"
 SPOT_EDGES = ("linear", "smooth")
@@ -33,7 +35,7 @@ class Area(Light):
 
     reach = "surface"
 
-    radiance: Any = emission(1.0, "emitted radiance", RADIANCE, textured=True)
+    radiance: Textured = emission(1.0, "emitted radiance", RADIANCE, textured=True)
     two_sided: bool = flag(False, "True: its back emits too")
 
 
@@ -46,7 +48,7 @@ class DirectionalArea(Light):
 
     reach = "surface"
 
-    irradiance: Any = emission(
+    irradiance: Textured = emission(
         1.0, "through a surface across the beam", "W m^-2 nm^-1", textured=True
     )
 
@@ -55,8 +57,8 @@ class DirectionalArea(Light):
 class Point(Light):
     """A point that emits evenly."""
 
-    position: Any = host((0.0, 0.0, 0.0), "where it is", "m")
-    intensity: Any = emission(1.0, "radiant intensity", "W sr^-1 nm^-1")
+    position: Vector3 = host((0.0, 0.0, 0.0), "where it is", "m")
+    intensity: SpectrumLike = emission(1.0, "radiant intensity", "W sr^-1 nm^-1")
     falloff: bool = flag(True, "False: irradiance does not fall with the distance (not physical)")
 
 
@@ -64,14 +66,14 @@ class Point(Light):
 class Spot(Light):
     """A point that emits into a cone about +z of `to_world`, smoothly cut off at its edge."""
 
-    to_world: Any = host(np.eye(4), "placement, (4, 4); shines along its +z")
-    intensity: Any = emission(1.0, "radiant intensity on the axis", "W sr^-1 nm^-1")
+    to_world: Matrix4 = host(np.eye(4), "placement, (4, 4); shines along its +z")
+    intensity: SpectrumLike = emission(1.0, "radiant intensity on the axis", "W sr^-1 nm^-1")
     cutoff: float = real(20.0, "half angle beyond which it is dark", "degrees", 0.0, 180.0)
     beam_width: float = real(15.0, "half angle of full intensity", "degrees", 0.0, 180.0)
     edge: str = choice(
         "linear", "how it falls off: linear in the angle, or smooth in its cosine", SPOT_EDGES
     )
-    image: Any = reflectance(
+    image: Textured = reflectance(
         1.0, "what its light passes through; a texture fills the square around a cone below 90"
     )
 
@@ -84,13 +86,13 @@ class Spot(Light):
 class Projector(Light):
     """A point that throws an image along +z of `to_world`: a pinhole camera in reverse."""
 
-    image: Any = reflectance(1.0, "what it shows, upright along +y; a bitmap may go beyond 1")
-    irradiance: Any = emission(
+    image: Textured = reflectance(1.0, "what it shows, upright along +y; a bitmap may go beyond 1")
+    irradiance: SpectrumLike = emission(
         1.0, "where the image is 1, in the middle, a metre away", "W m^-2 nm^-1"
     )
     fov: float = real(45.0, "angle that the image's width takes", "degrees", 1e-3, 179.0)
     aspect: float = real(0.0, "width over height; 0: that of the image, 1 if it has none", low=0.0)
-    to_world: Any = host(np.eye(4), "placement, (4, 4), without a shear")
+    to_world: Matrix4 = host(np.eye(4), "placement, (4, 4), without a shear")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -100,9 +102,11 @@ class Goniometric(Light):
     Directions lie in the image as in that of an envmap.
     """
 
-    intensity: Any = emission(1.0, "radiant intensity where the image is 1", "W sr^-1 nm^-1")
-    image: Any = reflectance(1.0, "factor by direction; a bitmap may go beyond 1")
-    to_world: Any = host(np.eye(4), "placement, (4, 4), without a shear")
+    intensity: SpectrumLike = emission(
+        1.0, "radiant intensity where the image is 1", "W sr^-1 nm^-1"
+    )
+    image: Textured = reflectance(1.0, "factor by direction; a bitmap may go beyond 1")
+    to_world: Matrix4 = host(np.eye(4), "placement, (4, 4), without a shear")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -111,8 +115,8 @@ class Directional(Light):
 
     reach = "distant"
 
-    direction: Any = host((0.0, 0.0, -1.0), "in which the light travels", form="direction")
-    irradiance: Any = emission(1.0, "on a surface that faces it", "W m^-2 nm^-1")
+    direction: Vector3 = host((0.0, 0.0, -1.0), "in which the light travels", form="direction")
+    irradiance: SpectrumLike = emission(1.0, "on a surface that faces it", "W m^-2 nm^-1")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -121,7 +125,7 @@ class Constant(Light):
 
     reach = "infinite"
 
-    radiance: Any = emission(1.0, "radiance of the surroundings", RADIANCE)
+    radiance: SpectrumLike = emission(1.0, "radiance of the surroundings", RADIANCE)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -133,14 +137,14 @@ class Envmap(Light):
 
     reach = "infinite"
 
-    image: Any = host(
+    image: ImageLike | None = host(
         None,
         "path of an .exr or .hdr file, or an array (h, w, 3) float32; an .exr may hold spectra, "
         "as clpt.SpectralImage does",
         form="image",
     )
     scale: float = real(1.0, "factor on the radiance", low=0.0)
-    to_world: Any = host(np.eye(4), "rotation, (4, 4)")
+    to_world: Matrix4 = host(np.eye(4), "rotation, (4, 4)")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -149,13 +153,13 @@ class CubeMap(Light):
 
     reach = "infinite"
 
-    image: Any = host(
+    image: Sequence[ImageLike] | ImageLike | None = host(
         None,
         "six images +x -x +y -y +z -z (paths or arrays), or one with the faces in a 4x3 cross",
         form="cube_images",
     )
     scale: float = real(1.0, "factor on the radiance", low=0.0)
-    to_world: Any = host(np.eye(4), "rotation, (4, 4)")
+    to_world: Matrix4 = host(np.eye(4), "rotation, (4, 4)")
 
 
 ON_SHAPES = (Area, DirectionalArea)

@@ -6,7 +6,7 @@ none: lowering turns it into rules by which a hit chooses its leaf.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -17,6 +17,7 @@ from clpt.errors import SceneError
 from clpt.scene.params import (
     ORDERS,
     Kind,
+    Texture,
     choice,
     coefficient,
     factor,
@@ -30,7 +31,9 @@ from clpt.scene.params import (
     reflectance,
     reradiation,
 )
-from clpt.spectra import Spectrum
+from clpt.scene.textures import Bitmap
+from clpt.scene.values import IndexLike, SpectrumLike, Textured, TexturedNumber
+from clpt.spectra import Reradiation, Spectrum
 
 DISTRIBUTIONS = ("ggx", "beckmann")
 FILMS = "thin films on the surface, from the outside in"
@@ -57,10 +60,12 @@ class Layer(Kind):
     Up to 100 um thick; from about 10 um on, its fringes are finer than an eye can tell.
     """
 
-    eta: Any = index("water", "index of refraction")
-    k: Any = index(0.0, "extinction coefficient; above 0 it absorbs", zero=True)
+    eta: IndexLike = index("water", "index of refraction")
+    k: IndexLike = index(0.0, "extinction coefficient; above 0 it absorbs", zero=True)
     thickness: float = real(400.0, "where it is thickest", "nm", low=0.0, high=1e5)
-    profile: Any = real(1.0, "share of that thickness that is there", "", 0.0, 1.0, textured=True)
+    profile: TexturedNumber = real(
+        1.0, "share of that thickness that is there", "", 0.0, 1.0, textured=True
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -99,7 +104,7 @@ class Material(Kind):
 class Diffuse(Material):
     """Lambertian reflection of the front side."""
 
-    reflectance: Any = reflectance(0.5, "albedo")
+    reflectance: Textured = reflectance(0.5, "albedo")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -112,9 +117,9 @@ class Phong(Material):
 
     uses_lobe_sample = True
 
-    diffuse: Any = reflectance(0.5, "diffuse albedo")
-    specular: Any = reflectance(0.2, "albedo of the lobe")
-    exponent: Any = real(30.0, "sharpness of the lobe", low=0.0, high=1e5, textured=True)
+    diffuse: Textured = reflectance(0.5, "diffuse albedo")
+    specular: Textured = reflectance(0.2, "albedo of the lobe")
+    exponent: TexturedNumber = real(30.0, "sharpness of the lobe", low=0.0, high=1e5, textured=True)
     reflectivity: float = real(0.0, "mirror share in the whitted integrator", low=0.0, high=1.0)
 
 
@@ -126,11 +131,11 @@ class Dielectric(Material):
     uses_lobe_sample = True
     refracts = True
 
-    int_ior: Any = index(1.5046, "inside index, number, glass name or spectrum")
-    ext_ior: Any = index(1.000277, "outside index")
-    specular_reflectance: Any = reflectance(1.0, "factor on reflection; 1 is physical")
-    specular_transmittance: Any = reflectance(1.0, "factor on transmission; 1 is physical")
-    absorption: Any = coefficient(0.0, "of the inside: exp(-absorption distance) passes")
+    int_ior: IndexLike = index(1.5046, "inside index, number, glass name or spectrum")
+    ext_ior: IndexLike = index(1.000277, "outside index")
+    specular_reflectance: Textured = reflectance(1.0, "factor on reflection; 1 is physical")
+    specular_transmittance: Textured = reflectance(1.0, "factor on transmission; 1 is physical")
+    absorption: SpectrumLike = coefficient(0.0, "of the inside: exp(-absorption distance) passes")
     layers: tuple[Layer, ...] = layers(FILMS)
 
     @property
@@ -145,10 +150,10 @@ class ThinDielectric(Material):
     delta = True
     uses_lobe_sample = True
 
-    int_ior: Any = index(1.5046, "index of the slab")
-    ext_ior: Any = index(1.000277, "index around it")
-    specular_reflectance: Any = reflectance(1.0, "factor on reflection; 1 is physical")
-    specular_transmittance: Any = reflectance(1.0, "factor on transmission; 1 is physical")
+    int_ior: IndexLike = index(1.5046, "index of the slab")
+    ext_ior: IndexLike = index(1.000277, "index around it")
+    specular_reflectance: Textured = reflectance(1.0, "factor on reflection; 1 is physical")
+    specular_transmittance: Textured = reflectance(1.0, "factor on transmission; 1 is physical")
 
     @property
     def transmits(self) -> bool:
@@ -163,14 +168,16 @@ class RoughDielectric(Material):
     refracts = True
     chromatic = True
 
-    int_ior: Any = index(1.5046, "inside index")
-    ext_ior: Any = index(1.000277, "outside index")
+    int_ior: IndexLike = index(1.5046, "inside index")
+    ext_ior: IndexLike = index(1.000277, "outside index")
     distribution: str = choice("ggx", "of the microfacet normals", DISTRIBUTIONS)
-    alpha_u: Any = real(0.1, "roughness along the tangent", low=1e-4, high=1.0, textured=True)
-    alpha_v: Any = real(0.1, "roughness across it", low=1e-4, high=1.0, textured=True)
-    specular_reflectance: Any = reflectance(1.0, "factor on reflection; 1 is physical")
-    specular_transmittance: Any = reflectance(1.0, "factor on transmission; 1 is physical")
-    absorption: Any = coefficient(0.0, "of the inside: exp(-absorption distance) passes")
+    alpha_u: TexturedNumber = real(
+        0.1, "roughness along the tangent", low=1e-4, high=1.0, textured=True
+    )
+    alpha_v: TexturedNumber = real(0.1, "roughness across it", low=1e-4, high=1.0, textured=True)
+    specular_reflectance: Textured = reflectance(1.0, "factor on reflection; 1 is physical")
+    specular_transmittance: Textured = reflectance(1.0, "factor on transmission; 1 is physical")
+    absorption: SpectrumLike = coefficient(0.0, "of the inside: exp(-absorption distance) passes")
     layers: tuple[Layer, ...] = layers(FILMS)
 
     @property
@@ -184,9 +191,9 @@ class Conductor(Material):
 
     delta = True
 
-    eta: Any = index(0.0, "index of refraction", zero=True, textured=True)
-    k: Any = index(1.0, "extinction coefficient", zero=True, textured=True)
-    specular_reflectance: Any = reflectance(1.0, "factor on reflection; 1 is physical")
+    eta: IndexLike | Texture = index(0.0, "index of refraction", zero=True, textured=True)
+    k: IndexLike | Texture = index(1.0, "extinction coefficient", zero=True, textured=True)
+    specular_reflectance: Textured = reflectance(1.0, "factor on reflection; 1 is physical")
     layers: tuple[Layer, ...] = layers(FILMS)
 
 
@@ -194,12 +201,14 @@ class Conductor(Material):
 class RoughConductor(Material):
     """A rough metal of microfacets (Cook and Torrance; Heitz 2018 visible normals); front side."""
 
-    eta: Any = index(0.0, "index of refraction", zero=True, textured=True)
-    k: Any = index(1.0, "extinction coefficient", zero=True, textured=True)
+    eta: IndexLike | Texture = index(0.0, "index of refraction", zero=True, textured=True)
+    k: IndexLike | Texture = index(1.0, "extinction coefficient", zero=True, textured=True)
     distribution: str = choice("ggx", "of the microfacet normals", DISTRIBUTIONS)
-    alpha_u: Any = real(0.1, "roughness along the tangent", low=1e-4, high=1.0, textured=True)
-    alpha_v: Any = real(0.1, "roughness across it", low=1e-4, high=1.0, textured=True)
-    specular_reflectance: Any = reflectance(1.0, "factor on reflection; 1 is physical")
+    alpha_u: TexturedNumber = real(
+        0.1, "roughness along the tangent", low=1e-4, high=1.0, textured=True
+    )
+    alpha_v: TexturedNumber = real(0.1, "roughness across it", low=1e-4, high=1.0, textured=True)
+    specular_reflectance: Textured = reflectance(1.0, "factor on reflection; 1 is physical")
     layers: tuple[Layer, ...] = layers(FILMS)
 
 
@@ -209,10 +218,12 @@ class Plastic(Material):
 
     uses_lobe_sample = True
 
-    diffuse_reflectance: Any = reflectance(0.5, "albedo of the base")
-    int_ior: Any = index(1.49, "index of the coat")
-    ext_ior: Any = index(1.000277, "index outside")
-    specular_reflectance: Any = reflectance(1.0, "factor on the coat's reflection; 1 is physical")
+    diffuse_reflectance: Textured = reflectance(0.5, "albedo of the base")
+    int_ior: IndexLike = index(1.49, "index of the coat")
+    ext_ior: IndexLike = index(1.000277, "index outside")
+    specular_reflectance: Textured = reflectance(
+        1.0, "factor on the coat's reflection; 1 is physical"
+    )
     nonlinear: bool = flag(False, "whether internal reflection saturates the colour")
 
 
@@ -222,12 +233,14 @@ class RoughPlastic(Material):
 
     uses_lobe_sample = True
 
-    diffuse_reflectance: Any = reflectance(0.5, "albedo of the base")
-    int_ior: Any = index(1.49, "index of the coat")
-    ext_ior: Any = index(1.000277, "index outside")
-    specular_reflectance: Any = reflectance(1.0, "factor on the coat's reflection; 1 is physical")
+    diffuse_reflectance: Textured = reflectance(0.5, "albedo of the base")
+    int_ior: IndexLike = index(1.49, "index of the coat")
+    ext_ior: IndexLike = index(1.000277, "index outside")
+    specular_reflectance: Textured = reflectance(
+        1.0, "factor on the coat's reflection; 1 is physical"
+    )
     distribution: str = choice("ggx", "of the microfacet normals", DISTRIBUTIONS)
-    alpha: Any = real(0.1, "roughness", low=1e-4, high=1.0, textured=True)
+    alpha: TexturedNumber = real(0.1, "roughness", low=1e-4, high=1.0, textured=True)
     nonlinear: bool = flag(False, "whether internal reflection saturates the colour")
 
 
@@ -240,20 +253,30 @@ class CoatedConductor(Material):
 
     uses_lobe_sample = True
 
-    coat_ior: Any = index(1.5046, "index of the coat")
-    ext_ior: Any = index(1.000277, "index outside")
-    coat_alpha: Any = real(0.01, "roughness of the coat", low=1e-4, high=1.0, textured=True)
-    eta: Any = index(
+    coat_ior: IndexLike = index(1.5046, "index of the coat")
+    ext_ior: IndexLike = index(1.000277, "index outside")
+    coat_alpha: TexturedNumber = real(
+        0.01, "roughness of the coat", low=1e-4, high=1.0, textured=True
+    )
+    eta: IndexLike | Texture = index(
         0.0,
         "index of refraction of the metal; the default is a perfect mirror",
         zero=True,
         textured=True,
     )
-    k: Any = index(1.0, "extinction coefficient of the metal", zero=True, textured=True)
+    k: IndexLike | Texture = index(
+        1.0, "extinction coefficient of the metal", zero=True, textured=True
+    )
     distribution: str = choice("ggx", "of both their microfacet normals", DISTRIBUTIONS)
-    alpha_u: Any = real(0.1, "the metal's roughness along tangents", "", 1e-4, 1.0, textured=True)
-    alpha_v: Any = real(0.1, "the metal's roughness across it", "", 1e-4, 1.0, textured=True)
-    specular_reflectance: Any = reflectance(1.0, "factor on the metal's reflection; 1 is physical")
+    alpha_u: TexturedNumber = real(
+        0.1, "the metal's roughness along tangents", "", 1e-4, 1.0, textured=True
+    )
+    alpha_v: TexturedNumber = real(
+        0.1, "the metal's roughness across it", "", 1e-4, 1.0, textured=True
+    )
+    specular_reflectance: Textured = reflectance(
+        1.0, "factor on the metal's reflection; 1 is physical"
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -268,18 +291,22 @@ class Principled(Material):
     chromatic = True
     tints = ("spec_tint", "sheen_tint")
 
-    base_color: Any = reflectance(0.5, "colour of base and metal; its root is of transmission")
-    roughness: Any = _share(0.5, "of reflection and refraction")
-    anisotropic: Any = _share(0.0, "how much it is stretched along the tangent")
-    metallic: Any = _share(0.0, "share of the metal")
-    spec_trans: Any = _share(0.0, "share of the rest that lets light through")
-    eta: Any = index(1.5, "inside index over the outside's")
-    spec_tint: Any = _share(0.0, "how much of the base's colour the dielectric reflection has")
-    sheen: Any = _share(0.0, "strength of a sheen at grazing angles")
-    sheen_tint: Any = _share(0.0, "how much of the base's colour the sheen has")
-    flatness: Any = _share(0.0, "share of the base that looks as if light came from below")
-    clearcoat: Any = _share(0.0, "strength of a second, colourless reflection")
-    clearcoat_gloss: Any = _share(0.0, "how smooth that is")
+    base_color: Textured = reflectance(0.5, "colour of base and metal; its root is of transmission")
+    roughness: TexturedNumber = _share(0.5, "of reflection and refraction")
+    anisotropic: TexturedNumber = _share(0.0, "how much it is stretched along the tangent")
+    metallic: TexturedNumber = _share(0.0, "share of the metal")
+    spec_trans: TexturedNumber = _share(0.0, "share of the rest that lets light through")
+    eta: IndexLike = index(1.5, "inside index over the outside's")
+    spec_tint: TexturedNumber = _share(
+        0.0, "how much of the base's colour the dielectric reflection has"
+    )
+    sheen: TexturedNumber = _share(0.0, "strength of a sheen at grazing angles")
+    sheen_tint: TexturedNumber = _share(0.0, "how much of the base's colour the sheen has")
+    flatness: TexturedNumber = _share(
+        0.0, "share of the base that looks as if light came from below"
+    )
+    clearcoat: TexturedNumber = _share(0.0, "strength of a second, colourless reflection")
+    clearcoat_gloss: TexturedNumber = _share(0.0, "how smooth that is")
 
     @property
     def transmits(self) -> bool:
@@ -297,16 +324,20 @@ class PrincipledThin(Material):
     uses_lobe_sample = True
     tints = ("spec_tint", "sheen_tint")
 
-    base_color: Any = reflectance(0.5, "colour of all but reflection and sheen")
-    roughness: Any = _share(0.5, "of reflection; transmission's grows with the index")
-    anisotropic: Any = _share(0.0, "how much it is stretched along the tangent")
-    spec_trans: Any = _share(0.0, "share of the slab: of reflection and clear transmission")
-    eta: Any = index(1.5, "inside index over the outside's")
-    spec_tint: Any = _share(0.0, "how much of the base's colour the reflection has")
-    sheen: Any = _share(0.0, "strength of a sheen at grazing angles")
-    sheen_tint: Any = _share(0.0, "how much of the base's colour the sheen has")
-    flatness: Any = _share(0.0, "share of the base that looks as if light came from below")
-    diff_trans: Any = real(
+    base_color: Textured = reflectance(0.5, "colour of all but reflection and sheen")
+    roughness: TexturedNumber = _share(0.5, "of reflection; transmission's grows with the index")
+    anisotropic: TexturedNumber = _share(0.0, "how much it is stretched along the tangent")
+    spec_trans: TexturedNumber = _share(
+        0.0, "share of the slab: of reflection and clear transmission"
+    )
+    eta: IndexLike = index(1.5, "inside index over the outside's")
+    spec_tint: TexturedNumber = _share(0.0, "how much of the base's colour the reflection has")
+    sheen: TexturedNumber = _share(0.0, "strength of a sheen at grazing angles")
+    sheen_tint: TexturedNumber = _share(0.0, "how much of the base's colour the sheen has")
+    flatness: TexturedNumber = _share(
+        0.0, "share of the base that looks as if light came from below"
+    )
+    diff_trans: TexturedNumber = real(
         0.0, "diffuse light that goes through; 2: all of it", low=0.0, high=2.0, textured=True
     )
 
@@ -328,8 +359,8 @@ class DiffuseTransmission(Material):
 
     uses_lobe_sample = True
 
-    transmittance: Any = reflectance(0.25, "share that goes through")
-    reflectance: Any = reflectance(0.25, "share that is scattered back")
+    transmittance: Textured = reflectance(0.25, "share that goes through")
+    reflectance: Textured = reflectance(0.25, "share that is scattered back")
 
     @property
     def transmits(self) -> bool:
@@ -349,32 +380,38 @@ class GltfSurface(Material):
     chromatic = True
     needs_wavelengths = True
 
-    base_color: Any = reflectance(1.0, "colour of base, metal, and of what is let through")
-    metallic: Any = _share(0.0, "share of the metal", lobe=True)
-    roughness: Any = _share(1.0, "of reflection and of what is let through")
-    ior: Any = index(
+    base_color: Textured = reflectance(1.0, "colour of base, metal, and of what is let through")
+    metallic: TexturedNumber = _share(0.0, "share of the metal", lobe=True)
+    roughness: TexturedNumber = _share(1.0, "of reflection and of what is let through")
+    ior: IndexLike = index(
         1.5, "index of the dielectric; 0: it reflects all but for `specular_color`", zero=True
     )
-    specular: Any = _share(1.0, "strength of the dielectric's reflection")
-    specular_color: Any = reflectance(1.0, "factor on it at normal incidence")
-    anisotropy: Any = _share(0.0, "how much rougher the tangent's direction is", lobe=True)
-    anisotropy_rotation: Any = real(
+    specular: TexturedNumber = _share(1.0, "strength of the dielectric's reflection")
+    specular_color: Textured = reflectance(1.0, "factor on it at normal incidence")
+    anisotropy: TexturedNumber = _share(
+        0.0, "how much rougher the tangent's direction is", lobe=True
+    )
+    anisotropy_rotation: TexturedNumber = real(
         0.0, "from the tangent to that direction", "degrees", -360.0, 360.0, textured=True
     )
-    clearcoat: Any = _share(0.0, "strength of a coat of index 1.5 over all", lobe=True)
-    clearcoat_roughness: Any = _share(0.0, "its roughness")
-    sheen_color: Any = reflectance(0.0, "colour of fibres under the coat", lobe=True)
-    sheen_roughness: Any = _share(0.5, "how much fibres lean; at least 0.25")
-    transmission: Any = _share(0.0, "share of what enters the base that is let through", lobe=True)
+    clearcoat: TexturedNumber = _share(0.0, "strength of a coat of index 1.5 over all", lobe=True)
+    clearcoat_roughness: TexturedNumber = _share(0.0, "its roughness")
+    sheen_color: Textured = reflectance(0.0, "colour of fibres under the coat", lobe=True)
+    sheen_roughness: TexturedNumber = _share(0.5, "how much fibres lean; at least 0.25")
+    transmission: TexturedNumber = _share(
+        0.0, "share of what enters the base that is let through", lobe=True
+    )
     thin: bool = flag(False, "whether light goes straight through, as there is no volume")
-    absorption: Any = coefficient(0.0, "of the inside: exp(-absorption distance) passes")
-    diffuse_transmission: Any = _share(
+    absorption: SpectrumLike = coefficient(0.0, "of the inside: exp(-absorption distance) passes")
+    diffuse_transmission: TexturedNumber = _share(
         0.0, "share of what is scattered that goes through", lobe=True
     )
-    diffuse_transmission_color: Any = reflectance(1.0, "its colour")
-    iridescence: Any = _share(0.0, "strength of a thin film on the facets", lobe=True)
+    diffuse_transmission_color: Textured = reflectance(1.0, "its colour")
+    iridescence: TexturedNumber = _share(0.0, "strength of a thin film on the facets", lobe=True)
     iridescence_ior: float = real(1.3, "index of that film", low=1.0, high=5.0)
-    iridescence_thickness: Any = real(400.0, "its thickness", "nm", 0.0, 1e5, textured=True)
+    iridescence_thickness: TexturedNumber = real(
+        400.0, "its thickness", "nm", 0.0, 1e5, textured=True
+    )
 
     @property
     def transmits(self) -> bool:
@@ -404,21 +441,27 @@ class Grating(Material):
         "of the grooves, or explicit `efficiencies`",
         ("sinusoidal", "lamellar", "blazed", "explicit"),
     )
-    period: Any = real(1600.0, "from groove to groove", "nm", 100.0, 1e5, textured=True)
-    angle: Any = real(0.0, "tangent to next groove", "degrees", -360.0, 360.0, textured=True)
-    depth: Any = real(150.0, "of a groove", "nm", 0.0, 1000.0, textured=True)
+    period: TexturedNumber = real(1600.0, "from groove to groove", "nm", 100.0, 1e5, textured=True)
+    angle: TexturedNumber = real(
+        0.0, "tangent to next groove", "degrees", -360.0, 360.0, textured=True
+    )
+    depth: TexturedNumber = real(150.0, "of a groove", "nm", 0.0, 1000.0, textured=True)
     fill: float = real(0.5, "share of the period that lamellar crests take", low=0.0, high=1.0)
     orders: float = real(float(ORDERS), "highest order that is followed", low=0.0, high=ORDERS)
-    efficiencies: Any = per_order((1.0, 1.0, 1.0), "how strong orders -n to n are, explicitly")
-    ior: Any = index(1.5, "index of a transmissive plate")
-    eta: Any = index(
+    efficiencies: Sequence[float] = per_order(
+        (1.0, 1.0, 1.0), "how strong orders -n to n are, explicitly"
+    )
+    ior: IndexLike = index(1.5, "index of a transmissive plate")
+    eta: IndexLike | Texture = index(
         0.0,
         "index of refraction of the metal; the default is a perfect mirror",
         zero=True,
         textured=True,
     )
-    k: Any = index(1.0, "extinction coefficient of the metal", zero=True, textured=True)
-    reflectance: Any = reflectance(1.0, "factor on the light of all orders; 1 is physical")
+    k: IndexLike | Texture = index(
+        1.0, "extinction coefficient of the metal", zero=True, textured=True
+    )
+    reflectance: Textured = reflectance(1.0, "factor on the light of all orders; 1 is physical")
 
     @property
     def transmits(self) -> bool:
@@ -443,9 +486,11 @@ class Fluorescent(Material):
 
     fluoresces = True
 
-    reflectance: Any = reflectance(0.5, "albedo of the light that keeps its wavelength")
-    reradiation: Any = reradiation(None, "what is given out at other wavelengths")
-    amount: Any = real(1.0, "factor on the re-radiation", low=0.0, high=1.0, textured=True)
+    reflectance: Textured = reflectance(0.5, "albedo of the light that keeps its wavelength")
+    reradiation: Reradiation | None = reradiation(None, "what is given out at other wavelengths")
+    amount: TexturedNumber = real(
+        1.0, "factor on the re-radiation", low=0.0, high=1.0, textured=True
+    )
 
     def check(self) -> None:
         if self.reradiation is None or not isinstance(self.reflectance, Spectrum):
@@ -474,9 +519,9 @@ class Hair(Material):
     uses_lobe_sample = True
     no_back = True
 
-    sigma_a: Any = factor(pigment(1.3, 0.2), "absorption, per radius of the fibre")
-    longitudinal_roughness: Any = _share(0.3, "of the angle along the fibre")
-    azimuthal_roughness: Any = _share(0.3, "of the angle around it")
+    sigma_a: Textured = factor(pigment(1.3, 0.2), "absorption, per radius of the fibre")
+    longitudinal_roughness: TexturedNumber = _share(0.3, "of the angle along the fibre")
+    azimuthal_roughness: TexturedNumber = _share(0.3, "of the angle around it")
     scale_tilt: float = real(2.0, "of the scales against the fibre", "degrees", -45.0, 45.0)
     eta: float = real(1.55, "index of the fibre over that outside", "", 1.001, 5.0)
 
@@ -501,32 +546,36 @@ class Null(Material):
 class TwoSided(Material):
     """Gives one-sided materials to both sides of a surface."""
 
-    front: Any = host(Diffuse(), "material of the front", form="material")
-    back: Any = host(None, "material of the back; the front's when None", form="material")
+    front: Material = host(Diffuse(), "material of the front", form="material")
+    back: Material | None = host(
+        None, "material of the back; the front's when None", form="material"
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Mask(Material):
     """Lets light through where `opacity` is below one."""
 
-    material: Any = host(Diffuse(), "what is there where it is opaque", form="material")
-    opacity: Any = real(0.5, "share of light that meets the material", "", 0.0, 1.0, textured=True)
+    material: Material = host(Diffuse(), "what is there where it is opaque", form="material")
+    opacity: TexturedNumber = real(
+        0.5, "share of light that meets the material", "", 0.0, 1.0, textured=True
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Blend(Material):
     """A linear mixture of two materials."""
 
-    first: Any = host(Diffuse(), "material where the weight is 0", form="material")
-    second: Any = host(Diffuse(), "material where the weight is 1", form="material")
-    weight: Any = real(0.5, "share of the second", "", 0.0, 1.0, textured=True)
+    first: Material = host(Diffuse(), "material where the weight is 0", form="material")
+    second: Material = host(Diffuse(), "material where the weight is 1", form="material")
+    weight: TexturedNumber = real(0.5, "share of the second", "", 0.0, 1.0, textured=True)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NormalMapped(Material):
     """Base of the maps that bend the shading normal. Their flags and defaults are Mitsuba 3's."""
 
-    material: Any = host(Diffuse(), "what is shaded with the bent normal", form="material")
+    material: Material = host(Diffuse(), "what is shaded with the bent normal", form="material")
     scale: float = real(1.0, "factor on what the map bends")
     flip_invalid: bool = flag(True, "turn a normal round that faces away from the viewer")
     shadowing: bool = flag(True, "soften the edge where the bent surface turns dark")
@@ -536,7 +585,7 @@ class NormalMapped(Material):
 class NormalMap(NormalMapped):
     """Takes the shading normal from an image, relative to that of the surface."""
 
-    map: Any = host(
+    map: Bitmap | None = host(
         None,
         "bitmap, read raw; its colours are (x, y, z) / 2 + 1/2; None: none",
         form="texture",
@@ -552,7 +601,7 @@ class NormalMap(NormalMapped):
 class BumpMap(NormalMapped):
     """Bends the shading normal as if the surface were raised by a height."""
 
-    height: Any = real(0.0, "what it is raised by", "m", textured=True)
+    height: TexturedNumber = real(0.0, "what it is raised by", "m", textured=True)
 
 
 LEAVES = (

@@ -8,7 +8,7 @@ its entry in the documentation and the JSON schema:
 role           accepted                               in the kernel               texture
 =============  =====================================  ==========================  ===============
 reflectance    number, (r, g, b), Spectrum, Texture   Spectrum in [0, 1]          yes
-emission       number, (r, g, b), Spectrum, Texture   Spectrum, rgb times D65     area, envmap
+emission       number, name, (r, g, b), ...           Spectrum, rgb times D65     area, envmap
 index          number, name, Spectrum, Texture        Spectrum, unbounded         conductors
 factor         number, (r, g, b), Spectrum, Texture   Spectrum, unbounded         yes
 coefficient    number, (r, g, b), Spectrum            of the inside, in [1/m]     no
@@ -40,13 +40,14 @@ from clpt.spectra import (
     RGB,
     Constant,
     Reradiation,
+    RGBIlluminant,
     RGBUnbounded,
     Spectrum,
     Tabulated,
-    illuminants,
+    illuminant,
 )
 from clpt.spectra import index as index_of
-from clpt.spectra.spectrum import LONGEST, SHORTEST, extremes
+from clpt.spectra.spectrum import check_reach, extremes
 
 SPECTRUM_ROLES = ("reflectance", "emission", "index", "factor", "coefficient")
 DEVICE_ROLES = (
@@ -97,7 +98,7 @@ def reflectance(default: Any, doc: str, *, lobe: bool = False) -> Any:
 
 
 def emission(default: Any, doc: str, unit: str, *, textured: bool = False) -> Any:
-    """Declare an emitted spectrum; an rgb triple means that multiple of D65."""
+    """Declare an emitted spectrum; a number or an rgb triple means that multiple of D65."""
     return _field(default, Param("emission", doc, unit, low=0.0, textured=textured))
 
 
@@ -215,6 +216,13 @@ class Kind:
         """Raise SceneError where the parameters contradict each other."""
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Texture(Kind):
+    """Base of all textures."""
+
+    is_texture = True
+
+
 @cache
 def _snake(name: str) -> str:
     return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
@@ -318,6 +326,11 @@ def _orders(value: Any, param: Param, where: str) -> tuple[float, ...]:
 def _spectrum(value: Any, param: Param, where: str) -> Any:
     if isinstance(value, str) and param.role == "index":
         return value
+    if isinstance(value, str) and param.role == "emission":
+        try:
+            return illuminant(value)
+        except SceneError as error:
+            raise SceneError(error.message, where=where) from None
     if isinstance(value, Spectrum):
         _check_spectrum(value, param, where)
         return value
@@ -325,23 +338,22 @@ def _spectrum(value: Any, param: Param, where: str) -> Any:
         made = RGBUnbounded if param.role == "factor" else RGB
         return made(*(_number(v, param, where) for v in value))
     if isinstance(value, (int, float, np.number)):
-        return Constant(_number(value, param, where))
-    message = f"must be a number, three numbers or a spectrum, not {value!r}"
-    if isinstance(value, str) and value in illuminants():
-        message += f"; give clpt.spectra.illuminant({value!r})"
-    raise SceneError(message, where=where)
+        number = _number(value, param, where)
+        return RGBIlluminant(*[number] * 3) if param.role == "emission" else Constant(number)
+    names = ", a name" if param.role in ("index", "emission") else ""
+    raise SceneError(
+        f"must be a number, three numbers{names} or a spectrum of clpt.spectra, not {value!r}",
+        where=where,
+    )
 
 
 def _check_spectrum(value: Spectrum, param: Param, where: str) -> None:
     """Raise SceneError for a spectrum beyond its limits, or a table that no film can reach."""
-    if isinstance(value, Tabulated) and (
-        value.lambdas[-1] < SHORTEST or value.lambdas[0] > LONGEST
-    ):
-        raise SceneError(
-            f"its table goes from {value.lambdas[0]:g} to {value.lambdas[-1]:g}, and films lie"
-            f" within {SHORTEST:g} to {LONGEST:g} nm; give wavelengths in nm",
-            where=where,
-        )
+    if isinstance(value, Tabulated):
+        try:
+            check_reach(value.lambdas[0], value.lambdas[-1])
+        except SceneError as error:
+            raise SceneError(error.message, where=where) from None
     if math.isinf(param.low) and math.isinf(param.high):
         return
     meant = index_of(value) if param.role in ("index", "coefficient") else value

@@ -9,9 +9,11 @@ import numpy as np
 
 from clpt import images
 from clpt.errors import SceneError
-from clpt.scene.materials import Diffuse, TwoSided
+from clpt.scene.lights import Light
+from clpt.scene.materials import Diffuse, Material, TwoSided
 from clpt.scene.params import Kind, choice, host
 from clpt.scene.textures import MeshAttribute
+from clpt.scene.values import Matrix4, OnDevice, Vector3
 
 SMOOTH = "smooth"  # normals of a mesh: the means of the triangles around a vertex, by their areas
 BASES = ("linear", "bspline", "bezier")
@@ -21,9 +23,9 @@ BASES = ("linear", "bspline", "bezier")
 class Shape(Kind):
     """Base of all shapes; placed by `to_world`."""
 
-    material: Any = host(Diffuse(), "of the surface", form="material")
-    emission: Any = host(None, "an `area` light, or None", form="area_light")
-    to_world: Any = host(np.eye(4), "placement, (4, 4)")
+    material: Material = host(Diffuse(), "of the surface", form="material")
+    emission: Light | None = host(None, "an `area` light, or None", form="area_light")
+    to_world: Matrix4 | OnDevice = host(np.eye(4), "placement, (4, 4)")
     flip_normals: bool = host(False, "turn the front to the other side")
     name: str = host("", "for messages")
 
@@ -84,7 +86,7 @@ class Mesh(Shape):
 class Sphere(Shape):
     """A sphere; uv from the azimuth and polar angle about z."""
 
-    center: Any = host((0.0, 0.0, 0.0), "before `to_world`", "m")
+    center: Vector3 = host((0.0, 0.0, 0.0), "before `to_world`", "m")
     radius: float = host(1.0, "before `to_world`, which may scale it evenly", "m")
 
 
@@ -125,8 +127,8 @@ class Cube(Shape):
 class Cylinder(Shape):
     """An open tube around the line from p0 to p1, facing outward; u azimuth, v along the line."""
 
-    p0: Any = host((0.0, 0.0, 0.0), "start of the axis", "m")
-    p1: Any = host((0.0, 0.0, 1.0), "end of the axis", "m")
+    p0: Vector3 = host((0.0, 0.0, 0.0), "start of the axis", "m")
+    p1: Vector3 = host((0.0, 0.0, 1.0), "end of the axis", "m")
     radius: float = host(1.0, "before `to_world`, which may scale it evenly", "m")
 
 
@@ -170,7 +172,7 @@ class Group:
 class Instance(Shape):
     """A group at a place; many share its triangles. In a mirror a front stays a front."""
 
-    group: Any = host(None, "what is placed: a name in the scene's `groups`", form="group")
+    group: Group = host(None, "what is placed: a name in the scene's `groups`", form="group")
     # The surfaces are those of the group's shapes.
     material: Any = field(default=None, init=False, repr=False)
     emission: Any = field(default=None, init=False, repr=False)

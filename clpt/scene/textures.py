@@ -10,6 +10,8 @@ import numpy as np
 
 from clpt.errors import SceneError
 from clpt.scene.params import Kind, choice, factor, host, params, real, reflectance
+from clpt.scene.params import Texture as Texture
+from clpt.scene.values import ImageLike, Matrix4, Textured, TexturedNumber
 
 ATTRIBUTES = ("vertex_", "face_")  # how the names of what meshes have begin
 PATTERNS = ("fbm", "wrinkled", "windy")
@@ -20,13 +22,6 @@ WRAPS = ("repeat", "clamp", "mirror", "zero")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Texture(Kind):
-    """Base of all textures."""
-
-    is_texture = True
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
 class Placed(Texture):
     """Base of those that lie on uv: a surface's own, or such as a mapping makes of its place."""
 
@@ -34,7 +29,7 @@ class Placed(Texture):
     mapping: str = choice(
         "uv", "where u and v come from; uv1: attributes vertex_u1, vertex_v1", MAPPINGS
     )
-    to_texture: np.ndarray = host(np.eye(4), "from the world to the mapping's space, (4, 4)")
+    to_texture: Matrix4 = host(np.eye(4), "from the world to the mapping's space, (4, 4)")
 
     def check(self) -> None:
         _matrix(self, "to_uv", 3)
@@ -45,7 +40,7 @@ class Placed(Texture):
 class Solid(Texture):
     """Base of those that fill space."""
 
-    to_texture: np.ndarray = host(np.eye(4), "from the world to the texture's space, (4, 4)")
+    to_texture: Matrix4 = host(np.eye(4), "from the world to the texture's space, (4, 4)")
 
     def check(self) -> None:
         _matrix(self, "to_texture", 4)
@@ -59,7 +54,7 @@ class Bitmap(Placed):
     of MIP maps. With few samples a pixel, fine textures far away are noisy.
     """
 
-    image: Any = host(
+    image: ImageLike | None = host(
         None,
         "path of an image, or an array (h, w) or (h, w, 1|3|4), float32, or uint8 as 8-bit files "
         "have; an .exr may hold spectra, as clpt.SpectralImage does",
@@ -78,25 +73,28 @@ class Bitmap(Placed):
 class Checkerboard(Placed):
     """Two colours in a 2x2 pattern per unit of uv."""
 
-    color0: Any = reflectance(0.4, "colour where both or neither coordinate is below a half")
-    color1: Any = reflectance(0.2, "colour elsewhere")
+    color0: Textured = reflectance(0.4, "colour where both or neither coordinate is below a half")
+    color1: Textured = reflectance(0.2, "colour elsewhere")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Product(Texture):
     """The product of two values; in an emission the second is a factor, not a light of its own."""
 
-    first: Any = factor(1.0, "one of them")
-    second: Any = factor(1.0, "the other")
+    first: Textured = factor(1.0, "one of them")
+    second: Textured = factor(1.0, "the other")
+    rgb: bool = host(
+        False, "True: colours are multiplied as linear Rec. 709, and the product made a spectrum"
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Mix(Texture):
     """Between two values: (1 - amount) first + amount second."""
 
-    first: Any = factor(0.0, "where the amount is 0")
-    second: Any = factor(1.0, "where it is 1")
-    amount: Any = real(0.5, "share of the second", textured=True)
+    first: Textured = factor(0.0, "where the amount is 0")
+    second: Textured = factor(1.0, "where it is 1")
+    amount: TexturedNumber = real(0.5, "share of the second", textured=True)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -104,6 +102,9 @@ class MeshAttribute(Texture):
     """What a mesh says per vertex or face: its `attributes` of that name."""
 
     name: str = host("vertex_color", "begins with vertex_ or face_")
+    channel: str = choice(
+        "luminance", "of a colour, where a number is asked for", ("luminance", *"rgb")
+    )
 
     def check(self) -> None:
         if not str(self.name).startswith(ATTRIBUTES):

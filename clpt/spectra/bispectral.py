@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.errors import SceneError
-from clpt.spectra.files import _text
+from clpt.spectra.files import _text, fields_of
 from clpt.spectra.reradiation import Donaldson
 from clpt.spectra.spectrum import Tabulated, _floats
 
@@ -77,8 +76,8 @@ def _lines(path: str | Path) -> list[tuple[int, list[str]]]:
     """Line numbers and fields of the lines that hold any; `;` begins a line of remarks."""
     found = []
     for number, line in enumerate(_text(path).splitlines(), 1):
-        fields = [f for f in re.split(r"[\s,;]+", line.split("#")[0]) if f]
-        if fields and not line.startswith(";"):
+        fields = [] if line.startswith(";") else fields_of(line, path, number)
+        if fields:
             found.append((number, fields))
     if len(found) < 3:
         raise SceneError("holds no matrix of two rows or more", file=path)

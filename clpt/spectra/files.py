@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 
 from clpt.errors import SceneError
 from clpt.spectra.dispersion import MICROMETRE, from_formula
-from clpt.spectra.spectrum import Constant, Outside, Spectrum, Tabulated, absorption
+from clpt.spectra.spectrum import (
+    Constant,
+    Outside,
+    Spectrum,
+    Tabulated,
+    absorption,
+    check_reach,
+)
 
 PAGES = (".yml", ".yaml")
 SITE_COLUMNS = (["wl", "n"], ["wl", "k"])  # titles in refractiveindex.info's CSV, in um
@@ -105,7 +112,7 @@ def _tables(path: str | Path, text: str, widths: tuple[int, ...]) -> dict[str, l
     tables: dict[str, list[list[float]]] = {}
     title, titles_allowed, factor = "", True, 1.0
     for number, line in enumerate(text.splitlines(), 1):
-        fields = [f for f in re.split(r"[\s,;]+", line.split("#")[0]) if f]
+        fields = fields_of(line, path, number)
         if not fields:
             continue
         if 3 in widths and fields in SITE_COLUMNS and "" not in tables:
@@ -131,6 +138,19 @@ def _tables(path: str | Path, text: str, widths: tuple[int, ...]) -> dict[str, l
     if not tables:
         raise SceneError("no wavelengths in this file", file=path)
     return tables
+
+
+def fields_of(line: str, path: str | Path, number: int) -> list[str]:
+    """Split a line at blanks, commas or semicolons; `#` starts a comment.
+
+    Raises SceneError for a comma within a number, which a table has whose fields are separated
+    otherwise: it would begin another field.
+    """
+    text = line.split("#")[0]
+    if re.search(r"\d,\d", text) and re.search(r";|[^\s,;]\s+[^\s,;]", text.strip()):
+        message = f"write numbers with a decimal point, not a comma: {line.strip()!r}"
+        raise SceneError(message, file=path, line=number)
+    return [f for f in re.split(r"[\s,;]+", text) if f]
 
 
 def _tabulated(
@@ -161,11 +181,10 @@ def _page(path: str | Path, text: str) -> tuple[Spectrum | None, Spectrum]:
         kind = str(part.get("type", ""))
         try:
             if kind.startswith("formula"):
-                eta = from_formula(
-                    kind.removeprefix("formula").strip(),
-                    _numbers(part, "coefficients"),
-                    _numbers(part, "wavelength_range"),
-                )
+                ends = _numbers(part, "wavelength_range")
+                check_reach(ends[0] * MICROMETRE, ends[-1] * MICROMETRE)
+                name = kind.removeprefix("formula").strip()
+                eta = from_formula(name, _numbers(part, "coefficients"), ends)
             elif kind in ("tabulated n", "tabulated k", "tabulated nk"):
                 columns = _page_columns(part, 3 if kind.endswith("nk") else 2)
                 if "n" in kind.split()[1]:

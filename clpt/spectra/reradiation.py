@@ -3,8 +3,8 @@
 A re-radiation matrix Phi(out, in) [1/nm] (Donaldson 1954) is the share of the energy that arrives
 at `in` and leaves again per nm at `out`. It holds fluorescence only; what keeps its wavelength is
 an ordinary reflectance. Light is never given out at a shorter wavelength than it had (Stokes
-1852), but for the steps of a table: between two of its wavelengths what comes at one may leave at
-the other.
+1852), but for the steps of a table: what comes between two of its wavelengths may leave between
+them.
 """
 
 from __future__ import annotations

@@ -186,10 +186,22 @@ class Cauchy(Spectrum):
 def absorption(k: Spectrum) -> Spectrum:
     """Absorption coefficient [1/m] where the extinction coefficient is k: 4 pi k / lambda.
 
-    Born and Wolf, Principles of Optics, 7th ed., 14.1 eq. 19. Whole nanometres, 200 to 2000.
+    Born and Wolf, Principles of Optics, 7th ed., 14.1 eq. 19. Whole nanometres, 200 to 2000. Raises
+    SceneError for a table that lies elsewhere.
     """
+    if isinstance(k, Tabulated):
+        check_reach(k.lambdas[0], k.lambdas[-1])
     values = 4e9 * np.pi * k.sample(WIDEST) / WIDEST
     return Tabulated(WIDEST, values, "hold") if values.any() else Constant(0.0)
+
+
+def check_reach(first: float, last: float) -> None:
+    """Raise SceneError for data from `first` to `last` [nm] of which no film can see anything."""
+    if last < SHORTEST or first > LONGEST:
+        raise SceneError(
+            f"its wavelengths are {first:g} to {last:g} nm, but films lie within {SHORTEST:g} to"
+            f" {LONGEST:g} nm; give wavelengths in nm"
+        )
 
 
 @lru_cache(maxsize=4096)
@@ -218,6 +230,17 @@ def extremes(
 def d65() -> Tabulated:
     """CIE standard illuminant D65 with luminance 1."""
     return with_luminance_one(data.table("illuminants/D65.csv"))
+
+
+@cache
+def primaries() -> tuple[Tabulated, Tabulated, Tabulated]:
+    """Reflectances of the colours red, green and blue of Rec. 709, which add up to 1.
+
+    r, g and b times them has the colour (r, g, b) under D65, exactly (Mallett and Yuksel 2019).
+    """
+    rows = data.table("primaries.csv")
+    red, green, blue = (Tabulated(rows[:, 0], rows[:, i], "hold") for i in (1, 2, 3))
+    return red, green, blue
 
 
 def with_luminance_one(rows: Samples) -> Tabulated:

@@ -106,7 +106,7 @@ def evaluate(coefficients: ArrayLike, lambdas: ArrayLike) -> Array:
 
 @cache
 def _table() -> NDArray[np.float32]:
-    with np.load(ROOT / "uplift.npz") as file:
+    with np.load(ROOT / "uplift.npz", allow_pickle=False) as file:
         steps = file["steps"]
     for axis in (1, 2, 3):
         steps = steps.cumsum(axis=axis + 1, dtype=np.int32)

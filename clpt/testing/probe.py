@@ -111,7 +111,8 @@ class Probe:
         if not layers:
             return NOTHING
         if self.mode == "spectral":
-            films = [[e.eta.value, e.k.value, e.thickness, e.profile] for e in layers]
+            constants: Sequence[Any] = layers  # whose values are no textures
+            films = [[e.eta.value, e.k.value, e.thickness, e.profile] for e in constants]
             return np.array(films, np.float32)
         indices = {
             k: np.asarray(params[k], float) for k, p in self._streamed() if p.role == "index"

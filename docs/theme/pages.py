@@ -37,6 +37,7 @@ MODULES = {
         f"clpt.scene.{category}": category
         for category in ("cameras", "shapes", "materials", "textures", "lights", "integrators")
     },
+    "clpt.scene.values": "values",
     "clpt.spectra": "spectra",
     "clpt.transforms": "transforms",
     "clpt.device": "device",

@@ -1,7 +1,7 @@
 /* Every triangle against every ray, in lanes: the layout for tiny scenes.
  *
  * `tris` holds a record of 16 floats for each triangle, in the caller's order: v0, e1 = v1 - v0,
- * e2 = v2 - v0, n = cross(e1, e2), prim, tag, two unused. A record is read once and tested against
+ * e2 = v2 - v0, n = cross(e1, e2), prim, tag, plane, side as of TriHit. A record is read once and tested against
  * all lanes of the work-item.
  */
 #include "bvh/hit.cl"
@@ -9,7 +9,7 @@
 
 #define BRUTE_EDGE 2e-6f
 
-typedef struct { real t, u, v; natural prim, tag; vec3 n; } BruteHit;
+typedef struct { real t, u, v; natural prim, tag; vec3 n; real plane, side; } BruteHit;
 
 /* The lanes that meet a record between tmin and tmax. With s = v0 - o and w = s x d, Cramer's rule
  * gives t = s.n / d.n, u = e2.w / d.n, v = -e1.w / d.n. Triangles reach a few rounding errors beyond
@@ -52,6 +52,8 @@ inline BruteHit brute_closest(global const float *tris, uint count, vec3 o, vec3
     hit.n.x = gather(tris, at + 9);
     hit.n.y = gather(tris, at + 10);
     hit.n.z = gather(tris, at + 11);
+    hit.plane = gather(tris, at + 14);
+    hit.side = gather(tris, at + 15);
     return hit;
 }
 

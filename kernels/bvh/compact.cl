@@ -140,11 +140,9 @@ inline uint compact_item(uint2 *items)
 inline TriHit compact_hit(global const float *leaves, uint item, float t, float u, float v)
 {
     global const float *c = leaves + (ulong)item * 12;
-    float e1x = c[3] - c[0], e1y = c[4] - c[1], e1z = c[5] - c[2];
-    float e2x = c[6] - c[0], e2y = c[7] - c[1], e2z = c[8] - c[2];
-    TriHit hit = {t, u, v, as_uint(c[9]), as_uint(c[10]),
-                  e1y * e2z - e1z * e2y, e1z * e2x - e1x * e2z, e1x * e2y - e1y * e2x};
-    return hit;
+    float3 v0 = (float3)(c[0], c[1], c[2]);
+    float3 e1 = (float3)(c[3], c[4], c[5]) - v0, e2 = (float3)(c[6], c[7], c[8]) - v0;
+    return tri_hit(t, u, v, as_uint(c[9]), as_uint(c[10]), v0, e1, e2);
 }
 
 inline TriHit compact_closest(global const float *nodes, global const float *leaves, float ox, float oy,

@@ -21,22 +21,24 @@ inline int leaf_corners(global const float *vertices, global const uint *faces, 
     return 0;
 }
 
-/* Of bvh/binary.cl, 16 floats: v0, v1, v2, n = cross(v1 - v0, v2 - v0); then prim, tag, two unused. */
+/* Of bvh/binary.cl, 16 floats: v0, v1, v2, n = cross(v1 - v0, v2 - v0); then prim, tag, plane, side. */
 inline void leaf_store_record(global float *record, const float4 v[3])
 {
-    float4 n = cross(v[1] - v[0], v[2] - v[0]);
+    float4 e1 = v[1] - v[0], e2 = v[2] - v[0], n = cross(e1, e2);
     vstore4((float4)(v[0].xyz, v[1].x), 0, record);
     vstore4((float4)(v[1].yz, v[2].xy), 1, record);
     vstore4((float4)(v[2].z, n.xyz), 2, record);
+    vstore2((float2)(dot(n, v[0]), tri_side(e1.xyz, e2.xyz)), 7, record);
 }
 
-/* Of bvh/brute.cl, 16 floats: v0, e1, e2, n = cross(e1, e2); then prim, tag, two unused. */
+/* Of bvh/brute.cl, 16 floats: v0, e1, e2, n = cross(e1, e2); then prim, tag, plane, side. */
 inline void leaf_store_brute(global float *record, const float4 v[3])
 {
     float4 e1 = v[1] - v[0], e2 = v[2] - v[0], n = cross(e1, e2);
     vstore4((float4)(v[0].xyz, e1.x), 0, record);
     vstore4((float4)(e1.yz, e2.xy), 1, record);
     vstore4((float4)(e2.z, n.xyz), 2, record);
+    vstore2((float2)(dot(n, v[0]), tri_side(e1.xyz, e2.xyz)), 7, record);
 }
 
 inline float leaf_least(float8 row)

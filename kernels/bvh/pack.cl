@@ -49,7 +49,7 @@ kernel NO_VECTORIZE void pack_triangles(global const float8 *restrict items, uin
     global float *record = records + (ulong)i * 16;
     leaf_corners(vertices, faces, prim, corners);
     leaf_store_record(record, corners);
-    vstore4((float4)(as_float(prim), as_float(tags[prim]), 0.0f, 0.0f), 3, record);
+    vstore2((float2)(as_float(prim), as_float(tags[prim])), 6, record);
 }
 
 /* The items' indices alone, for trees over shapes that the caller keeps. */

@@ -1,4 +1,4 @@
-/* One ray against one triangle record of bvh/leaves.cl: v0, v1, v2, n, prim, tag. */
+/* One ray against one triangle record of bvh/leaves.cl: v0, v1, v2, n, prim, tag, plane, side. */
 #include "bvh/hit.cl"
 #include "bvh/ray.cl"
 #include "bvh/shear.cl"
@@ -10,7 +10,7 @@ inline int triangle_intersect(global const float *record, const Shear *shear, fl
     int inside = shear_intersect(shear, record, 1, &t, &u, &v);
     if (!(inside && t > tmin && t < hit->t)) return 0;
     TriHit found = {t, u, v, as_uint(record[12]), as_uint(record[13]),
-                    record[9], record[10], record[11]};
+                    record[9], record[10], record[11], record[14], record[15]};
     *hit = found;
     return 1;
 }

@@ -93,11 +93,9 @@ inline TriHit wide8_hit(global const float *leaves, uint slot, float t, const Wi
     global const float *b = leaves + (ulong)(slot >> 3) * 88 + (slot & 7);
     float again, u, v;
     shear_intersect(&r->shear, b, 8, &again, &u, &v);
-    float e1x = b[24] - b[0], e1y = b[32] - b[8], e1z = b[40] - b[16];
-    float e2x = b[48] - b[0], e2y = b[56] - b[8], e2z = b[64] - b[16];
-    TriHit hit = {t, u, v, as_uint(b[72]), as_uint(b[80]),
-                  e1y * e2z - e1z * e2y, e1z * e2x - e1x * e2z, e1x * e2y - e1y * e2x};
-    return hit;
+    float3 v0 = (float3)(b[0], b[8], b[16]);
+    float3 e1 = (float3)(b[24], b[32], b[40]) - v0, e2 = (float3)(b[48], b[56], b[64]) - v0;
+    return tri_hit(t, u, v, as_uint(b[72]), as_uint(b[80]), v0, e1, e2);
 }
 
 /* The nearest of the children `m` of a node that are met, of which there is one at least, by their words and

@@ -1,5 +1,5 @@
-/* Arbitrary output values of the first surface, in three channels; CHANNEL says which. Depth along the ray and position
- * in metres. */
+/* Arbitrary output values of the first surface that is not null, in three channels; CHANNEL says which. Depth along
+ * the ray and position in metres. */
 #define CHANNEL_DEPTH 0
 #define CHANNEL_POSITION 1
 #define CHANNEL_GEOMETRIC_NORMAL 2
@@ -11,13 +11,18 @@
 
 void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mask active)
 {
-    mask front;
-    Surface s = surface_load(scene, hit, at, active, load_path_o(path, at), load_path_d(path, at), &front);
+    Vertex vertex = vertex_load(scene, path, hit, at, active);
+    Surface s = vertex.s;
+#if BSDF_IS_NULL
+    mask next = active & vertex_continues(scene, vertex);
+    vertex_leave(path, at, next, vertex, vertex.d, vertex.beta);
+    vertex_end(path, at, active, next, vertex.state);
+#else
     integer row = sel_i(active, load_hit_shape(hit, at), (integer)(0)) * SHAPE_ROW_WORDS;
     ShapeRow shape = shape_row_row(scene.shapes, row);
     vec3 v = v3(0.0f, 0.0f, 0.0f);
 #if CHANNEL == CHANNEL_DEPTH
-    v.x = load_hit_t(hit, at);
+    v.x = vertex.t + path_null_distance(path, at);
 #elif CHANNEL == CHANNEL_POSITION
     v = s.p;
 #elif CHANNEL == CHANNEL_GEOMETRIC_NORMAL
@@ -44,5 +49,6 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
 #endif
     Spectrum value = {v.x, v.y, v.z};
     store_path_radiance(path, at, active, value);
-    store_path_state(path, at, active, load_path_state(path, at) - PATH_ALIVE + 1);
+    vertex_end(path, at, active, mask_of(0), vertex.state);
+#endif
 }

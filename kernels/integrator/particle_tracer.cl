@@ -42,7 +42,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     /* The next direction. */
     vec2 uv = sampler_pair(sampler, scatter.dimension + DIMENSION_BSDF);
     BsdfSample bs = hero_sample(m, wo, v3(uv.x, uv.y, scatter.choice.y), &ratio);
-    mask next = active & (bs.pdf > 0.0f) & (depth + 1 < settings->max_depth);
+    mask next = active & (bs.pdf > 0.0f) & vertex_continues(scene, v);
     vec3 onward = normalize3(to_world(frame, bs.wi));
     real leaves = fabs(dot3(s.n, onward)) * arrives;
     real adjoint = bs.eta * bs.eta * leaves * fabs(wo.z) / max_r(fabs(bs.wi.z), (real)(1e-6f));
@@ -54,7 +54,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
 #endif
     beta = spectrum_scale(spectrum_mul(beta, carried), shading_frame_share(scatter.shading, neg3(v.d)));
 
-    /* Russian roulette, on what is left of what the light gave. */
+#if !BSDF_IS_NULL /* Russian roulette, on what is left of what the light gave. */
     mask play = depth >= settings->rr_depth;
     real strength = spectrum_max(beta) * load_path_weight(path, at);
     next = next & (strength > 0.0f);
@@ -62,6 +62,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
         vec2 u = sampler_pair(sampler, scatter.dimension + DIMENSION_ROULETTE);
         next = roulette(next, play, strength, u.x, &beta);
     }
+#endif
 
     vertex_leave(path, at, next, v, onward, beta);
     hero_keep(path, at, next, ratio);

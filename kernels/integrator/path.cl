@@ -28,7 +28,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
         store_path_radiance(path, at, lit, spectrum_add(load_path_radiance(path, at), le));
     }
 #endif
-    mask met = active & !hidden, next = met & (depth + 1 < settings->max_depth);
+    mask met = active & !hidden, next = met & vertex_continues(scene, v);
 
     Sampler sampler = pixel_sampler(settings, load_path_pixel_index(path, at), load_path_sample(path, at));
     Scattering scatter = vertex_scattering(scene, path, at, met, v, sampler);
@@ -60,7 +60,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     beta = spectrum_scale(spectrum_mul(beta, bs.weight), shading_frame_share(scatter.shading, onward));
     real eta = load_path_eta(path, at) * bs.eta;
 
-    /* Russian roulette. */
+#if !BSDF_IS_NULL /* Russian roulette. */
     mask play = depth + 1 >= settings->rr_depth;
     real strength = spectrum_max(beta);
     next = next & (strength > 0.0f);
@@ -68,11 +68,10 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
         vec2 u = sampler_pair(sampler, scatter.dimension + DIMENSION_ROULETTE);
         next = roulette(next, play, strength * eta * eta, u.x, &beta);
     }
+#endif
 
     vertex_leave(path, at, next, v, onward, beta);
-#if BSDF_IS_NULL /* for weighing a light that is met further on, nothing has happened */
-    store_path_null_distance(path, at, next, load_path_null_distance(path, at) + v.t);
-#else
+#if !BSDF_IS_NULL
     path_scattered(path, at, next);
     store_path_pdf(path, at, next, sel((bs.lobe & LOBE_DELTA) != 0, (real)(-1.0f), bs.pdf));
 #if USES_INFINITE && !BSDF_DELTA

@@ -51,11 +51,13 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
     mask next = active & (bs.pdf > 0.0f);
     hero_keep(path, at, next, ratio);
 #endif
-    next = next & (depth + 1 < settings->max_depth);
+    next = next & vertex_continues(scene, v);
     vec3 onward = normalize3(to_world(frame, wi));
     beta = spectrum_scale(beta, shading_frame_share(scatter.shading, onward));
     store_path_radiance(path, at, active, radiance);
     vertex_leave(path, at, next, v, onward, beta);
+#if !BSDF_IS_NULL
     store_path_pdf(path, at, next, (real)(-1.0f));
+#endif
     vertex_end(path, at, active, next, state);
 }

@@ -31,6 +31,7 @@ inline LightRay surface_emit(SurfacePoint q, mask along, Spectrum value, vec2 v)
     LightRay r;
     r.o = q.p;
     r.n = q.n;
+    r.size = sqrt(q.area);
     r.d = sel3(along, q.n, to_world(frame_of(q.n), cosine_hemisphere(v)));
     r.power = spectrum_scale(value, q.area * sel(along, (real)(1.0f), (real)(PI)));
     r.seen = spectrum_sel(along, spectrum_of(0.0f), spectrum_scale(value, q.area));
@@ -51,6 +52,7 @@ inline LightRay distant_emit(Scene scene, LightSample s, vec2 v)
     vec3 center = v3((real)(settings->center[0]), (real)(settings->center[1]), (real)(settings->center[2]));
     r.o = add3(center, to_world(f, v3(q.x * radius, q.y * radius, (real)(-radius))));
     r.n = r.d;
+    r.size = 0.0f;
     r.seen = spectrum_sel(s.pdf > 0.0f, spectrum_scale(s.radiance, 1.0f / max_r(s.pdf, (real)(1e-30f))),
                           spectrum_of(0.0f));
     r.power = spectrum_scale(spectrum_sel(s.pdf > 0.0f, r.seen, s.radiance), PI * radius * radius);

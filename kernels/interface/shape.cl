@@ -8,6 +8,8 @@
  * and, for shapes that rays meet as they are (not as triangles),
  *
  *   ShapeHit    <kind>_intersect(<Kind> s, vec3 o, vec3 d, real tmin, real tmax);    nearest hit in (tmin, tmax)
+ *   vec3        <kind>_onto(<Kind> s, vec3 p);                                       the point of it that p is beside
+ *   real        <kind>_size(<Kind> s);                                               see core/rounding.cl [m]
  *   vec3        <kind>_dpdu(<Kind> s, vec3 p, vec2 uv);                              tangent at a point of it
  *   vec3        <kind>_dpdv(<Kind> s, vec3 p, vec2 uv);                              and along v
  *

@@ -6,12 +6,14 @@ inline ShapeSample area_turned(ShapeSample q, mask both)
     return q;
 }
 
-inline LightSample area_sample(ShapeSample q, Spectrum radiance)
+/* The sample ends a rounding off the surface, so that the surface does not shade it. p: the point [m]. */
+inline LightSample area_sample(ShapeSample q, vec3 p, Spectrum radiance)
 {
-    mask front = dot3(q.n, q.wi) < 0.0f;
+    real cosine = -dot3(q.n, q.wi);
+    mask front = cosine > 0.0f;
     LightSample s;
     s.wi = q.wi;
-    s.t = q.t;
+    s.t = max_r(q.t - rounding_step(p, q.size + q.t) / max_r(cosine, (real)(1e-6f)), 0.5f * q.t);
     s.radiance = spectrum_sel(front, radiance, spectrum_of(0.0f));
     s.pdf = sel(front, q.pdf, (real)(0.0f));
     return s;

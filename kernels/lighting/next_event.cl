@@ -1,8 +1,7 @@
 /* Rays to lights, and what weighing a light that was met needs to know of the path. */
 
 /* Puts a shadow ray into its slab, for the lanes that `shine`; the other active ones have none. It goes
- * from off the surface to the point on the light: along ls.wi it would meet another one, and a light
- * seen at a grazing angle would shade itself. */
+ * from off the surface to the point of the light sample: along ls.wi it would end beside it. */
 inline void shadow_toward(Slab shadow, At at, mask active, mask shine, Surface s, LightSample ls, Spectrum value)
 {
     vec3 from = surface_offset(s, ls.wi), to = sub3(madd3(ls.wi, ls.t, s.p), from);

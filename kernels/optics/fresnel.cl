@@ -6,7 +6,17 @@ typedef struct {
     real eta;   /* index of the side that light is refracted to, over that of the side of cos_i */
 } Fresnel;
 
-/* Two dielectrics (Born and Wolf 1999, 1.5.2). An index of one is no boundary: f = 0 at any angle. */
+/* The shares that two dielectrics reflect of light polarised across the plane of incidence and along it
+ * (Born and Wolf 1999, 1.5.2); c, t: cosines before and behind, eta: index behind over that before. */
+inline vec2 fresnel_polarised(real c, real t, real eta)
+{
+    vec2 r = {(c - eta * t) / max_r(c + eta * t, (real)(1e-20f)), (eta * c - t) / max_r(eta * c + t, (real)(1e-20f))};
+    r.x *= r.x;
+    r.y *= r.y;
+    return r;
+}
+
+/* Two dielectrics. An index of one is no boundary: f = 0 at any angle. */
 inline Fresnel fresnel_dielectric(real cos_i, real eta)
 {
     Fresnel r;
@@ -14,9 +24,8 @@ inline Fresnel fresnel_dielectric(real cos_i, real eta)
     r.eta = sel(cos_i >= 0.0f, eta, 1.0f / eta);
     real cos2_t = 1.0f - (1.0f - c * c) / (r.eta * r.eta);
     real t = sqrt_r(cos2_t);
-    real s_polarised = (c - r.eta * t) / max_r(c + r.eta * t, (real)(1e-20f));
-    real p_polarised = (r.eta * c - t) / max_r(r.eta * c + t, (real)(1e-20f));
-    real f = 0.5f * (s_polarised * s_polarised + p_polarised * p_polarised);
+    vec2 both = fresnel_polarised(c, t, r.eta);
+    real f = 0.5f * (both.x + both.y);
     f = sel((cos2_t <= 0.0f) | (c == 0.0f), (real)(1.0f), f);
     r.f = sel(eta == 1.0f, (real)(0.0f), f);
     r.cos_t = sel(cos_i >= 0.0f, -t, t);

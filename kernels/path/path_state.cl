@@ -6,7 +6,17 @@
 #define PATH_DONE 0x4000  /* the slot is at the end of its work list */
 #define PATH_SHADOW 0x10000
 
-/* Dimensions of a sample, in pairs: film, lens, wavelength, then DIMENSIONS_A_VERTEX per vertex. */
+/* A null surface (a hole of a mask, a boundary that neither bends nor scatters) is no step of a path: it adds nothing
+ * to the depth. A path crosses this many of them, and then ends; a shadow ray that meets more is blocked. */
+#define MOST_NULL_SURFACES 1024
+#if USES_NULL_SURFACES
+#define path_nulls(path, at) load_path_nulls(path, at)
+#else
+#define path_nulls(path, at) ((integer)(0))
+#endif
+
+/* Dimensions of a sample, in pairs: film, lens, wavelength, then DIMENSIONS_A_VERTEX per surface that is met, null
+ * ones among them. */
 #define DIMENSION_FILM 0
 #define DIMENSION_LENS 1
 #define DIMENSION_WAVELENGTH 2

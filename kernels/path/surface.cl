@@ -1,10 +1,12 @@
 /* The point of a surface that a ray hit, with all that shading asks for. */
+#include "core/rounding.cl"
 #include "path/surface_flags.cl"
 #include "tracing/trace_hit.cl"
 #include "generated/instances.cl"
 
 typedef struct {
-    vec3 p;       /* [m] */
+    vec3 p;       /* on it, but for the rounding of p itself [m] */
+    real size;    /* of the primitive [m], see core/rounding.cl */
     vec3 n;       /* geometric normal, unit length, on the side of the front */
     vec3 ns;      /* shading normal, unit length */
     vec3 dpdu;    /* along the surface's u; not normalised, may be zero */
@@ -31,13 +33,20 @@ inline vec2 vertex_vec2(global const float *table, integer vertex)
 
 /* The surface where the ray from `o` along `d` ends. `front` tells which side was hit. A two-sided
  * back has its normals negated, so that the BSDF sees a front. USES_NORMALS, USES_UVS and USES_TANGENTS say
- * what the scene needs; dpdu_of_shape and dpdv_of_shape are generated for its analytic shapes. */
+ * what the scene needs; onto_of_shape, size_of_shape, dpdu_of_shape and dpdv_of_shape are generated for its analytic
+ * shapes. */
 inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, mask *front)
 {
     Surface s;
     ShapeRow shape = shape_row_row(scene.shapes, sel_i(active, h.shape, (integer)(0)) * SHAPE_ROW_WORDS);
-    s.n = normalize3(sel3(active, h.n, v3(0.0f, 0.0f, 1.0f)));
-    s.p = madd3(d, h.t, o);
+    vec3 n = sel3(active, h.n, v3(0.0f, 0.0f, 1.0f));
+    real inverse = 1.0f / sqrt(max_r(dot3(n, n), (real)(1e-35f)));
+    s.n = scale3(n, inverse);
+    /* The ray's roundings grow with its length. They may have put its end behind the surface, so that it is put back
+     * on it, or behind a neighbour, so that it is put back along the ray first. */
+    s.p = madd3(d, h.t * (1.0f - 2.0f * SURFACE_ROUNDING) - 2.0f * rounding_step(o, (real)(0.0f)), o);
+    s.p = madd3(s.n, h.plane * inverse - dot3(s.n, s.p), s.p);
+    s.size = triangle_size(h.side, inverse);
     s.ns = s.n;
     s.uv.x = h.u;
     s.uv.y = h.v;
@@ -104,11 +113,15 @@ inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, 
 #endif
     }
 #endif
-#if USES_ANALYTIC && USES_TANGENTS
+#if USES_ANALYTIC
     mask analytic = active & (shape.kind != 0);
     if (any(analytic)) {
+        s.p = sel3(analytic, onto_of_shape(scene, shape, prim, madd3(d, h.t, o)), s.p);
+        s.size = sel(analytic, size_of_shape(scene, shape, prim), s.size);
+#if USES_TANGENTS
         s.dpdu = sel3(analytic, dpdu_of_shape(scene, shape, prim, s.p, s.uv), s.dpdu);
         s.dpdv = sel3(analytic, dpdv_of_shape(scene, shape, prim, s.p, s.uv), s.dpdv);
+#endif
     }
 #endif
     *front = dot3(s.n, d) < 0.0f;
@@ -125,7 +138,7 @@ inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, 
 inline Surface surface_load(Scene scene, Slab hit, At at, mask active, vec3 o, vec3 d, mask *front)
 {
     TraceHit h = {load_hit_t(hit, at), load_hit_u(hit, at), load_hit_v(hit, at), load_hit_n(hit, at),
-                  load_hit_prim(hit, at), load_hit_shape(hit, at)};
+                  load_hit_plane(hit, at), load_hit_side(hit, at), load_hit_prim(hit, at), load_hit_shape(hit, at)};
 #if USES_INSTANCES
     h.instance = load_hit_instance(hit, at);
 #endif
@@ -157,15 +170,15 @@ inline Frame surface_frame(Surface s)
     return f;
 }
 
-/* How far off the surface a ray starts: by more than what rounding may have put it under. */
-inline real surface_step(Surface s)
-{
-    return (1.0f + max_r(max_r(fabs(s.p.x), fabs(s.p.y)), fabs(s.p.z))) * RAY_EPSILON;
-}
-
-/* Where a ray toward `w` starts. */
+/* Where a ray toward `w` starts: off the surface by more than what rounding may have put it under. */
 inline vec3 surface_offset(Surface s, vec3 w)
 {
-    real step = surface_step(s);
+    real step = rounding_step(s.p, s.size);
     return madd3(s.n, sel(dot3(s.n, w) < 0.0f, -step, step), s.p);
+}
+
+/* How far along the unit vector `w` that is, where it does not graze the surface. */
+inline real surface_lead(Surface s, vec3 w)
+{
+    return rounding_step(s.p, s.size) / max_r(fabs(dot3(s.n, w)), (real)(0.01f));
 }

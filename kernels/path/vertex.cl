@@ -6,6 +6,7 @@ typedef struct {
     Wavelengths lambdas;
     Spectrum beta;        /* throughput, here */
     integer state, depth; /* see path/path_state.cl */
+    integer met;          /* surfaces so far, with the null ones, which are no depth */
     Surface s;
     mask front;           /* the front was hit */
     integer row;          /* of the material */
@@ -36,12 +37,14 @@ inline Vertex vertex_load(Scene scene, Slab path, Slab hit, At at, mask active)
     v.beta = load_path_beta(path, at);
     v.state = load_path_state(path, at);
     v.depth = v.state & PATH_DEPTH;
+    v.met = v.depth + path_nulls(path, at);
     v.s = surface_load(scene, hit, at, active, v.o, v.d, &v.front);
     v.row = MATERIAL_ROW(sel_i(active, load_hit_material(hit, at), (integer)(0)));
 #if USES_ABSORPTION
     v.inside = BSDF_INTERIOR(v.row);
     v.medium = medium_met(sel_i(active, load_path_medium(path, at), (integer)(0)), v.inside, v.front);
-    v.beta = spectrum_mul(v.beta, medium_transmittance(scene, v.medium, v.t, v.lambdas));
+    real through = v.t + sel(active, load_path_lead(path, at), (real)(0.0f));
+    v.beta = spectrum_mul(v.beta, medium_transmittance(scene, v.medium, through, v.lambdas));
 #endif
     return v;
 }
@@ -51,7 +54,7 @@ inline Scattering vertex_scattering(Scene scene, Slab path, At at, mask active, 
 {
     Scattering scatter;
     scatter.sampler = sampler;
-    scatter.dimension = as_natural(DIMENSION_VERTEX + v.depth * DIMENSIONS_A_VERTEX);
+    scatter.dimension = as_natural(DIMENSION_VERTEX + v.met * DIMENSIONS_A_VERTEX);
     scatter.choice.x = 0.0f;
     scatter.choice.y = 0.0f;
 #if USES_CHOICE
@@ -85,20 +88,41 @@ inline Spectrum vertex_beyond(Scene scene, Vertex v, vec3 w, real t, Wavelengths
     return value;
 }
 
+/* Whether paths may be longer than to this vertex. */
+inline mask vertex_continues(Scene scene, Vertex v)
+{
+#if BSDF_IS_NULL
+    return v.met - v.depth < MOST_NULL_SURFACES;
+#else
+    return v.depth + 1 < scene.settings->max_depth;
+#endif
+}
+
 /* The `next` paths go on from here, along d. */
 inline void vertex_leave(Slab path, At at, mask next, Vertex v, vec3 d, Spectrum beta)
 {
+#if BSDF_IS_NULL /* nothing has happened: the camera's ray has its end, and lights are weighed by what was before */
+    real pdf = load_path_pdf(path, at);
+    store_path_pdf(path, at, next & (v.depth == 0), pdf + v.t);
+    store_path_null_distance(path, at, next, load_path_null_distance(path, at) + v.t);
+#endif
     store_path_o(path, at, next, surface_offset(v.s, d));
     store_path_d(path, at, next, d);
     store_path_beta(path, at, next, beta);
 #if USES_ABSORPTION
     store_path_medium(path, at, next, medium_beyond(v.medium, v.inside, v.front, dot3(v.s.n, d) < 0.0f));
+    store_path_lead(path, at, next, surface_lead(v.s, d));
 #endif
 }
 
-/* The `active` paths are a vertex longer; those that do not go on are no longer alive. */
+/* The `active` paths are a vertex longer, if it is not a null surface; those that do not go on are no longer alive. */
 inline void vertex_end(Slab path, At at, mask active, mask next, integer state)
 {
-    state = sel_i(next, state, state - (state & PATH_ALIVE)) + sel_i(active, (integer)(1), (integer)(0));
+    state = sel_i(next, state, state - (state & PATH_ALIVE));
+#if BSDF_IS_NULL
+    store_path_nulls(path, at, active, load_path_nulls(path, at) + 1);
     store_path_state(path, at, active, state);
+#else
+    store_path_state(path, at, active, state + 1);
+#endif
 }

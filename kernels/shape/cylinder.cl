@@ -1,6 +1,8 @@
 /* An open tube; sampled evenly over its area. u is the azimuth over 2 pi, v runs along the axis. */
 #include "tracing/analytic.cl"
 
+real cylinder_size(Cylinder q) { return q.radius + size3(q.axis); }
+
 inline real cylinder_pdf_area(Cylinder q)
 {
     return INV_2PI / max_r(q.radius * sqrt(dot3(q.axis, q.axis)), (real)(1e-30f));
@@ -17,6 +19,7 @@ ShapeSample cylinder_sample(Cylinder q, vec3 p, vec2 u)
     r.wi = scale3(to, 1.0f / r.t);
     r.n = scale3(outward, q.side);
     r.uv = u;
+    r.size = cylinder_size(q);
     r.pdf = solid_angle_pdf(cylinder_pdf_area(q), r.t, fabs(dot3(outward, r.wi)));
     return r;
 }
@@ -52,6 +55,13 @@ ShapeHit cylinder_intersect(Cylinder q, vec3 o, vec3 d, real tmin, real tmax)
     h.uv.x = turn_of(y, x);
     h.uv.y = v;
     return h;
+}
+
+vec3 cylinder_onto(Cylinder q, vec3 p)
+{
+    vec3 f = sub3(p, q.p0), out = add3(scale3(q.x, dot3(f, q.x)), scale3(q.y, dot3(f, q.y)));
+    real v = dot3(f, q.axis) / dot3(q.axis, q.axis);
+    return add3(madd3(normalize3(out), q.radius, scale3(q.axis, v)), q.p0);
 }
 
 vec3 cylinder_dpdu(Cylinder q, vec3 p, vec2 uv)

@@ -2,6 +2,8 @@
  * distance from the centre (1 at the rim), v the azimuth over 2 pi. */
 #include "tracing/analytic.cl"
 
+real disk_size(Disk q) { return size3(q.s) + size3(q.t); }
+
 inline real disk_pdf_area(Disk q)
 {
     vec3 c = cross3(q.s, q.t);
@@ -18,6 +20,7 @@ ShapeSample disk_sample(Disk q, vec3 p, vec2 u)
     r.n = q.n;
     r.uv.x = sqrt_r(u.x);
     r.uv.y = u.y;
+    r.size = disk_size(q);
     r.pdf = solid_angle_pdf(disk_pdf_area(q), r.t, fabs(dot3(q.n, r.wi)));
     return r;
 }
@@ -45,6 +48,8 @@ ShapeHit disk_intersect(Disk q, vec3 o, vec3 d, real tmin, real tmax)
     h.uv.y = turn_of(y, x);
     return h;
 }
+
+vec3 disk_onto(Disk q, vec3 p) { return madd3(q.n, dot3(q.n, sub3(q.center, p)), p); }
 
 vec3 disk_dpdu(Disk q, vec3 p, vec2 uv) /* along the radius */
 {

@@ -1,15 +1,18 @@
 /* A rectangle as a light, sampled evenly over its area. Rays meet its two triangles. */
+#include "core/rounding.cl"
+
 ShapeSample rectangle_sample(Rectangle q, vec3 p, vec2 u)
 {
     vec3 to = sub3(madd3(q.s, 2.0f * u.x - 1.0f, madd3(q.t, 2.0f * u.y - 1.0f, q.center)), p);
     vec3 quarter = cross3(q.s, q.t);
-    real t2 = max_r(dot3(to, to), (real)(1e-20f));
+    real t2 = max_r(dot3(to, to), (real)(1e-20f)), area = max_r(4.0f * sqrt(dot3(quarter, quarter)), (real)(1e-30f));
     ShapeSample r;
     r.t = sqrt(t2);
     r.wi = scale3(to, 1.0f / r.t);
     r.n = q.n;
     r.uv = u;
-    r.pdf = solid_angle_pdf(0.25f / max_r(sqrt(dot3(quarter, quarter)), (real)(1e-30f)), r.t, fabs(dot3(q.n, r.wi)));
+    r.size = triangle_size(2.0f * max_r(size3(q.s), size3(q.t)), 1.0f / area);
+    r.pdf = solid_angle_pdf(1.0f / area, r.t, fabs(dot3(q.n, r.wi)));
     return r;
 }
 

@@ -1,7 +1,8 @@
 /* A sphere. As a light it is sampled evenly over the cone that it fills from outside, and evenly over
  * its area from inside. u is the azimuth about its z axis over 2 pi, v the angle from it over pi. */
 #include "tracing/analytic.cl"
-#include "path/surface_flags.cl"
+
+real sphere_size(Sphere q) { return q.radius; }
 
 inline vec2 sphere_uv(Sphere q, vec3 outward)
 {
@@ -16,7 +17,7 @@ inline vec2 sphere_uv(Sphere q, vec3 outward)
  * may put it there: it would find no light, while a ray from its offset inside meets all of it. */
 inline mask sphere_outside(Sphere q, real d)
 {
-    return d > q.radius + 2.0f * RAY_EPSILON * (1.0f + size3(q.center) + q.radius);
+    return d > q.radius + 2.0f * SURFACE_ROUNDING * (size3(q.center) + 2.0f * q.radius);
 }
 
 /* sin^2 of the cone's half angle from a distance d > radius, and 1 - cos without cancellation. */
@@ -56,6 +57,7 @@ ShapeSample sphere_sample(Sphere q, vec3 p, vec2 u)
     }
     r.n = scale3(outward, q.side);
     r.uv = sphere_uv(q, outward);
+    r.size = sphere_size(q);
     return r;
 }
 
@@ -92,6 +94,8 @@ ShapeHit sphere_intersect(Sphere q, vec3 o, vec3 d, real tmin, real tmax)
     h.uv = sphere_uv(q, outward);
     return h;
 }
+
+vec3 sphere_onto(Sphere q, vec3 p) { return madd3(normalize3(sub3(p, q.center)), q.radius, q.center); }
 
 vec3 sphere_dpdu(Sphere q, vec3 p, vec2 uv)
 {

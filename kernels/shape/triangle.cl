@@ -1,4 +1,6 @@
 /* One triangle as a light: sampled evenly over its area. Rays meet triangles through kernels/bvh. */
+#include "core/rounding.cl"
+
 ShapeSample triangle_sample(Triangle s, vec3 p, vec2 u)
 {
     vec2 b = uniform_triangle(u);
@@ -10,6 +12,7 @@ ShapeSample triangle_sample(Triangle s, vec3 p, vec2 u)
     r.n = scale3(n, s.side / twice);
     r.uv.x = b.x; /* barycentrics: the caller turns them into the mesh's uv */
     r.uv.y = b.y;
+    r.size = triangle_size(max_r(size3(s.e1), size3(s.e2)), 1.0f / twice);
     r.pdf = solid_angle_pdf(2.0f / twice, r.t, fabs(dot3(r.n, r.wi)));
     return r;
 }

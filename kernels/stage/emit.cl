@@ -36,13 +36,19 @@ inline integer begin_light_path(Scene scene, Slab path, Slab shadow, At at, mask
     Surface s;
     s.p = r.o;
     s.n = r.n;
+    s.size = r.size;
     store_path_o(path, at, go, sel3(r.away, r.o, surface_offset(s, r.d)));
     store_path_d(path, at, go, r.d);
     store_path_lambdas(path, at, go, lambdas);
     store_path_beta(path, at, go, r.power);
     store_path_weight(path, at, go, 1.0f / max_r(strength, (real)(1e-30f)));
+#if USES_NULL_SURFACES
+    store_path_nulls(path, at, go, (integer)(0));
+    store_path_null_distance(path, at, go, (real)(0.0f));
+#endif
 #if USES_ABSORPTION
     store_path_medium(path, at, go, (integer)(0));
+    store_path_lead(path, at, go, (real)(0.0f));
 #endif
 #if USES_DISPERSION
     store_path_ratio(path, at, go, spectrum_of(1.0f));
@@ -68,7 +74,7 @@ STAGE(emit)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
     STAGE_AT
     PathEnd end = path_end(path, hit, at);
     if (any(end.ended)) {
-        path_end_count(counters, end, end.depth - 1);
+        path_end_count(counters, end, end.depth - 1 + path_nulls(path, at));
         integer slot = LANE_INDEX + (int)at;
         integer pixel_index = load_path_pixel_index(path, at), sample = load_path_sample(path, at);
         integer plane = divide(slot, settings->per_plane);

@@ -58,7 +58,7 @@ inline Exposure add_sample(Scene scene, Slab path, At at, BEGIN_ARGS, PathEnd en
     full += bands_add(scene, bands, accepted, divide(slot, scene.settings->per_plane), pixel_index, radiance, lambdas,
                       weight);
 #endif
-    path_end_count(counters, end, end.depth);
+    path_end_count(counters, end, end.depth + path_nulls(path, at));
     count(counters, COUNTER_REJECTED, finished & !accepted, (integer)(1));
     count(counters, COUNTER_FULL, finished & (full > 0), full);
     return e;
@@ -97,8 +97,13 @@ inline void begin_path(Scene scene, Slab path, At at, mask go, integer pixel_ind
     store_path_radiance(path, at, go, spectrum_of(0.0f));
     store_path_pdf(path, at, go, -ray.far);
     store_path_eta(path, at, go, (real)(1.0f));
+#if USES_NULL_SURFACES
+    store_path_nulls(path, at, go, (integer)(0));
+    store_path_null_distance(path, at, go, (real)(0.0f));
+#endif
 #if USES_ABSORPTION
     store_path_medium(path, at, go, (integer)(0));
+    store_path_lead(path, at, go, (real)(0.0f));
 #endif
 #if USES_DISPERSION
     store_path_ratio(path, at, go, camera_start());

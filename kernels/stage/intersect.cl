@@ -24,6 +24,8 @@ STAGE(intersect)(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS STAGE_AT_ARG)
         store_hit_u(hit, at, active, h.u);
         store_hit_v(hit, at, active, h.v);
         store_hit_n(hit, at, active, h.n);
+        store_hit_plane(hit, at, active, h.plane);
+        store_hit_side(hit, at, active, h.side);
         store_hit_prim(hit, at, active, h.prim);
         store_hit_shape(hit, at, active, shape);
 #if USES_INSTANCES

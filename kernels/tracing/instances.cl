@@ -1,6 +1,6 @@
 /* From the space of a group to the world, by an InstanceRow, whose x, y and z are the rows of the inverse: of the
  * matrix from the world to the group. They are scaled first, so that neither tiny nor huge instances leave float. */
-typedef struct { vec3 x, y, z; real scale; } InstanceFrame;
+typedef struct { vec3 x, y, z, origin; real scale; } InstanceFrame;
 
 inline real instance_size(vec3 v) { return fabs(v.x) + fabs(v.y) + fabs(v.z); }
 
@@ -9,7 +9,7 @@ inline InstanceFrame instance_frame(Scene scene, mask placed, integer instance)
     integer row = sel_i(placed, instance - 1, (integer)(0)) * INSTANCE_ROW_WORDS;
     InstanceRow i = instance_row_row(scene.instances, row);
     real size = instance_size(i.x) + instance_size(i.y) + instance_size(i.z), scale = 1.0f / size;
-    InstanceFrame f = {scale3(i.x, scale), scale3(i.y, scale), scale3(i.z, scale), scale};
+    InstanceFrame f = {scale3(i.x, scale), scale3(i.y, scale), scale3(i.z, scale), i.origin, scale};
     return f;
 }
 
@@ -25,4 +25,12 @@ inline vec3 instance_vector(InstanceFrame f, vec3 v)
     vec3 yz = cross3(f.y, f.z);
     vec3 sum = madd3(yz, v.x, madd3(cross3(f.z, f.x), v.y, scale3(cross3(f.x, f.y), v.z)));
     return scale3(sum, f.scale / dot3(f.x, yz));
+}
+
+/* About the greatest length that a vector of length 1 gets in the world. */
+inline real instance_stretch(InstanceFrame f)
+{
+    vec3 yz = cross3(f.y, f.z);
+    real sum = instance_size(yz) + instance_size(cross3(f.z, f.x)) + instance_size(cross3(f.x, f.y));
+    return sum * fabs(f.scale / dot3(f.x, yz));
 }

@@ -1,4 +1,5 @@
 /* What a ray that goes alone meets among instances, by `instances_trace` of a layout. */
+#include "core/rounding.cl"
 
 /* The nearest hit, if there is one nearer than h: it becomes that one, in the world. */
 inline void instances_closest(global const float *nodes, global const float *leaves,
@@ -14,7 +15,13 @@ inline void instances_closest(global const float *nodes, global const float *lea
     h->instance = as_int(at) + 1;
     h->prim = as_int(tri.prim) + instance_row_row(scene.instances, as_int(at) * INSTANCE_ROW_WORDS).prim;
     h->shape = as_int(tri.tag);
-    h->n = instance_normal(instance_frame(scene, 1, h->instance), v3(tri.nx, tri.ny, tri.nz));
+    InstanceFrame f = instance_frame(scene, 1, h->instance);
+    vec3 own = v3(tri.nx, tri.ny, tri.nz), n = instance_normal(f, own);
+    real size = triangle_size(tri.side, 1.0f / sqrt(max_r(dot3(own, own), (real)(1e-35f))));
+    h->side = size * instance_stretch(f) + size3(sub3(madd3(d, tri.t, o), f.origin));
+    real length = h->side * h->side / sqrt(max_r(dot3(n, n), (real)(1e-35f))); /* as of a triangle that is not thin */
+    h->n = scale3(n, length);
+    h->plane = tri.plane * f.scale * length + dot3(h->n, f.origin);
 }
 
 inline int instances_occluded(global const float *nodes, global const float *leaves,

@@ -8,7 +8,7 @@
 typedef union { real v; float at[LANES]; } TraceReal;
 typedef union { integer v; int at[LANES]; } TraceInteger;
 typedef struct { TraceReal ox, oy, oz, dx, dy, dz, t; } TraceRays;
-typedef struct { TraceReal t, u, v, nx, ny, nz; TraceInteger prim, tag; } TraceHits;
+typedef struct { TraceReal t, u, v, nx, ny, nz, plane, side; TraceInteger prim, tag; } TraceHits;
 #define TRACE_RAY(r, i) (r)->ox.at[i], (r)->oy.at[i], (r)->oz.at[i], (r)->dx.at[i], (r)->dy.at[i], \
                         (r)->dz.at[i], 0.0f, (r)->t.at[i]
 
@@ -42,6 +42,8 @@ inline void trace_put(TraceHits *h, uint i, TriHit hit)
     h->nx.at[i] = hit.nx;
     h->ny.at[i] = hit.ny;
     h->nz.at[i] = hit.nz;
+    h->plane.at[i] = hit.plane;
+    h->side.at[i] = hit.side;
     h->prim.at[i] = as_int(hit.prim);
     h->tag.at[i] = as_int(hit.tag);
 }
@@ -69,7 +71,7 @@ inline void trace_step_all(global const float *nodes, global const float *leaves
 inline TraceHit trace_closest(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real far, mask active)
 {
     TraceReal none = {(real)(0.0f)};
-    TraceHits h = {{far}, none, none, none, none, none, {(integer)(-1)}, {(integer)(0)}};
+    TraceHits h = {{far}, none, none, none, none, none, none, none, {(integer)(-1)}, {(integer)(0)}};
     TraceRays r = {{o.x}, {o.y}, {o.z}, {d.x}, {d.y}, {d.z}, {far}};
     uint rays[LANES], count = trace_active(active, rays);
     if (!trace_alike(&r, rays, count)) {
@@ -78,6 +80,6 @@ inline TraceHit trace_closest(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real far,
         for (uint k = 0; k < count; k++)
             trace_put(&h, rays[k], wide8_closest(nodes, leaves, TRACE_RAY(&r, rays[k])));
     }
-    TraceHit hit = {h.t.v, h.u.v, h.v.v, {h.nx.v, h.ny.v, h.nz.v}, h.prim.v, h.tag.v};
+    TraceHit hit = {h.t.v, h.u.v, h.v.v, {h.nx.v, h.ny.v, h.nz.v}, h.plane.v, h.side.v, h.prim.v, h.tag.v};
     return hit;
 }

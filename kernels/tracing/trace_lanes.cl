@@ -7,7 +7,7 @@
 inline TraceHit trace_closest(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real far, mask active)
 {
     BruteHit b = brute_closest(tris, triangles, o, d, (real)(0.0f), far, active);
-    TraceHit h = {b.t, b.u, b.v, b.n, as_integer(b.prim), as_integer(b.tag)};
+    TraceHit h = {b.t, b.u, b.v, b.n, b.plane, b.side, as_integer(b.prim), as_integer(b.tag)};
 #if USES_ANALYTIC
     for (int i = 0; i < scene.settings->analytic_count; i++) {
         int row = shape_row_of(scene, i);

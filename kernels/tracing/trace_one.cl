@@ -10,7 +10,7 @@
 inline TraceHit trace_closest(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real far, mask active)
 {
     TriHit t = LAYOUT(closest)(nodes, leaves, o.x, o.y, o.z, d.x, d.y, d.z, 0.0f, far);
-    TraceHit h = {t.t, t.u, t.v, {t.nx, t.ny, t.nz}, as_int(t.prim), as_int(t.tag)};
+    TraceHit h = {t.t, t.u, t.v, {t.nx, t.ny, t.nz}, t.plane, t.side, as_int(t.prim), as_int(t.tag)};
 #if USES_INSTANCES
     instances_closest(nodes, leaves, instance_nodes, scene, o, d, t, &h);
 #endif

@@ -7,8 +7,6 @@
 #include "path/surface.cl"
 #include "generated/null_transmittance.cl"
 
-#define MOST_SURFACES 1024 /* so many on one ray, and it is taken as blocked */
-
 inline real trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real t, Wavelengths lambdas, mask active)
 {
     real transmittance = 1.0f;
@@ -22,11 +20,11 @@ inline real trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real t,
             Surface s = surface_at(scene, h, active, o, d, &front);
             integer word = sel_i(active, sel_i(front, shape.front, shape.back), (integer)(0));
             real own = null_transmittance(scene, word, surface_texture_point(s), lambdas) *
-                       (surfaces < MOST_SURFACES ? 1.0f : 0.0f);
+                       (surfaces < MOST_NULL_SURFACES ? 1.0f : 0.0f);
             transmittance = sel(active, transmittance * own, transmittance);
             active = active & (own > 0.0f);
             /* On along d: beside it, the ray would miss its end, and a round light would shade itself. */
-            real on = h.t + surface_step(s) / max_r(fabs(dot3(s.n, d)), (real)(0.1f));
+            real on = h.t * (1.0f + SURFACE_ROUNDING) + surface_lead(s, d);
             o = sel3(active, madd3(d, on, o), o);
             t = sel(active, t - on, t);
             surfaces++;

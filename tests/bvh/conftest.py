@@ -35,14 +35,16 @@ kernel NO_VECTORIZE void closest(global const float *tris, uint count, global co
 {
     vec3 o = {RAY(0), RAY(1), RAY(2)}, d = {RAY(4), RAY(5), RAY(6)};
     BruteHit h = brute_closest(tris, count, o, d, RAY(3), RAY(7), EVERY);
-    scatter_if(hits, AT * 8, EVERY, h.t);
-    scatter_if(hits, AT * 8 + 1, EVERY, h.u);
-    scatter_if(hits, AT * 8 + 2, EVERY, h.v);
-    scatter_if(hits, AT * 8 + 3, EVERY, as_real(h.prim));
-    scatter_if(hits, AT * 8 + 4, EVERY, as_real(h.tag));
-    scatter_if(hits, AT * 8 + 5, EVERY, h.n.x);
-    scatter_if(hits, AT * 8 + 6, EVERY, h.n.y);
-    scatter_if(hits, AT * 8 + 7, EVERY, h.n.z);
+    scatter_if(hits, AT * 10, EVERY, h.t);
+    scatter_if(hits, AT * 10 + 1, EVERY, h.u);
+    scatter_if(hits, AT * 10 + 2, EVERY, h.v);
+    scatter_if(hits, AT * 10 + 3, EVERY, as_real(h.prim));
+    scatter_if(hits, AT * 10 + 4, EVERY, as_real(h.tag));
+    scatter_if(hits, AT * 10 + 5, EVERY, h.n.x);
+    scatter_if(hits, AT * 10 + 6, EVERY, h.n.y);
+    scatter_if(hits, AT * 10 + 7, EVERY, h.n.z);
+    scatter_if(hits, AT * 10 + 8, EVERY, h.plane);
+    scatter_if(hits, AT * 10 + 9, EVERY, h.side);
 }
 kernel NO_VECTORIZE void occluded(global const float *tris, uint count, global const float *rays,
                                   global float *hits)
@@ -54,6 +56,7 @@ kernel NO_VECTORIZE void occluded(global const float *tris, uint count, global c
 """
 HIT = np.dtype(
     [("t", "f4"), ("u", "f4"), ("v", "f4"), ("prim", "u4"), ("tag", "u4"), ("n", "f4", 3)]
+    + [("plane", "f4"), ("side", "f4")]
 )
 MISS = 0xFFFFFFFF
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import gc
+import sys
 
 import numpy as np
 import pyopencl as cl
@@ -115,3 +116,20 @@ def test_capsules_that_nobody_takes_keep_nothing(array):
 def test_dlpack_refuses_other_devices(array):
     with pytest.raises(BufferError, match=r"DLPack's device.*\(2, 0\)"):
         array.__dlpack__(dl_device=(2, 0))
+
+
+@pytest.mark.parametrize("fewer", [0, 1, 2])
+def test_a_capsule_that_is_held_stays_however_python_counts(array, monkeypatch, fewer):
+    """Some versions of Python borrow references where others count one more."""
+    real = sys.getrefcount
+    monkeypatch.setattr(dlpack.sys, "getrefcount", lambda one: real(one) - 1 - fewer)
+    monkeypatch.setattr(dlpack, "_owned", {})
+    on = (dlpack.OPENCL, 0)
+    held = array.__dlpack__(dl_device=on)
+    array.__dlpack__(dl_device=on)  # nobody takes it
+    assert len(dlpack._owned) == 2
+    dlpack._sweep()
+    assert [entry[-1] for entry in dlpack._owned.values()] == [held]
+    del held
+    dlpack._sweep()
+    assert not dlpack._owned

@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 
 from clpt import spectra
+from clpt import transforms as tf
 from clpt.errors import SceneError
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Orthographic
-from clpt.scene.lights import Constant
+from clpt.scene.lights import Area, Constant
+from clpt.scene.shapes import Rectangle
+from clpt.scene.textures import Checkerboard, Mix, Product
 from tests.renders.support import assert_mean, exposures, with_film
 
 FINE = np.arange(360.0, 830.0, 0.05)  # [nm]
@@ -67,3 +70,31 @@ def test_narrow_films_are_exact_at_their_ends(lo: float, hi: float) -> None:
 def test_films_too_narrow_for_float32_are_refused() -> None:
     with pytest.raises(SceneError, match=r"film\.lambda_min: must be 0\.01 nm or more below"):
         Film(lambda_min=550.0, lambda_max=550.001)
+
+
+BEFORE = tf.translate([0, 0, 2]) @ tf.rotate([1, 0, 0], 180)  # the camera, facing it
+NUMBERS = {
+    "a number": 0.7,
+    "three numbers": (0.7, 0.7, 0.7),
+    "a product": Product(first=0.35, second=2.0),
+    "a mixture": Mix(first=0.0, second=1.4, amount=Checkerboard(color0=0.5, color1=0.5)),
+}
+
+
+@pytest.mark.parametrize("mode", ["spectral", "rgb"])
+def test_a_number_is_white_light(mode: str) -> None:
+    """D65 times the number, on a shape as in the sky, in textures as without."""
+    film = Film(width=16, height=16, mode=mode)
+    for given in NUMBERS.values():
+        lamp = Rectangle(emission=Area(radiance=given), to_world=BEFORE)
+        scene = Scene(camera=Orthographic(), shapes=[lamp], film=film)
+        assert_mean(exposures(scene, 4, 16), [0.7] * 3, 0.02, 1e-3)
+    sky = Scene(camera=Orthographic(), lights=[Constant(radiance=0.7)], film=film)
+    assert_mean(exposures(sky, 4, 16), [0.7] * 3, 0.02, 1e-3)
+
+
+def test_names_of_lamps_are_taken_where_files_take_them() -> None:
+    assert Area(radiance="D65").radiance == spectra.illuminant("D65")
+    assert Constant(radiance="E").radiance == spectra.Constant(1.0)
+    with pytest.raises(SceneError, match=r"area\.radiance: unknown illuminant 'D66'.*D65"):
+        Area(radiance="D66")

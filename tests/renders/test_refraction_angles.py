@@ -47,7 +47,7 @@ def arrives(
     strip = tf.look_at(at(leaving, AWAY), [0, 0, 0], UP) @ tf.scale(HALF_WIDTH * AWAY)
     scene = Scene(
         camera=Orthographic(to_world=view),
-        shapes=[body, Rectangle(to_world=strip, material=BLACK, emission=Area(radiance=1.0))],
+        shapes=[body, Rectangle(to_world=strip, material=BLACK, emission=Area(radiance="E"))],
         integrator=Path(max_depth=6, rr_depth=100),
         film=Film(width=8, height=8, lambda_min=nm - RANGE, lambda_max=nm + RANGE),
     )

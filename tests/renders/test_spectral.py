@@ -56,7 +56,7 @@ def strip(sampler: object) -> Scene:
             to_world=tf.look_at([0, 0, 4], [0, 0, 0], UP) @ tf.scale([half, half, 1])
         ),
         shapes=squares,
-        lights=[Constant(radiance=1.0)],
+        lights=[Constant(radiance="E")],
         integrator=PathIntegrator(max_depth=2),
         sampler=sampler,
         film=Film(width=4 * len(CENTRES), height=8),
@@ -89,7 +89,7 @@ def test_no_ripple(sampler: object, spp: int) -> None:
 def test_range_of_wavelengths(ends: tuple[float, float]) -> None:
     """A film records its own range; a flat light has there what the observer sees of it."""
     film = Film(width=16, height=16, lambda_min=ends[0], lambda_max=ends[1])
-    scene = Scene(camera=Orthographic(), lights=[Constant(radiance=1.0)], film=film)
+    scene = Scene(camera=Orthographic(), lights=[Constant(radiance="E")], film=film)
     images = exposures(scene, 32, 16)
     assert_mean(images, to_rgb(((ends[0] <= FINE) & (ends[1] >= FINE)) * 1.0), 0.01, 1e-3)
 

@@ -222,3 +222,32 @@ def test_every_page_of_the_samples_is_read(assets):
     for page in pages:
         eta, k = spectra.read_refractive_index(page)
         assert (eta.sample(visible) > 0.0).all() and (k.sample(visible) >= 0.0).all(), page
+
+
+@pytest.mark.parametrize("line", ["400;0,1", "400 0,1", "400,0\t0,1", "400,5; 1", "400 ; 0,1;2"])
+@pytest.mark.parametrize(
+    "read", [spectra.read_table, spectra.read_refractive_index, spectra.read_absorption]
+)
+def test_decimal_commas_are_refused(tmp_path, line, read):
+    path = write(tmp_path, f"# in nm\n{line}\n")
+    with pytest.raises(SceneError, match="decimal point") as caught:
+        read(path)
+    assert caught.value.file == path and caught.value.line == 2
+
+
+@pytest.mark.parametrize("line", ["400, 0.5, 1", "400,0.5,1", "400 ,0.5 ,1", "400; 0.5; 1"])
+def test_commas_between_numbers_are_separators(tmp_path, line):
+    eta, k = spectra.read_refractive_index(write(tmp_path, line))
+    assert (eta.sample(400.0), k.sample(400.0)) == (0.5, 1.0)
+
+
+def test_pages_of_the_infrared_are_refused(tmp_path):
+    """3 to 5 um, which no film sees."""
+    rows = "    data: |\n      3.0 1.5\n      5.0 1.4"
+    sellmeier = "    wavelength_range: 3 5\n    coefficients: 0 1 0.01"
+    for read, text in (
+        (spectra.read_absorption, page("tabulated k", rows)),
+        (spectra.read_refractive_index, page("formula 1", sellmeier)),
+    ):
+        with pytest.raises(SceneError, match=r"3000 to 5000 nm.*give wavelengths in nm"):
+            read(write(tmp_path, text, "page.yml"))

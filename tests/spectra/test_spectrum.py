@@ -9,7 +9,7 @@ import pytest
 from clpt import spectra
 from clpt.errors import SceneError
 from clpt.spectra import cie
-from clpt.spectra.spectrum import gridded, hat_means
+from clpt.spectra.spectrum import gridded, hat_means, primaries
 
 ANY = np.array([300.0, 361.0, 555.5, 829.0, 1200.0])
 
@@ -202,3 +202,11 @@ def test_means_stay_within_the_limits_of_a_table():
     assert means.min() >= -1e-12 and means.max() <= 1.0 + 1e-12
     line = hat_means(at, 2.0 * at - 3.0, GRID)
     np.testing.assert_allclose(line[1:-1], 2.0 * GRID[1:-1] - 3.0, rtol=1e-9)
+
+
+def test_primaries_add_up_to_white():
+    rows = np.stack([one.sample(cie.GRID) for one in primaries()])
+    assert rows.min() >= 0.0
+    np.testing.assert_allclose(rows.sum(axis=0), 1.0, atol=2e-7)
+    seen = [spectra.Tabulated(cie.GRID, row).to_rgb("unbounded") for row in rows]
+    np.testing.assert_allclose(seen, np.eye(3), atol=1e-6)

@@ -45,7 +45,7 @@ def material(element: Element | None, *, colours: bool = False) -> tuple[Materia
         inner = Diffuse(reflectance=0.0, name=element.text("name", ""))
         shown = surface.base_color(element)
         if colours:
-            shown = Product(first=shown, second=MeshAttribute())
+            shown = Product(first=shown, second=MeshAttribute(), rgb=True)
         emission: Area | None = Area(radiance=shown, two_sided=both)
     else:
         inner = surface.surface(element, colours)
@@ -87,8 +87,11 @@ def _emission(element: Element, both: bool) -> Area | None:
     info = element.child("emissiveTexture")
     if info is not None:
         image = texture(info)
-        plain = radiance == surface.WHITE
-        radiance = image if plain else Product(first=image, second=surface.unbounded(radiance))
+        if radiance == surface.WHITE:
+            radiance = image
+        else:
+            tinted = max(radiance) > min(radiance)
+            radiance = Product(first=image, second=surface.unbounded(radiance), rgb=tinted)
     return Area(radiance=radiance, two_sided=both)
 
 

@@ -32,7 +32,7 @@ def surface(element: Element, colours: bool) -> GltfSurface:
     glossy = element.extension(GLOSSINESS)
     values = _rough(element) if glossy is None else _glossy(glossy)
     if colours:
-        values["base_color"] = Product(first=MeshAttribute(), second=values["base_color"])
+        values["base_color"] = Product(first=MeshAttribute(), second=values["base_color"], rgb=True)
     for name, read in EXTENSIONS.items():
         extension = element.extension(name)
         if extension is not None:
@@ -65,7 +65,9 @@ def colour(
     if child is None:
         return rgb
     image = texture(child)
-    return image if rgb == WHITE else Product(first=image, second=unbounded(rgb))
+    if rgb == WHITE:
+        return image
+    return Product(first=image, second=unbounded(rgb), rgb=max(rgb) > min(rgb))
 
 
 def number(owner: Element, factor: str, info: str, channel: str, default: float) -> Any:

@@ -126,7 +126,7 @@ def shape_bounds(thing: shapes.Shape) -> tuple[NDArray[np.float64], NDArray[np.f
     matrix = np.asarray(thing.to_world, np.float64)
     linear = matrix[:3, :3]
     if isinstance(thing, shapes.Sphere):
-        points = transforms.transform_points(matrix, [thing.center])
+        points = transforms.transform_points(matrix, np.atleast_2d(thing.center))
         reach = thing.radius * np.linalg.norm(linear, axis=1)
     elif isinstance(thing, shapes.Spheres):
         given = np.asarray(thing.centers, np.float64)
@@ -136,7 +136,7 @@ def shape_bounds(thing: shapes.Shape) -> tuple[NDArray[np.float64], NDArray[np.f
     elif isinstance(thing, shapes.Disk):
         points, reach = matrix[None, :3, 3], np.linalg.norm(linear[:, :2], axis=1)
     elif isinstance(thing, shapes.Cylinder):
-        points = transforms.transform_points(matrix, [thing.p0, thing.p1])
+        points = transforms.transform_points(matrix, np.stack([thing.p0, thing.p1]))
         axis = np.subtract(thing.p1, thing.p0) / np.linalg.norm(np.subtract(thing.p1, thing.p0))
         # A circle about the axis reaches r |row x axis| along each row of the matrix.
         reach = thing.radius * np.linalg.norm(np.cross(linear, axis), axis=1)
@@ -153,7 +153,7 @@ def _outlines(things: Sequence[shapes.Shape]) -> Iterator[NDArray[np.float64]]:
     """Yield for each shape points (n, 3) in world space whose hull contains it."""
     for thing in things:
         if isinstance(thing, shapes.Mesh):
-            yield transforms.transform_points(thing.to_world, thing.vertices)
+            yield transforms.transform_points(np.asarray(thing.to_world), thing.vertices)
         elif not isinstance(thing, shapes.Instance):
             yield _box_corners(*shape_bounds(thing))
     yield from _instance_points(things)

@@ -63,7 +63,7 @@ def read_mesh(path: Path, *, materials: bool = True) -> MeshFile:
 def join(meshes: list[Mesh]) -> Mesh:
     """Return one mesh that holds all triangles, in world space, with the first one's material."""
     first = meshes[0]
-    if len(meshes) == 1 and np.array_equal(first.to_world, np.eye(4)):
+    if len(meshes) == 1 and np.array_equal(np.asarray(first.to_world), np.eye(4)):
         return first
     starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])])
     faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=True)]
@@ -71,12 +71,12 @@ def join(meshes: list[Mesh]) -> Mesh:
     shared = set(first.attributes).intersection(*(mesh.attributes for mesh in meshes))
     whole["attributes"] = {k: np.concatenate([m.attributes[k] for m in meshes]) for k in shared}
     if all(mesh.normals is not None for mesh in meshes):
-        turned = [transforms.transform_normals(m.to_world, m.normals) for m in meshes]
+        turned = [transforms.transform_normals(np.asarray(m.to_world), m.normals) for m in meshes]
         whole["normals"] = np.concatenate(turned).astype(np.float32)
     if any(mesh.uvs is not None for mesh in meshes):
         none = [np.zeros((len(m.vertices), 2)) if m.uvs is None else m.uvs for m in meshes]
         whole["uvs"] = np.concatenate(none).astype(np.float32)
-    moved = [transforms.transform_points(m.to_world, m.vertices) for m in meshes]
+    moved = [transforms.transform_points(np.asarray(m.to_world), m.vertices) for m in meshes]
     return Mesh(
         vertices=np.concatenate(moved).astype(np.float32),
         faces=np.concatenate(faces).astype(np.uint32),

@@ -115,7 +115,8 @@ def _aspect(image: Any) -> float:
     """Width over height of an image; 1 for what is none."""
     if not isinstance(image, Bitmap):
         return 1.0
-    values = images.read(image.image) if isinstance(image.image, (str, Path)) else image.image
+    given: Any = image.image
+    values = images.read(given) if isinstance(given, (str, Path)) else given
     height, width = np.shape(values)[:2]
     return width / height
 

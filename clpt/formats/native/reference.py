@@ -71,15 +71,21 @@ applied first: `{"translate": [x, y, z]}`, `{"scale": s}` or `{"scale": [x, y, z
 plane of u and v.
 
 **Spectra** are a number (the same at every wavelength), `[r, g, b]` in linear Rec. 709, a name, or
-an object. What a colour means depends on the parameter's role:
+an object. What a number or a colour means depends on the parameter's role:
 
-| role | `[r, g, b]` | name |
-| --- | --- | --- |
-| reflectance | the smoothest reflectance of that colour (Jakob and Hanika 2019) | - |
-| emission | D65 times such a spectrum | an illuminant |
-| index | a smooth unbounded spectrum | a glass or liquid |
-| factor | a smooth unbounded spectrum | - |
-| coefficient | a smooth unbounded spectrum | - |
+| role | number | `[r, g, b]` | name | a table beyond its ends |
+| --- | --- | --- | --- | --- |
+| reflectance | even | the smoothest reflectance of that colour (Jakob and Hanika 2019) | - | 0 |
+| emission | D65 times it: white light | D65 times such a spectrum | an illuminant | 0 |
+| index | even | a smooth unbounded spectrum | a glass or liquid | its end values |
+| factor | even | a smooth unbounded spectrum | - | 0 |
+| coefficient | even | a smooth unbounded spectrum | - | its end values |
+
+Light of the same strength at every wavelength is the illuminant `"E"`; it looks pink beside D65.
+Tables have the limits that numbers have, at every wavelength from 200 to 2000 nm. An index is above
+0 at every wavelength of the film. Named metals end at 1100 nm and hold their end values; the
+illuminants A and D65 end at 830 nm and are dark beyond. Beyond their bands, spectral images of
+reflectances hold, and those of light are dark.
 """
 
 HEADINGS = {

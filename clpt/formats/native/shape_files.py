@@ -80,7 +80,7 @@ def read_transforms(cursor: Cursor) -> np.ndarray:
     """Read the matrices (n, 3, 4) of a .npy; return them as (n, 4, 4) float64."""
     path = find_file(cursor)
     try:
-        rows = np.load(path, mmap_mode="r")  # a wrong header claims no memory
+        rows = np.load(path, mmap_mode="r", allow_pickle=False)  # a wrong header claims no memory
     except (OSError, ValueError, EOFError) as error:
         raise cursor.error(f"is no .npy file: {error}") from None
     valid = isinstance(rows, np.ndarray) and rows.dtype.kind == "f" and rows.shape[1:] == (3, 4)

@@ -1,7 +1,7 @@
 """Spectra in scene.json, read and written.
 
-A number is constant; [r, g, b] is a colour, which as emission means that multiple of D65; a name is
-a glass as an index, and an illuminant as emission; an object has a `type` from SPECTRA and its
+A number is constant; [r, g, b] is a colour; as emission either means that multiple of D65. A name
+is a glass as an index, and an illuminant as emission; an object has a `type` from SPECTRA and its
 fields, or `values` [[nm, value], ...], or a `file`.
 """
 
@@ -101,7 +101,7 @@ def write(spectrum: Spectrum | str, role: str) -> Any:
     """Return what stands for a spectrum in JSON, such that `read` gives it back."""
     if isinstance(spectrum, str):
         return spectrum
-    if isinstance(spectrum, spectra.Constant):
+    if isinstance(spectrum, spectra.Constant) and role != "emission":
         return spectrum.value
     fields = dataclasses.asdict(spectrum)  # type: ignore[call-overload]
     if type(spectrum) is COLOURS.get(role):

@@ -134,7 +134,7 @@ def _sample_text(
         rows += [
             "point.p = madd3(q.wi, q.t, p);",
             "Spectrum le = emission_load(scene, l.radiance, point, lambdas);",
-            "s = light_sample_sel(l.shape >= 0, area_sample(q, le), s);",
+            "s = light_sample_sel(l.shape >= 0, area_sample(q, point.p, le), s);",
         ]
     return function(head, *rows, f"return light_chosen(s, {'pmf' if tree else 'l.pmf'});")
 

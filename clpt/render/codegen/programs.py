@@ -181,7 +181,7 @@ def _shared(features: Features, layout: str) -> Files:
         ),
         "generated/lights.cl": stages.lights_text(features),
         "generated/null_transmittance.cl": stages.null_transmittance_text(features),
-        "generated/shapes.cl": shapes.tangents_text(features),
+        "generated/shapes.cl": shapes.points_text(features),
         "generated/shape_tree.cl": shapes.hit_text(features),
         "generated/layout.cl": bvh.traversal_text(layout),
     }

@@ -44,26 +44,31 @@ def hit_text(features: Features) -> str:
     return _includes(features) + files + function(signature, *body)
 
 
-def tangents_text(features: Features) -> str:
-    """Return `dpdu_of_shape` and `dpdv_of_shape` of analytic shapes, in lanes."""
-    if not (features.analytic and features.tangents):
+def points_text(features: Features) -> str:
+    """Return what shading asks of points of analytic shapes, `<verb>_of_shape`, in lanes."""
+    if not features.analytic:
         return ""
-    tangents = [
-        Function(
-            f"vec3 {tangent}_of_shape(Scene scene, ShapeRow shape, integer prim, vec3 p, vec2 uv)",
-            "v3(0.0f, 0.0f, 0.0f)",
-            [
-                Case(
-                    f"shape.kind == {_number(kind)}",
-                    f"{ONE_OF.get(kind, kind)}_{tangent}"
-                    f"({_row_text(kind, active('shape.params'), 'm')}, p, uv)",
-                )
-                for kind in features.analytic
-            ],
-        ).text()
-        for tangent in ("dpdu", "dpdv")
+    functions = [_of_shape(features, "vec3", "onto", "vec3 p"), _of_shape(features, "real", "size")]
+    if features.tangents:
+        point = ("vec3 p", "vec2 uv")
+        functions += [_of_shape(features, "vec3", verb, *point) for verb in ("dpdu", "dpdv")]
+    return _includes(features) + "".join(functions)
+
+
+def _of_shape(features: Features, type_: str, verb: str, *parameters: str) -> str:
+    """Return `<verb>_of_shape`, which chooses among `<kind>_<verb>` of the scene's kinds."""
+    head = ", ".join(("Scene scene", "ShapeRow shape", "integer prim", *parameters))
+    names = [parameter.split()[-1] for parameter in parameters]
+    cases = [
+        Case(
+            f"shape.kind == {_number(kind)}",
+            f"{ONE_OF.get(kind, kind)}_{verb}"
+            f"({', '.join((_row_text(kind, active('shape.params'), 'm'), *names))})",
+        )
+        for kind in features.analytic
     ]
-    return _includes(features) + "".join(tangents)
+    nothing = "0.0f" if type_ == "real" else "v3(0.0f, 0.0f, 0.0f)"
+    return Function(f"{type_} {verb}_of_shape({head})", nothing, cases).text()
 
 
 def _includes(features: Features) -> str:

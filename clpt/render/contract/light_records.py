@@ -156,6 +156,7 @@ LIGHT_RAY = Record(
     o=("vec3", "where it starts [m]"),
     d=("vec3", "in which direction, unit length", "v3(0.0f, 0.0f, 1.0f)"),
     n=("vec3", "unit normal of the surface there; d off all surfaces", "v3(0.0f, 0.0f, 1.0f)"),
+    size=("real", "of that surface, 0 off all, see kernels/core/rounding.cl [m]"),
     power=("spectrum", "radiance |cos| over the pdf of o and d [W/nm]"),
     seen=(
         "spectrum",

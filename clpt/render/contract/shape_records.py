@@ -56,6 +56,7 @@ SHAPE_SAMPLE = Record(
     t=("real", "distance [m]", "FAR"),
     n=("vec3", "unit normal there, toward the front", "v3(0.0f, 0.0f, 1.0f)"),
     uv=("vec2", "there"),
+    size=("real", "of the primitive, see kernels/core/rounding.cl [m]"),
     pdf=("real", "[1/sr]; 0: nothing"),
 )
 SURFACE_POINT = Record(

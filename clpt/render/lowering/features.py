@@ -50,7 +50,7 @@ def features_of(
         tangents=tangents,
         mixtures=materials.mixture_depth,
         normal_mapped=index.normal_mapped and not channels,
-        null_surfaces=any(cls.is_null for cls in index.leaves) and not channels,
+        null_surfaces=any(cls.is_null for cls in index.leaves),
         infinite=lights.infinite > 0 and not channels,
         light_paths=index.light_paths,
         visible_lights=lights.visible,

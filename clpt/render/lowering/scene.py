@@ -35,6 +35,7 @@ from clpt.render.lowering.settings import DEEPEST, settings_of
 from clpt.render.lowering.textures.attributes import Owner, lower_attributes
 from clpt.scene import Scene
 from clpt.scene import materials as mt
+from clpt.scene.integrators import Film
 from clpt.scene.shapes import Mesh
 
 TREE_FROM = 16  # lights from which a tree chooses among them, see bench/lights.py
@@ -202,9 +203,21 @@ def _warnings(index: SceneIndex) -> list[str]:
     depth = getattr(scene.integrator, "max_depth", -1)
     if depth > DEEPEST:
         warnings.append(f"integrator.max_depth: {depth} counts as {DEEPEST}, the longest path")
+    if index.spectral and not film.bands and not index.channels and not _sees(film):
+        warnings.append(
+            f"film.sensor sees nothing from {film.lambda_min:g} to {film.lambda_max:g} nm, so the"
+            " picture is black; ask for film.bands"
+        )
+    if not index.channels and next(emissions(index), None) is None:
+        warnings.append("no light in the scene, so the picture is black: add one to `lights`")
     if film.mode == "rgb" and mt.Fluorescent in index.leaves:
         warnings.append("in rgb mode fluorescent paint has its colour under D65, at most white")
     return warnings
+
+
+def _sees(film: Film) -> bool:
+    """Whether a film's sensor responds to any of its wavelengths."""
+    return bool(sensor(film).sample(np.linspace(film.lambda_min, film.lambda_max, 2001)).any())
 
 
 def _zero_copy_tables(index: SceneIndex, geometry: Geometry) -> dict[str, Any]:

@@ -147,14 +147,16 @@ class SpectraTable:
             words[:4] = as_words([0.0, 0.0, ONE, value.value])
         elif type(value) is RGB:
             words[:4] = as_words([*_uplifted(value), 1.0])
+        elif type(value) is RGBIlluminant and value.r == value.g == value.b:
+            return self._table_words(d65(), value.r), "table"
         else:
             return self._table_words(value), "table"
         return words, "constant"
 
-    def _table_words(self, spectrum: Spectrum) -> Words:
-        """Five words: a factor of 1, and -1 - the row in `spectra`."""
+    def _table_words(self, spectrum: Spectrum, factor: float = 1.0) -> Words:
+        """Five words: a factor, and -1 - the row in `spectra`."""
         words = np.zeros(SPECTRUM_WORDS, np.uint32)
-        words[3] = as_words([1.0])[0]
+        words[3] = as_words([factor])[0]
         words[4] = np.int32(-1 - self.row(spectrum)).view(np.uint32)
         return words
 

@@ -115,7 +115,8 @@ def test_look_at(scene):
 
 
 SPECTRA = [
-    (2, spectra.Constant(2)),
+    (2, spectra.RGBIlluminant(2, 2, 2)),
+    ({"type": "constant", "value": 2}, spectra.Constant(2)),
     ([1, 2, 3], spectra.RGBIlluminant(1, 2, 3)),
     ("A", spectra.illuminant("A")),
     ({"type": "illuminant", "name": "sodium", "scale": 4}, spectra.illuminant("sodium", 4)),

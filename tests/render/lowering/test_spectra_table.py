@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import pytest
 
 from clpt.errors import SceneError
 from clpt.render.lowering.scene import lower
-from clpt.scene import Film, Scene, cameras, lights, materials
+from clpt.scene import Film, Scene, cameras, integrators, lights, materials
 from clpt.scene.params import params
 from clpt.scene.shapes import Sphere
 from clpt.spectra import Cauchy, Tabulated
@@ -61,3 +62,20 @@ def test_a_table_beyond_the_film_is_told() -> None:
     (warning,) = lower(scene).warnings
     assert warning.startswith("diffuse.reflectance: its table from 900 to 1000 nm has nothing")
     assert not lower(ball(materials.Diffuse(reflectance=infrared), lambda_max=950.0)).warnings
+
+
+def test_a_film_that_sees_nothing_is_told() -> None:
+    infrared = {"lambda_min": 900.0, "lambda_max": 2000.0}
+    (warning,) = lower(ball(materials.Diffuse(), **infrared)).warnings
+    assert "sees nothing from 900 to 2000 nm" in warning
+    assert not lower(ball(materials.Diffuse(), **infrared, bands=2)).warnings
+
+
+def test_a_scene_without_light_is_told_once() -> None:
+    dark = dataclasses.replace(ball(materials.Diffuse()), lights=[])
+    (warning,) = lower(dark).warnings
+    assert warning.startswith("no light in the scene")
+    lamp = Sphere(emission=lights.Area())
+    whitted, aov = integrators.Whitted(), integrators.Aov()
+    for lit in ({"shapes": [lamp]}, {"integrator": whitted}, {"integrator": aov}):
+        assert not lower(dataclasses.replace(dark, **lit)).warnings

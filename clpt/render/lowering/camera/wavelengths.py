@@ -150,7 +150,11 @@ def _fluorescent(material: Any) -> Iterator[Reradiation]:
 def emissions(index: SceneIndex) -> Iterator[Spectrum]:
     """What the lights of a scene emit; an image of colours stands for D65."""
     scene = index.scene
-    sources = [*scene.lights, *(shape.emission for shape in index.shapes), scene.integrator]
+    sources: list[Any] = [
+        *scene.lights,
+        *(shape.emission for shape in index.shapes),
+        scene.integrator,
+    ]
     for source in sources:
         if source is None:
             continue

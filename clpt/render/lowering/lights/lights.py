@@ -147,7 +147,7 @@ def _lamp_block(lamp: Light, encoder: Encoder, scene_radius: float) -> Block:
 def _emitter_block(emitter: Emitter, encoder: Encoder) -> Block:
     """The rows of a shape that emits."""
     shape = emitter.shape
-    emission = shape.emission
+    emission: Any = shape.emission  # an area light, of either kind
     along = isinstance(emission, DirectionalArea)
     emission_mode = ALONG if along else BOTH if emission.two_sided else FRONT
     value = emission.irradiance if along else emission.radiance

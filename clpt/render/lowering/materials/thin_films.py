@@ -38,7 +38,7 @@ def film_colours(material: Kind) -> NDArray[np.float32]:
     kernels/optics/boundary_table.cl, a metal has only the first. Profiles and cosines are even from
     0 to 1; where no texture varies the thickness there is one profile.
     """
-    layers: tuple[Layer, ...] = material.layers  # type: ignore[attr-defined]
+    layers: tuple[Any, ...] = material.layers  # type: ignore[attr-defined]
     textured = [layer for layer in layers if _textured(layer)]
     thickest = max((layer.thickness for layer in textured), default=0.0)
     count = int(np.clip(np.ceil(thickest / THICKNESS_STEP) + 1, 2, MOST_ROWS)) if textured else 1

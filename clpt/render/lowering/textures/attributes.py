@@ -46,7 +46,7 @@ def lower_attributes(
         directory = np.zeros((count, 2), np.int32)
         for (name, role), number in textures.attributes.items():
             if name in names:
-                words = 1 if role == "real" else COLOUR_WORDS
+                words = 1 if role.startswith("real") else COLOUR_WORDS
                 first = first_face if per_face(name) else first_vertex
                 if shape.kind in shape_records.ONE_OF:
                     first = int(row["prim"]) - single_count
@@ -77,6 +77,9 @@ def _names(shape: Shape) -> set[str]:
 
 def _words(shape: Shape, name: str, role: str, spectral: bool) -> np.ndarray:
     values: np.ndarray = triangles.attribute(shape, name)
+    role, _, channel = role.partition(".")
     if role == "real" and values.shape[1] == 3:
-        values = spectra.luminance(values)[:, None]
+        values = (
+            values[:, "rgb".index(channel), None] if channel else spectra.luminance(values)[:, None]
+        )
     return texels(values[:, None].astype(np.float32), role, spectral).view(np.uint32)

@@ -7,6 +7,8 @@ instructions of two words: operand, operation and perhaps END, and the operand's
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache, reduce
 from typing import Any
 
 import numpy as np
@@ -16,8 +18,9 @@ from clpt.render.contract.parameter_words import SPECTRUM_WORDS
 from clpt.render.contract.texture_records import END, OPERANDS, OPERATIONS
 from clpt.render.lowering.spectra_table import SpectraTable
 from clpt.render.lowering.tables import TableStore, Words
-from clpt.scene.textures import Checkerboard, Mix, Product, Texture
-from clpt.spectra import RGB, Constant, RGBUnbounded
+from clpt.scene.textures import Bitmap, Checkerboard, MeshAttribute, Mix, Product, Texture
+from clpt.spectra import RGB, Constant, RGBIlluminant, RGBUnbounded, Spectrum, Tabulated, cie
+from clpt.spectra.spectrum import d65, primaries
 
 Code = list[tuple[int, int]]
 Lower = Callable[[Texture, str], int]
@@ -39,7 +42,7 @@ def folded(value: Any, role: str) -> Any:
         pattern = Checkerboard(color0=0.0, color1=1.0, to_uv=value.to_uv)
         return folded(Mix(first=value.color0, second=value.color1, amount=pattern), role)
     if isinstance(value, Product):
-        return _product(folded(value.first, role), folded(value.second, role), role)
+        return _product(folded(value.first, role), folded(value.second, role), role, value.rgb)
     if isinstance(value, Mix):
         first, second = folded(value.first, role), folded(value.second, role)
         amount = folded(value.amount, "real")
@@ -52,17 +55,76 @@ def folded(value: Any, role: str) -> Any:
     return value
 
 
-def _product(a: Any, b: Any, role: str) -> Any:
+def _product(a: Any, b: Any, role: str, rgb: bool) -> Any:
     if not _textured(a) and _textured(b):
         a, b = b, a  # so that light comes from the texture, and the constant is its factor
     x, y = _number(a, role), _number(b, role)
     if x is not None and y is not None:
-        return Constant(x * y)
+        return RGBIlluminant(*[x * y] * 3) if role == "emission" else Constant(x * y)
     if y == 1.0 and _textured(a):
         return a
     if x == 1.0 and role != "emission":
         return b
-    return Product(first=a, second=b)
+    return Product(first=a, second=b, rgb=rgb)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Scaled(Product):
+    """A spectrum times a number."""
+
+
+def separated(value: Any, role: str) -> Any:
+    """Return a value in which products of colours in RGB are sums of three products of numbers.
+
+    Each of `primaries` has its channel as the factor. A program adds by mixing: half and half, the
+    sum with the third, so the first two are times four and the third times two.
+    """
+    if isinstance(value, Mix):
+        parts = {name: separated(getattr(value, name), role) for name in ("first", "second")}
+        return replace(value, **parts)
+    if not isinstance(value, Product):
+        return value
+    light = role == "emission"
+    if not value.rgb:
+        factor = separated(value.second, "reflectance" if light else role)
+        return replace(value, first=separated(value.first, role), second=factor)
+    red, green, blue = (
+        _scaled(_primary(i, times, light), _factors(value, i)) for i, times in enumerate((4, 4, 2))
+    )
+    return Mix(first=Mix(first=red, second=green, amount=0.5), second=blue, amount=0.5)
+
+
+@cache
+def _primary(number: int, times: float, light: bool) -> Tabulated:
+    """A primary times a number, and times D65 for light."""
+    values = times * primaries()[number].sample(cie.GRID)
+    return Tabulated(cie.GRID, values * d65().sample(cie.GRID) if light else values, "hold")
+
+
+def _scaled(spectrum: Spectrum, factors: list[Any]) -> Any:
+    """A spectrum times textures and numbers; the numbers become one."""
+    number = float(np.prod([f for f in factors if not _textured(f)]))
+    made: Any = spectrum
+    for one in (*filter(_textured, factors), *([number] if number != 1.0 else [])):
+        made = _Scaled(first=made, second=one)
+    return made
+
+
+def _factors(value: Any, number: int) -> list[Any]:
+    """What a channel of a product of colours is the product of: textures in the role "real"."""
+    if isinstance(value, Product):
+        return [*_factors(value.first, number), *_factors(value.second, number)]
+    if isinstance(value, (Bitmap, MeshAttribute)):
+        return [replace(value, channel="rgb"[number])]
+    if isinstance(value, Mix):
+        first, second = (_joint(_factors(end, number)) for end in (value.first, value.second))
+        return [Mix(first=first, second=second, amount=value.amount)]
+    return [value if _textured(value) else float(value.to_rgb("unbounded")[number])]
+
+
+def _joint(factors: list[Any]) -> Any:
+    """The product of factors as one value."""
+    return reduce(lambda a, b: Product(first=a, second=b), factors)
 
 
 def _number(value: Any, role: str) -> float | None:
@@ -101,6 +163,8 @@ class _Writer:
 
     def code(self, value: Any, use: str) -> tuple[Code, int]:
         """Instructions that push a value, and how many they stack; use: an operand's name."""
+        if isinstance(value, _Scaled):
+            return self._joined([(value.first, use)], (value.second, "real"), "multiply")
         if isinstance(value, Product):
             second = "factor" if use == "own" and self.role == "emission" else use
             return self._joined([(value.first, use)], (value.second, second), "multiply")
@@ -138,7 +202,9 @@ class _Writer:
         return OPERANDS.index("constant"), self.store.append("textures", self._words(value, role))
 
     def _words(self, value: Any, role: str) -> Words:
-        """A colour or spectrum as five words; colours may exceed one."""
+        """A colour or spectrum as five words; colours may exceed one; emitted numbers are D65."""
+        if role == "emission" and isinstance(value, Constant):
+            value = RGBIlluminant(*[value.value] * 3)
         if role in ("reflectance", "index") and type(value) in (RGB, RGBUnbounded):
             rgb = (value.r, value.g, value.b)
             words = np.zeros(SPECTRUM_WORDS, np.float32)

@@ -19,7 +19,7 @@ from clpt.render.lowering.tables import TableStore
 from clpt.render.lowering.textures import noise
 from clpt.render.lowering.textures.bitmaps import Images, identity
 from clpt.render.lowering.textures.texels import bands, spectral_image
-from clpt.render.lowering.textures.texture_programs import folded, is_composite, program
+from clpt.render.lowering.textures.texture_programs import folded, is_composite, program, separated
 from clpt.scene.params import params
 from clpt.scene.textures import (
     MAPPINGS,
@@ -63,7 +63,9 @@ class TextureTable:
         """Return a texture with its constants put together, see `texture_programs.folded`."""
         key = id(texture), role
         if key not in self._folded:
-            self._folded[key] = folded(texture, role)
+            made = folded(texture, role)
+            spectral = self.spectra.spectral and role in ("reflectance", "emission")
+            self._folded[key] = separated(made, role) if spectral else made
             self._alive.append(texture)
         return self._folded[key]
 
@@ -87,7 +89,10 @@ class TextureTable:
         return self.images.finish(self.store, self.roles)
 
     def attribute(self, name: str, role: str) -> int:
-        """Return the index of a mesh attribute in the directories of `attributes`."""
+        """Return the index of a mesh attribute in the directories of `attributes`.
+
+        role: as in `row`; for a channel of a colour "real.r", "real.g" or "real.b".
+        """
         return self.attributes.setdefault((name, role), len(self.attributes))
 
     def append_row(self, kind: str, members: dict[str, Any]) -> tuple[int, np.ndarray]:
@@ -121,7 +126,8 @@ def _identity(texture: Texture) -> Any:
     """What makes two textures the same: of bitmaps their parameters, else being one object."""
     if isinstance(texture, Bitmap):
         values = (getattr(texture, name) for name in ("raw", "filter", "wrap", "wrap_v", "channel"))
-        placed = (texture.to_uv.tobytes(), texture.mapping, texture.to_texture.tobytes())
+        to_texture = np.asarray(texture.to_texture).tobytes()
+        placed = (texture.to_uv.tobytes(), texture.mapping, to_texture)
         return (identity(texture), *values, *placed)
     return id(texture)
 
@@ -150,10 +156,10 @@ def _second_uv(table: TextureTable) -> int:
 
 def _transform(texture: Placed | Solid, table: TextureTable) -> int:
     """Append the rows of `to_texture`. Raises SceneError for a projection."""
-    if not np.allclose(texture.to_texture[3], [0.0, 0.0, 0.0, 1.0]):
+    matrix = np.asarray(texture.to_texture, np.float32)
+    if not np.allclose(matrix[3], [0.0, 0.0, 0.0, 1.0]):
         raise SceneError("its last row must be 0 0 0 1", where=f"{texture.kind}.to_texture")
-    rows = texture.to_texture[:3].astype(np.float32)
-    return table.store.append("textures", np.ascontiguousarray(rows).view(np.uint32))
+    return table.store.append("textures", np.ascontiguousarray(matrix[:3]).view(np.uint32))
 
 
 def _checkerboard(
@@ -207,7 +213,8 @@ def per_face(name: str) -> bool:
 def _mesh_attribute(
     texture: MeshAttribute, role: str, table: TextureTable
 ) -> tuple[str, dict[str, Any]]:
-    number = table.attribute(texture.name, role)
+    channel = f".{texture.channel}" if role == "real" and texture.channel != "luminance" else ""
+    number = table.attribute(texture.name, role + channel)
     return texture.kind, {"number": number, "per_face": per_face(texture.name)}
 
 

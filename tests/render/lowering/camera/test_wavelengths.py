@@ -73,7 +73,7 @@ def test_an_infrared_camera_gets_a_table() -> None:
     """The eye's importance says nothing there."""
     curves = [Tabulated((low, low + 60.0, low + 120.0), (0, 1, 0)) for low in (720, 800, 880)]
     camera = Sensor(tuple(curves), np.eye(3))
-    found = density(scene(1.0, sensor=camera, lambda_max=1100.0))
+    found = density(scene("E", sensor=camera, lambda_max=1100.0))
     assert found.values is not None and (found.lo, found.hi) == (720.0, 1000.0)
 
 
