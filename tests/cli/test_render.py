@@ -149,6 +149,7 @@ def test_names_that_the_locale_cannot_spell(tmp_path):
     shutil.copy(ROOT / "tests" / "scenes" / "bowl.obj", scene)
     plain = {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0", "PYTHONPATH": str(ROOT)}
     command = [sys.executable, "-m", "clpt", "render", str(scene), "--size", "8x8", "--spp", "1"]
+    command += ["--mode", "rgb"]
     done = subprocess.run(
         command, cwd=tmp_path, env={**os.environ, **plain}, capture_output=True, check=False
     )
@@ -176,7 +177,7 @@ def test_closed_streams(tmp_path, streams):
 def test_warnings_of_a_file_come_before_kernels_are_built(tmp_path, capsys):
     path = tmp_path / "a.pbrt"
     path.write_text('Integrator "bdpt"\nWorldBegin\nLightSource "infinite"\nShape "sphere"\n')
-    common = ["-o", str(tmp_path / "a.png"), "--size", "8x8", "--spp", "1"]
+    common = ["-o", str(tmp_path / "a.png"), "--size", "8x8", "--spp", "1", "--mode", "rgb"]
     assert run(["render", str(path), *common]) == 0
     told = capsys.readouterr().err
     assert told.count("is missing") == 1
