@@ -104,7 +104,8 @@ class Pictures(DeviceOwner):
         """The picture so far: (h, w, 3) float32, linear in the film's output space.
 
         Of a film with alpha (h, w, 4), colours as they arrive and how much of the pixel is covered:
-        to lie over another picture, which adds the rest of its own. Of a film with bands (h, w, bands), the mean radiance in each; of `aov` (h, w, channels).
+        to lie over another picture, which adds the rest of its own. Of a film with bands (h, w,
+        bands), the mean radiance in each; of `aov` (h, w, channels).
         """
         if self.channels:
             return np.concatenate(list(self.layers().values()), axis=2)

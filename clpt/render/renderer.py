@@ -196,8 +196,8 @@ class Renderer(Pictures):
             if self._stop.is_set() or progress is None:
                 return not self._stop.is_set()
             try:
-                told = Progress(paths / pixels, end, paths, rays, seconds, self.active)
-                return progress(told) is not False
+                so_far = Progress(paths / pixels, end, paths, rays, seconds, self.active)
+                return progress(so_far) is not False
             except BaseException as error:
                 raised.append(error)
                 return False

@@ -1,5 +1,5 @@
-/* Pixels: where each is stored, where it lies on the film, and how it is known. They are stored in 4x4 tiles, row by row
- * in a tile and tile by tile in a row of them. */
+/* Pixels: where each is stored, where it lies on the film, and its number there. They are stored in 4x4 tiles, row by
+ * row in a tile and tile by tile in a row of them. */
 
 /* Where the pixel (x, y) of the picture is stored. */
 inline integer film_pixel_index(global const Settings *settings, integer x, integer y)

@@ -1,9 +1,9 @@
-/* The pixel filter of light that arrives at a point of the film: one of the pixels whose filter holds the point gets it,
- * chosen by |f|, with the sum of |f| as its weight. So every pixel gets what the filter gives it, in the mean: as by
- * film/filter.cl, where a pixel's samples choose points. Along the axes one by one, as filters are separable.
+/* The pixel filter of light that arrives at a point of the film: one of the pixels whose filter holds the point gets
+ * it, chosen by |f|, with the sum of |f| as its weight. So every pixel gets what the filter gives it, in the mean: as
+ * by film/filter.cl, where a pixel's samples choose points. One axis after the other, as filters are separable.
  *
- * FILTER_BOX: f is the same in the radius, which `distributions` holds as film/filter.cl says. Else a table of f follows
- * the one that is told there: the radius, the number of steps n, and n + 1 values of f from 0 to the radius. */
+ * FILTER_BOX: f is the same in the radius, which `distributions` holds as film/filter.cl says. Else a table of f
+ * follows the one that is told there: the radius, the number of steps n, and n + 1 values of f from 0 to the radius. */
 #ifndef FILTER_BOX
 /* f at a distance, 0 beyond the radius. */
 inline real spread_filter(Scene scene, int table, real distance)

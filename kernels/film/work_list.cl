@@ -53,8 +53,8 @@ inline NextSample next_sample(global const Settings *settings, global const uint
     integer left = work_list_end(settings, work_list, pixel_index, samples.y) - sample; /* sums may leave an int */
     n.leaves = ended & (!begun | (left <= planes));
     if (any(n.leaves)) {
-        integer next = work_list_next(settings, work_list, n.leaves, begun, pixel_index, slot - plane * per_plane, ahead,
-                                      samples);
+        integer own = slot - plane * per_plane;
+        integer next = work_list_next(settings, work_list, n.leaves, begun, pixel_index, own, ahead, samples);
         n.done = n.leaves & (next >= settings->padded_pixels);
         n.pixel_index = sel_i(n.leaves & !n.done, next, pixel_index);
         n.sample = sel_i(n.leaves & !n.done, ahead + samples.x, n.sample);

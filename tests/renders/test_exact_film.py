@@ -10,7 +10,7 @@ import pytest
 
 import clpt
 from clpt.errors import SceneError
-from clpt.render.wavefront.film_state import FILM_WORDS, FilmState
+from clpt.render.wavefront.film_state import FILM_WORDS, SAMPLES_WORD, FilmState
 from clpt.scene import Film, Scene, lights
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Aov, Independent, Mitchell, ParticleTracer, Sobol, Zsobol

@@ -19,8 +19,9 @@ class Film:
     """The film of a wavefront.
 
     settings: of the paths, which say the film's size and halves; bands: whether it has any;
-    alpha: whether it tells what is covered. size: width and height [pixels]; sums: the buffers that samples are added to, by the names of
-    the kernels' arguments; picture: (h, w, 4) float32, always the same memory.
+    alpha: whether it tells what is covered. size: width and height [pixels]; sums: the buffers that
+    samples are added to, by the names of the kernels' arguments; picture: (h, w, 4) float32, always
+    the same memory.
 
     Raises MemoryBudgetError.
     """
