@@ -69,6 +69,14 @@ def cancel_and_resume(renderer: clpt.Renderer, i: int) -> None:
     renderer.run(SPP)
 
 
+def save_and_merge(renderer: clpt.Renderer, i: int) -> None:
+    """Take the film out, empty it, and put it in again."""
+    state = renderer.film_state()
+    renderer.reset()
+    renderer.merge(state)
+    renderer.run(SPP)
+
+
 def run_until_noise_is_low(renderer: clpt.Renderer, i: int) -> None:
     """Run with a limit of noise, twice, the second lower."""
     renderer.run(NOISY // 2, noise=0.2 + 0.01 * (i % 10))
@@ -92,6 +100,7 @@ CHANGES: dict[str, Callable[[clpt.Renderer, int], Any]] = {
     "noise": run_until_noise_is_low,
     "reset": lambda r, i: r.reset(seed=i),
     "cancel": cancel_and_resume,
+    "merge": save_and_merge,
     "lower again": lower_again,
 }  # fmt: skip
 

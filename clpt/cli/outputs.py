@@ -53,7 +53,7 @@ def check_contents(paths: tuple[Path, ...], scene: Scene) -> None:
 def metadata(renderer: Renderer, scene: Path, seconds: float) -> dict[str, str | int | float]:
     """Return the metadata of an .exr: how it was made. spp is the mean over all pixels."""
     plan = renderer.scene
-    pixels = math.prod(plan.film.size) * len(renderer.wavefronts)
+    samples = max(wavefront.counts.samples for wavefront in renderer.wavefronts)
     return {
         "software": f"clpt {__version__}",
         "scene": os.fsencode(scene).decode("utf-8", "replace"),
@@ -61,7 +61,7 @@ def metadata(renderer: Renderer, scene: Path, seconds: float) -> dict[str, str |
         "integrator": plan.integrator.kind,
         "sampler": plan.sampler.kind,
         "seed": plan.seed,
-        "spp": sum(wavefront.counts.samples for wavefront in renderer.wavefronts) / pixels,
+        "spp": samples / math.prod(plan.film.size),
         "device": renderer.device.info.label,
         "seconds": round(seconds, 3),
     }

@@ -25,6 +25,7 @@ CHANNELS = {  # of the aov integrator: how many values each has
     "shape_id": 1,
     "primitive_id": 1,
 }
+IDS = ("shape_id", "primitive_id")  # of these, which are names: a mean of them would be none
 
 
 MOST_BANDS = 1024
@@ -90,7 +91,10 @@ class ParticleTracer(Integrator):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Aov(Integrator):
-    """Arbitrary output values of the first hit, in the channels named; a pixel holds their mean."""
+    """Arbitrary output values of the first hit, in the channels named; a pixel holds their mean.
+
+    Ids are those that the pixel's centre sees, by its first sample; -1: it sees no shape.
+    """
 
     channels: tuple[str, ...] = host(tuple(CHANNELS), f"of {', '.join(CHANNELS)}")
 

@@ -36,13 +36,19 @@ inline Spectrum path_radiance(Scene scene, Slab path, At at, PathEnd end, Wavele
     return radiance;
 }
 
-/* What the slots have summed of their pixels, with the finished paths added. What is not finite counts as black. */
+/* What the slots have summed of their pixels, with the finished paths added. What is not finite counts as black, at
+ * its own wavelength. */
 inline Exposure add_sample(Scene scene, Slab path, At at, BEGIN_ARGS, PathEnd end, integer slot, integer pixel_index,
                            integer sample)
 {
     Wavelengths lambdas = load_path_lambdas(path, at);
     Spectrum radiance = path_radiance(scene, path, at, end, lambdas);
-    mask finished = end.ended & end.begun;
+    mask finished = end.ended & end.begun, finite = mask_of(1);
+#define C(c)                                              \
+    finite = finite & (fabs(radiance.c) < FIXED_LARGEST); \
+    radiance.c = sel(fabs(radiance.c) < FIXED_LARGEST, radiance.c, (real)(0.0f));
+    SPECTRUM_EACH(C)
+#undef C
 #if USES_FLUORESCENCE /* the film sees the camera's wavelengths, not those by which the light came */
     Sampler begun_with = pixel_sampler(scene.settings, pixel_index, sample);
     lambdas = wavelengths_sample(scene, sampler_pair(begun_with, (natural)(DIMENSION_WAVELENGTH)).x);
@@ -63,7 +69,7 @@ inline Exposure add_sample(Scene scene, Slab path, At at, BEGIN_ARGS, PathEnd en
                       weight);
 #endif
     path_end_count(counters, end, end.depth + path_nulls(path, at));
-    count(counters, COUNTER_REJECTED, finished & !accepted, (integer)(1));
+    count(counters, COUNTER_REJECTED, finished & !(accepted & finite), (integer)(1));
     count(counters, COUNTER_FULL, finished & (full > 0), full);
     return e;
 }
@@ -87,9 +93,13 @@ inline void begin_path(Scene scene, Slab path, At at, mask go, integer pixel_ind
     global const Settings *settings = scene.settings;
     vec2 pixel = pixel_of_index(settings, pixel_index);
     Sampler sampler = pixel_sampler(settings, pixel_index, sample);
-    vec2 offset;
-    real weight;
+    vec2 offset = {0.0f, 0.0f};
+    real weight = 1.0f, nothing = 0.0f;
+#if CHANNEL_IS_ID /* which has no mean over a filter */
+    nothing = -1.0f;
+#else
     filter_sample(scene, sampler_pair(sampler, (natural)(DIMENSION_FILM)), &offset, &weight);
+#endif
     vec2 position = film_position(settings, pixel, offset);
     Wavelengths lambdas = wavelengths_sample(scene, sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH)).x);
     CameraRay ray = camera_ray(scene, position, sampler_pair(sampler, (natural)(DIMENSION_LENS)), lambdas);
@@ -98,7 +108,7 @@ inline void begin_path(Scene scene, Slab path, At at, mask go, integer pixel_ind
     store_path_d(path, at, go, ray.d);
     store_path_lambdas(path, at, go, lambdas);
     store_path_beta(path, at, go, camera_start());
-    store_path_radiance(path, at, go, spectrum_of(0.0f));
+    store_path_radiance(path, at, go, spectrum_of(nothing));
     store_path_pdf(path, at, go, -ray.far);
     store_path_eta(path, at, go, (real)(1.0f));
 #if USES_NULL_SURFACES

@@ -12,6 +12,7 @@ from typing import Any
 from clpt.render.contract import shape_records
 from clpt.render.contract.features import Features
 from clpt.render.contract.parameter_words import RERADIATION_STEP
+from clpt.scene.integrators import IDS
 from clpt.scene.materials import Material
 
 Defines = dict[str, str | int]
@@ -46,6 +47,7 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "CAMERA_DISPERSES": lambda f: f.glass_lens,
     "FILTER_BOX": lambda f: f.filter == "box",
     "CHANNEL": lambda f: bool(f.channel) and f"CHANNEL_{f.channel.upper()}",
+    "CHANNEL_IS_ID": lambda f: f.channel in IDS,
     "SPECTRA_SIZE": lambda f: f.spectra_size,
     "SPECTRA_STEP": lambda f: f"{f.spectra_step}f",
     "RERADIATION_STEP": lambda f: RERADIATION_STEP,

@@ -29,6 +29,7 @@ from clpt.render.wavefront.film import Film
 from clpt.render.wavefront.film_state import Words, add_films, add_sums
 from clpt.render.wavefront.path_buffers import GROUP, PathBuffers, divide_film
 from clpt.render.wavefront.strategy import Strategy, Tuning
+from clpt.scene.integrators import IDS
 
 BATCH = 8  # bounces that are enqueued between two reads of the counters
 CORE_BOUNCES = 1 << 16  # of all slots, that a core's part of a loop takes at once
@@ -213,6 +214,7 @@ class Wavefront:
 
     def enqueue(self, first: int, end: int) -> None:
         """Enqueue that samples first to end - 1 of every pixel are added; wait for nothing."""
+        first, end = self._range(first, end)
         samples = np.array([first, end], np.int32)
         self.loop.set_args(samples=samples, bounces=ENDLESS, restart=1)
         size, group = self._sizes(self.lanes)
@@ -229,6 +231,7 @@ class Wavefront:
         brought to its end and no other begins: a valid film, whose pixels differ in their number of
         samples. Returns whether all samples were added.
         """
+        first, end = self._range(first, end)
         steps = self._batch()
         begin = steps[0].bound
         self.paths.restart()
@@ -309,6 +312,10 @@ class Wavefront:
         self._accumulate_bands = (
             self._bind("bands", "accumulate_bands", **whole) if self.film.has_bands else None
         )
+
+    def _range(self, first: int, end: int) -> tuple[int, int]:
+        """The numbers among these of samples that the film takes: an id is known by the first."""
+        return (first, max(first, min(end, 1))) if self.channel in IDS else (first, end)
 
     def _note_paths(self, first: int, end: int) -> None:
         """Count the paths of sample numbers first to end - 1, which are in the film by now."""
