@@ -162,7 +162,7 @@ def test_choices_follow_the_probabilities():
 
 
 def test_many_lights_are_chosen_with_enough_bits():
-    """Of 65,536 lights each has 128 of the numbers that a float has: others tell a row from its alias.
+    """Each of 65,536 lights has 128 of the numbers of 23 bits: others tell a row from its alias.
 
     Chi-square at 1e-4 of how often a row stays, over rows whose share is no multiple of 1 / 128.
     """

@@ -14,6 +14,6 @@ def test_a_table_that_indices_do_not_reach_is_refused() -> None:
     store = TableStore()
     store.append_floats("texels", np.zeros(3, np.float32))
     few = np.lib.stride_tricks.as_strided(np.zeros(1, np.float32), (MOST_ELEMENTS - 2,), (0,))
-    with pytest.raises(SceneError, match="texels.* smaller images"):
+    with pytest.raises(SceneError, match=r"texels.* smaller images"):
         store.append_floats("texels", few)
     assert store.size("texels") == 3
