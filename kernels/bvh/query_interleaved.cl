@@ -26,8 +26,7 @@ inline void query_put(TriHit hit, uint8 begins, uint i, global float *t, global 
 {
     t[begins.s4 + i] = hit.prim == BVH_MISS ? INFINITY : hit.t;
     primitive[begins.s5 + i] = as_int(hit.prim);
-    barycentrics[begins.s6 + 2 * i] = hit.u;
-    barycentrics[begins.s6 + 2 * i + 1] = hit.v;
+    vstore2((float2)(hit.u, hit.v), i, barycentrics + begins.s6);
 }
 
 /* The rays of a batch: `alone` traces ray i by itself; `step` takes state s a step further and is 0 at the end of

@@ -80,6 +80,7 @@ inline real min_r(real a, real b) { return a < b ? a : b; }
 inline real max_r(real a, real b) { return a > b ? a : b; }
 inline integer min_i(integer a, integer b) { return a < b ? a : b; }
 inline integer max_i(integer a, integer b) { return a > b ? a : b; }
+inline integer clamp_i(integer i, integer most) { return max_i(min_i(i, most), (integer)(0)); } /* an index */
 inline real clamp_r(real x, real lo, real hi) { return min_r(max_r(x, lo), hi); }
 inline real sqrt_r(real x) { return sqrt(max_r(x, (real)(0.0f))); } /* of a rounded negative: 0 */
 

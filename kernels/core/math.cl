@@ -108,5 +108,13 @@ inline real erfinv_r(real x)
     return x * sel(w < 5.0f, p, q);
 }
 
-/* a / b for 0 <= a < 2^23; an integer division would run lane by lane. */
-inline integer divide(integer a, int b) { return to_integer((to_real(a) + 0.5f) / (float)b); }
+/* a / b for 0 <= a < 2^30 and b > 0; an integer division would run lane by lane. The quotient of floats is off by some
+ * 2^-22 of itself, more where a device divides worse; so is that of what is left; the last step is exact. */
+inline integer divide(integer a, int b)
+{
+    real inverse = 1.0f / (float)b;
+    integer q = to_integer(to_real(a) * inverse);
+    q += to_integer(floor(to_real(a - q * b) * inverse));
+    integer left = a - q * b;
+    return q + sel_i(left >= b, (integer)(1), (integer)(0)) - sel_i(left < 0, (integer)(1), (integer)(0));
+}

@@ -8,4 +8,5 @@ inline natural hash_natural(natural x)
     return (x >> 22u) ^ x;
 }
 /* [0, 1): 23 bits put into a mantissa, so that 1 never comes out. */
+#define UNIT_GRAIN 0x1p-23f
 inline real unit_interval(natural x) { return as_real((x >> 9u) | 0x3f800000u) - 1.0f; }

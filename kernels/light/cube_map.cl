@@ -35,7 +35,7 @@ inline Grid cube_map_grid(CubeMap l)
 inline Spectrum cube_map_between(CubeMap l, Scene scene, CubePoint p, Wavelengths lambdas)
 {
     real column = (p.a + 1.0f) * 0.5f * to_real(l.width) + 0.5f, row = (p.b + 1.0f) * 0.5f * to_real(l.width) + 0.5f;
-    integer i = min_i(to_integer(column), l.width), j = min_i(to_integer(row), l.width), stride = l.width + 2;
+    integer i = clamp_i(to_integer(column), l.width), j = clamp_i(to_integer(row), l.width), stride = l.width + 2;
     vec2 at = {column - to_real(i), row - to_real(j)};
     integer k = (p.face * stride + j) * stride + i;
     return texels_between(scene, l.texels, k, k + 1, k + stride, k + stride + 1, at, lambdas);
@@ -50,7 +50,7 @@ real cube_map_pdf(CubeMap l, Scene scene, vec3 hemisphere, vec3 d)
 {
     CubePoint p = cube_map_point(l, d);
     real cells = to_real(l.width * 2), column = (p.a + 1.0f) * 0.5f * cells, row = (p.b + 1.0f) * 0.5f * cells;
-    integer last = l.width * 2 - 1, i = min_i(to_integer(column), last), j = min_i(to_integer(row), last);
+    integer last = l.width * 2 - 1, i = clamp_i(to_integer(column), last), j = clamp_i(to_integer(row), last);
     vec2 at = {column - to_real(i), row - to_real(j)};
     real pdf = grid_pdf(scene, cube_map_grid(l), p.face * l.width * 2 + j, i, at);
     return pdf * sqr(to_real(l.width)) * p.jacobian;

@@ -25,12 +25,12 @@ inline EnvmapPoint envmap_point(Envmap l, vec3 d)
     real u = atan2_r(x, -z) * INV_2PI, v = atan2_r(p.sin_t, y) * INV_PI;
     real column = (u + sel(u < 0.0f, (real)(1.0f), (real)(0.0f))) * to_real(l.width) - 0.5f;
     real row = v * to_real(l.height - 1);
-    p.row = min_i(to_integer(row), l.height - 2);
+    p.row = clamp_i(to_integer(row), l.height - 2); /* even where d is not finite */
     p.at.y = row - to_real(p.row);
     real left = floor(column);
     p.at.x = column - left;
     p.column = to_integer(left);
-    p.column = sel_i(p.column < 0, p.column + l.width, min_i(p.column, l.width - 1));
+    p.column = clamp_i(p.column + sel_i(p.column < 0, l.width, (integer)(0)), l.width - 1);
     return p;
 }
 

@@ -10,16 +10,27 @@ inline LightRow light_at(Scene scene, integer row)
 #define FEW_LIGHTS 0
 #endif
 
+/* A random number has 23 bits, and every choice by it spends some. This stands for those below: uniform in [0, grain),
+ * where u is a multiple of `grain`; other: a random number of the same sample. */
+inline real light_bits(real u, real other, real grain)
+{
+    return unit_interval(hash_natural(as_natural(u) ^ hash_natural(as_natural(other)))) * grain;
+}
+
 /* A row of `lights`: *u chooses a row, and by its fraction either that row or its alias; what is left of it is uniform
- * in [0, 1) again. */
-inline integer light_pick(Scene scene, real *u)
+ * in [0, 1) again. other: see light_bits. */
+inline integer light_pick(Scene scene, real *u, real other)
 {
     int count = scene.settings->light_count;
     if (count == 1) return (integer)(0);
-    real position = *u * (float)count;
-    integer row = min_i(to_integer(position), (integer)(count - 1));
+    real position = *u * (float)count, whole = floor(position), remainder = position - whole;
+#if !FEW_LIGHTS
+    remainder += light_bits(*u, other, (real)((float)count * UNIT_GRAIN));
+    whole += floor(remainder);
+    remainder -= floor(remainder);
+#endif
+    integer row = min_i(to_integer(whole), (integer)(count - 1));
     LightRow l = light_at(scene, row);
-    real remainder = position - to_real(row);
     mask stay = remainder < l.keep;
     real left = sel(stay, remainder, remainder - l.keep), share = sel(stay, l.keep, 1.0f - l.keep);
     *u = clamp_r(left / max_r(share, (real)(1e-20f)), (real)(0.0f), (real)(0.99999994f));

@@ -62,12 +62,15 @@ inline integer light_tree_root(Scene scene)
     return (integer)(as_int(scene.lights[nodes + LIGHT_NODE_CHILD]));
 }
 
-/* A row, and its chance at p; what is left of *u is uniform in [0, 1) again. */
-inline integer light_tree_pick(Scene scene, vec3 p, real *u, real *pmf)
+/* A row, and its chance at p; what is left of *u is uniform in [0, 1) again. other: see light_bits. */
+inline integer light_tree_pick(Scene scene, vec3 p, real *u, real other, real *pmf)
 {
     integer at = light_tree_root(scene), first, second;
     mask open = at >= 0;
     *pmf = 1.0f;
+#if !FEW_LIGHTS
+    real grain = UNIT_GRAIN; /* of *u: grows as its bits are spent */
+#endif
     while (any(open)) {
         real chance = light_tree_chance(scene, sel_i(open, at, (integer)(1)), p, &first, &second);
         mask left = *u < chance;
@@ -75,6 +78,15 @@ inline integer light_tree_pick(Scene scene, vec3 p, real *u, real *pmf)
         real remainder = sel(left, *u, *u - chance) / max_r(share, (real)(1e-20f));
         *u = sel(open, clamp_r(remainder, (real)(0.0f), (real)(0.99999994f)), *u);
         *pmf *= sel(open, share, (real)(1.0f));
+#if !FEW_LIGHTS
+        grain /= sel(open, max_r(share, (real)(1e-20f)), (real)(1.0f));
+        mask coarse = open & (grain > 0x1p-11f);
+        if (any(coarse)) {
+            real finer = min_r(*u + light_bits(*u, other, min_r(grain, (real)(1.0f))), (real)(0.99999994f));
+            *u = sel(coarse, finer, *u);
+            grain = sel(coarse, (real)(UNIT_GRAIN), grain);
+        }
+#endif
         at = sel_i(open, sel_i(left, first, second), at);
         open = at >= 0;
     }

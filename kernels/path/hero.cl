@@ -23,10 +23,12 @@ inline real hero_pdf(Bsdf m, vec3 wo, vec3 wi, Spectrum ratio)
 #endif
 }
 
-/* bsdf_sample, its pdf and weight those of the four together. */
+/* bsdf_sample, its pdf and weight those of the four together. A direction that is not finite has a pdf of 0, so that
+ * the path ends: it would leave the scene, and no sky knows where. */
 inline BsdfSample hero_sample(Bsdf m, vec3 wo, vec3 u, Spectrum *ratio)
 {
     BsdfSample s = bsdf_sample(m, wo, u);
+    s.pdf = sel(dot3(s.wi, s.wi) < 4.0f, s.pdf, (real)(0.0f)); /* NaN fails the comparison */
 #if USES_DISPERSION
 #if BSDF_CHROMATIC
     Spectrum pdfs = spectrum_mul(*ratio, bsdf_pdfs(m, wo, s.wi));

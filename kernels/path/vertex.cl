@@ -102,9 +102,9 @@ inline mask vertex_continues(Scene scene, Vertex v)
 inline void vertex_leave(Slab path, At at, mask next, Vertex v, vec3 d, Spectrum beta)
 {
 #if BSDF_IS_NULL /* nothing has happened: the camera's ray has its end, and lights are weighed by what was before */
-    real pdf = load_path_pdf(path, at);
-    store_path_pdf(path, at, next & (v.depth == 0), pdf + v.t);
-    store_path_null_distance(path, at, next, load_path_null_distance(path, at) + v.t);
+    real pdf = load_path_pdf(path, at), onward = v.t + surface_lead(v.s, d);
+    store_path_pdf(path, at, next & (v.depth == 0), pdf + onward);
+    store_path_null_distance(path, at, next, load_path_null_distance(path, at) + onward);
 #endif
     store_path_o(path, at, next, surface_offset(v.s, d));
     store_path_d(path, at, next, d);

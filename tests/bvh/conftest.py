@@ -54,9 +54,11 @@ kernel NO_VECTORIZE void occluded(global const float *tris, uint count, global c
     scatter_if(hits, AT, EVERY, as_real(met & 1));
 }
 """
-HIT = np.dtype(
-    [("t", "f4"), ("u", "f4"), ("v", "f4"), ("prim", "u4"), ("tag", "u4"), ("n", "f4", 3)]
-    + [("plane", "f4"), ("side", "f4")]
+HIT = np.dtype(  # TriHit
+    {
+        "names": ["t", "u", "v", "prim", "tag", "n", "plane", "side"],
+        "formats": ["f4", "f4", "f4", "u4", "u4", "3f4", "f4", "f4"],
+    }
 )
 MISS = 0xFFFFFFFF
 

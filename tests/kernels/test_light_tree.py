@@ -21,7 +21,7 @@ PMF = """
 """
 PICK = """
     real u = x[3], pmf;
-    r[0] = to_real(light_tree_pick(scene, v3(x[0], x[1], x[2]), &u, &pmf));
+    r[0] = to_real(light_tree_pick(scene, v3(x[0], x[1], x[2]), &u, x[4], &pmf));
     r[1] = pmf;
     r[2] = u;
 """
@@ -145,7 +145,9 @@ def test_choices_follow_the_probabilities():
     n = 200_000
     for i, p in enumerate(points(4, seed=5).T):
         u = np.random.default_rng(i).random(n)
-        row, pmf, rest = scene()(PICK, np.vstack([np.tile(p[:, None], n), u]), 3).astype(float)
+        row, pmf, rest = scene()(PICK, np.vstack([np.tile(p[:, None], n), u, u[::-1]]), 3).astype(
+            float
+        )
         chances = pmfs(scene(), p[:, None])[:, 0]
         np.testing.assert_allclose(pmf, chances[row.astype(int)], rtol=1e-5)
         counts = np.bincount(row.astype(int), minlength=len(chances))
@@ -157,6 +159,26 @@ def test_choices_follow_the_probabilities():
         assert chi2.sf(statistic, full.sum()) > 1e-4
         assert (counts[chances == 0.0] == 0).all()
         assert abs(rest.mean() - 0.5) < SIGMAS / np.sqrt(12 * n) and rest.max() < 1.0
+
+
+def test_many_lights_are_chosen_with_enough_bits():
+    """Each of 65,536 lights has 128 of the numbers of 23 bits: others tell a row from its alias.
+
+    Chi-square at 1e-4 of how often a row stays, over rows whose share is no multiple of 1 / 128.
+    """
+    count, each = 1 << 16, 256
+    there = lit([], [scattered(count)], tree=False)
+    keep = there.rows.rows["keep"].astype(float)
+    beyond = keep * 128 % 1.0
+    rows = np.flatnonzero((keep > 0.2) & (keep < 0.8) & (beyond > 0.05) & (beyond < 0.3))[:16]
+    u = (rows[:, None] + np.arange(128) / 128) / count
+    others = np.random.default_rng(1).random((len(rows), 128, each))
+    given = np.stack([np.broadcast_to(u[..., None], others.shape), others]).reshape(2, -1)
+    got = there("real u = x[0]; r[0] = to_real(light_pick(scene, &u, x[1]));", given, 1)[0]
+    stays = (got.reshape(len(rows), -1) == rows[:, None]).mean(axis=1)
+    n = 128 * each
+    statistic = (n * (stays - keep[rows]) ** 2 / (keep[rows] * (1.0 - keep[rows]))).sum()
+    assert chi2.sf(statistic, len(rows)) > 1e-4
 
 
 def test_a_light_that_shines_on_a_point_may_be_chosen():
@@ -190,7 +212,7 @@ def test_the_estimate_is_that_of_choosing_by_power():
 
 @pytest.mark.parametrize("lanes", [1, 16])
 def test_lanes_agree(lanes):
-    given = np.vstack([points(500, 3), np.random.default_rng(3).random(500)])
+    given = np.vstack([points(500, 3), np.random.default_rng(3).random((2, 500))])
     one, other = (scene()(PICK, given, 3, lanes=k) for k in (8, lanes))
     np.testing.assert_array_equal(one, other)
 

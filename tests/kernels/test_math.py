@@ -62,3 +62,20 @@ def test_pow():
     assert np.abs(got - truth).max() < 2e-6
     normal = truth > 1e-30
     assert np.abs(got / np.maximum(truth, 1e-38) - 1.0)[normal].max() < 2e-5
+
+
+def test_divide_is_exact_for_integers():
+    """Quotients of numbers up to 2^30: multiples, their neighbours, and others."""
+    rng = np.random.default_rng(1)
+    divisors = (1, 2, 3, 7, 641, 65_537, 4_194_304, 1_000_000_007)
+    body = "".join(
+        f"r[{k}] = as_real(divide(as_integer(x[0]), {b}));" for k, b in enumerate(divisors)
+    )
+    edges = [b * rng.integers(0, 2**30 // b + 1, 2000) + d for b in divisors for d in (-1, 0, 1)]
+    given = np.concatenate([*edges, rng.integers(0, 2**30, 4000), np.arange(4000)])
+    given = given[(given >= 0) & (given < 2**30)][: given.size // 64 * 32].astype(np.int32)
+    for lanes in (1, 16):
+        text = map_text(body, 1, len(divisors))
+        got = run(text, lanes, given.view(np.float32)[None], len(divisors)).view(np.int32)
+        for row, b in zip(got, divisors, strict=True):
+            assert np.array_equal(row, given // b), b

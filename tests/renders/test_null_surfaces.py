@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from clpt import transforms as tf
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m
 from clpt.scene.cameras import Perspective
-from clpt.scene.integrators import ParticleTracer, Path
+from clpt.scene.integrators import Aov, Integrator, ParticleTracer, Path, Whitted
 from clpt.scene.lights import Area, Constant, Point, Spot
 from clpt.scene.shapes import Rectangle, Shape, Sphere
 from clpt.scene.textures import Checkerboard
@@ -43,7 +45,7 @@ def screened(lights: list, emitters: list[Shape], mode: str) -> Scene:
         camera=facing_down(),
         shapes=[GROUND, *above, *emitters],
         lights=lights,
-        integrator=Path(max_depth=12),
+        integrator=Path(max_depth=2),  # screens are no depth
         film=Film(width=4, height=4, mode=mode),
     )
 
@@ -96,3 +98,67 @@ def test_light_paths_pass_as_well() -> None:
     passed = 0.5 * 0.5 * 0.5
     expected = float((ALBEDO / np.pi * 100.0 / d2 * 2.0 / np.sqrt(d2)).mean()) * passed
     assert_mean(images, [expected] * 3, 0.02, 5e-3)
+
+
+def carded(integrator: Integrator, cards: int) -> Scene:
+    """A lit wall behind cards of which nothing is left."""
+    hole = m.Mask(material=BLACK, opacity=0.0)
+    white = m.Diffuse(reflectance=0.8)
+    return Scene(
+        camera=facing_down(),
+        shapes=[
+            Rectangle(material=white, to_world=tf.scale(9.0)),
+            *(
+                Rectangle(material=hole, to_world=tf.translate([0, 0, 1e-4 * i]) @ tf.scale(3.0))
+                for i in range(1, 1 + cards)
+            ),
+        ],
+        lights=[Point(position=(0.0, 0.0, 2.0), intensity=(4.0, 4.0, 4.0))],
+        integrator=integrator,
+        film=Film(width=4, height=4, mode="rgb"),
+    )
+
+
+DEPTHS = [  # integrators, and the least depth at which they see a lit wall
+    Path(max_depth=2),
+    Whitted(max_depth=1, ambient=0.0),
+    ParticleTracer(max_depth=2),
+]
+
+
+@pytest.mark.parametrize("integrator", DEPTHS, ids=lambda i: i.kind)
+def test_holes_are_no_depth(integrator: Integrator) -> None:
+    """A hundred holes cost no `max_depth`, and no light: a wall at 2 m, whatever is before it."""
+    scene = carded(integrator, 100)
+    if isinstance(integrator, ParticleTracer):  # it needs a camera of one point, and many paths
+        view = tf.look_at([0, 0, 0.05], [0, 0, 0], [0, 1, 0])
+        spot = Spot(intensity=(4.0,) * 3, cutoff=0.5, beam_width=0.49)
+        spot = dataclasses.replace(
+            spot, to_world=tf.translate([0, 0, 2]) @ tf.rotate([1, 0, 0], 180)
+        )
+        camera = Perspective(to_world=view, fov=20.0)
+        scene = dataclasses.replace(scene, camera=camera, lights=[spot])
+    images = exposures(scene, 8, 64)
+    assert_mean(images, [0.8 / np.pi * 4.0 / 2.0**2] * 3, 0.05, 2e-3)
+
+
+def test_a_stack_of_more_than_a_path_crosses_is_black() -> None:
+    """A path crosses 1024 null surfaces, and then ends."""
+    assert exposures(carded(Path(max_depth=2), 1100), 2, 1).max() == 0.0
+
+
+def test_what_lies_behind_a_hole_is_the_first_surface() -> None:
+    """Depth of the wall from the near plane at 1 mm, not of the nearest card."""
+    image = exposures(carded(Aov(channels=("depth",)), 20), 2, 4)
+    np.testing.assert_allclose(image, 0.049, rtol=1e-5)
+
+
+def test_the_camera_s_end_and_hidden_lights_hold_behind_holes() -> None:
+    """A wall beyond `far` is not seen through holes either, nor a sky that is hidden."""
+    scene = carded(Path(max_depth=2), 3)
+    ends = dataclasses.replace(scene.camera, far=0.03)
+    sky = [Constant(radiance=(1.0, 1.0, 1.0))]
+    scene = dataclasses.replace(scene, camera=ends, lights=sky)
+    np.testing.assert_allclose(exposures(scene, 2, 4), 1.0, rtol=1e-6)
+    scene = dataclasses.replace(scene, integrator=Path(max_depth=2, hide_lights=True))
+    assert exposures(scene, 2, 4).max() == 0.0

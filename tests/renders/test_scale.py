@@ -12,15 +12,17 @@ import numpy as np
 import pytest
 
 import clpt
+from clpt import device as dev
 from clpt import transforms as tf
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Orthographic, Perspective
-from clpt.scene.integrators import ParticleTracer, Path, Whitted
+from clpt.scene.integrators import Path
 from clpt.scene.lights import Area, Constant
-from clpt.scene.materials import Dielectric, Diffuse, Mask, Null
+from clpt.scene.materials import Dielectric, Diffuse, TwoSided
 from clpt.scene.shapes import Cube, Cylinder, Disk, Mesh, Rectangle, Shape, Sphere
 from tests.renders.builders import BLACK, DOWN, UP
-from tests.renders.support import assert_agree, exposures
+from tests.renders.support import assert_agree, blocks, exposures
+from tests.rotation import rotating
 
 EVEN = Constant(radiance=(1.0, 1.0, 1.0))
 DEEP = Path(max_depth=60, rr_depth=100)
@@ -30,7 +32,7 @@ CLEAR = {"int_ior": 1.0, "ext_ior": 1.0}  # a boundary that bends and reflects n
 def looking_at(point: Any, half: float, shapes: list[Shape], **more: Any) -> Scene:
     """Shapes seen along -z from 4 m above a point, in a square 2 * half wide, under an even sky."""
     point = np.asarray(point, float)
-    view = tf.look_at(point + [0, 0, 4], point, UP) @ tf.scale([half, half, 1])
+    view = tf.look_at(np.add(point, (0, 0, 4)), point, UP) @ tf.scale([half, half, 1])
     return Scene(
         camera=Orthographic(to_world=view),
         shapes=shapes,
@@ -63,32 +65,84 @@ def test_thin_bodies_are_left_again() -> None:
     np.testing.assert_allclose(image, 1.0, atol=1e-4)
 
 
-def corner(shape: str) -> list[Shape]:
-    """A lit white floor under a shape of each kind, with a lamp above."""
+def still_life() -> list[Shape]:
+    """A shape of each kind on a white floor, under a square lamp and a round one."""
     white = Diffuse(reflectance=0.7)
-    lamp = tf.translate([0.5, 0.5, 3.0]) @ DOWN @ tf.scale(0.5)
-    turned = tf.rotate([1, 2, 3], 40) @ tf.scale(0.5)
-    ball = {
-        "cube": Cube(to_world=tf.translate([0, 0, 0.9]) @ turned, material=white),
-        "sphere": Sphere(center=(0, 0, 0.6), radius=0.5, material=white),
-        "disk": Disk(to_world=tf.translate([0, 0, 0.6]) @ turned, material=white),
-        "cylinder": Cylinder(p0=(-0.5, 0, 0.4), p1=(0.5, 0.2, 0.7), radius=0.3, material=white),
-    }[shape]
+    turned = tf.rotate([1, 2, 3], 40) @ tf.scale(0.3)
+    glow = Area(radiance=(4.0, 4.0, 4.0))
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32)
+    tetrahedron = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], np.uint32)
     return [
         Rectangle(to_world=tf.scale(2.0), material=white),
-        ball,
-        Rectangle(to_world=lamp, material=BLACK, emission=Area(radiance=(4.0, 4.0, 4.0))),
+        Cube(to_world=tf.translate([0.6, 0.6, 0.6]) @ turned, material=white),
+        Sphere(center=(-0.6, 0.6, 0.4), radius=0.4, material=white),
+        Disk(to_world=tf.translate([0.6, -0.6, 0.4]) @ turned, material=white),
+        Cylinder(p0=(-0.9, -0.6, 0.4), p1=(-0.3, -0.5, 0.5), radius=0.2, material=white),
+        Mesh(vertices=vertices, faces=tetrahedron, to_world=tf.scale(0.5), material=white),
+        Rectangle(
+            to_world=tf.translate([0.5, 0.5, 3.0]) @ DOWN @ tf.scale(0.5),
+            material=BLACK,
+            emission=glow,
+        ),
+        Sphere(center=(-1.5, 0.0, 1.5), radius=0.2, material=BLACK, emission=glow),
     ]
 
 
-def placed(shapes: list[Shape], to_world: Any, mode: str) -> Scene:
-    """The shapes and the camera that looks at them, all of them moved."""
+def placed(shapes: list[Shape], to_world: np.ndarray, mode: str) -> Scene:
+    """The shapes and the camera that looks at them, all of them moved and scaled."""
     view = tf.look_at([2.5, -2.0, 2.5], [0, 0, 0.4], [0, 0, 1])
-    eye = view.copy()
-    eye[:3, 3] = (to_world @ view)[:3, 3]
+    view[:3, 3] = (to_world @ view)[:3, 3]
     return Scene(
-        camera=Perspective(to_world=eye, fov=50.0, near=1e-9),
+        camera=Perspective(to_world=view, fov=50.0, near=1e-9),
         shapes=[dataclasses.replace(s, to_world=to_world @ s.to_world) for s in shapes],
         integrator=Path(max_depth=4),
-        film=Film(width=12, height=12, mode=mode),
+        film=Film(width=16, height=16, mode=mode),
     )
+
+
+FAR_AWAY = tf.translate([1e4, -1e4, 1e4])
+PLACES = {  # 1e4 m away float32 has steps of 1 mm: there the scene is 400 m wide
+    "small": tf.scale(1e-3),
+    "large": tf.scale(1e3),
+    "far_away": FAR_AWAY @ tf.scale(100.0),
+}
+
+
+def gpu_form() -> dev.Device:
+    """The device of all tests, which says that it is a GPU."""
+    on = dev.choose()
+    info = dataclasses.replace(on.info, kind="gpu", compute_units=2)
+    return dev.Device(on.context, on.queue, info)
+
+
+@rotating("layout, mode", ("wide8", "brute", "compact", "binary", "gpu"), ("rgb", "spectral"))
+def test_the_same_picture_everywhere(layout: str, mode: str) -> None:
+    """Means over blocks of a still life, as large as it is and where it is, and elsewhere."""
+    form: dict[str, Any] = {"layout": layout}
+    if layout == "gpu":
+        form = {"device": gpu_form(), "slots": 1 << 12}
+    shapes = still_life()
+    here = blocks(exposures(placed(shapes, np.eye(4), mode), 8, 32, **form))
+    for name, to_world in PLACES.items():
+        there = blocks(exposures(placed(shapes, to_world, mode), 8, 32, 101, **form))
+        assert_agree(there, here, name, 1e-3)
+
+
+@pytest.mark.parametrize("layout", ["brute", "wide8"])
+def test_a_closed_box_is_black_inside(layout: str) -> None:
+    """A bright sky outside of a white box, as it stands and turned: no path finds a way out."""
+    white = Diffuse(reflectance=0.9)
+    turned = tf.rotate([1, 2, 3], 40)
+    for to_world in (np.eye(4), turned, *PLACES.values()):
+        box = Cube(to_world=to_world, material=TwoSided(front=white))
+        scene = placed([], to_world, "rgb")
+        view = tf.look_at([0.1, 0.2, 0.3], [1, 1, 1], UP)
+        view[:3, 3] = (to_world @ view)[:3, 3]
+        scene = dataclasses.replace(
+            scene,
+            shapes=[box],
+            camera=Perspective(to_world=view, fov=90.0, near=1e-9),
+            lights=[Constant(radiance=(1e6, 1e6, 1e6))],
+            integrator=Path(max_depth=20, rr_depth=20),
+        )
+        assert clpt.render(scene, 64, layout=layout).max() == 0.0, to_world

@@ -26,7 +26,7 @@ def dispatch_text(kinds: Iterable[str], textured: bool, two_sided: bool = False)
     if not present:
         return "\n".join([*includes, function(head, "return light_ray_nothing();")])
     rows = [
-        "integer row = light_pick(scene, &pick);",
+        "integer row = light_pick(scene, &pick, u.y);",
         "LightRow l = light_at(scene, row);",
         "LightRay r = light_ray_nothing();",
     ]

@@ -111,9 +111,9 @@ def _sample_text(
         return function(head, "return light_sample_nothing();")
     number = "FEW_LIGHTS ? &u.x : &pick"
     if tree:
-        rows = ["real pmf;", f"integer row = light_tree_pick(scene, p, {number}, &pmf);"]
+        rows = ["real pmf;", f"integer row = light_tree_pick(scene, p, {number}, u.y, &pmf);"]
     else:
-        rows = [f"integer row = light_pick(scene, {number});"]
+        rows = [f"integer row = light_pick(scene, {number}, u.y);"]
     rows += ["LightRow l = light_at(scene, row);", "LightSample s = light_sample_nothing();"]
     for kind in others:
         seen = "hemisphere" if kind in INFINITE else "p"

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from clpt.errors import SceneError
 from clpt.records import TABLES
 
 Words = NDArray[np.uint32]
+MOST_ELEMENTS = 2**31 - 1  # of a table: kernels have indices of 32 bits with a sign
 DTYPES = {"float": np.float32, "uint": np.uint32}
 
 
@@ -33,18 +35,29 @@ class TableStore:
         return self._sizes[name]
 
     def append(self, name: str, words: ArrayLike) -> int:
-        """Append words to a table of `uint`; return the index of the first."""
+        """Append words to a table of `uint`; return the index of the first.
+
+        Raises SceneError if the table has more than MOST_ELEMENTS then.
+        """
         return self._append(name, "uint", words)
 
     def append_floats(self, name: str, values: ArrayLike) -> int:
-        """Append values to a table of `float`; return the index of the first."""
+        """Append values to a table of `float`; return the index of the first.
+
+        Raises SceneError if the table has more than MOST_ELEMENTS then.
+        """
         return self._append(name, "float", values)
 
     def _append(self, name: str, element: str, values: ArrayLike) -> int:
         if TABLES[name][0] != element:
             raise TypeError(f"table {name!r} holds {TABLES[name][0]}, not {element}")
+        first, size = self._sizes[name], np.size(values)
+        if first + size > MOST_ELEMENTS:
+            raise SceneError(
+                f"fills the table {name!r} with {first + size:,} numbers; kernels reach "
+                f"{MOST_ELEMENTS:,}: use smaller images or meshes, or fewer bands"
+            )
         array = np.ascontiguousarray(values, DTYPES[element]).reshape(-1)
-        first = self._sizes[name]
         self._parts[name].append(array)
         self._sizes[name] += array.size
         return first

@@ -21,7 +21,7 @@ GROUP = 64  # slots are a multiple of it, and it is the local size of one-lane k
 FRESH = 0x2000  # kernels/path/path_state.cl
 CPU_SLOTS = 1 << 14
 UNIT_SLOTS = 1 << 14  # of a GPU's compute unit, which runs about an eighth of them at once
-MOST_SLOTS = 1 << 22  # kernels/core/math.cl divides them as floats
+MOST_SLOTS = 1 << 22  # beyond, more slots bring no speed
 # A work-item of the loop keeps its paths in the first cache, and waits the less for the longest of
 # them the more samples each slot has to take: few slots, measured on CPUs.
 LOOP_SLOTS = 1 << 10  # of a core
