@@ -7,11 +7,19 @@ inline integer film_pixel_index(global const Settings *settings, integer x, inte
     return ((y >> 2) * settings->tiles_x + (x >> 2)) * 16 + (y & 3) * 4 + (x & 3);
 }
 
-/* The pixel that is stored at an index: x and y, whole numbers. */
-inline vec2 pixel_of_index(global const Settings *settings, integer pixel_index)
+/* Column and row of the pixel that is stored at an index. */
+inline void pixel_place(global const Settings *settings, integer pixel_index, integer *x, integer *y)
 {
     integer tile = pixel_index >> 4, row = divide(tile, settings->tiles_x), column = tile - row * settings->tiles_x;
-    vec2 p = {to_real(column * 4 + (pixel_index & 3)), to_real(row * 4 + ((pixel_index >> 2) & 3))};
+    *x = column * 4 + (pixel_index & 3);
+    *y = row * 4 + ((pixel_index >> 2) & 3);
+}
+
+inline vec2 pixel_of_index(global const Settings *settings, integer pixel_index)
+{
+    integer x, y;
+    pixel_place(settings, pixel_index, &x, &y);
+    vec2 p = {to_real(x), to_real(y)};
     return p;
 }
 
@@ -21,12 +29,4 @@ inline vec2 film_position(global const Settings *settings, vec2 pixel, vec2 offs
     vec2 p = {(pixel.x + (settings->crop_x + 0.5f) + offset.x) / (float)settings->film_width,
               (pixel.y + (settings->crop_y + 0.5f) + offset.y) / (float)settings->film_height};
     return p;
-}
-
-/* The pixel's number in the whole film, by which its samples are drawn: a crop has those of the whole picture. */
-inline natural pixel_key(global const Settings *settings, integer pixel_index)
-{
-    vec2 p = pixel_of_index(settings, pixel_index);
-    natural x = to_natural(p.x) + (uint)settings->crop_x, y = to_natural(p.y) + (uint)settings->crop_y;
-    return y * (uint)settings->film_width + x;
 }

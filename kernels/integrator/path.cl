@@ -30,7 +30,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mas
 #endif
     mask met = active & !hidden, next = met & vertex_continues(scene, v);
 
-    Sampler sampler = pixel_sampler(settings, load_path_pixel_index(path, at), load_path_sample(path, at));
+    Sampler sampler = pixel_sampler(settings, load_path_pixel_key(path, at), load_path_sample(path, at));
     Scattering scatter = vertex_scattering(scene, path, at, met, v, sampler);
     Bsdf m = scatter.bsdf;
     Frame frame = scatter.shading.frame;

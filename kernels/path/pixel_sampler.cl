@@ -1,7 +1,15 @@
-/* The random numbers of a sample of a pixel. */
+/* The random numbers of a sample of a pixel, which is known by its number in the whole film: a crop has the samples of
+ * the whole picture. */
 #include "film/pixel.cl"
 
-inline Sampler pixel_sampler(global const Settings *settings, integer pixel_index, integer sample)
+inline natural pixel_key(global const Settings *settings, integer pixel_index)
 {
-    return sampler_start(settings->seed, pixel_key(settings, pixel_index), as_natural(sample));
+    integer x, y;
+    pixel_place(settings, pixel_index, &x, &y);
+    return as_natural((y + settings->crop_y) * settings->film_width + x + settings->crop_x);
+}
+
+inline Sampler pixel_sampler(global const Settings *settings, natural pixel_key, integer sample)
+{
+    return sampler_start(settings->seed, pixel_key, as_natural(sample));
 }

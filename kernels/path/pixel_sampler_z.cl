@@ -1,4 +1,5 @@
-/* The random numbers of a sample of a pixel, pixels along the Z curve: bits of x and y alternate (Morton 1966). */
+/* The random numbers of a sample of a pixel, which is known by its place on the Z curve over the whole film: bits of x
+ * and y alternate (Morton 1966). */
 #include "film/pixel.cl"
 
 inline natural spread_bits(natural x) /* of 16 to every other one of 32 */
@@ -9,10 +10,14 @@ inline natural spread_bits(natural x) /* of 16 to every other one of 32 */
     return (x | (x << 1u)) & 0x55555555u;
 }
 
-inline Sampler pixel_sampler(global const Settings *settings, integer pixel_index, integer sample)
+inline natural pixel_key(global const Settings *settings, integer pixel_index)
 {
-    vec2 p = pixel_of_index(settings, pixel_index);
-    natural x = to_natural(p.x) + (uint)settings->crop_x, y = to_natural(p.y) + (uint)settings->crop_y;
-    return zsobol_start(settings->seed, (uint)settings->sample_bits, spread_bits(x) | (spread_bits(y) << 1u),
-                        as_natural(sample));
+    integer x, y;
+    pixel_place(settings, pixel_index, &x, &y);
+    return spread_bits(as_natural(x + settings->crop_x)) | (spread_bits(as_natural(y + settings->crop_y)) << 1u);
+}
+
+inline Sampler pixel_sampler(global const Settings *settings, natural pixel_key, integer sample)
+{
+    return zsobol_start(settings->seed, (uint)settings->sample_bits, pixel_key, as_natural(sample));
 }

@@ -83,6 +83,7 @@ STAGE(emit)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
         count(counters, COUNTER_DONE, next.done, (integer)(1));
         mask go = end.ended & !next.done;
         store_path_pixel_index(path, at, go, next.pixel_index);
+        store_path_pixel_key(path, at, go, as_natural(next.pixel_index));
         store_path_sample(path, at, go, next.sample);
         integer state = begin_light_path(scene, path, shadow, at, end.ended, go, next.pixel_index, next.sample);
         store_path_state(path, at, end.ended, sel_i(next.done, (integer)(PATH_DONE), state + 1));

@@ -50,7 +50,7 @@ inline Exposure add_sample(Scene scene, Slab path, At at, BEGIN_ARGS, PathEnd en
     SPECTRUM_EACH(C)
 #undef C
 #if USES_FLUORESCENCE /* the film sees the camera's wavelengths, not those by which the light came */
-    Sampler begun_with = pixel_sampler(scene.settings, pixel_index, sample);
+    Sampler begun_with = pixel_sampler(scene.settings, load_path_pixel_key(path, at), sample);
     lambdas = wavelengths_sample(scene, sampler_pair(begun_with, (natural)(DIMENSION_WAVELENGTH)).x);
 #endif
     real weight = load_path_weight(path, at);
@@ -92,7 +92,8 @@ inline void begin_path(Scene scene, Slab path, At at, mask go, integer pixel_ind
 {
     global const Settings *settings = scene.settings;
     vec2 pixel = pixel_of_index(settings, pixel_index);
-    Sampler sampler = pixel_sampler(settings, pixel_index, sample);
+    natural key = pixel_key(settings, pixel_index);
+    Sampler sampler = pixel_sampler(settings, key, sample);
     vec2 offset = {0.0f, 0.0f};
     real weight = 1.0f, nothing = 0.0f;
 #if CHANNEL_IS_ID /* which has no mean over a filter */
@@ -103,6 +104,7 @@ inline void begin_path(Scene scene, Slab path, At at, mask go, integer pixel_ind
     vec2 position = film_position(settings, pixel, offset);
     Wavelengths lambdas = wavelengths_sample(scene, sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH)).x);
     CameraRay ray = camera_ray(scene, position, sampler_pair(sampler, (natural)(DIMENSION_LENS)), lambdas);
+    store_path_pixel_key(path, at, go, key);
     store_path_weight(path, at, go, weight);
     store_path_o(path, at, go, ray.o);
     store_path_d(path, at, go, ray.d);

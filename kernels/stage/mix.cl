@@ -24,7 +24,7 @@ STAGE(mix_materials)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
         mask front, chosen = open;
         Surface s = surface_load(scene, hit, at, open, load_path_o(path, at), load_path_d(path, at), &front);
         Wavelengths lambdas = load_path_lambdas(path, at);
-        Sampler sampler = pixel_sampler(scene.settings, load_path_pixel_index(path, at), load_path_sample(path, at));
+        Sampler sampler = pixel_sampler(scene.settings, load_path_pixel_key(path, at), load_path_sample(path, at));
         integer met = (state & PATH_DEPTH) + path_nulls(path, at);
         natural dimension = as_natural(DIMENSION_VERTEX + met * DIMENSIONS_A_VERTEX + DIMENSION_ROULETTE);
         real u = sampler_pair(sampler, dimension).y;

@@ -130,7 +130,8 @@ def test_all_lane_widths_give_the_same_bits(kind, lanes):
 
 
 ON_FILM = """
-    Sampler sampler = pixel_sampler(scene.settings, to_integer(x[0]), to_integer(x[1]));
+    natural key = pixel_key(scene.settings, to_integer(x[0]));
+    Sampler sampler = pixel_sampler(scene.settings, key, to_integer(x[1]));
     vec2 u = sampler_pair(sampler, to_natural(x[2]));
     r[0] = u.x; r[1] = u.y;
 """
