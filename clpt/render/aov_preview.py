@@ -29,7 +29,9 @@ def viewable(name: str, layer: Image) -> Image:
     if name == "depth":  # the nearest point is white, one twice as far half as bright
         near = np.min(layer, where=layer > 0, initial=np.inf)
         return np.repeat(np.divide(near, layer, where=layer > 0, out=np.zeros_like(layer)), 3, 2)
-    if name.endswith("_id"):  # neighbours in number differ in hue; where nothing is seen it is black
+    if name.endswith(
+        "_id"
+    ):  # neighbours in number differ in hue; where nothing is seen it is black
         hue = layer * np.float32(0.618034) + np.arange(3, dtype=np.float32) / np.float32(3.0)
         shown = 0.5 + 0.5 * np.cos(2 * np.pi * hue)
         return np.where(layer < 0, 0.0, shown).astype(np.float32)
