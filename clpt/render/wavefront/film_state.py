@@ -27,7 +27,8 @@ class FilmState:
     words: (films, halves, 10, h, w) uint32, one film, or one for each channel of `aov`; of each
     pixel three sums, and the number of its samples; with alpha 13, a sum of what is covered.
     halves: 2 where even and odd samples are kept apart, else 1. bands: (halves, bands, 3, h, w)
-    uint32, a sum for each band; bands may be 0. taken: first and end of each range of sample numbers that were taken, ascending and apart.
+    uint32, a sum for each band; bands may be 0. taken: first and end of each range of sample
+    numbers that were taken, ascending and apart.
     """
 
     words: Words
