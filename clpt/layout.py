@@ -25,12 +25,18 @@ TYPES: dict[str, tuple[int, str, str, tuple[str, ...]]] = {
     "natural": (1, "uint", "natural", ("",)),
     "vec2": (2, "float", "vec2", (".x", ".y")),
     "vec3": (3, "float", "vec3", _XYZ),
+    "natural3": (3, "uint", "Natural3", _XYZ),
     "fixed": (3, "uint", "Fixed", (".low", ".middle", ".high")),
     "spectrum": (4, "float", "Spectrum", (*_XYZ, ".w")),
     "matrix": (16, "float", "", ()),
 }
-_NUMPY = {"real": "f4", "integer": "i4", "natural": "u4", "fixed": "u4"}
-_CASTS = {"integer": "as_integer", "natural": "as_natural", "fixed": "as_natural"}
+_NUMPY = {"real": "f4", "integer": "i4", "natural": "u4", "natural3": "u4", "fixed": "u4"}
+_CASTS = {
+    "integer": "as_integer",
+    "natural": "as_natural",
+    "natural3": "as_natural",
+    "fixed": "as_natural",
+}
 _SELECT = {"real": "sel", "integer": "sel_i", "natural": "sel_n", "vec3": "sel3"}
 _ZERO = {
     "integer": "0", "natural": "0", "vec3": "v3(0.0f, 0.0f, 0.0f)", "Spectrum": "spectrum_of(0.0f)",

@@ -40,9 +40,9 @@ PATH = Record(
     pixel_index=("integer", "where the film stores the path's pixel, see kernels/film/pixel.cl"),
     pixel_key=("natural", "number by which the sampler knows that pixel of the whole film"),
     sample=("integer", "number of the path's sample in its pixel"),
-    first=("fixed", "sum of the pixel's samples so far, first channel: x, or red in RGB mode"),
-    second=("fixed", "the same of the second channel"),
-    third=("fixed", "the same of the third channel"),
+    low=("natural3", "lowest words of the pixel's three sums so far: xyz, or rgb in RGB mode"),
+    middle=("natural3", "middle words of these sums, see kernels/core/fixed.cl"),
+    high=("natural3", "highest words of these sums"),
     covered=("fixed", "weights of those samples that met a surface; of a film with alpha"),
     samples=("natural", "number of samples in these sums"),
 )

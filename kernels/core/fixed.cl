@@ -1,8 +1,8 @@
 /* Sums of pixels are whole numbers of 96 bits, in units of 2^-48, two's complement: they do not depend on the order
  * of their terms, so that a film is the same however its samples are divided, and films add without a rounding. */
 typedef struct { natural low, middle, high; } Fixed;
+typedef struct { natural x, y, z; } Natural3;
 
-#define FIXED_UNIT 0x1p-48f
 #define FIXED_LARGEST 0x1p44f /* of one term */
 
 inline Fixed fixed_zero(void)
@@ -44,5 +44,13 @@ inline Fixed fixed_of(real v)
     return fixed_add(f, one);
 }
 
+/* The same of 0 <= v < 2^16, which has no highest word. */
+inline Fixed fixed_of_small(real v)
+{
+    natural middle = to_natural(v * 0x1p16f), low = to_natural((v - to_real(middle) * 0x1p-16f) * 0x1p48f);
+    Fixed f = {low, middle, (natural)(0u)};
+    return f;
+}
+
 /* Where a sum is so large, or so far below 0, that another term might leave the 96 bits. */
-inline mask fixed_is_full(Fixed f) { return f.high + 0x40000000u >= 0x80000000u; }
+inline mask fixed_is_full(natural high) { return high + 0x40000000u >= 0x80000000u; }

@@ -108,13 +108,10 @@ inline real erfinv_r(real x)
     return x * sel(w < 5.0f, p, q);
 }
 
-/* a / b for 0 <= a < 2^30 and b > 0; an integer division would run lane by lane. The quotient of floats is off by some
- * 2^-22 of itself, more where a device divides worse; so is that of what is left; the last step is exact. */
+/* a / b for a from 0 to 2^28, b > 0 and a quotient up to 2^20; an integer division would run lane by lane. The quotient
+ * of floats is off by some 2^-22 of itself, more where a device divides worse: by 1 at most, which is put right. */
 inline integer divide(integer a, int b)
 {
-    real inverse = 1.0f / (float)b;
-    integer q = to_integer(to_real(a) * inverse);
-    q += to_integer(floor(to_real(a - q * b) * inverse));
-    integer left = a - q * b;
+    integer q = to_integer(to_real(a) * (1.0f / (float)b)), left = a - q * b;
     return q + sel_i(left >= b, (integer)(1), (integer)(0)) - sel_i(left < 0, (integer)(1), (integer)(0));
 }

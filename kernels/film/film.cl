@@ -14,7 +14,7 @@
 /* Whether the film takes a value: neither NaN nor so large that sums would overflow. */
 inline mask film_accepts(vec3 value) { return fabs(value.x) + fabs(value.y) + fabs(value.z) < FIXED_LARGEST; }
 
-/* What a slot has summed of a pixel: three channels, the number of samples, and what is covered. */
+/* What slots have summed of a pixel: three channels, the number of samples, and what is covered. */
 typedef struct {
     Fixed first, second, third;
     natural samples;
@@ -22,39 +22,6 @@ typedef struct {
     Fixed covered;
 #endif
 } Exposure;
-
-inline Exposure exposure_sel(mask m, Exposure a, Exposure b)
-{
-    Exposure e = {fixed_sel(m, a.first, b.first), fixed_sel(m, a.second, b.second), fixed_sel(m, a.third, b.third),
-                  sel_n(m, a.samples, b.samples)};
-#if USES_ALPHA
-    e.covered = fixed_sel(m, a.covered, b.covered);
-#endif
-    return e;
-}
-
-inline Exposure exposure_none(void)
-{
-    Exposure e = {fixed_zero(), fixed_zero(), fixed_zero(), (natural)(0u)};
-#if USES_ALPHA
-    e.covered = fixed_zero();
-#endif
-    return e;
-}
-
-inline Exposure exposure_add(Exposure e, vec3 value)
-{
-    e.first = fixed_add(e.first, fixed_of(value.x));
-    e.second = fixed_add(e.second, fixed_of(value.y));
-    e.third = fixed_add(e.third, fixed_of(value.z));
-    e.samples += 1u;
-    return e;
-}
-
-inline mask exposure_is_full(Exposure e)
-{
-    return fixed_is_full(e.first) | fixed_is_full(e.second) | fixed_is_full(e.third);
-}
 
 /* The first word of a pixel in the half of the film that a plane's samples go to: even or odd ones, where these are
  * kept apart and planes are an even number; else the only one. */
@@ -77,14 +44,14 @@ inline integer film_add(global const Settings *settings, global uint *film, mask
 #else
 #define ADD_ALPHA(i)
 #endif
-#define ADD(i)                                                                                \
-    if (LANE(m, i)) {                                                                         \
-        global uint *at = film + film_at(settings, LANE(plane, i), LANE(pixel_index, i));     \
-        SUM(i, 0, e.first);                                                                   \
-        SUM(i, 3, e.second);                                                                  \
-        SUM(i, 6, e.third);                                                                   \
-        atomic_add((volatile global uint *)(at + FILM_SAMPLES * stream), LANE(e.samples, i)); \
-        ADD_ALPHA(i)                                                                          \
+#define ADD(i)                                                                            \
+    if (LANE(m, i)) {                                                                     \
+        global uint *at = film + film_at(settings, LANE(plane, i), LANE(pixel_index, i)); \
+        SUM(i, 0, e.first);                                                               \
+        SUM(i, 3, e.second);                                                              \
+        SUM(i, 6, e.third);                                                               \
+        sums_add_word(at + FILM_SAMPLES * stream, LANE(e.samples, i));                    \
+        ADD_ALPHA(i)                                                                      \
     }
     FOR_LANES(ADD)
 #undef ADD

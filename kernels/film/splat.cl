@@ -1,11 +1,11 @@
 /* Adding to pixels that the slot does not own: what a path from a light leaves where the camera sees it. */
 #include "film/film.cl"
 
-/* Returns how many sums are full, lane by lane. No sample is counted: the host knows how many paths there were. */
+/* Returns how many sums are full, lane by lane. No sample is counted here: stage/emit.cl counts paths. */
 inline integer film_splat(global const Settings *settings, global uint *film, mask m, integer plane,
                           integer pixel_index, vec3 value)
 {
-    Exposure e = exposure_add(exposure_none(), sel3(m, value, v3(0.0f, 0.0f, 0.0f)));
-    e.samples = 0;
+    value = sel3(m, value, v3(0.0f, 0.0f, 0.0f));
+    Exposure e = {fixed_of(value.x), fixed_of(value.y), fixed_of(value.z), (natural)(0u)};
     return film_add(settings, film, m, plane, pixel_index, e);
 }

@@ -5,6 +5,12 @@
  * sample before which each pixel is left; then the first pixel of each slot of a plane. An index that is not below
  * `padded_pixels` ends a list. The samples of a pixel are dealt out to the planes in turn. */
 
+inline integer slot_plane(global const Settings *settings, integer slot)
+{
+    if (settings->planes == 1) return (integer)(0);
+    return divide(slot, settings->per_plane);
+}
+
 /* How far after `first` the first sample is that belongs to a plane. */
 inline integer plane_ahead(integer plane, int planes, int first)
 {
@@ -48,7 +54,7 @@ inline NextSample next_sample(global const Settings *settings, global const uint
                               integer slot, mask ended, mask begun, integer pixel_index, integer sample)
 {
     int planes = settings->planes, per_plane = settings->per_plane;
-    integer plane = divide(slot, per_plane), ahead = plane_ahead(plane, planes, samples.x);
+    integer plane = slot_plane(settings, slot), ahead = plane_ahead(plane, planes, samples.x);
     NextSample n = {plane, pixel_index, sample + planes, (integer)(0), (integer)(0)};
     integer left = work_list_end(settings, work_list, pixel_index, samples.y) - sample; /* sums may leave an int */
     n.leaves = ended & (!begun | (left <= planes));

@@ -44,9 +44,8 @@ inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, 
     s.n = scale3(n, inverse);
     s.size = triangle_size(h.side, inverse);
     /* The ray's roundings grow with its length. They may have put its end behind the surface, so that it is put back
-     * on it, or behind a neighbour, so that it goes back along the ray first: not far beside what is tiny. */
-    real back = 2.0f * rounding_step(o, h.t), tenth = 0.1f * h.side * h.side / max_r(s.size, (real)(1e-30f));
-    s.p = madd3(d, h.t - min_r(back, tenth), o);
+     * on it, or behind a neighbour, so that it goes back along the ray first. */
+    s.p = madd3(d, h.t - 2.0f * rounding_step(o, h.t), o);
     s.p = madd3(s.n, h.plane * inverse - dot3(s.n, s.p), s.p);
     s.ns = s.n;
     s.uv.x = h.u;

@@ -77,7 +77,7 @@ STAGE(emit)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
         path_end_count(counters, end, end.depth - 1 + path_nulls(path, at));
         integer slot = LANE_INDEX + (int)at;
         integer pixel_index = load_path_pixel_index(path, at), sample = load_path_sample(path, at);
-        integer plane = divide(slot, settings->per_plane);
+        integer plane = slot_plane(settings, slot);
         film_count(settings, film, end.ended & end.begun, plane, pixel_index);
         NextSample next = next_sample(settings, work_list, samples, slot, end.ended, end.begun, pixel_index, sample);
         count(counters, COUNTER_DONE, next.done, (integer)(1));

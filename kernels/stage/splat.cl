@@ -3,6 +3,7 @@
 #include "interface/stage.cl"
 #include "path/shadow_ray.cl"
 #include "film/splat.cl"
+#include "film/work_list.cl"
 #include "generated/bands.cl"
 
 STAGE(splat)(SLAB_ARGS, SCENE_ARGS, JOIN_ARGS STAGE_AT_ARG)
@@ -19,7 +20,7 @@ STAGE(splat)(SLAB_ARGS, SCENE_ARGS, JOIN_ARGS STAGE_AT_ARG)
         Spectrum value = spectrum_scale(load_shadow_value(shadow, at), transmittance);
         vec3 colour = film_value(scene, value, lambdas);
         mask accepted = arrives & film_accepts(colour);
-        integer plane = divide(LANE_INDEX + (int)at, settings->per_plane), pixel_index = load_shadow_pixel(shadow, at);
+        integer plane = slot_plane(settings, LANE_INDEX + (int)at), pixel_index = load_shadow_pixel(shadow, at);
         integer full = film_splat(settings, film, accepted, plane, pixel_index, colour);
 #if USES_BANDS
         full += bands_add(scene, bands, accepted, plane, pixel_index, value, lambdas, (real)(1.0f));

@@ -13,7 +13,7 @@ RNG = np.random.default_rng(96)
 ADD_FLOAT = """Fixed sum = {as_natural(x[0]), as_natural(x[1]), as_natural(x[2])};
 sum = fixed_add(sum, fixed_of(x[3]));
 r[0] = as_real(sum.low); r[1] = as_real(sum.middle); r[2] = as_real(sum.high);
-r[3] = sel(fixed_is_full(sum), (real)(1.0f), (real)(0.0f));"""
+r[3] = sel(fixed_is_full(sum.high), (real)(1.0f), (real)(0.0f));"""
 
 
 def floats(count: int) -> np.ndarray:

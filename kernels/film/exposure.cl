@@ -1,0 +1,67 @@
+/* What a slot has summed of the pixel that it is in: words of its path's state, until it leaves the pixel. */
+#include "film/film.cl"
+
+/* Whether the highest words of these numbers are 0; false for what is not finite. */
+inline mask exposure_is_small(vec3 v)
+{
+    real least = min_r(min_r(v.x, v.y), v.z), most = max_r(max_r(v.x, v.y), v.z);
+    return (least >= 0.0f) & (most < 65536.0f) & (v.y == v.y) & (v.z == v.z);
+}
+
+/* Adds a value and a sample where m; small: all values are, as they mostly are. The highest words of sums then change
+ * only by a carry, once in 2^16 of the sum: they are read and written only where they change. */
+inline void exposure_add(Slab path, At at, global uint *counters, mask m, vec3 value, int small)
+{
+    value = sel3(m, value, v3(0.0f, 0.0f, 0.0f));
+    Natural3 low = load_path_low(path, at), middle = load_path_middle(path, at), high;
+#define ADD(c)                                                                             \
+    {                                                                                      \
+        Fixed before = {low.c, middle.c, (natural)(0u)};                                   \
+        Fixed f = fixed_add(before, small ? fixed_of_small(value.c) : fixed_of(value.c)); \
+        low.c = f.low;                                                                     \
+        middle.c = f.middle;                                                               \
+        high.c = f.high;                                                                   \
+    }
+    ADD(x) ADD(y) ADD(z)
+#undef ADD
+    store_path_low(path, at, m, low);
+    store_path_middle(path, at, m, middle);
+    store_path_samples(path, at, m, load_path_samples(path, at) + 1u);
+    if (any(m & ((high.x | high.y | high.z) != 0u))) {
+        Natural3 before = load_path_high(path, at);
+        high.x += before.x;
+        high.y += before.y;
+        high.z += before.z;
+        store_path_high(path, at, m, high);
+        count(counters, COUNTER_FULL, m & (fixed_is_full(high.x) | fixed_is_full(high.y) | fixed_is_full(high.z)),
+              (integer)(1));
+    }
+}
+
+#if USES_ALPHA
+/* Adds the weight of a sample that met a surface. */
+inline void exposure_cover(Slab path, At at, mask m, real weight)
+{
+    store_path_covered(path, at, m, fixed_add(load_path_covered(path, at), fixed_of(sel(m, weight, (real)(0.0f)))));
+}
+#endif
+
+/* Gives the film what was summed where slots `leave` their pixels, and begins again at 0 where they `enter` others. */
+inline void exposure_leave(Scene scene, Slab path, At at, global uint *film, global uint *counters, mask leave,
+                           mask enter, integer plane, integer pixel_index)
+{
+    Natural3 low = load_path_low(path, at), middle = load_path_middle(path, at), high = load_path_high(path, at), none;
+    Exposure e = {{low.x, middle.x, high.x}, {low.y, middle.y, high.y}, {low.z, middle.z, high.z},
+                  load_path_samples(path, at)};
+    none.x = none.y = none.z = 0u;
+    store_path_low(path, at, enter, none);
+    store_path_middle(path, at, enter, none);
+    store_path_high(path, at, enter, none);
+    store_path_samples(path, at, enter, none.x);
+#if USES_ALPHA
+    e.covered = load_path_covered(path, at);
+    store_path_covered(path, at, enter, fixed_zero());
+#endif
+    integer full = film_add(scene.settings, film, leave, plane, pixel_index, e);
+    count(counters, COUNTER_FULL, leave & (full > 0), full);
+}
