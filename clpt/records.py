@@ -112,6 +112,7 @@ SETTINGS = Record(
     tanh_max=("real", "tanh of the wavelength importance where the sensor ends to respond"),
     bands=("integer", "number of bands of a spectral film"),
     density=("integer", "first word in `distributions` of the density of wavelengths"),
+    film_scale=("real", "what a sum has of a value of 1: a power of two, near the exposure"),
     to_first=("vec3", "factors of the film's three sums in the picture's first channel"),
     to_second=("vec3", "the same of its second channel"),
     to_third=("vec3", "the same of its third channel"),

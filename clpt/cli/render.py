@@ -208,9 +208,11 @@ def render(
         shown.note(f"clpt: warning: only {share:.1%} of the pixels have a sample; others are black")
     rejected = sum(wavefront.counts.rejected for wavefront in renderer.wavefronts)
     if rejected:
-        shown.note(f"clpt: warning: {rejected} samples were not finite and count as black")
+        shown.note(
+            f"clpt: warning: {rejected} samples were not finite, or too bright, and count as black"
+        )
     if any(wavefront.counts.full for wavefront in renderer.wavefronts):
-        shown.note("clpt: warning: pixels are too bright for the film: scale the lights down")
+        shown.note("clpt: warning: pixels are too bright for the film: lower film.exposure")
     if verbose:
         report.after(renderer)
     return STATUS + stopped[0] if stopped else 0

@@ -271,7 +271,8 @@ class Renderer(Pictures):
     def film_state(self) -> FilmState:
         """Return what the film holds, as whole numbers on the host; wait for it."""
         films, bands = zip(*(one.film.words() for one in self.wavefronts), strict=True)
-        return FilmState(np.stack(films), bands[0], self._taken)
+        scale = float(self.wavefronts[0].paths.settings["film_scale"])
+        return FilmState(np.stack(films), bands[0], self._taken, scale)
 
     @synchronized
     def merge(self, state: FilmState) -> None:

@@ -48,7 +48,8 @@ inline void add_sample(Scene scene, Slab path, At at, BEGIN_ARGS, PathEnd end, i
     lambdas = wavelengths_sample(scene, sampler_pair(begun_with, (natural)(DIMENSION_WAVELENGTH)).x);
 #endif
     real weight = load_path_weight(path, at);
-    vec3 value = scale3(film_value(scene, radiance, lambdas), weight);
+    real scale = weight * scene.settings->film_scale;
+    vec3 value = scale3(film_value(scene, radiance, lambdas), scale);
     int small = !any(finished & !exposure_is_small(value));
     if (!small) {
         mask rejected = finished & !film_accepts(value);
@@ -56,7 +57,7 @@ inline void add_sample(Scene scene, Slab path, At at, BEGIN_ARGS, PathEnd end, i
 #define C(c) radiance.c = sel(fabs(radiance.c) < FIXED_LARGEST, radiance.c, (real)(0.0f));
         SPECTRUM_EACH(C)
 #undef C
-        value = scale3(film_value(scene, radiance, lambdas), weight);
+        value = scale3(film_value(scene, radiance, lambdas), scale);
         rejected = finished & !film_accepts(value);
         value = sel3(rejected, v3(0.0f, 0.0f, 0.0f), value);
     }
@@ -66,7 +67,7 @@ inline void add_sample(Scene scene, Slab path, At at, BEGIN_ARGS, PathEnd end, i
 #endif
 #if USES_BANDS
     integer plane = slot_plane(scene.settings, slot);
-    integer full = bands_add(scene, bands, finished, plane, pixel_index, radiance, lambdas, weight);
+    integer full = bands_add(scene, bands, finished, plane, pixel_index, radiance, lambdas, scale);
     count(counters, COUNTER_FULL, finished & (full > 0), full);
 #endif
     path_end_count(counters, end, end.depth + path_nulls(path, at));

@@ -18,12 +18,13 @@ STAGE(splat)(SLAB_ARGS, SCENE_ARGS, JOIN_ARGS STAGE_AT_ARG)
         mask arrives = active & (transmittance > 0.0f);
         Wavelengths lambdas = load_path_lambdas(path, at);
         Spectrum value = spectrum_scale(load_shadow_value(shadow, at), transmittance);
-        vec3 colour = film_value(scene, value, lambdas);
+        real scale = settings->film_scale;
+        vec3 colour = scale3(film_value(scene, value, lambdas), scale);
         mask accepted = arrives & film_accepts(colour);
         integer plane = slot_plane(settings, LANE_INDEX + (int)at), pixel_index = load_shadow_pixel(shadow, at);
         integer full = film_splat(settings, film, accepted, plane, pixel_index, colour);
 #if USES_BANDS
-        full += bands_add(scene, bands, accepted, plane, pixel_index, value, lambdas, (real)(1.0f));
+        full += bands_add(scene, bands, accepted, plane, pixel_index, value, lambdas, scale);
 #endif
         count(counters, COUNTER_REJECTED, arrives & !accepted, (integer)(1));
         count(counters, COUNTER_FULL, accepted & (full > 0), full);

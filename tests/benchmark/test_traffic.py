@@ -17,14 +17,15 @@ def moved(mode: str, queued: bool, *more: lights.Light) -> dict[str, Moved]:
 
 
 def test_a_ray_and_its_hit() -> None:
-    """Read: o, d, pdf, state; written: t, u, v, n, prim, shape, material."""
+    """Read: o, d, pdf, state; written: t, u, v, n, plane, side, prim, shape, material."""
     for mode in ("rgb", "spectral"):
-        assert moved(mode, False)["intersect"] == Moved(4 * 8, 4 * 9)
+        assert moved(mode, False)["intersect"] == Moved(4 * 8, 4 * 11)
 
 
 def test_a_path_that_ends_and_the_next() -> None:
     """Spectra have three words in rgb mode, four in spectral; a sky takes side, d, pdf, beta."""
-    rest = 3 + 3 + 1 + 1 + 1 + 1 + 1 + 1  # sum, rest, samples, weight, place, sample, state, prim
+    sums = 3 + 3 + 3 + 1  # low, middle, high, samples
+    rest = sums + 1 + 1 + 1 + 1 + 1  # weight, place, sample, state, prim
     assert moved("rgb", False)["generate"].read == 4 * (rest + 2 * 3)
     assert moved("spectral", False)["generate"].read == 4 * (rest + 2 * 4)
     with_sky = moved("spectral", False, lights.Constant())["generate"].read

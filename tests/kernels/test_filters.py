@@ -151,4 +151,4 @@ def test_filter_comes_first():
             return 7
 
     with pytest.raises(SceneError, match="first"):
-        filters.lower_filter(scene.Box(), Full())
+        filters.lower_filter(scene.Box(), Full(), False)

@@ -208,3 +208,17 @@ def test_sums_near_their_end_are_counted():
         renderer.update(scene=dataclasses.replace(bright, lights=dazzling))
         renderer.run(2)
         assert renderer.wavefronts[0].counts.rejected == 12 and not renderer.image().any()
+
+
+def test_the_exposure_moves_the_range():
+    """Light of 1e20 and of 1e-20 W, seen with an exposure that makes it 1."""
+    for light in (1e20, 1e-20):
+        scene = dataclasses.replace(
+            sky(exposure=1.0 / light), lights=[lights.Constant(radiance=(light, 0.5 * light, 0.0))]
+        )
+        with clpt.Renderer(scene) as renderer, clpt.Renderer(sky()) as plain:
+            renderer.run(3)
+            assert renderer.wavefronts[0].counts.rejected == 0
+            np.testing.assert_allclose(renderer.image(), [[[1.0, 0.5, 0.0]] * 3] * 2, rtol=1e-5)
+            with pytest.raises(SceneError, match="exposure"):
+                plain.merge(renderer.film_state())

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.records import SETTINGS
-from clpt.render.lowering.camera.colour import output_matrix
+from clpt.render.lowering.camera.colour import film_scale, output_matrix
 from clpt.render.lowering.camera.wavelengths import Density
 from clpt.render.lowering.geometry.geometry import Geometry
 from clpt.render.lowering.index import SceneIndex
@@ -59,6 +59,8 @@ def settings_of(
     settings["bands"] = film.bands
     settings["density"] = density_row
     matrix = np.eye(3) if index.channels else output_matrix(film, index.mode)
-    settings["to_first"], settings["to_second"], settings["to_third"] = matrix
+    scale = 1.0 if index.channels else film_scale(film)
+    settings["film_scale"] = scale
+    settings["to_first"], settings["to_second"], settings["to_third"] = matrix / scale
     settings["center"], settings["scene_radius"] = sphere
     return settings

@@ -28,12 +28,14 @@ class FilmState:
     pixel three sums, and the number of its samples; with alpha 13, a sum of what is covered.
     halves: 2 where even and odd samples are kept apart, else 1. bands: (halves, bands, 3, h, w)
     uint32, a sum for each band; bands may be 0. taken: first and end of each range of sample
-    numbers that were taken, ascending and apart.
+    numbers that were taken, ascending and apart. scale: of a value of 1, a power of two that
+    follows from the film's exposure.
     """
 
     words: Words
     bands: Words
     taken: Ranges
+    scale: float = 1.0
 
     @property
     def samples(self) -> NDArray[np.uint32]:
@@ -52,10 +54,11 @@ class FilmState:
                 raise SceneError(
                     f"films of another form cannot be merged: {name} are {own} and {given}"
                 )
+        if self.scale != other.scale:
+            raise SceneError("films of another exposure cannot be merged", where="film.exposure")
         taken = join_ranges(self.taken, other.taken)
-        return FilmState(
-            add_films(self.words, other.words), add_sums(self.bands, other.bands), taken
-        )
+        words, bands = add_films(self.words, other.words), add_sums(self.bands, other.bands)
+        return FilmState(words, bands, taken, self.scale)
 
 
 def add_films(a: Words, b: Words) -> Words:

@@ -92,7 +92,7 @@ def test_text_holds_only_what_the_scene_has() -> None:
     texts = programs.sources(lowered([m.Diffuse()], "rgb").features, "wide8", 8, queued=False)
     assert set(texts) == {"generate", "intersect", "shadow", "shade_diffuse"}
     shade = texts["shade_diffuse"].text
-    assert not any(f"{kind}_row(" in shade for kind in ("bitmap", "checkerboard", "sphere"))
+    assert not any(f"{kind}_row(" in shade for kind in ("bitmap", "checkerboard", "cylinder"))
     assert "rough_conductor" not in shade
 
 

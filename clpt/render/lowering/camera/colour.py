@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,6 +12,8 @@ from clpt.errors import SceneError
 from clpt.scene.integrators import Film
 from clpt.spectra import Sensor, spaces
 from clpt.spectra.sensors import observer
+
+LARGEST_SCALE = 60  # exponent of 2
 
 
 def sensor(film: Film) -> Sensor:
@@ -29,6 +33,13 @@ def output_matrix(film: Film, mode: str) -> NDArray[np.float64]:
         balance = spaces.bradford(white(film), spaces.white(film.output_space))
     whole = spaces.from_xyz(film.output_space) @ balance @ first
     return film.exposure * np.round(whole, 12)  # from a space to itself is the identity, to the bit
+
+
+def film_scale(film: Film) -> float:
+    """The power of two next to the film's exposure: what is seen well is near 1 in its sums."""
+    if not 0.0 < film.exposure < math.inf:
+        return 1.0
+    return 2.0 ** min(max(round(math.log2(film.exposure)), -LARGEST_SCALE), LARGEST_SCALE)
 
 
 def white(film: Film) -> NDArray[np.float64]:
