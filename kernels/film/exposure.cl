@@ -14,13 +14,13 @@ inline void exposure_add(Slab path, At at, global uint *counters, mask m, vec3 v
 {
     value = sel3(m, value, v3(0.0f, 0.0f, 0.0f));
     Natural3 low = load_path_low(path, at), middle = load_path_middle(path, at), high;
-#define ADD(c)                                                                             \
-    {                                                                                      \
-        Fixed before = {low.c, middle.c, (natural)(0u)};                                   \
+#define ADD(c)                                                                            \
+    {                                                                                     \
+        Fixed before = {low.c, middle.c, (natural)(0u)};                                  \
         Fixed f = fixed_add(before, small ? fixed_of_small(value.c) : fixed_of(value.c)); \
-        low.c = f.low;                                                                     \
-        middle.c = f.middle;                                                               \
-        high.c = f.high;                                                                   \
+        low.c = f.low;                                                                    \
+        middle.c = f.middle;                                                              \
+        high.c = f.high;                                                                  \
     }
     ADD(x) ADD(y) ADD(z)
 #undef ADD

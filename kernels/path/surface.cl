@@ -44,8 +44,8 @@ inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, 
     s.n = scale3(n, inverse);
     s.size = triangle_size(h.side, inverse);
     /* The ray's roundings grow with its length. They may have put its end behind the surface, so that it is put back
-     * on it, or behind a neighbour, so that it goes back along the ray first. */
-    s.p = madd3(d, h.t - 2.0f * rounding_step(o, h.t), o);
+     * on it, or behind a neighbour, so that it goes back along the ray first, but not behind its beginning. */
+    s.p = madd3(d, max_r(h.t - 2.0f * rounding_step(o, h.t), 0.5f * h.t), o);
     s.p = madd3(s.n, h.plane * inverse - dot3(s.n, s.p), s.p);
     s.ns = s.n;
     s.uv.x = h.u;
