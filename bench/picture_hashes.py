@@ -5,8 +5,7 @@
 
 renders each scene of `scenes` and `tests/scenes` small, with few samples, in both modes; Cornell's
 box also with every integrator, sampler, layout and way of queueing. Equal hashes are equal floats.
-The hashes differ between processors, drivers and compilers: compare on one machine only. Pictures
-of `particle_tracer` are left out: it adds to the film in no fixed order.
+The hashes differ between processors, drivers and compilers: compare on one machine only.
 """
 
 from __future__ import annotations
@@ -64,11 +63,10 @@ def cases(only: str) -> Iterator[tuple[str, Scene, dict[str, Any]]]:
             except clpt.SceneError as error:  # of a scene whose files its generate.py has to make
                 click.echo(f"left out: {error}", err=True)
                 continue
-            if not isinstance(scene.integrator, integrators.ParticleTracer):
-                yield from ((f"{name} {mode}", small(scene, mode), {}) for mode in MODES)
+            yield from ((f"{name} {mode}", small(scene, mode), {}) for mode in MODES)
     box = clpt.load(ROOT / "scenes/cornell_box/scene.json")
     for mode in MODES:
-        for cls in (cls for cls in integrators.KINDS if cls is not integrators.ParticleTracer):
+        for cls in integrators.KINDS:
             yield f"integrator {cls.kind} {mode}", small(box, mode, integrator=cls()), {}
         for sampler in integrators.SAMPLERS:
             yield f"sampler {sampler.kind} {mode}", small(box, mode, sampler=sampler()), {}

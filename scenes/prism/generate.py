@@ -81,7 +81,10 @@ def lamp(middle: np.ndarray) -> list[JSON]:
     w, h = SLIT
     beam = {
         "type": "rectangle", "name": "slit", "material": "black",
-        "emission": {"type": "directional_area", "irradiance": 330},
+        "emission": {
+            "type": "directional_area",
+            "irradiance": {"type": "illuminant", "name": "E", "scale": 330},
+        },
         "to_world": [
             {"scale": [w / 2, h / 2, 1]},
             {"rotate": {"axis": [1, 0, 0], "angle": SLOPE}},

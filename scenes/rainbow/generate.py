@@ -38,7 +38,10 @@ def beam() -> JSON:
     faces = [*np.stack([i, i + SIDES, j], 1), *np.stack([j, i + SIDES, j + SIDES], 1)]
     return {
         "type": "mesh", "name": "beam", "material": "black",
-        "emission": {"type": "directional_area", "irradiance": 6000},
+        "emission": {
+            "type": "directional_area",
+            "irradiance": {"type": "illuminant", "name": "E", "scale": 6000},
+        },
         "vertices": np.round(RADIUS * np.concatenate([circle, inner]), 6).tolist(),
         "faces": [face[::-1].tolist() for face in faces],
     }  # fmt: skip
