@@ -113,10 +113,10 @@ def main(
             path = SCENES[name](Path(folder))
             for mode in modes:
                 ratios = compare(checkout.resolve(), Path(path), mode, spp, rounds)
-                rows.append(
-                    {"scene": name, "mode": mode, "spp": spp, "rounds": rounds,
-                     "other": found.stdout.strip(), **ratios}
-                )  # fmt: skip
+                stages = ", ".join(f"{n} {r:.3f}" for n, r in ratios.items() if n != "all")
+                about = {"scene": name, "mode": mode, "spp": spp, "rounds": rounds}
+                about |= {"other": found.stdout.strip()}
+                rows.append({**about, "ratio": ratios["all"], "stages": stages})
                 for stage, ratio in ratios.items():
                     table.add_row(name, mode, stage, f"{ratio:.3f}")
     machine.console().print(table)

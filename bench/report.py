@@ -177,6 +177,7 @@ TABLES: dict[str, Callable[[Sequence[Row]], str]] = {
     "instancing": plain,
     "embedding": plain,
     "soak": plain,
+    "beside": plain,
     "startup": startup,
     "traversal": plain,
     "building": plain,

@@ -31,3 +31,13 @@ inline uint film_samples(global const Settings *settings, global const uint *fil
     for (int i = halves.x; i < halves.y; i++) samples += film[(i * FILM_WORDS + FILM_SAMPLES) * stream + pixel_index];
     return samples;
 }
+
+/* The number of samples that a picture's sums are divided by: the pixel's own, or, of light paths, how many there were
+ * per pixel, which the host says, as each may have lit any pixel. */
+#ifdef LIGHT_PATHS
+#define SAMPLES_ARG , float samples
+#define SAMPLES samples
+#else
+#define SAMPLES_ARG
+#define SAMPLES (float)film_samples(settings, film, pixel_index, halves)
+#endif

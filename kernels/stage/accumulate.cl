@@ -3,14 +3,6 @@
 #include "core/base.cl"
 #include "film/picture.cl"
 
-#ifdef LIGHT_PATHS /* the host says how many light paths there were per pixel: each may have lit any pixel */
-#define SAMPLES_ARG , float samples
-#define SAMPLES samples
-#else
-#define SAMPLES_ARG
-#define SAMPLES (float)film_samples(settings, film, pixel_index, halves)
-#endif
-
 kernel void accumulate(global const Settings *settings, global const uint *film, global float *image,
                        int2 halves SAMPLES_ARG)
 {

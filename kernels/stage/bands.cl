@@ -4,14 +4,6 @@
 #include "film/picture.cl"
 #include "film/bands.cl"
 
-#ifdef LIGHT_PATHS /* see stage/accumulate.cl */
-#define SAMPLES_ARG , float samples
-#define SAMPLES samples
-#else
-#define SAMPLES_ARG
-#define SAMPLES (float)film_samples(settings, film, pixel_index, halves)
-#endif
-
 kernel void accumulate_bands(global const Settings *settings, global const uint *film, global const uint *bands,
                              global float *band_image, int2 halves SAMPLES_ARG)
 {
