@@ -9,6 +9,23 @@ inline size_t bands_at(global const Settings *settings, int plane, int band, int
     return (size_t)3 * (half_film * settings->bands + band) * settings->padded_pixels + pixel_index;
 }
 
+/* Adds a number to a band of each pixel, lane by lane as `film_add` does. */
+inline integer band_add(global const Settings *settings, global uint *bands, mask m, integer plane, integer band,
+                        integer pixel_index, Fixed f)
+{
+    integer full = 0;
+    const int *at_lane = (const int *)&m, *planes = (const int *)&plane, *own = (const int *)&band;
+    const int *pixels = (const int *)&pixel_index;
+    const uint *words = (const uint *)&f;
+    for (int i = 0; i < LANES; i++) {
+        if (!at_lane[i]) continue;
+        global uint *at = bands + bands_at(settings, planes[i], own[i], pixels[i]);
+        const uint *w = words + i;
+        ((int *)&full)[i] = (int)sums_add(at, settings->padded_pixels, w[0], w[LANES], w[2 * LANES]);
+    }
+    return full;
+}
+
 /* Adds `weight` times the radiance of paths to the bands of their wavelengths. Returns how many sums are full. */
 inline integer bands_add(Scene scene, global uint *bands, mask m, integer plane, integer pixel_index,
                          Spectrum radiance, Wavelengths lambdas, real weight)
@@ -18,20 +35,14 @@ inline integer bands_add(Scene scene, global uint *bands, mask m, integer plane,
     Spectrum value = wavelengths_weigh(scene, radiance, lambdas);
     integer full = 0, last = settings->bands - 1;
     weight *= 0.25f / width;
-#define ADD(i)                                                                                                      \
-    if (LANE(m, i)) {                                                                                               \
-        global uint *at = bands + bands_at(settings, LANE(plane, i), LANE(band, i), LANE(pixel_index, i));          \
-        LANE(full, i) += sums_add(at, settings->padded_pixels, LANE(f.low, i), LANE(f.middle, i), LANE(f.high, i)); \
-    }
-#define C(c)                                                                                   \
-    {                                                                                          \
-        integer band = max_i(min_i(to_integer((lambdas.c - lo) / width), last), (integer)(0)); \
-        real term = value.c * weight;                                                          \
-        Fixed f = fixed_of(sel(m & (fabs(term) < FIXED_LARGEST), term, (real)(0.0f)));         \
-        FOR_LANES(ADD)                                                                         \
+#define C(c)                                                                                                          \
+    {                                                                                                                 \
+        integer band = max_i(min_i(to_integer((lambdas.c - lo) / width), last), (integer)(0));                        \
+        real term = value.c * weight;                                                                                 \
+        mask taken = m & (fabs(term) < FIXED_LARGEST);                                                                \
+        full += band_add(settings, bands, taken, plane, band, pixel_index, fixed_of(sel(taken, term, (real)(0.0f)))); \
     }
     SPECTRUM_EACH(C)
 #undef C
-#undef ADD
     return full;
 }

@@ -31,46 +31,36 @@ inline size_t film_at(global const Settings *settings, int plane, int pixel_inde
     return (size_t)half_film * FILM_WORDS * settings->padded_pixels + pixel_index;
 }
 
-/* Adds what slots have summed to their pixels. Returns how many sums are full, lane by lane. */
+/* Adds what slots have summed to their pixels. Returns how many sums are full, lane by lane. A loop, as its text for
+ * every lane would take longer to compile than to run. */
 inline integer film_add(global const Settings *settings, global uint *film, mask m, integer plane,
                         integer pixel_index, Exposure e)
 {
     size_t stream = settings->padded_pixels;
     integer full = 0;
-#define SUM(i, word, f) \
-    LANE(full, i) += sums_add(at + (word) * stream, stream, LANE((f).low, i), LANE((f).middle, i), LANE((f).high, i))
-#if USES_ALPHA
-#define ADD_ALPHA(i) SUM(i, FILM_ALPHA, e.covered);
-#else
-#define ADD_ALPHA(i)
-#endif
-#define ADD(i)                                                                            \
-    if (LANE(m, i)) {                                                                     \
-        global uint *at = film + film_at(settings, LANE(plane, i), LANE(pixel_index, i)); \
-        SUM(i, 0, e.first);                                                               \
-        SUM(i, 3, e.second);                                                              \
-        SUM(i, 6, e.third);                                                               \
-        sums_add_word(at + FILM_SAMPLES * stream, LANE(e.samples, i));                    \
-        ADD_ALPHA(i)                                                                      \
+    const int *at_lane = (const int *)&m, *planes = (const int *)&plane, *pixels = (const int *)&pixel_index;
+    const uint *words = (const uint *)&e; /* as the members of Exposure lie in memory, LANES numbers each */
+    for (int i = 0; i < LANES; i++) {
+        if (!at_lane[i]) continue;
+        global uint *at = film + film_at(settings, planes[i], pixels[i]);
+        uint count = 0;
+        for (int word = 0; word < FILM_WORDS; word += word == FILM_SAMPLES ? 1 : 3) {
+            const uint *w = words + word * LANES + i;
+            if (word == FILM_SAMPLES) sums_add_word(at + word * stream, w[0]);
+            else count += sums_add(at + word * stream, stream, w[0], w[LANES], w[2 * LANES]);
+        }
+        ((int *)&full)[i] = (int)count;
     }
-    FOR_LANES(ADD)
-#undef ADD
-#undef ADD_ALPHA
-#undef SUM
     return full;
 }
 
 /* Counts a sample in each pixel where something else adds its value. */
 inline void film_count(global const Settings *settings, global uint *film, mask m, integer plane, integer pixel_index)
 {
-    size_t samples = (size_t)FILM_SAMPLES * settings->padded_pixels;
-#define ADD(i)                                                                                        \
-    if (LANE(m, i)) {                                                                                 \
-        size_t at = film_at(settings, LANE(plane, i), LANE(pixel_index, i));                          \
-        atomic_inc((volatile global uint *)(film + at + samples));                                    \
-    }
-    FOR_LANES(ADD)
-#undef ADD
+    const int *at_lane = (const int *)&m, *planes = (const int *)&plane, *pixels = (const int *)&pixel_index;
+    for (int i = 0; i < LANES; i++)
+        if (at_lane[i])
+            sums_add_word(film + film_at(settings, planes[i], pixels[i]) + FILM_SAMPLES * settings->padded_pixels, 1u);
 }
 
 /* Counters that the host reads while it enqueues, two words each, the lower first. */

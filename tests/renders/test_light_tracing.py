@@ -310,6 +310,7 @@ def test_every_filter(chosen: Filter) -> None:
     assert_agree(exposures(from_lights, 12, 2048), reference, chosen.kind)
 
 
+@pytest.mark.slow
 def test_bands() -> None:
     """A film of bands gets what the camera's paths bring."""
     scene = with_film(still_life("spectral", {"disk": 10.0}), bands=3, width=8, height=8)

@@ -22,7 +22,6 @@ from clpt.scene.materials import Dielectric, Diffuse, TwoSided
 from clpt.scene.shapes import Cube, Cylinder, Disk, Mesh, Rectangle, Shape, Sphere
 from tests.renders.builders import BLACK, DOWN, UP
 from tests.renders.support import assert_agree, blocks, exposures
-from tests.rotation import rotating
 
 EVEN = Constant(radiance=(1.0, 1.0, 1.0))
 DEEP = Path(max_depth=60, rr_depth=100)
@@ -108,6 +107,9 @@ PLACES = {  # 1e4 m away float32 has steps of 1 mm: there the scene is 400 m wid
 }
 
 
+QUICK = (("wide8", "spectral"), ("gpu", "rgb"))
+
+
 def gpu_form() -> dev.Device:
     """The device of all tests, which says that it is a GPU."""
     on = dev.choose()
@@ -115,7 +117,15 @@ def gpu_form() -> dev.Device:
     return dev.Device(on.context, on.queue, info)
 
 
-@rotating("layout, mode", ("wide8", "brute", "compact", "binary", "gpu"), ("rgb", "spectral"))
+# Quick where programs are the same in other tests; every layout is slow in both modes.
+@pytest.mark.parametrize(
+    ("layout", "mode"),
+    [
+        pytest.param(layout, mode, marks=() if (layout, mode) in QUICK else pytest.mark.slow)
+        for layout in ("wide8", "brute", "compact", "binary", "gpu")
+        for mode in ("rgb", "spectral")
+    ],
+)
 def test_the_same_picture_everywhere(layout: str, mode: str) -> None:
     """Means over blocks of a still life, as large as it is and where it is, and elsewhere."""
     form: dict[str, Any] = {"layout": layout}

@@ -130,8 +130,7 @@ def test_a_wide_range_changes_no_colour(film: dict) -> None:
     made = sky(light, output_space="xyz", sampler=Independent(), **film)
     renderer, found = clpt.Renderer(made), []
     for i in range(16):
-        renderer.reset()
-        renderer.samples = 64 * i  # independent samples of one sequence
+        renderer.reset(seed=i)
         renderer.run(64)
         found.append(renderer.colours())
     assert_mean(found, narrow, 0.05, 2e-3)
