@@ -52,5 +52,11 @@ inline Fixed fixed_of_small(real v)
     return f;
 }
 
+/* Whether that function takes all three; false for what is not finite. */
+inline mask fixed_takes_small(vec3 v)
+{
+    return (v.x >= 0.0f) & (v.y >= 0.0f) & (v.z >= 0.0f) & (v.x + v.y + v.z < 65536.0f);
+}
+
 /* Where a sum is so large, or so far below 0, that another term might leave the 96 bits. */
 inline mask fixed_is_full(natural high) { return high + 0x40000000u >= 0x80000000u; }

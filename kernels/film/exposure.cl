@@ -1,13 +1,6 @@
 /* What a slot has summed of the pixel that it is in: words of its path's state, until it leaves the pixel. */
 #include "film/film.cl"
 
-/* Whether the highest words of these numbers are 0; false for what is not finite. */
-inline mask exposure_is_small(vec3 v)
-{
-    real least = min_r(min_r(v.x, v.y), v.z), most = max_r(max_r(v.x, v.y), v.z);
-    return (least >= 0.0f) & (most < 65536.0f) & (v.y == v.y) & (v.z == v.z);
-}
-
 /* Adds a value and a sample where m; small: all values are, as they mostly are. The highest words of sums then change
  * only by a carry, once in 2^16 of the sum: they are read and written only where they change. */
 inline void exposure_add(Slab path, At at, global uint *counters, mask m, vec3 value, int small)

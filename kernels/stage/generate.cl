@@ -50,7 +50,7 @@ inline void add_sample(Scene scene, Slab path, At at, BEGIN_ARGS, PathEnd end, i
     real weight = load_path_weight(path, at);
     real scale = weight * scene.settings->film_scale;
     vec3 value = scale3(film_value(scene, radiance, lambdas), scale);
-    int small = !any(finished & !exposure_is_small(value));
+    int small = !any(finished & !fixed_takes_small(value));
     if (!small) {
         mask rejected = finished & !film_accepts(value);
         count(counters, COUNTER_REJECTED, rejected, (integer)(1));

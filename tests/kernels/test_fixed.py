@@ -89,3 +89,17 @@ def test_the_host_adds_as_python_does():
     got = add_sums(a.T[:, None, :].copy(), b[::-1].T[:, None, :].copy())[:, 0].T
     expected = [(x + y) % mod for x, y in zip(value(a), value(b[::-1]), strict=True)]
     assert [v % mod for v in value(got)] == expected
+
+
+@pytest.mark.parametrize("lanes", [1, 16])
+def test_what_has_no_highest_word(lanes):
+    """Colours of which every channel is from 0 to 2^16; never one that is not finite."""
+    cases = [0.0, 1.0, 3e4, 65536.0, 1e30, -1.0, np.inf, -np.inf, np.nan]
+    given = np.array([(a, b, c) for a in cases for b in cases for c in cases], np.float32)
+    given = np.concatenate([given, given[: -len(given) % 16]])
+    body = "r[0] = sel(fixed_takes_small(v3(x[0], x[1], x[2])), (real)(1.0f), (real)(0.0f));"
+    text = map_text(body, 3, 1, files=("core/fixed.cl",))
+    small = run(text, lanes, np.ascontiguousarray(given.T), 1)[0].astype(bool)
+    ordinary = (np.isfinite(given) & (given >= 0) & (given < 65536.0)).all(axis=1)
+    assert not (small & ~ordinary).any()
+    assert small[(ordinary & (given.sum(axis=1) < 65536.0))].all()
