@@ -169,9 +169,8 @@ def render(
 
     The scene decides what no option sets. With --time or --noise but no --spp the render goes on
     until the time is over, or the noise is below the limit. The time counts from the command's
-    start, kernels included. Ctrl-C stops it within a second; the
-    picture so far is written, and the exit status is 130. SIGTERM and SIGHUP do the same, with the
-    statuses 143 and 129.
+    start, kernels included. Ctrl-C stops it within a second; the picture so far is written, and the
+    exit status is 130. SIGTERM and SIGHUP do the same, with the statuses 143 and 129.
     """
     targets = outputs.checked(paths or outputs.default(scene))
     shown = display(quiet, limit)

@@ -284,8 +284,8 @@ class Renderer(Pictures):
         Raises SceneError if the film has another form, or a sample is in both: nothing has changed.
         """
         merged = self.film_state().merged(state)
-        for one, words in zip(self.wavefronts, state.words, strict=True):
-            one.add_words(words, state.bands)
+        for one, words in zip(self.wavefronts, merged.words, strict=True):
+            one.set_words(words, merged.bands)
         self._taken, self._adaptive = merged.taken, None
 
     @synchronized

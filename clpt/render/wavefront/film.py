@@ -34,7 +34,7 @@ class Film:
         bands: bool,
         alpha: bool,
     ):
-        self.stream, self.has_bands, self._buffers = stream, bands, buffers
+        self.stream, self.has_bands = stream, bands
         self._words = FILM_WORDS + SUM_WORDS * alpha  # of a pixel
         self.size = int(settings["width"]), int(settings["height"])
         self.band_count = int(settings["bands"]) if bands else 0
@@ -83,28 +83,18 @@ class Film:
 
     def colours(self) -> NDArray[np.float32]:
         """Return the picture, (h, w, 3) float32 in the film's output space; wait for it."""
-        return self._read_colours(self._images["image"])
+        return np.ascontiguousarray(self._read(self._images["image"], 4)[..., :3])
 
-    def colours_of(self, kernel: device.BoundKernel) -> NDArray[np.float32]:
-        """Return the picture that a kernel makes, as `colours` does, and leave this film's own."""
-        image = self._buffers.allocate("a half's image", self._images["image"].size)
-        kernel.set_args(image=image)
+    def made(
+        self, kernel: device.BoundKernel, image: cl.Buffer, channels: int
+    ) -> NDArray[np.float32]:
+        """Return what a kernel makes in a buffer, (h, w, channels) float32; wait for it."""
         self.stream.run(kernel, self.size)
-        return self._read_colours(image)
-
-    def alpha(self, kernel: device.BoundKernel) -> NDArray[np.float32]:
-        """Return how much of each pixel is covered, (h, w) float32; wait for it."""
-        values = np.empty(self.size[::-1], np.float32)
-        buffer = self._buffers.allocate("the alpha", values.nbytes)
-        kernel.set_args(alpha=buffer)
-        self.stream.run(kernel, self.size)
-        return self.stream.read(buffer, values)
+        return self._read(image, channels)
 
     def bands(self, kernel: device.BoundKernel) -> NDArray[np.float32]:
         """Return the mean radiance in each band, (h, w, bands) float32; wait for it."""
-        self.stream.run(kernel, self.size)
-        values = np.empty((*self.size[::-1], self.band_count), np.float32)
-        return self.stream.read(self._images["band_image"], values)
+        return self.made(kernel, self._images["band_image"], self.band_count)
 
     def words(self) -> tuple[Words, Words]:
         """Return what the film holds: (halves, 10 or 13, h, w) uint32, and of bands (halves, bands,
@@ -132,9 +122,12 @@ class Film:
 
     def count_samples(self) -> list[int]:
         """Return how many samples the film has, in each half; wait for it."""
-        film, _ = self.words()
-        return [int(half[SAMPLES_WORD].sum(dtype=np.uint64)) for half in film]
+        stream, counts = 4 * self._padded_pixels, []
+        for half in range(self.halves):
+            words = np.empty(self._padded_pixels, np.uint32)
+            at = (half * self._words + SAMPLES_WORD) * stream
+            counts.append(int(self.stream.read(self.sums["film"], words, at).sum(dtype=np.uint64)))
+        return counts
 
-    def _read_colours(self, image: cl.Buffer) -> NDArray[np.float32]:
-        whole = self.stream.read(image, np.empty((*self.size[::-1], 4), np.float32))
-        return np.ascontiguousarray(whole[:, :, :3])
+    def _read(self, image: cl.Buffer, channels: int) -> NDArray[np.float32]:
+        return self.stream.read(image, np.empty((*self.size[::-1], channels), np.float32))

@@ -26,7 +26,7 @@ from clpt.render.lowering.scene import Lowered
 from clpt.render.wavefront import queues, strategy
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.render.wavefront.film import Film
-from clpt.render.wavefront.film_state import Words, add_films, add_sums
+from clpt.render.wavefront.film_state import SAMPLES_WORD, Words
 from clpt.render.wavefront.path_buffers import GROUP, PathBuffers, divide_film
 from clpt.render.wavefront.strategy import Strategy, Tuning
 from clpt.scene.integrators import IDS
@@ -259,7 +259,7 @@ class Wavefront:
             device.wait(event)
         if finished:
             self._note_paths(first, end)
-        else:
+        elif self.features.light_paths:
             self._paths = self.film.count_samples()
         self.accumulate_film()
         return finished
@@ -276,15 +276,17 @@ class Wavefront:
     def half(self, which: int) -> NDArray[np.float32]:
         """Return the picture of the even (0) or odd (1) samples, as `image` does."""
         halves = (which, which + 1)
-        own = {"halves": halves, "samples": 0.0, **self._samples(*halves)}
-        return self.film.colours_of(self._bind("accumulate", "accumulate", **own))
+        image = self.buffers.allocate("a half's image", 16 * math.prod(self.film.size))
+        own = {"image": image, "halves": halves, "samples": 0.0, **self._samples(*halves)}
+        whole = self.film.made(self._bind("accumulate", "accumulate", **own), image, 4)
+        return np.ascontiguousarray(whole[..., :3])
 
     def alpha(self) -> NDArray[np.float32]:
         """Return how much of each pixel is covered so far, (h, w) float32; wait for it."""
-        halves = (0, self.film.halves)
-        # Any buffer will do for `alpha`, which the film replaces.
-        own = {"halves": halves, "alpha": self.film.sums["film"]}
-        return self.film.alpha(self._bind("accumulate", "accumulate_alpha", **own))
+        image = self.buffers.allocate("the alpha", 4 * math.prod(self.film.size))
+        own = {"alpha": image, "halves": (0, self.film.halves)}
+        kernel = self._bind("accumulate", "accumulate_alpha", **own)
+        return self.film.made(kernel, image, 1)[..., 0]
 
     def bands(self) -> NDArray[np.float32]:
         """Return the mean radiance in each band so far, (h, w, bands) float32; wait for it."""
@@ -292,11 +294,10 @@ class Wavefront:
         self._accumulate_bands.set_args(**self._samples(0, self.film.halves))
         return self.film.bands(self._accumulate_bands)
 
-    def add_words(self, film: Words, bands: Words) -> None:
-        """Add to the film what another one holds, in the form of `Film.words`; wait for it."""
-        own_film, own_bands = self.film.words()
-        self.film.set_words(add_films(own_film, film), add_sums(own_bands, bands))
-        self._paths = self.film.count_samples()
+    def set_words(self, film: Words, bands: Words) -> None:
+        """Enqueue that the film holds these words, of the form that `Film.words` returns."""
+        self.film.set_words(film, bands)
+        self._paths = [int(half[SAMPLES_WORD].sum(dtype=np.uint64)) for half in film]
         self.accumulate_film()
 
     def _features_of(self, lowered: Lowered) -> Features:
