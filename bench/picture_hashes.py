@@ -31,9 +31,10 @@ OPTIONS: tuple[dict[str, Any], ...] = (
     {"layout": "binary"},
     {"layout": "wide8"},
     {"layout": "compact"},
-    {"queued": "sort"},
-    {"queued": "append"},
-    {"looped": True},
+    {"queued": True},
+    {"queued": False},
+    {"looped": False},
+    {"looped": False, "queued": True},
     {"slots": 128},
 )
 

@@ -175,9 +175,9 @@ class Record:
                 store += ["#if SPECTRUM_SIZE == 4", write, "#endif"] if guard else [write]
             parts += [
                 f"/* {m.doc} */",
-                f"inline {lane} load_{lower}_{m.name}(Slab s, At at)",
+                f"inline {lane} load_{lower}_{m.name}(Slab s, uint at)",
                 "{", f"    {lane} r;", *load, "    return r;", "}",
-                f"inline void store_{lower}_{m.name}(Slab s, At at, mask m, {lane} v)",
+                f"inline void store_{lower}_{m.name}(Slab s, uint at, mask m, {lane} v)",
                 "{", *store, "}",
             ]  # fmt: skip
         return "\n".join([*parts, ""])

@@ -47,7 +47,7 @@ def test_what_is_no_scene(function: Any, scene: Any, message: str) -> None:
         ({"queue": 1}, TypeError, r"a pyopencl\.CommandQueue, not int; .* device=1"),
         ({"layout": "wide9"}, UnknownKindError, "unknown layout 'wide9'; did you mean 'wide8'"),
         ({"tree_quality": "best"}, UnknownKindError, "unknown quality 'best'"),
-        ({"queued": "no"}, SceneError, "queued: 'no' is none of sort, append"),
+        ({"queued": "no"}, SceneError, "queued: must be true or false, not 'no'"),
         ({"slots": 0}, SceneError, "slots: must be a whole number from 1, not 0"),
         ({"slots": 1.5}, SceneError, "slots: must be a whole number from 1"),
         ({"texture_budget": -1}, SceneError, "texture_budget: must be a whole number from 0"),

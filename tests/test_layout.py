@@ -21,7 +21,7 @@ def opened() -> device.Device:
     return device.choose()
 
 
-def run(on: device.Device, text: str, lanes: int, queued: int, *arrays: np.ndarray) -> None:
+def run(on: device.Device, text: str, lanes: int, *arrays: np.ndarray) -> None:
     """Run `probe` on one work-item; arrays are read and written in place."""
     virtual = {
         "probe.cl": text,
@@ -29,7 +29,7 @@ def run(on: device.Device, text: str, lanes: int, queued: int, *arrays: np.ndarr
         "generated/spectrum.cl": '#include "spectrum/spectral.cl"\n',
         "generated/spectrum_read.cl": '#include "spectrum/spectral_read.cl"\n',
     }
-    defines = {"LANES": lanes, "QUEUED": queued, "SPECTRA_SIZE": 471, "SPECTRA_STEP": "1.0f"}
+    defines = {"LANES": lanes, "SPECTRA_SIZE": 471, "SPECTRA_STEP": "1.0f"}
     program = device.build(on, device.assemble("probe.cl", virtual, defines))
     flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
     buffers = [cl.Buffer(on.context, flags, hostbuf=a) for a in arrays]
@@ -79,24 +79,20 @@ def test_offsets_on_the_device(opened: device.Device, record: Record) -> None:
         f"    a[{n}] = sizeof({record.name});\n}}\n"
     )
     found = np.zeros(n + 1, np.uint32)
-    run(opened, kernel, 1, 0, found, np.zeros(record.words, np.uint32))
+    run(opened, kernel, 1, found, np.zeros(record.words, np.uint32))
     expected = [4 * m.word for m in record.members]
     assert found.tolist() == [*expected, record.dtype.itemsize]
 
 
-@pytest.mark.parametrize("queued", [0, 1])
 @pytest.mark.parametrize("lanes", [1, 8, 16])
-def test_slab_members_go_in_and_out(opened: device.Device, lanes: int, queued: int) -> None:
+def test_slab_members_go_in_and_out(opened: device.Device, lanes: int) -> None:
     """Every word of a slab, loaded and stored elsewhere member by member, lands where it should."""
     stride = 48
     rng = np.random.default_rng(1)
     source = rng.normal(size=(PATH.words, stride)).astype(np.float32)
     target = np.zeros_like(source)
     slots = np.arange(16, 16 + lanes, dtype=np.uint32)
-    if queued:
-        slots = rng.permutation(stride)[:lanes].astype(np.uint32)
     lane_mask = (rng.random(lanes) < 0.6).astype(np.uint32)
-    at = "*(global const integer *)c" if queued and lanes > 1 else "c[0]"
     read = "(*(global const integer *)d)" if lanes > 1 else "((integer)d[0])"
     moves = "".join(
         f"    store_path_{m.name}(to, at, m, load_path_{m.name}(from, at));\n" for m in PATH.members
@@ -106,9 +102,9 @@ def test_slab_members_go_in_and_out(opened: device.Device, lanes: int, queued: i
         "kernel void probe(global float *a, global float *b, global const uint *c, "
         "global const uint *d)\n{\n"
         f"    Slab from = {{a, {stride}}}, to = {{b, {stride}}};\n"
-        f"    At at = {at};\n    mask m = {read} != 0;\n{moves}}}\n"
+        f"    uint at = c[0];\n    mask m = {read} != 0;\n{moves}}}\n"
     )
-    run(opened, kernel, lanes, queued, source, target, slots, lane_mask)
+    run(opened, kernel, lanes, source, target, slots, lane_mask)
     expected = np.zeros_like(source)
     kept = slots[lane_mask != 0]
     expected[:, kept] = source[:, kept]
@@ -136,7 +132,7 @@ def test_rows_are_gathered(opened: device.Device, record: Record, lanes: int) ->
         f"    {record.name} r = {name}_row(a, row * {record.words});\n{writes}}}\n"
     )
     found = np.zeros((record.words, lanes), np.uint32)
-    run(opened, kernel, lanes, 0, rows.reshape(-1), found.reshape(-1), chosen)
+    run(opened, kernel, lanes, rows.reshape(-1), found.reshape(-1), chosen)
     assert np.array_equal(found, rows[chosen].T)
 
 
@@ -176,7 +172,7 @@ def test_records_are_chosen_lane_by_lane(opened: device.Device, lanes: int) -> N
         f"    OddPoint r = odd_point_sel(m, one, two), none = odd_point_nothing();\n{writes}}}\n"
     )
     found = np.zeros((2, record.words, lanes), np.uint32)
-    run(opened, text, lanes, 0, rows.reshape(-1), found.reshape(-1), lane_mask)
+    run(opened, text, lanes, rows.reshape(-1), found.reshape(-1), lane_mask)
     numbers = np.arange(lanes)
     assert np.array_equal(found[0], rows[np.where(lane_mask, numbers, numbers + 16)].T)
     nothing = np.zeros((), record.dtype)

@@ -19,7 +19,6 @@ import clpt
 from clpt import bvh, device
 from clpt.render.codegen import programs
 from clpt.render.lowering.scene import Lowered, lower
-from clpt.render.wavefront import queues
 from clpt.scene import Film, Scene, lights, materials, shapes
 from clpt.scene.cameras import Perspective
 
@@ -55,10 +54,10 @@ def texts_of(lowered: Lowered) -> list[str]:
     for layout in bvh.LAYOUTS:
         if layout == "brute" and features.instances:
             continue
-        for way in queues.WAYS:
-            made += programs.sources(features, layout, 1, queued=way).values()
+        for queued in (False, True):
+            made += programs.sources(features, layout, 1, queued=queued).values()
         made += programs.film_sources(features, layout).values()
-        made += programs.loop_sources(features, layout, 1).values()
+        made += programs.loop_sources(features, layout, 1, queued=False).values()
     return [source.text for source in made]
 
 

@@ -25,7 +25,7 @@ from .bandwidth import Copying
 from .figures import Figure, Taken, clock_complaint, timed
 from .flight import Flight
 
-QUEUEING = [kernel for way in queues.WAYS for kernel, *_ in queues.steps(way, 1, 1)]
+QUEUEING = [kernel for kernel, *_ in queues.steps(1, 1)]
 WARM = 4  # bounces before anything is noted, so that paths of all depths are in flight
 BOUNCES = 4  # of a round: in a single one few paths may begin
 
@@ -64,9 +64,8 @@ def measure(
     for name, found in noted.items():
         if name not in QUEUEING and _asked(name, only):
             yield _figure(flight, copying, name, moved[name].total, found)
-    for way in queues.WAYS:
-        if _asked(way, only):
-            yield _queue(flight, copying, way, rounds)
+    if _asked("append", only):
+        yield _queue(flight, copying, rounds)
     if _asked("accumulate", only):
         yield _accumulate(flight, copying, rounds)
 
@@ -110,7 +109,7 @@ def _figure(
     return figure.refuse(clock_complaint(t for _, t in busy), *wrong)
 
 
-def _queue(flight: Flight, copying: Copying, way: str, rounds: int) -> Figure:
+def _queue(flight: Flight, copying: Copying, rounds: int) -> Figure:
     """All slots brought into queues by the kind of their material, looked at afterwards."""
     on, wave = flight.device, flight.wavefront
     features, layout = wave.features, wave.scene.strategy.layout
@@ -119,13 +118,13 @@ def _queue(flight: Flight, copying: Copying, way: str, rounds: int) -> Figure:
         if step.bound.kernel.name == "shade" or step.name in QUEUEING:
             break
         flight.stage(step)
-    texts = programs.sources(features, layout, wave.lanes, queued=way)
-    program = device.build(on, texts[way])
-    named, give = {**wave.arguments, **queues.numbers(flight.slots)}, device.Buffers(on)
-    for name, size in queues.sizes(way, flight.slots, kinds).items():
+    texts = programs.sources(features, layout, wave.lanes, queued=True)
+    program = device.build(on, texts["append"])
+    named, give = dict(wave.arguments), device.Buffers(on)
+    for name, size in queues.sizes(flight.slots, kinds).items():
         named[name] = give.allocate("the queues", 4 * size)
     steps = []
-    for name, size, group in queues.steps(way, flight.slots, kinds):
+    for name, size, group in queues.steps(flight.slots, kinds):
         kernel = program.kernel(name)
         bound = kernel.bind(**{a.name: named[a.name] for a in kernel.arguments})
         steps.append((bound, (size,), (group,) if group else None))
@@ -134,8 +133,8 @@ def _queue(flight: Flight, copying: Copying, way: str, rounds: int) -> Figure:
         wave.stream.fill(named["queue"], 0xFFFFFFFF, 0, named["queue"].size)
         taken = timed(on, lambda: [wave.stream.run(*step) for step in steps])
         found.append((flight.slots, taken))
-    nbytes = traffic(features, layout, queued=way)[way].total
-    figure = _figure(flight, copying, way, nbytes, found[1:])
+    nbytes = traffic(features, layout, queued=True)["append"].total
+    figure = _figure(flight, copying, "append", nbytes, found[1:])
     queue, starts, counts = (
         give.download(named[name], (named[name].size // 4,), np.uint32)
         for name in ("queue", "queue_starts", "queue_counts")
@@ -144,8 +143,9 @@ def _queue(flight: Flight, copying: Copying, way: str, rounds: int) -> Figure:
     for kind in range(kinds):
         own = queue[starts[kind] :][: counts[kind]]
         expected = np.flatnonzero(flight.kinds == kind)
-        own = own if way == "sort" else np.sort(own)  # which is stable
-        wrong += int((own != expected).sum()) if len(own) == len(expected) else len(expected)
+        wrong += (
+            int((np.sort(own) != expected).sum()) if len(own) == len(expected) else len(expected)
+        )
     return figure.refuse(f"{wrong:,} slots are not where they belong" if wrong else "")
 
 

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from clpt.records import SLABS
 from clpt.render.codegen import programs
 from clpt.render.contract.features import Features
-from clpt.render.wavefront import queues
 
 _WORD = 4  # bytes
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
@@ -27,7 +26,7 @@ _TERM = re.compile(
 )
 _COMPARE = {"==": operator.eq, ">": operator.gt}
 _CALL = re.compile(r"(?<!\w)(?P<verb>load|store)_(?P<member>\w+)\((?!Slab )")
-_QUEUED = {"sort": (0, 1), "append": (0, 1), "shade": (1, 0)}  # words read and written of a queue
+_QUEUED = {"append": (0, 1), "shade": (1, 0)}  # words read and written of a queue
 
 
 @dataclass(frozen=True)
@@ -42,12 +41,11 @@ class Moved:
         return self.read + self.written
 
 
-def traffic(features: Features, layout: str, *, queued: bool | str = False) -> dict[str, Moved]:
+def traffic(features: Features, layout: str, *, queued: bool = False) -> dict[str, Moved]:
     """Return what a slot's part of each program moves, by the names of `programs.sources`.
 
     An item is a slot that has work there: in `generate` a path that ends and the one that begins,
-    in `intersect` and `shade_...` a ray and its hit, in `shadow` a shadow ray, in `append` and
-    `sort` a slot, whose key `sort` reads twice.
+    in `intersect` and `shade_...` a ray and its hit, in `shadow` a shadow ray, in `append` a slot.
     """
     texts = programs.sources(features, layout, 1, queued=queued)
     return {name: _moved(name, source.text, features.mode) for name, source in texts.items()}
@@ -66,9 +64,7 @@ def _moved(name: str, text: str, mode: str) -> Moved:
             if call["member"] in sizes:
                 words[call["verb"]].add(call["member"])
     read, written = (sum(sizes[member] for member in words[verb]) for verb in ("load", "store"))
-    if name == "sort":
-        read *= 2
-    if name in queues.WAYS or "#define QUEUED 1\n" in text:
+    if name == "append" or "#define QUEUED 1\n" in text:
         own = _QUEUED[name.split("_")[0]]
         read, written = read + own[0], written + own[1]
     return Moved(_WORD * read, _WORD * written)

@@ -11,8 +11,6 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from clpt.render.wavefront.queues import WAYS
-
 from .. import benchmark
 from .. import device as dev
 from ..benchmark import comparing, records, scenes
@@ -25,7 +23,7 @@ from .output_console import output_console
 
 SLOWER = 3  # the exit status if a figure was refused, or is below --fail-below
 STAGES = (
-    "generate", "emit", "intersect", "mix", "shade", "shadow", "splat", *WAYS, "accumulate",
+    "generate", "emit", "intersect", "mix", "shade", "shadow", "splat", "append", "accumulate",
 )  # fmt: skip
 HEADINGS = ("figure", "", "unit", "±", "GB/s", "of a copy", "")
 

@@ -26,8 +26,7 @@ class RenderOptions(TypedDict, total=False):
     layout: of the trees over triangles, a name in clpt.bvh.LAYOUTS.
     tree_quality: "high", or "fast", which is built sooner and traced a little slower.
     slots: paths in flight.
-    queued: whether slots are queued by material before they are shaded, or how, a name in
-    clpt.render.wavefront.queues.WAYS.
+    queued: whether slots are queued by material before they are shaded.
     looped: whether a kernel on the device runs all bounces.
     first_sample: the number of the first sample, 0 to 2^31 - 1, by default 0. Renderers that take
     other numbers have other samples, and their films merge, see `Renderer.merge`.
@@ -42,7 +41,7 @@ class RenderOptions(TypedDict, total=False):
     layout: str | None
     tree_quality: bvh.Quality
     slots: int | None
-    queued: bool | str | None
+    queued: bool | None
     looped: bool | None
     first_sample: int
     halves: bool
@@ -75,6 +74,9 @@ def check_options(scene: Scene, options: Mapping[str, Any]) -> None:
     quality = options.get("tree_quality", "high")
     if quality not in get_args(bvh.Quality):
         raise UnknownKindError("quality", str(quality), get_args(bvh.Quality), where="tree_quality")
+    for name in ("queued", "looped", "halves", "profiling"):
+        if options.get(name) not in (None, False, True):
+            raise SceneError(f"must be true or false, not {options[name]!r}", where=name)
     for name, least in (("slots", 1), ("texture_budget", 0), ("first_sample", 0)):
         number = options.get(name)
         whole = isinstance(number, int) and not isinstance(number, bool)

@@ -100,7 +100,6 @@ class Renderer(Pictures):
             slots=options.get("slots"),
             queued=options.get("queued"),
             looped=options.get("looped", None if queue is None else True),
-            paths=scene.spp * math.prod(scene.film.size),
             tree_quality=options.get("tree_quality", "high"),
             halves=options.get("halves", False),
         )

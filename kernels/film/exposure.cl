@@ -3,7 +3,7 @@
 
 /* Adds a value and a sample where m; small: all values are, as they mostly are. The highest words of sums then change
  * only by a carry, once in 2^16 of the sum: they are read and written only where they change. */
-inline void exposure_add(Slab path, At at, global uint *counters, mask m, vec3 value, int small)
+inline void exposure_add(Slab path, uint at, global uint *counters, mask m, vec3 value, int small)
 {
     value = sel3(m, value, v3(0.0f, 0.0f, 0.0f));
     Natural3 low = load_path_low(path, at), middle = load_path_middle(path, at), high;
@@ -33,14 +33,14 @@ inline void exposure_add(Slab path, At at, global uint *counters, mask m, vec3 v
 
 #if USES_ALPHA
 /* Adds the weight of a sample that met a surface. */
-inline void exposure_cover(Slab path, At at, mask m, real weight)
+inline void exposure_cover(Slab path, uint at, mask m, real weight)
 {
     store_path_covered(path, at, m, fixed_add(load_path_covered(path, at), fixed_of(sel(m, weight, (real)(0.0f)))));
 }
 #endif
 
 /* Gives the film what was summed where slots `leave` their pixels, and begins again at 0 where they `enter` others. */
-inline void exposure_leave(Scene scene, Slab path, At at, global uint *film, global uint *counters, mask leave,
+inline void exposure_leave(Scene scene, Slab path, uint at, global uint *film, global uint *counters, mask leave,
                            mask enter, integer plane, integer pixel_index)
 {
     Natural3 low = load_path_low(path, at), middle = load_path_middle(path, at), high = load_path_high(path, at), none;

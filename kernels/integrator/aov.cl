@@ -9,7 +9,7 @@
 #define CHANNEL_SHAPE_ID 6
 #define CHANNEL_PRIMITIVE_ID 7
 
-void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mask active)
+void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, mask active)
 {
     Vertex vertex = vertex_load(scene, path, hit, at, active);
     Surface s = vertex.s;

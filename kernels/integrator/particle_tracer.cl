@@ -10,7 +10,7 @@
 #include "generated/connect.cl"
 #include "lighting/light_path.cl"
 
-void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mask active)
+void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, mask active)
 {
     global const Settings *settings = scene.settings;
     Vertex v = vertex_load(scene, path, hit, at, active);

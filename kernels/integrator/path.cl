@@ -1,7 +1,7 @@
 /* One vertex of a path from the camera: the light that is met, next-event estimation, and the direction to go on.
  * Light is found both by meeting it and by choosing it; the two are weighted by the power heuristic (Veach 1997,
  * 9.2.4). */
-void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mask active)
+void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, mask active)
 {
     global const Settings *settings = scene.settings;
     Vertex v = vertex_load(scene, path, hit, at, active);

@@ -1,7 +1,7 @@
 /* The classic ray tracer (Whitted 1980): ambient and direct light, and one ray onward where a surface mirrors: with the
  * weight of a material's `reflectivity`, or as a delta material sends it. Direct light comes from one light a sample,
  * chosen at random, so several lights converge to their sum. */
-void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, At at, mask active)
+void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, mask active)
 {
     global const Settings *settings = scene.settings;
     Vertex v = vertex_load(scene, path, hit, at, active);

@@ -10,7 +10,7 @@ inline Sampler light_path_sampler(global const Settings *settings, integer pixel
 }
 
 /* Puts a ray between the camera and a point of a surface, or of infinity, into the shadow slab. */
-inline void connect_camera(Slab shadow, At at, mask active, mask shine, Surface s, CameraPoint c, Spectrum value)
+inline void connect_camera(Slab shadow, uint at, mask active, mask shine, Surface s, CameraPoint c, Spectrum value)
 {
     LightSample ls;
     ls.wi = neg3(c.d);

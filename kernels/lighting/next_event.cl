@@ -2,7 +2,7 @@
 
 /* Puts a shadow ray into its slab, for the lanes that `shine`; the other active ones have none. It goes
  * from off the surface to the point of the light sample: along ls.wi it would end beside it. */
-inline void shadow_toward(Slab shadow, At at, mask active, mask shine, Surface s, LightSample ls, Spectrum value)
+inline void shadow_toward(Slab shadow, uint at, mask active, mask shine, Surface s, LightSample ls, Spectrum value)
 {
     vec3 from = surface_offset(s, ls.wi), to = sub3(madd3(ls.wi, ls.t, s.p), from);
     real t = sqrt(dot3(to, to));

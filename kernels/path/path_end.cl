@@ -8,7 +8,7 @@ typedef struct {
     mask ended;           /* the slot is free for another path */
 } PathEnd;
 
-inline PathEnd path_end(Slab path, Slab hit, At at)
+inline PathEnd path_end(Slab path, Slab hit, uint at)
 {
     PathEnd e;
     e.state = load_path_state(path, at);

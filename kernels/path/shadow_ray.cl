@@ -4,7 +4,7 @@
 #include "generated/transmittance.cl"
 
 /* How much of the light between the two points of each active ray passes, 0 to 1. The rays wait no longer. */
-inline real shadow_ray_transmittance(TRACE_ARGS, Scene scene, Slab path, Slab shadow, At at, real t, mask active)
+inline real shadow_ray_transmittance(TRACE_ARGS, Scene scene, Slab path, Slab shadow, uint at, real t, mask active)
 {
     vec3 o = load_shadow_o(shadow, at), d = load_shadow_d(shadow, at);
     store_shadow_t(shadow, at, active, (real)(-1.0f));

@@ -135,7 +135,7 @@ inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, 
 }
 
 /* The same from what the intersect stage has kept. */
-inline Surface surface_load(Scene scene, Slab hit, At at, mask active, vec3 o, vec3 d, mask *front)
+inline Surface surface_load(Scene scene, Slab hit, uint at, mask active, vec3 o, vec3 d, mask *front)
 {
     TraceHit h = {load_hit_t(hit, at), load_hit_u(hit, at), load_hit_v(hit, at), load_hit_n(hit, at),
                   load_hit_plane(hit, at), load_hit_side(hit, at), load_hit_prim(hit, at), load_hit_shape(hit, at)};

@@ -27,7 +27,7 @@ typedef struct {
     vec3 wo;               /* to where the ray comes from, in shading.frame */
 } Scattering;
 
-inline Vertex vertex_load(Scene scene, Slab path, Slab hit, At at, mask active)
+inline Vertex vertex_load(Scene scene, Slab path, Slab hit, uint at, mask active)
 {
     Vertex v;
     v.o = load_path_o(path, at);
@@ -50,7 +50,7 @@ inline Vertex vertex_load(Scene scene, Slab path, Slab hit, At at, mask active)
 }
 
 /* Loads the material. Where it fluoresces, the `active` paths take the wavelengths by which light comes. */
-inline Scattering vertex_scattering(Scene scene, Slab path, At at, mask active, Vertex v, Sampler sampler)
+inline Scattering vertex_scattering(Scene scene, Slab path, uint at, mask active, Vertex v, Sampler sampler)
 {
     Scattering scatter;
     scatter.sampler = sampler;
@@ -99,7 +99,7 @@ inline mask vertex_continues(Scene scene, Vertex v)
 }
 
 /* The `next` paths go on from here, along d. */
-inline void vertex_leave(Slab path, At at, mask next, Vertex v, vec3 d, Spectrum beta)
+inline void vertex_leave(Slab path, uint at, mask next, Vertex v, vec3 d, Spectrum beta)
 {
 #if BSDF_IS_NULL /* nothing has happened: the camera's ray has its end, and lights are weighed by what was before */
     real pdf = load_path_pdf(path, at), onward = v.t + surface_lead(v.s, d);
@@ -116,7 +116,7 @@ inline void vertex_leave(Slab path, At at, mask next, Vertex v, vec3 d, Spectrum
 }
 
 /* The `active` paths are a vertex longer, if it is not a null surface; those that do not go on are no longer alive. */
-inline void vertex_end(Slab path, At at, mask active, mask next, integer state)
+inline void vertex_end(Slab path, uint at, mask active, mask next, integer state)
 {
     state = sel_i(next, state, state - (state & PATH_ALIVE));
 #if BSDF_IS_NULL

@@ -22,7 +22,7 @@
 
 /* Puts a ray from a light into the slots that `go` on, and, where the camera sees lights, one from it to the camera
  * into the shadow slab. Returns the bits of Path.state that follow. */
-inline integer begin_light_path(Scene scene, Slab path, Slab shadow, At at, mask ended, mask go, integer pixel_index,
+inline integer begin_light_path(Scene scene, Slab path, Slab shadow, uint at, mask ended, mask go, integer pixel_index,
                                 integer sample)
 {
     global const Settings *settings = scene.settings;

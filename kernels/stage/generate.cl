@@ -17,7 +17,7 @@
 #include "path/path_end.cl"
 
 /* The radiance of the paths, with what those that left the scene gather there. */
-inline Spectrum path_radiance(Scene scene, Slab path, At at, PathEnd end, Wavelengths lambdas)
+inline Spectrum path_radiance(Scene scene, Slab path, uint at, PathEnd end, Wavelengths lambdas)
 {
     Spectrum radiance = load_path_radiance(path, at);
 #if USES_INFINITE
@@ -37,7 +37,7 @@ inline Spectrum path_radiance(Scene scene, Slab path, At at, PathEnd end, Wavele
 }
 
 /* Adds the finished paths to the sums of their pixels. What is not finite counts as black, at its own wavelength. */
-inline void add_sample(Scene scene, Slab path, At at, BEGIN_ARGS, PathEnd end, integer slot, integer pixel_index,
+inline void add_sample(Scene scene, Slab path, uint at, BEGIN_ARGS, PathEnd end, integer slot, integer pixel_index,
                        integer sample)
 {
     Wavelengths lambdas = load_path_lambdas(path, at);
@@ -74,7 +74,7 @@ inline void add_sample(Scene scene, Slab path, At at, BEGIN_ARGS, PathEnd end, i
 }
 
 /* Puts a ray from the camera into the slots that `go` on. */
-inline void begin_path(Scene scene, Slab path, At at, mask go, integer pixel_index, integer sample)
+inline void begin_path(Scene scene, Slab path, uint at, mask go, integer pixel_index, integer sample)
 {
     global const Settings *settings = scene.settings;
     vec2 pixel = pixel_of_index(settings, pixel_index);

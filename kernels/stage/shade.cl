@@ -1,5 +1,5 @@
-/* Shades the paths that met one kind of material. Built once per kind, so it holds no switch: as
- * dense blocks that mask out other kinds, or, where QUEUED, along the sorted queue. */
+/* Shades the paths that met one kind of material. Built once per kind, so it holds no switch: LANES neighbouring slots,
+ * in which other kinds are masked out, or, where QUEUED, those from `entry` of the kind's queue on. */
 #include "core/base.cl"
 #include "interface/stage.cl"
 #include "generated/sampler.cl"
@@ -20,31 +20,36 @@
 #include "path/hero.cl"
 #include "path/roulette.cl"
 #include "generated/integrator.cl"
+#include "path/block.cl"
 
-#if QUEUED
-#define QUEUE_ARGS , global const uint *queue, global const uint *queue_starts, global const uint *queue_counts
+#if !QUEUED
+#define QUEUE_ARGS STAGE_AT_ARG
+#elif defined(PART)
+#define QUEUE_ARGS , global const uint *queue, uint entry, uint end, uint block
 #else
-#define QUEUE_ARGS
+#define QUEUE_ARGS , global const uint *queue, global const uint *queue_starts, global const uint *queue_counts
 #endif
 
-STAGE(shade)(SLAB_ARGS, SCENE_ARGS QUEUE_ARGS STAGE_AT_ARG)
+STAGE(shade)(SLAB_ARGS, SCENE_ARGS QUEUE_ARGS)
 {
     SLABS
     SCENE
 #if QUEUED
-    uint first = get_global_id(0) * LANES, count = queue_counts[BSDF_KIND];
-    if (first < count) {
-        integer i = LANE_INDEX + (int)first;
-        At at = gather_i(queue, (int)queue_starts[BSDF_KIND] + min_i(i, (integer)((int)count - 1)));
-        mask active = i < (int)count;
+#ifndef PART
+    uint first = get_global_id(0) * LANES, entry = queue_starts[BSDF_KIND] + first;
+    uint end = queue_starts[BSDF_KIND] + queue_counts[BSDF_KIND], block = settings->slots + first;
+#endif
+    if (entry < end) {
+        uint at = block_take(path, hit, shadow, queue, entry, end, block);
+        integrator_vertex(scene, path, hit, shadow, at, LANE_INDEX + (integer)((int)entry) < (int)end);
+        block_return(path, shadow, queue, entry, end, block);
+    }
 #else
     STAGE_AT
     mask active = ((load_path_state(path, at) & PATH_ALIVE) != 0) & (load_hit_prim(hit, at) >= 0);
 #if BSDF_COUNT > 1
     active = active & (MATERIAL_KIND(load_hit_material(hit, at)) == BSDF_KIND);
 #endif
-    if (any(active)) {
+    if (any(active)) integrator_vertex(scene, path, hit, shadow, at, active);
 #endif
-        integrator_vertex(scene, path, hit, shadow, at, active);
-    }
 }

@@ -1,43 +1,27 @@
-/* Sorts the paths that met a surface by the kind of its material: a stable counting sort of slot
- * indices, so that a kind's indices ascend. Every work-item counts a chunk of neighbouring
- * slots and later puts them into the queue; in between, one work-item sums. No atomics, no barriers. */
+/* Sorts the paths of a loop's work-item that met a surface by the kind of its material: a stable counting sort of slot
+ * numbers, so that those of a kind ascend. */
 #include "core/base.cl"
+#include "interface/stage.cl"
 #include "path/waiting.cl"
 
-/* counts[kind * chunks + chunk]: how many of a chunk's slots wait for a kind. */
-kernel void sort_count(SLAB_ARGS, global uint *counts, uint chunk, uint slots)
+/* Of the slots from `at` to `end`, those that wait for kind k go to queue[starts[k]] and further, below
+ * queue[starts[k + 1]]. The entries of the queue from `at` to `end` are theirs alone. */
+STAGE(sort)(SLAB_ARGS, global uint *queue, uint *starts, uint end STAGE_AT_ARG)
 {
     SLABS
-    uint id = get_global_id(0), chunks = get_global_size(0), tally[BSDF_COUNT];
-    for (int k = 0; k < BSDF_COUNT; k++) tally[k] = 0;
-    for (uint slot = id * chunk; slot < min((id + 1) * chunk, slots); slot++) {
+    uint next[BSDF_COUNT], total = at;
+    for (int k = 0; k < BSDF_COUNT; k++) next[k] = 0;
+    for (uint slot = at; slot < end; slot++) {
         int kind = waiting_kind(path, hit, slot);
-        if (kind >= 0) tally[kind]++;
+        if (kind >= 0) next[kind]++;
     }
-    for (int k = 0; k < BSDF_COUNT; k++) counts[k * chunks + id] = tally[k];
-}
-
-/* Turns counts into positions in the queue, and tells where each kind begins and how long it is. */
-kernel void sort_scan(global uint *counts, global uint *queue_starts, global uint *queue_counts, uint chunks)
-{
-    uint total = 0;
     for (int k = 0; k < BSDF_COUNT; k++) {
-        queue_starts[k] = total;
-        for (uint i = k * chunks; i < (k + 1) * chunks; i++) {
-            uint n = counts[i];
-            counts[i] = total;
-            total += n;
-        }
-        queue_counts[k] = total - queue_starts[k];
+        starts[k] = total;
+        total += next[k];
+        next[k] = starts[k];
     }
-}
-
-kernel void sort_place(SLAB_ARGS, global const uint *counts, global uint *queue, uint chunk, uint slots)
-{
-    SLABS
-    uint id = get_global_id(0), chunks = get_global_size(0), next[BSDF_COUNT];
-    for (int k = 0; k < BSDF_COUNT; k++) next[k] = counts[k * chunks + id];
-    for (uint slot = id * chunk; slot < min((id + 1) * chunk, slots); slot++) {
+    starts[BSDF_COUNT] = total;
+    for (uint slot = at; slot < end; slot++) {
         int kind = waiting_kind(path, hit, slot);
         if (kind >= 0) queue[next[kind]++] = slot;
     }

@@ -136,10 +136,10 @@ def test_layouts_that_lie_are_refused(
         assert figure.value > 0.0 and figure.more["count"] <= COUNT + 64
 
 
-def test_stages_have_work_and_a_sort_that_is_right(on: device.Device, scene: Scene) -> None:
+def test_stages_have_work_and_queues_that_are_right(on: device.Device, scene: Scene) -> None:
     figures = {f.name: f for f in stages.measure(on, scene, 2, slots=COUNT)}
     assert list(figures) == [
-        "generate", "intersect", "shade_diffuse", "shadow", "sort", "append", "accumulate",
+        "generate", "intersect", "shade_diffuse", "shadow", "append", "accumulate",
     ]  # fmt: skip
     for figure in figures.values():
         assert figure.refused == "" and figure.value > 0.0
@@ -147,8 +147,8 @@ def test_stages_have_work_and_a_sort_that_is_right(on: device.Device, scene: Sce
     each = figures["intersect"].more["items"] / stages.BOUNCES
     assert 0.9 * COUNT < each <= figures["intersect"].more["slots"]
     assert 0 < figures["generate"].more["items"] < figures["shade_diffuse"].more["items"]
-    only = [f.name for f in stages.measure(on, scene, 1, ("shade", "sort"), slots=COUNT)]
-    assert only == ["shade_diffuse", "sort"]
+    only = [f.name for f in stages.measure(on, scene, 1, ("shade", "append"), slots=COUNT)]
+    assert only == ["shade_diffuse", "append"]
 
 
 def test_state_is_read_as_it_lies(on: device.Device, scene: Scene) -> None:

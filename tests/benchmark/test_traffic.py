@@ -34,7 +34,7 @@ def test_a_path_that_ends_and_the_next() -> None:
 
 def test_queues() -> None:
     plain, sorted_ = moved("rgb", False), moved("rgb", True)
-    assert "sort" not in plain
-    assert sorted_["sort"] == Moved(4 * 2 * 3, 4)  # state, prim and material, twice; a slot
+    assert "append" not in plain
+    assert sorted_["append"] == Moved(4 * 3, 4)  # state, prim and material; a slot
     assert sorted_["shade_diffuse"].read == plain["shade_diffuse"].read + 4
     assert sorted_["shade_diffuse"].written == plain["shade_diffuse"].written > 0

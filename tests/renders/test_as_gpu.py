@@ -28,7 +28,7 @@ def test_forms(gpu: dev.Device, scenes: Path) -> None:
     renderer = clpt.Renderer(scene, gpu, queued=True)  # one kind: it would not be asked for
     front = renderer.wavefronts[0]
     slots, strategy = front.paths.slots, front.scene.strategy
-    assert (front.lanes, strategy.layout, strategy.queued) == (1, "compact", "append")
+    assert (front.lanes, strategy.layout, strategy.queued) == (1, "compact", True)
     assert UNIT_SLOTS < slots <= 2 * UNIT_SLOTS  # whole pictures
     renderer.run(2)
     image, plain = renderer.image(), clpt.render(scene, 2, slots=slots)

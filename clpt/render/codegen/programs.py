@@ -36,13 +36,13 @@ class Stage:
 
 
 def sources(
-    features: Features, layout: str, lanes: int, *, queued: bool | str, interleaved: bool = False
+    features: Features, layout: str, lanes: int, *, queued: bool, interleaved: bool = False
 ) -> dict[str, device.Source]:
     """Return the text of every program of a bounce, by program name.
 
     layout: of the triangles, a name in clpt.bvh.LAYOUTS; lanes: paths that a work-item shades;
-    queued: whether shading goes along queues, or how: one of clpt.render.wavefront.queues.WAYS,
-    "sort" if True; interleaved: a work-item of `intersect` has the rays of `lanes` paths in flight.
+    queued: whether shading goes along queues, which `append` fills; interleaved: a work-item of
+    `intersect` has the rays of `lanes` paths in flight.
     """
     files, defines = _shared(features, layout), flags.defines(flags.SCENE, features)
     begin, join = begin_and_join(features)
@@ -60,13 +60,12 @@ def sources(
     if features.mixtures:
         texts["mix"] = _source("mix", files, defines, lanes)
     if queued:
-        way = "sort" if queued is True else queued
-        texts[way] = _source(way, files, defines, 1)
+        texts["append"] = _source("append", files, defines, 1)
     for cls in features.leaves:
         own = {**files, "generated/bsdf.cl": stages.bsdf_text(features, cls)}
         if cls.source is not None:
             own[f"bsdf/{cls.kind}.cl"] = custom_materials.text(cls)
-        kind = {**flags.defines(flags.MATERIAL, features, cls), "QUEUED": int(bool(queued))}
+        kind = {**flags.defines(flags.MATERIAL, features, cls), "QUEUED": int(queued)}
         texts[f"shade_{cls.kind}"] = _source("shade", own, {**defines, **kind}, lanes)
     return texts
 
@@ -98,41 +97,64 @@ def order(features: Features, layout: str, lanes: int, interleaved: bool = False
 
 
 def loop_sources(
-    features: Features, layout: str, lanes: int, interleaved: bool = False
+    features: Features, layout: str, lanes: int, *, queued: bool, interleaved: bool = False
 ) -> dict[str, device.Source]:
     """Return the texts that are linked to the loop of all stages on the device, by name.
 
     "loop" holds the kernel; the others are the stages as functions, see kernels/interface/stage.cl.
     """
-    texts = sources(features, layout, lanes, queued=False, interleaved=interleaved)
+    texts = sources(features, layout, lanes, queued=queued, interleaved=interleaved)
+    shared, defines = _shared(features, layout), flags.defines(flags.SCENE, features)
     bounce = order(features, layout, lanes, interleaved)
     names = dict.fromkeys(stage.program for stage in bounce)
+    if queued:
+        names["sort"] = None
+        texts["sort"] = _source("sort", shared, defines, 1)
     parts = {name: texts[name].with_private(name, {"PART": f"loop_{name}"}) for name in names}
-    files = {**_shared(features, layout), "generated/loop.cl": _loop_text(features, bounce)}
-    loop = _source("loop", files, flags.defines(flags.SCENE, features), lanes)
-    return {**parts, "loop": loop.with_private("loop")}
+    files = {**shared, "generated/loop.cl": _loop_text(features, bounce, queued)}
+    return {**parts, "loop": _source("loop", files, defines, lanes).with_private("loop")}
 
 
-def _loop_text(features: Features, bounce: list[Stage]) -> str:
+def _loop_text(features: Features, bounce: list[Stage], queued: bool) -> str:
     """What loop.cl calls: `loop_begin`, and `loop_bounce`, all other stages in their order."""
     begin, join = begin_and_join(features)
     extra = {begin: ["BEGIN"], "intersect": ["TRACE"], join: ["JOIN"]}
     groups = {s.program: ["SLAB", "SCENE", *extra.get(s.program, ())] for s in bounce}
+    shading = [stage.program for stage in bounce if stage.kernel == "shade"] if queued else []
+    entries = "global const uint *queue, uint entry, uint end, uint block"
     lines = [
-        f"void loop_{name}({', '.join(f'{group}_ARGS' for group in own)}, uint at);"
+        f"void loop_{name}({', '.join(f'{group}_ARGS' for group in own)}, "
+        f"{entries if name in shading else 'uint at'});"
         for name, own in groups.items()
     ]
+    if queued:
+        sort = "(SLAB_ARGS, global uint *queue, uint *starts, uint end, uint at);"
+        lines.append(f"void loop_sort{sort}")
     lines += [
+        *signatures.args_text("LOOP", signatures.loop_args(queued)),
         f"#define loop_begin loop_{begin}",
-        "inline void loop_bounce(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS, BEGIN_ARGS, uint at)",
+        "inline void loop_bounce(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS, BEGIN_ARGS, LOOP_ARGS, "
+        "uint first, uint end)",
         "{",
     ]
+    if shading:
+        block = "uint block = settings->slots + get_global_id(0) * LANES;"
+        lines += ["    uint starts[BSDF_COUNT + 1];", f"    {block}"]
     for stage in bounce[1:]:
-        times = "LANES" if stage.lanes == 1 else "1"
         passed = ", ".join(f"{group}_PASSED" for group in groups[stage.program])
-        lines.append(
-            f"    for (uint i = 0; i < {times}; i++) loop_{stage.program}({passed}, at + i);"
-        )
+        begins, ends, own = "first", "end", "at"
+        if stage.program in shading:
+            kind = shading.index(stage.program)
+            begins, ends = f"starts[{kind}]", f"starts[{kind + 1}]"
+            own = f"queue, at, {ends}, block"
+            if kind == 0:
+                lines.append("    loop_sort(SLAB_PASSED, queue, starts, end, first);")
+        step = "LANES" if stage.lanes > 1 else "1"
+        lines += [
+            f"    for (uint at = {begins}; at < {ends}; at += {step}) {{",
+            f"        loop_{stage.program}({passed}, {own});",
+            "    }",
+        ]
     return "\n".join([*lines, "}", ""])
 
 

@@ -22,8 +22,8 @@ FRESH = 0x2000  # kernels/path/path_state.cl
 CPU_SLOTS = 1 << 14
 UNIT_SLOTS = 1 << 14  # of a GPU's compute unit, which runs about an eighth of them at once
 MOST_SLOTS = 1 << 22  # beyond, more slots bring no speed
-# A work-item of the loop keeps its paths in the first cache, and waits the less for the longest of
-# them the more samples each slot has to take: few slots, measured on CPUs.
+# A core keeps its paths in its second cache, and waits the less for the longest of them the more
+# samples each slot has to take: few slots, measured on CPUs.
 LOOP_SLOTS = 1 << 10  # of a core
 WORDS = sum(record.words for record in SLABS) + 2  # of a slot, with those of queues
 LARGEST = max(record.words for record in SLABS)
@@ -94,7 +94,8 @@ class PathBuffers:
     """The state of the paths in flight on a device.
 
     settings: those of the lowered scene, of which this is a copy, with the numbers of slots and
-    planes and the seed of the samples; stride: words from one stream of a slab to the next.
+    planes and the seed of the samples; blocks: slots beyond those of the paths, see
+    kernels/path/block.cl; stride: words from one stream of a slab to the next.
 
     Raises MemoryBudgetError.
     """
@@ -105,14 +106,16 @@ class PathBuffers:
         buffers: Buffers,
         settings: NDArray[np.void],
         slots: Slots,
-        queued: str,
+        blocks: int,
+        queued: bool,
         kinds: int,
     ):
         self.stream, self.buffers = stream, buffers
-        self._slots, self.slots, self.stride = slots, slots.total, slots.total + PADDING
+        self._slots, self.slots = slots, slots.total
+        self.stride = slots.total + blocks + PADDING
         self.settings = self._with_slots(settings)
         self._read = np.zeros(len(COUNTERS), np.uint64)
-        self._fixed: dict[str, Any] = {"stride": self.stride}
+        self._fixed: dict[str, Any] = {"stride": self.stride, "slots": self.slots}
         for record in SLABS:
             name, size = f"{record.name.lower()}_words", 4 * record.words * self.stride
             buffer = buffers.allocate(name, size, "lower the number of slots")
@@ -129,13 +132,12 @@ class PathBuffers:
         """The kernels' arguments by name."""
         return {**self._fixed, **self.queue}
 
-    def new_queue(self, queued: str, kinds: int) -> dict[str, Any]:
+    def new_queue(self, queued: bool, kinds: int) -> dict[str, Any]:
         """Return the arguments of the kernels that queue slots by material, with new buffers."""
         if not queued:
             return {}
-        sizes = queues.sizes(queued, self.slots, kinds)
-        buffers = {name: self.buffers.allocate("the queues", 4 * n) for name, n in sizes.items()}
-        return {**buffers, **queues.numbers(self.slots)}
+        sizes = queues.sizes(self.slots, kinds)
+        return {name: self.buffers.allocate("the queues", 4 * n) for name, n in sizes.items()}
 
     def set_work_list(
         self, padded_pixels: work_list.PixelIndices, ends: work_list.PixelIndices | None = None

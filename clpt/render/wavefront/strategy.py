@@ -11,52 +11,56 @@ from dataclasses import dataclass
 from clpt import bvh, device
 from clpt.errors import SceneError
 from clpt.render.lowering.scene import Lowered
-from clpt.render.wavefront import queues
 
 BRUTE_SHAPES = 32  # analytic shapes up to which a ray tests all of them
 UNSORTED_KINDS = 4  # of cheap materials, up to which sorting costs more; see bench/NOTES.md
 INTERLEAVED_TRIANGLES = 1 << 20  # from which interleaved rays pay; measured, see bench/NOTES.md
-LOOP_PATHS = 1 << 22  # paths of a render from which a loop is worth its compilation
+SHARE = 512  # slots of a work-item of the loop on a CPU, which fit into the second cache of a core
 
 
 @dataclass(frozen=True)
 class Tuning:
     """What the caller wants of a `Strategy`; None for what suits the device and the scene.
 
-    queued: True for the way that suits the device.
+    Members are those of `Strategy`.
     """
 
     layout: str | None = None
-    queued: bool | str | None = None
+    queued: bool | None = None
 
 
 @dataclass(frozen=True)
 class Strategy:
     """How kernels trace and shade the paths of a scene.
 
-    layout: of the trees over triangles, a name in clpt.bvh.LAYOUTS; queued: how slots are queued by
-    material before they are shaded, one of clpt.render.wavefront.queues.WAYS, or "" for no queues;
-    interleaved: whether a work-item traces the rays of several paths at once.
+    layout: of the trees over triangles, a name in clpt.bvh.LAYOUTS; queued: whether slots are
+    queued by material before they are shaded; interleaved: whether a work-item traces the rays of
+    several paths at once.
     """
 
     layout: str
-    queued: str
+    queued: bool
     interleaved: bool
 
 
 def choose(on: device.Device, lowered: Lowered, tuning: Tuning) -> Strategy:
     """Return how a device renders a scene.
 
-    Raises SceneError for a layout that cannot hold the scene, and for an unknown way to queue.
+    Raises SceneError for a layout that cannot hold the scene.
     """
     layout = _layout(on, lowered, tuning.layout)
-    queued = _queued(on, lowered, tuning.queued)
+    queued = _queued(on, lowered) if tuning.queued is None else tuning.queued
     return Strategy(layout, queued, _interleaved(on, lowered, layout))
 
 
-def use_loop(on: device.Device, queued: str, paths: int) -> bool:
-    """Return whether a kernel on the device that runs all bounces pays for that many paths."""
-    return on.info.is_cpu and not queued and paths >= LOOP_PATHS
+def use_loop(on: device.Device) -> bool:
+    """Return whether a kernel on the device runs all bounces: on CPUs, whose caches it suits."""
+    return on.info.is_cpu
+
+
+def loop_share(on: device.Device) -> int:
+    """Return how many slots a work-item of the loop takes."""
+    return SHARE if on.info.is_cpu else on.lanes
 
 
 def _layout(on: device.Device, lowered: Lowered, layout: str | None) -> str:
@@ -71,16 +75,10 @@ def _layout(on: device.Device, lowered: Lowered, layout: str | None) -> str:
     return suited
 
 
-def _queued(on: device.Device, lowered: Lowered, queued: bool | str | None) -> str:
-    if queued is None:
-        features = lowered.features
-        unsorted = 1 if not on.info.is_cpu or features.costly else UNSORTED_KINDS
-        queued = len(features.materials) > unsorted
-    if queued is True:
-        return "sort" if on.info.is_cpu else "append"
-    if queued and queued not in queues.WAYS:
-        raise SceneError(f"{queued!r} is none of {', '.join(queues.WAYS)}", where="queued")
-    return queued or ""
+def _queued(on: device.Device, lowered: Lowered) -> bool:
+    features = lowered.features
+    unsorted = 1 if not on.info.is_cpu or features.costly else UNSORTED_KINDS
+    return len(features.materials) > unsorted
 
 
 def _interleaved(on: device.Device, lowered: Lowered, layout: str) -> bool:

@@ -89,6 +89,7 @@ class Wavefront:
         self.device, self.stream, self.buffers = scene.device, scene.stream, scene.buffers
         self.scene, self.paths, self.looped, self.channel = scene, paths, looped, channel
         self._tuning = tuning
+        self._share = strategy.loop_share(self.device)
         self.lanes = self.device.lanes
         self.timings = Timings(self.device.queue)
         self.program_seconds = 0.0
@@ -108,19 +109,17 @@ class Wavefront:
         *,
         layout: str | None = None,
         slots: int | None = None,
-        queued: bool | str | None = None,
+        queued: bool | None = None,
         looped: bool | None = None,
-        paths: int = 0,
         tree_quality: bvh.Quality = "high",
         halves: bool = False,
     ) -> Wavefront:
         """Return a wavefront of a lowered scene, which others may render too.
 
         layout: of the trees over triangles, a name in clpt.bvh.LAYOUTS; slots: paths in flight;
-        queued: whether slots are queued by material before they are shaded, or how, see
-        clpt.render.wavefront.queues.WAYS; looped: whether a kernel on the device runs all bounces.
-        Each is chosen to suit the device and the scene where it is None. paths: how many will be
-        rendered; tree_quality: see clpt.bvh.build; halves: whether even and odd samples are kept
+        queued: whether slots are queued by material before they are shaded; looped: whether a
+        kernel on the device runs all bounces. Each is chosen to suit the device and the scene where
+        it is None. tree_quality: see clpt.bvh.build; halves: whether even and odd samples are kept
         apart.
 
         Raises as `Wavefront` does, SceneError for a layout that cannot hold the scene.
@@ -128,13 +127,17 @@ class Wavefront:
         tuning = Tuning(layout, queued)
         chosen = strategy.choose(on, lowered, tuning)
         if looped is None:
-            looped = strategy.use_loop(on, chosen.queued, paths)
+            looped = strategy.use_loop(on)
         stream, buffers = device.Stream(on.queue), device.Buffers(on)
         settings, kinds = lowered.settings, len(lowered.features.materials)
         padded_pixels = int(settings["padded_pixels"])
         divided = divide_film(on.info, padded_pixels, buffers.limit, slots, looped, halves)
         scene = DeviceScene(stream, buffers, lowered, chosen, tree_quality)
-        in_flight = PathBuffers(stream, buffers, settings, divided, chosen.queued, kinds)
+        blocks = 0
+        if on.lanes > 1:  # one for each work-item that shades
+            items = -(-divided.total // strategy.loop_share(on))
+            blocks = items * on.lanes if looped else divided.total
+        in_flight = PathBuffers(stream, buffers, settings, divided, blocks, chosen.queued, kinds)
         return cls(scene, in_flight, looped, lowered.features.channel, tuning)
 
     def with_channel(self, channel: str) -> Wavefront:
@@ -195,7 +198,7 @@ class Wavefront:
                 start = time.perf_counter()
                 self.programs["loop"] = self._link(self.scene.lowered, self.scene.strategy)
                 self.program_seconds += time.perf_counter() - start
-            self._loop = self._bind("loop", "loop", **IDLE)
+            self._loop = self._bind("loop", "loop", **IDLE, share=self._share)
         return self._loop
 
     def auxiliary_kernel(
@@ -217,8 +220,7 @@ class Wavefront:
         first, end = self._range(first, end)
         samples = np.array([first, end], np.int32)
         self.loop.set_args(samples=samples, bounces=ENDLESS, restart=1)
-        size, group = self._sizes(self.lanes)
-        self.timings.add("loop", self.stream.run(self.loop, size, group))
+        self.timings.add("loop", self.stream.run(self.loop, *self._loop_sizes()))
         self._note_paths(first, end)
         self.accumulate_film()
 
@@ -343,13 +345,13 @@ class Wavefront:
             steps.append(Step(stage.program, bound, *self._sizes(stage.lanes)))
         return steps
 
-    def _bind_queues(self, queued: str, kinds: int) -> list[Step]:
+    def _bind_queues(self, queued: bool, kinds: int) -> list[Step]:
         """The kernels that queue slots by material, none where they are not queued."""
         if not queued:
             return []
         return [
-            Step(name, self._bind(queued, name), (size,), (group,) if group else None)
-            for name, size, group in queues.steps(queued, self.paths.slots, kinds)
+            Step(name, self._bind("append", name), (size,), (group,) if group else None)
+            for name, size, group in queues.steps(self.paths.slots, kinds)
         ]
 
     def _stage_texts(self, lowered: Lowered, chosen: Strategy) -> dict[str, device.Source]:
@@ -360,8 +362,11 @@ class Wavefront:
 
     def _link(self, lowered: Lowered, chosen: Strategy) -> device.Program:
         features, layout = self._features_of(lowered), chosen.layout
-        texts = programs.loop_sources(features, layout, self.lanes, chosen.interleaved)
-        known = {"loop": signatures.loop_arguments(features, layout)}
+        queued = chosen.queued and self._share > self.lanes
+        texts = programs.loop_sources(
+            features, layout, self.lanes, queued=queued, interleaved=chosen.interleaved
+        )
+        known = {"loop": signatures.loop_arguments(features, layout, queued)}
         return device.link(self.device, texts, "loop", known)
 
     def _build(self, texts: dict[str, device.Source]) -> None:
@@ -380,13 +385,18 @@ class Wavefront:
     def _batch(self) -> list[Step]:
         """What `render_samples` enqueues between two reads of the counters."""
         if self.looped:
-            return [Step("loop", self.loop, *self._sizes(self.lanes))]
+            return [Step("loop", self.loop, *self._loop_sizes())]
         return self.stages * BATCH
 
     def _loop_bounces(self) -> int:
         """Bounces of a loop between two reads of the counters: some hundredths of a second."""
         info, slots = self.device.info, self.paths.slots
         return max(BATCH, CORE_BOUNCES * info.compute_units // slots) if info.is_cpu else BATCH
+
+    def _loop_sizes(self) -> tuple[tuple[int], tuple[int]]:
+        """How many work-items of the loop serve all slots, and how many of them are a group."""
+        items = -(-self.paths.slots // self._share)
+        return (items,), (1 if self._share > self.lanes else GROUP,)
 
     def _sizes(self, lanes: int) -> tuple[tuple[int], tuple[int]]:
         """How many work-items serve all slots, `lanes` each, and how many of them are a group."""

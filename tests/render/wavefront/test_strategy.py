@@ -18,7 +18,7 @@ from clpt.render.wavefront.path_buffers import (
     Slots,
     divide_film,
 )
-from clpt.render.wavefront.strategy import LOOP_PATHS, Tuning, choose, use_loop
+from clpt.render.wavefront.strategy import Tuning, choose
 
 MEMORY = 1 << 34
 
@@ -37,13 +37,9 @@ def divided(on: device.Device, side: int, slots: int | None = None, looped: bool
     return divide_film(on.info, side * side, MEMORY, slots, looped)
 
 
-def test_the_loop_is_used_where_it_pays(on: device.Device, cornell: Lowered) -> None:
-    """On a CPU, for many paths, where nothing is to be sorted."""
-    cpu = on.info.is_cpu
+def test_few_cheap_kinds_are_not_sorted(on: device.Device, cornell: Lowered) -> None:
     plain, sorted_ = (choose(on, cornell, Tuning(queued=q)).queued for q in (None, True))
-    assert use_loop(on, plain, LOOP_PATHS) == cpu
-    assert not use_loop(on, plain, LOOP_PATHS - 1)
-    assert not use_loop(on, sorted_, LOOP_PATHS)
+    assert (plain, sorted_) == (False, True)
 
 
 @pytest.mark.parametrize("side", [24, 64, 160])
