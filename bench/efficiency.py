@@ -210,10 +210,11 @@ def name_of(scene: Path) -> str:
 def figures(
     pair: Sequence[Contender], spp: int, pixels: int, reference: NDArray[np.floating]
 ) -> Row:
-    """Return what both took beside each other; clpt first in lists."""
+    """Return what both took beside each other; clpt first in lists. The first sample of each pixel
+    is not counted: its time is the start's."""
     cold = [one.render(1, 1) for one in pair]
     warm = [[one.render(1, seed) for one in pair] for seed in SEEDS]
-    full = [[one.render(spp + 1, seed) for one in pair] for seed in SEEDS]
+    full = [[one.render(spp, seed) for one in pair] for seed in SEEDS]
     start = [min(run[i].cpu for run in warm) for i in range(2)]
     clock = [min(run[i].seconds for run in warm) for i in range(2)]
     cpu = [min(run[i].cpu for run in full) - start[i] for i in range(2)]
@@ -222,7 +223,7 @@ def figures(
         float(np.mean([relative_mse(run[i].image, reference) for run in full])) for i in range(2)
     ]
     return {
-        "msamples": [round(pixels * spp / t / 1e6, 4) for t in cpu],
+        "msamples": [round(pixels * (spp - 1) / t / 1e6, 4) for t in cpu],
         "rate_ratio": round(cpu[1] / cpu[0], 3),
         "relmse": [round(e, 6) for e in errors],
         "efficiency_ratio": round(errors[1] * cpu[1] / (errors[0] * cpu[0]), 3),

@@ -31,10 +31,7 @@ OPTIONS: tuple[dict[str, Any], ...] = (
     {"layout": "binary"},
     {"layout": "wide8"},
     {"layout": "compact"},
-    {"queued": True},
-    {"queued": False},
     {"looped": False},
-    {"looped": False, "queued": True},
     {"slots": 128},
 )
 

@@ -57,7 +57,7 @@ def texts_of(lowered: Lowered) -> list[str]:
         for queued in (False, True):
             made += programs.sources(features, layout, 1, queued=queued).values()
         made += programs.film_sources(features, layout).values()
-        made += programs.loop_sources(features, layout, 1, queued=False).values()
+        made += programs.loop_sources(features, layout, 1).values()
     return [source.text for source in made]
 
 

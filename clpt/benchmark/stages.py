@@ -118,10 +118,10 @@ def _queue(flight: Flight, copying: Copying, rounds: int) -> Figure:
         if step.bound.kernel.name == "shade" or step.name in QUEUEING:
             break
         flight.stage(step)
-    texts = programs.sources(features, layout, wave.lanes, queued=True)
+    texts = programs.sources(features, layout, 1, queued=True)
     program = device.build(on, texts["append"])
     named, give = dict(wave.arguments), device.Buffers(on)
-    for name, size in queues.sizes(flight.slots, kinds).items():
+    for name, size in queues.sizes(flight.slots, kinds, True).items():
         named[name] = give.allocate("the queues", 4 * size)
     steps = []
     for name, size, group in queues.steps(flight.slots, kinds):

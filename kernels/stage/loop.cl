@@ -7,9 +7,11 @@
 #include "core/base.cl"
 #include "interface/stage.cl"
 #include "generated/trace_args.cl"
+#include "path/queue.cl"
 #include "generated/loop.cl"
 
-kernel NO_VECTORIZE void loop(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS, BEGIN_ARGS, LOOP_ARGS, uint bounces, uint restart)
+kernel NO_VECTORIZE void loop(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS, BEGIN_ARGS, global uint *queue, uint share,
+                              uint bounces, uint restart)
 {
     SLABS
     uint first = get_global_id(0) * share, end = min(first + share, (uint)settings->slots);
@@ -23,6 +25,6 @@ kernel NO_VECTORIZE void loop(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS, BEGIN_ARGS, LOO
             left |= any((load_path_state(path, at) & PATH_DONE) == 0);
         }
         if (!left) break;
-        loop_bounce(SLAB_PASSED, SCENE_PASSED, TRACE_PASSED, BEGIN_PASSED, LOOP_PASSED, first, end);
+        loop_bounce(SLAB_PASSED, SCENE_PASSED, TRACE_PASSED, BEGIN_PASSED, queue, first, end);
     }
 }

@@ -1,5 +1,5 @@
 /* Shades the paths that met one kind of material. Built once per kind, so it holds no switch: LANES neighbouring slots,
- * in which other kinds are masked out, or, where QUEUED, those from `entry` of the kind's queue on. */
+ * in which other kinds are masked out, or, where QUEUED, one slot of the kind's queue. */
 #include "core/base.cl"
 #include "interface/stage.cl"
 #include "generated/sampler.cl"
@@ -20,14 +20,11 @@
 #include "path/hero.cl"
 #include "path/roulette.cl"
 #include "generated/integrator.cl"
-#include "path/block.cl"
 
-#if !QUEUED
-#define QUEUE_ARGS STAGE_AT_ARG
-#elif defined(PART)
-#define QUEUE_ARGS , global const uint *queue, uint entry, uint end, uint block
-#else
+#if QUEUED
 #define QUEUE_ARGS , global const uint *queue, global const uint *queue_starts, global const uint *queue_counts
+#else
+#define QUEUE_ARGS STAGE_AT_ARG
 #endif
 
 STAGE(shade)(SLAB_ARGS, SCENE_ARGS QUEUE_ARGS)
@@ -35,14 +32,9 @@ STAGE(shade)(SLAB_ARGS, SCENE_ARGS QUEUE_ARGS)
     SLABS
     SCENE
 #if QUEUED
-#ifndef PART
-    uint first = get_global_id(0) * LANES, entry = queue_starts[BSDF_KIND] + first;
-    uint end = queue_starts[BSDF_KIND] + queue_counts[BSDF_KIND], block = settings->slots + first;
-#endif
-    if (entry < end) {
-        uint at = block_take(path, hit, shadow, queue, entry, end, block);
-        integrator_vertex(scene, path, hit, shadow, at, LANE_INDEX + (integer)((int)entry) < (int)end);
-        block_return(path, shadow, queue, entry, end, block);
+    uint entry = get_global_id(0);
+    if (entry < queue_counts[BSDF_KIND]) {
+        integrator_vertex(scene, path, hit, shadow, queue[queue_starts[BSDF_KIND] + entry], mask_of(1));
     }
 #else
     STAGE_AT

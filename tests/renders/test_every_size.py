@@ -24,7 +24,7 @@ IMAGES = {
     "envmap": np.linspace(0.1, 2.0, 4 * 8 * 3, dtype=np.float32).reshape(4, 8, 3),
     "cube_map": [np.full((2, 2, 3), 0.2 + 0.2 * i, np.float32) for i in range(6)],
 }
-FORMS = [{"queued": True}, {"queued": False, "slots": 64}, {"slots": 1 << 14}]
+FORMS = [{"looped": False}, {"slots": 64}, {"slots": 1 << 14}]
 ALL = [(w, h) for w in range(1, SIDE + 1) for h in range(1, SIDE + 1)]
 QUICK = [(1, 1), (1, 17), (2, 3), (3, 40), (4, 4), (5, 16), (16, 16), (17, 17), (33, 1), (39, 37)]
 

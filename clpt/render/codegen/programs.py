@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from clpt import bvh, device
 from clpt.render.codegen import (
+    blocks,
     choices,
     emission,
     flags,
@@ -41,8 +42,8 @@ def sources(
     """Return the text of every program of a bounce, by program name.
 
     layout: of the triangles, a name in clpt.bvh.LAYOUTS; lanes: paths that a work-item shades;
-    queued: whether shading goes along queues, which `append` fills; interleaved: a work-item of
-    `intersect` has the rays of `lanes` paths in flight.
+    queued: whether shading goes along queues, which `append` fills, if a work-item shades one path;
+    interleaved: a work-item of `intersect` has the rays of `lanes` paths in flight.
     """
     files, defines = _shared(features, layout), flags.defines(flags.SCENE, features)
     begin, join = begin_and_join(features)
@@ -50,6 +51,7 @@ def sources(
     rays: Files = {}
     if interleaved and layout != "brute":
         rays["generated/trace.cl"] = ("tracing/trace_interleaved.cl",)
+    queued = queued and lanes == 1
     texts = {
         begin: _source(begin, files, defines, lanes),
         "intersect": _source(
@@ -97,62 +99,64 @@ def order(features: Features, layout: str, lanes: int, interleaved: bool = False
 
 
 def loop_sources(
-    features: Features, layout: str, lanes: int, *, queued: bool, interleaved: bool = False
+    features: Features, layout: str, lanes: int, interleaved: bool = False
 ) -> dict[str, device.Source]:
     """Return the texts that are linked to the loop of all stages on the device, by name.
 
     "loop" holds the kernel; the others are the stages as functions, see kernels/interface/stage.cl.
     """
-    texts = sources(features, layout, lanes, queued=queued, interleaved=interleaved)
-    shared, defines = _shared(features, layout), flags.defines(flags.SCENE, features)
+    texts = sources(features, layout, lanes, queued=False, interleaved=interleaved)
     bounce = order(features, layout, lanes, interleaved)
     names = dict.fromkeys(stage.program for stage in bounce)
-    if queued:
-        names["sort"] = None
-        texts["sort"] = _source("sort", shared, defines, 1)
     parts = {name: texts[name].with_private(name, {"PART": f"loop_{name}"}) for name in names}
-    files = {**shared, "generated/loop.cl": _loop_text(features, bounce, queued)}
-    return {**parts, "loop": _source("loop", files, defines, lanes).with_private("loop")}
+    files = {
+        **_shared(features, layout),
+        "generated/block.cl": blocks.block_text(features),
+        "generated/loop.cl": _loop_text(features, bounce),
+    }
+    loop = _source("loop", files, flags.defines(flags.SCENE, features), lanes)
+    return {**parts, "loop": loop.with_private("loop")}
 
 
-def _loop_text(features: Features, bounce: list[Stage], queued: bool) -> str:
+def _loop_text(features: Features, bounce: list[Stage]) -> str:
     """What loop.cl calls: `loop_begin`, and `loop_bounce`, all other stages in their order."""
     begin, join = begin_and_join(features)
     extra = {begin: ["BEGIN"], "intersect": ["TRACE"], join: ["JOIN"]}
     groups = {s.program: ["SLAB", "SCENE", *extra.get(s.program, ())] for s in bounce}
-    shading = [stage.program for stage in bounce if stage.kernel == "shade"] if queued else []
-    entries = "global const uint *queue, uint entry, uint end, uint block"
+    shading = [stage.program for stage in bounce if stage.kernel == "shade"]
     lines = [
-        f"void loop_{name}({', '.join(f'{group}_ARGS' for group in own)}, "
-        f"{entries if name in shading else 'uint at'});"
+        f"void loop_{name}({', '.join(f'{group}_ARGS' for group in own)}, uint at);"
         for name, own in groups.items()
     ]
-    if queued:
-        sort = "(SLAB_ARGS, global uint *queue, uint *starts, uint end, uint at);"
-        lines.append(f"void loop_sort{sort}")
     lines += [
-        *signatures.args_text("LOOP", signatures.loop_args(queued)),
         f"#define loop_begin loop_{begin}",
-        "inline void loop_bounce(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS, BEGIN_ARGS, LOOP_ARGS, "
-        "uint first, uint end)",
+        "inline void loop_bounce(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS, BEGIN_ARGS, "
+        "global uint *queue, uint first, uint end)",
         "{",
+        "    SLABS",
+        "    uint starts[BSDF_COUNT + 1], block = settings->slots + get_global_id(0) * LANES;",
     ]
-    if shading:
-        block = "uint block = settings->slots + get_global_id(0) * LANES;"
-        lines += ["    uint starts[BSDF_COUNT + 1];", f"    {block}"]
     for stage in bounce[1:]:
         passed = ", ".join(f"{group}_PASSED" for group in groups[stage.program])
-        begins, ends, own = "first", "end", "at"
-        if stage.program in shading:
-            kind = shading.index(stage.program)
-            begins, ends = f"starts[{kind}]", f"starts[{kind + 1}]"
-            own = f"queue, at, {ends}, block"
-            if kind == 0:
-                lines.append("    loop_sort(SLAB_PASSED, queue, starts, end, first);")
+        call = f"loop_{stage.program}({passed}, "
         step = "LANES" if stage.lanes > 1 else "1"
+        plain = f"for (uint at = first; at < end; at += {step}) {call}at);"
+        if stage.program not in shading:
+            lines.append(f"    {plain}")
+            continue
+        kind = shading.index(stage.program)
+        if kind == 0:
+            lines.append("    queue_sort(path, hit, queue, starts, first, end);")
+        begins, ends = f"starts[{kind}]", f"starts[{kind + 1}]"
         lines += [
-            f"    for (uint at = {begins}; at < {ends}; at += {step}) {{",
-            f"        loop_{stage.program}({passed}, {own});",
+            f"    if (queue_is_dense({ends} - {begins}, end - first)) {{",
+            f"        {plain}",
+            "    } else {",
+            f"        for (uint entry = {begins}; entry < {ends}; entry += LANES) {{",
+            f"            queue_take(path, hit, shadow, queue, entry, {ends}, block);",
+            f"            {call}block);",
+            f"            queue_return(path, shadow, queue, entry, {ends}, block);",
+            "        }",
             "    }",
         ]
     return "\n".join([*lines, "}", ""])

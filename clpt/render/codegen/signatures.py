@@ -7,7 +7,7 @@ kernel, the one that passes it on, and what the host binds.
 from __future__ import annotations
 
 from clpt import device
-from clpt.records import INSTANCE, LIGHT, PATH, SETTINGS, SHAPE, SLABS, TABLES
+from clpt.records import INSTANCE, LIGHT, SETTINGS, SHAPE, SLABS, TABLES
 from clpt.render.contract.features import Features
 
 SLAB_ARGS = {f"{record.name.lower()}_words": "global float *restrict " for record in SLABS}
@@ -60,7 +60,6 @@ def scene_text() -> str:
             f"#define SHAPE_ROW_PRIM {next(m.word for m in SHAPE.members if m.name == 'prim')}",
             f"#define INSTANCE_ROW_WORDS {INSTANCE.words}",
             f"#define LIGHT_ROW_WORDS {LIGHT.words}",
-            f"#define PATH_SUMS {next(m.word for m in PATH.members if m.name == 'low')}",
             *args_text("SCENE", SCENE_ARGS),
             "#define SCENE Scene scene = {SCENE_PASSED};",
             *args_text("SLAB", SLAB_ARGS),
@@ -96,16 +95,11 @@ def join_args(features: Features, layout: str) -> dict[str, str]:
     return {**trace_args(features, layout), **splats}
 
 
-def loop_args(queued: bool) -> dict[str, str]:
-    """Return what the loop of all stages takes of its own."""
-    queue = {"queue": "global uint *"} if queued else {}
-    return {**queue, "share": "uint "}
-
-
-def loop_arguments(features: Features, layout: str, queued: bool) -> tuple[device.Argument, ...]:
+def loop_arguments(features: Features, layout: str) -> tuple[device.Argument, ...]:
     """Return what the kernel of stage/loop.cl takes: a linked kernel has no argument names."""
     args = {**SLAB_ARGS, **SCENE_ARGS, **trace_args(features, layout), **begin_args(features)}
-    args |= {**loop_args(queued), "bounces": "uint ", "restart": "uint "}
+    args |= {"queue": "global uint *"}
+    args |= dict.fromkeys(("share", "bounces", "restart"), "uint ")
     return tuple(
         device.Argument(
             name,

@@ -84,8 +84,3 @@ class Features:
             if owner == kind:
                 found[name] = found.get(name, frozenset()) | {source}
         return found
-
-    @property
-    def costly(self) -> bool:
-        """Whether shading a vertex takes about as long as its ray: textures, a tree over lights."""
-        return self.light_tree or bool(self.textures)

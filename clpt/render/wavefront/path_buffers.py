@@ -95,7 +95,7 @@ class PathBuffers:
 
     settings: those of the lowered scene, of which this is a copy, with the numbers of slots and
     planes and the seed of the samples; blocks: slots beyond those of the paths, see
-    kernels/path/block.cl; stride: words from one stream of a slab to the next.
+    kernels/path/queue.cl; stride: words from one stream of a slab to the next.
 
     Raises MemoryBudgetError.
     """
@@ -133,10 +133,8 @@ class PathBuffers:
         return {**self._fixed, **self.queue}
 
     def new_queue(self, queued: bool, kinds: int) -> dict[str, Any]:
-        """Return the arguments of the kernels that queue slots by material, with new buffers."""
-        if not queued:
-            return {}
-        sizes = queues.sizes(self.slots, kinds)
+        """Return what the kernels take that queue slots by material, with new buffers."""
+        sizes = queues.sizes(self.slots, kinds, queued)
         return {name: self.buffers.allocate("the queues", 4 * n) for name, n in sizes.items()}
 
     def set_work_list(

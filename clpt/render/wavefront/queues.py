@@ -10,8 +10,10 @@ from __future__ import annotations
 GROUP = 256  # work-items that append together
 
 
-def sizes(slots: int, kinds: int) -> dict[str, int]:
-    """Return how many words each buffer has: a queue for every kind."""
+def sizes(slots: int, kinds: int, queued: bool) -> dict[str, int]:
+    """Return how many words each buffer has: a queue for every kind, or one for the loop."""
+    if not queued:
+        return {"queue": slots}
     return {"queue": slots * kinds, "queue_starts": kinds, "queue_counts": kinds}
 
 

@@ -13,7 +13,6 @@ from clpt.errors import SceneError
 from clpt.render.lowering.scene import Lowered
 
 BRUTE_SHAPES = 32  # analytic shapes up to which a ray tests all of them
-UNSORTED_KINDS = 4  # of cheap materials, up to which sorting costs more; see bench/NOTES.md
 INTERLEAVED_TRIANGLES = 1 << 20  # from which interleaved rays pay; measured, see bench/NOTES.md
 SHARE = 512  # slots of a work-item of the loop on a CPU, which fit into the second cache of a core
 
@@ -33,9 +32,9 @@ class Tuning:
 class Strategy:
     """How kernels trace and shade the paths of a scene.
 
-    layout: of the trees over triangles, a name in clpt.bvh.LAYOUTS; queued: whether slots are
-    queued by material before they are shaded; interleaved: whether a work-item traces the rays of
-    several paths at once.
+    layout: of the trees over triangles, a name in clpt.bvh.LAYOUTS; queued: whether stages that the
+    host enqueues shade along queues by material; interleaved: whether a work-item traces the rays
+    of several paths at once.
     """
 
     layout: str
@@ -49,7 +48,7 @@ def choose(on: device.Device, lowered: Lowered, tuning: Tuning) -> Strategy:
     Raises SceneError for a layout that cannot hold the scene.
     """
     layout = _layout(on, lowered, tuning.layout)
-    queued = _queued(on, lowered) if tuning.queued is None else tuning.queued
+    queued = _queued(on, lowered, tuning.queued)
     return Strategy(layout, queued, _interleaved(on, lowered, layout))
 
 
@@ -75,10 +74,10 @@ def _layout(on: device.Device, lowered: Lowered, layout: str | None) -> str:
     return suited
 
 
-def _queued(on: device.Device, lowered: Lowered) -> bool:
-    features = lowered.features
-    unsorted = 1 if not on.info.is_cpu or features.costly else UNSORTED_KINDS
-    return len(features.materials) > unsorted
+def _queued(on: device.Device, lowered: Lowered, wanted: bool | None) -> bool:
+    """Whether there are queues: only for work-items that shade one path each."""
+    several = len(lowered.features.materials) > 1
+    return on.lanes == 1 and (several if wanted is None else wanted)
 
 
 def _interleaved(on: device.Device, lowered: Lowered, layout: str) -> bool:

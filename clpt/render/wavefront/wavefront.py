@@ -133,10 +133,8 @@ class Wavefront:
         padded_pixels = int(settings["padded_pixels"])
         divided = divide_film(on.info, padded_pixels, buffers.limit, slots, looped, halves)
         scene = DeviceScene(stream, buffers, lowered, chosen, tree_quality)
-        blocks = 0
-        if on.lanes > 1:  # one for each work-item that shades
-            items = -(-divided.total // strategy.loop_share(on))
-            blocks = items * on.lanes if looped else divided.total
+        share = strategy.loop_share(on)
+        blocks = -(-divided.total // share) * on.lanes if share > on.lanes else 0  # one each
         in_flight = PathBuffers(stream, buffers, settings, divided, blocks, chosen.queued, kinds)
         return cls(scene, in_flight, looped, lowered.features.channel, tuning)
 
@@ -362,11 +360,8 @@ class Wavefront:
 
     def _link(self, lowered: Lowered, chosen: Strategy) -> device.Program:
         features, layout = self._features_of(lowered), chosen.layout
-        queued = chosen.queued and self._share > self.lanes
-        texts = programs.loop_sources(
-            features, layout, self.lanes, queued=queued, interleaved=chosen.interleaved
-        )
-        known = {"loop": signatures.loop_arguments(features, layout, queued)}
+        texts = programs.loop_sources(features, layout, self.lanes, chosen.interleaved)
+        known = {"loop": signatures.loop_arguments(features, layout)}
         return device.link(self.device, texts, "loop", known)
 
     def _build(self, texts: dict[str, device.Source]) -> None:

@@ -64,10 +64,7 @@ def test_only_stages_are_seen_outside(name: str) -> None:
     features = features_of(name)
     for layout, lanes, interleaved in WAYS:
         outside: list[str] = []
-        queued = lanes > 1
-        made = programs.loop_sources(
-            features, layout, lanes, queued=queued, interleaved=interleaved
-        )
+        made = programs.loop_sources(features, layout, lanes, interleaved)
         for program, source in made.items():
             private = dict(re.findall(r"^#define (\w+) (\w+)$", source.text, re.MULTILINE))
             found = list(definitions(source))
@@ -81,7 +78,6 @@ def test_only_stages_are_seen_outside(name: str) -> None:
                     assert head.startswith("kernel "), f"{program}: {head} is not private"
                     outside.append(own)
         bounce = {stage.program for stage in programs.order(features, layout, lanes, interleaved)}
-        bounce |= {"sort"} if queued else set()
         assert sorted(outside) == sorted({"loop", *(f"loop_{stage}" for stage in bounce)})
 
 

@@ -1,48 +1,70 @@
-"""Queues of slots by the kind of their material: sorting in the loop, and appending; and blocks."""
+"""Queues of slots by the kind of their material: in the loop, with blocks, and appending."""
 
 from __future__ import annotations
+
+import dataclasses
+import re
+from pathlib import Path
 
 import numpy as np
 import pyopencl as cl
 import pytest
 
+import clpt
 from clpt import device
+from clpt.benchmark.traffic import kept_lines
 from clpt.device import Source
 from clpt.records import HIT, PATH, SHADOW, SLABS
+from clpt.render.codegen import programs
+from clpt.render.codegen.blocks import block_text, members
 from clpt.render.codegen.signatures import scene_text
+from clpt.render.lowering.scene import lower
 from clpt.render.wavefront import queues
+from clpt.scene import Scene, integrators
+from clpt.scene.cameras import Perspective
 
+ROOT = Path(__file__).resolve().parents[3]
+SCENES = [
+    "tests/scenes/instances.xml",
+    "tests/scenes/light_tracing.xml",
+    "tests/scenes/textures.xml",
+    "tests/scenes/glass_metal.xml",
+    "scenes/oil_film/scene.json",
+    "scenes/fluorescent_paint/scene.json",
+    "scenes/rainbow/scene.json",
+]
+CALL = re.compile(r"\b(load|store)_(path|hit|shadow)_(\w+)\((?!Slab )")
 ALIVE = 0x1000
 KINDS = 5
 VIRTUAL = {
     "generated/scene.cl": scene_text(),
     "generated/spectrum.cl": '#include "spectrum/rgb.cl"\n',
     "generated/spectrum_read.cl": '#include "spectrum/rgb_read.cl"\n',
-    "generated/stage_args.cl": "",
+    "generated/block.cl": block_text(lower(Scene(camera=Perspective())).features),
     "sorting.cl": """
-#define PART loop_sort
-#include "stage/sort.cl"
+#include "core/base.cl"
+#include "path/queue.cl"
 kernel void probe(SLAB_ARGS, global uint *queue, global uint *queue_starts, uint begin, uint end)
 {
+    SLABS
     uint starts[BSDF_COUNT + 1];
-    loop_sort(path_words, hit_words, shadow_words, stride, queue, starts, end, begin);
+    queue_sort(path, hit, queue, starts, begin, end);
     for (int k = 0; k <= BSDF_COUNT; k++) queue_starts[k] = starts[k];
 }
 """,
     "blocks.cl": """
 #include "core/base.cl"
-#include "path/block.cl"
-kernel void probe(
-    SLAB_ARGS, global const uint *queue, global uint *where, uint entry, uint end, uint block)
+#include "path/queue.cl"
+kernel void probe(SLAB_ARGS, global const uint *queue, uint entry, uint end, uint block)
 {
     SLABS
-    uint at = block_take(path, hit, shadow, queue, entry, end, block);
-    where[0] = at;
-    mask active = LANE_INDEX + (integer)((int)entry) < (int)end;
-    store_path_sample(path, at, active, load_path_sample(path, at) + load_hit_prim(hit, at));
-    store_shadow_t(shadow, at, active, load_shadow_t(shadow, at) * 2.0f);
-    store_hit_t(hit, at, active, (real)(-1.0f));
-    block_return(path, shadow, queue, entry, end, block);
+    queue_take(path, hit, shadow, queue, entry, end, block);
+    mask all = mask_of(1);
+    store_path_state(path, block, all, load_path_sample(path, block) + load_hit_prim(hit, block));
+    store_path_pdf(path, block, all, load_path_pdf(path, block) * 2.0f);
+    store_shadow_t(shadow, block, all, load_shadow_t(shadow, block) * 2.0f);
+    store_hit_t(hit, block, all, (real)(-1.0f));
+    queue_return(path, shadow, queue, entry, end, block);
 }
 """,
 }
@@ -102,13 +124,14 @@ def slabs(slots: int, *members: np.ndarray) -> dict[str, np.ndarray]:
     }
 
 
-@pytest.mark.parametrize(("slots", "begin", "end"), [(64, 0, 64), (1000, 64, 777), (4096, 0, 4096)])
-def test_sorting_against_numpy(slots: int, begin: int, end: int) -> None:
+@pytest.mark.parametrize("lanes", [1, 16])
+@pytest.mark.parametrize(("slots", "begin", "end"), [(64, 0, 64), (1024, 64, 784), (4096, 0, 4096)])
+def test_sorting_against_numpy(slots: int, begin: int, end: int, lanes: int) -> None:
     """Of its own slots alone, and nothing is written beyond its own entries."""
     host, waits, kind = some(slots)
     host |= {"queue": np.full(slots, 0xDEAD, np.uint32), "queue_starts": np.zeros(6, np.uint32)}
     numbers = {"stride": slots + 80, "begin": begin, "end": end}
-    made = on_device(assembled("sorting.cl"), (("probe", 1, None),), host, **numbers)
+    made = on_device(assembled("sorting.cl", lanes), (("probe", 1, None),), host, **numbers)
     own = (waits >= begin) & (waits < end)
     waits, kind = waits[own], kind[own]
     counts = np.bincount(kind, minlength=KINDS)
@@ -122,7 +145,7 @@ def test_sorting_against_numpy(slots: int, begin: int, end: int) -> None:
 def test_appending_gathers_the_same(slots: int) -> None:
     """Every slot that waits is once in the queue of its kind; what is behind is left alone."""
     host, waits, kind = some(slots)
-    host |= {n: np.full(k, 0xDEAD, np.uint32) for n, k in queues.sizes(slots, KINDS).items()}
+    host |= {n: np.full(k, 0xDEAD, np.uint32) for n, k in queues.sizes(slots, KINDS, True).items()}
     numbers = {"stride": slots + 80, "slots": slots}
     made = on_device(
         assembled("stage/append.cl"), tuple(queues.steps(slots, KINDS)), host, **numbers
@@ -137,7 +160,7 @@ def test_appending_gathers_the_same(slots: int) -> None:
 
 def test_nothing_waits() -> None:
     host = slabs(100, *np.zeros((3, 100)))
-    host |= {n: np.full(k, 0xDEAD, np.uint32) for n, k in queues.sizes(100, KINDS).items()}
+    host |= {n: np.full(k, 0xDEAD, np.uint32) for n, k in queues.sizes(100, KINDS, True).items()}
     steps = tuple(queues.steps(100, KINDS))
     made = on_device(assembled("stage/append.cl"), steps, host, stride=180, slots=100)
     assert not made["queue_counts"].any()
@@ -154,17 +177,44 @@ def test_blocks_bring_paths_and_take_them_back(lanes: int) -> None:
         name: rng.integers(1, 1 << 20, (record.words, slots + 80)).astype(np.uint32)
         for name, record in zip(names, SLABS, strict=True)
     }
-    word = {m.name: m.word for m in (*PATH.members, *SHADOW.members) if m.name in ("sample", "t")}
-    prim = next(m.word for m in HIT.members if m.name == "prim")
-    host["shadow_words"][word["t"]] = np.float32(1.5).view(np.uint32)
+    word = {m.name: m.word for record in (SHADOW, HIT, PATH) for m in record.members}
+    shadow_t = next(m.word for m in SHADOW.members if m.name == "t")
+    host["shadow_words"][shadow_t] = np.float32(1.5).view(np.uint32)
+    host["path_words"][word["pdf"]] = np.float32(0.25).view(np.uint32)
     before = {name: words[:, :slots].copy() for name, words in host.items()}
     queue = rng.permutation(slots).astype(np.uint32)
-    arguments = {**host, "queue": queue, "where": np.zeros(1, np.uint32)}
     numbers = {"stride": slots + 80, "entry": entry, "end": end, "block": block}
-    made = on_device(assembled("blocks.cl", lanes), (("probe", 1, None),), arguments, **numbers)
-    own = queue[entry:end]
-    assert made["where"][0] == (block if lanes > 1 else own[0])
-    before["path_words"][word["sample"], own] += before["hit_words"][prim, own]
-    before["shadow_words"][word["t"], own] = np.float32(3.0).view(np.uint32)
-    for name in ("path_words", "shadow_words"):
-        assert np.array_equal(made[name][:, :slots], before[name])
+    source = assembled("blocks.cl", lanes)
+    made = on_device(source, (("probe", 1, None),), {**host, "queue": queue}, **numbers)
+    own, path = queue[entry:end], before["path_words"]
+    path[word["state"], own] = path[word["sample"], own] + before["hit_words"][word["prim"], own]
+    path[word["pdf"], own] = np.float32(0.5).view(np.uint32)
+    assert np.array_equal(made["path_words"][:, :slots], path)
+    others = np.setdiff1d(np.arange(slots), own)
+    shadow = made["shadow_words"][:, :slots]
+    assert (shadow[shadow_t, own] == np.float32(3.0).view(np.uint32)).all()
+    assert np.array_equal(shadow[:, others], before["shadow_words"][:, others])
+
+
+@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+@pytest.mark.parametrize("name", SCENES)
+def test_blocks_hold_what_shading_uses(name: str, mode: str) -> None:
+    """What a text of shading loads is brought, what it stores is returned."""
+    scene = clpt.load(ROOT / name)
+    film = dataclasses.replace(scene.film, mode=mode, bands=0)
+    for integrator in (integrators.Path(), integrators.ParticleTracer()):
+        changed = dataclasses.replace(scene, film=film, integrator=integrator)
+        try:
+            features = lower(changed).features
+        except clpt.SceneError:  # not every integrator takes every scene
+            assert type(integrator) is not type(scene.integrator)
+            continue
+        kept = members(features)
+        kept |= {"load path": kept["path"], "store path": kept["changed"]}
+        texts = programs.sources(features, "wide8", 8, queued=False)
+        for program in (name for name in texts if name.startswith("shade_")):
+            calls = set(CALL.findall("\n".join(kept_lines(texts[program].text))))
+            assert len(calls) > 10
+            for verb, slab, member in calls:
+                own = [*kept.get(f"{verb} {slab}", kept[slab]), *(["lambdas"] * (mode == "rgb"))]
+                assert member in own, f"{program}: {verb}_{slab}_{member}"

@@ -37,9 +37,11 @@ def divided(on: device.Device, side: int, slots: int | None = None, looped: bool
     return divide_film(on.info, side * side, MEMORY, slots, looped)
 
 
-def test_few_cheap_kinds_are_not_sorted(on: device.Device, cornell: Lowered) -> None:
-    plain, sorted_ = (choose(on, cornell, Tuning(queued=q)).queued for q in (None, True))
-    assert (plain, sorted_) == (False, True)
+def test_queues_are_for_those_who_shade_one_path(on: device.Device, cornell: Lowered) -> None:
+    gpu = device.Device(on.context, on.queue, dataclasses.replace(on.info, kind="gpu"))
+    found = [choose(gpu, cornell, Tuning(queued=q)).queued for q in (None, True)]
+    assert found == [False, True]  # of one kind
+    assert not choose(on, cornell, Tuning(queued=on.lanes == 1)).queued
 
 
 @pytest.mark.parametrize("side", [24, 64, 160])
