@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 
 from clpt import bvh, device
 
-from . import bandwidth, building, rays, stages, starting
+from . import bandwidth, building, rays, shading, stages, starting
 from .figures import Figure
 from .scenes import opened
 
@@ -20,6 +20,7 @@ PARTS = {
     "bandwidth": "a kernel that only copies, GB/s",
     "rays": "rays a second by layout, set and query, hits checked",
     "stages": "what each stage of a render gets through, Mitems/s and GB/s; sort and film too",
+    "shading": "every kind of material in a box of its own, Mitems/s, beside diffuse",
     "build": "trees built and refitted, Mtri/s",
     "start": "whole processes until a first picture, with empty caches and with full ones",
 }
@@ -31,6 +32,7 @@ def measure(
     *,
     parts: Sequence[str] = tuple(PARTS),
     only: Sequence[str] = (),
+    kinds: Sequence[str] = (),
     scene: str | None = None,
     mode: str | None = None,
     layouts: Sequence[str] = bvh.TREES,
@@ -39,9 +41,9 @@ def measure(
 ) -> Iterator[Figure]:
     """Figures of a device, whose queue must be profiling.
 
-    parts: names of PARTS; only: of the stages, if not all; scene: as of `opened`, by default the
-    atrium, and for starts the Cornell box; layouts: names of clpt.bvh.TREES; rounds:
-    of each figure; count: rays of a set. Raises SceneError, DeviceError.
+    parts: names of PARTS; only: of the stages, kinds: of materials, if not all; scene: as of
+    `opened`, by default the atrium, and for starts the Cornell box; layouts: names of
+    clpt.bvh.TREES; rounds: of each figure; count: rays of a set. Raises SceneError, DeviceError.
     """
     if "bandwidth" in parts:
         yield from bandwidth.measure(on, rounds)
@@ -54,6 +56,8 @@ def measure(
             yield from stages.measure(on, plan, rounds, only)
         if "build" in parts:
             yield from building.measure(on, plan, rounds, layouts)
+    if "shading" in parts:
+        yield from shading.measure(on, rounds, kinds, (mode,) if mode else shading.MODES)
     if "start" in parts:
         name = scene or START_SCENE
         which = on.info.label if on.info.index < 0 else on.info.index

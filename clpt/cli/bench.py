@@ -87,7 +87,7 @@ def bench(
 
         bench_plot.check(plot)
     before = None if record is None else records.read(record)
-    parts, only = _chosen(stages)
+    parts, only, kinds = _chosen(stages)
     failed = False
     for info in _infos(device):
         on = dev.Device.open(info, profiling=True)
@@ -95,8 +95,9 @@ def bench(
             f"[bold]{info.label}[/], {info.version}, driver {info.driver}", highlight=False
         )
         figures = _measured(
-            console, on, parts=parts, only=only, scene=scene, layouts=layouts or TREES, **settings
-        )
+            console, on, parts=parts, only=only, kinds=kinds, scene=scene,
+            layouts=layouts or TREES, **settings,
+        )  # fmt: skip
         good = [figure for figure in figures if figure.rounds and not figure.refused]
         failed |= any(figure.refused for figure in figures)
         if target is not None:
@@ -113,20 +114,25 @@ def bench(
     return SLOWER if failed else 0
 
 
-def _chosen(names: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Return parts, and stages of a render if not all. Raises click.BadParameter."""
-    parts, only = [], []
+def _chosen(names: Sequence[str]) -> tuple[list[str], list[str], list[str]]:
+    """Return parts, and stages and kinds of material if not all. Raises click.BadParameter."""
+    parts: list[str] = []
+    only: list[str] = []
+    kinds: list[str] = []
     for name in names:
         if name in benchmark.PARTS:
             parts.append(name)
+        elif name.startswith("shading_"):
+            kinds.append(name.removeprefix("shading_"))
         elif name.split("_")[0] in STAGES:
             only.append(name)
         else:
             known = ", ".join([*benchmark.PARTS, *STAGES])
             raise click.BadParameter(f"{name!r} is none of {known}", param_hint="--stage")
-    if only and "stages" not in parts:
-        parts.append("stages")
-    return parts or list(benchmark.PARTS), only
+    for part, chosen in (("stages", only), ("shading", kinds)):
+        if chosen and part not in parts:
+            parts.append(part)
+    return parts or list(benchmark.PARTS), only, kinds
 
 
 def _infos(device: str | None) -> list[dev.DeviceInfo]:
@@ -203,7 +209,11 @@ def _show_ratios(console: Console, ratios: Sequence[Ratio], limit: float | None)
 
 def _list(console: Console) -> None:
     """Print what --stage, --scene, --layout and --device accept."""
-    rows = {**benchmark.PARTS, "a stage": "of `stages` alone: " + ", ".join(STAGES)}
+    rows = {
+        **benchmark.PARTS,
+        "a stage": "of `stages` alone: " + ", ".join(STAGES),
+        "shading_KIND": "of `shading` that kind of material alone, as shading_diffuse",
+    }
     for heading, names in (
         ("--stage", rows),
         ("--scene", {name: make.__doc__ for name, make in scenes.SCENES.items()}),

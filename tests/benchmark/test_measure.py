@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from clpt import benchmark, device
-from clpt.benchmark import bandwidth, building, rays, stages
+from clpt.benchmark import bandwidth, building, rays, shading, stages
 from clpt.errors import SceneError, UnknownKindError
 from clpt.rays import Accel
 from clpt.records import PATH
 from clpt.scene import Scene
+from clpt.scene.materials import LEAVES
 
 COUNT = 1024
 
@@ -149,6 +150,23 @@ def test_stages_have_work_and_queues_that_are_right(on: device.Device, scene: Sc
     assert 0 < figures["generate"].more["items"] < figures["shade_diffuse"].more["items"]
     only = [f.name for f in stages.measure(on, scene, 1, ("shade", "append"), slots=COUNT)]
     assert only == ["shade_diffuse", "append"]
+
+
+def test_a_box_keeps_all_slots_at_its_kind(on: device.Device) -> None:
+    figures = list(shading.measure(on, 1, ("diffuse",), ("rgb",), COUNT))
+    assert [figure.name for figure in figures] == ["diffuse constant", "diffuse textured"]
+    for figure in figures:
+        assert figure.refused == "" and figure.value > 0.0 and figure.more["of_diffuse"] > 0.0
+        assert figure.more["items"] > 0.95 * shading.BOUNCES * COUNT  # the film has fewer pixels
+    with pytest.raises(UnknownKindError, match="rough_plastic"):
+        next(shading.measure(on, 1, ("rough_plastik",)))
+
+
+def test_every_kind_has_a_box() -> None:
+    made = {cls.kind: shading.variants(cls) for cls in LEAVES}
+    assert all("constant" in own for own in made.values())
+    assert set(made["gltf_surface"]) == set(shading.VARIANTS)
+    assert made["principled"]["full"].clearcoat > 0.0
 
 
 def test_state_is_read_as_it_lies(on: device.Device, scene: Scene) -> None:

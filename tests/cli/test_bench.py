@@ -53,6 +53,8 @@ def test_what_is_asked_for(made: Made, capsys: pytest.CaptureFixture) -> None:
     assert asked[-1]["parts"] == ["rays", "stages"]
     assert asked[-1]["only"] == ["shade_diffuse", "sort"]
     assert (asked[-1]["layouts"], asked[-1]["scene"]) == (("wide8",), "cornell")
+    assert run(["bench", "--stage", "shading_hair"]) == 0
+    assert (asked[-1]["parts"], asked[-1]["kinds"]) == (["shading"], ["hair"])
 
 
 def test_record_comparison_and_plot(
