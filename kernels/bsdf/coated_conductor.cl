@@ -25,30 +25,14 @@ inline Spectrum coated_conductor_fresnel(CoatedConductor m, real cos_i)
     return spectrum_mul(m.specular_reflectance, fresnel_conductor(cos_i, eta, k));
 }
 
-/* How light within the coat, of cosine cos_i, fares at facets that reflect all: what leaves them, and
- * how much of that the coat throws back. Nodes as for the coat's transmittance. */
-inline vec2 coated_conductor_bounce(Microfacets d, real alpha, real cos_i, real eta)
+/* How light within a smooth coat, of cosine 0.8, fares at facets below that reflect all: what leaves
+ * them, and how much of that the coat throws back. */
+inline vec2 coated_conductor_bounce(Microfacets d, real alpha, real eta)
 {
-    real sin_i = sqrt_r(1.0f - cos_i * cos_i), seen = 1e-20f;
-    vec2 sum = {0.0f, 0.0f};
-    d.alpha_u = d.alpha_v = alpha;
-    for (int i = 0; i < 3; ++i) {
-        real radius = sel(d.beckmann, (real)(coat_radius_beckmann[i]), (real)(coat_radius_ggx[i])) * alpha;
-        real cos_h = 1.0f / sqrt(1.0f + radius * radius), lean = sin_i * radius;
-        for (int j = 0; j < 4; ++j) {
-            real area = max_r(cos_i + lean * coat_azimuth[j], (real)(0.0f));
-            real z = min_r(2.0f * area * cos_h * cos_h - cos_i, (real)(1.0f));
-            vec3 out = v3(sqrt_r(1.0f - z * z), (real)(0.0f), max_r(z, (real)(0.0f)));
-            area *= coat_weight[i];
-            real g1 = area * microfacet_g1(d, out, v3((real)(0.0f), (real)(0.0f), (real)(1.0f)));
-            sum.x += g1;
-            sum.y += g1 * fresnel_dielectric(-out.z, eta).f;
-            seen += area;
-        }
-    }
-    sum.x /= seen;
-    sum.y /= seen;
-    return sum;
+    d.alpha_u = alpha;
+    CoatCell cell = coat_cell(d, eta);
+    vec2 r = {COAT_BOUNCE_UNIT * coat_look_up(coat_bounce, cell), COAT_THROWN_UNIT * coat_look_up(coat_thrown, cell)};
+    return r;
 }
 
 inline CoatedMetal coated_metal_of(CoatedConductor m, real eta)
@@ -59,7 +43,7 @@ inline CoatedMetal coated_metal_of(CoatedConductor m, real eta)
     real spread = 2.5f * sqr((1.0f - 1.0f / c.eta) * m.coat_alpha);
     real u = sqrt_r(sqr(m.alpha_u) + spread), v = sqrt_r(sqr(m.alpha_v) + spread);
     c.metal = microfacets_of(m.distribution, u, v);
-    vec2 bounce = coated_conductor_bounce(c.metal, sqrt_r(u * v), (real)(0.77f), c.eta);
+    vec2 bounce = coated_conductor_bounce(c.metal, sqrt_r(u * v), c.eta);
     c.lost = bounce.y / max_r(bounce.x, (real)(1e-20f));
     c.between = 0.04f / (0.04f + u * v);
     Spectrum f = coated_conductor_fresnel(m, (real)(0.8f));

@@ -89,6 +89,7 @@ inline real sqrt_r(real x) { return sqrt(max_r(x, (real)(0.0f))); } /* of a roun
 #if LANES == 1
 inline real gather(global const float *p, integer at) { return p[at]; }
 inline integer gather_i(global const uint *p, integer at) { return as_int(p[at]); }
+inline integer gather_constant(constant uint *p, integer at) { return as_int(p[at]); }
 inline void scatter_if(global float *p, integer at, mask m, real v) { if (m) p[at] = v; }
 inline int sum_lanes(integer v) { return v; }
 #define FOR_LANES(F) F(0)
@@ -110,6 +111,14 @@ inline real gather(global const float *p, integer at)
     return r;
 }
 inline integer gather_i(global const uint *p, integer at)
+{
+    integer r;
+#define LOAD(i) r.s##i = as_int(p[at.s##i]);
+    FOR_LANES(LOAD)
+#undef LOAD
+    return r;
+}
+inline integer gather_constant(constant uint *p, integer at)
 {
     integer r;
 #define LOAD(i) r.s##i = as_int(p[at.s##i]);

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from clpt.render.codegen import rough_coat_table as coats
 from tests.kernels.harness import map_text, run
 
 FILES = ("optics/fresnel.cl", "optics/microfacet.cl", "optics/rough_coat.cl")
@@ -96,3 +97,58 @@ def test_smooth_coat_passes_what_fresnel_says(eta):
     for distribution in (0, 1):
         (t,) = call(body, 1, COSINES[20:], eta, distribution)
         np.testing.assert_allclose(t, 1.0 - dielectric(COSINES[20:], eta), atol=3e-3)
+
+
+COAT = "Microfacets d = microfacets_of(to_integer(x[0]), x[1], x[1]);"
+
+
+def coat_points():
+    """Distribution, roughness and index (3, n), between the nodes of the tables."""
+    alphas = [1e-4, 0.002, 0.013, 0.07, 0.13, 0.31, 0.57, 0.83, 1.0]
+    etas = [1.01, 1.03, 1.11, 1.21, 1.31, 1.333, 1.49, 1.5046, 1.7, 2.1, 2.42, 2.95]
+    return np.stack([g.ravel() for g in np.meshgrid([0, 1], alphas, etas, indexing="ij")])
+
+
+def test_coat_tables_are_the_ones_that_are_made():
+    assert coats.FILE.read_text(encoding="utf-8") == coats.text()
+
+
+def test_coat_transmittance_follows_its_integral():
+    cos_i = np.concatenate([np.linspace(0.003, 0.1, 12), np.linspace(0.13, 1.0, 20)])
+    points = coat_points()
+    given = [np.repeat(row, len(cos_i)) for row in points]
+    body = f"{COAT} r[0] = coat_transmittance(d, x[3], x[2]);"
+    (found,) = call(body, 1, *given, np.tile(cos_i, points.shape[1]))
+    exact = [coats.transmittance(NAMES[int(d)], a, e, cos_i) for d, a, e in points.T]
+    off = np.abs(found.reshape(-1, len(cos_i)) - exact)
+    assert off[points[2] >= 1.2].max() < 0.01  # all that coats are made of
+    assert off[points[2] >= 1.1].max() < 0.02 and off.max() < 0.05  # at grazing angles
+    assert ((off * cos_i).sum(1) / cos_i.sum()).max() < 0.004
+
+
+def test_what_a_coat_throws_back_follows_its_integral():
+    points = coat_points()
+    body = f"{COAT} r[0] = coat_inside_reflectance(d, x[2]);"
+    body += (
+        "CoatCell c = coat_cell(d, x[2]); r[1] = COAT_BOUNCE_UNIT * coat_look_up(coat_bounce, c);"
+    )
+    body += "r[2] = COAT_THROWN_UNIT * coat_look_up(coat_thrown, c);"
+    inside, bounce, thrown = call(body, 3, *points)
+    rough = points[1] > 0.3  # a smooth metal's light meets the critical angle all at once
+    for found, exact, where in (
+        (inside, [coats.inside_reflectance(NAMES[int(d)], a, e) for d, a, e in points.T], ...),
+        (bounce, [coats.bounce(NAMES[int(d)], a) for d, a, _ in points.T], ...),
+        (thrown, [coats.thrown_back(NAMES[int(d)], a, e) for d, a, e in points.T], rough),
+    ):
+        assert np.abs(found - exact)[where].max() < 0.01
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_coats_integrals_give_no_light(name):
+    """What passes a smooth coat inwards passes it outwards too, over eta^2; masks only take."""
+    cos_i = (np.arange(200) + 0.5) / 200
+    for eta in (1.2, 1.5, 2.4):
+        for alpha in (1e-3, 0.3, 1.0):
+            inwards = 2.0 * (cos_i * coats.transmittance(name, alpha, eta, cos_i)).mean()
+            outwards = eta**2 * (1.0 - coats.inside_reflectance(name, alpha, eta))
+            assert inwards <= outwards * (1.0 + 1e-3), (alpha, eta)

@@ -1,0 +1,192 @@
+"""The tables of kernels/optics/rough_coat.cl: integrals over a rough coat's normals, in float64.
+
+`python -m clpt.render.codegen.rough_coat_table` writes kernels/optics/rough_coat_table.cl.
+Isotropic microfacets of roughness alpha; eta: index of the coat over that outside, from 1 on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.polynomial.legendre import leggauss
+from numpy.typing import NDArray
+
+from clpt.scene.materials import DISTRIBUTIONS
+
+Floats = NDArray[np.float64]
+Made = Callable[[str, float, float], "Floats | float"]
+
+FILE = Path(__file__).parents[3] / "kernels/optics/rough_coat_table.cl"
+ALPHAS, INDICES, COSINES = 16, 14, 16
+HIGHEST = 3.0  # index up to which the tables go
+BOUNCE = 0.8  # cosine of light within a coat, see kernels/bsdf/coated_conductor.cl
+_RADII, _AZIMUTHS = leggauss(40), 48
+
+
+def alphas() -> Floats:
+    """The nodes (ALPHAS,) of roughness: even in its root."""
+    return np.maximum(np.linspace(0.0, 1.0, ALPHAS) ** 2, 1e-3)
+
+
+def indices() -> Floats:
+    """The nodes (INDICES,) of the index: even in the root of 1 - 1 / eta."""
+    roots = np.linspace(0.0, np.sqrt(1.0 - 1.0 / HIGHEST), INDICES)
+    return 1.0 / np.minimum(1.0 - roots**2, 1.0 - 1e-5)
+
+
+def facing(cos_i: Floats, alpha: float) -> Floats:
+    """A cosine that stands for those of the facets which cos_i sees."""
+    return np.sqrt(cos_i**2 + alpha**2 * (1.0 - cos_i**2))
+
+
+def cosines(alpha: float) -> Floats:
+    """The nodes (COSINES,) for a roughness: even in the root of 1 - cos_i / facing(cos_i)."""
+    share = np.maximum(1.0 - np.linspace(1.0, 0.0, COSINES) ** 2, 1e-4)
+    return np.minimum(share * alpha / np.sqrt(1.0 - share**2 * (1.0 - alpha**2)), 1.0)
+
+
+def fresnel(cos_i: Floats, eta: float) -> Floats:
+    """Reflectance of a smooth boundary, met at cosines above 0 (Born and Wolf 1999, 1.5.2)."""
+    cos2 = 1.0 - (1.0 - cos_i**2) / eta**2
+    cos_t = np.sqrt(np.maximum(cos2, 0.0))
+    across = (cos_i - eta * cos_t) / np.maximum(cos_i + eta * cos_t, 1e-300)
+    along = (eta * cos_i - cos_t) / np.maximum(eta * cos_i + cos_t, 1e-300)
+    return np.where(cos2 <= 0.0, 1.0, 0.5 * (across**2 + along**2))
+
+
+def masking(distribution: str, alpha: float, z: Floats) -> Floats:
+    """Smith's G1 of directions with these cosines, as in kernels/optics/microfacet.cl."""
+    z = np.clip(z, 0.0, 1.0)
+    spread = alpha * np.sqrt(1.0 - z**2)
+    if distribution == "ggx":
+        return 2.0 * z / np.maximum(z + np.sqrt(z**2 + spread**2), 1e-300)
+    a = z / np.maximum(spread, 1e-300)
+    near = np.minimum(a, 1.6)
+    fit = near * (3.535 + 2.181 * near) / (1.0 + near * (2.276 + 2.577 * near))
+    return np.where(a < 1.6, fit, 1.0)
+
+
+def _mean(distribution: str, alpha: float, cos_i: Floats, value: Callable[..., Floats]) -> Floats:
+    """Mean of value(cosine to the normal, normal's z) over the normals that cos_i (n,) sees."""
+    nodes, weights = _RADII
+    v = 0.5 * (nodes + 1.0)  # 1 - v^2: share of projected area with smaller slopes
+    slope = np.sqrt(1.0 - v**2) / v if distribution == "ggx" else np.sqrt(-2.0 * np.log(v))
+    radius = (alpha * slope)[:, None]
+    turn = np.cos((np.arange(_AZIMUTHS) + 0.5) / _AZIMUTHS * np.pi)
+    cos_i = cos_i[:, None, None]
+    cos_h = 1.0 / np.sqrt(1.0 + radius**2)
+    area = np.maximum(cos_i + np.sqrt(1.0 - cos_i**2) * radius * turn, 0.0)
+    cosine = np.minimum(area * cos_h, 1.0)
+    area = area * (weights * v)[:, None]
+    found = area * value(cos_i, np.maximum(cosine, 1e-12), cos_h)
+    return found.sum((1, 2)) / area.sum((1, 2))
+
+
+def transmittance(distribution: str, alpha: float, eta: float, cos_i: Floats) -> Floats:
+    """Mean of (1 - F) G1(refracted direction) for light from outside: what Mitsuba 3 tabulates."""
+
+    def passed(cos_i: Floats, c: Floats, cos_h: Floats) -> Floats:
+        cos_t = np.sqrt(np.maximum(1.0 - (1.0 - c**2) / eta**2, 0.0))
+        z = cos_i / eta + (cos_t - c / eta) * cos_h
+        return (1.0 - fresnel(c, eta)) * masking(distribution, alpha, z)
+
+    return _mean(distribution, alpha, cos_i, passed)
+
+
+def reflectance(distribution: str, alpha: float, eta: float, cos_i: Floats) -> Floats:
+    """Mean of F(c) G1(reflected direction), for eta behind the facets over that before them."""
+
+    def thrown(cos_i: Floats, c: Floats, cos_h: Floats) -> Floats:
+        return fresnel(c, eta) * masking(distribution, alpha, 2.0 * c * cos_h - cos_i)
+
+    return _mean(distribution, alpha, cos_i, thrown)
+
+
+def inside_reflectance(distribution: str, alpha: float, eta: float) -> float:
+    """What a coat reflects of a diffuse light below it, less what facets mask.
+
+    A mean over 64 cosines, ends included, as Mitsuba 3 takes it: of a smooth coat of index 1.5 that
+    is 1.5 % less than the integral.
+    """
+    cos_i = np.maximum(np.linspace(0.0, 1.0, 64), 1e-6)
+    return float(2.0 * (cos_i * reflectance(distribution, alpha, 1.0 / eta, cos_i)).mean())
+
+
+def bounce(distribution: str, alpha: float) -> float:
+    """What leaves facets that reflect all, of light of cosine BOUNCE."""
+
+    def kept(cos_i: Floats, c: Floats, cos_h: Floats) -> Floats:
+        return masking(distribution, alpha, 2.0 * c * cos_h - cos_i)
+
+    return float(_mean(distribution, alpha, np.array([BOUNCE]), kept)[0])
+
+
+def thrown_back(distribution: str, alpha: float, eta: float) -> float:
+    """And how much of that a smooth coat throws back, which it meets from within."""
+
+    def thrown(cos_i: Floats, c: Floats, cos_h: Floats) -> Floats:
+        z = np.clip(2.0 * c * cos_h - cos_i, 1e-12, 1.0)
+        return masking(distribution, alpha, z) * fresnel(z, 1.0 / eta)
+
+    return float(_mean(distribution, alpha, np.array([BOUNCE]), thrown)[0])
+
+
+def _rows(make: Made) -> Floats:
+    """A table by distribution, roughness and index."""
+    return np.array([[[make(d, a, e) for e in indices()] for a in alphas()] for d in DISTRIBUTIONS])
+
+
+def _passed(distribution: str, alpha: float, eta: float) -> Floats:
+    cos_i = cosines(alpha)
+    smooth = 1.0 - fresnel(facing(cos_i, alpha), eta)
+    return transmittance(distribution, alpha, eta, cos_i) / smooth
+
+
+def _array(name: str, table: Floats) -> str:
+    """The text of a table of 16-bit shares of its largest number, and in upper halves the next's.
+
+    The next: along the last axis, on which the last node has none.
+    """
+    most = float(table.max())
+    shares = np.round(table / most * 65535.0).astype(np.uint32)
+    pairs = (shares[..., :-1] | shares[..., 1:] << np.uint32(16)).reshape(-1).tolist()
+    lines = [f"#define {name.upper()}_UNIT {most / 65535.0:.9g}f"]
+    lines += [f"constant uint {name}[{len(pairs)}] = {{"]
+    lines += [",".join(map(str, pairs[i : i + 10])) + "," for i in range(0, len(pairs), 10)]
+    return "\n".join([*lines, "};", ""])
+
+
+HEAD = """\
+/* Integrals over the normals of a rough coat, by distribution, roughness and index, made by
+ * `python -m clpt.render.codegen.rough_coat_table`, which has their formulas. A word holds a
+ * number and, in its upper half, the next along the last axis; `_UNIT`: what 1 of them means. */
+"""
+
+
+def text() -> str:
+    """The text of FILE."""
+    scale = (INDICES - 1) / np.sqrt(1.0 - 1.0 / HIGHEST)
+    numbers = {
+        "COAT_ALPHAS": ALPHAS,
+        "COAT_INDICES": INDICES,
+        "COAT_COSINES": COSINES,
+        "COAT_INDEX_SCALE": f"{scale:.9g}f",
+    }
+    tables: dict[str, tuple[str, Made]] = {
+        "passed": ("Transmittance over a smooth coat's, by cosine too", _passed),
+        "inside": ("Reflectance for diffuse light below", inside_reflectance),
+        "bounce": (
+            f"Of light of cosine {BOUNCE}, what leaves facets that reflect all",
+            lambda d, a, _: bounce(d, a),
+        ),
+        "thrown": ("What of that a smooth coat above throws back", thrown_back),
+    }
+    made = [f"#define {name} {value}\n" for name, value in numbers.items()]
+    made += [f"/* {doc}. */\n" + _array(f"coat_{n}", _rows(f)) for n, (doc, f) in tables.items()]
+    return HEAD + "".join(made)
+
+
+if __name__ == "__main__":
+    FILE.write_text(text(), encoding="utf-8")
