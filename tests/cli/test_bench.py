@@ -48,10 +48,10 @@ def test_what_is_asked_for(made: Made, capsys: pytest.CaptureFixture) -> None:
     assert "wide8 primary any" in told and "5 programs in 1.00 s, 256 MiB" in told
     assert "no slot had work" in told and "10.0%" in told
     assert asked[-1]["parts"] == list(benchmark.PARTS)
-    stages = [word for name in ("shade_diffuse", "sort", "rays") for word in ("--stage", name)]
+    stages = [word for name in ("shade_diffuse", "append", "rays") for word in ("--stage", name)]
     assert run(["bench", *stages, "--layout", "wide8", "--scene", "cornell"]) == 0
     assert asked[-1]["parts"] == ["rays", "stages"]
-    assert asked[-1]["only"] == ["shade_diffuse", "sort"]
+    assert asked[-1]["only"] == ["shade_diffuse", "append"]
     assert (asked[-1]["layouts"], asked[-1]["scene"]) == (("wide8",), "cornell")
     assert run(["bench", "--stage", "shading_hair"]) == 0
     assert (asked[-1]["parts"], asked[-1]["kinds"]) == (["shading"], ["hair"])
