@@ -23,10 +23,9 @@ OBJECTS = {
     "volume", "medium", "phase", "ref",
 }  # fmt: skip
 UNSUPPORTED = {
-    "measured", "measured_polarized", "polarizer", "retarder", "circular", "pplastic",
-    "sdfgrid", "ellipsoids", "ellipsoidsmesh", "sunsky", "timed_sunsky",
-    "distant", "irradiancemeter", "radiancemeter", "batch", "specfilm",
-    "depth", "stokes", "rawconstant",
+    "measured", "measured_polarized", "sdfgrid", "ellipsoids", "ellipsoidsmesh",
+    "sunsky", "timed_sunsky", "distant", "irradiancemeter", "radiancemeter", "batch", "specfilm",
+    "stokes",
 }  # fmt: skip
 SEPARATOR = re.compile(r"[\s,]+")
 LARGEST_INTEGER = 2**31 - 1
