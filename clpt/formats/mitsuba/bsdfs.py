@@ -32,6 +32,11 @@ from clpt.spectra import Constant, RGBUnbounded, Spectrum
 
 Parameters = dict[str, Any]
 SMOOTHEST = 1e-4  # Mitsuba's own floor of a roughness
+SHOWN = {  # metals of Mitsuba without free data: how bright r, g and b of its pictures are, head-on
+    "Cu2O": (0.24, 0.26, 0.27), "CuO": (0.22, 0.22, 0.22), "HgTe": (0.38, 0.38, 0.39),
+    "Se": (0.30, 0.28, 0.28), "Se-e": (0.42, 0.43, 0.45), "SnTe": (0.33, 0.11, 0.05),
+    "Ta": (0.45, 0.36, 0.41), "Te": (0.56, 0.59, 0.58), "Te-e": (0.65, 0.69, 0.67),
+}  # fmt: skip
 
 
 def bsdf(element: Element, context: Context) -> Material:
@@ -93,10 +98,20 @@ def _metal(props: Properties) -> Parameters:
     child = props.take("material")
     if child is not None:
         with child.locating():
-            eta, k = spectra.metal(child.attribute("value"))
+            eta, k = _named_metal(child, props.context)
     else:
         eta, k = index(props, "eta", 0.0), index(props, "k", 1.0)
     return {"eta": eta, "k": k}
+
+
+def _named_metal(child: Element, context: Context) -> tuple[Spectrum, Spectrum]:
+    """A metal by its name; one of SHOWN has its colour where light meets it head-on."""
+    name = child.attribute("value")
+    shown = SHOWN.get(name.removesuffix("_palik"))
+    if shown is None:
+        return spectra.metal(name)
+    context.warn(child, f"there are no free data of {name}; a metal of its colour stands for it")
+    return Constant(1.0), RGBUnbounded(*(2.0 * np.sqrt(r / (1.0 - r)) for r in shown))
 
 
 def _conductor(props: Properties) -> Parameters:

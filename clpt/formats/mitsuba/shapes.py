@@ -75,7 +75,8 @@ def shape(element: Element, context: Context) -> Shape:
     with element.locating():
         made: Shape = cls(**parameters)
         if stretch is not None:
-            made = Instance(group=Group((made,), made.name), to_world=stretch, name=made.name)
+            group = Group((made,), made.name or made.kind)
+            made = Instance(group=group, to_world=stretch, name=made.name)
     props.finish()
     return made
 

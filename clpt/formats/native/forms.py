@@ -112,7 +112,7 @@ def _of_cursor(
 def _spectrum(role: str) -> Form:
     return Form(
         role,
-        ref(f"spectrum_{role}"),
+        lambda param: ref(f"spectrum_{_limits_of(param)}"),
         lambda cursor, _: json_spectra.read(cursor, role),
         # a default may be given as a number or three
         lambda value, _: (
@@ -121,6 +121,11 @@ def _spectrum(role: str) -> Form:
             else json_spectra.write(value, role)
         ),
     )
+
+
+def _limits_of(param: Param) -> str:
+    """The role whose limits a spectrum has."""
+    return "factor" if param.role == "reflectance" and math.isinf(param.high) else param.role
 
 
 def _rows(width: int, item: str = "number") -> Form:

@@ -589,7 +589,7 @@ def test_a_scene_without_sensor_is_framed(scene):
 def test_the_tests_own_scenes_load(scenes):
     for path in sorted(scenes.glob("*.xml")):
         made = load(path)
-        assert made.shapes and not made.warnings, path
+        assert made.shapes and bool(made.warnings) == (path.name == "bent.xml"), path
 
 
 @pytest.mark.peers
