@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from clpt import spectra
+from clpt.formats.missing import EVEN, GREY
 from clpt.formats.mitsuba.fluorescence import fluorescent
 from clpt.formats.mitsuba.hair import hair
 from clpt.formats.mitsuba.limits import within
@@ -271,6 +273,8 @@ def _normal_map(props: Properties) -> Parameters:
     made = factor(props, "normalmap", None)
     if isinstance(made, (Constant, RGBUnbounded)):
         made = Bitmap(image=made.to_rgb("unbounded").astype(np.float32)[None, None], raw=True)
+    if isinstance(made, Bitmap) and made.image is GREY:
+        made = replace(made, image=EVEN)
     if not isinstance(made, Bitmap):
         raise props.element.error("'normalmap' must be a bitmap, or one colour")
     return {**given, "map": made}

@@ -138,7 +138,7 @@ def _constant(props: Properties) -> Parameters:
 def _envmap(props: Properties) -> Parameters:
     props.ignore("mis_compensation")
     return {
-        "image": props.file(),
+        "image": props.image(),
         "scale": props.number("scale", 1.0),
         "to_world": props.placement(),
     }

@@ -342,7 +342,7 @@ def _bitmap(props: Properties) -> Bitmap:
     wraps = {"repeat": "repeat", "clamp": "clamp", "mirror": "mirror"}
     props.ignore("format", "accel")
     return Bitmap(
-        image=props.file(),
+        image=props.image(),
         raw=props.flag("raw", False),
         filter=props.text("filter_type", "bilinear", ("bilinear", "nearest")),
         wrap=wraps[props.text("wrap_mode", "repeat", tuple(wraps))],
