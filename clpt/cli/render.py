@@ -14,6 +14,7 @@ import click
 from .. import device as dev
 from ..bvh import LAYOUTS, Quality
 from ..formats import load
+from ..formats.missing import Missing
 from ..render.lowering.checks import check
 from ..render.renderer import Renderer
 from ..scene import Scene, kinds
@@ -149,6 +150,10 @@ class White(click.ParamType):
     "--texture-budget", type=Bytes(), metavar="SIZE",
     help="Memory for images, such as 500M; larger ones are halved.  [default: half the free]",
 )  # fmt: skip
+@click.option(
+    "--missing-textures", type=click.Choice(get_args(Missing)), default="error",
+    help="grey: go on with grey where an image is not there.",
+)  # fmt: skip
 @verbose_option("Print memory, trees, programs and stages; log more, twice for everything.")
 @click.option("--quiet", is_flag=True, help="Show no progress and no warnings.")
 def render(
@@ -161,6 +166,7 @@ def render(
     exposure: float,
     variables: dict[str, Any],
     texture_budget: int | None,
+    missing_textures: Missing,
     verbose: int,
     quiet: bool,
     **changes: Any,
@@ -178,7 +184,8 @@ def render(
     with ThreadPoolExecutor(max_workers=1) as beside:
         chosen = beside.submit(dev.choose, device, profiling=bool(verbose))
         with shown.loading(scene.name) as tell:
-            plan = changed(load(scene, progress=tell, **variables), **changes)
+            loaded = load(scene, progress=tell, missing_textures=missing_textures, **variables)
+            plan = changed(loaded, **changes)
         loading = time.perf_counter() - began
         ends = limit is not None or bool(changes["noise"])
         spp = changes["spp"] if ends else plan.spp

@@ -7,7 +7,11 @@ from typing import Any
 
 import click
 
-RESERVED = ("kinds", "progress")  # parameters of clpt.load that are no variables
+RESERVED = (
+    "kinds",
+    "progress",
+    "missing_textures",
+)  # parameters of clpt.load that are no variables
 
 
 def _parse(_: Any, __: Any, definitions: Iterable[str]) -> dict[str, Any]:

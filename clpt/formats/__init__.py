@@ -5,9 +5,10 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from clpt.errors import SceneError
+from clpt.formats.missing import Missing
 from clpt.scene import Scene
 from clpt.scene.materials import Material
 
@@ -39,14 +40,16 @@ def load(
     *,
     kinds: Iterable[type[Material]] = (),
     progress: Callable[[float, str], None] | None = None,
+    missing_textures: Missing = "error",
     **variables: Any,
 ) -> Scene:
     """Read a scene or a bare mesh; a folder means the scene in it (see IN_FOLDERS).
 
     `kinds` are materials that are not clpt's own, of which a scene.json may speak. `variables` set
     the `$names` of Mitsuba's XML; of glTF they choose camera, scene and time. `progress` is
-    called with the share that is read, from 0 to 1, and a text, for files of many shapes. Raises
-    SceneError with the file and, where it is known, the line.
+    called with the share that is read, from 0 to 1, and a text, for files of many shapes.
+    `missing_textures`: "grey" puts grey in the place of images that are not there, with a warning.
+    Raises SceneError with the file and, where it is known, the line.
     """
     path = _existing(Path(path))
     name = path.name.lower()
@@ -61,11 +64,15 @@ def load(
     if kinds and kind != "native":
         raise SceneError("only a scene.json can have kinds that are not clpt's own", file=path)
     loader = importlib.import_module(f"clpt.formats.{kind}").load
+    if missing_textures not in get_args(Missing):
+        raise SceneError(f"missing_textures is 'error' or 'grey', not {missing_textures!r}")
     if kind == "native":
-        return loader(path, kinds)
+        return loader(path, kinds, missing_textures)
     if kind == "pbrt":
-        return loader(path, progress)
-    return loader(path, **variables)
+        return loader(path, progress, missing_textures)
+    if kind in WITH_VARIABLES:
+        return loader(path, missing_textures, **variables)
+    return loader(path)
 
 
 def save(scene: Scene, path: str | Path, /) -> None:

@@ -92,9 +92,13 @@ def _field(default: Any, param: Param) -> Any:
     return field(default=default, metadata={"param": param})
 
 
-def reflectance(default: Any, doc: str, *, lobe: bool = False) -> Any:
-    """Declare a spectrum in [0, 1]; may be a texture. `lobe`: see `Param`."""
-    return _field(default, Param("reflectance", doc, low=0.0, high=1.0, textured=True, lobe=lobe))
+def reflectance(default: Any, doc: str, *, lobe: bool = False, limited: bool = True) -> Any:
+    """Declare a spectrum in [0, 1]; may be a texture. `lobe`: see `Param`.
+
+    limited: False where it may be a number of any kind, as what textures are made of.
+    """
+    low, high = (0.0, 1.0) if limited else (-math.inf, math.inf)
+    return _field(default, Param("reflectance", doc, low=low, high=high, textured=True, lobe=lobe))
 
 
 def emission(default: Any, doc: str, unit: str, *, textured: bool = False) -> Any:
@@ -335,7 +339,8 @@ def _spectrum(value: Any, param: Param, where: str) -> Any:
         _check_spectrum(value, param, where)
         return value
     if isinstance(value, (list, tuple, np.ndarray)) and len(value) == 3:
-        made = RGBUnbounded if param.role == "factor" else RGB
+        bounded = param.role != "factor" and max(value) <= 1.0
+        made = RGB if bounded or param.role == "emission" else RGBUnbounded
         return made(*(_number(v, param, where) for v in value))
     if isinstance(value, (int, float, np.number)):
         number = _number(value, param, where)
@@ -356,6 +361,9 @@ def _check_spectrum(value: Spectrum, param: Param, where: str) -> None:
             raise SceneError(error.message, where=where) from None
     if math.isinf(param.low) and math.isinf(param.high):
         return
+    if isinstance(value, RGBUnbounded) and min(value.r, value.g, value.b) < param.low:
+        shown = ", ".join(f"{part:g}" for part in (value.r, value.g, value.b))
+        raise SceneError(f"a colour cannot be negative here: {shown}", where=where)
     meant = index_of(value) if param.role in ("index", "coefficient") else value
     for found, at in extremes(meant):
         if not param.low - ROUNDING <= found <= param.high + ROUNDING:

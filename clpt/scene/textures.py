@@ -73,8 +73,10 @@ class Bitmap(Placed):
 class Checkerboard(Placed):
     """Two colours in a 2x2 pattern per unit of uv."""
 
-    color0: Textured = reflectance(0.4, "colour where both or neither coordinate is below a half")
-    color1: Textured = reflectance(0.2, "colour elsewhere")
+    color0: Textured = reflectance(
+        0.4, "colour where both or neither coordinate is below a half", limited=False
+    )
+    color1: Textured = reflectance(0.2, "colour elsewhere", limited=False)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -16,6 +16,7 @@ import numpy as np
 
 from clpt.spectra import files
 from clpt.spectra.data import ROOT
+from clpt.spectra.dispersion import POINTS
 from clpt.spectra.spectrum import Tabulated
 
 LAMPS = (
@@ -24,6 +25,7 @@ LAMPS = (
     *(f"LED-{name}" for name in ("B1", "B2", "B3", "B4", "B5", "BH1", "RGB1", "V1", "V2")),
 )
 METALS_WITHIN = (300.0, 1100.0)  # [nm]
+FORMULA_AT = np.arange(300.0, 1101.0, 20.0)  # [nm], where pages of formulas are tabulated
 
 
 def write_csv(path: Path, notes: list[str], header: str, rows: np.ndarray) -> None:
@@ -83,9 +85,12 @@ def rewrite_metals(database: Path) -> None:
             print(f"{page}: not in {database}, kept as it is")
             continue
         eta, k = files.read_refractive_index(found[0])
-        assert isinstance(eta, Tabulated) and isinstance(k, Tabulated), f"{page} has no table"
-        lambdas = np.array(eta.lambdas)
-        rows = np.column_stack([lambdas, eta.values, k.values])
+        lambdas = FORMULA_AT
+        if isinstance(eta, Tabulated):
+            known = np.array(eta.lambdas)
+            lambdas = known if len(known) != POINTS else lambdas
+            lambdas = lambdas[(lambdas >= known[0]) & (lambdas <= known[-1])]
+        rows = np.column_stack([lambdas, eta.sample(lambdas), k.sample(lambdas)])
         keep = (lambdas >= METALS_WITHIN[0]) & (lambdas <= METALS_WITHIN[1])
         write_csv(path, notes, "lambda [nm], eta, k", rows[keep])
 

@@ -21,6 +21,7 @@ from clpt.formats.gltf import (
 from clpt.formats.gltf.document import Document
 from clpt.formats.meshes import framing
 from clpt.formats.meshes.mesh import MeshFile
+from clpt.formats.missing import Missing
 from clpt.scene import Scene
 from clpt.scene.shapes import Mesh
 
@@ -35,14 +36,14 @@ VARIANTS = "KHR_materials_variants"
 __all__ = ["load", "read_mesh"]
 
 
-def load(path: Path, /, **variables: Any) -> Scene:
+def load(path: Path, missing: Missing = "error", /, **variables: Any) -> Scene:
     """Read a glTF file; a camera or light that it lacks is added, as for a bare mesh.
 
     variables: `time` [s] of an animation (the first, or the `animation` of that number or name);
     without it nodes have their own transforms. `camera` and `scene` choose by number or name.
-    Raises SceneError with the JSON path of what is wrong.
+    missing: see clpt.load. Raises SceneError with the JSON path of what is wrong.
     """
-    document, graph = _open(path, variables)
+    document, graph = _open(path, variables, missing)
     chosen = cameras.chosen(graph, _text(variables.get("camera")))
     shapes = meshes.shapes(graph)
     if not shapes:
@@ -72,8 +73,10 @@ def read_mesh(path: Path) -> MeshFile:
     return MeshFile([part for part in shapes if isinstance(part, Mesh)], document.warnings)
 
 
-def _open(path: Path, variables: dict[str, Any]) -> tuple[Document, nodes.Graph]:
-    document = Document(path)
+def _open(
+    path: Path, variables: dict[str, Any], missing: Missing = "error"
+) -> tuple[Document, nodes.Graph]:
+    document = Document(path, missing)
     _check_extensions(document)
     checks.check(document)
     unknown = sorted(set(variables) - set(VARIABLES))

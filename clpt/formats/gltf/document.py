@@ -17,6 +17,7 @@ from typing import Any, NoReturn, TypeVar
 from urllib.parse import unquote, unquote_to_bytes
 
 from clpt.errors import SceneError
+from clpt.formats.missing import Missing
 
 T = TypeVar("T")
 REQUIRED: Any = object()
@@ -187,8 +188,8 @@ class Element:
 class Document:
     """A parsed file: `root` is its JSON; `warnings` say what was left out."""
 
-    def __init__(self, file: Path):
-        self.file = file
+    def __init__(self, file: Path, missing: Missing = "error"):
+        self.file, self.missing = file, missing
         self.warnings: list[str] = []
         self.uv_sets: list[int] = []  # of the textures that were made since it was cleared
         self._made: dict[Any, Any] = {}
@@ -229,7 +230,18 @@ class Document:
             raise element.error(message, key) from None
 
     def beside(self, element: Element, key: str = "uri") -> Path:
-        """Return the file that a relative URI names. Raises SceneError for any other URI."""
+        """Return the file that a relative URI names, and that is there. Raises SceneError."""
+        path = self.path_of(element, key)
+        try:
+            exists = path.is_file()
+        except (OSError, ValueError):  # too long, or with a zero in it
+            exists = False
+        if not exists:
+            raise element.error(f"there is no file {_shown(unquote(element.text(key)))}", key)
+        return path
+
+    def path_of(self, element: Element, key: str = "uri") -> Path:
+        """Return the path that a relative URI names. Raises SceneError for any other URI."""
         uri = element.text(key)
         name = unquote(uri)
         parts = PurePosixPath(name).parts
@@ -237,14 +249,7 @@ class Document:
         if outside or not parts:
             message = f"{_shown(uri)} does not lie beside the file, so it is not read"
             raise element.error(message, key)
-        path = self.file.parent.joinpath(*parts)
-        try:
-            exists = path.is_file()
-        except (OSError, ValueError):  # too long, or with a zero in it
-            exists = False
-        if not exists:
-            raise element.error(f"there is no file {_shown(name)}", key)
-        return path
+        return self.file.parent.joinpath(*parts)
 
     def _buffer(self, index: int) -> bytes:
         element = self.entry("buffers", index)

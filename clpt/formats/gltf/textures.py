@@ -16,6 +16,7 @@ from clpt import images
 from clpt.errors import SceneError
 from clpt.formats.gltf import accessors
 from clpt.formats.gltf.document import Document, Element
+from clpt.formats.missing import EVEN, GREY, grey_for
 from clpt.scene.textures import Bitmap
 
 FORMATS = ("PNG", "JPEG", "WEBP")
@@ -44,7 +45,8 @@ def texture(info: Element, *, raw: bool = False, channel: str | None = None) -> 
     sets = info.document.uv_sets
     if uv_set not in sets:
         sets.append(uv_set)
-    image = _image(element, raw)
+    image = _stand_in(info, element)
+    image = _image(element, raw) if image is None else image
     values: dict[str, Any] = {"raw": raw or image.dtype != np.uint8, **_sampling(element)}
     if transform is not None:
         values["to_uv"] = FLIP @ _transform(transform) @ FLIP
@@ -60,6 +62,18 @@ def _source(texture: Element) -> Element | None:
     webp = texture.extension("EXT_texture_webp")
     source = None if webp is None else webp.entry("source", "images")
     return source or texture.entry("source", "images")
+
+
+def _stand_in(info: Element, texture: Element) -> NDArray[np.float32] | None:
+    """Grey where the file of a texture's image is not there and missing ones are grey."""
+    source, document = _source(texture), info.document
+    if source is None or document.missing == "error" or "uri" not in source:
+        return None
+    uri = source.text("uri")
+    if uri[:5].lower() == "data:" or document.path_of(source).is_file():
+        return None
+    document.warn(grey_for(uri))
+    return EVEN if info.path.endswith("ormalTexture") else GREY
 
 
 def _image(texture: Element, raw: bool) -> NDArray[Any]:

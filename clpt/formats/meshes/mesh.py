@@ -195,7 +195,7 @@ def _ply(path: Path, materials: bool, warnings: list[str]) -> Mesh:
     """Read a PLY file; trimesh would take ten times as long."""
     triangles = ply.read(path)
     warnings += triangles.warnings
-    own = _attributes(triangles, warnings)
+    own = _attributes(triangles)
     arrays = checked(
         path,
         path.name,
@@ -231,20 +231,17 @@ def _mesh(
     return Mesh(name=name, material=material, **arrays)
 
 
-def _attributes(triangles: ply.Triangles, warnings: list[str]) -> dict[str, NDArray[np.float32]]:
+def _attributes(triangles: ply.Triangles) -> dict[str, NDArray[np.float32]]:
     """Return colours and other numbers of a PLY file per vertex and face, by Mitsuba's names.
 
     r, g, b or red, green, blue are vertex_color or face_color, bytes decoded from sRGB; x_0, x_1,
     x_2 or x_r, x_g, x_b are vertex_x.
     """
     attributes: dict[str, NDArray[np.float32]] = {}
-    counts = {"vertex": len(triangles.vertices), "face": len(triangles.faces)}
-    for element, count in counts.items():
+    for element in ("vertex", "face"):
         for name, parts in _grouped(triangles.columns[element]).items():
             values = np.column_stack(parts)
-            if len(values) != count:
-                warnings.append(f"{element}_{name} left out: the file's polygons are no triangles")
-            elif values.shape[1] in (1, 3):
+            if values.shape[1] in (1, 3):
                 scaled = values.dtype == np.uint8
                 linear = images.srgb_to_linear(values / np.float32(255.0)) if scaled else values
                 attributes[f"{element}_{name}"] = linear.astype(np.float32)

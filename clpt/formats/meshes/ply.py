@@ -52,7 +52,8 @@ class Element:
 class Triangles:
     """vertices (n, 3), faces (m, 3) int64, normals (n, 3) or None, uvs (n, 2) or None.
 
-    columns: further numbers of each "vertex" and "face" by name; a polygon's are one for its fan.
+    columns: further numbers of each "vertex" and "face" by name; a polygon's are those of all its
+    triangles.
     """
 
     vertices: NDArray[np.float32]
@@ -167,8 +168,8 @@ def _number(data: bytes, at: int, dtype: str) -> int:
 def _uneven_rows(
     data: bytes, element: Element, start: int, order: str
 ) -> tuple[dict[str, Any], int]:
-    """The list columns of a table, row by row; other columns are skipped."""
-    result: dict[str, Any] = {c.name: ([], []) for c in element.properties if c.length}
+    """As `_even_rows`, row by row."""
+    result = _empty(element)
     columns = [
         (c.name, c.length and order + c.length, order + c.type, np.dtype(c.type).itemsize)
         for c in element.properties
@@ -176,21 +177,15 @@ def _uneven_rows(
     at = start
     for _ in range(element.count):
         for name, length, type, size in columns:
-            if not length:
-                at += size
-                continue
-            count = _number(data, at, length)
-            at += np.dtype(length).itemsize
+            count = _number(data, at, length) if length else 1
+            at += np.dtype(length).itemsize if length else 0
             if at + count * size > len(data):
                 raise SceneError(f"it ends within {element.count} rows of {element.name[:40]!r}")
             lengths, values = result[name]
             lengths.append(count)
             values.append(np.frombuffer(data, type, count, at))
             at += count * size
-        if at > len(data):
-            raise SceneError(f"it ends within {element.count} rows of {element.name[:40]!r}")
-    lists = {k: (np.array(n, np.int64), np.concatenate(v)) for k, (n, v) in result.items()}
-    return lists, at - start
+    return _joined(element, result), at - start
 
 
 def _ascii(data: bytes, elements: list[Element], start: int) -> dict[str, dict[str, Any]]:
@@ -244,30 +239,42 @@ def _ascii_rows(words: NDArray[np.float64], element: Element) -> tuple[dict[str,
             raise short
         rows = words[: width * element.count].reshape(-1, width)
         return {c.name: _typed(rows[:, i], c) for i, c in enumerate(element.properties)}, rows.size
-    result: dict[str, Any] = {c.name: ([], []) for c in element.properties if c.length}
+    result = _empty(element)
     at = 0
     for _ in range(element.count):
         for column in element.properties:
             if at >= len(words):
                 raise short
-            if column.length:
-                count = words[at]
-                if not (0 <= count <= MOST_CORNERS and count == int(count)):
-                    raise SceneError(f"a list has {count:g} values")
-                result[column.name][0].append(int(count))
-                result[column.name][1].append(words[at + 1 : at + 1 + int(count)])
-                at += int(count)
-            at += 1
+            count = words[at] if column.length else 1
+            if not (0 <= count <= MOST_CORNERS and count == int(count)):
+                raise SceneError(f"a list has {count:g} values")
+            at += 1 if column.length else 0
+            result[column.name][0].append(int(count))
+            result[column.name][1].append(words[at : at + int(count)])
+            at += int(count)
         if at > len(words):
             raise short
-    none = [np.zeros(0)]
-    lists = {k: (np.array(n, np.int64), np.concatenate(v or none)) for k, (n, v) in result.items()}
-    return lists, at
+    return _joined(element, result), at
 
 
-def _typed(values: NDArray[np.float64], column: Property) -> NDArray[Any]:
+def _empty(element: Element) -> dict[str, Any]:
+    return {column.name: ([], []) for column in element.properties}
+
+
+def _joined(element: Element, rows: dict[str, Any]) -> dict[str, Any]:
+    """Columns of lengths and values, row by row, as `_binary` has them."""
+    made: dict[str, Any] = {}
+    for column in element.properties:
+        lengths, values = rows[column.name]
+        joined = np.concatenate(values or [np.zeros(0)])
+        whole = (np.array(lengths, np.int64), joined)
+        made[column.name] = whole if column.length else _typed(joined, column)
+    return made
+
+
+def _typed(values: NDArray[Any], column: Property) -> NDArray[Any]:
     """Return values of the type uchar as bytes: as colours they mean other values than floats."""
-    if column.type != "u1":
+    if column.type != "u1" or values.dtype == np.uint8:
         return values
     return np.clip(np.nan_to_num(values), 0, 255).astype(np.uint8)
 
@@ -288,7 +295,7 @@ def _triangles(tables: dict[str, dict[str, Any]]) -> Triangles:
         faces=_fans(*corners),
         normals=None if normals is None else _columns(vertex, normals),
         uvs=None if uvs is None else _columns(vertex, uvs),
-        columns={"vertex": further, "face": _plain(face)},
+        columns={"vertex": further, "face": _per_triangle(face, corners[0])},
         warnings=["texture coordinates of faces left out"] if "texcoord" in face else [],
     )
 
@@ -296,6 +303,12 @@ def _triangles(tables: dict[str, dict[str, Any]]) -> Triangles:
 def _plain(table: dict[str, Any]) -> dict[str, NDArray[Any]]:
     """Return the columns that are no lists."""
     return {name: values for name, values in table.items() if isinstance(values, np.ndarray)}
+
+
+def _per_triangle(face: dict[str, Any], lengths: NDArray[Any]) -> dict[str, NDArray[Any]]:
+    """Return the columns of polygons, for each triangle of their fans."""
+    counts = np.maximum(lengths.astype(np.int64) - 2, 0)
+    return {name: np.repeat(values, counts) for name, values in _plain(face).items()}
 
 
 def _columns(table: dict[str, Any], names: Any) -> NDArray[np.float32]:

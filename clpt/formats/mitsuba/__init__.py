@@ -9,6 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from clpt.formats.meshes.framing import framing_camera
+from clpt.formats.missing import Missing
 from clpt.formats.mitsuba import sensors
 from clpt.formats.mitsuba.bsdfs import bsdf
 from clpt.formats.mitsuba.emitters import emitter
@@ -25,13 +26,13 @@ __all__ = ["load"]
 REFERENCED = ("spectrum", "volume", "film", "sampler", "rfilter", "medium", "phase")
 
 
-def load(path: Path, /, **variables: object) -> Scene:
-    """Read a Mitsuba scene; `variables` stand for its `$names`.
+def load(path: Path, missing: Missing = "error", /, **variables: object) -> Scene:
+    """Read a Mitsuba scene; `variables` stand for its `$names`; missing: see clpt.load.
 
     Raises SceneError with file, line and element for anything broken or not supported.
     """
     document = parse(path, variables)
-    context = Context(document)
+    context = Context(document, missing)
     props = Properties(document.root, context)
     shapes = shapes_of(props.objects("shape"), context)
     emitters = [emitter(element, context) for element in props.objects("emitter")]

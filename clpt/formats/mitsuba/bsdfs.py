@@ -3,22 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from clpt import spectra
+from clpt.formats.missing import EVEN, GREY
 from clpt.formats.mitsuba.fluorescence import fluorescent
 from clpt.formats.mitsuba.hair import hair
+from clpt.formats.mitsuba.limits import within
 from clpt.formats.mitsuba.principled import principled, principled_thin
 from clpt.formats.mitsuba.properties import Context, Properties, numbers, unknown
-from clpt.formats.mitsuba.spectra import coefficient, index, ior, real, reflectance, texture
+from clpt.formats.mitsuba.spectra import (
+    coefficient,
+    factor,
+    index,
+    ior,
+    nested_textures,
+    real,
+    reflectance,
+    texture,
+)
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene import materials
 from clpt.scene.materials import Material
 from clpt.scene.params import params
-from clpt.scene.textures import Bitmap, Texture
+from clpt.scene.textures import Bitmap, Product, Texture
+from clpt.spectra import Constant, RGBUnbounded, Spectrum
 
 Parameters = dict[str, Any]
 SMOOTHEST = 1e-4  # Mitsuba's own floor of a roughness
+SHOWN = {  # metals of Mitsuba without free data: how bright r, g and b of its pictures are, head-on
+    "Cu2O": (0.24, 0.26, 0.27), "CuO": (0.22, 0.22, 0.22), "HgTe": (0.38, 0.38, 0.39),
+    "Se": (0.30, 0.28, 0.28), "Se-e": (0.42, 0.43, 0.45), "SnTe": (0.33, 0.11, 0.05),
+    "Ta": (0.45, 0.36, 0.41), "Te": (0.56, 0.59, 0.58), "Te-e": (0.65, 0.69, 0.67),
+}  # fmt: skip
 
 
 def bsdf(element: Element, context: Context) -> Material:
@@ -32,7 +52,8 @@ def _bsdf(element: Element, context: Context) -> Material:
     cls, read = PLUGINS[element.type]
     props = Properties(element, context)
     with element.locating():
-        made = cls(name=element.attributes.get("id", ""), **read(props))
+        given = within(cls, read(props), props)
+        made = cls(name=element.attributes.get("id", ""), **given)
     props.finish()
     return made
 
@@ -79,10 +100,20 @@ def _metal(props: Properties) -> Parameters:
     child = props.take("material")
     if child is not None:
         with child.locating():
-            eta, k = spectra.metal(child.attribute("value"))
+            eta, k = _named_metal(child, props.context)
     else:
         eta, k = index(props, "eta", 0.0), index(props, "k", 1.0)
     return {"eta": eta, "k": k}
+
+
+def _named_metal(child: Element, context: Context) -> tuple[Spectrum, Spectrum]:
+    """A metal by its name; one of SHOWN has its colour where light meets it head-on."""
+    name = child.attribute("value")
+    shown = SHOWN.get(name.removesuffix("_palik"))
+    if shown is None:
+        return spectra.metal(name)
+    context.warn(child, f"there are no free data of {name}; a metal of its colour stands for it")
+    return Constant(1.0), RGBUnbounded(*(2.0 * np.sqrt(r / (1.0 - r)) for r in shown))
 
 
 def _conductor(props: Properties) -> Parameters:
@@ -141,7 +172,7 @@ def _roughness(props: Properties) -> Parameters:
 
 def _alpha(props: Properties, name: str, default: Any) -> Any:
     value = real(props, name, default)
-    return max(value, SMOOTHEST) if isinstance(value, float) and value >= 0.0 else value
+    return max(value, SMOOTHEST) if isinstance(value, float) else value
 
 
 def _plastic(props: Properties) -> Parameters:
@@ -157,6 +188,30 @@ def _plastic(props: Properties) -> Parameters:
 def _rough_plastic(props: Properties) -> Parameters:
     distribution = _distribution(props)
     return {**_plastic(props), "distribution": distribution, "alpha": _alpha(props, "alpha", 0.1)}
+
+
+def _polarized_plastic(props: Properties) -> Parameters:
+    """As Mitsuba's without polarisation, but for what its boundary reflects inwards."""
+    props.context.warn(props.element, "light has no polarisation here: taken as roughplastic")
+    return {**_rough_plastic(props), "nonlinear": False}
+
+
+def _polarizing(share: float) -> Callable[[Properties], Parameters]:
+    """What lets a share of unpolarised light through, straight on."""
+
+    def read(props: Properties) -> Parameters:
+        props.ignore("theta", "delta", "polarizing", "left_handed")
+        props.context.warn(props.element, "light has no polarisation here: it dims all light alike")
+        passed = reflectance(props, "transmittance", 1.0)
+        if isinstance(passed, Texture):
+            passed = Product(first=passed, second=share)
+        elif isinstance(passed, Spectrum):
+            passed = tuple(share * passed.to_rgb())
+        else:
+            passed = tuple(share * np.broadcast_to(passed, 3))
+        return {"int_ior": 1.0, "ext_ior": 1.0, "specular_transmittance": passed}
+
+    return read
 
 
 def _grating(props: Properties) -> Parameters:
@@ -213,21 +268,21 @@ def _bent(props: Properties) -> Parameters:
 
 def _normal_map(props: Properties) -> Parameters:
     given = _bent(props)
-    child = props.take("normalmap")
-    if child is None:
+    if "normalmap" not in props.named:
         raise props.element.error("needs the texture 'normalmap'")
-    made = texture(props.context.resolve(child), props)
+    made = factor(props, "normalmap", None)
+    if isinstance(made, (Constant, RGBUnbounded)):
+        made = Bitmap(image=made.to_rgb("unbounded").astype(np.float32)[None, None], raw=True)
+    if isinstance(made, Bitmap) and made.image is GREY:
+        made = replace(made, image=EVEN)
     if not isinstance(made, Bitmap):
-        raise child.error("must be a texture of the type 'bitmap'")
+        raise props.element.error("'normalmap' must be a bitmap, or one colour")
     return {**given, "map": made}
 
 
 def _bump_map(props: Properties) -> Parameters:
     given = _bent(props)
-    tags = {name: props.context.resolve(child).tag for name, child in props.named.items()}
-    named = [props.take(name) for name, tag in tags.items() if tag == "texture"]
-    found = [props.context.resolve(child) for child in named if child is not None]
-    found += props.objects("texture")
+    found = nested_textures(props)
     if len(found) != 1:
         raise props.element.error(f"needs one texture of heights, not {len(found)}")
     return {**given, "height": texture(found[0], props), "scale": props.number("scale", 1.0)}
@@ -251,6 +306,10 @@ PLUGINS: dict[str, tuple[type[Material], Callable[[Properties], Parameters]]] = 
     "roughconductor": (materials.RoughConductor, _rough_conductor),
     "plastic": (materials.Plastic, _plastic),
     "roughplastic": (materials.RoughPlastic, _rough_plastic),
+    "pplastic": (materials.RoughPlastic, _polarized_plastic),
+    "polarizer": (materials.ThinDielectric, _polarizing(0.5)),
+    "circular": (materials.ThinDielectric, _polarizing(0.5)),
+    "retarder": (materials.ThinDielectric, _polarizing(1.0)),
     "principled": (materials.Principled, principled),
     "principledthin": (materials.PrincipledThin, principled_thin),
     "grating": (materials.Grating, _grating),

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from clpt import images
+from clpt.formats.mitsuba.limits import within
 from clpt.formats.mitsuba.properties import Context, Properties, unknown
 from clpt.formats.mitsuba.sensors import from_focal_length
 from clpt.formats.mitsuba.spectra import TOP_DOWN, emission, reflectance
@@ -49,7 +50,7 @@ def _make(
     props = Properties(element, context)
     props.ignore("sampling_weight")
     with element.locating():
-        made = cls(**read(props))
+        made = cls(**within(cls, read(props), props))
     props.finish()
     return made
 
@@ -71,9 +72,9 @@ def _point(props: Properties) -> Parameters:
 
 def _spot(props: Properties) -> Parameters:
     cutoff = props.number("cutoff_angle", 20.0)
-    beam = props.number("beam_width", 0.75 * cutoff)
-    if not 0.0 <= beam <= cutoff:
-        raise props.element.error("beam_width must lie between 0 and cutoff_angle")
+    beam = min(props.number("beam_width", 0.75 * cutoff), cutoff)
+    if beam < 0.0:
+        raise props.element.error("beam_width cannot be negative")
     return {
         "to_world": props.placement(),
         "intensity": emission(props, "intensity"),
@@ -137,7 +138,7 @@ def _constant(props: Properties) -> Parameters:
 def _envmap(props: Properties) -> Parameters:
     props.ignore("mis_compensation")
     return {
-        "image": props.file(),
+        "image": props.image(),
         "scale": props.number("scale", 1.0),
         "to_world": props.placement(),
     }

@@ -9,6 +9,7 @@ from clpt.formats.mitsuba.properties import Properties
 from clpt.formats.mitsuba.spectra import index, real, reflectance
 
 LEAST_SPECULAR, LEAST_ETA = 1e-3, 1.001  # Mitsuba's, of what transmits light
+MOST_SPECULAR = 12.5  # where the index that it stands for is infinite
 SHARED = (
     "anisotropic", "spec_trans", "spec_tint", "sheen", "sheen_tint", "flatness",
 )  # fmt: skip
@@ -49,8 +50,9 @@ def _eta(props: Properties, *, transmits: bool) -> Any:
         eta = index(props, "eta", 1.5)
         return LEAST_ETA if transmits and eta == 1.0 else eta
     specular = props.number("specular", 0.5)
-    if not 0.0 <= specular <= 1.0:
-        raise props.element.error(f"specular must be from 0 to 1, not {specular:g}")
+    if not 0.0 <= specular < MOST_SPECULAR:
+        message = f"specular must be at least 0 and below {MOST_SPECULAR:g}, not {specular:g}"
+        raise props.element.error(message)
     if transmits:
         specular = specular or LEAST_SPECULAR
     return 2.0 / (1.0 - math.sqrt(0.08 * specular)) - 1.0

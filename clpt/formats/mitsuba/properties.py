@@ -9,9 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clpt import transforms
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
+from clpt.formats.missing import GREY, Missing, grey_for
 from clpt.formats.mitsuba.xml import MAX_NESTING, Document, Element
 
 VALUES = {
@@ -23,10 +25,9 @@ OBJECTS = {
     "volume", "medium", "phase", "ref",
 }  # fmt: skip
 UNSUPPORTED = {
-    "measured", "measured_polarized", "polarizer", "retarder", "circular", "pplastic",
-    "sdfgrid", "ellipsoids", "ellipsoidsmesh", "sunsky", "timed_sunsky",
-    "distant", "irradiancemeter", "radiancemeter", "batch", "specfilm",
-    "depth", "stokes", "rawconstant",
+    "measured", "measured_polarized", "sdfgrid", "ellipsoids", "ellipsoidsmesh",
+    "sunsky", "timed_sunsky", "distant", "irradiancemeter", "radiancemeter", "batch", "specfilm",
+    "stokes",
 }  # fmt: skip
 SEPARATOR = re.compile(r"[\s,]+")
 LARGEST_INTEGER = 2**31 - 1
@@ -36,8 +37,8 @@ MAX_PARTS = 1000  # of one material or texture
 class Context:
     """What all parts of the loader share: the document, its ids, the objects made, warnings."""
 
-    def __init__(self, document: Document):
-        self.document = document
+    def __init__(self, document: Document, missing: Missing = "error"):
+        self.document, self.missing = document, missing
         self.warnings: list[str] = []
         self.ids: dict[str, Element] = {}
         self._made: dict[int, Any] = {}
@@ -193,6 +194,17 @@ class Properties:
             raise self.element.error(f"needs the parameter {name!r}")
         self._expect(child, "string")
         return self.context.document.find_file(child, child.attribute("value"))
+
+    def image(self) -> Path | NDArray[np.float32]:
+        """Take the name of an image; grey where there is none and missing ones are grey."""
+        child = self.named.get("filename")
+        try:
+            return self.file()
+        except SceneError:
+            if child is None or child.tag != "string" or self.context.missing == "error":
+                raise
+            self.context.warn(self.element, grey_for(child.attributes.get("value")))
+            return GREY
 
     def vector(self, name: str, default: Sequence[float] | None) -> Any:
         """Take a point or a vector."""

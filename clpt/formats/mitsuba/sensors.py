@@ -310,6 +310,10 @@ def _aov(props: Properties) -> Integrator:
     return integrators.Aov(channels=tuple(dict.fromkeys(channels)))
 
 
+def _depth(props: Properties) -> Integrator:
+    return integrators.Aov(channels=("depth",))
+
+
 def _moment(props: Properties) -> Integrator:
     nested = props.object("integrator")
     if nested is None:
@@ -323,6 +327,7 @@ INTEGRATORS: dict[str, Callable[[Properties], Integrator]] = {
     "direct": _direct,
     "ptracer": _particle_tracer,
     "aov": _aov,
+    "depth": _depth,
     "moment": _moment,
     "volpath": _volume_path,
     "volpathmis": _volume_path,

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clpt import transforms
 from clpt.errors import SceneError
@@ -21,6 +22,7 @@ from clpt.scene.shapes import Group, Instance, Shape
 
 Parameters = dict[str, Any]
 UNEVEN = 1e-3  # relative stretch of round shapes that a transform may have
+STRETCH = "stretch"  # no parameter: a transform that the shape takes as an instance
 
 
 def shapes_of(elements: Iterable[Element], context: Context) -> list[Shape]:
@@ -66,11 +68,15 @@ def shape(element: Element, context: Context) -> Shape:
         "name": element.attributes.get("id", ""),
     }
     parameters |= read(props)
+    stretch = parameters.pop(STRETCH, None)
     if cls is shapes.Sphere and transforms.flips_handedness(parameters["to_world"]):
         # A mirror turns Mitsuba's spheres inside out, and no other shape.
         parameters["flip_normals"] = not parameters["flip_normals"]
     with element.locating():
-        made = cls(**parameters)
+        made: Shape = cls(**parameters)
+        if stretch is not None:
+            group = Group((made,), made.name or made.kind)
+            made = Instance(group=group, to_world=stretch, name=made.name)
     props.finish()
     return made
 
@@ -113,36 +119,47 @@ def _transform_only(props: Properties) -> Parameters:
 
 
 def _sphere(props: Properties) -> Parameters:
-    return {
-        "center": props.vector("center", (0.0, 0.0, 0.0)),
-        "radius": _radius(props),
-        "to_world": _round(props, (0.0, 0.0, 0.0)),
-    }
+    centre, radius = props.vector("center", (0.0, 0.0, 0.0)), _radius(props)
+    to_world, even = _placed(props, (0.0, 0.0, 0.0))
+    if even:
+        return {"center": centre, "radius": radius, "to_world": to_world}
+    message = "to_world stretches or shears the sphere, which stays round, as in Mitsuba"
+    props.context.warn(props.element, message)
+    turned, sizes = _rounded(to_world @ transforms.translate(centre))
+    return {"center": (0.0, 0.0, 0.0), "radius": radius * sizes[0, 0], "to_world": turned}
 
 
 def _cylinder(props: Properties) -> Parameters:
     p0, p1 = props.vector("p0", (0.0, 0.0, 0.0)), props.vector("p1", (0.0, 0.0, 1.0))
     if p0 == p1:
         raise props.element.error("p0 and p1 are the same point")
-    to_world = _round(props, np.subtract(p1, p0))
-    return {"p0": p0, "p1": p1, "radius": _radius(props), "to_world": to_world}
+    radius = _radius(props)
+    to_world, even = _placed(props, np.subtract(p1, p0))
+    if even:
+        return {"p0": p0, "p1": p1, "radius": radius, "to_world": to_world}
+    return {"p0": p0, "p1": p1, "radius": radius, STRETCH: to_world}
 
 
-def _round(props: Properties, axis: Any) -> transforms.Matrix:
-    """Take a transform that keeps a shape round about an axis, or about a point.
+def _rounded(matrix: transforms.Matrix) -> tuple[transforms.Matrix, NDArray[np.float64]]:
+    """Part a matrix into what turns, mirrors and moves, (4, 4), and what stretches, (3, 3).
 
-    Mitsuba warns of any other transform, and renders a round shape.
+    Mitsuba takes a sphere's radius from the first number of the latter.
     """
-    child = props.named.get("to_world")
+    u, sizes, v = np.linalg.svd(matrix[:3, :3])
+    turned = matrix.copy()
+    turned[:3, :3] = u @ v
+    return turned, v.T @ np.diag(sizes) @ v
+
+
+def _placed(props: Properties, axis: Any) -> tuple[transforms.Matrix, bool]:
+    """Take a transform, and tell whether it keeps a shape round about an axis, or about a point."""
     to_world = props.placement()
     products = to_world[:3, :3].T @ to_world[:3, :3]
     along = np.outer(axis, axis) / max(np.dot(axis, axis), 1e-300)
     length = np.sum(along * products)
     even = (np.trace(products) - length) / (3.0 - np.trace(along))
     uneven = products - even * np.eye(3) - (length - even * np.trace(along)) * along
-    if child is not None and np.abs(uneven).max() > UNEVEN * np.trace(products):
-        raise child.error(f"it stretches or shears the {props.element.type}; use a mesh for that")
-    return to_world
+    return to_world, bool(np.abs(uneven).max() <= UNEVEN * np.trace(products))
 
 
 def _radius(props: Properties) -> float:

@@ -14,7 +14,14 @@ import numpy as np
 
 from clpt import spectra
 from clpt.formats.colour import colour
-from clpt.formats.mitsuba.properties import Context, Properties, number, numbers, unknown
+from clpt.formats.mitsuba.properties import (
+    Context,
+    Properties,
+    number,
+    numbers,
+    triple,
+    unknown,
+)
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene.textures import ATTRIBUTES, Bitmap, Checkerboard, MeshAttribute, Product, Texture
 from clpt.spectra import (
@@ -132,6 +139,7 @@ def _volume(element: Element, role: str, context: Context) -> Any:
 
 
 def _spectrum(child: Element, role: str, props: Properties, name: str) -> Any:
+    """Make a number, a colour or a spectrum; what lies beyond limits is left to `within`."""
     if child.tag in ("float", "integer"):
         value = number(child)
         return colour(role, [value] * 3) if role == "emission" else value
@@ -196,7 +204,19 @@ def _blackbody(props: Properties) -> Spectrum:
     )
 
 
-def _d65(props: Properties) -> Spectrum:
+def nested_textures(props: Properties) -> list[Element]:
+    """Take the textures that stand in an object, whatever their names."""
+    tags = {name: props.context.resolve(child).tag for name, child in props.named.items()}
+    named = [props.take(name) for name, tag in tags.items() if tag == "texture"]
+    found = [props.context.resolve(child) for child in named if child is not None]
+    return found + props.objects("texture")
+
+
+def _d65(props: Properties) -> Any:
+    """D65, times a colour or a texture."""
+    found = nested_textures(props)
+    if found:
+        return _scaled(texture(found[0], props), props.number("scale", 1.0))
     child = props.take("color")
     rgb = _colour(child) if child is not None else [1.0, 1.0, 1.0]
     scale = props.number("scale", 1.0)
@@ -212,6 +232,21 @@ def _needed_colour(props: Properties) -> list[float]:
     if child is None:
         raise props.element.error("needs the parameter 'color'")
     return _colour(child)
+
+
+def _raw_constant(props: Properties) -> Any:
+    """A number or three, by a <vector>; of three a colour is made as of <rgb>, where one is asked.
+
+    Mitsuba refuses three in spectral mode.
+    """
+    child = props.take("value")
+    if child is None:
+        raise props.element.error("needs the parameter 'value'")
+    if child.tag in ("float", "integer"):
+        return Constant(number(child))
+    if child.tag not in ("vector", "point"):
+        raise child.error("must be a <float> or a <vector>")
+    return RGBUnbounded(*triple(child, "value", 0.0).tolist())
 
 
 def _irregular(props: Properties) -> Spectrum:
@@ -260,11 +295,12 @@ def _list(props: Properties, name: str) -> list[float]:
     return numbers(child, "value")
 
 
-PLUGINS: dict[str, Callable[[Properties], Spectrum]] = {
+PLUGINS: dict[str, Callable[[Properties], Any]] = {
     "uniform": _uniform,
     "blackbody": _blackbody,
     "d65": _d65,
     "srgb": _srgb,
+    "rawconstant": _raw_constant,
     "irregular": _irregular,
     "regular": _regular,
     "illuminant": _illuminant,
@@ -280,9 +316,10 @@ def _plugin(child: Element, role: str, outer: Properties) -> Any:
     if child.type not in PLUGINS:
         raise unknown(child, PLUGINS)
     props = Properties(child, outer.context)
-    bounded = child.type == "srgb" and role == "reflectance"
-    made = tuple(_needed_colour(props)) if bounded else PLUGINS[child.type](props)
+    made = PLUGINS[child.type](props)
     props.finish()
+    if role == "reflectance" and type(made) is RGBUnbounded:
+        return made.r, made.g, made.b
     return made
 
 
@@ -305,7 +342,7 @@ def _bitmap(props: Properties) -> Bitmap:
     wraps = {"repeat": "repeat", "clamp": "clamp", "mirror": "mirror"}
     props.ignore("format", "accel")
     return Bitmap(
-        image=props.file(),
+        image=props.image(),
         raw=props.flag("raw", False),
         filter=props.text("filter_type", "bilinear", ("bilinear", "nearest")),
         wrap=wraps[props.text("wrap_mode", "repeat", tuple(wraps))],
@@ -326,7 +363,10 @@ def _mesh_attribute(props: Properties) -> Texture:
     if not name.startswith(ATTRIBUTES):
         message = f"'name' must begin with {' or '.join(ATTRIBUTES)}, not {name!r}"
         raise props.element.error(message)
-    made = MeshAttribute(name=name)
+    return _scaled(MeshAttribute(name=name), scale)
+
+
+def _scaled(made: Texture, scale: float) -> Texture:
     return made if scale == 1.0 else Product(first=made, second=scale)
 
 

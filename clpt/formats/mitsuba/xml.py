@@ -125,18 +125,12 @@ def _read(path: Path) -> Element:
         stack[-1].children.append(element)
         stack.append(element)
 
-    def text(data: str) -> None:
-        if data.strip():
-            shown = data.strip()[:20]
-            raise SceneError(f"stray text {shown!r}", file=path, line=parser.CurrentLineNumber)
-
     def doctype(*_: object) -> None:
         line = parser.CurrentLineNumber
         raise SceneError("a document type is not allowed in a scene", file=path, line=line)
 
     parser.StartElementHandler = start
     parser.EndElementHandler = lambda tag: stack.pop()
-    parser.CharacterDataHandler = text
     parser.StartDoctypeDeclHandler = doctype
     try:
         parser.Parse(path.read_bytes(), True)

@@ -17,7 +17,7 @@ from clpt.formats.native import json_schema, reradiation, sensors
 from clpt.formats.native import spectra as json_spectra
 from clpt.formats.native.cursor import Cursor
 from clpt.formats.native.json_schema import NUMBER, NUMBERS, STRING, TRIPLE, Schema, ref
-from clpt.formats.native.spectra import find_file, kind_name
+from clpt.formats.native.spectra import kind_name
 from clpt.formats.native.transforms import matrix
 from clpt.scene import kinds
 from clpt.scene.params import ORDERS, SPECTRUM_ROLES, Kind, Param
@@ -34,6 +34,7 @@ class Reader(Protocol):
     def material(self, cursor: Cursor) -> Any: ...
     def area_light(self, cursor: Cursor) -> Any: ...
     def group(self, cursor: Cursor) -> Any: ...
+    def image(self, cursor: Cursor) -> Any: ...
 
 
 class Writer(Protocol):
@@ -112,7 +113,7 @@ def _of_cursor(
 def _spectrum(role: str) -> Form:
     return Form(
         role,
-        ref(f"spectrum_{role}"),
+        lambda param: ref(f"spectrum_{_limits_of(param)}"),
         lambda cursor, _: json_spectra.read(cursor, role),
         # a default may be given as a number or three
         lambda value, _: (
@@ -121,6 +122,11 @@ def _spectrum(role: str) -> Form:
             else json_spectra.write(value, role)
         ),
     )
+
+
+def _limits_of(param: Param) -> str:
+    """The role whose limits a spectrum has."""
+    return "factor" if param.role == "reflectance" and math.isinf(param.high) else param.role
 
 
 def _rows(width: int, item: str = "number") -> Form:
@@ -177,10 +183,10 @@ def _number_or_list(cursor: Cursor) -> Any:
     return cursor.numbers() if isinstance(cursor.value, list) else cursor.number()
 
 
-def _cube_images(cursor: Cursor) -> Any:
+def _cube_images(cursor: Cursor, reader: Reader) -> Any:
     if isinstance(cursor.value, list):
-        return [find_file(entry) for entry in cursor.entries(6)]
-    return find_file(cursor)
+        return [reader.image(entry) for entry in cursor.entries(6)]
+    return reader.image(cursor)
 
 
 def _write_cube_images(value: Any, writer: Writer) -> Any:
@@ -302,13 +308,13 @@ FORMS: dict[str, Form] = {
     "image": Form(
         "name of an image file",
         STRING,
-        lambda cursor, _: find_file(cursor),
+        lambda cursor, reader: reader.image(cursor),
         lambda value, writer: writer.image(value),
     ),
     "cube_images": Form(
         "name of an image file, or a list of six",
         {"anyOf": [STRING, {"type": "array", "items": STRING, "minItems": 6, "maxItems": 6}]},
-        lambda cursor, _: _cube_images(cursor),
+        _cube_images,
         _write_cube_images,
     ),
     "sensor": Form(

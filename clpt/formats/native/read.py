@@ -11,6 +11,7 @@ import numpy as np
 
 from clpt import spectra
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
+from clpt.formats.missing import EVEN, GREY, Missing, grey_for
 from clpt.formats.native import forms, shape_files
 from clpt.formats.native.cursor import Cursor, parse
 from clpt.formats.native.spectra import find_file, kind_name
@@ -24,20 +25,22 @@ KEYS = (
 )  # fmt: skip
 
 
-def load(path: Path, outside: Iterable[type[materials.Material]] = ()) -> Scene:
+def load(
+    path: Path, outside: Iterable[type[materials.Material]] = (), missing: Missing = "error"
+) -> Scene:
     """Read a scene.json.
 
-    outside: material kinds that are not clpt's own. Raises SceneError, UnknownKindError and
-    UnusedParameterError with file, line and path of the value.
+    outside: material kinds that are not clpt's own; missing: see clpt.load. Raises SceneError,
+    UnknownKindError and UnusedParameterError with file, line and path of the value.
     """
-    return _Reader(parse(path), outside).scene()
+    return _Reader(parse(path), outside, missing).scene()
 
 
 class _Reader:
     """Reads one file; keeps materials and groups by name, so that shapes share them."""
 
-    def __init__(self, root: Cursor, outside: Iterable[type[materials.Material]]):
-        self.root = root
+    def __init__(self, root: Cursor, outside: Iterable[type[materials.Material]], missing: Missing):
+        self.root, self.missing = root, missing
         self.outside: dict[str, type[Kind]] = {}
         for cls in outside:
             if cls.kind in {**kinds("material"), **self.outside}:
@@ -99,6 +102,17 @@ class _Reader:
             values["eta"], values["k"] = _metal(cursor.at("metal"))
         with cursor.locating():
             return cls(**values)
+
+    def image(self, cursor: Cursor) -> Any:
+        """Return the path of an image; grey where there is none and missing ones are grey."""
+        try:
+            return find_file(cursor)
+        except SceneError:
+            if self.missing == "error" or not isinstance(cursor.value, str):
+                raise
+            if grey_for(cursor.value) not in self.warnings:
+                self.warnings.append(grey_for(cursor.value))
+            return EVEN if cursor.path[-2:] == ("map", "image") else GREY
 
     def layer(self, cursor: Cursor) -> Any:
         """Read a thin film."""

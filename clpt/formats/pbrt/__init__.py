@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from clpt.formats.missing import Missing
 from clpt.formats.pbrt import build_scene, camera_film, films, reader
 from clpt.formats.pbrt.build_scene import Progress
 from clpt.formats.pbrt.files import Contents
@@ -18,14 +19,15 @@ from clpt.scene import Scene
 __all__ = ["load"]
 
 
-def load(path: Path, progress: Progress | None = None) -> Scene:
+def load(path: Path, progress: Progress | None = None, missing: Missing = "error") -> Scene:
     """Read a .pbrt file, packed by gzip or not.
 
-    progress: called with the share that is done, from 0 to 1, and a text. Raises SceneError with
-    file, line and directive for anything broken or not supported.
+    progress: called with the share that is done, from 0 to 1, and a text; missing: see clpt.load.
+    Raises SceneError with file, line and directive for anything broken or not supported.
     """
     contents = reader.read(path)
     shared = contents.shared
+    shared.missing = missing
     shared.make_material = build_scene.make_material
     options = contents.options
     camera = options.get("Camera") or _default_camera(path, contents)

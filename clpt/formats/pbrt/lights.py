@@ -14,6 +14,7 @@ import numpy as np
 
 from clpt import images, transforms
 from clpt.errors import SceneError, UnknownKindError
+from clpt.formats.missing import GREY
 from clpt.formats.pbrt import octahedral
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.spectra import scaled, spectrum
@@ -208,7 +209,8 @@ def _projection(params: Parameters, state: State) -> Light:
 
 def _image(file: str, state: State) -> Any:
     """The colours (h, w, 3) float32 of a light's image, none of them negative."""
-    image = images.read(state.existing_file(file))
+    path = state.image(file)
+    image = GREY if path is None else images.read(path)
     if not np.isfinite(image).all():
         raise SceneError(f"{file!r} has values that are not finite, so it cannot be a light")
     if image.shape[2] not in (1, 3, 4):

@@ -13,6 +13,7 @@ import numpy as np
 
 from clpt import transforms
 from clpt.errors import SceneError
+from clpt.formats.missing import Missing, grey_for
 from clpt.formats.pbrt.params import Parameter, Parameters
 from clpt.scene.materials import Material
 
@@ -44,6 +45,7 @@ class Shared:
     files: dict[str, State] = field(default_factory=dict)  # the names, and where each stands
     made: dict[Any, Any] = field(default_factory=dict)
     make_material: Callable[..., Material] | None = None
+    missing: Missing = "error"
 
     def once(self, key: Any, source: Parameters | Parameter, make: Callable[[], Any]) -> Any:
         """Return make(), called once for each key. Raises SceneError where it needs itself."""
@@ -107,6 +109,14 @@ class State:
         missing = [n for n, state in named if n != name and not state.file(n).is_file()]
         nor = f"; nor are there {', '.join(map(repr, missing))}" if missing else ""
         raise SceneError(f"there is no file {name!r}{nor}")
+
+    def image(self, name: str) -> Path | None:
+        """Return the path of an image; None where grey is to stand for it. Raises SceneError."""
+        if self.shared.missing == "error" or self.file(name).is_file():
+            return self.existing_file(name)
+        if grey_for(name) not in self.shared.warnings:
+            self.shared.warnings.append(grey_for(name))
+        return None
 
     def texture(self, values: str, name: str, source: Parameters | Parameter) -> Definition:
         """Return the definition of a texture of "float" or "spectrum" values. Raises SceneError."""

@@ -15,6 +15,7 @@ import numpy as np
 
 from clpt import transforms
 from clpt.errors import SceneError, UnknownKindError
+from clpt.formats.missing import EVEN, GREY
 from clpt.formats.pbrt.map_values import map_values
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.spectra import SPECTRUM_TYPES, spectrum, value_of
@@ -68,7 +69,8 @@ def _texture(form: str, definition: Definition) -> Any:
 
 def normals(file: str, state: State) -> Bitmap:
     """The image of a normal map, whose colours are read as they are."""
-    return Bitmap(image=state.file(file), raw=True)
+    path = state.image(file)
+    return Bitmap(image=EVEN if path is None else path, raw=True)
 
 
 def _argument(form: str, params: Parameters, name: str, state: State, default: float) -> Any:
@@ -142,23 +144,25 @@ def _checkerboard(form: str, params: Parameters, state: State) -> Any:
 
 
 def _imagemap(form: str, params: Parameters, state: State) -> Any:
-    file = state.existing_file(params.one("filename", "string", ""))
+    file = state.image(params.one("filename", "string", ""))
     wrap = params.choice("wrap", "repeat", WRAPS)
     if wrap == "octahedralsphere":
         state.warn(params, "wrap 'octahedralsphere' is taken as 'clamp'")
     params.one("maxanisotropy", "float", 8.0)
     made = Bitmap(
-        image=file,
+        image=GREY if file is None else file,
         filter=FILTERS[params.choice("filter", "bilinear", FILTERS)],
         wrap=WRAPS[wrap],
         channel="r" if form == "float" else "luminance",
         **_mapping(params, state),
     )
     encoding = params.one("encoding", "string", "sRGB")
-    if file.suffix.lower() == ".png":  # pbrt ignores the encoding of other files
+    if (
+        file is not None and file.suffix.lower() == ".png"
+    ):  # pbrt ignores the encoding of other files
         made = _decoded(made, encoding)
     scale, invert = params.one("scale", "float", 1.0), params.one("invert", "bool", False)
-    if scale == 1.0 and not invert:
+    if file is None or (scale == 1.0 and not invert):
         return made
     return map_values(made, lambda v: np.maximum(1.0 - scale * v if invert else scale * v, 0.0))
 

@@ -117,10 +117,12 @@ def lower(
     features = features_of(index, encoder, materials, geometry, lights, tabulated)
     settings = settings_of(index, geometry, lights, wavelengths, density_row, ambient_row, sphere)
     cache.settle()
+    tables = encoder.store.arrays()
+    encoder.textures.images.joined(tables["images"])
     return Lowered(
         features=features,
         settings=settings,
-        tables=encoder.store.arrays(),
+        tables=tables,
         vertices=geometry.vertices,
         faces=geometry.faces,
         tags=geometry.tags,

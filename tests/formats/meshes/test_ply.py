@@ -41,13 +41,13 @@ def content(form, faces, count="uchar"):
     head = HEADER.format(form, len(faces), count).encode()
     if form == "ascii":
         rows = [f"{x} {y} {z} 9 {x / 2} {y / 2}" for x, y, z in POINTS]
-        rows += [f"7 {len(face)} " + " ".join(map(str, face)) for face in faces]
+        rows += [f"{face[1]} {len(face)} " + " ".join(map(str, face)) for face in faces]
         return head + "\n".join(rows).encode()
     order = "<" if "little" in form else ">"
     body = b"".join(struct.pack(f"{order}3fB2d", *p, 9, p[0] / 2, p[1] / 2) for p in POINTS)
     letter = {"uchar": "B", "int": "i"}[count]
     for face in faces:
-        body += struct.pack(f"{order}i{letter}{len(face)}i", 7, len(face), *face)
+        body += struct.pack(f"{order}i{letter}{len(face)}i", face[1], len(face), *face)
     return head + body
 
 
@@ -67,6 +67,8 @@ def test_forms(tmp_path, form, name, packed):
     assert made.uvs == pytest.approx(np.array(POINTS)[:, :2] / 2)
     assert made.normals is None
     assert (made.columns["vertex"]["red"] == 9).all()
+    flags = [face[1] for face in FACES[name] for _ in face[2:]]  # a polygon's, of each triangle
+    assert made.columns["face"]["flags"].tolist() == flags
 
 
 @pytest.mark.parametrize("ends", ["\r\n", "\r"], ids=["CRLF", "CR"])

@@ -498,8 +498,7 @@ ERRORS = {
     '<bsdf type="principled"><float name="eta" value="2"/><float name="specular" value="1"/>'
     "</bsdf>":
         "either 'eta' or 'specular'",
-    '<bsdf type="principled"><float name="specular" value="2"/></bsdf>': "from 0 to 1, not 2",
-    '<bsdf type="principled"><float name="metallic" value="2"/></bsdf>': r"outside \[0, 1\]",
+    '<bsdf type="principled"><float name="specular" value="13"/></bsdf>': "below 12.5, not 13",
     '<bsdf type="difuse"/>': "did you mean 'diffuse'",
     '<shape type="heightfield"/>': r":2: <shape .*unknown shape 'heightfield'",
     '<shape type="instance"/>': r":2: <shape .*needs a <shape type=.shapegroup.>",
@@ -511,7 +510,6 @@ ERRORS = {
     '<bsdf type="diffuse"><float name="foo" value="1"/></bsdf>': "has no parameter 'foo'",
     '<bsdf type="diffuse"><float name="reflectance" value="x"/></bsdf>': "must be numbers",
     '<bsdf type="diffuse"><float name="reflectance" value="nan"/></bsdf>': "must be finite",
-    '<bsdf type="diffuse"><float name="reflectance" value="2"/></bsdf>': r"outside \[0, 1\]",
     '<bsdf type="diffuse"><string name="reflectance" value="2"/></bsdf>': "must be a number",
     '<bsdf type="diffuse"><ref name="reflectance" id="x"/></bsdf>': "no object with the id 'x'",
     '<bsdf type="diffuse"><bsdf type="null"/></bsdf>': "cannot stand in bsdf 'diffuse'",
@@ -530,16 +528,11 @@ ERRORS = {
     '<shape type="cube"><transform name="to_world"><scale value="0"/></transform></shape>':
         "cannot be inverted",
     '<shape type="cube"><transform name="to_world"><skew/></transform></shape>': "<skew>: is no",
-    '<shape type="sphere"><transform name="to_world"><scale x="2"/></transform></shape>':
-        "<transform name=.to_world.>: it stretches or shears the sphere",
-    '<shape type="cylinder"><transform name="to_world"><scale x="2"/></transform></shape>':
-        "<transform name=.to_world.>: it stretches or shears the cylinder",
     '<shape type="cube"><emitter type="point"/></shape>': "only an area light",
     '<emitter type="area"/>': "must stand in a <shape>",
     '<emitter type="projector"><float name="fov" value="0"/></emitter>': "field of view",
     '<emitter type="projector"><float name="fov" value="9"/><spectrum name="irradiance" value="2"/>'
     "</emitter>": "a texture or a colour",
-    '<emitter type="constant"><rgb name="radiance" value="-1"/></emitter>': "negative",
     '<integrator type="path"><integer name="max_depth" value="1.5"/></integrator>': "whole number",
     '<integrator type="path"><boolean name="hide_emitters" value="1"/></integrator>': "true or",
     '<integrator type="path"><integer name="rr_depth" value="1"/>'
@@ -551,14 +544,13 @@ ERRORS = {
     '<alias id="no" as="a"/>': "no object with the id 'no'",
     '<bsdf type="null" id="a"/><alias id="a" as="a"/>': "already used",
     '<shape type="cube"><bsdf type="normalmap"><texture type="checkerboard" name="normalmap"/>'
-    '<bsdf type="diffuse"/></bsdf></shape>': "must be a texture of the type 'bitmap'",
+    '<bsdf type="diffuse"/></bsdf></shape>': "must be a bitmap, or one colour",
     '<bsdf type="diffuse"><texture type="volume" name="reflectance"><volume type="gridvolume" '
     'name="volume"/></texture></bsdf>': "<volume type=.gridvolume.>: only a <volume>",
     '<bsdf type="roughconductor"><spectrum name="alpha" value="400:0, 500:0.1"/></bsdf>':
         "must be a number or a texture",
     '<float value="1"/>': "needs the attribute 'name'",
     "<scene>": "broken XML: no element found",
-    "text": "stray text",
 }  # fmt: skip
 
 
@@ -597,7 +589,7 @@ def test_a_scene_without_sensor_is_framed(scene):
 def test_the_tests_own_scenes_load(scenes):
     for path in sorted(scenes.glob("*.xml")):
         made = load(path)
-        assert made.shapes and not made.warnings, path
+        assert made.shapes and bool(made.warnings) == (path.name == "bent.xml"), path
 
 
 @pytest.mark.peers

@@ -268,6 +268,4 @@ def test_round_shapes_may_be_scaled_turned_mirrored_and_a_cylinder_lengthened(re
         f'<shape type="sphere">{place}</shape><shape type="cylinder">{longer}</shape>'
         f'<shape type="cylinder">{ends}{along}</shape>'
     )
-    assert len(made.shapes) == 3
-    with pytest.raises(SceneError, match="stretches or shears"):
-        read(f'<shape type="cylinder">{ends}{longer}</shape>')
+    assert len(made.shapes) == 3 and not made.warnings

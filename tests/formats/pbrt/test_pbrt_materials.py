@@ -196,12 +196,13 @@ def test_mixtures_nest():
     assert isinstance(opaque.first, TwoSided)
 
 
-def test_relief():
+def test_relief(tmp_path):
+    (tmp_path / "n.png").write_bytes(b"")
     at = state()
     define(at, "float", "t", "checkerboard")
     made = make("diffuse", at, displacement=("texture", "t"))
     assert isinstance(made, materials.BumpMap) and isinstance(made.height, Checkerboard)
-    mapped = make("diffuse", at, normalmap=("string", "n.png"))
+    mapped = make("diffuse", at, normalmap=("string", str(tmp_path / "n.png")))
     assert isinstance(mapped, materials.NormalMap) and mapped.map.raw
 
 

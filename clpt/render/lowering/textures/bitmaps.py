@@ -33,12 +33,69 @@ THREADS = 8
 
 
 @dataclass
+class _Form:
+    """What an image is, without its pixels: (h, w, c), whether of bytes, and `Stored.encoded`."""
+
+    shape: tuple[int, ...]
+    bytes: bool
+    encoded: bool
+
+
+class _Pixels:
+    """The pixels of an image; of a file they are decoded beside, and let go of when packed."""
+
+    def __init__(self, image: Any):
+        self._image = image
+        self._stored: Future[Stored] | None = None
+        self._form: _Form | None = None
+        self._is_file = isinstance(image, (str, Path))
+        self.begin()
+
+    def begin(self) -> None:
+        """Have them, or begin to read them."""
+        if self._is_file:
+            self._stored = _pool(os.getpid()).submit(images.read_stored, self._image)
+        else:
+            self._stored = Future()
+            self._stored.set_result(_array(self._image))
+
+    @property
+    def stored(self) -> Stored:
+        """The image; it is read again after `let_go`. Raises SceneError."""
+        if self._stored is None:
+            self.begin()
+        assert self._stored is not None
+        return self._stored.result()
+
+    @property
+    def form(self) -> _Form:
+        """What is known of it even after `let_go`. Raises SceneError."""
+        if self._form is None:
+            values, encoded = self.stored.values, self.stored.encoded
+            self._form = _Form(values.shape, values.dtype == np.uint8, encoded)
+        return self._form
+
+    def let_go(self) -> None:
+        """Forget the pixels of a file."""
+        if self._is_file and self._form is not None:
+            self._stored = None
+
+
+@dataclass
+class _Packed:
+    """The words of an image, a view of the table once that is joined; its height and width."""
+
+    words: Words
+    size: tuple[int, ...]
+
+
+@dataclass
 class _Image:
     """An image in one role, and the rows of `textures` that show it."""
 
     texture: Bitmap
     role: str
-    stored: Future[Stored]
+    pixels: _Pixels
     rows: list[np.ndarray] = field(default_factory=list)
     halvings: int = 0
 
@@ -55,6 +112,7 @@ class Images:
         self.spectral, self.budget, self.cache = spectral, budget, cache or LoweringCache()
         self._wanted: dict[Any, _Image] = {}
         self._decoding: dict[bool, int] = {}
+        self._placed: list[tuple[int, _Packed]] = []  # the first word of each in the table
         self._spectra: dict[bool, _Spectra] = defaultdict(_Spectra)
 
     def add(self, texture: Bitmap, role: str, row: np.ndarray) -> None:
@@ -78,8 +136,8 @@ class Images:
         wanted, self._wanted = list(self._wanted.values()), {}
         notes = self._fit(wanted)
         for image in wanted:
-            stored = image.stored.result()
-            packed = _packs(stored, image, self.spectral)
+            form = image.pixels.form
+            bytes_ = _packs(form, image, self.spectral)
             texture, halvings = image.texture, image.halvings
             by = (
                 version(texture.image),
@@ -89,51 +147,61 @@ class Images:
                 halvings,
                 self.spectral,
             )
-            words, (height, width) = self.cache(Images._words, self, stored, image, by=by)
-            kind = "packed_bitmap" if packed else "bitmap"
-            if store.size("images") + words.size > LARGEST:
+            packed: _Packed = self.cache(Images._words, self, image, by=by)
+            height, width = packed.size
+            kind = "packed_bitmap" if bytes_ else "bitmap"
+            if store.size("images") + packed.words.size > LARGEST:
                 raise SceneError("all images together have too many texels", where="bitmap.image")
-            curved = stored.encoded and not image.texture.raw and not _is_alpha(image)
+            curved = form.encoded and not image.texture.raw and not _is_alpha(image)
             for row in image.rows:
                 row["kind"], row["width"], row["height"] = KINDS.index(kind), width, height
-                row["decode"] = self._decode(curved, store) if packed else 0
-            first = store.append("images", words)
+                row["decode"] = self._decode(curved, store) if bytes_ else 0
+            first = store.append("images", packed.words)
+            self._placed.append((first, packed))
             for row in image.rows:
                 row["first"] = first
             roles.add((kind, image.role))
+        for image in wanted:
+            image.pixels.let_go()
+        self._spectra.clear()
         return notes
 
-    def _words(self, stored: Stored, image: _Image) -> tuple[Words, tuple[int, ...]]:
-        """The words of an image, row by row from the top, and its height and width."""
-        texture, role = image.texture, image.role
+    def joined(self, table: Words) -> None:
+        """Keep the words of the images as parts of the table that they have been joined to."""
+        for first, packed in self._placed:
+            packed.words = table[first : first + packed.words.size]
+
+    def _words(self, image: _Image) -> _Packed:
+        """The words of an image, row by row from the top."""
+        texture, role, stored = image.texture, image.role, image.pixels.stored
+        packs = _packs(image.pixels.form, image, self.spectral)
         values, curved = _shaped(stored.values), stored.encoded and not texture.raw
         if image.halvings:
             values = _halved(values, curved, image.halvings)
         size = values.shape[:2]
-        if role == "real" and _packs(stored, image, self.spectral):
+        if role == "real" and packs:
             number = "rgba".find(texture.channel) if values.shape[2] > 1 else 0
             if texture.channel == "a" and values.shape[2] < 4:
-                return np.full(1, 0xFFFFFFFF, np.uint32), (1, 1)
+                return _Packed(np.full(1, 0xFFFFFFFF, np.uint32), (1, 1))
             chosen = values[..., number].reshape(-1)
-            return np.pad(chosen, (0, -len(chosen) % 4)).view("<u4"), size
-        if _packs(stored, image, self.spectral):
+            return _Packed(np.pad(chosen, (0, -len(chosen) % 4)).view("<u4"), size)
+        if packs:
             codes = _codes(values)
-            return (self._spectra[curved].packed(codes, curved) if self.spectral else codes), size
+            made = self._spectra[curved].packed(codes, curved) if self.spectral else codes
+            return _Packed(made, size)
         decoded = Stored(values, curved).decoded()
         if role == "real":
             numbers = np.nan_to_num(channel(decoded, texture.channel).astype(np.float32))
-            return numbers.reshape(-1).view(np.uint32), size
-        made = texels(np.nan_to_num(decoded[..., :3]), role, self.spectral)
-        made = made if self.spectral else made[:, :3]
-        return np.ascontiguousarray(made).reshape(-1).view(np.uint32), size
+            return _Packed(numbers.reshape(-1).view(np.uint32), size)
+        colours = texels(np.nan_to_num(decoded[..., :3]), role, self.spectral)
+        colours = colours if self.spectral else colours[:, :3]
+        return _Packed(np.ascontiguousarray(colours).reshape(-1).view(np.uint32), size)
 
-    def _read(self, image: Any) -> Future[Stored]:
-        """An image, or the promise of a file's, of which each is decoded once."""
+    def _read(self, image: Any) -> _Pixels:
+        """The pixels of an image; a file is decoded once."""
         if isinstance(image, (str, Path)):
-            return self.cache(_read_later, str(image), by=(version(image),))
-        made: Future[Stored] = Future()
-        made.set_result(_array(image))
-        return made
+            return self.cache(_Pixels, str(image), by=(version(image),))
+        return _Pixels(image)
 
     def _decode(self, curved: bool, store: TableStore) -> int:
         """The first of 256 words that say what bytes mean."""
@@ -164,10 +232,6 @@ def identity(texture: Bitmap) -> Any:
     return str(image) if isinstance(image, (str, Path)) else id(image)
 
 
-def _read_later(file: str) -> Future[Stored]:
-    return _pool(os.getpid()).submit(images.read_stored, file)
-
-
 @cache
 def _pool(process: int) -> ThreadPoolExecutor:
     """The threads of a process, by its id: those of a parent do not come along when it forks."""
@@ -196,20 +260,20 @@ def _is_alpha(image: _Image) -> bool:
     return image.role == "real" and image.texture.channel == "a"
 
 
-def _packs(stored: Stored, image: _Image, spectral: bool) -> bool:
+def _packs(form: _Form, image: _Image, spectral: bool) -> bool:
     """Whether bytes stay bytes."""
-    if stored.values.dtype != np.uint8:
+    if not form.bytes:
         return False
     if image.role == "real":
-        return stored.values.shape[2] == 1 or image.texture.channel != "luminance"
+        return form.shape[2] == 1 or image.texture.channel != "luminance"
     return not spectral or image.role == "reflectance"
 
 
 def _size(image: _Image, spectral: bool) -> int:
     """Bytes on the device."""
-    stored = image.stored.result()
-    height, width = (max(1, -(-n >> image.halvings)) for n in stored.values.shape[:2])
-    packed = _packs(stored, image, spectral)
+    form = image.pixels.form
+    height, width = (max(1, -(-n >> image.halvings)) for n in form.shape[:2])
+    packed = _packs(form, image, spectral)
     if image.role == "real":
         return height * width * (1 if packed else 4)
     if packed:
@@ -218,7 +282,7 @@ def _size(image: _Image, spectral: bool) -> int:
 
 
 def _note(image: _Image) -> str:
-    height, width = image.stored.result().values.shape[:2]
+    height, width = image.pixels.form.shape[:2]
     small = " x ".join(str(max(1, -(-n >> image.halvings))) for n in (width, height))
     source = image.texture.image
     name = source if isinstance(source, (str, Path)) else "an image"

@@ -1,0 +1,17 @@
+"""What stands for an image that a scene names and that is not there, where its user allows it."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+
+Missing = Literal["error", "grey"]
+GREY = np.full((1, 1, 3), 0.5, np.float32)
+EVEN = np.array([[[0.5, 0.5, 1.0]]], np.float32)  # a normal map that bends nothing
+GREY.flags.writeable = EVEN.flags.writeable = False
+
+
+def grey_for(name: Any) -> str:
+    """Return the warning of an image for which GREY or EVEN stands."""
+    return f"there is no file {str(name)!r}; grey stands for it"
