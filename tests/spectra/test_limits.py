@@ -15,7 +15,7 @@ LIMITED = [
     pytest.param(cls, name, param, id=f"{cls.kind}.{name}")
     for cls in (*(kind for group in KINDS.values() for kind in group), materials.Layer)
     for name, param in params(cls).items()
-    if param.role in SPECTRUM_ROLES and param.role != "factor"
+    if param.role in SPECTRUM_ROLES and param.low == 0.0
 ]
 
 

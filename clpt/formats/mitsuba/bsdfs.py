@@ -34,11 +34,9 @@ from clpt.spectra import Constant, RGBUnbounded, Spectrum
 
 Parameters = dict[str, Any]
 SMOOTHEST = 1e-4  # Mitsuba's own floor of a roughness
-SHOWN = {  # metals of Mitsuba without free data: how bright r, g and b of its pictures are, head-on
-    "Cu2O": (0.24, 0.26, 0.27), "CuO": (0.22, 0.22, 0.22), "HgTe": (0.38, 0.38, 0.39),
-    "Se": (0.30, 0.28, 0.28), "Se-e": (0.42, 0.43, 0.45), "SnTe": (0.33, 0.11, 0.05),
-    "Ta": (0.45, 0.36, 0.41), "Te": (0.56, 0.59, 0.58), "Te-e": (0.65, 0.69, 0.67),
-}  # fmt: skip
+# metals of Mitsuba without free data
+WITHOUT_DATA = ("Cu2O", "CuO", "HgTe", "Se", "Se-e", "SnTe", "Ta")
+GREY_METAL = 0.3  # what they reflect head-on
 
 
 def bsdf(element: Element, context: Context) -> Material:
@@ -107,13 +105,12 @@ def _metal(props: Properties) -> Parameters:
 
 
 def _named_metal(child: Element, context: Context) -> tuple[Spectrum, Spectrum]:
-    """A metal by its name; one of SHOWN has its colour where light meets it head-on."""
+    """A metal by its name; a grey one where there are no free data."""
     name = child.attribute("value")
-    shown = SHOWN.get(name.removesuffix("_palik"))
-    if shown is None:
+    if name.removesuffix("_palik") not in WITHOUT_DATA:
         return spectra.metal(name)
-    context.warn(child, f"there are no free data of {name}; a metal of its colour stands for it")
-    return Constant(1.0), RGBUnbounded(*(2.0 * np.sqrt(r / (1.0 - r)) for r in shown))
+    context.warn(child, f"there are no free data of {name}; a grey metal stands for it")
+    return Constant(1.0), Constant(2.0 * np.sqrt(GREY_METAL / (1.0 - GREY_METAL)))
 
 
 def _conductor(props: Properties) -> Parameters:
