@@ -292,7 +292,7 @@ class Renderer(Pictures):
         """Return two independent pictures, of the even and of the odd samples; wait for them.
 
         (h, w, 3) float32 each, in the film's output space, of a Renderer with `halves=True`. Their
-        mean, weighted by numbers of samples (or their weights), is the whole picture. Raises SceneError without.
+        mean, weighted as samples are, is the whole picture. Raises SceneError without.
         """
         first = self.wavefronts[0]
         if first.film.halves != 2:

@@ -51,8 +51,8 @@ INFINITE = """
     r[0] = s.x; r[1] = s.y; r[2] = s.z; r[3] = pdf;
 """
 PDF = """
-    r[0] = light_pdf(scene, to_integer(x[0]), v3(x[1], x[2], x[3]), v3(x[4], x[5], x[6]), x[7],
-                     v3(x[8], x[9], x[10]));
+    r[0] = light_pdf(scene, to_integer(x[0]), v3(x[1], x[2], x[3]), v3(0.0f, 0.0f, 0.0f),
+                     v3(x[4], x[5], x[6]), x[7], v3(x[8], x[9], x[10]));
 """
 
 

@@ -39,6 +39,7 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "USES_BANDS": lambda f: f.bands,
     "USES_ALPHA": lambda f: f.alpha,
     "USES_INFINITE": lambda f: f.infinite,
+    "USES_HEMISPHERE": lambda f: f.infinite or f.light_tree,
     "USES_LIGHTS": lambda f: bool(f.lights),
     "USES_SURFACE_LIGHTS": lambda f: not shape_records.RECORDS.keys().isdisjoint(f.lights),
     "USES_VISIBLE_LIGHTS": lambda f: f.light_paths and f.visible_lights,
