@@ -69,7 +69,10 @@ SHADOW = Record(
     d=("vec3", "direction, unit length"),
     t=("real", "distance to its end [m]; 0 or below: no ray waits"),
     value=("spectrum", "what arrives if nothing is between: radiance, or what a pixel gets"),
-    pixel=("integer", "where the film stores the pixel that gets it; paths that start at lights"),
+    film=(
+        "vec2",
+        "where the picture shows its beginning, from the corner [pixels]; of light paths",
+    ),
 )
 
 SETTINGS = Record(
@@ -81,8 +84,9 @@ SETTINGS = Record(
     crop_y=("integer", "row of the film where the picture begins, from above [pixels]"),
     film_width=("integer", "width of the whole film [pixels]"),
     film_height=("integer", "height of the whole film [pixels]"),
+    margin=("integer", "pixels around the picture whose samples its filter reaches"),
     tiles_x=("integer", "4x4-pixel tiles in a row"),
-    padded_pixels=("integer", "16 times the number of 4x4 tiles that cover the picture"),
+    padded_pixels=("integer", "16 times the number of 4x4 tiles that cover picture and margin"),
     slots=("integer", "number of slots: paths that are traced at once"),
     per_plane=("integer", "slots that share a film plane"),
     planes=("integer", "planes of slots; those of different ones may render the same pixel"),

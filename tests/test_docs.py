@@ -146,7 +146,7 @@ def test_the_code_of_coming_from(run: Run):
     names = run("coming_from.md")
     axes = [names[name].fov_axis for name in ("like_mitsuba", "like_pbrt", "like_blender")]
     assert axes == ["x", "smaller", "larger"]
-    assert names["scene"].integrator.max_depth > 0 and names["scene"].sampler.kind == "independent"
+    assert names["scene"].integrator.max_depth > 0 and names["scene"].sampler.kind == "sobol"
 
 
 def test_the_code_of_choosing(run: Run):

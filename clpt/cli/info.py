@@ -74,6 +74,7 @@ def summary(scene: Scene) -> dict[str, Any]:
         "spp": scene.spp,
         "integrator": scene.integrator.kind,
         "sampler": scene.sampler.kind,
+        "sampler_in_file": scene.extra.get("sampler", scene.sampler.kind),
         "warnings": scene.warnings,
     }
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import secrets
 import tempfile
@@ -61,7 +60,7 @@ def metadata(renderer: Renderer, scene: Path, seconds: float) -> dict[str, str |
         "integrator": plan.integrator.kind,
         "sampler": plan.sampler.kind,
         "seed": plan.seed,
-        "spp": samples / math.prod(plan.film.size),
+        "spp": samples / renderer.wavefronts[0].paths.pixels,
         "device": renderer.device.info.label,
         "seconds": round(seconds, 3),
     }

@@ -129,6 +129,9 @@ class White(click.ParamType):
 )  # fmt: skip
 @click.option("--integrator", metavar="NAME", help=f"One of {', '.join(kinds('integrator'))}.")
 @click.option(
+    "--sampler", type=click.Choice([*kinds("sampler")]), help="Where random numbers come from."
+)
+@click.option(
     "--max-depth", type=click.IntRange(-1), help="Longest path, at most 4000; -1: no limit."
 )
 @click.option("--sensor", type=SensorName(), help="cie1931, cie1964 or a file of three curves.")
@@ -233,6 +236,7 @@ def changed(
     size: tuple[int, int] | None = None,
     seed: int | None = None,
     integrator: str | None = None,
+    sampler: str | None = None,
     max_depth: int | None = None,
     **film: Any,
 ) -> Scene:
@@ -245,6 +249,7 @@ def changed(
     if noise is not None:
         scene = dataclasses.replace(scene, noise=noise or None)
     given: dict[str, Any] = {"spp": spp, "seed": seed}
+    given["sampler"] = None if sampler is None else kinds("sampler")[sampler]()
     given["film"] = dataclasses.replace(scene.film, **film)
     if integrator is not None and integrator != scene.integrator.kind:
         given["integrator"] = _integrator(integrator, scene.integrator)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import logging
-import math
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -148,7 +147,7 @@ class Renderer(Pictures):
         What the caller then raises is logged: in a thread of the driver nobody could catch it.
         """
         samples, start = self.samples, self._start
-        pixels = math.prod(self.scene.film.size) * len(self.wavefronts)
+        pixels = self.wavefronts[0].paths.pixels * len(self.wavefronts)
 
         def report(_: int) -> None:
             seconds = time.perf_counter() - start
@@ -189,7 +188,7 @@ class Renderer(Pictures):
             paths = sum(c.samples for c in counts)
             if paths:
                 self._seconds.setdefault("first_sample", time.perf_counter() - self._start)
-            pixels = math.prod(self.scene.film.size) * len(counts)
+            pixels = self.wavefronts[0].paths.pixels * len(counts)
             seconds = time.perf_counter() - start
             rays = sum(c.rays for c in counts)
             if self._stop.is_set() or progress is None:
@@ -292,7 +291,7 @@ class Renderer(Pictures):
         """Return two independent pictures, of the even and of the odd samples; wait for them.
 
         (h, w, 3) float32 each, in the film's output space, of a Renderer with `halves=True`. Their
-        mean, weighted by numbers of samples, is the whole picture. Raises SceneError without.
+        mean, weighted as samples are, is the whole picture. Raises SceneError without.
         """
         first = self.wavefronts[0]
         if first.film.halves != 2:
@@ -460,6 +459,7 @@ def render(
     """
     check_scene(scene)
     spp = _whole(scene.spp if spp is None else spp)
-    renderer = Renderer(dataclasses.replace(scene, spp=spp), device, **options)
-    renderer.run(spp, progress, noise=scene.noise if noise is None else noise)
+    noise = scene.noise if noise is None else noise
+    renderer = Renderer(dataclasses.replace(scene, spp=spp, noise=noise), device, **options)
+    renderer.run(spp, progress, noise=noise)
     return renderer.image()

@@ -135,7 +135,7 @@ class Independent(Sampler):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Filter(Kind):
-    """Base of the pixel filters; importance-sampled, so a sample serves one pixel."""
+    """Base of the pixel filters; see `Film.filtering` for how samples meet them."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -205,6 +205,12 @@ class Film(Kind):
     )
     mode: str = choice("spectral", "what light is made of", ("spectral", "rgb"))
     filter: Filter = host(Box(), "pixel filter", form="filter")
+    filtering: str = choice(
+        "auto",
+        "splatting: a sample serves all pixels whose filters hold it; importance: one pixel, at a "
+        "place drawn from its filter; auto: splatting, but importance with `noise`",
+        ("auto", "splatting", "importance"),
+    )
     lambda_min: float = real(360.0, "shortest wavelength", "nm", SHORTEST, LONGEST)
     lambda_max: float = real(830.0, "longest wavelength", "nm", SHORTEST, LONGEST)
     wavelengths: str = choice(

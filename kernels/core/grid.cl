@@ -1,11 +1,40 @@
-/* Choosing a point by a grid of cells with a weight at every corner, bilinear in between: a cell by
- * its cumulative sums, the point in it by the bilinear function itself (pbrt-v4, A.5). */
+/* Choosing a direction by a grid of cells with a weight at every corner, bilinear in between: a block of cells by its
+ * weight times the cosine to a receiver's normal, a cell in it by cumulative sums, the point in that by the bilinear
+ * function itself (pbrt-v4, A.5). Blocks lie in bands of rows and in strips of columns. The cosines are those of many
+ * normals together, GRID_SIDE^2 parts of the octahedron, and none for a receiver on both sides of its surface. */
+#define GRID_SIDE 8
+
 typedef struct {
     integer rows, columns; /* of cells */
     integer faces;         /* the rows are those of so many grids, each with one more row of corners */
-    integer corners, marginal, conditional; /* first words in `distributions` */
+    integer corners;       /* first word in `distributions` of the corners' weights */
+    integer marginal;      /* of sums over the rows of a block, for every strip; 1 at its end */
+    integer conditional;   /* of sums over the columns of a block, for every row; 1 at its end */
+    integer blocks;        /* of what `grid_receiver` goes to */
+    integer block_rows, block_columns; /* cells of a block */
     real norm;
 } Grid;
+
+/* How many blocks hold so many cells. */
+inline integer grid_blocks(integer cells, integer block)
+{
+    return to_integer((to_real(cells + block) - 0.5f) / to_real(block));
+}
+
+/* The first word of what is told for a receiver: sums over bands, 1 at the end; for every band sums over its strips, 1
+ * at the end; and for every block its chance over that by weight alone. n: unit normal in the grid's own axes. */
+inline integer grid_receiver(Grid g, mask given, vec3 n)
+{
+    integer down = grid_blocks(g.rows, g.block_rows), across = grid_blocks(g.columns, g.block_columns);
+    real over = 1.0f / max_r(fabs(n.x) + fabs(n.y) + fabs(n.z), (real)(1e-20f)), x = n.x * over, y = n.y * over;
+    mask back = n.z < 0.0f;
+    real u = sel(back, (1.0f - fabs(y)) * sel(x < 0.0f, (real)(-1.0f), (real)(1.0f)), x);
+    real v = sel(back, (1.0f - fabs(x)) * sel(y < 0.0f, (real)(-1.0f), (real)(1.0f)), y);
+    integer i = clamp_i(to_integer((u + 1.0f) * (0.5f * GRID_SIDE)), (integer)(GRID_SIDE - 1));
+    integer j = clamp_i(to_integer((v + 1.0f) * (0.5f * GRID_SIDE)), (integer)(GRID_SIDE - 1));
+    integer part = sel_i(given, j * GRID_SIDE + i, (integer)(GRID_SIDE * GRID_SIDE));
+    return g.blocks + part * (down + 2 * down * across);
+}
 
 typedef struct {
     integer row, column;
@@ -58,26 +87,38 @@ inline real grid_density(Grid g, real w[4], vec2 at)
     return (top + at.y * (bottom - top)) * g.norm;
 }
 
-inline GridPoint grid_sample(Scene scene, Grid g, vec2 u)
+/* receiver: of grid_receiver. */
+inline GridPoint grid_sample(Scene scene, Grid g, integer receiver, vec2 u)
 {
     GridPoint p;
-    p.row = grid_search(scene, g.marginal, g.rows, u.y);
-    integer first = g.conditional + p.row * g.columns;
-    p.column = grid_search(scene, first, g.columns, u.x);
+    integer down = grid_blocks(g.rows, g.block_rows), across = grid_blocks(g.columns, g.block_columns);
+    integer band = grid_search(scene, receiver, down, u.y), strips = receiver + down + band * across;
+    integer strip = grid_search(scene, strips, across, u.x);
+    u.y = grid_rest(scene, receiver, band, u.y);
+    u.x = grid_rest(scene, strips, strip, u.x);
+    integer top = band * g.block_rows, rows = g.marginal + strip * g.rows + top;
+    integer row = grid_search(scene, rows, min_i(g.block_rows, g.rows - top), u.y);
+    p.row = top + row;
+    integer left = strip * g.block_columns, columns = g.conditional + p.row * g.columns + left;
+    integer column = grid_search(scene, columns, min_i(g.block_columns, g.columns - left), u.x);
+    p.column = left + column;
     real w[4];
     grid_weights(scene, g, p.row, p.column, w);
-    p.at.y = linear_sample(grid_rest(scene, g.marginal, p.row, u.y), w[0] + w[1], w[2] + w[3]);
-    p.at.x = linear_sample(grid_rest(scene, first, p.column, u.x), w[0] + p.at.y * (w[2] - w[0]),
+    p.at.y = linear_sample(grid_rest(scene, rows, row, u.y), w[0] + w[1], w[2] + w[3]);
+    p.at.x = linear_sample(grid_rest(scene, columns, column, u.x), w[0] + p.at.y * (w[2] - w[0]),
                            w[1] + p.at.y * (w[3] - w[1]));
-    p.pdf = grid_density(g, w, p.at);
+    p.pdf = grid_density(g, w, p.at) * gather(scene.distributions, strips + strip + down * across);
     return p;
 }
 
-inline real grid_pdf(Scene scene, Grid g, integer row, integer column, vec2 at)
+inline real grid_pdf(Scene scene, Grid g, integer receiver, integer row, integer column, vec2 at)
 {
+    integer down = grid_blocks(g.rows, g.block_rows), across = grid_blocks(g.columns, g.block_columns);
+    integer band = to_integer((to_real(row) + 0.5f) / to_real(g.block_rows));
+    integer strip = to_integer((to_real(column) + 0.5f) / to_real(g.block_columns));
     real w[4];
     grid_weights(scene, g, row, column, w);
-    return grid_density(g, w, at);
+    return grid_density(g, w, at) * gather(scene.distributions, receiver + down + (down + band) * across + strip);
 }
 
 /* Radiance between four texels of four floats, the first of which begins at `first`. */

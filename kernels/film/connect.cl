@@ -12,14 +12,13 @@
  */
 #include "core/warp.cl"
 #include "film/film.cl"
-#include "film/spread.cl"
 
 typedef struct {
     vec3 o;         /* where the camera's ray begins, on the near plane [m] */
     vec3 d;         /* from there to the point, unit length */
     real t;         /* distance to it [m]; FAR at infinity */
     vec2 film;      /* where it is seen, from the corner of the picture [pixels] */
-    integer pixel;  /* where the film stores the pixel that gets it; -1: none does, or it is not in view */
+    mask seen;      /* it is in view, and a filter of the picture's pixels may hold it */
     real importance; /* see above [1/m^2] */
 } CameraPoint;
 
@@ -30,7 +29,7 @@ inline CameraPoint camera_nowhere(void)
     c.d = v3(0.0f, 0.0f, 1.0f);
     c.t = FAR;
     c.film.x = c.film.y = 0.0f;
-    c.pixel = -1;
+    c.seen = mask_of(0);
     c.importance = 0.0f;
     return c;
 }
@@ -56,21 +55,19 @@ inline CameraPoint pinhole_connect(global const Settings *settings, global const
     c.t = sel(away, (real)(FAR), length * (1.0f - start));
     c.film.x = x * (float)settings->film_width - (float)settings->crop_x;
     c.film.y = y * (float)settings->film_height - (float)settings->crop_y;
-    c.pixel = sel_i(seen, (integer)(0), (integer)(-1));
+    c.seen = seen;
     float cropped = ((float)settings->film_width * (float)settings->film_height) /
                     ((float)settings->width * (float)settings->height);
     c.importance = length * cropped / (z * z * z * (extent[0] * extent[1]));
     return c;
 }
 
-/* The pixel that gets a point in view, chosen by the pixel filter with the number u. */
-inline CameraPoint camera_pixel(Scene scene, CameraPoint c, real u)
+/* The point, which is not seen where no filter of the picture's pixels holds it. */
+inline CameraPoint camera_near(Scene scene, CameraPoint c)
 {
-    global const Settings *settings = scene.settings;
-    mask seen = (c.pixel >= 0) & (fabs(c.film.x) < 1e6f) & (fabs(c.film.y) < 1e6f);
-    integer x = spread_axis(scene, sel(seen, c.film.x, (real)(0.0f)), &u, &c.importance);
-    integer y = spread_axis(scene, sel(seen, c.film.y, (real)(0.0f)), &u, &c.importance);
-    seen = seen & (x >= 0) & (x < settings->width) & (y >= 0) & (y < settings->height);
-    c.pixel = sel_i(seen, film_pixel_index(settings, x, y), (integer)(-1));
+    float radius = scene.distributions[0], width = (float)scene.settings->width, height = (float)scene.settings->height;
+    mask near_x = fabs(c.film.x - 0.5f * width) < 0.5f * width + radius;
+    mask near_y = fabs(c.film.y - 0.5f * height) < 0.5f * height + radius;
+    c.seen = c.seen & near_x & near_y;
     return c;
 }

@@ -1,9 +1,26 @@
-/* What a slot has summed of the pixel that it is in: words of its path's state, until it leaves the pixel. */
-#include "film/film.cl"
+/* Samples that serve their own pixel, at places drawn from its filter: a slot sums those of the pixel that it is in as
+ * words of its path's state, until it leaves the pixel. See film/light.cl. */
+#include "film/light.cl"
+#include "film/filter.cl"
+
+/* Where the sample of a pixel lies, from the pixel's centre [pixels]. */
+inline vec2 exposure_begin(Scene scene, Slab path, uint at, mask go, Sampler sampler)
+{
+    vec2 offset = {0.0f, 0.0f};
+    real weight = 1.0f;
+#if !CHANNEL_IS_ID /* which has no mean over a filter */
+    filter_sample(scene, sampler_pair(sampler, (natural)(DIMENSION_FILM)), &offset, &weight);
+#endif
+    store_path_weight(path, at, go, weight);
+    return offset;
+}
+
+/* What that counts, 1 on average. */
+inline real exposure_weight(Slab path, uint at) { return load_path_weight(path, at); }
 
 /* Adds a value and a sample where m; small: all values are, as they mostly are. The highest words of sums then change
  * only by a carry, once in 2^16 of the sum: they are read and written only where they change. */
-inline void exposure_add(Slab path, uint at, global uint *counters, mask m, vec3 value, int small)
+inline void exposure_sum(Slab path, uint at, global uint *counters, mask m, vec3 value, int small)
 {
     value = sel3(m, value, v3(0.0f, 0.0f, 0.0f));
     Natural3 low = load_path_low(path, at), middle = load_path_middle(path, at), high;
@@ -39,9 +56,23 @@ inline void exposure_cover(Slab path, uint at, mask m, real weight)
 }
 #endif
 
+/* Adds finished samples. */
+inline void exposure_add(Scene scene, Slab path, uint at, BEGIN_ARGS, mask m, integer plane, integer pixel_index,
+                         integer sample, Light light)
+{
+    exposure_sum(path, at, counters, m, light.value, light.small);
+#if USES_ALPHA
+    exposure_cover(path, at, m & light.covers, load_path_weight(path, at));
+#endif
+#if USES_BANDS
+    integer full = bands_add(scene, bands, m, plane, pixel_index, light.radiance, light.lambdas, light.scale);
+    count(counters, COUNTER_FULL, m & (full > 0), full);
+#endif
+}
+
 /* Gives the film what was summed where slots `leave` their pixels, and begins again at 0 where they `enter` others. */
-inline void exposure_leave(Scene scene, Slab path, uint at, global uint *film, global uint *counters, mask leave,
-                           mask enter, integer plane, integer pixel_index)
+inline void exposure_leave(Scene scene, Slab path, uint at, BEGIN_ARGS, mask leave, mask enter, integer plane,
+                           integer pixel_index)
 {
     Natural3 low = load_path_low(path, at), middle = load_path_middle(path, at), high = load_path_high(path, at), none;
     Exposure e = {{low.x, middle.x, high.x}, {low.y, middle.y, high.y}, {low.z, middle.z, high.z},

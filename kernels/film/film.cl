@@ -4,20 +4,28 @@
 #include "film/pixel.cl"
 #include "film/sums.cl"
 #define FILM_SAMPLES 9 /* after the sums of three channels, three words each: the number of samples */
-#if USES_ALPHA
-#define FILM_ALPHA 10 /* then the sum of what is covered */
-#define FILM_WORDS 13
+#if FILM_WEIGHTS
+#define FILM_WEIGHT 10 /* then the sum of the filter's values, where samples serve several pixels */
+#define FILM_ALPHA 13
 #else
-#define FILM_WORDS 10
+#define FILM_ALPHA 10
+#endif
+#if USES_ALPHA
+#define FILM_WORDS (FILM_ALPHA + 3) /* then the sum of what is covered */
+#else
+#define FILM_WORDS FILM_ALPHA
 #endif
 
 /* Whether the film takes a value: neither NaN nor so large that sums would overflow. */
 inline mask film_accepts(vec3 value) { return fabs(value.x) + fabs(value.y) + fabs(value.z) < FIXED_LARGEST; }
 
-/* What slots have summed of a pixel: three channels, the number of samples, and what is covered. */
+/* What slots have summed of a pixel: three channels, the number of samples, their weight, and what is covered. */
 typedef struct {
     Fixed first, second, third;
     natural samples;
+#if FILM_WEIGHTS
+    Fixed weight;
+#endif
 #if USES_ALPHA
     Fixed covered;
 #endif

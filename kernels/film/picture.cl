@@ -32,8 +32,8 @@ inline uint film_samples(global const Settings *settings, global const uint *fil
     return samples;
 }
 
-/* The number of samples that a picture's sums are divided by: the pixel's own, or, of light paths, how many there were
- * per pixel, which the host says, as each may have lit any pixel. */
+/* The number of samples of a pixel in a picture: its own, or, of light paths, how many there were per pixel, which the
+ * host says, as each may have lit any pixel. */
 #ifdef LIGHT_PATHS
 #define SAMPLES_ARG , float samples
 #define SAMPLES samples
@@ -41,3 +41,14 @@ inline uint film_samples(global const Settings *settings, global const uint *fil
 #define SAMPLES_ARG
 #define SAMPLES (float)film_samples(settings, film, pixel_index, halves)
 #endif
+
+/* One over what a pixel's sums are divided by: its samples, or, of samples that serve several pixels, their weight. */
+inline float film_mean(global const Settings *settings, global const uint *film, int pixel_index, int2 halves,
+                       float samples)
+{
+#if FILM_WEIGHTS
+    size_t stream = settings->padded_pixels;
+    samples = halves_sum(film + FILM_WEIGHT * stream + pixel_index, stream, FILM_WORDS * stream, halves);
+#endif
+    return samples > 0.0f ? 1.0f / samples : 0.0f;
+}

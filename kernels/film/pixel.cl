@@ -1,9 +1,12 @@
 /* Pixels: where each is stored, where it lies on the film, and its number there. They are stored in 4x4 tiles, row by
- * row in a tile and tile by tile in a row of them. */
+ * row in a tile and tile by tile in a row of them, with `margin` pixels on each side of the picture: samples there
+ * serve pixels of the picture whose filters reach them. */
 
 /* Where the pixel (x, y) of the picture is stored. */
 inline integer film_pixel_index(global const Settings *settings, integer x, integer y)
 {
+    x += settings->margin;
+    y += settings->margin;
     return ((y >> 2) * settings->tiles_x + (x >> 2)) * 16 + (y & 3) * 4 + (x & 3);
 }
 
@@ -11,8 +14,8 @@ inline integer film_pixel_index(global const Settings *settings, integer x, inte
 inline void pixel_place(global const Settings *settings, integer pixel_index, integer *x, integer *y)
 {
     integer tile = pixel_index >> 4, row = divide(tile, settings->tiles_x), column = tile - row * settings->tiles_x;
-    *x = column * 4 + (pixel_index & 3);
-    *y = row * 4 + ((pixel_index >> 2) & 3);
+    *x = column * 4 + (pixel_index & 3) - settings->margin;
+    *y = row * 4 + ((pixel_index >> 2) & 3) - settings->margin;
 }
 
 inline vec2 pixel_of_index(global const Settings *settings, integer pixel_index)

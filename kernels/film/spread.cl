@@ -1,50 +1,85 @@
-/* The pixel filter of light that arrives at a point of the film: one of the pixels whose filter holds the point gets
- * it, chosen by |f|, with the sum of |f| as its weight. So every pixel gets what the filter gives it, in the mean: as
- * by film/filter.cl, where a pixel's samples choose points. One axis after the other, as filters are separable.
- *
- * FILTER_BOX: f is the same in the radius, which `distributions` holds as film/filter.cl says. Else a table of f
- * follows the one that is told there: the radius, the number of steps n, and n + 1 values of f from 0 to the radius. */
-#ifndef FILTER_BOX
-/* f at a distance, 0 beyond the radius. */
-inline real spread_filter(Scene scene, int table, real distance)
+/* Splatting: light at a point of the film serves every pixel whose filter holds the point, each by the filter's value f
+ * there. Filters are separable and even: `distributions` begins with the radius, a number of steps n, and n + 1 values
+ * of f from 0 to the radius (clpt/render/lowering/camera/filters.py). FILTER_TAPS: how many pixels of an axis hold a
+ * point at most; FILTER_REACH: how far they are from its own. */
+#include "film/light.cl"
+#define SPREAD_PIXELS (FILTER_TAPS * FILTER_TAPS)
+
+typedef struct {
+    integer x, y;                               /* the first pixel of the picture that may hold the point */
+    real across[FILTER_TAPS], down[FILTER_TAPS]; /* f along both axes, from that pixel on */
+} Spread;
+
+/* f at a distance, 0 beyond the radius [1/pixel]. */
+inline real spread_filter(Scene scene, real distance)
 {
-    float radius = scene.distributions[table], steps = scene.distributions[table + 1];
+    float radius = scene.distributions[0], steps = scene.distributions[1];
     real x = fabs(distance) * (steps / radius);
-    mask inside = x < steps;
-    integer i = to_integer(sel(inside, x, (real)(0.0f)));
-    real a = gather(scene.distributions, i + (table + 2)), b = gather(scene.distributions, i + (table + 3));
+    mask inside = x <= steps;
+    integer i = min_i(to_integer(sel(inside, x, (real)(0.0f))), (integer)((int)steps - 1));
+    real a = gather(scene.distributions, i + 2), b = gather(scene.distributions, i + 3);
     return sel(inside, a + (x - to_real(i)) * (b - a), (real)(0.0f));
 }
-#endif
 
-/* The number of a pixel along an axis for the position p [pixels]. u: a number in [0, 1), which is used up in part and
- * is such a number again; weight: is multiplied by the filter's. */
-inline integer spread_axis(Scene scene, real p, real *u, real *weight)
+/* Along an axis: `own`, the pixel of a point, becomes the first that holds it. offset: from that pixel's centre. */
+inline integer spread_axis(Scene scene, integer own, real offset, real f[FILTER_TAPS])
 {
-#ifdef FILTER_BOX
-    float radius = scene.distributions[2];
-    integer first = to_integer(ceil(p - (radius + 0.5f)));
-    real count = floor(p + (radius - 0.5f)) - to_real(first) + 1.0f, x = *u * count, whole = floor(x);
-    *u = x - whole;
-    *weight *= count / (2.0f * radius);
-    return sel_i(count > 0.0f, first + to_integer(whole), (integer)(-1));
-#else
-    int table = 2 * (int)scene.distributions[0] + 2, most = (int)(2.0f * scene.distributions[table]) + 2;
-    integer first = to_integer(floor(p - scene.distributions[table])), chosen = first;
-    real sum = 0.0f, before = 0.0f, share = 1.0f;
-    for (int k = 0; k < most; k++) sum += fabs(spread_filter(scene, table, to_real(first + k) + 0.5f - p));
-    real wanted = *u * sum, total = 0.0f, sign = 1.0f;
-    for (int k = 0; k < most; k++) {
-        real f = spread_filter(scene, table, to_real(first + k) + 0.5f - p), after = total + fabs(f);
-        mask here = (f != 0.0f) & (total <= wanted);
-        chosen = sel_i(here, first + k, chosen);
-        before = sel(here, total, before);
-        share = sel(here, fabs(f), share);
-        sign = sel(here, sel(f < 0.0f, (real)(-1.0f), (real)(1.0f)), sign);
-        total = after;
-    }
-    *u = clamp_r((wanted - before) / share, (real)(0.0f), (real)(0.999999f));
-    *weight *= sum * sign;
-    return chosen;
-#endif
+    real lowest = (float)-FILTER_REACH, highest = (float)(FILTER_REACH + 1 - FILTER_TAPS);
+    real first = clamp_r(ceil(offset - scene.distributions[0]), lowest, highest);
+    for (int i = 0; i < FILTER_TAPS; i++) f[i] = spread_filter(scene, first + (float)i - offset);
+    return own + to_integer(first);
 }
+
+/* x, y: the pixel where the point lies; offset: from its centre [pixels]. */
+inline Spread spread_point(Scene scene, integer x, integer y, vec2 offset)
+{
+    Spread s;
+    s.x = spread_axis(scene, x, offset.x, s.across);
+    s.y = spread_axis(scene, y, offset.y, s.down);
+    return s;
+}
+
+/* Whether the picture has the pixel `i` of those that may hold the point, where it is stored, and f there. */
+inline mask spread_pixel(global const Settings *settings, Spread s, int i, integer *pixel_index, real *f)
+{
+    integer x = s.x + i % FILTER_TAPS, y = s.y + i / FILTER_TAPS;
+    *f = s.across[i % FILTER_TAPS] * s.down[i / FILTER_TAPS];
+    *pixel_index = film_pixel_index(settings, x, y);
+    return (*f != 0.0f) & (x >= 0) & (x < settings->width) & (y >= 0) & (y < settings->height);
+}
+
+/* Adds light to the pixels whose filters hold its point. Returns how many sums are full, lane by lane. */
+inline integer spread_add(Scene scene, global uint *film, mask m, integer plane, Spread s, Light light)
+{
+    integer full = 0;
+    for (int i = 0; i < SPREAD_PIXELS; i++) {
+        integer pixel_index;
+        real f;
+        mask there = m & spread_pixel(scene.settings, s, i, &pixel_index, &f);
+        vec3 v = scale3(light.value, f);
+        Exposure e = {fixed_of(v.x), fixed_of(v.y), fixed_of(v.z), (natural)(0u)};
+#if FILM_WEIGHTS
+        e.weight = fixed_of(f);
+#endif
+#if USES_ALPHA
+        e.covered = fixed_of(sel(light.covers, f, (real)(0.0f)));
+#endif
+        full += film_add(scene.settings, film, there, plane, pixel_index, e);
+    }
+    return full;
+}
+
+#if USES_BANDS
+/* The same of a film's bands. */
+inline integer spread_bands(Scene scene, global uint *bands, mask m, integer plane, Spread s, Light light)
+{
+    integer full = 0;
+    for (int i = 0; i < SPREAD_PIXELS; i++) {
+        integer pixel_index;
+        real f;
+        mask there = m & spread_pixel(scene.settings, s, i, &pixel_index, &f);
+        full += bands_add(scene, bands, there, plane, pixel_index, light.radiance, light.lambdas, light.scale * f);
+    }
+    return full;
+}
+#endif

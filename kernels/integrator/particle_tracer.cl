@@ -28,10 +28,9 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
 #if !BSDF_DELTA
     /* To the camera. */
     vec2 lens = sampler_pair(sampler, scatter.dimension + DIMENSION_LIGHT);
-    real pixel = sampler_pair(sampler, scatter.dimension + DIMENSION_CHOICE).x;
-    CameraPoint c = camera_connect(scene, s.p, mask_of(0), lens, pixel);
+    CameraPoint c = camera_connect(scene, s.p, mask_of(0), lens);
     Spectrum f = bsdf_eval(m, to_local(frame, neg3(c.d)), wo);
-    mask shine = active & (c.pixel >= 0) & (spectrum_max(f) > 0.0f);
+    mask shine = active & c.seen & (spectrum_max(f) > 0.0f);
     real carries = fabs(dot3(s.n, c.d)) * arrives * c.importance * shading_frame_share(scatter.shading, neg3(v.d));
     Spectrum value = spectrum_scale(spectrum_mul(beta, f), carries);
     value = vertex_beyond(scene, v, neg3(c.d), c.t, v.lambdas, value);

@@ -21,7 +21,8 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
     if (any(lit)) {
         integer light = sel_i(lit, s.light, (integer)(0));
         real pdf = load_path_pdf(path, at), null_distance = path_null_distance(path, at);
-        real other = light_pdf(scene, light, madd3(v.d, -null_distance, v.o), v.d, v.t + null_distance, s.n);
+        vec3 from = madd3(v.d, -null_distance, v.o), side = path_hemisphere(path, at);
+        real other = light_pdf(scene, light, from, side, v.d, v.t + null_distance, s.n);
         real w = sel(pdf < 0.0f, (real)(1.0f), mis_weight(pdf, other));
         Spectrum le = emission_load(scene, light_at(scene, light).radiance, surface_texture_point(s), v.lambdas);
         le = spectrum_scale(spectrum_mul(beta, le), w);
@@ -74,7 +75,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
 #if !BSDF_IS_NULL
     path_scattered(path, at, next);
     store_path_pdf(path, at, next, sel((bs.lobe & LOBE_DELTA) != 0, (real)(-1.0f), bs.pdf));
-#if USES_INFINITE && !BSDF_DELTA
+#if USES_HEMISPHERE && !BSDF_DELTA
     store_path_sampled_hemisphere(path, at, next, hemisphere);
 #endif
 #endif

@@ -28,8 +28,14 @@ inline CubePoint cube_map_point(CubeMap l, vec3 d)
 
 inline Grid cube_map_grid(CubeMap l)
 {
-    Grid g = {l.width * 12, l.width * 2, (integer)(6), l.corners, l.marginal, l.conditional, l.norm};
+    Grid g = {l.width * 12, l.width * 2, (integer)(6), l.corners, l.marginal, l.conditional, l.blocks, l.block_rows,
+              l.block_columns, l.norm};
     return g;
+}
+
+inline integer cube_map_receiver(CubeMap l, vec3 n)
+{
+    return grid_receiver(cube_map_grid(l), hemisphere_given(n), v3(dot3(n, l.x), dot3(n, l.y), dot3(n, l.z)));
 }
 
 inline Spectrum cube_map_between(CubeMap l, Scene scene, CubePoint p, Wavelengths lambdas)
@@ -52,13 +58,14 @@ real cube_map_pdf(CubeMap l, Scene scene, vec3 hemisphere, vec3 d)
     real cells = to_real(l.width * 2), column = (p.a + 1.0f) * 0.5f * cells, row = (p.b + 1.0f) * 0.5f * cells;
     integer last = l.width * 2 - 1, i = clamp_i(to_integer(column), last), j = clamp_i(to_integer(row), last);
     vec2 at = {column - to_real(i), row - to_real(j)};
-    real pdf = grid_pdf(scene, cube_map_grid(l), p.face * l.width * 2 + j, i, at);
+    integer receiver = cube_map_receiver(l, hemisphere);
+    real pdf = grid_pdf(scene, cube_map_grid(l), receiver, p.face * l.width * 2 + j, i, at);
     return pdf * sqr(to_real(l.width)) * p.jacobian;
 }
 
 LightSample cube_map_sample(CubeMap l, Scene scene, vec3 hemisphere, vec2 u, Wavelengths lambdas)
 {
-    GridPoint g = grid_sample(scene, cube_map_grid(l), u);
+    GridPoint g = grid_sample(scene, cube_map_grid(l), cube_map_receiver(l, hemisphere), u);
     real step = 1.0f / to_real(l.width);
     CubePoint c;
     c.face = to_integer((to_real(g.row) + 0.5f) * 0.5f * step);

@@ -6,8 +6,14 @@
 
 inline Grid envmap_grid(Envmap l)
 {
-    Grid g = {l.height - 1, l.width, (integer)(1), l.corners, l.marginal, l.conditional, l.norm};
+    Grid g = {l.height - 1, l.width, (integer)(1), l.corners, l.marginal, l.conditional, l.blocks, l.block_rows,
+              l.block_columns, l.norm};
     return g;
+}
+
+inline integer envmap_receiver(Envmap l, vec3 n)
+{
+    return grid_receiver(envmap_grid(l), hemisphere_given(n), v3(dot3(n, l.x), dot3(n, l.y), dot3(n, l.z)));
 }
 
 /* Cells lie between the texels' centres. */
@@ -56,7 +62,8 @@ Spectrum envmap_radiance(Envmap l, Scene scene, vec3 d, Wavelengths lambdas)
 real envmap_pdf(Envmap l, Scene scene, vec3 hemisphere, vec3 d)
 {
     EnvmapPoint p = envmap_point(l, d);
-    return envmap_solid_angle_pdf(l, grid_pdf(scene, envmap_grid(l), p.row, p.column, p.at), p.sin_t);
+    integer receiver = envmap_receiver(l, hemisphere);
+    return envmap_solid_angle_pdf(l, grid_pdf(scene, envmap_grid(l), receiver, p.row, p.column, p.at), p.sin_t);
 }
 
 /* A direction with its density, dark so far. */
@@ -76,7 +83,7 @@ inline LightSample envmap_direction(Envmap l, GridPoint g)
 
 LightSample envmap_sample(Envmap l, Scene scene, vec3 hemisphere, vec2 u, Wavelengths lambdas)
 {
-    GridPoint g = grid_sample(scene, envmap_grid(l), u);
+    GridPoint g = grid_sample(scene, envmap_grid(l), envmap_receiver(l, hemisphere), u);
     LightSample s = envmap_direction(l, g);
     s.radiance = envmap_between(l, scene, g.row, g.column, g.at, lambdas);
     return s;

@@ -4,7 +4,8 @@
 
 inline Envmap spectral_envmap_image(SpectralEnvmap l)
 {
-    Envmap e = {l.x, l.y, l.z, l.width, l.height, l.texels, l.corners, l.marginal, l.conditional, l.norm};
+    Envmap e = {l.x, l.y, l.z, l.width, l.height, l.texels, l.corners, l.marginal, l.conditional, l.blocks,
+                l.block_rows, l.block_columns, l.norm};
     return e;
 }
 
@@ -36,7 +37,7 @@ real spectral_envmap_pdf(SpectralEnvmap l, Scene scene, vec3 hemisphere, vec3 d)
 LightSample spectral_envmap_sample(SpectralEnvmap l, Scene scene, vec3 hemisphere, vec2 u, Wavelengths lambdas)
 {
     Envmap image = spectral_envmap_image(l);
-    GridPoint g = grid_sample(scene, envmap_grid(image), u);
+    GridPoint g = grid_sample(scene, envmap_grid(image), envmap_receiver(image, hemisphere), u);
     LightSample s = envmap_direction(image, g);
     s.radiance = spectral_envmap_between(l, scene, g.row, g.column, g.at, lambdas);
     return s;

@@ -21,5 +21,5 @@ inline void connect_camera(Slab shadow, uint at, mask active, mask shine, Surfac
         store_shadow_o(shadow, at, away, c.o);
         store_shadow_d(shadow, at, away, c.d);
     }
-    store_shadow_pixel(shadow, at, shine, c.pixel);
+    store_shadow_film(shadow, at, shine, c.film);
 }

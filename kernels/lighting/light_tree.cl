@@ -24,9 +24,10 @@ inline vec3 light_tree_axis(natural word)
     return normalize3(v3(u + sel(u < 0.0f, fold, -fold), v + sel(v < 0.0f, fold, -fold), z));
 }
 
-/* What the lights below a node may send to p, all surfaces there shading them: their power, times the
- * cosine at the light, over the squared distance. */
-inline real light_tree_importance(LightNode n, vec3 p)
+/* What the lights below a node may send to p, all surfaces there shading them: their power, times the cosine at the
+ * light, over the squared distance; and times the cosine at p, where light from one hemisphere only matters. The
+ * cosines are the largest that any of these lights may have. */
+inline real light_tree_importance(LightNode n, vec3 p, vec3 hemisphere)
 {
     vec3 from = sub3(p, n.center), axis = light_tree_axis(n.axis);
     real r2 = n.radius * n.radius, d2 = max_r(dot3(from, from), (real)(1e-20f));
@@ -35,22 +36,26 @@ inline real light_tree_importance(LightNode n, vec3 p)
     cos_w = sel((n.cones & 0x80000000u) != 0, fabs(cos_w), cos_w);
     real cos_o = light_tree_16(n.cones, 0);
     real cos_e = to_real(as_integer((n.cones >> 16) & 0x7fffu)) * (2.0f / 32767.0f) - 1.0f;
-    real sin2_b = sel(outside, r2 / d2, (real)(1.0f)), cos_x, sin_x, cos_p, sin_p;
+    real sin2_b = sel(outside, r2 / d2, (real)(1.0f)), cos_x, sin_x, cos_p, sin_p, cos_r, sin_r;
+    real cos_b = sqrt_r(1.0f - sin2_b), sin_b = sqrt(sin2_b), cos_i = -dot3(hemisphere, from) / sqrt(d2);
     light_tree_minus(cos_w, sqrt_r(1.0f - cos_w * cos_w), cos_o, sqrt_r(1.0f - cos_o * cos_o), &cos_x, &sin_x);
-    light_tree_minus(cos_x, sin_x, sqrt_r(1.0f - sin2_b), sqrt(sin2_b), &cos_p, &sin_p);
+    light_tree_minus(cos_x, sin_x, cos_b, sin_b, &cos_p, &sin_p);
+    light_tree_minus(cos_i, sqrt_r(1.0f - cos_i * cos_i), cos_b, sin_b, &cos_r, &sin_r);
     cos_p = sel(outside, cos_p, (real)(1.0f));
-    real importance = n.power * max_r(cos_p, (real)(LIGHT_TREE_SLACK)) / max_r(d2, r2);
-    importance = sel(cos_p > cos_e - LIGHT_TREE_SLACK, importance, (real)(0.0f));
+    cos_r = sel(outside & hemisphere_given(hemisphere), cos_r, (real)(1.0f));
+    real arrives = max_r(cos_p, (real)(LIGHT_TREE_SLACK)) * max_r(cos_r, (real)(LIGHT_TREE_SLACK));
+    mask faces = (cos_p > cos_e - LIGHT_TREE_SLACK) & (cos_r > -LIGHT_TREE_SLACK);
+    real importance = sel(faces, n.power * arrives / max_r(d2, r2), (real)(0.0f));
     return sel(n.radius < 0.0f, n.power, importance);
 }
 
 /* The chance to go on to the first child of a pair, and where either leads. */
-inline real light_tree_chance(Scene scene, integer pair, vec3 p, integer *first, integer *second)
+inline real light_tree_chance(Scene scene, integer pair, vec3 p, vec3 hemisphere, integer *first, integer *second)
 {
     int nodes = scene.settings->light_count * (LIGHT_ROW_WORDS + 1);
     LightNode a = light_node_row(scene.lights, pair * LIGHT_NODE_WORDS + nodes);
     LightNode b = light_node_row(scene.lights, (pair + 1) * LIGHT_NODE_WORDS + nodes);
-    real ia = light_tree_importance(a, p), ib = light_tree_importance(b, p), sum = ia + ib;
+    real ia = light_tree_importance(a, p, hemisphere), ib = light_tree_importance(b, p, hemisphere), sum = ia + ib;
     *first = a.child;
     *second = b.child;
     return sel(sum > 0.0f, ia / max_r(sum, (real)(1e-37f)), (real)(0.5f));
@@ -62,8 +67,9 @@ inline integer light_tree_root(Scene scene)
     return (integer)(as_int(scene.lights[nodes + LIGHT_NODE_CHILD]));
 }
 
-/* A row, and its chance at p; what is left of *u is uniform in [0, 1) again. other: see light_bits. */
-inline integer light_tree_pick(Scene scene, vec3 p, real *u, real other, real *pmf)
+/* A row, and its chance at p, for a surface that sends light to `hemisphere` (interface/light.cl); what is left of *u
+ * is uniform in [0, 1) again. other: see light_bits. */
+inline integer light_tree_pick(Scene scene, vec3 p, vec3 hemisphere, real *u, real other, real *pmf)
 {
     integer at = light_tree_root(scene), first, second;
     mask open = at >= 0;
@@ -72,7 +78,7 @@ inline integer light_tree_pick(Scene scene, vec3 p, real *u, real other, real *p
     real grain = UNIT_GRAIN; /* of *u: grows as its bits are spent */
 #endif
     while (any(open)) {
-        real chance = light_tree_chance(scene, sel_i(open, at, (integer)(1)), p, &first, &second);
+        real chance = light_tree_chance(scene, sel_i(open, at, (integer)(1)), p, hemisphere, &first, &second);
         mask left = *u < chance;
         real share = sel(left, chance, 1.0f - chance);
         real remainder = sel(left, *u, *u - chance) / max_r(share, (real)(1e-20f));
@@ -94,7 +100,7 @@ inline integer light_tree_pick(Scene scene, vec3 p, real *u, real other, real *p
 }
 
 /* The chance of a row at p. */
-inline real light_tree_pmf(Scene scene, integer row, vec3 p)
+inline real light_tree_pmf(Scene scene, integer row, vec3 p, vec3 hemisphere)
 {
     int trails = scene.settings->light_count * LIGHT_ROW_WORDS;
     natural trail = as_natural(gather_i(scene.lights, row + trails));
@@ -102,7 +108,7 @@ inline real light_tree_pmf(Scene scene, integer row, vec3 p)
     mask open = at >= 0;
     real pmf = 1.0f;
     while (any(open)) {
-        real chance = light_tree_chance(scene, sel_i(open, at, (integer)(1)), p, &first, &second);
+        real chance = light_tree_chance(scene, sel_i(open, at, (integer)(1)), p, hemisphere, &first, &second);
         mask left = (trail & 1u) == 0;
         pmf *= sel(open, sel(left, chance, 1.0f - chance), (real)(1.0f));
         at = sel_i(open, sel_i(left, first, second), at);

@@ -6,7 +6,8 @@ inline natural pixel_key(global const Settings *settings, integer pixel_index)
 {
     integer x, y;
     pixel_place(settings, pixel_index, &x, &y);
-    return as_natural((y + settings->crop_y) * settings->film_width + x + settings->crop_x);
+    int margin = settings->margin, width = settings->film_width + 2 * margin;
+    return as_natural((y + (settings->crop_y + margin)) * width + x + (settings->crop_x + margin));
 }
 
 inline Sampler pixel_sampler(global const Settings *settings, natural pixel_key, integer sample)

@@ -14,7 +14,9 @@ inline natural pixel_key(global const Settings *settings, integer pixel_index)
 {
     integer x, y;
     pixel_place(settings, pixel_index, &x, &y);
-    return spread_bits(as_natural(x + settings->crop_x)) | (spread_bits(as_natural(y + settings->crop_y)) << 1u);
+    int margin = settings->margin;
+    natural column = as_natural(x + (settings->crop_x + margin)), row = as_natural(y + (settings->crop_y + margin));
+    return spread_bits(column) | (spread_bits(row) << 1u);
 }
 
 inline Sampler pixel_sampler(global const Settings *settings, natural pixel_key, integer sample)

@@ -9,8 +9,8 @@ kernel void accumulate(global const Settings *settings, global const uint *film,
     int x = get_global_id(0), y = get_global_id(1);
     if (x < settings->width && y < settings->height) {
         int pixel_index = film_pixel_index(settings, x, y);
-        float count = SAMPLES;
-        vec3 v = scale3(film_sum(settings, film, pixel_index, halves), count > 0.0f ? 1.0f / count : 1.0f);
+        float count = SAMPLES, mean = film_mean(settings, film, pixel_index, halves, count);
+        vec3 v = scale3(film_sum(settings, film, pixel_index, halves), mean);
         global float *pixel = image + 4 * ((size_t)y * settings->width + x);
         pixel[0] = settings->to_first[0] * v.x + settings->to_first[1] * v.y + settings->to_first[2] * v.z;
         pixel[1] = settings->to_second[0] * v.x + settings->to_second[1] * v.y + settings->to_second[2] * v.z;
@@ -29,7 +29,7 @@ kernel void accumulate_alpha(global const Settings *settings, global const uint 
         int pixel_index = film_pixel_index(settings, x, y);
         float sum = halves_sum(film + FILM_ALPHA * stream + pixel_index, stream, FILM_WORDS * stream, halves);
         float samples = (float)film_samples(settings, film, pixel_index, halves);
-        alpha[(size_t)y * settings->width + x] = sum / fmax(samples, 1.0f);
+        alpha[(size_t)y * settings->width + x] = sum * film_mean(settings, film, pixel_index, halves, samples);
     }
 }
 #endif

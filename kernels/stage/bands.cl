@@ -11,7 +11,7 @@ kernel void accumulate_bands(global const Settings *settings, global const uint 
     if (x < settings->width && y < settings->height) {
         int pixel_index = film_pixel_index(settings, x, y);
         size_t stream = settings->padded_pixels;
-        float scale = 1.0f / (fmax(SAMPLES, 1e-30f) * settings->film_scale);
+        float scale = film_mean(settings, film, pixel_index, halves, SAMPLES) / settings->film_scale;
         global float *pixel = band_image + (size_t)count * ((size_t)y * settings->width + x);
         for (int band = 0; band < count; band++)
             pixel[band] = halves_sum(bands + bands_at(settings, 0, band, pixel_index), stream, 3 * stream * count,

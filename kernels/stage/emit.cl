@@ -56,10 +56,9 @@ inline integer begin_light_path(Scene scene, Slab path, Slab shadow, uint at, ma
     integer state = sel_i(alive, (integer)(PATH_ALIVE), (integer)(0));
 #if USES_VISIBLE_LIGHTS
     vec2 lens = sampler_pair(sampler, (natural)(DIMENSION_VERTEX + DIMENSION_LIGHT));
-    real pixel = sampler_pair(sampler, (natural)(DIMENSION_VERTEX + DIMENSION_CHOICE)).x;
-    CameraPoint c = camera_connect(scene, sel3(r.away, neg3(r.d), r.o), r.away, lens, pixel);
+    CameraPoint c = camera_connect(scene, sel3(r.away, neg3(r.d), r.o), r.away, lens);
     real cosine = sel(r.away, (real)(1.0f), -dot3(r.n, c.d));
-    mask seen = go & (c.pixel >= 0) & (cosine > 0.0f) & (spectrum_max(r.seen) > 0.0f);
+    mask seen = go & c.seen & (cosine > 0.0f) & (spectrum_max(r.seen) > 0.0f);
     mask shine = seen & mask_of(settings->hide_lights == 0);
     connect_camera(shadow, at, ended, shine, s, c, spectrum_scale(r.seen, cosine * c.importance));
     state += sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));

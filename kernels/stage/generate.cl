@@ -6,10 +6,8 @@
 #include "generated/sampler.cl"
 #include "interface/camera.cl"
 #include "generated/camera.cl"
-#include "film/filter.cl"
-#include "film/exposure.cl"
 #include "film/work_list.cl"
-#include "generated/bands.cl"
+#include "generated/exposure.cl"
 #include "interface/shape.cl"
 #include "interface/light.cl"
 #include "generated/lights.cl"
@@ -47,8 +45,7 @@ inline void add_sample(Scene scene, Slab path, uint at, BEGIN_ARGS, PathEnd end,
     Sampler begun_with = pixel_sampler(scene.settings, load_path_pixel_key(path, at), sample);
     lambdas = wavelengths_sample(scene, sampler_pair(begun_with, (natural)(DIMENSION_WAVELENGTH)).x);
 #endif
-    real weight = load_path_weight(path, at);
-    real scale = weight * scene.settings->film_scale;
+    real scale = exposure_weight(path, at) * scene.settings->film_scale;
     vec3 value = scale3(film_value(scene, radiance, lambdas), scale);
     int small = !any(finished & !fixed_takes_small(value));
     if (!small) {
@@ -61,15 +58,8 @@ inline void add_sample(Scene scene, Slab path, uint at, BEGIN_ARGS, PathEnd end,
         rejected = finished & !film_accepts(value);
         value = sel3(rejected, v3(0.0f, 0.0f, 0.0f), value);
     }
-    exposure_add(path, at, counters, finished, value, small);
-#if USES_ALPHA
-    exposure_cover(path, at, finished & !(end.missed & (end.depth == 0)), weight);
-#endif
-#if USES_BANDS
-    integer plane = slot_plane(scene.settings, slot);
-    integer full = bands_add(scene, bands, finished, plane, pixel_index, radiance, lambdas, scale);
-    count(counters, COUNTER_FULL, finished & (full > 0), full);
-#endif
+    Light light = {value, small, !(end.missed & (end.depth == 0)), radiance, lambdas, scale};
+    exposure_add(scene, path, at, BEGIN_PASSED, finished, slot_plane(scene.settings, slot), pixel_index, sample, light);
     path_end_count(counters, end, end.depth + path_nulls(path, at));
 }
 
@@ -80,17 +70,14 @@ inline void begin_path(Scene scene, Slab path, uint at, mask go, integer pixel_i
     vec2 pixel = pixel_of_index(settings, pixel_index);
     natural key = pixel_key(settings, pixel_index);
     Sampler sampler = pixel_sampler(settings, key, sample);
-    vec2 offset = {0.0f, 0.0f};
-    real weight = 1.0f, nothing = 0.0f;
-#if CHANNEL_IS_ID /* which has no mean over a filter */
+    real nothing = 0.0f;
+#if CHANNEL_IS_ID
     nothing = -1.0f;
-#else
-    filter_sample(scene, sampler_pair(sampler, (natural)(DIMENSION_FILM)), &offset, &weight);
 #endif
+    vec2 offset = exposure_begin(scene, path, at, go, sampler);
     vec2 position = film_position(settings, pixel, offset);
     Wavelengths lambdas = wavelengths_sample(scene, sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH)).x);
     CameraRay ray = camera_ray(scene, position, sampler_pair(sampler, (natural)(DIMENSION_LENS)), lambdas);
-    store_path_weight(path, at, go, weight);
     store_path_o(path, at, go, ray.o);
     store_path_d(path, at, go, ray.d);
     store_path_lambdas(path, at, go, lambdas);
@@ -124,7 +111,7 @@ STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
         NextSample next = next_sample(settings, work_list, samples, slot, end.ended, end.begun, pixel_index, sample);
         if (any(next.leaves)) {
             mask leaves = next.leaves & end.begun, enters = next.leaves & !next.done;
-            exposure_leave(scene, path, at, film, counters, leaves, enters, next.plane, pixel_index);
+            exposure_leave(scene, path, at, BEGIN_PASSED, leaves, enters, next.plane, pixel_index);
             store_path_pixel_index(path, at, enters, next.pixel_index);
             store_path_pixel_key(path, at, enters, pixel_key(settings, next.pixel_index));
         }

@@ -1,10 +1,10 @@
-/* Tests the rays that wait to reach the camera, and adds what arrives of what they carry to the pixel that sees it. */
+/* Tests the rays that wait to reach the camera, and adds what arrives of what they carry to the pixels whose
+ * filters hold the point where it is seen. No sample is counted here: stage/emit.cl counts paths. */
 #include "core/base.cl"
 #include "interface/stage.cl"
 #include "path/shadow_ray.cl"
-#include "film/splat.cl"
+#include "film/spread.cl"
 #include "film/work_list.cl"
-#include "generated/bands.cl"
 
 STAGE(splat)(SLAB_ARGS, SCENE_ARGS, JOIN_ARGS STAGE_AT_ARG)
 {
@@ -21,10 +21,16 @@ STAGE(splat)(SLAB_ARGS, SCENE_ARGS, JOIN_ARGS STAGE_AT_ARG)
         real scale = settings->film_scale;
         vec3 colour = scale3(film_value(scene, value, lambdas), scale);
         mask accepted = arrives & film_accepts(colour);
-        integer plane = slot_plane(settings, LANE_INDEX + (int)at), pixel_index = load_shadow_pixel(shadow, at);
-        integer full = film_splat(settings, film, accepted, plane, pixel_index, colour);
+        integer plane = slot_plane(settings, LANE_INDEX + (int)at);
+        vec2 seen = load_shadow_film(shadow, at);
+        seen.x = sel(accepted, seen.x, (real)(0.0f));
+        seen.y = sel(accepted, seen.y, (real)(0.0f));
+        vec2 offset = {seen.x - floor(seen.x) - 0.5f, seen.y - floor(seen.y) - 0.5f};
+        Spread spread = spread_point(scene, to_integer(floor(seen.x)), to_integer(floor(seen.y)), offset);
+        Light light = {colour, 0, accepted, value, lambdas, scale};
+        integer full = spread_add(scene, film, accepted, plane, spread, light);
 #if USES_BANDS
-        full += bands_add(scene, bands, accepted, plane, pixel_index, value, lambdas, scale);
+        full += spread_bands(scene, bands, accepted, plane, spread, light);
 #endif
         count(counters, COUNTER_REJECTED, arrives & !accepted, (integer)(1));
         count(counters, COUNTER_FULL, accepted & (full > 0), full);

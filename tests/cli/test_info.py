@@ -20,7 +20,8 @@ def test_the_cornell_box(scenes, capsys):
     assert found["shapes"] == {"rectangle": 6, "cube": 2}
     assert found["triangles"] == found["triangles_instanced"] == 6 * 2 + 2 * 12
     assert found["cameras"] == ["perspective"]
-    assert (found["spp"], found["integrator"], found["sampler"]) == (16, "path", "independent")
+    assert (found["spp"], found["integrator"]) == (16, "path")
+    assert (found["sampler"], found["sampler_in_file"]) == ("sobol", "independent")
     assert found["animations"] == []
     assert found["lights"] == {"area": 1}
     assert found["materials"] == {"diffuse": 3}

@@ -288,6 +288,7 @@ def test_changes_of_a_scene():
     assert (scene.film.width, scene.film.height) == (30, 20)
     assert (scene.spp, scene.integrator.kind, scene.seed) == (7, "direct", 3)
     assert changed(load(CORNELL), max_depth=3).integrator.max_depth == 3
+    assert changed(load(CORNELL), sampler="independent").sampler.kind == "independent"
     assert changed(load(CORNELL), integrator="whitted").integrator.max_depth == 8  # as it was
 
 

@@ -17,18 +17,19 @@ from tests.kernels.light_probe import Lit, lit
 
 SIGMAS = 4.5  # of the Monte Carlo estimates: a chance of 7e-6 each
 PMF = """
-    r[0] = light_tree_pmf(scene, to_integer(x[0]), v3(x[1], x[2], x[3]));
+    r[0] = light_tree_pmf(scene, to_integer(x[0]), v3(x[1], x[2], x[3]), v3(x[4], x[5], x[6]));
 """
 PICK = """
     real u = x[3], pmf;
-    r[0] = to_real(light_tree_pick(scene, v3(x[0], x[1], x[2]), &u, x[4], &pmf));
+    vec3 side = v3(x[5], x[6], x[7]);
+    r[0] = to_real(light_tree_pick(scene, v3(x[0], x[1], x[2]), side, &u, x[4], &pmf));
     r[1] = pmf;
     r[2] = u;
 """
 SAMPLE = """
     vec2 u = {x[4], x[5]};
-    vec3 both = v3(0.0f, 0.0f, 0.0f);
-    LightSample s = light_sample(scene, v3(x[0], x[1], x[2]), both, x[3], u, lambdas);
+    vec3 side = v3(x[6], x[7], x[8]);
+    LightSample s = light_sample(scene, v3(x[0], x[1], x[2]), side, x[3], u, lambdas);
     r[0] = s.wi.x; r[1] = s.wi.y; r[2] = s.wi.z; r[3] = s.pdf; r[4] = s.radiance.y;
 """
 
@@ -72,11 +73,21 @@ def points(count: int, seed: int = 2) -> np.ndarray:
     return np.random.default_rng(seed).uniform(-2.5, 2.5, (3, count))
 
 
-def pmfs(there: Lit, p: np.ndarray) -> np.ndarray:
-    """Probabilities (rows, n) of all lights at points (3, n)."""
+BOTH = np.zeros(3)  # light from either side of a surface matters
+
+
+def sides(p: np.ndarray) -> np.ndarray:
+    """Normals (3, n), one for each point (3, n)."""
+    normals = np.random.default_rng(7).normal(size=p.shape)
+    return normals / np.linalg.norm(normals, axis=0)
+
+
+def pmfs(there: Lit, p: np.ndarray, side: np.ndarray | None = None) -> np.ndarray:
+    """Probabilities (rows, n) of all lights at points (3, n), of surfaces with normals (3, n)."""
     count = len(there.rows.rows)
+    side = np.zeros_like(p) if side is None else side
     row, at = np.meshgrid(np.arange(count), np.arange(p.shape[1]), indexing="ij")
-    given = np.vstack([row.ravel(), p[:, at.ravel()]])
+    given = np.vstack([row.ravel(), p[:, at.ravel()], side[:, at.ravel()]])
     return there(PMF, given, 1)[0].reshape(count, -1).astype(float)
 
 
@@ -93,7 +104,7 @@ def unpacked(nodes: np.ndarray) -> tuple[np.ndarray, ...]:
     return axis, o, ((cones >> 16) & 0x7FFF) * (2.0 / 32767.0) - 1.0, cones >> 31 != 0
 
 
-def importance(nodes: np.ndarray, p: np.ndarray) -> np.ndarray:
+def importance(nodes: np.ndarray, p: np.ndarray, side: np.ndarray) -> np.ndarray:
     """Of all nodes at one point, (k,) float64, with angles instead of their cosines."""
     axis, cos_o, cos_e, both = unpacked(nodes)
     away = p - nodes["center"].astype(float)
@@ -105,16 +116,19 @@ def importance(nodes: np.ndarray, p: np.ndarray) -> np.ndarray:
     spread = np.arcsin(np.clip(radius / np.sqrt(d2), -1.0, 1.0))
     least = np.cos(np.maximum(np.maximum(lean, 0.0) - spread, 0.0))
     least = np.where(d2 > radius**2, least, 1.0)
+    tilt = np.arccos(np.clip(-(side * away).sum(axis=1) / np.sqrt(d2), -1, 1))
+    near = np.cos(np.maximum(tilt - spread, 0.0))
+    near = np.where((d2 > radius**2) & side.any(), near, 1.0)
     value = nodes["power"] * np.maximum(least, 1e-3) / np.maximum(d2, radius**2)
-    value = np.where(least > cos_e - 1e-3, value, 0.0)
+    value = np.where((least > cos_e - 1e-3) & (near > -1e-3), value * np.maximum(near, 1e-3), 0.0)
     return np.where(radius < 0.0, nodes["power"], value)
 
 
-def reference(there: Lit, p: np.ndarray) -> np.ndarray:
+def reference(there: Lit, p: np.ndarray, side: np.ndarray) -> np.ndarray:
     """Probabilities (rows,) at one point, from the root down."""
     count = len(there.rows.rows)
     nodes = there.rows.tree[count:].view(light_records.NODE.dtype)
-    value, chance = importance(nodes, p), np.zeros(len(nodes))
+    value, chance = importance(nodes, p, side), np.zeros(len(nodes))
     chance[0] = 1.0
     for at in range(len(nodes)):  # children stand behind their parents
         child = nodes["child"][at]
@@ -128,11 +142,13 @@ def reference(there: Lit, p: np.ndarray) -> np.ndarray:
     return found
 
 
-def test_probabilities_are_those_of_the_tree():
+@pytest.mark.parametrize("sided", [False, True])
+def test_probabilities_are_those_of_the_tree(sided):
     p = points(60)
-    found = pmfs(scene(), p)
+    side = sides(p) if sided else np.zeros_like(p)
+    found = pmfs(scene(), p, side)
     np.testing.assert_allclose(found.sum(axis=0), 1.0, atol=2e-5)
-    expected = np.stack([reference(scene(), q) for q in p.T], axis=1)
+    expected = np.stack([reference(scene(), *q) for q in zip(p.T, side.T, strict=True)], axis=1)
     np.testing.assert_allclose(found, expected, rtol=2e-3, atol=2e-6)
     # What is not placed keeps its share by power wherever p is.
     rows = scene().rows.rows
@@ -145,10 +161,10 @@ def test_choices_follow_the_probabilities():
     n = 200_000
     for i, p in enumerate(points(4, seed=5).T):
         u = np.random.default_rng(i).random(n)
-        row, pmf, rest = scene()(PICK, np.vstack([np.tile(p[:, None], n), u, u[::-1]]), 3).astype(
-            float
-        )
-        chances = pmfs(scene(), p[:, None])[:, 0]
+        side = sides(p[:, None]) if i % 2 else np.zeros((3, 1))
+        given = np.vstack([np.tile(p[:, None], n), u, u[::-1], np.tile(side, n)])
+        row, pmf, rest = scene()(PICK, given, 3).astype(float)
+        chances = pmfs(scene(), p[:, None], side)[:, 0]
         np.testing.assert_allclose(pmf, chances[row.astype(int)], rtol=1e-5)
         counts = np.bincount(row.astype(int), minlength=len(chances))
         expected = chances * n
@@ -186,12 +202,17 @@ def test_a_light_that_shines_on_a_point_may_be_chosen():
     p = points(400, seed=9)
     mesh = scattered(40)
     first = scene().rows.first[0]
-    chances = pmfs(scene(), p)[first : first + 40]
+    side = sides(p)
+    chances, sided = (pmfs(scene(), p, n)[first : first + 40] for n in (None, side))
     corners = mesh.vertices[mesh.faces].astype(float)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     height = np.einsum("mk,mkn->mn", normals, p[None] - corners[:, 0, :, None])
     assert (chances[height > 1e-9] > 0.0).all()
     assert (chances[height < 0.0] == 0.0).mean() > 0.5  # while it does look at the cones
+    toward = corners[:, :, :, None] - p[None, None]
+    above = (np.einsum("kn,mckn->mcn", side, toward) > 1e-9).any(axis=1)
+    assert (sided[(height > 1e-9) & above] > 0.0).all()
+    assert (sided[~above] == 0.0).mean() > 0.5
 
 
 def test_the_estimate_is_that_of_choosing_by_power():
@@ -200,19 +221,22 @@ def test_the_estimate_is_that_of_choosing_by_power():
     u = np.random.default_rng(4).random((3, n))
     p = np.array([0.2, 0.1, -0.5])
     found = []
-    for tree in (True, False):
-        there = scene() if tree else mixed(False)
-        r = there(SAMPLE, np.vstack([np.tile(p[:, None], n), u]), 5).astype(float)
+    for there, side in ((scene(), BOTH), (scene(), normal), (mixed(False), BOTH)):
+        given = np.vstack([np.tile(p[:, None], n), u, np.tile(side[:, None], n)])
+        r = there(SAMPLE, given, 5).astype(float)
         pdf = np.where(r[3] > 0.0, r[3], 1.0)
         value = np.where(r[3] != 0.0, r[4] * np.maximum(normal @ r[:3], 0.0) / pdf, 0.0)
         found.append((value.mean(), value.std() / np.sqrt(n)))
-    (ours, error), (theirs, other) = found
-    assert abs(ours - theirs) < SIGMAS * np.hypot(error, other)
+    theirs, other = found.pop()
+    for ours, error in found:
+        assert abs(ours - theirs) < SIGMAS * np.hypot(error, other)
+    assert found[1][1] < found[0][1]  # the normal helps
 
 
 @pytest.mark.parametrize("lanes", [1, 16])
 def test_lanes_agree(lanes):
-    given = np.vstack([points(500, 3), np.random.default_rng(3).random((2, 500))])
+    p = points(500, 3)
+    given = np.vstack([p, np.random.default_rng(3).random((2, 500)), sides(p)])
     one, other = (scene()(PICK, given, 3, lanes=k) for k in (8, lanes))
     np.testing.assert_array_equal(one, other)
 

@@ -10,10 +10,18 @@ import pytest
 
 import clpt
 from clpt.errors import SceneError
-from clpt.render.wavefront.film_state import FILM_WORDS, SAMPLES_WORD, FilmState
+from clpt.render.wavefront.film_state import FILM_WORDS, SAMPLES_WORD, SUM_WORDS, FilmState
 from clpt.scene import Film, Scene, lights
 from clpt.scene.cameras import Perspective
-from clpt.scene.integrators import Aov, Independent, Mitchell, ParticleTracer, Sobol, Zsobol
+from clpt.scene.integrators import (
+    Aov,
+    Independent,
+    Mitchell,
+    ParticleTracer,
+    Sobol,
+    Tent,
+    Zsobol,
+)
 from tests.renders.support import with_film
 
 SPP = 12
@@ -21,8 +29,13 @@ SIZE = {"width": 26, "height": 18}
 
 
 def box(scenes: Path, kind: str) -> Scene:
-    """A small Cornell box; kind: rgb, bands or light."""
-    films = {"rgb": {"filter": Mitchell()}, "bands": {"mode": "spectral", "bands": 5}, "light": {}}
+    """A small Cornell box; kind: rgb, splat (samples serve several pixels), bands or light."""
+    films = {
+        "rgb": {"filter": Mitchell(), "filtering": "importance"},
+        "splat": {"filter": Mitchell(), "alpha": True},
+        "bands": {"mode": "spectral", "bands": 5},
+        "light": {"filter": Tent()},
+    }
     scene = with_film(clpt.load(scenes / "cornell.xml"), **{"mode": "rgb", **SIZE, **films[kind]})
     if kind == "light":
         scene = dataclasses.replace(scene, integrator=ParticleTracer())
@@ -33,7 +46,7 @@ def same(a: FilmState, b: FilmState) -> bool:
     return np.array_equal(a.words, b.words) and np.array_equal(a.bands, b.bands)
 
 
-@pytest.fixture(scope="module", params=["rgb", "bands", "light"])
+@pytest.fixture(scope="module", params=["rgb", "splat", "bands", "light"])
 def scene(request, scenes: Path) -> Scene:
     return box(scenes, request.param)
 
@@ -87,11 +100,12 @@ def test_halves(scene, whole):
         renderer.run(5)
         renderer.run(SPP - 5)
         state = renderer.film_state()
-        assert state.words.shape == (1, 2, FILM_WORDS, SIZE["height"], SIZE["width"])
+        words = FILM_WORDS + 2 * SUM_WORDS * scene.film.alpha  # weights, and what is covered
+        assert state.words.shape == (1, 2, words, SIZE["height"], SIZE["width"])
         np.testing.assert_array_equal(renderer.image(), whole[1])
         even, odd = renderer.halves()
         assert not np.array_equal(even, odd)
-        if not scene.film.bands:
+        if not scene.film.bands and not scene.film.alpha:
             np.testing.assert_allclose(0.5 * (even + odd), whole[1], rtol=1e-5, atol=1e-6)
         assert (state.words[0, :, SAMPLES_WORD].sum(axis=(1, 2)) == SPP / 2 * 26 * 18).all()
 
@@ -103,7 +117,7 @@ def test_halves_of_a_whole_film(scene, whole):
 
 @pytest.mark.parametrize("sampler", [Sobol(), Zsobol(), Independent()], ids=lambda s: s.kind)
 def test_a_crop_is_part_of_the_picture(scenes: Path, sampler):
-    scene = dataclasses.replace(box(scenes, "rgb"), sampler=sampler, spp=4)
+    scene = dataclasses.replace(box(scenes, "splat"), sampler=sampler, spp=4)
     x, y, width, height = crop = (9, 5, 14, 7)
     with clpt.Renderer(scene) as one, clpt.Renderer(with_film(scene, crop=crop)) as part:
         one.run(4)

@@ -53,13 +53,17 @@ def load(path: Path, missing: Missing = "error", /, **variables: object) -> Scen
         shapes=shapes,
         lights=lights,
         integrator=_default() if integrator is None else sensors.integrator(integrator, context),
-        sampler=integrators.Independent() if first is None else first.sampler,
+        sampler=integrators.Sobol(),
         film=sensors.default_film() if first is None else first.film,
         spp=4 if first is None else first.spp,
         seed=0 if first is None else first.seed,
         name=path.stem,
         warnings=context.warnings,
-        extra={"format": "mitsuba", "cameras": [one.camera.kind for one in all_sensors]},
+        extra={
+            "format": "mitsuba",
+            "cameras": [one.camera.kind for one in all_sensors],
+            "sampler": sensors.DEFAULT_SAMPLER if first is None else first.sampler,
+        },
     )
 
 

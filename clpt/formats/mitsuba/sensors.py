@@ -13,13 +13,14 @@ from clpt.errors import UnknownKindError
 from clpt.formats.mitsuba.properties import Context, Properties, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene import cameras, integrators
-from clpt.scene.integrators import Film, Filter, Integrator, Sampler
+from clpt.scene.integrators import Film, Filter, Integrator
 from clpt.spectra import read_sensor, spaces
 from clpt.spectra.sensors import OBSERVERS
 
 FULL_FRAME = math.hypot(36.0, 24.0)  # diagonal of 35 mm film [mm], which focal_length refers to
 FILMS = ("hdrfilm", "clptfilm")
 SAMPLERS = ("independent", "stratified", "multijitter", "orthogonal", "ldsampler")
+DEFAULT_SAMPLER = "independent"
 CHANNELS = {
     "depth": "depth",
     "position": "position",
@@ -34,11 +35,11 @@ CHANNELS = {
 
 @dataclass
 class Sensor:
-    """What a <sensor> and its children describe."""
+    """What a <sensor> and its children describe; sampler: its name in the file."""
 
     camera: cameras.Camera
     film: Film
-    sampler: Sampler
+    sampler: str
     spp: int
     seed: int
 
@@ -232,18 +233,17 @@ def _crop(props: Properties, width: int, height: int) -> tuple[int, int, int, in
     return x, y, props.integer(names[2], width - x, 1), props.integer(names[3], height - y, 1)
 
 
-def _sampler(element: Element | None, context: Context) -> tuple[Sampler, int, int]:
-    """Return the sampler, the samples of a pixel and the seed."""
+def _sampler(element: Element | None, context: Context) -> tuple[str, int, int]:
+    """Return the sampler's name, the samples of a pixel and the seed."""
     if element is None:
-        return integrators.Independent(), 4, 0
+        return DEFAULT_SAMPLER, 4, 0
     if element.type not in SAMPLERS:
         raise unknown(element, SAMPLERS)
     props = Properties(element, context)
     spp, seed = props.integer("sample_count", 4, 1), props.integer("seed", 0)
     props.ignore("jitter", "strength")
     props.finish()
-    independent = element.type == "independent"
-    return integrators.Independent() if independent else integrators.Sobol(), spp, seed
+    return element.type, spp, seed
 
 
 def integrator(element: Element, context: Context) -> Integrator:

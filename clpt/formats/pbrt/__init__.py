@@ -33,7 +33,8 @@ def load(path: Path, progress: Progress | None = None, missing: Missing = "error
     camera = options.get("Camera") or _default_camera(path, contents)
     exposure = camera_film.exposure_time(camera.params)
     film = films.film(options.get("Film"), options.get("PixelFilter"), exposure)
-    sampler, spp, seed = films.sampler(options.get("Sampler"))
+    chosen = options.get("Sampler")
+    sampler, spp, seed = films.sampler(chosen)
     scene = Scene(
         camera=camera_film.camera(camera, film),
         shapes=build_scene.shapes(contents, progress),
@@ -44,7 +45,7 @@ def load(path: Path, progress: Progress | None = None, missing: Missing = "error
         spp=spp,
         seed=contents.seed or 0 if seed is None else seed,
         name=path.name.partition(".pbrt")[0],
-        extra={"format": "pbrt"},
+        extra={"format": "pbrt", "sampler": chosen.kind if chosen else sampler.kind},
     )
     build_scene.check_unused_materials(contents)
     build_scene.check_options([one for name, one in options.items() if name != "Accelerator"])

@@ -16,8 +16,9 @@ from clpt.scene.integrators import Film, Filter, Integrator, Sampler
 
 FILMS = ("rgb", "gbuffer", "spectral")
 SPACES = {"srgb": "rec709", "rec2020": "rec2020", "dci-p3": "display_p3"}
-RANDOM = ("independent",)
-SAMPLERS = ("halton", "sobol", "zsobol", "paddedsobol", "pmj02bn", "stratified", *RANDOM)
+SAMPLERS = (
+    "halton", "sobol", "zsobol", "paddedsobol", "pmj02bn", "stratified", "independent",
+)  # fmt: skip
 STORED = ("filename", "savefp16", "diagonal")  # how a file is stored is decided when it is written
 SIZE = (("xresolution", 1280), ("yresolution", 720))
 DAYLIGHT = 6500.0  # [K], what pbrt takes a measured sensor's white to be
@@ -147,7 +148,10 @@ FILTERS: dict[str, Callable[[Parameters, State], Filter]] = {
 
 
 def sampler(definition: Definition | None) -> tuple[Sampler, int, int | None]:
-    """Return the sampler, the samples of a pixel, and the seed if it is given."""
+    """Return the sampler, the samples of a pixel, and the seed if it is given.
+
+    Sobol stands for all but zsobol: other random numbers, the same picture in the end.
+    """
     if definition is None:
         return integrators.Sobol(), 16, None
     params = definition.params
@@ -162,8 +166,7 @@ def sampler(definition: Definition | None) -> tuple[Sampler, int, int | None]:
     seed = params.one("seed", "integer", None)
     if not 0 < spp < 2**31:
         raise params.error(f"there must be at least one sample in a pixel, not {spp}")
-    own = {"zsobol": integrators.Zsobol(), **dict.fromkeys(RANDOM, integrators.Independent())}
-    made: Sampler = own.get(definition.kind, integrators.Sobol())
+    made = integrators.Zsobol() if definition.kind == "zsobol" else integrators.Sobol()
     return made, spp, None if seed is None else seed % 2**31
 
 

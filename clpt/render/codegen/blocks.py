@@ -17,7 +17,7 @@ READ = ("weight", "pixel_index", "pixel_key", "sample")  # and not changed
 # members that a scene has only with a flag
 NEEDED = {
     "lambdas": "SPECTRAL",
-    "sampled_hemisphere": "USES_INFINITE",
+    "sampled_hemisphere": "USES_HEMISPHERE",
     "null_distance": "USES_NULL_SURFACES",
     "nulls": "USES_NULL_SURFACES",
     "ratio": "USES_DISPERSION",
@@ -25,7 +25,7 @@ NEEDED = {
     "lead": "USES_ABSORPTION",
     "weight": "LIGHT_PATHS",
     "pixel_index": "LIGHT_PATHS",
-    "pixel": "LIGHT_PATHS",
+    "film": "LIGHT_PATHS",
     "instance": "USES_INSTANCES",
 }
 

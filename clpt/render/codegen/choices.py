@@ -14,6 +14,9 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         f"sampler/{f.sampler}.cl",
         f"path/pixel_sampler{'_z' * (f.sampler == 'zsobol')}.cl",
     ),
+    "generated/exposure.cl": lambda f, _: (
+        "film/splatting.cl" if f.film_weights else "film/exposure.cl",
+    ),
     "generated/bands.cl": lambda f, _: ("film/bands.cl",) * f.bands,
     "generated/integrator.cl": lambda f, _: (f"integrator/{f.integrator}.cl",),
     "generated/medium.cl": lambda f, _: (

@@ -30,7 +30,7 @@ def dispatch_text(
     them. It includes the files of `virtual_files`, here and in clpt.render.codegen.shapes.
 
     light_sample(scene, p, hemisphere, pick, u, lambdas): chooses a light and a direction to it
-    light_pdf(scene, row, p, wi, t, n): of it, [1/sr], for a ray that met a shape
+    light_pdf(scene, row, p, hemisphere, wi, t, n): of it, [1/sr], for a ray that met a shape
     light_shows(scene, row, front): whether the side of a shape that was met emits
     infinite_light(scene, row, hemisphere, d, lambdas, ...): radiance and pdf of one infinite light
     infinite_gather(scene, hemisphere, d, pdf, lambdas): what they add to a path that left the scene
@@ -111,7 +111,10 @@ def _sample_text(
         return function(head, "return light_sample_nothing();")
     number = "FEW_LIGHTS ? &u.x : &pick"
     if tree:
-        rows = ["real pmf;", f"integer row = light_tree_pick(scene, p, {number}, u.y, &pmf);"]
+        rows = [
+            "real pmf;",
+            f"integer row = light_tree_pick(scene, p, hemisphere, {number}, u.y, &pmf);",
+        ]
     else:
         rows = [f"integer row = light_pick(scene, {number}, u.y);"]
     rows += ["LightRow l = light_at(scene, row);", "LightSample s = light_sample_nothing();"]
@@ -140,9 +143,10 @@ def _sample_text(
 
 
 def _pdf_text(surfaces: list[str], tree: bool) -> str:
-    pmf = "light_tree_pmf(scene, row, p)" if tree else "l.pmf"
+    pmf = "light_tree_pmf(scene, row, p, hemisphere)" if tree else "l.pmf"
     return Function(
-        "real light_pdf(Scene scene, integer row, vec3 p, vec3 wi, real t, vec3 n)",
+        "real light_pdf(Scene scene, integer row, vec3 p, vec3 hemisphere, vec3 wi, real t, "
+        "vec3 n)",
         "0.0f",
         [
             Case(kind_test(kind, surfaces), f"{kind}_pdf({row_text(kind)}, p, wi, t, n)")

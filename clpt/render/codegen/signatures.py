@@ -84,8 +84,9 @@ def trace_args(features: Features, layout: str) -> dict[str, str]:
 def begin_args(features: Features) -> dict[str, str]:
     """Return what the stage takes that begins paths."""
     film = ["film", "bands"] if features.bands else ["film"]
+    own = {"footprints": "global long *"} if features.film_weights else {}
     rest = {"counters": "global uint *", "work_list": "global const uint *", "samples": "int2 "}
-    return {**dict.fromkeys(film, "global uint *"), **rest}
+    return {**dict.fromkeys(film, "global uint *"), **own, **rest}
 
 
 def join_args(features: Features, layout: str) -> dict[str, str]:

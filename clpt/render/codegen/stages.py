@@ -32,9 +32,9 @@ def connect_text(kind: str) -> str:
     """Return `camera_connect`, for paths that start at lights."""
     record = camera_records.RECORDS[kind]
     return (
-        f'#include "camera/{kind}_connect.cl"\n#define camera_connect(scene, p, away, lens, u) '
-        f"camera_pixel(scene, {kind}_connect((global const {record.name} *)(scene).camera, "
-        "(scene).settings, p, away, lens), u)\n"
+        f'#include "camera/{kind}_connect.cl"\n#define camera_connect(scene, p, away, lens) '
+        f"camera_near(scene, {kind}_connect((global const {record.name} *)(scene).camera, "
+        "(scene).settings, p, away, lens))\n"
     )
 
 

@@ -38,6 +38,8 @@ class Features:
     camera: str
     sampler: str
     filter: str
+    filter_taps: int  # pixels of an axis that light may serve; 0: a sample serves its own
+    filter_reach: int  # how far these are from its own
     integrator: str
     leaves: tuple[type[Material], ...]
     transmitting: tuple[str, ...] = ()  # kinds of leaves of which some let light through
@@ -71,6 +73,17 @@ class Features:
     spectra_size: int = 0
     spectra_step: float = 1.0
     sources: Sources = frozenset()
+
+    @property
+    def film_weights(self) -> bool:
+        """Whether samples serve several pixels, whose sums are then divided by their weights."""
+        return self.filter_reach > 0 and not self.light_paths
+
+    @property
+    def footprint_words(self) -> int:
+        """Words of what a slot sums around its pixel, see kernels/film/splatting.cl."""
+        side = 2 * self.filter_reach + 1
+        return side * side * 8 * (1 + self.alpha) if self.film_weights else 0
 
     @property
     def materials(self) -> tuple[str, ...]:

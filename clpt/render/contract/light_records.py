@@ -16,8 +16,11 @@ _IMAGE = {
     "height": ("integer", "[texels]"),
     "texels": ("integer", "first float of the first texel in `texels`"),
     "corners": ("integer", "first weight in `distributions`"),
-    "marginal": ("integer", "first of the cumulative sums over rows"),
-    "conditional": ("integer", "first of those within rows"),
+    "marginal": ("integer", "first of the cumulative sums over the rows of blocks"),
+    "conditional": ("integer", "first of those over the columns of blocks"),
+    "blocks": ("integer", "first of the chances of blocks, see kernels/core/grid.cl"),
+    "block_rows": ("integer", "rows of cells of a block"),
+    "block_columns": ("integer", "columns of cells of a block"),
     "norm": ("real", "one over the sum of the cells' mean weights"),
 }
 

@@ -23,7 +23,17 @@ log = logging.getLogger(__name__)
 
 GAP = 256  # words that are written though they are the same, rather than by two commands
 MOST_WRITES = 64  # beyond which the whole range between the first and the last is one write
-FIXED = ("width", "height", "crop_x", "crop_y", "film_width", "film_height", "bands", "alpha")
+FIXED = (
+    "width",
+    "height",
+    "margin",
+    "crop_x",
+    "crop_y",
+    "film_width",
+    "film_height",
+    "bands",
+    "alpha",
+)
 
 
 @dataclass(frozen=True)
@@ -64,7 +74,8 @@ def take(wavefronts: Sequence[Wavefront], lowered: Lowered, refit: bool = False)
     scene, paths = first.scene, first.paths
     if any(scene.lowered.settings[name] != lowered.settings[name] for name in FIXED):
         raise SceneError(
-            "its size, bands and alpha stay as they are; make a new Renderer", where="film"
+            "its size, bands, alpha and the reach of its filter stay; make a new Renderer",
+            where="film",
         )
     changes = _changes(first, lowered, refit)
     with scene.buffers.all_or_nothing():

@@ -34,6 +34,8 @@ def features_of(
         camera=scene.camera.kind,
         sampler=scene.sampler.kind,
         filter=scene.film.filter.kind,
+        filter_taps=index.filter_taps,
+        filter_reach=index.filter_reach,
         integrator=INTEGRATORS.get(scene.integrator.kind, scene.integrator.kind),
         leaves=index.leaves,
         transmitting=tuple(sorted(materials.transmitting)),

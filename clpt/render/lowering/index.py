@@ -7,6 +7,7 @@ from typing import Any
 
 from clpt.errors import SceneError
 from clpt.render.contract import custom_materials
+from clpt.render.lowering.camera import filters
 from clpt.render.lowering.geometry import instancing, shapes
 from clpt.render.lowering.geometry.instancing import Placed, Prototype
 from clpt.scene import Scene
@@ -66,6 +67,24 @@ class SceneIndex:
     def alpha(self) -> bool:
         """Whether the film tells what is covered."""
         return self.scene.film.alpha and not self.channels
+
+    @property
+    def splatting(self) -> bool:
+        """Whether light serves all pixels whose filters hold it; else a sample serves its own."""
+        film = self.scene.film
+        wanted = film.filtering != "importance" and self.scene.noise is None
+        reaches = filters.reach(film.filter) > 0 and wanted and not self.channels
+        return reaches or self.light_paths
+
+    @property
+    def filter_taps(self) -> int:
+        """How many pixels of an axis light may serve; 0 without splatting."""
+        return filters.taps(self.scene.film.filter) if self.splatting else 0
+
+    @property
+    def filter_reach(self) -> int:
+        """How far these are from the light's own pixel."""
+        return filters.reach(self.scene.film.filter) if self.splatting else 0
 
     @property
     def mode(self) -> str:

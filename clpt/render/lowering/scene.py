@@ -143,7 +143,7 @@ def _lower_film(index: SceneIndex, encoder: Encoder, wavelengths: Density) -> tu
     Return where the density would begin in `distributions`, and whether it is there.
     """
     # first in its table
-    filters.lower_filter(index.scene.film.filter, encoder.store, index.light_paths)
+    filters.lower_filter(index.scene.film.filter, encoder.store, index.splatting)
     density_row = encoder.store.size("distributions")
     tabulated = index.spectral and wavelengths.values is not None
     if tabulated:

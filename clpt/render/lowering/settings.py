@@ -38,8 +38,9 @@ def settings_of(
     settings["width"], settings["height"] = width, height
     settings["crop_x"], settings["crop_y"] = (0, 0) if film.crop is None else film.crop[:2]
     settings["film_width"], settings["film_height"] = film.width, film.height
-    settings["tiles_x"] = -(-width // 4)
-    settings["padded_pixels"] = 16 * settings["tiles_x"] * -(-height // 4)
+    margin = settings["margin"] = 0 if index.light_paths else index.filter_reach
+    settings["tiles_x"] = -(-(width + 2 * margin) // 4)
+    settings["padded_pixels"] = 16 * settings["tiles_x"] * -(-(height + 2 * margin) // 4)
     settings["seed"] = scene.seed % 2**32
     settings["sample_bits"] = min((max(scene.spp, 1) - 1).bit_length(), MOST_SAMPLE_BITS)
     depth: int = DEPTHS.get(integrator.kind, 0) or getattr(integrator, "max_depth", -1)

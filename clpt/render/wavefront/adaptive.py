@@ -49,6 +49,9 @@ def checked(noise: float, features: Features) -> float:
     if features.light_paths:
         message = "the integrator particle_tracer cannot choose which pixels its paths reach"
         raise SceneError(f"{message}; leave it out, or choose path", where="noise")
+    if features.film_weights:
+        message = f"neighbouring pixels share samples under the filter {features.filter}"
+        raise SceneError(f"{message}; give the scene `noise`, or film.filtering", where="noise")
     if features.sampler not in [cls.kind for cls in PIXELWISE]:
         message = f"neighbouring pixels share the points of the sampler {features.sampler}"
         raise SceneError(f"{message}; leave it out, or choose sobol", where="noise")

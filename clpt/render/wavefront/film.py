@@ -19,9 +19,9 @@ class Film:
     """The film of a wavefront.
 
     settings: of the paths, which say the film's size and halves; bands: whether it has any;
-    alpha: whether it tells what is covered. size: width and height [pixels]; sums: the buffers that
-    samples are added to, by the names of the kernels' arguments; picture: (h, w, 4) float32, always
-    the same memory.
+    weights: whether samples serve several pixels; alpha: whether it tells what is covered. size:
+    width and height [pixels]; sums: the buffers that samples are added to, by the names of the
+    kernels' arguments; picture: (h, w, 4) float32, always the same memory.
 
     Raises MemoryBudgetError.
     """
@@ -32,10 +32,11 @@ class Film:
         buffers: Buffers,
         settings: NDArray[np.void],
         bands: bool,
+        weights: bool,
         alpha: bool,
     ):
         self.stream, self.has_bands = stream, bands
-        self._words = FILM_WORDS + SUM_WORDS * alpha  # of a pixel
+        self._words = FILM_WORDS + SUM_WORDS * (weights + alpha)  # of a pixel
         self.size = int(settings["width"]), int(settings["height"])
         self.band_count = int(settings["bands"]) if bands else 0
         self.halves = int(settings["halves"])
@@ -97,7 +98,7 @@ class Film:
         return self.made(kernel, self._images["band_image"], self.band_count)
 
     def words(self) -> tuple[Words, Words]:
-        """Return what the film holds: (halves, 10 or 13, h, w) uint32, and of bands (halves, bands,
+        """Return what the film holds: (halves, 10 to 16, h, w) uint32, and of bands (halves, bands,
         3, h, w); wait for it."""
         width, height = self.size
         found = []

@@ -11,7 +11,7 @@ from clpt.errors import SceneError
 
 SUM_WORDS = 3  # kernels/core/fixed.cl
 SAMPLES_WORD = 3 * SUM_WORDS  # after three sums, kernels/film/film.cl
-FILM_WORDS = SAMPLES_WORD + 1  # of a pixel; a film with alpha has another sum
+FILM_WORDS = SAMPLES_WORD + 1  # of a pixel; one of weights and one of alpha may follow
 
 Words = NDArray[np.uint32]
 Ranges = tuple[tuple[int, int], ...]
@@ -24,8 +24,9 @@ class FilmState:
     A sum is 96 bits in two's complement, three words with the lowest first, in units of 2^-48. So
     two states of different samples merge to the state of one run, to the bit, in any order.
 
-    words: (films, halves, 10, h, w) uint32, one film, or one for each channel of `aov`; of each
-    pixel three sums, and the number of its samples; with alpha 13, a sum of what is covered.
+    words: (films, halves, 10 to 16, h, w) uint32, one film, or one for each channel of `aov`; of
+    each pixel three sums, and the number of its samples; then, where samples serve all pixels whose
+    filters hold them, a sum of the filter's values, and with alpha a sum of what is covered.
     halves: 2 where even and odd samples are kept apart, else 1. bands: (halves, bands, 3, h, w)
     uint32, a sum for each band; bands may be 0. taken: first and end of each range of sample
     numbers that were taken, ascending and apart. scale: of a value of 1, a power of two that
@@ -62,12 +63,12 @@ class FilmState:
 
 
 def add_films(a: Words, b: Words) -> Words:
-    """Return the sums and numbers of samples, (..., 10 or 13, h, w) each, of two films."""
+    """Return the sums and numbers of samples, (..., 10 to 16, h, w) each, of two films."""
     total = a + b
-    for first in (0, SUM_WORDS, 2 * SUM_WORDS, FILM_WORDS):
+    further = range(FILM_WORDS, a.shape[-3], SUM_WORDS)
+    for first in (0, SUM_WORDS, 2 * SUM_WORDS, *further):
         part = np.s_[..., first : first + SUM_WORDS, :, :]
-        if first < a.shape[-3]:
-            total[part] = add_sums(a[part], b[part])
+        total[part] = add_sums(a[part], b[part])
     return total
 
 

@@ -46,14 +46,15 @@ class Slots:
         return self.per_plane * self.planes
 
 
-def default_slots(info: device.DeviceInfo) -> int:
+def default_slots(info: device.DeviceInfo, footprint: int = 0) -> int:
     """Return how many paths in flight suit a device: more for one with more compute units.
 
     A CPU gets as many as its cache holds. Any other device gets several times as many as it runs at
-    once, so that no unit is idle while the last work-items of a queue run.
+    once, so that no unit is idle while the last work-items of a queue run. footprint: words of a
+    slot beside its state.
     """
     if info.is_cpu:
-        return CPU_SLOTS
+        return CPU_SLOTS * WORDS // (WORDS + footprint)
     return min(info.compute_units * UNIT_SLOTS, MOST_SLOTS)
 
 
@@ -64,20 +65,23 @@ def divide_film(
     slots: int | None,
     looped: bool,
     halves: bool = False,
+    footprint: int = 0,
 ) -> Slots:
     """Return how a film is divided among slots: as many as are wanted, or as memory allows.
 
     memory: that buffers may take [bytes], of which slots get half; slots: wanted, None for what
-    suits the device. A film with fewer pixels than slots gets several planes; one whose even and
-    odd samples are kept apart (halves) an even number of them. The picture does not depend on it.
+    suits the device; footprint: words of a slot beside its state. A film with fewer pixels than
+    slots gets several planes; one whose even and odd samples are kept apart (halves) an even number
+    of them. The picture does not depend on it.
 
     Raises MemoryBudgetError.
     """
-    room = min(memory // 2 // (4 * WORDS), info.max_alloc // 4 // LARGEST)
-    wanted = min(slots or default_slots(info), int(room) - PADDING)
+    words, largest = WORDS + footprint, max(LARGEST, footprint)
+    room = min(memory // 2 // (4 * words), info.max_alloc // 4 // largest)
+    wanted = min(slots or default_slots(info, footprint), int(room) - PADDING)
     if wanted < GROUP:
         advice = "close other programs or choose another device"
-        raise MemoryBudgetError("the least number of paths", 4 * WORDS * GROUP, memory, advice)
+        raise MemoryBudgetError("the least number of paths", 4 * words * GROUP, memory, advice)
     film = -(-padded_pixels // GROUP) * GROUP
     per_plane = min(wanted // GROUP * GROUP, film)
     planes = max(1, wanted // film) if per_plane == film else 1
@@ -94,8 +98,10 @@ class PathBuffers:
     """The state of the paths in flight on a device.
 
     settings: those of the lowered scene, of which this is a copy, with the numbers of slots and
-    planes and the seed of the samples; blocks: slots beyond those of the paths, see
-    kernels/path/queue.cl; stride: words from one stream of a slab to the next.
+    planes and the seed of the samples; pixels: how many have samples, with those around the
+    picture; blocks: slots beyond those of the paths, see kernels/path/queue.cl; footprint: words of
+    what a slot sums around its pixel, see kernels/film/splatting.cl; stride: words from one stream
+    of a slab to the next.
 
     Raises MemoryBudgetError.
     """
@@ -109,6 +115,7 @@ class PathBuffers:
         blocks: int,
         queued: bool,
         kinds: int,
+        footprint: int,
     ):
         self.stream, self.buffers = stream, buffers
         self._slots, self.slots = slots, slots.total
@@ -121,9 +128,16 @@ class PathBuffers:
             buffer = buffers.allocate(name, size, "lower the number of slots")
             stream.fill(buffer, 0, 0, size)
             self._fixed[name] = buffer
+        if footprint:
+            size = 4 * footprint * self.slots
+            buffer = buffers.allocate("the footprints", size, "lower the number of slots")
+            stream.fill(buffer, 0, 0, size)
+            self._fixed["footprints"] = buffer
         self._fixed["counters"] = buffers.allocate("the counters", 8 * len(COUNTERS))
         self._fixed["settings"] = buffers.upload("the settings", self._setting_words)
-        every_pixel = work_list.table(self.settings, work_list.inside(self.settings))
+        sampled = work_list.sampled(self.settings)
+        self.pixels = len(sampled)
+        every_pixel = work_list.table(self.settings, sampled)
         self._fixed["work_list"] = buffers.upload("the work list", every_pixel)
         self.queue = self.new_queue(queued, kinds)
 

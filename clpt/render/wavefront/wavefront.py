@@ -97,7 +97,10 @@ class Wavefront:
         self._stages: list[Step] | None = None
         self._loop: device.BoundKernel | None = None
         features = self.features
-        self.film = Film(self.stream, self.buffers, paths.settings, features.bands, features.alpha)
+        self.film = Film(
+            self.stream, self.buffers, paths.settings,
+            features.bands, features.film_weights, features.alpha,
+        )  # fmt: skip
         self._bind_film()
         self.clear()
 
@@ -131,11 +134,16 @@ class Wavefront:
         stream, buffers = device.Stream(on.queue), device.Buffers(on)
         settings, kinds = lowered.settings, len(lowered.features.materials)
         padded_pixels = int(settings["padded_pixels"])
-        divided = divide_film(on.info, padded_pixels, buffers.limit, slots, looped, halves)
+        footprint = lowered.features.footprint_words
+        divided = divide_film(
+            on.info, padded_pixels, buffers.limit, slots, looped, halves, footprint
+        )
         scene = DeviceScene(stream, buffers, lowered, chosen, tree_quality)
         share = strategy.loop_share(on)
         blocks = -(-divided.total // share) * on.lanes if share > on.lanes else 0  # one each
-        in_flight = PathBuffers(stream, buffers, settings, divided, blocks, chosen.queued, kinds)
+        in_flight = PathBuffers(
+            stream, buffers, settings, divided, blocks, chosen.queued, kinds, footprint
+        )
         return cls(scene, in_flight, looped, lowered.features.channel, tuning)
 
     def with_channel(self, channel: str) -> Wavefront:

@@ -11,16 +11,28 @@ PixelIndices = NDArray[np.int64]  # of padded pixels, in the order of 4x4 tiles,
 
 
 def pixels(settings: NDArray[np.void]) -> tuple[PixelIndices, PixelIndices]:
-    """Return x and y of every padded pixel, (padded_pixels,) each."""
-    index = np.arange(int(settings["padded_pixels"]))
+    """Return x and y in the picture of every padded pixel, (padded_pixels,) each."""
+    index, margin = np.arange(int(settings["padded_pixels"])), int(settings["margin"])
     row, column = np.divmod(index >> 4, int(settings["tiles_x"]))
-    return column * 4 + (index & 3), row * 4 + (index >> 2 & 3)
+    return column * 4 + (index & 3) - margin, row * 4 + (index >> 2 & 3) - margin
 
 
 def inside(settings: NDArray[np.void]) -> PixelIndices:
     """Return the pixels in the picture, ascending: its sides need not be multiples of four."""
+    return _within(settings, 0)
+
+
+def sampled(settings: NDArray[np.void]) -> PixelIndices:
+    """Return the pixels that have samples, ascending: those of the picture and its margin."""
+    return _within(settings, int(settings["margin"]))
+
+
+def _within(settings: NDArray[np.void], margin: int) -> PixelIndices:
+    """The pixels in the picture and in so many around it."""
     x, y = pixels(settings)
-    return np.flatnonzero((x < settings["width"]) & (y < settings["height"]))
+    width, height = int(settings["width"]), int(settings["height"])
+    across = (-margin <= x) & (x < width + margin)
+    return np.flatnonzero(across & (-margin <= y) & (y < height + margin))
 
 
 def table(

@@ -173,7 +173,8 @@ def test_samplers_and_integrators(scene):
     made = scene('Sampler "stratified" "integer xsamples" 3 "integer ysamples" 5\nOption "seed" 7')
     assert (made.spp, made.seed, type(made.sampler)) == (15, 7, integrators.Sobol)
     made = scene('Sampler "independent" "integer pixelsamples" 9')
-    assert (made.spp, type(made.sampler)) == (9, integrators.Independent)
+    assert (made.spp, type(made.sampler)) == (9, integrators.Sobol)
+    assert made.extra["sampler"] == "independent"
     assert made.integrator.max_depth == 6
     assert scene('Integrator "volpath" "integer maxdepth" 65').integrator.max_depth == 66
 

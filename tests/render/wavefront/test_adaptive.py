@@ -171,7 +171,8 @@ def test_refused_where_pixels_share_points():
 
 def test_work_list():
     """Every pixel of the picture is dealt once, and the padding to nobody."""
-    settings = {"width": 10, "height": 7, "tiles_x": 3, "padded_pixels": 96, "per_plane": 32}
+    settings = {"width": 10, "height": 7, "margin": 0, "tiles_x": 3, "padded_pixels": 96}
+    settings["per_plane"] = 32
     order = inside(settings)
     x, y = pixels(settings)
     assert {*zip(x[order], y[order], strict=True)} == {(i, j) for i in range(10) for j in range(7)}

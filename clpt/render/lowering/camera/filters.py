@@ -1,7 +1,8 @@
-"""Pixel filters on their way to the device: tables to sample them by (kernels/film/filter.cl)."""
+"""Pixel filters on their way to the device: tables to sample them by, and of their values."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -27,16 +28,24 @@ PROFILE = 256  # steps of a filter's values
 CUT = 4.0  # standard deviations at which a Gaussian ends that has no radius
 
 
-def lower_filter(chosen: Filter, store: TableStore, light_paths: bool) -> None:
+def lower_filter(chosen: Filter, store: TableStore, splatting: bool) -> None:
     """Put a filter's table into `distributions`, where the kernels expect it to be the first.
 
-    light_paths: whether points choose pixels; then the filter's values follow. Raises SceneError if
-    something stands there already, and as `table` does.
+    splatting: whether light serves all pixels whose filters hold it: then the filter's values.
+    Raises SceneError if something stands there already, and as `table` does.
     """
-    if store.append_floats("distributions", table(chosen)) != 0:
+    if store.append_floats("distributions", (profile if splatting else table)(chosen)) != 0:
         raise SceneError("the pixel filter has to be lowered first")
-    if light_paths and not isinstance(chosen, Box):
-        store.append_floats("distributions", profile(chosen))
+
+
+def reach(chosen: Filter) -> int:
+    """Return how many pixels beside its own a sample may serve, along an axis to one side."""
+    return max(math.ceil(radius(chosen) - 0.5), 0)
+
+
+def taps(chosen: Filter) -> int:
+    """Return how many pixels of an axis have a point in their filters at most."""
+    return math.ceil(2.0 * radius(chosen))
 
 
 def radius(chosen: Filter) -> float:
@@ -79,8 +88,9 @@ def table(chosen: Filter) -> NDArray[np.float32]:
 def profile(chosen: Filter) -> NDArray[np.float32]:
     """Return the radius, n, and n + 1 values from the centre to there: see kernels/film/spread.cl.
 
-    The integral of the filter, over both sides, is 1.
+    The integral of the filter, over both sides, is 1. Raises as `table` does.
     """
+    table(chosen)
     distances = np.linspace(0.0, radius(chosen), PROFILE + 1)
     values = value(chosen, distances)
     area = 2.0 * np.sum((values[1:] + values[:-1]) / 2.0) * radius(chosen) / PROFILE

@@ -1,13 +1,14 @@
 """Images around the scene on their way to the device: texels, and a grid to choose directions by.
 
 A grid has a weight at every corner of its cells and is bilinear inside them; it follows radiance
-times solid angle. Cells are chosen by rows and then columns, points in a cell by the bilinear
-function itself (kernels/core/grid.cl).
+times solid angle. Cells are chosen by blocks, see clpt.render.lowering.lights.block_grids, points
+in a cell by the bilinear function itself (kernels/core/grid.cl).
 """
 
 from __future__ import annotations
 
 import dataclasses
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,6 +19,7 @@ from clpt import images, spectral_exr, transforms
 from clpt.errors import SceneError
 from clpt.render.lowering.device_arrays import on_host
 from clpt.render.lowering.encoder import Encoder
+from clpt.render.lowering.lights import block_grids
 from clpt.render.lowering.lowering_cache import version
 from clpt.render.lowering.textures.texels import bands, texels
 from clpt.scene.lights import CubeMap, Envmap
@@ -26,7 +28,6 @@ from clpt.spectral_exr import SpectralImage
 
 Array = NDArray[np.float32]
 
-ROWS = 256  # of an image that are worked on at a time
 UNSEEN = 0.1  # share of the mean over bands in the weight of a texel: light of no colour counts too
 
 FACES = "+x -x +y -y +z -z"
@@ -38,16 +39,15 @@ _TALL = ((2, 1), (0, 1), (1, 0), (1, 2), (1, 1), (1, 3))
 class _Content(NamedTuple):
     """What an image light is made of: texels, and cells to choose among by their mean weights.
 
-    bands, number: of texels that are spectra: how many values they have, which one by wavelength.
+    grid: how blocks of cells and the cells in them are chosen; bands, number: of texels that are
+    spectra: how many values they have, which one by wavelength.
     """
 
     width: int
     height: int
     texels: Array
     corners: NDArray[Any]
-    marginal: NDArray[np.float64]
-    conditional: Array
-    total: float
+    grid: block_grids.BlockGrid
     bands: int = 0
     number: Tabulated | None = None
 
@@ -75,13 +75,16 @@ def lower_image(lamp: Envmap | CubeMap, encoder: Encoder) -> tuple[dict[str, Arr
         "height": made.height,
         "texels": encoder.store.append_floats("texels", made.texels),
         "corners": encoder.store.append_floats("distributions", made.corners),
-        "marginal": encoder.store.append_floats("distributions", made.marginal),
-        "conditional": encoder.store.append_floats("distributions", made.conditional),
-        "norm": 1.0 / made.total if made.total > 0.0 else 0.0,
+        "marginal": encoder.store.append_floats("distributions", made.grid.marginal),
+        "conditional": encoder.store.append_floats("distributions", made.grid.conditional),
+        "blocks": encoder.store.append_floats("distributions", made.grid.blocks),
+        "block_rows": made.grid.block_rows,
+        "block_columns": made.grid.block_columns,
+        "norm": 1.0 / made.grid.total if made.grid.total > 0.0 else 0.0,
     }
     if made.number is not None:
         members |= {"bands": made.bands, "number": encoder.spectra.row(made.number)}
-    return members, made.total * cell / (4.0 * np.pi)
+    return members, made.grid.total * cell / (4.0 * np.pi)
 
 
 def _sphere(given: Any, scale: float, spectral: bool, lo: float, hi: float) -> _Content:
@@ -94,12 +97,18 @@ def _sphere(given: Any, scale: float, spectral: bool, lo: float, hi: float) -> _
     if found is None or not spectral:
         corners = _latitude_weights(_brightness(image))[None]
         values = texels(image.reshape(1, -1, 3), "emission", spectral)
-        return _Content(width, height, values, corners, *_cumulative(corners))
+        return _Content(
+            width,
+            height,
+            values,
+            corners,
+            block_grids.of(corners, partial(sphere_directions, width)),
+        )
     found = _scaled(found, scale, where)
     corners = _latitude_weights(luminance(image) + UNSEEN * _brightness(found.values))[None]
     values, number = bands(found, lo, hi)
-    cells = _cumulative(corners)
-    return _Content(width, height, values, corners, *cells, values.shape[1], number)
+    grid = block_grids.of(corners, partial(sphere_directions, width))
+    return _Content(width, height, values, corners, grid, values.shape[1], number)
 
 
 def _cube(given: Any, scale: float, spectral: bool) -> _Content:
@@ -108,7 +117,7 @@ def _cube(given: Any, scale: float, spectral: bool) -> _Content:
     image, size = _bordered(faces), faces.shape[1]
     corners = _cube_weights(_brightness(image))
     values = texels(image.reshape(1, -1, 3), "emission", spectral)
-    return _Content(size, size, values, corners, *_cumulative(corners))
+    return _Content(size, size, values, corners, block_grids.of(corners, cube_directions))
 
 
 def _axes(lamp: Envmap | CubeMap) -> NDArray[np.float64]:
@@ -191,6 +200,25 @@ def face_directions(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
     return np.stack([np.stack(row, axis=-1) for row in rows])
 
 
+def sphere_directions(width: int, row: ArrayLike, column: ArrayLike) -> NDArray[np.float64]:
+    """Directions (..., 3) at places of a grid in latitude and longitude, rows and columns 0 to 1.
+
+    The grid begins in the middle of the first of `width` texels.
+    """
+    theta = np.pi * np.asarray(row, np.float64)
+    phi = 2.0 * np.pi * (np.asarray(column, np.float64) + 0.5 / width)
+    sine = np.sin(theta)
+    return np.stack([np.sin(phi) * sine, np.cos(theta), -np.cos(phi) * sine], axis=-1)
+
+
+def cube_directions(row: ArrayLike, column: ArrayLike) -> NDArray[np.float64]:
+    """Directions (..., 3) at places of six faces, one below the other, rows and columns 0 to 1."""
+    within, face = np.modf(np.minimum(6.0 * np.asarray(row, np.float64), 5.999999))
+    d = face_directions(2.0 * np.asarray(column) - 1.0, 2.0 * within - 1.0)
+    d = np.take_along_axis(d, face.astype(np.int64)[None, ..., None], axis=0)[0]
+    return d / np.linalg.norm(d, axis=-1, keepdims=True)
+
+
 def face_coordinates(d: ArrayLike) -> tuple[NDArray[np.int64], Any, Any]:
     """The face that a direction (..., 3) meets, and a and b there."""
     x, y, z = np.moveaxis(np.asarray(d, np.float64), -1, 0)
@@ -239,23 +267,3 @@ def _cube_weights(bright: Array) -> NDArray[np.float64]:
     weights[..., 1::2], weights[..., ::2] = wide[..., 1:-1], 0.5 * (wide[..., 1:] + wide[..., :-1])
     at = np.linspace(-1.0, 1.0, 2 * n + 1)
     return weights * (1.0 + at[None, :] ** 2 + at[:, None] ** 2) ** -1.5
-
-
-def _cumulative(corners: NDArray[Any]) -> tuple[NDArray[np.float64], Array, float]:
-    """Sums over rows and within rows, each up to 1, of the cells of grids (k, r + 1, c + 1)."""
-    grids, rows, columns = corners.shape[0], corners.shape[1] - 1, corners.shape[2] - 1
-    conditional = np.empty((grids, rows, columns), np.float32)
-    sums = np.empty((grids, rows))
-    for grid, own, total in zip(corners, conditional, sums, strict=True):
-        for first in range(0, rows, ROWS):
-            part = grid[first : first + ROWS + 1]
-            wide = part[1:].astype(np.float64) + part[:-1]
-            cells = np.cumsum(0.25 * (wide[:, 1:] + wide[:, :-1]), axis=1)
-            total[first : first + ROWS] = cells[:, -1]
-            cells /= np.where(cells[:, -1:] > 0.0, cells[:, -1:], 1.0)
-            own[first : first + ROWS] = cells
-    marginal = np.cumsum(sums)
-    whole = float(marginal[-1])
-    marginal /= whole if whole > 0.0 else 1.0
-    conditional[..., -1] = marginal[-1] = 1.0
-    return marginal, conditional.reshape(-1, columns), whole

@@ -26,6 +26,7 @@ def blank_row() -> NDArray[np.uint32]:
     """
     words = np.zeros(1, RECORDS["spectral_envmap"].dtype)
     words["width"], words["height"] = 1, 2
+    words["block_rows"] = words["block_columns"] = 1
     longest = max(record.words for record in RECORDS.values())
     return np.pad(words.view(np.uint32), (0, longest - RECORDS["spectral_envmap"].words))
 
