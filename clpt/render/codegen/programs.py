@@ -182,7 +182,8 @@ def _alone(features: Features, layout: str, *names: str) -> dict[str, device.Sou
 def _source(
     stage: str, virtual: device.Virtual, defines: flags.Defines, lanes: int
 ) -> device.Source:
-    return device.assemble(f"stage/{stage}.cl", virtual, {"LANES": lanes, "QUEUED": 0, **defines})
+    whole = device.assemble(f"stage/{stage}.cl", virtual, {"LANES": lanes, "QUEUED": 0, **defines})
+    return whole.with_static()
 
 
 def _shared(features: Features, layout: str) -> Files:
