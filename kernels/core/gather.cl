@@ -1,11 +1,12 @@
-/* Memory lane by lane: `gather` reads table[at]; the index of an idle lane must be valid: give 0. `scatter_if` writes
- * only where m; where lanes write to one place the last one counts.
+/* Memory lane by lane: `gather` reads table[at]; the index of an idle lane must be valid: give 0. `scatter_if`
+ * writes only where m; where lanes write to one place the last one counts.
  *
  * Processors with an instruction for it get it by a compiler's built-in function. Written out lane by lane, reads are
  * nine tenths of a compiled shading kernel, and of the time to compile it. */
 #ifdef __has_builtin
 #if LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_ia32_gathersiv16sf)
-#define NATIVE_GATHER(p, at) __builtin_ia32_gathersiv16sf((real)(0.0f), (const void *)(size_t)(p), at, (ushort)0xffff, 4)
+#define NATIVE_GATHER(p, at) \
+    __builtin_ia32_gathersiv16sf((real)(0.0f), (const void *)(size_t)(p), at, (ushort)0xffff, 4)
 #elif LANES == 8 && defined(__AVX2__) && __has_builtin(__builtin_ia32_gatherd_ps256)
 #define NATIVE_GATHER(p, at) \
     __builtin_ia32_gatherd_ps256((real)(0.0f), (const float *)(size_t)(p), at, as_real((mask)(-1)), 4)
