@@ -192,6 +192,9 @@ def render(
         outputs.check_contents(targets, plan)
         check(plan)
         on = chosen.result()
+    if dev.spare_cores():
+        compilers = dev.Compilers(dev.spare_cores())
+        on.compilers = click.get_current_context().with_resource(compilers)
     for warning in plan.warnings:
         shown.note(f"clpt: warning: {warning}")
     with shown.phase(f"building kernels for {on.info.name}"):
@@ -221,6 +224,8 @@ def render(
         shown.note("clpt: warning: pixels are too bright for the film: lower film.exposure")
     if verbose:
         report.after(renderer)
+    if stopped and on.compilers is not None:
+        on.compilers.kill()
     return STATUS + stopped[0] if stopped else 0
 
 

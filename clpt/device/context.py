@@ -15,6 +15,7 @@ import pyopencl as cl
 from clpt.device import memory, native_programs, program_cache, runtimes
 
 from ..errors import DeviceError
+from .compilers import Compilers
 
 log = logging.getLogger(__name__)
 
@@ -102,6 +103,7 @@ class Device:
     def __init__(self, context: cl.Context, queue: cl.CommandQueue, info: DeviceInfo):
         self.context, self.queue, self.info = context, queue, info
         self.builds = Builds()
+        self.compilers: Compilers | None = None  # in other processes, where the caller gives some
         self.programs = program_cache.of(queue)
 
     @classmethod
@@ -162,11 +164,7 @@ def choose(which: str | int | None = None, *, profiling: bool = False) -> Device
     """
     choice = selection(which)
     log.info("%s: %s", choice.info.label, choice.reason)
-    key = os.getpid(), choice.info
-    # Of two threads at once both open a context, and the first is kept: a lock might be held by
-    # another thread when the process is forked.
-    first = _opened.get(key) or _opened.setdefault(key, Device.open(choice.info))
-    return Device.open(choice.info, profiling=profiling, context=first.context)
+    return Device.open(choice.info, profiling=profiling, context=_first(choice.info).context)
 
 
 def selection(which: str | int | None = None) -> Choice:
@@ -182,7 +180,7 @@ def selection(which: str | int | None = None) -> Choice:
     named = which is not None
     failures: list[str] = []
     for info in _matching(which, found) if named else by_preference(found):
-        failure = None if (os.getpid(), info) in _opened else trial(info)
+        failure = None if _key(info) in _opened else trial(info)
         if failure is None:
             reason = f"asked for by {asked}" if named else _reason(info, found)
             return Choice(info, "; ".join([reason, *(f"passed over {f}" for f in failures)]))
@@ -201,17 +199,31 @@ def by_preference(infos: tuple[DeviceInfo, ...]) -> list[DeviceInfo]:
 def trial(info: DeviceInfo) -> str | None:
     """Build and run a trivial kernel; return None if it worked, else the error in one line."""
     try:
-        context = cl.Context([info.cl_device])
-        queue = _queue(context, info.cl_device, False)
-        kernel = cl.Kernel(native_programs.build(context, info.cl_device, _TRIAL), "trial")
+        # The process's own context: in each one PoCL reads its library anew, which takes a second.
+        device = _opened.get(_key(info)) or Device.open(info)
+        program = native_programs.build(device.context, info.cl_device, _TRIAL)
         result = np.zeros(4, np.uint32)
-        buffer = cl.Buffer(context, cl.mem_flags.WRITE_ONLY, result.nbytes)
-        kernel(queue, result.shape, None, buffer)
-        cl.enqueue_copy(queue, result, buffer)
+        buffer = cl.Buffer(device.context, cl.mem_flags.WRITE_ONLY, result.nbytes)
+        cl.Kernel(program, "trial")(device.queue, result.shape, None, buffer)
+        cl.enqueue_copy(device.queue, result, buffer)
     except Exception as error:  # whatever a broken driver raises, the next one is tried
         rows = str(error).splitlines() or [type(error).__name__]
         return next((row for row in rows if "error:" in row), rows[0]).strip()[:200]
-    return None if (result == 7).all() else "a trivial kernel gave a wrong result"
+    if not (result == 7).all():
+        return "a trivial kernel gave a wrong result"
+    _opened.setdefault(_key(info), device)
+    return None
+
+
+def _key(info: DeviceInfo) -> tuple[int, DeviceInfo]:
+    return os.getpid(), info
+
+
+def _first(info: DeviceInfo) -> Device:
+    """The device in the process's context, which is opened the first time. Raises DeviceError."""
+    # Of two threads at once both open a context, and the first is kept: a lock might be held by
+    # another thread when the process is forked.
+    return _opened.get(_key(info)) or _opened.setdefault(_key(info), Device.open(info))
 
 
 def _matching(which: str | int | None, infos: tuple[DeviceInfo, ...]) -> list[DeviceInfo]:
