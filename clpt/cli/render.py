@@ -117,6 +117,7 @@ class White(click.ParamType):
 @click.option("--size", type=Size(), help="Size of the picture.")
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), help="Seed of the random numbers.")
 @click.option("--device", metavar="NAME-OR-INDEX", help="Where to render: see `clpt devices`.")
+@click.option("--threads", type=click.IntRange(1), help="Cores of a CPU to use, at most.")
 @click.option(
     "--bvh",
     "layout",
@@ -161,6 +162,7 @@ def render(
     paths: tuple[Path, ...],
     limit: float | None,
     device: str | None,
+    threads: int | None,
     layout: str | None,
     tree_quality: Quality,
     exposure: float,
@@ -182,7 +184,7 @@ def render(
     shown = display(quiet, limit)
     began = time.perf_counter()
     with ThreadPoolExecutor(max_workers=1) as beside:
-        chosen = beside.submit(dev.choose, device, profiling=bool(verbose))
+        chosen = beside.submit(dev.choose, device, profiling=bool(verbose), threads=threads)
         with shown.loading(scene.name) as tell:
             loaded = load(scene, progress=tell, missing_textures=missing_textures, **variables)
             plan = changed(loaded, **changes)
@@ -192,8 +194,9 @@ def render(
         outputs.check_contents(targets, plan)
         check(plan)
         on = chosen.result()
-    if dev.spare_cores():
-        compilers = dev.Compilers(dev.spare_cores())
+    spare = min(dev.spare_cores(), (threads or on.info.compute_units) - 1)
+    if spare:
+        compilers = dev.Compilers(spare)
         on.compilers = click.get_current_context().with_resource(compilers)
     for warning in plan.warnings:
         shown.note(f"clpt: warning: {warning}")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import functools
 import logging
 import os
 import threading
@@ -149,7 +151,9 @@ def devices() -> tuple[DeviceInfo, ...]:
     return tuple(_info(index, device) for index, device in enumerate(_cl_devices()))
 
 
-def choose(which: str | int | None = None, *, profiling: bool = False) -> Device:
+def choose(
+    which: str | int | None = None, *, profiling: bool = False, threads: int | None = None
+) -> Device:
     """Open the device named by an index, or by a part of its names in any case.
 
     Its names are the platform's, its own and that in its version, such as "pocl".
@@ -160,11 +164,15 @@ def choose(which: str | int | None = None, *, profiling: bool = False) -> Device
     None takes the environment variable CLPT_DEVICE if it is set, and otherwise the first device
     that works: GPUs, then accelerators, then CPUs.
 
-    Raises DeviceError, which lists the devices, if none matches or none works.
+    threads: how many cores of a CPU take part at most, by default all.
+
+    Raises DeviceError, which lists the devices, if none matches or none works, and where threads
+    make no sense.
     """
     choice = selection(which)
     log.info("%s: %s", choice.info.label, choice.reason)
-    return Device.open(choice.info, profiling=profiling, context=_first(choice.info).context)
+    info = choice.info if threads is None else _limited(choice.info, threads)
+    return Device.open(info, profiling=profiling, context=_first(info).context)
 
 
 def selection(which: str | int | None = None) -> Choice:
@@ -217,6 +225,26 @@ def trial(info: DeviceInfo) -> str | None:
 
 def _key(info: DeviceInfo) -> tuple[int, DeviceInfo]:
     return os.getpid(), info
+
+
+def _limited(info: DeviceInfo, threads: int) -> DeviceInfo:
+    """A part of a CPU that has so many cores, or all of it. Raises DeviceError."""
+    if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
+        raise DeviceError(f"threads must be a whole number above zero, not {threads!r}")
+    if not info.is_cpu:
+        raise DeviceError(f"threads are of a CPU, and {info.label} is none")
+    return info if threads >= info.compute_units else _part(info, threads)
+
+
+@functools.cache
+def _part(info: DeviceInfo, threads: int) -> DeviceInfo:
+    """A part of a CPU, the same each time, so that its context is kept. Raises DeviceError."""
+    by_counts = [cl.device_partition_property.BY_COUNTS, threads, 0]
+    try:
+        part = info.cl_device.create_sub_devices(by_counts)[0]
+    except cl.Error as error:
+        raise DeviceError(f"{info.label} cannot be limited to {threads} threads: {error}") from error
+    return dataclasses.replace(info, cl_device=part, compute_units=threads)
 
 
 def _first(info: DeviceInfo) -> Device:
