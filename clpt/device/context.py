@@ -243,7 +243,9 @@ def _part(info: DeviceInfo, threads: int) -> DeviceInfo:
     try:
         part = info.cl_device.create_sub_devices(by_counts)[0]
     except cl.Error as error:
-        raise DeviceError(f"{info.label} cannot be limited to {threads} threads: {error}") from error
+        raise DeviceError(
+            f"{info.label} cannot be limited to {threads} threads: {error}"
+        ) from error
     return dataclasses.replace(info, cl_device=part, compute_units=threads)
 
 
