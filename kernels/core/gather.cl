@@ -23,9 +23,11 @@
 #ifdef NATIVE_GATHER
 inline real gather(global const float *p, integer at) { return NATIVE_GATHER(p, at); }
 inline integer gather_i(global const uint *p, integer at) { return as_integer(NATIVE_GATHER(p, at)); }
+inline integer gather_constant(constant uint *p, integer at) { return as_integer(NATIVE_GATHER(p, at)); }
 #elif LANES == 1
 inline real gather(global const float *p, integer at) { return p[at]; }
 inline integer gather_i(global const uint *p, integer at) { return as_int(p[at]); }
+inline integer gather_constant(constant uint *p, integer at) { return as_int(p[at]); }
 #else
 inline real gather(global const float *p, integer at)
 {
@@ -36,6 +38,14 @@ inline real gather(global const float *p, integer at)
     return r;
 }
 inline integer gather_i(global const uint *p, integer at)
+{
+    integer r;
+#define LOAD(i) r.s##i = as_int(p[at.s##i]);
+    FOR_LANES(LOAD)
+#undef LOAD
+    return r;
+}
+inline integer gather_constant(constant uint *p, integer at)
 {
     integer r;
 #define LOAD(i) r.s##i = as_int(p[at.s##i]);

@@ -46,6 +46,7 @@ def sources(
     queued: whether shading goes along queues, which `append` fills, if a work-item shades one path;
     interleaved: a work-item of `intersect` has the rays of `lanes` paths in flight.
     """
+    queued = queued and lanes == 1
     texts = _stages(features, layout, lanes, queued, interleaved)
     if queued:
         texts |= _alone(features, layout, "append")
@@ -62,7 +63,6 @@ def _stages(
     rays: Files = {}
     if interleaved and layout != "brute":
         rays["generated/trace.cl"] = ("tracing/trace_interleaved.cl",)
-    queued = queued and lanes == 1
     texts = {
         begin: _source(begin, files, defines, lanes),
         "intersect": _source(
