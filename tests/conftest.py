@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pyopencl as cl
 import pytest
@@ -44,9 +45,9 @@ def one_context() -> Iterator[None]:
     """
     first, opened = _first(), device.choose
 
-    def choose(which: str | int | None = None, *, profiling: bool = False) -> device.Device:
-        if which is not None or profiling:
-            return opened(which, profiling=profiling)
+    def choose(which: str | int | None = None, **more: Any) -> device.Device:
+        if which is not None or any(more.values()):
+            return opened(which, **more)
         queue = cl.CommandQueue(first.context, first.info.cl_device)
         return device.Device(first.context, queue, first.info)
 

@@ -117,6 +117,7 @@ class White(click.ParamType):
 @click.option("--size", type=Size(), help="Size of the picture.")
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), help="Seed of the random numbers.")
 @click.option("--device", metavar="NAME-OR-INDEX", help="Where to render: see `clpt devices`.")
+@click.option("--threads", type=click.IntRange(1), help="Cores of a CPU to use, at most.")
 @click.option(
     "--bvh",
     "layout",
@@ -164,6 +165,7 @@ def render(
     paths: tuple[Path, ...],
     limit: float | None,
     device: str | None,
+    threads: int | None,
     layout: str | None,
     tree_quality: Quality,
     exposure: float,
@@ -185,7 +187,7 @@ def render(
     shown = display(quiet, limit)
     began = time.perf_counter()
     with ThreadPoolExecutor(max_workers=1) as beside:
-        chosen = beside.submit(dev.choose, device, profiling=bool(verbose))
+        chosen = beside.submit(dev.choose, device, profiling=bool(verbose), threads=threads)
         with shown.loading(scene.name) as tell:
             loaded = load(scene, progress=tell, missing_textures=missing_textures, **variables)
             plan = changed(loaded, **changes)
@@ -195,6 +197,10 @@ def render(
         outputs.check_contents(targets, plan)
         check(plan)
         on = chosen.result()
+    spare = min(dev.spare_cores(), (threads or on.info.compute_units) - 1)
+    if spare:
+        compilers = dev.Compilers(spare)
+        on.compilers = click.get_current_context().with_resource(compilers)
     for warning in plan.warnings:
         shown.note(f"clpt: warning: {warning}")
     with shown.phase(f"building kernels for {on.info.name}"):
@@ -224,6 +230,8 @@ def render(
         shown.note("clpt: warning: pixels are too bright for the film: lower film.exposure")
     if verbose:
         report.after(renderer)
+    if stopped and on.compilers is not None:
+        on.compilers.kill()
     return STATUS + stopped[0] if stopped else 0
 
 

@@ -2,8 +2,9 @@
 
 from .array import DeviceArray, supersede
 from .buffers import Buffers, host_buffer
+from .compilers import Compilers, spare_cores
 from .context import Device, DeviceInfo, choose, devices
-from .program import Argument, BoundKernel, Kernel, Program, build, build_all, link
+from .program import Argument, BoundKernel, Kernel, Program, build, build_all, compile_ahead, link
 from .refusals import refused, wait
 from .source import Part, Source, Virtual, assemble, kernels_folder
 from .stream import Events, Stream
@@ -13,6 +14,7 @@ __all__ = [
     "Argument",
     "BoundKernel",
     "Buffers",
+    "Compilers",
     "Device",
     "DeviceArray",
     "DeviceInfo",
@@ -29,11 +31,13 @@ __all__ = [
     "build",
     "build_all",
     "choose",
+    "compile_ahead",
     "devices",
     "host_buffer",
     "kernels_folder",
     "link",
     "refused",
+    "spare_cores",
     "supersede",
     "wait",
 ]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import functools
 import logging
 import os
 import threading
@@ -15,6 +17,7 @@ import pyopencl as cl
 from clpt.device import memory, native_programs, program_cache, runtimes
 
 from ..errors import DeviceError
+from .compilers import Compilers
 
 log = logging.getLogger(__name__)
 
@@ -102,6 +105,7 @@ class Device:
     def __init__(self, context: cl.Context, queue: cl.CommandQueue, info: DeviceInfo):
         self.context, self.queue, self.info = context, queue, info
         self.builds = Builds()
+        self.compilers: Compilers | None = None  # in other processes, where the caller gives some
         self.programs = program_cache.of(queue)
 
     @classmethod
@@ -147,7 +151,9 @@ def devices() -> tuple[DeviceInfo, ...]:
     return tuple(_info(index, device) for index, device in enumerate(_cl_devices()))
 
 
-def choose(which: str | int | None = None, *, profiling: bool = False) -> Device:
+def choose(
+    which: str | int | None = None, *, profiling: bool = False, threads: int | None = None
+) -> Device:
     """Open the device named by an index, or by a part of its names in any case.
 
     Its names are the platform's, its own and that in its version, such as "pocl".
@@ -158,15 +164,15 @@ def choose(which: str | int | None = None, *, profiling: bool = False) -> Device
     None takes the environment variable CLPT_DEVICE if it is set, and otherwise the first device
     that works: GPUs, then accelerators, then CPUs.
 
-    Raises DeviceError, which lists the devices, if none matches or none works.
+    threads: how many cores of a CPU take part at most, by default all.
+
+    Raises DeviceError, which lists the devices, if none matches or none works, and where threads
+    make no sense.
     """
     choice = selection(which)
     log.info("%s: %s", choice.info.label, choice.reason)
-    key = os.getpid(), choice.info
-    # Of two threads at once both open a context, and the first is kept: a lock might be held by
-    # another thread when the process is forked.
-    first = _opened.get(key) or _opened.setdefault(key, Device.open(choice.info))
-    return Device.open(choice.info, profiling=profiling, context=first.context)
+    info = choice.info if threads is None else _limited(choice.info, threads)
+    return Device.open(info, profiling=profiling, context=_first(info).context)
 
 
 def selection(which: str | int | None = None) -> Choice:
@@ -182,7 +188,7 @@ def selection(which: str | int | None = None) -> Choice:
     named = which is not None
     failures: list[str] = []
     for info in _matching(which, found) if named else by_preference(found):
-        failure = None if (os.getpid(), info) in _opened else trial(info)
+        failure = None if _key(info) in _opened else trial(info)
         if failure is None:
             reason = f"asked for by {asked}" if named else _reason(info, found)
             return Choice(info, "; ".join([reason, *(f"passed over {f}" for f in failures)]))
@@ -201,17 +207,53 @@ def by_preference(infos: tuple[DeviceInfo, ...]) -> list[DeviceInfo]:
 def trial(info: DeviceInfo) -> str | None:
     """Build and run a trivial kernel; return None if it worked, else the error in one line."""
     try:
-        context = cl.Context([info.cl_device])
-        queue = _queue(context, info.cl_device, False)
-        kernel = cl.Kernel(native_programs.build(context, info.cl_device, _TRIAL), "trial")
+        # The process's own context: in each one PoCL reads its library anew, which takes a second.
+        device = _opened.get(_key(info)) or Device.open(info)
+        program = native_programs.build(device.context, info.cl_device, _TRIAL)
         result = np.zeros(4, np.uint32)
-        buffer = cl.Buffer(context, cl.mem_flags.WRITE_ONLY, result.nbytes)
-        kernel(queue, result.shape, None, buffer)
-        cl.enqueue_copy(queue, result, buffer)
+        buffer = cl.Buffer(device.context, cl.mem_flags.WRITE_ONLY, result.nbytes)
+        cl.Kernel(program, "trial")(device.queue, result.shape, None, buffer)
+        cl.enqueue_copy(device.queue, result, buffer)
     except Exception as error:  # whatever a broken driver raises, the next one is tried
         rows = str(error).splitlines() or [type(error).__name__]
         return next((row for row in rows if "error:" in row), rows[0]).strip()[:200]
-    return None if (result == 7).all() else "a trivial kernel gave a wrong result"
+    if not (result == 7).all():
+        return "a trivial kernel gave a wrong result"
+    _opened.setdefault(_key(info), device)
+    return None
+
+
+def _key(info: DeviceInfo) -> tuple[int, DeviceInfo]:
+    return os.getpid(), info
+
+
+def _limited(info: DeviceInfo, threads: int) -> DeviceInfo:
+    """A part of a CPU that has so many cores, or all of it. Raises DeviceError."""
+    if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
+        raise DeviceError(f"threads must be a whole number above zero, not {threads!r}")
+    if not info.is_cpu:
+        raise DeviceError(f"threads are of a CPU, and {info.label} is none")
+    return info if threads >= info.compute_units else _part(info, threads)
+
+
+@functools.cache
+def _part(info: DeviceInfo, threads: int) -> DeviceInfo:
+    """A part of a CPU, the same each time, so that its context is kept. Raises DeviceError."""
+    by_counts = [cl.device_partition_property.BY_COUNTS, threads, 0]
+    try:
+        part = info.cl_device.create_sub_devices(by_counts)[0]
+    except cl.Error as error:
+        raise DeviceError(
+            f"{info.label} cannot be limited to {threads} threads: {error}"
+        ) from error
+    return dataclasses.replace(info, cl_device=part, compute_units=threads)
+
+
+def _first(info: DeviceInfo) -> Device:
+    """The device in the process's context, which is opened the first time. Raises DeviceError."""
+    # Of two threads at once both open a context, and the first is kept: a lock might be held by
+    # another thread when the process is forked.
+    return _opened.get(_key(info)) or _opened.setdefault(_key(info), Device.open(info))
 
 
 def _matching(which: str | int | None, infos: tuple[DeviceInfo, ...]) -> list[DeviceInfo]:

@@ -87,6 +87,11 @@ def store(entry: str, header: str, binary: bytes) -> None:
         log.debug("the cache cannot be written: %s", error)
 
 
+def holds(entry: str) -> bool:
+    """Return whether something was written under a key, perhaps damaged since."""
+    return (folder() / "programs" / entry).exists()
+
+
 def load(entry: str) -> tuple[str, bytes] | None:
     """Return header and binary that `store` wrote; None if they are missing or damaged.
 

@@ -9,7 +9,7 @@ import os
 import re
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import astuple, dataclass
@@ -22,6 +22,7 @@ from pyopencl.characterize import has_src_build_cache
 from clpt.device import disk_cache, native_programs
 
 from ..errors import DeviceError, KernelBuildError
+from .compilers import Job
 from .context import Device
 from .refusals import refused
 from .source import Source
@@ -29,6 +30,7 @@ from .source import Source
 log = logging.getLogger(__name__)
 
 OPTIONS = ("-cl-std=CL1.2", "-cl-kernel-arg-info", "-w")
+_PART = "a part, to be linked"
 
 _SCALARS = {
     "char": np.int8,
@@ -212,7 +214,16 @@ def build(device: Device, source: Source, options: Sequence[str] = ()) -> Progra
     """
     flags = _flags(device, options)
     on_disk = not has_src_build_cache(device.info.cl_device)
-    return _cached(device, source, flags, on_disk, lambda: _from_source(device, source, flags))
+    program = _known(device, source, flags, on_disk)
+    if program is not None:
+        return program
+    start = time.perf_counter()
+    program = _from_source(device, source, flags)
+    if on_disk:  # a binary is compiled to the end, a program of the driver may not be
+        entry = _entry(device, source, flags)
+        disk_cache.store(entry, _encode(program.signatures), _binary(program.cl_program))
+        program = _from_cache(device, source, flags, entry) or program
+    return _built(device, source, flags, program, time.perf_counter() - start)
 
 
 def link(
@@ -220,60 +231,135 @@ def link(
 ) -> Program:
     """Compile programs and link them; the kernels are those of the one named `main`.
 
-    signatures: of its kernels, which OpenCL does not tell of linked ones. The result is written to
-    the user's cache folder, since drivers cache the parts at best. Raises KernelBuildError as
-    `build` does, and where the parts do not fit together.
+    signatures: of its kernels, which OpenCL does not tell of linked ones. The parts are written to
+    the user's cache folder, and so is the result. The device's `compilers`, if it has any, compile
+    parts beside this process. Raises KernelBuildError as `build` does, and where the parts do not
+    fit together.
     """
-    flags = _flags(device, ())
-    files = dict.fromkeys(file for source in sources.values() for file in source.files)
-    text = "\n".join(source.text for source in sources.values())
-    whole = Source(sources[main].name, text, tuple(files))
-
-    def make() -> Program:
-        linked = _linked(device, sources.values(), whole, flags)
-        return Program(whole.name, linked, signatures)
-
-    on_disk = not _is_oclgrind(device)  # which has no compiled form
-    return _cached(device, whole, flags, on_disk, make)
-
-
-def _cached(
-    device: Device, source: Source, flags: list[str], on_disk: bool, make: Callable[[], Program]
-) -> Program:
-    """A program from the context's cache or, if `on_disk`, the folder's; else `make` builds it."""
-    entry = _entry(device, source, flags)
-    key = (device.info.cl_device.int_ptr, entry)  # devices of one context may be alike
-    program: Program | None = device.programs.find(key)
+    flags, whole = _flags(device, ()), _whole(sources, main)
+    compile_ahead(device, sources, main)
+    program = _known(device, whole, flags, _has_binaries(device))
     if program is not None:
         return program
     start = time.perf_counter()
-    program = _from_cache(device, source, flags, entry) if on_disk else None
-    cached = program is not None
-    if program is None:
-        program = make()
-        if on_disk:  # a binary is compiled to the end, a program of the driver may not be
-            disk_cache.store(entry, _encode(program.signatures), _binary(program))
-            program = _from_cache(device, source, flags, entry) or program
-    seconds = time.perf_counter() - start
-    device.builds.add(seconds, cached)
-    log.debug("%s is %s in %.2f s", source.name, "loaded" if cached else "built", seconds)
-    device.programs.keep(key, program)
+    parts = [_part(device, source, flags) for source in reversed(list(sources.values()))]
+    try:
+        programs = [part for part, _ in parts]
+        linked = cl.link_program(device.context, programs, [], [device.info.cl_device])
+    except cl.Error as error:
+        raise _build_error(whole, str(error)) from error
+    program = Program(whole.name, linked, signatures)
+    if _has_binaries(device):
+        program = _keep_linked(device, whole, flags, program, [binary for _, binary in parts])
+    return _built(device, whole, flags, program, time.perf_counter() - start)
+
+
+def compile_ahead(device: Device, sources: Mapping[str, Source], main: str) -> None:
+    """Let the device's `compilers` begin with what `link` will need; it returns at once."""
+    flags = _flags(device, ())
+    if device.compilers is None or not _has_binaries(device):
+        return
+    entry = _entry(device, _whole(sources, main), flags)
+    if device.programs.find(_key(device, entry)) is not None or disk_cache.holds(entry):
+        return
+    for source in sources.values():
+        part = _entry(device, source, [*flags, _PART])
+        if not disk_cache.holds(part):
+            device.compilers.submit(part, _job(device, "compile", flags, source.text))
+
+
+def _whole(sources: Mapping[str, Source], main: str) -> Source:
+    """What the texts of a linked program are together, for its key and for errors."""
+    files = dict.fromkeys(file for source in sources.values() for file in source.files)
+    text = "\n".join(source.text for source in sources.values())
+    return Source(sources[main].name, text, tuple(files))
+
+
+def _part(device: Device, source: Source, flags: list[str]) -> tuple[cl.Program, bytes]:
+    """A compiled part of a program: of the cache folder, another process, or this one.
+
+    Its binary too, which is empty where the device has none.
+    """
+    entry, on_disk = _entry(device, source, [*flags, _PART]), _has_binaries(device)
+    stored = disk_cache.load(entry) if on_disk else None
+    binary = stored[1] if stored else None
+    if binary is None and device.compilers is not None:
+        binary = device.compilers.take(entry)
+        if binary is not None:
+            disk_cache.store(entry, _PART, binary)
+    if binary is not None:
+        try:
+            return cl.Program(device.context, [device.info.cl_device], [binary]), binary
+        except cl.Error as error:
+            log.debug("%s is compiled again: %s", source.name, error)
+    try:
+        part = native_programs.compile_part(
+            device.context, device.info.cl_device, source.text, flags
+        )
+    except cl.Error as error:
+        raise _build_error(source, str(error)) from error
+    if not on_disk:
+        return part, b""
+    binary = _binary(part)
+    disk_cache.store(entry, _PART, binary)
+    return part, binary
+
+
+def _keep_linked(
+    device: Device, whole: Source, flags: list[str], program: Program, parts: list[bytes]
+) -> Program:
+    """Write a linked program's binary to the cache folder; return the program to use.
+
+    parts: their binaries.
+    Making one takes as long as compiling it for its first call, so another process does it if there
+    is one, and the program is the one that was given.
+    """
+    entry, header = _entry(device, whole, flags), _encode(program.signatures)
+    if device.compilers is None:
+        disk_cache.store(entry, header, _binary(program.cl_program))
+        return _from_cache(device, whole, flags, entry) or program
+    job = _job(device, "link", flags, parts)
+    device.compilers.then(entry, job, lambda binary: disk_cache.store(entry, header, binary))
     return program
 
 
-def _linked(
-    device: Device, sources: Iterable[Source], whole: Source, flags: list[str]
-) -> cl.Program:
-    parts, only = [], [device.info.cl_device]
-    for source in sources:
-        try:
-            parts.append(native_programs.compile_part(device.context, only[0], source.text, flags))
-        except cl.Error as error:
-            raise _build_error(source, str(error)) from error
-    try:
-        return cl.link_program(device.context, parts, [], only)
-    except cl.Error as error:
-        raise _build_error(whole, str(error)) from error
+def _job(device: Device, kind: str, flags: list[str], given: str | list[bytes]) -> Job:
+    return Job(kind, device.info.platform, device.info.name, " ".join(flags), given)
+
+
+def _has_binaries(device: Device) -> bool:
+    return not _is_oclgrind(device)  # which has no compiled form
+
+
+def _known(device: Device, source: Source, flags: list[str], on_disk: bool) -> Program | None:
+    """A program of the context's cache or, if `on_disk`, of the folder's; None if it is new."""
+    entry, start = _entry(device, source, flags), time.perf_counter()
+    program: Program | None = device.programs.find(_key(device, entry))
+    if program is None and on_disk:
+        program = _from_cache(device, source, flags, entry)
+        if program is not None:
+            _built(device, source, flags, program, time.perf_counter() - start, cached=True)
+    return program
+
+
+def _built(
+    device: Device,
+    source: Source,
+    flags: list[str],
+    program: Program,
+    seconds: float,
+    cached: bool = False,
+) -> Program:
+    """Count a program, keep it in the context's cache, and return it."""
+    device.builds.add(seconds, cached)
+    log.debug("%s is %s in %.2f s", source.name, "loaded" if cached else "built", seconds)
+    device.programs.keep(_key(device, _entry(device, source, flags)), program)
+    return program
+
+
+def _key(device: Device, entry: str) -> tuple[int, str]:
+    """A program's key in its context, whose devices may be alike."""
+    return device.info.cl_device.int_ptr, entry
 
 
 def build_all(
@@ -298,9 +384,9 @@ def _flags(device: Device, options: Sequence[str]) -> list[str]:
     return [*OPTIONS, *options, *plain]
 
 
-def _binary(program: Program) -> bytes:
+def _binary(program: cl.Program) -> bytes:
     """The binary, for the one device of the context that it was built for."""
-    return next(filter(None, program.cl_program.get_info(cl.program_info.BINARIES)))
+    return next(filter(None, program.get_info(cl.program_info.BINARIES)))
 
 
 def _is_oclgrind(device: Device) -> bool:

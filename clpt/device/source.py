@@ -15,11 +15,14 @@ _INCLUDE = re.compile(r'\s*#\s*include\s+"([^"]+)"\s*(?://.*|/\*.*\*/\s*)?$')
 _WORD = re.compile(r"\w+")
 _OPEN_IF = re.compile(r"\s*#\s*if")
 _FUNCTION = re.compile(  # at the beginning of a line: type, name, and a first argument or "void"
-    r"^(?!static\b|kernel\b|typedef\b|return\b|else\b|void loop_)"
-    r"[A-Za-z_]\w*(?: \w+)* \*?(?P<name>\w+)\((?=[A-Za-z_])",
+    r"^(?:static )?(?P<rest>(?!static\b|kernel\b|typedef\b|return\b|else\b|void loop_)"
+    r"[A-Za-z_]\w*(?: \w+)* \*?(?P<name>\w+)\((?=[A-Za-z_]))",
     re.MULTILINE,
 )
-_CONSTANT = re.compile(r"^constant\b[^;=\[]*?(?P<name>\w+)\s*(?=[=\[])", re.MULTILINE)
+_CONSTANT = re.compile(
+    r"^(?:static )?(?P<rest>constant\b[^;=\[]*?(?P<name>\w+)\s*(?=[=\[]))", re.MULTILINE
+)
+_PRIVATE = (_FUNCTION, _CONSTANT)
 _CLOSE_IF = re.compile(r"\s*#\s*endif")
 
 
@@ -35,22 +38,30 @@ class Source:
     text: str
     files: tuple[str, ...]
 
+    def with_static(self) -> Source:
+        """Return a source whose functions and constants are static.
+
+        The rule: a definition begins at the beginning of a line, with its type. Kernels, and
+        functions that a macro names, stay as they are. A compiler leaves out what is not used, and
+        does not optimise by itself what it puts into its callers: a third less time.
+        """
+        text = self.text
+        for pattern in _PRIVATE:
+            text = pattern.sub(r"static \g<rest>", text)
+        return Source(self.name, text, self.files)
+
     def with_private(self, prefix: str, defines: Mapping[str, str] | None = None) -> Source:
         """Return a source whose functions and constants other programs do not see, to be linked.
 
-        The rule: a definition begins at the beginning of a line, with its type. It becomes static
-        and gets the prefix, since some linkers look at nothing but names. Kernels, and functions
-        that a macro names, stay as they are. defines: more `#define` lines at the top.
+        They are static, see `with_static`, and get the prefix, since some linkers look at nothing
+        but names. defines: more `#define` lines at the top.
         """
-        private = (_FUNCTION, _CONSTANT)
-        matches = (match for pattern in private for match in pattern.finditer(self.text))
+        matches = (match for pattern in _PRIVATE for match in pattern.finditer(self.text))
         names = dict.fromkeys(match["name"] for match in matches)
         renamed = {name: f"{prefix}_{name}" for name in names}
         head = [f"#define {name} {value}" for name, value in {**(defines or {}), **renamed}.items()]
-        text = self.text
-        for pattern in private:
-            text = pattern.sub(r"static \g<0>", text)
-        return Source(self.name, "\n".join([*head, text]), self.files)
+        static = self.with_static()
+        return Source(self.name, "\n".join([*head, static.text]), self.files)
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ class RenderOptions(TypedDict, total=False):
 
     queue: a `pyopencl.CommandQueue` of the caller, instead of a device: all buffers and programs
     are made in its context, all commands go there, and no other OpenCL object is made or changed.
+    threads: how many cores of a CPU take part at most.
     profiling: whether the queue that is made measures times, for `Renderer.stats`.
     texture_budget: [bytes] that bitmaps may take; larger ones are halved. By default half of what
     the device has free.
@@ -37,6 +38,7 @@ class RenderOptions(TypedDict, total=False):
     """
 
     queue: cl.CommandQueue | None
+    threads: int | None
     profiling: bool
     texture_budget: int | None
     layout: str | None

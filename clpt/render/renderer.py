@@ -73,13 +73,16 @@ class Renderer(Pictures):
         check_options(scene, options)
         self._stop = threading.Event()
         self.scene = scene
-        queue = options.get("queue")
+        queue, threads = options.get("queue"), options.get("threads")
+        if threads is not None and (queue is not None or isinstance(device, dev.Device)):
+            raise DeviceError("threads are of a device that is chosen here; give its name or index")
         if queue is not None:
             if device is not None:
                 raise DeviceError("give a device or a queue; a queue has its device")
             device = dev.Device.adopt(queue)
         elif not isinstance(device, dev.Device):
-            device = dev.choose(device, profiling=options.get("profiling", False))
+            profiling = options.get("profiling", False)
+            device = dev.choose(device, profiling=profiling, threads=threads)
         self.device = device
         self.channels: tuple[str, ...] = ()
         if isinstance(scene.integrator, Aov):

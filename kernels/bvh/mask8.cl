@@ -1,4 +1,4 @@
-/* Eight truth values as bits, the first and the last of them; the only file with a compiler's built-ins.
+/* Eight truth values as bits, the first and the last of them.
  *
  * On x86 the sign bits of a vector are one instruction away; elsewhere eight bytes of a ulong serve.
  */

@@ -84,14 +84,7 @@ inline integer clamp_i(integer i, integer most) { return max_i(min_i(i, most), (
 inline real clamp_r(real x, real lo, real hi) { return min_r(max_r(x, lo), hi); }
 inline real sqrt_r(real x) { return sqrt(max_r(x, (real)(0.0f))); } /* of a rounded negative: 0 */
 
-/* Memory. `gather` reads table[at] lane by lane; the index of an idle lane must be valid: give 0.
- * `scatter_if` writes only where m. */
 #if LANES == 1
-inline real gather(global const float *p, integer at) { return p[at]; }
-inline integer gather_i(global const uint *p, integer at) { return as_int(p[at]); }
-inline integer gather_constant(constant uint *p, integer at) { return as_int(p[at]); }
-inline void scatter_if(global float *p, integer at, mask m, real v) { if (m) p[at] = v; }
-inline int sum_lanes(integer v) { return v; }
 #define FOR_LANES(F) F(0)
 #define LANE(v, i) (v)
 #else
@@ -102,36 +95,12 @@ inline int sum_lanes(integer v) { return v; }
 #define FOR_LANES(F) LANES_8(F) F(8) F(9) F(a) F(b) F(c) F(d) F(e) F(f)
 #endif
 #define LANE(v, i) ((v).s##i)
-inline real gather(global const float *p, integer at)
-{
-    real r;
-#define LOAD(i) r.s##i = p[at.s##i];
-    FOR_LANES(LOAD)
-#undef LOAD
-    return r;
-}
-inline integer gather_i(global const uint *p, integer at)
-{
-    integer r;
-#define LOAD(i) r.s##i = as_int(p[at.s##i]);
-    FOR_LANES(LOAD)
-#undef LOAD
-    return r;
-}
-inline integer gather_constant(constant uint *p, integer at)
-{
-    integer r;
-#define LOAD(i) r.s##i = as_int(p[at.s##i]);
-    FOR_LANES(LOAD)
-#undef LOAD
-    return r;
-}
-inline void scatter_if(global float *p, integer at, mask m, real v)
-{
-#define STORE(i) if (m.s##i) p[at.s##i] = v.s##i;
-    FOR_LANES(STORE)
-#undef STORE
-}
+#endif
+#include "core/gather.cl"
+
+#if LANES == 1
+inline int sum_lanes(integer v) { return v; }
+#else
 inline int sum_lanes(integer v)
 {
     int r = 0;

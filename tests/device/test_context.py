@@ -105,6 +105,23 @@ def test_the_trial_reports_instead_of_raising(device, monkeypatch):
     assert context.trial(device.info) == "a trivial kernel gave a wrong result"
 
 
+def test_threads_are_limited(device):
+    """Commands of a part of the processor run there, in a context that is kept for the next."""
+    if not device.info.is_cpu or device.info.compute_units < 2:
+        pytest.skip("needs a CPU with two cores")
+    one = choose(device.info.index, threads=1)
+    assert one.info.compute_units == one.queue.device.max_compute_units == 1
+    assert one.context == choose(device.info.index, threads=1).context
+    assert choose(device.info.index, threads=10**6).info == device.info
+    assert context.trial(one.info) is None
+
+
+@pytest.mark.parametrize("threads", [0, True, "2"])
+def test_threads_that_make_no_sense(device, threads):
+    with pytest.raises(DeviceError, match="threads must be a whole number above zero"):
+        choose(device.info.index, threads=threads)
+
+
 def test_no_device_tells_what_to_do(monkeypatch):
     monkeypatch.setattr(context, "devices", lambda: ())
     with pytest.raises(DeviceError, match="pocl-opencl-icd"):

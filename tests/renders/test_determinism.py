@@ -43,6 +43,13 @@ def test_several_planes(scenes: Path, once: np.ndarray) -> None:
         assert np.array_equal(clpt.render(cornell(scenes), SPP, slots=slots), once)
 
 
+def test_fewer_cores(scenes: Path, once: np.ndarray) -> None:
+    """One core takes fewer slots."""
+    if not clpt.device.choose().info.is_cpu:
+        pytest.skip("needs a CPU")
+    assert np.array_equal(clpt.render(cornell(scenes), SPP, threads=1), once)
+
+
 def test_who_runs_the_loop_changes_no_bit(scenes: Path) -> None:
     """Slots own their pixels: in which order they are shaded, and beside whom, does not matter."""
     scene = with_film(clpt.load(scenes / "glass_metal.xml"), mode="rgb")

@@ -6,6 +6,7 @@ material in a scene rebuilds nothing else.
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 from clpt import bvh, device
@@ -45,13 +46,23 @@ def sources(
     queued: whether shading goes along queues, which `append` fills, if a work-item shades one path;
     interleaved: a work-item of `intersect` has the rays of `lanes` paths in flight.
     """
+    queued = queued and lanes == 1
+    texts = _stages(features, layout, lanes, queued, interleaved)
+    if queued:
+        texts |= _alone(features, layout, "append")
+    return _static(texts)
+
+
+def _stages(
+    features: Features, layout: str, lanes: int, queued: bool, interleaved: bool
+) -> dict[str, device.Source]:
+    """The texts of a bounce but for queues, see `sources`."""
     files, defines = _shared(features, layout), flags.defines(flags.SCENE, features)
     begin, join = begin_and_join(features)
     trace_lanes = _trace_lanes(layout, lanes)
     rays: Files = {}
     if interleaved and layout != "brute":
         rays["generated/trace.cl"] = ("tracing/trace_interleaved.cl",)
-    queued = queued and lanes == 1
     texts = {
         begin: _source(begin, files, defines, lanes),
         "intersect": _source(
@@ -61,8 +72,6 @@ def sources(
     }
     if features.mixtures:
         texts["mix"] = _source("mix", files, defines, lanes)
-    if queued:
-        texts["append"] = _source("append", files, defines, 1)
     for cls in features.leaves:
         own = {**files, "generated/bsdf.cl": stages.bsdf_text(features, cls)}
         if cls.source is not None:
@@ -74,12 +83,13 @@ def sources(
 
 def film_sources(features: Features, layout: str) -> dict[str, device.Source]:
     """Return the texts of what makes pictures of a film, by program name."""
-    return _alone(features, layout, "accumulate", *(["bands"] if features.bands else []))
+    names = ("accumulate", *(("bands",) if features.bands else ()))
+    return _static(_alone(features, layout, *names))
 
 
 def noise_sources(features: Features, layout: str) -> dict[str, device.Source]:
     """Return the text of what tells a film's noise, by program name."""
-    return _alone(features, layout, "noise")
+    return _static(_alone(features, layout, "noise"))
 
 
 def order(features: Features, layout: str, lanes: int, interleaved: bool = False) -> list[Stage]:
@@ -98,14 +108,16 @@ def order(features: Features, layout: str, lanes: int, interleaved: bool = False
     return bounce
 
 
+@functools.lru_cache(maxsize=2)
 def loop_sources(
     features: Features, layout: str, lanes: int, interleaved: bool = False
 ) -> dict[str, device.Source]:
     """Return the texts that are linked to the loop of all stages on the device, by name.
 
     "loop" holds the kernel; the others are the stages as functions, see kernels/interface/stage.cl.
+    They are kept, since a renderer asks twice: to compile ahead, and to link.
     """
-    texts = sources(features, layout, lanes, queued=False, interleaved=interleaved)
+    texts = _stages(features, layout, lanes, False, interleaved)
     bounce = order(features, layout, lanes, interleaved)
     names = dict.fromkeys(stage.program for stage in bounce)
     parts = {name: texts[name].with_private(name, {"PART": f"loop_{name}"}) for name in names}
@@ -177,6 +189,10 @@ def _alone(features: Features, layout: str, *names: str) -> dict[str, device.Sou
     """The texts of programs whose work-items serve a pixel each."""
     files, defines = _shared(features, layout), flags.defines(flags.SCENE, features)
     return {name: _source(name, files, defines, 1) for name in names}
+
+
+def _static(texts: dict[str, device.Source]) -> dict[str, device.Source]:
+    return {name: text.with_static() for name, text in texts.items()}
 
 
 def _source(

@@ -131,6 +131,11 @@ class Wavefront:
         chosen = strategy.choose(on, lowered, tuning)
         if looped is None:
             looped = strategy.use_loop(on)
+        if looped:  # beside the trees
+            texts = programs.loop_sources(
+                lowered.features, chosen.layout, on.lanes, chosen.interleaved
+            )
+            device.compile_ahead(on, texts, "loop")
         stream, buffers = device.Stream(on.queue), device.Buffers(on)
         settings, kinds = lowered.settings, len(lowered.features.materials)
         padded_pixels = int(settings["padded_pixels"])

@@ -1,0 +1,66 @@
+"""A process that compiles, see `clpt.device.compilers`.
+
+It is run by its path, and imports nothing of clpt, so it begins soon. It reads
+requests from its standard input until that ends, as it does when whoever started it ends.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import queue
+import sys
+import threading
+from typing import Any
+
+import pyopencl as cl
+from pyopencl import _cl
+
+
+def main() -> None:
+    """Answer (job, platform, device, options, texts or binaries) with a binary or an error."""
+    replies = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what drivers print is no reply
+    requests: queue.SimpleQueue[Any] = queue.SimpleQueue()
+    threading.Thread(target=_read, args=(requests,), daemon=True).start()
+    opened: dict[tuple[str, str], cl.Context] = {}
+    while True:
+        job, platform, device, options, given = requests.get()
+        try:
+            if (platform, device) not in opened:
+                opened[platform, device] = cl.Context([_device(platform, device)])
+            context = opened[platform, device]
+            binary = _link(context, given) if job == "link" else _compile(context, options, given)
+        except Exception:  # the caller compiles it again, and finds the error
+            binary = None
+        pickle.dump(binary, replies)
+        replies.flush()
+
+
+def _read(requests: queue.SimpleQueue[Any]) -> None:
+    while True:
+        try:
+            requests.put(pickle.load(sys.stdin.buffer))
+        except Exception:  # the end
+            os._exit(0)
+
+
+def _device(platform: str, device: str) -> cl.Device:
+    found = (d for p in cl.get_platforms() if p.name.strip() == platform for d in p.get_devices())
+    return next(d for d in found if d.name.strip() == device)
+
+
+def _compile(context: cl.Context, options: str, text: str) -> bytes:
+    program = _cl._Program(context, text)
+    program.compile(options.encode(), context.devices, [])
+    return _binary(program)
+
+
+def _link(context: cl.Context, binaries: list[bytes]) -> bytes:
+    parts = [cl.Program(_cl._Program(context, context.devices, [it])) for it in binaries]
+    return _binary(cl.link_program(context, parts, [], context.devices))
+
+
+def _binary(program: Any) -> bytes:
+    binary: bytes = program.get_info(cl.program_info.BINARIES)[0]
+    return binary

@@ -1,0 +1,179 @@
+"""Processes that compile beside this one, for drivers that compile one text at a time.
+
+PoCL compiles under one lock, so threads do not help. Nothing here is needed: where a process does
+not start, or dies, the caller compiles by itself.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import pickle
+import subprocess
+import sys
+import threading
+from collections import deque
+from collections.abc import Callable, Hashable, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+log = logging.getLogger(__name__)
+
+_PROGRAM = Path(__file__).with_name("compiler_process.py")
+_MOST = 4  # processes: more than parts of a loop that take long
+
+
+@dataclass(frozen=True)
+class Job:
+    """What a process does: "compile" a text, or "link" binaries; the result is a binary.
+
+    platform, device: their names; options: of the compiler.
+    """
+
+    kind: str
+    platform: str
+    device: str
+    options: str
+    given: str | Sequence[bytes]
+
+
+@dataclass
+class _Task:
+    job: Job
+    result: Future[bytes | None] = field(default_factory=Future)
+
+
+class Compilers:
+    """Some processes, that start when there is something to do for them.
+
+    count: how many there are at most. With `with` they end after what they are at, or at once where
+    an exception is raised.
+    """
+
+    def __init__(self, count: int):
+        self.count = min(count, _MOST)
+        self._tasks: dict[Hashable, _Task] = {}
+        self._waiting: deque[_Task] = deque()
+        self._changed = threading.Condition()
+        self._processes: list[subprocess.Popen[bytes]] = []
+        self._threads: list[threading.Thread] = []
+        self._closed = False
+
+    def submit(self, key: Hashable, job: Job) -> None:
+        """Let a process do a job, if none has the key yet."""
+        with self._changed:
+            if self._closed or key in self._tasks:
+                return
+            task = self._tasks[key] = _Task(job)
+            self._waiting.append(task)
+            self._changed.notify()
+            if len(self._threads) < min(self.count, len(self._waiting)):
+                thread = threading.Thread(target=self._serve, daemon=True)
+                self._threads.append(thread)
+                thread.start()
+
+    def take(self, key: Hashable) -> bytes | None:
+        """Return a job's binary; None if it has not begun, and never will, or has failed.
+
+        It waits for a job that has begun.
+        """
+        with self._changed:
+            task = self._tasks.pop(key, None)
+            if task is None:
+                return None
+            if task in self._waiting:
+                self._waiting.remove(task)
+                return None
+        return task.result.result()
+
+    def then(self, key: Hashable, job: Job, use: Callable[[bytes], Any]) -> None:
+        """Let a process do a job, and call `use` with the binary, in a thread, if there is one."""
+        self.submit(key, job)
+        with self._changed:
+            task = self._tasks.pop(key, None)
+        if task is not None:
+            task.result.add_done_callback(lambda done: _use(done.result(), use))
+
+    def close(self) -> None:
+        """Let the processes do what was submitted, then end them; wait for that."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+        for thread in self._threads:
+            thread.join()
+
+    def kill(self) -> None:
+        """End the processes at once."""
+        with self._changed:
+            self._closed = True
+            self._waiting.clear()
+            for process in self._processes:
+                process.kill()
+        self.close()
+
+    def __enter__(self) -> Compilers:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *error: object) -> None:
+        self.close() if kind is None else self.kill()
+
+    def _serve(self) -> None:
+        """Start a process and give it jobs, one after the other."""
+        try:
+            with subprocess.Popen(
+                _command(),
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                start_new_session=True,  # Ctrl-C is for this process
+            ) as process:
+                with self._changed:
+                    self._processes.append(process)
+                    if self._closed and not self._waiting:
+                        return
+                while task := self._next():
+                    try:
+                        task.result.set_result(_answer(process, task.job))
+                    except BaseException:
+                        task.result.set_result(None)
+                        raise
+        except Exception as error:  # a process that died, or did not start
+            log.debug("nothing is compiled in another process: %s", error)
+
+    def _next(self) -> _Task | None:
+        with self._changed:
+            while not self._waiting:
+                if self._closed:
+                    return None
+                self._changed.wait()
+            return self._waiting.popleft()
+
+
+def _use(binary: bytes | None, use: Callable[[bytes], Any]) -> None:
+    if binary is not None:
+        use(binary)
+
+
+def spare_cores() -> int:
+    """Return how many processes may compile beside this one: a core each."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0)) - 1
+    return (os.cpu_count() or 1) - 1
+
+
+def _command() -> list[str]:
+    """The command of a process, which finds modules where this one does."""
+    main = f"runpy.run_path({str(_PROGRAM)!r})['main']()"
+    return [sys.executable, "-c", f"import runpy, sys; sys.path[:] = {sys.path!r}; {main}"]
+
+
+def _answer(process: subprocess.Popen[bytes], job: Job) -> bytes | None:
+    assert process.stdin is not None
+    assert process.stdout is not None
+    request = (job.kind, job.platform, job.device, job.options, job.given)
+    pickle.dump(request, process.stdin)
+    process.stdin.flush()
+    binary: bytes | None = pickle.load(process.stdout)  # from our own program
+    return binary

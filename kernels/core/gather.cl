@@ -1,0 +1,69 @@
+/* Memory lane by lane: `gather` reads table[at]; the index of an idle lane must be valid: give 0. `scatter_if`
+ * writes only where m; where lanes write to one place the last one counts.
+ *
+ * Processors with an instruction for it get it by a compiler's built-in function. Written out lane by lane, reads are
+ * nine tenths of a compiled shading kernel, and of the time to compile it. */
+#ifdef __has_builtin
+#if LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_ia32_gathersiv16sf)
+#define NATIVE_GATHER(p, at) \
+    __builtin_ia32_gathersiv16sf((real)(0.0f), (const void *)(size_t)(p), at, (ushort)0xffff, 4)
+#elif LANES == 8 && defined(__AVX2__) && __has_builtin(__builtin_ia32_gatherd_ps256)
+#define NATIVE_GATHER(p, at) \
+    __builtin_ia32_gatherd_ps256((real)(0.0f), (const float *)(size_t)(p), at, as_real((mask)(-1)), 4)
+#endif
+#if LANES == 16 && defined(__AVX512DQ__) && __has_builtin(__builtin_ia32_scattersiv16sf)
+#define NATIVE_SCATTER(p, at, m, v) \
+    __builtin_ia32_scattersiv16sf((void *)(size_t)(p), __builtin_ia32_cvtd2mask512(m), at, v, 4)
+#elif LANES == 8 && defined(__AVX512DQ__) && defined(__AVX512VL__) && __has_builtin(__builtin_ia32_scattersiv8sf)
+#define NATIVE_SCATTER(p, at, m, v) \
+    __builtin_ia32_scattersiv8sf((void *)(size_t)(p), __builtin_ia32_cvtd2mask256(m), at, v, 4)
+#endif
+#endif
+
+#ifdef NATIVE_GATHER
+inline real gather(global const float *p, integer at) { return NATIVE_GATHER(p, at); }
+inline integer gather_i(global const uint *p, integer at) { return as_integer(NATIVE_GATHER(p, at)); }
+inline integer gather_constant(constant uint *p, integer at) { return as_integer(NATIVE_GATHER(p, at)); }
+#elif LANES == 1
+inline real gather(global const float *p, integer at) { return p[at]; }
+inline integer gather_i(global const uint *p, integer at) { return as_int(p[at]); }
+inline integer gather_constant(constant uint *p, integer at) { return as_int(p[at]); }
+#else
+inline real gather(global const float *p, integer at)
+{
+    real r;
+#define LOAD(i) r.s##i = p[at.s##i];
+    FOR_LANES(LOAD)
+#undef LOAD
+    return r;
+}
+inline integer gather_i(global const uint *p, integer at)
+{
+    integer r;
+#define LOAD(i) r.s##i = as_int(p[at.s##i]);
+    FOR_LANES(LOAD)
+#undef LOAD
+    return r;
+}
+inline integer gather_constant(constant uint *p, integer at)
+{
+    integer r;
+#define LOAD(i) r.s##i = as_int(p[at.s##i]);
+    FOR_LANES(LOAD)
+#undef LOAD
+    return r;
+}
+#endif
+
+#ifdef NATIVE_SCATTER
+inline void scatter_if(global float *p, integer at, mask m, real v) { NATIVE_SCATTER(p, at, m, v); }
+#elif LANES == 1
+inline void scatter_if(global float *p, integer at, mask m, real v) { if (m) p[at] = v; }
+#else
+inline void scatter_if(global float *p, integer at, mask m, real v)
+{
+#define STORE(i) if (m.s##i) p[at.s##i] = v.s##i;
+    FOR_LANES(STORE)
+#undef STORE
+}
+#endif
