@@ -38,7 +38,7 @@ test-all: $(VENV)/.dev
 	$(BIN)/python -m pytest -q $(SHARED) -m ""
 
 bench: $(VENV)/.dev
-	$(BIN)/python -m bench
+	ASSETS=$(ASSETS) $(BIN)/python -m bench
 
 assets-report: $(VENV)/.dev
 	$(BIN)/python -m bench.assets $(ASSETS)

@@ -24,6 +24,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "builders": (),
     "queries": (),
     "renders": (),
+    "efficiency": (),
     "spectral": (),
     "effects": (),
     "lights": (),

@@ -263,7 +263,7 @@ def cells(row: Row) -> list[str]:
 
 @click.command(help=__doc__)
 @click.argument("scenes", nargs=-1)
-@click.option("--assets", type=click.Path(path_type=Path, exists=True, file_okay=False))
+@click.option("--assets", type=click.Path(path_type=Path, file_okay=False), envvar="ASSETS")
 @click.option("--width", default=200, show_default=True, help="of the film [pixels]")
 @click.option("--mode", "modes", multiple=True, type=click.Choice(["rgb", "spectral"]))
 @click.option("--threads", multiple=True, type=int, help="cores that both are held to  [1, 2]")

@@ -11,7 +11,7 @@ import numpy as np
 RESULTS = Path(__file__).parent / "results"
 WHICH = (
     "scene", "mode", "renderer", "sampler", "threads", "layout", "rays", "query", "effect",
-    "figure", "triangles", "builder", "bent",
+    "figure", "triangles", "builder", "bent", "as_file",
 )  # fmt: skip
 
 HEAD = """# What was measured
@@ -126,6 +126,39 @@ def figures(rows: Sequence[Row]) -> str:
     return table(headings, map(cells, rows))
 
 
+def efficiency(rows: Sequence[Row]) -> str:
+    """Scenes as their files are, clpt's figure before Mitsuba's; seconds of processor time."""
+
+    def cells(row: Row) -> list[str]:
+        pairs = ("msamples", "relmse", "busy", "first_cold", "first_cold_clock", "first_warm")
+        return [
+            *(str(row[name]) for name in ("scene", "mode", "threads")),
+            "the file's" if row["as_file"] else "box, best",
+            *(f"**{row[name]:.2f}**" for name in ("efficiency_ratio", "rate_ratio")),
+            *(" / ".join(f"{value:g}" for value in row[name]) for name in (*pairs, "peak_mib")),
+        ]
+
+    headings = ["scene", "mode", "threads", "filter, sampler", "efficiency : Mitsuba"]
+    headings += ["rate : Mitsuba", "Msamples/s", "relMSE", "cores busy", "first sample, cold"]
+    headings += ["the same by the clock", "with caches", "peak [MiB]"]
+    return table(headings, map(cells, rows)) + "\n" + geometric_means(rows)
+
+
+def geometric_means(rows: Sequence[Row]) -> str:
+    """Efficiency over all scenes, by mode, threads and filter."""
+    groups: dict[tuple[object, ...], list[float]] = {}
+    for row in rows:
+        which = tuple(row[name] for name in ("mode", "threads", "as_file"))
+        groups.setdefault(which, []).append(float(row["efficiency_ratio"]))
+    lines = [
+        f"- {mode}, {threads} thread(s), {'as the file' if as_file else 'box, best sampler'}: "
+        f"geometric mean {np.exp(np.mean(np.log(found))):.2f}, least {min(found):.2f}, "
+        f"of {len(found)} scenes"
+        for (mode, threads, as_file), found in groups.items()
+    ]
+    return "\n".join(["Efficiency over Mitsuba's:", "", *lines, ""])
+
+
 def sizes(rows: Sequence[Row]) -> str:
     """Hilly ground of ever more triangles, one picture; a ray's time is plotted in `sizes.png`."""
 
@@ -167,8 +200,9 @@ def shares(rows: Sequence[Row]) -> str:
 
 
 TABLES: dict[str, Callable[[Sequence[Row]], str]] = {
-    **dict.fromkeys(("bandwidth", "rays", "stages", "build", "start"), figures),
+    **dict.fromkeys(("bandwidth", "rays", "stages", "shading", "build", "start"), figures),
     "renders": renders,
+    "efficiency": efficiency,
     "spectral": plain,
     "effects": plain,
     "lights": plain,
