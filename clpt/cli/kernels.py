@@ -31,16 +31,15 @@ from .scene_variables import scene_variables
     "--layout", type=click.Choice(list(LAYOUTS)), default="wide8", show_default=True,
     help="Acceleration structure of the triangles.",
 )  # fmt: skip
-@click.option("--queued", is_flag=True, help="Shade in queues sorted by material.")
 @scene_variables
-def kernels(
-    scene: Path, folder: Path, lanes: str, layout: str, queued: bool, variables: dict[str, Any]
-) -> None:
+def kernels(scene: Path, folder: Path, lanes: str, layout: str, variables: dict[str, Any]) -> None:
     """Write the OpenCL programs that render SCENE, one file each.
 
-    Each is a complete program for any OpenCL compiler. No device is needed.
+    Each is a complete program for any OpenCL compiler. No device is needed. On a CPU the functions of
+    these programs are linked to one.
     """
     features = lower(load(scene, **variables)).features
+    queued = len(features.materials) > 1
     made = sources(features, layout, int(lanes), queued=queued) | film_sources(features, layout)
     try:
         folder.mkdir(parents=True, exist_ok=True)

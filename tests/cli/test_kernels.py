@@ -16,11 +16,11 @@ SCENES = Path(__file__).resolve().parents[2] / "scenes"
 def test_a_file_for_every_program(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(device, "choose", lambda *a, **k: pytest.fail("a device was asked for"))
     folder = tmp_path / "new" / "sources"
-    assert run(["kernels", str(SCENES / "three_spheres"), "-o", str(folder), "--queued"]) == 0
+    assert run(["kernels", str(SCENES / "three_spheres"), "-o", str(folder), "--lanes", "1"]) == 0
     told = capsys.readouterr().out.splitlines()
     made = {path.stem: path.read_text("utf-8") for path in folder.iterdir()}
     assert len(made) == len(told)
-    assert {"generate", "intersect", "sort", "shade_plastic", "accumulate"} <= made.keys()
+    assert {"generate", "intersect", "append", "shade_plastic", "accumulate"} <= made.keys()
     for text in made.values():
         assert re.search(r"\bkernel\b.* void ", text) and "#include" not in text
         assert "#define LANES" in text

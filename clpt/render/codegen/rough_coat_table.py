@@ -13,6 +13,7 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 
+from clpt import output_files
 from clpt.scene.materials import DISTRIBUTIONS
 
 Floats = NDArray[np.float64]
@@ -189,4 +190,4 @@ def text() -> str:
 
 
 if __name__ == "__main__":
-    FILE.write_text(text(), encoding="utf-8")
+    output_files.write_text(FILE, text())

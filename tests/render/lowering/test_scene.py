@@ -21,7 +21,6 @@ from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Direct, Path
 from clpt.scene.lights import Area, Constant, Directional, Point
 from clpt.scene.shapes import Cube, Mesh, Rectangle, Shape, Sphere
-from clpt.scene.textures import Checkerboard
 
 CORNERS = np.eye(3, dtype=np.float32)
 FACE = np.array([[0, 1, 2]], np.uint32)
@@ -167,15 +166,6 @@ def test_shapes_cost_the_same_however_many() -> None:
     calls(1)  # what is kept for all
     few, many = calls(100), calls(300)
     assert (many - few) / 200 < 1.1 * few / 100 < 250
-
-
-def test_what_is_costly_to_shade() -> None:
-    """Textures and a tree over lights are, few lights and plain colours are not."""
-    texture = Checkerboard()
-    lamps = [Rectangle(emission=Area(radiance=1.0)) for _ in range(40)]
-    assert lower(scene(Rectangle(material=m.Diffuse(reflectance=texture)))).features.costly
-    assert lower(scene(Rectangle(), *lamps)).features.costly
-    assert not lower(scene(Rectangle(), Sphere(material=m.Dielectric()), lamps[0])).features.costly
 
 
 def test_more_triangles_than_kernels_count(monkeypatch: pytest.MonkeyPatch) -> None:
