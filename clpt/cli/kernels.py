@@ -35,8 +35,8 @@ from .scene_variables import scene_variables
 def kernels(scene: Path, folder: Path, lanes: str, layout: str, variables: dict[str, Any]) -> None:
     """Write the OpenCL programs that render SCENE, one file each.
 
-    Each is a complete program for any OpenCL compiler. No device is needed. On a CPU the functions of
-    these programs are linked to one.
+    Each is a complete program for any OpenCL compiler. No device is needed. On a CPU a render has
+    their functions in one program.
     """
     features = lower(load(scene, **variables)).features
     queued = len(features.materials) > 1
