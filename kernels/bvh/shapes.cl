@@ -8,17 +8,17 @@
 #include "bvh/hit.cl"
 #include "bvh/ray.cl"
 
-/* The nearest shape, or with `first_only` any; BVH_MISS if none. *t begins as the farthest allowed. */
+/* The nearest shape, or with `first_only` any; BVH_MISS if none. *t begins as the farthest allowed. What waits is a
+ * node with where the ray enters it, so that each box is tested once. */
 inline uint shapes_trace(global const float *nodes, global const uint *indices, ShapeTable table,
                          const Ray *ray, float *t, int first_only)
 {
     global const float8 *tree = (global const float8 *)nodes;
-    uint waiting[BVH_DEPTH + 1];
-    uint n = 1, found = BVH_MISS;
-    waiting[0] = 0;
-    while (n) {
-        float8 node = tree[waiting[--n]];
-        if (ray_enter(ray, node, *t) == INFINITY) continue;
+    uint waiting[BVH_DEPTH + 1], n = 0, found = BVH_MISS, at = 0;
+    float entry[BVH_DEPTH + 1];
+    if (ray_enter(ray, tree[0], *t) == INFINITY) return BVH_MISS;
+    for (;;) {
+        float8 node = tree[at];
         uint link = node_link(node);
         if (node_is_leaf(node)) {
             for (uint i = link; i < link + node_count(node); i++)
@@ -26,11 +26,22 @@ inline uint shapes_trace(global const float *nodes, global const uint *indices, 
             if (first_only && found != BVH_MISS) return found;
         } else {
             float left = ray_enter(ray, tree[link], *t), right = ray_enter(ray, tree[link + 1], *t);
-            waiting[n++] = link + (left <= right);
-            waiting[n++] = link + (left > right);
+            float near = ray_min(left, right), far = ray_max(left, right);
+            if (near < INFINITY) {
+                uint nearer = left <= right ? 0 : 1;
+                at = link + nearer;
+                if (far < INFINITY) {
+                    waiting[n] = link + 1 - nearer;
+                    entry[n++] = far;
+                }
+                continue;
+            }
         }
+        do {
+            if (!n) return found;
+            at = waiting[--n];
+        } while (entry[n] > *t);
     }
-    return found;
 }
 
 inline uint shapes_closest(global const float *nodes, global const uint *indices, ShapeTable table,
