@@ -32,6 +32,7 @@ from rich.table import Table
 import clpt
 from bench import machine
 from bench.renders import SCENES
+from bench.startup import SMALL
 from bench.workers import find_llvm
 
 MITSUBA = """
@@ -101,7 +102,9 @@ class Contender:
             os.makedirs(folder, exist_ok=True)
         threads = {"POCL_MAX_PTHREAD_COUNT": str(len(self.cores))}
         cores = ",".join(map(str, self.cores))
-        command = ["taskset", "-c", cores, sys.executable, *arguments]
+        kilobytes = self.caches / "kilobytes"
+        small = [sys.executable, "-I", "-S", "-c", SMALL, str(kilobytes)]
+        command = ["taskset", "-c", cores, *small, sys.executable, *arguments]
         with tempfile.TemporaryFile("w+") as words:
             start = time.perf_counter()
             process = subprocess.Popen(
@@ -115,7 +118,7 @@ class Contender:
                 words.seek(0)
                 last = (words.read().strip().splitlines() or [f"status {process.returncode}"])[-1]
                 raise RuntimeError(f"{self.name}: {last[:300]}")
-        return usage.ru_utime + usage.ru_stime, seconds, usage.ru_maxrss * 1024
+        return usage.ru_utime + usage.ru_stime, seconds, int(kilobytes.read_text()) * 1024
 
 
 def relative_mse(image: NDArray[np.floating], reference: NDArray[np.floating]) -> float:
