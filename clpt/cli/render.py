@@ -198,7 +198,7 @@ def render(
         check(plan)
         on = chosen.result()
     spare = min(dev.spare_cores(), (threads or on.info.compute_units) - 1)
-    if spare:
+    if spare and on.info.compiles_singly:
         compilers = dev.Compilers(spare)
         on.compilers = click.get_current_context().with_resource(compilers)
     for warning in plan.warnings:

@@ -59,6 +59,11 @@ class DeviceInfo:
         return 16 if self.float_width >= 16 else 8
 
     @property
+    def compiles_singly(self) -> bool:
+        """Whether the driver compiles one text at a time in a process: PoCL has one lock."""
+        return "pocl" in self.version.casefold()
+
+    @property
     def label(self) -> str:
         """Platform and device, for people to read."""
         return f"{self.platform} {self.name}"

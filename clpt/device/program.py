@@ -9,7 +9,7 @@ import os
 import re
 import threading
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import astuple, dataclass
@@ -242,15 +242,17 @@ def link(
     if program is not None:
         return program
     start = time.perf_counter()
-    parts = [_part(device, source, flags) for source in reversed(list(sources.values()))]
     try:
-        programs = [part for part, _ in parts]
-        linked = cl.link_program(device.context, programs, [], [device.info.cl_device])
-    except cl.Error as error:
-        raise _build_error(whole, str(error)) from error
+        linked, binaries = _linked(device, sources, flags, _part)
+    except cl.Error as refusal:
+        log.debug("%s is compiled again: %s", whole.name, refusal)
+        try:
+            linked, binaries = _linked(device, sources, flags, _compiled)
+        except cl.Error as error:
+            raise _build_error(whole, str(error)) from error
     program = Program(whole.name, linked, signatures)
     if _has_binaries(device):
-        program = _keep_linked(device, whole, flags, program, [binary for _, binary in parts])
+        program = _keep_linked(device, whole, flags, program, binaries)
     return _built(device, whole, flags, program, time.perf_counter() - start)
 
 
@@ -275,33 +277,49 @@ def _whole(sources: Mapping[str, Source], main: str) -> Source:
     return Source(sources[main].name, text, tuple(files))
 
 
+def _linked(
+    device: Device,
+    sources: Mapping[str, Source],
+    flags: list[str],
+    part: Callable[[Device, Source, list[str]], tuple[cl.Program, bytes]],
+) -> tuple[cl.Program, list[bytes]]:
+    """A linked program and the binaries of its parts; `part` makes these. Raises pyopencl.Error."""
+    parts = [part(device, source, flags) for source in reversed(list(sources.values()))]
+    programs = [program for program, _ in parts]
+    linked = cl.link_program(device.context, programs, [], [device.info.cl_device])
+    return linked, [binary for _, binary in parts]
+
+
 def _part(device: Device, source: Source, flags: list[str]) -> tuple[cl.Program, bytes]:
     """A compiled part of a program: of the cache folder, another process, or this one.
 
-    Its binary too, which is empty where the device has none.
+    Its binary too, which is empty where the device has none. Raises pyopencl.Error if the driver
+    refuses a binary that was not made here, at once or when it is linked.
     """
-    entry, on_disk = _entry(device, source, [*flags, _PART]), _has_binaries(device)
-    stored = disk_cache.load(entry) if on_disk else None
+    entry = _entry(device, source, [*flags, _PART])
+    stored = disk_cache.load(entry) if _has_binaries(device) else None
     binary = stored[1] if stored else None
     if binary is None and device.compilers is not None:
         binary = device.compilers.take(entry)
         if binary is not None:
             disk_cache.store(entry, _PART, binary)
-    if binary is not None:
-        try:
-            return cl.Program(device.context, [device.info.cl_device], [binary]), binary
-        except cl.Error as error:
-            log.debug("%s is compiled again: %s", source.name, error)
+    if binary is None:
+        return _compiled(device, source, flags)
+    return cl.Program(device.context, [device.info.cl_device], [binary]), binary
+
+
+def _compiled(device: Device, source: Source, flags: list[str]) -> tuple[cl.Program, bytes]:
+    """A part of a program that this process compiles, and its binary. Raises KernelBuildError."""
     try:
         part = native_programs.compile_part(
             device.context, device.info.cl_device, source.text, flags
         )
     except cl.Error as error:
         raise _build_error(source, str(error)) from error
-    if not on_disk:
+    if not _has_binaries(device):
         return part, b""
     binary = _binary(part)
-    disk_cache.store(entry, _PART, binary)
+    disk_cache.store(_entry(device, source, [*flags, _PART]), _PART, binary)
     return part, binary
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import logging
 import subprocess
 import sys
 
 import numpy as np
+import pyopencl as cl
 import pytest
 
 from clpt import device as dev
-from clpt.device import compilers, disk_cache
+from clpt.device import compilers, disk_cache, native_programs
 from clpt.device.compilers import Compilers, Job
 from clpt.device.program import Argument
 
@@ -67,6 +69,41 @@ def test_without_processes_the_caller_compiles(
     monkeypatch.setattr(compilers, "_command", lambda: command)
     with Compilers(2) as opened.compilers:
         assert answer(opened, command[0][-9:]) == [7, 7, 7, 7]
+
+
+class Given:
+    """In the place of `Compilers`: each part is the given binary, and nothing is linked."""
+
+    def __init__(self, binary: bytes):
+        self.binary = binary
+
+    def submit(self, key: str, job: Job) -> None:
+        pass
+
+    def take(self, key: str) -> bytes:
+        return self.binary
+
+    def then(self, *job: object) -> None:
+        pass
+
+
+@pytest.mark.parametrize("kind", ["nonsense", "a program that is whole"])
+def test_a_part_that_the_driver_refuses_is_compiled_here(
+    opened: dev.Device, kind: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Nonsense is refused at once, a whole program when it is linked."""
+    binary = b"nonsense"
+    if kind != "nonsense":
+        if not opened.info.compiles_singly:
+            pytest.skip("other drivers are given no part of another process; Intel's crashes")
+        whole = native_programs.build(opened.context, opened.info.cl_device, PARTS["part"])
+        binary = whole.get_info(cl.program_info.BINARIES)[0]
+    opened.compilers = Given(binary)
+    assert answer(opened, kind) == [7, 7, 7, 7]
+    opened.compilers = None
+    again = dev.Device.open(opened.info)
+    assert answer(again, kind) == [7, 7, 7, 7]  # of parts in the cache folder, which are good now
+    assert not [record for record in caplog.records if record.levelno > logging.DEBUG]
 
 
 def test_processes_end_with_who_started_them() -> None:
