@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 import pyopencl as cl
 
-from clpt.device import memory, native_programs, program_cache, runtimes
+from clpt.device import memory, native_programs, program_cache, runtimes, speed_trial
 
 from ..errors import DeviceError
 from .compilers import Compilers
@@ -167,7 +167,8 @@ def choose(
     a process that was forked has another one.
 
     None takes the environment variable CLPT_DEVICE if it is set, and otherwise the first device
-    that works: GPUs, then accelerators, then CPUs.
+    that works: GPUs, then accelerators, then CPUs; of a CPU's runtimes the one that is the fastest
+    in a short trial, which is made once and remembered in clpt's cache folder.
 
     threads: how many cores of a CPU take part at most, by default all.
 
@@ -192,10 +193,15 @@ def selection(which: str | int | None = None) -> Choice:
         asked = f"device {which!r}"
     named = which is not None
     failures: list[str] = []
-    for info in _matching(which, found) if named else by_preference(found):
+    reason = f"asked for by {asked}"
+    if named:
+        order = _matching(which, found)
+    else:
+        order, seconds = _by_speed(by_preference(found))
+    for info in order:
         failure = None if _key(info) in _opened else trial(info)
         if failure is None:
-            reason = f"asked for by {asked}" if named else _reason(info, found)
+            reason = reason if named else _reason(info, found, seconds)
             return Choice(info, "; ".join([reason, *(f"passed over {f}" for f in failures)]))
         log.warning("%s is passed over: %s", info.label, failure)
         failures.append(f"{info.label} ({failure})")
@@ -207,6 +213,36 @@ def selection(which: str | int | None = None) -> Choice:
 def by_preference(infos: tuple[DeviceInfo, ...]) -> list[DeviceInfo]:
     """Return GPUs before accelerators before CPUs; among equals, in the order of the platforms."""
     return sorted(infos, key=lambda info: _ORDER.index(info.kind))
+
+
+def _by_speed(
+    infos: list[DeviceInfo],
+) -> tuple[list[DeviceInfo], dict[DeviceInfo, float]]:
+    """Put the fastest one first if the first device is a CPU that others serve too.
+
+    Their seconds in a trial too, which are empty where there was none, or it failed.
+    """
+    peers = [info for info in infos if _same_processor(info, infos[0])]
+    if len(peers) < 2:
+        return infos, {}
+    runtimes = [f"{i.label} {i.version} {i.driver} {i.compute_units}" for i in peers]
+    taken = speed_trial.remembered(runtimes, lambda number: _measured(peers[number]))
+    if taken is None:
+        return infos, {}
+    seconds = dict(zip(peers, taken, strict=True))
+    ranked = sorted(peers, key=seconds.__getitem__)
+    return ranked + [info for info in infos if info not in ranked], seconds
+
+
+def _same_processor(one: DeviceInfo, other: DeviceInfo) -> bool:
+    """Whether two devices are runtimes of one CPU: PoCL puts words before its name."""
+    a, b = one.name.casefold(), other.name.casefold()
+    return one.is_cpu and other.is_cpu and (a.endswith(b) or b.endswith(a))
+
+
+def _measured(info: DeviceInfo) -> float:
+    """What a trial takes on a device [s], in the process's own context; raises what drivers do."""
+    return speed_trial.measure(_first(info).queue, info.lanes)
 
 
 def trial(info: DeviceInfo) -> str | None:
@@ -273,7 +309,12 @@ def _matching(which: str | int | None, infos: tuple[DeviceInfo, ...]) -> list[De
     return [info for info in names if text.casefold() in names[info]]
 
 
-def _reason(info: DeviceInfo, infos: tuple[DeviceInfo, ...]) -> str:
+def _reason(
+    info: DeviceInfo, infos: tuple[DeviceInfo, ...], seconds: dict[DeviceInfo, float]
+) -> str:
+    if info in seconds:
+        taken = ", ".join(f"{1e3 * s:.2f} ms by {i.platform}" for i, s in seconds.items())
+        return f"the fastest runtime of this CPU in a short trial, remembered: {taken}"
     if len(infos) == 1:
         return "the only device"
     peers = [other for other in infos if other.kind == info.kind]

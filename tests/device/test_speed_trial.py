@@ -1,0 +1,89 @@
+"""Of several runtimes of one processor the fastest is taken, by a trial that is made once."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+
+from clpt.device import DeviceInfo, context, disk_cache, speed_trial
+
+SECONDS = {"Alpha": 0.003, "Beta": 0.001, "Gamma": 0.002}
+
+
+@pytest.fixture
+def runtimes(monkeypatch, device, cache_folder) -> tuple[DeviceInfo, ...]:
+    """Two runtimes of one processor, and one of another; all are the device that is there."""
+    names = {"Alpha": "Core 9", "Beta": "pthread-new-Core 9", "Gamma": "Other"}
+    there = tuple(
+        dataclasses.replace(device.info, index=i, kind="cpu", platform=platform, name=name)
+        for i, (platform, name) in enumerate(names.items())
+    )
+    monkeypatch.setattr(context, "devices", lambda: there)
+    monkeypatch.setattr(context, "_opened", {})
+    monkeypatch.delenv("CLPT_DEVICE", raising=False)
+    return there
+
+
+@pytest.fixture
+def tried(monkeypatch) -> list[str]:
+    """The platforms that were tried, with seconds as in `SECONDS`."""
+    platforms: list[str] = []
+
+    def measured(info: DeviceInfo) -> float:
+        platforms.append(info.platform)
+        return SECONDS[info.platform]
+
+    monkeypatch.setattr(context, "_measured", measured)
+    return platforms
+
+
+def fails(info: DeviceInfo) -> float:
+    raise RuntimeError("broken")
+
+
+def test_the_fastest_runtime_is_taken_and_remembered(runtimes, tried):
+    for _ in range(2):
+        choice = context.selection()
+        assert choice.info.platform == "Beta"
+        assert "3.00 ms by Alpha, 1.00 ms by Beta" in choice.reason
+    assert tried == ["Alpha", "Beta"]
+
+
+def test_a_new_driver_is_tried(runtimes, tried, monkeypatch):
+    context.selection()
+    newer = tuple(dataclasses.replace(info, driver="newer") for info in runtimes)
+    monkeypatch.setattr(context, "devices", lambda: newer)
+    context.selection()
+    assert len(tried) == 4
+
+
+@pytest.mark.parametrize("case", ["named", "environment", "one processor each", "a GPU"])
+def test_without_a_question_there_is_no_trial(runtimes, tried, monkeypatch, case):
+    if case == "environment":
+        monkeypatch.setenv("CLPT_DEVICE", "alpha")
+    elif case == "one processor each":
+        monkeypatch.setattr(context, "devices", lambda: runtimes[1:])
+    elif case == "a GPU":
+        gpu = dataclasses.replace(runtimes[0], kind="gpu", index=3)
+        monkeypatch.setattr(context, "devices", lambda: (*runtimes, gpu))
+    choice = context.selection("alpha" if case == "named" else None)
+    assert choice.info.platform == ("Beta" if case == "one processor each" else "Alpha")
+    assert not tried
+
+
+def test_a_trial_that_failed_leaves_the_first_and_is_not_made_again(runtimes, monkeypatch):
+    monkeypatch.setattr(context, "_measured", fails)
+    assert context.selection().info.platform == "Alpha"
+    monkeypatch.setattr(context, "_measured", lambda info: pytest.fail("tried again"))
+    assert context.selection().info.platform == "Alpha"
+
+
+def test_without_a_cache_there_is_no_trial(runtimes, tried, monkeypatch):
+    monkeypatch.setattr(disk_cache, "store", lambda *content: None)
+    assert context.selection().info.platform == "Alpha"
+    assert not tried
+
+
+def test_a_trial_takes_time(device):
+    assert 0.0 < speed_trial.measure(device.queue, device.lanes) < 60.0
