@@ -216,6 +216,7 @@ def figures(
     """Return what both took beside each other; clpt first in lists. The first sample of each pixel
     is not counted: its time is the start's."""
     cold = [one.render(1, 1) for one in pair]
+    machine.settle(pair[0].caches)
     warm = [[one.render(1, seed) for one in pair] for seed in SEEDS]
     full = [[one.render(spp, seed) for one in pair] for seed in SEEDS[:2]]
     start = [min(run[i].cpu for run in warm) for i in range(2)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import time
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from rich.console import Console
 from clpt.benchmark import records
 from clpt.benchmark.records import ROOT, circumstances, processor, vectors
 
-__all__ = ["ROOT", "append", "circumstances", "console", "kind", "processor"]
+__all__ = ["ROOT", "append", "circumstances", "console", "kind", "processor", "settle"]
 
 
 def kind() -> str:
@@ -31,3 +32,16 @@ def append(path: str | Path | None, bench: str, rows: Iterable[dict[str, object]
     """Add records to a file of JSON lines; no file, no record."""
     if path is not None:
         records.append(path, ({"bench": bench, **row} for row in rows))
+
+
+def settle(caches: Path, quiet: float = 5.0, most: float = 60.0) -> None:
+    """Wait till no file has come to a cache folder for `quiet` seconds, or for `most` in all.
+
+    After a first render a process of clpt goes on for some seconds, and writes there.
+    """
+    began = changed = time.monotonic()
+    count = -1
+    while time.monotonic() < min(changed + quiet, began + most):
+        if count != (count := sum(1 for _ in caches.rglob("*"))):
+            changed = time.monotonic()
+        time.sleep(0.2)

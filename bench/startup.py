@@ -76,6 +76,7 @@ def measure(folder: Path, mode: str, rounds: int, python: str) -> list[dict]:
         for n in range(rounds):
             caches = folder / f"{renderer}{n}"
             cold.append(run(cornell[renderer], caches))
+            machine.settle(caches)
             warm.append(run(cornell[renderer], caches))
         rows.append(
             {

@@ -13,11 +13,11 @@ import subprocess
 import sys
 import threading
 from collections import deque
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Hashable, Sequence
 from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 log = logging.getLogger(__name__)
 
@@ -27,9 +27,10 @@ _MOST = 4  # processes: more than parts of a loop that take long
 
 @dataclass(frozen=True)
 class Job:
-    """What a process does: "compile" a text, or "link" binaries; the result is a binary.
+    """What a process does: "compile" a text to a binary, or "link" binaries and keep the result.
 
-    platform, device: their names; options: of the compiler.
+    platform, device: their names; options: of the compiler; place: in the cache folder, as
+    `disk_cache.store` takes it, of a result that is kept.
     """
 
     kind: str
@@ -37,6 +38,7 @@ class Job:
     device: str
     options: str
     given: str | Sequence[bytes]
+    place: tuple[str, str, Path] | None = None  # entry, header, folder
 
 
 @dataclass
@@ -49,7 +51,8 @@ class Compilers:
     """Some processes, that start when there is something to do for them.
 
     count: how many there are at most. With `with` they end after what they are at, or at once where
-    an exception is raised.
+    an exception is raised. Nobody waits for what is kept for the next time: a process may end
+    after the one that started it.
     """
 
     def __init__(self, count: int):
@@ -88,16 +91,15 @@ class Compilers:
                 return None
         return task.result.result()
 
-    def then(self, key: Hashable, job: Job, use: Callable[[bytes], Any]) -> None:
-        """Let a process do a job, and call `use` with the binary, in a thread, if there is one."""
-        self.submit(key, job)
-        with self._changed:
-            task = self._tasks.pop(key, None)
-        if task is not None:
-            task.result.add_done_callback(lambda done: _use(done.result(), use))
+    def leave(self, job: Job) -> None:
+        """Let a process do a job of which only its place in the cache folder will tell."""
+        self.submit(job.place, job)
 
     def close(self) -> None:
-        """Let the processes do what was submitted, then end them; wait for that."""
+        """Let the processes do what was submitted, then end them.
+
+        Wait for that, but not for what is kept.
+        """
         with self._changed:
             self._closed = True
             self._changed.notify_all()
@@ -112,6 +114,8 @@ class Compilers:
             for process in self._processes:
                 process.kill()
         self.close()
+        for process in self._processes:
+            process.wait()
 
     def __enter__(self) -> Compilers:
         return self
@@ -122,25 +126,31 @@ class Compilers:
     def _serve(self) -> None:
         """Start a process and give it jobs, one after the other."""
         try:
-            with subprocess.Popen(
+            process = subprocess.Popen(
                 _command(),
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
                 start_new_session=True,  # Ctrl-C is for this process
-            ) as process:
-                with self._changed:
-                    self._processes.append(process)
-                    if self._closed and not self._waiting:
-                        return
-                while task := self._next():
-                    try:
-                        task.result.set_result(_answer(process, task.job))
-                    except BaseException:
-                        task.result.set_result(None)
-                        raise
-        except Exception as error:  # a process that died, or did not start
+            )
+        except OSError as error:
             log.debug("nothing is compiled in another process: %s", error)
+            return
+        with self._changed:
+            self._processes.append(process)
+        keeps = False
+        try:
+            while task := self._next():
+                try:
+                    keeps |= task.job.place is not None
+                    task.result.set_result(_answer(process, task.job))
+                except BaseException:
+                    task.result.set_result(None)
+                    raise
+        except Exception as error:  # a process that died
+            log.debug("nothing is compiled in another process: %s", error)
+        finally:
+            _end(process, wait=not keeps)
 
     def _next(self) -> _Task | None:
         with self._changed:
@@ -151,9 +161,14 @@ class Compilers:
             return self._waiting.popleft()
 
 
-def _use(binary: bytes | None, use: Callable[[bytes], Any]) -> None:
-    if binary is not None:
-        use(binary)
+def _end(process: subprocess.Popen[bytes], wait: bool) -> None:
+    """Let a process end after what it keeps."""
+    for pipe in (process.stdin, process.stdout):
+        assert pipe is not None
+        with suppress(OSError):
+            pipe.close()
+    if wait:
+        process.wait()
 
 
 def spare_cores() -> int:
@@ -172,8 +187,10 @@ def _command() -> list[str]:
 def _answer(process: subprocess.Popen[bytes], job: Job) -> bytes | None:
     assert process.stdin is not None
     assert process.stdout is not None
-    request = (job.kind, job.platform, job.device, job.options, job.given)
+    request = (job.kind, job.platform, job.device, job.options, job.given, job.place)
     pickle.dump(request, process.stdin)
     process.stdin.flush()
+    if job.place is not None:
+        return None
     binary: bytes | None = pickle.load(process.stdout)  # from our own program
     return binary

@@ -77,12 +77,15 @@ def _unfit(path: Path) -> str | None:
     return None
 
 
-def store(entry: str, header: str, binary: bytes) -> None:
-    """Write a program's binary under a key, with a line of text; a full disk is no error."""
+def store(entry: str, header: str, binary: bytes, root: Path | None = None) -> None:
+    """Write a program's binary under a key, with a line of text; a full disk is no error.
+
+    root: the cache folder, where another process tells it.
+    """
     content = header.encode() + b"\n" + binary
     check = hashlib.sha256(content).hexdigest().encode()
     try:
-        _write(folder() / "programs" / entry, check + b"\n" + content)
+        _write((root or folder()) / "programs" / entry, check + b"\n" + content)
     except OSError as error:
         log.debug("the cache cannot be written: %s", error)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import json
 import logging
@@ -337,7 +338,8 @@ def _keep_linked(
         disk_cache.store(entry, header, _binary(program.cl_program))
         return _from_cache(device, whole, flags, entry) or program
     job = _job(device, "link", flags, parts)
-    device.compilers.then(entry, job, lambda binary: disk_cache.store(entry, header, binary))
+    place = entry, header, disk_cache.folder()
+    device.compilers.leave(dataclasses.replace(job, place=place))
     return program
 
 
