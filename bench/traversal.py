@@ -37,8 +37,8 @@ kernel NO_VECTORIZE void occluded(global const float *nodes, global const float 
     hits[i] = {layout}_occluded(nodes, leaves, r.s0, r.s1, r.s2, r.s4, r.s5, r.s6, r.s3, r.s7);
 }}
 """
-HIT = np.dtype(
-    [("t", "f4"), ("u", "f4"), ("v", "f4"), ("prim", "u4"), ("tag", "u4"), ("n", "f4", 3)]
+HIT = np.dtype(  # TriHit
+    [("t", "f4"), ("uv", "f4", 2), ("prim", "u4"), ("tag", "u4"), ("n", "f4", 3), ("ends", "f4", 2)]
 )
 MISS = 0xFFFFFFFF
 

@@ -16,6 +16,7 @@ from .building import Building
 
 Quality = Literal["high", "fast"]
 """high: the surface area heuristic down to the leaves; fast: leaves are cut out of a curve."""
+REINSERT_LIMIT = 10_000  # triangles; below, the program takes longer to load than it saves
 
 _COLLAPSE, _REFIT = "bvh/collapse.cl", "bvh/refit.cl"
 _BINARY_LEAF = 4  # triangles of a leaf, at most
@@ -101,6 +102,8 @@ def binary(building: Building, mesh: Mesh) -> Packed:
 def wide8(building: Building, mesh: Mesh) -> Packed:
     """Build a binary tree, make it 8 wide, and pack blocks of 8 triangles."""
     built = _binary_tree(building, mesh, _BLOCK, at_once=_BLOCK)
+    if mesh.quality == "high" and mesh.count >= REINSERT_LIMIT:
+        built = tree.reinserted(building, built)
     wide = _wide_nodes(building, built)
     blocks = building.allocate(352 * wide.leaves)
     source = {"vertices": mesh.vertices, "faces": mesh.faces, "tags": mesh.tags}

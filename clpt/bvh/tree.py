@@ -11,9 +11,10 @@ import pyopencl as cl
 from . import curve
 from .building import Building
 
-_BUILD, _PACK = "bvh/build.cl", "bvh/pack.cl"
+_BUILD, _PACK, _REINSERT = "bvh/build.cl", "bvh/pack.cl", "bvh/reinsert.cl"
 _RUN = 2048  # items whose bounds one work-item finds
 _SUBTREES = 64  # for each compute unit, so that they even out
+_PASSES = 6  # of reinsertion
 
 
 @dataclass(frozen=True)
@@ -73,6 +74,29 @@ def over(
     leaf_size: items of a leaf, at most; at_once: items that are tested in the time of one.
     """
     return _divided(building, count, items, parts, leaf_size=leaf_size, share=1 / at_once, runs=0)
+
+
+def reinserted(building: Building, tree: Tree) -> Tree:
+    """Put the large nodes of a tree where the sum of areas is the least.
+
+    The tree that is returned has the same buffers, but for `ranges`. It is for
+    kernels/bvh/collapse.cl: an inner node's count is that of the levels below it.
+    """
+    subtrees = 1 << tree.levels
+    begin = subtrees - 1
+    parents, targets = (building.allocate(size * tree.count) for size in (4, 8))
+    ends, areas = (building.allocate(size * subtrees) for size in (4, 8))
+    ranges = building.allocate(tree.ranges.size)
+    building.stream.copy(ranges, tree.ranges)
+    shared = {"nodes": tree.nodes, "ranges": tree.ranges, "begin": begin, "parents": parents}
+    moves = {**shared, "ends": ends, "targets": targets}
+    building.run(_REINSERT, "reinsert_subtree", subtrees, ends=ends, areas=areas, **shared)
+    building.run(_REINSERT, "reinsert_top", 1, areas=areas, **shared)
+    for _ in range(_PASSES):
+        building.run(_REINSERT, "reinsert_find", 2 * subtrees - 1, areas=areas, **moves)
+        building.run(_REINSERT, "reinsert_all", 1, **moves)
+    building.run(_REINSERT, "reinsert_ranges", 1, nodes=tree.nodes, ranges=ranges, begin=begin)
+    return replace(tree, ranges=ranges)
 
 
 def over_runs(

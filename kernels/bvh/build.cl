@@ -34,7 +34,7 @@ inline float8 build_node(float8 bounds, float reach, uint link, uint count)
 }
 
 /* Small ranges are cut with fewer bins: there they cost more than they find. */
-inline uint build_bins(uint count) { return count > 24 ? BUILD_BINS : 4; }
+inline uint build_bins(uint count) { return count > 12 ? BUILD_BINS : 4; }
 
 inline int4 build_bin(float8 item, float4 low, float4 scale)
 {

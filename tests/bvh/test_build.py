@@ -10,6 +10,7 @@ import trimesh
 
 from clpt import bvh
 from clpt import device as dev
+from clpt.bvh import layouts
 from clpt.errors import MemoryBudgetError, SceneError
 from tests.rotation import rotating
 
@@ -95,8 +96,14 @@ def test_binary_tree_holds_everything_once(device, shape, quality):
     assert deepest <= DEPTH
 
 
+@pytest.fixture
+def reinserting(monkeypatch):
+    """Small trees have their nodes reinserted too."""
+    monkeypatch.setattr(layouts, "REINSERT_LIMIT", 1)
+
+
 @rotating("shape, quality", tuple(SHAPES), QUALITIES, turn=1)
-def test_wide_tree_holds_everything_once(device, shape, quality):
+def test_wide_tree_holds_everything_once(device, shape, quality, reinserting):
     triangles = SHAPES[shape](np.random.default_rng(3))
     tree = bvh.build(device, *mesh(triangles), layout="wide8", quality=quality)
     nodes = read(device, tree.buffers["nodes"], np.float32).reshape(-1, 8, 8)
@@ -118,9 +125,27 @@ def test_wide_tree_holds_everything_once(device, shape, quality):
     assert tree.bytes == nodes.nbytes + blocks.nbytes
 
 
+@pytest.mark.parametrize("spread", [1.0, 2.0])
+def test_reinsertion_makes_a_tree_cheaper(device, trace, monkeypatch, spread):
+    """Sizes are lognormal: large triangles among small ones are what a plane divides badly."""
+    rng = np.random.default_rng(5)
+    triangles = random_triangles(rng, 5000, 0.02 * rng.lognormal(0.0, spread, (5000, 1, 1)))
+    ends = np.zeros((2000, 1)), np.full((2000, 1), np.inf)
+    rays = np.concatenate([rng.random((2000, 3)), ends[0], rng.normal(0, 1, (2000, 3)), ends[1]], 1)
+    costs, hits = [], []
+    for limit in (len(triangles) + 1, len(triangles)):
+        monkeypatch.setattr(layouts, "REINSERT_LIMIT", limit)
+        tree = bvh.build(device, *mesh(triangles), layout="wide8")
+        costs.append(tree.stats["cost"])
+        hits.append(trace(tree, rays.astype(np.float32)))
+    np.testing.assert_array_equal(hits[0][0], hits[1][0])
+    np.testing.assert_array_equal(hits[0][1], hits[1][1])
+    assert 0.5 < costs[1] / costs[0] < 0.97
+
+
 @pytest.mark.parametrize("quality", QUALITIES)
 @pytest.mark.parametrize("layout", bvh.TREES)
-def test_builds_are_repeatable(device, layout, quality):
+def test_builds_are_repeatable(device, layout, quality, reinserting):
     triangles = random_triangles(np.random.default_rng(4), 3000, 0.02)
     builds = [bvh.build(device, *mesh(triangles), layout=layout, quality=quality) for _ in range(2)]
     first, second = (read(device, tree.buffers["leaves"], np.uint32) for tree in builds)
@@ -144,7 +169,7 @@ def test_qualities_meet_the_same_triangles(device, trace, layout):
 
 
 @pytest.mark.parametrize("quality", QUALITIES)
-def test_what_is_not_finite_on_the_device_is_not_met(device, trace, quality):
+def test_what_is_not_finite_on_the_device_is_not_met(device, trace, quality, reinserting):
     """Buffers are not checked: triangles without a place must not spoil those that have one."""
     triangles = random_triangles(np.random.default_rng(10), 3000, 0.02)
     for value, at in zip((np.nan, np.inf, -np.inf, 1e30), range(4), strict=True):
@@ -212,7 +237,7 @@ def test_memory_of_a_build(device, monkeypatch, layout, quality):
     sphere = trimesh.creation.icosphere(5)
     bvh.build(device, sphere.vertices, sphere.faces, layout=layout, quality=quality)
     n = len(sphere.faces)
-    assert sum(sizes) < (250 if quality == "high" else 240) * n
+    assert sum(sizes) < (260 if quality == "high" else 240) * n
     assert max(sizes) <= 64 * n
 
 
