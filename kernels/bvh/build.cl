@@ -18,7 +18,7 @@ typedef struct {
     global float8 *items, *nodes;
     float reach;    /* the largest coordinate of the scene */
     uint leaf_size; /* items of a leaf, at most */
-    float share;    /* of a test in one item, where several are tested at once */
+    uint at_once;   /* items that are tested in the time of one, as a power of two */
     uint runs;      /* are the items runs of bvh/curve.cl? Each is a leaf then */
 } Build;
 
@@ -45,7 +45,7 @@ inline int4 build_bin(float8 item, float4 low, float4 scale)
 /* What it costs to test `count` items in a box. A side that nothing is in has no number for an area. */
 inline float build_cost(const Build *b, float8 bounds, uint count)
 {
-    return item_half_area(bounds) * ceil(count * b->share);
+    return item_half_area(bounds) * (int)(count + (1u << b->at_once) - 1 >> b->at_once);
 }
 
 /* Adds an item to its bins of the three axes, and to their numbers of items, 8 bits a bin. */
@@ -198,10 +198,10 @@ kernel NO_VECTORIZE void build_root(global const Extent *restrict parts, uint n_
 /* Ranges from `begin` on in the heap, a level of it. Those with no items are no ranges. */
 kernel NO_VECTORIZE void build_level(global float8 *restrict items, global float8 *restrict nodes,
                                      global Range *restrict ranges, global Extent *restrict extents,
-                                     uint begin, uint leaf_size, float share, uint runs)
+                                     uint begin, uint leaf_size, uint at_once, uint runs)
 {
     uint k = begin + get_global_id(0);
-    Build b = {items, nodes, build_reach(extents[0].bounds), leaf_size, share, runs};
+    Build b = {items, nodes, build_reach(extents[0].bounds), leaf_size, at_once, runs};
     Range r = ranges[k], children[2] = {{0, 0, 0, 0}, {0, 0, 0, 0}};
     Extent sides[2];
     if (r.count && build_range(&b, r, extents[k], 0, children, sides)) {
@@ -215,9 +215,9 @@ kernel NO_VECTORIZE void build_level(global float8 *restrict items, global float
 kernel NO_VECTORIZE void build_subtree(global float8 *restrict items, global float8 *restrict nodes,
                                        global const Range *restrict ranges,
                                        global const Extent *restrict extents, uint begin, uint leaf_size,
-                                       float share, uint runs)
+                                       uint at_once, uint runs)
 {
-    Build b = {items, nodes, build_reach(extents[0].bounds), leaf_size, share, runs};
+    Build b = {items, nodes, build_reach(extents[0].bounds), leaf_size, at_once, runs};
     Range waiting[BVH_DEPTH];
     Extent waiting_halves[BVH_DEPTH];
     int n = 0;
