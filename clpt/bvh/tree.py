@@ -14,6 +14,7 @@ from .building import Building
 _BUILD, _PACK, _REINSERT = "bvh/build.cl", "bvh/pack.cl", "bvh/reinsert.cl"
 _RUN = 2048  # items whose bounds one work-item finds
 _SUBTREES = 64  # for each compute unit, so that they even out
+_CPU_UNITS = 16  # those of any CPU: the order of reinsertion, and so the tree, follows from them
 _PASSES = 4  # of reinsertion; more cost a build 2 % each and save rays less
 
 
@@ -119,7 +120,8 @@ def _divided(
     at_once: int,
     runs: int,
 ) -> Tree:
-    wanted = _SUBTREES * building.device.info.compute_units
+    info = building.device.info
+    wanted = _SUBTREES * (_CPU_UNITS if info.is_cpu else info.compute_units)
     levels = int(math.log2(max(1, min(wanted, count // leaf_size))))
     ranges = building.allocate(16 * (2 << levels))
     extents = building.allocate(64 * (2 << levels))
