@@ -121,13 +121,13 @@ class Record:
     def row_text(self) -> str:
         """Return the lane struct and `name_row(table, at)`; `at`: a row's first word, per lane."""
         lower = self.snake_name
-        body = []
+        body, words = row_words("table", "at", self.words)
+        body = [f"    {row}" for row in body]
         for m in self.members:
-            read = "gather_i" if m.type == "integer" else "gather_w"
             for i, component in enumerate(TYPES[m.type][3]):
-                value = f"{read}(table, at + {m.word + i})"
-                if m.type == "natural":
-                    value = f"as_natural({value})"
+                value = words[m.word + i]
+                if m.type in _CASTS:
+                    value = f"{_CASTS[m.type]}({value})"
                 if m.type == "spectrum" and i == 3:
                     body += ["#if SPECTRUM_SIZE == 4", f"    r.{m.name}.w = {value};", "#endif"]
                 else:
@@ -181,6 +181,19 @@ class Record:
                 "{", *store, "}",
             ]  # fmt: skip
         return "\n".join([*parts, ""])
+
+
+def row_words(table: str, at: str, count: int) -> tuple[list[str], list[str]]:
+    """Return statements that read `count` words from `at` on, per lane, and each word's name.
+
+    Four at a time, see kernels/core/rows.cl; the last four may be some of those before.
+    """
+    if count < 4:
+        return [], [f"gather_w({table}, {at} + {i})" for i in range(count)]
+    firsts = [*range(0, count - 4, 4), count - 4]
+    rows = [f"vec4 words{first} = gather_w4({table} + {first}, {at});" for first in firsts]
+    names = {first + i: f"words{first}.{c}" for first in firsts for i, c in enumerate("xyzw")}
+    return rows, [names[i] for i in range(count)]
 
 
 def _snake(name: str) -> str:

@@ -289,23 +289,27 @@ class Principled(Material):
     uses_lobe_sample = True
     refracts = True
     chromatic = True
-    tints = ("spec_tint", "sheen_tint")
+    tints = (("spec_tint",), ("sheen", "sheen_tint"))
 
     base_color: Textured = reflectance(0.5, "colour of base and metal; its root is of transmission")
     roughness: TexturedNumber = _share(0.5, "of reflection and refraction")
-    anisotropic: TexturedNumber = _share(0.0, "how much it is stretched along the tangent")
-    metallic: TexturedNumber = _share(0.0, "share of the metal")
-    spec_trans: TexturedNumber = _share(0.0, "share of the rest that lets light through")
+    anisotropic: TexturedNumber = _share(
+        0.0, "how much it is stretched along the tangent", lobe=True
+    )
+    metallic: TexturedNumber = _share(0.0, "share of the metal", lobe=True)
+    spec_trans: TexturedNumber = _share(0.0, "share of the rest that lets light through", lobe=True)
     eta: IndexLike = index(1.5, "inside index over the outside's")
     spec_tint: TexturedNumber = _share(
-        0.0, "how much of the base's colour the dielectric reflection has"
+        0.0, "how much of the base's colour the dielectric reflection has", lobe=True
     )
-    sheen: TexturedNumber = _share(0.0, "strength of a sheen at grazing angles")
+    sheen: TexturedNumber = _share(0.0, "strength of a sheen at grazing angles", lobe=True)
     sheen_tint: TexturedNumber = _share(0.0, "how much of the base's colour the sheen has")
     flatness: TexturedNumber = _share(
-        0.0, "share of the base that looks as if light came from below"
+        0.0, "share of the base that looks as if light came from below", lobe=True
     )
-    clearcoat: TexturedNumber = _share(0.0, "strength of a second, colourless reflection")
+    clearcoat: TexturedNumber = _share(
+        0.0, "strength of a second, colourless reflection", lobe=True
+    )
     clearcoat_gloss: TexturedNumber = _share(0.0, "how smooth that is")
 
     @property
@@ -322,23 +326,32 @@ class PrincipledThin(Material):
     """The principled model of a thin sheet (Burley 2015), as Mitsuba 3 defines it; both sides."""
 
     uses_lobe_sample = True
-    tints = ("spec_tint", "sheen_tint")
+    tints = (("spec_tint",), ("sheen", "sheen_tint"))
 
     base_color: Textured = reflectance(0.5, "colour of all but reflection and sheen")
     roughness: TexturedNumber = _share(0.5, "of reflection; transmission's grows with the index")
-    anisotropic: TexturedNumber = _share(0.0, "how much it is stretched along the tangent")
+    anisotropic: TexturedNumber = _share(
+        0.0, "how much it is stretched along the tangent", lobe=True
+    )
     spec_trans: TexturedNumber = _share(
-        0.0, "share of the slab: of reflection and clear transmission"
+        0.0, "share of the slab: of reflection and clear transmission", lobe=True
     )
     eta: IndexLike = index(1.5, "inside index over the outside's")
-    spec_tint: TexturedNumber = _share(0.0, "how much of the base's colour the reflection has")
-    sheen: TexturedNumber = _share(0.0, "strength of a sheen at grazing angles")
+    spec_tint: TexturedNumber = _share(
+        0.0, "how much of the base's colour the reflection has", lobe=True
+    )
+    sheen: TexturedNumber = _share(0.0, "strength of a sheen at grazing angles", lobe=True)
     sheen_tint: TexturedNumber = _share(0.0, "how much of the base's colour the sheen has")
     flatness: TexturedNumber = _share(
-        0.0, "share of the base that looks as if light came from below"
+        0.0, "share of the base that looks as if light came from below", lobe=True
     )
     diff_trans: TexturedNumber = real(
-        0.0, "diffuse light that goes through; 2: all of it", low=0.0, high=2.0, textured=True
+        0.0,
+        "diffuse light that goes through; 2: all of it",
+        low=0.0,
+        high=2.0,
+        textured=True,
+        lobe=True,
     )
 
     @property

@@ -202,8 +202,9 @@ class Kind:
     """Base of all kinds; the class name gives the name in files and kernels."""
 
     needs_wavelengths: ClassVar[bool] = False  # its struct in the kernels has `lambdas`
-    tints: ClassVar[tuple[str, ...]] = ()  # where one is above 0, its struct has the `luminance`
-    # of `base_color`, and its kernel file includes core/luminance.cl
+    # Where all numbers of one of these are above 0, its struct has the `luminance` of `base_color`,
+    # and its kernel file includes core/luminance.cl.
+    tints: ClassVar[tuple[tuple[str, ...], ...]] = ()
 
     @classproperty
     def kind(cls) -> str:

@@ -54,13 +54,9 @@ inline Spectrum principled_reflected(Principled m, Microfacets d, vec3 wo, vec3 
 {
     mask front = wo.z > 0.0f;
     RefractingFacet p = refracting_facet(wo, wi, (real)(1.0f));
-    Spectrum f = fresnel_spectrum(p.o, eta), weight, tint = principled_tint(m.base_color, m.luminance);
-    mask reflects = mask_of(0);
-#define C(c)                                       \
-    weight.c = schlick_boundary(fabs(p.o), eta.c); \
-    reflects = reflects | (f.c > 0.0f);
-    SPECTRUM_EACH(C)
-#undef C
+    Spectrum f = fresnel_spectrum(p.o, eta), weight = schlick_boundary_spectrum(fabs(p.o), eta);
+    Spectrum tint = principled_tint(m.base_color, m.luminance);
+    mask reflects = spectrum_max(f) > 0.0f;
     Spectrum metal = schlick_spectrum(m.base_color, weight);
     Spectrum share = principled_fresnel(f, eta, weight, tint, m.spec_tint);
     share = spectrum_madd(spectrum_sub(metal, share), m.metallic, share);
@@ -71,7 +67,8 @@ inline Spectrum principled_reflected(Principled m, Microfacets d, vec3 wo, vec3 
     real cos_o = fabs(wo.z), cos_i = fabs(wi.z), c = dot3(p.h, wi);
     real base = principled_diffuse(cos_o, cos_i, c, m.roughness, m.flatness) * principled_base(m) * INV_PI;
     Spectrum below = spectrum_scale(m.base_color, base);
-    below = spectrum_madd(principled_sheen(tint, m.sheen_tint, c), m.sheen * (1.0f - m.metallic), below);
+    if (any(m.sheen > 0.0f))
+        below = spectrum_madd(principled_sheen(tint, m.sheen_tint, c), m.sheen * (1.0f - m.metallic), below);
     if (any(m.clearcoat > 0.0f)) {
         Microfacets masking = microfacets_of((integer)(0), (real)(0.25f), (real)(0.25f));
         real coat = 0.25f * m.clearcoat * (0.04f + 0.96f * weight.x) * principled_coat_d(m, p.h)
@@ -85,10 +82,10 @@ Spectrum principled_eval(Principled m, vec3 wo, vec3 wi)
 {
     Microfacets d = principled_facets(m.roughness, m.anisotropic);
     Spectrum eta = principled_index(m), v = principled_reflected(m, d, wo, wi, eta);
-    real passed = principled_passed(m);
     mask reflected = wo.z * wi.z > 0.0f, transmitted = wo.z * wi.z < 0.0f;
     v = spectrum_sel(reflected, v, spectrum_of(0.0f));
-    if (any(transmitted & (passed > 0.0f))) {
+    if (any(transmitted & (m.spec_trans > 0.0f))) {
+        real passed = principled_passed(m);
         Spectrum t;
 #define C(c) t.c = refracting_facet_transmitted(d, wo, wi, eta.c) * passed * sqrt_r(m.base_color.c);
         SPECTRUM_EACH(C)
@@ -103,12 +100,16 @@ inline real principled_density(Principled m, vec3 wo, vec3 wi, real index)
 {
     Microfacets d = principled_facets(m.roughness, m.anisotropic);
     mask reflected = wo.z * wi.z > 0.0f, crossed = wo.z * wi.z < 0.0f;
-    real eta = sel(wo.z > 0.0f, index, 1.0f / index);
-    RefractingFacet p = refracting_facet(wo, wi, sel(crossed, eta, (real)(1.0f)));
+    real eta = 1.0f;
+    if (any(crossed & (m.spec_trans > 0.0f))) eta = sel(crossed, sel(wo.z > 0.0f, index, 1.0f / index), eta);
+    RefractingFacet p = refracting_facet(wo, wi, eta);
     PrincipledLobes lobes = principled_lobes(m, wo, fresnel_dielectric(p.o, index).f);
-    real coat = lobes.coat * principled_coat_d(m, p.h) * p.h.z;
     real facets = sel(crossed, lobes.transmit, lobes.reflect) * microfacet_visible_pdf(d, wo, p.h);
-    facets = (facets + sel(reflected, coat, (real)(0.0f))) * p.jacobian;
+    if (any(m.clearcoat > 0.0f)) {
+        real coat = lobes.coat * principled_coat_d(m, p.h) * p.h.z;
+        facets += sel(reflected, coat, (real)(0.0f));
+    }
+    facets *= p.jacobian;
     real pdf = sel(p.shading, facets, (real)(0.0f));
     pdf += sel(reflected, lobes.diffuse * cosine_hemisphere_pdf(wi.z), (real)(0.0f));
     return sel(reflected | crossed, pdf, (real)(0.0f));
@@ -139,7 +140,7 @@ BsdfSample principled_sample(Principled m, vec3 wo, vec3 u)
     Fresnel f = fresnel_dielectric(dot3(wo, h), principled_index(m).x);
     PrincipledLobes p = principled_lobes(m, wo, f.f);
     mask diffuse = u.z < p.diffuse, coat = !diffuse & (u.z < p.diffuse + p.coat);
-    mask crossed = !diffuse & !coat & (u.z < p.diffuse + p.coat + p.transmit);
+    mask crossed = !diffuse & !coat & (m.spec_trans > 0.0f) & (u.z < p.diffuse + p.coat + p.transmit);
     if (any(coat)) h = sel3(coat, principled_coat_normal(m, uv), h);
     s.wi = reflect_at(wo, h);
     if (any(crossed)) {

@@ -1,5 +1,6 @@
 /* All that a stage and a kind may rely on, in order. generated/scene.cl is made from clpt/records.py. */
 #include "core/lanes.cl"
+#include "core/rows.cl"
 #include "core/math.cl"
 #include "core/random.cl"
 #include "core/frame.cl"
@@ -13,4 +14,3 @@
 #include "generated/scene.cl"
 #include "generated/spectrum_read.cl"
 #include "texturing/texture_point.cl"
-#include "core/param.cl"

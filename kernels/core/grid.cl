@@ -76,10 +76,11 @@ inline void grid_weights(Scene scene, Grid g, integer row, integer column, real 
 {
     integer face = to_integer((to_real(row) + 0.5f) * to_real(g.faces) / to_real(g.rows));
     integer first = g.corners + (row + face) * (g.columns + 1) + column;
-    w[0] = gather(scene.distributions, first);
-    w[1] = gather(scene.distributions, first + 1);
-    w[2] = gather(scene.distributions, first + g.columns + 1);
-    w[3] = gather(scene.distributions, first + g.columns + 2);
+    vec2 top = gather2(scene.distributions, first), bottom = gather2(scene.distributions, first + g.columns + 1);
+    w[0] = top.x;
+    w[1] = top.y;
+    w[2] = bottom.x;
+    w[3] = bottom.y;
 }
 inline real grid_density(Grid g, real w[4], vec2 at)
 {
@@ -124,9 +125,8 @@ inline real grid_pdf(Scene scene, Grid g, integer receiver, integer row, integer
 /* Radiance between four texels of four floats, the first of which begins at `first`. */
 inline Spectrum texel_at(Scene scene, integer first, integer i, Wavelengths lambdas)
 {
-    integer at = first + 4 * i;
-    return spectrum_light_texel(scene, gather(scene.texels, at), gather(scene.texels, at + 1),
-                                gather(scene.texels, at + 2), gather(scene.texels, at + 3), lambdas);
+    vec4 texel = gather4(scene.texels, first + 4 * i);
+    return spectrum_light_texel(scene, texel.x, texel.y, texel.z, texel.w, lambdas);
 }
 inline Spectrum texels_between(Scene scene, integer first, integer i00, integer i10, integer i01, integer i11, vec2 at,
                                Wavelengths lambdas)

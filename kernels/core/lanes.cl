@@ -58,6 +58,7 @@ typedef integer mask;
 
 typedef struct { real x, y; } vec2;
 typedef struct { real x, y, z; } vec3;
+typedef struct { real x, y, z, w; } vec4;
 
 /* A scalar condition as a mask: in a vector it would be 1, which selects nothing. */
 #if LANES == 1

@@ -11,9 +11,11 @@
 /* A colour or spectrum that stands in `textures` in the five words that parameters have. */
 inline Spectrum texture_constant(Scene scene, integer at, Wavelengths lambdas)
 {
-    Spectrum value = spectrum_constant(scene.textures, at, lambdas);
-    mask tabulated = gather_i(scene.textures, at + 4) < 0;
-    if (any(tabulated)) value = spectrum_sel(tabulated, spectrum_table(scene, scene.textures, at, lambdas), value);
+    vec4 words = gather_w4(scene.textures, at);
+    integer source = gather_i(scene.textures, at + 4);
+    Spectrum value = spectrum_constant(words, lambdas);
+    mask tabulated = source < 0;
+    if (any(tabulated)) value = spectrum_sel(tabulated, spectrum_table(scene, words, source, lambdas), value);
     return value;
 }
 
@@ -23,8 +25,8 @@ inline vec3 texture_transformed(Scene scene, integer transform, vec3 p)
     real r[3];
     for (int i = 0; i < 3; i++) {
         integer at = transform + 4 * i;
-        vec3 row = v3(gather_w(scene.textures, at), gather_w(scene.textures, at + 1), gather_w(scene.textures, at + 2));
-        r[i] = dot3(row, p) + gather_w(scene.textures, at + 3);
+        vec4 row = gather_w4(scene.textures, at);
+        r[i] = dot3(v3(row.x, row.y, row.z), p) + row.w;
     }
     return v3(r[0], r[1], r[2]);
 }

@@ -38,14 +38,14 @@ inline TexturePoint area_sphere_point(Scene scene, ShapeRow shape, integer row, 
 inline TexturePoint area_triangle_point(Scene scene, ShapeRow shape, integer row, vec2 b)
 {
     integer face = shape.prim + row - shape.light, corner = 3 * face;
-    integer i0 = 2 * gather_i(scene.faces, corner), i1 = 2 * gather_i(scene.faces, corner + 1);
-    integer i2 = 2 * gather_i(scene.faces, corner + 2);
+    vec3 corners = gather3((global const float *)scene.faces, corner);
+    vec2 uv0 = gather2(scene.uvs, 2 * as_integer(corners.x)), uv1 = gather2(scene.uvs, 2 * as_integer(corners.y));
+    vec2 uv2 = gather2(scene.uvs, 2 * as_integer(corners.z));
     mask mapped = (shape.flags & SHAPE_UVS) != 0;
     real b0 = 1.0f - b.x - b.y;
     vec2 uv;
-    uv.x = sel(mapped, gather(scene.uvs, i0) * b0 + gather(scene.uvs, i1) * b.x + gather(scene.uvs, i2) * b.y, b.x);
-    uv.y = sel(mapped,
-               gather(scene.uvs, i0 + 1) * b0 + gather(scene.uvs, i1 + 1) * b.x + gather(scene.uvs, i2 + 1) * b.y, b.y);
+    uv.x = sel(mapped, uv0.x * b0 + uv1.x * b.x + uv2.x * b.y, b.x);
+    uv.y = sel(mapped, uv0.y * b0 + uv1.y * b.x + uv2.y * b.y, b.y);
     TexturePoint t = texture_point(uv, v3(0.0f, 0.0f, 0.0f));
 #if USES_ATTRIBUTES
     t.attributes = shape.attributes;

@@ -30,14 +30,15 @@ inline vec3 light_tree_axis(natural word)
 inline real light_tree_importance(LightNode n, vec3 p, vec3 hemisphere)
 {
     vec3 from = sub3(p, n.center), axis = light_tree_axis(n.axis);
-    real r2 = n.radius * n.radius, d2 = max_r(dot3(from, from), (real)(1e-20f));
+    real r2 = n.radius * n.radius, d2 = dot3(from, from);
     mask outside = d2 > r2;
-    real cos_w = dot3(axis, from) / sqrt(d2);
+    real inverse = 1.0f / sqrt(max_r(max_r(d2, r2), (real)(1e-20f))); /* of the distance, within of the radius */
+    real cos_w = dot3(axis, from) * inverse, cos_i = -dot3(hemisphere, from) * inverse;
     cos_w = sel((n.cones & 0x80000000u) != 0, fabs(cos_w), cos_w);
     real cos_o = light_tree_16(n.cones, 0);
     real cos_e = to_real(as_integer((n.cones >> 16) & 0x7fffu)) * (2.0f / 32767.0f) - 1.0f;
-    real sin2_b = sel(outside, r2 / d2, (real)(1.0f)), cos_x, sin_x, cos_p, sin_p, cos_r, sin_r;
-    real cos_b = sqrt_r(1.0f - sin2_b), sin_b = sqrt(sin2_b), cos_i = -dot3(hemisphere, from) / sqrt(d2);
+    real sin_b = sel(outside, n.radius * inverse, (real)(1.0f)), cos_b = sqrt_r(1.0f - sin_b * sin_b);
+    real cos_x, sin_x, cos_p, sin_p, cos_r, sin_r;
     light_tree_minus(cos_w, sqrt_r(1.0f - cos_w * cos_w), cos_o, sqrt_r(1.0f - cos_o * cos_o), &cos_x, &sin_x);
     light_tree_minus(cos_x, sin_x, cos_b, sin_b, &cos_p, &sin_p);
     light_tree_minus(cos_i, sqrt_r(1.0f - cos_i * cos_i), cos_b, sin_b, &cos_r, &sin_r);
@@ -45,16 +46,16 @@ inline real light_tree_importance(LightNode n, vec3 p, vec3 hemisphere)
     cos_r = sel(outside & hemisphere_given(hemisphere), cos_r, (real)(1.0f));
     real arrives = max_r(cos_p, (real)(LIGHT_TREE_SLACK)) * max_r(cos_r, (real)(LIGHT_TREE_SLACK));
     mask faces = (cos_p > cos_e - LIGHT_TREE_SLACK) & (cos_r > -LIGHT_TREE_SLACK);
-    real importance = sel(faces, n.power * arrives / max_r(d2, r2), (real)(0.0f));
+    real importance = sel(faces, n.power * arrives * sqr(inverse), (real)(0.0f));
     return sel(n.radius < 0.0f, n.power, importance);
 }
 
 /* The chance to go on to the first child of a pair, and where either leads. */
 inline real light_tree_chance(Scene scene, integer pair, vec3 p, vec3 hemisphere, integer *first, integer *second)
 {
-    int nodes = scene.settings->light_count * (LIGHT_ROW_WORDS + 1);
-    LightNode a = light_node_row(scene.lights, pair * LIGHT_NODE_WORDS + nodes);
-    LightNode b = light_node_row(scene.lights, (pair + 1) * LIGHT_NODE_WORDS + nodes);
+    global const uint *nodes = scene.lights + scene.settings->light_count * (LIGHT_ROW_WORDS + 1);
+    integer at = pair * LIGHT_NODE_WORDS;
+    LightNode a = light_node_row(nodes, at), b = light_node_row(nodes + LIGHT_NODE_WORDS, at);
     real ia = light_tree_importance(a, p, hemisphere), ib = light_tree_importance(b, p, hemisphere), sum = ia + ib;
     *first = a.child;
     *second = b.child;

@@ -23,6 +23,16 @@ inline real schlick_boundary(real cos_i, real eta)
     real refracted = sqrt_r(1.0f - (1.0f - sqr(cos_i)) / sqr(eta));
     return schlick_weight(sel(eta > 1.0f, fabs(cos_i), refracted));
 }
+inline Spectrum schlick_boundary_spectrum(real cos_i, Spectrum eta)
+{
+    Spectrum weight = spectrum_of(schlick_boundary(cos_i, eta.x));
+    if (any(spectrum_varies(eta))) {
+#define C(c) weight.c = schlick_boundary(cos_i, eta.c);
+        SPECTRUM_EACH(C)
+#undef C
+    }
+    return weight;
+}
 inline Spectrum schlick_spectrum(Spectrum at_normal, Spectrum weight)
 {
     Spectrum r;
@@ -42,11 +52,14 @@ inline Spectrum principled_tint(Spectrum colour, real luminance)
 /* A dielectric's Fresnel reflection f, the share `amount` of it by Schlick and tinted. */
 inline Spectrum principled_fresnel(Spectrum f, Spectrum eta, Spectrum weight, Spectrum tint, real amount)
 {
-    Spectrum at_normal;
+    if (any(amount > 0.0f)) {
+        Spectrum at_normal;
 #define C(c) at_normal.c = tint.c * sqr((eta.c - 1.0f) / (eta.c + 1.0f));
-    SPECTRUM_EACH(C)
+        SPECTRUM_EACH(C)
 #undef C
-    return spectrum_madd(schlick_spectrum(at_normal, weight), amount, spectrum_scale(f, 1.0f - amount));
+        f = spectrum_madd(schlick_spectrum(at_normal, weight), amount, spectrum_scale(f, 1.0f - amount));
+    }
+    return f;
 }
 
 /* Diffuse reflection with retro-reflection at grazing angles, times pi over the colour (Burley 2015
@@ -55,9 +68,12 @@ inline real principled_diffuse(real cos_o, real cos_i, real c, real roughness, r
 {
     real o = schlick_weight(cos_o), i = schlick_weight(cos_i), r = 2.0f * roughness * sqr(c);
     real diffuse = (1.0f - 0.5f * o) * (1.0f - 0.5f * i) + r * (o + i + o * i * (r - 1.0f));
-    real half_r = 0.5f * r, flat = (1.0f + (half_r - 1.0f) * o) * (1.0f + (half_r - 1.0f) * i);
-    flat = 1.25f * (flat * (1.0f / max_r(cos_o + cos_i, (real)(1e-6f)) - 0.5f) + 0.5f);
-    return diffuse + flatness * (flat - diffuse);
+    if (any(flatness > 0.0f)) {
+        real half_r = 0.5f * r, flat = (1.0f + (half_r - 1.0f) * o) * (1.0f + (half_r - 1.0f) * i);
+        flat = 1.25f * (flat * (1.0f / max_r(cos_o + cos_i, (real)(1e-6f)) - 0.5f) + 0.5f);
+        diffuse += flatness * (flat - diffuse);
+    }
+    return diffuse;
 }
 
 /* Sheen (Burley 2012, 5.5), white or tinted. */

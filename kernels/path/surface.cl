@@ -22,14 +22,9 @@ typedef struct {
 
 inline vec3 vertex_vec3(global const float *table, integer vertex)
 {
-    integer at = vertex * 3;
-    return v3(gather(table, at), gather(table, at + 1), gather(table, at + 2));
+    return gather3(table, vertex * 3);
 }
-inline vec2 vertex_vec2(global const float *table, integer vertex)
-{
-    vec2 r = {gather(table, vertex * 2), gather(table, vertex * 2 + 1)};
-    return r;
-}
+inline vec2 vertex_vec2(global const float *table, integer vertex) { return gather2(table, vertex * 2); }
 
 /* The surface where the ray from `o` along `d` ends. `front` tells which side was hit. A two-sided
  * back has its normals negated, so that the BSDF sees a front. USES_NORMALS, USES_UVS and USES_TANGENTS say
@@ -75,8 +70,8 @@ inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, 
 #if USES_NORMALS || USES_UVS || USES_TANGENTS
     mask triangle = active & (shape.kind == 0);
     integer corner = sel_i(triangle, prim, (integer)(0)) * 3;
-    integer a = gather_i(scene.faces, corner), b = gather_i(scene.faces, corner + 1);
-    integer c = gather_i(scene.faces, corner + 2);
+    vec3 corners = gather3((global const float *)scene.faces, corner);
+    integer a = as_integer(corners.x), b = as_integer(corners.y), c = as_integer(corners.z);
     real u = s.uv.x, v = s.uv.y, w = 1.0f - u - v;
 #endif
 #if USES_NORMALS

@@ -6,7 +6,8 @@ inline Sphere spheres_one(Scene scene, integer params, integer prim, mask active
 {
     Sphere q = sphere_row(scene.geometry, params);
     integer at = 4 * sel_i(active, prim - scene.settings->single_count, (integer)(0));
-    q.center = v3(gather(scene.spheres, at), gather(scene.spheres, at + 1), gather(scene.spheres, at + 2));
-    q.radius = gather(scene.spheres, at + 3);
+    vec4 sphere = gather4(scene.spheres, at);
+    q.center = v3(sphere.x, sphere.y, sphere.z);
+    q.radius = sphere.w;
     return q;
 }

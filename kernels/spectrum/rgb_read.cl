@@ -2,15 +2,15 @@
 typedef Spectrum Wavelengths;
 
 /* A value that stands in the row itself: linear rgb. */
-inline Spectrum spectrum_constant(global const uint *table, integer at, Wavelengths lambdas)
+inline Spectrum spectrum_constant(vec4 words, Wavelengths lambdas)
 {
-    Spectrum r = {gather_w(table, at), gather_w(table, at + 1), gather_w(table, at + 2)};
+    Spectrum r = {words.x, words.y, words.z};
     return r;
 }
 /* Tabulated spectra were turned to rgb on the host. */
-inline Spectrum spectrum_table(Scene scene, global const uint *table, integer at, Wavelengths lambdas)
+inline Spectrum spectrum_table(Scene scene, vec4 words, integer source, Wavelengths lambdas)
 {
-    return spectrum_constant(table, at, lambdas);
+    return spectrum_constant(words, lambdas);
 }
 /* What a texel of a bitmap means: linear rgb. */
 inline Spectrum spectrum_texel(real x, real y, real z, real w, Wavelengths lambdas)
@@ -27,7 +27,8 @@ inline Spectrum spectrum_light_texel(Scene scene, real x, real y, real z, real w
 /* The same for a texel of three floats in a table. */
 inline Spectrum spectrum_texel_at(global const uint *table, integer at, Wavelengths lambdas)
 {
-    Spectrum r = {gather_w(table, at), gather_w(table, at + 1), gather_w(table, at + 2)};
+    vec3 rgb = gather3((global const float *)table, at);
+    Spectrum r = {rgb.x, rgb.y, rgb.z};
     return r;
 }
 inline Spectrum spectrum_light_texel_at(Scene scene, global const uint *table, integer at, Wavelengths lambdas)

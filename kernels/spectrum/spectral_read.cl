@@ -34,16 +34,14 @@ inline Spectrum sigmoid_spectrum(real c0, real c1, real c2, real w, Wavelengths 
     return r;
 }
 /* A value that stands in the row itself: sigmoid coefficients and a factor. */
-inline Spectrum spectrum_constant(global const uint *table, integer at, Wavelengths lambdas)
+inline Spectrum spectrum_constant(vec4 words, Wavelengths lambdas)
 {
-    return sigmoid_spectrum(gather_w(table, at), gather_w(table, at + 1), gather_w(table, at + 2),
-                            gather_w(table, at + 3), lambdas);
+    return sigmoid_spectrum(words.x, words.y, words.z, words.w, lambdas);
 }
-/* A tabulated spectrum: the fifth word is -1 - its row, the fourth a factor. */
-inline Spectrum spectrum_table(Scene scene, global const uint *table, integer at, Wavelengths lambdas)
+/* A tabulated spectrum: the fifth word, its source, is -1 - its row, the fourth a factor. */
+inline Spectrum spectrum_table(Scene scene, vec4 words, integer source, Wavelengths lambdas)
 {
-    integer row = max_i(-1 - gather_i(table, at + 4), (integer)(0));
-    return spectrum_scale(spectra_row(scene, row, lambdas), gather_w(table, at + 3));
+    return spectrum_scale(spectra_row(scene, max_i(-1 - source, (integer)(0)), lambdas), words.w);
 }
 /* What a texel of a bitmap means: sigmoid coefficients and a factor. */
 inline Spectrum spectrum_texel(real x, real y, real z, real w, Wavelengths lambdas)
@@ -58,11 +56,11 @@ inline Spectrum spectrum_light_texel(Scene scene, real x, real y, real z, real w
 /* The same for a texel of four floats in a table. */
 inline Spectrum spectrum_texel_at(global const uint *table, integer at, Wavelengths lambdas)
 {
-    return spectrum_constant(table, at, lambdas);
+    return spectrum_constant(gather_w4(table, at), lambdas);
 }
 inline Spectrum spectrum_light_texel_at(Scene scene, global const uint *table, integer at, Wavelengths lambdas)
 {
-    return spectrum_mul(spectrum_constant(table, at, lambdas), spectra_row(scene, (integer)(0), lambdas));
+    return spectrum_mul(spectrum_constant(gather_w4(table, at), lambdas), spectra_row(scene, (integer)(0), lambdas));
 }
 /* Light of a grey: D65. */
 inline Spectrum spectrum_grey_light(Scene scene, real value, Wavelengths lambdas)

@@ -56,6 +56,7 @@ Spectrum bitmap_reflectance(Bitmap t, Scene scene, TexturePoint point, Wavelengt
     for (int corner = 0; corner < 4; corner++) {
         real weight;
         integer at = t.first + SPECTRUM_SIZE * bitmap_corner(t, b, corner, &weight);
+        if (!any(weight > 0.0f)) continue;
         Spectrum texel = spectrum_texel_at(scene.images, at, lambdas);
         sum = spectrum_madd(texel, weight, sum);
     }
@@ -69,6 +70,7 @@ Spectrum bitmap_emission(Bitmap t, Scene scene, TexturePoint point, Wavelengths 
     for (int corner = 0; corner < 4; corner++) {
         real weight;
         integer at = t.first + SPECTRUM_SIZE * bitmap_corner(t, b, corner, &weight);
+        if (!any(weight > 0.0f)) continue;
         Spectrum texel = spectrum_light_texel_at(scene, scene.images, at, lambdas);
         sum = spectrum_madd(texel, weight, sum);
     }
@@ -82,6 +84,7 @@ real bitmap_real(Bitmap t, Scene scene, TexturePoint point)
     for (int corner = 0; corner < 4; corner++) {
         real weight;
         integer at = t.first + bitmap_corner(t, b, corner, &weight);
+        if (!any(weight > 0.0f)) continue;
         sum += weight * gather_w(scene.images, at);
     }
     return sum;

@@ -16,9 +16,8 @@ Spectrum mesh_attribute_reflectance(MeshAttribute t, Scene scene, TexturePoint p
     for (int corner = 0; corner < 3; corner++) {
         real weight;
         integer at = mesh_attribute_at(t, scene, point, corner, &weight);
-        Spectrum value = spectrum_texel(gather_w(scene.attributes, at), gather_w(scene.attributes, at + 1),
-                                        gather_w(scene.attributes, at + 2),
-                                        gather_w(scene.attributes, at + 3), lambdas);
+        vec4 row = gather_w4(scene.attributes, at);
+        Spectrum value = spectrum_texel(row.x, row.y, row.z, row.w, lambdas);
         sum = spectrum_madd(value, weight, sum);
     }
     return sum;
@@ -30,9 +29,8 @@ Spectrum mesh_attribute_emission(MeshAttribute t, Scene scene, TexturePoint poin
     for (int corner = 0; corner < 3; corner++) {
         real weight;
         integer at = mesh_attribute_at(t, scene, point, corner, &weight);
-        Spectrum value = spectrum_light_texel(scene, gather_w(scene.attributes, at), gather_w(scene.attributes, at + 1),
-                                              gather_w(scene.attributes, at + 2),
-                                              gather_w(scene.attributes, at + 3), lambdas);
+        vec4 row = gather_w4(scene.attributes, at);
+        Spectrum value = spectrum_light_texel(scene, row.x, row.y, row.z, row.w, lambdas);
         sum = spectrum_madd(value, weight, sum);
     }
     return sum;

@@ -15,6 +15,7 @@ Spectrum packed_bitmap_reflectance(PackedBitmap t, Scene scene, TexturePoint poi
     for (int corner = 0; corner < 4; corner++) {
         real weight;
         integer index = bitmap_corner(image, b, corner, &weight);
+        if (!any(weight > 0.0f)) continue;
         Spectrum texel = spectrum_packed_texel(scene.images, t.first, index, t.decode, lambdas);
         sum = spectrum_madd(texel, weight, sum);
     }
@@ -35,6 +36,7 @@ real packed_bitmap_real(PackedBitmap t, Scene scene, TexturePoint point)
     for (int corner = 0; corner < 4; corner++) {
         real weight;
         integer index = bitmap_corner(image, b, corner, &weight);
+        if (!any(weight > 0.0f)) continue;
         integer word = gather_i(scene.images, t.first + (index >> 2));
         integer byte = (word >> ((index & 3) << 3)) & 255;
         sum += weight * gather_w(scene.images, t.decode + byte);

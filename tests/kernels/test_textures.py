@@ -435,9 +435,11 @@ LOADERS = """
     TexturePoint point = texture_point_nowhere();
     point.uv.x = x[1]; point.uv.y = x[2];
     Wavelengths lambdas = spectrum_of(0.0f);
-    Spectrum s = spectrum_texture_reflectance(scene, scene.materials, word, point, lambdas);
+    integer colour = gather_i(scene.materials, word + 4);
+    integer number = gather_i(scene.materials, word + 6);
+    Spectrum s = spectrum_texture_reflectance(scene, colour, point, lambdas);
     r[0] = s.x; r[1] = s.y; r[2] = s.z;
-    r[3] = real_texture_real(scene, scene.materials, word + 5, point, lambdas);
+    r[3] = real_texture_real(scene, number, point, lambdas);
 """
 
 

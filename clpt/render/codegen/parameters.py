@@ -7,16 +7,15 @@ that occur.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
+from clpt.layout import row_words
 from clpt.render.codegen.dispatch import Case, choose, function, indented
 from clpt.render.contract.features import Features
 from clpt.render.contract.parameter_words import (
     NORMAL_MAP_WORDS,
     ORDERS_WORDS,
-    REAL_WORDS,
     SPECTRAL,
-    SPECTRUM_WORDS,
     words,
 )
 from clpt.scene.params import Kind, Param, device_params
@@ -62,20 +61,20 @@ def load_text(cls: type[Kind], sources: Mapping[str, frozenset[str]], table: str
 
     sources: of each parameter; of one that is not there, "constant".
     """
-    rows = [f"{cls.__name__} r;"]
-    for name, param in device_params(cls).items():
-        at = f"row + {word_before(cls, name)}"
-        if (size := array_size(param)) > 1:
-            rows += [
-                f"for (int i = 0; i < {size}; i++)",
-                f"    r.{name}[i] = gather_w(scene.{table}, {at} + i);",
-            ]
+    declared = device_params(cls)
+    read, given = row_words(f"scene.{table}", "row", sum(map(words, declared.values())))
+    rows = [f"{cls.__name__} r;", *read]
+    for name, param in declared.items():
+        first = word_before(cls, name)
+        own = given[first : first + words(param)]
+        if array_size(param) > 1:
+            rows += [f"r.{name}[{i}] = {word};" for i, word in enumerate(own)]
         else:
-            rows += _member(f"r.{name}", param, at, sources.get(name), table)
+            rows += _member(f"r.{name}", param, own, f"row + {first}", sources.get(name))
     before = ""
     if cls.tints:
         before = value_text(
-            f"{cls.kind}_colour", device_params(cls)["base_color"], sources.get("base_color"), table
+            f"{cls.kind}_colour", declared["base_color"], sources.get("base_color"), table
         )
         rows += _luminance(cls)
     if cls.needs_wavelengths:
@@ -91,7 +90,8 @@ def load_text(cls: type[Kind], sources: Mapping[str, frozenset[str]], table: str
 
 def _luminance(cls: type[Kind]) -> list[str]:
     """Set `luminance`: of base_color, at wavelengths of its own, where a lane has a tint."""
-    tests = " | ".join(f"(r.{name} > 0.0f)" for name in cls.tints)
+    each = (" & ".join(f"(r.{name} > 0.0f)" for name in names) for names in cls.tints)
+    tests = " | ".join(f"({test})" for test in each)
     row = f"row + {word_before(cls, 'base_color')}"
     colour = f"{cls.kind}_colour(scene, {row}, point, luminance_lambdas())"
     return [
@@ -102,12 +102,15 @@ def _luminance(cls: type[Kind]) -> list[str]:
 
 
 def _member(
-    target: str, param: Param, at: str, sources: frozenset[str] | None, table: str
+    target: str, param: Param, given: Sequence[str], at: str, sources: frozenset[str] | None
 ) -> list[str]:
-    """Set a member from the sources that occur; a lane's word after the value says from which."""
+    """Set a member from the sources that occur; a lane's word after the value says from which.
+
+    given: its words, which are at `at`.
+    """
     form, present = lane_type(param), sources or frozenset({"constant"})
     if form == "integer":
-        return [f"{target} = gather_i(scene.{table}, {at});"]
+        return [f"{target} = as_integer({given[0]});"]
     if form == "Layers":
         loaded = f"layers_load(scene, {at}, point, lambdas)"
         return [f"{target} = {loaded if 'layers' in present else 'layers_none()'};"]
@@ -115,18 +118,17 @@ def _member(
         return [f"{target} = {'spectrum_of(0.0f)' if form == 'Spectrum' else '(real)(0.0f)'};"]
     if "none" in present:
         present |= {"constant"}
-    prefix = form.lower()
-    source = f"{at} + {(SPECTRUM_WORDS if form == 'Spectrum' else REAL_WORDS) - 1}"
+    *own, source = given
+    whole = f"v4({', '.join(own)})" if form == "Spectrum" else own[0]
+    constant, table = f"spectrum_constant({whole}, lambdas)", f"spectrum_table(scene, {whole}"
+    texture = f"{form.lower()}_texture_{param.role}(scene, as_integer({source}), point, lambdas)"
     loads = {
-        "constant": ("", f"{prefix}_constant(scene.{table}, {at}, lambdas)"),
-        "table": ("< 0", f"{prefix}_table(scene, scene.{table}, {at}, lambdas)"),
-        "texture": (
-            "> 0",
-            f"{prefix}_texture_{param.role}(scene, scene.{table}, {at}, point, lambdas)",
-        ),
+        "constant": ("", constant if form == "Spectrum" else whole),
+        "table": ("< 0", f"{table}, as_integer({source}), lambdas)"),
+        "texture": ("> 0", texture),
     }
     (_, first), *others = [load for name, load in loads.items() if name in present]
-    cases = [Case(f"gather_i(scene.{table}, {source}) {test}", value) for test, value in others]
+    cases = [Case(f"as_integer({source}) {test}", value) for test, value in others]
     return [f"{target} = {first};", *choose(target, form, *cases)]
 
 
@@ -135,7 +137,8 @@ def value_text(
 ) -> str:
     """Return `name(scene, at, point, lambdas)`, which loads a single parameter from `table`."""
     form = lane_type(param)
-    rows = [f"{form} value;", *_member("value", param, "at", sources, table)]
+    read, given = row_words(f"scene.{table}", "at", words(param))
+    rows = [*read, f"{form} value;", *_member("value", param, given, "at", sources)]
     return function(f"{form} {name}{_LOADED}", *rows, "return value;")
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from clpt.render.codegen.dispatch import Case, Function, active, function
-from clpt.render.contract.parameter_words import REAL_WORDS, SPECTRUM_WORDS
 from clpt.render.contract.texture_records import (
     END,
     KINDS,
@@ -33,8 +32,8 @@ def dispatch_text(
     depth: how many values the programs stack; mappings: some texture makes its own uv.
 
     texture_<role>(scene, row, point, lambdas)                 whose row is at a word
-    spectrum_texture_<role>(scene, table, at, point, lambdas)  that the parameter at `at` names
-    real_texture_real(scene, table, at, point, lambdas)        the same for a real
+    spectrum_texture_<role>(scene, source, point, lambdas)     of 1 + the row, or no texture
+    real_texture_real(scene, source, point, lambdas)           the same for a real
     """
     pairs, used = set(roles), set(kinds)
     lines = [f"#define MAPPING_{name.upper()} {i}" for i, name in enumerate(MAPPINGS)]
@@ -108,13 +107,10 @@ def _with_programs(role: str, some: bool) -> str:
 def _parameter(role: str) -> str:
     """The texture that a parameter in a row names."""
     form = _type(role)
-    source = (REAL_WORDS if role == "real" else SPECTRUM_WORDS) - 1
     return function(
         f"{form} {form.lower()}_texture_{role}"
-        "(Scene scene, global const uint *table, integer at,"
-        " TexturePoint point, Wavelengths lambdas)",
-        f"integer word = gather_i(table, at + {source}); /* 1 + the row, or no texture */",
-        f"return texture_{role}(scene, max_i(word - 1, (integer)(0)), point, lambdas);",
+        "(Scene scene, integer source, TexturePoint point, Wavelengths lambdas)",
+        f"return texture_{role}(scene, max_i(source - 1, (integer)(0)), point, lambdas);",
     )
 
 

@@ -23,7 +23,7 @@ def test_a_lobe_that_no_material_has_is_left_out():
     assert "r.clearcoat = (real)(0.0f);" in alone and "r.clearcoat = (real)(0.0f);" not in both
     for text in (alone, both):
         assert "r.sheen_color = spectrum_of(0.0f);" in text
-    assert "real_constant(scene.materials" in both
+    assert "r.clearcoat = words" in both
 
 
 def test_sides():
