@@ -14,23 +14,24 @@ from . import bandwidth, building, rays, shading, stages, starting
 from .figures import Figure
 from .scenes import opened
 
-__all__ = ["PARTS", "Figure", "measure", "opened"]
+__all__ = ["DEFAULT_PARTS", "PARTS", "Figure", "measure", "opened"]
 
 PARTS = {
     "bandwidth": "a kernel that only copies, GB/s",
     "rays": "rays a second by layout, set and query, hits checked",
     "stages": "what each stage of a render gets through, Mitems/s and GB/s; sort and film too",
-    "shading": "every kind of material in a box of its own, Mitems/s, beside diffuse",
+    "shading": "every kind of material in a box of its own, Mitems/s, beside diffuse; if asked for",
     "build": "trees built and refitted, Mtri/s",
     "start": "whole processes until a first picture, with empty caches and with full ones",
 }
+DEFAULT_PARTS = tuple(part for part in PARTS if part != "shading")  # that one takes minutes
 START_SCENE = "cornell"  # where none is asked for
 
 
 def measure(
     on: device.Device,
     *,
-    parts: Sequence[str] = tuple(PARTS),
+    parts: Sequence[str] = DEFAULT_PARTS,
     only: Sequence[str] = (),
     kinds: Sequence[str] = (),
     scene: str | None = None,

@@ -32,7 +32,7 @@ HEADINGS = ("figure", "", "unit", "±", "GB/s", "of a copy", "")
 @click.option("--scene", help="A scene's file or folder, or atrium or cornell, made from formulas.")
 @click.option(
     "--stage", "stages", multiple=True, metavar="NAME",
-    help="What to measure: see --list; repeat it for several.  [default: all]",
+    help="What to measure: see --list; repeat it for several.  [default: all but shading]",
 )  # fmt: skip
 @click.option("--layout", "layouts", multiple=True, type=click.Choice(TREES), help="Of the trees.")
 @click.option("--mode", type=click.Choice(["spectral", "rgb"]), help="What light is made of.")
@@ -132,7 +132,7 @@ def _chosen(names: Sequence[str]) -> tuple[list[str], list[str], list[str]]:
     for part, chosen in (("stages", only), ("shading", kinds)):
         if chosen and part not in parts:
             parts.append(part)
-    return parts or list(benchmark.PARTS), only, kinds
+    return parts or list(benchmark.DEFAULT_PARTS), only, kinds
 
 
 def _infos(device: str | None) -> list[dev.DeviceInfo]:

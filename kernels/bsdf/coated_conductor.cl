@@ -25,7 +25,7 @@ inline Spectrum coated_conductor_fresnel(CoatedConductor m, real cos_i)
     return spectrum_mul(m.specular_reflectance, fresnel_conductor(cos_i, eta, k));
 }
 
-/* How light within a smooth coat, of cosine 0.8, fares at facets below that reflect all: what leaves
+/* How light within a smooth coat, of cosine 0.77, fares at facets below that reflect all: what leaves
  * them, and how much of that the coat throws back. */
 inline vec2 coated_conductor_bounce(Microfacets d, real alpha, real eta)
 {

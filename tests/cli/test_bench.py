@@ -47,7 +47,7 @@ def test_what_is_asked_for(made: Made, capsys: pytest.CaptureFixture) -> None:
     told = capsys.readouterr().out
     assert "wide8 primary any" in told and "5 programs in 1.00 s, 256 MiB" in told
     assert "no slot had work" in told and "10.0%" in told
-    assert asked[-1]["parts"] == list(benchmark.PARTS)
+    assert asked[-1]["parts"] == list(benchmark.DEFAULT_PARTS)
     stages = [word for name in ("shade_diffuse", "append", "rays") for word in ("--stage", name)]
     assert run(["bench", *stages, "--layout", "wide8", "--scene", "cornell"]) == 0
     assert asked[-1]["parts"] == ["rays", "stages"]

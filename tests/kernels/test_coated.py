@@ -127,7 +127,7 @@ def coated(coat, alpha, eta):
         (1e-3, 1e-3, ALUMINIUM, 0.006),  # smooth on smooth is exact
         (1e-3, 0.3, DULL, 0.006),
         (1e-3, 0.1, ALUMINIUM, 0.11),
-        (0.1, 0.3, ALUMINIUM, 0.04),
+        (0.1, 0.3, ALUMINIUM, 0.045),
         (0.3, 0.1, ALUMINIUM, 0.075),
         (0.6, 1e-3, DULL, 0.03),
         (0.6, 0.3, ALUMINIUM, 0.03),

@@ -22,7 +22,7 @@ Made = Callable[[str, float, float], "Floats | float"]
 FILE = Path(__file__).parents[3] / "kernels/optics/rough_coat_table.cl"
 ALPHAS, INDICES, COSINES = 16, 14, 16
 HIGHEST = 3.0  # index up to which the tables go
-BOUNCE = 0.8  # cosine of light within a coat, see kernels/bsdf/coated_conductor.cl
+BOUNCE = 0.77  # cosine of light within a coat, see kernels/bsdf/coated_conductor.cl
 _RADII, _AZIMUTHS = leggauss(40), 48
 
 
