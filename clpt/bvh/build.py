@@ -87,8 +87,8 @@ def build(
     layout: a key of LAYOUTS; None asks `choose_layout`. quality: "fast" cuts leaves out of a
     space-filling curve, and builds the nodes above them as "high" does; brute has no tree.
 
-    The build takes up to 250 bytes a triangle and .25 MiB on the device, beside its input, of which about 60
-    stay (binary: 130); no buffer has more than 64 bytes a triangle.
+    The build takes up to 250 bytes a triangle and .25 MiB on the device, beside its input, of which
+    about 60 bytes stay (binary: 130); no buffer has more than 64 bytes a triangle.
     Trees are never deeper than BVH_DEPTH of kernels/bvh/node.cl: traversals cannot overflow.
 
     Raises SceneError for vertices that are not finite or beyond 1e12, for indices out of range and
