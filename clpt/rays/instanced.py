@@ -166,6 +166,7 @@ class InstancedAccel(Queries):
         return "\n".join(
             [
                 '#include "core/lanes.cl"',
+                '#include "core/rows.cl"',
                 '#include "core/math.cl"',
                 "typedef struct { global const uint *instances; } Scene;",
                 INSTANCE.row_text(),
