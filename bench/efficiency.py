@@ -177,16 +177,17 @@ def compare(
         for mode in modes:
             with tempfile.TemporaryDirectory() as folder:
 
-                def pair(number: int, mode: str = mode, kept: str = folder) -> list[Contender]:
-                    cores = every[:number]
-                    where = Path(kept) / str(number)
+                def pair(
+                    number: int, what: str, mode: str = mode, kept: str = folder
+                ) -> list[Contender]:
+                    cores, where = every[:number], Path(kept) / what
                     return [
                         Contender(name, copy, mode, cores, where) for name in ("clpt", "mitsuba")
                     ]
 
                 both = [
                     one.render(long, seed).image
-                    for one, seed in zip(pair(len(every)), (77, 7777), strict=True)
+                    for one, seed in zip(pair(len(every), "reference"), (77, 7777), strict=True)
                 ]
                 reference = (both[0] + both[1]) / 2
                 about = {
@@ -198,7 +199,7 @@ def compare(
                     "means": [round(float(image.mean()), 6) for image in both],
                 }
                 for number in threads:
-                    measured = figures(pair(number), spp, w * h, reference)
+                    measured = figures(pair(number, f"{number}"), spp, w * h, reference)
                     rows.append({**about, "threads": number, **measured})
     finally:
         copy.unlink()
