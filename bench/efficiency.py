@@ -53,6 +53,7 @@ while done < spp:
 numpy.save(out, total / spp)
 """
 TRIM = 0.001
+APART = 0.03  # of the means of what the two render: beyond, there is no common reference
 SEEDS = (3, 4, 5)
 BEST = "multijitter"  # which clpt reads as Sobol
 
@@ -189,6 +190,9 @@ def compare(
                     one.render(long, seed).image
                     for one, seed in zip(pair(len(every), "reference"), (77, 7777), strict=True)
                 ]
+                means = [float(image.mean()) for image in both]
+                if abs(means[0] - means[1]) > APART * means[1]:
+                    raise RuntimeError(f"{mode}: the two have other pictures, of means {means}")
                 reference = (both[0] + both[1]) / 2
                 about = {
                     "scene": name_of(scene),
@@ -196,7 +200,7 @@ def compare(
                     "as_file": film["as_file"],
                     "size": [w, h],
                     "spp": spp,
-                    "means": [round(float(image.mean()), 6) for image in both],
+                    "means": [round(mean, 6) for mean in means],
                 }
                 for number in threads:
                     measured = figures(pair(number, f"{number}"), spp, w * h, reference)

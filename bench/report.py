@@ -135,7 +135,7 @@ def efficiency(rows: Sequence[Row]) -> str:
             *(str(row[name]) for name in ("scene", "mode", "threads")),
             "the file's" if row["as_file"] else "box, best",
             *(f"**{row[name]:.2f}**" for name in ("efficiency_ratio", "rate_ratio")),
-            *(" / ".join(f"{value:g}" for value in row[name]) for name in (*pairs, "peak_mib")),
+            *(" / ".join(f"{v:g}" for v in row.get(name, ())) for name in (*pairs, "peak_mib")),
         ]
 
     headings = ["scene", "mode", "threads", "filter, sampler", "efficiency : Mitsuba"]
