@@ -8,7 +8,8 @@ what a process takes until its first sample is taken out, and told by itself. Ef
 other seeds; the worst .1 % of the pixels are left out.
 
 Each renderer has its best sampler (Sobol, multijitter) and both a box filter; with `--as-file` the
-filter and the sampler are the file's own.
+filter and the sampler are the file's own. In spectral mode a metal's `eta` and `k` by RGB are taken
+as values at 610, 550 and 460 nm: Mitsuba would cut them at 1, as if they were reflectances.
 """
 
 from __future__ import annotations
@@ -52,6 +53,7 @@ while done < spp:
     total, done = total + numpy.array(image)[..., :3] * some, done + some
 numpy.save(out, total / spp)
 """
+METAL = (610, 550, 460)  # wavelengths for the red, green and blue of a metal's index [nm]
 TRIM = 0.001
 APART = 0.03  # of the means of what the two render: beyond, there is no common reference
 SEEDS = (3, 4, 5)
@@ -130,7 +132,7 @@ def relative_mse(image: NDArray[np.floating], reference: NDArray[np.floating]) -
     return float(error[: int(error.size * (1 - TRIM))].mean())
 
 
-def with_film(scene: Path, width: int, as_file: bool) -> tuple[Path, tuple[int, int]]:
+def with_film(scene: Path, width: int, mode: str, as_file: bool) -> tuple[Path, tuple[int, int]]:
     """Write a copy of a scene beside it with a film of that width; return it and the film's size.
 
     as_file: leave its pixel filter and sampler as they are.
@@ -158,6 +160,13 @@ def with_film(scene: Path, width: int, as_file: bool) -> tuple[Path, tuple[int, 
     if not as_file:
         for sampler in root.iter("sampler"):
             sampler.set("type", BEST)
+    if mode == "spectral":
+        for element in root.iter("rgb"):
+            if element.get("name") in ("eta", "k"):
+                values = element.get("value", "").replace(",", " ").split()
+                pairs = sorted(zip(METAL, values, strict=True))
+                element.tag = "spectrum"
+                element.set("value", ", ".join(f"{nm}:{value}" for nm, value in pairs))
     for integrator in root.iter("integrator"):
         name = integrator.get("type", "")
         if name.startswith("$") and name[1:] not in given:
@@ -171,40 +180,42 @@ def compare(
     scene: Path, modes: Sequence[str], threads: Sequence[int], spp: int, long: int, film: Row
 ) -> list[Row]:
     """Return a row for each mode and number of threads. film: as `with_film` takes it."""
-    copy, (w, h) = with_film(scene, **film)
+    return [row for mode in modes for row in in_mode(scene, mode, threads, spp, long, film)]
+
+
+def in_mode(
+    scene: Path, mode: str, threads: Sequence[int], spp: int, long: int, film: Row
+) -> list[Row]:
+    """Return a row for each number of threads."""
+    copy, (w, h) = with_film(scene, mode=mode, **film)
     every = sorted(os.sched_getaffinity(0))
     rows = []
     try:
-        for mode in modes:
-            with tempfile.TemporaryDirectory() as folder:
+        with tempfile.TemporaryDirectory() as folder:
 
-                def pair(
-                    number: int, what: str, mode: str = mode, kept: str = folder
-                ) -> list[Contender]:
-                    cores, where = every[:number], Path(kept) / what
-                    return [
-                        Contender(name, copy, mode, cores, where) for name in ("clpt", "mitsuba")
-                    ]
+            def pair(number: int, what: str) -> list[Contender]:
+                cores, where = every[:number], Path(folder) / what
+                return [Contender(name, copy, mode, cores, where) for name in ("clpt", "mitsuba")]
 
-                both = [
-                    one.render(long, seed).image
-                    for one, seed in zip(pair(len(every), "reference"), (77, 7777), strict=True)
-                ]
-                means = [float(image.mean()) for image in both]
-                if abs(means[0] - means[1]) > APART * means[1]:
-                    raise RuntimeError(f"{mode}: the two have other pictures, of means {means}")
-                reference = (both[0] + both[1]) / 2
-                about = {
-                    "scene": name_of(scene),
-                    "mode": mode,
-                    "as_file": film["as_file"],
-                    "size": [w, h],
-                    "spp": spp,
-                    "means": [round(mean, 6) for mean in means],
-                }
-                for number in threads:
-                    measured = figures(pair(number, f"{number}"), spp, w * h, reference)
-                    rows.append({**about, "threads": number, **measured})
+            both = [
+                one.render(long, seed).image
+                for one, seed in zip(pair(len(every), "reference"), (77, 7777), strict=True)
+            ]
+            means = [float(image.mean()) for image in both]
+            if abs(means[0] - means[1]) > APART * means[1]:
+                raise RuntimeError(f"{mode}: the two have other pictures, of means {means}")
+            reference = (both[0] + both[1]) / 2
+            about = {
+                "scene": name_of(scene),
+                "mode": mode,
+                "as_file": film["as_file"],
+                "size": [w, h],
+                "spp": spp,
+                "means": [round(mean, 6) for mean in means],
+            }
+            for number in threads:
+                measured = figures(pair(number, f"{number}"), spp, w * h, reference)
+                rows.append({**about, "threads": number, **measured})
     finally:
         copy.unlink()
     return rows
