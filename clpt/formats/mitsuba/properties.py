@@ -29,6 +29,7 @@ UNSUPPORTED = {
     "sunsky", "timed_sunsky", "distant", "irradiancemeter", "radiancemeter", "batch", "specfilm",
     "stokes",
 }  # fmt: skip
+FLAT_SIZE = 1e-5  # thickness over size of a shape that is flattened
 SEPARATOR = re.compile(r"[\s,]+")
 LARGEST_INTEGER = 2**31 - 1
 MAX_PARTS = 1000  # of one material or texture
@@ -229,12 +230,24 @@ class Properties:
                 )
         return transform(child)
 
-    def placement(self, name: str = "to_world") -> transforms.Matrix:
-        """Take a transform that can be inverted."""
+    def placement(self, name: str = "to_world", *, thin: bool = False) -> transforms.Matrix:
+        """Take a transform that can be inverted.
+
+        thin: one that flattens space leaves a thickness of FLAT_SIZE; raises NoArea for one that
+        leaves a line or a point.
+        """
         child = self.named.get(name)
         matrix = self.matrix(name)
-        if child is not None and transforms.is_singular(matrix):
+        if child is None or not transforms.is_singular(matrix):
+            return matrix
+        if not thin or not transforms.is_affine(matrix):
             raise child.error("the transform cannot be inverted: it flattens space")
+        u, sizes, v = np.linalg.svd(matrix[:3, :3])
+        if sizes[1] <= FLAT_SIZE * sizes[0]:
+            self.context.warn(child, "nothing is left of the shape: the transform makes it a line")
+            raise NoArea
+        self.context.warn(child, "the transform flattens the shape: black in Mitsuba, flat here")
+        matrix[:3, :3] = u * [sizes[0], sizes[1], FLAT_SIZE * sizes[0]] @ v
         return matrix
 
     def finish(self) -> None:
@@ -252,6 +265,10 @@ class Properties:
     def _expect(self, child: Element, tag: str) -> None:
         if child.tag != tag:
             raise child.error(f"must be a <{tag}>")
+
+
+class NoArea(Exception):
+    """A shape that its transform makes a line or a point."""
 
 
 def unknown(element: Element, known: Iterable[str]) -> SceneError:

@@ -263,8 +263,11 @@ def _integrator(element: Element, context: Context) -> Integrator:
 
 
 def _depths(props: Properties) -> dict[str, Any]:
+    depth = props.integer("max_depth", -1, -1)
+    if depth == 0:
+        props.context.warn(props.element, "max_depth of 0: black in Mitsuba, lights are seen here")
     return {
-        "max_depth": props.integer("max_depth", -1, -1),
+        "max_depth": depth or 1,
         "rr_depth": props.integer("rr_depth", integrators.Path.rr_depth, 1),
         "hide_lights": props.flag("hide_emitters", False),
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from clpt.formats.meshes import mesh, strands
 from clpt.formats.mitsuba import serialized
 from clpt.formats.mitsuba.bsdfs import bsdf
 from clpt.formats.mitsuba.emitters import area
-from clpt.formats.mitsuba.properties import Context, Properties, unknown
+from clpt.formats.mitsuba.properties import Context, NoArea, Properties, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene import shapes
 from clpt.scene.materials import Diffuse
@@ -34,12 +35,11 @@ def shapes_of(elements: Iterable[Element], context: Context) -> list[Shape]:
     for element in elements:
         if element.type == "shapegroup":
             _group(element, context)
-        elif element.type == "instance":
-            made.append(_instance(element, context))
         elif element.type == "merge":
             made += shapes_of(_merged(element, context), context)
         else:
-            made.append(shape(element, context))
+            with suppress(NoArea):
+                made.append((_instance if element.type == "instance" else shape)(element, context))
     return made
 
 
@@ -88,7 +88,9 @@ def _instance(element: Element, context: Context) -> Shape:
         raise element.error('needs a <shape type="shapegroup">, or a <ref> to one')
     name = element.attributes.get("id", "")
     with element.locating():
-        made = Instance(group=_group(group, context), to_world=props.placement(), name=name)
+        made = Instance(
+            group=_group(group, context), to_world=props.placement(thin=True), name=name
+        )
     props.finish()
     return made
 
@@ -103,8 +105,7 @@ def _group(element: Element, context: Context) -> Group:
             if child.type in ("shapegroup", "instance"):
                 raise child.error("cannot stand in a shapegroup")
         props.finish()
-        made = (shape(child, context) for child in inner)
-        return Group(tuple(made), element.attributes.get("id", ""))
+        return Group(tuple(shapes_of(inner, context)), element.attributes.get("id", ""))
 
     return context.once(element, make)
 
@@ -115,7 +116,7 @@ def _default_material(emitter: Element | None) -> Diffuse:
 
 
 def _transform_only(props: Properties) -> Parameters:
-    return {"to_world": props.placement()}
+    return {"to_world": props.placement(thin=True)}
 
 
 def _sphere(props: Properties) -> Parameters:
@@ -153,7 +154,7 @@ def _rounded(matrix: transforms.Matrix) -> tuple[transforms.Matrix, NDArray[np.f
 
 def _placed(props: Properties, axis: Any) -> tuple[transforms.Matrix, bool]:
     """Take a transform, and tell whether it keeps a shape round about an axis, or about a point."""
-    to_world = props.placement()
+    to_world = props.placement(thin=True)
     products = to_world[:3, :3].T @ to_world[:3, :3]
     along = np.outer(axis, axis) / max(np.dot(axis, axis), 1e-300)
     length = np.sum(along * products)
@@ -185,7 +186,7 @@ def _mesh(props: Properties, suffix: str, *, flip_v: bool) -> Parameters:
     """Read a mesh into world space, where Mitsuba makes the normals that the file lacks."""
     path = props.file()
     flat = props.flag("face_normals", False)
-    to_world = props.placement()
+    to_world = props.placement(thin=True)
     if path.suffix.lower() != suffix:
         raise props.element.error(f"{path.name!r} is not a {suffix} file")
     try:
@@ -229,7 +230,7 @@ def _linear_curve(props: Properties) -> Parameters:
 
 def _curves(props: Properties) -> Parameters:
     """Read strands; `to_world` moves their points and, as in Mitsuba, leaves their radii."""
-    path, to_world = props.file(), props.placement()
+    path, to_world = props.file(), props.placement(thin=True)
     try:
         arrays = strands.read(path)
     except SceneError as error:

@@ -523,8 +523,8 @@ ERRORS = {
     '<shape type="obj"><string name="filename" value="no.obj"/></shape>': "no file 'no.obj'",
     '<shape type="obj"><string name="filename" value="t.png"/></shape>': "not a .obj file",
     '<shape type="sphere"><float name="radius" value="-1"/></shape>': "must be positive",
-    '<shape type="cube"><transform name="to_world"><scale value="0"/></transform></shape>':
-        "cannot be inverted",
+    '<emitter type="constant"/><emitter type="spot"><transform name="to_world"><scale value="0"/>'
+    "</transform></emitter>": "cannot be inverted",
     '<shape type="cube"><transform name="to_world"><skew/></transform></shape>': "<skew>: is no",
     '<shape type="cube"><emitter type="point"/></shape>': "only an area light",
     '<emitter type="area"/>': "must stand in a <shape>",

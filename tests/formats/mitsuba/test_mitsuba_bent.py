@@ -157,3 +157,37 @@ def test_light_of_a_texture_under_d65(read, tmp_path):
 def test_text_between_elements_and_the_integrator_of_distances(read):
     made = read('stray <integrator type="depth"/>')
     assert made.integrator.channels == ("depth",)
+
+
+FLATTENED = '<transform name="to_world"><scale x="2" y="{}" z="0"/></transform>'
+FLAT_KINDS = ("rectangle", "disk", "cube", "cylinder")
+
+
+@pytest.mark.parametrize("kind", FLAT_KINDS)
+def test_a_flattened_shape_is_flat(read, kind):
+    made = read(f'<shape type="{kind}">{FLATTENED.format(3)}</shape>')
+    assert len(made.warnings) == 1 and "flattens" in made.warnings[0]
+    sizes = np.linalg.svd(made.shapes[0].to_world[:3, :3])[1]
+    assert sizes == pytest.approx([3, 2, 3e-5])
+
+
+@pytest.mark.parametrize("kind", (*FLAT_KINDS, "sphere"))
+def test_a_shape_that_becomes_a_line_is_left_out(read, kind):
+    shape = f'<shape type="{kind}">{FLATTENED.format(0)}</shape>'
+    for body in (shape, f'<shape type="merge">{shape}</shape>'):
+        made = read(body)
+        assert not made.shapes and len(made.warnings) == 1
+        assert "nothing is left of the shape" in made.warnings[0]
+    made = read(f'<shape type="shapegroup" id="g">{shape}<shape type="cube"/></shape>'
+                '<shape type="instance"><ref id="g"/></shape>')  # fmt: skip
+    assert len(made.shapes[0].group.shapes) == 1
+
+
+def test_a_flattened_sphere_stays_round_as_in_mitsuba(read):
+    made = read(f'<shape type="sphere">{FLATTENED.format(3)}</shape>').shapes[0]
+    assert made.radius == pytest.approx(2.0)
+
+
+def test_no_depth_counts_as_one(read):
+    made = read('<integrator type="path"><integer name="max_depth" value="0"/></integrator>')
+    assert made.integrator.max_depth == 1 and "max_depth of 0" in made.warnings[0]
