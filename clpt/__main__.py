@@ -11,7 +11,7 @@ import click
 import platformdirs
 
 from . import output_files
-from .cli import cli, stopping, streams
+from .cli import allocator, cli, stopping, streams
 from .errors import ClptError
 
 BAD_INPUT, BUG = 2, 1
@@ -20,6 +20,7 @@ BAD_INPUT, BUG = 2, 1
 def main() -> None:
     """Run the command line and leave with its exit status."""
     streams.make_safe()
+    allocator.return_large_blocks()
     stopping.raise_at_signals()
     sys.exit(run(sys.argv[1:]))
 

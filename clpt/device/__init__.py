@@ -2,9 +2,10 @@
 
 from .array import DeviceArray, supersede
 from .buffers import Buffers, host_buffer
+from .building import build, build_all, compile_ahead, link
 from .compilers import Compilers, spare_cores
 from .context import Device, DeviceInfo, choose, devices
-from .program import Argument, BoundKernel, Kernel, Program, build, build_all, compile_ahead, link
+from .program import Argument, BoundKernel, Kernel, Program
 from .refusals import refused, wait
 from .source import Part, Source, Virtual, assemble, kernels_folder
 from .stream import Events, Stream

@@ -51,12 +51,12 @@ class Compilers:
     """Some processes, that start when there is something to do for them.
 
     count: how many there are at most. With `with` they end after what they are at, or at once where
-    an exception is raised. Nobody waits for what is kept for the next time: a process may end
-    after the one that started it.
+    an exception is raised. wait_for_kept: also wait for what is kept for the next time; else a
+    process may end after the one that started it.
     """
 
-    def __init__(self, count: int):
-        self.count = min(count, _MOST)
+    def __init__(self, count: int, wait_for_kept: bool = False):
+        self.count, self.wait_for_kept = min(count, _MOST), wait_for_kept
         self._tasks: dict[Hashable, _Task] = {}
         self._waiting: deque[_Task] = deque()
         self._changed = threading.Condition()
@@ -98,7 +98,7 @@ class Compilers:
     def close(self) -> None:
         """Let the processes do what was submitted, then end them.
 
-        Wait for that, but not for what is kept.
+        Wait for that, but for what is kept only with `wait_for_kept`.
         """
         with self._changed:
             self._closed = True
@@ -150,7 +150,7 @@ class Compilers:
         except Exception as error:  # a process that died
             log.debug("nothing is compiled in another process: %s", error)
         finally:
-            _end(process, wait=not keeps)
+            _end(process, wait=self.wait_for_kept or not keeps)
 
     def _next(self) -> _Task | None:
         with self._changed:

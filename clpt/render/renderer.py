@@ -121,6 +121,16 @@ class Renderer(Pictures):
         log.info("ready in %.2f s", self._seconds["ready"])
 
     @synchronized
+    def prepare(self) -> None:
+        """Run every kernel of `run` once with nothing to do, and wait.
+
+        Many drivers compile a kernel to its end when it runs for the first time. The film and the
+        number of the next sample stay.
+        """
+        for wavefront in self.wavefronts:
+            wavefront.render_samples(self.samples, self.samples)
+
+    @synchronized
     def step(self, samples: int = 1, wait_for: dev.Events = None) -> cl.Event:
         """Enqueue `samples` more of every pixel; `self.samples` is then the next one's number.
 

@@ -273,20 +273,20 @@ inline real gltf_density(GltfSurface m, GltfParts p, GltfLobes l, vec3 wo, vec3 
     return sel(reflected | (crossed & ((p.passed > 0.0f) | (p.through > 0.0f))), pdf, (real)(0.0f));
 }
 
-Spectrum gltf_surface_eval(GltfSurface m, vec3 wo, vec3 wi)
+inline Spectrum gltf_surface_eval(GltfSurface m, vec3 wo, vec3 wi)
 {
     GltfPair w = gltf_pair(m, wo, wi);
     return gltf_value(m, gltf_parts(m), w.wo, w.wi);
 }
 
-real gltf_surface_pdf(GltfSurface m, vec3 wo, vec3 wi)
+inline real gltf_surface_pdf(GltfSurface m, vec3 wo, vec3 wi)
 {
     GltfPair w = gltf_pair(m, wo, wi);
     GltfParts p = gltf_parts(m);
     return gltf_density(m, p, gltf_lobes(m, p, w.wo), w.wo, w.wi, p.eta.x);
 }
 
-Spectrum gltf_surface_pdfs(GltfSurface m, vec3 wo, vec3 wi)
+inline Spectrum gltf_surface_pdfs(GltfSurface m, vec3 wo, vec3 wi)
 {
     GltfPair w = gltf_pair(m, wo, wi);
     GltfParts p = gltf_parts(m);
@@ -300,7 +300,7 @@ Spectrum gltf_surface_pdfs(GltfSurface m, vec3 wo, vec3 wi)
     return v;
 }
 
-BsdfSample gltf_surface_sample(GltfSurface m, vec3 wo, vec3 u)
+inline BsdfSample gltf_surface_sample(GltfSurface m, vec3 wo, vec3 u)
 {
     BsdfSample s = bsdf_nothing();
     GltfPair w = gltf_pair(m, wo, wo);
@@ -346,4 +346,4 @@ BsdfSample gltf_surface_sample(GltfSurface m, vec3 wo, vec3 u)
     return s;
 }
 
-Spectrum gltf_surface_albedo(GltfSurface m) { return m.base_color; }
+inline Spectrum gltf_surface_albedo(GltfSurface m) { return m.base_color; }

@@ -78,7 +78,7 @@ inline Spectrum principled_reflected(Principled m, Microfacets d, vec3 wo, vec3 
     return spectrum_madd(below, sel(front, cos_i, (real)(0.0f)), v);
 }
 
-Spectrum principled_eval(Principled m, vec3 wo, vec3 wi)
+inline Spectrum principled_eval(Principled m, vec3 wo, vec3 wi)
 {
     Microfacets d = principled_facets(m.roughness, m.anisotropic);
     Spectrum eta = principled_index(m), v = principled_reflected(m, d, wo, wi, eta);
@@ -115,7 +115,7 @@ inline real principled_density(Principled m, vec3 wo, vec3 wi, real index)
     return sel(reflected | crossed, pdf, (real)(0.0f));
 }
 
-Spectrum principled_pdfs(Principled m, vec3 wo, vec3 wi)
+inline Spectrum principled_pdfs(Principled m, vec3 wo, vec3 wi)
 {
     Spectrum eta = principled_index(m), v = spectrum_of(principled_density(m, wo, wi, eta.x));
     if (any(spectrum_varies(eta))) {
@@ -126,12 +126,12 @@ Spectrum principled_pdfs(Principled m, vec3 wo, vec3 wi)
     return v;
 }
 
-real principled_pdf(Principled m, vec3 wo, vec3 wi)
+inline real principled_pdf(Principled m, vec3 wo, vec3 wi)
 {
     return principled_density(m, wo, wi, principled_index(m).x);
 }
 
-BsdfSample principled_sample(Principled m, vec3 wo, vec3 u)
+inline BsdfSample principled_sample(Principled m, vec3 wo, vec3 u)
 {
     BsdfSample s = bsdf_nothing();
     Microfacets d = principled_facets(m.roughness, m.anisotropic);
@@ -156,4 +156,4 @@ BsdfSample principled_sample(Principled m, vec3 wo, vec3 u)
     return s;
 }
 
-Spectrum principled_albedo(Principled m) { return m.base_color; }
+inline Spectrum principled_albedo(Principled m) { return m.base_color; }

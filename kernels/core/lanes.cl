@@ -11,6 +11,12 @@
 #ifndef NOT_INLINED
 #define inline __attribute__((always_inline)) inline
 #endif
+/* What is long and stands in several places of a text is `called`, so that a CPU's compiler has it once. */
+#if LANES > 1 && !defined(NOT_INLINED)
+#define called __attribute__((noinline))
+#else
+#define called inline
+#endif
 
 #define CAT_(a, b) a##b
 #define CAT(a, b) CAT_(a, b)
@@ -38,14 +44,24 @@ typedef CAT(uint, LANES) natural;
 #define to_real(x) CAT(convert_float, LANES)(x)
 #define to_integer(x) CAT(convert_int, LANES)(x)
 #define to_natural(x) CAT(convert_uint, LANES)(x)
+/* Of a mask that is known when the text is compiled a compiler sees through its own built-in function, and leaves the
+ * branch out; convert_char8 may be a function of a library that is linked later. */
+#if defined(__has_builtin)
+#if __has_builtin(__builtin_convertvector)
+#define NARROW(m, type) __builtin_convertvector(m, type)
+#endif
+#endif
+#ifndef NARROW
+#define NARROW(m, type) CAT(convert_, type)(m)
+#endif
 #if LANES == 8
 #define LANE_INDEX ((integer)(0, 1, 2, 3, 4, 5, 6, 7))
-inline int any_lane(int8 m) { return as_ulong(convert_char8(m)) != 0; }
+inline int any_lane(int8 m) { return as_ulong(NARROW(m, char8)) != 0; }
 #else
 #define LANE_INDEX ((integer)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15))
 inline int any_lane(int16 m)
 {
-    ulong2 q = as_ulong2(convert_char16(m));
+    ulong2 q = as_ulong2(NARROW(m, char16));
     return (q.x | q.y) != 0;
 }
 #endif

@@ -77,7 +77,7 @@ inline real coat_transmittance_thinner(Microfacets d, real cos_i, real eta)
 }
 /* Mean over the normals that cos_i > 0 sees of (1 - F) G1(refracted direction): the transmittance that
  * Mitsuba 3 tabulates. Here its ratio to a smooth coat's, at a cosine that stands for the facets', is. */
-inline real coat_transmittance(Microfacets d, real cos_i, real eta)
+called real coat_transmittance(Microfacets d, real cos_i, real eta)
 {
     CoatCell cell = coat_cell(d, eta);
     real c2 = cos_i * cos_i, facing = sqrt(c2 + sqr(d.alpha_u) * max_r(1.0f - c2, (real)(0.0f)));

@@ -18,11 +18,11 @@ from clpt.device import (
     assemble,
     build,
     build_all,
+    building,
     context,
     disk_cache,
     link,
     native_programs,
-    program,
 )
 from clpt.errors import KernelBuildError
 
@@ -161,10 +161,10 @@ def test_build_all(device):
 
 def test_our_cache(device, cache_folder, monkeypatch):
     """As for a driver without a cache of its own: kept, taken again, rebuilt when damaged."""
-    monkeypatch.setattr(program, "has_src_build_cache", lambda device: False)
-    from_source = program._from_source
+    monkeypatch.setattr(building, "has_src_build_cache", lambda device: False)
+    from_source = building._from_source
     built = []
-    monkeypatch.setattr(program, "_from_source", lambda *a: built.append(1) or from_source(*a))
+    monkeypatch.setattr(building, "_from_source", lambda *a: built.append(1) or from_source(*a))
 
     first, again = Device.open(device.info), Device.open(device.info)
     cold, warm = build(first, source()), build(again, source())
@@ -208,7 +208,7 @@ def test_remarks_of_a_driver_are_no_warnings(device, cache_folder, monkeypatch, 
             return super().get_build_info(*of) + "kernel was vectorised"
 
     monkeypatch.setattr(native_programs._cl, "_Program", Remarking)
-    monkeypatch.setattr(program, "has_src_build_cache", lambda device: False)
+    monkeypatch.setattr(building, "has_src_build_cache", lambda device: False)
     with warnings.catch_warnings(), caplog.at_level(logging.DEBUG, "clpt"):
         warnings.simplefilter("error")
         before = list(warnings.filters)

@@ -73,9 +73,9 @@ def masked(test: str, *body: str) -> list[str]:
     ]
 
 
-def function(signature: str, *body: str) -> str:
-    """Return a definition with these statements."""
-    return "\n".join([f"inline {signature}", "{", *indented(*body), "}", ""])
+def function(signature: str, *body: str, how: str = "inline") -> str:
+    """Return a definition with these statements; how: "inline" or "called", see core/lanes.cl."""
+    return "\n".join([f"{how} {signature}", "{", *indented(*body), "}", ""])
 
 
 def indented(*rows: str) -> list[str]:

@@ -111,6 +111,7 @@ def _parameter(role: str) -> str:
         f"{form} {form.lower()}_texture_{role}"
         "(Scene scene, integer source, TexturePoint point, Wavelengths lambdas)",
         f"return texture_{role}(scene, max_i(source - 1, (integer)(0)), point, lambdas);",
+        how="called",
     )
 
 

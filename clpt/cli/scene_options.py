@@ -1,0 +1,238 @@
+"""What `clpt render` and `clpt warm` share: options that say what is rendered and where, and how a
+renderer is made of them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any, TypeVar, get_args
+
+import click
+
+from .. import device as dev
+from ..bvh import LAYOUTS, Quality
+from ..formats import load
+from ..formats.missing import Missing
+from ..render.lowering.checks import check
+from ..render.renderer import Renderer
+from ..scene import Scene, kinds
+from ..scene.params import Kind, params
+from ..spectra import read_sensor, spaces
+from ..spectra.sensors import OBSERVERS
+from .display import Display
+from .scene_variables import scene_variables
+
+LARGEST = 65536  # pixels of a side
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+class Size(click.ParamType):
+    """WIDTHxHEIGHT in pixels."""
+
+    name = "WxH"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[int, int]:
+        found = re.fullmatch(r"(\d{1,9})x(\d{1,9})", str(value).strip().lower())
+        if not found:
+            self.fail(f"{value!r} does not look like 640x480", param, ctx)
+        width, height = int(found[1]), int(found[2])
+        if not (1 <= width <= LARGEST and 1 <= height <= LARGEST):
+            self.fail(f"{width}x{height}: each side can be 1 to {LARGEST} pixels", param, ctx)
+        return width, height
+
+
+class SensorName(click.ParamType):
+    """An observer's name, or the file of a camera's curves."""
+
+    name = "NAME-OR-FILE"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        return value if value in OBSERVERS else read_sensor(value)
+
+
+class Bytes(click.ParamType):
+    """A number of bytes, such as 500M or 2G."""
+
+    name = "SIZE"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        match = re.fullmatch(r"(\d+(?:\.\d+)?)\s*([KMGT]?)i?B?", str(value).strip(), re.IGNORECASE)
+        if match is None:
+            self.fail(f"{value!r} is no size in memory; write 500M or 2G", param, ctx)
+        return int(float(match[1]) * 1024 ** " KMGT".index(match[2].upper() or " "))
+
+
+class White(click.ParamType):
+    """none, an illuminant, a colour temperature in K such as 3200, or a chromaticity x,y."""
+
+    name = "WHITE"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        try:
+            numbers = [float(part) for part in str(value).split(",")]
+        except ValueError:
+            return value
+        return numbers[0] if len(numbers) == 1 else tuple(numbers)
+
+
+_OPTIONS = (
+    click.option(
+        "--mode", type=click.Choice(["spectral", "rgb"]), help="Whether light is spectra or RGB."
+    ),
+    click.option("--size", type=Size(), help="Size of the picture."),
+    click.option("--device", metavar="NAME-OR-INDEX", help="Where to render: see `clpt devices`."),
+    click.option("--threads", type=click.IntRange(1), help="Cores of a CPU to use, at most."),
+    click.option(
+        "--bvh", "layout", type=click.Choice([*LAYOUTS]),
+        help="Acceleration structure of the triangles.",
+    ),
+    click.option(
+        "--tree-quality", type=click.Choice(get_args(Quality)), default="high",
+        help="fast: built sooner, a little slower to trace.",
+    ),
+    click.option(
+        "--integrator", metavar="NAME", help=f"One of {', '.join(kinds('integrator'))}."
+    ),
+    click.option(
+        "--sampler", type=click.Choice([*kinds("sampler")]),
+        help="Where random numbers come from.",
+    ),
+    click.option(
+        "--max-depth", type=click.IntRange(-1), help="Longest path, at most 4000; -1: no limit."
+    ),
+    click.option(
+        "--sensor", type=SensorName(), help="cie1931, cie1964 or a file of three curves."
+    ),
+    click.option(
+        "--white-balance", type=White(), help="What becomes white: none, D65, 3200 or x,y."
+    ),
+    click.option(
+        "--output-space", type=click.Choice(spaces.SPACES), help="Colour space of the picture."
+    ),
+    click.option(
+        "--bands", type=click.IntRange(0), help="Bands of a spectral picture, for .npy and .exr."
+    ),
+    click.option("--lambda-min", type=float, help="Shortest wavelength of the light [nm]."),
+    click.option(
+        "--lambda-max", type=float, help="Longest wavelength; fluorescence needs 300 to 830."
+    ),
+    click.option(
+        "--alpha", is_flag=True, default=None, help="Leave the sky out, and write what is covered."
+    ),
+    scene_variables,
+    click.option(
+        "--texture-budget", type=Bytes(), metavar="SIZE",
+        help="Memory for images, such as 500M; larger ones are halved.  [default: half the free]",
+    ),
+    click.option(
+        "--missing-textures", type=click.Choice(get_args(Missing)), default="error",
+        help="grey: go on with grey where an image is not there.",
+    ),
+)  # fmt: skip
+
+
+def scene_options(command: Command) -> Command:
+    """Give a command the options that `open_renderer` takes."""
+    for option in reversed(_OPTIONS):
+        command = option(command)
+    return command
+
+
+def open_renderer(
+    scene: Path,
+    shown: Display,
+    resources: ExitStack,
+    accept: Callable[[Scene], None] | None = None,
+    *,
+    profiling: bool = False,
+    keep: bool = False,
+    device: str | None,
+    threads: int | None,
+    layout: str | None,
+    tree_quality: Quality,
+    variables: dict[str, Any],
+    texture_budget: int | None,
+    missing_textures: Missing,
+    **changes: Any,
+) -> tuple[Renderer, float]:
+    """Return a renderer of a scene file, and the seconds that the file took.
+
+    resources: get the processes that compile beside this one; accept: called with the scene, before
+    anything is built for it; keep: wait for what they keep for the next time; changes: see
+    `changed`.
+    """
+    began = time.perf_counter()
+    with ThreadPoolExecutor(max_workers=1) as beside:
+        chosen = beside.submit(dev.choose, device, profiling=profiling, threads=threads)
+        with shown.loading(scene.name) as tell:
+            loaded = load(scene, progress=tell, missing_textures=missing_textures, **variables)
+            plan = changed(loaded, **changes)
+        loading = time.perf_counter() - began
+        if accept is not None:
+            accept(plan)
+        check(plan)
+        on = chosen.result()
+    spare = min(dev.spare_cores(), (threads or on.info.compute_units) - 1)
+    if spare and on.info.compiles_singly:
+        on.compilers = resources.enter_context(dev.Compilers(spare, wait_for_kept=keep))
+    for warning in plan.warnings:
+        shown.note(f"clpt: warning: {warning}")
+    with shown.phase(f"building kernels for {on.info.name}"):
+        renderer = Renderer(
+            plan, on, texture_budget=texture_budget, layout=layout, tree_quality=tree_quality
+        )
+    for warning in renderer.warnings:
+        shown.note(f"clpt: warning: {warning}")
+    return renderer, loading
+
+
+def changed(
+    scene: Scene,
+    *,
+    mode: str | None = None,
+    spp: int | None = None,
+    noise: float | None = None,
+    size: tuple[int, int] | None = None,
+    seed: int | None = None,
+    integrator: str | None = None,
+    sampler: str | None = None,
+    max_depth: int | None = None,
+    **film: Any,
+) -> Scene:
+    """Return the scene with those settings replaced that are not None; `film`: of its film.
+
+    Raises click.BadParameter, and SceneError for an invalid film.
+    """
+    film = {name: value for name, value in {"mode": mode, **film}.items() if value is not None}
+    film |= {} if size is None else {"width": size[0], "height": size[1]}
+    if noise is not None:
+        scene = dataclasses.replace(scene, noise=noise or None)
+    given: dict[str, Any] = {"spp": spp, "seed": seed}
+    given["sampler"] = None if sampler is None else kinds("sampler")[sampler]()
+    given["film"] = dataclasses.replace(scene.film, **film)
+    if integrator is not None and integrator != scene.integrator.kind:
+        given["integrator"] = _integrator(integrator, scene.integrator)
+    if max_depth is not None:
+        how: Any = given.get("integrator", scene.integrator)
+        if not hasattr(how, "max_depth"):
+            message = f"the integrator {how.kind} has no depth"
+            raise click.BadParameter(message, param_hint="--max-depth")
+        given["integrator"] = dataclasses.replace(how, max_depth=max_depth)
+    return dataclasses.replace(scene, **{k: v for k, v in given.items() if v is not None})
+
+
+def _integrator(name: str, old: Kind) -> Any:
+    """Return an integrator of another kind, with the parameters that both have."""
+    known = kinds("integrator")
+    if name not in known:
+        message = f"{name!r} is none of {', '.join(known)}"
+        raise click.BadParameter(message, param_hint="--integrator")
+    shared = params(known[name]).keys() & params(type(old)).keys()
+    return known[name](**{key: getattr(old, key) for key in shared})

@@ -1,0 +1,39 @@
+"""`clpt warm`: compiles what scenes are rendered with, so that later renders begin at once."""
+
+from __future__ import annotations
+
+import time
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .display import display
+from .scene_options import open_renderer, scene_options
+from .verbosity import verbose_option
+
+
+@click.command()
+@click.argument("scenes", type=click.Path(path_type=Path), nargs=-1, required=True)
+@scene_options
+@verbose_option("Log more; twice for everything.")
+@click.option("--quiet", is_flag=True, help="Show no progress and no warnings.")
+def warm(scenes: tuple[Path, ...], verbose: int, quiet: bool, **options: Any) -> None:
+    """Compile the programs of SCENES into the caches, and render nothing.
+
+    Give the options of the renders that come: mode, size, device and others decide what is
+    compiled. Scenes of the same kinds of materials, lights and shapes share programs.
+    """
+    for scene in scenes:
+        shown, began = display(quiet, None), time.perf_counter()
+        with ExitStack() as resources:
+            renderer, loading = open_renderer(scene, shown, resources, keep=True, **options)
+            with shown.phase("compiling for the first samples"):
+                renderer.prepare()
+        builds, seconds = renderer.device.builds, time.perf_counter() - began
+        click.echo(
+            f"{scene}: {builds.programs} programs, {builds.cached} of them found, in {seconds:.1f}"
+            f" s; the scene took {loading:.1f} s of it"
+        )
+        renderer.close()

@@ -1,0 +1,281 @@
+"""Building and linking programs, with their caches, and errors with our file and line."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import logging
+import os
+import re
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+import pyopencl as cl
+from pyopencl.characterize import has_src_build_cache
+
+from clpt.device import disk_cache, native_programs
+
+from ..errors import DeviceError, KernelBuildError
+from .compilers import Job
+from .context import Device
+from .program import Program, Signatures, decode, encode, read_signatures
+from .source import Source
+
+log = logging.getLogger(__name__)
+
+OPTIONS = ("-cl-std=CL1.2", "-cl-kernel-arg-info", "-w")
+_PART = "a part, to be linked"
+
+
+def build(device: Device, source: Source, options: Sequence[str] = ()) -> Program:
+    """Compile a program for the device, or take it from a cache.
+
+    A program that was built in the context before is used again. For drivers that have no cache of
+    their own (all but PoCL and NVIDIA) the binary is written to the user's cache folder. In a
+    context with several devices it is built for this one only.
+
+    Raises KernelBuildError with our file and line, the log, and the path of the text.
+    """
+    flags = _flags(device, options)
+    on_disk = not has_src_build_cache(device.info.cl_device)
+    program = _known(device, source, flags, on_disk)
+    if program is not None:
+        return program
+    start = time.perf_counter()
+    program = _from_source(device, source, flags)
+    if on_disk:  # a binary is compiled to the end, a program of the driver may not be
+        entry = _entry(device, source, flags)
+        disk_cache.store(entry, encode(program.signatures), _binary(program.cl_program))
+        program = _from_cache(device, source, flags, entry) or program
+    return _built(device, source, flags, program, time.perf_counter() - start)
+
+
+def link(
+    device: Device, sources: Mapping[str, Source], main: str, signatures: Signatures
+) -> Program:
+    """Compile programs and link them; the kernels are those of the one named `main`.
+
+    signatures: of its kernels, which OpenCL does not tell of linked ones. The parts are written to
+    the user's cache folder, and so is the result. The device's `compilers`, if it has any, compile
+    parts beside this process. Raises KernelBuildError as `build` does, and where the parts do not
+    fit together.
+    """
+    flags, whole = _flags(device, ()), _whole(sources, main)
+    compile_ahead(device, sources, main)
+    program = _known(device, whole, flags, _has_binaries(device))
+    if program is not None:
+        return program
+    start = time.perf_counter()
+    try:
+        linked, binaries = _linked(device, sources, flags, _part)
+    except cl.Error as refusal:
+        log.debug("%s is compiled again: %s", whole.name, refusal)
+        try:
+            linked, binaries = _linked(device, sources, flags, _compiled)
+        except cl.Error as error:
+            raise _build_error(whole, str(error)) from error
+    program = Program(whole.name, linked, signatures)
+    if _has_binaries(device):
+        program = _keep_linked(device, whole, flags, program, binaries)
+    return _built(device, whole, flags, program, time.perf_counter() - start)
+
+
+def compile_ahead(device: Device, sources: Mapping[str, Source], main: str) -> None:
+    """Let the device's `compilers` begin with what `link` will need; it returns at once."""
+    flags = _flags(device, ())
+    if device.compilers is None or not _has_binaries(device):
+        return
+    entry = _entry(device, _whole(sources, main), flags)
+    if device.programs.find(_key(device, entry)) is not None or disk_cache.holds(entry):
+        return
+    for source in sources.values():
+        part = _entry(device, source, [*flags, _PART])
+        if not disk_cache.holds(part):
+            device.compilers.submit(part, _job(device, "compile", flags, source.text))
+
+
+def _whole(sources: Mapping[str, Source], main: str) -> Source:
+    """What the texts of a linked program are together, for its key and for errors."""
+    files = dict.fromkeys(file for source in sources.values() for file in source.files)
+    text = "\n".join(source.text for source in sources.values())
+    return Source(sources[main].name, text, tuple(files))
+
+
+def _linked(
+    device: Device,
+    sources: Mapping[str, Source],
+    flags: list[str],
+    part: Callable[[Device, Source, list[str]], tuple[cl.Program, bytes]],
+) -> tuple[cl.Program, list[bytes]]:
+    """A linked program and the binaries of its parts; `part` makes these. Raises pyopencl.Error."""
+    parts = [part(device, source, flags) for source in reversed(list(sources.values()))]
+    programs = [program for program, _ in parts]
+    linked = cl.link_program(device.context, programs, [], [device.info.cl_device])
+    return linked, [binary for _, binary in parts]
+
+
+def _part(device: Device, source: Source, flags: list[str]) -> tuple[cl.Program, bytes]:
+    """A compiled part of a program: of the cache folder, another process, or this one.
+
+    Its binary too, which is empty where the device has none. Raises pyopencl.Error if the driver
+    refuses a binary that was not made here, at once or when it is linked.
+    """
+    entry = _entry(device, source, [*flags, _PART])
+    stored = disk_cache.load(entry) if _has_binaries(device) else None
+    binary = stored[1] if stored else None
+    if binary is None and device.compilers is not None:
+        binary = device.compilers.take(entry)
+        if binary is not None:
+            disk_cache.store(entry, _PART, binary)
+    if binary is None:
+        return _compiled(device, source, flags)
+    return cl.Program(device.context, [device.info.cl_device], [binary]), binary
+
+
+def _compiled(device: Device, source: Source, flags: list[str]) -> tuple[cl.Program, bytes]:
+    """A part of a program that this process compiles, and its binary. Raises KernelBuildError."""
+    try:
+        part = native_programs.compile_part(
+            device.context, device.info.cl_device, source.text, flags
+        )
+    except cl.Error as error:
+        raise _build_error(source, str(error)) from error
+    if not _has_binaries(device):
+        return part, b""
+    binary = _binary(part)
+    disk_cache.store(_entry(device, source, [*flags, _PART]), _PART, binary)
+    return part, binary
+
+
+def _keep_linked(
+    device: Device, whole: Source, flags: list[str], program: Program, parts: list[bytes]
+) -> Program:
+    """Write a linked program's binary to the cache folder; return the program to use.
+
+    parts: their binaries.
+    Making one takes as long as compiling it for its first call, so another process does it if there
+    is one, and the program is the one that was given.
+    """
+    entry, header = _entry(device, whole, flags), encode(program.signatures)
+    if device.compilers is None:
+        disk_cache.store(entry, header, _binary(program.cl_program))
+        return _from_cache(device, whole, flags, entry) or program
+    job = _job(device, "link", flags, parts)
+    place = entry, header, disk_cache.folder()
+    device.compilers.leave(dataclasses.replace(job, place=place))
+    return program
+
+
+def _job(device: Device, kind: str, flags: list[str], given: str | list[bytes]) -> Job:
+    return Job(kind, device.info.platform, device.info.name, " ".join(flags), given)
+
+
+def _has_binaries(device: Device) -> bool:
+    return not _is_oclgrind(device)  # which has no compiled form
+
+
+def _known(device: Device, source: Source, flags: list[str], on_disk: bool) -> Program | None:
+    """A program of the context's cache or, if `on_disk`, of the folder's; None if it is new."""
+    entry, start = _entry(device, source, flags), time.perf_counter()
+    program: Program | None = device.programs.find(_key(device, entry))
+    if program is None and on_disk:
+        program = _from_cache(device, source, flags, entry)
+        if program is not None:
+            _built(device, source, flags, program, time.perf_counter() - start, cached=True)
+    return program
+
+
+def _built(
+    device: Device,
+    source: Source,
+    flags: list[str],
+    program: Program,
+    seconds: float,
+    cached: bool = False,
+) -> Program:
+    """Count a program, keep it in the context's cache, and return it."""
+    device.builds.add(seconds, cached)
+    log.debug("%s is %s in %.2f s", source.name, "loaded" if cached else "built", seconds)
+    device.programs.keep(_key(device, _entry(device, source, flags)), program)
+    return program
+
+
+def _key(device: Device, entry: str) -> tuple[int, str]:
+    """A program's key in its context, whose devices may be alike."""
+    return device.info.cl_device.int_ptr, entry
+
+
+def build_all(
+    device: Device, sources: Mapping[str, Source], options: Sequence[str] = ()
+) -> dict[str, Program]:
+    """Build several programs at once, each in a thread of its own. Raises as `build` does."""
+    start, before = time.perf_counter(), device.builds.programs
+    # Oclgrind's compiler is not safe in threads.
+    threads = 1 if _is_oclgrind(device) else os.cpu_count() or 1
+    with ThreadPoolExecutor(max_workers=max(1, min(len(sources), threads))) as pool:
+        futures = {name: pool.submit(build, device, s, options) for name, s in sources.items()}
+        programs = {name: future.result() for name, future in futures.items()}
+    seconds, built = time.perf_counter() - start, device.builds.programs - before
+    log.info("%d programs in %.2f s, %d of them built", len(programs), seconds, built)
+    return programs
+
+
+def _flags(device: Device, options: Sequence[str]) -> list[str]:
+    """The compiler's options."""
+    # Oclgrind cannot interpret all that its compiler's optimiser makes.
+    plain = ["-cl-opt-disable", "-DNOT_INLINED"] if _is_oclgrind(device) else []
+    return [*OPTIONS, *options, *plain]
+
+
+def _binary(program: cl.Program) -> bytes:
+    """The binary, for the one device of the context that it was built for."""
+    return next(filter(None, program.get_info(cl.program_info.BINARIES)))
+
+
+def _is_oclgrind(device: Device) -> bool:
+    return "oclgrind" in device.info.platform.casefold()
+
+
+def _from_source(device: Device, source: Source, flags: list[str]) -> Program:
+    try:
+        built = native_programs.build(device.context, device.info.cl_device, source.text, flags)
+    except cl.Error as error:
+        raise _build_error(source, str(error)) from error
+    try:
+        return Program(source.name, built, read_signatures(built))
+    except cl.Error as error:
+        raise DeviceError(
+            f"{device.info.label} does not tell the arguments of its kernels ({error}); "
+            "clpt cannot run on this driver"
+        ) from error
+
+
+def _from_cache(device: Device, source: Source, flags: list[str], entry: str) -> Program | None:
+    """The program in the cache folder; None if it is missing, or the driver refuses it."""
+    stored = disk_cache.load(entry)
+    if stored is None:
+        return None
+    try:
+        loaded = native_programs.build(device.context, device.info.cl_device, stored[1], flags)
+        return Program(source.name, loaded, decode(stored[0]))
+    except (cl.Error, TypeError, ValueError) as error:
+        log.debug("%s is built again: %s", source.name, error)
+        return None
+
+
+def _entry(device: Device, source: Source, flags: list[str]) -> str:
+    """The cache's key: a hash of everything that the binary depends on."""
+    info = device.info
+    parts = (source.text, *flags, info.platform, info.name, info.version, info.driver)
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()
+
+
+def _build_error(source: Source, log: str) -> KernelBuildError:
+    """The first error of a compiler's log with our file and line; the text is written to disk."""
+    names = "|".join(rf"(?:kernels/)?{re.escape(name)}" for name in source.files)
+    location = re.compile(rf"""(?<![\w/.])({names})["']?(?::|, line |\()(\d+)""")
+    rows = (row for row in log.splitlines() if re.search(r"\berror\b", row))
+    first = next(filter(None, map(location.search, rows)), None)
+    file, line = (first[1], int(first[2])) if first else (None, None)
+    return KernelBuildError(source.name, file, line, log, disk_cache.keep_failed(source))

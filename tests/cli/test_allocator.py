@@ -1,0 +1,32 @@
+"""Freed memory goes back to the system, though much was freed before."""
+
+from __future__ import annotations
+
+import platform
+import subprocess
+import sys
+
+import pytest
+
+PROGRAM = """
+import re
+import numpy as np
+from clpt.cli import allocator
+allocator.return_large_blocks()
+def resident():
+    return int(re.search(r"VmRSS:\\s*(\\d+)", open("/proc/self/status").read())[1]) / 1024
+for _ in range(3):
+    np.ones(30 << 20, np.uint8)  # by itself the library would keep blocks up to this size
+before = resident()
+blocks = [np.ones(4 << 20, np.uint8) for _ in range(20)]
+del blocks[:-1]
+print(resident() - before)
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="only glibc is asked")
+def test_blocks_below_one_that_is_kept_are_given_back():
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM], capture_output=True, text=True, check=True
+    )
+    assert float(done.stdout) < 20.0  # of 80 MiB
