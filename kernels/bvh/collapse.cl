@@ -10,11 +10,13 @@
  * wide node, or its block with BVH_LEAF set.
  */
 #include "bvh/collapsed.cl"
+#include "bvh/fetch.cl"
 #include "bvh/hit.cl"
 #include "bvh/items.cl"
 #include "bvh/leaves.cl"
 #include "bvh/node.cl"
 
+#define COLLAPSE_AHEAD 4 /* blocks */
 #define COLLAPSE_NODE_COST 1.0f
 #define COLLAPSE_BLOCK_COST 1.0f
 
@@ -190,6 +192,14 @@ kernel NO_VECTORIZE void collapse_nodes(global const float8 *restrict nodes,
     }
 }
 
+/* Asks for the faces of a leaf's triangles, which lie anywhere. */
+inline void collapse_fetch(global const float8 *nodes, global const float8 *items, global const uint *faces,
+                           uint leaf)
+{
+    uint first = node_link(nodes[leaf]), n = node_count(nodes[leaf]);
+    for (uint k = 0; k < n; k++) FETCH(faces + 3 * (ulong)item_index(items[first + k]));
+}
+
 /* Writes one block. */
 kernel NO_VECTORIZE void collapse_blocks(global const float8 *restrict nodes,
                                          global const float8 *restrict items,
@@ -200,6 +210,7 @@ kernel NO_VECTORIZE void collapse_blocks(global const float8 *restrict nodes,
 {
     uint b = get_global_id(0);
     if (b >= count) return;
+    collapse_fetch(nodes, items, faces, leaf_roots[min(b + COLLAPSE_AHEAD, count - 1)]);
     float8 node = nodes[leaf_roots[b]];
     uint first = node_link(node), n = node_count(node);
     global float *block = blocks + (ulong)b * 88;
