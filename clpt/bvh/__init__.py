@@ -2,7 +2,7 @@
 
 from .build import Bvh, build, build_boxes, build_parts, choose_layout, choose_tree, outgrows_caches
 from .building import Building
-from .layouts import LAYOUTS, TREES, Quality, traversal_text
+from .layouts import LAYOUTS, TREES, Quality, shapes_layout, traversal_text
 from .refit import rebuild_boxes, refit, refit_boxes
 
 __all__ = [
@@ -20,5 +20,6 @@ __all__ = [
     "rebuild_boxes",
     "refit",
     "refit_boxes",
+    "shapes_layout",
     "traversal_text",
 ]

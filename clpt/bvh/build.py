@@ -46,9 +46,8 @@ class Bvh:
     @property
     def bytes(self) -> int:
         """Device memory that it holds."""
-        own = [buffer for part in self.parts for buffer in (part.ranges, part.bounds)]
-        whole = [*self.buffers.values(), *(buffer for buffer in own if buffer is not None)]
-        return sum(buffer.size for buffer in whole)
+        own = [buffer for part in self.parts for buffer in part.own]
+        return sum(buffer.size for buffer in [*self.buffers.values(), *own])
 
 
 def choose_layout(device: Device, n_triangles: int) -> str:
@@ -168,11 +167,11 @@ def build_parts(
     return Bvh(layout, sum(counts), buffers, parts, stats), offsets.astype(np.uint32)
 
 
-def build_boxes(device: Device, boxes: NDArray, layout: str = "shapes") -> Bvh:
+def build_boxes(device: Device, boxes: NDArray, layout: str = "shapes_binary") -> Bvh:
     """Build a tree over boxes, (m, 2, 3) float32 low and high corners.
 
-    layout: a key of BOX_LAYOUTS. Leaves of "shapes" hold up to two boxes; those of the others
-    one, and their nodes are as in the layout of that name. Raises as `build` does.
+    layout: a key of BOX_LAYOUTS. Leaves of "shapes_binary" hold up to two boxes; those of the
+    others one, and their nodes are as in the layout of that name. Raises as `build` does.
     """
     start = time.perf_counter()
     boxes = np.asarray(boxes, np.float32).reshape(-1, 2, 3)
@@ -180,7 +179,7 @@ def build_boxes(device: Device, boxes: NDArray, layout: str = "shapes") -> Bvh:
     building, n = Building(device), len(boxes)
     packed = BOX_LAYOUTS[layout](building, n, building.wrap_host(boxes, np.float32))
     building.stream.wait()
-    stats = {"seconds": time.perf_counter() - start}
+    stats = {**packed.stats, "seconds": time.perf_counter() - start}
     return Bvh(layout, n, packed.buffers, (packed.part,), stats)
 
 

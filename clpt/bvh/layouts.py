@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 import pyopencl as cl
 
-from . import tree
+from . import tree, wide
 from .building import Building
 
 Quality = Literal["high", "fast"]
@@ -23,8 +22,8 @@ _COLLAPSE, _REFIT = "bvh/collapse.cl", "bvh/refit.cl"
 _BINARY_LEAF = 4  # triangles of a leaf, at most
 _BLOCK = 8
 _COMPACT_LEAF = 3  # triangles of a leaf, at most; kernels/bvh/compact.cl counts them in 3 bits
-SHAPES_LEAF = 2  # boxes of a leaf of "shapes", at most
-_LEAF, _DEEPEST = 0x80000000, 48  # BVH_LEAF and BVH_DEPTH of kernels/bvh/node.cl
+SHAPES_LEAF = 2  # boxes of a leaf of "shapes_binary", at most
+_LEAF = 0x80000000  # BVH_LEAF of kernels/bvh/node.cl
 
 
 @dataclass(frozen=True)
@@ -48,7 +47,8 @@ class Part:
     count: triangles or boxes; reach: the largest coordinate that it was built with; steps: (begin,
     count) of each launch of a kernel, from the leaves up: of wide nodes, or of ranges in the heap
     `ranges` of a binary tree; bounds: of the nodes of a compressed tree, in full precision; nodes,
-    leaves: offsets of its own [32 bytes]; first: its first triangle.
+    leaves: offsets of its own [32 bytes]; first: its first triangle; binary, totals: of a wide tree
+    that follows a binary one, the nodes of that, and on the device how many wide nodes there are.
     """
 
     count: int
@@ -59,6 +59,14 @@ class Part:
     nodes: int = 0
     leaves: int = 0
     first: int = 0
+    binary: cl.Buffer | None = None
+    totals: cl.Buffer | None = None
+
+    @property
+    def own(self) -> tuple[cl.Buffer, ...]:
+        """The buffers that refitting needs and traversals do not."""
+        every = (self.ranges, self.bounds, self.binary, self.totals)
+        return tuple(buffer for buffer in every if buffer is not None)
 
 
 @dataclass(frozen=True)
@@ -105,12 +113,15 @@ def wide8(building: Building, mesh: Mesh) -> Packed:
     built = _binary_tree(building, mesh, _BLOCK, at_once=_BLOCK)
     if mesh.quality == "high" and mesh.count >= REINSERT_LIMIT:
         built = tree.reinserted(building, built)
-    wide = _wide_nodes(building, built)
-    blocks = building.allocate(352 * wide.leaves)
+    chosen = wide.collapse(building, built)
+    made = wide.figures(building, chosen)
+    nodes, blocks = building.allocate(256 * made.nodes), building.allocate(352 * made.leaves)
+    wide.write_nodes(building, chosen, nodes)
     source = {"vertices": mesh.vertices, "faces": mesh.faces, "tags": mesh.tags}
-    leaves = {"nodes": built.nodes, "items": built.items, "leaf_roots": wide.leaf_roots}
-    building.run_each(_COLLAPSE, "collapse_blocks", wide.leaves, blocks=blocks, **leaves, **source)
-    return Packed({"nodes": wide.nodes, "leaves": blocks}, wide.part, wide.stats)
+    leaves = {"nodes": built.nodes, "items": built.items, "leaf_roots": chosen.leaf_roots}
+    building.run_each(_COLLAPSE, "collapse_blocks", made.leaves, blocks=blocks, **leaves, **source)
+    part = Part(mesh.count, built.reach(building), made.steps)
+    return Packed({"nodes": nodes, "leaves": blocks}, part, made.stats)
 
 
 def binary_boxes(building: Building, count: int, boxes: cl.Buffer, leaf_size: int = 1) -> Packed:
@@ -127,13 +138,36 @@ def binary_boxes(building: Building, count: int, boxes: cl.Buffer, leaf_size: in
 
 def wide8_boxes(building: Building, count: int, boxes: cl.Buffer) -> Packed:
     """As `binary_boxes`, with one box in a leaf, and make the tree 8 wide."""
+    chosen, made = _wide_over_boxes(building, count, boxes)
+    nodes, indices = building.allocate(256 * made.nodes), building.allocate(4 * count)
+    wide.write_nodes(building, chosen, nodes)
+    wide.write_indices(building, chosen, indices)
+    part = Part(count, chosen.built.reach(building), made.steps)
+    return Packed({"nodes": nodes, "indices": indices}, part, made.stats)
+
+
+def wide8_shapes(building: Building, count: int, boxes: cl.Buffer) -> Packed:
+    """As `wide8_boxes`; the binary tree stays too, by which the wide one is refitted."""
+    if not count:
+        rows = np.repeat([np.inf, -np.inf] * 3 + [0, 0], 8).astype(np.float32)  # nothing in it
+        nodes = building.upload(rows, np.float32)
+        return Packed({"nodes": nodes, "indices": building.allocate(0)}, Part(0))
+    chosen, made = _wide_over_boxes(building, count, boxes)
+    room = made.nodes + made.nodes // 4 + 8  # for another tree over as many boxes
+    nodes, indices = building.allocate(256 * room), building.allocate(4 * count)
+    wide.write_nodes(building, chosen, nodes)
+    wide.write_indices(building, chosen, indices)
+    binary = {"binary": chosen.built.nodes, "totals": chosen.totals}
+    part = replace(_binary_part(building, chosen.built), **binary)
+    return Packed({"nodes": nodes, "indices": indices}, part, made.stats)
+
+
+def _wide_over_boxes(
+    building: Building, count: int, boxes: cl.Buffer
+) -> tuple[wide.Collapse, wide.Figures]:
     items, parts = tree.items_of_boxes(building, count, boxes)
-    built = tree.over(building, count, items, parts, 1)
-    wide = _wide_nodes(building, built)
-    indices = building.allocate(4 * count)
-    leaves = {"nodes": built.nodes, "items": items, "leaf_roots": wide.leaf_roots}
-    building.run_each(_COLLAPSE, "collapse_indices", count, indices=indices, **leaves)
-    return Packed({"nodes": wide.nodes, "indices": indices}, wide.part, wide.stats)
+    chosen = wide.collapse(building, tree.over(building, count, items, parts, 1))
+    return chosen, wide.figures(building, chosen)
 
 
 def compact(building: Building, mesh: Mesh) -> Packed:
@@ -161,15 +195,17 @@ def _compact_nodes(
     building: Building, built: tree.Tree, leaves: cl.Buffer, tags: cl.Buffer | None
 ) -> tuple[cl.Buffer, Part, dict[str, float]]:
     """Compressed nodes that have no boxes yet, for `refit_nodes`; the leaves are filled in."""
-    wide = _collapse(building, built)
-    n_nodes = int(wide.stats["nodes"])
-    nodes, bounds = building.allocate(_round_up(80 * n_nodes)), building.allocate(32 * n_nodes)
-    common = {"places": building.allocate(8 * n_nodes), "compact": nodes, "tags": tags}
+    chosen = wide.collapse(building, built)
+    made = wide.figures(building, chosen)
+    nodes = building.allocate(_round_up(80 * made.nodes))
+    common = {"places": building.allocate(8 * made.nodes), "compact": nodes, "tags": tags}
     common |= {"nodes": built.nodes, "items": built.items, "leaves": leaves}
-    common |= {"costs": wide.costs, "roots": wide.roots, "firsts": wide.firsts}
-    for begin, count in reversed(wide.part.steps):
+    common |= {"costs": chosen.costs, "roots": chosen.roots, "firsts": chosen.firsts}
+    for begin, count in reversed(made.steps):
         building.run_each("bvh/compact_pack.cl", "compact_nodes", count, begin=begin, **common)
-    return nodes, replace(wide.part, bounds=bounds), wide.stats
+    bounds = building.allocate(32 * made.nodes)
+    part = Part(built.count, built.reach(building), made.steps, bounds=bounds)
+    return nodes, part, made.stats
 
 
 def refit_nodes(building: Building, part: Part, **buffers: cl.Buffer | None) -> None:
@@ -195,71 +231,6 @@ def refit_nodes(building: Building, part: Part, **buffers: cl.Buffer | None) -> 
             building.run(_REFIT, kernel, count, begin=begin, ranges=part.ranges, **common)
 
 
-@dataclass(frozen=True)
-class _Collapse:
-    """The numbering of a binary tree made 8 wide, as in kernels/bvh/collapse.cl.
-
-    leaf_roots: the binary nodes that became wide leaves, `leaves` of them.
-    """
-
-    costs: cl.Buffer
-    occlusion: cl.Buffer
-    roots: cl.Buffer
-    firsts: cl.Buffer
-    leaf_roots: cl.Buffer
-    leaves: int
-    part: Part
-    stats: dict[str, float]
-
-
-def _collapse(building: Building, built: tree.Tree) -> _Collapse:
-    """Choose and number the wide nodes."""
-    n = built.count
-    costs, occlusion = building.allocate(64 * n), building.allocate(8 * n)
-    below = {"nodes": built.nodes, "costs": costs, "occlusion": occlusion}
-    parts = {"items": built.items, "ranges": built.ranges, **below}
-    begin = (1 << built.levels) - 1
-    building.run(_COLLAPSE, "collapse_subtree", 1 << built.levels, begin=begin, **parts)
-    for level in reversed(range(built.levels)):
-        begin = (1 << level) - 1
-        building.run(_COLLAPSE, "collapse_level", 1 << level, begin=begin, **parts)
-
-    roots, firsts = building.allocate(4 * n), building.allocate(8 * n)
-    leaf_roots, totals = building.allocate(4 * n), building.allocate(4 * (4 + _DEEPEST))
-    numbers = {"roots": roots, "firsts": firsts, "leaf_roots": leaf_roots, "totals": totals}
-    building.run(_COLLAPSE, "collapse_number", 1, nodes=built.nodes, costs=costs, **numbers)
-    words = building.read(totals, 4 + _DEEPEST, np.uint32)
-    n_nodes, n_leaves, levels = words[:3].tolist()
-    starts = [*words[4 : 4 + levels].tolist(), n_nodes]
-    steps = tuple((begin, end - begin) for begin, end in pairwise(starts))[::-1]
-    cost = float(words[3:].view(np.float32)[0])
-    stats = {"nodes": n_nodes, "leaves": n_leaves, "depth": levels - 1, "cost": cost}
-    part = Part(n, built.reach(building), steps)
-    return _Collapse(costs, occlusion, roots, firsts, leaf_roots, n_leaves, part, stats)
-
-
-@dataclass(frozen=True)
-class _Wide:
-    """8-wide nodes, the binary nodes that became their leaves, and the number of those."""
-
-    nodes: cl.Buffer
-    leaf_roots: cl.Buffer
-    leaves: int
-    part: Part
-    stats: dict[str, float]
-
-
-def _wide_nodes(building: Building, built: tree.Tree) -> _Wide:
-    """The inner nodes of a binary tree made 8 wide."""
-    collapse = _collapse(building, built)
-    n_nodes = int(collapse.stats["nodes"])
-    wide = building.allocate(256 * n_nodes)
-    below = {"nodes": built.nodes, "costs": collapse.costs, "occlusion": collapse.occlusion}
-    numbers = {"roots": collapse.roots, "firsts": collapse.firsts}
-    building.run_each(_COLLAPSE, "collapse_nodes", n_nodes, wide=wide, **numbers, **below)
-    return _Wide(wide, collapse.leaf_roots, collapse.leaves, collapse.part, collapse.stats)
-
-
 LAYOUTS: dict[str, Callable[[Building, Mesh], Packed]] = {
     "brute": brute,
     "binary": binary,
@@ -267,13 +238,19 @@ LAYOUTS: dict[str, Callable[[Building, Mesh], Packed]] = {
     "compact": compact,
 }
 BOX_LAYOUTS: dict[str, Callable[[Building, int, cl.Buffer], Packed]] = {
-    "shapes": partial(binary_boxes, leaf_size=SHAPES_LEAF),
+    "shapes_binary": partial(binary_boxes, leaf_size=SHAPES_LEAF),
+    "shapes_wide8": wide8_shapes,
     "binary": binary_boxes,
     "wide8": wide8_boxes,
     "compact": compact_boxes,
 }
 
 TREES = tuple(name for name in LAYOUTS if name in BOX_LAYOUTS)  # all but brute force
+
+
+def shapes_layout(layout: str) -> str:
+    """Return the layout, of BOX_LAYOUTS, for shapes beside triangles in a layout."""
+    return "shapes_wide8" if layout == "wide8" else "shapes_binary"
 
 
 def traversal_text(layout: str, all_hits: bool = False) -> str:

@@ -12,6 +12,7 @@ from collections.abc import Iterable
 import pyopencl as cl
 
 from . import tree as trees
+from . import wide
 from .build import Bvh
 from .building import Building
 from .layouts import SHAPES_LEAF, refit_nodes
@@ -58,25 +59,54 @@ def refit_boxes(building: Building, tree: Bvh, boxes: cl.Buffer) -> cl.Event | N
     """
     boxed = {"boxes": boxes, "indices": tree.buffers["indices"]}
     if tree.count:
-        nodes = tree.buffers["nodes"]
-        refit_nodes(building, tree.parts[0], nodes=nodes, **boxed, **_NO_TRIANGLES)
+        part, nodes = tree.parts[0], tree.buffers["nodes"]
+        refitted = nodes if part.binary is None else part.binary
+        refit_nodes(building, part, nodes=refitted, **boxed, **_NO_TRIANGLES)
+        if part.binary is not None:
+            source = {"binary": part.binary, "totals": part.totals}
+            building.run_each(_ROOT, "refit_followers", nodes.size // 256, nodes=nodes, **source)
     return building.stream.last
 
 
 def rebuild_boxes(building: Building, tree: Bvh, boxes: cl.Buffer) -> cl.Event | None:
-    """Enqueue that a tree of the layout "shapes", in place, is built anew over its boxes.
+    """Enqueue that a tree of the layout "shapes_...", in place, is built anew over its boxes.
 
-    boxes: as of `refit_boxes`. It takes about five times as long, and 160 bytes a box while it
-    runs; rays are then as fast as after `build_boxes`. The host waits for nothing.
+    boxes: as of `refit_boxes`. It takes about five times as long, and up to 310 bytes a box while
+    it runs; rays are then as fast as after `build_boxes`. The host waits for nothing: a wide tree
+    that came out larger than there is room for is refitted instead.
     """
-    part = tree.parts[0]
     if tree.count:
         own = Building(building.device, building.stream)  # with a memory count of its own
         items, extents = trees.items_of_boxes(own, tree.count, boxes)
-        built = trees.over(own, tree.count, items, extents, SHAPES_LEAF)
-        indices = tree.buffers["indices"]
-        own.run_each("bvh/pack.cl", "pack_indices", tree.count, items=items, indices=indices)
-        building.stream.copy(tree.buffers["nodes"], built.nodes)
-        if part.ranges is not None:
-            building.stream.copy(part.ranges, built.ranges)
+        if tree.parts[0].binary is None:
+            built = trees.over(own, tree.count, items, extents, SHAPES_LEAF)
+            _adopt_binary(own, tree, built)
+        else:
+            _adopt_wide(own, tree, trees.over(own, tree.count, items, extents, 1))
+            refit_boxes(building, tree, boxes)
     return building.stream.last
+
+
+def _adopt_binary(building: Building, tree: Bvh, built: trees.Tree) -> None:
+    """Enqueue that a binary tree takes the place of one."""
+    indices, part = tree.buffers["indices"], tree.parts[0]
+    building.run_each("bvh/pack.cl", "pack_indices", tree.count, items=built.items, indices=indices)
+    building.stream.copy(tree.buffers["nodes"], built.nodes)
+    if part.ranges is not None:
+        building.stream.copy(part.ranges, built.ranges)
+
+
+def _adopt_wide(building: Building, tree: Bvh, built: trees.Tree) -> None:
+    """Enqueue that a binary tree and its wide one take the place of others, if there is room."""
+    part, nodes = tree.parts[0], tree.buffers["nodes"]
+    chosen, indices = wide.collapse(building, built), building.allocate(4 * tree.count)
+    wide.write_nodes(building, chosen, nodes)
+    wide.write_indices(building, chosen, indices)
+    made = [built.nodes, built.ranges, indices, chosen.totals]
+    former = [part.binary, part.ranges, tree.buffers["indices"], part.totals]
+    for new, old in zip(made, former, strict=True):
+        words = new.size // 4
+        building.run_each(
+            _ROOT, "refit_adopt", -(-words // 16), totals=chosen.totals, room=nodes.size // 256,
+            words=words, made=new, adopts=old,
+        )  # fmt: skip

@@ -6,14 +6,17 @@
  * triangles at most, is a block; testing one costs the same however few they are.
  *
  * Wide nodes are 8 rows of float8: low x, high x, low y, high y, low z, high z of the children,
- * their words, and 1 where there is a child; its word is its wide node, or its block with BVH_LEAF set.
+ * their words, and the binary nodes that they were, plus 1, or 0 where there is no child; a child's word is its
+ * wide node, or its block with BVH_LEAF set.
  */
 #include "bvh/collapsed.cl"
+#include "bvh/fetch.cl"
 #include "bvh/hit.cl"
 #include "bvh/items.cl"
 #include "bvh/leaves.cl"
 #include "bvh/node.cl"
 
+#define COLLAPSE_AHEAD 4 /* blocks */
 #define COLLAPSE_NODE_COST 1.0f
 #define COLLAPSE_BLOCK_COST 1.0f
 
@@ -143,17 +146,19 @@ inline float collapse_promise(global const float8 *nodes, global const float8 *c
     return cost > 0.0f ? occlusion[node] * node_half_area(nodes[node]) / cost : 0.0f;
 }
 
-/* Writes one wide node. Children stand in ascending promise, for traversals visit the last slot
- * first. Empty slots hold what no ray meets, and lead to block 0 if one does nevertheless. */
+/* Writes one wide node, of `totals` that there are, if there is room for `count`. Children stand in ascending
+ * promise, for traversals visit the last slot first. Empty slots hold what no ray meets, and lead to block 0 if one
+ * does nevertheless. */
 kernel NO_VECTORIZE void collapse_nodes(global const float8 *restrict nodes,
                                         global const float8 *restrict costs,
                                         global const float *restrict occlusion,
                                         global const uint *restrict roots,
-                                        global const uint2 *restrict firsts, uint count,
+                                        global const uint2 *restrict firsts,
+                                        global const uint *restrict totals, uint count,
                                         global float *restrict wide)
 {
     uint w = get_global_id(0);
-    if (w >= count) return;
+    if (w >= totals[0] || totals[0] > count) return;
     uint children[8], words[8];
     float promise[8];
     uint found = collapse_children(nodes, costs, roots[w], children);
@@ -183,8 +188,16 @@ kernel NO_VECTORIZE void collapse_nodes(global const float8 *restrict nodes,
         row[32] = node.s2;
         row[40] = node.s6;
         row[48] = as_float(k < found ? words[k] : BVH_LEAF);
-        row[56] = k < found ? 1.0f : 0.0f;
+        row[56] = as_float(k < found ? children[k] + 1 : 0);
     }
+}
+
+/* Asks for the faces of a leaf's triangles, which lie anywhere. */
+inline void collapse_fetch(global const float8 *nodes, global const float8 *items, global const uint *faces,
+                           uint leaf)
+{
+    uint first = node_link(nodes[leaf]), n = node_count(nodes[leaf]);
+    for (uint k = 0; k < n; k++) FETCH(faces + 3 * (ulong)item_index(items[first + k]));
 }
 
 /* Writes one block. */
@@ -197,6 +210,7 @@ kernel NO_VECTORIZE void collapse_blocks(global const float8 *restrict nodes,
 {
     uint b = get_global_id(0);
     if (b >= count) return;
+    collapse_fetch(nodes, items, faces, leaf_roots[min(b + COLLAPSE_AHEAD, count - 1)]);
     float8 node = nodes[leaf_roots[b]];
     uint first = node_link(node), n = node_count(node);
     global float *block = blocks + (ulong)b * 88;
@@ -209,12 +223,16 @@ kernel NO_VECTORIZE void collapse_blocks(global const float8 *restrict nodes,
     leaf_store_block(block, vertices, faces);
 }
 
-/* The items of leaves that hold one each, by their indices. */
-kernel NO_VECTORIZE void collapse_indices(global const float8 *restrict nodes,
+/* The items of leaves that hold one each, by their indices, in the order of the wide tree: the binary leaves come to
+ * name them so, too. */
+kernel NO_VECTORIZE void collapse_indices(global float8 *restrict nodes,
                                           global const float8 *restrict items,
                                           global const uint *restrict leaf_roots, uint count,
                                           global uint *restrict indices)
 {
     uint b = get_global_id(0);
-    if (b < count) indices[b] = item_index(items[node_link(nodes[leaf_roots[b]])]);
+    if (b >= count) return;
+    global float8 *leaf = nodes + leaf_roots[b];
+    indices[b] = item_index(items[node_link(*leaf)]);
+    ((global uint *)leaf)[3] = BVH_LEAF | b;
 }

@@ -9,11 +9,13 @@
  * A key is Morton's code above the item's index. What stands for a run, to build a tree over, is an item
  * named after its first, with the number of items instead of the area.
  */
+#include "bvh/fetch.cl"
 #include "bvh/no_vectorize.cl"
 #include "bvh/items.cl"
 
 #define CURVE_BITS 11 /* of a digit */
 #define CURVE_INDEX 31
+#define CURVE_AHEAD 16 /* items */
 #define CURVE_SHARE 0.2f /* of the area of the last eight items: what one leaf more costs above it */
 #define CURVE_FAR 1e37f /* more than any sum of areas */
 
@@ -36,6 +38,7 @@ kernel NO_VECTORIZE void curve_keys(global const float8 *restrict items, uint co
     keys[i] = code << CURVE_INDEX | i;
 }
 
+inline uint curve_item(ulong key) { return key & (1ul << CURVE_INDEX) - 1; }
 inline uint curve_digit(ulong key, uint shift) { return key >> shift & ((1 << CURVE_BITS) - 1); }
 
 /* How often each digit stands among `run` neighbours; one work-item has so many. */
@@ -98,7 +101,8 @@ kernel NO_VECTORIZE void curve_cut(global const float8 *restrict items, global c
     float8 before = (float8)(CURVE_FAR); /* the least cost of all before the run, less that of one item less */
     before.s0 = 0.0f;
     for (uint i = begin; i < end; i++) {
-        float8 item = items[keys[i] & (1ul << CURVE_INDEX) - 1];
+        FETCH(items + curve_item(keys[min(i + CURVE_AHEAD, count - 1)]));
+        float8 item = items[curve_item(keys[i])];
         sorted[i] = item;
         x = curve_reach(x, item.s0);
         y = curve_reach(y, item.s1);

@@ -144,7 +144,7 @@ kernel NO_VECTORIZE void refit_wide8(global float8 *nodes, uint nodes_begin, uin
     nodes += nodes_begin;
     global float *row = (global float *)(nodes + (ulong)(begin + get_global_id(0)) * 8);
     for (uint k = 0; k < 8; k++, row++) {
-        if (row[56] == 0.0f) continue;
+        if (as_uint(row[56]) == 0) continue;
         uint word = as_uint(row[48]);
         float8 bounds;
         if (word & BVH_LEAF) {
@@ -162,6 +162,35 @@ kernel NO_VECTORIZE void refit_wide8(global float8 *nodes, uint nodes_begin, uin
         row[32] = bounds.s2;
         row[40] = -bounds.s6;
     }
+}
+
+/* Wide nodes that follow a binary tree: the box of each child is that of the binary node which it was. */
+kernel NO_VECTORIZE void refit_followers(global const float8 *restrict binary, global const uint *restrict totals,
+                                         uint count, global float *restrict nodes)
+{
+    if (get_global_id(0) >= min(count, totals[0])) return;
+    global float *row = nodes + (ulong)get_global_id(0) * 64;
+    for (uint k = 0; k < 8; k++, row++) {
+        if (as_uint(row[56]) == 0) continue;
+        float8 node = binary[as_uint(row[56]) - 1];
+        if (node.s0 == FLT_MAX) node.hi = (float4)(-FLT_MAX);
+        row[0] = node.s0;
+        row[8] = node.s4;
+        row[16] = node.s1;
+        row[24] = node.s5;
+        row[32] = node.s2;
+        row[40] = node.s6;
+    }
+}
+
+/* A buffer of a tree that was built anew takes the place of one, unless the tree has more wide nodes than there is
+ * room for. A work-item has 16 words. */
+kernel NO_VECTORIZE void refit_adopt(global const uint *restrict totals, uint room, uint count, uint words,
+                                     global const uint *restrict made, global uint *restrict adopts)
+{
+    if (get_global_id(0) >= count || totals[0] > room) return;
+    uint begin = get_global_id(0) * 16, end = min(begin + 16, words);
+    for (uint i = begin; i < end; i++) adopts[i] = made[i];
 }
 
 /* The bounds of item `at` of a compressed tree, whose record is written. */

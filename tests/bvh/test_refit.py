@@ -160,7 +160,7 @@ def test_one_of_several_trees_moves(device, building, layout):
     assert content(device, tree) == before
 
 
-@pytest.mark.parametrize("layout", ["shapes", *bvh.TREES])
+@pytest.mark.parametrize("layout", ["shapes_binary", "shapes_wide8", *bvh.TREES])
 @pytest.mark.parametrize("count", [0, 1, 300])
 def test_a_tree_over_boxes_follows_them(device, building, layout, count):
     """Every box is inside of all that stands above it, but for those that are none."""
@@ -204,7 +204,7 @@ def children_of(rows, at, layout):
     """Low, high corner, items and child nodes of what stands in a node."""
     if layout == "compact":
         yield from compact_children(rows, at)
-    elif layout == "wide8":
+    elif layout.endswith("wide8"):
         node = rows.reshape(-1, 8, 8)[at]
         for slot in np.flatnonzero(node[7]):
             word = int(node[6, slot].view(np.uint32))

@@ -193,42 +193,43 @@ def test_nothing_slips_through_from_afar(device, trace, layout):
 
 
 SPHERES = """
-#include "bvh/ray.cl"
 typedef global const float4 *ShapeTable;
-inline int shape_intersect(ShapeTable table, uint prim, const Ray *ray, float *t)
-{
-    float3 s = ray->o - table[prim].xyz;
-    float a = dot(ray->d, ray->d), b = dot(ray->d, s);
+inline int shape_intersect(ShapeTable table, uint prim, float3 o, float3 d, float tmin, float *t)
+{{
+    float3 s = o - table[prim].xyz;
+    float a = dot(d, d), b = dot(d, s);
     float c = dot(s, s) - table[prim].w * table[prim].w;
     float discriminant = b * b - a * c;
     if (discriminant < 0.0f) return 0;
     float at = (-b - sqrt(discriminant)) / a;
-    if (!(at > ray->tmin && at < *t)) return 0;
+    if (!(at > tmin && at < *t)) return 0;
     *t = at;
     return 1;
-}
+}}
+#include "bvh/{layout}.cl"
 #include "bvh/shapes.cl"
 kernel void closest(global const float *nodes, global const uint *indices, ShapeTable table,
                     global const float8 *rays, global float2 *hits, global int *met)
-{
+{{
     uint i = get_global_id(0);
     float8 r = rays[i];
     float t = r.s7;
     uint prim = shapes_closest(nodes, indices, table, r.s0, r.s1, r.s2, r.s4, r.s5, r.s6, r.s3, &t);
     hits[i] = (float2)(t, as_float(prim));
     met[i] = shapes_occluded(nodes, indices, table, r.s0, r.s1, r.s2, r.s4, r.s5, r.s6, r.s3, r.s7);
-}
+}}
 """
 
 
+@pytest.mark.parametrize("layout", ["shapes_binary", "shapes_wide8"])
 @pytest.mark.parametrize("count", [0, 1, 2, 700])
-def test_tree_over_shapes(device, count):
+def test_tree_over_shapes(device, count, layout):
     rng = np.random.default_rng(count)
     spheres = np.concatenate(
         [rng.random((max(count, 1), 3)), 0.02 + 0.05 * rng.random((max(count, 1), 1))], 1
     ).astype(np.float32)
     centre, radius = spheres[:count, None, :3], spheres[:count, None, 3:]
-    tree = bvh.build_boxes(device, np.concatenate([centre - radius, centre + radius], 1))
+    tree = bvh.build_boxes(device, np.concatenate([centre - radius, centre + radius], 1), layout)
     rays = rays_at(rng, spheres[rng.integers(0, max(count, 1), 2000), :3] + 0.02)
     s = rays[:, None, :3].astype(np.float64) - spheres[None, :count, :3]
     b, c = (s * rays[:, None, 4:7]).sum(-1), (s**2).sum(-1) - spheres[:count, 3] ** 2.0
@@ -238,7 +239,7 @@ def test_tree_over_shapes(device, count):
     nearest = t.min(1, initial=np.inf)
     sure = (np.abs(b**2 - c) > 1e-5).all(1) & (np.abs(t - 1e-4) > 1e-4).all(1)
 
-    program = dev.build(device, dev.assemble("test", {"test": SPHERES}))
+    program = dev.build(device, dev.assemble("test", {"test": SPHERES.format(layout=layout)}))
     kernel = program.kernel("closest")
     hits, met = np.zeros((2000, 2), np.float32), np.zeros(2000, np.int32)
     upload, download = _buffers(device)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from clpt import bvh
 from clpt.render.contract.features import Features
 
 # name: the files that stand for it, for a scene's features and the layout of its triangles
@@ -33,7 +34,9 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/trace.cl": lambda _, layout: (
         f"tracing/trace_{'lanes' if layout == 'brute' else 'one'}.cl",
     ),
-    "generated/shape_traversal.cl": lambda f, _: ("bvh/shapes.cl",) * bool(f.analytic),
+    "generated/shape_traversal.cl": lambda f, layout: (
+        (f"bvh/{bvh.shapes_layout(layout)}.cl", "bvh/shapes.cl") * bool(f.analytic)
+    ),
     "generated/instances.cl": lambda f, _: ("tracing/instances.cl",) * f.instances,
     "generated/instance_traversal.cl": lambda f, layout: (
         (f"tracing/instances_{layout}.cl", "tracing/trace_instances.cl") * f.instances

@@ -79,7 +79,7 @@ def build(
         triangles, offsets = former.triangles, former.offsets
     boxes = {}
     if lowered.features.analytic and layout != "brute":
-        boxes["shape"] = bvh.build_boxes(buffers.device, lowered.boxes)
+        boxes["shape"] = bvh.build_boxes(buffers.device, lowered.boxes, bvh.shapes_layout(layout))
     order, rows = np.zeros(0, np.uint32), instances.rows
     if lowered.features.instances:
         boxes["instance"] = bvh.build_boxes(buffers.device, instances.boxes, layout)

@@ -223,21 +223,54 @@ def test_they_move_on_the_device(monkeypatch: pytest.MonkeyPatch) -> None:
     assert agree(renderer, centers=after, to_world=np.eye(4), material=paint, emission=glow)
 
 
-def test_a_tree_is_built_anew_in_place() -> None:
+@pytest.mark.parametrize("layout", ["shapes_binary", "shapes_wide8"])
+def test_a_tree_is_built_anew_in_place(layout: str) -> None:
     """Over boxes that moved, bit for bit as a new one."""
     on = opened()
     old, new = (spheres.boxes([RNG.random((500, 4)).astype(np.float32)]) for _ in range(2))
-    tree, expected = (bvh.build_boxes(on, boxes) for boxes in (old, new))
+    tree, expected = (bvh.build_boxes(on, boxes, layout) for boxes in (old, new))
     building = bvh.Building(on)
     bvh.rebuild_boxes(building, tree, building.upload(new, np.float32))
+    same_trees(building, tree, expected)
+    again = bvh.build_boxes(on, old, layout)
+    bvh.refit_boxes(building, tree, building.upload(old, np.float32))
+    bvh.rebuild_boxes(building, tree, building.upload(old, np.float32))
+    same_trees(building, tree, again)
+
+
+def same_trees(building: bvh.Building, tree: bvh.Bvh, expected: bvh.Bvh) -> None:
+    """What rays read of a tree is that of another, to the bit."""
+    words = 64 * int(expected.stats["nodes"]) if tree.layout == "shapes_wide8" else 8
     for name, buffer in tree.buffers.items():
+        used = tree.count if name == "indices" else words
         found, wanted = (
-            building.read(b, buffer.size // 4, np.uint32) for b in (buffer, expected.buffers[name])
+            building.read(b, used, np.uint32) for b in (buffer, expected.buffers[name])
         )
-        used = slice(0, None) if name == "indices" else slice(0, 8)
-        np.testing.assert_array_equal(found[used], wanted[used])
-    assert not np.array_equal(
-        building.read(tree.buffers["nodes"], 8, np.float32)[:3], old.min(axis=(0, 1))
+        np.testing.assert_array_equal(found, wanted)
+
+
+def test_a_tree_for_which_there_is_no_room_is_refitted() -> None:
+    """It holds the boxes that moved, in the nodes that it had."""
+    on = opened()
+    building = bvh.Building(on)
+    balls = [spheres.boxes([RNG.random((500, 4)).astype(np.float32)]) for _ in range(8)]
+    trees = [bvh.build_boxes(on, boxes, "shapes_wide8") for boxes in balls]
+    sizes = [int(tree.stats["nodes"]) for tree in trees]
+    small, large = np.argmin(sizes), np.argmax(sizes)
+    assert sizes[small] < sizes[large]
+    nodes = building.allocate(256 * sizes[small])
+    building.stream.copy(nodes, trees[small].buffers["nodes"], byte_count=nodes.size)
+    buffers = {**trees[small].buffers, "nodes": nodes}
+    cramped = dataclasses.replace(trees[small], buffers=buffers)
+    moved = building.upload(balls[large], np.float32)
+    bvh.rebuild_boxes(building, cramped, moved)
+    found = building.read(nodes, nodes.size // 4, np.uint32)
+    building.stream.copy(nodes, trees[small].buffers["nodes"], byte_count=nodes.size)
+    bvh.refit_boxes(building, cramped, moved)
+    wanted = building.read(nodes, nodes.size // 4, np.uint32)
+    np.testing.assert_array_equal(found, wanted)
+    np.testing.assert_array_equal(
+        found[:48].view(np.float32).reshape(6, 8)[::2].min(axis=1) <= balls[large].min((0, 1)), True
     )
 
 
