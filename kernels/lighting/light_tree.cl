@@ -3,6 +3,9 @@
  * whose bits say which child leads to it at each level, and then the nodes: see
  * clpt/render/lowering/lights/light_tree.py. */
 #define LIGHT_TREE_SLACK 1e-3f /* of a cosine, so that rounding hides no light */
+/* The least chance of lights at places beside those that shine on the whole scene, and of the latter beside the former,
+ * where both may send light: what is in the way is not known. */
+#define LIGHT_TREE_LEAST 0.05f
 
 /* cos and sin of max(a - b, 0) for angles in [0, pi]. */
 inline void light_tree_minus(real cos_a, real sin_a, real cos_b, real sin_b, real *c, real *s)
@@ -26,7 +29,8 @@ inline vec3 light_tree_axis(natural word)
 
 /* What the lights below a node may send to p, all surfaces there shading them: their power, times the cosine at the
  * light, over the squared distance; and times the cosine at p, where light from one hemisphere only matters. The
- * cosines are the largest that any of these lights may have. */
+ * cosines are the largest that any of these lights may have. Lights that shine on the whole scene count as much
+ * everywhere. */
 inline real light_tree_importance(LightNode n, vec3 p, vec3 hemisphere)
 {
     vec3 from = sub3(p, n.center), axis = light_tree_axis(n.axis);
@@ -59,7 +63,9 @@ inline real light_tree_chance(Scene scene, integer pair, vec3 p, vec3 hemisphere
     real ia = light_tree_importance(a, p, hemisphere), ib = light_tree_importance(b, p, hemisphere), sum = ia + ib;
     *first = a.child;
     *second = b.child;
-    return sel(sum > 0.0f, ia / max_r(sum, (real)(1e-37f)), (real)(0.5f));
+    real chance = sel(sum > 0.0f, ia / max_r(sum, (real)(1e-37f)), (real)(0.5f));
+    mask apart = (b.radius < 0.0f) & (a.radius >= 0.0f) & (ia > 0.0f) & (ib > 0.0f);
+    return sel(apart, clamp_r(chance, (real)(LIGHT_TREE_LEAST), (real)(1.0f - LIGHT_TREE_LEAST)), chance);
 }
 
 inline integer light_tree_root(Scene scene)

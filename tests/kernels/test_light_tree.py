@@ -26,6 +26,12 @@ PICK = """
     r[1] = pmf;
     r[2] = u;
 """
+INFINITE = """
+    vec3 side = v3(x[3], x[4], x[5]), d = v3(x[6], x[7], x[8]);
+    Spectrum le;
+    infinite_light(scene, 0, v3(x[0], x[1], x[2]), side, d, lambdas, &le, &r[0]);
+"""
+LEAST = 0.05  # LIGHT_TREE_LEAST
 SAMPLE = """
     vec2 u = {x[4], x[5]};
     vec3 side = v3(x[6], x[7], x[8]);
@@ -135,6 +141,9 @@ def reference(there: Lit, p: np.ndarray, side: np.ndarray) -> np.ndarray:
         if child >= 0:
             total = value[child] + value[child + 1]
             share = value[child] / total if total > 0.0 else 0.5
+            apart = nodes["radius"][child] >= 0.0 > nodes["radius"][child + 1]
+            if apart and 0.0 < share < 1.0:
+                share = np.clip(share, LEAST, 1.0 - LEAST)
             chance[child], chance[child + 1] = chance[at] * share, chance[at] * (1.0 - share)
     leaves = nodes["child"] < 0
     found = np.zeros(count)
@@ -150,10 +159,29 @@ def test_probabilities_are_those_of_the_tree(sided):
     np.testing.assert_allclose(found.sum(axis=0), 1.0, atol=2e-5)
     expected = np.stack([reference(scene(), *q) for q in zip(p.T, side.T, strict=True)], axis=1)
     np.testing.assert_allclose(found, expected, rtol=2e-3, atol=2e-6)
-    # What is not placed keeps its share by power wherever p is.
-    rows = scene().rows.rows
-    for row in (0, 1):
-        np.testing.assert_allclose(found[row], rows["pmf"][row], rtol=1e-4)
+
+
+@pytest.mark.parametrize("radiance", [1e-6, 0.2, 1e6])
+def test_surroundings_are_chosen_by_the_irradiance_they_give(radiance):
+    """A small square that faces p from 2 m, beside a sky: each as it shines on p, within limits."""
+    square = Rectangle(to_world=T.scale(0.01), emission=Area(radiance=(3e4,) * 3))
+    sky = Constant(radiance=(radiance,) * 3)
+    p, side = np.array([[0.0], [0.0], [2.0]]), np.array([[0.0], [0.0], [-1.0]])
+    found = pmfs(lit([sky], [square], tree=True), p, side)[:, 0]
+    irradiance = np.pi * radiance, 3e4 * 0.02**2 / 2.0**2
+    share = np.clip(irradiance[0] / sum(irradiance), LEAST, 1.0 - LEAST)
+    np.testing.assert_allclose(found, [share, 1.0 - share], rtol=2e-3)
+
+
+def test_a_direction_to_the_surroundings_has_the_pdf_of_its_sample():
+    n = 4096
+    u, p = np.random.default_rng(6).random((3, n)), points(n, 8)
+    normal = sides(p)
+    r = scene()(SAMPLE, np.vstack([p, u, normal]), 5).astype(float)
+    sky = (r[3] > 0.0) & np.isclose(r[4], 0.02)
+    assert 0 < sky.sum() < n
+    given = np.vstack([p, normal, r[:3]])[:, sky]
+    np.testing.assert_allclose(scene()(INFINITE, given, 1)[0], r[3][sky], rtol=1e-4)
 
 
 def test_choices_follow_the_probabilities():

@@ -33,12 +33,13 @@ class Tree:
         return np.concatenate([self.trails, self.nodes.view(np.uint32)])
 
 
-def build(bounds: Bounds, pmf: Floats) -> Tree:
-    """Build the tree over lights with these bounds, n at least; pmf (n,): their share of the power.
+def build(bounds: Bounds, power: Floats) -> Tree:
+    """Build the tree over lights with these bounds; power (n,): of each, in any unit.
 
-    Lights that are not placed keep their share whatever the point; they have a branch of their own.
+    Lights that are not placed count the same whatever the point; they have a branch of their own.
     """
-    builder = _Builder(bounds, np.asarray(pmf, np.float64))
+    power = np.asarray(power, np.float64)
+    builder = _Builder(bounds, power / max(power.sum(), 1e-300))
     rows = np.arange(len(bounds))
     groups = [g for g in (rows[bounds.placed], rows[~bounds.placed]) if len(g)]
     if len(groups) == 2:
@@ -89,7 +90,7 @@ class _Builder:
         )
 
     def node(self, at: NDArray[np.int64], level: _Level, child: NDArray[np.int64]) -> None:
-        """Fill in nodes; those that are fixed get their radius afterwards."""
+        """Fill in nodes; those that are not placed get their radius afterwards."""
         nodes = np.zeros(len(at), NODE.dtype)
         nodes["center"] = 0.5 * (level.low + level.high)
         nodes["radius"] = 0.5 * np.linalg.norm(level.high - level.low, axis=1) * (1.0 + 1e-5)
@@ -102,14 +103,12 @@ class _Builder:
         """Make the nodes of a level, which are those of segments of `order`, and all below."""
         at = depth + np.arange(len(starts))
         free = int(at[-1]) + 1
-        apart = depth == 1  # two neighbours whose shares are fixed
         while len(order):
             level, counts = self.summed(order, starts), _counts(starts, len(order))
             inner = counts > 1
             child = np.where(inner, free + 2 * (np.cumsum(inner) - 1), -1 - order[starts])
             self.node(at, level, child)
-            self.nodes["radius"][at[~self.bounds.placed[order[starts]] | apart]] = -1.0
-            apart = False
+            self.nodes["radius"][at[~self.bounds.placed[order[starts]]]] = -1.0
             kept = np.repeat(inner, counts)
             order, counts = order[kept], counts[inner]
             if not len(order):
