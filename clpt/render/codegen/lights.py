@@ -7,7 +7,16 @@ from collections.abc import Iterable
 from clpt.records import LIGHT, SHAPE
 from clpt.render.codegen.dispatch import Case, Function, active, choose, function, masked
 from clpt.render.contract import light_records, shape_records
-from clpt.render.contract.light_records import BASES, BOTH, INFINITE, KINDS, RECORDS, VALUES
+from clpt.render.contract.light_records import (
+    BASES,
+    BOTH,
+    INFINITE,
+    KINDS,
+    LINE,
+    RECORDS,
+    VALUES,
+    WIDTH,
+)
 
 
 def virtual_files() -> dict[str, str]:
@@ -81,11 +90,11 @@ def point_text(kind: str, uv: str) -> list[str]:
 def _tree_text() -> list[str]:
     """Nodes of the tree over lights, and how one goes down in it."""
     node = light_records.NODE
-    child = next(member.word for member in node.members if member.name == "child")
     return [
         node.row_text(),
         f"#define LIGHT_NODE_WORDS {node.words}",
-        f"#define LIGHT_NODE_CHILD {child}",
+        f"#define LIGHT_TREE_WIDTH {WIDTH}",
+        f"#define LIGHT_TREE_LINE {LINE}",
         '#include "lighting/light_tree.cl"',
     ]
 

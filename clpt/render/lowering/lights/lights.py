@@ -128,7 +128,7 @@ def light_rows(
 
 
 def _tree_words(bounds: light_bounds.Bounds, importance: np.ndarray) -> NDArray[np.uint32]:
-    return light_tree.build(bounds, importance).words()
+    return light_tree.build(bounds, importance).words(LIGHT.words * len(bounds))
 
 
 def _whole(shape: Shape) -> bool:
