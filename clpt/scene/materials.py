@@ -85,6 +85,7 @@ class Material(Kind):
     fluoresces: ClassVar[bool] = False  # light may leave at another wavelength: it has `shift`
     is_null: ClassVar[bool] = False  # light goes on as if nothing were there, to lights as well
     no_back: ClassVar[bool] = False  # its back is not there
+    absorbs: ClassVar[bool] = False  # all light, where its albedo is 0: none is sought there
 
     @property
     def transmits(self) -> bool:
@@ -103,6 +104,8 @@ class Material(Kind):
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Diffuse(Material):
     """Lambertian reflection of the front side."""
+
+    absorbs = True
 
     reflectance: Textured = reflectance(0.5, "albedo")
 

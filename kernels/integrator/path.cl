@@ -36,21 +36,28 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
     Bsdf m = scatter.bsdf;
     Frame frame = scatter.shading.frame;
     vec3 wo = scatter.wo;
+#if BSDF_ABSORBS /* as the surfaces of lights mostly do */
+    next = next & (spectrum_max(bsdf_albedo(m)) > 0.0f);
+#endif
 
 #if USES_LIGHTS && !BSDF_DELTA
     /* Next-event estimation. */
     vec3 hemisphere = vertex_hemisphere(frame, wo);
-    vec2 point = sampler_pair(sampler, scatter.dimension + DIMENSION_LIGHT);
-    LightSample ls = light_sample(scene, s.p, hemisphere, scatter.choice.x, point, scatter.lambdas);
-    vec3 wi = to_local(frame, ls.wi);
-    Spectrum f = spectrum_scale(bsdf_eval(m, wo, wi), shading_frame_share(scatter.shading, ls.wi));
-    real w = sel(ls.pdf < 0.0f, (real)(1.0f), mis_weight(ls.pdf, hero_pdf(m, wo, wi, ratio)));
-    mask shine = next & (ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
-    w = w / sel(shine, fabs(ls.pdf), (real)(1.0f));
-    Spectrum value = spectrum_scale(spectrum_mul(spectrum_mul(beta, f), ls.radiance), w);
-    value = vertex_beyond(scene, v, ls.wi, ls.t, scatter.lambdas, value);
-    shadow_toward(shadow, at, active, shine, s, ls, value);
-    state += sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
+    if (any(next)) {
+        vec2 point = sampler_pair(sampler, scatter.dimension + DIMENSION_LIGHT);
+        LightSample ls = light_sample(scene, s.p, hemisphere, scatter.choice.x, point, scatter.lambdas);
+        vec3 wi = to_local(frame, ls.wi);
+        Spectrum f = spectrum_scale(bsdf_eval(m, wo, wi), shading_frame_share(scatter.shading, ls.wi));
+        real w = sel(ls.pdf < 0.0f, (real)(1.0f), mis_weight(ls.pdf, hero_pdf(m, wo, wi, ratio)));
+        mask shine = next & (ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
+        w = w / sel(shine, fabs(ls.pdf), (real)(1.0f));
+        Spectrum value = spectrum_scale(spectrum_mul(spectrum_mul(beta, f), ls.radiance), w);
+        value = vertex_beyond(scene, v, ls.wi, ls.t, scatter.lambdas, value);
+        shadow_toward(shadow, at, active, shine, s, ls, value);
+        state += sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
+    } else {
+        store_shadow_t(shadow, at, active, (real)(-1.0f));
+    }
 #endif
 
     /* The next direction. */

@@ -1,13 +1,13 @@
 /* What all infinite lights add to a path that leaves the scene along d [W m^-2 sr^-1 nm^-1]. The direction was chosen
- * with `pdf` [1/sr] (below 0: delta) at a surface that sends light to `hemisphere`, see interface/light.cl; the power
- * heuristic weighs that against its choice on the light (Veach 1997, 9.2.4). */
-inline Spectrum infinite_gather(Scene scene, vec3 hemisphere, vec3 d, real pdf, Wavelengths lambdas)
+ * with `pdf` [1/sr] (below 0: delta) at a point p of a surface that sends light to `hemisphere`, see
+ * interface/light.cl; the power heuristic weighs that against its choice on the light (Veach 1997, 9.2.4). */
+inline Spectrum infinite_gather(Scene scene, vec3 p, vec3 hemisphere, vec3 d, real pdf, Wavelengths lambdas)
 {
     Spectrum sum = spectrum_of(0.0f);
     for (int row = 0; row < scene.settings->infinite_count; row++) {
         Spectrum radiance;
         real other;
-        infinite_light(scene, row, hemisphere, d, lambdas, &radiance, &other);
+        infinite_light(scene, row, p, hemisphere, d, lambdas, &radiance, &other);
         sum = spectrum_madd(radiance, sel(pdf < 0.0f, (real)(1.0f), mis_weight(pdf, other)), sum);
     }
     return sum;

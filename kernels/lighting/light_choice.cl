@@ -37,11 +37,11 @@ inline integer light_pick(Scene scene, real *u, real other)
     return sel_i(stay, row, l.alias);
 }
 
-/* With the probability of the row in it; a delta light keeps its mark and carries it as a factor. */
+/* With the probability of the row in it, 0 for none; a delta light keeps its mark and carries it as a factor. */
 inline LightSample light_chosen(LightSample s, real pmf)
 {
     mask delta = s.pdf < 0.0f;
     s.radiance = spectrum_scale(s.radiance, sel(delta, 1.0f / max_r(pmf, (real)(1e-30f)), (real)(1.0f)));
-    s.pdf = sel(delta, s.pdf, s.pdf * pmf);
+    s.pdf = sel(delta & (pmf > 0.0f), s.pdf, max_r(s.pdf, (real)(0.0f)) * pmf);
     return s;
 }

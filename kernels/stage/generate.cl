@@ -23,7 +23,8 @@ inline Spectrum path_radiance(Scene scene, Slab path, uint at, PathEnd end, Wave
     if (any(sky)) {
         real pdf = load_path_pdf(path, at);
         vec3 d = sel3(sky, load_path_d(path, at), v3(0.0f, 0.0f, 1.0f)); /* a slot without a pixel has none */
-        Spectrum arrives = infinite_gather(scene, load_path_sampled_hemisphere(path, at), d, pdf, lambdas);
+        vec3 from = madd3(d, -path_null_distance(path, at), load_path_o(path, at)), side = path_hemisphere(path, at);
+        Spectrum arrives = infinite_gather(scene, from, side, d, pdf, lambdas);
 #if USES_ABSORPTION
         integer medium = sel_i(sky, load_path_medium(path, at), (integer)(0));
         arrives = spectrum_mul(arrives, medium_transmittance(scene, medium, (real)(FAR), lambdas));

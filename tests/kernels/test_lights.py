@@ -47,7 +47,8 @@ SAMPLE = """
 INFINITE = """
     Spectrum s;
     real pdf;
-    infinite_light(scene, 0, v3(0.0f, 0.0f, 0.0f), v3(x[0], x[1], x[2]), lambdas, &s, &pdf);
+    vec3 none = v3(0.0f, 0.0f, 0.0f);
+    infinite_light(scene, 0, none, none, v3(x[0], x[1], x[2]), lambdas, &s, &pdf);
     r[0] = s.x; r[1] = s.y; r[2] = s.z; r[3] = pdf;
 """
 PDF = """
@@ -61,7 +62,7 @@ SIDED = """
     vec3 side = v3(x[0], x[1], x[2]);
     LightSample s = light_sample(scene, v3(0.0f, 0.0f, 0.0f), side, 0.0f, u, lambdas);
     Spectrum le;
-    infinite_light(scene, 0, side, s.wi, lambdas, &le, r + 8);
+    infinite_light(scene, 0, v3(0.0f, 0.0f, 0.0f), side, s.wi, lambdas, &le, r + 8);
     r[0] = s.wi.x; r[1] = s.wi.y; r[2] = s.wi.z; r[3] = s.pdf;
     r[4] = s.radiance.x; r[5] = s.radiance.y; r[6] = s.radiance.z; r[7] = le.x;
 """

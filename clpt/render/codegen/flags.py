@@ -62,6 +62,7 @@ MATERIAL: dict[str, Callable[[Features, type[Material]], str | int]] = {
     "BSDF_KIND": lambda f, cls: f.leaves.index(cls),
     "BSDF_DELTA": lambda f, cls: cls.delta,
     "BSDF_TRANSMITS": lambda f, cls: int(cls.kind in f.transmitting),  # kernels calculate with it
+    "BSDF_ABSORBS": lambda f, cls: cls.absorbs,
     "BSDF_CHROMATIC": lambda f, cls: cls.chromatic,
     "BSDF_FLUORESCES": fluoresces,
     "BSDF_IS_NULL": lambda f, cls: cls.is_null and f.null_surfaces,

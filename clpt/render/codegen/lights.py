@@ -7,7 +7,16 @@ from collections.abc import Iterable
 from clpt.records import LIGHT, SHAPE
 from clpt.render.codegen.dispatch import Case, Function, active, choose, function, masked
 from clpt.render.contract import light_records, shape_records
-from clpt.render.contract.light_records import BASES, BOTH, INFINITE, KINDS, RECORDS, VALUES
+from clpt.render.contract.light_records import (
+    BASES,
+    BOTH,
+    INFINITE,
+    KINDS,
+    LINE,
+    RECORDS,
+    VALUES,
+    WIDTH,
+)
 
 
 def virtual_files() -> dict[str, str]:
@@ -32,8 +41,8 @@ def dispatch_text(
     light_sample(scene, p, hemisphere, pick, u, lambdas): chooses a light and a direction to it
     light_pdf(scene, row, p, hemisphere, wi, t, n): of it, [1/sr], for a ray that met a shape
     light_shows(scene, row, front): whether the side of a shape that was met emits
-    infinite_light(scene, row, hemisphere, d, lambdas, ...): radiance and pdf of one infinite light
-    infinite_gather(scene, hemisphere, d, pdf, lambdas): what they add to a path that left the scene
+    infinite_light(scene, row, p, hemisphere, d, lambdas, ...): radiance and pdf of an infinite one
+    infinite_gather(scene, p, hemisphere, d, pdf, lambdas): what they add to a path that left
     """
     present = [kind for kind in KINDS if kind in set(kinds)]
     others = [kind for kind in present if kind in RECORDS]
@@ -50,7 +59,7 @@ def dispatch_text(
     parts.append(_sides_text(two_sided))
     parts.append(_sample_text(others, surfaces, textured, two_sided, tree))
     parts.append(_pdf_text(surfaces, tree))
-    parts += _infinite_text([kind for kind in others if kind in INFINITE])
+    parts += _infinite_text([kind for kind in others if kind in INFINITE], tree)
     return "\n".join(parts) + "\n"
 
 
@@ -81,11 +90,11 @@ def point_text(kind: str, uv: str) -> list[str]:
 def _tree_text() -> list[str]:
     """Nodes of the tree over lights, and how one goes down in it."""
     node = light_records.NODE
-    child = next(member.word for member in node.members if member.name == "child")
     return [
         node.row_text(),
         f"#define LIGHT_NODE_WORDS {node.words}",
-        f"#define LIGHT_NODE_CHILD {child}",
+        f"#define LIGHT_TREE_WIDTH {WIDTH}",
+        f"#define LIGHT_TREE_LINE {LINE}",
         '#include "lighting/light_tree.cl"',
     ]
 
@@ -143,7 +152,6 @@ def _sample_text(
 
 
 def _pdf_text(surfaces: list[str], tree: bool) -> str:
-    pmf = "light_tree_pmf(scene, row, p, hemisphere)" if tree else "l.pmf"
     return Function(
         "real light_pdf(Scene scene, integer row, vec3 p, vec3 hemisphere, vec3 wi, real t, "
         "vec3 n)",
@@ -153,11 +161,16 @@ def _pdf_text(surfaces: list[str], tree: bool) -> str:
             for kind in surfaces
         ],
         ("LightRow l = light_at(scene, row);",),
-        f"value * {pmf}",
+        f"value * {_pmf_text(tree)}",
     ).text()
 
 
-def _infinite_text(kinds: list[str]) -> list[str]:
+def _pmf_text(tree: bool) -> str:
+    """The chance of the light `l` in row `row`, for a surface at p."""
+    return "light_tree_pmf(scene, (integer)(row), p, hemisphere)" if tree else "l.pmf"
+
+
+def _infinite_text(kinds: list[str], tree: bool) -> list[str]:
     """`row` is the same in all lanes."""
     if not kinds:
         return []
@@ -171,10 +184,11 @@ def _infinite_text(kinds: list[str]) -> list[str]:
             kind_test(kind, kinds),
             f"{RECORDS[kind].name} light = {row_text(kind)};",
             f"*radiance = spectrum_sel(m, {kind}_radiance(light, scene, d, lambdas), *radiance);",
-            f"*pdf = sel(m, {kind}_pdf(light, scene, hemisphere, d) * l.pmf, *pdf);",
+            f"*pdf = sel(m, {kind}_pdf(light, scene, hemisphere, d), *pdf);",
         )
+    rows.append(f"*pdf *= {_pmf_text(tree)};")
     head = (
-        "void infinite_light(Scene scene, int row, vec3 hemisphere, vec3 d, Wavelengths lambdas, "
-        "Spectrum *radiance, real *pdf)"
+        "void infinite_light(Scene scene, int row, vec3 p, vec3 hemisphere, vec3 d, "
+        "Wavelengths lambdas, Spectrum *radiance, real *pdf)"
     )
     return [function(head, *rows), '#include "lighting/infinite.cl"']

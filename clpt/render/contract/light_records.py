@@ -132,14 +132,18 @@ BASES = {"spectral_envmap": "envmap", "image_spot": "spot"}  # whose functions a
 KINDS = (*RECORDS, *shape_records.RECORDS)  # LightRow.kind is a position in this tuple
 NODE = Record(
     "LightNode",
-    "A node of the tree over lights; the two children of a node are neighbours.",
+    "A node of the tree over lights; children of a node are a group, neighbours in the table.",
     center=("vec3", "of the sphere around its lights [m]"),
     radius=("real", "[m]; below 0: it shines on the whole scene, power is all that counts"),
-    axis=("natural", "of the cone around its lights' normals: 16 bits each of an octahedral map"),
-    cones=("natural", "cosines of theta_o, in 16 bits, and of theta_e, in 15, and the bit `both`"),
+    axis=("vec3", "of the cone around its lights' normals, unit length"),
     power=("real", "of all its lights"),
-    child=("integer", "the first of its children; below 0: -1 - the row in `lights`"),
+    cos_o=("real", "of the angle by which normals lean from the axis"),
+    sin_o=("real", "below 0: light leaves against the normals too"),
+    cos_e=("real", "of the angle by which light leans from a normal"),
+    child=("integer", "the group of its children; below 0: -1 - the row in `lights`"),
 )
+WIDTH = 4  # nodes of a group
+LINE = 16  # words, to a multiple of which the first group is aligned
 
 # What the functions of lights return, see kernels/interface/light.cl and emission.cl.
 LIGHT_SAMPLE = Record(

@@ -39,24 +39,6 @@ class Cones:
         for field in fields(self):
             getattr(self, field.name)[rows] = getattr(others, field.name)
 
-    def packed(self, slack: float) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
-        """Return the axes and the angles in a word each, `slack` [rad] wider."""
-        x, y, z = (self.axis / np.abs(self.axis).sum(axis=1, keepdims=True)).T
-        fold = z < 0.0
-        u = np.where(fold, (1.0 - np.abs(y)) * np.copysign(1.0, x), x)
-        v = np.where(fold, (1.0 - np.abs(x)) * np.copysign(1.0, y), y)
-        axis = _steps(u, 16) | _steps(v, 16) << np.uint32(16)
-        o = np.cos(np.minimum(self.theta_o + slack, np.pi))
-        e = np.cos(np.minimum(self.theta_e + slack, np.pi))
-        angles = _steps(o, 16, down=True) | _steps(e, 15, down=True) << np.uint32(16)
-        return axis, angles | self.both.astype(np.uint32) << np.uint32(31)
-
-
-def _steps(values: Floats, bits: int, *, down: bool = False) -> NDArray[np.uint32]:
-    """Values in [-1, 1] as whole numbers of so many bits."""
-    scaled = (np.clip(values, -1.0, 1.0) + 1.0) * 0.5 * ((1 << bits) - 1)
-    return (np.floor(scaled) if down else np.rint(scaled)).astype(np.uint32)
-
 
 def around(cones: Cones, starts: NDArray[np.int64]) -> Cones:
     """Return the cones around the segments of `cones` that begin at `starts`."""

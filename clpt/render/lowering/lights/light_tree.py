@@ -2,7 +2,8 @@
 
 Conty Estevez and Kulla 2018: a node bounds where its lights are (a box) and where they shine
 (cones), and sums their power. It is built from the top by their surface area orientation
-heuristic, over bins as in pbrt-v4 (12.6.3), all nodes of a level at once.
+heuristic, over bins as in pbrt-v4 (12.6.3), all nodes of a level at once. Every second level is
+then left out: a point looks at up to WIDTH nodes at once, which are neighbours.
 """
 
 from __future__ import annotations
@@ -12,33 +13,38 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.render.contract.light_records import NODE
+from clpt.render.contract.light_records import LINE, NODE, WIDTH
 from clpt.render.lowering.lights.light_bounds import Bounds, Floats
 from clpt.render.lowering.lights.light_cones import Cones, around, measure, merged
 
 BINS = 12  # places along an axis where a node may be split
-DEEPEST = 31  # levels below the root: bits of a trail
-SLACK = 2e-4  # [rad] by which cones are widened, for what 16 bits round
+DEEPEST = 31  # levels below the root, half of which are left: two bits each of a trail
+SLACK = 2e-4  # [rad] by which cones are widened, for what is rounded
 
 
 @dataclass(frozen=True)
 class Tree:
-    """nodes (k,) structured as NODE; trails (n,) uint32: which child leads to a light, by level."""
+    """nodes (k, WIDTH) structured as NODE, a group each, the root's first; groups that are not full
+    have nodes of power 0 behind. trails (n,) uint32: which nodes lead to a light, from the root.
+    """
 
     nodes: np.ndarray
     trails: NDArray[np.uint32]
 
-    def words(self) -> NDArray[np.uint32]:
-        """Return what stands behind the rows in `lights`: a trail for every row, then the nodes."""
-        return np.concatenate([self.trails, self.nodes.view(np.uint32)])
+    def words(self, before: int) -> NDArray[np.uint32]:
+        """Return what stands behind the rows in `lights`, which have so many words: a trail for
+        every row, and then the groups, aligned."""
+        gap = np.zeros(-(before + len(self.trails)) % LINE, np.uint32)
+        return np.concatenate([self.trails, gap, self.nodes.ravel().view(np.uint32)])
 
 
-def build(bounds: Bounds, pmf: Floats) -> Tree:
-    """Build the tree over lights with these bounds, n at least; pmf (n,): their share of the power.
+def build(bounds: Bounds, power: Floats) -> Tree:
+    """Build the tree over lights with these bounds; power (n,): of each, in any unit.
 
-    Lights that are not placed keep their share whatever the point; they have a branch of their own.
+    Lights that are not placed count the same whatever the point; they have a branch of their own.
     """
-    builder = _Builder(bounds, np.asarray(pmf, np.float64))
+    power = np.asarray(power, np.float64)
+    builder = _Builder(bounds, power / max(power.sum(), 1e-300))
     rows = np.arange(len(bounds))
     groups = [g for g in (rows[bounds.placed], rows[~bounds.placed]) if len(g)]
     if len(groups) == 2:
@@ -47,9 +53,38 @@ def build(bounds: Bounds, pmf: Floats) -> Tree:
         starts, depth = np.array([0, len(groups[0])]), 1
     else:
         order, starts, depth = rows, np.array([0]), 0
-    builder.trails[order] = np.repeat(np.arange(len(starts)), _counts(starts, len(order)))
     builder.run(order, starts, depth)
-    return builder.tree()
+    return _widened(builder.nodes[: builder.count], apart=depth == 1)
+
+
+def _widened(nodes: np.ndarray, apart: bool) -> Tree:
+    """The groups of a tree of two children a node (k,) structured as NODE.
+
+    apart: keep the root's two children as a group of their own.
+    """
+    empty = np.zeros(1, NODE.dtype)
+    empty["child"] = -1
+    nodes = np.concatenate([nodes, empty])
+    trails = np.zeros(int((nodes["child"][:-1] < 0).sum()), np.uint32)
+    if nodes["child"][0] < 0:
+        return Tree(nodes[[[0] + [-1] * (WIDTH - 1)]], trails)
+    groups, inner, trail = [], np.array([0]), np.zeros(1, np.uint32)
+    made, depth = 1, 0
+    while len(inner):
+        pairs = nodes["child"][inner][:, None] + [0, 1]
+        down = nodes["child"][pairs]
+        split = (down >= 0) & (depth > 0 or not apart)
+        first, second = np.where(split, down, pairs), np.where(split, down + 1, -1)
+        slots = np.stack([first, second], axis=2).reshape(-1, WIDTH)
+        group = nodes[slots]
+        trail = trail[:, None] | np.arange(WIDTH, dtype=np.uint32) << np.uint32(2 * depth)
+        leaf, more = (group["child"] < 0) & (slots >= 0), group["child"] >= 0
+        trails[-1 - group["child"][leaf]] = trail[leaf]
+        inner, trail = slots[more], trail[more]
+        group["child"][more] = made + np.arange(len(inner))
+        groups.append(group)
+        made, depth = made + len(inner), depth + 1
+    return Tree(np.concatenate(groups), trails)
 
 
 @dataclass
@@ -67,16 +102,12 @@ def _counts(starts: NDArray[np.int64], n: int) -> NDArray[np.int64]:
 
 
 class _Builder:
-    """The state of one `build`: nodes so far, and the trail of every light."""
+    """The nodes of a tree of two children a node, so far."""
 
     def __init__(self, bounds: Bounds, power: Floats):
         self.bounds, self.power = bounds, power
         self.nodes = np.zeros(2 * len(bounds) + 1, NODE.dtype)
         self.count = 1
-        self.trails = np.zeros(len(bounds), np.uint32)
-
-    def tree(self) -> Tree:
-        return Tree(self.nodes[: self.count], self.trails)
 
     def summed(self, order: NDArray[np.int64], starts: NDArray[np.int64]) -> _Level:
         """Bounds and power over the segments of `order` that begin at `starts`."""
@@ -89,11 +120,14 @@ class _Builder:
         )
 
     def node(self, at: NDArray[np.int64], level: _Level, child: NDArray[np.int64]) -> None:
-        """Fill in nodes; those that are fixed get their radius afterwards."""
+        """Fill in nodes; those that are not placed get their radius afterwards."""
         nodes = np.zeros(len(at), NODE.dtype)
         nodes["center"] = 0.5 * (level.low + level.high)
         nodes["radius"] = 0.5 * np.linalg.norm(level.high - level.low, axis=1) * (1.0 + 1e-5)
-        nodes["axis"], nodes["cones"] = level.cones.packed(SLACK)
+        cones = level.cones
+        theta_o, theta_e = (np.minimum(a + SLACK, np.pi) for a in (cones.theta_o, cones.theta_e))
+        nodes["axis"], nodes["cos_o"], nodes["cos_e"] = cones.axis, np.cos(theta_o), np.cos(theta_e)
+        nodes["sin_o"] = np.where(cones.both, -1.0, 1.0) * np.maximum(np.sin(theta_o), 1e-30)
         nodes["power"], nodes["child"] = level.power, child
         self.nodes[at] = nodes
         self.count = max(self.count, int(at.max()) + 1)
@@ -102,14 +136,12 @@ class _Builder:
         """Make the nodes of a level, which are those of segments of `order`, and all below."""
         at = depth + np.arange(len(starts))
         free = int(at[-1]) + 1
-        apart = depth == 1  # two neighbours whose shares are fixed
         while len(order):
             level, counts = self.summed(order, starts), _counts(starts, len(order))
             inner = counts > 1
             child = np.where(inner, free + 2 * (np.cumsum(inner) - 1), -1 - order[starts])
             self.node(at, level, child)
-            self.nodes["radius"][at[~self.bounds.placed[order[starts]] | apart]] = -1.0
-            apart = False
+            self.nodes["radius"][at[~self.bounds.placed[order[starts]]]] = -1.0
             kept = np.repeat(inner, counts)
             order, counts = order[kept], counts[inner]
             if not len(order):
@@ -119,8 +151,6 @@ class _Builder:
             segment = np.repeat(np.arange(len(counts)), counts)
             order = order[np.argsort(2 * segment + side, kind="stable")]
             right = np.add.reduceat(side.astype(np.int64), starts)
-            side = np.sort(2 * segment + side) & 1
-            self.trails[order] |= (side << depth).astype(np.uint32)
             starts = np.stack([starts, starts + counts - right], axis=1).ravel()
             at = free + np.arange(2 * len(counts))
             free += 2 * len(counts)

@@ -69,11 +69,15 @@ class LightRows:
 
 
 class Block(NamedTuple):
-    """The rows of one lamp or emitter, their power [W/nm], and where they shine."""
+    """The rows of one lamp or emitter, their power [W/nm], and where they shine.
+
+    importance: how much they count in a tree, see `non_shape_lights`; their power by default.
+    """
 
     rows: np.ndarray
     power: np.ndarray
     bounds: light_bounds.Bounds
+    importance: np.ndarray | None = None
 
 
 def light_rows(
@@ -105,8 +109,10 @@ def light_rows(
         apart = sum(bool(block.bounds.placed.any()) for block in blocks)
         if tree_from is not None and max(len(rows), PLACED_LIGHT_WEIGHT * apart) >= tree_from:
             bounds = light_bounds.concatenated([block.bounds for block in blocks])
-            by = same, content(*vars(bounds).values())
-            tree = encoder.cache(_tree_words, bounds, weights / weights.sum(), by=by)
+            counts = (b.power if b.importance is None else b.importance for b in blocks)
+            importance = np.concatenate([*counts])
+            by = content(importance, *vars(bounds).values())
+            tree = encoder.cache(_tree_words, bounds, importance, by=(by,))
     kinds = tuple(KINDS[i] for i in np.unique(rows["kind"]))
     return LightRows(
         rows=rows,
@@ -121,8 +127,8 @@ def light_rows(
     )
 
 
-def _tree_words(bounds: light_bounds.Bounds, pmf: np.ndarray) -> NDArray[np.uint32]:
-    return light_tree.build(bounds, pmf).words()
+def _tree_words(bounds: light_bounds.Bounds, importance: np.ndarray) -> NDArray[np.uint32]:
+    return light_tree.build(bounds, importance).words(LIGHT.words * len(bounds))
 
 
 def _whole(shape: Shape) -> bool:
@@ -139,9 +145,10 @@ def _block(count: int, kind: str, params: ArrayLike, radiance: int, shape_row: i
 
 def _lamp_block(lamp: Light, encoder: Encoder, scene_radius: float) -> Block:
     """The row of a light that is not on a shape."""
-    kind, at, radiance, power = lower_lamp(lamp, encoder, scene_radius)
-    row = _block(1, kind, at, radiance, -1)
-    return Block(row, np.array([power]), light_bounds.of_lamp(lamp))
+    made = lower_lamp(lamp, encoder, scene_radius)
+    row = _block(1, made.kind, made.row, made.radiance, -1)
+    bounds = light_bounds.of_lamp(lamp)
+    return Block(row, np.array([made.power]), bounds, np.array([made.importance]))
 
 
 def _emitter_block(emitter: Emitter, encoder: Encoder) -> Block:

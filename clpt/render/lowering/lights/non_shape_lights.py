@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,12 +31,24 @@ def blank_row() -> NDArray[np.uint32]:
     return np.pad(words.view(np.uint32), (0, longest - RECORDS["spectral_envmap"].words))
 
 
-def lower_lamp(lamp: Light, encoder: Encoder, scene_radius: float) -> tuple[str, int, int, float]:
+class Lowered(NamedTuple):
+    """A light in the tables: its record's name, its row and its emission in `light_params`.
+
+    power, importance: as the functions of these names have them.
+    """
+
+    kind: str
+    row: int
+    radiance: int
+    power: float
+    importance: float
+
+
+def lower_lamp(lamp: Light, encoder: Encoder, scene_radius: float) -> Lowered:
     """Put a light into the tables.
 
-    Return its record's name, its row and its emission in `light_params`, and its power [W/nm]: an
-    estimate, the mean of channels. scene_radius: of a sphere around the scene [m]. Raises
-    SceneError for a light that has no position or no direction.
+    scene_radius: of a sphere around the scene [m]. Raises SceneError for a light that has no
+    position or no direction.
     """
     if lamp.kind not in RECORDS:
         raise SceneError(f"a light of kind {lamp.kind!r} is a shape's `emission`", where="lights")
@@ -60,7 +72,8 @@ def lower_lamp(lamp: Light, encoder: Encoder, scene_radius: float) -> tuple[str,
     for name, value in members.items():
         words[name] = value
     at = encoder.store.append("light_params", words.view(np.uint32))
-    return kind, at, radiance, power(lamp, strength, scene_radius)
+    sent = power(lamp, strength, scene_radius)
+    return Lowered(kind, at, radiance, sent, importance(lamp, strength, sent))
 
 
 def _emissions(lamp: Light) -> dict[str, Any]:
@@ -139,6 +152,17 @@ def power(lamp: Light, strength: float, scene_radius: float) -> float:
         return 4.0 * np.pi * strength
     disk = np.pi * scene_radius**2
     return disk * strength if lamp.reach == "distant" else 4.0 * np.pi * disk * strength
+
+
+def importance(lamp: Light, strength: float, power: float) -> float:
+    """Return how much a light off all shapes counts in a tree over lights.
+
+    A small flat light of power P gives an irradiance of P / pi at a metre, so that of a light
+    without a place counts pi times.
+    """
+    if lamp.reach == "placed" and getattr(lamp, "falloff", True):
+        return power
+    return np.pi * strength * (np.pi if lamp.reach == "infinite" else 1.0)
 
 
 def brightness(value: Any) -> float:
