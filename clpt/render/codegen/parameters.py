@@ -36,9 +36,13 @@ def array_size(param: Param) -> int:
     return ORDERS_WORDS if param.role == "orders" else 1
 
 
-def struct_text(cls: type[Kind]) -> str:
-    """Return `typedef struct {...} Kind;` with one member per device parameter."""
-    rows = []
+def struct_text(cls: type[Kind], sources: Mapping[str, frozenset[str]] | None = None) -> str:
+    """Return `typedef struct {...} Kind;` with one member per device parameter.
+
+    Before it, for a lobe that a parameter of 0 leaves out, `USES_KIND_PARAMETER`: whether the scene
+    has it. sources: of each parameter; without, there are all lobes.
+    """
+    rows, uses = [], []
     for name, param in device_params(cls).items():
         size = f"[{array_size(param)}]" if array_size(param) > 1 else ""
         rows.append(f"    {lane_type(param)} {name}{size}; /* {param.doc} */")
@@ -46,8 +50,11 @@ def struct_text(cls: type[Kind]) -> str:
         rows.append("    real luminance; /* of base_color, where a tint is above 0 */")
     if cls.needs_wavelengths:
         rows.append("    Spectrum lambdas; /* the path's wavelengths [nm] */")
+    for name in (name for name, param in device_params(cls).items() if param.lobe):
+        used = not sources or sources.get(name) != {"none"}
+        uses.append(f"#define USES_{cls.kind.upper()}_{name.upper()} {int(used)}")
     rows = rows or ["    integer unused; /* no parameters */"]
-    return "\n".join(["typedef struct {", *rows, f"}} {cls.__name__};", ""])
+    return "\n".join([*uses, "typedef struct {", *rows, f"}} {cls.__name__};", ""])
 
 
 def word_before(cls: type[Kind], name: str) -> int:
