@@ -1,8 +1,9 @@
 """Kernel text of the parameters of kinds: structs, and the loaders that fill them.
 
 A parameter's sources are where its values in a scene come from: "none" (0, which leaves a lobe
-out), "constant", "table" (a tabulated spectrum), "texture", "layers". A loader reads from those
-that occur.
+out), "constant", "grey" (the same at all wavelengths: an index), "table" (a tabulated spectrum),
+"texture", "layers"; of a flag or a choice, its number. A loader reads from those that occur, and
+holds a flag or a choice that is the same in the whole scene.
 """
 
 from __future__ import annotations
@@ -117,16 +118,20 @@ def _member(
     """
     form, present = lane_type(param), sources or frozenset({"constant"})
     if form == "integer":
-        return [f"{target} = as_integer({given[0]});"]
+        numbers = [source for source in present if source.isdigit()]
+        held = f"(integer)({numbers[0]})" if len(numbers) == len(present) == 1 else None
+        return [f"{target} = {held or f'as_integer({given[0]})'};"]
     if form == "Layers":
         loaded = f"layers_load(scene, {at}, point, lambdas)"
         return [f"{target} = {loaded if 'layers' in present else 'layers_none()'};"]
     if present == {"none"}:
         return [f"{target} = {'spectrum_of(0.0f)' if form == 'Spectrum' else '(real)(0.0f)'};"]
-    if "none" in present:
-        present |= {"constant"}
     *own, source = given
     whole = f"v4({', '.join(own)})" if form == "Spectrum" else own[0]
+    if present == {"grey"}:
+        return [f"{target} = spectrum_grey({whole});"]
+    if present & {"none", "grey"}:
+        present |= {"constant"}
     constant, table = f"spectrum_constant({whole}, lambdas)", f"spectrum_table(scene, {whole}"
     texture = f"{form.lower()}_texture_{param.role}(scene, as_integer({source}), point, lambdas)"
     loads = {
