@@ -203,7 +203,8 @@ inline Spectrum gltf_facets(GltfSurface m, GltfParts p, vec3 wo, vec3 wi, real i
 {
     mask front = wo.z > 0.0f, crossed = wo.z * wi.z < 0.0f;
     RefractingFacet h = gltf_facet(m, wo, wi, index);
-    real v = microfacet_visible_pdf(p.facets, wo, h.h) * h.jacobian * microfacet_g1(p.facets, gltf_seen(m, wo, wi), h.h);
+    real v = microfacet_visible_pdf(p.facets, wo, h.h) * h.jacobian;
+    v *= microfacet_g1(p.facets, gltf_seen(m, wo, wi), h.h);
     Spectrum f0 = p.f0;
     FilmBase film = p.film;
     real f90 = p.f90, c = gltf_cosine(m, h.o, index), share = sel(front, (real)(1.0f), p.passed);
