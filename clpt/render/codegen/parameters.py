@@ -52,7 +52,7 @@ def struct_text(cls: type[Kind], sources: Mapping[str, frozenset[str]] | None = 
     if cls.needs_wavelengths:
         rows.append("    Spectrum lambdas; /* the path's wavelengths [nm] */")
     for name in (name for name, param in device_params(cls).items() if param.lobe):
-        used = not sources or sources.get(name) != {"none"}
+        used = not sources or sources.get(name) != frozenset({"none"})
         uses.append(f"#define USES_{cls.kind.upper()}_{name.upper()} {int(used)}")
     rows = rows or ["    integer unused; /* no parameters */"]
     return "\n".join([*uses, "typedef struct {", *rows, f"}} {cls.__name__};", ""])
