@@ -278,20 +278,20 @@ inline real gltf_density(GltfSurface m, GltfParts p, GltfLobes l, vec3 wo, vec3 
     return sel(reflected | (crossed & ((p.passed > 0.0f) | (p.through > 0.0f))), pdf, (real)(0.0f));
 }
 
-inline Spectrum gltf_surface_eval(GltfSurface m, vec3 wo, vec3 wi)
+Spectrum gltf_surface_eval(GltfSurface m, vec3 wo, vec3 wi)
 {
     GltfPair w = gltf_pair(m, wo, wi);
     return gltf_value(m, gltf_parts(m), w.wo, w.wi);
 }
 
-inline real gltf_surface_pdf(GltfSurface m, vec3 wo, vec3 wi)
+real gltf_surface_pdf(GltfSurface m, vec3 wo, vec3 wi)
 {
     GltfPair w = gltf_pair(m, wo, wi);
     GltfParts p = gltf_parts(m);
     return gltf_density(m, p, gltf_lobes(m, p, w.wo), w.wo, w.wi, p.eta.x);
 }
 
-inline Spectrum gltf_surface_pdfs(GltfSurface m, vec3 wo, vec3 wi)
+Spectrum gltf_surface_pdfs(GltfSurface m, vec3 wo, vec3 wi)
 {
     GltfPair w = gltf_pair(m, wo, wi);
     GltfParts p = gltf_parts(m);
@@ -305,7 +305,7 @@ inline Spectrum gltf_surface_pdfs(GltfSurface m, vec3 wo, vec3 wi)
     return v;
 }
 
-inline BsdfSample gltf_surface_sample(GltfSurface m, vec3 wo, vec3 u)
+BsdfSample gltf_surface_sample(GltfSurface m, vec3 wo, vec3 u)
 {
     BsdfSample s = bsdf_nothing();
     GltfPair w = gltf_pair(m, wo, wo);
@@ -348,4 +348,4 @@ inline BsdfSample gltf_surface_sample(GltfSurface m, vec3 wo, vec3 u)
     return s;
 }
 
-inline Spectrum gltf_surface_albedo(GltfSurface m) { return m.base_color; }
+Spectrum gltf_surface_albedo(GltfSurface m) { return m.base_color; }

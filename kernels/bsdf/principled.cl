@@ -85,7 +85,7 @@ inline Spectrum principled_reflected(Principled m, RefractingFacet p, Spectrum f
     return spectrum_madd(below, sel(front, cos_i, (real)(0.0f)), v);
 }
 
-inline Spectrum principled_eval(Principled m, vec3 wo, vec3 wi)
+Spectrum principled_eval(Principled m, vec3 wo, vec3 wi)
 {
     Microfacets d = principled_facets(m.roughness, m.anisotropic);
     Spectrum eta = principled_index(m);
@@ -131,7 +131,7 @@ inline real principled_density(Principled m, vec3 wo, vec3 wi, real index)
     return sel(reflected | crossed, pdf, (real)(0.0f));
 }
 
-inline Spectrum principled_pdfs(Principled m, vec3 wo, vec3 wi)
+Spectrum principled_pdfs(Principled m, vec3 wo, vec3 wi)
 {
     Spectrum eta = principled_index(m), v = spectrum_of(principled_density(m, wo, wi, eta.x));
     if (any(spectrum_varies(eta))) {
@@ -142,12 +142,12 @@ inline Spectrum principled_pdfs(Principled m, vec3 wo, vec3 wi)
     return v;
 }
 
-inline real principled_pdf(Principled m, vec3 wo, vec3 wi)
+real principled_pdf(Principled m, vec3 wo, vec3 wi)
 {
     return principled_density(m, wo, wi, principled_index(m).x);
 }
 
-inline BsdfSample principled_sample(Principled m, vec3 wo, vec3 u)
+BsdfSample principled_sample(Principled m, vec3 wo, vec3 u)
 {
     BsdfSample s = bsdf_nothing();
     Microfacets d = principled_facets(m.roughness, m.anisotropic);
@@ -172,4 +172,4 @@ inline BsdfSample principled_sample(Principled m, vec3 wo, vec3 u)
     return s;
 }
 
-inline Spectrum principled_albedo(Principled m) { return m.base_color; }
+Spectrum principled_albedo(Principled m) { return m.base_color; }

@@ -67,7 +67,7 @@ constant float coat_azimuth[4] = {0.923880f, 0.382683f, -0.382683f, -0.923880f};
 
 /* The transmittance of a coat of lower index than what is outside, summed over these; off by less than
  * 0.015. Nothing is tabulated for it: light beyond the critical angle makes edges. */
-real coat_transmittance_thinner(Microfacets d, real cos_i, real eta)
+called real coat_transmittance_thinner(Microfacets d, real cos_i, real eta)
 {
     real sin_i = sqrt_r(1.0f - cos_i * cos_i), inv = 1.0f / eta, a2 = sqr(d.alpha_u), sum = 0.0f, seen = 1e-20f;
     for (int i = 0; i < 3; ++i) {
@@ -91,7 +91,7 @@ real coat_transmittance_thinner(Microfacets d, real cos_i, real eta)
 }
 /* Mean over the normals that cos_i > 0 sees of (1 - F) G1(refracted direction): the transmittance that
  * Mitsuba 3 tabulates. Here its ratio to a smooth coat's, at a cosine that stands for the facets', is. */
-called real coat_transmittance(Microfacets d, real cos_i, real eta)
+inline real coat_transmittance(Microfacets d, real cos_i, real eta)
 {
     CoatCell cell = coat_cell(d, eta);
     real c2 = cos_i * cos_i, facing = sqrt(c2 + sqr(d.alpha_u) * max_r(1.0f - c2, (real)(0.0f)));
