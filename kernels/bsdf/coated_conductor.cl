@@ -3,19 +3,21 @@
  * f = T(wo) T(wi) f_metal(wo', wi') / eta^2 [1/sr], exact where the coat is smooth. A rough coat turns
  * light by (1 - 1/eta) times its slopes: their variance, times that squared and a factor of 2.5, fitted
  * to random walks (tests/kernels/test_coated.py), is added to the metal's. What the coat throws back
- * inside is summed as a geometric series: along the mirror direction as between smooth boundaries, or,
- * the rougher the metal, as a diffuse light like plastic's. A coat that disperses bends each wavelength by
- * its own index; directions are sampled by the mean of the four. */
+ * inside, tabulated by the cosine at which it came, is summed as a geometric series: along the mirror direction, as
+ * between smooth boundaries, or, the rougher the metal, as a diffuse light like plastic's. What a rough metal has sent
+ * beyond the critical angle tends to stay beyond it: `leaves`, fitted to the same walks. A coat that disperses bends
+ * each wavelength by its own index; directions are sampled by the mean of the four. */
 #include "optics/fresnel.cl"
 #include "optics/microfacet.cl"
 #include "optics/rough_coat.cl"
 
 typedef struct {
-    Microfacets coat, metal;
+    Microfacets coat, metal, even; /* even: the metal's, as rough in all directions */
     real eta;          /* of the coat over what is outside */
-    real lost;         /* share of a bounce off the metal that the coat throws back */
-    Spectrum again;    /* what comes of that, as a diffuse albedo below the coat */
+    real bounce;       /* what leaves the metal's facets, if they reflect all */
+    Spectrum again;    /* what comes of light that the coat throws back, as a diffuse albedo below it */
     real between;      /* share of it that stays in the mirror direction instead */
+    real leaves;       /* how much less of that leaves the coat at the next bounce than of what had come */
 } CoatedMetal;
 
 /* Index and extinction of the metal over the coat's index. */
@@ -23,16 +25,6 @@ inline Spectrum coated_conductor_fresnel(CoatedConductor m, real cos_i)
 {
     Spectrum eta = spectrum_div(m.eta, m.coat_ior), k = spectrum_div(m.k, m.coat_ior);
     return spectrum_mul(m.specular_reflectance, fresnel_conductor(cos_i, eta, k));
-}
-
-/* How light within a smooth coat, of cosine 0.77, fares at facets below that reflect all: what leaves
- * them, and how much of that the coat throws back. */
-inline vec2 coated_conductor_bounce(Microfacets d, real alpha, real eta)
-{
-    d.alpha_u = alpha;
-    CoatCell cell = coat_cell(d, eta);
-    vec2 r = {COAT_BOUNCE_UNIT * coat_look_up(coat_bounce, cell), COAT_THROWN_UNIT * coat_look_up(coat_thrown, cell)};
-    return r;
 }
 
 inline CoatedMetal coated_metal_of(CoatedConductor m, real eta)
@@ -43,18 +35,22 @@ inline CoatedMetal coated_metal_of(CoatedConductor m, real eta)
     real spread = 2.5f * sqr((1.0f - 1.0f / c.eta) * m.coat_alpha);
     real u = sqrt_r(sqr(m.alpha_u) + spread), v = sqrt_r(sqr(m.alpha_v) + spread);
     c.metal = microfacets_of(m.distribution, u, v);
-    vec2 bounce = coated_conductor_bounce(c.metal, sqrt_r(u * v), c.eta);
-    c.lost = bounce.y / max_r(bounce.x, (real)(1e-20f));
+    c.even = c.metal;
+    c.even.alpha_u = sqrt_r(u * v);
+    c.bounce = coat_bounced(c.even);
     c.between = 0.04f / (0.04f + u * v);
+    c.leaves = 1.0f / (1.0f + 40.0f * sqr(c.even.alpha_u) / (c.even.alpha_u + 0.01f));
     Spectrum f = coated_conductor_fresnel(m, (real)(0.8f));
     real inside = coat_inside_reflectance(c.coat, c.eta);
-#define C(x_)                                                           \
-    c.again.x_ = (1.0f - c.between) * f.x_ * bounce.y * f.x_ * bounce.x \
-               / (1.0f - min_r(inside * f.x_ * bounce.x, (real)(0.999f)));
+#define C(x_)                                                \
+    c.again.x_ = (1.0f - c.between) * f.x_ * f.x_ * c.bounce \
+               / (1.0f - min_r(inside * f.x_ * c.bounce, (real)(0.999f)));
     SPECTRUM_EACH(C)
 #undef C
     return c;
 }
+/* Of light that comes at a cosine, what the coat throws back once a metal that reflects all has sent it up. */
+inline real coated_metal_thrown(CoatedMetal c, real cos_i) { return coat_thrown_back(c.even, cos_i, c.eta); }
 
 /* w within the coat. */
 inline vec3 coated_metal_refracted(CoatedMetal c, vec3 w)
@@ -64,10 +60,11 @@ inline vec3 coated_metal_refracted(CoatedMetal c, vec3 w)
 }
 
 /* Probabilities of the coat's reflection and of the metal's lobe; the rest is diffuse. */
-inline vec2 coated_conductor_lobes(CoatedConductor m, CoatedMetal c, real t)
+inline vec2 coated_conductor_lobes(CoatedConductor m, CoatedMetal c, vec3 wo, real t)
 {
-    real metal = t * (1.0f - c.lost) * spectrum_mean(coated_conductor_fresnel(m, (real)(1.0f)));
-    real diffuse = t * spectrum_mean(c.again), total = max_r(1.0f - t + metal + diffuse, (real)(1e-20f));
+    real thrown = coated_metal_thrown(c, fabs(wo.z)), kept = 1.0f - thrown / max_r(c.bounce, (real)(1e-20f));
+    real metal = t * kept * spectrum_mean(coated_conductor_fresnel(m, (real)(1.0f)));
+    real diffuse = t * thrown * spectrum_mean(c.again), total = max_r(1.0f - t + metal + diffuse, (real)(1e-20f));
     vec2 p = {(1.0f - t) / total, metal / total};
     return p;
 }
@@ -94,11 +91,12 @@ inline Spectrum coated_conductor_at(CoatedConductor m, CoatedMetal c, vec3 wo, v
     real cos_h = clamp_r(dot3(inner_o, inner_h), (real)(0.0f), (real)(1.0f));
     real lobe = coated_conductor_lobe(c, inner_o, inner_i, inner_h, wi.z) * microfacet_g1(c.metal, inner_i, inner_h);
     Spectrum metal = coated_conductor_fresnel(m, cos_h), r;
-    real thrown = fresnel_dielectric(-cos_h, c.eta).f, diffuse = wi.z * INV_PI / sqr(c.eta);
-#define C(x_)                                                                                         \
-    real CAT(echo_, x_) = thrown * metal.x_;                                                          \
-    CAT(echo_, x_) = 1.0f + c.between * CAT(echo_, x_) / max_r(1.0f - CAT(echo_, x_), (real)(1e-3f)); \
-    r.x_ = coat * f + t * (lobe * metal.x_ * CAT(echo_, x_) + diffuse * c.again.x_);
+    real thrown = sqrt_r(coated_metal_thrown(c, fabs(wo.z)) * coated_metal_thrown(c, fabs(wi.z)));
+    real diffuse = thrown * wi.z * INV_PI / sqr(c.eta);
+#define C(x_)                                                                                          \
+    real CAT(echo_, x_) = c.between * thrown * metal.x_ * c.leaves                                     \
+                        / max_r(1.0f - metal.x_ * (1.0f - c.leaves * (1.0f - thrown)), (real)(1e-3f)); \
+    r.x_ = coat * f + t * (lobe * metal.x_ * (1.0f + CAT(echo_, x_)) + diffuse * c.again.x_);
     SPECTRUM_EACH(C)
 #undef C
     return spectrum_sel((wo.z > 0.0f) & (wi.z > 0.0f), r, spectrum_of(0.0f));
@@ -132,7 +130,7 @@ inline real coated_conductor_density(CoatedConductor m, CoatedMetal c, vec3 wo, 
 {
     vec3 h = normalize3(add3(wo, wi));
     vec3 inner_o = coated_metal_refracted(c, wo), inner_i = coated_metal_refracted(c, wi);
-    vec2 p = coated_conductor_lobes(m, c, t_wo);
+    vec2 p = coated_conductor_lobes(m, c, wo, t_wo);
     real coat = microfacet_visible_pdf(c.coat, wo, h) / max_r(4.0f * dot3(wo, h), (real)(1e-20f));
     real metal = coated_conductor_lobe(c, inner_o, inner_i, normalize3(add3(inner_o, inner_i)), wi.z);
     real pdf = p.x * coat + p.y * metal + max_r(1.0f - p.x - p.y, (real)(0.0f)) * cosine_hemisphere_pdf(wi.z);
@@ -156,7 +154,7 @@ BsdfSample coated_conductor_sample(CoatedConductor m, vec3 wo, vec3 u)
     BsdfSample s = bsdf_nothing();
     CoatedMetal c = coated_metal_of(m, spectrum_mean(relative_index(m.coat_ior, m.ext_ior)));
     real t = coat_transmittance(c.coat, fabs(wo.z), c.eta);
-    vec2 uv = {u.x, u.y}, p = coated_conductor_lobes(m, c, t);
+    vec2 uv = {u.x, u.y}, p = coated_conductor_lobes(m, c, wo, t);
     mask coat = u.z < p.x, metal = !coat & (u.z < p.x + p.y), kept = wo.z > 0.0f;
     vec3 from = sel3(coat, wo, coated_metal_refracted(c, wo));
     Microfacets d = c.metal;

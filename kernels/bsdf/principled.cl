@@ -49,27 +49,34 @@ inline PrincipledLobes principled_lobes(Principled m, vec3 wo, real f)
     return p;
 }
 
-/* f |cos| of what is reflected. */
-inline Spectrum principled_reflected(Principled m, Microfacets d, vec3 wo, vec3 wi, Spectrum eta)
+/* The facet between two directions, by reflection or through it at one index. */
+inline RefractingFacet principled_facet(vec3 wo, vec3 wi, real index)
+{
+    real eta = 1.0f;
+    if (USES_PRINCIPLED_SPEC_TRANS) eta = sel(wo.z * wi.z < 0.0f, sel(wo.z > 0.0f, index, 1.0f / index), eta);
+    return refracting_facet(wo, wi, eta);
+}
+
+/* f |cos| of what is reflected; f, facets: the share that the facet p reflects, and f |cos| if it reflected all. */
+inline Spectrum principled_reflected(Principled m, RefractingFacet p, Spectrum f, real facets, vec3 wo, vec3 wi,
+                                     Spectrum eta)
 {
     mask front = wo.z > 0.0f;
-    RefractingFacet p = refracting_facet(wo, wi, (real)(1.0f));
-    Spectrum f = fresnel_spectrum(p.o, eta), weight = schlick_boundary_spectrum(fabs(p.o), eta);
+    Spectrum weight = schlick_boundary_spectrum(fabs(p.o), eta);
     Spectrum tint = principled_tint(m.base_color, m.luminance);
     mask reflects = spectrum_max(f) > 0.0f;
     Spectrum metal = schlick_spectrum(m.base_color, weight);
     Spectrum share = principled_fresnel(f, eta, weight, tint, m.spec_tint);
     share = spectrum_madd(spectrum_sub(metal, share), m.metallic, share);
     share = spectrum_sel(front, share, spectrum_scale(f, principled_passed(m)));
-    real facets = microfacet_visible_pdf(d, wo, p.h) * p.jacobian * microfacet_g1(d, wi, p.h);
-    Spectrum v = spectrum_scale(share, sel(p.shading & reflects, facets, (real)(0.0f)));
+    Spectrum v = spectrum_scale(share, sel(reflects, facets, (real)(0.0f)));
 
     real cos_o = fabs(wo.z), cos_i = fabs(wi.z), c = dot3(p.h, wi);
     real base = principled_diffuse(cos_o, cos_i, c, m.roughness, m.flatness) * principled_base(m) * INV_PI;
     Spectrum below = spectrum_scale(m.base_color, base);
-    if (any(m.sheen > 0.0f))
+    if (USES_PRINCIPLED_SHEEN)
         below = spectrum_madd(principled_sheen(tint, m.sheen_tint, c), m.sheen * (1.0f - m.metallic), below);
-    if (any(m.clearcoat > 0.0f)) {
+    if (USES_PRINCIPLED_CLEARCOAT) {
         Microfacets masking = microfacets_of((integer)(0), (real)(0.25f), (real)(0.25f));
         real coat = 0.25f * m.clearcoat * (0.04f + 0.96f * weight.x) * principled_coat_d(m, p.h)
                   * microfacet_g1(masking, wo, p.h) * microfacet_g1(masking, wi, p.h);
@@ -78,19 +85,30 @@ inline Spectrum principled_reflected(Principled m, Microfacets d, vec3 wo, vec3 
     return spectrum_madd(below, sel(front, cos_i, (real)(0.0f)), v);
 }
 
-inline Spectrum principled_eval(Principled m, vec3 wo, vec3 wi)
+Spectrum principled_eval(Principled m, vec3 wo, vec3 wi)
 {
     Microfacets d = principled_facets(m.roughness, m.anisotropic);
-    Spectrum eta = principled_index(m), v = principled_reflected(m, d, wo, wi, eta);
+    Spectrum eta = principled_index(m);
+    RefractingFacet p = principled_facet(wo, wi, eta.x);
+    real facets = microfacet_visible_pdf(d, wo, p.h) * p.jacobian * microfacet_g1(d, wi, p.h);
+    facets = sel(p.shading, facets, (real)(0.0f));
+    Spectrum f = fresnel_spectrum(p.o, eta), v = principled_reflected(m, p, f, facets, wo, wi, eta);
     mask reflected = wo.z * wi.z > 0.0f, transmitted = wo.z * wi.z < 0.0f;
     v = spectrum_sel(reflected, v, spectrum_of(0.0f));
-    if (any(transmitted & (m.spec_trans > 0.0f))) {
+    if (USES_PRINCIPLED_SPEC_TRANS) {
         real passed = principled_passed(m);
         Spectrum t;
-#define C(c) t.c = refracting_facet_transmitted(d, wo, wi, eta.c) * passed * sqrt_r(m.base_color.c);
+#define C(c) t.c = facets * (1.0f - f.c) * sel(wo.z > 0.0f, 1.0f / sqr(eta.c), sqr(eta.c));
         SPECTRUM_EACH(C)
 #undef C
-        v = spectrum_sel(transmitted, t, v);
+        if (any(spectrum_varies(eta))) {
+#define C(c) t.c = refracting_facet_transmitted(d, wo, wi, eta.c);
+            SPECTRUM_EACH(C)
+#undef C
+        }
+#define C(c) v.c = sel(transmitted, t.c * passed * sqrt_r(m.base_color.c), v.c);
+        SPECTRUM_EACH(C)
+#undef C
     }
     return v;
 }
@@ -100,12 +118,10 @@ inline real principled_density(Principled m, vec3 wo, vec3 wi, real index)
 {
     Microfacets d = principled_facets(m.roughness, m.anisotropic);
     mask reflected = wo.z * wi.z > 0.0f, crossed = wo.z * wi.z < 0.0f;
-    real eta = 1.0f;
-    if (any(crossed & (m.spec_trans > 0.0f))) eta = sel(crossed, sel(wo.z > 0.0f, index, 1.0f / index), eta);
-    RefractingFacet p = refracting_facet(wo, wi, eta);
+    RefractingFacet p = principled_facet(wo, wi, index);
     PrincipledLobes lobes = principled_lobes(m, wo, fresnel_dielectric(p.o, index).f);
     real facets = sel(crossed, lobes.transmit, lobes.reflect) * microfacet_visible_pdf(d, wo, p.h);
-    if (any(m.clearcoat > 0.0f)) {
+    if (USES_PRINCIPLED_CLEARCOAT) {
         real coat = lobes.coat * principled_coat_d(m, p.h) * p.h.z;
         facets += sel(reflected, coat, (real)(0.0f));
     }
@@ -115,7 +131,7 @@ inline real principled_density(Principled m, vec3 wo, vec3 wi, real index)
     return sel(reflected | crossed, pdf, (real)(0.0f));
 }
 
-inline Spectrum principled_pdfs(Principled m, vec3 wo, vec3 wi)
+Spectrum principled_pdfs(Principled m, vec3 wo, vec3 wi)
 {
     Spectrum eta = principled_index(m), v = spectrum_of(principled_density(m, wo, wi, eta.x));
     if (any(spectrum_varies(eta))) {
@@ -126,12 +142,12 @@ inline Spectrum principled_pdfs(Principled m, vec3 wo, vec3 wi)
     return v;
 }
 
-inline real principled_pdf(Principled m, vec3 wo, vec3 wi)
+real principled_pdf(Principled m, vec3 wo, vec3 wi)
 {
     return principled_density(m, wo, wi, principled_index(m).x);
 }
 
-inline BsdfSample principled_sample(Principled m, vec3 wo, vec3 u)
+BsdfSample principled_sample(Principled m, vec3 wo, vec3 u)
 {
     BsdfSample s = bsdf_nothing();
     Microfacets d = principled_facets(m.roughness, m.anisotropic);
@@ -156,4 +172,4 @@ inline BsdfSample principled_sample(Principled m, vec3 wo, vec3 u)
     return s;
 }
 
-inline Spectrum principled_albedo(Principled m) { return m.base_color; }
+Spectrum principled_albedo(Principled m) { return m.base_color; }

@@ -42,7 +42,7 @@ inline real principled_thin_slab(PrincipledThin m, ThinPair p, real eta)
     return principled_thin_lobe(p, d) * microfacet_g1(d, p.wi, p.h) * m.spec_trans;
 }
 
-inline Spectrum principled_thin_eval(PrincipledThin m, vec3 wo, vec3 wi)
+Spectrum principled_thin_eval(PrincipledThin m, vec3 wo, vec3 wi)
 {
     ThinPair p = principled_thin_pair(m, wo, wi);
     real through = 0.5f * m.diff_trans, cos_o = p.wo.z, cos_i = fabs(p.wi.z);
@@ -69,7 +69,7 @@ inline Spectrum principled_thin_eval(PrincipledThin m, vec3 wo, vec3 wi)
     return spectrum_sel(usable, base, spectrum_of(0.0f));
 }
 
-inline real principled_thin_pdf(PrincipledThin m, vec3 wo, vec3 wi)
+real principled_thin_pdf(PrincipledThin m, vec3 wo, vec3 wi)
 {
     ThinPair p = principled_thin_pair(m, wo, wi);
     Microfacets d = principled_thin_facets(m, p.crossed, spectrum_mean(m.eta));
@@ -79,7 +79,7 @@ inline real principled_thin_pdf(PrincipledThin m, vec3 wo, vec3 wi)
     return sel((p.wo.z > 0.0f) & (cos_i > 0.0f), pdf, (real)(0.0f));
 }
 
-inline BsdfSample principled_thin_sample(PrincipledThin m, vec3 wo, vec3 u)
+BsdfSample principled_thin_sample(PrincipledThin m, vec3 wo, vec3 u)
 {
     BsdfSample s = bsdf_nothing();
     vec2 uv = {u.x, u.y};
@@ -104,4 +104,4 @@ inline BsdfSample principled_thin_sample(PrincipledThin m, vec3 wo, vec3 u)
     return s;
 }
 
-inline Spectrum principled_thin_albedo(PrincipledThin m) { return m.base_color; }
+Spectrum principled_thin_albedo(PrincipledThin m) { return m.base_color; }

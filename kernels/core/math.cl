@@ -42,6 +42,14 @@ inline void sincos_2pi(real u, real *s, real *c)
     *c = (a - b) * (a + b);
 }
 
+/* cos of 2 pi u for u in [0, 1]; absolute error below 5e-7. */
+inline real cos_2pi(real u)
+{
+    real s, c;
+    sincos_2pi(u, &s, &c);
+    return c;
+}
+
 /* log2 of a positive normal x; relative error below 2e-7 off x = 1 (cephes' logf polynomial). */
 inline real log2_r(real x)
 {

@@ -81,12 +81,14 @@ inline real spectrum_max(Spectrum a)
     return r;
 }
 inline real spectrum_mean(Spectrum a) { return SPECTRUM_MEAN(a); }
-/* Whether the components differ: a dispersive index. */
+/* Whether the components differ: a dispersive index. By their bits, which compilers know to be the same where all are
+ * one number; of numbers they do not, as NaN is not itself. */
 inline mask spectrum_varies(Spectrum a)
 {
-    mask m = (a.y != a.x) | (a.z != a.x);
+    integer x = as_integer(a.x);
+    mask m = (as_integer(a.y) != x) | (as_integer(a.z) != x);
 #if SPECTRUM_SIZE == 4
-    m = m | (a.w != a.x);
+    m = m | (as_integer(a.w) != x);
 #endif
     return m;
 }

@@ -43,26 +43,28 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
 #if USES_LIGHTS && !BSDF_DELTA
     /* Next-event estimation. */
     vec3 hemisphere = vertex_hemisphere(frame, wo);
-    if (any(next)) {
-        vec2 point = sampler_pair(sampler, scatter.dimension + DIMENSION_LIGHT);
-        LightSample ls = light_sample(scene, s.p, hemisphere, scatter.choice.x, point, scatter.lambdas);
-        vec3 wi = to_local(frame, ls.wi);
-        Spectrum f = spectrum_scale(bsdf_eval(m, wo, wi), shading_frame_share(scatter.shading, ls.wi));
-        real w = sel(ls.pdf < 0.0f, (real)(1.0f), mis_weight(ls.pdf, hero_pdf(m, wo, wi, ratio)));
-        mask shine = next & (ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
-        w = w / sel(shine, fabs(ls.pdf), (real)(1.0f));
-        Spectrum value = spectrum_scale(spectrum_mul(spectrum_mul(beta, f), ls.radiance), w);
-        value = vertex_beyond(scene, v, ls.wi, ls.t, scatter.lambdas, value);
-        shadow_toward(shadow, at, active, shine, s, ls, value);
-        state += sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
-    } else {
-        store_shadow_t(shadow, at, active, (real)(-1.0f));
-    }
+    vec2 point = sampler_pair(sampler, scatter.dimension + DIMENSION_LIGHT);
+    LightSample ls = light_sample_nothing();
+#if BSDF_ABSORBS
+    if (any(next))
+#endif
+        ls = light_sample(scene, s.p, hemisphere, scatter.choice.x, point, scatter.lambdas);
+    vec3 wi = to_local(frame, ls.wi);
+    Spectrum f = spectrum_scale(bsdf_eval(m, wo, wi), shading_frame_share(scatter.shading, ls.wi));
+    real w = sel(ls.pdf < 0.0f, (real)(1.0f), mis_weight(ls.pdf, hero_pdf(m, wo, wi, ratio)));
+    mask shine = next & (ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
+    w = w / sel(shine, fabs(ls.pdf), (real)(1.0f));
+    Spectrum value = spectrum_scale(spectrum_mul(spectrum_mul(beta, f), ls.radiance), w);
+    value = vertex_beyond(scene, v, ls.wi, ls.t, scatter.lambdas, value);
+    state += sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
 #endif
 
     /* The next direction. */
     vec2 uv = sampler_pair(sampler, scatter.dimension + DIMENSION_BSDF);
     BsdfSample bs = hero_sample(m, wo, v3(uv.x, uv.y, scatter.choice.y), &ratio);
+#if USES_LIGHTS && !BSDF_DELTA /* after the sample: between them compilers would read tables of materials again */
+    shadow_toward(shadow, at, active, shine, s, ls, value);
+#endif
     next = next & (bs.pdf > 0.0f);
     vec3 onward = normalize3(to_world(frame, bs.wi));
     beta = spectrum_scale(spectrum_mul(beta, bs.weight), shading_frame_share(scatter.shading, onward));

@@ -13,9 +13,10 @@
  * `needs_wavelengths` has the path's as `lambdas` [nm].
  * What is sampled may depend on the hero (x) where LOBE_DISPERSE or `pdfs` tell; else a probability
  * must be symmetric in the wavelengths: take it from a spectrum_mean. path/hero.cl relies on that.
+ * Where a parameter is declared with lobe=True, USES_<KIND>_<PARAMETER> says whether the scene has that lobe: 0 if the
+ * parameter is 0 in all of its materials. The first three functions are declared as inline before the file is read.
  * Functions are pure and free of branches but for if (any(mask)); lanes that have nothing to do
- * compute what they like, but their result must not be NaN where pdf > 0. A long kind whose lobes a scene may leave out
- * writes `inline` before them: else a compiler calls it, and does not see which parameters are always 0.
+ * compute what they like, but their result must not be NaN where pdf > 0.
  */
 #define LOBE_REFLECT 1
 #define LOBE_TRANSMIT 2

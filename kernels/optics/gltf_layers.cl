@@ -88,33 +88,34 @@ inline Spectrum film_colours(FilmSeries f, real path, Spectrum lambdas)
 {
     Spectrum v;
 #if SPECTRUM_SIZE == 3
-    Spectrum order = f.cm;
-    v = f.dc;
-    for (int m = 1; m <= 2; ++m) {
-        real d = (float)m * path, d2 = d * d, s;
-        Spectrum xyz, red;
-        order = spectrum_mul(order, f.r);
-#define WAVE(value, at, centre, fall, height)                \
-        {                                                    \
-            real turns = d * centre + (float)m * f.shift.at; \
-            sincos_2pi(turns - floor(turns), &s, &value);    \
-            value *= height * exp_r(-fall * d2);             \
-        }
-        WAVE(xyz.x, x, 1.6810e-3f, 1.708547e-7f, 0.8465900f)
-        WAVE(red.x, x, 2.2399e-3f, 1.787662e-7f, 0.1538683f)
-        WAVE(xyz.y, y, 1.7953e-3f, 3.673309e-7f, 1.0002219f)
-        WAVE(xyz.z, z, 2.2084e-3f, 2.610352e-7f, 1.0011225f)
-#undef WAVE
-        xyz.x += red.x;
-        v.x += 2.0f * order.x * (3.2404542f * xyz.x - 1.5371385f * xyz.y - 0.4985314f * xyz.z);
-        v.y += 2.0f * order.y * (-0.9692660f * xyz.x + 1.8760108f * xyz.y + 0.0415560f * xyz.z);
-        v.z += 2.0f * order.z * (0.0556434f * xyz.x - 0.2040259f * xyz.y + 1.0572252f * xyz.z);
+    Spectrum one = spectrum_of(0.0f), two = one; /* xyz of the first two orders, by the cosine's double angle */
+    real d2 = path * path;
+#define WAVE(at, centre, fall, height)                                     \
+    {                                                                      \
+        real turns = path * centre + f.shift.at;                           \
+        real wave = cos_2pi(turns - floor(turns)), g = exp_r(-fall * d2);  \
+        one.at += height * wave * g;                                       \
+        two.at += height * (2.0f * wave * wave - 1.0f) * sqr(sqr(g));      \
     }
+    WAVE(x, 1.6810e-3f, 1.708547e-7f, 0.8465900f)
+    WAVE(x, 2.2399e-3f, 1.787662e-7f, 0.1538683f)
+    WAVE(y, 1.7953e-3f, 3.673309e-7f, 1.0002219f)
+    WAVE(z, 2.2084e-3f, 2.610352e-7f, 1.0011225f)
+#undef WAVE
+#define ROW(at, x_, y_, z_)                                                                     \
+    {                                                                                           \
+        real first = x_ * one.x + y_ * one.y + z_ * one.z;                                      \
+        real second = x_ * two.x + y_ * two.y + z_ * two.z;                                     \
+        v.at = f.dc.at + 2.0f * f.cm.at * f.r.at * (first + f.r.at * second);                   \
+    }
+    ROW(x, 3.2404542f, -1.5371385f, -0.4985314f)
+    ROW(y, -0.9692660f, 1.8760108f, 0.0415560f)
+    ROW(z, 0.0556434f, -0.2040259f, 1.0572252f)
+#undef ROW
 #else
 #define C(c)                                                                                       \
     {                                                                                              \
-        real turns = path / lambdas.c + f.shift.c, s, wave;                                        \
-        sincos_2pi(turns - floor(turns), &s, &wave);                                               \
+        real turns = path / lambdas.c + f.shift.c, wave = cos_2pi(turns - floor(turns));           \
         real low = 1.0f - 2.0f * f.r.c * wave + f.r.c * f.r.c;                                     \
         v.c = f.dc.c + 2.0f * f.cm.c * (f.r.c * wave - f.r.c * f.r.c) / max_r(low, (real)(1e-4f)); \
     }
@@ -123,23 +124,38 @@ inline Spectrum film_colours(FilmSeries f, real path, Spectrum lambdas)
 #endif
     return v;
 }
-inline Spectrum iridescence(real c, Spectrum f0, real film, real thickness, Spectrum lambdas)
+/* A base of reflectance f0 at normal incidence, under the film: what their boundary reflects, and the shift. */
+typedef struct { Spectrum reflectance, shift; } FilmBase;
+
+inline FilmBase film_base(Spectrum f0, real film)
+{
+    FilmBase b;
+#define C(c)                                                                                            \
+    {                                                                                                   \
+        real root = sqrt_r(min_r(f0.c + 1e-4f, (real)(0.9998f))), base = (1.0f + root) / (1.0f - root); \
+        b.reflectance.c = sqr((base - film) / (base + film));                                           \
+        b.shift.c = 0.5f + sel(base < film, (real)(0.5f), (real)(0.0f));                                \
+    }
+    SPECTRUM_EACH(C)
+#undef C
+    return b;
+}
+inline Spectrum iridescence(real c, FilmBase base, real film, real thickness, Spectrum lambdas)
 {
     real cos2 = 1.0f - (1.0f - c * c) / (film * film), c2 = sqrt_r(cos2), w = 1.0f - c, w2 = 1.0f - c2;
     real r0 = sqr((film - 1.0f) / (film + 1.0f)), r12 = r0 + (1.0f - r0) * w * w * w * w * w, t = 1.0f - r12;
     real grazing = w2 * w2 * w2 * w2 * w2;
     FilmSeries f;
     Spectrum v;
-#define C(c)                                                                                            \
-    {                                                                                                   \
-        real root = sqrt_r(min_r(f0.c + 1e-4f, (real)(0.9998f))), base = (1.0f + root) / (1.0f - root); \
-        real r1 = sqr((base - film) / (base + film)), r23 = r1 + (1.0f - r1) * grazing;                 \
-        real both = clamp_r(r12 * r23, (real)(1e-5f), (real)(0.9999f));                                 \
-        real rs = t * t * r23 / (1.0f - both);                                                          \
-        f.dc.c = r12 + rs;                                                                              \
-        f.cm.c = rs - t;                                                                                \
-        f.r.c = sqrt(both);                                                                             \
-        f.shift.c = 0.5f + sel(base < film, (real)(0.5f), (real)(0.0f));                                \
+#define C(c)                                                               \
+    {                                                                      \
+        real r1 = base.reflectance.c, r23 = r1 + (1.0f - r1) * grazing;    \
+        real both = clamp_r(r12 * r23, (real)(1e-5f), (real)(0.9999f));    \
+        real rs = t * t * r23 / (1.0f - both);                             \
+        f.dc.c = r12 + rs;                                                 \
+        f.cm.c = rs - t;                                                   \
+        f.r.c = sqrt(both);                                                \
+        f.shift.c = base.shift.c;                                          \
     }
     SPECTRUM_EACH(C)
 #undef C

@@ -1,7 +1,8 @@
 /* A rough dielectric boundary over a diffuse base: how much light passes it, and how much of the base's
  * light it throws back. Isotropic microfacets of roughness alpha; eta: index of the coat over outside.
- * From 1 on the integrals stand in tables, bilinear in the roots of alpha and of 1 - 1 / eta: within 0.01 of
- * float64 sums for an index of 1.2 to 3, where grazing light meets one below within 0.05. */
+ * From 1 on the integrals stand in tables, linear in the roots of alpha and of 1 - 1 / eta: within 0.01 of
+ * float64 sums for an index of 1.2 to 3, where grazing light meets one below within 0.05; what a smooth coat throws
+ * back of a metal's light within 0.01 in the mean, near the critical angle of a smooth metal within 0.07. */
 #include "optics/rough_coat_table.cl"
 
 /* A node of the tables by roughness and index, and how far it is to the next ones. */
@@ -36,6 +37,19 @@ inline real coat_look_up(constant uint *table, CoatCell cell)
     return a + cell.by_alpha * (b - a);
 }
 
+/* Of a table by `nodes` cosines too; by: how far beyond the k-th. */
+inline real coat_look_up_by(constant uint *table, int nodes, CoatCell cell, integer k, real by)
+{
+    integer at = (cell.row * COAT_INDICES + cell.column) * (nodes - 1) + k;
+    real t[4];
+#pragma unroll
+    for (int corner = 0; corner < 4; corner++)
+        t[corner] = coat_pair(table, at + ((corner >> 1) * COAT_INDICES + (corner & 1)) * (nodes - 1), by);
+    t[0] += cell.by_index * (t[1] - t[0]);
+    t[2] += cell.by_index * (t[3] - t[2]);
+    return t[0] + cell.by_alpha * (t[2] - t[0]);
+}
+
 /* The share that a smooth boundary lets through, cos_i > 0. */
 inline real coat_smooth(real c, real eta)
 {
@@ -53,7 +67,7 @@ constant float coat_azimuth[4] = {0.923880f, 0.382683f, -0.382683f, -0.923880f};
 
 /* The transmittance of a coat of lower index than what is outside, summed over these; off by less than
  * 0.015. Nothing is tabulated for it: light beyond the critical angle makes edges. */
-inline real coat_transmittance_thinner(Microfacets d, real cos_i, real eta)
+called real coat_transmittance_thinner(Microfacets d, real cos_i, real eta)
 {
     real sin_i = sqrt_r(1.0f - cos_i * cos_i), inv = 1.0f / eta, a2 = sqr(d.alpha_u), sum = 0.0f, seen = 1e-20f;
     for (int i = 0; i < 3; ++i) {
@@ -77,21 +91,13 @@ inline real coat_transmittance_thinner(Microfacets d, real cos_i, real eta)
 }
 /* Mean over the normals that cos_i > 0 sees of (1 - F) G1(refracted direction): the transmittance that
  * Mitsuba 3 tabulates. Here its ratio to a smooth coat's, at a cosine that stands for the facets', is. */
-called real coat_transmittance(Microfacets d, real cos_i, real eta)
+inline real coat_transmittance(Microfacets d, real cos_i, real eta)
 {
     CoatCell cell = coat_cell(d, eta);
     real c2 = cos_i * cos_i, facing = sqrt(c2 + sqr(d.alpha_u) * max_r(1.0f - c2, (real)(0.0f)));
     real x = (1.0f - sqrt_r(1.0f - cos_i / facing)) * (float)(COAT_COSINES - 1);
     integer k = clamp_i(to_integer(x), (integer)(COAT_COSINES - 2));
-    integer at = (cell.row * COAT_INDICES + cell.column) * (COAT_COSINES - 1) + k;
-    real next = x - to_real(k), t[4];
-    for (int corner = 0; corner < 4; corner++) {
-        int nodes = (corner >> 1) * COAT_INDICES + (corner & 1);
-        t[corner] = coat_pair(coat_passed, at + nodes * (COAT_COSINES - 1), next);
-    }
-    t[0] += cell.by_index * (t[1] - t[0]);
-    t[2] += cell.by_index * (t[3] - t[2]);
-    real ratio = COAT_PASSED_UNIT * (t[0] + cell.by_alpha * (t[2] - t[0]));
+    real ratio = COAT_PASSED_UNIT * coat_look_up_by(coat_passed, COAT_COSINES, cell, k, x - to_real(k));
     real passed = min_r(ratio * coat_smooth(facing, eta), (real)(1.0f));
     if (any(eta < 1.0f)) passed = sel(eta < 1.0f, coat_transmittance_thinner(d, cos_i, eta), passed);
     return passed;
@@ -112,4 +118,24 @@ inline real coat_inside_reflectance(Microfacets d, real eta)
 {
     real inside = COAT_INSIDE_UNIT * coat_look_up(coat_inside, coat_cell(d, eta));
     return sel(eta > 1.0f, inside, fresnel_diffuse(1.0f / eta));
+}
+
+/* What leaves facets d that reflect all, of light of the cosine that is usual within a coat. */
+inline real coat_bounced(Microfacets d)
+{
+    CoatCell cell = coat_cell(d, (real)(1.0f));
+    integer at = cell.row - sel_i(d.beckmann, (integer)(1), (integer)(0)); /* the last roughness begins no pair */
+    return COAT_BOUNCE_UNIT * coat_pair(coat_bounce, at, cell.by_alpha);
+}
+/* Of light that comes at cosine cos_i > 0 to a smooth coat over such facets: what they send up and the coat throws
+ * back. */
+inline real coat_thrown_back(Microfacets d, real cos_i, real eta)
+{
+    CoatCell cell = coat_cell(d, eta);
+    real x = sqrt(cos_i) * (float)(COAT_STEEPS - 1), a2 = sqr(sqr(cell.by_alpha));
+    integer k = clamp_i(to_integer(x), (integer)(COAT_STEEPS - 2));
+    mask smooth = d.alpha_u < 1.0f / ((COAT_ALPHAS - 1) * (COAT_ALPHAS - 1)); /* few slopes are far: by alpha^2 */
+    cell.by_alpha = sel(smooth, a2, cell.by_alpha);
+    real more = COAT_THROWN_UNIT * coat_look_up_by(coat_thrown, COAT_STEEPS, cell, k, x - to_real(k));
+    return max_r(more - coat_smooth(cos_i, eta), (real)(0.0f));
 }

@@ -7,6 +7,8 @@ inline Spectrum spectrum_constant(vec4 words, Wavelengths lambdas)
     Spectrum r = {words.x, words.y, words.z};
     return r;
 }
+/* The same of a value without colour. */
+inline Spectrum spectrum_grey(vec4 words) { return spectrum_of(words.x); }
 /* Tabulated spectra were turned to rgb on the host. */
 inline Spectrum spectrum_table(Scene scene, vec4 words, integer source, Wavelengths lambdas)
 {
@@ -36,12 +38,16 @@ inline Spectrum spectrum_light_texel_at(Scene scene, global const uint *table, i
     return spectrum_texel_at(table, at, lambdas);
 }
 /* And for a texel that takes a word: a byte a channel, whose meaning stands in 256 words from `decode`. */
-inline Spectrum spectrum_packed_texel(global const uint *table, integer first, integer index, integer decode,
-                                      Wavelengths lambdas)
+typedef struct { integer rgb; } PackedTexel;
+inline PackedTexel spectrum_packed_words(global const uint *table, integer first, integer index)
 {
-    integer word = gather_i(table, first + index);
-    Spectrum r = {gather_w(table, decode + (word & 255)), gather_w(table, decode + ((word >> 8) & 255)),
-                  gather_w(table, decode + ((word >> 16) & 255))};
+    PackedTexel t = {gather_i(table, first + index)};
+    return t;
+}
+inline Spectrum spectrum_packed_texel(global const uint *table, PackedTexel t, integer decode, Wavelengths lambdas)
+{
+    Spectrum r = {gather_w(table, decode + (t.rgb & 255)), gather_w(table, decode + ((t.rgb >> 8) & 255)),
+                  gather_w(table, decode + ((t.rgb >> 16) & 255))};
     return r;
 }
 /* Light of a grey: as bright in all channels. */

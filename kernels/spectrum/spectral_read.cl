@@ -38,6 +38,8 @@ inline Spectrum spectrum_constant(vec4 words, Wavelengths lambdas)
 {
     return sigmoid_spectrum(words.x, words.y, words.z, words.w, lambdas);
 }
+/* The same of a value without colour: the factor alone. */
+inline Spectrum spectrum_grey(vec4 words) { return spectrum_of(words.w); }
 /* A tabulated spectrum: the fifth word, its source, is -1 - its row, the fourth a factor. */
 inline Spectrum spectrum_table(Scene scene, vec4 words, integer source, Wavelengths lambdas)
 {
@@ -69,12 +71,17 @@ inline Spectrum spectrum_grey_light(Scene scene, real value, Wavelengths lambdas
 }
 /* And for a texel of two words: a sigmoid's argument at 400, 550 and 700 nm, as floats of 21 bits, two in
  * the words' upper bits, the third in what is left. In between it is the parabola through them. */
-inline Spectrum spectrum_packed_texel(global const uint *table, integer first, integer index, integer decode,
-                                      Wavelengths lambdas)
+typedef struct { integer p, q; } PackedTexel;
+inline PackedTexel spectrum_packed_words(global const uint *table, integer first, integer index)
 {
-    integer at = first + 2 * index, p = gather_i(table, at), q = gather_i(table, at + 1);
-    real a = as_real(p & ~0x7ff), b = as_real(q & ~0x7ff);
-    real c = as_real(((p & 0x7ff) << 21) | ((q & 0x3ff) << 11));
+    integer at = first + 2 * index;
+    PackedTexel t = {gather_i(table, at), gather_i(table, at + 1)};
+    return t;
+}
+inline Spectrum spectrum_packed_texel(global const uint *table, PackedTexel t, integer decode, Wavelengths lambdas)
+{
+    real a = as_real(t.p & ~0x7ff), b = as_real(t.q & ~0x7ff);
+    real c = as_real(((t.p & 0x7ff) << 21) | ((t.q & 0x3ff) << 11));
     Spectrum r;
 #define C(c_)                                                                         \
     {                                                                                 \

@@ -41,6 +41,8 @@ inline BitmapTexels bitmap_texels(Bitmap t, Scene scene, TexturePoint point)
     return b;
 }
 
+/* How many of the four texels have weight in some lane: all, or the first. */
+inline int bitmap_corners(BitmapTexels b) { return any((b.u1 > 0.0f) | (b.v1 > 0.0f)) ? 4 : 1; }
 /* One of the four texels: its index in the image, and its weight. */
 inline integer bitmap_corner(Bitmap t, BitmapTexels b, int corner, real *weight)
 {

@@ -1,5 +1,6 @@
 /* An image of 8 bits a channel, placed on uv as in texture/bitmap.cl, in fewer bytes: a number takes one, a colour
- * four, or eight as a spectrum (spectrum_packed_texel). `decode` is the first of 256 values that bytes mean. */
+ * four, or eight as a spectrum (spectrum_packed_texel). `decode` is the first of 256 values that bytes mean. All four
+ * texels are read before the first is decoded, so that the processor waits for memory once. */
 inline Bitmap packed_bitmap_image(PackedBitmap t)
 {
     Bitmap b = {t.kind, t.to_u, t.to_v, t.mapping, t.transform, t.width, t.height, t.first, t.filter, t.wrap_u,
@@ -11,13 +12,17 @@ Spectrum packed_bitmap_reflectance(PackedBitmap t, Scene scene, TexturePoint poi
 {
     Bitmap image = packed_bitmap_image(t);
     BitmapTexels b = bitmap_texels(image, scene, point);
+    PackedTexel texels[4];
+    real weights[4];
+    int corners = bitmap_corners(b);
+    for (int corner = 0; corner < corners; corner++) {
+        integer index = bitmap_corner(image, b, corner, &weights[corner]);
+        texels[corner] = spectrum_packed_words(scene.images, t.first, index);
+    }
     Spectrum sum = spectrum_of(0.0f);
-    for (int corner = 0; corner < 4; corner++) {
-        real weight;
-        integer index = bitmap_corner(image, b, corner, &weight);
-        if (!any(weight > 0.0f)) continue;
-        Spectrum texel = spectrum_packed_texel(scene.images, t.first, index, t.decode, lambdas);
-        sum = spectrum_madd(texel, weight, sum);
+    for (int corner = 0; corner < corners; corner++) {
+        Spectrum texel = spectrum_packed_texel(scene.images, texels[corner], t.decode, lambdas);
+        sum = spectrum_madd(texel, weights[corner], sum);
     }
     return sum;
 }

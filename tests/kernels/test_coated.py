@@ -124,11 +124,11 @@ def coated(coat, alpha, eta):
 @pytest.mark.parametrize(
     ("coat", "alpha", "eta", "bound"),
     [
-        (1e-3, 1e-3, ALUMINIUM, 0.006),  # smooth on smooth is exact
+        (1e-3, 1e-3, ALUMINIUM, 0.008),  # smooth on smooth: by equations, and tables
         (1e-3, 0.3, DULL, 0.006),
-        (1e-3, 0.1, ALUMINIUM, 0.11),
-        (0.1, 0.3, ALUMINIUM, 0.045),
-        (0.3, 0.1, ALUMINIUM, 0.075),
+        (1e-3, 0.1, ALUMINIUM, 0.075),
+        (0.1, 0.3, ALUMINIUM, 0.02),
+        (0.3, 0.1, ALUMINIUM, 0.06),
         (0.6, 1e-3, DULL, 0.03),
         (0.6, 0.3, ALUMINIUM, 0.03),
     ],

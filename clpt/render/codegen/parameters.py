@@ -1,8 +1,9 @@
 """Kernel text of the parameters of kinds: structs, and the loaders that fill them.
 
 A parameter's sources are where its values in a scene come from: "none" (0, which leaves a lobe
-out), "constant", "table" (a tabulated spectrum), "texture", "layers". A loader reads from those
-that occur.
+out), "constant", "grey" (the same at all wavelengths: an index), "table" (a tabulated spectrum),
+"texture", "layers"; of a flag or a choice, its number. A loader reads from those that occur, and
+holds a flag or a choice that is the same in the whole scene.
 """
 
 from __future__ import annotations
@@ -36,9 +37,13 @@ def array_size(param: Param) -> int:
     return ORDERS_WORDS if param.role == "orders" else 1
 
 
-def struct_text(cls: type[Kind]) -> str:
-    """Return `typedef struct {...} Kind;` with one member per device parameter."""
-    rows = []
+def struct_text(cls: type[Kind], sources: Mapping[str, frozenset[str]] | None = None) -> str:
+    """Return `typedef struct {...} Kind;` with one member per device parameter.
+
+    Before it, for a lobe that a parameter of 0 leaves out, `USES_KIND_PARAMETER`: whether the scene
+    has it. sources: of each parameter; without, there are all lobes.
+    """
+    rows, uses = [], []
     for name, param in device_params(cls).items():
         size = f"[{array_size(param)}]" if array_size(param) > 1 else ""
         rows.append(f"    {lane_type(param)} {name}{size}; /* {param.doc} */")
@@ -46,8 +51,11 @@ def struct_text(cls: type[Kind]) -> str:
         rows.append("    real luminance; /* of base_color, where a tint is above 0 */")
     if cls.needs_wavelengths:
         rows.append("    Spectrum lambdas; /* the path's wavelengths [nm] */")
+    for name in (name for name, param in device_params(cls).items() if param.lobe):
+        used = not sources or sources.get(name) != frozenset({"none"})
+        uses.append(f"#define USES_{cls.kind.upper()}_{name.upper()} {int(used)}")
     rows = rows or ["    integer unused; /* no parameters */"]
-    return "\n".join(["typedef struct {", *rows, f"}} {cls.__name__};", ""])
+    return "\n".join([*uses, "typedef struct {", *rows, f"}} {cls.__name__};", ""])
 
 
 def word_before(cls: type[Kind], name: str) -> int:
@@ -110,16 +118,20 @@ def _member(
     """
     form, present = lane_type(param), sources or frozenset({"constant"})
     if form == "integer":
-        return [f"{target} = as_integer({given[0]});"]
+        numbers = [source for source in present if source.isdigit()]
+        held = f"(integer)({numbers[0]})" if len(numbers) == len(present) == 1 else None
+        return [f"{target} = {held or f'as_integer({given[0]})'};"]
     if form == "Layers":
         loaded = f"layers_load(scene, {at}, point, lambdas)"
         return [f"{target} = {loaded if 'layers' in present else 'layers_none()'};"]
     if present == {"none"}:
         return [f"{target} = {'spectrum_of(0.0f)' if form == 'Spectrum' else '(real)(0.0f)'};"]
-    if "none" in present:
-        present |= {"constant"}
     *own, source = given
     whole = f"v4({', '.join(own)})" if form == "Spectrum" else own[0]
+    if present == {"grey"}:
+        return [f"{target} = spectrum_grey({whole});"]
+    if present & {"none", "grey"}:
+        present |= {"constant"}
     constant, table = f"spectrum_constant({whole}, lambdas)", f"spectrum_table(scene, {whole}"
     texture = f"{form.lower()}_texture_{param.role}(scene, as_integer({source}), point, lambdas)"
     loads = {

@@ -21,6 +21,7 @@ Made = Callable[[str, float, float], "Floats | float"]
 
 FILE = Path(__file__).parents[3] / "kernels/optics/rough_coat_table.cl"
 ALPHAS, INDICES, COSINES = 16, 14, 16
+STEEPS = 6  # cosines by which light that a coat throws back came, even in their roots
 HIGHEST = 3.0  # index up to which the tables go
 BOUNCE = 0.77  # cosine of light within a coat, see kernels/bsdf/coated_conductor.cl
 _RADII, _AZIMUTHS = leggauss(40), 48
@@ -124,14 +125,27 @@ def bounce(distribution: str, alpha: float) -> float:
     return float(_mean(distribution, alpha, np.array([BOUNCE]), kept)[0])
 
 
-def thrown_back(distribution: str, alpha: float, eta: float) -> float:
-    """And how much of that a smooth coat throws back, which it meets from within."""
+def within(cos_i: Floats, eta: float) -> Floats:
+    """Cosines within a smooth coat of light that comes to it at these."""
+    return np.sqrt(1.0 - (1.0 - cos_i**2) / eta**2)
+
+
+def thrown_back(distribution: str, alpha: float, eta: float, cos_i: Floats) -> Floats:
+    """What a smooth coat throws back of light that facets below it, which reflect all, send up.
+
+    cos_i (n,): the cosines at which the light came to the coat.
+    """
 
     def thrown(cos_i: Floats, c: Floats, cos_h: Floats) -> Floats:
         z = np.clip(2.0 * c * cos_h - cos_i, 1e-12, 1.0)
         return masking(distribution, alpha, z) * fresnel(z, 1.0 / eta)
 
-    return float(_mean(distribution, alpha, np.array([BOUNCE]), thrown)[0])
+    return _mean(distribution, alpha, within(cos_i, eta), thrown)
+
+
+def _bounces() -> Floats:
+    """A table by distribution and roughness."""
+    return np.array([[bounce(d, a) for a in alphas()] for d in DISTRIBUTIONS])
 
 
 def _rows(make: Made) -> Floats:
@@ -143,6 +157,11 @@ def _passed(distribution: str, alpha: float, eta: float) -> Floats:
     cos_i = cosines(alpha)
     smooth = 1.0 - fresnel(facing(cos_i, alpha), eta)
     return transmittance(distribution, alpha, eta, cos_i) / smooth
+
+
+def _thrown(distribution: str, alpha: float, eta: float) -> Floats:
+    cos_i = np.maximum(np.linspace(0.0, 1.0, STEEPS) ** 2, 1e-4)
+    return 1.0 + thrown_back(distribution, alpha, eta, cos_i) - fresnel(cos_i, eta)
 
 
 def _array(name: str, table: Floats) -> str:
@@ -173,19 +192,24 @@ def text() -> str:
         "COAT_ALPHAS": ALPHAS,
         "COAT_INDICES": INDICES,
         "COAT_COSINES": COSINES,
+        "COAT_STEEPS": STEEPS,
         "COAT_INDEX_SCALE": f"{scale:.9g}f",
     }
-    tables: dict[str, tuple[str, Made]] = {
-        "passed": ("Transmittance over a smooth coat's, by cosine too", _passed),
-        "inside": ("Reflectance for diffuse light below", inside_reflectance),
+    tables = {
+        "passed": ("Transmittance over a smooth coat's, by cosine too", _rows(_passed)),
+        "inside": ("Reflectance for diffuse light below", _rows(inside_reflectance)),
         "bounce": (
-            f"Of light of cosine {BOUNCE}, what leaves facets that reflect all",
-            lambda d, a, _: bounce(d, a),
+            f"Of light of cosine {BOUNCE}, what leaves facets that reflect all, by roughness alone",
+            _bounces(),
         ),
-        "thrown": ("What of that a smooth coat above throws back", thrown_back),
+        "thrown": (
+            "1, and what a smooth coat throws back of light from these less from smooth ones,"
+            " by cosine",
+            _rows(_thrown),
+        ),
     }
     made = [f"#define {name} {value}\n" for name, value in numbers.items()]
-    made += [f"/* {doc}. */\n" + _array(f"coat_{n}", _rows(f)) for n, (doc, f) in tables.items()]
+    made += [f"/* {doc}. */\n" + _array(f"coat_{n}", t) for n, (doc, t) in tables.items()]
     return HEAD + "".join(made)
 
 

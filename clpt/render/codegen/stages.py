@@ -91,7 +91,23 @@ def functions_text(cls: type[Material], mode: str, features: Features | None = N
     """
     own, layer = (features.sources_of(kind) if features else {} for kind in (cls.kind, "layer"))
     boundary = thin_films.boundary_text(cls, mode, own, layer)
-    return f'{boundary}{parameters.struct_text(cls)}#include "bsdf/{cls.kind}.cl"\n'
+    struct, declared = parameters.struct_text(cls, own), _declared_text(cls)
+    return f'{boundary}{struct}{declared}#include "bsdf/{cls.kind}.cl"\n'
+
+
+def _declared_text(cls: type[Material]) -> str:
+    """Declare a kind's costly functions as inline.
+
+    Only so do compilers see which lobes a scene leaves out, and what the functions have in common.
+    """
+    types = {"sample": "BsdfSample", "eval": "Spectrum", "pdf": "real", "pdfs": "Spectrum"}
+    last = {"sample": "vec3 u"}
+    return "".join(
+        f"inline {types[verb]} {cls.kind}_{verb}"
+        f"({cls.__name__} m, vec3 wo, {last.get(verb, 'vec3 wi')});\n"
+        for verb in types
+        if verb != "pdfs" or cls.chromatic
+    )
 
 
 def bsdf_text(features: Features, cls: type[Material]) -> str:

@@ -59,7 +59,7 @@ class Encoder:
     def sources(self) -> Sources:
         """Where values come from: (kind, parameter, source).
 
-        A source is "none" (the share of a lobe is 0), "constant", "table", "texture" or "layers".
+        A source is one of those in clpt.render.codegen.parameters.
         """
         return frozenset(
             (kind, name, source)
@@ -149,7 +149,7 @@ class Encoder:
             return words, "texture"
         if role in ("flag", "choice"):
             number = choices.index(value) if choices else int(value)
-            return np.array([number], np.uint32), "constant"
+            return np.array([number], np.uint32), str(number)
         if role == "real":
             plain = value.value if isinstance(value, Constant) else value
             return np.array([as_words([plain])[0], 0], np.uint32), "constant"

@@ -133,6 +133,7 @@ class SpectraTable:
     def words(self, value: Spectrum | str, role: str) -> tuple[Words, str]:
         """Return the five words of a spectrum and its source: "constant" or "table".
 
+        An index that does not disperse is "grey", so that kernels see it.
         role: one of SPECTRUM_ROLES in clpt.scene.params; an index may be a glass's name.
         """
         if isinstance(value, str) or role in ("index", "coefficient"):
@@ -140,9 +141,10 @@ class SpectraTable:
         if role == "emission" and isinstance(value, RGB):
             value = RGBIlluminant(value.r, value.g, value.b)
         words = np.zeros(SPECTRUM_WORDS, np.uint32)
+        given = "grey" if role == "index" and isinstance(value, Constant) else "constant"
         if not self.spectral:
             words[:3] = as_words(value.to_rgb(RGB_ROLES[role]))
-            return words, "constant"
+            return words, given
         if isinstance(value, Constant):
             words[:4] = as_words([0.0, 0.0, ONE, value.value])
         elif type(value) is RGB:
@@ -151,7 +153,7 @@ class SpectraTable:
             return self._table_words(d65(), value.r), "table"
         else:
             return self._table_words(value), "table"
-        return words, "constant"
+        return words, given
 
     def _table_words(self, spectrum: Spectrum, factor: float = 1.0) -> Words:
         """Five words: a factor, and -1 - the row in `spectra`."""

@@ -160,7 +160,7 @@ def test_a_kind_from_outside() -> None:
         clpt.kernel_source(Chalk)
     Chalk.source = "Spectrum chalk_albedo(Chalk m) {} // chalk_eval chalk_pdf chalk_sample"
     text = clpt.kernel_source(Chalk, lines=False)
-    assert text.endswith(f"}} Chalk;\n{Chalk.source}\n")
+    assert "} Chalk;\n" in text and text.endswith(f"\n{Chalk.source}\n")
 
 
 @pytest.mark.parametrize("option", [{"mode": "xyz"}, {"lanes": 4}, {"layout": "brute"}])
