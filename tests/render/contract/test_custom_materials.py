@@ -38,6 +38,8 @@ Spectrum flawed_albedo(Flawed m) { return spectrum_of(0.0f); }
 class Paint(m.Material):
     """What Diffuse is, under another name."""
 
+    absorbs = True
+
     reflectance: Any = reflectance(0.5, "albedo")
     source = DIFFUSE.replace("diffuse_", "paint_").replace("(Diffuse ", "(Paint ")
 
