@@ -35,7 +35,7 @@ def test_cold_and_warm() -> None:
     """About 20 s: kernels are compiled."""
     cold, warm = starting.measure("cornell", "rgb", "", 1, "cornell")
     assert cold.refused == warm.refused == ""
-    assert cold.more["programs"] == warm.more["programs"] > 3
+    assert cold.more["programs"] == warm.more["programs"] > 1
     assert warm.more["build_seconds"] < cold.more["build_seconds"]
     assert 2**25 < warm.more["memory"] < 2**33
 

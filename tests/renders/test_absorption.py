@@ -166,11 +166,14 @@ def test_camera_inside() -> None:
 
 @pytest.mark.slow
 def test_light_traced_from_the_lamp() -> None:
-    """A dyed block between a lamp and a table: its shadow is the same from either end."""
+    """A dyed block between a lamp and a table: its shadow is the same from either end.
+
+    The camera does not see the block, in which light traced from the lamp shows nothing.
+    """
     lamp = tf.translate([0, 0, 2.0]) @ DOWN @ tf.scale(0.5)
     block = tf.translate([0, 0, 1.0]) @ tf.scale([0.4, 0.4, 0.2])
     scene = Scene(
-        camera=Perspective(to_world=tf.look_at([3, 0, 3], [0, 0, 0], UP), fov=15.0),
+        camera=Perspective(to_world=tf.look_at([3, 0, 3], [0, 0, 0], UP), fov=8.0),
         shapes=[
             Rectangle(to_world=tf.scale(2.0), material=Diffuse(reflectance=0.8)),
             Cube(to_world=block, material=Dielectric(int_ior=GLASS, ext_ior=1.0, absorption=DYE)),
@@ -179,11 +182,12 @@ def test_light_traced_from_the_lamp() -> None:
         film=Film(width=16, height=16),
     )
     images = [
-        exposures(dataclasses.replace(scene, integrator=integrator), 16, 64)
+        exposures(dataclasses.replace(scene, integrator=integrator), 16, 256)
         for integrator in (Path(max_depth=8, rr_depth=100), ParticleTracer(max_depth=8))
     ]
     assert_agree(blocks(images[0]), blocks(images[1]), "shadow")
-    assert abs(images[0].mean() / images[1].mean() - 1.0) < 0.02
+    whole = [image.mean(axis=(1, 2), keepdims=True) for image in images]
+    assert_agree(whole[0], whole[1], "all of it")
 
 
 def coloured(material: type, **changes: Any) -> Scene:

@@ -126,8 +126,9 @@ def test_steps_between(renderer):
 def test_other_films():
     """A crop, sides that are no multiples of four, bands, a filter with negative weights."""
     film = Film(
-        width=60, height=40, crop=(5, 3, 37, 21), mode="spectral", bands=4, filter=Mitchell()
-    )
+        width=60, height=40, crop=(5, 3, 37, 21), mode="spectral", bands=4, filter=Mitchell(),
+        filtering="importance",
+    )  # fmt: skip
     with clpt.Renderer(bulb(film=film)) as made:
         made.run(40, noise=1e-6)
         adaptive, bands = made.film.get(), made.image()
