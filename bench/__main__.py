@@ -28,6 +28,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "spectral": (),
     "effects": (),
     "lights": (),
+    "hard_light": (),
     "noise": (),
     "instancing": (),
     "embedding": (),

@@ -144,6 +144,25 @@ def efficiency(rows: Sequence[Row]) -> str:
     return table(headings, map(cells, rows)) + "\n" + geometric_means(rows)
 
 
+def hard_light(rows: Sequence[Row]) -> str:
+    """Caustics: errors after equal processor time, and the light that was found."""
+
+    def cells(row: Row) -> list[str]:
+        own = [str(row[name]) for name in ("scene", "renderer", "cpu", "samples", "seeds")]
+        for part in ("direct", "sharp"):
+            found = row.get(part)
+            assert found is None or isinstance(found, dict)
+            own += (
+                [f"{found['relmse']:.2g}", f"{found['light']:.3f} ({found['light_kept']:.3f})"]
+                if found
+                else ["", ""]
+            )
+        return own
+
+    headings = ["scene", "method", "seconds", "samples", "seeds", "relMSE, direct", "light"]
+    return table([*headings, "relMSE, sharp", "light"], map(cells, rows))
+
+
 def geometric_means(rows: Sequence[Row]) -> str:
     """Efficiency over all scenes, by mode, threads and filter."""
     groups: dict[tuple[object, ...], list[float]] = {}
@@ -203,6 +222,7 @@ TABLES: dict[str, Callable[[Sequence[Row]], str]] = {
     **dict.fromkeys(("bandwidth", "rays", "stages", "shading", "build", "start"), figures),
     "renders": renders,
     "efficiency": efficiency,
+    "hard_light": hard_light,
     "spectral": plain,
     "effects": plain,
     "lights": plain,
