@@ -64,6 +64,15 @@ class DeviceInfo:
         return "pocl" in self.version.casefold()
 
     @property
+    def links(self) -> bool:
+        """Whether the driver links what was compiled apart.
+
+        rusticl, of Mesa 22 at least, refuses modules of different versions of SPIR-V, and compiles
+        each to the lowest that it needs.
+        """
+        return self.platform.casefold() != "rusticl"
+
+    @property
     def label(self) -> str:
         """Platform and device, for people to read."""
         return f"{self.platform} {self.name}"

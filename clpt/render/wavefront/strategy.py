@@ -54,7 +54,7 @@ def choose(on: device.Device, lowered: Lowered, tuning: Tuning) -> Strategy:
 
 def use_loop(on: device.Device) -> bool:
     """Return whether a kernel on the device runs all bounces: on CPUs, whose caches it suits."""
-    return on.info.is_cpu
+    return on.info.is_cpu and on.info.links
 
 
 def loop_share(on: device.Device) -> int:
