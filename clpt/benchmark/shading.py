@@ -13,7 +13,7 @@ import numpy as np
 
 from clpt import device, transforms
 from clpt.errors import UnknownKindError
-from clpt.render.wavefront.wavefront import Step
+from clpt.render.wavefront.bounce_loop import Step
 from clpt.scene import Scene, integrators, lights, params, textures
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Film
@@ -119,7 +119,7 @@ def _figure(name: str, flight: Flight, yardstick: Flight, rounds: int) -> Figure
         "mode": mode,
         "of_diffuse": ratio,
         "items": float(np.mean([items for (items, _), _ in both])),
-        "lanes": flight.wavefront.lanes,
+        "lanes": flight.wavefront.device.lanes,
         "note": f"{mode}, {ratio:.2f} of diffuse",
     }
     figure = Figure("shading", name, "Mitems/s", tuple(own), flight.scene.name, more)

@@ -17,8 +17,8 @@ from clpt.benchmark.traffic import traffic
 from clpt.records import SLABS
 from clpt.render.codegen import programs
 from clpt.render.wavefront import queues
+from clpt.render.wavefront.bounce_loop import Step
 from clpt.render.wavefront.film_state import FILM_WORDS
-from clpt.render.wavefront.wavefront import Step
 from clpt.scene import Scene
 
 from .bandwidth import Copying
@@ -100,7 +100,7 @@ def _figure(
         "gbytes": gigabytes,
         "copy_gbytes": copied,
         "of_copy": gigabytes / copied,
-        "lanes": flight.wavefront.lanes,
+        "lanes": flight.wavefront.device.lanes,
         "layout": flight.wavefront.scene.strategy.layout,
         "mode": flight.scene.film.mode,
     }
