@@ -43,6 +43,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
     real over = rival_to_camera(rival, s, c.d, mask_of(0), 1.0f / max_r(c.importance, (real)(1e-30f)),
                                 rival_pdf(m, to, wo));
     carries *= 1.0f / (1.0f + sqr(over));
+    shine = shine & !rival.first;
 #endif
     Spectrum value = spectrum_scale(spectrum_mul(beta, f), carries);
     value = vertex_beyond(scene, v, neg3(c.d), c.t, v.lambdas, value);

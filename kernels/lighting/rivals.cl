@@ -22,7 +22,9 @@
  * p_back is 0 there for a light that no ray meets, q is 0 behind a delta lobe. At the joint c' / p becomes
  * importance c', c' being that to the camera.
  *
- * Null surfaces change nothing. Where a material ends light paths (BSDF_ENDS_LIGHT_PATHS) the camera's rival is 0. */
+ * Light that comes to x_1 from the light itself is left to the camera's path, which chooses a light there: a light
+ * path is joined from its second vertex on, and for k = 2 the third density is 0. (Splats of light that next-event
+ * estimation finds without noise are noise only, see bench/NOTES.md.) Null surfaces change nothing. Where a material ends light paths (BSDF_ENDS_LIGHT_PATHS) the camera's rival is 0. */
 #define RIVAL_MOST 1e18f /* so that its square is finite */
 
 /* The density of a direction, for any of the four wavelengths as the hero: the same number from either end. */
@@ -68,9 +70,10 @@ inline Rival rival_of_camera(Scene scene, Slab path, uint at, Vertex v, Sampler 
 /* Over the density of next-event estimation, that of a light path along wi. p_back: see above. */
 inline real rival_of_light_sample(Scene scene, Rival r, Surface s, LightSample ls, real p_back)
 {
-    real chosen = sel(ls.pdf < 0.0f, ls.chance, ls.pdf), back = sel(r.first, (real)(1.0f), p_back);
+    real chosen = sel(ls.pdf < 0.0f, ls.chance, ls.pdf);
     real emission = light_emit_pdf(scene, ls.row, ls.wi, ls.t) / max_r(chosen, (real)(1e-30f));
-    return rival_limited(r.arrives * back * fabs(dot3(s.n, ls.wi)) * emission);
+    real third = rival_limited(r.arrives * p_back * fabs(dot3(s.n, ls.wi)) * emission);
+    return sel(r.first, (real)(0.0f), third);
 }
 
 /* Along a camera's path that goes on along d, with density p; delta: by a delta lobe. */

@@ -24,7 +24,7 @@ inline Spectrum path_radiance(Scene scene, Slab path, uint at, PathEnd end, Wave
         real pdf = load_path_pdf(path, at);
         vec3 d = sel3(sky, load_path_d(path, at), v3(0.0f, 0.0f, 1.0f)); /* a slot without a pixel has none */
         vec3 from = madd3(d, -path_null_distance(path, at), load_path_o(path, at)), side = path_hemisphere(path, at);
-        real rival = sel(end.depth > 0, path_rival(path, at), (real)(0.0f));
+        real rival = sel(end.depth > 1, path_rival(path, at), (real)(0.0f));
         Spectrum arrives = infinite_gather(scene, from, side, d, pdf, rival, lambdas);
 #if USES_ABSORPTION
         integer medium = sel_i(sky, load_path_medium(path, at), (integer)(0));

@@ -296,7 +296,7 @@ def test_halves_are_the_whole() -> None:
 
 def test_stopped_early_is_as_bright() -> None:
     """The film is balanced wherever it was left: pixels that have samples, and light paths."""
-    scene = with_light_paths(dataclasses.replace(corner({"sphere": 30.0}), seed=3), max_depth=2)
+    scene = with_light_paths(dataclasses.replace(corner({"sphere": 30.0}), seed=3), max_depth=3)
     film = dataclasses.replace(scene.film, width=160, height=120)
     scene = dataclasses.replace(scene, film=film)
     whole = picture(scene, 64).mean()

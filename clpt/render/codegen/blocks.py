@@ -25,7 +25,7 @@ NEEDED = {
     "lead": "USES_ABSORPTION",
     "rival": "WEIGHS_LIGHT_PATHS",
     "weight": "LIGHT_PATHS",
-    "light": "BEGINS_WEIGHED",
+    "light": "WEIGHS_LIGHT_PATHS",
     "pixel_index": "LIGHT_PATHS",
     "film": "LIGHT_PATHS",
     "instance": "USES_INSTANCES",

@@ -51,7 +51,6 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "FEW_LIGHTS": lambda f: not f.many_lights,
     "LIGHT_PATHS": lambda f: f.light_paths,
     "WEIGHS_LIGHT_PATHS": lambda f: f.weighed,
-    "BEGINS_WEIGHED": lambda f: f.weighed and f.light_paths,
     "CAMERA_DISPERSES": lambda f: f.glass_lens,
     "FILTER_BOX": lambda f: f.filter == "box",
     "FILTER_TAPS": lambda f: f.filter_taps,
