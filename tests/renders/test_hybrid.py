@@ -2,7 +2,7 @@
 
 Means over blocks of pixels are compared by the spread of independent exposures; see
 tests/renders/support.py for the significance. Kernels are one lane wide, which compiles soonest;
-test_lanes has the others.
+test_lanes has another width.
 """
 
 from __future__ import annotations
@@ -242,14 +242,13 @@ def test_caustics_converge() -> None:
 
 
 def test_lanes() -> None:
-    """The same paths in every number of lanes."""
+    """The same paths one and eight lanes wide."""
     scene, pictures = with_light_paths(caustic()), []
-    for lanes in (1, 8, 16):
+    for lanes in (1, 8):
         device = choose()
         device.lanes = lanes
         pictures.append(clpt.render(scene, 16, device=device))
-    for picture in pictures[1:]:
-        np.testing.assert_allclose(picture, pictures[0], rtol=2e-3, atol=1e-4)
+    np.testing.assert_allclose(pictures[1], pictures[0], rtol=2e-3, atol=1e-4)
 
 
 def picture(scene: Scene, *runs: int, **options: Any) -> np.ndarray:
