@@ -74,16 +74,16 @@ def test_variables(scene):
     )
     assert scene(body).integrator.max_depth == 3
     assert scene(body, n=7).integrator.max_depth == 7
-
-
-def test_light_paths_are_a_parameter_of_ours() -> None:
-    path = '<integrator type="path"><integer name="light_paths" value="2"/></integrator>'
-    assert scene(path).integrator.light_paths == 2
-    assert scene('<integrator type="path"/>').integrator.light_paths == 0
     with pytest.raises(SceneError, match=r"scene.xml: has no variable 'm'; variables: n"):
         scene(body, m=7)
     with pytest.raises(SceneError, match=r"scene.xml:2: .*\$q is not defined"):
         scene('<integrator type="$q"/>')
+
+
+def test_light_paths_are_a_parameter_of_ours(scene):
+    path = '<integrator type="path"><integer name="light_paths" value="2"/></integrator>'
+    assert scene(path).integrator.light_paths == 2
+    assert scene('<integrator type="path"/>').integrator.light_paths == 0
 
 
 def test_include_and_path(scene, tmp_path):
