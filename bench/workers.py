@@ -98,7 +98,7 @@ class Clpt:
             "milliseconds": {name: round(t.seconds * 1e3, 2) for name, t in timings.items()},
             "rays": {"closest": wavefront.counts.closest, "shadow": wavefront.counts.shadow},
             "layout": wavefront.scene.strategy.layout,
-            "lanes": wavefront.device.lanes,
+            "lanes": wavefront.lanes,
             "slots": wavefront.slots,
         }
 

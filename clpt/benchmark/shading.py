@@ -119,7 +119,7 @@ def _figure(name: str, flight: Flight, yardstick: Flight, rounds: int) -> Figure
         "mode": mode,
         "of_diffuse": ratio,
         "items": float(np.mean([items for (items, _), _ in both])),
-        "lanes": flight.wavefront.device.lanes,
+        "lanes": flight.wavefront.lanes,
         "note": f"{mode}, {ratio:.2f} of diffuse",
     }
     figure = Figure("shading", name, "Mitems/s", tuple(own), flight.scene.name, more)

@@ -100,7 +100,7 @@ def _figure(
         "gbytes": gigabytes,
         "copy_gbytes": copied,
         "of_copy": gigabytes / copied,
-        "lanes": flight.wavefront.device.lanes,
+        "lanes": flight.wavefront.lanes,
         "layout": flight.wavefront.scene.strategy.layout,
         "mode": flight.scene.film.mode,
     }

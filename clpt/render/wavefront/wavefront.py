@@ -75,7 +75,7 @@ class Wavefront:
     ):
         self.device, self.stream, self.buffers = scene.device, scene.stream, scene.buffers
         self.scene, self.paths, self.looped, self.channel = scene, paths, looped, channel
-        self._tuning = tuning
+        self._tuning, self.lanes = tuning, self.device.lanes
         self.timings = Timings(self.device.queue)
         self.kernels = Kernels(self.device, lambda: self.arguments)
         features = self.features
