@@ -31,7 +31,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
     Rival rival = rival_of_emission(scene, path, at, v, vertex_hemisphere(frame, wo));
 #endif
 
-#if !BSDF_DELTA && !BSDF_ENDS_LIGHT_PATHS
+#if !BSDF_DELTA
     /* To the camera. */
     vec2 lens = sampler_pair(sampler, scatter.dimension + DIMENSION_LIGHT);
     CameraPoint c = camera_connect(scene, s.p, mask_of(0), lens);
@@ -43,7 +43,8 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
     real over = rival_to_camera(rival, s, c.d, mask_of(0), 1.0f / max_r(c.importance, (real)(1e-30f)),
                                 rival_pdf(m, to, wo));
     carries *= 1.0f / (1.0f + sqr(over));
-    shine = shine & !rival.first;
+    mask hidden = mask_of(settings->hide_lights != 0) & (s.light >= 0);
+    shine = shine & !rival.first & !hidden & !rival_ends(scene, v);
 #endif
     Spectrum value = spectrum_scale(spectrum_mul(beta, f), carries);
     value = vertex_beyond(scene, v, neg3(c.d), c.t, v.lambdas, value);
@@ -76,9 +77,8 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
     }
 #endif
 
-#if BSDF_ENDS_LIGHT_PATHS
-    next = mask_of(0);
-#elif WEIGHS_LIGHT_PATHS && !BSDF_IS_NULL
+#if WEIGHS_LIGHT_PATHS && !BSDF_IS_NULL
+    next = next & !rival_ends(scene, v);
     mask delta = (bs.lobe & LOBE_DELTA) != 0;
     real p = rival_pdf(m, wo, bs.wi), p_back = rival_pdf(m, bs.wi, wo);
     store_path_rival(path, at, next, rival_to_camera(rival, s, onward, delta, p, p_back));

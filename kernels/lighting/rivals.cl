@@ -24,7 +24,7 @@
  *
  * Light that comes to x_1 from the light itself is left to the camera's path, which chooses a light there: a light
  * path is joined from its second vertex on, and for k = 2 the third density is 0. (Splats of light that next-event
- * estimation finds without noise are noise only, see bench/NOTES.md.) Null surfaces change nothing. Where a material ends light paths (BSDF_ENDS_LIGHT_PATHS) the camera's rival is 0. */
+ * estimation finds without noise are noise only, see bench/NOTES.md.) Null surfaces change nothing. Where a material ends light paths (`rival_ends`) the camera's rival is 0. */
 #define RIVAL_MOST 1e18f /* so that its square is finite */
 
 /* The density of a direction, for any of the four wavelengths as the hero: the same number from either end. */
@@ -38,6 +38,16 @@ inline real rival_pdf(Bsdf m, vec3 wo, vec3 wi)
 }
 
 inline real rival_limited(real rival) { return min_r(rival, (real)(RIVAL_MOST)); }
+
+/* Whether light paths end at a vertex: what happens there is not the same for light that comes the other way. */
+inline mask rival_ends(Scene scene, Vertex v)
+{
+#if BSDF_ENDS_LIGHT_PATHS
+    return mask_of(1);
+#else
+    return shading_frame_turns(scene, v.row);
+#endif
+}
 
 /* What a vertex knows of the rival of its path. */
 typedef struct {
@@ -60,9 +70,7 @@ inline Rival rival_of_camera(Scene scene, Slab path, uint at, Vertex v, Sampler 
         real seen = sel(c.seen, rival / max_r(c.importance, (real)(1e-30f)), (real)(0.0f));
         rival = sel(r.first, seen, rival);
     }
-#if BSDF_ENDS_LIGHT_PATHS
-    rival = 0.0f;
-#endif
+    rival = sel(rival_ends(scene, v), (real)(0.0f), rival);
     r.arrives = rival / max_r(fabs(dot3(v.s.n, v.d)), (real)(1e-7f));
     return r;
 }

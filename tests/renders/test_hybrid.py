@@ -23,7 +23,8 @@ from clpt.scene import materials as m
 from clpt.scene.cameras import Orthographic, Perspective, ThinLens
 from clpt.scene.integrators import Box, Direct, Filter, Gaussian, Path
 from clpt.scene.lights import Area, Constant, Light, Point
-from clpt.scene.shapes import Cube, Disk, Rectangle, Shape, Sphere
+from clpt.scene.shapes import Cube, Disk, Group, Instance, Rectangle, Shape, Sphere
+from clpt.scene.textures import Bitmap
 from tests.renders.support import assert_agree, assert_mean, blocks, exposures
 from tests.renders.test_light_tracing import (
     BLACK,
@@ -31,6 +32,7 @@ from tests.renders.test_light_tracing import (
     LIGHTS,
     UP,
     VIEW,
+    ball,
     lamps,
     lit_shapes,
     still_life,
@@ -163,6 +165,29 @@ def test_smooth_normals_and_kinds_that_end_light_paths(mode: str) -> None:
     grating = Rectangle(to_world=plate, material=m.TwoSided(front=m.Grating()))
     shapes = [*scene.shapes, grating] if mode == "spectral" else scene.shapes
     both(dataclasses.replace(scene, shapes=shapes), 256, mode, max_depth=4)
+
+
+@pytest.mark.slow
+def test_normal_maps_are_left_to_the_camera() -> None:
+    """A bent normal is turned to the viewer, wherever light comes from."""
+    image = np.random.default_rng(2).random((16, 16, 3)) * 0.4 + np.array([0.3, 0.3, 0.6])
+    bent = m.NormalMap(
+        material=m.Diffuse(reflectance=0.8), map=Bitmap(image=image.astype(np.float32), raw=True)
+    )
+    scene = corner({}, lamp())
+    shapes = [dataclasses.replace(scene.shapes[0], material=bent), *scene.shapes[1:]]
+    both(dataclasses.replace(scene, shapes=shapes), 512, "normal map", max_depth=4)
+
+
+@pytest.mark.slow
+def test_instances() -> None:
+    glass = m.RoughDielectric(int_ior=1.5, alpha_u=0.2, alpha_v=0.2)
+    group = Group(shapes=[ball(0.3, (0, 0, 0), glass)])
+    placed = [
+        Instance(group=group, to_world=tf.translate([x, 0.4, 0.2]) @ tf.scale([1.0, 0.8, 1.2]))
+        for x in (-0.6, 0.6)
+    ]
+    both(corner({}, lamp(), *placed), 256, "instances", max_depth=5)
 
 
 @pytest.mark.slow
