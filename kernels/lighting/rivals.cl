@@ -24,7 +24,8 @@
  *
  * Light that comes to x_1 from the light itself is left to the camera's path, which chooses a light there: a light
  * path is joined from its second vertex on, and for k = 2 the third density is 0. (Splats of light that next-event
- * estimation finds without noise are noise only, see bench/NOTES.md.) Null surfaces change nothing. Where a material ends light paths (`rival_ends`) the camera's rival is 0. */
+ * estimation finds without noise are noise only, see bench/NOTES.md.) Null surfaces change nothing. Where a material
+ * ends light paths (`rival_ends`) the camera's rival is 0. */
 #define RIVAL_MOST 1e18f /* so that its square is finite */
 
 /* The density of a direction, for any of the four wavelengths as the hero: the same number from either end. */
