@@ -36,6 +36,11 @@ PATH = Record(
     weight=("real", "sample's weight by the pixel filter; from a light, 1 over its first beta"),
     medium=("integer", "absorbing medium of the ray, see kernels/optics/medium.cl; 0: none"),
     lead=("real", "how far before o the ray's medium begins: o lies off the surface [m]"),
+    rival=(
+        "real",
+        "density of what the other side does over the path's own, see kernels/lighting/rivals.cl",
+    ),
+    light=("integer", "row in `lights` of the light where the path began"),
     state=("integer", "PATH_ bits and depth, see kernels/path/path_state.cl"),
     pixel_index=("integer", "where the film stores the path's pixel, see kernels/film/pixel.cl"),
     pixel_key=("natural", "number by which the sampler knows that pixel of the whole film"),
@@ -100,6 +105,10 @@ SETTINGS = Record(
     rr_depth=("integer", "depth from which Russian roulette is played"),
     hide_lights=("integer", "1: the camera does not see lights"),
     alpha=("integer", "1: the film has a channel of what is covered; the camera sees no sky"),
+    light_paths=(
+        "integer",
+        "light paths for each camera sample, weighed against it; 0: there are none",
+    ),
     light_count=("integer", "rows in `lights`"),
     ambient=(
         "integer",

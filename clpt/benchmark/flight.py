@@ -14,8 +14,9 @@ from clpt import device
 from clpt.layout import Record
 from clpt.records import HIT, PATH, SHADOW
 from clpt.render.lowering.scene import lower
+from clpt.render.wavefront.bounce_loop import Step
 from clpt.render.wavefront.path_buffers import default_slots
-from clpt.render.wavefront.wavefront import Step, Wavefront
+from clpt.render.wavefront.wavefront import Wavefront
 from clpt.scene import Scene
 
 ALIVE, FRESH, DONE = 0x1000, 0x2000, 0x4000  # kernels/path/path_state.cl

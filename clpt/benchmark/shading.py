@@ -13,7 +13,7 @@ import numpy as np
 
 from clpt import device, transforms
 from clpt.errors import UnknownKindError
-from clpt.render.wavefront.wavefront import Step
+from clpt.render.wavefront.bounce_loop import Step
 from clpt.scene import Scene, integrators, lights, params, textures
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Film

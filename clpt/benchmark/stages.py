@@ -17,8 +17,8 @@ from clpt.benchmark.traffic import traffic
 from clpt.records import SLABS
 from clpt.render.codegen import programs
 from clpt.render.wavefront import queues
+from clpt.render.wavefront.bounce_loop import Step
 from clpt.render.wavefront.film_state import FILM_WORDS
-from clpt.render.wavefront.wavefront import Step
 from clpt.scene import Scene
 
 from .bandwidth import Copying

@@ -40,7 +40,11 @@ def kernels(scene: Path, folder: Path, lanes: str, layout: str, variables: dict[
     """
     features = lower(load(scene, **variables)).features
     queued = len(features.materials) > 1
-    made = sources(features, layout, int(lanes), queued=queued) | film_sources(features, layout)
+    made = film_sources(features, layout)
+    for own in features.passes:
+        label = "light_" if own is not features else ""
+        texts = sources(own, layout, int(lanes), queued=queued)
+        made |= {f"{label}{name}": text for name, text in texts.items()}
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, source in made.items():

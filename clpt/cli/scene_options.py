@@ -22,6 +22,7 @@ from ..formats.missing import Missing
 from ..render.lowering.checks import check
 from ..render.renderer import Renderer
 from ..scene import Scene, kinds
+from ..scene.integrators import MOST_LIGHT_PATHS
 from ..scene.params import Kind, params
 from ..spectra import read_sensor, spaces
 from ..spectra.sensors import OBSERVERS
@@ -106,6 +107,10 @@ _OPTIONS = (
     ),
     click.option(
         "--max-depth", type=click.IntRange(-1), help="Longest path, at most 4000; -1: no limit."
+    ),
+    click.option(
+        "--light-paths", type=click.IntRange(0, MOST_LIGHT_PATHS),
+        help="Of path: paths from lights for each sample, for caustics; 0: none.",
     ),
     click.option(
         "--sensor", type=SensorName(), help="cie1931, cie1964 or a file of three curves."
@@ -204,6 +209,7 @@ def changed(
     integrator: str | None = None,
     sampler: str | None = None,
     max_depth: int | None = None,
+    light_paths: int | None = None,
     **film: Any,
 ) -> Scene:
     """Return the scene with those settings replaced that are not None; `film`: of its film.
@@ -219,12 +225,16 @@ def changed(
     given["film"] = dataclasses.replace(scene.film, **film)
     if integrator is not None and integrator != scene.integrator.kind:
         given["integrator"] = _integrator(integrator, scene.integrator)
-    if max_depth is not None:
-        how: Any = given.get("integrator", scene.integrator)
-        if not hasattr(how, "max_depth"):
-            message = f"the integrator {how.kind} has no depth"
-            raise click.BadParameter(message, param_hint="--max-depth")
-        given["integrator"] = dataclasses.replace(how, max_depth=max_depth)
+    how: Any = given.get("integrator", scene.integrator)
+    for name, value, what in (
+        ("max_depth", max_depth, "depth"), ("light_paths", light_paths, "light paths beside it"),
+    ):  # fmt: skip
+        if value is None:
+            continue
+        if not hasattr(how, name):
+            message = f"the integrator {how.kind} has no {what}"
+            raise click.BadParameter(message, param_hint=f"--{name.replace('_', '-')}")
+        how = given["integrator"] = dataclasses.replace(how, **{name: value})
     return dataclasses.replace(scene, **{k: v for k, v in given.items() if v is not None})
 
 

@@ -29,6 +29,7 @@ IDS = ("shape_id", "primitive_id")  # of these, which are names: a mean of them 
 
 
 MOST_BANDS = 1024
+MOST_LIGHT_PATHS = 64  # for a sample of the camera
 NARROWEST = 0.01  # [nm], a range of wavelengths
 
 
@@ -51,11 +52,24 @@ class Path(Integrator):
     """Path tracing with next-event estimation and multiple importance sampling (power heuristic).
 
     `max_depth` counts surfaces and the light: 1 shows only lights, 2 adds direct light.
+
+    With `light_paths` paths start at lights too: each vertex is joined to the camera, and weighed
+    against what the camera's paths find. Caustics that the camera sees directly converge then. The
+    camera must be `perspective` or `thin_lens`.
     """
 
     max_depth: int = host(8, "longest path; -1: no limit")
     rr_depth: int = host(3, "depth from which Russian roulette may end a path")
     hide_lights: bool = flag(False, "the camera sees through lights, also those on shapes")
+    light_paths: int = host(0, "paths from lights for each sample, weighed against it; 0: none")
+
+    def check(self) -> None:
+        super().check()
+        paths: Any = self.light_paths
+        whole = isinstance(paths, int) and not isinstance(paths, bool)
+        if not whole or not 0 <= paths <= MOST_LIGHT_PATHS:
+            message = f"must be a whole number from 0 to {MOST_LIGHT_PATHS}, not {paths!r}"
+            raise SceneError(message, where="path.light_paths")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -86,6 +86,7 @@ class Material(Kind):
     is_null: ClassVar[bool] = False  # light goes on as if nothing were there, to lights as well
     no_back: ClassVar[bool] = False  # its back is not there
     absorbs: ClassVar[bool] = False  # all light, where its albedo is 0: none is sought there
+    reversible: ClassVar[bool] = True  # light that comes the other way takes the same paths
 
     @property
     def transmits(self) -> bool:
@@ -450,6 +451,7 @@ class Grating(Material):
     uses_lobe_sample = True
     disperses = True
     needs_wavelengths = True
+    reversible = False
 
     mode: str = choice("reflective", "whether light is turned back", ("reflective", "transmissive"))
     profile: str = choice(
@@ -534,6 +536,7 @@ class Hair(Material):
 
     uses_lobe_sample = True
     no_back = True
+    reversible = False
 
     sigma_a: Textured = factor(pigment(1.3, 0.2), "absorption, per radius of the fibre")
     longitudinal_roughness: TexturedNumber = _share(0.3, "of the angle along the fibre")

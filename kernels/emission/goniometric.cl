@@ -8,3 +8,5 @@ LightRay goniometric_emit(Goniometric l, Scene scene, vec2 u, vec2 v, Wavelength
     r.power = spectrum_scale(goniometric_intensity(l, scene, r.d, lambdas), 4.0f * PI);
     return r;
 }
+
+real goniometric_emit_pdf(Goniometric l, vec3 d) { return INV_4PI; }

@@ -5,3 +5,5 @@ LightRay image_spot_emit(ImageSpot l, Scene scene, vec2 u, vec2 v, Wavelengths l
     r.power = spectrum_mul(r.power, image_spot_factor(l, scene, r.d, lambdas));
     return r;
 }
+
+real image_spot_emit_pdf(ImageSpot l, vec3 d) { return spot_emit_pdf(image_spot_bare(l), d); }

@@ -8,3 +8,6 @@ LightRay point_emit(Point l, Scene scene, vec2 u, vec2 v, Wavelengths lambdas)
     r.power = spectrum_scale(emission_load(scene, l.intensity, texture_point_nowhere(), lambdas), 4.0f * PI);
     return r;
 }
+
+/* A light without falloff sends no rays: no number of them would give what it is seen to do. */
+real point_emit_pdf(Point l, vec3 d) { return sel(l.falloff != 0, (real)(INV_4PI), (real)(0.0f)); }

@@ -11,3 +11,10 @@ LightRay projector_emit(Projector l, Scene scene, vec2 u, vec2 v, Wavelengths la
     r.power = spectrum_scale(projector_irradiance(l, scene, v, lambdas), area);
     return r;
 }
+
+/* dA = d omega / cos^3 on the image's plane. */
+real projector_emit_pdf(Projector l, vec3 d)
+{
+    real cos_t = max_r(dot3(d, l.z), (real)(1e-6f));
+    return 0.25f * sqrt(dot3(l.x, l.x) * dot3(l.y, l.y)) / (cos_t * cos_t * cos_t);
+}

@@ -65,7 +65,8 @@ inline CameraPoint pinhole_connect(global const Settings *settings, global const
 /* The point, which is not seen where no filter of the picture's pixels holds it. */
 inline CameraPoint camera_near(Scene scene, CameraPoint c)
 {
-    float radius = scene.distributions[0], width = (float)scene.settings->width, height = (float)scene.settings->height;
+    float radius = scene.distributions[FILTER_PROFILE];
+    float width = (float)scene.settings->width, height = (float)scene.settings->height;
     mask near_x = fabs(c.film.x - 0.5f * width) < 0.5f * width + radius;
     mask near_y = fabs(c.film.y - 0.5f * height) < 0.5f * height + radius;
     c.seen = c.seen & near_x & near_y;

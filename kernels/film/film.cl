@@ -1,6 +1,7 @@
 /* The film while it is being exposed. A film is FILM_WORDS streams of `padded_pixels` words, or, where even and odd
  * samples are kept apart, two times as many. Slots of several planes may render the same pixel: it is added to by
- * atomics. */
+ * atomics. Where paths from lights are weighed against those from the camera, a film has two groups of words: first
+ * that of the camera's paths, then that of light paths; a program adds to the group that begins at FILM_GROUP. */
 #include "film/pixel.cl"
 #include "film/sums.cl"
 #define FILM_SAMPLES 9 /* after the sums of three channels, three words each: the number of samples */
@@ -11,9 +12,13 @@
 #define FILM_ALPHA 10
 #endif
 #if USES_ALPHA
-#define FILM_WORDS (FILM_ALPHA + 3) /* then the sum of what is covered */
+#define FILM_GROUP_WORDS (FILM_ALPHA + 3) /* then the sum of what is covered */
 #else
-#define FILM_WORDS FILM_ALPHA
+#define FILM_GROUP_WORDS FILM_ALPHA
+#endif
+#ifndef FILM_GROUP /* there is one group */
+#define FILM_GROUP 0
+#define FILM_WORDS FILM_GROUP_WORDS
 #endif
 
 /* Whether the film takes a value: neither NaN nor so large that sums would overflow. */
@@ -31,12 +36,12 @@ typedef struct {
 #endif
 } Exposure;
 
-/* The first word of a pixel in the half of the film that a plane's samples go to: even or odd ones, where these are
- * kept apart and planes are an even number; else the only one. */
+/* The first word of a pixel's group in the half of the film that a plane's samples go to: even or odd ones, where these
+ * are kept apart and planes are an even number; else the only one. */
 inline size_t film_at(global const Settings *settings, int plane, int pixel_index)
 {
     int half_film = plane & (settings->halves - 1);
-    return (size_t)half_film * FILM_WORDS * settings->padded_pixels + pixel_index;
+    return (size_t)(half_film * FILM_WORDS + FILM_GROUP) * settings->padded_pixels + pixel_index;
 }
 
 /* Adds what slots have summed to their pixels. Returns how many sums are full, lane by lane. A loop, as its text for
@@ -52,7 +57,7 @@ inline integer film_add(global const Settings *settings, global uint *film, mask
         if (!at_lane[i]) continue;
         global uint *at = film + film_at(settings, planes[i], pixels[i]);
         uint count = 0;
-        for (int word = 0; word < FILM_WORDS; word += word == FILM_SAMPLES ? 1 : 3) {
+        for (int word = 0; word < FILM_GROUP_WORDS; word += word == FILM_SAMPLES ? 1 : 3) {
             const uint *w = words + word * LANES + i;
             if (word == FILM_SAMPLES) sums_add_word(at + word * stream, w[0]);
             else count += sums_add(at + word * stream, stream, w[0], w[LANES], w[2 * LANES]);

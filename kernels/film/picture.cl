@@ -14,11 +14,11 @@ inline float halves_sum(global const uint *sum, size_t stream, size_t size, int2
     return sums_float(total.low, total.middle, total.high);
 }
 
-/* A pixel's three sums. */
-inline vec3 film_sum(global const Settings *settings, global const uint *film, int pixel_index, int2 halves)
+/* A pixel's three sums, in the group of words that begins at `group`. */
+inline vec3 film_sum(global const Settings *settings, global const uint *film, int pixel_index, int2 halves, int group)
 {
     size_t stream = settings->padded_pixels, size = FILM_WORDS * stream;
-    global const uint *first = film + pixel_index;
+    global const uint *first = film + group * stream + pixel_index;
     return v3(halves_sum(first, stream, size, halves), halves_sum(first + 3 * stream, stream, size, halves),
               halves_sum(first + 6 * stream, stream, size, halves));
 }
@@ -34,11 +34,14 @@ inline uint film_samples(global const Settings *settings, global const uint *fil
 
 /* The number of samples of a pixel in a picture: its own, or, of light paths, how many there were per pixel, which the
  * host says, as each may have lit any pixel. */
-#ifdef LIGHT_PATHS
-#define SAMPLES_ARG , float samples
-#define SAMPLES samples
+#if LIGHT_PATHS || WEIGHS_LIGHT_PATHS
+#define LIGHT_PATHS_ARG , float light_paths
 #else
-#define SAMPLES_ARG
+#define LIGHT_PATHS_ARG
+#endif
+#if LIGHT_PATHS
+#define SAMPLES light_paths
+#else
 #define SAMPLES (float)film_samples(settings, film, pixel_index, halves)
 #endif
 

@@ -18,6 +18,17 @@ inline void pixel_place(global const Settings *settings, integer pixel_index, in
     *y = row * 4 + ((pixel_index >> 2) & 3) - settings->margin;
 }
 
+/* The pixel of the picture nearest to one that may lie in the margin. */
+inline integer film_nearest_index(global const Settings *settings, integer pixel_index)
+{
+    integer x, y;
+    if (settings->margin == 0) return pixel_index;
+    pixel_place(settings, pixel_index, &x, &y);
+    x = max_i(min_i(x, (integer)(settings->width - 1)), (integer)(0));
+    y = max_i(min_i(y, (integer)(settings->height - 1)), (integer)(0));
+    return film_pixel_index(settings, x, y);
+}
+
 inline vec2 pixel_of_index(global const Settings *settings, integer pixel_index)
 {
     integer x, y;

@@ -1,7 +1,7 @@
 /* Splatting: light at a point of the film serves every pixel whose filter holds the point, each by the filter's value f
- * there. Filters are separable and even: `distributions` begins with the radius, a number of steps n, and n + 1 values
- * of f from 0 to the radius (clpt/render/lowering/camera/filters.py). FILTER_TAPS: how many pixels of an axis hold a
- * point at most; FILTER_REACH: how far they are from its own. */
+ * there. Filters are separable and even: from FILTER_PROFILE on `distributions` has the radius, a number of steps n,
+ * and n + 1 values of f from 0 to the radius (clpt/render/lowering/camera/filters.py). FILTER_TAPS: how many pixels of
+ * an axis hold a point at most; FILTER_REACH: how far they are from its own. */
 #include "film/light.cl"
 #define SPREAD_PIXELS (FILTER_TAPS * FILTER_TAPS)
 
@@ -13,11 +13,12 @@ typedef struct {
 /* f at a distance, 0 beyond the radius [1/pixel]. */
 inline real spread_filter(Scene scene, real distance)
 {
-    float radius = scene.distributions[0], steps = scene.distributions[1];
+    float radius = scene.distributions[FILTER_PROFILE], steps = scene.distributions[FILTER_PROFILE + 1];
     real x = fabs(distance) * (steps / radius);
     mask inside = x <= steps;
     integer i = min_i(to_integer(sel(inside, x, (real)(0.0f))), (integer)((int)steps - 1));
-    real a = gather(scene.distributions, i + 2), b = gather(scene.distributions, i + 3);
+    integer at = i + (FILTER_PROFILE + 2);
+    real a = gather(scene.distributions, at), b = gather(scene.distributions, at + 1);
     return sel(inside, a + (x - to_real(i)) * (b - a), (real)(0.0f));
 }
 
@@ -25,7 +26,7 @@ inline real spread_filter(Scene scene, real distance)
 inline integer spread_axis(Scene scene, integer own, real offset, real f[FILTER_TAPS])
 {
     real lowest = (float)-FILTER_REACH, highest = (float)(FILTER_REACH + 1 - FILTER_TAPS);
-    real first = clamp_r(ceil(offset - scene.distributions[0]), lowest, highest);
+    real first = clamp_r(ceil(offset - scene.distributions[FILTER_PROFILE]), lowest, highest);
     for (int i = 0; i < FILTER_TAPS; i++) f[i] = spread_filter(scene, first + (float)i - offset);
     return own + to_integer(first);
 }

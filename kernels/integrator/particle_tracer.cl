@@ -3,12 +3,15 @@
  * f is asked for as radiance flows, from the light to the camera, and light that is carried takes it with the
  * geometric cosine of the side where it leaves (Veach 1997, 5.3.2): what bsdf_sample gives for the opposite flow
  * lacks, where light is refracted, eta^2, and where normals are smoothed, the quotient
- * |wo . ns| |wi . n| / (|wo . n| |wi . ns|), wo being the side where the light came from. */
+ * |wo . ns| |wi . n| / (|wo . n| |wi . ns|), wo being the side where the light came from.
+ *
+ * As the light paths of `path` they are weighed against those from the camera (lighting/rivals.cl). */
 #include "interface/camera.cl"
 #include "generated/camera.cl"
 #include "film/connect.cl"
 #include "generated/connect.cl"
 #include "lighting/light_path.cl"
+#include "generated/rivals.cl"
 
 void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, mask active)
 {
@@ -24,14 +27,25 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
     Frame frame = scatter.shading.frame;
     vec3 wo = scatter.wo;
     real arrives = 1.0f / max_r(fabs(dot3(s.n, v.d)), (real)(1e-6f));
+#if WEIGHS_LIGHT_PATHS && !BSDF_IS_NULL
+    Rival rival = rival_of_emission(scene, path, at, v, vertex_hemisphere(frame, wo));
+#endif
 
 #if !BSDF_DELTA
     /* To the camera. */
     vec2 lens = sampler_pair(sampler, scatter.dimension + DIMENSION_LIGHT);
     CameraPoint c = camera_connect(scene, s.p, mask_of(0), lens);
-    Spectrum f = bsdf_eval(m, to_local(frame, neg3(c.d)), wo);
+    vec3 to = to_local(frame, neg3(c.d));
+    Spectrum f = bsdf_eval(m, to, wo);
     mask shine = active & c.seen & (spectrum_max(f) > 0.0f);
     real carries = fabs(dot3(s.n, c.d)) * arrives * c.importance * shading_frame_share(scatter.shading, neg3(v.d));
+#if WEIGHS_LIGHT_PATHS
+    real over = rival_to_camera(rival, s, c.d, mask_of(0), 1.0f / max_r(c.importance, (real)(1e-30f)),
+                                rival_pdf(m, to, wo));
+    carries *= 1.0f / (1.0f + sqr(over));
+    mask hidden = mask_of(settings->hide_lights != 0) & (s.light >= 0);
+    shine = shine & !rival.first & !hidden & !rival_ends(scene, v);
+#endif
     Spectrum value = spectrum_scale(spectrum_mul(beta, f), carries);
     value = vertex_beyond(scene, v, neg3(c.d), c.t, v.lambdas, value);
     connect_camera(shadow, at, active, shine, s, c, value);
@@ -63,6 +77,12 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
     }
 #endif
 
+#if WEIGHS_LIGHT_PATHS && !BSDF_IS_NULL
+    next = next & !rival_ends(scene, v);
+    mask delta = (bs.lobe & LOBE_DELTA) != 0;
+    real p = rival_pdf(m, wo, bs.wi), p_back = rival_pdf(m, bs.wi, wo);
+    store_path_rival(path, at, next, rival_to_camera(rival, s, onward, delta, p, p_back));
+#endif
     vertex_leave(path, at, next, v, onward, beta);
     hero_keep(path, at, next, ratio);
     vertex_end(path, at, active, next, state);

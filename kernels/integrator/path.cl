@@ -1,6 +1,8 @@
 /* One vertex of a path from the camera: the light that is met, next-event estimation, and the direction to go on.
  * Light is found both by meeting it and by choosing it; the two are weighted by the power heuristic (Veach 1997,
- * 9.2.4). */
+ * 9.2.4), and against paths from lights where there are some (lighting/rivals.cl). */
+#include "generated/rivals.cl"
+
 void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, mask active)
 {
     global const Settings *settings = scene.settings;
@@ -16,6 +18,9 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
     if (any(hidden)) {
         store_path_o(path, at, hidden, surface_offset(s, v.d));
         store_path_pdf(path, at, hidden, load_path_pdf(path, at) + v.t);
+#if WEIGHS_LIGHT_PATHS /* the light is in the way of what light paths bring to the camera */
+        store_path_rival(path, at, hidden, (real)(0.0f));
+#endif
     }
     mask lit = active & (s.light >= 0) & light_shows(scene, s.light, v.front) & !hidden;
     if (any(lit)) {
@@ -24,6 +29,10 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
         vec3 from = madd3(v.d, -null_distance, v.o), side = path_hemisphere(path, at);
         real other = light_pdf(scene, light, from, side, v.d, v.t + null_distance, s.n);
         real w = sel(pdf < 0.0f, (real)(1.0f), mis_weight(pdf, other));
+#if WEIGHS_LIGHT_PATHS
+        real rival = sel(depth > 1, load_path_rival(path, at), (real)(0.0f));
+        w = mis_weight_of_three(pdf, other, rival * light_emit_pdf(scene, light, v.d, v.t));
+#endif
         Spectrum le = emission_load(scene, light_at(scene, light).radiance, surface_texture_point(s), v.lambdas);
         le = spectrum_scale(spectrum_mul(beta, le), w);
         store_path_radiance(path, at, lit, spectrum_add(load_path_radiance(path, at), le));
@@ -39,6 +48,9 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
 #if BSDF_ABSORBS /* as the surfaces of lights mostly do */
     next = next & (spectrum_max(bsdf_albedo(m)) > 0.0f);
 #endif
+#if WEIGHS_LIGHT_PATHS && !BSDF_IS_NULL
+    Rival rival = rival_of_camera(scene, path, at, v, sampler);
+#endif
 
 #if USES_LIGHTS && !BSDF_DELTA
     /* Next-event estimation. */
@@ -51,7 +63,12 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
         ls = light_sample(scene, s.p, hemisphere, scatter.choice.x, point, scatter.lambdas);
     vec3 wi = to_local(frame, ls.wi);
     Spectrum f = spectrum_scale(bsdf_eval(m, wo, wi), shading_frame_share(scatter.shading, ls.wi));
+#if WEIGHS_LIGHT_PATHS
+    real third = rival_of_light_sample(scene, rival, s, ls, rival_pdf(m, wi, wo));
+    real w = mis_weight_of_three(ls.pdf, rival_pdf(m, wo, wi), third);
+#else
     real w = sel(ls.pdf < 0.0f, (real)(1.0f), mis_weight(ls.pdf, hero_pdf(m, wo, wi, ratio)));
+#endif
     mask shine = next & (ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
     w = w / sel(shine, fabs(ls.pdf), (real)(1.0f));
     Spectrum value = spectrum_scale(spectrum_mul(spectrum_mul(beta, f), ls.radiance), w);
@@ -83,7 +100,13 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
     vertex_leave(path, at, next, v, onward, beta);
 #if !BSDF_IS_NULL
     path_scattered(path, at, next);
-    store_path_pdf(path, at, next, sel((bs.lobe & LOBE_DELTA) != 0, (real)(-1.0f), bs.pdf));
+    mask delta = (bs.lobe & LOBE_DELTA) != 0;
+#if WEIGHS_LIGHT_PATHS
+    bs.pdf = rival_pdf(m, wo, bs.wi);
+    real p_back = rival_pdf(m, bs.wi, wo);
+    store_path_rival(path, at, next, rival_to_light(rival, s, onward, delta, bs.pdf, p_back));
+#endif
+    store_path_pdf(path, at, next, sel(delta, (real)(-1.0f), bs.pdf));
 #if USES_HEMISPHERE && !BSDF_DELTA
     store_path_sampled_hemisphere(path, at, next, hemisphere);
 #endif

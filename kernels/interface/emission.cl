@@ -2,6 +2,8 @@
  * lights at a point,
  *
  *   LightRay <kind>_emit(<Kind> l, Scene scene, vec2 u, vec2 v, Wavelengths lambdas);
+ *   real     <kind>_emit_pdf(<Kind> l, vec3 d);       with which it chooses a direction d [1/sr]; 0: it cannot be
+ *                                                     weighed, and is left to paths from the camera
  *
  * and for shapes, from which `surface_emit` makes a ray,
  *
@@ -39,12 +41,15 @@ inline LightRay surface_emit(SurfacePoint q, mask along, Spectrum value, vec2 v)
     return r;
 }
 
+/* Of the disk from which light from infinity starts [m]. */
+inline float emission_radius(global const Settings *settings) { return settings->scene_radius * 1.001f; }
+
 /* From infinity: the direction as a light sample has it, and a point of the disk across it that covers
  * the scene's sphere. */
 inline LightRay distant_emit(Scene scene, LightSample s, vec2 v)
 {
     global const Settings *settings = scene.settings;
-    float radius = settings->scene_radius * 1.001f;
+    float radius = emission_radius(settings);
     vec2 q = concentric_disk(v);
     LightRay r;
     r.d = neg3(s.wi);

@@ -1,14 +1,26 @@
 /* What all infinite lights add to a path that leaves the scene along d [W m^-2 sr^-1 nm^-1]. The direction was chosen
  * with `pdf` [1/sr] (below 0: delta) at a point p of a surface that sends light to `hemisphere`, see
- * interface/light.cl; the power heuristic weighs that against its choice on the light (Veach 1997, 9.2.4). */
-inline Spectrum infinite_gather(Scene scene, vec3 p, vec3 hemisphere, vec3 d, real pdf, Wavelengths lambdas)
+ * interface/light.cl; the power heuristic weighs that against its choice on the light (Veach 1997, 9.2.4), and, by the
+ * path's `rival`, against paths from the light (lighting/rivals.cl). */
+#if WEIGHS_LIGHT_PATHS
+#define path_rival(path, at) load_path_rival(path, at)
+#else
+#define path_rival(path, at) ((real)(0.0f))
+#endif
+
+inline Spectrum infinite_gather(Scene scene, vec3 p, vec3 hemisphere, vec3 d, real pdf, real rival,
+                                Wavelengths lambdas)
 {
     Spectrum sum = spectrum_of(0.0f);
     for (int row = 0; row < scene.settings->infinite_count; row++) {
         Spectrum radiance;
         real other;
         infinite_light(scene, row, p, hemisphere, d, lambdas, &radiance, &other);
-        sum = spectrum_madd(radiance, sel(pdf < 0.0f, (real)(1.0f), mis_weight(pdf, other)), sum);
+        real w = sel(pdf < 0.0f, (real)(1.0f), mis_weight(pdf, other));
+#if WEIGHS_LIGHT_PATHS
+        w = mis_weight_of_three(pdf, other, rival * light_emit_pdf(scene, (integer)(row), d, (real)(FAR)));
+#endif
+        sum = spectrum_madd(radiance, w, sum);
     }
     return sum;
 }

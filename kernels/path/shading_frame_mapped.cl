@@ -76,6 +76,13 @@ inline ShadingFrame shading_frame_load(Scene scene, integer row, Surface s, vec3
     return f;
 }
 
+/* Whether the frame of a material at `row` depends on where the ray comes from. */
+inline mask shading_frame_turns(Scene scene, integer row)
+{
+    integer flags = gather_i(scene.materials, max_i(row - NORMAL_MAP_WORDS, (integer)(0)));
+    return (flags & (PERTURB_NORMAL | PERTURB_HEIGHT)) != 0;
+}
+
 /* What is left of light toward or from `w`: none where the
  * perturbed surface and the real one disagree on the side. */
 inline real shading_frame_share(ShadingFrame f, vec3 w)

@@ -4,13 +4,17 @@
 #include "film/picture.cl"
 
 kernel void accumulate(global const Settings *settings, global const uint *film, global float *image,
-                       int2 halves SAMPLES_ARG)
+                       int2 halves LIGHT_PATHS_ARG)
 {
     int x = get_global_id(0), y = get_global_id(1);
     if (x < settings->width && y < settings->height) {
         int pixel_index = film_pixel_index(settings, x, y);
         float count = SAMPLES, mean = film_mean(settings, film, pixel_index, halves, count);
-        vec3 v = scale3(film_sum(settings, film, pixel_index, halves), mean);
+        vec3 v = scale3(film_sum(settings, film, pixel_index, halves, 0), mean);
+#if WEIGHS_LIGHT_PATHS /* a pixel without samples stays black */
+        float share = light_paths > 0.0f && count > 0.0f ? 1.0f / light_paths : 0.0f;
+        v = add3(v, scale3(film_sum(settings, film, pixel_index, halves, FILM_GROUP_WORDS), share));
+#endif
         global float *pixel = image + 4 * ((size_t)y * settings->width + x);
         pixel[0] = settings->to_first[0] * v.x + settings->to_first[1] * v.y + settings->to_first[2] * v.z;
         pixel[1] = settings->to_second[0] * v.x + settings->to_second[1] * v.y + settings->to_second[2] * v.z;

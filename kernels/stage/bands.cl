@@ -5,7 +5,7 @@
 #include "film/bands.cl"
 
 kernel void accumulate_bands(global const Settings *settings, global const uint *film, global const uint *bands,
-                             global float *band_image, int2 halves SAMPLES_ARG)
+                             global float *band_image, int2 halves LIGHT_PATHS_ARG)
 {
     int x = get_global_id(0), y = get_global_id(1), count = settings->bands;
     if (x < settings->width && y < settings->height) {

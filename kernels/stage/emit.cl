@@ -42,6 +42,11 @@ inline integer begin_light_path(Scene scene, Slab path, Slab shadow, uint at, ma
     store_path_lambdas(path, at, go, lambdas);
     store_path_beta(path, at, go, r.power);
     store_path_weight(path, at, go, 1.0f / max_r(strength, (real)(1e-30f)));
+#if WEIGHS_LIGHT_PATHS
+    store_path_light(path, at, go, r.row);
+    store_path_sampled_hemisphere(path, at, go, r.n);
+    store_path_rival(path, at, go, (real)(1.0f / (float)settings->light_paths));
+#endif
 #if USES_NULL_SURFACES
     store_path_nulls(path, at, go, (integer)(0));
     store_path_null_distance(path, at, go, (real)(0.0f));
@@ -77,7 +82,7 @@ STAGE(emit)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
         integer slot = LANE_INDEX + (int)at;
         integer pixel_index = load_path_pixel_index(path, at), sample = load_path_sample(path, at);
         integer plane = slot_plane(settings, slot);
-        film_count(settings, film, end.ended & end.begun, plane, pixel_index);
+        film_count(settings, film, end.ended & end.begun, plane, film_nearest_index(settings, pixel_index));
         NextSample next = next_sample(settings, work_list, samples, slot, end.ended, end.begun, pixel_index, sample);
         count(counters, COUNTER_DONE, next.done, (integer)(1));
         mask go = end.ended & !next.done;

@@ -24,7 +24,8 @@ inline Spectrum path_radiance(Scene scene, Slab path, uint at, PathEnd end, Wave
         real pdf = load_path_pdf(path, at);
         vec3 d = sel3(sky, load_path_d(path, at), v3(0.0f, 0.0f, 1.0f)); /* a slot without a pixel has none */
         vec3 from = madd3(d, -path_null_distance(path, at), load_path_o(path, at)), side = path_hemisphere(path, at);
-        Spectrum arrives = infinite_gather(scene, from, side, d, pdf, lambdas);
+        real rival = sel(end.depth > 1, path_rival(path, at), (real)(0.0f));
+        Spectrum arrives = infinite_gather(scene, from, side, d, pdf, rival, lambdas);
 #if USES_ABSORPTION
         integer medium = sel_i(sky, load_path_medium(path, at), (integer)(0));
         arrives = spectrum_mul(arrives, medium_transmittance(scene, medium, (real)(FAR), lambdas));
@@ -86,6 +87,9 @@ inline void begin_path(Scene scene, Slab path, uint at, mask go, integer pixel_i
     store_path_radiance(path, at, go, spectrum_of(nothing));
     store_path_pdf(path, at, go, -ray.far);
     store_path_eta(path, at, go, (real)(1.0f));
+#if WEIGHS_LIGHT_PATHS
+    store_path_rival(path, at, go, (real)((float)settings->light_paths));
+#endif
 #if USES_NULL_SURFACES
     store_path_nulls(path, at, go, (integer)(0));
     store_path_null_distance(path, at, go, (real)(0.0f));

@@ -23,7 +23,7 @@ kernel void noise(global const Settings *settings, global const uint *film, glob
             if (((x + y) & 1) != colour || x >= settings->width || y >= settings->height) continue;
             int2 halves = (int2)(0, settings->halves);
             float samples = (float)film_samples(settings, film, pixel_index, halves);
-            vec3 v = scale3(film_sum(settings, film, pixel_index, halves), 1.0f / fmax(samples, 1.0f));
+            vec3 v = scale3(film_sum(settings, film, pixel_index, halves, 0), 1.0f / fmax(samples, 1.0f));
 #if SPECTRUM_SIZE == 3
             float now = 0.2126f * v.x + 0.7152f * v.y + 0.0722f * v.z;
 #else

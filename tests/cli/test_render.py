@@ -288,6 +288,8 @@ def test_changes_of_a_scene():
     assert (scene.film.width, scene.film.height) == (30, 20)
     assert (scene.spp, scene.integrator.kind, scene.seed) == (7, "direct", 3)
     assert changed(load(CORNELL), max_depth=3).integrator.max_depth == 3
+    both = changed(load(CORNELL), max_depth=3, light_paths=2).integrator
+    assert (both.max_depth, both.light_paths) == (3, 2)
     assert changed(load(CORNELL), sampler="independent").sampler.kind == "independent"
     assert changed(load(CORNELL), integrator="whitted").integrator.max_depth == 8  # as it was
 
@@ -305,6 +307,7 @@ def test_changes_of_a_scene():
         (["--mode", "cmyk"], "spectral"),
         (["--integrator", "magic"], "whitted"),
         (["--integrator", "direct", "--max-depth", "3"], "no depth"),
+        (["--integrator", "direct", "--light-paths", "1"], "no light paths"),
         (["--device", "no such device"], "is not there"),
         (["-o", "picture.jpeg"], ".exr"),
         (["-o", "no/such/folder/a.png"], "folder"),

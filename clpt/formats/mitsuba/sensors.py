@@ -274,7 +274,8 @@ def _depths(props: Properties) -> dict[str, Any]:
 
 
 def _path(props: Properties) -> Integrator:
-    return integrators.Path(**_depths(props))
+    # ours: Mitsuba's path has no such parameter
+    return integrators.Path(**_depths(props), light_paths=props.integer("light_paths", 0, 0))
 
 
 def _direct(props: Properties) -> Integrator:

@@ -11,9 +11,9 @@ from clpt.render.contract.features import Features
 
 CHANGED = (
     "o", "d", "beta", "radiance", "lambdas", "pdf", "sampled_hemisphere", "null_distance", "nulls",
-    "ratio", "eta", "medium", "lead", "state",
+    "ratio", "eta", "medium", "lead", "rival", "state",
 )  # fmt: skip
-READ = ("weight", "pixel_index", "pixel_key", "sample")  # and not changed
+READ = ("weight", "light", "pixel_index", "pixel_key", "sample")  # and not changed
 # members that a scene has only with a flag
 NEEDED = {
     "lambdas": "SPECTRAL",
@@ -23,7 +23,9 @@ NEEDED = {
     "ratio": "USES_DISPERSION",
     "medium": "USES_ABSORPTION",
     "lead": "USES_ABSORPTION",
+    "rival": "WEIGHS_LIGHT_PATHS",
     "weight": "LIGHT_PATHS",
+    "light": "WEIGHS_LIGHT_PATHS",
     "pixel_index": "LIGHT_PATHS",
     "film": "LIGHT_PATHS",
     "instance": "USES_INSTANCES",

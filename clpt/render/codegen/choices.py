@@ -20,6 +20,17 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     ),
     "generated/bands.cl": lambda f, _: ("film/bands.cl",) * f.bands,
     "generated/integrator.cl": lambda f, _: (f"integrator/{f.integrator}.cl",),
+    "generated/rivals.cl": lambda f, _: (
+        (
+            "interface/camera.cl",
+            "generated/camera.cl",
+            "film/connect.cl",
+            "generated/connect.cl",
+            "lighting/rivals.cl",
+        )
+        if f.weighed
+        else ()
+    ),
     "generated/medium.cl": lambda f, _: (
         ("generated/medium_absorption.cl", "optics/medium.cl") if f.absorption else ()
     ),

@@ -1,13 +1,23 @@
-"""The dispatch over all lights for paths that start at them: `light_emit`."""
+"""The dispatch over all lights for paths that start at them, and for weighing these paths."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-from clpt.render.codegen.dispatch import Case, choose, function
+from clpt.render.codegen.dispatch import Case, Function, choose, function
 from clpt.render.codegen.lights import kind_test, point_text, row_text
 from clpt.render.contract import shape_records
-from clpt.render.contract.light_records import ALONG, BASES, BOTH, KINDS, PLACED, RECORDS
+from clpt.render.contract.light_records import (
+    ALONG,
+    BASES,
+    BOTH,
+    INFINITE,
+    KINDS,
+    PLACED,
+    RECORDS,
+)
+
+NOWHERE = "v3(0.0f, 0.0f, 0.0f)"  # the hemisphere of a light that is sampled for all directions
 
 
 def dispatch_text(kinds: Iterable[str], textured: bool, two_sided: bool = False) -> str:
@@ -19,9 +29,7 @@ def dispatch_text(kinds: Iterable[str], textured: bool, two_sided: bool = False)
     present = [kind for kind in KINDS if kind in set(kinds)]
     others = [kind for kind in present if kind in RECORDS]
     surfaces = [kind for kind in present if kind in shape_records.RECORDS]
-    needed = {*present, *(BASES[kind] for kind in present if kind in BASES)}
-    files = [k for k in KINDS if k in needed and (k in PLACED or k in shape_records.RECORDS)]
-    includes = ['#include "interface/emission.cl"', *(f'#include "emission/{k}.cl"' for k in files)]
+    includes = _includes(present)
     head = "LightRay light_emit(Scene scene, real pick, vec2 u, vec2 v, Wavelengths lambdas)"
     if not present:
         return "\n".join([*includes, function(head, "return light_ray_nothing();")])
@@ -35,6 +43,7 @@ def dispatch_text(kinds: Iterable[str], textured: bool, two_sided: bool = False)
     if surfaces:
         rows += _surfaces_text(surfaces, present, textured, two_sided)
     rows += [
+        "r.row = row;",
         "real share = 1.0f / max_r(l.pmf, (real)(1e-30f));",
         "r.power = spectrum_scale(r.power, share);",
         "r.seen = spectrum_scale(r.seen, share);",
@@ -43,12 +52,74 @@ def dispatch_text(kinds: Iterable[str], textured: bool, two_sided: bool = False)
     return "\n".join([*includes, function(head, *rows)])
 
 
+def densities_text(kinds: Iterable[str], two_sided: bool, tree: bool) -> str:
+    """Return what kernels/lighting/rivals.cl asks of the light in a row, seen along wi.
+
+    light_emit_pdf(scene, row, wi, t): how densely light_emit sends rays against wi to a surface
+    across it at distance t; over the cosine at a light on a shape. Of that, what is left where
+    squared distances cancel: [1/(m^2 sr)], and of a light at a point per t^2 [1/m^2].
+    light_found_pdf(scene, row, p, hemisphere, wi, t, n): the density with which next-event
+    estimation at p finds that point of the light [1/sr]; n: the normal there. Of a delta light it
+    is the chance of its row.
+    """
+    present = [kind for kind in KINDS if kind in set(kinds)]
+    emitted = Function(
+        "real light_emit_pdf(Scene scene, integer row, vec3 wi, real t)",
+        "0.0f",
+        [Case(kind_test(kind, present), _emit_pdf(kind, two_sided)) for kind in present],
+        (
+            "LightRow l = light_at(scene, row);",
+            "float disk = PI * emission_radius(scene.settings) * emission_radius(scene.settings);",
+        ),
+        "value * l.pmf",
+    )
+    found = Function(
+        "real light_found_pdf(Scene scene, integer row, vec3 p, vec3 hemisphere, vec3 wi, real t, "
+        "vec3 n)",
+        "1.0f",
+        [
+            Case(kind_test(kind, present), f"{kind}_pdf({row_text(kind)}, {given})")
+            for kind in present
+            if (given := _pdf_arguments(kind))
+        ],
+        ("LightRow l = light_at(scene, row);",),
+        f"value * {'light_tree_pmf(scene, row, p, hemisphere)' if tree else 'l.pmf'}",
+    )
+    return "\n".join([*_includes(present), emitted.text(), found.text()])
+
+
+def _includes(present: list[str]) -> list[str]:
+    """Lines that include what lights of these kinds emit."""
+    needed = {*present, *(BASES[kind] for kind in present if kind in BASES)}
+    files = [k for k in KINDS if k in needed and (k in PLACED or k in shape_records.RECORDS)]
+    return ['#include "interface/emission.cl"', *(f'#include "emission/{k}.cl"' for k in files)]
+
+
+def _emit_pdf(kind: str, two_sided: bool) -> str:
+    """The density of a kind in light_emit_pdf, but for its row's chance."""
+    row = row_text(kind)
+    if kind in shape_records.RECORDS:
+        sides = f" * sel(l.emission_mode == {BOTH}, (real)(0.5f), (real)(1.0f))" * two_sided
+        return f"INV_PI / {kind}_point({row}, (vec2){{0.5f, 0.5f}}).area{sides}"
+    if kind in PLACED:
+        return f"{kind}_emit_pdf({row}, neg3(wi)) / (t * t)"
+    if kind in INFINITE:
+        return f"{kind}_pdf({row}, scene, {NOWHERE}, wi) / disk"
+    return "(real)(1.0f / disk)"
+
+
+def _pdf_arguments(kind: str) -> str:
+    """What `<kind>_pdf` is given, "" for delta lights, which have none."""
+    if kind in shape_records.RECORDS:
+        return "p, wi, t, n"
+    return "scene, hemisphere, wi" if kind in INFINITE else ""
+
+
 def _lamp(kind: str) -> str:
     """A ray from a lamp; from infinity, its direction is that of a light sample."""
     if kind in PLACED:
         return f"{kind}_emit({row_text(kind)}, scene, u, v, lambdas)"
-    nowhere = "v3(0.0f, 0.0f, 0.0f)"
-    sample = f"{kind}_sample({row_text(kind)}, scene, {nowhere}, u, lambdas)"
+    sample = f"{kind}_sample({row_text(kind)}, scene, {NOWHERE}, u, lambdas)"
     return f"distant_emit(scene, {sample}, v)"
 
 

@@ -23,6 +23,11 @@ def fluoresces(features: Features, cls: type[Material]) -> bool:
     return cls.fluoresces and features.mode == "spectral"
 
 
+def ends_light_paths(features: Features, cls: type[Material]) -> bool:
+    """Whether a material does not do to light that comes the other way what it does to this."""
+    return not cls.reversible or fluoresces(features, cls)
+
+
 # name: its value, of a scene's features
 SCENE: dict[str, Callable[[Features], str | int]] = {
     "BSDF_COUNT": lambda f: len(f.materials),
@@ -39,16 +44,20 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "USES_BANDS": lambda f: f.bands,
     "USES_ALPHA": lambda f: f.alpha,
     "USES_INFINITE": lambda f: f.infinite,
-    "USES_HEMISPHERE": lambda f: f.infinite or f.light_tree,
+    "USES_HEMISPHERE": lambda f: f.infinite or f.light_tree or (f.weighed and f.light_paths),
     "USES_LIGHTS": lambda f: bool(f.lights),
     "USES_SURFACE_LIGHTS": lambda f: not shape_records.RECORDS.keys().isdisjoint(f.lights),
-    "USES_VISIBLE_LIGHTS": lambda f: f.light_paths and f.visible_lights,
+    "USES_VISIBLE_LIGHTS": lambda f: f.shows_lights,
     "FEW_LIGHTS": lambda f: not f.many_lights,
     "LIGHT_PATHS": lambda f: f.light_paths,
+    "WEIGHS_LIGHT_PATHS": lambda f: f.weighed,
     "CAMERA_DISPERSES": lambda f: f.glass_lens,
     "FILTER_BOX": lambda f: f.filter == "box",
     "FILTER_TAPS": lambda f: f.filter_taps,
     "FILTER_REACH": lambda f: f.filter_reach,
+    "FILTER_PROFILE": lambda f: f.filter_profile,
+    "FILM_GROUP": lambda f: f.weighed and f.film_group,
+    "FILM_WORDS": lambda f: f.weighed and f.film_words,
     "FILM_WEIGHTS": lambda f: f.film_weights,
     "CHANNEL": lambda f: bool(f.channel) and f"CHANNEL_{f.channel.upper()}",
     "CHANNEL_IS_ID": lambda f: f.channel in IDS,
@@ -65,6 +74,7 @@ MATERIAL: dict[str, Callable[[Features, type[Material]], str | int]] = {
     "BSDF_ABSORBS": lambda f, cls: cls.absorbs,
     "BSDF_CHROMATIC": lambda f, cls: cls.chromatic,
     "BSDF_FLUORESCES": fluoresces,
+    "BSDF_ENDS_LIGHT_PATHS": lambda f, cls: f.weighed and ends_light_paths(f, cls),
     "BSDF_IS_NULL": lambda f, cls: cls.is_null and f.null_surfaces,
     "USES_CHOICE": lambda f, cls: cls.uses_lobe_sample or cls.fluoresces or f.many_lights,
 }

@@ -30,13 +30,18 @@ def virtual_files() -> dict[str, str]:
 
 
 def dispatch_text(
-    kinds: Iterable[str], textured: bool = False, two_sided: bool = False, tree: bool = False
+    kinds: Iterable[str],
+    textured: bool = False,
+    two_sided: bool = False,
+    tree: bool = False,
+    densities: str = "",
 ) -> str:
     """Return the functions over all lights, for the kinds in the scene (`LightRows.kinds`).
 
     textured: some emission is a texture, so that triangles need the uv of their mesh; two_sided:
     some shape emits from its back too; tree: the rows are followed by a tree that chooses among
-    them. It includes the files of `virtual_files`, here and in clpt.render.codegen.shapes.
+    them; densities: the functions that weigh light paths, where there are some. It includes the
+    files of `virtual_files`, here and in clpt.render.codegen.shapes.
 
     light_sample(scene, p, hemisphere, pick, u, lambdas): chooses a light and a direction to it
     light_pdf(scene, row, p, hemisphere, wi, t, n): of it, [1/sr], for a ray that met a shape
@@ -57,8 +62,8 @@ def dispatch_text(
     parts += [f'#include "{name}"' for name in includes]
     parts += _tree_text() if tree else []
     parts.append(_sides_text(two_sided))
-    parts.append(_sample_text(others, surfaces, textured, two_sided, tree))
-    parts.append(_pdf_text(surfaces, tree))
+    parts.append(_sample_text(others, surfaces, textured, two_sided, tree, bool(densities)))
+    parts += [_pdf_text(surfaces, tree), densities]
     parts += _infinite_text([kind for kind in others if kind in INFINITE], tree)
     return "\n".join(parts) + "\n"
 
@@ -109,7 +114,12 @@ def _sides_text(two_sided: bool) -> str:
 
 
 def _sample_text(
-    others: list[str], surfaces: list[str], textured: bool, two_sided: bool, tree: bool
+    others: list[str],
+    surfaces: list[str],
+    textured: bool,
+    two_sided: bool,
+    tree: bool,
+    weighed: bool,
 ) -> str:
     kinds = [*others, *surfaces]
     head = (
@@ -148,7 +158,11 @@ def _sample_text(
             "Spectrum le = emission_load(scene, l.radiance, point, lambdas);",
             "s = light_sample_sel(l.shape >= 0, area_sample(q, point.p, le), s);",
         ]
-    return function(head, *rows, f"return light_chosen(s, {'pmf' if tree else 'l.pmf'});")
+    pmf = "pmf" if tree else "l.pmf"
+    rows.append(f"s = light_chosen(s, {pmf});")
+    if weighed:
+        rows += ["s.row = row;", f"s.chance = {pmf};"]
+    return function(head, *rows, "return s;")
 
 
 def _pdf_text(surfaces: list[str], tree: bool) -> str:

@@ -97,7 +97,7 @@ def order(features: Features, layout: str, lanes: int, interleaved: bool = False
     trace_lanes = _trace_lanes(layout, lanes)
     begin, join = begin_and_join(features)
     bounce = [Stage(begin, begin, lanes)]
-    if features.light_paths and features.visible_lights:
+    if features.shows_lights:
         bounce.append(Stage(join, join, trace_lanes))
     bounce.append(Stage("intersect", "intersect", lanes if interleaved else trace_lanes))
     if features.mixtures:
@@ -108,7 +108,7 @@ def order(features: Features, layout: str, lanes: int, interleaved: bool = False
     return bounce
 
 
-@functools.lru_cache(maxsize=2)
+@functools.lru_cache(maxsize=4)
 def loop_sources(
     features: Features, layout: str, lanes: int, interleaved: bool = False
 ) -> dict[str, device.Source]:

@@ -5,7 +5,7 @@ The physics is always in a file.
 
 from __future__ import annotations
 
-from clpt.render.codegen import flags, lights, parameters, thin_films
+from clpt.render.codegen import emission, flags, lights, parameters, thin_films
 from clpt.render.codegen.dispatch import Case, Function, active, function
 from clpt.render.contract import camera_records
 from clpt.render.contract.features import Features
@@ -47,6 +47,11 @@ def lights_text(features: Features) -> str:
     """Return the loader of emissions, from wherever they come in this scene, and the dispatch."""
     emissions = emission_sources(features)
     factors = features.sources_of("factor").get("value", frozenset())
+    densities = ""
+    if features.weighed:
+        densities = emission.densities_text(
+            features.lights, features.two_sided_lights, features.light_tree
+        )
     return (
         ('#include "generated/textures.cl"\n' if "texture" in emissions | factors else "")
         + parameters.emission_text(emissions)
@@ -56,6 +61,7 @@ def lights_text(features: Features) -> str:
             "texture" in emissions,
             features.two_sided_lights,
             features.light_tree,
+            densities,
         )
     )
 

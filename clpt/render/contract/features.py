@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from clpt.scene.materials import Material
 from clpt.scene.params import device_params
 
 Sources = frozenset[tuple[str, str, str]]
+
+SUM_WORDS = 3  # kernels/core/fixed.cl
+GROUP_WORDS = 3 * SUM_WORDS + 1  # of a pixel: three sums and a count, see kernels/film/film.cl
 
 
 def disperses(leaves: Iterable[type[Material]], sources: Sources) -> bool:
@@ -59,6 +62,9 @@ class Features:
     null_surfaces: bool = False  # some surface lets light through as if it were not there
     infinite: bool = False
     light_paths: bool = False  # paths start at lights
+    weighed: bool = False  # paths from the camera are weighed against some from lights
+    light_filter: tuple[int, int, int] = (0, 0, 0)  # of those: taps, reach and profile
+    film_group: int = 0  # words of a pixel before those that paths add to
     visible_lights: bool = False  # some light is no delta light: a camera may see it
     two_sided_lights: bool = False  # some shape emits from its back too
     light_tree: bool = False  # a tree chooses among the lights
@@ -70,6 +76,7 @@ class Features:
     bands: bool = False  # a spectral film
     alpha: bool = False  # a film that tells what is covered
     tabulated_density: bool = False  # of wavelengths
+    filter_profile: int = 0  # where in `distributions` its values begin
     spectra_size: int = 0
     spectra_step: float = 1.0
     sources: Sources = frozenset()
@@ -78,6 +85,40 @@ class Features:
     def film_weights(self) -> bool:
         """Whether samples serve several pixels, whose sums are then divided by their weights."""
         return self.filter_reach > 0 and not self.light_paths
+
+    @property
+    def passes(self) -> tuple[Features, ...]:
+        """The features of each kind of paths, in their order; those of the film are the last."""
+        if not self.weighed:
+            return (self,)
+        taps, reach, profile = self.light_filter
+        from_lights = replace(
+            self,
+            integrator="particle_tracer",
+            light_paths=True,
+            filter_taps=taps,
+            filter_reach=reach,
+            filter_profile=profile,
+            film_group=self.group_words,
+            alpha=False,
+        )
+        return from_lights, self
+
+    @property
+    def shows_lights(self) -> bool:
+        """Whether paths that start at lights join these to the camera."""
+        return self.light_paths and self.visible_lights and not self.weighed
+
+    @property
+    def group_words(self) -> int:
+        """Words of a pixel that paths add to."""
+        return GROUP_WORDS + SUM_WORDS * (self.film_weights + self.alpha)
+
+    @property
+    def film_words(self) -> int:
+        """Words of a pixel of the film: of one group, or of the camera's paths and light paths."""
+        beside = GROUP_WORDS if self.weighed and not self.light_paths else 0
+        return self.film_group + self.group_words + beside
 
     @property
     def footprint_words(self) -> int:

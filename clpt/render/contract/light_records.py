@@ -156,6 +156,8 @@ LIGHT_SAMPLE = Record(
         "what comes along it; for a delta light, irradiance on a shading surface",
     ),
     pdf=("real", "[1/sr]; below 0: a delta light, to be taken as it is; 0: nothing comes"),
+    row=("integer", "of the light in `lights`; where light paths are weighed"),
+    chance=("real", "with which that row was chosen; likewise"),
 )
 LIGHT_RAY = Record(
     "LightRay",
@@ -171,5 +173,6 @@ LIGHT_RAY = Record(
         "0: a delta light",
     ),
     away=("integer", "a mask: it comes from infinity"),
+    row=("integer", "of the light in `lights`; where light paths are weighed"),
 )
 VALUES = (LIGHT_SAMPLE, LIGHT_RAY)

@@ -112,7 +112,7 @@ class Moving:
 
     def _plan(self, scene: Scene, replaced: Replacements) -> list[Action]:
         """What enqueues a move. Raises CannotMove."""
-        if self.target.lowered.features.light_paths:
+        if any(one.light_paths for one in self.target.lowered.features.passes):
             raise CannotMove("light is traced from lights, whose choice follows from the shapes")
         numbers = {id(shape): number for number, shape in enumerate(scene.shapes)}
         actions: list[Action] = []

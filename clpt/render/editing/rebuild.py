@@ -33,6 +33,7 @@ FIXED = (
     "film_height",
     "bands",
     "alpha",
+    "light_paths",
 )
 
 
@@ -74,7 +75,8 @@ def take(wavefronts: Sequence[Wavefront], lowered: Lowered, refit: bool = False)
     scene, paths = first.scene, first.paths
     if any(scene.lowered.settings[name] != lowered.settings[name] for name in FIXED):
         raise SceneError(
-            "its size, bands, alpha and the reach of its filter stay; make a new Renderer",
+            "its size, bands, alpha, the reach of its filter and light paths stay; make a new "
+            "Renderer",
             where="film",
         )
     changes = _changes(first, lowered, refit)

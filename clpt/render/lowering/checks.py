@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NoReturn
 
 from clpt.errors import SceneError
-from clpt.render.lowering.camera.cameras import dispersive_glass
+from clpt.render.lowering.camera.cameras import CONNECTED, dispersive_glass
 from clpt.render.lowering.geometry import shapes
 from clpt.render.lowering.geometry.instancing import distinct
 from clpt.scene import Scene
@@ -16,7 +16,6 @@ from clpt.scene.materials import Material
 from clpt.scene.params import params
 from clpt.scene.shapes import Shape
 
-CONNECTED = ("perspective", "thin_lens")  # cameras that particle_tracer can join a point to
 LARGEST = 1 << 26  # pixels of a film; its tiles are divided in float32, see kernels/film/film.cl
 
 
@@ -58,6 +57,9 @@ def _check_light_paths(scene: Scene, shapes_: list[Shape]) -> None:
                     f"not {scene.integrator.kind}",
                     where=shapes.where(shape),
                 )
+        if getattr(scene.integrator, "light_paths", 0) and scene.film.bands:
+            message = "light paths do not fill the bands of a film yet; leave one of them out"
+            raise SceneError(message, where="path.light_paths")
         return
     spectral = scene.film.mode == "spectral"
     if scene.camera.kind not in CONNECTED:

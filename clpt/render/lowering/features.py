@@ -22,8 +22,12 @@ def features_of(
     geometry: Geometry,
     lights: LightRows,
     tabulated_density: bool,
+    profile: int,
 ) -> Features:
-    """Return the features of a scene, from what each step of its lowering has met."""
+    """Return the features of a scene, from what each step of its lowering has met.
+
+    profile: where in `distributions` the values of the pixel filter begin.
+    """
     scene, textures, channels = index.scene, encoder.textures, index.channels
     sources = encoder.sources
     tangents = materials.tangents or index.normal_mapped
@@ -55,6 +59,8 @@ def features_of(
         null_surfaces=any(cls.is_null for cls in index.leaves),
         infinite=lights.infinite > 0 and not channels,
         light_paths=index.light_paths,
+        weighed=index.weighed > 0,
+        light_filter=(*index.spread, profile) if index.weighed else (0, 0, 0),
         visible_lights=lights.visible,
         two_sided_lights=lights.two_sided,
         light_tree=lights.tree is not None,

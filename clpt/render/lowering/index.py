@@ -7,7 +7,7 @@ from typing import Any
 
 from clpt.errors import SceneError
 from clpt.render.contract import custom_materials
-from clpt.render.lowering.camera import filters
+from clpt.render.lowering.camera import cameras, filters
 from clpt.render.lowering.geometry import instancing, shapes
 from clpt.render.lowering.geometry.instancing import Placed, Prototype
 from clpt.scene import Scene
@@ -64,6 +64,12 @@ class SceneIndex:
         return isinstance(self.scene.integrator, ParticleTracer)
 
     @property
+    def weighed(self) -> int:
+        """Light paths for each camera sample of `path`, weighed against it; 0: there are none."""
+        wanted: int = getattr(self.scene.integrator, "light_paths", 0)
+        return wanted if cameras.is_connected(self.scene.camera, self.scene.film.mode) else 0
+
+    @property
     def alpha(self) -> bool:
         """Whether the film tells what is covered."""
         return self.scene.film.alpha and not self.channels
@@ -77,14 +83,20 @@ class SceneIndex:
         return reaches or self.light_paths
 
     @property
+    def spread(self) -> tuple[int, int]:
+        """How many pixels of an axis the light of a point may serve, and how far these are from
+        its own."""
+        return filters.taps(self.scene.film.filter), filters.reach(self.scene.film.filter)
+
+    @property
     def filter_taps(self) -> int:
-        """How many pixels of an axis light may serve; 0 without splatting."""
-        return filters.taps(self.scene.film.filter) if self.splatting else 0
+        """How many pixels of an axis a path's light may serve; 0 without splatting."""
+        return self.spread[0] if self.splatting else 0
 
     @property
     def filter_reach(self) -> int:
         """How far these are from the light's own pixel."""
-        return filters.reach(self.scene.film.filter) if self.splatting else 0
+        return self.spread[1] if self.splatting else 0
 
     @property
     def mode(self) -> str:

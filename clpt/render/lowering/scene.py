@@ -36,6 +36,7 @@ from clpt.render.lowering.textures.attributes import Owner, lower_attributes
 from clpt.scene import Scene
 from clpt.scene import materials as mt
 from clpt.scene.integrators import Film
+from clpt.scene.lights import Point
 from clpt.scene.shapes import Mesh
 
 TREE_FROM = 16  # lights from which a tree chooses among them, see bench/lights.py
@@ -101,7 +102,7 @@ def lower(
     ends = film.lambda_min, film.lambda_max
     wavelengths = density(index) if index.spectral else Density(*ends)
     encoder = Encoder(index.mode, *ends, sensor(film), wavelengths, texture_budget, cache)
-    density_row, tabulated = _lower_film(index, encoder, wavelengths)
+    density_row, tabulated, profile = _lower_film(index, encoder, wavelengths)
     materials = _begin_materials(index, encoder)
     geometry = lower_geometry(index, encoder, materials)
     sphere = geometry.bounding_sphere()
@@ -114,7 +115,7 @@ def lower(
         *_warnings(index), *sorted(encoder.warnings), *geometry.warnings,
         *encoder.textures.finish(),
     )  # fmt: skip
-    features = features_of(index, encoder, materials, geometry, lights, tabulated)
+    features = features_of(index, encoder, materials, geometry, lights, tabulated, profile)
     settings = settings_of(index, geometry, lights, wavelengths, density_row, ambient_row, sphere)
     cache.settle()
     tables = encoder.store.arrays()
@@ -137,18 +138,20 @@ def lower(
     )
 
 
-def _lower_film(index: SceneIndex, encoder: Encoder, wavelengths: Density) -> tuple[int, bool]:
+def _lower_film(index: SceneIndex, encoder: Encoder, wavelengths: Density) -> tuple[int, bool, int]:
     """Append the pixel filter, and the density of wavelengths where it is tabulated.
 
-    Return where the density would begin in `distributions`, and whether it is there.
+    Return where the density would begin in `distributions`, whether it is there, and where the
+    filter's values begin.
     """
     # first in its table
-    filters.lower_filter(index.scene.film.filter, encoder.store, index.splatting)
+    film, weighed = index.scene.film, index.weighed > 0
+    profile = filters.lower_filter(film.filter, encoder.store, index.splatting, weighed)
     density_row = encoder.store.size("distributions")
     tabulated = index.spectral and wavelengths.values is not None
     if tabulated:
         encoder.store.append_floats("distributions", wavelengths.words())
-    return density_row, tabulated
+    return density_row, tabulated, profile
 
 
 def _begin_materials(index: SceneIndex, encoder: Encoder) -> MaterialWords:
@@ -202,6 +205,8 @@ def _warnings(index: SceneIndex) -> list[str]:
     warnings = list(index.warnings)
     if index.mode == "rgb" and not index.channels and cameras.dispersive_glass(scene.camera):
         warnings.append("thin_lens.glass: in RGB mode all wavelengths have one focus")
+    if getattr(scene.integrator, "light_paths", 0):
+        warnings += _left_to_the_camera(index)
     depth = getattr(scene.integrator, "max_depth", -1)
     if depth > DEEPEST:
         warnings.append(f"integrator.max_depth: {depth} counts as {DEEPEST}, the longest path")
@@ -215,6 +220,22 @@ def _warnings(index: SceneIndex) -> list[str]:
     if film.mode == "rgb" and mt.Fluorescent in index.leaves:
         warnings.append("in rgb mode fluorescent paint has its colour under D65, at most white")
     return warnings
+
+
+def _left_to_the_camera(index: SceneIndex) -> list[str]:
+    """What the light paths of `path` do not do, and its paths from the camera do alone."""
+    scene = index.scene
+    if not index.weighed:
+        names = " and ".join(cameras.CONNECTED)
+        reason = f"a {scene.camera.kind} camera cannot be joined to a point"
+        if scene.camera.kind in cameras.CONNECTED:
+            reason = "its glass disperses"
+        return [f"path.light_paths: left aside, as {reason}; {names} can, without such glass"]
+    return [
+        f"path.light_paths: none start at lights[{i}], whose light does not fall with distance"
+        for i, light in enumerate(scene.lights)
+        if isinstance(light, Point) and not light.falloff
+    ]
 
 
 def _sees(film: Film) -> bool:

@@ -48,6 +48,7 @@ def settings_of(
     settings["rr_depth"] = min(getattr(integrator, "rr_depth", DEEPEST), DEEPEST)
     settings["hide_lights"] = getattr(integrator, "hide_lights", False)
     settings["alpha"] = index.alpha
+    settings["light_paths"] = index.weighed
     settings["light_count"] = len(lights.rows)
     settings["infinite_count"] = lights.infinite
     settings["ambient"] = ambient_row

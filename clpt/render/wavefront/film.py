@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from clpt import device
 from clpt.device.buffers import Buffers
 from clpt.render.wavefront import work_list
-from clpt.render.wavefront.film_state import FILM_WORDS, SAMPLES_WORD, SUM_WORDS, Words
+from clpt.render.wavefront.film_state import SAMPLES_WORD, SUM_WORDS, Words
 
 
 class Film:
     """The film of a wavefront.
 
-    settings: of the paths, which say the film's size and halves; bands: whether it has any;
-    weights: whether samples serve several pixels; alpha: whether it tells what is covered. size:
+    settings: of the paths, which say the film's size and halves; bands: whether it has any; words:
+    of a pixel, see `Features.film_words`. size:
     width and height [pixels]; sums: the buffers that samples are added to, by the names of the
     kernels' arguments; picture: (h, w, 4) float32, always the same memory.
 
@@ -32,11 +32,9 @@ class Film:
         buffers: Buffers,
         settings: NDArray[np.void],
         bands: bool,
-        weights: bool,
-        alpha: bool,
+        words: int,
     ):
-        self.stream, self.has_bands = stream, bands
-        self._words = FILM_WORDS + SUM_WORDS * (weights + alpha)  # of a pixel
+        self.stream, self.has_bands, self._words = stream, bands, words
         self.size = int(settings["width"]), int(settings["height"])
         self.band_count = int(settings["bands"]) if bands else 0
         self.halves = int(settings["halves"])
@@ -98,7 +96,7 @@ class Film:
         return self.made(kernel, self._images["band_image"], self.band_count)
 
     def words(self) -> tuple[Words, Words]:
-        """Return what the film holds: (halves, 10 to 16, h, w) uint32, and of bands (halves, bands,
+        """Return what the film holds: (halves, 10 to 26, h, w) uint32, and of bands (halves, bands,
         3, h, w); wait for it."""
         width, height = self.size
         found = []
@@ -121,12 +119,12 @@ class Film:
                 streams[:, self._inside] = pixels[:, self._at]
                 self.stream.write(self.sums[name], streams)
 
-    def count_samples(self) -> list[int]:
-        """Return how many samples the film has, in each half; wait for it."""
+    def count_samples(self, group: int) -> list[int]:
+        """Return how many samples the film has in a group of words, in each half; wait for it."""
         stream, counts = 4 * self._padded_pixels, []
         for half in range(self.halves):
             words = np.empty(self._padded_pixels, np.uint32)
-            at = (half * self._words + SAMPLES_WORD) * stream
+            at = (half * self._words + group + SAMPLES_WORD) * stream
             counts.append(int(self.stream.read(self.sums["film"], words, at).sum(dtype=np.uint64)))
         return counts
 

@@ -12,6 +12,7 @@ from clpt.errors import SceneError
 SUM_WORDS = 3  # kernels/core/fixed.cl
 SAMPLES_WORD = 3 * SUM_WORDS  # after three sums, kernels/film/film.cl
 FILM_WORDS = SAMPLES_WORD + 1  # of a pixel; one of weights and one of alpha may follow
+LEAST_WITH_LIGHT_PATHS = 2 * FILM_WORDS  # from which a pixel's last words are those of light paths
 
 Words = NDArray[np.uint32]
 Ranges = tuple[tuple[int, int], ...]
@@ -24,9 +25,10 @@ class FilmState:
     A sum is 96 bits in two's complement, three words with the lowest first, in units of 2^-48. So
     two states of different samples merge to the state of one run, to the bit, in any order.
 
-    words: (films, halves, 10 to 16, h, w) uint32, one film, or one for each channel of `aov`; of
+    words: (films, halves, 10 to 26, h, w) uint32, one film, or one for each channel of `aov`; of
     each pixel three sums, and the number of its samples; then, where samples serve all pixels whose
-    filters hold them, a sum of the filter's values, and with alpha a sum of what is covered.
+    filters hold them, a sum of the filter's values, and with alpha a sum of what is covered; then,
+    where light paths are weighed, three sums of theirs, and how many began at the pixel's number.
     halves: 2 where even and odd samples are kept apart, else 1. bands: (halves, bands, 3, h, w)
     uint32, a sum for each band; bands may be 0. taken: first and end of each range of sample
     numbers that were taken, ascending and apart. scale: of a value of 1, a power of two that
@@ -63,13 +65,21 @@ class FilmState:
 
 
 def add_films(a: Words, b: Words) -> Words:
-    """Return the sums and numbers of samples, (..., 10 to 16, h, w) each, of two films."""
+    """Return the sums and numbers of samples, (..., 10 to 26, h, w) each, of two films."""
     total = a + b
-    further = range(FILM_WORDS, a.shape[-3], SUM_WORDS)
-    for first in (0, SUM_WORDS, 2 * SUM_WORDS, *further):
+    group = light_group(a.shape[-3])
+    firsts = [*range(0, SAMPLES_WORD, SUM_WORDS), *range(FILM_WORDS, group, SUM_WORDS)]
+    if group < a.shape[-3]:
+        firsts += range(group, group + SAMPLES_WORD, SUM_WORDS)
+    for first in firsts:
         part = np.s_[..., first : first + SUM_WORDS, :, :]
         total[part] = add_sums(a[part], b[part])
     return total
+
+
+def light_group(words: int) -> int:
+    """Return which of a pixel's words is the first of light paths; `words` where there are none."""
+    return words - FILM_WORDS if words >= LEAST_WITH_LIGHT_PATHS else words
 
 
 def add_sums(a: Words, b: Words) -> Words:

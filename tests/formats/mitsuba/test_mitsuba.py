@@ -80,6 +80,12 @@ def test_variables(scene):
         scene('<integrator type="$q"/>')
 
 
+def test_light_paths_are_a_parameter_of_ours(scene):
+    path = '<integrator type="path"><integer name="light_paths" value="2"/></integrator>'
+    assert scene(path).integrator.light_paths == 2
+    assert scene('<integrator type="path"/>').integrator.light_paths == 0
+
+
 def test_include_and_path(scene, tmp_path):
     (tmp_path / "parts").mkdir()
     inner = '<scene><bsdf type="null" id="m"/>\n<shape type="cube"><ref id="m"/></shape></scene>'

@@ -14,6 +14,7 @@ from clpt.render.contract.camera_records import RECORDS
 from clpt.scene.cameras import Camera, Matrix, Orthographic, Perspective, Spherical, ThinLens
 from clpt.spectra import Constant, Spectrum
 
+CONNECTED = ("perspective", "thin_lens")  # cameras that a point can be joined to
 DESIGN_WAVELENGTH = 587.56  # [nm], the helium line d, at which a lens's focal length is given
 
 
@@ -21,6 +22,11 @@ def dispersive_glass(camera: Camera) -> Spectrum | None:
     """Return the index of a lens's glass, or None where it is the same at all wavelengths."""
     index = spectra.index(getattr(camera, "glass", Constant(1.0)))
     return None if isinstance(index, Constant) else index
+
+
+def is_connected(camera: Camera, mode: str) -> bool:
+    """Return whether paths from lights can be joined to a camera, in the mode of the film."""
+    return camera.kind in CONNECTED and (mode == "rgb" or dispersive_glass(camera) is None)
 
 
 def lower_camera(

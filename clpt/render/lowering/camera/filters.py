@@ -28,14 +28,19 @@ PROFILE = 256  # steps of a filter's values
 CUT = 4.0  # standard deviations at which a Gaussian ends that has no radius
 
 
-def lower_filter(chosen: Filter, store: TableStore, splatting: bool) -> None:
+def lower_filter(chosen: Filter, store: TableStore, splatting: bool, spread: bool = False) -> int:
     """Put a filter's table into `distributions`, where the kernels expect it to be the first.
 
-    splatting: whether light serves all pixels whose filters hold it: then the filter's values.
-    Raises SceneError if something stands there already, and as `table` does.
+    splatting: whether light serves all pixels whose filters hold it: then the filter's values;
+    spread: these follow the table of samples that serve their own pixel, for the light of others.
+    Returns where the values begin. Raises SceneError if something stands there already, and as
+    `table` does.
     """
     if store.append_floats("distributions", (profile if splatting else table)(chosen)) != 0:
         raise SceneError("the pixel filter has to be lowered first")
+    if splatting or not spread:
+        return 0
+    return store.append_floats("distributions", profile(chosen))
 
 
 def reach(chosen: Filter) -> int:

@@ -1,0 +1,244 @@
+"""The bounce loop of one kind of paths: its kernels, and how they run until all paths have ended.
+
+The host only enqueues; it reads the counters of an iteration while later ones run.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pyopencl as cl
+from numpy.typing import NDArray
+
+from clpt import device
+from clpt.device.timing import Timings
+from clpt.render.codegen import programs, signatures
+from clpt.render.contract.features import Features
+from clpt.render.lowering.scene import Lowered
+from clpt.render.wavefront import queues, strategy
+from clpt.render.wavefront.device_scene import DeviceScene
+from clpt.render.wavefront.path_buffers import GROUP, PathBuffers
+from clpt.render.wavefront.strategy import Strategy
+
+BATCH = 8  # bounces that are enqueued between two reads of the counters
+CORE_BOUNCES = 1 << 16  # of all slots, that a core's part of a loop takes at once
+ENDLESS = 0xFFFFFFFF  # bounces of a loop that goes on till all paths have ended
+IDLE = {"samples": (0, 0), "bounces": 0, "restart": 0}  # of a loop that has nothing to do
+
+
+@dataclass(frozen=True)
+class Step:
+    """A kernel of a bounce with its arguments, work-items, and those of a group."""
+
+    name: str
+    bound: device.BoundKernel
+    size: tuple[int]
+    group: tuple[int] | None
+
+
+class Kernels:
+    """Programs of a device by name, and their kernels with the arguments that they all share.
+
+    arguments: returns these by name. seconds: that building took.
+    """
+
+    def __init__(self, on: device.Device, arguments: Callable[[], dict[str, Any]]):
+        self.device, self._arguments = on, arguments
+        self.programs: dict[str, device.Program] = {}
+        self.seconds = 0.0
+
+    def build(self, texts: dict[str, device.Source]) -> None:
+        """Build those programs that are not built yet."""
+        start = time.perf_counter()
+        missing = {n: text for n, text in texts.items() if n not in self.programs}
+        self.programs |= device.build_all(self.device, missing)
+        self.seconds += time.perf_counter() - start
+
+    def keep(self, name: str, make: Callable[[], device.Program]) -> None:
+        """Make a program, if there is none of its name."""
+        if name not in self.programs:
+            start = time.perf_counter()
+            self.programs[name] = make()
+            self.seconds += time.perf_counter() - start
+
+    def bind(self, program: str, name: str, **more: Any) -> device.BoundKernel:
+        """Return a kernel of a program with its arguments, by the names in its signature."""
+        kernel = self.programs[program].kernel(name)
+        arguments = {**self._arguments(), **more}
+        return kernel.bind(**{a.name: arguments[a.name] for a in kernel.arguments})
+
+
+class BounceLoop:
+    """The bounce loop of one kind of paths in a scene.
+
+    which: of `Features.passes`; per_sample: how many of its paths are traced for a sample;
+    features_of: returns the features of a lowering, for the film's channel.
+    """
+
+    def __init__(
+        self,
+        kernels: Kernels,
+        scene: DeviceScene,
+        paths: PathBuffers,
+        timings: Timings,
+        looped: bool,
+        features_of: Callable[[Lowered], Features],
+        which: int,
+    ):
+        self.kernels, self.scene, self.paths, self.timings = kernels, scene, paths, timings
+        self.device, self.stream, self.looped = scene.device, scene.stream, looped
+        self.lanes = self.device.lanes
+        self._features_of, self._which = features_of, which
+        self.is_last = which == len(features_of(scene.lowered).passes) - 1
+        self.per_sample = 1 if self.is_last else int(scene.lowered.settings["light_paths"])
+        self._label = "" if self.is_last else "light "
+        self._share = strategy.loop_share(self.device)
+        self._stages: list[Step] | None = None
+        self._loop: device.BoundKernel | None = None
+
+    @property
+    def features(self) -> Features:
+        """The features of the scene, for this kind of paths."""
+        return self._own(self.scene.lowered)
+
+    @property
+    def stages(self) -> list[Step]:
+        """The kernels of a bounce in their order, for a host that enqueues bounce after bounce."""
+        if self._stages is None:
+            self._stages = self._bind_stages()
+        return self._stages
+
+    @property
+    def loop(self) -> device.BoundKernel:
+        """The kernel of the bounce loop on the device, for a host that does not wait."""
+        if self._loop is None:
+            name, scene = f"{self._label}loop", self.scene
+            self.kernels.keep(name, lambda: self._link(scene.lowered, scene.strategy))
+            self._loop = self.kernels.bind(name, "loop", **IDLE, share=self._share)
+        return self._loop
+
+    def prepare(self) -> None:
+        """Build what `run` runs."""
+        _ = self.loop if self.looped else self.stages
+
+    def build_ahead(self, lowered: Lowered, chosen: Strategy) -> None:
+        """Build the programs that are in use for another lowering, so that no later build fails."""
+        if self._stages is not None:
+            device.build_all(self.device, self._texts(lowered, chosen))
+        if self._loop is not None:
+            self._link(lowered, chosen)
+
+    def bind_again(self) -> None:
+        """Bind the kernels that are in use to the present buffers."""
+        has_stages, has_loop = self._stages is not None, self._loop is not None
+        self._stages = self._loop = None
+        if has_stages:
+            _ = self.stages
+        if has_loop:
+            _ = self.loop
+
+    def numbers(self, first: int, end: int) -> tuple[int, int]:
+        """Return the numbers, first and end, of the paths of samples first to end - 1."""
+        return first * self.per_sample, end * self.per_sample
+
+    def enqueue(self, first: int, end: int) -> None:
+        """Enqueue the paths of samples first to end - 1 of every pixel; wait for nothing."""
+        samples = np.array(self.numbers(first, end), np.int32)
+        self.loop.set_args(samples=samples, bounces=ENDLESS, restart=1)
+        event = self.stream.run(self.loop, *self._loop_sizes())
+        self.timings.add(f"{self._label}loop", event)
+
+    def run(self, first: int, end: int, on_batch: Callable[[NDArray[np.uint64]], bool]) -> bool:
+        """Trace the paths of samples first to end - 1 of every pixel, and wait.
+
+        on_batch is called every few iterations with the counters; if it returns False, every path
+        is brought to its end and no other begins. Returns whether all paths were traced.
+        """
+        steps = self._batch()
+        begin, numbers = steps[0].bound, self.numbers(first, end)
+        self.paths.restart()
+        begin.set_args(samples=numbers)
+        if self.looped:
+            begin.set_args(bounces=self._loop_bounces(), restart=0)
+        finished = True
+        reads: deque[tuple[NDArray[np.uint64], cl.Event]] = deque()
+        while True:
+            for step in steps:
+                self.timings.add(step.name, self.stream.run(step.bound, step.size, step.group))
+            reads.append(self.paths.read_counters())
+            self.stream.flush()
+            if len(reads) < 2:
+                continue
+            counters, event = reads.popleft()
+            device.wait(event)
+            if not on_batch(counters) and finished:
+                begin.set_args(samples=(numbers[0], numbers[0]))
+                finished = False
+            if counters[0] >= self.paths.slots:
+                break
+        for _, event in reads:
+            device.wait(event)
+        return finished
+
+    def _own(self, lowered: Lowered) -> Features:
+        return self._features_of(lowered).passes[self._which]
+
+    def _bind_stages(self) -> list[Step]:
+        features, chosen, label = self.features, self.scene.strategy, self._label
+        self.kernels.build(self._texts(self.scene.lowered, chosen))
+        steps: list[Step] = []
+        for stage in programs.order(features, chosen.layout, self.lanes, chosen.interleaved):
+            if stage.kernel == "shade" and steps[-1].bound.kernel.name != "shade":
+                steps += self._bind_queues(chosen.queued, len(features.materials))
+            samples = {} if steps else {"samples": (0, 0)}
+            bound = self.kernels.bind(label + stage.program, stage.kernel, **samples)
+            steps.append(Step(label + stage.program, bound, *self._sizes(stage.lanes)))
+        return steps
+
+    def _bind_queues(self, queued: bool, kinds: int) -> list[Step]:
+        """The kernels that queue slots by material, none where they are not queued."""
+        if not queued:
+            return []
+        append = f"{self._label}append"
+        return [
+            Step(name, self.kernels.bind(append, name), (size,), (group,) if group else None)
+            for name, size, group in queues.steps(self.paths.slots, kinds)
+        ]
+
+    def _texts(self, lowered: Lowered, chosen: Strategy) -> dict[str, device.Source]:
+        texts = programs.sources(
+            self._own(lowered), chosen.layout, self.lanes,
+            queued=chosen.queued, interleaved=chosen.interleaved,
+        )  # fmt: skip
+        return {self._label + name: text for name, text in texts.items()}
+
+    def _link(self, lowered: Lowered, chosen: Strategy) -> device.Program:
+        features, layout = self._own(lowered), chosen.layout
+        texts = programs.loop_sources(features, layout, self.lanes, chosen.interleaved)
+        known = {"loop": signatures.loop_arguments(features, layout)}
+        return device.link(self.device, texts, "loop", known)
+
+    def _batch(self) -> list[Step]:
+        """What `run` enqueues between two reads of the counters."""
+        if self.looped:
+            return [Step(f"{self._label}loop", self.loop, *self._loop_sizes())]
+        return self.stages * BATCH
+
+    def _loop_bounces(self) -> int:
+        """Bounces of a loop between two reads of the counters: some hundredths of a second."""
+        info, slots = self.device.info, self.paths.slots
+        return max(BATCH, CORE_BOUNCES * info.compute_units // slots) if info.is_cpu else BATCH
+
+    def _loop_sizes(self) -> tuple[tuple[int], tuple[int]]:
+        """How many work-items of the loop serve all slots, and how many of them are a group."""
+        items = -(-self.paths.slots // self._share)
+        return (items,), (1 if self._share > self.lanes else GROUP,)
+
+    def _sizes(self, lanes: int) -> tuple[tuple[int], tuple[int]]:
+        """How many work-items serve all slots, `lanes` each, and how many of them are a group."""
+        return (self.paths.slots // lanes,), (GROUP // lanes,) if lanes > 1 else (GROUP,)

@@ -1,0 +1,123 @@
+/* Light paths that are weighed against paths from the camera.
+ *
+ * A path x_1 .. x_k, seen by the camera at x_1, with the light at x_k, may be found in three ways: the camera's path
+ * meets the light, or chooses it from x_{k-1}, or a light path is joined to the camera at x_1. The power heuristic with
+ * exponent 2 weighs them (Veach 1997, 9.2.4 and 10.2). Each side carries one number from vertex to vertex, as in
+ * Georgiev 2012, "Implementing Vertex Connection and Merging": the `rival` of its path, the density of what the other
+ * side does over its own. Squared distances cancel, and what is left are the densities of directions p [1/sr], their
+ * reverses, and cosines to the geometric normals.
+ *
+ * A camera's path begins with the number l of light paths a sample. With c the cosine to where the ray comes from, c'
+ * to where it goes, and p_back the density with which a light path would come back along it:
+ *
+ *     rival' = rival / (importance c) c' / p at x_1,    rival / c p_back c' / p at further ones;
+ *
+ * importance: film/connect.cl. At x_1 a delta lobe leaves 0, as no light path can be joined there; at further vertices
+ * p_back / p counts as 1. Times the density of emission (light_emit_pdf) that is the third density over the first.
+ *
+ * A light path begins with 1 / l. At its first vertex, with q the density of next-event estimation there,
+ *
+ *     rival' = rival / (emission c) sqrt(q^2 + p_back^2) c' / p,    then rival / c p_back c' / p;
+ *
+ * p_back is 0 there for a light that no ray meets, q is 0 behind a delta lobe. At the joint c' / p becomes
+ * importance c', c' being that to the camera.
+ *
+ * Light that comes to x_1 from the light itself is left to the camera's path, which chooses a light there: a light
+ * path is joined from its second vertex on, and for k = 2 the third density is 0. (Splats of light that next-event
+ * estimation finds without noise are noise only, see bench/NOTES.md.) Null surfaces change nothing. Where a material
+ * ends light paths (`rival_ends`) the camera's rival is 0. */
+#define RIVAL_MOST 1e18f /* so that its square is finite */
+
+/* The density of a direction, for any of the four wavelengths as the hero: the same number from either end. */
+inline real rival_pdf(Bsdf m, vec3 wo, vec3 wi)
+{
+#if USES_DISPERSION && BSDF_CHROMATIC
+    return spectrum_mean(bsdf_pdfs(m, wo, wi));
+#else
+    return bsdf_pdf(m, wo, wi);
+#endif
+}
+
+inline real rival_limited(real rival) { return min_r(rival, (real)(RIVAL_MOST)); }
+
+/* Whether light paths end at a vertex: what happens there is not the same for light that comes the other way. */
+inline mask rival_ends(Scene scene, Vertex v)
+{
+#if BSDF_ENDS_LIGHT_PATHS
+    return mask_of(1);
+#else
+    return shading_frame_turns(scene, v.row);
+#endif
+}
+
+/* What a vertex knows of the rival of its path. */
+typedef struct {
+    real arrives; /* rival / c, with importance and emission */
+    real found;   /* of a light path's first vertex, q */
+    mask first;   /* it is the path's first vertex */
+    mask met;     /* a ray from it might meet the light */
+} Rival;
+
+/* Of a camera's path. sampler: of its sample. */
+inline Rival rival_of_camera(Scene scene, Slab path, uint at, Vertex v, Sampler sampler)
+{
+    Rival r;
+    real rival = load_path_rival(path, at);
+    r.first = v.depth == 0;
+    r.met = mask_of(1);
+    r.found = 0.0f;
+    if (any(r.first)) {
+        CameraPoint c = camera_connect(scene, v.s.p, mask_of(0), sampler_pair(sampler, (natural)(DIMENSION_LENS)));
+        real seen = sel(c.seen, rival / max_r(c.importance, (real)(1e-30f)), (real)(0.0f));
+        rival = sel(r.first, seen, rival);
+    }
+    rival = sel(rival_ends(scene, v), (real)(0.0f), rival);
+    r.arrives = rival / max_r(fabs(dot3(v.s.n, v.d)), (real)(1e-7f));
+    return r;
+}
+
+/* Over the density of next-event estimation, that of a light path along wi. p_back: see above. */
+inline real rival_of_light_sample(Scene scene, Rival r, Surface s, LightSample ls, real p_back)
+{
+    real chosen = sel(ls.pdf < 0.0f, ls.chance, ls.pdf);
+    real emission = light_emit_pdf(scene, ls.row, ls.wi, ls.t) / max_r(chosen, (real)(1e-30f));
+    real third = rival_limited(r.arrives * p_back * fabs(dot3(s.n, ls.wi)) * emission);
+    return sel(r.first, (real)(0.0f), third);
+}
+
+/* Along a camera's path that goes on along d, with density p; delta: by a delta lobe. */
+inline real rival_to_light(Rival r, Surface s, vec3 d, mask delta, real p, real p_back)
+{
+    real scatters = sel(r.first, (real)(1.0f), p_back) / max_r(p, (real)(1e-30f));
+    real change = sel(delta, sel(r.first, (real)(0.0f), (real)(1.0f)), scatters);
+    return rival_limited(r.arrives * change * fabs(dot3(s.n, d)));
+}
+
+/* Of a light path. hemisphere: to which a camera's path would send next-event estimation here. */
+inline Rival rival_of_emission(Scene scene, Slab path, uint at, Vertex v, vec3 hemisphere)
+{
+    Rival r;
+    r.arrives = load_path_rival(path, at) / max_r(fabs(dot3(v.s.n, v.d)), (real)(1e-7f));
+    r.first = v.depth == 1;
+    r.met = mask_of(1);
+    r.found = 0.0f;
+    if (any(r.first)) {
+        integer row = sel_i(r.first, load_path_light(path, at), (integer)(0));
+        vec3 wi = neg3(v.d), n = load_path_sampled_hemisphere(path, at);
+        real t = v.t + path_null_distance(path, at);
+        real emission = light_emit_pdf(scene, row, wi, t);
+        r.arrives = r.arrives / sel(r.first, max_r(emission, (real)(1e-30f)), (real)(1.0f));
+        r.found = light_found_pdf(scene, row, v.s.p, hemisphere, wi, t, n);
+        r.met = !r.first | (row < scene.settings->infinite_count) | (light_at(scene, row).shape >= 0);
+    }
+    return r;
+}
+
+/* Along a light path that goes on along d, with density p, or 1 / importance where it is joined to the camera. */
+inline real rival_to_camera(Rival r, Surface s, vec3 d, mask delta, real p, real p_back)
+{
+    real back = sel(r.met, p_back, (real)(0.0f));
+    real either = sel(r.first, sqrt(sqr(back) + sqr(r.found)), back) / max_r(p, (real)(1e-30f));
+    real change = sel(delta, sel(r.met, (real)(1.0f), (real)(0.0f)), either);
+    return rival_limited(r.arrives * change * fabs(dot3(s.n, d)));
+}
