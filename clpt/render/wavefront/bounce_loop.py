@@ -48,7 +48,7 @@ class Kernels:
     """
 
     def __init__(self, on: device.Device, arguments: Callable[[], dict[str, Any]]):
-        self.device, self._arguments = on, arguments
+        self.device, self.arguments = on, arguments
         self.programs: dict[str, device.Program] = {}
         self.seconds = 0.0
 
@@ -69,7 +69,7 @@ class Kernels:
     def bind(self, program: str, name: str, **more: Any) -> device.BoundKernel:
         """Return a kernel of a program with its arguments, by the names in its signature."""
         kernel = self.programs[program].kernel(name)
-        arguments = {**self._arguments(), **more}
+        arguments = {**self.arguments(), **more}
         return kernel.bind(**{a.name: arguments[a.name] for a in kernel.arguments})
 
 

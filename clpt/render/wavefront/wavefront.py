@@ -7,6 +7,7 @@ any depth. Where paths start at lights beside those from the camera, they take t
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -77,13 +78,17 @@ class Wavefront:
         self.scene, self.paths, self.looped, self.channel = scene, paths, looped, channel
         self._tuning, self.lanes = tuning, self.device.lanes
         self.timings = Timings(self.device.queue)
-        self.kernels = Kernels(self.device, lambda: self.arguments)
         features = self.features
-        self.film = Film(
+        self.film = film = Film(
             self.stream, self.buffers, paths.settings, features.bands, features.film_words
         )
+        # What follows knows nothing of this wavefront: memory is given back without a collector.
+        self.kernels = Kernels(
+            self.device, lambda: {**scene.arguments, **paths.arguments, **film.arguments}
+        )
+        own_features = functools.partial(_features_of, channel)
         self.loops = [
-            BounceLoop(self.kernels, scene, paths, self.timings, looped, self._features_of, which)
+            BounceLoop(self.kernels, scene, paths, self.timings, looped, own_features, which)
             for which in range(len(features.passes))
         ]
         self._bind_film()
@@ -142,12 +147,12 @@ class Wavefront:
     @property
     def features(self) -> Features:
         """The features of the scene, for the channel of this film."""
-        return self._features_of(self.scene.lowered)
+        return _features_of(self.channel, self.scene.lowered)
 
     @property
     def arguments(self) -> dict[str, Any]:
         """The arguments of all kernels by name: of the scene, the paths and the film."""
-        return {**self.scene.arguments, **self.paths.arguments, **self.film.arguments}
+        return self.kernels.arguments()
 
     def choose_strategy(self, lowered: Lowered) -> Strategy:
         """Return how another lowering would be rendered. Raises SceneError as `create` does."""
@@ -175,7 +180,7 @@ class Wavefront:
 
     def build_ahead(self, lowered: Lowered, chosen: Strategy) -> None:
         """Build the programs that are in use for another lowering, so that no later build fails."""
-        features = self._features_of(lowered)
+        features = _features_of(self.channel, lowered)
         device.build_all(self.device, programs.film_sources(features, chosen.layout))
         for loop in self.loops:
             loop.build_ahead(lowered, chosen)
@@ -269,11 +274,6 @@ class Wavefront:
         self._paths = [int(half[count].sum(dtype=np.uint64)) for half in film]
         self.accumulate_film()
 
-    def _features_of(self, lowered: Lowered) -> Features:
-        if lowered.features.channel == self.channel:
-            return lowered.features
-        return dataclasses.replace(lowered.features, channel=self.channel)
-
     def _bind_film(self) -> None:
         """Bind the kernels that make a picture of the film."""
         self.kernels.build(programs.film_sources(self.features, self.scene.strategy.layout))
@@ -335,3 +335,10 @@ class Wavefront:
             gained.pop("samples")
         for name, n in gained.items():
             setattr(self.counts, name, getattr(self.counts, name) + n)
+
+
+def _features_of(channel: str, lowered: Lowered) -> Features:
+    """The features of a lowering, for a film of a channel."""
+    if lowered.features.channel == channel:
+        return lowered.features
+    return dataclasses.replace(lowered.features, channel=channel)
