@@ -39,7 +39,7 @@ from tests.renders.test_light_tracing import (
 )
 
 FLAT = tf.rotate([1, 0, 0], -90)
-QUICK = ("sphere", "spot", "constant")
+QUICK = ("sphere", "constant")
 
 
 def narrow() -> Device:
@@ -132,7 +132,7 @@ MATERIALS = {
     "masked": m.Mask(material=m.Diffuse(), opacity=0.5),
     "blend": m.Blend(first=m.Diffuse(), second=m.Conductor(), weight=0.5),
 }
-SHARP = ("rough_dielectric", "plastic")
+SHARP = ("rough_dielectric",)
 
 
 @pytest.mark.parametrize(
