@@ -138,12 +138,9 @@ def binary_boxes(building: Building, count: int, boxes: cl.Buffer, leaf_size: in
 
 def wide8_boxes(building: Building, count: int, boxes: cl.Buffer) -> Packed:
     """As `binary_boxes`, with one box in a leaf, and make the tree 8 wide."""
-    chosen, made = _wide_over_boxes(building, count, boxes)
-    nodes, indices = building.allocate(256 * made.nodes), building.allocate(4 * count)
-    wide.write_nodes(building, chosen, nodes)
-    wide.write_indices(building, chosen, indices)
+    chosen, made, buffers = _wide_over_boxes(building, count, boxes)
     part = Part(count, chosen.built.reach(building), made.steps)
-    return Packed({"nodes": nodes, "indices": indices}, part, made.stats)
+    return Packed(buffers, part, made.stats)
 
 
 def wide8_shapes(building: Building, count: int, boxes: cl.Buffer) -> Packed:
@@ -152,22 +149,24 @@ def wide8_shapes(building: Building, count: int, boxes: cl.Buffer) -> Packed:
         rows = np.repeat([np.inf, -np.inf] * 3 + [0, 0], 8).astype(np.float32)  # nothing in it
         nodes = building.upload(rows, np.float32)
         return Packed({"nodes": nodes, "indices": building.allocate(0)}, Part(0))
-    chosen, made = _wide_over_boxes(building, count, boxes)
-    room = made.nodes + made.nodes // 4 + 8  # for another tree over as many boxes
-    nodes, indices = building.allocate(256 * room), building.allocate(4 * count)
-    wide.write_nodes(building, chosen, nodes)
-    wide.write_indices(building, chosen, indices)
+    chosen, made, buffers = _wide_over_boxes(building, count, boxes, spare=True)
     binary = {"binary": chosen.built.nodes, "totals": chosen.totals}
     part = replace(_binary_part(building, chosen.built), **binary)
-    return Packed({"nodes": nodes, "indices": indices}, part, made.stats)
+    return Packed(buffers, part, made.stats)
 
 
 def _wide_over_boxes(
-    building: Building, count: int, boxes: cl.Buffer
-) -> tuple[wide.Collapse, wide.Figures]:
+    building: Building, count: int, boxes: cl.Buffer, spare: bool = False
+) -> tuple[wide.Collapse, wide.Figures, dict[str, cl.Buffer]]:
+    """A wide tree and its buffers; spare: with room for another tree over as many boxes."""
     items, parts = tree.items_of_boxes(building, count, boxes)
     chosen = wide.collapse(building, tree.over(building, count, items, parts, 1))
-    return chosen, wide.figures(building, chosen)
+    made = wide.figures(building, chosen)
+    room = made.nodes + made.nodes // 4 + 8 if spare else made.nodes
+    nodes, indices = building.allocate(256 * room), building.allocate(4 * count)
+    wide.write_nodes(building, chosen, nodes)
+    wide.write_indices(building, chosen, indices)
+    return chosen, made, {"nodes": nodes, "indices": indices}
 
 
 def compact(building: Building, mesh: Mesh) -> Packed:

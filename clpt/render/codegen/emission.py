@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from clpt.render.codegen.dispatch import Case, Function, choose, function
-from clpt.render.codegen.lights import kind_test, point_text, row_text
+from clpt.render.codegen.lights import kind_test, pmf_text, point_text, row_text
 from clpt.render.contract import shape_records
 from clpt.render.contract.light_records import (
     ALONG,
@@ -83,7 +83,7 @@ def densities_text(kinds: Iterable[str], two_sided: bool, tree: bool) -> str:
             if (given := _pdf_arguments(kind))
         ],
         ("LightRow l = light_at(scene, row);",),
-        f"value * {'light_tree_pmf(scene, row, p, hemisphere)' if tree else 'l.pmf'}",
+        f"value * {pmf_text(tree)}",
     )
     return "\n".join([*_includes(present), emitted.text(), found.text()])
 

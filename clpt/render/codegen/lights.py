@@ -175,11 +175,11 @@ def _pdf_text(surfaces: list[str], tree: bool) -> str:
             for kind in surfaces
         ],
         ("LightRow l = light_at(scene, row);",),
-        f"value * {_pmf_text(tree)}",
+        f"value * {pmf_text(tree)}",
     ).text()
 
 
-def _pmf_text(tree: bool) -> str:
+def pmf_text(tree: bool) -> str:
     """The chance of the light `l` in row `row`, for a surface at p."""
     return "light_tree_pmf(scene, (integer)(row), p, hemisphere)" if tree else "l.pmf"
 
@@ -200,7 +200,7 @@ def _infinite_text(kinds: list[str], tree: bool) -> list[str]:
             f"*radiance = spectrum_sel(m, {kind}_radiance(light, scene, d, lambdas), *radiance);",
             f"*pdf = sel(m, {kind}_pdf(light, scene, hemisphere, d), *pdf);",
         )
-    rows.append(f"*pdf *= {_pmf_text(tree)};")
+    rows.append(f"*pdf *= {pmf_text(tree)};")
     head = (
         "void infinite_light(Scene scene, int row, vec3 p, vec3 hemisphere, vec3 d, "
         "Wavelengths lambdas, Spectrum *radiance, real *pdf)"

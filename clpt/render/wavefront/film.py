@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from clpt import device
 from clpt.device.buffers import Buffers
+from clpt.render.contract.features import SUM_WORDS
 from clpt.render.wavefront import work_list
-from clpt.render.wavefront.film_state import SAMPLES_WORD, SUM_WORDS, Words
+from clpt.render.wavefront.film_state import SAMPLES_WORD, Words
 
 
 class Film:

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.errors import SceneError
+from clpt.render.contract.features import GROUP_WORDS, SUM_WORDS
 
-SUM_WORDS = 3  # kernels/core/fixed.cl
 SAMPLES_WORD = 3 * SUM_WORDS  # after three sums, kernels/film/film.cl
-FILM_WORDS = SAMPLES_WORD + 1  # of a pixel; one of weights and one of alpha may follow
+FILM_WORDS = GROUP_WORDS  # of a pixel; one of weights and one of alpha may follow
 LEAST_WITH_LIGHT_PATHS = 2 * FILM_WORDS  # from which a pixel's last words are those of light paths
 
 Words = NDArray[np.uint32]
