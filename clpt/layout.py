@@ -137,6 +137,20 @@ class Record:
             [head, "{", f"    {self.name} r;", *body, "    return r;", "}", ""]
         )
 
+    def keep_text(self) -> str:
+        """Return `name_keep(table, at, m, v)`: writes a row where m; `at`: its first word."""
+        lower = self.snake_name
+        body = []
+        for m in self.members:
+            for i, component in enumerate(TYPES[m.type][3]):
+                value = f"v.{m.name}{component}"
+                value = f"as_real({value})" if m.type in _CASTS else value
+                write = f"    scatter_if((global float *)table + {m.word + i}, at, m, {value});"
+                guard = m.type == "spectrum" and i == 3
+                body += ["#if SPECTRUM_SIZE == 4", write, "#endif"] if guard else [write]
+        head = f"inline void {lower}_keep(global uint *table, integer at, mask m, {self.name} v)"
+        return "\n".join([head, "{", *body, "}", ""])
+
     def select_text(self) -> str:
         """Return the lane struct, `name_sel(m, a, b)`, a where m, else b, and `name_nothing()`."""
         choices, values = [], []

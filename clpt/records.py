@@ -40,6 +40,7 @@ PATH = Record(
         "real",
         "density of what the other side does over the path's own, see kernels/lighting/rivals.cl",
     ),
+    pending=("real", "what joins it if the next surface is sharp, see kernels/lighting/rivals.cl"),
     light=("integer", "row in `lights` of the light where the path began"),
     state=("integer", "PATH_ bits and depth, see kernels/path/path_state.cl"),
     pixel_index=("integer", "where the film stores the path's pixel, see kernels/film/pixel.cl"),
@@ -109,6 +110,12 @@ SETTINGS = Record(
         "integer",
         "light paths for each camera sample, weighed against it; 0: there are none",
     ),
+    radius=("real", "of the disk in which photons are merged in the first pass [m]"),
+    photon_places=("integer", "photons that a light path may leave"),
+    photon_pixels=("integer", "light paths whose index is below this leave photons"),
+    photon_paths=("real", "how many these are in a pass, for each group of wavelengths"),
+    photon_cells=("integer", "cells that are told apart, a power of two"),
+    wavelength_groups=("integer", "groups of paths that have the same wavelengths, in a pass"),
     light_count=("integer", "rows in `lights`"),
     ambient=(
         "integer",
@@ -171,6 +178,18 @@ LIGHT = Record(
     shape=("integer", "row of its shape in `shapes`; -1: not on a shape"),
     radiance=("integer", "first word of its emission parameter in `light_params`"),
     emission_mode=("integer", "where a shape's light leaves it, see kernels/light/area.cl"),
+)
+
+PHOTON = Record(
+    "Photon",
+    "A light path where it has met a surface by something sharp.",
+    p=("vec3", "where [m]"),
+    power=("spectrum", "light that it stands for [W nm^-1]"),
+    ratio=("spectrum", "density of the path at each wavelength, over the mean of the four"),
+    to_light=("natural", "direction to where it came from, see kernels/core/octahedral.cl"),
+    normal=("natural", "geometric normal, likewise"),
+    rival=("real", "of its light path, over the cosine there, see kernels/lighting/rivals.cl"),
+    depth=("integer", "surfaces that the light path has met; its group from bit 16 up"),
 )
 
 SLABS = (PATH, HIT, SHADOW)

@@ -239,10 +239,12 @@ def changed(
 
 
 def _integrator(name: str, old: Kind) -> Any:
-    """Return an integrator of another kind, with the parameters that both have."""
+    """Return an integrator of another kind, with those parameters of both that the old one sets."""
     known = kinds("integrator")
     if name not in known:
         message = f"{name!r} is none of {', '.join(known)}"
         raise click.BadParameter(message, param_hint="--integrator")
+    usual = type(old)()
     shared = params(known[name]).keys() & params(type(old)).keys()
-    return known[name](**{key: getattr(old, key) for key in shared})
+    given = {key: getattr(old, key) for key in shared}
+    return known[name](**{k: v for k, v in given.items() if v != getattr(usual, k)})

@@ -30,6 +30,7 @@ IDS = ("shape_id", "primitive_id")  # of these, which are names: a mean of them 
 
 MOST_BANDS = 1024
 MOST_LIGHT_PATHS = 64  # for a sample of the camera
+MOST_GROUPS = 64  # of wavelengths
 NARROWEST = 0.01  # [nm], a range of wavelengths
 
 
@@ -65,11 +66,46 @@ class Path(Integrator):
 
     def check(self) -> None:
         super().check()
-        paths: Any = self.light_paths
-        whole = isinstance(paths, int) and not isinstance(paths, bool)
-        if not whole or not 0 <= paths <= MOST_LIGHT_PATHS:
-            message = f"must be a whole number from 0 to {MOST_LIGHT_PATHS}, not {paths!r}"
-            raise SceneError(message, where="path.light_paths")
+        _check_whole(self, "light_paths", 0, MOST_LIGHT_PATHS)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Vcm(Integrator):
+    """`path` with light paths and photons: vertex connection and merging (Georgiev 2012).
+
+    Each pass is a sample of every pixel. Where a light path meets a surface behind something sharp
+    it leaves a photon, and paths from the camera gather the photons of their pass around them. So
+    caustics converge that are seen in mirrors and through glass, also those of points and suns.
+    What is gathered is blurred by the radius, which shrinks from pass to pass. A `max_depth` of -1
+    counts as 64.
+    """
+
+    max_depth: int = host(8, "longest path, as of `path`; -1: 64")
+    rr_depth: int = host(3, "depth from which Russian roulette may end a path")
+    hide_lights: bool = flag(False, "the camera sees through lights, also those on shapes")
+    light_paths: int = host(1, "paths from lights for each sample of the camera")
+    light_tracing: bool = host(True, "light paths are joined to the camera")
+    merging: bool = host(True, "photons are gathered")
+    radius: float = real(0.0, "of the disk of the first pass; 0: as suits the picture", "m", 0.0)
+    wavelength_groups: int = host(
+        0, "of paths that have the same wavelengths in a pass; 0: as suits the scene"
+    )
+    photon_memory: int = host(256, "most that photons take", "MiB")
+
+    def check(self) -> None:
+        super().check()
+        _check_whole(self, "light_paths", 1, MOST_LIGHT_PATHS)
+        _check_whole(self, "wavelength_groups", 0, MOST_GROUPS)
+        _check_whole(self, "photon_memory", 1, 1 << 20)
+
+
+def _check_whole(integrator: Integrator, name: str, least: int, most: int) -> None:
+    """Raise SceneError for a parameter that is no whole number between two."""
+    value: Any = getattr(integrator, name)
+    whole = isinstance(value, int) and not isinstance(value, bool)
+    if not whole or not least <= value <= most:
+        message = f"must be a whole number from {least} to {most}, not {value!r}"
+        raise SceneError(message, where=f"{integrator.kind}.{name}")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -319,7 +355,7 @@ def _white_balance(given: Any) -> Any:
     return x, y
 
 
-KINDS = (Path, Direct, Whitted, ParticleTracer, Aov)
+KINDS = (Path, Vcm, Direct, Whitted, ParticleTracer, Aov)
 SAMPLERS = (Sobol, Zsobol, Independent)
 PIXELWISE = (Sobol, Independent)  # samplers whose pixels do not know of each other
 FILTERS = (Box, Tent, Gaussian, Mitchell, Lanczos, BlackmanHarris)

@@ -31,7 +31,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
     Rival rival = rival_of_emission(scene, path, at, v, vertex_hemisphere(frame, wo));
 #endif
 
-#if !BSDF_DELTA
+#if !BSDF_DELTA && JOINS_CAMERA
     /* To the camera. */
     vec2 lens = sampler_pair(sampler, scatter.dimension + DIMENSION_LIGHT);
     CameraPoint c = camera_connect(scene, s.p, mask_of(0), lens);
@@ -40,8 +40,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
     mask shine = active & c.seen & (spectrum_max(f) > 0.0f);
     real carries = fabs(dot3(s.n, c.d)) * arrives * c.importance * shading_frame_share(scatter.shading, neg3(v.d));
 #if WEIGHS_LIGHT_PATHS
-    real over = rival_to_camera(rival, s, c.d, mask_of(0), 1.0f / max_r(c.importance, (real)(1e-30f)),
-                                rival_pdf(m, to, wo));
+    real over = rival_of_joint(rival, s, c, rival_pdf(m, to, wo));
     carries *= 1.0f / (1.0f + sqr(over));
     mask hidden = mask_of(settings->hide_lights != 0) & (s.light >= 0);
     shine = shine & !rival.first & !hidden & !rival_ends(scene, v);
@@ -82,6 +81,10 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
     mask delta = (bs.lobe & LOBE_DELTA) != 0;
     real p = rival_pdf(m, wo, bs.wi), p_back = rival_pdf(m, bs.wi, wo);
     store_path_rival(path, at, next, rival_to_camera(rival, s, onward, delta, p, p_back));
+#if MERGES
+    integer sharp = sel_i(rival_sharp(delta, p, p_back), (integer)(PATH_SHARP), (integer)(0));
+    state = (state - (state & PATH_SHARP)) | sharp;
+#endif
 #endif
     vertex_leave(path, at, next, v, onward, beta);
     hero_keep(path, at, next, ratio);

@@ -2,8 +2,9 @@
  * Light is found both by meeting it and by choosing it; the two are weighted by the power heuristic (Veach 1997,
  * 9.2.4), and against paths from lights where there are some (lighting/rivals.cl). */
 #include "generated/rivals.cl"
+#include "generated/gather.cl"
 
-void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, mask active)
+void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, mask active MERGE_ARGS)
 {
     global const Settings *settings = scene.settings;
     Vertex v = vertex_load(scene, path, hit, at, active);
@@ -51,6 +52,15 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
 #if WEIGHS_LIGHT_PATHS && !BSDF_IS_NULL
     Rival rival = rival_of_camera(scene, path, at, v, sampler);
 #endif
+#if BSDF_MERGES
+    mask merges = met & merging_here(depth);
+    if (any(merges)) {
+        integer sample = load_path_sample(path, at);
+        Spectrum merged = merge_photons(scene, merges, v, scatter, rival, ratio, sample MERGE_PASSED);
+        merged = spectrum_add(load_path_radiance(path, at), spectrum_mul(beta, merged));
+        store_path_radiance(path, at, merges, merged);
+    }
+#endif
 
 #if USES_LIGHTS && !BSDF_DELTA
     /* Next-event estimation. */
@@ -64,8 +74,9 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
     vec3 wi = to_local(frame, ls.wi);
     Spectrum f = spectrum_scale(bsdf_eval(m, wo, wi), shading_frame_share(scatter.shading, ls.wi));
 #if WEIGHS_LIGHT_PATHS
-    real third = rival_of_light_sample(scene, rival, s, ls, rival_pdf(m, wi, wo));
-    real w = mis_weight_of_three(ls.pdf, rival_pdf(m, wo, wi), third);
+    real p = rival_pdf(m, wo, wi);
+    real third = rival_of_light_sample(scene, rival, s, ls, p, rival_pdf(m, wi, wo));
+    real w = mis_weight_of_three(ls.pdf, p, third);
 #else
     real w = sel(ls.pdf < 0.0f, (real)(1.0f), mis_weight(ls.pdf, hero_pdf(m, wo, wi, ratio)));
 #endif
@@ -105,6 +116,13 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
     bs.pdf = rival_pdf(m, wo, bs.wi);
     real p_back = rival_pdf(m, bs.wi, wo);
     store_path_rival(path, at, next, rival_to_light(rival, s, onward, delta, bs.pdf, p_back));
+#if MERGES
+#if BSDF_MERGES
+    store_path_pending(path, at, next, rival_pending(rival, s, onward, delta, bs.pdf));
+#else
+    store_path_pending(path, at, next, (real)(0.0f));
+#endif
+#endif
 #endif
     store_path_pdf(path, at, next, sel(delta, (real)(-1.0f), bs.pdf));
 #if USES_HEMISPHERE && !BSDF_DELTA

@@ -25,8 +25,19 @@
  * Light that comes to x_1 from the light itself is left to the camera's path, which chooses a light there: a light
  * path is joined from its second vertex on, and for k = 2 the third density is 0. (Splats of light that next-event
  * estimation finds without noise are noise only, see bench/NOTES.md.) Null surfaces change nothing. Where a material
- * ends light paths (`rival_ends`) the camera's rival is 0. */
+ * ends light paths (`rival_ends`) the camera's rival is 0.
+ *
+ * Where photons are merged (merging/gather.cl) the same path may also be found at any x_i where the light has come by
+ * something sharp, x_{i+1}, as the camera's path and a light path that end there nearly meet. With e = `merging_area`,
+ * the density of that over both paths' own is e, so that each square of a rival gains
+ *
+ *     (e c' / p)^2  at x_i of a camera's path, once x_{i+1} is known to be sharp: till then it is `pending`;
+ *     (e / l c' / p)^2  at x_i of a light path that has come by something sharp.
+ *
+ * What is sharp depends on the densities of both ways alone, and so is the same for both sides: a delta lobe, or a
+ * density above SHARP_PDF. */
 #define RIVAL_MOST 1e18f /* so that its square is finite */
+#define SHARP_PDF 8.0f /* [1/sr]; an even hemisphere has 0.16 */
 
 /* The density of a direction, for any of the four wavelengths as the hero: the same number from either end. */
 inline real rival_pdf(Bsdf m, vec3 wo, vec3 wi)
@@ -50,13 +61,30 @@ inline mask rival_ends(Scene scene, Vertex v)
 #endif
 }
 
+inline mask rival_sharp(mask delta, real p, real p_back) { return delta | (max_r(p, p_back) > SHARP_PDF); }
+
 /* What a vertex knows of the rival of its path. */
 typedef struct {
     real arrives; /* rival / c, with importance and emission */
     real found;   /* of a light path's first vertex, q */
     mask first;   /* it is the path's first vertex */
     mask met;     /* a ray from it might meet the light */
+#if MERGES
+    real pending; /* what joins `arrives` where the vertex is sharp, of a camera's path */
+    real merges;  /* what merging here has over the path's density: 0 where there is none */
+#endif
 } Rival;
+
+/* The rival that arrives, if the vertex scatters with these densities. */
+inline real rival_arrives(Rival r, mask delta, real p, real p_back)
+{
+#if MERGES && !LIGHT_PATHS
+    real more = sel(rival_sharp(delta, p, p_back), r.pending, (real)(0.0f));
+    return sqrt(sqr(r.arrives) + sqr(more));
+#else
+    return r.arrives;
+#endif
+}
 
 /* Of a camera's path. sampler: of its sample. */
 inline Rival rival_of_camera(Scene scene, Slab path, uint at, Vertex v, Sampler sampler)
@@ -67,21 +95,32 @@ inline Rival rival_of_camera(Scene scene, Slab path, uint at, Vertex v, Sampler 
     r.met = mask_of(1);
     r.found = 0.0f;
     if (any(r.first)) {
+#if JOINS_CAMERA
         CameraPoint c = camera_connect(scene, v.s.p, mask_of(0), sampler_pair(sampler, (natural)(DIMENSION_LENS)));
         real seen = sel(c.seen, rival / max_r(c.importance, (real)(1e-30f)), (real)(0.0f));
         rival = sel(r.first, seen, rival);
+#else
+        rival = sel(r.first, (real)(0.0f), rival);
+#endif
     }
-    rival = sel(rival_ends(scene, v), (real)(0.0f), rival);
-    r.arrives = rival / max_r(fabs(dot3(v.s.n, v.d)), (real)(1e-7f));
+    real goes_on = sel(rival_ends(scene, v), (real)(0.0f), 1.0f / max_r(fabs(dot3(v.s.n, v.d)), (real)(1e-7f)));
+    r.arrives = rival * goes_on;
+#if MERGES
+    r.pending = load_path_pending(path, at) * goes_on;
+    r.merges = merging_area(scene, merging_pass(scene, load_path_sample(path, at)));
+    r.merges = sel(merging_here(v.depth), r.merges, (real)(0.0f));
+#endif
     return r;
 }
 
-/* Over the density of next-event estimation, that of a light path along wi. p_back: see above. */
-inline real rival_of_light_sample(Scene scene, Rival r, Surface s, LightSample ls, real p_back)
+/* Over the density of next-event estimation, that of a light path along wi, where the material has densities p and
+ * p_back. */
+inline real rival_of_light_sample(Scene scene, Rival r, Surface s, LightSample ls, real p, real p_back)
 {
     real chosen = sel(ls.pdf < 0.0f, ls.chance, ls.pdf);
     real emission = light_emit_pdf(scene, ls.row, ls.wi, ls.t) / max_r(chosen, (real)(1e-30f));
-    real third = rival_limited(r.arrives * p_back * fabs(dot3(s.n, ls.wi)) * emission);
+    real arrives = rival_arrives(r, mask_of(0), p, p_back);
+    real third = rival_limited(arrives * p_back * fabs(dot3(s.n, ls.wi)) * emission);
     return sel(r.first, (real)(0.0f), third);
 }
 
@@ -90,8 +129,17 @@ inline real rival_to_light(Rival r, Surface s, vec3 d, mask delta, real p, real 
 {
     real scatters = sel(r.first, (real)(1.0f), p_back) / max_r(p, (real)(1e-30f));
     real change = sel(delta, sel(r.first, (real)(0.0f), (real)(1.0f)), scatters);
-    return rival_limited(r.arrives * change * fabs(dot3(s.n, d)));
+    return rival_limited(rival_arrives(r, delta, p, p_back) * change * fabs(dot3(s.n, d)));
 }
+
+#if MERGES
+/* What joins that rival if the next vertex is sharp. */
+inline real rival_pending(Rival r, Surface s, vec3 d, mask delta, real p)
+{
+    real merged = r.merges / max_r(p, (real)(1e-30f));
+    return sel(delta, (real)(0.0f), rival_limited(merged * fabs(dot3(s.n, d))));
+}
+#endif
 
 /* Of a light path. hemisphere: to which a camera's path would send next-event estimation here. */
 inline Rival rival_of_emission(Scene scene, Slab path, uint at, Vertex v, vec3 hemisphere)
@@ -110,14 +158,38 @@ inline Rival rival_of_emission(Scene scene, Slab path, uint at, Vertex v, vec3 h
         r.found = light_found_pdf(scene, row, v.s.p, hemisphere, wi, t, n);
         r.met = !r.first | (row < scene.settings->infinite_count) | (light_at(scene, row).shape >= 0);
     }
+#if MERGES
+    r.pending = 0.0f;
+    r.merges = 0.0f;
+#if BSDF_MERGES
+    float number = (float)scene.settings->light_paths;
+    real area = merging_area(scene, merging_pass(scene, load_path_sample(path, at)));
+    r.merges = sel((v.state & PATH_SHARP) != 0, area / number, (real)(0.0f));
+#endif
+#endif
     return r;
 }
 
-/* Along a light path that goes on along d, with density p, or 1 / importance where it is joined to the camera. */
+/* Along a light path that goes on along d, with density p. */
 inline real rival_to_camera(Rival r, Surface s, vec3 d, mask delta, real p, real p_back)
 {
     real back = sel(r.met, p_back, (real)(0.0f));
-    real either = sel(r.first, sqrt(sqr(back) + sqr(r.found)), back) / max_r(p, (real)(1e-30f));
-    real change = sel(delta, sel(r.met, (real)(1.0f), (real)(0.0f)), either);
-    return rival_limited(r.arrives * change * fabs(dot3(s.n, d)));
+    real either = r.arrives * sel(r.first, sqrt(sqr(back) + sqr(r.found)), back);
+#if MERGES
+    either = sqrt(sqr(either) + sqr(r.merges));
+#endif
+    either = either / max_r(p, (real)(1e-30f));
+    real change = sel(delta, r.arrives * sel(r.met, (real)(1.0f), (real)(0.0f)), either);
+    return rival_limited(change * fabs(dot3(s.n, d)));
 }
+
+#if JOINS_CAMERA
+/* Of a light path that is joined to the camera, where paths from it are not merged. */
+inline real rival_of_joint(Rival r, Surface s, CameraPoint c, real p_back)
+{
+#if MERGES
+    r.merges = 0.0f;
+#endif
+    return rival_to_camera(r, s, c.d, mask_of(0), 1.0f / max_r(c.importance, (real)(1e-30f)), p_back);
+}
+#endif

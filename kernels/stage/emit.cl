@@ -19,6 +19,7 @@
 #include "path/path_end.cl"
 #include "lighting/next_event.cl"
 #include "lighting/light_path.cl"
+#include "generated/merging.cl"
 
 /* Puts a ray from a light into the slots that `go` on, and, where the camera sees lights, one from it to the camera
  * into the shadow slab. Returns the bits of Path.state that follow. */
@@ -28,6 +29,9 @@ inline integer begin_light_path(Scene scene, Slab path, Slab shadow, uint at, ma
     global const Settings *settings = scene.settings;
     Sampler sampler = light_path_sampler(settings, pixel_index, sample);
     vec2 u = sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH));
+#if MERGES
+    u.x = merging_wavelength(scene, u.x, sample);
+#endif
     Wavelengths lambdas = wavelengths_sample(scene, u.x);
     LightRay r = light_emit(scene, u.y, sampler_pair(sampler, (natural)(DIMENSION_FILM)),
                             sampler_pair(sampler, (natural)(DIMENSION_LENS)), lambdas);

@@ -12,6 +12,7 @@
 #include "interface/light.cl"
 #include "generated/lights.cl"
 #include "generated/medium.cl"
+#include "generated/merging.cl"
 #include "path/path_end.cl"
 
 /* The radiance of the paths, with what those that left the scene gather there. */
@@ -78,7 +79,11 @@ inline void begin_path(Scene scene, Slab path, uint at, mask go, integer pixel_i
 #endif
     vec2 offset = exposure_begin(scene, path, at, go, sampler);
     vec2 position = film_position(settings, pixel, offset);
-    Wavelengths lambdas = wavelengths_sample(scene, sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH)).x);
+    real u = sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH)).x;
+#if MERGES
+    u = merging_wavelength(scene, u, sample);
+#endif
+    Wavelengths lambdas = wavelengths_sample(scene, u);
     CameraRay ray = camera_ray(scene, position, sampler_pair(sampler, (natural)(DIMENSION_LENS)), lambdas);
     store_path_o(path, at, go, ray.o);
     store_path_d(path, at, go, ray.d);
@@ -89,6 +94,9 @@ inline void begin_path(Scene scene, Slab path, uint at, mask go, integer pixel_i
     store_path_eta(path, at, go, (real)(1.0f));
 #if WEIGHS_LIGHT_PATHS
     store_path_rival(path, at, go, (real)((float)settings->light_paths));
+#endif
+#if MERGES
+    store_path_pending(path, at, go, (real)(0.0f));
 #endif
 #if USES_NULL_SURFACES
     store_path_nulls(path, at, go, (integer)(0));

@@ -10,8 +10,8 @@
 #include "path/queue.cl"
 #include "generated/loop.cl"
 
-kernel NO_VECTORIZE void loop(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS, BEGIN_ARGS, global uint *queue, uint share,
-                              uint bounces, uint restart)
+kernel NO_VECTORIZE void loop(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS, BEGIN_ARGS DEPOSIT_ARGS MERGE_ARGS,
+                              global uint *queue, uint share, uint bounces, uint restart)
 {
     SLABS
     uint first = get_global_id(0) * share, end = min(first + share, (uint)settings->slots);
@@ -25,6 +25,6 @@ kernel NO_VECTORIZE void loop(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS, BEGIN_ARGS, glo
             left |= any((load_path_state(path, at) & PATH_DONE) == 0);
         }
         if (!left) break;
-        loop_bounce(SLAB_PASSED, SCENE_PASSED, TRACE_PASSED, BEGIN_PASSED, queue, first, end);
+        loop_bounce(SLAB_PASSED, SCENE_PASSED, TRACE_PASSED, BEGIN_PASSED DEPOSIT_PASSED MERGE_PASSED, queue, first, end);
     }
 }

@@ -27,14 +27,14 @@
 #define QUEUE_ARGS STAGE_AT_ARG
 #endif
 
-STAGE(shade)(SLAB_ARGS, SCENE_ARGS QUEUE_ARGS)
+STAGE(shade)(SLAB_ARGS, SCENE_ARGS MERGE_ARGS QUEUE_ARGS)
 {
     SLABS
     SCENE
 #if QUEUED
     uint entry = get_global_id(0);
     if (entry < queue_counts[BSDF_KIND]) {
-        integrator_vertex(scene, path, hit, shadow, queue[queue_starts[BSDF_KIND] + entry], mask_of(1));
+        integrator_vertex(scene, path, hit, shadow, queue[queue_starts[BSDF_KIND] + entry], mask_of(1) MERGE_PASSED);
     }
 #else
     STAGE_AT
@@ -42,6 +42,6 @@ STAGE(shade)(SLAB_ARGS, SCENE_ARGS QUEUE_ARGS)
 #if BSDF_COUNT > 1
     active = active & (MATERIAL_KIND(load_hit_material(hit, at)) == BSDF_KIND);
 #endif
-    if (any(active)) integrator_vertex(scene, path, hit, shadow, at, active);
+    if (any(active)) integrator_vertex(scene, path, hit, shadow, at, active MERGE_PASSED);
 #endif
 }

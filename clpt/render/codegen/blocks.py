@@ -11,7 +11,7 @@ from clpt.render.contract.features import Features
 
 CHANGED = (
     "o", "d", "beta", "radiance", "lambdas", "pdf", "sampled_hemisphere", "null_distance", "nulls",
-    "ratio", "eta", "medium", "lead", "rival", "state",
+    "ratio", "eta", "medium", "lead", "rival", "pending", "state",
 )  # fmt: skip
 READ = ("weight", "light", "pixel_index", "pixel_key", "sample")  # and not changed
 # members that a scene has only with a flag
@@ -24,6 +24,7 @@ NEEDED = {
     "medium": "USES_ABSORPTION",
     "lead": "USES_ABSORPTION",
     "rival": "WEIGHS_LIGHT_PATHS",
+    "pending": "MERGES",
     "weight": "LIGHT_PATHS",
     "light": "WEIGHS_LIGHT_PATHS",
     "pixel_index": "LIGHT_PATHS",

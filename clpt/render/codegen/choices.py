@@ -20,8 +20,13 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     ),
     "generated/bands.cl": lambda f, _: ("film/bands.cl",) * f.bands,
     "generated/integrator.cl": lambda f, _: (f"integrator/{f.integrator}.cl",),
+    "generated/merging.cl": lambda f, _: ("merging/area.cl",) * f.merged,
+    "generated/gather.cl": lambda f, _: (
+        ("generated/photon.cl", "merging/gather.cl") * (f.merged and not f.light_paths)
+    ),
     "generated/rivals.cl": lambda f, _: (
         (
+            "generated/merging.cl",
             "interface/camera.cl",
             "generated/camera.cl",
             "film/connect.cl",

@@ -28,6 +28,11 @@ def ends_light_paths(features: Features, cls: type[Material]) -> bool:
     return not cls.reversible or fluoresces(features, cls)
 
 
+def gathers_photons(features: Features, cls: type[Material]) -> bool:
+    """Whether paths from the camera are merged with photons at a material."""
+    return not (cls.delta or cls.is_null or ends_light_paths(features, cls))
+
+
 # name: its value, of a scene's features
 SCENE: dict[str, Callable[[Features], str | int]] = {
     "BSDF_COUNT": lambda f: len(f.materials),
@@ -51,6 +56,8 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "FEW_LIGHTS": lambda f: not f.many_lights,
     "LIGHT_PATHS": lambda f: f.light_paths,
     "WEIGHS_LIGHT_PATHS": lambda f: f.weighed,
+    "JOINS_CAMERA": lambda f: f.joined,
+    "MERGES": lambda f: f.merged,
     "CAMERA_DISPERSES": lambda f: f.glass_lens,
     "FILTER_BOX": lambda f: f.filter == "box",
     "FILTER_TAPS": lambda f: f.filter_taps,
@@ -75,6 +82,7 @@ MATERIAL: dict[str, Callable[[Features, type[Material]], str | int]] = {
     "BSDF_CHROMATIC": lambda f, cls: cls.chromatic,
     "BSDF_FLUORESCES": fluoresces,
     "BSDF_ENDS_LIGHT_PATHS": lambda f, cls: f.weighed and ends_light_paths(f, cls),
+    "BSDF_MERGES": lambda f, cls: f.merged and gathers_photons(f, cls),
     "BSDF_IS_NULL": lambda f, cls: cls.is_null and f.null_surfaces,
     "USES_CHOICE": lambda f, cls: cls.uses_lobe_sample or cls.fluoresces or f.many_lights,
 }

@@ -68,8 +68,11 @@ def _stages(
         "intersect": _source(
             "intersect", {**files, **rays}, defines, lanes if interleaved else trace_lanes
         ),
-        join: _source(join, files, defines, trace_lanes),
     }
+    if _joins(features):
+        texts[join] = _source(join, files, defines, trace_lanes)
+    if _deposits(features):
+        texts["deposit"] = _source("deposit", files, defines, lanes)
     if features.mixtures:
         texts["mix"] = _source("mix", files, defines, lanes)
     for cls in features.leaves:
@@ -100,10 +103,12 @@ def order(features: Features, layout: str, lanes: int, interleaved: bool = False
     if features.shows_lights:
         bounce.append(Stage(join, join, trace_lanes))
     bounce.append(Stage("intersect", "intersect", lanes if interleaved else trace_lanes))
+    if _deposits(features):
+        bounce.append(Stage("deposit", "deposit", lanes))
     if features.mixtures:
         bounce.append(Stage("mix", "mix_materials", lanes))
     bounce += [Stage(f"shade_{kind}", "shade", lanes) for kind in features.materials]
-    if any(not cls.delta for cls in features.leaves):
+    if _joins(features) and any(not cls.delta for cls in features.leaves):
         bounce.append(Stage(join, join, trace_lanes))
     return bounce
 
@@ -133,24 +138,27 @@ def loop_sources(
 def _loop_text(features: Features, bounce: list[Stage]) -> str:
     """What loop.cl calls: `loop_begin`, and `loop_bounce`, all other stages in their order."""
     begin, join = begin_and_join(features)
-    extra = {begin: ["BEGIN"], "intersect": ["TRACE"], join: ["JOIN"]}
-    groups = {s.program: ["SLAB", "SCENE", *extra.get(s.program, ())] for s in bounce}
     shading = [stage.program for stage in bounce if stage.kernel == "shade"]
-    lines = [
-        f"void loop_{name}({', '.join(f'{group}_ARGS' for group in own)}, uint at);"
-        for name, own in groups.items()
-    ]
+    extra = {begin: ", BEGIN_", "intersect": ", TRACE_", join: ", JOIN_", "deposit": " DEPOSIT_"}
+    extra |= dict.fromkeys(shading, " MERGE_")
+
+    def group(program: str, form: str) -> str:
+        """The arguments of a stage as it declares them, or as they are passed on."""
+        own = f"{extra[program]}{form}" if program in extra else ""
+        return f"SLAB_{form}, SCENE_{form}{own}"
+
+    names = dict.fromkeys(stage.program for stage in bounce)
+    lines = [f"void loop_{name}({group(name, 'ARGS')}, uint at);" for name in names]
     lines += [
         f"#define loop_begin loop_{begin}",
-        "inline void loop_bounce(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS, BEGIN_ARGS, "
-        "global uint *queue, uint first, uint end)",
+        "inline void loop_bounce(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS, BEGIN_ARGS DEPOSIT_ARGS "
+        "MERGE_ARGS, global uint *queue, uint first, uint end)",
         "{",
         "    SLABS",
         "    uint starts[BSDF_COUNT + 1], block = settings->slots + get_global_id(0) * LANES;",
     ]
     for stage in bounce[1:]:
-        passed = ", ".join(f"{group}_PASSED" for group in groups[stage.program])
-        call = f"loop_{stage.program}({passed}, "
+        call = f"loop_{stage.program}({group(stage.program, 'PASSED')}, "
         step = "LANES" if stage.lanes > 1 else "1"
         plain = f"for (uint at = first; at < end; at += {step}) {call}at);"
         if stage.program not in shading:
@@ -178,6 +186,16 @@ def begin_and_join(features: Features) -> tuple[str, str]:
     """Return the stage that begins paths, and the one that tests the rays that join them to a light
     or, of paths that start at lights, to the camera."""
     return ("emit", "splat") if features.light_paths else ("generate", "shadow")
+
+
+def _joins(features: Features) -> bool:
+    """Whether paths are joined to lights or, those that start at lights, to the camera."""
+    return not features.light_paths or features.joined
+
+
+def _deposits(features: Features) -> bool:
+    """Whether paths leave photons."""
+    return features.light_paths and features.merged
 
 
 def _trace_lanes(layout: str, lanes: int) -> int:
@@ -211,7 +229,8 @@ def _shared(features: Features, layout: str) -> Files:
         **parameters.virtual_files(features),
         **choices.virtual_files(features, layout),
         "generated/camera.cl": stages.camera_text(features.camera, features.glass_lens),
-        "generated/connect.cl": stages.connect_text(features.camera),
+        "generated/connect.cl": stages.connect_text(features),
+        "generated/photon.cl": stages.photon_text(features) if features.merged else "",
         "generated/emission.cl": emission.dispatch_text(
             features.lights, textured, features.two_sided_lights
         ),

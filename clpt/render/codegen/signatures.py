@@ -16,22 +16,39 @@ SCENE_ARGS = {n: f"global const {element} *restrict " for n, (element, _) in TAB
 SCENE_ARGS["settings"] = "global const Settings *restrict "
 
 
-def args_text(name: str, args: dict[str, str]) -> list[str]:
-    """Return the macro that declares a group of arguments, and the one that passes them on."""
-    declared = ", ".join(f"{type_}{own}" for own, type_ in args.items())
-    return [f"#define {name}_ARGS {declared}", f"#define {name}_PASSED {', '.join(args)}"]
+def args_text(name: str, args: dict[str, str], behind: bool = False) -> list[str]:
+    """Return the macro that declares a group of arguments, and the one that passes them on.
+
+    behind: with a comma before each, so that there may be none.
+    """
+    declared = [f"{type_}{own}" for own, type_ in args.items()]
+    if behind:
+        declared, passed = [f", {text}" for text in declared], [f", {own}" for own in args]
+        return [
+            f"#define {name}_ARGS {''.join(declared)}",
+            f"#define {name}_PASSED {''.join(passed)}",
+        ]
+    return [
+        f"#define {name}_ARGS {', '.join(declared)}",
+        f"#define {name}_PASSED {', '.join(args)}",
+    ]
 
 
 def virtual_files(features: Features, layout: str) -> dict[str, str]:
     """Return the generated files that define the groups of arguments."""
     groups = {
         "trace_args": {"TRACE": trace_args(features, layout)},
-        "stage_args": {"BEGIN": begin_args(features), "JOIN": join_args(features, layout)},
+        "stage_args": {
+            "BEGIN": begin_args(features),
+            "JOIN": join_args(features, layout),
+        },
     }
     files = {"generated/scene.cl": scene_text()}
     for file, args in groups.items():
         rows = [row for name, own in args.items() for row in args_text(name, own)]
         files[f"generated/{file}.cl"] = "\n".join([*rows, ""])
+    for name, own in {"DEPOSIT": deposit_args(features), "MERGE": merge_args(features)}.items():
+        files["generated/stage_args.cl"] += "\n".join([*args_text(name, own, behind=True), ""])
     return files
 
 
@@ -96,10 +113,24 @@ def join_args(features: Features, layout: str) -> dict[str, str]:
     return {**trace_args(features, layout), **splats}
 
 
+def deposit_args(features: Features) -> dict[str, str]:
+    """Return what the stage takes that keeps light paths as photons."""
+    if not (features.merged and features.light_paths):
+        return {}
+    return dict.fromkeys(("photons", "photon_numbers"), "global uint *")
+
+
+def merge_args(features: Features) -> dict[str, str]:
+    """Return what shading takes that gathers photons."""
+    if not features.merged or features.light_paths:
+        return {}
+    return dict.fromkeys(("photons", "photon_order", "photon_cells"), "global const uint *")
+
+
 def loop_arguments(features: Features, layout: str) -> tuple[device.Argument, ...]:
     """Return what the kernel of stage/loop.cl takes: a linked kernel has no argument names."""
     args = {**SLAB_ARGS, **SCENE_ARGS, **trace_args(features, layout), **begin_args(features)}
-    args |= {"queue": "global uint *"}
+    args |= {**deposit_args(features), **merge_args(features), "queue": "global uint *"}
     args |= dict.fromkeys(("share", "bounces", "restart"), "uint ")
     return tuple(
         device.Argument(

@@ -5,6 +5,7 @@ The physics is always in a file.
 
 from __future__ import annotations
 
+from clpt.records import PHOTON
 from clpt.render.codegen import emission, flags, lights, parameters, thin_films
 from clpt.render.codegen.dispatch import Case, Function, active, function
 from clpt.render.contract import camera_records
@@ -12,6 +13,8 @@ from clpt.render.contract.features import Features
 from clpt.render.contract.parameter_words import row_words, words
 from clpt.scene.materials import Material
 from clpt.scene.params import device_params, interior_params
+
+MIXTURE = 0xFF  # the kind in a mixture's material word, see kernels/stage/mix.cl
 
 
 def camera_text(kind: str, glass: bool) -> str:
@@ -28,14 +31,27 @@ def camera_text(kind: str, glass: bool) -> str:
     )
 
 
-def connect_text(kind: str) -> str:
-    """Return `camera_connect`, for paths that start at lights."""
+def connect_text(features: Features) -> str:
+    """Return `camera_connect`, for paths that start at lights; nothing where none is joined."""
+    if not features.joined:
+        return ""
+    kind = features.camera
     record = camera_records.RECORDS[kind]
     return (
         f'#include "camera/{kind}_connect.cl"\n#define camera_connect(scene, p, away, lens) '
         f"camera_near(scene, {kind}_connect((global const {record.name} *)(scene).camera, "
         "(scene).settings, p, away, lens))\n"
     )
+
+
+def photon_text(features: Features) -> str:
+    """Return the struct of a photon, and `photon_met(kind)`: whether one is kept at a material, or
+    at a mixture, of which no part is chosen yet."""
+    kinds = [i for i, cls in enumerate(features.leaves) if flags.gathers_photons(features, cls)]
+    met = " | ".join(f"((kind) == {kind})" for kind in [*kinds, MIXTURE])
+    return f"""{PHOTON.row_text()}{PHOTON.keep_text()}#define PHOTON_WORDS {PHOTON.words}
+#define photon_met(kind) ({met})
+"""
 
 
 def emission_sources(features: Features) -> frozenset[str]:

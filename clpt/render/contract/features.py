@@ -63,6 +63,8 @@ class Features:
     infinite: bool = False
     light_paths: bool = False  # paths start at lights
     weighed: bool = False  # paths from the camera are weighed against some from lights
+    joined: bool = False  # those are joined to the camera
+    merged: bool = False  # those leave photons, which paths from the camera gather
     light_filter: tuple[int, int, int] = (0, 0, 0)  # of those: taps, reach and profile
     film_group: int = 0  # words of a pixel before those that paths add to
     visible_lights: bool = False  # some light is no delta light: a camera may see it

@@ -34,6 +34,8 @@ FIXED = (
     "bands",
     "alpha",
     "light_paths",
+    "photon_places",
+    "photon_pixels",
 )
 
 

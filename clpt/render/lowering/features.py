@@ -12,7 +12,7 @@ from clpt.render.lowering.lights.lights import LightRows
 from clpt.render.lowering.materials.material_words import MaterialWords
 
 FEW_LIGHTS = 256  # up to which one random number chooses a light and a point on it
-INTEGRATORS = {"direct": "path"}  # kinds that have the kernels of another one
+INTEGRATORS = {"direct": "path", "vcm": "path"}  # kinds that have the kernels of another one
 
 
 def features_of(
@@ -60,6 +60,8 @@ def features_of(
         infinite=lights.infinite > 0 and not channels,
         light_paths=index.light_paths,
         weighed=index.weighed > 0,
+        joined=index.joined and (index.light_paths or index.weighed > 0),
+        merged=index.merged,
         light_filter=(*index.spread, profile) if index.weighed else (0, 0, 0),
         visible_lights=lights.visible,
         two_sided_lights=lights.two_sided,

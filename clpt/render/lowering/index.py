@@ -7,12 +7,13 @@ from typing import Any
 
 from clpt.errors import SceneError
 from clpt.render.contract import custom_materials
+from clpt.render.lowering import photons
 from clpt.render.lowering.camera import cameras, filters
 from clpt.render.lowering.geometry import instancing, shapes
 from clpt.render.lowering.geometry.instancing import Placed, Prototype
 from clpt.scene import Scene
 from clpt.scene import materials as mt
-from clpt.scene.integrators import ParticleTracer
+from clpt.scene.integrators import ParticleTracer, Vcm
 from clpt.scene.shapes import Shape
 
 
@@ -65,9 +66,29 @@ class SceneIndex:
 
     @property
     def weighed(self) -> int:
-        """Light paths for each camera sample of `path`, weighed against it; 0: there are none."""
+        """Light paths for each camera sample, weighed against it; 0: there are none."""
         wanted: int = getattr(self.scene.integrator, "light_paths", 0)
-        return wanted if cameras.is_connected(self.scene.camera, self.scene.film.mode) else 0
+        return wanted if self.joined or self.merged else 0
+
+    @property
+    def joined(self) -> bool:
+        """Whether paths that start at lights are joined to the camera."""
+        if not isinstance(self.scene.integrator, Vcm):
+            return cameras.is_connected(self.scene.camera, self.scene.film.mode)
+        wanted = self.scene.integrator.light_tracing
+        return wanted and cameras.is_connected(self.scene.camera, self.scene.film.mode)
+
+    @property
+    def merged(self) -> bool:
+        """Whether light paths leave photons, which paths from the camera gather."""
+        integrator = self.scene.integrator
+        wanted = isinstance(integrator, Vcm) and integrator.merging
+        return wanted and photons.places(integrator) > 0 and not self.shifts
+
+    @property
+    def shifts(self) -> bool:
+        """Whether some material gives light another wavelength."""
+        return self.spectral and any(cls.fluoresces for cls in self.leaves)
 
     @property
     def alpha(self) -> bool:

@@ -116,7 +116,9 @@ def lower(
         *encoder.textures.finish(),
     )  # fmt: skip
     features = features_of(index, encoder, materials, geometry, lights, tabulated, profile)
-    settings = settings_of(index, geometry, lights, wavelengths, density_row, ambient_row, sphere)
+    settings = settings_of(
+        index, geometry, lights, wavelengths, density_row, ambient_row, sphere, features.dispersion
+    )
     cache.settle()
     tables = encoder.store.arrays()
     encoder.textures.images.joined(tables["images"])

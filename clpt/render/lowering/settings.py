@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from clpt.records import SETTINGS
+from clpt.render.lowering import photons
 from clpt.render.lowering.camera.colour import film_scale, output_matrix
 from clpt.render.lowering.camera.wavelengths import Density
 from clpt.render.lowering.geometry.geometry import Geometry
@@ -26,11 +29,13 @@ def settings_of(
     density_row: int,
     ambient_row: int,
     sphere: tuple[NDArray[np.float64], float],
+    disperses: bool,
 ) -> NDArray[np.void]:
     """Return the record SETTINGS of a scene; the wavefront adds what depends on the device.
 
     density_row: where the table of `density` begins in `distributions`; ambient_row: in
-    `light_params`; sphere: centre and radius of one around the scene [m].
+    `light_params`; sphere: centre and radius of one around the scene [m];
+    disperses: whether directions depend on wavelengths.
     """
     scene, film, integrator = index.scene, index.scene.film, index.scene.integrator
     settings = np.zeros((), SETTINGS.dtype)
@@ -49,6 +54,8 @@ def settings_of(
     settings["hide_lights"] = getattr(integrator, "hide_lights", False)
     settings["alpha"] = index.alpha
     settings["light_paths"] = index.weighed
+    if index.merged:
+        _set_photons(settings, index, geometry, sphere[1], disperses)
     settings["light_count"] = len(lights.rows)
     settings["infinite_count"] = lights.infinite
     settings["ambient"] = ambient_row
@@ -66,3 +73,28 @@ def settings_of(
     settings["to_first"], settings["to_second"], settings["to_third"] = matrix / scale
     settings["center"], settings["scene_radius"] = sphere
     return settings
+
+
+def _set_photons(
+    settings: NDArray[np.void],
+    index: SceneIndex,
+    geometry: Geometry,
+    scene_radius: float,
+    disperses: bool,
+) -> None:
+    """Write what merging needs; the wavefront adds how many light paths leave photons."""
+    scene = index.scene
+    integrator: Any = scene.integrator
+    size = scene.film.width, scene.film.height
+    settings["max_depth"] = min(int(settings["max_depth"]), photons.DEEPEST)
+    settings["radius"] = integrator.radius or photons.first_radius(
+        scene.camera, geometry, size, scene_radius
+    )
+    settings["photon_places"] = photons.places(integrator)
+    held = photons.pixels(integrator, int(settings["padded_pixels"]))
+    settings["photon_pixels"] = held
+    cells = max(held * index.weighed, photons.FEWEST_CELLS)
+    settings["photon_cells"] = 1 << (cells - 1).bit_length()
+    suited = photons.GROUPS if disperses else photons.FEW_GROUPS
+    groups = integrator.wavelength_groups or suited
+    settings["wavelength_groups"] = groups if index.spectral else 1

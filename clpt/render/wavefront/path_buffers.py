@@ -198,6 +198,9 @@ class PathBuffers:
         changed = settings.copy()
         changed["per_plane"], changed["planes"] = self._slots.per_plane, self._slots.planes
         changed["slots"], changed["halves"] = self._slots.total, self._slots.halves
+        leave = np.count_nonzero(work_list.sampled(changed) < changed["photon_pixels"])
+        groups = max(int(changed["wavelength_groups"]), 1)
+        changed["photon_paths"] = leave * int(changed["light_paths"]) / groups
         return changed
 
     def _set(self, settings: NDArray[np.void]) -> None:

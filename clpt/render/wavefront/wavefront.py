@@ -28,6 +28,7 @@ from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.render.wavefront.film import Film
 from clpt.render.wavefront.film_state import SAMPLES_WORD, Words
 from clpt.render.wavefront.path_buffers import PathBuffers, divide_film
+from clpt.render.wavefront.photons import Photons
 from clpt.render.wavefront.strategy import Strategy, Tuning
 from clpt.scene.integrators import IDS
 
@@ -82,10 +83,15 @@ class Wavefront:
         self.film = film = Film(
             self.stream, self.buffers, paths.settings, features.bands, features.film_words
         )
+        photons = Photons(self.stream, self.buffers, paths.settings) if features.merged else None
+        self.photons, photon_arguments = photons, photons.arguments if photons else {}
         # What follows knows nothing of this wavefront: memory is given back without a collector.
         self.kernels = Kernels(
-            self.device, lambda: {**scene.arguments, **paths.arguments, **film.arguments}
-        )
+            self.device,
+            lambda: {
+                **scene.arguments, **paths.arguments, **film.arguments, **photon_arguments
+            },
+        )  # fmt: skip
         own_features = functools.partial(_features_of, channel)
         self.loops = [
             BounceLoop(self.kernels, scene, paths, self.timings, looped, own_features, which)
@@ -210,8 +216,10 @@ class Wavefront:
     def enqueue(self, first: int, end: int) -> None:
         """Enqueue that samples first to end - 1 of every pixel are added; wait for nothing."""
         first, end = self._range(first, end)
-        for loop in self.loops:
-            loop.enqueue(first, end)
+        for turn in self._turns(first, end) if self.photons else [(first, end)]:
+            for loop in self.loops:
+                self._before(loop)
+                loop.enqueue(*turn)
         self._note_paths(first, end)
         self.accumulate_film()
 
@@ -295,6 +303,8 @@ class Wavefront:
         if len(self.loops) == 1:
             return [(first, end)]
         step = max(TURN_SAMPLES, TURN_PATHS // self.paths.pixels)
+        if self.photons is not None:
+            step = 1
         return [(at, min(at + step, end)) for at in range(first, end, step)]
 
     def _run(
@@ -302,6 +312,7 @@ class Wavefront:
     ) -> bool:
         """Trace one kind of paths for samples first to end - 1; return whether all were traced."""
         wanted = True
+        self._before(loop)
 
         def count(counters: NDArray[np.uint64]) -> bool:
             nonlocal wanted
@@ -310,6 +321,14 @@ class Wavefront:
             return wanted
 
         return loop.run(first, end, count)
+
+    def _before(self, loop: BounceLoop) -> None:
+        """Enqueue what paths of a kind need of the photons of their pass."""
+        if self.photons is not None:
+            if loop.is_last:
+                self.photons.sort(self.kernels)
+            else:
+                self.photons.clear()
 
     def _range(self, first: int, end: int) -> tuple[int, int]:
         """The numbers among these of samples that the film takes: an id is known by the first."""

@@ -1,0 +1,72 @@
+"""Photons of a pass: their memory, and the kernels that sort them by the cells where they are."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import device
+from clpt.device.buffers import Buffers
+from clpt.records import PHOTON
+from clpt.render.wavefront.bounce_loop import Kernels
+
+NONE = 0xFFFFFFFF  # kernels/merging/none.cl
+RUN = 1024  # kernels/merging/sort.cl
+GROUP = 8  # work-items of a group
+ADVICE = "lower photon_memory"
+PROGRAM = "photons"
+
+
+class Photons:
+    """The photons of one pass, which the next pass replaces.
+
+    settings: of the scene, with `photon_places` and so on; kernels: which know `arguments`.
+
+    Raises MemoryBudgetError.
+    """
+
+    def __init__(self, stream: device.Stream, buffers: Buffers, settings: NDArray[np.void]):
+        self.stream = stream
+        paths = int(settings["photon_pixels"]) * int(settings["light_paths"])
+        self.places = paths * int(settings["photon_places"])
+        self.cells = int(settings["photon_cells"])
+        self._runs = -(-self.cells // RUN)
+
+        def words(number: int) -> Any:
+            return buffers.allocate("photons", 4 * number, ADVICE)
+
+        self._cells = words(self.cells + 1)
+        self._numbers = words(self.places)
+        self._sums = words(self._runs)
+        self.arguments = {
+            "photons": words(self.places * PHOTON.words),
+            "photon_numbers": self._numbers,
+            "photon_order": words(self.places),
+            "photon_cells": self._cells,
+        }
+        stream.fill(self._cells, 0, 0, 4 * (self.cells + 1))
+
+    def clear(self) -> None:
+        """Enqueue that there are none."""
+        self.stream.fill(self._numbers, NONE, 0, 4 * self.places)
+
+    def sort(self, kernels: Kernels) -> None:
+        """Enqueue that the photons of a pass are sorted, for paths from the camera to find."""
+        kernels.build({PROGRAM: device.assemble("merging/sort.cl")})
+        order = self.arguments["photon_order"]
+        self.stream.fill(self._cells, 0, 0, 4 * (self.cells + 1))
+        place = {"numbers": self._numbers, "count": self.places, "cells": self._cells}
+        cell = {"count": self.cells, "cells": self._cells}
+        self._run(kernels, "photons_count", self.places, **place)
+        self._run(kernels, "photons_sum", self._runs, **cell, sums=self._sums)
+        self._run(kernels, "photons_scan", 1, sums=self._sums, runs=self._runs)
+        self._run(kernels, "photons_begin", self._runs, **cell, sums=self._sums)
+        self._run(kernels, "photons_place", self.places, **place, order=order)
+        self._run(kernels, "photons_order", self.cells, **cell, order=order)
+
+    def _run(self, kernels: Kernels, name: str, items: int, **arguments: Any) -> None:
+        bound = kernels.bind(PROGRAM, name, **arguments)
+        group = GROUP if items > 1 else 1
+        self.stream.run(bound, (-(-items // group) * group,), (group,))

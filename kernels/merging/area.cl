@@ -1,0 +1,54 @@
+/* The disk in which paths from the camera and photons are merged. A pass is a sample of every pixel, with the light
+ * paths beside it; its radius shrinks from pass to pass, so that the picture converges (Hachisuka and Jensen 2009). */
+
+#include "core/sobol.cl"
+
+/* The pass of a sample of the camera, or of a light path. */
+inline integer merging_pass(Scene scene, integer sample)
+{
+#if LIGHT_PATHS
+    return divide(sample, scene.settings->light_paths);
+#else
+    return sample;
+#endif
+}
+
+/* The radius in a pass [m]: the first one over the eighth root of the pass's number from 1, so that radius squared
+ * falls as the pass to the power of alpha - 1, alpha being 3/4 (Georgiev 2012). */
+inline real merging_radius(Scene scene, integer pass)
+{
+    return scene.settings->radius / sqrt(sqrt(sqrt(to_real(pass + 1))));
+}
+
+/* The disk's area times the number of photons' paths that may meet a path from the camera there [m^2]. */
+inline real merging_area(Scene scene, integer pass)
+{
+    return PI * scene.settings->photon_paths * sqr(merging_radius(scene, pass));
+}
+
+/* Whether paths from the camera are merged at a vertex with so many before it. Where light paths are joined to the
+ * camera, these find what it sees at first, sharper. */
+inline mask merging_here(integer depth)
+{
+#if JOINS_CAMERA
+    return depth > 0;
+#else
+    return depth >= 0;
+#endif
+}
+
+/* Paths are merged that have the same wavelengths: each pass has some groups of them, a path's own u chooses one. */
+inline integer merging_group(Scene scene, real u)
+{
+    int groups = scene.settings->wavelength_groups;
+    return min_i(to_integer(u * (float)groups), (integer)(groups - 1));
+}
+
+/* What stands for u where wavelengths are drawn: the same for all of a group. From pass to pass it goes through the
+ * group's part of the unit interval as van der Corput's sequence, whose beginning the seed chooses. */
+inline real merging_wavelength(Scene scene, real u, integer sample)
+{
+    natural bits = reverse_bits(as_natural(merging_pass(scene, sample)));
+    real inside = unit_interval(bits + hash_natural((natural)(scene.settings->seed)));
+    return (to_real(merging_group(scene, u)) + inside) / (float)scene.settings->wavelength_groups;
+}

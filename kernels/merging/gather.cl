@@ -1,0 +1,66 @@
+/* Merging: light from the photons of a pass around a vertex of a path from the camera (Georgiev 2012; Jensen 1996).
+ *
+ * A photon is a light path where it has met a surface by something sharp. Around x the photons in a disk of radius r
+ * are light per area, so that sum f power / (N pi r^2) is radiance, N being the number of light paths; f has no cosine.
+ * Each is weighed against all other ways to find its path, see lighting/rivals.cl. Photons of a surface that is turned
+ * away, or off the disk's plane, are left out. */
+#include "core/octahedral.cl"
+#include "merging/cells.cl"
+
+#define MERGING_FLAT 0.5f    /* how far off the plane photons may lie, over the radius */
+#define MERGING_TURN 0.866f  /* least cosine between the normals */
+
+/* Light from one photon for each lane that is `near`, without what the path carries. */
+inline Spectrum merge_photon(Photon photon, mask near, Vertex v, Scattering scatter, Rival rival, Spectrum ratio,
+                             real area, real number)
+{
+    vec3 to = octahedral_unpack(photon.to_light), wi = to_local(scatter.shading.frame, to);
+    Spectrum f = bsdf_eval(scatter.bsdf, scatter.wo, wi);
+    real p = rival_pdf(scatter.bsdf, scatter.wo, wi), p_back = rival_pdf(scatter.bsdf, wi, scatter.wo);
+    real of_light = photon.rival * number * p, of_camera = rival_arrives(rival, mask_of(0), p, p_back) * p_back;
+    real w = 1.0f / (1.0f + sqr(of_light / area) + sqr(of_camera / area));
+    real share = shading_frame_share(scatter.shading, to);
+    real scale = w * share / (area * max_r(fabs(dot3(v.s.n, to)), (real)(1e-3f)));
+#if USES_DISPERSION /* the pdfs of both parts for each wavelength as the hero, over their mean */
+    scale /= max_r(spectrum_mean(spectrum_mul(ratio, photon.ratio)), (real)(1e-20f));
+#endif
+    Spectrum light = spectrum_scale(spectrum_mul(f, photon.power), scale);
+    return spectrum_sel(near & (spectrum_max(f) > 0.0f), light, spectrum_of(0.0f));
+}
+
+/* The light of all photons around a vertex, by the share of it that merging takes, without what the path carries.
+ * ratio: of the camera's path, see path/hero.cl. */
+inline Spectrum merge_photons(Scene scene, mask active, Vertex v, Scattering scatter, Rival rival, Spectrum ratio,
+                              integer sample MERGE_ARGS)
+{
+    global const Settings *settings = scene.settings;
+    integer pass = merging_pass(scene, sample), group = 0;
+    real radius = merging_radius(scene, pass), area = merging_area(scene, pass);
+    real number = (real)((float)settings->light_paths);
+#if SPECTRUM_SIZE == 4
+    group = merging_group(scene, sampler_pair(scatter.sampler, (natural)(DIMENSION_WAVELENGTH)).x);
+#endif
+    Spectrum sum = spectrum_of(0.0f);
+    Cell first = cell_at(scene, sub3(v.s.p, v3(radius, radius, radius)), 2.0f * radius);
+    for (int corner = 0; corner < 8; corner++) {
+        Cell c = {first.x + (corner & 1), first.y + (corner >> 1 & 1), first.z + (corner >> 2)};
+        integer cell = cell_number(scene, c, group), entry = gather_i(photon_cells, cell);
+        integer end = sel_i(active, gather_i(photon_cells, cell + 1), entry);
+        for (mask there = entry < end; any(there); there = entry < end) {
+            integer row = sel_i(there, gather_i(photon_order, sel_i(there, entry, (integer)(0))), (integer)(0));
+            row *= PHOTON_WORDS;
+            entry += 1;
+            vec3 off = sub3(gather3((global const float *)photons, row), v.s.p);
+            mask near = there & (dot3(off, off) < sqr(radius)) & (fabs(dot3(off, v.s.n)) < MERGING_FLAT * radius);
+            if (any(near)) {
+                Photon photon = photon_row(photons, row);
+                near = near & ((photon.depth >> 16) == group);
+                near = near & ((photon.depth & 0xffff) + v.depth < settings->max_depth);
+                near = near & (fabs(dot3(octahedral_unpack(photon.normal), v.s.n)) > MERGING_TURN);
+                Spectrum light = merge_photon(photon, near, v, scatter, rival, ratio, area, number);
+                sum = spectrum_add(sum, light);
+            }
+        }
+    }
+    return sum;
+}

@@ -1,0 +1,61 @@
+/* Keeps as photons the light paths that have met a surface by something sharp, before a material is chosen there. Each
+ * vertex of each light path of a pass has a place of its own, so that nothing is dropped and no order counts. */
+#include "core/base.cl"
+#include "core/octahedral.cl"
+#include "interface/stage.cl"
+#include "generated/sampler.cl"
+#include "interface/shape.cl"
+#include "generated/shapes.cl"
+#include "generated/medium.cl"
+#include "path/surface.cl"
+#include "lighting/light_path_sampler.cl"
+#include "merging/area.cl"
+#include "merging/cells.cl"
+#include "merging/none.cl"
+#include "generated/photon.cl"
+
+STAGE(deposit)(SLAB_ARGS, SCENE_ARGS DEPOSIT_ARGS STAGE_AT_ARG)
+{
+    SLABS
+    SCENE
+    STAGE_AT
+    integer state = load_path_state(path, at), depth = state & PATH_DEPTH;
+    integer pixel_index = load_path_pixel_index(path, at), kind = MATERIAL_KIND(load_hit_material(hit, at));
+    mask active = ((state & PATH_ALIVE) != 0) & ((state & PATH_SHARP) != 0) & (load_hit_prim(hit, at) >= 0);
+    active = active & (depth < settings->max_depth) & (pixel_index < settings->photon_pixels) & photon_met(kind);
+    if (any(active)) {
+        integer sample = load_path_sample(path, at), pass = merging_pass(scene, sample), group = 0;
+        mask front;
+        vec3 d = load_path_d(path, at);
+        Surface s = surface_load(scene, hit, at, active, load_path_o(path, at), d, &front);
+        Photon photon;
+        photon.p = s.p;
+        photon.power = load_path_beta(path, at);
+#if USES_DISPERSION
+        photon.ratio = load_path_ratio(path, at);
+#else
+        photon.ratio = spectrum_of(1.0f);
+#endif
+        photon.to_light = octahedral_pack(neg3(d));
+        photon.normal = octahedral_pack(s.n);
+        photon.rival = load_path_rival(path, at) / max_r(fabs(dot3(s.n, d)), (real)(1e-7f));
+#if USES_ABSORPTION
+        integer medium = sel_i(active, load_path_medium(path, at), (integer)(0));
+        real through = load_hit_t(hit, at) + sel(active, load_path_lead(path, at), (real)(0.0f));
+        Wavelengths lambdas = load_path_lambdas(path, at);
+        photon.power = spectrum_mul(photon.power, medium_transmittance(scene, medium, through, lambdas));
+#endif
+#if SPECTRUM_SIZE == 4
+        Sampler sampler = light_path_sampler(settings, pixel_index, sample);
+        group = merging_group(scene, sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH)).x);
+#endif
+        photon.depth = depth | group << 16;
+        int number = settings->light_paths, places = settings->photon_places;
+        integer place = (pixel_index * number + sample - pass * number) * places + depth - 2;
+        Cell cell = cell_at(scene, s.p, 2.0f * merging_radius(scene, pass));
+        place = sel_i(active, place, (integer)(0));
+        photon_keep(photons, place * PHOTON_WORDS, active, photon);
+        integer cell_of = cell_number(scene, cell, group);
+        scatter_if((global float *)photon_numbers, place, active, as_real(cell_of));
+    }
+}
