@@ -40,8 +40,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
     mask shine = active & c.seen & (spectrum_max(f) > 0.0f);
     real carries = fabs(dot3(s.n, c.d)) * arrives * c.importance * shading_frame_share(scatter.shading, neg3(v.d));
 #if WEIGHS_LIGHT_PATHS
-    real over = rival_of_joint(rival, s, c, rival_pdf(m, to, wo));
-    carries *= 1.0f / (1.0f + sqr(over));
+    carries *= 1.0f / (1.0f + rival_of_joint(rival, s, c, rival_pdf(m, to, wo), rival_pdf(m, wo, to)));
     mask hidden = mask_of(settings->hide_lights != 0) & (s.light >= 0);
     shine = shine & !rival.first & !hidden & !rival_ends(scene, v);
 #endif
@@ -82,6 +81,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
     real p = rival_pdf(m, wo, bs.wi), p_back = rival_pdf(m, bs.wi, wo);
     store_path_rival(path, at, next, rival_to_camera(rival, s, onward, delta, p, p_back));
 #if MERGES
+    store_path_pending(path, at, next, rival_merged(rival, s, onward, delta, p, p_back));
     integer sharp = sel_i(rival_sharp(delta, p, p_back), (integer)(PATH_SHARP), (integer)(0));
     state = (state - (state & PATH_SHARP)) | sharp;
 #endif

@@ -28,11 +28,14 @@
  * ends light paths (`rival_ends`) the camera's rival is 0.
  *
  * Where photons are merged (merging/gather.cl) the same path may also be found at any x_i where the light has come by
- * something sharp, x_{i+1}, as the camera's path and a light path that end there nearly meet. With e = `merging_area`,
- * the density of that over both paths' own is e, so that each square of a rival gains
+ * something sharp, x_{i+1}, as the camera's path and a light path that end there nearly meet. Where light paths are
+ * joined to the camera that holds only if x_1 is sharp too: what the camera sees by itself they find, sharper, and
+ * nothing is gathered there. With e = `merging_area` the density of merging over both paths' own is e, so that each
+ * square of a rival gains
  *
  *     (e c' / p)^2  at x_i of a camera's path, once x_{i+1} is known to be sharp: till then it is `pending`;
- *     (e / l c' / p)^2  at x_i of a light path that has come by something sharp.
+ *     (e / l c' / p)^2  at x_i of a light path that has come by something sharp: kept apart as `pending` too, as it
+ *     counts in a photon, and at the joint only if x_1 is sharp.
  *
  * What is sharp depends on the densities of both ways alone, and so is the same for both sides: a delta lobe, or a
  * density above SHARP_PDF. */
@@ -70,7 +73,7 @@ typedef struct {
     mask first;   /* it is the path's first vertex */
     mask met;     /* a ray from it might meet the light */
 #if MERGES
-    real pending; /* what joins `arrives` where the vertex is sharp, of a camera's path */
+    real pending; /* what joins `arrives` where the vertex is sharp; of a light path, where x_1 is */
     real merges;  /* what merging here has over the path's density: 0 where there is none */
 #endif
 } Rival;
@@ -108,7 +111,7 @@ inline Rival rival_of_camera(Scene scene, Slab path, uint at, Vertex v, Sampler 
 #if MERGES
     r.pending = load_path_pending(path, at) * goes_on;
     r.merges = merging_area(scene, merging_pass(scene, load_path_sample(path, at)));
-    r.merges = sel(merging_here(v.depth), r.merges, (real)(0.0f));
+    r.merges = sel(merging_here(v.state), r.merges, (real)(0.0f));
 #endif
     return r;
 }
@@ -159,7 +162,7 @@ inline Rival rival_of_emission(Scene scene, Slab path, uint at, Vertex v, vec3 h
         r.met = !r.first | (row < scene.settings->infinite_count) | (light_at(scene, row).shape >= 0);
     }
 #if MERGES
-    r.pending = 0.0f;
+    r.pending = load_path_pending(path, at) / max_r(fabs(dot3(v.s.n, v.d)), (real)(1e-7f));
     r.merges = 0.0f;
 #if BSDF_MERGES
     float number = (float)scene.settings->light_paths;
@@ -174,22 +177,32 @@ inline Rival rival_of_emission(Scene scene, Slab path, uint at, Vertex v, vec3 h
 inline real rival_to_camera(Rival r, Surface s, vec3 d, mask delta, real p, real p_back)
 {
     real back = sel(r.met, p_back, (real)(0.0f));
-    real either = r.arrives * sel(r.first, sqrt(sqr(back) + sqr(r.found)), back);
-#if MERGES
-    either = sqrt(sqr(either) + sqr(r.merges));
-#endif
-    either = either / max_r(p, (real)(1e-30f));
-    real change = sel(delta, r.arrives * sel(r.met, (real)(1.0f), (real)(0.0f)), either);
-    return rival_limited(change * fabs(dot3(s.n, d)));
+    real either = sel(r.first, sqrt(sqr(back) + sqr(r.found)), back) / max_r(p, (real)(1e-30f));
+    real change = sel(delta, sel(r.met, (real)(1.0f), (real)(0.0f)), either);
+    return rival_limited(r.arrives * change * fabs(dot3(s.n, d)));
 }
 
-#if JOINS_CAMERA
-/* Of a light path that is joined to the camera, where paths from it are not merged. */
-inline real rival_of_joint(Rival r, Surface s, CameraPoint c, real p_back)
+#if MERGES
+/* The same of what is pending. */
+inline real rival_merged(Rival r, Surface s, vec3 d, mask delta, real p, real p_back)
 {
+    real either = sqrt(sqr(r.pending * p_back) + sqr(r.merges)) / max_r(p, (real)(1e-30f));
+    return rival_limited(sel(delta, r.pending, either) * fabs(dot3(s.n, d)));
+}
+#endif
+
+#if JOINS_CAMERA
+/* The square of the rival of a light path that is joined to the camera, where the material has densities p and p_back
+ * of a camera's path. */
+inline real rival_of_joint(Rival r, Surface s, CameraPoint c, real p, real p_back)
+{
+    real chosen = 1.0f / max_r(c.importance, (real)(1e-30f));
+    real square = sqr(rival_to_camera(r, s, c.d, mask_of(0), chosen, p));
 #if MERGES
     r.merges = 0.0f;
+    real more = rival_merged(r, s, c.d, mask_of(0), chosen, p);
+    square += sel(rival_sharp(mask_of(0), p, p_back), sqr(more), (real)(0.0f));
 #endif
-    return rival_to_camera(r, s, c.d, mask_of(0), 1.0f / max_r(c.importance, (real)(1e-30f)), p_back);
+    return square;
 }
 #endif

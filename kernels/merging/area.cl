@@ -26,14 +26,14 @@ inline real merging_area(Scene scene, integer pass)
     return PI * scene.settings->photon_paths * sqr(merging_radius(scene, pass));
 }
 
-/* Whether paths from the camera are merged at a vertex with so many before it. Where light paths are joined to the
- * camera, these find what it sees at first, sharper. */
-inline mask merging_here(integer depth)
+/* Whether a path from the camera in such a state is merged. Where light paths are joined to the camera, these find what
+ * it sees by itself; what follows is left to merging where the camera's first surface is sharp. */
+inline mask merging_here(integer state)
 {
 #if JOINS_CAMERA
-    return depth > 0;
+    return (state & PATH_SHARP) != 0;
 #else
-    return depth >= 0;
+    return state >= 0;
 #endif
 }
 

@@ -42,14 +42,21 @@ inline Spectrum merge_photons(Scene scene, mask active, Vertex v, Scattering sca
 #endif
     Spectrum sum = spectrum_of(0.0f);
     Cell first = cell_at(scene, sub3(v.s.p, v3(radius, radius, radius)), 2.0f * radius);
-    for (int corner = 0; corner < 8; corner++) {
-        Cell c = {first.x + (corner & 1), first.y + (corner >> 1 & 1), first.z + (corner >> 2)};
-        integer cell = cell_number(scene, c, group), entry = gather_i(photon_cells, cell);
-        integer end = sel_i(active, gather_i(photon_cells, cell + 1), entry);
-        for (mask there = entry < end; any(there); there = entry < end) {
+    /* Each lane goes through the photons of its own eight cells. */
+    integer corner = sel_i(active, (integer)(0), (integer)(8)), entry = 0, end = 0;
+    mask empty = corner < 8;
+    while (any((entry < end) | empty)) {
+        if (any(empty)) {
+            Cell c = {first.x + (corner & 1), first.y + (corner >> 1 & 1), first.z + (corner >> 2)};
+            integer cell = sel_i(empty, cell_number(scene, c, group), (integer)(0));
+            entry = sel_i(empty, gather_i(photon_cells, cell), entry);
+            end = sel_i(empty, gather_i(photon_cells, cell + 1), end);
+            corner = sel_i(empty, corner + 1, corner);
+        }
+        mask there = entry < end;
+        if (any(there)) {
             integer row = sel_i(there, gather_i(photon_order, sel_i(there, entry, (integer)(0))), (integer)(0));
             row *= PHOTON_WORDS;
-            entry += 1;
             vec3 off = sub3(gather3((global const float *)photons, row), v.s.p);
             mask near = there & (dot3(off, off) < sqr(radius)) & (fabs(dot3(off, v.s.n)) < MERGING_FLAT * radius);
             if (any(near)) {
@@ -60,7 +67,9 @@ inline Spectrum merge_photons(Scene scene, mask active, Vertex v, Scattering sca
                 Spectrum light = merge_photon(photon, near, v, scatter, rival, ratio, area, number);
                 sum = spectrum_add(sum, light);
             }
+            entry += sel_i(there, (integer)(1), (integer)(0));
         }
+        empty = (entry >= end) & (corner < 8);
     }
     return sum;
 }

@@ -50,6 +50,9 @@ inline integer begin_light_path(Scene scene, Slab path, Slab shadow, uint at, ma
     store_path_light(path, at, go, r.row);
     store_path_sampled_hemisphere(path, at, go, r.n);
     store_path_rival(path, at, go, (real)(1.0f / (float)settings->light_paths));
+#if MERGES
+    store_path_pending(path, at, go, (real)(0.0f));
+#endif
 #endif
 #if USES_NULL_SURFACES
     store_path_nulls(path, at, go, (integer)(0));

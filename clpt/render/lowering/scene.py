@@ -12,6 +12,7 @@ from clpt import transforms
 from clpt.render.contract import shape_records
 from clpt.render.contract.features import Features
 from clpt.render.contract.parameter_words import row_words
+from clpt.render.lowering import photons
 from clpt.render.lowering.camera import cameras, filters
 from clpt.render.lowering.camera.colour import sensor
 from clpt.render.lowering.camera.wavelengths import Density, density, emissions
@@ -225,19 +226,29 @@ def _warnings(index: SceneIndex) -> list[str]:
 
 
 def _left_to_the_camera(index: SceneIndex) -> list[str]:
-    """What the light paths of `path` do not do, and its paths from the camera do alone."""
-    scene = index.scene
-    if not index.weighed:
+    """What light paths and photons do not do, and paths from the camera do alone."""
+    scene, integrator = index.scene, index.scene.integrator
+    kind, warnings = integrator.kind, []
+    if getattr(integrator, "light_tracing", True) and not index.joined:
         names = " and ".join(cameras.CONNECTED)
         reason = f"a {scene.camera.kind} camera cannot be joined to a point"
         if scene.camera.kind in cameras.CONNECTED:
             reason = "its glass disperses"
-        return [f"path.light_paths: left aside, as {reason}; {names} can, without such glass"]
-    return [
-        f"path.light_paths: none start at lights[{i}], whose light does not fall with distance"
-        for i, light in enumerate(scene.lights)
-        if isinstance(light, Point) and not light.falloff
-    ]
+        name = "light_tracing" if kind == "vcm" else "light_paths"
+        warnings.append(f"{kind}.{name}: left aside, as {reason}; {names} can, without such glass")
+    if getattr(integrator, "merging", False) and not index.merged:
+        reason = f"a path needs {photons.FIRST + 1} surfaces"
+        if index.shifts:
+            reason = "fluorescent paint gives light other wavelengths"
+        warnings.append(f"{kind}.merging: left aside, as {reason}")
+    if index.weighed:
+        warnings += [
+            f"{kind}.light_paths: none start at lights[{i}], whose light does not fall with "
+            "distance"
+            for i, light in enumerate(scene.lights)
+            if isinstance(light, Point) and not light.falloff
+        ]
+    return warnings
 
 
 def _sees(film: Film) -> bool:

@@ -49,6 +49,9 @@ def checked(noise: float, features: Features) -> float:
     if features.light_paths:
         message = "the integrator particle_tracer cannot choose which pixels its paths reach"
         raise SceneError(f"{message}; leave it out, or choose path", where="noise")
+    if features.merged:
+        message = "neighbouring pixels share the photons of the integrator vcm"
+        raise SceneError(f"{message}; leave it out, or vcm.merging", where="noise")
     if features.weighed:
         message = "light paths reach any pixel, whatever its noise"
         raise SceneError(f"{message}; leave it out, or path.light_paths", where="noise")

@@ -1,0 +1,244 @@
+"""`vcm` finds what `path` finds, and caustics behind glass and in mirrors, which have formulas.
+
+Merging blurs, so means over blocks are compared where light is smooth over the radius, and the bias
+is measured by itself. See tests/renders/support.py for the significance. Kernels are one lane wide,
+which compiles soonest; test_bits has another width.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+
+import clpt
+from clpt import transforms as tf
+from clpt.device import choose
+from clpt.errors import SceneError
+from clpt.render.lowering.scene import lower
+from clpt.scene import Film, Scene
+from clpt.scene import materials as m
+from clpt.scene.cameras import Orthographic, Perspective
+from clpt.scene.integrators import Path, Vcm
+from clpt.scene.lights import Constant, Point
+from clpt.scene.shapes import Cube, Group, Instance, Rectangle, Sphere
+from tests.renders.support import assert_agree, assert_mean, blocks, exposures
+from tests.renders.test_hybrid import FLAT, MATERIALS, UP, VIEW, caustic, corner, lamp, narrow
+
+WATER = 1.33
+ABOVE, DEEP, HEIGHT = 1.0, 1.0, 3.0  # the light over the water, the floor under it, the camera
+ALBEDO, INTENSITY = 0.7, 10.0
+
+
+def with_vcm(scene: Scene, **changes: Any) -> Scene:
+    return dataclasses.replace(scene, integrator=Vcm(**changes))
+
+
+def flat_pool(mode: str = "rgb", **integrator: Any) -> Scene:
+    """A floor under flat water, in the light of a point: no path from the camera finds that."""
+    water = m.Dielectric(int_ior=WATER)
+    return Scene(
+        camera=Perspective(
+            to_world=tf.look_at([0.0, HEIGHT, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]), fov=16
+        ),
+        shapes=[
+            Rectangle(to_world=FLAT @ tf.scale(2.0), material=water),
+            Rectangle(
+                to_world=tf.translate([0.0, -DEEP, 0.0]) @ FLAT @ tf.scale(2.0),
+                material=m.Diffuse(reflectance=ALBEDO),
+            ),
+        ],
+        lights=[Point(position=(0.6, ABOVE, 0.0), intensity=INTENSITY)],
+        film=Film(width=8, height=8, mode=mode),
+        integrator=Vcm(max_depth=4, light_paths=64, **integrator),
+    )
+
+
+def transmitted(angle: np.ndarray) -> np.ndarray:
+    """How much light passes flat water at an angle from its normal (Fresnel)."""
+    c, cosine = np.cos(angle), np.sqrt(1.0 - (np.sin(angle) / WATER) ** 2)
+    s, p = (c - WATER * cosine) / (c + WATER * cosine), (cosine - WATER * c) / (cosine + WATER * c)
+    return 1.0 - (s**2 + p**2) / 2.0
+
+
+def flat_pool_radiance(samples: int = 8) -> np.ndarray:
+    """What the camera sees of `flat_pool`, (8, 8): its rays, and light, refracted by Snell."""
+    at = (np.arange(8 * samples) + 0.5) / (4 * samples) - 1.0
+    x, z = np.meshgrid(-at, -at)  # of the film, mirrored as a camera's +x is to the left
+    slope = np.tan(np.radians(8.0)) * np.hypot(x, z)
+    across = np.arctan2(z, x)
+    out = np.arctan(slope)
+    inside = np.arcsin(np.sin(out) / WATER)
+    far = HEIGHT * np.tan(out) + DEEP * np.tan(inside)
+    rho = np.hypot(far * np.cos(across) - 0.6, far * np.sin(across))
+    low, high = np.zeros_like(rho), np.full_like(rho, 1.5)
+    for _ in range(60):  # the angle at which light comes there
+        t1 = (low + high) / 2.0
+        t2 = np.arcsin(np.sin(t1) / WATER)
+        short = ABOVE * np.tan(t1) + DEEP * np.tan(t2) < rho
+        low, high = np.where(short, t1, low), np.where(short, high, t1)
+    t2 = np.arcsin(np.sin(t1) / WATER)
+    spread = ABOVE / np.cos(t1) ** 2 + DEEP * np.cos(t1) / (WATER * np.cos(t2) ** 3)
+    irradiance = INTENSITY * transmitted(t1) * np.sin(t1) / (rho * spread)
+    seen = ALBEDO / np.pi * irradiance * transmitted(out) / WATER**2
+    return seen.reshape(8, samples, 8, samples).mean(axis=(1, 3))
+
+
+@pytest.mark.parametrize("mode", ["rgb", pytest.param("spectral", marks=pytest.mark.slow)])
+def test_a_point_seen_through_water(mode: str) -> None:
+    """Light to a diffuse floor and back through water, with an exact answer: 1 %."""
+    made = exposures(flat_pool(mode, radius=0.1), 8, 64, device=narrow())
+    if mode == "spectral":
+        made = made[..., 1:2] / made[..., 1].mean()  # of D65; the formula has no colours
+        made *= flat_pool_radiance().mean()
+    assert_mean(blocks(made, 8), flat_pool_radiance().mean(), 0.01)
+    reference = flat_pool_radiance()[None, :, :, None]
+    assert_agree(blocks(made[..., :1]), blocks(reference), mode, allowed=0.01)
+
+
+@pytest.mark.slow
+def test_the_bias_falls_with_the_square_of_the_radius() -> None:
+    """Of one pass: that of later ones is smaller."""
+    expected = flat_pool_radiance()
+    bright = np.unravel_index(expected.argmax(), expected.shape)
+    lost = []
+    for radius in (0.6, 0.3):
+        made = exposures(flat_pool(radius=radius), 400, 1, device=narrow())[..., 0]
+        lost.append(1.0 - made.mean(axis=0)[bright] / expected[bright])
+    assert lost[0] > 0.05, lost
+    assert lost[1] == pytest.approx(lost[0] / 4.0, abs=0.02)
+
+
+def agrees_with_path(scene: Scene, spp: int, what: str, **integrator: Any) -> None:
+    depth = {"max_depth": integrator.pop("max_depth", 6)}
+    alone = dataclasses.replace(scene, integrator=Path(**depth))
+    reference = blocks(exposures(alone, 12, 4 * spp, device=narrow()))
+    merged = with_vcm(scene, light_paths=4, radius=0.04, **depth, **integrator)
+    ours = blocks(exposures(merged, 12, spp, first_seed=101, device=narrow()))
+    assert_agree(ours, reference, what, allowed=0.01)
+
+
+SWITCHES: dict[str, dict[str, Any]] = {
+    "both": {},
+    "merging": {"light_tracing": False},
+    "light_tracing": {"merging": False},
+    "neither": {"light_tracing": False, "merging": False},
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("switch", SWITCHES)
+@pytest.mark.parametrize("kind", MATERIALS)
+def test_every_material(kind: str, switch: str) -> None:
+    """A ball of it before a mirror, under a lamp that paths from the camera find as well."""
+    ball = Sphere(center=(0.1, 0.45, 0.2), radius=0.4, material=MATERIALS[kind])
+    place = tf.translate([-0.9, 0.5, -0.2]) @ tf.rotate([0, 1, 0], 60) @ tf.scale(0.5)
+    mirror = Rectangle(to_world=place, material=m.TwoSided(front=m.Conductor()))
+    agrees_with_path(corner({}, lamp(), ball, mirror), 128, kind, **SWITCHES[switch])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["dielectric", "rough_dielectric"])
+def test_in_the_spectral_mode(kind: str) -> None:
+    alpha = {} if kind == "dielectric" else {"alpha_u": 0.2, "alpha_v": 0.2}
+    make = m.Dielectric if kind == "dielectric" else m.RoughDielectric
+    ball = Sphere(center=(0.1, 0.45, 0.2), radius=0.4, material=make(int_ior="sf11", **alpha))
+    agrees_with_path(corner({}, lamp(), ball, mode="spectral"), 256, kind, wavelength_groups=2)
+
+
+@pytest.mark.slow
+def test_instances() -> None:
+    group = Group(shapes=[Cube(to_world=tf.scale(0.3), material=m.Dielectric(int_ior=1.5))])
+    placed = [
+        Instance(group=group, to_world=tf.translate([x, 0.4, 0.2]) @ tf.rotate([0, 1, 0], 30))
+        for x in (-0.6, 0.6)
+    ]
+    agrees_with_path(corner({}, lamp(), *placed), 128, "instances")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("switch", SWITCHES)
+def test_furnace(switch: str) -> None:
+    """What absorbs nothing is as bright as the sky around it."""
+    glass, rough = m.Dielectric(int_ior=1.5), m.RoughDielectric(alpha_u=0.2, alpha_v=0.2)
+    scene = Scene(
+        camera=Perspective(to_world=tf.look_at([0, 0, 3], [0, 0, 0], UP), fov=50),
+        shapes=[
+            Sphere(radius=0.4, material=glass),
+            Cube(to_world=tf.translate([0.8, 0, 0]) @ tf.scale(0.2), material=rough),
+            Cube(to_world=tf.translate([-0.8, 0, 0]) @ tf.scale(0.2), material=m.Conductor()),
+            Sphere(center=(0, 0.8, 0), radius=0.3, material=m.Diffuse(reflectance=1.0)),
+        ],
+        lights=[Constant(radiance=(1.0, 1.0, 1.0))],
+        film=Film(width=8, height=8, mode="rgb"),
+        integrator=Vcm(max_depth=-1, rr_depth=20, radius=0.05, **SWITCHES[switch]),
+    )
+    made = exposures(scene, 12, 64, device=narrow())
+    assert_mean(made, (1.0, 1.0, 1.0), 2e-3, 1e-3)
+
+
+@pytest.mark.slow
+def test_cameras_that_cannot_be_joined_still_gather() -> None:
+    to_world = VIEW @ tf.scale([1.2, 1.2, 1.0])
+    ball = Sphere(center=(0.1, 0.45, 0.2), radius=0.4, material=m.Dielectric(int_ior=1.5))
+    scene = dataclasses.replace(corner({}, lamp(), ball), camera=Orthographic(to_world=to_world))
+    lowered = lower(with_vcm(scene))
+    assert lowered.features.merged and not lowered.features.joined
+    agrees_with_path(scene, 128, "orthographic")
+
+
+def picture(scene: Scene, *runs: int, lanes: int = 1, **options: Any) -> np.ndarray:
+    device = choose()
+    device.lanes = lanes
+    renderer = clpt.Renderer(scene, device, **options)
+    for samples in runs:
+        renderer.run(samples)
+    return renderer.image()
+
+
+def test_bits() -> None:
+    """Runs, slots, steps, stages that the host enqueues, numbers of lanes, a merge."""
+    scene = with_vcm(caustic(), max_depth=6, light_paths=4, radius=0.05)
+    whole = picture(scene, 7)
+    assert np.array_equal(picture(scene, 3, 4), whole)
+    assert np.array_equal(picture(scene, 7, slots=128), whole)
+    assert np.array_equal(picture(scene, 7, looped=False), whole)
+    np.testing.assert_allclose(picture(scene, 7, lanes=8), whole, rtol=2e-3, atol=1e-4)
+    renderer = clpt.Renderer(scene, narrow())
+    for samples in (5, 2):
+        event = renderer.step(samples)
+    event.wait()
+    assert np.array_equal(renderer.film.get()[..., :3], whole)
+    parts = [clpt.Renderer(scene, narrow(), first_sample=first) for first in (0, 3)]
+    for renderer, samples in zip(parts, (3, 4), strict=True):
+        renderer.run(samples)
+    parts[0].merge(parts[1].film_state())
+    assert np.array_equal(parts[0].image(), whole)
+    assert not np.array_equal(picture(with_vcm(caustic(), merging=False), 7), whole)
+
+
+def test_photons_that_do_not_fit_are_left_out() -> None:
+    """Fewer light paths leave some; all are joined to the camera."""
+    scene = with_vcm(caustic(), max_depth=16, light_paths=64, photon_memory=1)
+    settings = lower(scene).settings
+    assert 0 < settings["photon_pixels"] < settings["padded_pixels"]
+    few = dataclasses.replace(scene, integrator=Vcm(max_depth=-1, light_paths=64, photon_memory=1))
+    assert lower(few).settings["max_depth"] == 64
+
+
+def test_what_cannot_be_is_refused_or_left_aside() -> None:
+    with pytest.raises(SceneError, match=r"vcm.light_paths: must be a whole number from 1 to 64"):
+        Vcm(light_paths=0)
+    with pytest.raises(SceneError, match=r"vcm.photon_memory: must be a whole number"):
+        Vcm(photon_memory=0)
+    with pytest.raises(SceneError, match=r"vcm.radius"):
+        Vcm(radius=-1.0)
+    paint = Rectangle(material=m.Fluorescent(reflectance=0.5), to_world=tf.scale(0.1))
+    glows = with_vcm(corner({}, lamp(), paint, mode="spectral"))
+    lowered = lower(glows)
+    assert not lowered.features.merged
+    assert any("vcm.merging: left aside" in warning for warning in lowered.warnings)
+    with pytest.raises(SceneError, match="photons"):
+        clpt.Renderer(with_vcm(caustic()), narrow()).run(4, noise=0.1)
