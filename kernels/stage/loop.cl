@@ -25,6 +25,7 @@ kernel NO_VECTORIZE void loop(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS, BEGIN_ARGS DEPO
             left |= any((load_path_state(path, at) & PATH_DONE) == 0);
         }
         if (!left) break;
-        loop_bounce(SLAB_PASSED, SCENE_PASSED, TRACE_PASSED, BEGIN_PASSED DEPOSIT_PASSED MERGE_PASSED, queue, first, end);
+        loop_bounce(SLAB_PASSED, SCENE_PASSED, TRACE_PASSED, BEGIN_PASSED DEPOSIT_PASSED MERGE_PASSED, queue, first,
+                    end);
     }
 }

@@ -7,7 +7,6 @@ from typing import Any
 
 from clpt.errors import SceneError
 from clpt.render.contract import custom_materials
-from clpt.render.lowering import photons
 from clpt.render.lowering.camera import cameras, filters
 from clpt.render.lowering.geometry import instancing, shapes
 from clpt.render.lowering.geometry.instancing import Placed, Prototype
@@ -83,7 +82,7 @@ class SceneIndex:
         """Whether light paths leave photons, which paths from the camera gather."""
         integrator = self.scene.integrator
         wanted = isinstance(integrator, Vcm) and integrator.merging
-        return wanted and photons.places(integrator) > 0 and not self.shifts
+        return wanted and integrator.max_depth not in (1, 2) and not self.shifts
 
     @property
     def shifts(self) -> bool:

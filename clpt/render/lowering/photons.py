@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +10,9 @@ from numpy.typing import NDArray
 from clpt.errors import SceneError
 from clpt.records import PHOTON
 from clpt.render.lowering.camera import cameras
+from clpt.render.lowering.geometry.geometry import Geometry
 from clpt.scene.cameras import Camera
 from clpt.scene.integrators import Integrator
-
-if TYPE_CHECKING:
-    from clpt.render.lowering.geometry.geometry import Geometry
 
 DEEPEST = 64  # of a path where photons are merged: each of its vertices has a place
 FIRST = 2  # surfaces of a light path, before which it leaves no photon
