@@ -1,4 +1,4 @@
-"""Fills a swimming pool: water.ply, rail.ply, tiles.png, stones.png, ball.png, sky.exr, scene.json.
+"""Fills a swimming pool: water.ply, rail.ply, three textures, sky.exr and the two scenes.
 
     python scenes/pool/generate.py
 
@@ -22,7 +22,7 @@ from making import JSON, Array, curve, daylight, rod, surface, write_scene
 
 HERE = Path(__file__).parent
 HALF = np.array([3.0, 1.8])  # of the basin in x and z [m]
-DEPTH, LEVEL = -1.5, -0.14  # of its floor, of the water
+DEPTH, LEVEL = -1.5, -0.17  # of its floor, of the water
 CELL = 0.05  # of the water's top
 BEYOND = 0.05  # how far the water goes into the walls
 SUN = np.array([-0.8, 1.0, 0.3])
@@ -37,7 +37,7 @@ def waves(x: Array, z: Array) -> tuple[Array, Array]:
     """Heights and upward normals of the rippled water at points of the plane."""
     rng = np.random.default_rng(5)
     count = 28
-    k = 2 * np.pi / np.geomspace(0.42, 1.9, count)
+    k = 2 * np.pi / np.geomspace(0.4, 1.1, count)
     azimuth = rng.normal(0.6, 1.1, count)
     phase = rng.uniform(0, 2 * np.pi, count)
     lens = 0.75 / (0.25 * (LEVEL - DEPTH))  # root mean square of the curvature [1/m]
@@ -133,7 +133,13 @@ def tiles(name: str, count: int, colour: list[float], spread: float, joint: floa
     )
 
 
-def scene() -> JSON:
+def look(origin: list[float], target: list[float], fov: float) -> JSON:
+    """A camera."""
+    to_world = {"look_at": {"origin": origin, "target": target, "up": [0, 1, 0]}}
+    return {"type": "perspective", "fov": fov, "to_world": to_world}
+
+
+def scene(name: str, camera: JSON, light_paths: int) -> JSON:
     corners = HALF * [[-1, 1], [1, 1], [1, -1], [-1, -1]]
 
     def tiled(image: str, period: float) -> JSON:
@@ -143,17 +149,10 @@ def scene() -> JSON:
 
     return {
         "$schema": "../schema.json",
-        "name": "pool",
-        "camera": {
-            "type": "perspective", "fov": 48,
-            "to_world": {
-                "look_at": {
-                    "origin": [2.6, 2.6, 4], "target": [-0.4, -0.62, -0.1], "up": [0, 1, 0],
-                }
-            },
-        },
+        "name": name,
+        "camera": camera,
         "film": {"width": 480, "height": 360, "filter": {"type": "blackman_harris"}},
-        "integrator": {"type": "path", "max_depth": 12, "light_paths": 1},
+        "integrator": {"type": "path", "max_depth": 12, "light_paths": light_paths},
         "spp": 1024,
         "materials": {
             "water": {"type": "dielectric", "int_ior": 1.333, "absorption": {"values": PURE_WATER}},
@@ -188,7 +187,7 @@ def scene() -> JSON:
                 "type": "sphere", "name": "ball", "material": "ball", "radius": 0.2,
                 "to_world": [
                     {"rotate": {"axis": [1, 0, 0.3], "angle": -55}},
-                    {"translate": [0.55, -0.02, -0.35]},
+                    {"translate": [0.55, -0.05, -0.35]},
                 ],
             },
         ],
@@ -210,7 +209,10 @@ def main() -> None:
         HERE / "sky.exr", SUN, [2.6, 2.45, 2.15],
         zenith=[0.1, 0.2, 0.42], horizon=[0.5, 0.6, 0.7], ground=[0.1, 0.16, 0.05],
     )  # fmt: skip
-    write_scene(HERE / "scene.json", scene())
+    above = look([2.6, 2.6, 4], [-0.4, -0.62, -0.1], 48)
+    under = look([2.3, -0.5, 1.3], [-0.6, -1.42, -0.3], 80)
+    write_scene(HERE / "scene.json", scene("pool", above, 1))
+    write_scene(HERE / "scene_under.json", scene("pool_under", under, 2))
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ TALL = 1.3  # the prism
 WAY, AWAY = 4.0, 4.3  # from the slit to the prism's axis, from there to the screen
 EYE = np.array([1.0, 2.2, 5.7])
 MIRROR = np.array([-1.2, 1.3, -2.7])  # its middle
-SCREEN = (2.2, 2.0)  # width and height
+SCREEN = (1.8, 2.0)  # width and height
 
 
 def heading() -> tuple[Array, Array]:
