@@ -8,13 +8,11 @@ A profile of (radius, height) goes through given points as a Catmull-Rom curve a
 from __future__ import annotations
 
 import math
+import sys
 from pathlib import Path
 
-import numpy as np
-import trimesh
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
+sys.path.append(str(Path(__file__).parents[1]))
+from making import curve, lathe
 
 # From the middle of the foot, up the outside to the top of the head.
 PAWN = [
@@ -28,42 +26,6 @@ RING = [
     (1.00, 0.00), (1.05, 0.02), (1.07, 0.10), (1.07, 0.34), (1.05, 0.42), (1.00, 0.44),
     (0.97, 0.42), (0.96, 0.34), (0.96, 0.10), (0.97, 0.02), (1.00, 0.00),
 ]  # fmt: skip
-
-
-def curve(points: list[tuple[float, float]], steps: int, closed: bool) -> Array:
-    """Points (n, 2) on a Catmull-Rom curve through `points`, `steps` from each to the next."""
-    p = np.array(points)
-    before, after = (p[-2], p[1]) if closed else (p[0] * [-1, 1], p[-1] * [-1, 1])
-    p = np.vstack([before, p, after])
-    t = np.linspace(0, 1, steps, endpoint=False)[:, None]
-    a, b, c, d = (p[i : len(p) - 3 + i, None] for i in range(4))
-    inner = 0.5 * (
-        2 * b + (c - a) * t + (2 * a - 5 * b + 4 * c - d) * t**2 + (3 * b - a - 3 * c + d) * t**3
-    )
-    return np.vstack([inner.reshape(-1, 2), p[-2]])
-
-
-def lathe(profile: Array, around: int) -> trimesh.Trimesh:
-    """The surface that a profile (n, 2) sweeps around y, smooth; its right side is outside."""
-    turn = np.linspace(0, 2 * np.pi, around + 1)
-    radius, height = np.maximum(profile[:, 0], 0.0)[:, None], profile[:, 1][:, None]
-    tangent = np.gradient(profile, axis=0)
-    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
-    out, up = tangent[:, 1][:, None], -tangent[:, 0][:, None]
-
-    def swept(r: Array, y: Array) -> Array:
-        points = np.broadcast_arrays(r * np.cos(turn), y, r * np.sin(turn))
-        return np.stack(points, -1).reshape(-1, 3)
-
-    index = np.arange(len(profile) * (around + 1)).reshape(len(profile), around + 1)
-    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
-    faces = np.concatenate([np.stack([a, b, c], -1), np.stack([a, c, d], -1)]).reshape(-1, 3)
-    points = swept(radius, height)
-    corners = points[faces]
-    area = np.linalg.norm(
-        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
-    )
-    return trimesh.Trimesh(points, faces[area > 1e-9], vertex_normals=swept(out, up), process=False)
 
 
 def main() -> None:

@@ -9,8 +9,7 @@ down a little, so that it meets the table all along its way and is seen there.
 
 from __future__ import annotations
 
-import json
-import re
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -18,13 +17,14 @@ import numpy as np
 
 from clpt import spectra
 
+sys.path.append(str(Path(__file__).parents[1]))
+from making import JSON, write_scene
+
 APEX = 60.0  # angle at the edge [degrees]
 SLOPE = 5.0  # of the beam [degrees]
 WAY = 3.6  # from the slit to the prism
 SLIT = (0.022, 0.66)  # width and height
 HEIGHT = 0.5  # of the prism
-
-JSON = dict[str, Any]
 
 
 def prism() -> tuple[list[JSON], np.ndarray]:
@@ -144,9 +144,4 @@ def scene() -> JSON:
 
 
 if __name__ == "__main__":
-    text = re.sub(
-        r"\[\s+([^\[\]{}]*?)\s+\]",
-        lambda m: f"[{' '.join(m[1].split())}]",
-        json.dumps(scene(), indent=1),
-    )
-    Path(__file__).with_name("scene.json").write_text(text + "\n", encoding="utf-8")
+    write_scene(Path(__file__).with_name("scene.json"), scene())

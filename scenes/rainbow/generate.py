@@ -12,14 +12,13 @@ ring, so that little light is lost on rays that take no part in the bows.
 
 from __future__ import annotations
 
-import json
-import re
+import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-JSON = dict[str, Any]
+sys.path.append(str(Path(__file__).parents[1]))
+from making import JSON, write_scene
 
 RADIUS = 0.04  # of the ball [m]
 STOP = 0.76  # inner radius of the beam, in radii of the ball
@@ -111,9 +110,4 @@ def scene() -> JSON:
 
 
 if __name__ == "__main__":
-    text = re.sub(
-        r"\[\s+([^\[\]{}]*?)\s+\]",
-        lambda m: f"[{' '.join(m[1].split())}]",
-        json.dumps(scene(), indent=1),
-    )
-    Path(__file__).with_name("scene.json").write_text(text + "\n", encoding="utf-8")
+    write_scene(Path(__file__).with_name("scene.json"), scene())
