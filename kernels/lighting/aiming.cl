@@ -1,11 +1,11 @@
-/* Light paths that start toward what is sharp, weighed ones only.
+/* Light paths that start toward what is sharp; of those that are weighed.
  *
- * Spheres stand around glass and mirrors; `distributions` has centre, radius and share of each, see
- * clpt/render/lowering/lights/aims.py. By its share s_k of the light paths one aims at sphere k, the others start as
- * without aiming, with density p. From a point of a light an aimed direction lies evenly in the cone that the sphere
- * fills, p_k = 1 / (2 pi (1 - cos)) [1/sr]; from infinity a path starts evenly over the sphere's disk across its
- * direction, p_k = 1 / (pi r^2) [1/m^2]. Where a light is in a sphere, or its surface turns away from all of it, p_k = p.
- * A path carries light over the density of all these ways together,
+ * Spheres stand around glass and mirrors, see clpt/render/lowering/lights/aims.py; `distributions` has centre, radius
+ * and share of each, the smallest first. The share s_k of the light paths aims at sphere k, the others start as without
+ * aiming, with density p. From a point of a light an aimed direction lies evenly in the cone that the sphere fills,
+ * p_k = 1 / (2 pi (1 - cos)) [1/sr]; from infinity a path starts evenly over the sphere's disk across its direction,
+ * p_k = 1 / (pi r^2) [1/m^2]. Where a light's surface turns away from a sphere, or the light is in that sphere or in a
+ * smaller one, as in a bulb, p_k = p. A path carries light over the density of all these ways together,
  *
  *     p' = (1 - sum s_k) p + sum s_k p_k
  *
@@ -29,12 +29,8 @@ inline Aim aim_of(Scene scene, int k)
     return a;
 }
 
-/* Whether light can aim at a sphere. to: from its start to the centre; n: the normal there, 0 off all surfaces; away:
- * it comes from infinity. */
-inline mask aim_serves(vec3 to, real radius, vec3 n, mask away)
-{
-    return away | ((dot3(to, to) > radius * radius) & (dot3(to, n) > -radius));
-}
+/* Whether light starts in a sphere. to: from there to the centre. */
+inline mask aim_inside(vec3 to, real radius) { return dot3(to, to) <= radius * radius; }
 
 /* 1 - cos of the half angle of the cone that a sphere fills. */
 inline real aim_cone(vec3 to, real radius)
@@ -62,14 +58,19 @@ inline integer aim_choose(Scene scene, real *x)
     return chosen;
 }
 
-/* A ray from a light, turned or moved to the sphere `chosen` where that can be; n: as in aim_serves. *turned: where. */
+/* A ray from a light, turned or moved to the sphere `chosen` where that can be. n: the normal where it starts, 0 off
+ * all surfaces; *turned: where it was. */
 inline LightRay aim_turn(Scene scene, integer chosen, LightRay r, vec3 n, vec2 v, mask *turned)
 {
     global const Settings *settings = scene.settings;
     integer at = settings->aims + AIM_WORDS * max_i(chosen, (integer)(0));
     vec3 center = gather3(scene.distributions, at), to = sub3(center, r.o);
     real radius = gather(scene.distributions, at + 3);
-    *turned = (chosen >= 0) & aim_serves(to, radius, n, r.away);
+    *turned = (chosen >= 0) & (r.away | (dot3(to, n) > -radius));
+    for (int k = 0; k < settings->aim_count; k++) {
+        Aim a = aim_of(scene, k);
+        *turned = *turned & (r.away | (chosen < k) | !aim_inside(sub3(a.center, r.o), a.radius));
+    }
     mask turns = *turned & !r.away, moves = *turned & r.away, surface = dot3(n, n) > 0.5f;
     if (any(turns)) {
         r.d = sel3(turns, to_world(frame_of(normalize3(to)), uniform_cone(v, aim_cone(to, radius))), r.d);
@@ -102,13 +103,15 @@ inline LightRay aim_power(LightRay r, mask turned, LightSample s, real p)
 inline real light_gain(Scene scene, LightRow l, integer chosen, vec3 o, vec3 n, vec3 d, mask away)
 {
     real p = light_start_pdf(scene, l, n, d), kept = 1.0f, aimed = 0.0f;
+    mask outside = mask_of(1);
     n = sel3(l.shape >= 0, n, v3(0.0f, 0.0f, 0.0f));
     for (int k = 0; k < scene.settings->aim_count; k++) {
         Aim a = aim_of(scene, k);
         vec3 to = sub3(a.center, o);
         real along = dot3(to, d), r2 = a.radius * a.radius;
         vec3 across = madd3(d, -along, to);
-        mask serves = aim_serves(to, a.radius, n, away);
+        outside = outside & !aim_inside(to, a.radius);
+        mask serves = away | (outside & (dot3(to, n) > -a.radius));
         mask meets = (dot3(across, across) <= r2) & (away | (along > 0.0f));
         meets = meets | (chosen == k); /* whatever is rounded */
         real density = a.share / sel(away, PI * r2, 2.0f * PI * aim_cone(to, a.radius));

@@ -20,7 +20,9 @@ MOST = 32  # spheres
 SHARP = 0.2  # roughness alpha of microfacets below which a surface is sharp
 LARGE = 0.5  # of the scene's radius: one sphere that is larger is no aim
 CLUSTERS = 256  # into which all that is sharp is cut, to see what stands apart
-PIECES = 1 << 14  # of a mesh: neighbours in its list of triangles are one piece then
+PIECES = 1 << 12  # of a mesh: neighbours in its list of triangles are one piece then
+GAP = 0.05  # of the span of pieces along an axis: where they are cut first
+SEVERAL = 1 << 12  # pieces among which gaps are looked for
 PRICE = 1e-3  # of a sphere, over the area of all: what gains less is not cut
 PAD = 1.01  # radius over that of what is inside
 ROUNDING = 4e-6  # of the scene's coordinates, added to a radius
@@ -30,7 +32,7 @@ Pieces = NDArray[np.float64]
 
 
 def aims(index: SceneIndex, geometry: Geometry, scene_radius: float) -> NDArray[np.float32]:
-    """Return centre, radius and share (k, 5) of the spheres, k from 0 to MOST [m].
+    """Return centre, radius and share (k, 5) of the spheres by their size, k from 0 to MOST [m].
 
     They are around all shapes of which a material is sharp; what stands close together shares one.
     The shares of the light paths add up to AIMED. Half of them go to all spheres alike, half by the
@@ -40,7 +42,8 @@ def aims(index: SceneIndex, geometry: Geometry, scene_radius: float) -> NDArray[
     found = list(_sharp_pieces(geometry)) if index.weighed else []
     if not found:
         return none
-    centre, radius = np.split(_spheres(np.concatenate(found)), [3], axis=1)
+    spheres = _spheres(np.concatenate(found))
+    centre, radius = np.split(spheres[np.argsort(spheres[:, 3], kind="stable")], [3], axis=1)
     if len(radius) == 1 and radius[0] > LARGE * scene_radius:
         return none
     radius = radius * PAD + ROUNDING * (np.abs(centre).max(axis=1, keepdims=True) + scene_radius)
@@ -128,40 +131,44 @@ def _placed(geometry: Geometry, pieces: Pieces, prototype: int) -> Pieces:
     return _pieces(linear @ centre + rows["origin"], np.linalg.norm(linear, 2, (1, 2)) * radius)
 
 
+def _corners(pieces: Pieces) -> list[NDArray[np.float64]]:
+    """The three corners, (n, 3) each; numpy is slow along short axes."""
+    return np.split(pieces[:, :9], 3, axis=1)
+
+
 def _ends(pieces: Pieces) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The lowest and highest coordinates (n, 3) of pieces."""
-    corners, reach = pieces[:, :9].reshape(-1, 3, 3), pieces[:, 9:]
-    return corners.min(axis=1) - reach, corners.max(axis=1) + reach
+    (a, b, c), reach = _corners(pieces), pieces[:, 9:]
+    return np.minimum(np.minimum(a, b), c) - reach, np.maximum(np.maximum(a, b), c) + reach
 
 
 def _around(pieces: Pieces) -> NDArray[np.float64]:
     """Centre and radius (4,) of a sphere around pieces: about the middle of their box."""
     lows, highs = _ends(pieces)
     centre = (lows.min(axis=0) + highs.max(axis=0)) / 2
-    away = np.linalg.norm(pieces[:, :9].reshape(-1, 3, 3) - centre, axis=2).max(axis=1)
-    return np.append(centre, (away + pieces[:, 9]).max())
+    away = [np.einsum("ij,ij->i", p - centre, p - centre) for p in _corners(pieces)]
+    return np.append(centre, max((np.sqrt(square) + pieces[:, 9]).max() for square in away))
 
 
 def _cut(pieces: Pieces) -> tuple[tuple[Pieces, ...], bool]:
-    """Pieces in two parts, at the widest gap along an axis, else where the longest is halved; and
-    whether there is a gap."""
+    """Pieces in two parts, at a wide gap along an axis, else where the longest is halved; and
+    whether there is such a gap."""
     lows, highs = _ends(pieces)
-    widest, best = 0.0, None
-    for axis in range(3):
-        order = np.argsort(lows[:, axis], kind="stable")
-        gaps = lows[order[1:], axis] - np.maximum.accumulate(highs[order[:-1], axis])
-        at = int(gaps.argmax())
-        if gaps[at] > widest:
-            widest, best = float(gaps[at]), (order, at + 1)
-    if best is None:
-        middles = (lows + highs) / 2
-        axis = int(np.ptp(middles, axis=0).argmax())
-        order = np.argsort(middles[:, axis], kind="stable")
-        along = middles[order, axis]
-        at = int(np.searchsorted(along, (along[0] + along[-1]) / 2))
-        best = order, at if 0 < at < len(pieces) else len(pieces) // 2
-    order, at = best
-    return (pieces[order[:at]], pieces[order[at:]]), widest > 0.0
+    middles = (lows + highs) / 2
+    if len(pieces) <= SEVERAL:
+        span = np.maximum(highs.max(axis=0) - lows.min(axis=0), 1e-30)
+        order = np.argsort(lows, axis=0)
+        reached = np.maximum.accumulate(np.take_along_axis(highs, order[:-1], axis=0), axis=0)
+        gaps = (np.take_along_axis(lows, order[1:], axis=0) - reached) / span
+        at, axis = np.unravel_index(gaps.argmax(), gaps.shape)
+        if gaps[at, axis] > GAP:
+            return (pieces[order[: at + 1, axis]], pieces[order[at + 1 :, axis]]), True
+    axis = np.ptp(middles, axis=0).argmax()
+    along = middles[:, axis]
+    low = along < (along.min() + along.max()) / 2
+    if not low.any():  # all in one place
+        low = np.arange(len(pieces)) < len(pieces) // 2
+    return (pieces[low], pieces[~low]), False
 
 
 class _Cluster:
