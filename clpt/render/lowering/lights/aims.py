@@ -20,7 +20,7 @@ MOST = 32  # spheres
 SHARP = 0.2  # roughness alpha of microfacets below which a surface is sharp
 LARGE = 0.5  # of the scene's radius: one sphere that is larger is no aim
 CLUSTERS = 256  # into which all that is sharp is cut, to see what stands apart
-PIECES = 1 << 12  # of a mesh: neighbours in its list of triangles are one piece then
+CELLS = 16  # along each side of a grid: of more pieces than it has cells those of one count as one
 GAP = 0.05  # of the span of pieces along an axis: where they are cut first
 SEVERAL = 1 << 12  # pieces among which gaps are looked for
 PRICE = 1e-3  # of a sphere, over the area of all: what gains less is not cut
@@ -91,11 +91,11 @@ def _sharp_pieces(geometry: Geometry) -> Iterator[Pieces]:
             many = shape.kind in shape_records.ONE_OF
             first = int(row["prim"]) if many else i - geometry.first_analytic
             own_boxes = boxes[first : first + (len(shape.centers) if many else 1)]
-            yield _in_boxes(own_boxes, "sphere" in shape.kind)
+            yield _fewer(_in_boxes(own_boxes, "sphere" in shape.kind))
         elif end > face:
             pieces = _of_triangles(geometry, face, end)
             prototype = int(np.searchsorted(firsts, face, side="right")) - 1
-            yield pieces if prototype < 0 else _placed(geometry, pieces, prototype)
+            yield _fewer(pieces if prototype < 0 else _placed(geometry, pieces, prototype))
 
 
 def _pieces(middles: NDArray[np.float64], reach: NDArray[np.float64]) -> Pieces:
@@ -110,17 +110,9 @@ def _in_boxes(boxes: NDArray[np.float64], round_: bool) -> Pieces:
 
 
 def _of_triangles(geometry: Geometry, face: int, end: int) -> Pieces:
-    """Triangles, or runs of them, at most PIECES; coordinates as `vertices` has them."""
+    """Triangles; coordinates as `vertices` has them."""
     corners = geometry.vertices[geometry.faces[face:end]].astype(np.float64)
-    run = -(-len(corners) // PIECES)
-    if run == 1:
-        return np.hstack([corners.reshape(-1, 9), np.zeros((len(corners), 1))])
-    firsts = np.arange(0, len(corners), run)
-    lows = np.minimum.reduceat(corners.min(axis=1), firsts)
-    highs = np.maximum.reduceat(corners.max(axis=1), firsts)
-    middles = (lows + highs) / 2
-    away = corners - np.repeat(middles, run, axis=0)[: len(corners), None]
-    return _pieces(middles, np.maximum.reduceat(np.linalg.norm(away, axis=2).max(axis=1), firsts))
+    return np.hstack([corners.reshape(-1, 9), np.zeros((len(corners), 1))])
 
 
 def _placed(geometry: Geometry, pieces: Pieces, prototype: int) -> Pieces:
@@ -169,6 +161,21 @@ def _cut(pieces: Pieces) -> tuple[tuple[Pieces, ...], bool]:
     if not low.any():  # all in one place
         low = np.arange(len(pieces)) < len(pieces) // 2
     return (pieces[low], pieces[~low]), False
+
+
+def _fewer(pieces: Pieces) -> Pieces:
+    """Around pieces, one for each cell of a grid, where there are more than these."""
+    if len(pieces) <= CELLS**3:
+        return pieces
+    lows, highs = _ends(pieces)
+    middles = (lows + highs) / 2
+    least, span = middles.min(axis=0), np.maximum(np.ptp(middles, axis=0), 1e-30)
+    cells = np.minimum((middles - least) / span * CELLS, CELLS - 1).astype(np.int64)
+    cells = cells @ np.array([CELLS * CELLS, CELLS, 1])
+    order = np.argsort(cells)
+    firsts = np.flatnonzero(np.diff(cells[order], prepend=-1))
+    low, high = np.minimum.reduceat(lows[order], firsts), np.maximum.reduceat(highs[order], firsts)
+    return _in_boxes(np.stack([low, high], axis=1), False)
 
 
 class _Cluster:

@@ -10,7 +10,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from clpt import transforms as tf
-from clpt.render.lowering.lights.aims import AIMED, MOST, is_sharp
+from clpt.render.lowering.lights.aims import AIMED, CELLS, MOST, is_sharp
 from clpt.render.lowering.scene import lower
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m
@@ -59,8 +59,8 @@ def assert_inside(points: NDArray[np.floating], spheres: NDArray[np.float32]) ->
     assert (far.min(axis=1) <= 0.0).all()
 
 
-def ball_mesh(radius: float, center: tuple[float, float, float]) -> Mesh:
-    made = trimesh.creation.icosphere(subdivisions=2, radius=radius)
+def ball_mesh(radius: float, center: tuple[float, float, float], subdivisions: int = 2) -> Mesh:
+    made = trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius)
     vertices = np.asarray(made.vertices + np.array(center), np.float32)
     return Mesh(vertices=vertices, faces=np.asarray(made.faces, np.uint32), material=GLASS)
 
@@ -81,6 +81,15 @@ def test_one_shape_has_one_sphere(shape: Shape) -> None:
     (sphere,) = spheres_of(shape)
     np.testing.assert_allclose(sphere, (1, 2, 3, 0.5, AIMED), rtol=0.025)
     assert sphere[3] > 0.5
+
+
+def test_a_fine_mesh_has_a_sphere_a_little_larger() -> None:
+    """Of more triangles than are looked at one by one."""
+    fine = ball_mesh(0.5, (1, 2, 3), subdivisions=5)
+    assert len(fine.faces) > CELLS**3
+    (sphere,) = spheres_of(fine)
+    assert_inside(fine.vertices, sphere[None])
+    assert sphere[3] < 0.6
 
 
 def test_what_stands_apart_has_spheres_of_its_own() -> None:
