@@ -39,7 +39,7 @@ def aims(index: SceneIndex, geometry: Geometry, scene_radius: float) -> NDArray[
     areas of their disks. None where no path is aimed: one large sphere would gain nothing.
     """
     none = np.zeros((0, 5), np.float32)
-    found = list(_sharp_pieces(geometry)) if index.weighed else []
+    found = [pieces for pieces in _sharp_pieces(geometry) if len(pieces)] if index.weighed else []
     if not found:
         return none
     spheres = _spheres(np.concatenate(found))
