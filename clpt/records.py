@@ -116,6 +116,11 @@ SETTINGS = Record(
     photon_paths=("real", "how many these are in a pass, for each group of wavelengths"),
     photon_cells=("integer", "cells that are told apart, a power of two"),
     wavelength_groups=("integer", "groups of paths that have the same wavelengths, in a pass"),
+    aims=(
+        "integer",
+        "first float in `distributions` of the spheres at which light paths aim",
+    ),
+    aim_count=("integer", "number of these spheres, see kernels/lighting/aiming.cl"),
     light_count=("integer", "rows in `lights`"),
     ambient=(
         "integer",
@@ -216,6 +221,9 @@ TABLES: dict[str, tuple[str, str]] = {
     "textures": ("uint", "parameters of the textures, a row each"),
     "images": ("uint", "texels of bitmaps, see clpt.render.lowering.textures.bitmaps"),
     "texels": ("float", "texels of environment maps, and of bitmaps of spectra"),
-    "distributions": ("float", "tables of filter, environment maps, wavelengths, re-radiation"),
+    "distributions": (
+        "float",
+        "tables of filter, environment maps, wavelengths, re-radiation, aims",
+    ),
     "camera": ("float", "parameters of the camera"),
 }

@@ -32,7 +32,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
         real w = sel(pdf < 0.0f, (real)(1.0f), mis_weight(pdf, other));
 #if WEIGHS_LIGHT_PATHS
         real rival = sel(depth > 1, load_path_rival(path, at), (real)(0.0f));
-        w = mis_weight_of_three(pdf, other, rival * light_emit_pdf(scene, light, v.d, v.t));
+        w = mis_weight_of_three(pdf, other, rival * light_path_pdf(scene, light, v.o, v.d, v.t, s.n));
 #endif
         Spectrum le = emission_load(scene, light_at(scene, light).radiance, surface_texture_point(s), v.lambdas);
         le = spectrum_scale(spectrum_mul(beta, le), w);

@@ -9,6 +9,9 @@
  *
  *   SurfacePoint <kind>_point(<Kind> s, vec2 u);      a point of its surface, evenly over the area
  *
+ * Where light paths aim (lighting/aiming.cl), what a light at a point sends along d is its <kind>_sample seen from a
+ * metre away.
+ *
  * u: a point of the unit square for the position; v: for the direction. Light from infinity needs no more
  * than the <kind>_sample of interface/light.cl, see `distant_emit`. LightRay and SurfacePoint are Records in
  * clpt/render/contract.

@@ -18,7 +18,8 @@ inline Spectrum infinite_gather(Scene scene, vec3 p, vec3 hemisphere, vec3 d, re
         infinite_light(scene, row, p, hemisphere, d, lambdas, &radiance, &other);
         real w = sel(pdf < 0.0f, (real)(1.0f), mis_weight(pdf, other));
 #if WEIGHS_LIGHT_PATHS
-        w = mis_weight_of_three(pdf, other, rival * light_emit_pdf(scene, (integer)(row), d, (real)(FAR)));
+        real emission = light_path_pdf(scene, (integer)(row), p, d, (real)(FAR), neg3(d));
+        w = mis_weight_of_three(pdf, other, rival * emission);
 #endif
         sum = spectrum_madd(radiance, w, sum);
     }

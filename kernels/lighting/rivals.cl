@@ -13,9 +13,10 @@
  *     rival' = rival / (importance c) c' / p at x_1,    rival / c p_back c' / p at further ones;
  *
  * importance: film/connect.cl. At x_1 a delta lobe leaves 0, as no light path can be joined there; at further vertices
- * p_back / p counts as 1. Times the density of emission (light_emit_pdf) that is the third density over the first.
+ * p_back / p counts as 1. Times the density of emission (light_path_pdf) that is the third density over the first.
  *
- * A light path begins with 1 / l. At its first vertex, with q the density of next-event estimation there,
+ * A light path begins with 1 / l, over what aiming gains (lighting/aiming.cl). At its first vertex, with q the density
+ * of next-event estimation there,
  *
  *     rival' = rival / (emission c) sqrt(q^2 + p_back^2) c' / p,    then rival / c p_back c' / p;
  *
@@ -121,7 +122,7 @@ inline Rival rival_of_camera(Scene scene, Slab path, uint at, Vertex v, Sampler 
 inline real rival_of_light_sample(Scene scene, Rival r, Surface s, LightSample ls, real p, real p_back)
 {
     real chosen = sel(ls.pdf < 0.0f, ls.chance, ls.pdf);
-    real emission = light_emit_pdf(scene, ls.row, ls.wi, ls.t) / max_r(chosen, (real)(1e-30f));
+    real emission = light_path_pdf(scene, ls.row, s.p, ls.wi, ls.t, ls.n) / max_r(chosen, (real)(1e-30f));
     real arrives = rival_arrives(r, mask_of(0), p, p_back);
     real third = rival_limited(arrives * p_back * fabs(dot3(s.n, ls.wi)) * emission);
     return sel(r.first, (real)(0.0f), third);

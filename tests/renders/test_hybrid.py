@@ -17,12 +17,13 @@ import clpt
 from clpt import transforms as tf
 from clpt.device import Device, choose
 from clpt.errors import SceneError
+from clpt.render.lowering import scene as lowering
 from clpt.render.lowering.scene import lower
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m
 from clpt.scene.cameras import Orthographic, Perspective, ThinLens
 from clpt.scene.integrators import Box, Direct, Filter, Gaussian, Path
-from clpt.scene.lights import Area, Constant, Light, Point
+from clpt.scene.lights import Area, Constant, Directional, Light, Point
 from clpt.scene.shapes import Cube, Disk, Group, Instance, Rectangle, Shape, Sphere
 from clpt.scene.textures import Bitmap
 from tests.renders.support import assert_agree, assert_mean, blocks, exposures
@@ -40,6 +41,7 @@ from tests.renders.test_light_tracing import (
 
 FLAT = tf.rotate([1, 0, 0], -90)
 QUICK = ("sphere", "constant")
+AIMED = ("spot",)
 
 
 def narrow() -> Device:
@@ -91,6 +93,41 @@ def lamp(radius: float = 0.5, radiance: float = 10.0) -> Disk:
 )
 def test_every_light(kind: str) -> None:
     both(corner({kind: LIGHTS[kind]}), 256, kind, max_depth=4)
+
+
+def smooth(mode: str) -> Sphere:
+    """A small ball of glass that light paths aim at, not so smooth that `path` finds no lamp."""
+    index: Any = {"rgb": 1.5, "spectral": "sf11"}[mode]
+    glass = m.RoughDielectric(int_ior=index, alpha_u=0.15, alpha_v=0.15)
+    return Sphere(center=(0.2, 0.35, 0.2), radius=0.2, material=glass)
+
+
+@pytest.mark.parametrize("mode", ["rgb", pytest.param("spectral", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "kind", [pytest.param(k, marks=() if k in AIMED else pytest.mark.slow) for k in LIGHTS]
+)
+def test_every_light_aims(kind: str, mode: str) -> None:
+    scene = corner({kind: LIGHTS[kind]}, smooth(mode), mode=mode)
+    assert lower(with_light_paths(scene)).features.aimed
+    both(scene, 512, kind, max_depth=5)
+
+
+@pytest.mark.slow
+def test_many_lights_aim_at_many_things() -> None:
+    """In and out of glass, from both sides."""
+    some = ("sphere", "mesh", "point", "directional", "constant", "envmap")
+    plate = tf.translate([-0.7, 0.9, 0.5]) @ tf.rotate([0, 1, 0], 70) @ tf.scale(0.25)
+    shines = Area(radiance=(5.0, 4.0, 3.0), two_sided=True)
+    metal = m.RoughConductor(alpha_u=0.15, alpha_v=0.15)
+    things: list[Shape] = [
+        smooth("rgb"),
+        Rectangle(to_world=plate, material=BLACK, emission=shines),
+        Sphere(center=(0.5, 1.7, 0.9), radius=0.1, material=m.Dielectric(int_ior=1.2)),
+        Cube(to_world=tf.translate([-0.5, 0.2, 0.4]) @ tf.scale(0.15), material=metal),
+    ]
+    scene = corner({kind: LIGHTS[kind] for kind in some}, *things)
+    assert lower(with_light_paths(scene)).settings["aim_count"] == 3
+    both(scene, 512, "many", max_depth=5)
 
 
 @pytest.mark.slow
@@ -266,6 +303,30 @@ def test_caustics_converge() -> None:
     assert noise[1] < 0.2 * noise[0], noise
 
 
+def wide() -> Scene:
+    """The sun over a small ball of glass on a field."""
+    field = Rectangle(to_world=FLAT @ tf.scale(10.0), material=m.Diffuse())
+    glass = Sphere(center=(0.0, 0.5, 0.0), radius=0.4, material=m.Dielectric(int_ior=1.5))
+    return Scene(
+        camera=Perspective(to_world=tf.look_at([0.0, 2.5, 3.5], [0.2, 0.2, 0.0], UP), fov=35),
+        shapes=[field, glass],
+        lights=[Directional(direction=(0.3, -1.0, 0.1), irradiance=3.0)],
+        film=Film(width=16, height=12, mode="rgb"),
+    )
+
+
+def test_aiming_finds_the_caustic(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The spread of pixels, with aiming and without."""
+    scene, variance = with_light_paths(wide()), []
+    for aimed in (True, False):
+        if not aimed:
+            monkeypatch.setattr(lowering, "aims", lambda *_: np.zeros((0, 5), np.float32))
+        made = exposures(scene, 8, 64, device=narrow())
+        assert lower(scene).features.aimed == aimed
+        variance.append(made.var(axis=0).mean())
+    assert variance[0] < 0.1 * variance[1], variance
+
+
 def test_lanes() -> None:
     """The same paths one and eight lanes wide."""
     scene, pictures = with_light_paths(caustic()), []
@@ -350,6 +411,25 @@ def test_update_keeps_both_kinds_of_paths() -> None:
     assert np.array_equal(renderer.image(), picture(turned, 3))
     with pytest.raises(SceneError, match="light paths stay"):
         renderer.update(scene=dataclasses.replace(turned, integrator=Path()))
+
+
+def test_update_keeps_aims() -> None:
+    """Something sharp moves, and is sharp no more, as in a new renderer."""
+    ball = Sphere(center=(0.1, 0.45, 0.2), radius=0.4, material=m.RoughConductor())
+    scene = with_light_paths(corner({}, lamp(), ball))
+    renderer = clpt.Renderer(scene, narrow())
+    renderer.run(1)
+    moved = tf.translate([-0.5, 0.2, 0.0])
+    rough = m.RoughConductor(alpha_u=0.5, alpha_v=0.5)
+    renderer.update(transforms={ball: moved})
+    renderer.run(2)
+    there = dataclasses.replace(ball, to_world=moved)
+    assert np.array_equal(renderer.image(), picture(with_light_paths(corner({}, lamp(), there)), 2))
+    renderer.update(materials={ball.material: rough})
+    renderer.run(2)
+    dull = with_light_paths(corner({}, lamp(), dataclasses.replace(there, material=rough)))
+    assert not lower(dull).features.aimed
+    assert np.array_equal(renderer.image(), picture(dull, 2))
 
 
 def test_cameras_that_cannot_be_joined_leave_it_aside() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from clpt.render.codegen.dispatch import Case, Function, choose, function
-from clpt.render.codegen.lights import kind_test, pmf_text, point_text, row_text
+from clpt.render.codegen.lights import NOWHERE, kind_test, pmf_text, point_text, row_text
 from clpt.render.contract import shape_records
 from clpt.render.contract.light_records import (
     ALONG,
@@ -17,14 +17,15 @@ from clpt.render.contract.light_records import (
     RECORDS,
 )
 
-NOWHERE = "v3(0.0f, 0.0f, 0.0f)"  # the hemisphere of a light that is sampled for all directions
 
-
-def dispatch_text(kinds: Iterable[str], textured: bool, two_sided: bool = False) -> str:
+def dispatch_text(
+    kinds: Iterable[str], textured: bool, two_sided: bool = False, aimed: bool = False
+) -> str:
     """Return `light_emit(scene, pick, u, v, lambdas)`: a ray from a light that is chosen by `pick`.
 
     kinds: of the lights in the scene; textured: some emission is a texture; two_sided: some shape
-    emits from its back too. It stands behind the text of clpt.render.codegen.lights.dispatch_text.
+    emits from its back too; aimed: some rays go to what is sharp. It stands behind the text of
+    clpt.render.codegen.lights.dispatch_text.
     """
     present = [kind for kind in KINDS if kind in set(kinds)]
     others = [kind for kind in present if kind in RECORDS]
@@ -38,10 +39,14 @@ def dispatch_text(kinds: Iterable[str], textured: bool, two_sided: bool = False)
         "LightRow l = light_at(scene, row);",
         "LightRay r = light_ray_nothing();",
     ]
+    if aimed:
+        rows.append("integer chosen = aim_choose(scene, &v.x);")
     cases = [Case(kind_test(kind, present), _lamp(kind)) for kind in others]
     rows += choose("r", "LightRay", *cases)
     if surfaces:
         rows += _surfaces_text(surfaces, present, textured, two_sided)
+    if aimed:
+        rows += _aimed_text(present, bool(surfaces))
     rows += [
         "r.row = row;",
         "real share = 1.0f / max_r(l.pmf, (real)(1e-30f));",
@@ -52,7 +57,7 @@ def dispatch_text(kinds: Iterable[str], textured: bool, two_sided: bool = False)
     return "\n".join([*includes, function(head, *rows)])
 
 
-def densities_text(kinds: Iterable[str], two_sided: bool, tree: bool) -> str:
+def densities_text(kinds: Iterable[str], two_sided: bool, tree: bool, aimed: bool) -> str:
     """Return what kernels/lighting/rivals.cl asks of the light in a row, seen along wi.
 
     light_emit_pdf(scene, row, wi, t): how densely light_emit sends rays against wi to a surface
@@ -61,6 +66,7 @@ def densities_text(kinds: Iterable[str], two_sided: bool, tree: bool) -> str:
     light_found_pdf(scene, row, p, hemisphere, wi, t, n): the density with which next-event
     estimation at p finds that point of the light [1/sr]; n: the normal there. Of a delta light it
     is the chance of its row.
+    light_path_pdf(scene, row, p, wi, t, n): light_emit_pdf of light that is aimed, too.
     """
     present = [kind for kind in KINDS if kind in set(kinds)]
     emitted = Function(
@@ -85,7 +91,10 @@ def densities_text(kinds: Iterable[str], two_sided: bool, tree: bool) -> str:
         ("LightRow l = light_at(scene, row);",),
         f"value * {pmf_text(tree)}",
     )
-    return "\n".join([*_includes(present), emitted.text(), found.text()])
+    either = "#define light_path_pdf(scene, row, p, wi, t, n) light_emit_pdf(scene, row, wi, t)"
+    if aimed:
+        either = f'{_start_pdf_text(present)}#include "lighting/aiming.cl"'
+    return "\n".join([*_includes(present), emitted.text(), found.text(), either])
 
 
 def _includes(present: list[str]) -> list[str]:
@@ -106,6 +115,46 @@ def _emit_pdf(kind: str, two_sided: bool) -> str:
     if kind in INFINITE:
         return f"{kind}_pdf({row}, scene, {NOWHERE}, wi) / disk"
     return "(real)(1.0f / disk)"
+
+
+def _start_pdf_text(present: list[str]) -> str:
+    """`light_start_pdf(scene, l, n, d)`: what aiming changes in the density of a ray along d.
+
+    At a light it is the direction's [1/sr], n being the normal on a shape; from infinity the
+    place's across it [1/m^2]; 0 where nothing aims.
+    """
+    cases = []
+    for kind in present:
+        density = "1.0f / (PI * emission_radius(scene.settings) * emission_radius(scene.settings))"
+        if kind in PLACED:
+            density = f"{kind}_emit_pdf({row_text(kind)}, d)"
+        elif kind in shape_records.RECORDS:
+            even = f"(l.emission_mode != {ALONG}) & (dot3(n, d) > 0.0f)"
+            density = f"sel({even}, max_r(dot3(n, d), (real)(1e-6f)) * INV_PI, (real)(0.0f))"
+        cases.append(Case(kind_test(kind, present), density))
+    head = "real light_start_pdf(Scene scene, LightRow l, vec3 n, vec3 d)"
+    return Function(head, "0.0f", cases).text()
+
+
+def _aimed_text(present: list[str], surfaces: bool) -> list[str]:
+    """The ray `r` goes to the sphere `chosen`, and carries light over the density of all rays."""
+    rows = ["mask turned;", f"vec3 n = {NOWHERE};"]
+    if surfaces:
+        rows += [
+            "n = sel3(l.shape >= 0, r.n, n);",
+            f"chosen = sel_i(l.emission_mode == {ALONG}, (integer)(-1), chosen);",
+        ]
+    rows.append("r = aim_turn(scene, chosen, r, n, v, &turned);")
+    for kind in (kind for kind in present if kind in PLACED):
+        row = row_text(kind)
+        seen = f"{kind}_sample({row}, scene, add3(r.o, r.d), u, lambdas)"
+        power = f"aim_power(r, turned, {seen}, {kind}_emit_pdf({row}, r.d))"
+        rows += choose("r", "LightRay", Case(kind_test(kind, present), power))
+    return [
+        *rows,
+        "r.gain = light_gain(scene, l, chosen, r.o, n, r.d, r.away);",
+        "r.power = spectrum_scale(r.power, 1.0f / r.gain);",
+    ]
 
 
 def _pdf_arguments(kind: str) -> str:

@@ -58,6 +58,7 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "WEIGHS_LIGHT_PATHS": lambda f: f.weighed,
     "JOINS_CAMERA": lambda f: f.joined,
     "MERGES": lambda f: f.merged,
+    "AIMS_LIGHT_PATHS": lambda f: f.aimed,
     "CAMERA_DISPERSES": lambda f: f.glass_lens,
     "FILTER_BOX": lambda f: f.filter == "box",
     "FILTER_TAPS": lambda f: f.filter_taps,

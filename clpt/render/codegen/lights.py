@@ -18,6 +18,8 @@ from clpt.render.contract.light_records import (
     WIDTH,
 )
 
+NOWHERE = "v3(0.0f, 0.0f, 0.0f)"  # the hemisphere of a light that is sampled for all directions
+
 
 def virtual_files() -> dict[str, str]:
     """Return what lights give, and generated/light/<kind>.cl: struct, loader and functions."""
@@ -35,13 +37,15 @@ def dispatch_text(
     two_sided: bool = False,
     tree: bool = False,
     densities: str = "",
+    aimed: bool = False,
 ) -> str:
     """Return the functions over all lights, for the kinds in the scene (`LightRows.kinds`).
 
     textured: some emission is a texture, so that triangles need the uv of their mesh; two_sided:
     some shape emits from its back too; tree: the rows are followed by a tree that chooses among
-    them; densities: the functions that weigh light paths, where there are some. It includes the
-    files of `virtual_files`, here and in clpt.render.codegen.shapes.
+    them; densities: the functions that weigh light paths, where there are some; aimed: some of
+    these start toward what is sharp. It includes the files of `virtual_files`, here and in
+    clpt.render.codegen.shapes.
 
     light_sample(scene, p, hemisphere, pick, u, lambdas): chooses a light and a direction to it
     light_pdf(scene, row, p, hemisphere, wi, t, n): of it, [1/sr], for a ray that met a shape
@@ -62,7 +66,8 @@ def dispatch_text(
     parts += [f'#include "{name}"' for name in includes]
     parts += _tree_text() if tree else []
     parts.append(_sides_text(two_sided))
-    parts.append(_sample_text(others, surfaces, textured, two_sided, tree, bool(densities)))
+    weighed = bool(densities)
+    parts.append(_sample_text(others, surfaces, textured, two_sided, tree, weighed, aimed))
     parts += [_pdf_text(surfaces, tree), densities]
     parts += _infinite_text([kind for kind in others if kind in INFINITE], tree)
     return "\n".join(parts) + "\n"
@@ -82,8 +87,7 @@ def row_text(kind: str) -> str:
 def point_text(kind: str, uv: str) -> list[str]:
     """Lines that set `point`, what a texture sees, where the light `l` is a shape of a kind."""
     if kind not in ("triangle", "sphere"):
-        nowhere = "v3(0.0f, 0.0f, 0.0f)"
-        return [f"point = texture_point_sel(m, texture_point({uv}, {nowhere}), point);"]
+        return [f"point = texture_point_sel(m, texture_point({uv}, {NOWHERE}), point);"]
     seen = f"area_{kind}_point(scene, shape, sel_i(m, row, shape.light), {uv})"
     return [
         f"integer at = {active('l.shape')} * SHAPE_ROW_WORDS;",
@@ -120,6 +124,7 @@ def _sample_text(
     two_sided: bool,
     tree: bool,
     weighed: bool,
+    aimed: bool,
 ) -> str:
     kinds = [*others, *surfaces]
     head = (
@@ -162,6 +167,8 @@ def _sample_text(
     rows.append(f"s = light_chosen(s, {pmf});")
     if weighed:
         rows += ["s.row = row;", f"s.chance = {pmf};"]
+    if aimed:
+        rows.append(f"s.n = {'q.n' if surfaces else NOWHERE};")
     return function(head, *rows, "return s;")
 
 

@@ -232,7 +232,7 @@ def _shared(features: Features, layout: str) -> Files:
         "generated/connect.cl": stages.connect_text(features),
         "generated/photon.cl": stages.photon_text(features) if features.merged else "",
         "generated/emission.cl": emission.dispatch_text(
-            features.lights, textured, features.two_sided_lights
+            features.lights, textured, features.two_sided_lights, features.aimed
         ),
         "generated/textures.cl": textures.dispatch_text(
             features.textures,

@@ -66,7 +66,7 @@ def lights_text(features: Features) -> str:
     densities = ""
     if features.weighed:
         densities = emission.densities_text(
-            features.lights, features.two_sided_lights, features.light_tree
+            features.lights, features.two_sided_lights, features.light_tree, features.aimed
         )
     return (
         ('#include "generated/textures.cl"\n' if "texture" in emissions | factors else "")
@@ -78,6 +78,7 @@ def lights_text(features: Features) -> str:
             features.two_sided_lights,
             features.light_tree,
             densities,
+            features.aimed,
         )
     )
 

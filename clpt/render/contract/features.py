@@ -65,6 +65,7 @@ class Features:
     weighed: bool = False  # paths from the camera are weighed against some from lights
     joined: bool = False  # those are joined to the camera
     merged: bool = False  # those leave photons, which paths from the camera gather
+    aimed: bool = False  # some of these start toward what is sharp
     light_filter: tuple[int, int, int] = (0, 0, 0)  # of those: taps, reach and profile
     film_group: int = 0  # words of a pixel before those that paths add to
     visible_lights: bool = False  # some light is no delta light: a camera may see it

@@ -158,6 +158,7 @@ LIGHT_SAMPLE = Record(
     pdf=("real", "[1/sr]; below 0: a delta light, to be taken as it is; 0: nothing comes"),
     row=("integer", "of the light in `lights`; where light paths are weighed"),
     chance=("real", "with which that row was chosen; likewise"),
+    n=("vec3", "normal there of a light on a shape; where light paths are aimed"),
 )
 LIGHT_RAY = Record(
     "LightRay",
@@ -174,5 +175,6 @@ LIGHT_RAY = Record(
     ),
     away=("integer", "a mask: it comes from infinity"),
     row=("integer", "of the light in `lights`; where light paths are weighed"),
+    gain=("real", "how much denser aiming makes such rays; where they are aimed", "1.0f"),
 )
 VALUES = (LIGHT_SAMPLE, LIGHT_RAY)

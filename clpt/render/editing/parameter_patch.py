@@ -9,6 +9,7 @@ from clpt.render.editing.rebuild import ranges
 from clpt.render.editing.scene_edit import Replacements
 from clpt.render.lowering.camera.cameras import dispersive_glass, lower_camera
 from clpt.render.lowering.geometry.instancing import distinct
+from clpt.render.lowering.lights.aims import is_sharp
 from clpt.render.lowering.materials.material_words import CLEAR
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene import Scene
@@ -27,6 +28,8 @@ def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> str | None:
     pairs = [] if scene.shapes is former.shapes else _pairs(former, scene)
     if pairs is None:
         return "a material is of another kind or structure"
+    if lowered.features.weighed and any(is_sharp(old) != is_sharp(new) for old, new in pairs):
+        return "light paths aim at what is sharp, and a material is so now, or no more"
     camera = None
     if scene.camera is not former.camera:
         if dispersive_glass(scene.camera) != dispersive_glass(former.camera):

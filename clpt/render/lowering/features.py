@@ -23,10 +23,12 @@ def features_of(
     lights: LightRows,
     tabulated_density: bool,
     profile: int,
+    aimed: bool,
 ) -> Features:
     """Return the features of a scene, from what each step of its lowering has met.
 
-    profile: where in `distributions` the values of the pixel filter begin.
+    profile: where in `distributions` the values of the pixel filter begin;
+    aimed: whether light paths aim.
     """
     scene, textures, channels = index.scene, encoder.textures, index.channels
     sources = encoder.sources
@@ -62,6 +64,7 @@ def features_of(
         weighed=index.weighed > 0,
         joined=index.joined and (index.light_paths or index.weighed > 0),
         merged=index.merged,
+        aimed=aimed,
         light_filter=(*index.spread, profile) if index.weighed else (0, 0, 0),
         visible_lights=lights.visible,
         two_sided_lights=lights.two_sided,

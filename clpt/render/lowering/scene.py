@@ -29,6 +29,7 @@ from clpt.render.lowering.geometry.geometry import (
 )
 from clpt.render.lowering.geometry.instancing import Instances
 from clpt.render.lowering.index import SceneIndex
+from clpt.render.lowering.lights.aims import aims
 from clpt.render.lowering.lights.lights import LightRows, light_rows
 from clpt.render.lowering.lowering_cache import LoweringCache
 from clpt.render.lowering.materials.material_words import MaterialWords
@@ -108,6 +109,8 @@ def lower(
     geometry = lower_geometry(index, encoder, materials)
     sphere = geometry.bounding_sphere()
     lights = _lower_lights(index, encoder, geometry, sphere[1])
+    targets = aims(index, geometry, sphere[1])
+    first_aim = encoder.store.append_floats("distributions", targets)
     lower_attributes(geometry.owners, encoder.textures, cache, geometry.single_count)
     encoder.store.append("shapes", shape_words(geometry.rows))
     glass_row = _lower_camera(index, encoder)
@@ -116,10 +119,12 @@ def lower(
         *_warnings(index), *sorted(encoder.warnings), *geometry.warnings,
         *encoder.textures.finish(),
     )  # fmt: skip
-    features = features_of(index, encoder, materials, geometry, lights, tabulated, profile)
+    aimed = len(targets) > 0
+    features = features_of(index, encoder, materials, geometry, lights, tabulated, profile, aimed)
     settings = settings_of(
-        index, geometry, lights, wavelengths, density_row, ambient_row, sphere, features.dispersion
-    )
+        index, geometry, lights, wavelengths, density_row, ambient_row, sphere,
+        features.dispersion, (first_aim, len(targets)),
+    )  # fmt: skip
     cache.settle()
     tables = encoder.store.arrays()
     encoder.textures.images.joined(tables["images"])

@@ -30,12 +30,14 @@ def settings_of(
     ambient_row: int,
     sphere: tuple[NDArray[np.float64], float],
     disperses: bool,
+    aims: tuple[int, int],
 ) -> NDArray[np.void]:
     """Return the record SETTINGS of a scene; the wavefront adds what depends on the device.
 
     density_row: where the table of `density` begins in `distributions`; ambient_row: in
     `light_params`; sphere: centre and radius of one around the scene [m];
-    disperses: whether directions depend on wavelengths.
+    disperses: whether directions depend on wavelengths; aims: the first of the spheres at which
+    light paths aim, and their number.
     """
     scene, film, integrator = index.scene, index.scene.film, index.scene.integrator
     settings = np.zeros((), SETTINGS.dtype)
@@ -56,6 +58,7 @@ def settings_of(
     settings["light_paths"] = index.weighed
     if index.merged:
         _set_photons(settings, index, geometry, sphere[1], disperses)
+    settings["aims"], settings["aim_count"] = aims
     settings["light_count"] = len(lights.rows)
     settings["infinite_count"] = lights.infinite
     settings["ambient"] = ambient_row
