@@ -3,7 +3,7 @@
  * group of words. What is summed is radiance over the density of wavelengths and the width of a band, so that its mean
  * is the mean radiance in the band [W m^-2 sr^-1 nm^-1]. */
 
-/* The first word of a band of a pixel, in the half of the film that a plane's samples go to. group: of words, 0 or 1. */
+/* The first word of a band of a pixel, in the half of the film that a plane's samples go to. group: 0 or 1. */
 inline size_t bands_at(global const Settings *settings, int plane, int group, int band, int pixel_index)
 {
     int half_film = plane & (settings->halves - 1);

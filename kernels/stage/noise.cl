@@ -9,7 +9,8 @@
 
 /* A cell is the pixels of one colour in a square of `side` times `side` pixels. active_cells: which cells to measure,
  * a square's two colours after each other; previous_mean: luminance of every pixel when it was measured last, then
- * the samples that it had, then likewise of light paths; noise_sums: variance, luminance and number of pixels, per tile and colour. */
+ * the samples that it had, then likewise of light paths; noise_sums: variance, luminance and number of pixels, per
+ * tile and colour. */
 kernel void noise(global const Settings *settings, global const uint *film, global const uint *active_cells,
                   global float *previous_mean, global float *noise_sums, int side LIGHT_PATHS_ARG)
 {
