@@ -208,7 +208,7 @@ def test_no_bias_with_light_paths():
             made.run(MOST // 2, noise=4.0)
             means.append(made.image().mean())
             paths.append(made.film_state().words[0, 0, -1, 0, 0])
-    assert min(paths) < MOST / 16 and max(paths) == MOST / 2  # so that a bias could show
+    assert max(paths) > 2 * min(paths)  # so that a bias could show
     error = np.std(means, ddof=1) / np.sqrt(FEW_SEE)
     assert abs(np.mean(means) - converged) < SIGNIFICANCE * error
 
