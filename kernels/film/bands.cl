@@ -1,12 +1,14 @@
 /* A spectral film: settings->bands equal parts of the film's range of wavelengths. Beside the film of colours there is
- * a sum per band, three streams of `padded_pixels` words each. What is summed is radiance over the density of
- * wavelengths and the width of a band, so that its mean is the mean radiance in the band [W m^-2 sr^-1 nm^-1]. */
+ * a sum per band, three streams of `padded_pixels` words each, and likewise for light paths where the film has a second
+ * group of words. What is summed is radiance over the density of wavelengths and the width of a band, so that its mean
+ * is the mean radiance in the band [W m^-2 sr^-1 nm^-1]. */
 
-/* The first word of a band of a pixel, in the half of the film that a plane's samples go to. */
-inline size_t bands_at(global const Settings *settings, int plane, int band, int pixel_index)
+/* The first word of a band of a pixel, in the half of the film that a plane's samples go to. group: 0 or 1. */
+inline size_t bands_at(global const Settings *settings, int plane, int group, int band, int pixel_index)
 {
     int half_film = plane & (settings->halves - 1);
-    return (size_t)3 * (half_film * settings->bands + band) * settings->padded_pixels + pixel_index;
+    int row = (half_film * FILM_GROUPS + group) * settings->bands + band;
+    return (size_t)3 * row * settings->padded_pixels + pixel_index;
 }
 
 /* Adds a number to a band of each pixel, lane by lane as `film_add` does. */
@@ -19,7 +21,7 @@ inline integer band_add(global const Settings *settings, global uint *bands, mas
     const uint *words = (const uint *)&f;
     for (int i = 0; i < LANES; i++) {
         if (!at_lane[i]) continue;
-        global uint *at = bands + bands_at(settings, planes[i], own[i], pixels[i]);
+        global uint *at = bands + bands_at(settings, planes[i], FILM_GROUP > 0, own[i], pixels[i]);
         const uint *w = words + i;
         ((int *)&full)[i] = (int)sums_add(at, settings->padded_pixels, w[0], w[LANES], w[2 * LANES]);
     }

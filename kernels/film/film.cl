@@ -19,6 +19,9 @@
 #ifndef FILM_GROUP /* there is one group */
 #define FILM_GROUP 0
 #define FILM_WORDS FILM_GROUP_WORDS
+#define FILM_GROUPS 1
+#else
+#define FILM_GROUPS 2
 #endif
 
 /* Whether the film takes a value: neither NaN nor so large that sums would overflow. */

@@ -45,6 +45,14 @@ inline uint film_samples(global const Settings *settings, global const uint *fil
 #define SAMPLES (float)film_samples(settings, film, pixel_index, halves)
 #endif
 
+#if WEIGHS_LIGHT_PATHS
+/* One over what the sums of light paths are divided by; 0 where a pixel has no samples: it stays black. */
+inline float light_paths_mean(float light_paths, float samples)
+{
+    return light_paths > 0.0f && samples > 0.0f ? 1.0f / light_paths : 0.0f;
+}
+#endif
+
 /* One over what a pixel's sums are divided by: its samples, or, of samples that serve several pixels, their weight. */
 inline float film_mean(global const Settings *settings, global const uint *film, int pixel_index, int2 halves,
                        float samples)

@@ -109,10 +109,12 @@ inline void exposure_add(Scene scene, Slab path, uint at, BEGIN_ARGS, mask m, in
     Spread s = spread_point(scene, own_x, own_y, splat_offset(sampler));
     vec3 v = light.value;
     mask bright = m & (max_r(max_r(fabs(v.x), fabs(v.y)), fabs(v.z)) >= FOOTPRINT_LARGEST);
-    if (any(bright)) full = spread_add(scene, film, bright, plane, s, light);
-#if USES_BANDS
-    full += spread_bands(scene, bands, m, plane, s, light);
+#if USES_BANDS /* which have no footprints */
+    mask at_once = m;
+#else
+    mask at_once = bright;
 #endif
+    if (any(at_once)) full = spread_add(scene, SPREAD_PASSED, at_once, bright, plane, s, light);
     count(counters, COUNTER_FULL, m & (full > 0), full);
     natural taken = load_path_samples(path, at) + 1u;
     store_path_samples(path, at, m, taken);

@@ -49,8 +49,17 @@ inline mask spread_pixel(global const Settings *settings, Spread s, int i, integ
     return (*f != 0.0f) & (x >= 0) & (x < settings->width) & (y >= 0) & (y < settings->height);
 }
 
-/* Adds light to the pixels whose filters hold its point. Returns how many sums are full, lane by lane. */
-inline integer spread_add(Scene scene, global uint *film, mask m, integer plane, Spread s, Light light)
+#if USES_BANDS
+#define SPREAD_ARGS global uint *film, global uint *bands
+#define SPREAD_PASSED film, bands
+#else
+#define SPREAD_ARGS global uint *film
+#define SPREAD_PASSED film
+#endif
+
+/* Adds light to the pixels whose filters hold its point, where m; to their sums of colours only where `colours`.
+ * Returns how many sums are full, lane by lane. */
+inline integer spread_add(Scene scene, SPREAD_ARGS, mask m, mask colours, integer plane, Spread s, Light light)
 {
     integer full = 0;
     for (int i = 0; i < SPREAD_PIXELS; i++) {
@@ -65,22 +74,10 @@ inline integer spread_add(Scene scene, global uint *film, mask m, integer plane,
 #if USES_ALPHA
         e.covered = fixed_of(sel(light.covers, f, (real)(0.0f)));
 #endif
-        full += film_add(scene.settings, film, there, plane, pixel_index, e);
-    }
-    return full;
-}
-
+        full += film_add(scene.settings, film, there & colours, plane, pixel_index, e);
 #if USES_BANDS
-/* The same of a film's bands. */
-inline integer spread_bands(Scene scene, global uint *bands, mask m, integer plane, Spread s, Light light)
-{
-    integer full = 0;
-    for (int i = 0; i < SPREAD_PIXELS; i++) {
-        integer pixel_index;
-        real f;
-        mask there = m & spread_pixel(scene.settings, s, i, &pixel_index, &f);
         full += bands_add(scene, bands, there, plane, pixel_index, light.radiance, light.lambdas, light.scale * f);
+#endif
     }
     return full;
 }
-#endif

@@ -11,9 +11,9 @@ kernel void accumulate(global const Settings *settings, global const uint *film,
         int pixel_index = film_pixel_index(settings, x, y);
         float count = SAMPLES, mean = film_mean(settings, film, pixel_index, halves, count);
         vec3 v = scale3(film_sum(settings, film, pixel_index, halves, 0), mean);
-#if WEIGHS_LIGHT_PATHS /* a pixel without samples stays black */
-        float share = light_paths > 0.0f && count > 0.0f ? 1.0f / light_paths : 0.0f;
-        v = add3(v, scale3(film_sum(settings, film, pixel_index, halves, FILM_GROUP_WORDS), share));
+#if WEIGHS_LIGHT_PATHS
+        vec3 brought = film_sum(settings, film, pixel_index, halves, FILM_GROUP_WORDS);
+        v = add3(v, scale3(brought, light_paths_mean(light_paths, count)));
 #endif
         global float *pixel = image + 4 * ((size_t)y * settings->width + x);
         pixel[0] = settings->to_first[0] * v.x + settings->to_first[1] * v.y + settings->to_first[2] * v.z;

@@ -11,10 +11,17 @@ kernel void accumulate_bands(global const Settings *settings, global const uint 
     if (x < settings->width && y < settings->height) {
         int pixel_index = film_pixel_index(settings, x, y);
         size_t stream = settings->padded_pixels;
-        float scale = film_mean(settings, film, pixel_index, halves, SAMPLES) / settings->film_scale;
+        size_t size = 3 * stream * count * FILM_GROUPS; /* words of a half */
+        float samples = SAMPLES, scale = film_mean(settings, film, pixel_index, halves, samples) / settings->film_scale;
         global float *pixel = band_image + (size_t)count * ((size_t)y * settings->width + x);
         for (int band = 0; band < count; band++)
-            pixel[band] = halves_sum(bands + bands_at(settings, 0, band, pixel_index), stream, 3 * stream * count,
-                                     halves) * scale;
+            pixel[band] = halves_sum(bands + bands_at(settings, 0, 0, band, pixel_index), stream, size, halves) * scale;
+#if WEIGHS_LIGHT_PATHS
+        float share = light_paths_mean(light_paths, samples) / settings->film_scale;
+        for (int band = 0; band < count; band++) {
+            size_t sum = bands_at(settings, 0, 1, band, pixel_index);
+            pixel[band] += halves_sum(bands + sum, stream, size, halves) * share;
+        }
+#endif
     }
 }

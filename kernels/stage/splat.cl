@@ -28,10 +28,7 @@ STAGE(splat)(SLAB_ARGS, SCENE_ARGS, JOIN_ARGS STAGE_AT_ARG)
         vec2 offset = {seen.x - floor(seen.x) - 0.5f, seen.y - floor(seen.y) - 0.5f};
         Spread spread = spread_point(scene, to_integer(floor(seen.x)), to_integer(floor(seen.y)), offset);
         Light light = {colour, 0, accepted, value, lambdas, scale};
-        integer full = spread_add(scene, film, accepted, plane, spread, light);
-#if USES_BANDS
-        full += spread_bands(scene, bands, accepted, plane, spread, light);
-#endif
+        integer full = spread_add(scene, SPREAD_PASSED, accepted, accepted, plane, spread, light);
         count(counters, COUNTER_REJECTED, arrives & !accepted, (integer)(1));
         count(counters, COUNTER_FULL, accepted & (full > 0), full);
     }

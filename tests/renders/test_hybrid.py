@@ -26,7 +26,14 @@ from clpt.scene.integrators import Box, Direct, Filter, Gaussian, Path
 from clpt.scene.lights import Area, Constant, Directional, Light, Point
 from clpt.scene.shapes import Cube, Disk, Group, Instance, Rectangle, Shape, Sphere
 from clpt.scene.textures import Bitmap
-from tests.renders.support import assert_agree, assert_mean, blocks, exposures
+from clpt.spectra import cie
+from tests.renders.support import (
+    assert_agree,
+    assert_mean,
+    blocks,
+    exposures,
+    with_film,
+)
 from tests.renders.test_light_tracing import (
     BLACK,
     DOWN,
@@ -390,6 +397,45 @@ def test_halves_are_the_whole() -> None:
     np.testing.assert_allclose(mean, renderer.image(), rtol=1e-5, atol=1e-6)
 
 
+BANDS = caustic(mode="spectral", bands=235, output_space="xyz", filter=Gaussian())
+
+
+@pytest.mark.parametrize("filtering", ["importance", pytest.param("auto", marks=pytest.mark.slow)])
+def test_bands_add_up_to_the_colour(filtering: str) -> None:
+    """Bands of 2 nm, weighted by the observer, are the picture beside them, in each pixel that
+    light paths light: what both groups of sums bring is in both."""
+    scene = with_film(with_light_paths(BANDS), filtering=filtering)
+    renderer = clpt.Renderer(scene, narrow())
+    renderer.run(64)
+    middles = np.arange(361.0, 830.0, 2.0)
+    summed = renderer.image() @ cie.cie_xyz(middles) * 2.0 / cie.CIE_Y_INTEGRAL
+    np.testing.assert_allclose(summed, renderer.colours(), rtol=0.03, atol=1e-4)
+
+
+def test_bands_keep_their_bits_however_samples_are_split() -> None:
+    """Runs, and films that are merged; halves are the whole but for rounding."""
+    scene = with_film(with_light_paths(BANDS), bands=3)
+    one = clpt.Renderer(scene, narrow())
+    one.run(7)
+    whole = one.image()
+    assert whole.shape[-1] == 3 and whole.all(axis=2).any()
+    one.reset()
+    one.run(3)
+    state = one.film_state()
+    one.run(4)
+    assert np.array_equal(one.image(), whole)
+    later = clpt.Renderer(scene, narrow(), first_sample=3)
+    later.run(4)
+    later.merge(state)
+    assert np.array_equal(later.image(), whole)
+    np.testing.assert_allclose(picture(scene, 7, halves=True), whole, rtol=1e-5)
+
+
+@pytest.mark.slow
+def test_bands_are_those_of_path() -> None:
+    both(corner({"sphere": 30.0}, mode="spectral", bands=3), 512, "bands", max_depth=3)
+
+
 def test_stopped_early_is_as_bright() -> None:
     """The film is balanced wherever it was left: pixels that have samples, and light paths."""
     scene = with_light_paths(dataclasses.replace(corner({"sphere": 30.0}), seed=3), max_depth=3)
@@ -465,14 +511,6 @@ def test_lights_that_cannot_be_weighed_are_left_to_the_camera() -> None:
 def test_numbers_that_make_no_sense(given: Any) -> None:
     with pytest.raises(SceneError, match=r"path.light_paths: must be a whole number from 0 to 64"):
         Path(light_paths=given)
-
-
-def test_what_it_cannot_do_is_refused() -> None:
-    bands = with_light_paths(caustic(mode="spectral", bands=3))
-    with pytest.raises(SceneError, match="bands of a film yet"):
-        lower(bands)
-    with pytest.raises(SceneError, match="light paths reach any pixel"):
-        clpt.Renderer(with_light_paths(caustic()), narrow()).run(4, noise=0.1)
 
 
 def test_nothing_changes_without() -> None:

@@ -118,8 +118,13 @@ class Features:
         return GROUP_WORDS + SUM_WORDS * (self.film_weights + self.alpha)
 
     @property
+    def film_groups(self) -> int:
+        """Groups of sums of a pixel: of all paths, or of the camera's paths and of light paths."""
+        return 1 + self.weighed
+
+    @property
     def film_words(self) -> int:
-        """Words of a pixel of the film: of one group, or of the camera's paths and light paths."""
+        """Words of a pixel of the film: of all its groups."""
         beside = GROUP_WORDS if self.weighed and not self.light_paths else 0
         return self.film_group + self.group_words + beside
 

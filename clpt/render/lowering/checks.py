@@ -57,9 +57,6 @@ def _check_light_paths(scene: Scene, shapes_: list[Shape]) -> None:
                     f"not {scene.integrator.kind}",
                     where=shapes.where(shape),
                 )
-        if getattr(scene.integrator, "light_paths", 0) and scene.film.bands:
-            message = "light paths do not fill the bands of a film yet; leave one of them out"
-            raise SceneError(message, where="path.light_paths")
         return
     spectral = scene.film.mode == "spectral"
     if scene.camera.kind not in CONNECTED:

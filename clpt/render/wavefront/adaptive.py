@@ -9,6 +9,8 @@ makes a picture too dark: cells whose samples all missed the light seem to have 
 For that a partner's decision must not depend on how long the cell itself was sampled either. Where
 a cell has finished and its partner has not, the cell is sampled on as the partner's guide, and
 these samples do not go into the picture.
+
+Light paths, where the scene has them, reach all pixels: see clpt.render.wavefront.light_rounds.
 """
 
 from __future__ import annotations
@@ -22,21 +24,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.errors import SceneError
-from clpt.render.codegen import programs
 from clpt.render.contract.features import Features
-from clpt.render.wavefront import work_list
+from clpt.render.wavefront.light_rounds import LightRounds
+from clpt.render.wavefront.noise_meter import Cells, NoiseMeter, Values, divide
 from clpt.render.wavefront.wavefront import Wavefront
+from clpt.render.wavefront.work_list import FOREVER
 from clpt.scene import check_noise
 from clpt.scene.integrators import PIXELWISE
 
-SIDE = 16  # pixels of a square's side, a multiple of four
 LEAST = 8  # samples of a pixel at the first look at the film; the second look tells the noise
 AHEAD = 4  # a look decides where up to as many times its own samples are needed
 STEPS = 4  # a number of samples is decided in steps of this part of those at the look
-DARK = 0.01  # of the picture's mean luminance: a darker tile counts as if it were as bright
-OPEN = work_list.FOREVER  # of a cell whose number of samples is not decided
+OPEN = FOREVER  # of a cell whose number of samples is not decided
 
-Cells = NDArray[np.int64]
 OnBatch = Callable[[Any], bool]
 
 
@@ -52,9 +52,6 @@ def checked(noise: float, features: Features) -> float:
     if features.merged:
         message = "neighbouring pixels share the photons of the integrator vcm"
         raise SceneError(f"{message}; leave it out, or vcm.merging", where="noise")
-    if features.weighed:
-        message = "light paths reach any pixel, whatever its noise"
-        raise SceneError(f"{message}; leave it out, or path.light_paths", where="noise")
     if features.film_weights:
         message = f"neighbouring pixels share samples under the filter {features.filter}"
         raise SceneError(f"{message}; give the scene `noise`, or film.filtering", where="noise")
@@ -65,59 +62,49 @@ def checked(noise: float, features: Features) -> float:
 
 
 class Adaptive:
-    """The noise in a wavefront's film, and how many samples each cell gets.
+    """How many samples each cell of a wavefront's film gets, see `NoiseMeter`.
 
-    Cells are (2 * squares,): a square's two colours after each other. A cell's partner is the other
-    colour of its square or, where that has no pixel, of a square beside it.
+    A cell's partner is the other colour of its square or, where that has no pixel, of a square
+    beside it.
 
     noise: the limit; next: (cells,) the first sample that a cell's pixels do not have;
     stop: (cells,) how many samples they will have.
     """
 
     def __init__(self, wavefront: Wavefront):
-        self.wavefront = wavefront
-        settings = wavefront.paths.settings
-        x, y = work_list.pixels(settings)
-        self._inside = work_list.inside(settings)
-        across, down = (-(-int(settings[name]) // SIDE) for name in ("width", "height"))
-        self._cell = 2 * (y // SIDE * across + x // SIDE) + (x + y) % 2  # of each padded pixel
-        count = 2 * across * down
-        self._pixels = np.bincount(self._cell[self._inside], minlength=count)  # of each cell
-        self._partner = _partners(self._pixels, across, down)
+        self.wavefront, self._meter = wavefront, NoiseMeter(wavefront)
+        self._pixels = self._meter.pixels
+        count = len(self._pixels)
+        self._partner = _partners(self._pixels, self._meter.across)
+        self._lights = LightRounds(self._meter) if wavefront.features.weighed else None
         self.noise = 0.0
         self.next = np.zeros(count, np.int64)
         self.stop = np.full(count, OPEN)
         self._level = 0  # samples at the last look
         self._measured_at = np.zeros(count, np.int64)  # samples when a cell was last measured
         self._variance = np.full(count, np.inf)  # of a sample, relative
-        self._dark: NDArray[np.float64] | None = None  # luminance, for each of the two colours
         self._film_copies: dict[str, Any] = {}
-        self._allocate(int(settings["padded_pixels"]), count)
-
-    def _allocate(self, padded_pixels: int, count: int) -> None:
-        """Make the buffers and the kernel that measures noise."""
-        wavefront, allocate = self.wavefront, self.wavefront.buffers.allocate
-        texts = programs.noise_sources(wavefront.features, wavefront.scene.strategy.layout)
-        self._tiles = padded_pixels // 16
-        self._active_cells = allocate("the cells of the film", 4 * count)
-        self._noise_sums = allocate("the film's noise", 24 * self._tiles)
-        previous_mean = allocate("the film's former luminance", 8 * padded_pixels)
-        wavefront.stream.fill(previous_mean, 0, 0, previous_mean.size)
-        self._kernel = wavefront.auxiliary_kernel(
-            texts, "noise", active_cells=self._active_cells, noise_sums=self._noise_sums,
-            previous_mean=previous_mean, side=SIDE,
-        )  # fmt: skip
 
     @property
     def active(self) -> float:
         """The share of the picture's pixels that get more samples."""
-        return float(self._pixels[self.next < self.stop].sum() / self._pixels.sum())
+        active = self.next < self.stop
+        if self._lights is not None:
+            active |= self._lights.noisy(self.noise**2, self._known_variance)
+        return float(self._pixels[active].sum() / self._pixels.sum())
+
+    @property
+    def _known_variance(self) -> Values:
+        """The variance of a sample where it is known, else 0."""
+        return np.where(np.isfinite(self._variance), self._variance, 0.0)
 
     def skip(self, samples: int) -> None:
         """Note that every pixel has all samples before this one, whatever its noise."""
         self.next[:] = samples
         self._level = max(self._level, samples)
         self.stop[self.stop < samples] = samples
+        if self._lights is not None:
+            self._lights.skip(samples)
 
     def run(self, end: int, noise: float, on_batch: OnBatch) -> bool:
         """Add samples until the noise is below a limit, or all pixels have `end`.
@@ -129,20 +116,29 @@ class Adaptive:
         if noise != self.noise:
             self.noise = noise
             self.stop[:] = np.where(self._pixels > 0, OPEN, 0)
+            if self._lights is not None:
+                self._lights.reopen()
             self._decide()
         try:
-            while (self.next < np.minimum(self.stop, end)).any():
+            while self._goes_on(end):
                 if not self._round(end, on_batch):
                     return False
         finally:
-            self.wavefront.paths.set_work_list(self._inside)
+            self.wavefront.paths.set_work_list(self._meter.inside)
         return True
+
+    def _goes_on(self, end: int) -> bool:
+        """Whether something is missing of what is to come before sample `end`."""
+        lights = self._lights is not None and self._lights.next < min(self._lights.wanted, end)
+        return lights or bool((self.next < np.minimum(self.stop, end)).any())
 
     def _round(self, end: int, on_batch: OnBatch) -> bool:
         """Sample up to the next look or to `end`, look, and decide; return whether to go on."""
         look = self._next_look()
         ends = np.minimum(self.stop, min(look, end))
-        finished = self._sample(ends, on_batch)
+        # Pixels stay black without samples of the camera, and dark without light paths.
+        finished = self._lights is None or self._lights.sample(min(look, end), on_batch)
+        finished = finished and self._sample(ends, on_batch)
         self.next = np.maximum(self.next, ends)  # after a stop too: numbers are not used again
         if not finished:
             return False
@@ -152,7 +148,10 @@ class Adaptive:
         guide_cells = np.zeros(len(self.stop), bool)
         guide_cells[self._partner[(self.stop == OPEN) & (self._pixels > 0)]] = True
         overrun = guide_cells & (self.next < look)  # finished, and still a guide
-        with self._film_restored(bool(overrun.any())):
+        lights = self._lights if self._lights is not None and self._lights.open else None
+        with self._film_restored(lights is not None or bool(overrun.any())):
+            if lights is not None and not lights.measure(look, on_batch):
+                return False
             if not self._sample(np.where(overrun, look, 0), on_batch):
                 return False
             self._measure(guide_cells)
@@ -168,43 +167,30 @@ class Adaptive:
         behind = self.next < ends
         for first in np.unique(self.next[behind]):
             cells = behind & (self.next == first)
-            pixels = self._inside[cells[self._cell[self._inside]]]
-            own = ends[self._cell[pixels]]
+            pixels = self._meter.inside[cells[self._meter.cell[self._meter.inside]]]
+            own = ends[self._meter.cell[pixels]]
             self.wavefront.paths.set_work_list(pixels, own)
-            if not self.wavefront.render_samples(int(first), int(own.max()), on_batch):
+            if not self.wavefront.render_from_camera(int(first), int(own.max()), on_batch):
                 return False
         return True
 
     def _measure(self, cells: NDArray[np.bool_]) -> None:
         """Estimate the relative variance of a sample in these cells."""
-        variance, luminance, pixels = self._sums_of_tiles(cells)
-        if self._dark is None:  # of each colour by itself
-            self._dark = DARK * luminance.sum(axis=0) / np.maximum(pixels.sum(axis=0), 1)
-        cell = self._cell[::16, None] // 2 * 2 + np.arange(2)  # of a tile's two colours
-        count = np.maximum(self._pixels, 1)
-        mean_of_cell = np.bincount(cell.ravel(), luminance.ravel(), len(self.stop)) / count
-        mean = luminance / np.maximum(pixels, 1)
-        # A tile that a few paths have lit is as bright as its cell, for all that is known.
-        uncertain = np.minimum(_divide(variance, luminance**2), 1.0)
-        bright = mean + uncertain * (mean_of_cell[cell] - mean) + self._dark
-        relative = _divide(variance, bright**2)
-        sums = np.bincount(cell.ravel(), relative.ravel(), len(self.stop))
+        if not cells.any():
+            return
+        relative = self._meter.measure(cells)
         known = cells & (self._measured_at > 0)
-        self._variance[known] = self._level * (sums / count)[known]
+        self._variance[known] = self._level * relative[known]
         self._measured_at[cells] = self._level
-
-    def _sums_of_tiles(self, cells: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """Variance, luminance and number of pixels (3, tiles, 2) of each tile's two colours."""
-        stream = self.wavefront.stream
-        stream.write(self._active_cells, cells.astype(np.uint32))
-        stream.run(self._kernel, (self._tiles,))
-        sums = stream.read(self._noise_sums, np.empty((self._tiles, 2, 3), np.float32))
-        return np.moveaxis(sums.astype(float), 2, 0)
 
     def _decide(self) -> None:
         """Decide how many samples cells get whose partners know it closely enough."""
+        limit: Any = self.noise**2
+        if self._lights is not None:
+            self._lights.decide(limit, self._known_variance, AHEAD, STEPS)
+            limit = self._lights.left_over(limit, self._known_variance)[self._partner]
         measured_at = self._measured_at[self._partner]
-        needed = self._variance[self._partner] / self.noise**2
+        needed = divide(self._variance[self._partner], limit)
         sure = (self.stop == OPEN) & (needed <= AHEAD * measured_at) & (self._pixels > 0)
         step = np.maximum(measured_at // STEPS, 1)
         wanted = np.ceil(np.where(sure, needed, 0.0) / step) * step
@@ -227,10 +213,10 @@ class Adaptive:
         finally:
             for name, sums in film.sums.items():
                 stream.copy(sums, self._film_copies[name])
-            self.wavefront.accumulate_film()
+            self.wavefront.refresh()
 
 
-def _partners(pixels: Cells, across: int, down: int) -> Cells:
+def _partners(pixels: Cells, across: int) -> Cells:
     """Return the cell that decides about each cell: of the other colour, with pixels.
 
     pixels: of each cell. In a film of one pixel there is none: its cell is its own partner, and its
@@ -245,8 +231,3 @@ def _partners(pixels: Cells, across: int, down: int) -> Cells:
         other = np.where(usable, 2 * beside + 1 - cells % 2, partner)
         partner = np.where((pixels[partner] == 0) & (pixels[other] > 0), other, partner)
     return np.where(pixels[partner] == 0, cells, partner)
-
-
-def _divide(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a / b, and 0 where b is 0."""
-    return np.divide(a, b, out=np.zeros_like(a), where=b > 0.0)

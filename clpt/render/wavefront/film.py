@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from clpt import device
 from clpt.device.buffers import Buffers
-from clpt.render.contract.features import SUM_WORDS
+from clpt.render.contract.features import GROUP_WORDS, SUM_WORDS, Features
 from clpt.render.wavefront import work_list
 from clpt.render.wavefront.film_state import SAMPLES_WORD, Words
 
@@ -19,10 +19,9 @@ from clpt.render.wavefront.film_state import SAMPLES_WORD, Words
 class Film:
     """The film of a wavefront.
 
-    settings: of the paths, which say the film's size and halves; bands: whether it has any; words:
-    of a pixel, see `Features.film_words`. size:
-    width and height [pixels]; sums: the buffers that samples are added to, by the names of the
-    kernels' arguments; picture: (h, w, 4) float32, always the same memory.
+    settings: of the paths, which say the film's size and halves; features: which sums of a pixel it
+    has. size: width and height [pixels]; sums: the buffers that samples are added to, by the names
+    of the kernels' arguments; picture: (h, w, 4) float32, always the same memory.
 
     Raises MemoryBudgetError.
     """
@@ -32,12 +31,12 @@ class Film:
         stream: device.Stream,
         buffers: Buffers,
         settings: NDArray[np.void],
-        bands: bool,
-        words: int,
+        features: Features,
     ):
-        self.stream, self.has_bands, self._words = stream, bands, words
+        self.stream, self.has_bands, self._words = stream, features.bands, features.film_words
         self.size = int(settings["width"]), int(settings["height"])
-        self.band_count = int(settings["bands"]) if bands else 0
+        self.band_count = int(settings["bands"]) if features.bands else 0
+        self._band_sums = self.band_count * features.film_groups  # of a pixel
         self.halves = int(settings["halves"])
         self._padded_pixels = int(settings["padded_pixels"])
         x, y = work_list.pixels(settings)
@@ -46,9 +45,9 @@ class Film:
         words = 4 * self._padded_pixels * self.halves
         pixels, advice = math.prod(self.size), "lower the image's size"
         sums, images = {"film": self._words * words}, {"image": 16 * pixels}
-        if bands:
+        if features.bands:
             advice += " or the number of bands"
-            sums["bands"] = SUM_WORDS * self.band_count * words
+            sums["bands"] = SUM_WORDS * self._band_sums * words
             images["band_image"] = 4 * self.band_count * pixels
         self.sums, self._images = (
             {name: buffers.allocate(f"the {name}", size, advice) for name, size in sizes.items()}
@@ -74,6 +73,30 @@ class Film:
         image = self._images["image"]
         device.supersede(self.picture, self.stream.fill(image, 0, 0, image.size))
 
+    @property
+    def group_bytes(self) -> int:
+        """The size of a group of words of all pixels, in all halves."""
+        return 4 * GROUP_WORDS * self._padded_pixels * self.halves
+
+    def copy_group(self, first: int, into: cl.Buffer) -> None:
+        """Enqueue that a buffer of `group_bytes` gets a group, a pixel's words from `first` on."""
+        size = self.group_bytes // self.halves
+        for half in range(self.halves):
+            at = self._word_at(half, first)
+            offsets = {"src_offset": at, "dst_offset": half * size, "byte_count": size}
+            self.stream.copy(into, self.sums["film"], **offsets)
+
+    def set_group(self, first: int, words: cl.Buffer | None) -> None:
+        """Enqueue that a group is what `copy_group` took, or without that 0."""
+        size = self.group_bytes // self.halves
+        for half in range(self.halves):
+            at = self._word_at(half, first)
+            if words is None:
+                self.stream.fill(self.sums["film"], 0, at, size)
+            else:
+                offsets = {"src_offset": half * size, "dst_offset": at, "byte_count": size}
+                self.stream.copy(self.sums["film"], words, **offsets)
+
     def accumulate(self, kernel: device.BoundKernel) -> cl.Event:
         """Enqueue that `picture` becomes the mean of the samples, once its readers have ended."""
         self.stream.after([e for e in self.picture.events if e is not self._written])
@@ -97,11 +120,11 @@ class Film:
         return self.made(kernel, self._images["band_image"], self.band_count)
 
     def words(self) -> tuple[Words, Words]:
-        """Return what the film holds: (halves, 10 to 26, h, w) uint32, and of bands (halves, bands,
-        3, h, w); wait for it."""
+        """Return what the film holds, as `FilmState` has it of one film: (halves, 10 to 26, h, w)
+        uint32, and of bands (halves, sums, 3, h, w); wait for it."""
         width, height = self.size
         found = []
-        for name, each in (("film", self._words), ("bands", SUM_WORDS * self.band_count)):
+        for name, each in (("film", self._words), ("bands", SUM_WORDS * self._band_sums)):
             streams = np.zeros((self.halves * each, self._padded_pixels), np.uint32)
             if each:
                 streams = self.stream.read(self.sums[name], streams)
@@ -109,7 +132,7 @@ class Film:
             pixels[:, self._at] = streams[:, self._inside]
             found.append(pixels.reshape(self.halves, -1, height, width))
         film, bands = found
-        return film, bands.reshape(self.halves, self.band_count, SUM_WORDS, height, width)
+        return film, bands.reshape(self.halves, self._band_sums, SUM_WORDS, height, width)
 
     def set_words(self, film: Words, bands: Words) -> None:
         """Enqueue that the film holds these words, of the form that `words` returns."""
@@ -122,12 +145,16 @@ class Film:
 
     def count_samples(self, group: int) -> list[int]:
         """Return how many samples the film has in a group of words, in each half; wait for it."""
-        stream, counts = 4 * self._padded_pixels, []
+        counts = []
         for half in range(self.halves):
             words = np.empty(self._padded_pixels, np.uint32)
-            at = (half * self._words + group + SAMPLES_WORD) * stream
+            at = self._word_at(half, group + SAMPLES_WORD)
             counts.append(int(self.stream.read(self.sums["film"], words, at).sum(dtype=np.uint64)))
         return counts
+
+    def _word_at(self, half: int, word: int) -> int:
+        """Where a word of the pixels begins [bytes]."""
+        return 4 * (half * self._words + word) * self._padded_pixels
 
     def _read(self, image: cl.Buffer, channels: int) -> NDArray[np.float32]:
         return self.stream.read(image, np.empty((*self.size[::-1], channels), np.float32))

@@ -29,8 +29,9 @@ class FilmState:
     each pixel three sums, and the number of its samples; then, where samples serve all pixels whose
     filters hold them, a sum of the filter's values, and with alpha a sum of what is covered; then,
     where light paths are weighed, three sums of theirs, and how many began at the pixel's number.
-    halves: 2 where even and odd samples are kept apart, else 1. bands: (halves, bands, 3, h, w)
-    uint32, a sum for each band; bands may be 0. taken: first and end of each range of sample
+    halves: 2 where even and odd samples are kept apart, else 1. bands: (halves, sums, 3, h, w)
+    uint32, a sum for each band, then, where light paths are weighed, one of theirs for each; sums
+    may be 0. taken: first and end of each range of sample
     numbers that were taken, ascending and apart. scale: of a value of 1, a power of two that
     follows from the film's exposure.
     """

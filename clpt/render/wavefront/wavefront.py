@@ -80,9 +80,7 @@ class Wavefront:
         self._tuning, self.lanes = tuning, self.device.lanes
         self.timings = Timings(self.device.queue)
         features = self.features
-        self.film = film = Film(
-            self.stream, self.buffers, paths.settings, features.bands, features.film_words
-        )
+        self.film = film = Film(self.stream, self.buffers, paths.settings, features)
         photons = Photons(self.stream, self.buffers, paths.settings) if features.merged else None
         self.photons, photon_arguments = photons, photons.arguments if photons else {}
         # What follows knows nothing of this wavefront: memory is given back without a collector.
@@ -154,6 +152,16 @@ class Wavefront:
     def features(self) -> Features:
         """The features of the scene, for the channel of this film."""
         return _features_of(self.channel, self.scene.lowered)
+
+    @property
+    def has_light_paths(self) -> bool:
+        """Whether the film has sums of paths that start at lights."""
+        return self.features.passes[0].light_paths
+
+    @property
+    def light_group(self) -> int:
+        """Which of a pixel's words is the first that light paths add to."""
+        return self.features.passes[0].film_group
 
     @property
     def arguments(self) -> dict[str, Any]:
@@ -240,10 +248,38 @@ class Wavefront:
         )
         if finished:
             self._note_paths(first, end)
-        elif self._light_group is not None:
-            self._paths = self.film.count_samples(self._light_group)
+            self.accumulate_film()
+        else:
+            self.refresh()
+        return finished
+
+    def render_from_camera(
+        self, first: int, end: int, on_batch: Callable[[Counts], bool] | None = None
+    ) -> bool:
+        """Add samples as `render_samples`, without light paths."""
+        finished = self._run(self.loops[-1], first, end, on_batch)
         self.accumulate_film()
         return finished
+
+    def render_from_lights(
+        self, first: int, end: int, on_batch: Callable[[Counts], bool] | None = None
+    ) -> bool:
+        """Add the light paths of samples as `render_samples`, without the samples."""
+        finished = self.trace_from_lights(first, end, on_batch)
+        self.refresh()
+        return finished
+
+    def trace_from_lights(
+        self, first: int, end: int, on_batch: Callable[[Counts], bool] | None = None
+    ) -> bool:
+        """As `render_from_lights`, but leave the picture as it is."""
+        return self._run(self.loops[0], first, end, on_batch)
+
+    def refresh(self) -> None:
+        """Make the picture of whatever the film holds."""
+        if self.has_light_paths:
+            self._paths = self.film.count_samples(self.light_group)
+        self.accumulate_film()
 
     def accumulate_film(self) -> cl.Event:
         """Enqueue that the film's picture becomes that of the samples so far; return the event."""
@@ -278,7 +314,7 @@ class Wavefront:
     def set_words(self, film: Words, bands: Words) -> None:
         """Enqueue that the film holds these words, of the form that `Film.words` returns."""
         self.film.set_words(film, bands)
-        count = SAMPLES_WORD + (self._light_group or 0)
+        count = SAMPLES_WORD + (self.light_group if self.has_light_paths else 0)
         self._paths = [int(half[count].sum(dtype=np.uint64)) for half in film]
         self.accumulate_film()
 
@@ -290,12 +326,6 @@ class Wavefront:
         self._accumulate_bands = (
             self.kernels.bind("bands", "accumulate_bands", **whole) if self.film.has_bands else None
         )
-
-    @property
-    def _light_group(self) -> int | None:
-        """Which of a pixel's words is the first that light paths add to; None without them."""
-        from_lights = [one for one in self.features.passes if one.light_paths]
-        return from_lights[0].film_group if from_lights else None
 
     def _turns(self, first: int, end: int) -> list[tuple[int, int]]:
         """The numbers of samples that all kinds of paths take one after the other: few at a time,
@@ -343,7 +373,7 @@ class Wavefront:
 
     def _samples(self, first: int, end: int) -> dict[str, float]:
         """The argument `light_paths` of pictures of halves: how many there were for each pixel."""
-        if self._light_group is None:
+        if not self.has_light_paths:
             return {}
         return {"light_paths": sum(self._paths[first:end]) / math.prod(self.film.size)}
 

@@ -14,17 +14,21 @@ import pytest
 
 import clpt
 from clpt import transforms as tf
+from clpt.device import Device, choose
 from clpt.errors import SceneError
 from clpt.render.lowering.scene import lower
-from clpt.render.wavefront.adaptive import LEAST, SIDE, _partners, checked
+from clpt.render.wavefront.adaptive import LEAST, _partners, checked
+from clpt.render.wavefront.light_rounds import LightRounds
+from clpt.render.wavefront.noise_meter import SIDE
 from clpt.render.wavefront.work_list import FOREVER, inside, pixels, table
 from clpt.scene import Film, Scene, materials
 from clpt.scene.cameras import Perspective
-from clpt.scene.integrators import Aov, Mitchell, ParticleTracer, Path
+from clpt.scene.integrators import Aov, Mitchell, ParticleTracer, Path, Vcm
 from clpt.scene.lights import Area, Constant
 from clpt.scene.shapes import Rectangle, Sphere
 
 RENDERS, MOST, NOISE, SMALL = 100, 512, 2.0, 0.02
+FEW_SEE, TINY = 400, 0.005  # renders and radius, with light paths
 SIGNIFICANCE = 4.5  # standard deviations: by chance once in 150,000
 
 
@@ -151,13 +155,149 @@ def test_cancel(renderer):
     assert (renderer.film.get()[..., 3] == 16).all()
 
 
+def lit(seed: int = 0, radius: float = 0.1, **changes) -> Scene:
+    """The bulb with light paths beside the camera's."""
+    return bulb(radius, seed=seed, integrator=Path(max_depth=5, light_paths=1), **changes)
+
+
+@pytest.fixture(scope="module")
+def lit_renderer():
+    with clpt.Renderer(lit(), narrow()) as made:
+        yield made
+
+
+def narrow() -> Device:
+    """A device one lane wide: its kernels compile soonest."""
+    device = choose()
+    device.lanes = 1
+    return device
+
+
+def test_light_paths_meet_the_limit_with_fewer_samples(lit_renderer, renderer):
+    """The noise of eight pictures, which have 200 pixels or more each: the bounds are wide."""
+    limit, luminance, pictures = 0.3, np.array([0.2126, 0.7152, 0.0722]), []
+    lit_renderer.reset(seed=99)
+    lit_renderer.run(4096)
+    converged = lit_renderer.image() @ luminance
+    for seed in range(8):
+        lit_renderer.reset(seed=seed)
+        assert lit_renderer.run(4096, noise=limit) and lit_renderer.active == 0.0
+        assert lit_renderer.film_state().samples.max() < 128
+        pictures.append(lit_renderer.image() @ luminance)
+    floor = converged > 0.0
+    error = np.sqrt(np.mean((np.array(pictures)[:, floor] / converged[floor] - 1.0) ** 2))
+    assert 0.5 * limit < error < 1.3 * limit
+    again(renderer, 1)
+    renderer.run(4096, noise=limit)
+    assert renderer.film_state().samples.min() > 256
+
+
+@pytest.mark.slow
+def test_no_bias_with_light_paths():
+    """A small part of the floor, which few light paths reach. To stop by these themselves, rather
+    than by guides, is off by 33 %, 6 standard errors."""
+    at = tf.look_at([0, 0.6, 1.2], [0, 0, 0], [0, 1, 0])
+    wide, small = (Perspective(to_world=at, fov=fov) for fov in (8.0, 1.5))
+    with clpt.Renderer(lit(radius=TINY, camera=wide), narrow()) as made:
+        made.run(4096)
+        converged = made.image().mean()  # the floor is as bright everywhere, but for 0.5 %
+        made.update(camera=small)
+        means, paths = [], []
+        for seed in range(FEW_SEE):
+            made.reset(seed=seed)
+            made.run(MOST // 2, noise=4.0)
+            means.append(made.image().mean())
+            paths.append(made.film_state().words[0, 0, -1, 0, 0])
+    assert max(paths) > 2 * min(paths)  # so that a bias could show
+    error = np.std(means, ddof=1) / np.sqrt(FEW_SEE)
+    assert abs(np.mean(means) - converged) < SIGNIFICANCE * error
+
+
+def test_light_paths_in_pieces(lit_renderer):
+    """Several runs, or one, or a film that is merged: the same picture."""
+    pictures = []
+    for pieces in ((96,), (5, 20, 7, 64)):
+        lit_renderer.reset(seed=2)
+        for samples in pieces:
+            lit_renderer.run(samples, noise=0.5)
+        pictures.append(lit_renderer.film.get())
+    np.testing.assert_array_equal(pictures[0], pictures[1])
+    state = lit_renderer.film_state()
+    lit_renderer.reset(seed=2)
+    lit_renderer.merge(state)
+    np.testing.assert_array_equal(pictures[0], lit_renderer.film.get())
+
+
+def test_full_light_paths_are_an_ordinary_picture(lit_renderer):
+    """Guides leave nothing behind, in no half of the film; nor do steps between."""
+    for runs in ((48,), (16, None, 24)):
+        lit_renderer.reset(seed=3)
+        for samples in runs:
+            if samples is None:
+                lit_renderer.step(8)
+            else:
+                lit_renderer.run(samples, noise=1e-6)
+        assert lit_renderer.active == 1.0
+        adaptive = lit_renderer.film_state()
+        lit_renderer.reset(seed=3)
+        lit_renderer.run(48)
+        np.testing.assert_array_equal(adaptive.words, lit_renderer.film_state().words)
+
+
+def test_light_paths_go_on_for_all(lit_renderer):
+    """The camera's samples end early, light paths when all of the picture is calm."""
+    lit_renderer.reset(seed=1)
+    lit_renderer.run(16, noise=0.2)
+    assert lit_renderer.active == 1.0
+    first = lit_renderer.film.get()
+    lit_renderer.run(1024, noise=0.2)
+    second = lit_renderer.film.get()
+    words = lit_renderer.film_state().words[0, 0]
+    assert second[..., 3].max() < 64 < words[-1].min() and np.ptp(words[-1]) == 0
+    assert not np.array_equal(first[..., :3], second[..., :3])
+    lit_renderer.run(8)
+    assert (lit_renderer.film.get()[..., 3] == second[..., 3] + 8).all()
+
+
+def test_a_stop_leaves_no_guides(lit_renderer, monkeypatch):
+    """Stopped while guides are traced: the film is that of the samples before."""
+    measure = LightRounds.measure
+    monkeypatch.setattr(
+        LightRounds, "measure", lambda self, *_: measure(self, LEAST, lambda _: False)
+    )
+    lit_renderer.reset(seed=4)
+    assert not lit_renderer.run(4096, noise=1e-6)
+    stopped, image = lit_renderer.film_state().words, lit_renderer.image()
+    lit_renderer.reset(seed=4)
+    lit_renderer.run(LEAST)
+    np.testing.assert_array_equal(stopped, lit_renderer.film_state().words)
+    np.testing.assert_array_equal(image, lit_renderer.image())
+
+
+@pytest.mark.slow
+def test_other_films_with_light_paths():
+    """A crop, sides that are no multiples of four, bands, a wide filter, halves."""
+    film = Film(
+        width=60, height=40, crop=(5, 3, 37, 21), mode="spectral", bands=4, filter=Mitchell(),
+        filtering="importance",
+    )  # fmt: skip
+    with clpt.Renderer(lit(film=film), halves=True) as made:
+        made.run(40, noise=1e-6)
+        adaptive = made.film_state()
+        made.reset()
+        made.run(40)
+        ordinary = made.film_state()
+        np.testing.assert_array_equal(adaptive.words, ordinary.words)
+        np.testing.assert_array_equal(adaptive.bands, ordinary.bands)
+
+
 @pytest.mark.parametrize("noise", [0.0, -1.0, float("nan"), float("inf"), True, "low"])
 def test_no_noise(renderer, noise):
     with pytest.raises(SceneError, match="noise"):
         renderer.run(1, noise=noise)
 
 
-@pytest.mark.parametrize("integrator", [Aov(channels=("depth",)), ParticleTracer()])
+@pytest.mark.parametrize("integrator", [Aov(channels=("depth",)), ParticleTracer(), Vcm()])
 def test_refused(integrator):
     features = lower(bulb(integrator=integrator)).features
     with pytest.raises(SceneError, match=f"noise: .*{integrator.kind}"):
@@ -215,6 +355,6 @@ def test_partners():
         y, x = np.mgrid[:side, :side]
         cell = 2 * (y // SIDE * across + x // SIDE) + (x + y) % 2
         own = np.bincount(cell.ravel(), minlength=2 * across * across)
-        partner = _partners(own, across, across)
+        partner = _partners(own, across)
         cells = np.flatnonzero(own)
         assert (own[partner[cells]] > 0).all() and ((partner[cells] ^ cells) & 1).all()

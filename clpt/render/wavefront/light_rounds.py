@@ -1,0 +1,128 @@
+"""How many light paths adaptive sampling takes: one number for all pixels, as each may reach any.
+
+The number must not depend on what these paths bring, or their mean would be too dark where the
+noise seems to be low by chance. So others decide, which stay out of the picture: beside each four
+light paths one guide is traced, and what the guides' mean does while their number doubles tells
+how many are needed.
+
+Let v be the relative variance of a sample of the camera in a cell, w that of a sample's light
+paths. n and m of them leave v / n + w / m, and n + m is least for a limit e of that where
+m = (w + sqrt(v w)) / e. The cell that wants most decides m; any cell's n is what that leaves it.
+
+A cell's n must not depend on its own samples. So the two colours of the chessboard decide m
+separately, each by guides and by the samples of its own pixels: from that the cells of the other
+colour take their n. The picture gets the larger m, which leaves less noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.render.wavefront.noise_meter import NoiseMeter, Values, divide
+from clpt.render.wavefront.work_list import FOREVER
+
+GUIDES = 4  # light paths for each that is a guide
+GUIDE_NUMBERS = 1 << 30  # from which on light paths are guides: no others have these numbers
+
+
+class LightRounds:
+    """The light paths of a picture, in samples: a wavefront's `light_paths` for each pixel.
+
+    next: the first sample whose light paths are not in the picture; stop: (2,) how many samples
+    each colour's pixels want; variance: (cells,) of a sample's light paths, relative.
+    """
+
+    def __init__(self, meter: NoiseMeter):
+        self.wavefront, self.meter = meter.wavefront, meter
+        self.next = 0
+        self.stop = np.full(2, FOREVER)
+        self.variance = np.zeros(len(meter.pixels))
+        self._measured_at = np.zeros(2, np.int64)  # samples when each colour was measured last
+        self._guides = 0  # samples of light paths that are guides
+        size = self.wavefront.film.group_bytes
+        self._sums = self.wavefront.buffers.allocate(
+            "the film of light paths that are guides", size
+        )
+
+    @property
+    def wanted(self) -> int:
+        """How many samples both colours have enough with."""
+        return int(self.stop.max())
+
+    @property
+    def open(self) -> bool:
+        """Whether a colour does not know how many it wants."""
+        return self.wanted == FOREVER
+
+    def skip(self, samples: int) -> None:
+        """Note that the picture has the light paths of all samples before this one."""
+        self.next = max(self.next, samples)
+        self.stop = np.maximum(self.stop, samples)
+
+    def reopen(self) -> None:
+        """Forget how many are wanted: the limit of noise is another one."""
+        self.stop[:] = FOREVER
+
+    def sample(self, end: int, on_batch: Callable[[Any], bool]) -> bool:
+        """Add light paths up to a sample, or to those wanted; return whether it was not stopped."""
+        first, end = self.next, min(end, self.wanted)
+        if first >= end:
+            return True
+        self.next = end
+        self.wavefront.paths.set_work_list(self.meter.inside)
+        return self.wavefront.render_from_lights(first, end, on_batch)
+
+    def measure(self, look: int, on_batch: Callable[[Any], bool]) -> bool:
+        """Estimate the variance by guides, at a look after some number of samples.
+
+        The film then has the guides in place of the picture's light paths, and must be restored.
+        Returns whether it was not stopped.
+        """
+        wavefront, per_sample = self.wavefront, self.wavefront.loops[0].per_sample
+        first, end = self._guides, look // GUIDES
+        wavefront.paths.set_work_list(self.meter.inside)
+        wavefront.film.set_group(wavefront.light_group, self._sums if first else None)
+        start = GUIDE_NUMBERS // per_sample
+        if not wavefront.trace_from_lights(start + first, start + end, on_batch):
+            return False
+        self._guides = end
+        wavefront.film.copy_group(wavefront.light_group, self._sums)
+        undecided = np.tile(self.stop == FOREVER, len(self.variance) // 2)
+        found = self.meter.measure_lights(undecided, float(end * per_sample))
+        if self.meter.knows_brightness:
+            self.variance[undecided] = end * found[undecided]
+            self._measured_at[self.stop == FOREVER] = look
+        return True
+
+    def decide(self, limit: float, camera: Values, ahead: int, steps: int) -> None:
+        """Decide how many are wanted.
+
+        limit: of a pixel's relative variance; camera: (cells,) that of a sample of the camera, as
+        far as it is known, else 0; ahead, steps: see clpt.render.wavefront.adaptive.
+        """
+        at, needed = self._measured_at, self._of_colours(self._needed(limit, camera))
+        sure = (self.stop == FOREVER) & (at > 0) & (needed <= ahead * at)
+        step = np.maximum(at // steps, 1)
+        wanted = np.maximum(np.ceil(np.where(sure, needed, 0.0) / step) * step, at)
+        self.stop[sure] = wanted[sure]
+
+    def left_over(self, limit: float, camera: Values) -> Values:
+        """Return the variance that light paths leave to the camera's samples, (cells,) float64."""
+        taken = np.maximum(self._of_colours(self._needed(limit, camera)), self._measured_at)
+        return limit - divide(self.variance, np.tile(taken, len(self.variance) // 2))
+
+    def noisy(self, limit: float, camera: Values) -> NDArray[np.bool_]:
+        """Return whether a cell wants more light paths than there are so far, (cells,) bool."""
+        return (self.next < self.wanted) & (self._needed(limit, camera) > self.next)
+
+    def _needed(self, limit: float, camera: Values) -> Values:
+        """How many samples' light paths each cell wants, (cells,)."""
+        return (self.variance + np.sqrt(self.variance * camera)) / limit
+
+    def _of_colours(self, values: Values) -> Values:
+        """The largest value among the cells of each colour, (2,)."""
+        return values.reshape(-1, 2).max(axis=0)

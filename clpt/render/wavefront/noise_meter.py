@@ -1,0 +1,109 @@
+"""Cells of a film, and how much noise each has.
+
+The film is cut into squares, and their pixels into the two colours of a chessboard: two cells.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.render.codegen import programs
+from clpt.render.wavefront import work_list
+from clpt.render.wavefront.wavefront import Wavefront
+
+SIDE = 16  # pixels of a square's side, a multiple of four
+DARK = 0.01  # of the picture's mean luminance: a darker tile counts as if it were as bright
+
+Cells = NDArray[np.int64]
+Values = NDArray[np.float64]
+
+
+class NoiseMeter:
+    """Tells the variance of a wavefront's film since it was measured last, cell by cell.
+
+    Cells are (2 * squares,): a square's two colours after each other.
+
+    across: squares in a row; inside: the pixels of the picture, see `work_list.inside`; cell:
+    (padded_pixels,) of each pixel; pixels: (cells,) how many each has.
+    """
+
+    def __init__(self, wavefront: Wavefront):
+        self.wavefront = wavefront
+        settings = wavefront.paths.settings
+        x, y = work_list.pixels(settings)
+        self.inside = work_list.inside(settings)
+        self.across, down = (-(-int(settings[name]) // SIDE) for name in ("width", "height"))
+        self.cell: Cells = 2 * (y // SIDE * self.across + x // SIDE) + (x + y) % 2
+        count = 2 * self.across * down
+        self.pixels: Cells = np.bincount(self.cell[self.inside], minlength=count)
+        self._dark: Values | None = None  # luminance, for each of the two colours
+        self._allocate(int(settings["padded_pixels"]), count)
+
+    def _allocate(self, padded_pixels: int, count: int) -> None:
+        """Make the buffers and the kernel that measures noise."""
+        wavefront, allocate = self.wavefront, self.wavefront.buffers.allocate
+        features = wavefront.features
+        texts = programs.noise_sources(features, wavefront.scene.strategy.layout)
+        self._tiles = padded_pixels // 16
+        self._active_cells = allocate("the cells of the film", 4 * count)
+        self._noise_sums = allocate("the film's noise", 24 * self._tiles)
+        streams = 2 * features.film_groups
+        previous_mean = allocate("the film's former luminance", 4 * streams * padded_pixels)
+        wavefront.stream.fill(previous_mean, 0, 0, previous_mean.size)
+        self._kernel = wavefront.auxiliary_kernel(
+            texts, "noise", active_cells=self._active_cells, noise_sums=self._noise_sums,
+            previous_mean=previous_mean, side=SIDE, light_paths=0.0,
+        )  # fmt: skip
+
+    @property
+    def knows_brightness(self) -> bool:
+        """Whether the camera's paths have been measured, and so how bright the picture is."""
+        return self._dark is not None
+
+    def measure(self, cells: NDArray[np.bool_]) -> Values:
+        """Return the relative variance of what the camera's paths bring, (cells,) float64.
+
+        It is that of the pixels' means, on average over each of the cells that are asked for.
+        """
+        sums = self._sums_of_tiles(cells, 0.0)
+        if self._dark is None:  # of each colour by itself
+            _, luminance, pixels = sums
+            self._dark = DARK * luminance.sum(axis=0) / np.maximum(pixels.sum(axis=0), 1)
+        return self._of_cells(sums)
+
+    def measure_lights(self, cells: NDArray[np.bool_], light_paths: float) -> Values:
+        """Likewise of what light paths bring; light_paths: of each pixel, that the film holds."""
+        return self._of_cells(self._sums_of_tiles(cells, light_paths))
+
+    def _of_cells(self, sums: Values) -> Values:
+        """The mean over each cell's pixels of their relative variance."""
+        variance, luminance, pixels = sums
+        dark = np.zeros(2) if self._dark is None else self._dark
+        cell = self.cell[::16, None] // 2 * 2 + np.arange(2)  # of a tile's two colours
+        count = np.maximum(self.pixels, 1)
+        mean_of_cell = np.bincount(cell.ravel(), luminance.ravel(), len(count)) / count
+        mean = luminance / np.maximum(pixels, 1)
+        # A tile that a few paths have lit is as bright as its cell, for all that is known.
+        uncertain = np.minimum(divide(variance, luminance**2), 1.0)
+        bright = mean + uncertain * (mean_of_cell[cell] - mean) + dark
+        relative = divide(variance, bright**2)
+        return np.bincount(cell.ravel(), relative.ravel(), len(count)) / count
+
+    def _sums_of_tiles(self, cells: NDArray[np.bool_], light_paths: float) -> Values:
+        """Variance, luminance and number of pixels (3, tiles, 2) of each tile's two colours."""
+        stream = self.wavefront.stream
+        stream.write(self._active_cells, cells.astype(np.uint32))
+        if self.wavefront.features.weighed:
+            self._kernel.set_args(light_paths=light_paths)
+        stream.run(self._kernel, (self._tiles,))
+        sums = stream.read(self._noise_sums, np.empty((self._tiles, 2, 3), np.float32))
+        return np.moveaxis(sums.astype(float), 2, 0)
+
+
+def divide(a: Any, b: Any) -> Values:
+    """Return a / b, and 0 where b is 0."""
+    a, b = np.broadcast_arrays(a, b)
+    return np.divide(a, b, out=np.zeros(a.shape), where=b > 0.0)
