@@ -8,6 +8,7 @@ import pytest
 import clpt
 from clpt import transforms as tf
 from clpt.device import choose
+from clpt.render.lowering import scene as lowering
 from clpt.scene import Film, Scene, materials
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Path
@@ -53,7 +54,7 @@ def crowd(mode: str) -> Scene:
 def test_the_tree_and_the_choice_by_power_agree(mode, monkeypatch):
     scene = crowd(mode)
     ours = blocks(exposures(scene, 24, 16))
-    monkeypatch.setattr(scene, "TREE_FROM", 1 << 30)
+    monkeypatch.setattr(lowering, "TREE_FROM", 1 << 30)
     theirs = blocks(exposures(scene, 24, 32))
     assert_agree(ours, theirs, "tree against power")
 

@@ -81,8 +81,9 @@ class SceneIndex:
     def merged(self) -> bool:
         """Whether light paths leave photons, which paths from the camera gather."""
         integrator = self.scene.integrator
-        wanted = isinstance(integrator, Vcm) and integrator.merging
-        return wanted and integrator.max_depth not in (1, 2) and not self.shifts
+        if not isinstance(integrator, Vcm) or self.shifts:
+            return False
+        return integrator.merging and integrator.max_depth not in (1, 2)
 
     @property
     def shifts(self) -> bool:
