@@ -50,7 +50,8 @@ def view() -> cameras.Perspective:
 def traced(
     caption: str, integrator: integrators.Integrator, *, spp: int = 128, size: Any = SMALL
 ) -> Picture:
-    """The room, with a lamp below its ceiling; of what knows no surfaces that shine, a point."""
+    """The room, with a lamp below its ceiling; a point for what knows no surfaces that shine, and
+    for what finds a point's caustics."""
 
     def scene() -> Scene:
         lamp = shapes.Rectangle(
@@ -59,7 +60,7 @@ def traced(
             emission=lights.Area(radiance=(6.0, 5.6, 4.8)),
         )
         point = lights.Point(position=(0.0, 1.9, 0.2), intensity=(1.6, 1.5, 1.3))
-        whitted = isinstance(integrator, integrators.Whitted)
+        whitted = isinstance(integrator, (integrators.Whitted, integrators.Vcm))
         box = isinstance(integrator, integrators.ParticleTracer)
         picture = integrators.Film(width=size[0], height=size[1], mode="rgb")
         return Scene(
@@ -117,6 +118,11 @@ def filtered(caption: str, chosen: integrators.Filter) -> Picture:
 INTEGRATORS = {
     "path": traced(
         "All light: from wall to wall, by glass and mirrors.", integrators.Path(), spp=256
+    ),
+    "vcm": traced(
+        "A point light: its caustic on the floor, and the same in the mirror.",
+        integrators.Vcm(),
+        spp=192,
     ),
     "direct": traced("Straight from the lamp: the ceiling stays dark.", integrators.Direct()),
     "whitted": traced(

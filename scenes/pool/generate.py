@@ -139,7 +139,7 @@ def look(origin: list[float], target: list[float], fov: float) -> JSON:
     return {"type": "perspective", "fov": fov, "to_world": to_world}
 
 
-def scene(name: str, camera: JSON, light_paths: int) -> JSON:
+def scene(name: str, camera: JSON, integrator: JSON, spp: int) -> JSON:
     corners = HALF * [[-1, 1], [1, 1], [1, -1], [-1, -1]]
 
     def tiled(image: str, period: float) -> JSON:
@@ -152,8 +152,8 @@ def scene(name: str, camera: JSON, light_paths: int) -> JSON:
         "name": name,
         "camera": camera,
         "film": {"width": 480, "height": 360, "filter": {"type": "blackman_harris"}},
-        "integrator": {"type": "path", "max_depth": 12, "light_paths": light_paths},
-        "spp": 1024,
+        "integrator": {**integrator, "max_depth": 12},
+        "spp": spp,
         "materials": {
             "water": {"type": "dielectric", "int_ior": 1.333, "absorption": {"values": PURE_WATER}},
             "tiles": tiled("tiles", 1.2),
@@ -211,8 +211,9 @@ def main() -> None:
     )  # fmt: skip
     above = look([2.6, 2.6, 4], [-0.4, -0.62, -0.1], 48)
     under = look([2.3, -0.5, 1.3], [-0.6, -1.42, -0.3], 80)
-    write_scene(HERE / "scene.json", scene("pool", above, 1))
-    write_scene(HERE / "scene_under.json", scene("pool_under", under, 2))
+    write_scene(HERE / "scene.json", scene("pool", above, {"type": "vcm"}, 256))
+    both = {"type": "path", "light_paths": 2}
+    write_scene(HERE / "scene_under.json", scene("pool_under", under, both, 1024))
 
 
 if __name__ == "__main__":

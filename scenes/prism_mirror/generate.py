@@ -92,8 +92,8 @@ def scene() -> JSON:
             },
         },
         "film": {"width": 560, "height": 350, "filter": {"type": "blackman_harris"}},
-        "integrator": {"type": "path", "max_depth": 12, "light_paths": 1},
-        "spp": 2048,
+        "integrator": {"type": "vcm", "max_depth": 12},
+        "spp": 256,
         "materials": {
             "glass": {"type": "dielectric", "int_ior": "sf11"},
             "ground glass": {
