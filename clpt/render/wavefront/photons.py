@@ -16,13 +16,13 @@ NONE = 0xFFFFFFFF  # kernels/merging/none.cl
 RUN = 1024  # kernels/merging/sort.cl
 GROUP = 8  # work-items of a group
 ADVICE = "lower photon_memory"
-PROGRAM = "photons"
+PROGRAM, ROOT = "photons", "merging/sort.cl"
 
 
 class Photons:
     """The photons of one pass, which the next pass replaces.
 
-    settings: of the scene, with `photon_places` and so on; kernels: which know `arguments`.
+    settings: of the scene, with `photon_places` and so on; arguments: of kernels, by name.
 
     Raises MemoryBudgetError.
     """
@@ -54,7 +54,7 @@ class Photons:
 
     def sort(self, kernels: Kernels) -> None:
         """Enqueue that the photons of a pass are sorted, for paths from the camera to find."""
-        kernels.build({PROGRAM: device.assemble("merging/sort.cl")})
+        kernels.keep(PROGRAM, lambda: device.build(kernels.device, device.assemble(ROOT)))
         order = self.arguments["photon_order"]
         self.stream.fill(self._cells, 0, 0, 4 * (self.cells + 1))
         place = {"numbers": self._numbers, "count": self.places, "cells": self._cells}
