@@ -6,6 +6,7 @@
  * away, or off the disk's plane, are left out. */
 #include "core/octahedral.cl"
 #include "merging/cells.cl"
+#include "merging/weight.cl"
 
 #define MERGING_FLAT 0.5f    /* how far off the plane photons may lie, over the radius */
 #define MERGING_TURN 0.866f  /* least cosine between the normals */
@@ -17,8 +18,8 @@ inline Spectrum merge_photon(Photon photon, mask near, Vertex v, Scattering scat
     vec3 to = octahedral_unpack(photon.to_light), wi = to_local(scatter.shading.frame, to);
     Spectrum f = bsdf_eval(scatter.bsdf, scatter.wo, wi);
     real p = rival_pdf(scatter.bsdf, scatter.wo, wi), p_back = rival_pdf(scatter.bsdf, wi, scatter.wo);
-    real of_light = photon.rival * number * p, of_camera = rival_arrives(rival, mask_of(0), p, p_back) * p_back;
-    real w = 1.0f / (1.0f + sqr(of_light / area) + sqr(of_camera / area));
+    real of_camera = rival_arrives(rival, mask_of(0), p, p_back);
+    real w = photon_weight(photon.rival, of_camera, number, area, p, p_back);
     real share = shading_frame_share(scatter.shading, to);
     real scale = w * share / (area * max_r(fabs(dot3(v.s.n, to)), (real)(1e-3f)));
 #if USES_DISPERSION /* the pdfs of both parts for each wavelength as the hero, over their mean */

@@ -12,6 +12,7 @@
 #include "merging/area.cl"
 #include "merging/cells.cl"
 #include "merging/none.cl"
+#include "merging/weight.cl"
 #include "generated/photon.cl"
 
 STAGE(deposit)(SLAB_ARGS, SCENE_ARGS DEPOSIT_ARGS STAGE_AT_ARG)
@@ -38,8 +39,7 @@ STAGE(deposit)(SLAB_ARGS, SCENE_ARGS DEPOSIT_ARGS STAGE_AT_ARG)
 #endif
         photon.to_light = octahedral_pack(neg3(d));
         photon.normal = octahedral_pack(s.n);
-        real rival = sqrt(sqr(load_path_rival(path, at)) + sqr(load_path_pending(path, at)));
-        photon.rival = rival / max_r(fabs(dot3(s.n, d)), (real)(1e-7f));
+        photon.rival = photon_rival(load_path_rival(path, at), load_path_pending(path, at), dot3(s.n, d));
 #if USES_ABSORPTION
         integer medium = sel_i(active, load_path_medium(path, at), (integer)(0));
         real through = load_hit_t(hit, at) + sel(active, load_path_lead(path, at), (real)(0.0f));

@@ -1,0 +1,169 @@
+"""What lighting/rivals.cl asks of a scene, given as numbers, and a vertex of a path from each end.
+
+A vertex here does what kernels/integrator/path.cl and particle_tracer.cl do with the weights.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.render.codegen import lights
+from tests.kernels.scene_harness import SceneProbe
+
+LIGHT_PATHS = 3  # a sample
+LAMPS = ("infinite", "on a shape", "at a point")  # rows of lights: a ray meets the first two
+
+# The types and functions that the renderer's text has before lighting/rivals.cl, of such numbers.
+WORLD = """
+typedef struct {
+    global const Settings *settings;
+    real importance, emission, found, area;
+    mask seen, turns;
+} World;
+typedef struct { real rival, pending; integer light; } Carried;
+typedef struct { vec3 p, n; } Surface;
+typedef struct { Surface s; vec3 d; real t; integer state, depth, row; } Vertex;
+typedef struct { vec3 d; mask seen; real importance; } CameraPoint;
+typedef struct { integer shape; } Lamp;
+typedef integer Bsdf;
+
+/* A direction by its cosine to a surface whose normal is (0, 0, 1). */
+inline vec3 slanted(real cosine) { return v3(sqrt(1.0f - cosine * cosine), (real)(0.0f), cosine); }
+
+inline CameraPoint camera_point(World world)
+{
+    CameraPoint c = {v3(0.0f, 0.0f, 1.0f), world.seen, world.importance};
+    return c;
+}
+
+inline Lamp lamp(integer row)
+{
+    Lamp l = {sel_i(row == 1, (integer)(0), (integer)(-1))};
+    return l;
+}
+
+#define Scene World
+#define Slab Carried
+#define bsdf_pdf(m, wo, wi) ((real)(0.0f))
+#define shading_frame_turns(scene, row) (scene).turns
+#define camera_connect(scene, p, away, lens) camera_point(scene)
+#define merging_pass(scene, sample) (sample)
+#define merging_area(scene, pass) (scene).area
+#define light_at(scene, row) lamp(row)
+#define light_path_pdf(scene, row, p, wi, t, n) (scene).emission
+#define light_emit_pdf(scene, row, wi, t) (scene).emission
+#define light_found_pdf(scene, row, p, hemisphere, wi, t, n) (scene).found
+#define load_path_rival(path, at) (path).rival
+#define load_path_pending(path, at) (path).pending
+#define load_path_light(path, at) (path).light
+#define load_path_sample(path, at) ((integer)(0))
+#define load_path_sampled_hemisphere(path, at) v3(0.0f, 0.0f, 0.0f)
+#include "lighting/rivals.cl"
+#undef Scene
+#undef Slab
+"""
+
+GIVEN = (
+    *("rival", "pending", "sharp", "depth"),  # what the path carries
+    *("arrives", "leaves", "p", "p_back", "delta", "ends", "gathers"),  # the vertex; cosines first
+    *("importance", "seen", "emission", "found", "lamp", "area"),  # the two ends, and merging
+    "photon",  # the rival of one that is here
+)
+VERTEX = f"""
+    World world = {{scene.settings, importance, emission, found, area * gathers}};
+    world.seen = seen > 0.5f;
+    world.turns = ends > 0.5f;
+    Carried path = {{rival, pending, to_integer(lamp_row)}};
+    Surface s = {{v3(0.0f, 0.0f, 0.0f), v3(0.0f, 0.0f, 1.0f)}};
+    integer state = sel_i(sharp > 0.5f, (integer)(PATH_SHARP), (integer)(0));
+    Vertex v = {{s, slanted(-arrives), (real)(1.0f), state, to_integer(depth), (integer)(0)}};
+    vec3 onward = slanted(leaves);
+    mask is_delta = delta > 0.5f;
+    real number = (real)({LIGHT_PATHS}.0f);
+"""
+
+FROM_CAMERA = ("rival", "pending", "sharp", "met", "chosen", "merged")
+CAMERA = f"""{VERTEX}
+    Rival here = rival_of_camera(world, path, 0, v, sampler_start(0, 0, 0));
+    mask hit = lamp_row < 1.5f;
+
+    LightSample ls;
+    ls.wi = onward;
+    ls.chance = found;
+    ls.pdf = sel(hit, found, (real)(-1.0f));
+    real third = rival_of_light_sample(world, here, s, ls, p, p_back);
+    real chosen = mis_weight_of_three(ls.pdf, p, third);
+
+    rival = rival_to_light(here, s, onward, is_delta, p, p_back);
+    third = sel(depth > 0.5f, rival, (real)(0.0f)) * emission;
+    real met = mis_weight_of_three(sel(is_delta, (real)(-1.0f), p), found, third);
+    met = sel(hit, met, (real)(0.0f));
+
+    real merged = 0.0f;
+#if MERGES
+    real of_camera = rival_arrives(here, mask_of(0), p, p_back);
+    merged = photon_weight(photon, of_camera, number, area, p, p_back);
+    merged = sel(merging_here(state), merged, (real)(0.0f));
+    pending = rival_pending(here, s, onward, is_delta, p);
+    sharp = sel(here.first & rival_sharp(is_delta, p, p_back), (real)(1.0f), sharp);
+#endif
+"""
+
+FROM_LIGHT = ("rival", "pending", "sharp", "joined", "photon")
+LIGHT = f"""{VERTEX}
+    Rival here = rival_of_emission(world, path, 0, v, v3(0.0f, 0.0f, 0.0f));
+    real joined = 0.0f;
+#if JOINS_CAMERA
+    CameraPoint c = camera_point(world);
+    c.d = neg3(onward);
+    joined = 1.0f / (1.0f + rival_of_joint(here, s, c, p_back, p));
+    joined = sel(c.seen & !here.first & !rival_ends(world, v), joined, (real)(0.0f));
+#endif
+#if MERGES
+    photon = sel(sharp > 0.5f, photon_rival(rival, pending, dot3(s.n, v.d)), (real)(-1.0f));
+    pending = rival_merged(here, s, onward, is_delta, p, p_back);
+    sharp = sel(rival_sharp(is_delta, p, p_back), (real)(1.0f), (real)(0.0f));
+#endif
+    rival = rival_to_camera(here, s, onward, is_delta, p, p_back);
+"""
+
+
+class VertexProbe:
+    """A vertex of paths, from the camera or from the light; joined, merged: features of the scene.
+
+    Called with every name of GIVEN, each (n,). Returns those of FROM_CAMERA or FROM_LIGHT, each
+    (n,): `rival`, `pending` and `sharp` are carried on; `met`, `chosen`, `joined`, `merged` are
+    weights, 0 where the program leaves that way out; `photon`: the rival of the photon that the
+    light path leaves here, -1 without one.
+    """
+
+    def __init__(self, from_light: bool, joined: bool, merged: bool):
+        self.results = FROM_LIGHT if from_light else FROM_CAMERA
+        names = ["lamp_row" if name == "lamp" else name for name in GIVEN]
+        reads = "".join(f"    real {name} = x[{i}];\n" for i, name in enumerate(names))
+        writes = "".join(f"    r[{i}] = {name};\n" for i, name in enumerate(self.results))
+        flags = {"LIGHT_PATHS": from_light, "JOINS_CAMERA": joined, "MERGES": merged}
+        flags |= {"WEIGHS_LIGHT_PATHS": True, "BSDF_MERGES": merged}
+        self.probe = SceneProbe(
+            reads + (LIGHT if from_light else CAMERA) + writes,
+            len(GIVEN),
+            len(self.results),
+            files=("interface/light.cl", "merging/area.cl", "merging/weight.cl", "world.cl"),
+            lanes=1,
+            virtual={**lights.virtual_files(), "world.cl": WORLD},
+            defines={name: 1 for name, holds in flags.items() if holds},
+            settings={"light_paths": LIGHT_PATHS, "infinite_count": 1},
+        )
+
+    def __call__(self, **given: NDArray[np.floating]) -> dict[str, NDArray[np.float32]]:
+        """Run it."""
+        return dict(zip(self.results, self.probe(*(given[name] for name in GIVEN)), strict=True))
+
+
+@cache
+def vertex_probe(from_light: bool, joined: bool, merged: bool) -> VertexProbe:
+    """A probe of such features, compiled once."""
+    return VertexProbe(from_light, joined, merged)
