@@ -19,6 +19,8 @@ def before(renderer: Renderer, loading: float) -> None:
         parts.append(f"{stats.analytic:,} shapes as they are")
     _line("geometry", ", ".join(parts))
     _line("lights", f"{stats.lights:,}")
+    if stats.light_paths_reason:
+        _line("light paths", f"{stats.light_paths} a sample: {stats.light_paths_reason}")
     for name, size in stats.trees.items():
         layout = f"{first.scene.strategy.layout}, " if name == "triangles" else ""
         _line(f"tree {name}", layout + _bytes(size))

@@ -22,7 +22,7 @@ from ..formats.missing import Missing
 from ..render.lowering.checks import check
 from ..render.renderer import Renderer
 from ..scene import Scene, kinds
-from ..scene.integrators import MOST_LIGHT_PATHS
+from ..scene.integrators import AUTO, MOST_LIGHT_PATHS
 from ..scene.params import Kind, params
 from ..spectra import read_sensor, spaces
 from ..spectra.sensors import OBSERVERS
@@ -70,6 +70,15 @@ class Bytes(click.ParamType):
         return int(float(match[1]) * 1024 ** " KMGT".index(match[2].upper() or " "))
 
 
+class LightPaths(click.ParamType):
+    """A number of light paths, or auto."""
+
+    name = "N-OR-AUTO"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        return AUTO if value == AUTO else click.IntRange(0, MOST_LIGHT_PATHS)(value, param, ctx)
+
+
 class White(click.ParamType):
     """none, an illuminant, a colour temperature in K such as 3200, or a chromaticity x,y."""
 
@@ -109,8 +118,13 @@ _OPTIONS = (
         "--max-depth", type=click.IntRange(-1), help="Longest path, at most 4000; -1: no limit."
     ),
     click.option(
-        "--light-paths", type=click.IntRange(0, MOST_LIGHT_PATHS),
-        help="Of path: paths from lights for each sample, for caustics; 0: none.",
+        "--light-paths", type=LightPaths(),
+        help="Of path and vcm: paths from lights for each sample, for caustics. Of path, 0: none; "
+        "auto: one where something is sharp and a light is small.",
+    ),
+    click.option(
+        "--radius", type=click.FloatRange(0.0),
+        help="Of vcm: where photons are gathered in the first pass [m]; 0: as suits the picture.",
     ),
     click.option(
         "--sensor", type=SensorName(), help="cie1931, cie1964 or a file of three curves."
@@ -209,7 +223,8 @@ def changed(
     integrator: str | None = None,
     sampler: str | None = None,
     max_depth: int | None = None,
-    light_paths: int | None = None,
+    light_paths: int | str | None = None,
+    radius: float | None = None,
     **film: Any,
 ) -> Scene:
     """Return the scene with those settings replaced that are not None; `film`: of its film.
@@ -228,6 +243,7 @@ def changed(
     how: Any = given.get("integrator", scene.integrator)
     for name, value, what in (
         ("max_depth", max_depth, "depth"), ("light_paths", light_paths, "light paths beside it"),
+        ("radius", radius, "photons"),
     ):  # fmt: skip
         if value is None:
             continue
@@ -239,7 +255,10 @@ def changed(
 
 
 def _integrator(name: str, old: Kind) -> Any:
-    """Return an integrator of another kind, with those parameters of both that the old one sets."""
+    """Return an integrator of another kind, with those parameters of both that the old one sets.
+
+    What the old one leaves to clpt is left to the new one.
+    """
     known = kinds("integrator")
     if name not in known:
         message = f"{name!r} is none of {', '.join(known)}"
@@ -247,4 +266,4 @@ def _integrator(name: str, old: Kind) -> Any:
     usual = type(old)()
     shared = params(known[name]).keys() & params(type(old)).keys()
     given = {key: getattr(old, key) for key in shared}
-    return known[name](**{k: v for k, v in given.items() if v != getattr(usual, k)})
+    return known[name](**{k: v for k, v in given.items() if v not in (AUTO, getattr(usual, k))})

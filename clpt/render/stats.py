@@ -12,7 +12,8 @@ class RenderStats:
     """Figures of a renderer, for people and reports; `dataclasses.asdict` makes them JSON.
 
     triangles: on the device; triangles_instanced: as many as instances show; analytic: shapes that
-    are intersected without triangles; lights: rows to choose from. tables, trees: bytes by name;
+    are intersected without triangles; lights: rows to choose from; light_paths: for each sample;
+    light_paths_reason: why, where the scene says "auto", else "". tables, trees: bytes by name;
     memory: bytes of all buffers on the device. programs: built before the first sample;
     programs_cached: those of them that were in clpt's cache (a driver does not tell what it takes
     from its own). seconds: of `lower`, `trees` and `programs`; from the start to `ready`, when
@@ -24,6 +25,8 @@ class RenderStats:
     instances: int
     analytic: int
     lights: int
+    light_paths: int
+    light_paths_reason: str
     tables: dict[str, int]
     trees: dict[str, int]
     memory: int
@@ -50,6 +53,8 @@ def collect(
         instances=len(instances.rows),
         analytic=len(lowered.boxes),
         lights=int(lowered.settings["light_count"]),
+        light_paths=int(lowered.settings["light_paths"]),
+        light_paths_reason=lowered.light_paths_reason,
         # A table that the scene does not need has one word.
         tables={name: array.nbytes for name, array in arrays.items() if array.size > 1},
         trees=scene.trees.bytes,

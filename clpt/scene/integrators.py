@@ -30,6 +30,7 @@ IDS = ("shape_id", "primitive_id")  # of these, which are names: a mean of them 
 
 MOST_BANDS = 1024
 MOST_LIGHT_PATHS = 64  # for a sample of the camera
+AUTO = "auto"  # light paths as suits the scene
 MOST_GROUPS = 64  # of wavelengths
 NARROWEST = 0.01  # [nm], a range of wavelengths
 
@@ -56,17 +57,23 @@ class Path(Integrator):
 
     With `light_paths` paths start at lights too: each vertex is joined to the camera, and weighed
     against what the camera's paths find. Caustics that the camera sees directly converge then. The
-    camera must be `perspective` or `thin_lens`.
+    camera must be `perspective` or `thin_lens`. With "auto" there is one for each sample where
+    something is sharp and a light is small, else none.
     """
 
     max_depth: int = host(8, "longest path; -1: no limit")
     rr_depth: int = host(3, "depth from which Russian roulette may end a path")
     hide_lights: bool = flag(False, "the camera sees through lights, also those on shapes")
-    light_paths: int = host(0, "paths from lights for each sample, weighed against it; 0: none")
+    light_paths: int | str = host(
+        0,
+        "paths from lights for each sample, weighed against it; 0: none; auto: as suits the scene",
+        form="number_or_auto",
+    )
 
     def check(self) -> None:
         super().check()
-        _check_whole(self, "light_paths", 0, MOST_LIGHT_PATHS)
+        if self.light_paths != AUTO:
+            _check_whole(self, "light_paths", 0, MOST_LIGHT_PATHS, f", or {AUTO!r}")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -99,12 +106,13 @@ class Vcm(Integrator):
         _check_whole(self, "photon_memory", 1, 1 << 20)
 
 
-def _check_whole(integrator: Integrator, name: str, least: int, most: int) -> None:
-    """Raise SceneError for a parameter that is no whole number between two."""
+def _check_whole(integrator: Integrator, name: str, least: int, most: int, other: str = "") -> None:
+    """Raise SceneError for a parameter that is no whole number between two; other: what it may be
+    instead."""
     value: Any = getattr(integrator, name)
     whole = isinstance(value, int) and not isinstance(value, bool)
     if not whole or not least <= value <= most:
-        message = f"must be a whole number from {least} to {most}, not {value!r}"
+        message = f"must be a whole number from {least} to {most}{other}, not {value!r}"
         raise SceneError(message, where=f"{integrator.kind}.{name}")
 
 

@@ -274,8 +274,29 @@ def _depths(props: Properties) -> dict[str, Any]:
 
 
 def _path(props: Properties) -> Integrator:
-    # ours: Mitsuba's path has no such parameter
-    return integrators.Path(**_depths(props), light_paths=props.integer("light_paths", 0, 0))
+    return integrators.Path(**_depths(props), light_paths=_light_paths(props))
+
+
+def _light_paths(props: Properties) -> int | str:
+    """Ours, see docs/mitsuba_plugins.md: Mitsuba's path has no such parameter."""
+    child = props.named.get("light_paths")
+    if child is not None and child.tag == "string":
+        return props.text("light_paths", "", (integrators.AUTO,))
+    return props.integer("light_paths", 0)
+
+
+def _vcm(props: Properties) -> Integrator:
+    """Ours, see docs/mitsuba_plugins.md."""
+    usual = integrators.Vcm
+    return usual(
+        **_depths(props),
+        light_paths=props.integer("light_paths", usual.light_paths),
+        light_tracing=props.flag("light_tracing", usual.light_tracing),
+        merging=props.flag("merging", usual.merging),
+        radius=props.number("radius", usual.radius),
+        wavelength_groups=props.integer("wavelength_groups", usual.wavelength_groups),
+        photon_memory=props.integer("photon_memory", usual.photon_memory),
+    )
 
 
 def _direct(props: Properties) -> Integrator:
@@ -328,6 +349,7 @@ def _moment(props: Properties) -> Integrator:
 
 INTEGRATORS: dict[str, Callable[[Properties], Integrator]] = {
     "path": _path,
+    "vcm": _vcm,
     "direct": _direct,
     "ptracer": _particle_tracer,
     "aov": _aov,

@@ -20,6 +20,7 @@ from clpt.formats.native.json_schema import NUMBER, NUMBERS, STRING, TRIPLE, Sch
 from clpt.formats.native.spectra import kind_name
 from clpt.formats.native.transforms import matrix
 from clpt.scene import kinds
+from clpt.scene.integrators import AUTO
 from clpt.scene.params import ORDERS, SPECTRUM_ROLES, Kind, Param
 from clpt.scene.shapes import SMOOTH
 from clpt.scene.textures import ATTRIBUTES, Texture
@@ -183,6 +184,10 @@ def _number_or_list(cursor: Cursor) -> Any:
     return cursor.numbers() if isinstance(cursor.value, list) else cursor.number()
 
 
+def _number_or_auto(cursor: Cursor) -> int | str:
+    return AUTO if cursor.value == AUTO else cursor.integer()
+
+
 def _cube_images(cursor: Cursor, reader: Reader) -> Any:
     if isinstance(cursor.value, list):
         return [reader.image(entry) for entry in cursor.entries(6)]
@@ -282,6 +287,11 @@ FORMS: dict[str, Form] = {
         "four whole numbers",
         {"type": "array", "items": WHOLE, "minItems": 4, "maxItems": 4},
         _integers,
+    ),
+    "number_or_auto": _of_cursor(
+        f"whole number, or `{AUTO}`",
+        {"anyOf": [{"type": "integer"}, {"const": AUTO}]},
+        _number_or_auto,
     ),
     "rows2": _rows(2),
     "rows3": _rows(3),

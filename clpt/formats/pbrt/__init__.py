@@ -39,7 +39,7 @@ def load(path: Path, progress: Progress | None = None, missing: Missing = "error
         camera=camera_film.camera(camera, film),
         shapes=build_scene.shapes(contents, progress),
         lights=build_scene.lights(contents),
-        integrator=films.integrator(options.get("Integrator")),
+        integrator=films.integrator(options.get("Integrator"), film),
         sampler=sampler,
         film=film,
         spp=spp,

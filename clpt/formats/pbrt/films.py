@@ -12,7 +12,7 @@ from clpt.errors import UnknownKindError
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.state import Definition, State
 from clpt.scene import integrators
-from clpt.scene.integrators import Film, Filter, Integrator, Sampler
+from clpt.scene.integrators import MOST_LIGHT_PATHS, Film, Filter, Integrator, Sampler
 
 FILMS = ("rgb", "gbuffer", "spectral")
 SPACES = {"srgb": "rec709", "rec2020": "rec2020", "dci-p3": "display_p3"}
@@ -176,33 +176,51 @@ OTHERS = {  # what finds light in other ways than from the camera alone
     "mlt": (
         "bootstrapsamples", "chains", "mutationsperpixel", "largestepprobability", "sigma",
     ),
-    "sppm": ("photonsperiteration", "radius", "seed"),
     "lightpath": (),
 }  # fmt: skip
 CAUSTICS = (
     "paths are traced from the camera instead: light of a point, spot or distant light that comes "
     "through smooth glass or from a mirror is missing, and caustics of small lamps are noisy; "
-    "--integrator particle_tracer finds both"
+    "--integrator vcm finds both"
+)
+PHOTONS = (
+    "its photons are those of vcm: they count beside paths from the camera and from lights, where "
+    "something sharp has gathered light; the radius is one for all pixels, and shrinks by the "
+    "number of passes, not by the photons found"
 )
 IGNORED = ("regularize", "lightsampler", "rrthreshold", "samplelights", "samplebsdf")
 MOST_DEPTH = 2**31 - 2
 
 
-def integrator(definition: Definition | None) -> Integrator:
-    """Make the path tracer that stands for pbrt's integrator; its depth counts one less."""
+def integrator(definition: Definition | None, film: Film) -> Integrator:
+    """Make what stands for pbrt's integrator; its depth counts one less.
+
+    film: whose pixels share pbrt's photons.
+    """
     if definition is None:
         return integrators.Path(max_depth=6)
     params, state = definition.params, definition.state
     if definition.kind in ("ao", "function"):
         raise params.error("this integrator shows no light; use 'path'")
-    if definition.kind not in (*LIGHT_PATHS, *OTHERS):
-        raise UnknownKindError(
-            "integrator", definition.kind, (*LIGHT_PATHS, *OTHERS), **params.location()
-        )
+    known = (*LIGHT_PATHS, *OTHERS, "sppm")
+    if definition.kind not in known:
+        raise UnknownKindError("integrator", definition.kind, known, **params.location())
     if definition.kind in OTHERS:
         state.warn(params, CAUSTICS)
     params.ignore(*IGNORED, *OTHERS.get(definition.kind, ()))
     depth = params.one("maxdepth", "integer", 5)
     if depth < 0:
         raise params.error(f"'maxdepth' cannot be negative: {depth}")
-    return integrators.Path(max_depth=min(depth, MOST_DEPTH) + 1)
+    longest = min(depth, MOST_DEPTH) + 1
+    if definition.kind != "sppm":
+        return integrators.Path(max_depth=longest)
+    state.warn(params, PHOTONS)
+    return integrators.Vcm(max_depth=longest, **_photons(params, film))
+
+
+def _photons(params: Parameters, film: Film) -> dict[str, Any]:
+    """What `sppm` says of its photons; pbrt's own radius of 1 suits no scene of another size."""
+    params.ignore("seed")
+    radius = params.above_zero("radius", 0.0) if "radius" in params else 0.0
+    each = params.one("photonsperiteration", "integer", -1) / math.prod(film.size)
+    return {"radius": radius, "light_paths": min(max(round(each), 1), MOST_LIGHT_PATHS)}

@@ -65,7 +65,10 @@ class SceneIndex:
 
     @property
     def weighed(self) -> int:
-        """Light paths for each camera sample, weighed against it; 0: there are none."""
+        """Light paths for each camera sample, weighed against it; 0: there are none.
+
+        Where the scene says "auto" nothing may ask before `hard_light.decided` has chosen.
+        """
         wanted: int = getattr(self.scene.integrator, "light_paths", 0)
         return wanted if self.joined or self.merged else 0
 

@@ -30,6 +30,7 @@ from clpt.render.lowering.geometry.geometry import (
 from clpt.render.lowering.geometry.instancing import Instances
 from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.lights.aims import aims
+from clpt.render.lowering.lights.hard_light import decided
 from clpt.render.lowering.lights.lights import LightRows, light_rows
 from clpt.render.lowering.lowering_cache import LoweringCache
 from clpt.render.lowering.materials.material_words import MaterialWords
@@ -52,8 +53,9 @@ class Lowered:
     instances: what trees are built of, see `Geometry`. tables: every other read-only array by name;
     where an instance's tree begins is filled in when trees are built. zero_copy: tables that are
     the caller's buffers. owners: of each row of `shapes`. glass_row: of the camera, see
-    `lower_camera`. encoder: what made the tables, for values that are edited. cache: what the next
-    lowering need not make again.
+    `lower_camera`. light_paths_reason: why there are as many, "" where the scene says a number.
+    encoder: what made the tables, for values that are edited. cache: what the next lowering need
+    not make again.
     """
 
     features: Features
@@ -68,6 +70,7 @@ class Lowered:
     owners: tuple[Owner, ...]
     glass_row: int
     warnings: tuple[str, ...]
+    light_paths_reason: str
     encoder: Encoder
     cache: LoweringCache
 
@@ -93,8 +96,8 @@ def lower(
     """Lower a scene; of the `aov` integrator, for its first channel.
 
     texture_budget: [bytes] for images, None for any number. former: of a scene that has much in
-    common with this one; it only saves time. Arrays, lights and images that are the same objects as
-    then are taken to hold the same.
+    common with this one: it saves time, and light paths that are "auto" stay as many. Arrays,
+    lights and images that are the same objects as then are taken to hold the same.
 
     Raises SceneError where the scene makes no sense: it names the shape, light or material.
     """
@@ -104,10 +107,12 @@ def lower(
     ends = film.lambda_min, film.lambda_max
     wavelengths = density(index) if index.spectral else Density(*ends)
     encoder = Encoder(index.mode, *ends, sensor(film), wavelengths, texture_budget, cache)
-    density_row, tabulated, profile = _lower_film(index, encoder, wavelengths)
     materials = _begin_materials(index, encoder)
     geometry = lower_geometry(index, encoder, materials)
     sphere = geometry.bounding_sphere()
+    before = int(former.settings["light_paths"]) if former else None
+    index, why = decided(index, geometry, encoder, sphere[1], before)
+    density_row, tabulated, profile = _lower_film(index, encoder, wavelengths)
     lights = _lower_lights(index, encoder, geometry, sphere[1])
     targets = aims(index, geometry, sphere[1])
     first_aim = encoder.store.append_floats("distributions", targets)
@@ -141,6 +146,7 @@ def lower(
         owners=geometry.owners,
         glass_row=glass_row,
         warnings=warnings,
+        light_paths_reason=why,
         encoder=encoder,
         cache=cache,
     )

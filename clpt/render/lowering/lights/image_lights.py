@@ -28,6 +28,7 @@ from clpt.spectral_exr import SpectralImage
 
 Array = NDArray[np.float32]
 
+PARTS = 128  # of an image's side, in which bright directions are told from dark ones
 UNSEEN = 0.1  # share of the mean over bands in the weight of a texel: light of no colour counts too
 
 FACES = "+x -x +y -y +z -z"
@@ -58,16 +59,10 @@ def lower_image(lamp: Envmap | CubeMap, encoder: Encoder) -> tuple[dict[str, Arr
     Those of a spectral image have `bands`. Raises SceneError for what is no image, or a transform
     that is more than a rotation.
     """
-    axes = _axes(lamp)
-    made: _Content
-    given = lamp.image, lamp.scale, encoder.spectra.spectral
-    by = version(lamp.image), *given[1:]
+    axes, made = _axes(lamp), _content(lamp, encoder)
     if isinstance(lamp, Envmap):
-        ends = encoder.spectra.range
-        made = encoder.cache(_sphere, *given, *ends, by=(*by, *ends))
         cell = np.pi / (made.height - 1) * 2.0 * np.pi / made.width
     else:
-        made = encoder.cache(_cube, *given, by=by)
         cell = made.width**-2.0
     members: dict[str, ArrayLike] = {name: axes[:, i] for i, name in enumerate("xyz")}
     members |= {
@@ -85,6 +80,46 @@ def lower_image(lamp: Envmap | CubeMap, encoder: Encoder) -> tuple[dict[str, Arr
     if made.number is not None:
         members |= {"bands": made.bands, "number": encoder.spectra.row(made.number)}
     return members, made.grid.total * cell / (4.0 * np.pi)
+
+
+def extent(lamp: Envmap | CubeMap, encoder: Encoder, share: float) -> float:
+    """Return the part of the sphere, from 0 to 1, in whose brightest directions a share of an image
+    light's power is; 1 of a black one. It is counted in blocks, PARTS along each side of an image.
+
+    Raises SceneError for what is no image.
+    """
+    made = _content(lamp, encoder)
+    if isinstance(lamp, Envmap):
+        column = _latitude_weights(np.ones((made.height, 1), np.float32))[None, :, :1]
+        even: NDArray[Any] = np.broadcast_to(column, made.corners.shape)
+    else:
+        even = _cube_weights(np.ones((6, made.height + 2, made.width + 2), np.float32))
+    power, angle = _in_parts(made.corners), _in_parts(even)
+    brightest = np.argsort(-power / angle)
+    sums = np.cumsum(power[brightest])
+    if not sums[-1] > 0.0:
+        return 1.0
+    held = np.searchsorted(sums, share * sums[-1]) + 1
+    return float(angle[brightest[:held]].sum() / angle.sum())
+
+
+def _in_parts(weights: NDArray[Any]) -> NDArray[np.float64]:
+    """Sums (n,) over the blocks of grids (k, rows, columns)."""
+    sums = weights
+    for axis in (2, 1):
+        length = weights.shape[axis]
+        sums = np.add.reduceat(sums, np.arange(0, length, -(-length // PARTS)), axis=axis)
+    return sums.ravel().astype(np.float64)
+
+
+def _content(lamp: Envmap | CubeMap, encoder: Encoder) -> _Content:
+    """What an image light is made of, found once."""
+    given = lamp.image, lamp.scale, encoder.spectra.spectral
+    by = version(lamp.image), *given[1:]
+    if isinstance(lamp, CubeMap):
+        return encoder.cache(_cube, *given, by=by)
+    ends = encoder.spectra.range
+    return encoder.cache(_sphere, *given, *ends, by=(*by, *ends))
 
 
 def _sphere(given: Any, scale: float, spectral: bool, lo: float, hi: float) -> _Content:

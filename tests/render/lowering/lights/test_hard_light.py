@@ -1,0 +1,183 @@
+"""Light paths that are "auto": there are some where something sharp meets a small light."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+
+from clpt import transforms as tf
+from clpt.render.lowering.lights import image_lights
+from clpt.render.lowering.scene import Lowered, lower
+from clpt.scene import Film, Scene
+from clpt.scene import materials as m
+from clpt.scene.cameras import Orthographic, Perspective, ThinLens
+from clpt.scene.integrators import Path
+from clpt.scene.lights import (
+    Area,
+    Constant,
+    CubeMap,
+    Directional,
+    Envmap,
+    Goniometric,
+    Light,
+    Point,
+    Projector,
+    Spot,
+)
+from clpt.scene.shapes import Cube, Group, Instance, Rectangle, Shape, Sphere, Spheres
+
+ROOM = Cube(flip_normals=True, material=m.Diffuse())  # from -1 to 1
+BALL = Sphere(center=(0.3, -0.5, 0.2), radius=0.3, material=m.Dielectric())
+LAMP = Point(position=(0.0, 0.8, 0.0))
+
+
+def scene_of(*shapes: Shape, lights: Any = (LAMP,), **given: Any) -> Scene:
+    """The shapes under a lamp, by "auto" unless another integrator is given."""
+    usual = {"camera": Perspective(), "integrator": Path(light_paths="auto")}
+    film = Film(width=8, height=8, mode=given.pop("mode", "rgb"))
+    return Scene(shapes=list(shapes), lights=list(lights), film=film, **{**usual, **given})
+
+
+def chosen(scene: Scene, former: Lowered | None = None) -> tuple[int, str]:
+    """How many light paths a sample has, and why."""
+    lowered = lower(scene, former=former)
+    return int(lowered.settings["light_paths"]), lowered.light_paths_reason
+
+
+def sky(share: float, side: int = 64) -> np.ndarray:
+    """A sky of 1 with a sun of about 2 degrees, which has a share of all its power."""
+    rows, columns = np.indices((side, 2 * side))
+    image = np.ones((side, 2 * side, 3), np.float32)
+    sun = (abs(rows - side // 4) < 1) & (abs(columns - side) < 1)
+    weights = np.sin(np.pi * rows / (side - 1))  # of texels, rows from pole to pole
+    image[sun] = share / (1.0 - share) * weights[~sun].sum() / weights[sun].sum()
+    return image
+
+
+@pytest.mark.parametrize(
+    "lamp",
+    [
+        LAMP,
+        Spot(),
+        Projector(),
+        Goniometric(),
+        Directional(),
+        Envmap(image=sky(0.4)),
+    ],
+    ids=lambda lamp: lamp.kind,
+)
+def test_small_lights(lamp: Light) -> None:
+    assert chosen(scene_of(ROOM, BALL, lights=[Constant(), lamp])) == (
+        1,
+        "sphere is sharp, and lights[1] is a small light",
+    )
+
+
+@pytest.mark.parametrize(
+    "lamp",
+    [
+        Constant(),
+        Point(falloff=False),
+        Envmap(image=np.ones((8, 16, 3))),
+        Envmap(image=np.zeros((8, 16, 3))),
+        Envmap(image=sky(0.1)),
+        CubeMap(image=np.ones((6, 4, 4, 3))),
+    ],
+    ids=lambda lamp: lamp.kind,
+)
+def test_large_lights(lamp: Light) -> None:
+    assert chosen(scene_of(ROOM, BALL, lights=[lamp])) == (0, "no light is small")
+
+
+@pytest.mark.parametrize(
+    ("height", "limit"), [(0.8, 0.08), (0.0, 3**0.5 / 40)], ids=["above", "in the middle"]
+)
+def test_a_ball_that_shines_is_small_below_a_tenth_of_its_distance(
+    height: float, limit: float
+) -> None:
+    """4 pi r^2 is 1 % of 4 pi d^2; d is a fourth of the room's radius or more."""
+    for radius, number in ((0.99 * limit, 1), (1.01 * limit, 0)):
+        lamp = Sphere(center=(0.0, height, 0.0), radius=radius, emission=Area())
+        assert chosen(scene_of(ROOM, BALL, lamp, lights=()))[0] == number
+        balls = Spheres(centers=[[0.0, height, 0.0]], radii=radius, emission=Area())
+        assert chosen(scene_of(ROOM, BALL, balls, lights=()))[0] == number
+
+
+def test_triangles_that_shine_are_small_by_their_area() -> None:
+    """The area of a square of side 2 s is 4 s^2, of a cube's faces 24 s^2."""
+    for shape, faces in ((Rectangle, 1), (Cube, 6)):
+        limit = (0.01 * np.pi * 0.8**2 / faces) ** 0.5
+        for side, number in ((0.98 * limit, 1), (1.02 * limit, 0)):
+            to_world = tf.translate([0.0, 0.8, 0.0]) @ tf.scale(side)
+            lamp = shape(to_world=to_world, emission=Area(), name="lamp")
+            number_, reason = chosen(scene_of(ROOM, BALL, lamp, lights=()))
+            assert number_ == number and ("'lamp' is a small" in reason) == bool(number)
+
+
+GLASS_LENS = ThinLens(glass="bk7", focal_length=0.05)
+
+
+@pytest.mark.parametrize(
+    ("scene", "words"),
+    [
+        (scene_of(ROOM), "nothing is sharp"),
+        (scene_of(dataclasses.replace(ROOM, material=m.Conductor()), BALL), "nothing dull"),
+        (scene_of(BALL, Sphere(material=m.Null())), "nothing dull"),
+        (scene_of(BALL, Rectangle(material=m.BumpMap())), "nothing dull"),
+        (scene_of(BALL, Sphere(emission=Area())), "nothing dull"),
+        (scene_of(ROOM, BALL, camera=Orthographic()), "cannot be joined"),
+        (scene_of(ROOM, BALL, camera=GLASS_LENS, mode="spectral"), "cannot be joined"),
+        (scene_of(ROOM, BALL, integrator=Path(max_depth=2, light_paths="auto")), "too short"),
+    ],
+)  # fmt: skip
+def test_where_there_are_none(scene: Scene, words: str) -> None:
+    number, reason = chosen(scene)
+    assert number == 0 and words in reason
+
+
+def test_one_material_may_be_sharp_and_dull() -> None:
+    waxed = m.Blend(first=m.Diffuse(), second=m.Conductor(), weight=0.5)
+    assert chosen(scene_of(dataclasses.replace(ROOM, material=waxed)))[0] == 1
+
+
+def test_what_instances_show_counts() -> None:
+    group = Group(shapes=[BALL])
+    copies = [Instance(group=group, to_world=tf.translate([x, 0.0, 0.0])) for x in (-0.3, 0.3)]
+    assert chosen(scene_of(ROOM, *copies))[0] == 1
+    assert chosen(scene_of(*copies))[0] == 0
+
+
+@pytest.mark.parametrize(("shapes", "number"), [([ROOM], 0), ([ROOM, BALL], 1)])
+@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+def test_all_is_as_with_the_number(shapes: list[Shape], number: int, mode: str) -> None:
+    made = lower(scene_of(*shapes, mode=mode))
+    other = lower(scene_of(*shapes, mode=mode, integrator=Path(light_paths=number)))
+    assert made.features == other.features and made.warnings == other.warnings
+    assert made.settings == other.settings and other.light_paths_reason == ""
+    assert made.features.weighed == (number > 0)
+    for name, table in other.tables.items():
+        assert np.array_equal(made.tables[name].view(np.uint32), table.view(np.uint32)), name
+
+
+def test_an_edit_keeps_the_number() -> None:
+    """A film has a place for light paths, or none, as long as it lives."""
+    sharp, dull = scene_of(ROOM, BALL), scene_of(ROOM)
+    assert chosen(dull, former=lower(sharp)) == (1, "as before the scene was edited")
+    assert chosen(sharp, former=lower(dull))[0] == 0
+
+
+def test_the_extent_of_an_image() -> None:
+    """Above 3, below 1: half of the power is in two thirds of the half above."""
+    above = np.ones((256, 4, 3), np.float32)
+    above[:128] = 3.0
+    faces = np.ones((6, 64, 64, 3), np.float32)
+    faces[2] = 3.0
+    for i in (0, 1, 4, 5):
+        faces[i, :32] = 3.0
+    made = lower(scene_of(ROOM))
+    for lamp in (Envmap(image=above), CubeMap(image=faces)):
+        for share, part in ((0.5, 1 / 3), (0.75, 1 / 2), (1.0, 1.0)):
+            assert image_lights.extent(lamp, made.encoder, share) == pytest.approx(part, abs=0.01)
