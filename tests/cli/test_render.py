@@ -22,6 +22,7 @@ from clpt.cli.scene_options import changed
 from clpt.errors import SceneError
 from clpt.formats import load
 from clpt.render.renderer import Renderer
+from clpt.scene.integrators import Whitted
 from clpt.spectra import read_sensor
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -205,10 +206,12 @@ def test_quiet_says_nothing(tmp_path, capfd):
 def test_verbose_tells_of_tables_and_stages(tmp_path, capsys):
     path = tmp_path / "out.png"
     arguments = ["-o", str(path), "--size", "8x8", "--spp", "1", "--verbose"]
+    arguments += ["--light-paths", "auto"]
     assert run(["render", CORNELL, *arguments]) == 0
     told = capsys.readouterr().err
     expected = ("36 triangles", "tree triangles", "table vertices", "from clpt's cache",
                 "seconds to load", "seconds until ready", "seconds until a sample",
+                "0 a sample: nothing is sharp",
                 "stage loop" if device.choose().info.is_cpu else "stage shade_diffuse")  # fmt: skip
     for words in expected:
         assert words in told
@@ -290,8 +293,16 @@ def test_changes_of_a_scene():
     assert changed(load(CORNELL), max_depth=3).integrator.max_depth == 3
     both = changed(load(CORNELL), max_depth=3, light_paths=2).integrator
     assert (both.max_depth, both.light_paths) == (3, 2)
+    photons = changed(load(CORNELL), integrator="vcm", light_paths=2, radius=0.5).integrator
+    assert (photons.kind, photons.light_paths, photons.radius) == ("vcm", 2, 0.5)
+    auto = changed(load(CORNELL), light_paths="auto")
+    assert auto.integrator.light_paths == "auto"
+    assert changed(auto, integrator="vcm").integrator.light_paths == 1  # vcm has no "auto"
     assert changed(load(CORNELL), sampler="independent").sampler.kind == "independent"
-    assert changed(load(CORNELL), integrator="whitted").integrator.max_depth == 8  # as it was
+    deep = changed(load(CORNELL), max_depth=7)
+    assert changed(deep, integrator="whitted").integrator.max_depth == 7  # as it was
+    usual = changed(load(CORNELL), integrator="whitted").integrator
+    assert usual.max_depth == Whitted.max_depth  # nothing was set
 
 
 @pytest.mark.parametrize(
@@ -308,6 +319,11 @@ def test_changes_of_a_scene():
         (["--integrator", "magic"], "whitted"),
         (["--integrator", "direct", "--max-depth", "3"], "no depth"),
         (["--integrator", "direct", "--light-paths", "1"], "no light paths"),
+        (["--light-paths", "65"], "--light-paths"),
+        (["--light-paths", "many"], "--light-paths"),
+        (["--integrator", "vcm", "--light-paths", "auto"], "whole number from 1"),
+        (["--radius", "0.1"], "no photons"),
+        (["--integrator", "vcm", "--radius", "-1"], "--radius"),
         (["--device", "no such device"], "is not there"),
         (["-o", "picture.jpeg"], ".exr"),
         (["-o", "no/such/folder/a.png"], "folder"),

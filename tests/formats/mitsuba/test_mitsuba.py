@@ -84,6 +84,27 @@ def test_light_paths_are_a_parameter_of_ours(scene):
     path = '<integrator type="path"><integer name="light_paths" value="2"/></integrator>'
     assert scene(path).integrator.light_paths == 2
     assert scene('<integrator type="path"/>').integrator.light_paths == 0
+    auto = path.replace("integer", "string").replace('"2"', '"auto"')
+    assert scene(auto).integrator.light_paths == "auto"
+    with pytest.raises(SceneError, match=r"scene.xml:2: .*'many' is none of auto"):
+        scene(auto.replace("auto", "many"))
+
+
+def test_vcm_is_an_integrator_of_ours(scene):
+    given = {"max_depth": 9, "rr_depth": 4, "light_paths": 2, "wavelength_groups": 3}
+    given |= {"photon_memory": 40, "radius": 0.25, "merging": False, "light_tracing": False}
+    tags = {int: "integer", float: "float", bool: "boolean"}
+    inner = "".join(
+        f'<{tags[type(value)]} name="{name}" value="{str(value).lower()}"/>'
+        for name, value in given.items()
+    )
+    made = scene(f'<integrator type="vcm">{inner}</integrator>').integrator
+    assert vars(made) == {**vars(integrators.Vcm()), **given}
+    usual = scene('<integrator type="vcm"/>').integrator
+    assert vars(usual) == {**vars(integrators.Vcm()), "max_depth": -1, "rr_depth": usual.rr_depth}
+    none = '<integrator type="vcm"><integer name="light_paths" value="0"/></integrator>'
+    with pytest.raises(SceneError, match=r"scene.xml:2: .*light_paths.*from 1 to 64"):
+        scene(none)
 
 
 def test_include_and_path(scene, tmp_path):

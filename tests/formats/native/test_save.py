@@ -70,6 +70,7 @@ VALUES: dict[str, Any] = {
     "triangles": ROWS,
     "lengths": (5,),
     "number_or_list": 0.5,
+    "number_or_auto": "auto",
     "image": TEXELS,
     "cube_images": NEEDED[lights.CubeMap]["image"],
     "group": GROUP,

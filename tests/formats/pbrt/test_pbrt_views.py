@@ -160,13 +160,35 @@ def test_filters(scene, text, expected):
     assert type(made) is type(expected) and vars(made) == vars(expected)
 
 
-@pytest.mark.parametrize("kind", ["bdpt", "mlt", "sppm", "lightpath"])
+@pytest.mark.parametrize("kind", ["bdpt", "mlt", "lightpath"])
 def test_what_a_path_tracer_misses_is_told(scene, kind):
     made = scene(f'Integrator "{kind}"')
     (warning,) = made.warnings
     assert kind in warning and type(made.integrator) is integrators.Path
-    for word in ("point, spot or distant light", "smooth glass", "is missing", "particle_tracer"):
+    for word in ("point, spot or distant light", "smooth glass", "is missing", "vcm finds"):
         assert word in warning
+
+
+@pytest.mark.parametrize(
+    ("photons", "light_paths"),
+    [("", 1), ("-1", 1), ("600", 1), ("1800", 3), ("1000000", 64)],
+)
+def test_photons_are_those_of_vcm(scene, photons, light_paths):
+    """Light paths for each pixel, of 20 x 30."""
+    film = 'Film "rgb" "integer xresolution" 20 "integer yresolution" 30\n'
+    given = f'"integer photonsperiteration" {photons}' if photons else ""
+    made = scene(f'{film}Integrator "sppm" "float radius" 0.25 "integer maxdepth" 7 {given}')
+    (warning,) = made.warnings
+    assert "sppm" in warning and "passes" in warning
+    expected = integrators.Vcm(max_depth=8, radius=0.25, light_paths=light_paths)
+    assert type(made.integrator) is integrators.Vcm
+    assert vars(made.integrator) == vars(expected)
+
+
+def test_a_radius_that_is_not_given_suits_the_picture(scene):
+    assert scene('Integrator "sppm"').integrator.radius == 0.0
+    with pytest.raises(SceneError, match=r"a.pbrt:1: .*radius.*must be positive"):
+        scene('Integrator "sppm" "float radius" 0')
 
 
 def test_samplers_and_integrators(scene):
