@@ -111,7 +111,7 @@ def lower(
     geometry = lower_geometry(index, encoder, materials)
     sphere = geometry.bounding_sphere()
     before = int(former.settings["light_paths"]) if former else None
-    index, why = decided(index, geometry, encoder, sphere[1], before)
+    index, why = decided(index, geometry, encoder, sphere, before)
     density_row, tabulated, profile = _lower_film(index, encoder, wavelengths)
     lights = _lower_lights(index, encoder, geometry, sphere[1])
     targets = aims(index, geometry, sphere[1])

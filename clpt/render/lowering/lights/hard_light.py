@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clpt.render.contract import shape_records
 from clpt.render.lowering.camera import cameras
@@ -31,24 +32,26 @@ NEAR = 0.25  # of the scene's radius: a light counts as no nearer to what it shi
 SUN = 0.25  # of an image's power: where it comes from a small part the image is a small light
 FEWEST = 3  # edges of a path from a light over two surfaces to the camera: the shortest caustic
 
+Ball = tuple[NDArray[np.float64], float]  # centre and radius
+
 
 def decided(
     index: SceneIndex,
     geometry: Geometry,
     encoder: Encoder,
-    scene_radius: float,
+    sphere: Ball,
     former: int | None = None,
 ) -> tuple[SceneIndex, str]:
     """Return the index with a number in the place of "auto", and the reason as a sentence.
 
-    The sentence is empty where the scene says a number. scene_radius: of a sphere around the scene
-    [m]; former: the number of a renderer that goes on with this scene, whose film has a place for
-    light paths or none. Raises SceneError for an image light that is broken.
+    The sentence is empty where the scene says a number. sphere: centre and radius of one around the
+    scene [m]; former: the number of a renderer that goes on with this scene, whose film has a place
+    for light paths or none. Raises SceneError for an image light that is broken.
     """
     if getattr(index.scene.integrator, "light_paths", None) != AUTO:
         return index, ""
     if former is None:
-        number, reason = _choice(index, geometry, encoder, scene_radius)
+        number, reason = _choice(index, geometry, encoder, sphere)
     else:
         number, reason = former, "as before the scene was edited"
     integrator: Any = replace(index.scene.integrator, light_paths=number)  # type: ignore[call-arg]
@@ -56,7 +59,7 @@ def decided(
 
 
 def _choice(
-    index: SceneIndex, geometry: Geometry, encoder: Encoder, scene_radius: float
+    index: SceneIndex, geometry: Geometry, encoder: Encoder, sphere: Ball
 ) -> tuple[int, str]:
     """The number of light paths for each sample, and why; what is cheap to know is asked first."""
     scene = index.scene
@@ -69,7 +72,7 @@ def _choice(
         return 0, "nothing is sharp"
     if _first_with((one for one in index.shapes if one.emission is None), _is_dull) is None:
         return 0, "there is nothing dull for a caustic to be seen on"
-    small = next(_small_lights(index, geometry, encoder, scene_radius), None)
+    small = next(_small_lights(index, geometry, encoder, sphere), None)
     if small is None:
         return 0, "no light is small"
     return 1, f"{shapes.where(sharp)} is sharp, and {small} is a small light"
@@ -95,16 +98,16 @@ def _is_dull(material: mt.Material) -> bool:
 
 
 def _small_lights(
-    index: SceneIndex, geometry: Geometry, encoder: Encoder, scene_radius: float
+    index: SceneIndex, geometry: Geometry, encoder: Encoder, sphere: Ball
 ) -> Iterator[str]:
     """The names of small lights, those first of which it is known at once."""
     for i, lamp in enumerate(index.scene.lights):
         if lamp.reach in ("placed", "distant") and getattr(lamp, "falloff", True):
             yield f"lights[{i}]"
-    middle = geometry.bounding_sphere()[0]
+    middle, radius = sphere
     for emitter in geometry.emitters:
         area, place = _area_and_place(emitter, encoder)
-        far = max(float(np.linalg.norm(place - middle)), NEAR * scene_radius)
+        far = max(float(np.linalg.norm(place - middle)), NEAR * radius)
         if area < SMALL * 4.0 * np.pi * far**2:
             yield shapes.where(emitter.shape)
     for i, lamp in enumerate(index.scene.lights):
@@ -114,7 +117,7 @@ def _small_lights(
             yield f"lights[{i}]"
 
 
-def _area_and_place(emitter: Emitter, encoder: Encoder) -> tuple[float, np.ndarray]:
+def _area_and_place(emitter: Emitter, encoder: Encoder) -> tuple[float, NDArray[Any]]:
     """The area of a shape that emits [m^2], and the middle of the box around it (3,) [m]."""
     vertices, faces = emitter.vertices, emitter.faces
     if vertices is None:
