@@ -255,15 +255,16 @@ def changed(
 
 
 def _integrator(name: str, old: Kind) -> Any:
-    """Return an integrator of another kind, with those parameters of both that the old one sets.
+    """Return an integrator of another kind, with the parameters that both have.
 
-    What the old one leaves to clpt is left to the new one.
+    Light paths that the old one has not are left to the new one.
     """
     known = kinds("integrator")
     if name not in known:
         message = f"{name!r} is none of {', '.join(known)}"
         raise click.BadParameter(message, param_hint="--integrator")
-    usual = type(old)()
     shared = params(known[name]).keys() & params(type(old)).keys()
     given = {key: getattr(old, key) for key in shared}
-    return known[name](**{k: v for k, v in given.items() if v not in (AUTO, getattr(usual, k))})
+    if given.get("light_paths") in (0, AUTO):
+        given.pop("light_paths")
+    return known[name](**given)

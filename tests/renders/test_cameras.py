@@ -101,7 +101,13 @@ def test_where_a_lamp_appears(name: str) -> None:
     np.testing.assert_allclose(found, expected, atol=0.15)
 
 
-@pytest.mark.parametrize("pixel_filter", [Box(), Tent(), Gaussian(), Mitchell(), BlackmanHarris()])
+EDGES = [
+    Tent(), *(pytest.param(f, marks=pytest.mark.slow) for f in (Box(), Gaussian(), Mitchell())),
+    pytest.param(BlackmanHarris(), marks=pytest.mark.slow),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("pixel_filter", EDGES)
 def test_an_edge(pixel_filter: Filter) -> None:
     """A straight edge is blurred to the filter's integral: each pixel holds its part of it."""
     scene = Scene(

@@ -57,7 +57,9 @@ def test_lamps_in_rgb_mode() -> None:
     np.testing.assert_allclose(image, expected, rtol=2e-3, atol=1e-6)
 
 
-@pytest.mark.parametrize(("lo", "hi"), [(588.9, 589.7), (550.0, 550.02)])
+@pytest.mark.parametrize(
+    ("lo", "hi"), [(588.9, 589.7), pytest.param(550.0, 550.02, marks=pytest.mark.slow)]
+)
 def test_narrow_films_are_exact_at_their_ends(lo: float, hi: float) -> None:
     """The mean of a band of sodium's lines, and of a grey; float32 has 6e-5 nm at 550 nm."""
     for lamp in (LAMPS["sodium"], spectra.Constant(0.5)):
@@ -81,7 +83,7 @@ NUMBERS = {
 }
 
 
-@pytest.mark.parametrize("mode", ["spectral", "rgb"])
+@pytest.mark.parametrize("mode", ["spectral", pytest.param("rgb", marks=pytest.mark.slow)])
 def test_a_number_is_white_light(mode: str) -> None:
     """D65 times the number, on a shape as in the sky, in textures as without."""
     film = Film(width=16, height=16, mode=mode)

@@ -72,7 +72,7 @@ def bending(kind: type[materials.Material]) -> str | None:
 
 
 KINDS = [kind for kind in materials.LEAVES if bending(kind)]
-QUICK = (materials.RoughDielectric, materials.CoatedConductor)
+QUICK = (materials.CoatedConductor,)
 
 
 @pytest.mark.parametrize(

@@ -47,8 +47,7 @@ from tests.renders.test_light_tracing import (
 )
 
 FLAT = tf.rotate([1, 0, 0], -90)
-QUICK = ("sphere", "constant")
-AIMED = ("spot",)
+QUICK = ("sphere",)
 
 
 def narrow() -> Device:
@@ -114,10 +113,9 @@ def smooth(mode: str) -> Sphere:
     return Sphere(center=(0.2, 0.35, 0.2), radius=0.2, material=glass)
 
 
-@pytest.mark.parametrize("mode", ["rgb", pytest.param("spectral", marks=pytest.mark.slow)])
-@pytest.mark.parametrize(
-    "kind", [pytest.param(k, marks=() if k in AIMED else pytest.mark.slow) for k in LIGHTS]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+@pytest.mark.parametrize("kind", LIGHTS)
 def test_every_light_aims(kind: str, mode: str) -> None:
     scene = corner({kind: LIGHTS[kind]}, smooth(mode), mode=mode)
     assert lower(with_light_paths(scene)).features.aimed
@@ -312,6 +310,7 @@ def caustic(**film: Any) -> Scene:
     )
 
 
+@pytest.mark.slow
 def test_caustics_converge() -> None:
     """The spread of pixels of the floor, most of whose light comes through the glass."""
     noise = []
@@ -345,6 +344,7 @@ def test_aiming_finds_the_caustic(monkeypatch: pytest.MonkeyPatch) -> None:
     assert variance[0] < 0.1 * variance[1], variance
 
 
+@pytest.mark.slow
 def test_lanes() -> None:
     """The same paths one and eight lanes wide."""
     scene, pictures = with_light_paths(caustic()), []
@@ -412,6 +412,7 @@ def test_bands_add_up_to_the_colour(filtering: str) -> None:
     np.testing.assert_allclose(summed, renderer.colours(), rtol=0.03, atol=1e-4)
 
 
+@pytest.mark.slow
 def test_bands_keep_their_bits_however_samples_are_split() -> None:
     """Runs, and films that are merged; halves are the whole but for rounding."""
     scene = with_film(with_light_paths(BANDS), bands=3)
@@ -499,6 +500,7 @@ def test_cameras_that_cannot_be_joined_leave_it_aside() -> None:
     assert any("glass disperses" in warning for warning in lower(lens).warnings)
 
 
+@pytest.mark.slow
 def test_lights_that_cannot_be_weighed_are_left_to_the_camera() -> None:
     lights: list[Light] = [Point(position=(0.5, 1.7, 0.9), falloff=False)]
     scene = dataclasses.replace(corner({}), lights=lights)

@@ -296,7 +296,11 @@ def test_what_it_cannot_do_is_refused(changes: dict[str, Any], message: str) -> 
 FILTERS = [*(cls() for cls in kinds("filter").values()), Box(radius=0.8), Lanczos(radius=2.5)]
 
 
-@pytest.mark.parametrize("chosen", FILTERS, ids=lambda f: f"{f.kind}_{getattr(f, 'radius', 0)}")
+@pytest.mark.parametrize(
+    "chosen",
+    [pytest.param(f, marks=() if f.kind == "gaussian" else pytest.mark.slow) for f in FILTERS],
+    ids=lambda f: f"{f.kind}_{getattr(f, 'radius', 0)}",
+)
 def test_every_filter(chosen: Filter) -> None:
     """A small lamp in view, pixel by pixel: light from it is spread as pixels gather it."""
     turned = tf.translate([0.03, 0.02, 0]) @ tf.rotate([0, 0, 1], 20) @ tf.scale([0.15, 0.1, 1.0])
