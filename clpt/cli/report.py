@@ -21,6 +21,9 @@ def before(renderer: Renderer, loading: float) -> None:
     _line("lights", f"{stats.lights:,}")
     if stats.light_paths_reason:
         _line("light paths", f"{stats.light_paths} a sample: {stats.light_paths_reason}")
+    if stats.photons:
+        disk = f"within {stats.photon_radius:.3g} m at first"
+        _line("photons", f"up to {stats.photons:,} a pass, {_bytes(stats.photon_memory)}; {disk}")
     for name, size in stats.trees.items():
         layout = f"{first.scene.strategy.layout}, " if name == "triangles" else ""
         _line(f"tree {name}", layout + _bytes(size))

@@ -13,8 +13,9 @@ class RenderStats:
 
     triangles: on the device; triangles_instanced: as many as instances show; analytic: shapes that
     are intersected without triangles; lights: rows to choose from; light_paths: for each sample;
-    light_paths_reason: why, where the scene says "auto", else "". tables, trees: bytes by name;
-    memory: bytes of all buffers on the device. programs: built before the first sample;
+    light_paths_reason: why, where the scene says "auto", else ""; photons: most of a pass;
+    photon_radius: of the first one's disk [m]. tables, trees: bytes by name; photon_memory: bytes
+    of the photons; memory: of all buffers on the device. programs: built before the first sample;
     programs_cached: those of them that were in clpt's cache (a driver does not tell what it takes
     from its own). seconds: of `lower`, `trees` and `programs`; from the start to `ready`, when
     samples may begin, and, once there is one, to `first_sample`.
@@ -27,6 +28,9 @@ class RenderStats:
     lights: int
     light_paths: int
     light_paths_reason: str
+    photons: int
+    photon_radius: float
+    photon_memory: int
     tables: dict[str, int]
     trees: dict[str, int]
     memory: int
@@ -42,7 +46,7 @@ def collect(
 
     programs, cached: how many were built, and how many of them came from clpt's cache.
     """
-    scene = wavefronts[0].scene
+    scene, photons = wavefronts[0].scene, wavefronts[0].photons
     lowered, instances = scene.lowered, scene.lowered.instances
     of_world = len(lowered.faces) - sum(instances.triangles)
     instanced = sum(instances.triangles[prototype] for prototype in instances.prototypes.tolist())
@@ -55,6 +59,9 @@ def collect(
         lights=int(lowered.settings["light_count"]),
         light_paths=int(lowered.settings["light_paths"]),
         light_paths_reason=lowered.light_paths_reason,
+        photons=photons.places if photons else 0,
+        photon_radius=float(lowered.settings["radius"]),
+        photon_memory=photons.bytes if photons else 0,
         # A table that the scene does not need has one word.
         tables={name: array.nbytes for name, array in arrays.items() if array.size > 1},
         trees=scene.trees.bytes,

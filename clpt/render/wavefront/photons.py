@@ -48,6 +48,11 @@ class Photons:
         }
         stream.fill(self._cells, 0, 0, 4 * (self.cells + 1))
 
+    @property
+    def bytes(self) -> int:
+        """The size of all buffers."""
+        return sum(buffer.size for buffer in self.arguments.values()) + self._sums.size
+
     def clear(self) -> None:
         """Enqueue that there are none."""
         self.stream.fill(self._numbers, NONE, 0, 4 * self.places)
