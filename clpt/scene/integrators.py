@@ -32,6 +32,7 @@ MOST_BANDS = 1024
 MOST_LIGHT_PATHS = 64  # for a sample of the camera
 AUTO = "auto"  # light paths as suits the scene
 MOST_GROUPS = 64  # of wavelengths
+MOST_PHOTON_MEMORY = 8192  # [MiB]; words of photons are numbered by 31 bits
 NARROWEST = 0.01  # [nm], a range of wavelengths
 
 
@@ -103,7 +104,7 @@ class Vcm(Integrator):
         super().check()
         _check_whole(self, "light_paths", 1, MOST_LIGHT_PATHS)
         _check_whole(self, "wavelength_groups", 0, MOST_GROUPS)
-        _check_whole(self, "photon_memory", 1, 1 << 20)
+        _check_whole(self, "photon_memory", 1, MOST_PHOTON_MEMORY)
 
 
 def _check_whole(integrator: Integrator, name: str, least: int, most: int, other: str = "") -> None:

@@ -12,7 +12,7 @@ from clpt.records import PHOTON
 from clpt.render.lowering.camera import cameras
 from clpt.render.lowering.geometry.geometry import Geometry
 from clpt.scene.cameras import Camera
-from clpt.scene.integrators import Integrator
+from clpt.scene.integrators import Vcm
 
 DEEPEST = 64  # of a path where photons are merged: each of its vertices has a place
 FIRST = 2  # surfaces of a light path, before which it leaves no photon
@@ -34,22 +34,19 @@ WORDS = PHOTON.words + 2  # with the number of its cell, and its place in the or
 BYTES = 4 * WORDS
 
 
-def places(integrator: Integrator) -> int:
-    """Return how many photons a light path may leave: one at each surface but the first and last.
-
-    integrator: with `max_depth`.
-    """
-    depth: int = integrator.max_depth  # type: ignore[attr-defined]
+def places(integrator: Vcm) -> int:
+    """Return how many photons a light path may leave: all its surfaces but the first and last."""
+    depth = integrator.max_depth
     return (DEEPEST if depth < 0 else min(depth, DEEPEST)) - FIRST
 
 
-def pixels(integrator: Integrator, number: int) -> int:
+def pixels(integrator: Vcm, number: int) -> int:
     """Return of how many of `number` pixels the light paths leave photons.
 
-    integrator: a `Vcm`. Raises SceneError for memory that holds no light path.
+    Raises SceneError for memory that holds no light path.
     """
-    each = BYTES * places(integrator) * integrator.light_paths  # type: ignore[attr-defined]
-    memory: int = integrator.photon_memory  # type: ignore[attr-defined]
+    each = BYTES * places(integrator) * integrator.light_paths
+    memory = integrator.photon_memory
     held = memory * MIB // each
     if held < 1:
         message = f"{memory} MiB hold not one light path; give {math.ceil(each / MIB)} or more"
