@@ -107,6 +107,7 @@ def lower(
     ends = film.lambda_min, film.lambda_max
     wavelengths = density(index) if index.spectral else Density(*ends)
     encoder = Encoder(index.mode, *ends, sensor(film), wavelengths, texture_budget, cache)
+    filters.lower_filter(film.filter, encoder.store, index.splatting)
     materials = _begin_materials(index, encoder)
     geometry = lower_geometry(index, encoder, materials)
     sphere = geometry.bounding_sphere()
@@ -153,14 +154,14 @@ def lower(
 
 
 def _lower_film(index: SceneIndex, encoder: Encoder, wavelengths: Density) -> tuple[int, bool, int]:
-    """Append the pixel filter, and the density of wavelengths where it is tabulated.
+    """Append the filter's values for light paths, and wavelengths' density if it is tabulated.
 
     Return where the density would begin in `distributions`, whether it is there, and where the
     filter's values begin.
     """
-    # first in its table
-    film, weighed = index.scene.film, index.weighed > 0
-    profile = filters.lower_filter(film.filter, encoder.store, index.splatting, weighed)
+    chosen, profile = index.scene.film.filter, 0
+    if index.weighed:
+        profile = filters.lower_profile(chosen, encoder.store, index.splatting)
     density_row = encoder.store.size("distributions")
     tabulated = index.spectral and wavelengths.values is not None
     if tabulated:

@@ -28,19 +28,22 @@ PROFILE = 256  # steps of a filter's values
 CUT = 4.0  # standard deviations at which a Gaussian ends that has no radius
 
 
-def lower_filter(chosen: Filter, store: TableStore, splatting: bool, spread: bool = False) -> int:
+def lower_filter(chosen: Filter, store: TableStore, splatting: bool) -> None:
     """Put a filter's table into `distributions`, where the kernels expect it to be the first.
 
-    splatting: whether light serves all pixels whose filters hold it: then the filter's values;
-    spread: these follow the table of samples that serve their own pixel, for the light of others.
-    Returns where the values begin. Raises SceneError if something stands there already, and as
-    `table` does.
+    splatting: whether light serves all pixels whose filters hold it: then the filter's values.
+    Raises SceneError if something stands there already, and as `table` does.
     """
     if store.append_floats("distributions", (profile if splatting else table)(chosen)) != 0:
         raise SceneError("the pixel filter has to be lowered first")
-    if splatting or not spread:
-        return 0
-    return store.append_floats("distributions", profile(chosen))
+
+
+def lower_profile(chosen: Filter, store: TableStore, splatting: bool) -> int:
+    """Return where a filter's values begin in `distributions`, for the light of others' paths.
+
+    splatting: as of `lower_filter`; where samples serve their own pixel the values are appended.
+    """
+    return 0 if splatting else store.append_floats("distributions", profile(chosen))
 
 
 def reach(chosen: Filter) -> int:
