@@ -58,6 +58,7 @@ def test_direct_integrator(kind: str) -> None:
     assert_mean(images, [ALBEDO / np.pi * RADIANCE * EXPECTED[kind]] * 3, 0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [pytest.param("sphere", marks=pytest.mark.slow), "envmap"])
 def test_independent_sampler(kind: str) -> None:
     images = exposures(lit_ground(kind, "rgb", sampler=Independent()), 24, 64)

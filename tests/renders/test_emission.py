@@ -57,6 +57,7 @@ def test_lamps_in_rgb_mode() -> None:
     np.testing.assert_allclose(image, expected, rtol=2e-3, atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("lo", "hi"), [(588.9, 589.7), pytest.param(550.0, 550.02, marks=pytest.mark.slow)]
 )

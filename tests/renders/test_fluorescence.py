@@ -209,6 +209,7 @@ def test_without_a_dye_it_is_diffuse() -> None:
     np.testing.assert_allclose(images[0].mean(axis=0), images[1].mean(axis=0), rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_rgb_has_the_colour_under_d65() -> None:
     """Half the dye, whose colour is within [0, 1]: the same as the spectral picture."""
     scene = plane(LIGHTS["D65"], dataclasses.replace(PAINT, amount=0.3))

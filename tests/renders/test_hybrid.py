@@ -188,6 +188,7 @@ MATERIALS = {
 SHARP = ("rough_dielectric",)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "kind", [pytest.param(k, marks=() if k in SHARP else pytest.mark.slow) for k in MATERIALS]
 )
@@ -332,6 +333,7 @@ def wide() -> Scene:
     )
 
 
+@pytest.mark.slow
 def test_aiming_finds_the_caustic(monkeypatch: pytest.MonkeyPatch) -> None:
     """The spread of pixels, with aiming and without."""
     scene, variance = with_light_paths(wide()), []
@@ -400,6 +402,7 @@ def test_halves_are_the_whole() -> None:
 BANDS = caustic(mode="spectral", bands=235, output_space="xyz", filter=Gaussian())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("filtering", ["importance", pytest.param("auto", marks=pytest.mark.slow)])
 def test_bands_add_up_to_the_colour(filtering: str) -> None:
     """Bands of 2 nm, weighted by the observer, are the picture beside them, in each pixel that
@@ -471,6 +474,7 @@ def test_update_keeps_both_kinds_of_paths() -> None:
         renderer.update(scene=dataclasses.replace(turned, integrator=Path()))
 
 
+@pytest.mark.slow
 def test_update_keeps_aims() -> None:
     """Something sharp moves, and is sharp no more, as in a new renderer."""
     ball = Sphere(center=(0.1, 0.45, 0.2), radius=0.4, material=m.RoughConductor())
@@ -509,7 +513,7 @@ def test_lights_that_cannot_be_weighed_are_left_to_the_camera() -> None:
     both(scene, 16, "without falloff", max_depth=3)
 
 
-@pytest.mark.parametrize("given", [-1, 65, 0.5, True, "auto"])
+@pytest.mark.parametrize("given", [-1, 65, 0.5, True, "many"])
 def test_numbers_that_make_no_sense(given: Any) -> None:
     with pytest.raises(SceneError, match=r"path.light_paths: must be a whole number from 0 to 64"):
         Path(light_paths=given)

@@ -68,6 +68,7 @@ def test_a_camera_from_a_file(tmp_path) -> None:
     assert_mean(images, np.ones(3), 0.01, 1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("light", [COLOUR, LINES], ids=["smooth", "lines"])
 @pytest.mark.parametrize("drawn", ["auto", "visible"])
 def test_bands_are_the_means_of_the_light(light: Tabulated, drawn: str) -> None:
