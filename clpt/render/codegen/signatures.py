@@ -21,16 +21,11 @@ def args_text(name: str, args: dict[str, str], behind: bool = False) -> list[str
 
     behind: with a comma before each, so that there may be none.
     """
-    declared = [f"{type_}{own}" for own, type_ in args.items()]
-    if behind:
-        declared, passed = [f", {text}" for text in declared], [f", {own}" for own in args]
-        return [
-            f"#define {name}_ARGS {''.join(declared)}",
-            f"#define {name}_PASSED {''.join(passed)}",
-        ]
+    before = ", " if behind and args else ""
+    declared = ", ".join(f"{type_}{own}" for own, type_ in args.items())
     return [
-        f"#define {name}_ARGS {', '.join(declared)}",
-        f"#define {name}_PASSED {', '.join(args)}",
+        f"#define {name}_ARGS {before}{declared}",
+        f"#define {name}_PASSED {before}{', '.join(args)}",
     ]
 
 

@@ -10,11 +10,9 @@ from clpt.render.codegen import emission, flags, lights, parameters, thin_films
 from clpt.render.codegen.dispatch import Case, Function, active, function
 from clpt.render.contract import camera_records
 from clpt.render.contract.features import Features
-from clpt.render.contract.parameter_words import row_words, words
+from clpt.render.contract.parameter_words import MIXTURE, row_words, words
 from clpt.scene.materials import Material
 from clpt.scene.params import device_params, interior_params
-
-MIXTURE = 0xFF  # the kind in a mixture's material word, see kernels/stage/mix.cl
 
 
 def camera_text(kind: str, glass: bool) -> str:
@@ -101,7 +99,9 @@ def null_transmittance_text(features: Features) -> str:
             f"real first = {below}(scene, gather_i(scene.mixtures, row + 2), point, lambdas);",
             f"real second = {below}(scene, gather_i(scene.mixtures, row + 3), point, lambdas);",
         )
-        mixed = Case("MATERIAL_KIND(word) == 0xff", "first + w * (second - first)", children)
+        mixed = Case(
+            f"MATERIAL_KIND(word) == {MIXTURE:#x}", "first + w * (second - first)", children
+        )
         leaf = f"{below}(scene, word, point, lambdas)"
         parts.append(Function(f"real null_transmittance_{level}{arguments}", leaf, [mixed]).text())
     return "".join([*parts, f"#define null_transmittance null_transmittance_{features.mixtures}\n"])

@@ -12,6 +12,7 @@ from clpt.scene.params import (
 )
 
 NORMAL_MAP_WORDS = 11  # before a material's row, see kernels/path/shading_frame_mapped.cl
+MIXTURE = 0xFF  # the kind in a mixture's material word, see kernels/stage/mix.cl
 FILM_COSINES = 128  # of the table of a film's colours, from 0 to 1
 RERADIATION_STEP = 5  # [nm] between the nodes of a matrix
 SPECTRAL = (*SPECTRUM_ROLES, "reradiation")  # roles whose values are spectra in the kernels

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from clpt.errors import SceneError
+from clpt.render.contract.parameter_words import MIXTURE
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.geometry import shapes
 from clpt.render.lowering.index import any_of
@@ -20,7 +21,6 @@ from clpt.scene.params import device_params
 from clpt.scene.shapes import Shape
 from clpt.spectra import Constant
 
-MIXTURE = 0xFF
 CLEAR = Constant(0.0)  # absorption of what absorbs nothing
 _NULL, _BLACK = mt.Null(), mt.Diffuse(reflectance=0.0)
 
