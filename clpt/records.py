@@ -107,7 +107,7 @@ SETTINGS = Record(
     hide_lights=("integer", "1: the camera does not see lights"),
     alpha=("integer", "1: the film has a channel of what is covered; the camera sees no sky"),
     light_paths=(
-        "integer",
+        "real",
         "light paths for each camera sample, weighed against it; 0: there are none",
     ),
     radius=("real", "of the disk in which photons are merged in the first pass [m]"),

@@ -19,8 +19,9 @@ def before(renderer: Renderer, loading: float) -> None:
         parts.append(f"{stats.analytic:,} shapes as they are")
     _line("geometry", ", ".join(parts))
     _line("lights", f"{stats.lights:,}")
-    if stats.light_paths_reason:
-        _line("light paths", f"{stats.light_paths} a sample: {stats.light_paths_reason}")
+    if stats.reason:
+        paths = f", {stats.light_paths:g} light paths a sample" if stats.light_paths else ""
+        _line("integrator", f"{stats.integrator}{paths}: {stats.reason}")
     if stats.photons:
         disk = f"within {stats.photon_radius:.3g} m at first"
         _line("photons", f"up to {stats.photons:,} a pass, {_bytes(stats.photon_memory)}; {disk}")

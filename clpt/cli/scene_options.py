@@ -76,7 +76,7 @@ class LightPaths(click.ParamType):
     name = "N-OR-AUTO"
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        return AUTO if value == AUTO else click.IntRange(0, MOST_LIGHT_PATHS)(value, param, ctx)
+        return AUTO if value == AUTO else click.FloatRange(0.0, MOST_LIGHT_PATHS)(value, param, ctx)
 
 
 class White(click.ParamType):
@@ -223,7 +223,7 @@ def changed(
     integrator: str | None = None,
     sampler: str | None = None,
     max_depth: int | None = None,
-    light_paths: int | str | None = None,
+    light_paths: float | str | None = None,
     radius: float | None = None,
     **film: Any,
 ) -> Scene:
@@ -255,16 +255,14 @@ def changed(
 
 
 def _integrator(name: str, old: Kind) -> Any:
-    """Return an integrator of another kind, with the parameters that both have.
-
-    Light paths that the old one has not are left to the new one.
-    """
+    """Return an integrator of another kind, with the parameters that both have."""
     known = kinds("integrator")
     if name not in known:
         message = f"{name!r} is none of {', '.join(known)}"
         raise click.BadParameter(message, param_hint="--integrator")
     shared = params(known[name]).keys() & params(type(old)).keys()
     given = {key: getattr(old, key) for key in shared}
-    if given.get("light_paths") in (0, AUTO):
-        given.pop("light_paths")
+    if name == "vcm" and "light_paths" in given:  # a whole number, 1 or more
+        number = given.pop("light_paths")
+        given |= {} if number == AUTO else {"light_paths": max(round(number), 1)}
     return known[name](**given)

@@ -12,13 +12,13 @@ class RenderStats:
     """Figures of a renderer, for people and reports; `dataclasses.asdict` makes them JSON.
 
     triangles: on the device; triangles_instanced: as many as instances show; analytic: shapes that
-    are intersected without triangles; lights: rows to choose from; light_paths: for each sample;
-    light_paths_reason: why, where the scene says "auto", else ""; photons: most of a pass;
-    photon_radius: of the first one's disk [m]. tables, trees: bytes by name; photon_memory: bytes
-    of the photons; memory: of all buffers on the device. programs: built before the first sample;
-    programs_cached: those of them that were in clpt's cache (a driver does not tell what it takes
-    from its own). seconds: of `lower`, `trees` and `programs`; from the start to `ready`, when
-    samples may begin, and, once there is one, to `first_sample`.
+    are intersected without triangles; lights: rows to choose from; integrator: its kind, and
+    light_paths: for each sample, with the reason where clpt chose them, else ""; photons: most of a
+    pass; photon_radius: of the first one's disk [m]. tables, trees: bytes by name; photon_memory:
+    bytes of the photons; memory: of all buffers on the device. programs: built before the first
+    sample; programs_cached: those of them that were in clpt's cache (a driver does not tell what it
+    takes from its own). seconds: of `lower`, `trees` and `programs`; from the start to `ready`,
+    when samples may begin, and, once there is one, to `first_sample`.
     """
 
     triangles: int
@@ -26,8 +26,9 @@ class RenderStats:
     instances: int
     analytic: int
     lights: int
-    light_paths: int
-    light_paths_reason: str
+    integrator: str
+    light_paths: float
+    reason: str
     photons: int
     photon_radius: float
     photon_memory: int
@@ -57,8 +58,9 @@ def collect(
         instances=len(instances.rows),
         analytic=len(lowered.boxes),
         lights=int(lowered.settings["light_count"]),
-        light_paths=int(lowered.settings["light_paths"]),
-        light_paths_reason=lowered.light_paths_reason,
+        integrator=lowered.integrator.kind,
+        light_paths=float(lowered.settings["light_paths"]),
+        reason=lowered.reason,
         photons=photons.places if photons else 0,
         photon_radius=float(lowered.settings["radius"]),
         photon_memory=photons.bytes if photons else 0,

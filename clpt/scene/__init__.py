@@ -9,7 +9,7 @@ from typing import Any
 
 from clpt.errors import SceneError
 from clpt.scene import cameras, integrators, lights, materials, shapes, textures
-from clpt.scene.integrators import Film, Path, Sobol
+from clpt.scene.integrators import Auto, Film, Sobol
 from clpt.scene.params import Kind
 
 __all__ = [
@@ -58,7 +58,7 @@ class Scene:
     camera: cameras.Camera
     shapes: list[shapes.Shape] = field(default_factory=list)
     lights: list[lights.Light] = field(default_factory=list)
-    integrator: integrators.Integrator = field(default_factory=Path)
+    integrator: integrators.Integrator = field(default_factory=Auto)
     sampler: integrators.Sampler = field(default_factory=Sobol)
     film: Film = field(default_factory=Film)
     spp: int = 64

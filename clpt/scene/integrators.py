@@ -30,6 +30,7 @@ IDS = ("shape_id", "primitive_id")  # of these, which are names: a mean of them 
 
 MOST_BANDS = 1024
 MOST_LIGHT_PATHS = 64  # for a sample of the camera
+FEWEST_LIGHT_PATHS = 1.0 / 64
 AUTO = "auto"  # light paths as suits the scene
 MOST_GROUPS = 64  # of wavelengths
 MOST_PHOTON_MEMORY = 8192  # [MiB]; words of photons are numbered by 31 bits
@@ -58,23 +59,30 @@ class Path(Integrator):
 
     With `light_paths` paths start at lights too: each vertex is joined to the camera, and weighed
     against what the camera's paths find. Caustics that the camera sees directly converge then. The
-    camera must be `perspective` or `thin_lens`. With "auto" there is one for each sample where
-    something is sharp and a light is small, else none.
+    camera must be `perspective` or `thin_lens`. A number below 1 is a share: 0.5 is one for every
+    second sample. With "auto" there are some where something is sharp and a light is small, else
+    none.
     """
 
     max_depth: int = host(8, "longest path; -1: no limit")
     rr_depth: int = host(3, "depth from which Russian roulette may end a path")
     hide_lights: bool = flag(False, "the camera sees through lights, also those on shapes")
-    light_paths: int | str = host(
-        0,
+    light_paths: float | str = host(
+        AUTO,
         "paths from lights for each sample, weighed against it; 0: none; auto: as suits the scene",
         form="number_or_auto",
     )
 
     def check(self) -> None:
         super().check()
-        if self.light_paths != AUTO:
-            _check_whole(self, "light_paths", 0, MOST_LIGHT_PATHS, f", or {AUTO!r}")
+        given: Any = self.light_paths
+        if isinstance(given, str) and given == AUTO:
+            return
+        number = isinstance(given, (int, float)) and not isinstance(given, bool)
+        if not number or not (given == 0 or FEWEST_LIGHT_PATHS <= given <= MOST_LIGHT_PATHS):
+            fewest = f"{FEWEST_LIGHT_PATHS:g}"
+            message = f"must be 0, {fewest} to {MOST_LIGHT_PATHS}, or {AUTO!r}, not {given!r}"
+            raise SceneError(message, where=f"{self.kind}.light_paths")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -107,14 +115,26 @@ class Vcm(Integrator):
         _check_whole(self, "photon_memory", 1, MOST_PHOTON_MEMORY)
 
 
-def _check_whole(integrator: Integrator, name: str, least: int, most: int, other: str = "") -> None:
-    """Raise SceneError for a parameter that is no whole number between two; other: what it may be
-    instead."""
+def _check_whole(integrator: Integrator, name: str, least: int, most: int) -> None:
+    """Raise SceneError for a parameter that is no whole number between two."""
     value: Any = getattr(integrator, name)
     whole = isinstance(value, int) and not isinstance(value, bool)
     if not whole or not least <= value <= most:
-        message = f"must be a whole number from {least} to {most}{other}, not {value!r}"
+        message = f"must be a whole number from {least} to {most}, not {value!r}"
         raise SceneError(message, where=f"{integrator.kind}.{name}")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Auto(Integrator):
+    """The integrator that suits the scene: `path`, `path` with light paths, or `vcm`.
+
+    Light paths where something is sharp and a light is small; photons too where the camera sees
+    what is sharp, and the scene asks for no limit of noise.
+    """
+
+    max_depth: int = host(8, "longest path, as of `path`; -1: no limit")
+    rr_depth: int = host(3, "depth from which Russian roulette may end a path")
+    hide_lights: bool = flag(False, "the camera sees through lights, also those on shapes")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -364,7 +384,7 @@ def _white_balance(given: Any) -> Any:
     return x, y
 
 
-KINDS = (Path, Vcm, Direct, Whitted, ParticleTracer, Aov)
+KINDS = (Auto, Path, Vcm, Direct, Whitted, ParticleTracer, Aov)
 SAMPLERS = (Sobol, Zsobol, Independent)
 PIXELWISE = (Sobol, Independent)  # samplers whose pixels do not know of each other
 FILTERS = (Box, Tent, Gaussian, Mitchell, Lanczos, BlackmanHarris)

@@ -82,8 +82,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
     store_path_rival(path, at, next, rival_to_camera(rival, s, onward, delta, p, p_back));
 #if MERGES
     store_path_pending(path, at, next, rival_merged(rival, s, onward, delta, p, p_back));
-    integer sharp = sel_i(rival_sharp(delta, p, p_back), (integer)(PATH_SHARP), (integer)(0));
-    state = (state - (state & PATH_SHARP)) | sharp;
+    state = state | sel_i(rival_sharp(delta, p, p_back), (integer)(PATH_SHARP), (integer)(0));
 #endif
 #endif
     vertex_leave(path, at, next, v, onward, beta);

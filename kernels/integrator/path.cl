@@ -53,7 +53,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
     Rival rival = rival_of_camera(scene, path, at, v, sampler);
 #endif
 #if BSDF_MERGES
-    mask merges = met & merging_here(state);
+    mask merges = met & merging_here(state, depth);
     if (any(merges)) {
         integer sample = load_path_sample(path, at);
         Spectrum merged = merge_photons(scene, merges, v, scatter, rival, ratio, sample MERGE_PASSED);
@@ -117,13 +117,8 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
     real p_back = rival_pdf(m, bs.wi, wo);
     store_path_rival(path, at, next, rival_to_light(rival, s, onward, delta, bs.pdf, p_back));
 #if MERGES
-    mask sharp = next & rival.first & rival_sharp(delta, bs.pdf, p_back);
-    state += sel_i(sharp, (integer)(PATH_SHARP), (integer)(0));
-#if BSDF_MERGES
-    store_path_pending(path, at, next, rival_pending(rival, s, onward, delta, bs.pdf));
-#else
-    store_path_pending(path, at, next, (real)(0.0f));
-#endif
+    state -= sel_i(rival_sharp(delta, bs.pdf, p_back), (integer)(0), state & PATH_SHARP);
+    store_path_pending(path, at, next, rival_pending(rival, s, onward, delta, bs.pdf, p_back));
 #endif
 #endif
     store_path_pdf(path, at, next, sel(delta, (real)(-1.0f), bs.pdf));

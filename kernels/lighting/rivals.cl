@@ -28,15 +28,16 @@
  * estimation finds without noise are noise only, see bench/NOTES.md.) Null surfaces change nothing. Where a material
  * ends light paths (`rival_ends`) the camera's rival is 0.
  *
- * Where photons are merged (merging/gather.cl) the same path may also be found at any x_i where the light has come by
- * something sharp, x_{i+1}, as the camera's path and a light path that end there nearly meet. Where light paths are
- * joined to the camera that holds only if x_1 is sharp too: what the camera sees by itself they find, sharper, and
- * nothing is gathered there. With e = `merging_area` the density of merging over both paths' own is e, so that each
- * square of a rival gains
+ * Where photons are merged (merging/gather.cl) the same path may also be found at x_i, the first vertex from the camera
+ * that is not sharp, if some vertex beyond it is: the camera's path and a light path that end there nearly meet. Where
+ * light paths are joined to the camera, what it sees by itself they find, sharper: x_i is not x_1 then. With
+ * e = `merging_area` the density of merging over both paths' own is e. So a camera's path carries at x_i
  *
- *     (e c' / p)^2  at x_i of a camera's path, once x_{i+1} is known to be sharp: till then it is `pending`;
- *     (e / l c' / p)^2  at x_i of a light path that has come by something sharp: kept apart as `pending` too, as it
- *     counts in a photon, and at the joint only if x_1 is sharp.
+ *     pending' = e c' / p,    then pending / c p_back c' / p,
+ *
+ * and where it meets something sharp the square of its rival gains that of what is pending. A light path that has met
+ * something sharp begins, at each vertex that is not, with pending' = e / l c' / p, and goes on as above while all that
+ * follows is sharp; it counts at a joint to a sharp x_1.
  *
  * What is sharp depends on the densities of both ways alone, and so is the same for both sides: a delta lobe, or a
  * density above SHARP_PDF. */
@@ -74,7 +75,7 @@ typedef struct {
     mask first;   /* it is the path's first vertex */
     mask met;     /* a ray from it might meet the light */
 #if MERGES
-    real pending; /* what joins `arrives` where the vertex is sharp; of a light path, where x_1 is */
+    real pending; /* what joins `arrives` where the vertex is sharp; of a light path, at the joint alone */
     real merges;  /* what merging here has over the path's density: 0 where there is none */
 #endif
 } Rival;
@@ -111,8 +112,11 @@ inline Rival rival_of_camera(Scene scene, Slab path, uint at, Vertex v, Sampler 
     r.arrives = rival * goes_on;
 #if MERGES
     r.pending = load_path_pending(path, at) * goes_on;
-    r.merges = merging_area(scene, merging_pass(scene, load_path_sample(path, at)));
-    r.merges = sel(merging_here(v.state), r.merges, (real)(0.0f));
+    r.merges = 0.0f;
+#if BSDF_MERGES
+    real area = merging_area(scene, merging_pass(scene, load_path_sample(path, at)));
+    r.merges = sel(merging_here(v.state, v.depth), area, (real)(0.0f));
+#endif
 #endif
     return r;
 }
@@ -137,11 +141,11 @@ inline real rival_to_light(Rival r, Surface s, vec3 d, mask delta, real p, real 
 }
 
 #if MERGES
-/* What joins that rival if the next vertex is sharp. */
-inline real rival_pending(Rival r, Surface s, vec3 d, mask delta, real p)
+/* What joins that rival where something further is sharp. */
+inline real rival_pending(Rival r, Surface s, vec3 d, mask delta, real p, real p_back)
 {
-    real merged = r.merges / max_r(p, (real)(1e-30f));
-    return sel(delta, (real)(0.0f), rival_limited(merged * fabs(dot3(s.n, d))));
+    real either = sqrt(sqr(r.pending * p_back) + sqr(r.merges)) / max_r(p, (real)(1e-30f));
+    return sel(rival_sharp(delta, p, p_back), (real)(0.0f), rival_limited(either * fabs(dot3(s.n, d))));
 }
 #endif
 
@@ -166,9 +170,8 @@ inline Rival rival_of_emission(Scene scene, Slab path, uint at, Vertex v, vec3 h
     r.pending = load_path_pending(path, at) / max_r(fabs(dot3(v.s.n, v.d)), (real)(1e-7f));
     r.merges = 0.0f;
 #if BSDF_MERGES
-    float number = (float)scene.settings->light_paths;
     real area = merging_area(scene, merging_pass(scene, load_path_sample(path, at)));
-    r.merges = sel((v.state & PATH_SHARP) != 0, area / number, (real)(0.0f));
+    r.merges = sel((v.state & PATH_SHARP) != 0, area / scene.settings->light_paths, (real)(0.0f));
 #endif
 #endif
     return r;
@@ -184,11 +187,11 @@ inline real rival_to_camera(Rival r, Surface s, vec3 d, mask delta, real p, real
 }
 
 #if MERGES
-/* The same of what is pending. */
+/* What is pending along it. */
 inline real rival_merged(Rival r, Surface s, vec3 d, mask delta, real p, real p_back)
 {
-    real either = sqrt(sqr(r.pending * p_back) + sqr(r.merges)) / max_r(p, (real)(1e-30f));
-    return rival_limited(sel(delta, r.pending, either) * fabs(dot3(s.n, d)));
+    real begun = sel(rival_sharp(delta, p, p_back), r.pending * p_back, r.merges) / max_r(p, (real)(1e-30f));
+    return rival_limited(sel(delta, r.pending, begun) * fabs(dot3(s.n, d)));
 }
 #endif
 
@@ -200,8 +203,7 @@ inline real rival_of_joint(Rival r, Surface s, CameraPoint c, real p, real p_bac
     real chosen = 1.0f / max_r(c.importance, (real)(1e-30f));
     real square = sqr(rival_to_camera(r, s, c.d, mask_of(0), chosen, p));
 #if MERGES
-    r.merges = 0.0f;
-    real more = rival_merged(r, s, c.d, mask_of(0), chosen, p);
+    real more = rival_limited(r.pending * p * c.importance * fabs(dot3(s.n, c.d)));
     square += sel(rival_sharp(mask_of(0), p, p_back), sqr(more), (real)(0.0f));
 #endif
     return square;

@@ -7,7 +7,7 @@
 inline integer merging_pass(Scene scene, integer sample)
 {
 #if LIGHT_PATHS
-    return divide(sample, scene.settings->light_paths);
+    return divide(sample, (int)scene.settings->light_paths);
 #else
     return sample;
 #endif
@@ -26,15 +26,15 @@ inline real merging_area(Scene scene, integer pass)
     return PI * scene.settings->photon_paths * sqr(merging_radius(scene, pass));
 }
 
-/* Whether a path from the camera in such a state is merged. Where light paths are joined to the camera, these find what
- * it sees by itself; what follows is left to merging where the camera's first surface is sharp. */
-inline mask merging_here(integer state)
+/* Whether a path from the camera in such a state is merged: where all its surfaces so far were sharp. Where light paths
+ * are joined to the camera, what it sees by itself is left to them. */
+inline mask merging_here(integer state, integer depth)
 {
+    mask sharp = (state & PATH_SHARP) != 0;
 #if JOINS_CAMERA
-    return (state & PATH_SHARP) != 0;
-#else
-    return state >= 0;
+    sharp = sharp & (depth > 0);
 #endif
+    return sharp;
 }
 
 /* Paths are merged that have the same wavelengths: each pass has some groups of them, a path's own u chooses one. */

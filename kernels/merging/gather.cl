@@ -1,6 +1,6 @@
 /* Merging: light from the photons of a pass around a vertex of a path from the camera (Georgiev 2012; Jensen 1996).
  *
- * A photon is a light path where it has met a surface by something sharp. Around x the photons in a disk of radius r
+ * A photon is a light path that meets a surface after something sharp. Around x the photons in a disk of radius r
  * are light per area, so that sum f power / (N pi r^2) is radiance, N being the number of light paths; f has no cosine.
  * Each is weighed against all other ways to find its path, see lighting/rivals.cl. Photons of a surface that is turned
  * away, or off the disk's plane, are left out. */
@@ -18,14 +18,14 @@ inline Spectrum merge_photon(Photon photon, mask near, Vertex v, Scattering scat
     vec3 to = octahedral_unpack(photon.to_light), wi = to_local(scatter.shading.frame, to);
     Spectrum f = bsdf_eval(scatter.bsdf, scatter.wo, wi);
     real p = rival_pdf(scatter.bsdf, scatter.wo, wi), p_back = rival_pdf(scatter.bsdf, wi, scatter.wo);
-    real of_camera = rival_arrives(rival, mask_of(0), p, p_back);
-    real w = photon_weight(photon.rival, of_camera, number, area, p, p_back);
+    real w = photon_weight(photon.rival, rival.arrives, number, area, p, p_back);
     real share = shading_frame_share(scatter.shading, to);
     real scale = w * share / (area * max_r(fabs(dot3(v.s.n, to)), (real)(1e-3f)));
 #if USES_DISPERSION /* the pdfs of both parts for each wavelength as the hero, over their mean */
     scale /= max_r(spectrum_mean(spectrum_mul(ratio, photon.ratio)), (real)(1e-20f));
 #endif
     Spectrum light = spectrum_scale(spectrum_mul(f, photon.power), scale);
+    near = near & !rival_sharp(mask_of(0), p, p_back);
     return spectrum_sel(near & (spectrum_max(f) > 0.0f), light, spectrum_of(0.0f));
 }
 
@@ -37,7 +37,7 @@ inline Spectrum merge_photons(Scene scene, mask active, Vertex v, Scattering sca
     global const Settings *settings = scene.settings;
     integer pass = merging_pass(scene, sample), group = 0;
     real radius = merging_radius(scene, pass), area = merging_area(scene, pass);
-    real number = (real)((float)settings->light_paths);
+    real number = settings->light_paths;
 #if SPECTRUM_SIZE == 4
     group = merging_group(scene, sampler_pair(scatter.sampler, (natural)(DIMENSION_WAVELENGTH)).x);
 #endif

@@ -1,14 +1,11 @@
 /* How photons are weighed against all other ways to find their paths: the numbers of lighting/rivals.cl where a path
  * from the camera and a light path nearly meet. */
 
-/* The rival of a light path that leaves a photon, without the density of the material there. rival, pending: what
- * arrives; cosine: to where the light comes from. */
-inline real photon_rival(real rival, real pending, real cosine)
-{
-    return sqrt(sqr(rival) + sqr(pending)) / max_r(fabs(cosine), (real)(1e-7f));
-}
+/* The rival of a light path that leaves a photon, without the density of the material there. rival: what arrives;
+ * cosine: to where the light comes from. */
+inline real photon_rival(real rival, real cosine) { return rival / max_r(fabs(cosine), (real)(1e-7f)); }
 
-/* The weight of merging. of_light: of the photon; of_camera: `rival_arrives` of the path from the camera, where the
+/* The weight of merging. of_light: of the photon; of_camera: what arrives by the path from the camera, where the
  * material has densities p and p_back; number: light paths a sample; area: `merging_area`. */
 inline real photon_weight(real of_light, real of_camera, real number, real area, real p, real p_back)
 {

@@ -4,7 +4,7 @@
 #define PATH_ALIVE 0x1000 /* a ray is in flight */
 #define PATH_FRESH 0x2000 /* no sample has been begun: there is nothing to deposit */
 #define PATH_DONE 0x4000  /* the slot is at the end of its work list */
-#define PATH_SHARP 0x8000 /* the last surface of a light path was sharp, or the first of a camera's path */
+#define PATH_SHARP 0x8000 /* a surface of a light path was sharp, or all of a camera's path were */
 #define PATH_SHADOW 0x10000
 
 /* A null surface (a hole of a mask, a boundary that neither bends nor scatters) is no step of a path: it adds nothing

@@ -1,4 +1,4 @@
-/* Keeps as photons the light paths that have met a surface by something sharp, before a material is chosen there. Each
+/* Keeps as photons the light paths that meet a surface after something sharp, before a material is chosen there. Each
  * vertex of each light path of a pass has a place of its own, so that nothing is dropped and no order counts. */
 #include "core/base.cl"
 #include "core/octahedral.cl"
@@ -39,7 +39,7 @@ STAGE(deposit)(SLAB_ARGS, SCENE_ARGS DEPOSIT_ARGS STAGE_AT_ARG)
 #endif
         photon.to_light = octahedral_pack(neg3(d));
         photon.normal = octahedral_pack(s.n);
-        photon.rival = photon_rival(load_path_rival(path, at), load_path_pending(path, at), dot3(s.n, d));
+        photon.rival = photon_rival(load_path_rival(path, at), dot3(s.n, d));
 #if USES_ABSORPTION
         integer medium = sel_i(active, load_path_medium(path, at), (integer)(0));
         real through = load_hit_t(hit, at) + sel(active, load_path_lead(path, at), (real)(0.0f));
@@ -51,7 +51,7 @@ STAGE(deposit)(SLAB_ARGS, SCENE_ARGS DEPOSIT_ARGS STAGE_AT_ARG)
         group = merging_group(scene, sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH)).x);
 #endif
         photon.depth = depth | group << 16;
-        int number = settings->light_paths, places = settings->photon_places;
+        int number = (int)settings->light_paths, places = settings->photon_places;
         integer place = (pixel_index * number + sample - pass * number) * places + depth - 2;
         Cell cell = cell_at(scene, s.p, 2.0f * merging_radius(scene, pass));
         place = sel_i(active, place, (integer)(0));

@@ -49,7 +49,7 @@ inline integer begin_light_path(Scene scene, Slab path, Slab shadow, uint at, ma
 #if WEIGHS_LIGHT_PATHS
     store_path_light(path, at, go, r.row);
     store_path_sampled_hemisphere(path, at, go, r.n);
-    real rival = 1.0f / (float)settings->light_paths;
+    real rival = 1.0f / settings->light_paths;
 #if AIMS_LIGHT_PATHS
     rival /= r.gain;
 #endif

@@ -93,7 +93,7 @@ inline void begin_path(Scene scene, Slab path, uint at, mask go, integer pixel_i
     store_path_pdf(path, at, go, -ray.far);
     store_path_eta(path, at, go, (real)(1.0f));
 #if WEIGHS_LIGHT_PATHS
-    store_path_rival(path, at, go, (real)((float)settings->light_paths));
+    store_path_rival(path, at, go, (real)(settings->light_paths));
 #endif
 #if MERGES
     store_path_pending(path, at, go, (real)(0.0f));
@@ -132,6 +132,11 @@ STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
         mask go = end.ended & !next.done;
         store_path_sample(path, at, go, next.sample);
         begin_path(scene, path, at, go, next.pixel_index, next.sample);
-        store_path_state(path, at, end.ended, sel_i(next.done, (integer)(PATH_DONE), (integer)(PATH_ALIVE)));
+#if MERGES
+        integer begun = PATH_ALIVE | PATH_SHARP;
+#else
+        integer begun = PATH_ALIVE;
+#endif
+        store_path_state(path, at, end.ended, sel_i(next.done, (integer)(PATH_DONE), begun));
     }
 }

@@ -104,11 +104,11 @@ CAMERA = f"""{VERTEX}
 
     real merged = 0.0f;
 #if MERGES
-    real of_camera = rival_arrives(here, mask_of(0), p, p_back);
-    merged = photon_weight(photon, of_camera, number, area, p, p_back);
-    merged = sel(merging_here(state), merged, (real)(0.0f));
-    pending = rival_pending(here, s, onward, is_delta, p);
-    sharp = sel(here.first & rival_sharp(is_delta, p, p_back), (real)(1.0f), sharp);
+    merged = photon_weight(photon, here.arrives, number, area, p, p_back);
+    mask gathers_here = merging_here(state, v.depth) & !rival_sharp(mask_of(0), p, p_back);
+    merged = sel(gathers_here, merged, (real)(0.0f));
+    pending = rival_pending(here, s, onward, is_delta, p, p_back);
+    sharp = sel(rival_sharp(is_delta, p, p_back), sharp, (real)(0.0f));
 #endif
 """
 
@@ -123,9 +123,9 @@ LIGHT = f"""{VERTEX}
     joined = sel(c.seen & !here.first & !rival_ends(world, v), joined, (real)(0.0f));
 #endif
 #if MERGES
-    photon = sel(sharp > 0.5f, photon_rival(rival, pending, dot3(s.n, v.d)), (real)(-1.0f));
+    photon = sel(sharp > 0.5f, photon_rival(rival, dot3(s.n, v.d)), (real)(-1.0f));
     pending = rival_merged(here, s, onward, is_delta, p, p_back);
-    sharp = sel(rival_sharp(is_delta, p, p_back), (real)(1.0f), (real)(0.0f));
+    sharp = sel(rival_sharp(is_delta, p, p_back), (real)(1.0f), sharp);
 #endif
     rival = rival_to_camera(here, s, onward, is_delta, p, p_back);
 """

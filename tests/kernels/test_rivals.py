@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tests.kernels.rival_probe import LAMPS, LIGHT_PATHS, vertex_probe
 
-PATHS = 4096  # of each length
+PATHS = 1 << 15  # of each length
 SHARP = 8.0  # SHARP_PDF of lighting/rivals.cl [1/sr]
 SHARED = (
     50  # paths that every way that there is must share with others, so that the test can see it
@@ -120,10 +120,9 @@ def exact_weights(paths: Paths, joined: bool, merged: bool) -> Array:
     density[1] = np.where(a.delta[-1], 0, camera[k - 2] * a.found * arrives[-1])
     if joined and k > 2:
         density[2] = np.where(a.seen & ~a.delta[0] & passes[0], LIGHT_PATHS * light[0], 0)
-    for i in range(k - 2) if merged else ():
-        here = ~a.delta[i] & a.gathers[i] & sharp[i + 1] & passes[i + 1]
-        if joined:
-            here &= sharp[0] & (i > 0)
+    for i in range(joined, k - 2) if merged else ():
+        here = sharp[:i].all(axis=0) & ~sharp[i] & sharp[i + 1 :].any(axis=0)
+        here &= a.gathers[i] & passes[i + 1]
         density[3 + i] = np.where(here, camera[i] * light[i] * a.area, 0)
     square = density**2
     return square / np.maximum(square.sum(axis=0), 1e-300)
@@ -136,9 +135,8 @@ def kernel_weights(paths: Paths, joined: bool, merged: bool) -> Array:
     weights = np.zeros((k + 1, n))
     common = {name: getattr(a, name) for name in ("importance", "seen", "found", "lamp", "area")}
 
-    def start(rival: Array | float) -> dict[str, Array]:
-        zeros = {name: np.zeros(n) for name in ("pending", "sharp")}
-        return {"rival": np.zeros(n) + rival, **zeros}
+    def start(rival: Array | float, sharp: float) -> dict[str, Array]:
+        return {"rival": np.zeros(n) + rival, "pending": np.zeros(n), "sharp": np.full(n, sharp)}
 
     def vertex(i: int) -> dict[str, Array]:
         return {name: getattr(a, name)[i] for name in ("delta", "ends", "gathers")}
@@ -147,7 +145,7 @@ def kernel_weights(paths: Paths, joined: bool, merged: bool) -> Array:
         return {name: made[name] for name in ("rival", "pending", "sharp")}
 
     photons = np.full((k - 1, n), -1.0)
-    state, alive = start(1 / (LIGHT_PATHS * a.gain)), np.ones(n, bool)
+    state, alive = start(1 / (LIGHT_PATHS * a.gain), 0.0), np.ones(n, bool)
     step = vertex_probe(True, joined, merged)
     for i in range(k - 2, -1, -1):
         made = step(
@@ -161,7 +159,7 @@ def kernel_weights(paths: Paths, joined: bool, merged: bool) -> Array:
         state = carried(made)
     weights[2] = np.where(alive & ~a.delta[0], made["joined"], 0)
 
-    state = start(LIGHT_PATHS)
+    state = start(LIGHT_PATHS, 1.0)
     step = vertex_probe(False, joined, merged)
     for i in range(k - 1):
         made = step(

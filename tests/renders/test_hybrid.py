@@ -56,13 +56,13 @@ def narrow() -> Device:
     return device
 
 
-def with_light_paths(scene: Scene, number: int = 1, **changes: Any) -> Scene:
+def with_light_paths(scene: Scene, number: float = 1, **changes: Any) -> Scene:
     return dataclasses.replace(scene, integrator=Path(light_paths=number, **changes))
 
 
-def both(scene: Scene, spp: int, what: str, *, number: int = 1, **integrator: Any) -> None:
+def both(scene: Scene, spp: int, what: str, *, number: float = 1, **integrator: Any) -> None:
     """Compare `path` with and without light paths on a scene."""
-    alone = dataclasses.replace(scene, integrator=Path(**integrator))
+    alone = with_light_paths(scene, 0, **integrator)
     beside = with_light_paths(scene, number, **integrator)
     reference = blocks(exposures(alone, 12, spp, device=narrow()))
     ours = blocks(exposures(beside, 12, spp, first_seed=101, device=narrow()))
@@ -251,8 +251,10 @@ def test_depths(depth: int) -> None:
 
 
 @pytest.mark.slow
-def test_more_light_paths() -> None:
-    both(corner({"sphere": 30.0, "spot": 8.0}), 128, "three", number=3, max_depth=3)
+@pytest.mark.parametrize("number", [3, 0.3])
+def test_another_number_of_light_paths(number: float) -> None:
+    scene = corner({"sphere": 30.0, "spot": 8.0})
+    both(scene, 128, f"{number} a sample", number=number, max_depth=3)
 
 
 @pytest.mark.slow
@@ -382,8 +384,8 @@ def test_same_bits_however_samples_are_split() -> None:
     assert np.array_equal(picture(scene, 40), picture(scene, 17, 23)), "turns do not show"
 
 
-@pytest.mark.parametrize("number", [1, 2])
-def test_same_bits_after_a_merge(number: int) -> None:
+@pytest.mark.parametrize("number", [1, 2, 0.3])
+def test_same_bits_after_a_merge(number: float) -> None:
     scene = with_light_paths(SPLIT, number)
     parts = [clpt.Renderer(scene, narrow(), first_sample=first) for first in (0, 3)]
     for renderer, samples in zip(parts, (3, 4), strict=True):
@@ -513,9 +515,9 @@ def test_lights_that_cannot_be_weighed_are_left_to_the_camera() -> None:
     both(scene, 16, "without falloff", max_depth=3)
 
 
-@pytest.mark.parametrize("given", [-1, 65, 0.5, True, "many"])
+@pytest.mark.parametrize("given", [-1, 65, 0.01, True, "many"])
 def test_numbers_that_make_no_sense(given: Any) -> None:
-    with pytest.raises(SceneError, match=r"path.light_paths: must be a whole number from 0 to 64"):
+    with pytest.raises(SceneError, match=r"path.light_paths: must be 0, 0.015625 to 64"):
         Path(light_paths=given)
 
 

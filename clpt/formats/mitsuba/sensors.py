@@ -277,12 +277,12 @@ def _path(props: Properties) -> Integrator:
     return integrators.Path(**_depths(props), light_paths=_light_paths(props))
 
 
-def _light_paths(props: Properties) -> int | str:
+def _light_paths(props: Properties) -> float | str:
     """Ours, see docs/mitsuba_plugins.md: Mitsuba's path has no such parameter."""
     child = props.named.get("light_paths")
     if child is not None and child.tag == "string":
         return props.text("light_paths", "", (integrators.AUTO,))
-    return props.integer("light_paths", 0)
+    return integrators.AUTO if child is None else props.number("light_paths", 0.0)
 
 
 def _vcm(props: Properties) -> Integrator:

@@ -184,8 +184,8 @@ def _number_or_list(cursor: Cursor) -> Any:
     return cursor.numbers() if isinstance(cursor.value, list) else cursor.number()
 
 
-def _number_or_auto(cursor: Cursor) -> int | str:
-    return AUTO if cursor.value == AUTO else cursor.integer()
+def _number_or_auto(cursor: Cursor) -> float | str:
+    return AUTO if cursor.value == AUTO else cursor.number()
 
 
 def _cube_images(cursor: Cursor, reader: Reader) -> Any:
@@ -289,8 +289,8 @@ FORMS: dict[str, Form] = {
         _integers,
     ),
     "number_or_auto": _of_cursor(
-        f"whole number, or `{AUTO}`",
-        {"anyOf": [{"type": "integer"}, {"const": AUTO}]},
+        f"number, or `{AUTO}`",
+        {"anyOf": [NUMBER, {"const": AUTO}]},
         _number_or_auto,
     ),
     "rows2": _rows(2),

@@ -64,12 +64,12 @@ class SceneIndex:
         return isinstance(self.scene.integrator, ParticleTracer)
 
     @property
-    def weighed(self) -> int:
+    def weighed(self) -> float:
         """Light paths for each camera sample, weighed against it; 0: there are none.
 
         Where the scene says "auto" nothing may ask before `hard_light.decided` has chosen.
         """
-        wanted: int = getattr(self.scene.integrator, "light_paths", 0)
+        wanted: float = getattr(self.scene.integrator, "light_paths", 0)
         return wanted if self.joined or self.merged else 0
 
     @property

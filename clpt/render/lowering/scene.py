@@ -38,7 +38,7 @@ from clpt.render.lowering.settings import DEEPEST, settings_of
 from clpt.render.lowering.textures.attributes import Owner, lower_attributes
 from clpt.scene import Scene
 from clpt.scene import materials as mt
-from clpt.scene.integrators import Film
+from clpt.scene.integrators import Film, Integrator
 from clpt.scene.lights import Point
 from clpt.scene.shapes import Mesh
 
@@ -53,9 +53,9 @@ class Lowered:
     instances: what trees are built of, see `Geometry`. tables: every other read-only array by name;
     where an instance's tree begins is filled in when trees are built. zero_copy: tables that are
     the caller's buffers. owners: of each row of `shapes`. glass_row: of the camera, see
-    `lower_camera`. light_paths_reason: why there are as many, "" where the scene says a number.
-    encoder: what made the tables, for values that are edited. cache: what the next lowering need
-    not make again.
+    `lower_camera`. integrator: of the scene, or what was chosen; reason: why, "" where there was
+    no choice. encoder: what made the tables, for values that are edited. cache: what the next
+    lowering need not make again.
     """
 
     features: Features
@@ -70,7 +70,8 @@ class Lowered:
     owners: tuple[Owner, ...]
     glass_row: int
     warnings: tuple[str, ...]
-    light_paths_reason: str
+    integrator: Integrator
+    reason: str
     encoder: Encoder
     cache: LoweringCache
 
@@ -96,7 +97,7 @@ def lower(
     """Lower a scene; of the `aov` integrator, for its first channel.
 
     texture_budget: [bytes] for images, None for any number. former: of a scene that has much in
-    common with this one: it saves time, and light paths that are "auto" stay as many. Arrays,
+    common with this one: it saves time, and what is "auto" stays as chosen. Arrays,
     lights and images that are the same objects as then are taken to hold the same.
 
     Raises SceneError where the scene makes no sense: it names the shape, light or material.
@@ -111,8 +112,7 @@ def lower(
     materials = _begin_materials(index, encoder)
     geometry = lower_geometry(index, encoder, materials)
     sphere = geometry.bounding_sphere()
-    before = int(former.settings["light_paths"]) if former else None
-    index, why = decided(index, geometry, encoder, sphere, before)
+    index, why = decided(index, geometry, encoder, sphere, former.integrator if former else None)
     density_row, tabulated, profile = _lower_film(index, encoder, wavelengths)
     lights = _lower_lights(index, encoder, geometry, sphere[1])
     targets = aims(index, geometry, sphere[1])
@@ -147,7 +147,8 @@ def lower(
         owners=geometry.owners,
         glass_row=glass_row,
         warnings=warnings,
-        light_paths_reason=why,
+        integrator=index.scene.integrator,
+        reason=why,
         encoder=encoder,
         cache=cache,
     )

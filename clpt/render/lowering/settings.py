@@ -96,7 +96,7 @@ def _set_photons(
     settings["photon_places"] = photons.places(integrator)
     held = photons.pixels(integrator, int(settings["padded_pixels"]))
     settings["photon_pixels"] = held
-    cells = max(held * index.weighed, photons.FEWEST_CELLS)
+    cells = max(held * integrator.light_paths, photons.FEWEST_CELLS)
     settings["photon_cells"] = 1 << (cells - 1).bit_length()
     suited = photons.GROUPS if disperses else photons.FEW_GROUPS
     groups = integrator.wavelength_groups or suited

@@ -5,6 +5,7 @@ The host only enqueues; it reads the counters of an iteration while later ones r
 
 from __future__ import annotations
 
+import math
 import time
 from collections import deque
 from collections.abc import Callable
@@ -95,7 +96,7 @@ class BounceLoop:
         self.lanes = self.device.lanes
         self._features_of, self._which = features_of, which
         self.is_last = which == len(features_of(scene.lowered).passes) - 1
-        self.per_sample = 1 if self.is_last else int(scene.lowered.settings["light_paths"])
+        self.per_sample = 1 if self.is_last else float(scene.lowered.settings["light_paths"])
         self._label = "" if self.is_last else "light "
         self._share = strategy.loop_share(self.device)
         self._stages: list[Step] | None = None
@@ -144,7 +145,7 @@ class BounceLoop:
 
     def numbers(self, first: int, end: int) -> tuple[int, int]:
         """Return the numbers, first and end, of the paths of samples first to end - 1."""
-        return first * self.per_sample, end * self.per_sample
+        return math.ceil(first * self.per_sample), math.ceil(end * self.per_sample)
 
     def enqueue(self, first: int, end: int) -> None:
         """Enqueue the paths of samples first to end - 1 of every pixel; wait for nothing."""

@@ -16,6 +16,7 @@ colour take their n. The picture gets the larger m, which leaves less noise.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -82,17 +83,18 @@ class LightRounds:
         The film then has the guides in place of the picture's light paths, and must be restored.
         Returns whether it was not stopped.
         """
-        wavefront, per_sample = self.wavefront, self.wavefront.loops[0].per_sample
+        wavefront, loop = self.wavefront, self.wavefront.loops[0]
         first, end = self._guides, look // GUIDES
         wavefront.paths.set_work_list(self.meter.inside)
         wavefront.film.set_group(wavefront.light_group, self._sums if first else None)
-        start = GUIDE_NUMBERS // per_sample
+        start = math.ceil(GUIDE_NUMBERS / loop.per_sample)
         if not wavefront.trace_from_lights(start + first, start + end, on_batch):
             return False
         self._guides = end
         wavefront.film.copy_group(wavefront.light_group, self._sums)
         undecided = np.tile(self.stop == FOREVER, len(self.variance) // 2)
-        found = self.meter.measure_lights(undecided, float(end * per_sample))
+        begun, ended = loop.numbers(start, start + end)
+        found = self.meter.measure_lights(undecided, float(ended - begun))
         if self.meter.knows_brightness:
             self.variance[undecided] = end * found[undecided]
             self._measured_at[self.stop == FOREVER] = look

@@ -39,7 +39,7 @@ def aims(index: SceneIndex, geometry: Geometry, scene_radius: float) -> NDArray[
     areas of their disks. None where no path is aimed: one large sphere would gain nothing.
     """
     none = np.zeros((0, 5), np.float32)
-    found = [pieces for pieces in _sharp_pieces(geometry) if len(pieces)] if index.weighed else []
+    found = [pieces for pieces in sharp_pieces(geometry) if len(pieces)] if index.weighed else []
     if not found:
         return none
     spheres = _spheres(np.concatenate(found))
@@ -77,8 +77,8 @@ def _roughness(material: mt.Material) -> float:
     return roughness**2
 
 
-def _sharp_pieces(geometry: Geometry) -> Iterator[Pieces]:
-    """What every sharp shape consists of, in the world."""
+def sharp_pieces(geometry: Geometry) -> Iterator[Pieces]:
+    """Yield what every sharp shape consists of, in the world: a row for each triangle or ball."""
     own, placed = geometry.owners, geometry.instances
     ends = [*(face for _, _, _, face in own[1:]), len(geometry.faces)]
     firsts = len(geometry.faces) - sum(placed.triangles) + np.cumsum((0, *placed.triangles))[:-1]

@@ -1,11 +1,13 @@
-"""Whether paths from lights help: what `light_paths="auto"` of `path` becomes.
+"""What helps with hard light: what the integrator `auto` becomes, and "auto" light paths of `path`.
 
-They find the light that something sharp has gathered on something dull. Where the lamp is large,
-paths from the camera find that light too, and sooner.
+Light paths find the light that something sharp has gathered on something dull. Where the lamp is
+large, paths from the camera find that light too, and sooner. Photons find it also where it is seen
+in a mirror or through glass.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Any
@@ -20,10 +22,10 @@ from clpt.render.lowering.geometry import analytic, shapes, triangles
 from clpt.render.lowering.geometry.geometry import Geometry
 from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.lights import image_lights
-from clpt.render.lowering.lights.aims import is_sharp
+from clpt.render.lowering.lights.aims import is_sharp, sharp_pieces
 from clpt.render.lowering.lights.lights import Emitter
 from clpt.scene import materials as mt
-from clpt.scene.integrators import AUTO
+from clpt.scene.integrators import AUTO, Auto, Integrator, Path, Vcm
 from clpt.scene.lights import CubeMap, Envmap
 from clpt.scene.shapes import Shape
 
@@ -31,6 +33,7 @@ SMALL = 0.01  # of the sphere that is seen: up to it a light is small
 NEAR = 0.25  # of the scene's radius: a light counts as no nearer to what it shines on
 SUN = 0.25  # of an image's power: where it comes from a small part the image is a small light
 FEWEST = 3  # edges of a path from a light over two surfaces to the camera: the shortest caustic
+SEEN = 0.02  # of the picture: where what is sharp fills more, caustics may be seen through it
 
 Ball = tuple[NDArray[np.float64], float]  # centre and radius
 
@@ -40,42 +43,70 @@ def decided(
     geometry: Geometry,
     encoder: Encoder,
     sphere: Ball,
-    former: int | None = None,
+    former: Integrator | None = None,
 ) -> tuple[SceneIndex, str]:
-    """Return the index with a number in the place of "auto", and the reason as a sentence.
+    """Return the index with the integrator that "auto" stands for, and the reason as a sentence.
 
-    The sentence is empty where the scene says a number. sphere: centre and radius of one around the
-    scene [m]; former: the number of a renderer that goes on with this scene, whose film has a place
-    for light paths or none. Raises SceneError for an image light that is broken.
+    The sentence is empty where the scene leaves no choice. sphere: centre and radius of one around
+    the scene [m]; former: what a renderer has chosen that goes on with this scene, whose film has a
+    place for light paths or none. Raises SceneError for an image light that is broken.
     """
-    if getattr(index.scene.integrator, "light_paths", None) != AUTO:
+    given: Any = index.scene.integrator
+    if not isinstance(given, Auto) and getattr(given, "light_paths", None) != AUTO:
         return index, ""
     if former is None:
-        number, reason = _choice(index, geometry, encoder, sphere)
+        chosen, reason = _choice(index, geometry, encoder, sphere)
     else:
-        number, reason = former, "as before the scene was edited"
-    integrator: Any = replace(index.scene.integrator, light_paths=number)  # type: ignore[call-arg]
-    return replace(index, scene=replace(index.scene, integrator=integrator)), reason
+        chosen = former if isinstance(former, (Path, Vcm)) else Path(light_paths=0)
+        reason = "as before the scene was edited"
+    own = {name: getattr(given, name) for name in ("max_depth", "rr_depth", "hide_lights")}
+    chosen = replace(chosen, **own)
+    return replace(index, scene=replace(index.scene, integrator=chosen)), reason
 
 
 def _choice(
     index: SceneIndex, geometry: Geometry, encoder: Encoder, sphere: Ball
-) -> tuple[int, str]:
-    """The number of light paths for each sample, and why; what is cheap to know is asked first."""
-    scene = index.scene
+) -> tuple[Integrator, str]:
+    """The integrator but for its depths, and why; what is cheap to know is asked first."""
+    scene, without = index.scene, Path(light_paths=0)
     if not cameras.is_connected(scene.camera, scene.film.mode):
-        return 0, "points cannot be joined to this camera"
+        return without, "points cannot be joined to this camera"
     if 0 <= scene.integrator.max_depth < FEWEST:  # type: ignore[attr-defined]
-        return 0, "the longest path is too short for a caustic"
+        return without, "the longest path is too short for a caustic"
     sharp = _first_with(index.shapes, is_sharp)
     if sharp is None:
-        return 0, "nothing is sharp"
+        return without, "nothing is sharp"
     if _first_with((one for one in index.shapes if one.emission is None), _is_dull) is None:
-        return 0, "there is nothing dull for a caustic to be seen on"
+        return without, "there is nothing dull for a caustic to be seen on"
     small = next(_small_lights(index, geometry, encoder, sphere), None)
     if small is None:
-        return 0, "no light is small"
-    return 1, f"{shapes.where(sharp)} is sharp, and {small} is a small light"
+        return without, "no light is small"
+    reason = f"{shapes.where(sharp)} is sharp, and {small} is a small light"
+    if not isinstance(scene.integrator, Auto):
+        return Path(light_paths=1), reason
+    if scene.noise is not None:
+        return Path(light_paths=1), f"{reason}; noise is not measured with photons"
+    if index.shifts or _share_seen(index, geometry) < SEEN:
+        return Path(light_paths=1), reason
+    return Vcm(), f"{reason}; the camera sees what is sharp"
+
+
+def _share_seen(index: SceneIndex, geometry: Geometry) -> float:
+    """The share of the picture that sharp things fill: as if nothing hid them, with all sides."""
+    film = index.scene.film
+    lens = cameras.MEMBERS[type(index.scene.camera)](index.scene.camera, film.width, film.height)
+    matrix, extent = lens["to_world"], np.array(lens["extent"])  # of the film a metre away
+    angle = math.atan(float(np.linalg.norm(extent)) / 2.0)
+    pieces = np.concatenate([np.zeros((0, 10)), *sharp_pieces(geometry)])
+    a, b, c = (pieces[:, i : i + 3] - matrix[:3, 3] for i in (0, 3, 6))
+    middle, reach = (a + b + c) / 3.0, pieces[:, 9]
+    away = np.maximum(np.linalg.norm(middle, axis=1), 1e-30)
+    size = reach + np.max([np.linalg.norm(p - middle, axis=1) for p in (a, b, c)], axis=0)
+    around = np.arcsin(np.minimum(size / away, 1.0))
+    apart = np.arccos(np.clip(middle @ matrix[:3, 2] / away, -1.0, 1.0))
+    facing = np.abs(np.einsum("ij,ij->i", np.cross(b - a, c - a), middle)) / (2.0 * away**3)
+    solid = np.minimum(facing + np.pi * (reach / away) ** 2, 2.0 * np.pi)[apart < angle + around]
+    return float(solid.sum() / (2.0 * np.pi * (1.0 - math.cos(angle))))
 
 
 def _first_with(all_: Iterable[Shape], wanted: Any) -> Shape | None:

@@ -1,4 +1,7 @@
-"""Light paths that are "auto": there are some where something sharp meets a small light."""
+"""Light paths that are "auto": there are some where something sharp meets a small light.
+
+The integrator `auto` adds photons where the camera sees what is sharp.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,7 @@ from clpt.render.lowering.scene import Lowered, lower
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m
 from clpt.scene.cameras import Orthographic, Perspective, ThinLens
-from clpt.scene.integrators import Path
+from clpt.scene.integrators import Auto, Path, Vcm
 from clpt.scene.lights import (
     Area,
     Constant,
@@ -41,10 +44,10 @@ def scene_of(*shapes: Shape, lights: Any = (LAMP,), **given: Any) -> Scene:
     return Scene(shapes=list(shapes), lights=list(lights), film=film, **{**usual, **given})
 
 
-def chosen(scene: Scene, former: Lowered | None = None) -> tuple[int, str]:
+def chosen(scene: Scene, former: Lowered | None = None) -> tuple[float, str]:
     """How many light paths a sample has, and why."""
     lowered = lower(scene, former=former)
-    return int(lowered.settings["light_paths"]), lowered.light_paths_reason
+    return float(lowered.settings["light_paths"]), lowered.reason
 
 
 def sky(share: float, side: int = 64) -> np.ndarray:
@@ -156,7 +159,7 @@ def test_all_is_as_with_the_number(shapes: list[Shape], number: int, mode: str) 
     made = lower(scene_of(*shapes, mode=mode))
     other = lower(scene_of(*shapes, mode=mode, integrator=Path(light_paths=number)))
     assert made.features == other.features and made.warnings == other.warnings
-    assert made.settings == other.settings and other.light_paths_reason == ""
+    assert made.settings == other.settings and other.reason == ""
     assert made.features.weighed == (number > 0)
     for name, table in other.tables.items():
         assert np.array_equal(made.tables[name].view(np.uint32), table.view(np.uint32)), name
@@ -167,6 +170,52 @@ def test_an_edit_keeps_the_number() -> None:
     sharp, dull = scene_of(ROOM, BALL), scene_of(ROOM)
     assert chosen(dull, former=lower(sharp)) == (1, "as before the scene was edited")
     assert chosen(sharp, former=lower(dull))[0] == 0
+
+
+def looking(x: float, y: float, z: float) -> Perspective:
+    """A camera in the corner of the room, toward a point."""
+    return Perspective(fov=20.0, to_world=tf.look_at([-0.9, -0.9, 0.9], [x, y, z], [0, 1, 0]))
+
+
+AT_BALL, AT_WALL = looking(0.3, -0.5, 0.2), looking(-0.9, 1.0, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("scene", "kind", "number"),
+    [
+        (scene_of(ROOM, BALL, camera=AT_BALL, integrator=Auto()), Vcm, 1),
+        (scene_of(ROOM, BALL, camera=AT_WALL, integrator=Auto()), Path, 1),
+        (scene_of(ROOM, BALL, camera=AT_BALL, integrator=Auto(), noise=0.1), Path, 1),
+        (scene_of(ROOM, BALL, camera=AT_BALL, integrator=Path()), Path, 1),
+        (scene_of(ROOM, camera=AT_BALL, integrator=Auto()), Path, 0),
+        (scene_of(ROOM, BALL, camera=Orthographic(), integrator=Auto()), Path, 0),
+    ],
+    ids=["sharp in view", "not in view", "noise", "path", "dull", "cannot be joined"],
+)
+def test_the_integrator_that_suits_a_scene(scene: Scene, kind: type, number: float) -> None:
+    made = lower(scene)
+    assert type(made.integrator) is kind and made.reason
+    assert made.settings["light_paths"] == number
+    assert made.features.merged == (kind is Vcm)
+
+
+@pytest.mark.parametrize("name", ["max_depth", "rr_depth", "hide_lights"])
+def test_what_is_chosen_has_the_depths_of_auto(name: str) -> None:
+    value = {"max_depth": 5, "rr_depth": 4, "hide_lights": True}[name]
+    for camera in (AT_BALL, AT_WALL):
+        scene = scene_of(ROOM, BALL, camera=camera, integrator=Auto(**{name: value}))
+        assert getattr(lower(scene).integrator, name) == value
+
+
+def test_an_edit_keeps_the_integrator() -> None:
+    at_ball, dull = (
+        lower(scene_of(ROOM, *balls, camera=AT_BALL, integrator=Auto())) for balls in ([BALL], [])
+    )
+    for former in (at_ball, dull):
+        edited = scene_of(ROOM, BALL, camera=AT_WALL, integrator=Auto(max_depth=7))
+        made = lower(edited, former=former)
+        assert type(made.integrator) is type(former.integrator)
+        assert made.integrator.max_depth == 7
 
 
 def test_the_extent_of_an_image() -> None:
