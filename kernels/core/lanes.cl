@@ -34,6 +34,7 @@ typedef uint natural;
 #undef any
 #define any(m) (m)
 #define LANE_INDEX 0
+#define lanes_of(m) ((uint)(m))
 #else
 typedef CAT(float, LANES) real;
 typedef CAT(int, LANES) integer;
@@ -57,12 +58,18 @@ typedef CAT(uint, LANES) natural;
 #if LANES == 8
 #define LANE_INDEX ((integer)(0, 1, 2, 3, 4, 5, 6, 7))
 inline int any_lane(int8 m) { return as_ulong(NARROW(m, char8)) != 0; }
+inline uint lanes_of(int8 m) { return (uint)popcount(as_ulong(NARROW(m, char8))) / 8; }
 #else
 #define LANE_INDEX ((integer)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15))
 inline int any_lane(int16 m)
 {
     ulong2 q = as_ulong2(NARROW(m, char16));
     return (q.x | q.y) != 0;
+}
+inline uint lanes_of(int16 m)
+{
+    ulong2 q = as_ulong2(NARROW(m, char16));
+    return (uint)(popcount(q.x) + popcount(q.y)) / 8;
 }
 #endif
 #endif

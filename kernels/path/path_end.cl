@@ -19,6 +19,14 @@ inline PathEnd path_end(Slab path, Slab hit, uint at)
     return e;
 }
 
+/* Whether half of the lanes have ended their paths, or no other is in flight. To begin paths takes as long for one lane
+ * as for all: where that is long, and paths are short, lanes had better wait for others. */
+inline int path_end_of_half(PathEnd e)
+{
+    mask in_flight = ((e.state & PATH_ALIVE) != 0) & !e.missed;
+    return any(e.ended) && (2 * lanes_of(e.ended) >= LANES || !any(in_flight));
+}
+
 /* Counts paths that are finished; rays: how many of theirs met a surface. */
 inline void path_end_count(global uint *counters, PathEnd e, integer rays)
 {

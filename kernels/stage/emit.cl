@@ -88,7 +88,7 @@ STAGE(emit)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
     SCENE
     STAGE_AT
     PathEnd end = path_end(path, hit, at);
-    if (any(end.ended)) {
+    if (path_end_of_half(end)) {
         path_end_count(counters, end, end.depth - 1 + path_nulls(path, at));
         integer slot = LANE_INDEX + (int)at;
         integer pixel_index = load_path_pixel_index(path, at), sample = load_path_sample(path, at);

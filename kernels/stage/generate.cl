@@ -117,7 +117,12 @@ STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
     SCENE
     STAGE_AT
     PathEnd end = path_end(path, hit, at);
-    if (any(end.ended)) {
+#if USES_INFINITE /* light from all around is gathered here */
+    int due = path_end_of_half(end);
+#else
+    int due = any(end.ended);
+#endif
+    if (due) {
         integer slot = LANE_INDEX + (int)at;
         integer pixel_index = load_path_pixel_index(path, at), sample = load_path_sample(path, at);
         add_sample(scene, path, at, BEGIN_PASSED, end, slot, pixel_index, sample);
