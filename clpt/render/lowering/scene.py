@@ -112,9 +112,10 @@ def lower(
     materials = _begin_materials(index, encoder)
     geometry = lower_geometry(index, encoder, materials)
     sphere = geometry.bounding_sphere()
-    index, why = decided(index, geometry, encoder, sphere, former.integrator if former else None)
-    density_row, tabulated, profile = _lower_film(index, encoder, wavelengths)
     lights = _lower_lights(index, encoder, geometry, sphere[1])
+    before = former.integrator if former else None
+    index, why = decided(index, geometry, encoder, lights, sphere, before)
+    density_row, tabulated, profile = _lower_film(index, encoder, wavelengths)
     targets = aims(index, geometry, sphere[1])
     first_aim = encoder.store.append_floats("distributions", targets)
     lower_attributes(geometry.owners, encoder.textures, cache, geometry.single_count)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.render.contract import shape_records
+from clpt.render.contract.light_records import INFINITE
 from clpt.render.lowering.camera import cameras
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.geometry import analytic, shapes, triangles
@@ -23,7 +24,7 @@ from clpt.render.lowering.geometry.geometry import Geometry
 from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.lights import image_lights
 from clpt.render.lowering.lights.aims import is_sharp, sharp_pieces
-from clpt.render.lowering.lights.lights import Emitter
+from clpt.render.lowering.lights.lights import Emitter, LightRows
 from clpt.scene import materials as mt
 from clpt.scene.integrators import AUTO, Auto, Integrator, Path, Vcm
 from clpt.scene.lights import CubeMap, Envmap
@@ -33,6 +34,8 @@ SMALL = 0.01  # of the sphere that is seen: up to it a light is small
 NEAR = 0.25  # of the scene's radius: a light counts as no nearer to what it shines on
 SUN = 0.25  # of an image's power: where it comes from a small part the image is a small light
 FEWEST = 3  # edges of a path from a light over two surfaces to the camera: the shortest caustic
+MOSTLY = 0.5  # of the power of all lights: where small ones have less, few paths start at lights
+FEW = 0.25  # a sample
 SEEN = 0.02  # of the picture: where what is sharp fills more, caustics may be seen through it
 
 Ball = tuple[NDArray[np.float64], float]  # centre and radius
@@ -42,6 +45,7 @@ def decided(
     index: SceneIndex,
     geometry: Geometry,
     encoder: Encoder,
+    lights: LightRows,
     sphere: Ball,
     former: Integrator | None = None,
 ) -> tuple[SceneIndex, str]:
@@ -55,7 +59,7 @@ def decided(
     if not isinstance(given, Auto) and getattr(given, "light_paths", None) != AUTO:
         return index, ""
     if former is None:
-        chosen, reason = _choice(index, geometry, encoder, sphere)
+        chosen, reason = _choice(index, geometry, encoder, lights, sphere)
     else:
         chosen = former if isinstance(former, (Path, Vcm)) else Path(light_paths=0)
         reason = "as before the scene was edited"
@@ -65,7 +69,7 @@ def decided(
 
 
 def _choice(
-    index: SceneIndex, geometry: Geometry, encoder: Encoder, sphere: Ball
+    index: SceneIndex, geometry: Geometry, encoder: Encoder, lights: LightRows, sphere: Ball
 ) -> tuple[Integrator, str]:
     """The integrator but for its depths, and why; what is cheap to know is asked first."""
     scene, without = index.scene, Path(light_paths=0)
@@ -78,10 +82,12 @@ def _choice(
         return without, "nothing is sharp"
     if _first_with((one for one in index.shapes if one.emission is None), _is_dull) is None:
         return without, "there is nothing dull for a caustic to be seen on"
-    small = next(_small_lights(index, geometry, encoder, sphere), None)
-    if small is None:
+    small = list(_small_lights(index, geometry, encoder, lights, sphere))
+    if not small:
         return without, "no light is small"
-    reason = f"{shapes.where(sharp)} is sharp, and {small} is a small light"
+    reason = f"{shapes.where(sharp)} is sharp, and {small[0][0]} is a small light"
+    if sum(share for _, share in small) < MOSTLY:
+        return Path(light_paths=FEW), f"{reason}, though most light is of large ones"
     if not isinstance(scene.integrator, Auto):
         return Path(light_paths=1), reason
     if scene.noise is not None:
@@ -129,23 +135,26 @@ def _is_dull(material: mt.Material) -> bool:
 
 
 def _small_lights(
-    index: SceneIndex, geometry: Geometry, encoder: Encoder, sphere: Ball
-) -> Iterator[str]:
-    """The names of small lights, those first of which it is known at once."""
-    for i, lamp in enumerate(index.scene.lights):
-        if lamp.reach in ("placed", "distant") and getattr(lamp, "falloff", True):
-            yield f"lights[{i}]"
+    index: SceneIndex, geometry: Geometry, encoder: Encoder, lights: LightRows, sphere: Ball
+) -> Iterator[tuple[str, float]]:
+    """The names of small lights, and the share of all light that comes from each."""
+    lamps, share = index.scene.lights, lights.power / max(lights.power.sum(), 1e-300)
+    order = sorted(range(len(lamps)), key=lambda i: lamps[i].kind not in INFINITE)
+    for row, i in enumerate(order):
+        lamp = lamps[i]
+        if isinstance(lamp, (Envmap, CubeMap)):
+            small = image_lights.extent(lamp, encoder, SUN) < SMALL
+        else:
+            small = lamp.reach in ("placed", "distant") and getattr(lamp, "falloff", True)
+        if small:
+            yield f"lights[{i}]", float(share[row])
     middle, radius = sphere
-    for emitter in geometry.emitters:
+    ends = (*lights.first, len(share))[1:]
+    for emitter, first, end in zip(geometry.emitters, lights.first, ends, strict=True):
         area, place = _area_and_place(emitter, encoder)
         far = max(float(np.linalg.norm(place - middle)), NEAR * radius)
         if area < SMALL * 4.0 * np.pi * far**2:
-            yield shapes.where(emitter.shape)
-    for i, lamp in enumerate(index.scene.lights):
-        if not isinstance(lamp, (Envmap, CubeMap)):
-            continue
-        if image_lights.extent(lamp, encoder, SUN) < SMALL:
-            yield f"lights[{i}]"
+            yield shapes.where(emitter.shape), float(share[first:end].sum())
 
 
 def _area_and_place(emitter: Emitter, encoder: Encoder) -> tuple[float, NDArray[Any]]:

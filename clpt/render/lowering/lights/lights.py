@@ -51,7 +51,8 @@ class Emitter:
 class LightRows:
     """The table `lights` and what follows from it.
 
-    rows: structured (n,) of LIGHT.dtype; infinite: how many of them, the first ones, are infinite;
+    rows: structured (n,) of LIGHT.dtype; power: (n,) float64, what each sends into the scene, in a
+    unit of all of them; infinite: how many of them, the first ones, are infinite;
     kinds: those that occur, for `dispatch_text`; first: per emitter, its first row; whole: per
     emitter, whether that one row stands for all of it; visible: whether one is no delta light;
     two_sided: whether one shines from the back of its shape too; tree: the words of the tree that
@@ -59,6 +60,7 @@ class LightRows:
     """
 
     rows: np.ndarray
+    power: NDArray[np.float64]
     infinite: int
     kinds: tuple[str, ...]
     first: tuple[int, ...]
@@ -101,9 +103,10 @@ def light_rows(
     blocks += [_emitter_block(emitter, encoder) for emitter in emitters]
     first = np.cumsum([0, *(len(block.rows) for block in blocks)])[len(ordered) : -1]
     rows = np.concatenate([np.zeros(0, LIGHT.dtype), *(block.rows for block in blocks)])
+    power = np.concatenate([np.zeros(0), *(block.power for block in blocks)])
     tree = None
     if len(rows):
-        weights = _shared(np.concatenate([block.power for block in blocks]), infinite)
+        weights = _shared(power, infinite)
         same = content(weights)
         rows["pmf"], rows["keep"], rows["alias"] = encoder.cache(alias_table, weights, by=(same,))
         apart = sum(bool(block.bounds.placed.any()) for block in blocks)
@@ -116,6 +119,7 @@ def light_rows(
     kinds = tuple(KINDS[i] for i in np.unique(rows["kind"]))
     return LightRows(
         rows=rows,
+        power=power,
         infinite=infinite,
         kinds=kinds,
         first=tuple(int(i) for i in first),

@@ -73,10 +73,17 @@ def sky(share: float, side: int = 64) -> np.ndarray:
     ids=lambda lamp: lamp.kind,
 )
 def test_small_lights(lamp: Light) -> None:
-    assert chosen(scene_of(ROOM, BALL, lights=[Constant(), lamp])) == (
-        1,
-        "sphere is sharp, and lights[1] is a small light",
-    )
+    reason = "sphere is sharp, and lights[0] is a small light"
+    assert chosen(scene_of(ROOM, BALL, lights=[lamp])) == (1, reason)
+
+
+def test_few_light_paths_where_most_light_is_of_large_lights() -> None:
+    """A sky of radiance L sends 4 pi^2 r^2 L into a sphere, a sun pi r^2 times its irradiance."""
+    for irradiance, number in ((3.9 * np.pi, 0.25), (4.1 * np.pi, 1.0)):
+        lamps = [Constant(radiance=1.0), Directional(irradiance=irradiance)]
+        for integrator in (Path(), Auto()):
+            found, reason = chosen(scene_of(ROOM, BALL, lights=lamps, integrator=integrator))
+            assert found == number and ("though most light" in reason) == (number < 1)
 
 
 @pytest.mark.parametrize(
