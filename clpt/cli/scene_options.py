@@ -120,7 +120,7 @@ _OPTIONS = (
     click.option(
         "--light-paths", type=LightPaths(),
         help="Of path and vcm: paths from lights for each sample, for caustics. Of path, 0: none; "
-        "auto: one where something is sharp and a light is small.",
+        "auto: some where something is sharp and a light is small.",
     ),
     click.option(
         "--radius", type=click.FloatRange(0.0),

@@ -116,8 +116,13 @@ def filtered(caption: str, chosen: integrators.Filter) -> Picture:
 
 
 INTEGRATORS = {
+    "auto": traced(
+        "What suits the scene: path, light paths beside it, or vcm.", integrators.Auto()
+    ),
     "path": traced(
-        "All light: from wall to wall, by glass and mirrors.", integrators.Path(), spp=256
+        "All light: from wall to wall, by glass and mirrors.",
+        integrators.Path(light_paths=0),
+        spp=256,
     ),
     "vcm": traced(
         "A point light: its caustic on the floor, and the same in the mirror.",

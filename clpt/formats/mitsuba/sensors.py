@@ -349,6 +349,7 @@ def _moment(props: Properties) -> Integrator:
 
 INTEGRATORS: dict[str, Callable[[Properties], Integrator]] = {
     "path": _path,
+    "auto": lambda props: integrators.Auto(**_depths(props)),
     "vcm": _vcm,
     "direct": _direct,
     "ptracer": _particle_tracer,

@@ -178,11 +178,7 @@ OTHERS = {  # what finds light in other ways than from the camera alone
     ),
     "lightpath": (),
 }  # fmt: skip
-CAUSTICS = (
-    "paths are traced from the camera instead: light of a point, spot or distant light that comes "
-    "through smooth glass or from a mirror is missing, and caustics of small lamps are noisy; "
-    "--integrator vcm finds both"
-)
+CHOSEN = "clpt chooses what suits the scene instead: path, light paths beside it, or vcm"
 PHOTONS = (
     "its photons are those of vcm: they count beside paths from the camera and from lights, where "
     "something sharp has gathered light; the radius is one for all pixels, and shrinks by the "
@@ -206,12 +202,14 @@ def integrator(definition: Definition | None, film: Film) -> Integrator:
     if definition.kind not in known:
         raise UnknownKindError("integrator", definition.kind, known, **params.location())
     if definition.kind in OTHERS:
-        state.warn(params, CAUSTICS)
+        state.warn(params, CHOSEN)
     params.ignore(*IGNORED, *OTHERS.get(definition.kind, ()))
     depth = params.one("maxdepth", "integer", 5)
     if depth < 0:
         raise params.error(f"'maxdepth' cannot be negative: {depth}")
     longest = min(depth, MOST_DEPTH) + 1
+    if definition.kind in OTHERS:
+        return integrators.Auto(max_depth=longest)
     if definition.kind != "sppm":
         return integrators.Path(max_depth=longest)
     state.warn(params, PHOTONS)
