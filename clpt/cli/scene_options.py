@@ -22,7 +22,7 @@ from ..formats.missing import Missing
 from ..render.lowering.checks import check
 from ..render.renderer import Renderer
 from ..scene import Scene, kinds
-from ..scene.integrators import AUTO, MOST_LIGHT_PATHS
+from ..scene.integrators import AUTO, MOST_LIGHT_PATHS, Auto
 from ..scene.params import Kind, params
 from ..spectra import read_sensor, spaces
 from ..spectra.sensors import OBSERVERS
@@ -241,6 +241,9 @@ def changed(
     if integrator is not None and integrator != scene.integrator.kind:
         given["integrator"] = _integrator(integrator, scene.integrator)
     how: Any = given.get("integrator", scene.integrator)
+    if isinstance(how, Auto):  # a number of light paths, or a radius, is a choice
+        wanted = "vcm" if radius is not None else "path" if light_paths is not None else "auto"
+        how = _integrator(wanted, how)
     for name, value, what in (
         ("max_depth", max_depth, "depth"), ("light_paths", light_paths, "light paths beside it"),
         ("radius", radius, "photons"),

@@ -473,7 +473,7 @@ def test_update_keeps_both_kinds_of_paths() -> None:
     renderer.run(3)
     assert np.array_equal(renderer.image(), picture(turned, 3))
     with pytest.raises(SceneError, match="light paths stay"):
-        renderer.update(scene=dataclasses.replace(turned, integrator=Path()))
+        renderer.update(scene=with_light_paths(turned, 0))
 
 
 @pytest.mark.slow

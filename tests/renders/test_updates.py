@@ -57,7 +57,7 @@ def scene(**more: Any) -> Scene:
         "shapes": [FLOOR, WALL, BALL, LAMP],
         "lights": [POINT],
         "film": Film(width=20, height=16, mode="rgb"),
-        "integrator": Path(max_depth=4),
+        "integrator": Path(max_depth=4, light_paths=0),
     }
     return Scene(camera=CAMERA, **{**given, **more})
 
@@ -105,7 +105,7 @@ EDITS: dict[str, Callable[[Scene], dict[str, Any]]] = {
     "a shape more": lambda s: {"scene": dataclasses.replace(s, shapes=[*s.shapes, SIDE])},
     "a shape less": lambda s: {"scene": dataclasses.replace(s, shapes=s.shapes[1:])},
     "the integrator's depth": lambda s: {
-        "scene": dataclasses.replace(s, integrator=Path(max_depth=2), seed=5)
+        "scene": dataclasses.replace(s, integrator=Path(max_depth=2, light_paths=0), seed=5)
     },
 }
 

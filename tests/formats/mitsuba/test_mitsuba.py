@@ -83,11 +83,18 @@ def test_variables(scene):
 def test_light_paths_are_a_parameter_of_ours(scene):
     path = '<integrator type="path"><integer name="light_paths" value="2"/></integrator>'
     assert scene(path).integrator.light_paths == 2
-    assert scene('<integrator type="path"/>').integrator.light_paths == 0
+    assert scene(path.replace("integer", "float").replace("2", "0.5")).integrator.light_paths == 0.5
+    assert scene('<integrator type="path"/>').integrator.light_paths == "auto"
     auto = path.replace("integer", "string").replace('"2"', '"auto"')
     assert scene(auto).integrator.light_paths == "auto"
     with pytest.raises(SceneError, match=r"scene.xml:2: .*'many' is none of auto"):
         scene(auto.replace("auto", "many"))
+
+
+def test_auto_is_an_integrator_of_ours(scene):
+    inner = '<integer name="max_depth" value="9"/><boolean name="hide_emitters" value="true"/>'
+    made = scene(f'<integrator type="auto">{inner}</integrator>').integrator
+    assert vars(made) == {**vars(integrators.Auto()), "max_depth": 9, "hide_lights": True}
 
 
 def test_vcm_is_an_integrator_of_ours(scene):

@@ -30,7 +30,7 @@ from clpt.scene.integrators import AUTO, Auto, Integrator, Path, Vcm
 from clpt.scene.lights import CubeMap, Envmap
 from clpt.scene.shapes import Shape
 
-SMALL = 0.01  # of the sphere that is seen: up to it a light is small
+SMALL = 0.03  # of the sphere that is seen: up to it a light is small
 NEAR = 0.25  # of the scene's radius: a light counts as no nearer to what it shines on
 SUN = 0.25  # of an image's power: where it comes from a small part the image is a small light
 FEWEST = 3  # edges of a path from a light over two surfaces to the camera: the shortest caustic

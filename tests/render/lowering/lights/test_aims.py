@@ -172,5 +172,5 @@ def test_without_something_sharp_and_small_nothing_is_aimed() -> None:
     wide = Sphere(center=(0, 1, 0), radius=49.0, material=GLASS)
     assert len(spheres_of(dull)) == len(spheres_of(wide)) == 0
     scene = scene_of(Sphere(center=(0, 1, 0), radius=0.5, material=GLASS))
-    for integrator in (Path(), ParticleTracer()):
+    for integrator in (Path(light_paths=0), ParticleTracer()):
         assert not lower(dataclasses.replace(scene, integrator=integrator)).features.aimed
