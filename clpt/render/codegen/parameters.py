@@ -133,7 +133,8 @@ def _member(
     if present & {"none", "grey"}:
         present |= {"constant"}
     constant, table = f"spectrum_constant({whole}, lambdas)", f"spectrum_table(scene, {whole}"
-    texture = f"{form.lower()}_texture_{param.role}(scene, as_integer({source}), point, lambdas)"
+    looked_up = "texel" if param.linear else param.role
+    texture = f"{form.lower()}_texture_{looked_up}(scene, as_integer({source}), point, lambdas)"
     loads = {
         "constant": ("", constant if form == "Spectrum" else whole),
         "table": ("< 0", f"{table}, as_integer({source}), lambdas)"),
