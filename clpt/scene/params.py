@@ -101,8 +101,8 @@ def reflectance(
     limited: False where it may be a number of any kind, as what textures are made of.
     """
     low, high = (0.0, 1.0) if limited else (-math.inf, math.inf)
-    known = {"textured": True, "lobe": lobe, "linear": linear}
-    return _field(default, Param("reflectance", doc, low=low, high=high, **known))
+    param = Param("reflectance", doc, low=low, high=high, textured=True, lobe=lobe, linear=linear)
+    return _field(default, param)
 
 
 def emission(default: Any, doc: str, unit: str, *, textured: bool = False) -> Any:

@@ -115,8 +115,8 @@ def _is_linear(probe: Probe, params: Params, rng: Random, name: str) -> None:
         _hold(same, f"{value} depends on {name}, which is declared as linear, {params}")
     for value in ("eval", "weight"):
         between = (low[value] + high[value]) / 2
-        told = f"{value} is not linear in {name}, {params}"
-        _close(mean[value], between, told, rtol=1e-4, atol=1e-6)
+        message = f"{value} is not linear in {name}, {params}"
+        _close(mean[value], between, message, rtol=1e-4, atol=1e-6)
 
 
 def lanes_agree(wide: Probe, narrow: Probe, params: Params, rng: Random) -> None:

@@ -77,7 +77,8 @@ def _texel_text(kinds: list[str], programs: bool, stochastic: bool) -> list[str]
         return [same]
     text = _look_up("texel", kinds, "texture_leaf" if programs else "texture")
     own = [text, _with_programs("texel", True)] if programs else [text]
-    return ["#if STOCHASTIC_FILTERING", *own, _parameter("texel"), "#else", same, "#endif"]
+    own.append(_parameter("texel", how="inline"))  # short, and in few places
+    return ["#if STOCHASTIC_FILTERING", *own, "#else", same, "#endif"]
 
 
 def _choice_lines(cls: type[Texture]) -> list[str]:
@@ -119,14 +120,14 @@ def _with_programs(role: str, some: bool) -> str:
     return Function(signature, leaf, [case] if some else []).text()
 
 
-def _parameter(role: str) -> str:
-    """The texture that a parameter in a row names."""
+def _parameter(role: str, how: str = "called") -> str:
+    """The texture that a parameter in a row names; how: see `function`."""
     form = _type(role)
     return function(
         f"{form} {form.lower()}_texture_{role}"
         "(Scene scene, integer source, TexturePoint point, Wavelengths lambdas)",
         f"return texture_{role}(scene, max_i(source - 1, (integer)(0)), point, lambdas);",
-        how="called",
+        how=how,
     )
 
 
