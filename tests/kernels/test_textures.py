@@ -31,7 +31,8 @@ COLOURS = np.random.default_rng(1).random((5, 7, 3)).astype(np.float32)
 
 @cache
 def _dispatch(roles):
-    return dispatch_text({kind for kind, _ in roles}, roles, 4, stochastic=True)
+    stochastic = any(role == "reflectance" for _, role in roles)
+    return dispatch_text({kind for kind, _ in roles}, roles, 4, stochastic=stochastic)
 
 
 def _body(role, mode):

@@ -65,20 +65,17 @@ def dispatch_text(
     for role in leaves:
         parts += [_with_programs(role, role in programs)] if programs else []
         parts.append(_parameter(role))
-    if "reflectance" in leaves:
-        parts += _texel_text(leaves["reflectance"], "reflectance" in programs, stochastic)
+    if stochastic:
+        parts += _texel_text(leaves["reflectance"], "reflectance" in programs)
     return "\n".join([*parts, ""])
 
 
-def _texel_text(kinds: list[str], programs: bool, stochastic: bool) -> list[str]:
+def _texel_text(kinds: list[str], programs: bool) -> list[str]:
     """`spectrum_texture_texel`; programs: some texture is one, all of which is filtered."""
-    same = "#define spectrum_texture_texel spectrum_texture_reflectance"
-    if not stochastic:
-        return [same]
     text = _look_up("texel", kinds, "texture_leaf" if programs else "texture")
     own = [text, _with_programs("texel", True)] if programs else [text]
     own.append(_parameter("texel", how="inline"))  # short, and in few places
-    return ["#if STOCHASTIC_FILTERING", *own, "#else", same, "#endif"]
+    return ["#if STOCHASTIC_FILTERING", *own, "#endif"]
 
 
 def _choice_lines(cls: type[Texture]) -> list[str]:
