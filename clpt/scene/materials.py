@@ -108,7 +108,7 @@ class Diffuse(Material):
 
     absorbs = True
 
-    reflectance: Textured = reflectance(0.5, "albedo")
+    reflectance: Textured = reflectance(0.5, "albedo", linear=True)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -137,8 +137,12 @@ class Dielectric(Material):
 
     int_ior: IndexLike = index(1.5046, "inside index, number, glass name or spectrum")
     ext_ior: IndexLike = index(1.000277, "outside index")
-    specular_reflectance: Textured = reflectance(1.0, "factor on reflection; 1 is physical")
-    specular_transmittance: Textured = reflectance(1.0, "factor on transmission; 1 is physical")
+    specular_reflectance: Textured = reflectance(
+        1.0, "factor on reflection; 1 is physical", linear=True
+    )
+    specular_transmittance: Textured = reflectance(
+        1.0, "factor on transmission; 1 is physical", linear=True
+    )
     absorption: SpectrumLike = coefficient(0.0, "of the inside: exp(-absorption distance) passes")
     layers: tuple[Layer, ...] = layers(FILMS)
 
@@ -156,8 +160,12 @@ class ThinDielectric(Material):
 
     int_ior: IndexLike = index(1.5046, "index of the slab")
     ext_ior: IndexLike = index(1.000277, "index around it")
-    specular_reflectance: Textured = reflectance(1.0, "factor on reflection; 1 is physical")
-    specular_transmittance: Textured = reflectance(1.0, "factor on transmission; 1 is physical")
+    specular_reflectance: Textured = reflectance(
+        1.0, "factor on reflection; 1 is physical", linear=True
+    )
+    specular_transmittance: Textured = reflectance(
+        1.0, "factor on transmission; 1 is physical", linear=True
+    )
 
     @property
     def transmits(self) -> bool:
@@ -179,8 +187,12 @@ class RoughDielectric(Material):
         0.1, "roughness along the tangent", low=1e-4, high=1.0, textured=True
     )
     alpha_v: TexturedNumber = real(0.1, "roughness across it", low=1e-4, high=1.0, textured=True)
-    specular_reflectance: Textured = reflectance(1.0, "factor on reflection; 1 is physical")
-    specular_transmittance: Textured = reflectance(1.0, "factor on transmission; 1 is physical")
+    specular_reflectance: Textured = reflectance(
+        1.0, "factor on reflection; 1 is physical", linear=True
+    )
+    specular_transmittance: Textured = reflectance(
+        1.0, "factor on transmission; 1 is physical", linear=True
+    )
     absorption: SpectrumLike = coefficient(0.0, "of the inside: exp(-absorption distance) passes")
     layers: tuple[Layer, ...] = layers(FILMS)
 
@@ -197,7 +209,9 @@ class Conductor(Material):
 
     eta: IndexLike | Texture = index(0.0, "index of refraction", zero=True, textured=True)
     k: IndexLike | Texture = index(1.0, "extinction coefficient", zero=True, textured=True)
-    specular_reflectance: Textured = reflectance(1.0, "factor on reflection; 1 is physical")
+    specular_reflectance: Textured = reflectance(
+        1.0, "factor on reflection; 1 is physical", linear=True
+    )
     layers: tuple[Layer, ...] = layers(FILMS)
 
 
@@ -212,7 +226,9 @@ class RoughConductor(Material):
         0.1, "roughness along the tangent", low=1e-4, high=1.0, textured=True
     )
     alpha_v: TexturedNumber = real(0.1, "roughness across it", low=1e-4, high=1.0, textured=True)
-    specular_reflectance: Textured = reflectance(1.0, "factor on reflection; 1 is physical")
+    specular_reflectance: Textured = reflectance(
+        1.0, "factor on reflection; 1 is physical", linear=True
+    )
     layers: tuple[Layer, ...] = layers(FILMS)
 
 
@@ -479,7 +495,9 @@ class Grating(Material):
     k: IndexLike | Texture = index(
         1.0, "extinction coefficient of the metal", zero=True, textured=True
     )
-    reflectance: Textured = reflectance(1.0, "factor on the light of all orders; 1 is physical")
+    reflectance: Textured = reflectance(
+        1.0, "factor on the light of all orders; 1 is physical", linear=True
+    )
 
     @property
     def transmits(self) -> bool:

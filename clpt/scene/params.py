@@ -84,6 +84,7 @@ class Param:
     form: str = ""
     lobe: bool = False  # 0 leaves a lobe out: kernels are made without it where all have 0
     positive: bool = False  # it cannot be 0 either, at any wavelength of the film
+    linear: bool = False  # f is linear in it and no pdf knows it: a random texel may stand for it
 
 
 def _field(default: Any, param: Param) -> Any:
@@ -92,13 +93,16 @@ def _field(default: Any, param: Param) -> Any:
     return field(default=default, metadata={"param": param})
 
 
-def reflectance(default: Any, doc: str, *, lobe: bool = False, limited: bool = True) -> Any:
-    """Declare a spectrum in [0, 1]; may be a texture. `lobe`: see `Param`.
+def reflectance(
+    default: Any, doc: str, *, lobe: bool = False, linear: bool = False, limited: bool = True
+) -> Any:
+    """Declare a spectrum in [0, 1]; may be a texture. `lobe`, `linear`: see `Param`.
 
     limited: False where it may be a number of any kind, as what textures are made of.
     """
     low, high = (0.0, 1.0) if limited else (-math.inf, math.inf)
-    return _field(default, Param("reflectance", doc, low=low, high=high, textured=True, lobe=lobe))
+    param = Param("reflectance", doc, low=low, high=high, textured=True, lobe=lobe, linear=linear)
+    return _field(default, param)
 
 
 def emission(default: Any, doc: str, unit: str, *, textured: bool = False) -> Any:

@@ -101,6 +101,22 @@ def flags_are_told_truly(probe: Probe, params: Params, rng: Random) -> None:
     if cls.transmits is Material.transmits:
         through = r["lobe"][made] & (TRANSMIT | DELTA) == TRANSMIT
         _hold(not np.any(through), f"light goes through: define `transmits`, {params}")
+    for name in (name for name, param in device_params(cls).items() if param.linear):
+        _is_linear(probe, params, rng, name)
+
+
+def _is_linear(probe: Probe, params: Params, rng: Random, name: str) -> None:
+    """Light is linear in a parameter, and directions and their chances do not depend on it."""
+    (wo, wi), u = pairs(rng, 1000), rng.random((1000, 3))
+    a, b = rng.random((2, probe.components))
+    low, high, mean = (probe({**params, name: v}, wo, wi, u) for v in (a, b, (a + b) / 2))
+    for value in ("wi", "eta", "lobe", "sampled_pdf", "pdf"):
+        same = np.array_equal(low[value], high[value])
+        _hold(same, f"{value} depends on {name}, which is declared as linear, {params}")
+    for value in ("eval", "weight"):
+        between = (low[value] + high[value]) / 2
+        message = f"{value} is not linear in {name}, {params}"
+        _close(mean[value], between, message, rtol=1e-4, atol=1e-6)
 
 
 def lanes_agree(wide: Probe, narrow: Probe, params: Params, rng: Random) -> None:

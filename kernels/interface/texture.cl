@@ -4,6 +4,13 @@
  *   Spectrum <kind>_emission   (<Kind> t, Scene scene, TexturePoint point, Wavelengths lambdas);
  *   real     <kind>_real       (<Kind> t, Scene scene, TexturePoint point);
  *
+ * and an image, whose reflectance is a weighted mean of texels,
+ *
+ *   Spectrum <kind>_texel      (<Kind> t, Scene scene, TexturePoint point, vec2 u, Wavelengths lambdas);
+ *
+ * one of these texels, each with its weight as its chance, so that the mean is the reflectance (Fajardo et al. 2023,
+ * "Stochastic Texture Filtering"). It serves where light is linear in the value.
+ *
  * The struct <Kind> is a Record in clpt/render/contract/texture_records.py whose rows lie in `textures`. What
  * combines others is no kind here but a program of them: texture/program.cl.
  */

@@ -17,7 +17,7 @@
 #endif
 
 /* Dimensions of a sample, in pairs: film, lens, wavelength, then DIMENSIONS_A_VERTEX per surface that is met, null
- * ones among them. */
+ * ones among them; beyond all these DIMENSION_TEXEL, one pair per surface. */
 #define DIMENSION_FILM 0
 #define DIMENSION_LENS 1
 #define DIMENSION_WAVELENGTH 2
@@ -27,6 +27,7 @@
 #define DIMENSION_BSDF 1     /* a direction */
 #define DIMENSION_CHOICE 2   /* which light, which lobe */
 #define DIMENSION_ROULETTE 3 /* whether to go on; which part of a mixture */
+#define DIMENSION_TEXEL 0x10000 /* which texel stands for those around */
 
 /* Where lights are chosen by it, the hemisphere to which the surface sends light where the ray was chosen. */
 #if USES_HEMISPHERE

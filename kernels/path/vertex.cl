@@ -61,7 +61,11 @@ inline Scattering vertex_scattering(Scene scene, Slab path, uint at, mask active
     scatter.choice = sampler_pair(sampler, scatter.dimension + DIMENSION_CHOICE);
 #endif
     scatter.lambdas = v.lambdas;
-    scatter.bsdf = bsdf_load(scene, v.row, surface_texture_point(v.s), v.lambdas);
+    TexturePoint point = surface_texture_point(v.s);
+#if STOCHASTIC_FILTERING
+    point.u = sampler_pair(sampler, as_natural(DIMENSION_TEXEL + v.met));
+#endif
+    scatter.bsdf = bsdf_load(scene, v.row, point, v.lambdas);
 #if BSDF_FLUORESCES
     scatter.lambdas = bsdf_shift(scene, v.row, scatter.bsdf, v.lambdas, scatter.choice.y, v.depth);
     store_path_lambdas(path, at, active, scatter.lambdas);

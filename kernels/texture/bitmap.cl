@@ -14,21 +14,36 @@ inline integer bitmap_wrap(integer i, integer size, integer wrap)
     return min_i(max_i(i, (integer)(0)), size - 1);
 }
 
-/* One axis: two texels, and their weights; what lies outside weighs nothing where the wrap is zero. A
- * coordinate that is huge or not a number still ends inside the image. */
-inline void bitmap_axis(real x, integer size, integer wrap, mask smooth, integer *i0, integer *i1, real *w0, real *w1)
+/* A coordinate in the first period, or near the image; one that is huge or not a number as well. */
+inline real bitmap_coordinate(real x, integer wrap)
 {
     mask ends = wrap == BITMAP_WRAP_ZERO;
     real period = sel(wrap == BITMAP_WRAP_MIRROR, (real)(2.0f), (real)(1.0f)), turns = x / period;
     x = sel((wrap == BITMAP_WRAP_CLAMP) | ends, x, (turns - floor(turns)) * period);
-    x = clamp_r(x, sel(ends, (real)(-1.0f), (real)(0.0f)), sel(ends, (real)(2.0f), period));
-    x = x * to_real(size) - sel(smooth, (real)(0.5f), (real)(0.0f));
+    return clamp_r(x, sel(ends, (real)(-1.0f), (real)(0.0f)), sel(ends, (real)(2.0f), period));
+}
+
+/* One axis: two texels, and their weights; what lies outside weighs nothing where the wrap is zero. */
+inline void bitmap_axis(real x, integer size, integer wrap, mask smooth, integer *i0, integer *i1, real *w0, real *w1)
+{
+    mask ends = wrap == BITMAP_WRAP_ZERO;
+    x = bitmap_coordinate(x, wrap) * to_real(size) - sel(smooth, (real)(0.5f), (real)(0.0f));
     real below = floor(x), t = sel(smooth, x - below, (real)(0.0f));
     integer first = to_integer(below), second = first + 1;
     *w0 = sel(ends & ((first < 0) | (first >= size)), (real)(0.0f), 1.0f - t);
     *w1 = sel(ends & ((second < 0) | (second >= size)), (real)(0.0f), t);
     *i0 = bitmap_wrap(first, size, wrap);
     *i1 = bitmap_wrap(second, size, wrap);
+}
+
+/* One axis: one of the two, each with its weight as its chance; u: uniform. It is no longer `inside` where what lies
+ * outside weighs nothing. */
+inline integer bitmap_axis_texel(real x, integer size, integer wrap, mask smooth, real u, mask *inside)
+{
+    x = bitmap_coordinate(x, wrap) * to_real(size) + sel(smooth, u - 0.5f, (real)(0.0f));
+    integer i = to_integer(floor(x));
+    *inside = *inside & !((wrap == BITMAP_WRAP_ZERO) & ((i < 0) | (i >= size)));
+    return bitmap_wrap(i, size, wrap);
 }
 
 inline BitmapTexels bitmap_texels(Bitmap t, Scene scene, TexturePoint point)
@@ -49,6 +64,24 @@ inline integer bitmap_corner(Bitmap t, BitmapTexels b, int corner, real *weight)
     int right = corner & 1, next = corner >> 1;
     *weight = (right ? b.u1 : b.u0) * (next ? b.v1 : b.v0);
     return (next ? b.y1 : b.y0) * t.width + (right ? b.x1 : b.x0);
+}
+
+/* A texel at random: its index in the image. */
+inline integer bitmap_random(Bitmap t, Scene scene, TexturePoint point, vec2 u, mask *inside)
+{
+    vec3 p = texture_uv(scene, t.mapping, t.transform, point);
+    mask smooth = t.filter == BITMAP_FILTER_BILINEAR;
+    *inside = mask_of(1);
+    integer x = bitmap_axis_texel(dot3(t.to_u, p), t.width, t.wrap_u, smooth, u.x, inside);
+    integer y = bitmap_axis_texel(dot3(t.to_v, p), t.height, t.wrap_v, smooth, u.y, inside);
+    return y * t.width + x;
+}
+
+Spectrum bitmap_texel(Bitmap t, Scene scene, TexturePoint point, vec2 u, Wavelengths lambdas)
+{
+    mask inside;
+    integer at = t.first + SPECTRUM_SIZE * bitmap_random(t, scene, point, u, &inside);
+    return spectrum_sel(inside, spectrum_texel_at(scene.images, at, lambdas), spectrum_of(0.0f));
 }
 
 Spectrum bitmap_reflectance(Bitmap t, Scene scene, TexturePoint point, Wavelengths lambdas)

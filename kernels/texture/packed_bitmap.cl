@@ -27,6 +27,15 @@ Spectrum packed_bitmap_reflectance(PackedBitmap t, Scene scene, TexturePoint poi
     return sum;
 }
 
+Spectrum packed_bitmap_texel(PackedBitmap t, Scene scene, TexturePoint point, vec2 u, Wavelengths lambdas)
+{
+    mask inside;
+    integer index = bitmap_random(packed_bitmap_image(t), scene, point, u, &inside);
+    PackedTexel texel = spectrum_packed_words(scene.images, t.first, index);
+    Spectrum value = spectrum_packed_texel(scene.images, texel, t.decode, lambdas);
+    return spectrum_sel(inside, value, spectrum_of(0.0f));
+}
+
 /* In RGB mode alone: light has no packed spectra. */
 Spectrum packed_bitmap_emission(PackedBitmap t, Scene scene, TexturePoint point, Wavelengths lambdas)
 {

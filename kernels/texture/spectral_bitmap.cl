@@ -22,6 +22,14 @@ inline Spectrum spectral_bitmap_at(SpectralBitmap t, Scene scene, TexturePoint p
     return sum;
 }
 
+Spectrum spectral_bitmap_texel(SpectralBitmap t, Scene scene, TexturePoint point, vec2 u, Wavelengths lambdas)
+{
+    mask inside;
+    integer at = t.first + t.bands * bitmap_random(spectral_bitmap_image(t), scene, point, u, &inside);
+    Spectrum value = bands_texel(scene, at, t.bands, spectra_row(scene, t.number, lambdas));
+    return spectrum_sel(inside, value, spectrum_of(0.0f));
+}
+
 Spectrum spectral_bitmap_reflectance(SpectralBitmap t, Scene scene, TexturePoint point, Wavelengths lambdas)
 {
     return spectral_bitmap_at(t, scene, point, spectra_row(scene, t.number, lambdas));

@@ -1,5 +1,6 @@
 /* What a texture may look at: every loader of parameters gets it. What a scene's textures do not ask for
- * is never computed. USES_ATTRIBUTES: some texture reads what a mesh says per vertex or face. */
+ * is never computed. USES_ATTRIBUTES: some texture reads what a mesh says per vertex or face. STOCHASTIC_FILTERING:
+ * a random texel stands for some parameter of the material. */
 typedef struct {
     vec2 uv;
     vec3 p; /* in the world [m] */
@@ -7,6 +8,9 @@ typedef struct {
     integer attributes; /* of the mesh: first word in `attributes` of where each of them lies; 0: it has none */
     integer face;       /* of `faces`; below 0: of a sphere, see texture_face_of_sphere */
     vec2 b;             /* barycentrics of its vertices 1 and 2 */
+#endif
+#if STOCHASTIC_FILTERING
+    vec2 u; /* uniform numbers, which choose the texel */
 #endif
 } TexturePoint;
 
@@ -33,6 +37,10 @@ inline TexturePoint texture_point(vec2 uv, vec3 p)
     t.face = 0;
     t.b.x = 0.0f;
     t.b.y = 0.0f;
+#endif
+#if STOCHASTIC_FILTERING
+    t.u.x = 0.0f;
+    t.u.y = 0.0f;
 #endif
     return t;
 }

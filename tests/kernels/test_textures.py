@@ -19,6 +19,7 @@ from clpt.scene import textures as scene
 from clpt.spectra import cie
 from clpt.spectra.spectrum import d65
 from clpt.spectra.upsampling import evaluate
+from clpt.spectral_exr import SpectralImage
 from tests.kernels.scene_harness import SceneProbe
 
 FILE = "generated/textures.cl"
@@ -30,11 +31,15 @@ COLOURS = np.random.default_rng(1).random((5, 7, 3)).astype(np.float32)
 
 @cache
 def _dispatch(roles):
-    return dispatch_text({kind for kind, _ in roles}, roles, 4)
+    stochastic = any(role == "reflectance" for _, role in roles)
+    return dispatch_text({kind for kind, _ in roles}, roles, 4, stochastic=stochastic)
 
 
 def _body(role, mode):
-    """Text that looks row x[0] up at (x[1], x[2]), and how many numbers it sets."""
+    """Text that looks row x[0] up at (x[1], x[2]), and how many numbers it sets.
+
+    role: "texel" for a texel of a reflectance, which x[3] and x[4] choose.
+    """
     components = "xyzw" if mode == "spectral" else "xyz"
     lines = [
         "integer row = to_integer(x[0]);",
@@ -43,6 +48,7 @@ def _body(role, mode):
         "Wavelengths lambdas;",
     ]
     lines += [f"lambdas.{c} = {v}f;" for c, v in zip(components, LAMBDAS, strict=False)]
+    lines += ["point.u.x = x[3]; point.u.y = x[4];"] if role == "texel" else []
     if role == "real":
         return " ".join([*lines, "r[0] = texture_real(scene, row, point, lambdas);"]), 1
     lines.append(f"Spectrum s = texture_{role}(scene, row, point, lambdas);")
@@ -50,26 +56,33 @@ def _body(role, mode):
     return " ".join(lines), len(components)
 
 
-def look_up(made, role, uv, mode="rgb", lanes=8, rows=None):
-    """Values (n, 3 or 4) or (n,) of textures in a role; rows: which of them each uv reads."""
-    encoder = Encoder(mode)
-    words = np.array([encoder.param_words(t, role)[0][-1] - 1 for t in made])
+def look_up(made, role, uv, mode="rgb", lanes=8, rows=None, u=()):
+    """Values (n, 3 or 4) or (n,) of textures in a role; rows: which of them each uv reads.
+
+    u: (n, 2), which choose texels for the role "texel", see `_body`.
+    """
+    encoder, given = Encoder(mode), "reflectance" if role == "texel" else role
+    words = np.array([encoder.param_words(t, given)[0][-1] - 1 for t in made])
     encoder.textures.finish()
     which = words[np.zeros(len(uv), int) if rows is None else rows]
     body, components = _body(role, mode)
     probe = SceneProbe(
         body,
-        3,
+        3 + 2 * (role == "texel"),
         components,
         files=(FILE,),
         mode=mode,
         lanes=lanes,
         virtual={FILE: _dispatch(frozenset(encoder.textures.roles))},
-        defines={"SPECTRA_SIZE": encoder.spectra.samples},
+        defines={
+            "SPECTRA_SIZE": encoder.spectra.samples,
+            "STOCHASTIC_FILTERING": int(role == "texel"),
+        },
         tables=encoder.store.arrays(),
         settings={"lambda_min": 360.0, "lambda_max": 830.0},
     )
-    out = probe(which, *np.asarray(uv, np.float32).T).T
+    columns = [*np.asarray(uv, np.float32).T, *np.asarray(u, np.float32).T]
+    out = probe(which, *columns).T
     return out[:, 0] if role == "real" else out
 
 
@@ -125,6 +138,46 @@ def test_bitmap(wrap, filter, to_uv):
         assert not off.any()
     else:  # at the border of two texels rounding may choose either
         assert off.mean() < 0.01
+
+
+GRID = 64  # uniform numbers an axis
+IMAGES = {
+    "floats": COLOURS,
+    "bytes": (255 * COLOURS).astype(np.uint8),
+    "bands": SpectralImage(
+        np.random.default_rng(3).random((4, 6, 9)), np.linspace(400, 720, 9), False
+    ),
+}
+
+
+@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+@pytest.mark.parametrize("image", IMAGES)
+def test_random_texels_have_the_filtered_mean(image, mode):
+    """Numbers in the middle of the cells of a grid: the chance of a texel is off by half a cell an
+    axis at most, so the mean of values in [0, 1] by one cell."""
+    uv, wraps = _uvs(24), ["repeat", "clamp", "mirror", "zero"]
+    made = [scene.Bitmap(image=IMAGES[image], wrap=wrap, to_uv=TURNED) for wrap in wraps]
+    made.append(scene.Bitmap(image=IMAGES[image], filter="nearest"))
+    rows = np.arange(len(uv)) % len(made)
+    filtered = look_up(made, "reflectance", uv, mode=mode, rows=rows)
+    middles = (np.arange(GRID) + 0.5) / GRID
+    u = np.tile(np.stack(np.meshgrid(middles, middles), -1).reshape(-1, 2), (len(uv), 1))
+    often, which = (np.repeat(a, GRID**2, axis=0) for a in (uv, rows))
+    found = look_up(made, "texel", often, mode=mode, rows=which, u=u)
+    found = found.reshape(len(uv), GRID**2, -1)
+    np.testing.assert_allclose(found.mean(axis=1), filtered, atol=1.0 / GRID + 1e-4)
+    chosen = [len(np.unique(one.round(5), axis=0)) for one in found]
+    assert max(chosen) == 4, "one of four texels is chosen"
+    assert {n for n, row in zip(chosen, rows, strict=True) if row == len(wraps)} == {1}
+
+
+def test_what_combines_textures_is_filtered():
+    """A product of two random texels would not have the product of the means."""
+    first, second = scene.Bitmap(image=COLOURS), scene.Bitmap(image=COLOURS[:2, :3])
+    made, uv = [scene.Product(first=first, second=second)], _uvs(64)
+    u = np.random.default_rng(7).random((64, 2))
+    found = look_up(made, "texel", uv, u=u)
+    np.testing.assert_array_equal(found, look_up(made, "reflectance", uv))
 
 
 def test_v_runs_up():

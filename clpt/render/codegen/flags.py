@@ -12,8 +12,10 @@ from typing import Any
 from clpt.render.contract import shape_records
 from clpt.render.contract.features import Features
 from clpt.render.contract.parameter_words import RERADIATION_STEP
+from clpt.render.contract.texture_records import IMAGES
 from clpt.scene.integrators import IDS
 from clpt.scene.materials import Material
+from clpt.scene.params import device_params
 
 Defines = dict[str, str | int]
 
@@ -31,6 +33,15 @@ def ends_light_paths(features: Features, cls: type[Material]) -> bool:
 def gathers_photons(features: Features, cls: type[Material]) -> bool:
     """Whether paths from the camera are merged with photons at a material."""
     return not (cls.delta or cls.is_null or ends_light_paths(features, cls))
+
+
+def filters_at_random(features: Features, cls: type[Material]) -> bool:
+    """Whether a random texel stands for some parameter of a material."""
+    images = {(kind, "reflectance") for kind in IMAGES}
+    if features.channel or images.isdisjoint(features.texture_roles):
+        return False
+    sources, declared = features.sources_of(cls.kind), device_params(cls)
+    return any(p.linear and "texture" in sources.get(n, ()) for n, p in declared.items())
 
 
 # name: its value, of a scene's features
@@ -85,6 +96,7 @@ MATERIAL: dict[str, Callable[[Features, type[Material]], str | int]] = {
     "BSDF_ENDS_LIGHT_PATHS": lambda f, cls: f.weighed and ends_light_paths(f, cls),
     "BSDF_MERGES": lambda f, cls: f.merged and gathers_photons(f, cls),
     "BSDF_IS_NULL": lambda f, cls: cls.is_null and f.null_surfaces,
+    "STOCHASTIC_FILTERING": filters_at_random,
     "USES_CHOICE": lambda f, cls: cls.uses_lobe_sample or cls.fluoresces or f.many_lights,
 }
 

@@ -64,10 +64,16 @@ def word_before(cls: type[Kind], name: str) -> int:
     return sum(words(declared[one]) for one in [*declared][: [*declared].index(name)])
 
 
-def load_text(cls: type[Kind], sources: Mapping[str, frozenset[str]], table: str) -> str:
+def load_text(
+    cls: type[Kind],
+    sources: Mapping[str, frozenset[str]],
+    table: str,
+    stochastic: bool = False,
+) -> str:
     """Return `kind_load(scene, row, point, lambdas)`, which reads a row at the path's wavelengths.
 
-    sources: of each parameter; of one that is not there, "constant".
+    sources: of each parameter; of one that is not there, "constant"; stochastic: a random texel
+    stands for what is linear.
     """
     declared = device_params(cls)
     read, given = row_words(f"scene.{table}", "row", sum(map(words, declared.values())))
@@ -78,7 +84,8 @@ def load_text(cls: type[Kind], sources: Mapping[str, frozenset[str]], table: str
         if array_size(param) > 1:
             rows += [f"r.{name}[{i}] = {word};" for i, word in enumerate(own)]
         else:
-            rows += _member(f"r.{name}", param, own, f"row + {first}", sources.get(name))
+            at, texel = f"row + {first}", stochastic and param.linear
+            rows += _member(f"r.{name}", param, own, at, sources.get(name), texel)
     before = ""
     if cls.tints:
         before = value_text(
@@ -110,11 +117,16 @@ def _luminance(cls: type[Kind]) -> list[str]:
 
 
 def _member(
-    target: str, param: Param, given: Sequence[str], at: str, sources: frozenset[str] | None
+    target: str,
+    param: Param,
+    given: Sequence[str],
+    at: str,
+    sources: frozenset[str] | None,
+    texel: bool = False,
 ) -> list[str]:
     """Set a member from the sources that occur; a lane's word after the value says from which.
 
-    given: its words, which are at `at`.
+    given: its words, which are at `at`; texel: of an image a random texel is read.
     """
     form, present = lane_type(param), sources or frozenset({"constant"})
     if form == "integer":
@@ -133,7 +145,8 @@ def _member(
     if present & {"none", "grey"}:
         present |= {"constant"}
     constant, table = f"spectrum_constant({whole}, lambdas)", f"spectrum_table(scene, {whole}"
-    texture = f"{form.lower()}_texture_{param.role}(scene, as_integer({source}), point, lambdas)"
+    looked_up = "texel" if texel else param.role
+    texture = f"{form.lower()}_texture_{looked_up}(scene, as_integer({source}), point, lambdas)"
     loads = {
         "constant": ("", constant if form == "Spectrum" else whole),
         "table": ("< 0", f"{table}, as_integer({source}), lambdas)"),

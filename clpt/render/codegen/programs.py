@@ -239,6 +239,7 @@ def _shared(features: Features, layout: str) -> Files:
             features.texture_roles,
             features.texture_depth,
             features.texture_mappings,
+            any(flags.filters_at_random(features, cls) for cls in features.leaves),
         ),
         "generated/lights.cl": stages.lights_text(features),
         "generated/null_transmittance.cl": stages.null_transmittance_text(features),

@@ -141,7 +141,12 @@ def bsdf_text(features: Features, cls: type[Material]) -> str:
     return "\n".join(
         [
             functions_text(cls, features.mode, features),
-            parameters.load_text(cls, features.sources_of(kind), "materials"),
+            parameters.load_text(
+                cls,
+                features.sources_of(kind),
+                "materials",
+                flags.filters_at_random(features, cls),
+            ),
             f"typedef {cls.__name__} Bsdf;",
             f"#define BSDF_REFLECTIVITY(m) {reflectivity}",
             *(f"#define bsdf_{verb} {kind}_{verb}" for verb in verbs),

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from clpt.render.codegen.dispatch import Case, Function, active, function
 from clpt.render.contract.texture_records import (
     END,
+    IMAGES,
     KINDS,
     OPERANDS,
     OPERATIONS,
@@ -26,13 +27,16 @@ def dispatch_text(
     roles: Iterable[tuple[str, str]],
     depth: int = 0,
     mappings: bool = False,
+    stochastic: bool = False,
 ) -> str:
     """Return the look-ups of the (kind, role) pairs in the scene, and the loaders that call them.
 
-    depth: how many values the programs stack; mappings: some texture makes its own uv.
+    depth: how many values the programs stack; mappings: some texture makes its own uv; stochastic:
+    for some material a random texel stands for a reflectance.
 
     texture_<role>(scene, row, point, lambdas)                 whose row is at a word
     spectrum_texture_<role>(scene, source, point, lambdas)     of 1 + the row, or no texture
+    spectrum_texture_texel(scene, source, point, lambdas)      a reflectance, or a texel of it
     real_texture_real(scene, source, point, lambdas)           the same for a real
     """
     pairs, used = set(roles), set(kinds)
@@ -61,7 +65,17 @@ def dispatch_text(
     for role in leaves:
         parts += [_with_programs(role, role in programs)] if programs else []
         parts.append(_parameter(role))
+    if stochastic:
+        parts += _texel_text(leaves["reflectance"], "reflectance" in programs)
     return "\n".join([*parts, ""])
+
+
+def _texel_text(kinds: list[str], programs: bool) -> list[str]:
+    """`spectrum_texture_texel`; programs: some texture is one, all of which is filtered."""
+    text = _look_up("texel", kinds, "texture_leaf" if programs else "texture")
+    own = [text, _with_programs("texel", True)] if programs else [text]
+    own.append(_parameter("texel", how="inline"))  # short, and in few places
+    return ["#if STOCHASTIC_FILTERING", *own, "#endif"]
 
 
 def _choice_lines(cls: type[Texture]) -> list[str]:
@@ -80,38 +94,37 @@ def _type(role: str) -> str:
 def _look_up(role: str, kinds: list[str], name: str) -> str:
     """`name`_<role>, for textures that combine nothing."""
     zero, more = ("0.0f", "") if role == "real" else ("spectrum_of(0.0f)", ", lambdas")
-    # Indices and factors are the same look-up, of other numbers.
-    verb = "reflectance" if role in ("index", "factor") else role
-    row = active("row")
-    cases = [
-        Case(
-            f"kind == {KINDS.index(kind)}",
-            f"{kind}_{verb}({kind}_row(scene.textures, {row}), scene, point{more})",
-        )
-        for kind in kinds
-    ]
+    row, cases = active("row"), []
+    for kind in kinds:
+        chosen = role == "texel" and kind in IMAGES
+        # Indices and factors are the same look-up, of other numbers.
+        verb = role if chosen or role in ("emission", "real") else "reflectance"
+        seen = "point, point.u" if chosen else "point"
+        looked_up = f"{kind}_{verb}({kind}_row(scene.textures, {row}), scene, {seen}{more})"
+        cases.append(Case(f"kind == {KINDS.index(kind)}", looked_up))
     kind_of = "integer kind = gather_i(scene.textures, row);"
     return Function(f"{_type(role)} {name}_{role}{_LOOKED_UP}", zero, cases, (kind_of,)).text()
 
 
 def _with_programs(role: str, some: bool) -> str:
     """texture_<role> for all textures, where there are programs, and `some` in this role."""
-    run = f"texture_program(scene, TEXTURE_ROLE_{role.upper()}, row, m, point, lambdas)"
+    own = "reflectance" if role == "texel" else role
+    run = f"texture_program(scene, TEXTURE_ROLE_{own.upper()}, row, m, point, lambdas)"
     forms = {"real": f"{run}.x", "reflectance": f"spectrum_clamped({run})"}
-    case = Case(f"gather_i(scene.textures, row) == {PROGRAM}", forms.get(role, run))
+    case = Case(f"gather_i(scene.textures, row) == {PROGRAM}", forms.get(own, run))
     leaf = f"texture_leaf_{role}(scene, row, point, lambdas)"
     signature = f"{_type(role)} texture_{role}{_LOOKED_UP}"
     return Function(signature, leaf, [case] if some else []).text()
 
 
-def _parameter(role: str) -> str:
-    """The texture that a parameter in a row names."""
+def _parameter(role: str, how: str = "called") -> str:
+    """The texture that a parameter in a row names; how: see `function`."""
     form = _type(role)
     return function(
         f"{form} {form.lower()}_texture_{role}"
         "(Scene scene, integer source, TexturePoint point, Wavelengths lambdas)",
         f"return texture_{role}(scene, max_i(source - 1, (integer)(0)), point, lambdas);",
-        how="called",
+        how=how,
     )
 
 

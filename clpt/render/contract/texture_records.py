@@ -79,6 +79,8 @@ RECORDS["spectral_bitmap"] = Record(
     number=("integer", "row in `spectra`: the number of the band by wavelength"),
 )
 
+IMAGES = ("bitmap", "packed_bitmap", "spectral_bitmap")  # of texels, between which is filtered
+
 KINDS = (*RECORDS, "program")
 
 PROGRAM = KINDS.index("program")
