@@ -83,11 +83,33 @@ def waves(film: Film, photons: bool) -> Scene:
     )
 
 
+def caustic(film: Film) -> Scene:
+    """A floor and a small lamp over a ball of glass, seen beside a mirror: photons everywhere."""
+    glass = materials.Dielectric(int_ior="sf11" if film.mode == "spectral" else 1.5)
+    lamp = transforms.translate([0, 0, 2.0]) @ transforms.rotate([1, 0, 0], 180)
+    upright = transforms.translate([0, 0.8, 0.4]) @ transforms.rotate([1, 0, 0], 90)
+    view = transforms.look_at([0.5, -2.0, 1.0], [0, 0, 0.2], [0, 0, 1])
+    return Scene(
+        camera=cameras.Perspective(to_world=view),
+        shapes=[
+            shapes.Rectangle(material=materials.Diffuse()),
+            shapes.Rectangle(material=materials.Conductor(), to_world=upright),
+            shapes.Sphere(material=glass, center=(0, 0, 0.6), radius=0.4),
+            shapes.Disk(emission=lights.Area(radiance=50.0), to_world=lamp @ transforms.scale(0.2)),
+        ],
+        lights=[lights.Point(position=(0.5, 0.5, 1.5))],
+        integrator=integrators.Vcm(light_paths=4, radius=0.3),
+        film=film,
+    )
+
+
 def small_scene(name: str, mode: str) -> Scene:
     """A scene of the tests, or one without triangles, on a film of 6x5 pixels."""
     film = Film(width=6, height=5, mode=mode)
     if name in ("waves", "photons"):
         return waves(film, name == "photons")
+    if name == "merging":
+        return caustic(film)
     if name != "ball":
         scene = clpt.load(ROOT / "tests" / "scenes" / f"{name}.xml")
         return dataclasses.replace(scene, film=dataclasses.replace(film, filter=scene.film.filter))
@@ -132,8 +154,12 @@ QUICK = [
     ("delta_lights", "rgb", "8", "binary", "0"),
     ("cornell", "rgb", "1", "brute", "0"),
     ("waves", "spectral", "8", "binary", "1"),
+    ("merging", "rgb", "1", "brute", "0"),
 ]
-NAMES = ("ball", "glass_metal", "plastic", "textures", "thin_lens", "envmap", "waves", "photons")
+NAMES = (
+    "ball", "glass_metal", "plastic", "textures", "thin_lens", "envmap", "waves", "photons",
+    "merging",
+)  # fmt: skip
 WAYS = (
     ("rgb", "1", "wide8", "0"),
     ("spectral", "8", "binary", "1"),

@@ -22,6 +22,9 @@ def before(renderer: Renderer, loading: float) -> None:
     if stats.reason:
         paths = f", {stats.light_paths:g} light paths a sample" if stats.light_paths else ""
         _line("integrator", f"{stats.integrator}{paths}: {stats.reason}")
+    if stats.light_paths_end:
+        left = "what follows is left to paths from the camera"
+        _line("light paths end", f"at {', '.join(stats.light_paths_end)}; {left}")
     if stats.photons:
         disk = f"within {stats.photon_radius:.3g} m at first"
         _line("photons", f"up to {stats.photons:,} a pass, {_bytes(stats.photon_memory)}; {disk}")

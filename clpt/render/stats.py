@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from clpt.render.codegen.flags import ends_light_paths
+from clpt.render.contract.features import Features
 from clpt.render.wavefront.wavefront import Wavefront
 
 
@@ -13,12 +15,14 @@ class RenderStats:
 
     triangles: on the device; triangles_instanced: as many as instances show; analytic: shapes that
     are intersected without triangles; lights: rows to choose from; integrator: its kind, and
-    light_paths: for each sample, with the reason where clpt chose them, else ""; photons: most of a
-    pass; photon_radius: of the first one's disk [m]. tables, trees: bytes by name; photon_memory:
-    bytes of the photons; memory: of all buffers on the device. programs: built before the first
-    sample; programs_cached: those of them that were in clpt's cache (a driver does not tell what it
-    takes from its own). seconds: of `lower`, `trees` and `programs`; from the start to `ready`,
-    when samples may begin, and, once there is one, to `first_sample`.
+    light_paths: for each sample, with the reason where clpt chose them, else ""; light_paths_end:
+    where they end, so that what follows is left to the camera's paths: kinds of materials, and
+    "normal maps"; photons: most of a pass; photon_radius: of the first one's disk [m]. tables,
+    trees: bytes by name; photon_memory: bytes of the photons; memory: of all buffers on the device.
+    programs: built before the first sample; programs_cached: those of them that were in clpt's
+    cache (a driver does not tell what it takes from its own). seconds: of `lower`, `trees` and
+    `programs`; from the start to `ready`, when samples may begin, and, once there is one, to
+    `first_sample`.
     """
 
     triangles: int
@@ -29,6 +33,7 @@ class RenderStats:
     integrator: str
     light_paths: float
     reason: str
+    light_paths_end: tuple[str, ...]
     photons: int
     photon_radius: float
     photon_memory: int
@@ -61,6 +66,7 @@ def collect(
         integrator=lowered.integrator.kind,
         light_paths=float(lowered.settings["light_paths"]),
         reason=lowered.reason,
+        light_paths_end=_light_paths_end(lowered.features),
         photons=photons.places if photons else 0,
         photon_radius=float(lowered.settings["radius"]),
         photon_memory=photons.bytes if photons else 0,
@@ -72,3 +78,11 @@ def collect(
         programs_cached=cached,
         seconds=seconds,
     )
+
+
+def _light_paths_end(features: Features) -> tuple[str, ...]:
+    """Where paths that are weighed against those from the camera end."""
+    if not features.weighed:
+        return ()
+    kinds = [cls.kind for cls in features.leaves if ends_light_paths(features, cls)]
+    return (*kinds, *["normal maps"] * features.normal_mapped)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import os
 import shlex
@@ -195,6 +196,20 @@ def test_verbose_before_and_behind_the_command(tmp_path, capsys):
     assert logging.getLogger("clpt").level == logging.DEBUG
 
 
+def test_verbose_tells_where_light_paths_end(tmp_path, capsys):
+    path = tmp_path / "scene.json"
+    path.write_text(json.dumps({
+        "camera": {"type": "perspective"},
+        "integrator": {"type": "path", "light_paths": 1},
+        "film": {"width": 8, "height": 8, "mode": "rgb"},
+        "shapes": [{"type": "rectangle", "material": {"type": "grating"}}],
+        "lights": [{"type": "constant"}],
+    }))  # fmt: skip
+    given = ["render", str(path), "-o", str(tmp_path / "out.png"), "--spp", "1", "--verbose"]
+    assert run(given) == 0
+    assert "light paths end          at grating; what follows" in capsys.readouterr().err
+
+
 def test_quiet_says_nothing(tmp_path, capfd):
     path = tmp_path / "out.png"
     assert run(["render", CORNELL, "-o", str(path), "--size", "8x8", "--spp", "1", "--quiet"]) == 0
@@ -205,7 +220,6 @@ def test_quiet_says_nothing(tmp_path, capfd):
 def test_verbose_tells_of_tables_and_stages(tmp_path, capsys):
     path = tmp_path / "out.png"
     arguments = ["-o", str(path), "--size", "8x8", "--spp", "1", "--verbose"]
-    arguments += ["--light-paths", "auto"]
     assert run(["render", CORNELL, *arguments]) == 0
     told = capsys.readouterr().err
     expected = ("36 triangles", "tree triangles", "table vertices", "from clpt's cache",

@@ -14,14 +14,26 @@ import pytest
 from numpy.typing import NDArray
 
 from clpt import transforms as tf
-from clpt.render.codegen import emission, flags, lights, shapes, stages
+from clpt.render.codegen import emission, flags, lights, shapes, stages, textures
 from clpt.render.lowering.scene import Lowered, lower
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Path
-from clpt.scene.lights import Area, Constant, Directional, Light, Point, Projector, Spot
-from clpt.scene.shapes import Disk, Rectangle, Shape, Sphere
+from clpt.scene.lights import (
+    Area,
+    Constant,
+    CubeMap,
+    Directional,
+    Envmap,
+    Goniometric,
+    Light,
+    Point,
+    Projector,
+    Spot,
+)
+from clpt.scene.shapes import Curves, Disk, Rectangle, Shape, Sphere
+from clpt.scene.textures import Bitmap
 from tests.kernels.scene_harness import SceneProbe
 from tests.renders.support import assert_agree
 
@@ -30,6 +42,14 @@ GLASS = ((0.0, 0.5, 0.0, 0.3), (2.5, 0.5, 1.0, 0.45), (-1.0, 2.0, 0.0, 0.2))  # 
 BATCHES, PATHS = 24, 1 << 15
 DOWN = tf.rotate([1, 0, 0], 90)
 SPOT = tf.look_at([1.0, 3.0, 0.5], [0.2, 0.5, 0.0], UP)
+IMAGE = np.random.default_rng(3).random((6, 8, 3)).astype(np.float32) ** 2
+STRANDS = np.array(  # two, 3 cm thick and thinner: x y z and the radius
+    [
+        [(x, 1.0 + 0.3 * i, 0.8 + 0.1 * i * x, 0.03 - 0.005 * i) for i in range(4)]
+        for x in (-0.5, 1.0)
+    ],
+    np.float32,
+).reshape(-1, 4)
 
 LIGHTS: dict[str, Light | Shape] = {
     "point": Point(position=(0.5, 2.5, 1.0)),
@@ -49,8 +69,14 @@ LIGHTS: dict[str, Light | Shape] = {
         emission=Area(radiance=2.0, two_sided=True),
     ),
     "sphere": Sphere(center=(-0.5, 0.8, 1.0), radius=0.1, emission=Area(radiance=2.0)),
+    "hair": Curves(points=STRANDS, lengths=(4, 4), emission=Area(radiance=2.0)),
+    "envmap": Envmap(image=IMAGE, to_world=tf.rotate([0, 1, 0], 130)),
+    "cube_map": CubeMap(image=[np.full((2, 2, 3), 0.1 + 0.2 * i, np.float32) for i in range(6)]),
+    "thrown image": Projector(to_world=SPOT, fov=40.0, image=Bitmap(image=IMAGE)),
+    "image spot": Spot(to_world=SPOT, cutoff=25.0, image=Bitmap(image=IMAGE)),
+    "goniometric": Goniometric(to_world=SPOT, image=Bitmap(image=IMAGE)),
 }
-QUICK = ("spot", "directional", "two sides")
+QUICK = ("spot", "directional", "two sides", "envmap")
 
 BODY = """
     vec2 u = {x[0], x[1]}, v = {x[2], x[3]};
@@ -84,13 +110,15 @@ def scene_of(light: Light | Shape) -> Scene:
 def probe(lowered: Lowered, aimed: bool) -> SceneProbe:
     """Rays from the lights: five random numbers to o, d, power, gain from either end."""
     features = lowered.features
-    two_sided = features.two_sided_lights
+    two_sided, textured = features.two_sided_lights, "texture" in stages.emission_sources(features)
     virtual = {
         **shapes.virtual_files(),
         **lights.virtual_files(),
         "generated/lights.cl": stages.lights_text(features),
-        "generated/emission.cl": emission.dispatch_text(features.lights, False, two_sided, aimed),
-        "generated/textures.cl": "",
+        "generated/emission.cl": emission.dispatch_text(
+            features.lights, textured, two_sided, aimed
+        ),
+        "generated/textures.cl": textures.dispatch_text(features.textures, features.texture_roles),
     }
     return SceneProbe(
         BODY + GAIN * aimed,

@@ -10,8 +10,16 @@ import pytest
 
 import clpt
 from clpt import device as dev
+from clpt import transforms as tf
 from clpt.render.wavefront.path_buffers import MOST_SLOTS, UNIT_SLOTS, default_slots
+from clpt.scene import materials as m
+from clpt.scene.integrators import Integrator, ParticleTracer, Vcm
+from clpt.scene.integrators import Path as PathIntegrator
+from clpt.scene.shapes import Rectangle, Sphere
 from tests.renders.support import with_film
+from tests.renders.test_hybrid import corner, lamp
+
+INTEGRATORS = (PathIntegrator(light_paths=2), Vcm(), ParticleTracer())
 
 
 @pytest.fixture(scope="module")
@@ -34,6 +42,24 @@ def test_forms(gpu: dev.Device, scenes: Path) -> None:
     image, plain = renderer.image(), clpt.render(scene, 2, slots=slots)
     off = np.abs(image - plain).max(axis=2) > 1e-3 * (1e-2 + np.abs(plain).max(axis=2))
     assert off.mean() < 0.005
+    np.testing.assert_allclose(image.mean(), plain.mean(), rtol=2e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("integrator", INTEGRATORS, ids=lambda one: one.kind)
+def test_forms_of_light_paths(gpu: dev.Device, integrator: Integrator) -> None:
+    """The same of a caustic, seen and in a mirror."""
+    ball = Sphere(center=(0.1, 0.45, 0.2), radius=0.4, material=m.Dielectric(int_ior=1.5))
+    plate = tf.translate([-0.9, 0.5, -0.2]) @ tf.rotate([0, 1, 0], 60) @ tf.scale(0.5)
+    mirror = Rectangle(to_world=plate, material=m.TwoSided(front=m.Conductor()))
+    scene = dataclasses.replace(corner({}, lamp(0.1, 250.0), ball, mirror), integrator=integrator)
+    renderer = clpt.Renderer(scene, gpu, layout="compact", queued=True)
+    front = renderer.wavefronts[0]
+    assert front.lanes == 1 and front.scene.strategy.queued
+    renderer.run(8)
+    image, plain = renderer.image(), clpt.render(scene, 8)
+    off = np.abs(image - plain).max(axis=2) > 1e-2 * (1e-2 + np.abs(plain).max(axis=2))
+    assert off.mean() < 0.02
     np.testing.assert_allclose(image.mean(), plain.mean(), rtol=2e-3)
 
 

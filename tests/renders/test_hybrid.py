@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 import clpt
+from clpt import device as dev
 from clpt import transforms as tf
-from clpt.device import Device, choose
 from clpt.errors import SceneError
 from clpt.render.lowering import scene as lowering
 from clpt.render.lowering.scene import lower
@@ -50,8 +50,8 @@ FLAT = tf.rotate([1, 0, 0], -90)
 QUICK = ("sphere",)
 
 
-def narrow() -> Device:
-    device = choose()
+def narrow() -> dev.Device:
+    device = dev.choose()
     device.lanes = 1
     return device
 
@@ -353,7 +353,7 @@ def test_lanes() -> None:
     """The same paths one and eight lanes wide."""
     scene, pictures = with_light_paths(caustic()), []
     for lanes in (1, 8):
-        device = choose()
+        device = dev.choose()
         device.lanes = lanes
         pictures.append(clpt.render(scene, 16, device=device))
     np.testing.assert_allclose(pictures[1], pictures[0], rtol=2e-3, atol=1e-4)

@@ -16,9 +16,9 @@ from clpt import device as dev
 from clpt import transforms as tf
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Orthographic, Perspective
-from clpt.scene.integrators import Path
+from clpt.scene.integrators import Integrator, Path, Vcm
 from clpt.scene.lights import Area, Constant
-from clpt.scene.materials import Dielectric, Diffuse, TwoSided
+from clpt.scene.materials import Conductor, Dielectric, Diffuse, TwoSided
 from clpt.scene.shapes import Cube, Cylinder, Disk, Mesh, Rectangle, Shape, Sphere
 from tests.renders.builders import BLACK, DOWN, UP
 from tests.renders.support import assert_agree, blocks, exposures
@@ -136,6 +136,25 @@ def test_the_same_picture_everywhere(layout: str, mode: str) -> None:
     for name, to_world in PLACES.items():
         there = blocks(exposures(placed(shapes, to_world, mode), 8, 32, 101, **form))
         assert_agree(there, here, name, 1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "integrator", [Vcm(light_paths=4), Path(light_paths=4)], ids=["vcm", "path"]
+)
+def test_the_same_caustics_everywhere(integrator: Integrator) -> None:
+    """A ball of glass and a mirror in the still life; photons are as far apart as the scene is."""
+    glass = Sphere(center=(0.2, 0.0, 0.7), radius=0.35, material=Dielectric(int_ior=1.5))
+    upright = tf.translate([-0.9, 0.9, 0.6]) @ tf.rotate([1, -1, 0], 90) @ tf.scale(0.6)
+    mirror = Rectangle(to_world=upright, material=TwoSided(front=Conductor()))
+    shapes = [*still_life()[:1], glass, mirror, *still_life()[-2:]]
+    scenes = {
+        name: dataclasses.replace(placed(shapes, to_world, "rgb"), integrator=integrator)
+        for name, to_world in {"here": np.eye(4), **PLACES}.items()
+    }
+    here = blocks(exposures(scenes.pop("here"), 12, 64))
+    for name, scene in scenes.items():
+        assert_agree(blocks(exposures(scene, 12, 64, 101)), here, name, 2e-3)
 
 
 @pytest.mark.parametrize("layout", ["brute", "wide8"])

@@ -14,18 +14,20 @@ import numpy as np
 import pytest
 
 import clpt
+from clpt import device as dev
 from clpt import transforms as tf
-from clpt.device import choose
 from clpt.errors import SceneError
 from clpt.render.lowering.scene import lower
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m
-from clpt.scene.cameras import Orthographic, Perspective
+from clpt.scene.cameras import Camera, Orthographic, Perspective, Spherical, ThinLens
 from clpt.scene.integrators import Path, Vcm
-from clpt.scene.lights import Constant, Point
-from clpt.scene.shapes import Cube, Group, Instance, Rectangle, Sphere
-from tests.renders.support import assert_agree, assert_mean, blocks, exposures
-from tests.renders.test_hybrid import FLAT, MATERIALS, UP, VIEW, caustic, corner, lamp, narrow
+from clpt.scene.lights import DirectionalArea, Point
+from clpt.scene.shapes import Cube, Curves, Disk, Group, Instance, Rectangle, Shape, Sphere
+from clpt.scene.textures import Bitmap
+from clpt.spectra import LED, Fluorophore, cie
+from tests.renders.support import assert_agree, assert_mean, blocks, exposures, with_film
+from tests.renders.test_hybrid import FLAT, MATERIALS, VIEW, caustic, corner, lamp, narrow
 
 WATER = 1.33
 ABOVE, DEEP, HEIGHT = 1.0, 1.0, 3.0  # the light over the water, the floor under it, the camera
@@ -56,23 +58,21 @@ def flat_pool(mode: str = "rgb", **integrator: Any) -> Scene:
     )
 
 
-def transmitted(angle: np.ndarray) -> np.ndarray:
-    """How much light passes flat water at an angle from its normal (Fresnel)."""
-    c, cosine = np.cos(angle), np.sqrt(1.0 - (np.sin(angle) / WATER) ** 2)
-    s, p = (c - WATER * cosine) / (c + WATER * cosine), (cosine - WATER * c) / (cosine + WATER * c)
+def transmitted(angle: np.ndarray, index: float = WATER) -> np.ndarray:
+    """How much light passes a surface at an angle from its normal (Fresnel)."""
+    c, cosine = np.cos(angle), np.sqrt(1.0 - (np.sin(angle) / index) ** 2)
+    s, p = (c - index * cosine) / (c + index * cosine), (cosine - index * c) / (cosine + index * c)
     return 1.0 - (s**2 + p**2) / 2.0
 
 
-def flat_pool_radiance(samples: int = 8) -> np.ndarray:
-    """What the camera sees of `flat_pool`, (8, 8): its rays, and light, refracted by Snell."""
-    at = (np.arange(8 * samples) + 0.5) / (4 * samples) - 1.0
-    x, z = np.meshgrid(-at, -at)  # of the film, mirrored as a camera's +x is to the left
-    slope = np.tan(np.radians(8.0)) * np.hypot(x, z)
-    across = np.arctan2(z, x)
-    out = np.arctan(slope)
-    inside = np.arcsin(np.sin(out) / WATER)
-    far = HEIGHT * np.tan(out) + DEEP * np.tan(inside)
-    rho = np.hypot(far * np.cos(across) - 0.6, far * np.sin(across))
+def flat_pool_irradiance(x: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """Of the floor of `flat_pool` at (x, -DEEP, z): light refracted by Snell.
+
+    Light that leaves the point at t1 to the vertical goes on at t2, sin t1 = WATER sin t2, and
+    meets the floor at rho = ABOVE tan t1 + DEEP tan t2 from the point's foot. A ring of it keeps
+    its power: E = I T sin t1 / (rho drho/dt1).
+    """
+    rho = np.hypot(x - 0.6, z)
     low, high = np.zeros_like(rho), np.full_like(rho, 1.5)
     for _ in range(60):  # the angle at which light comes there
         t1 = (low + high) / 2.0
@@ -81,7 +81,19 @@ def flat_pool_radiance(samples: int = 8) -> np.ndarray:
         low, high = np.where(short, t1, low), np.where(short, high, t1)
     t2 = np.arcsin(np.sin(t1) / WATER)
     spread = ABOVE / np.cos(t1) ** 2 + DEEP * np.cos(t1) / (WATER * np.cos(t2) ** 3)
-    irradiance = INTENSITY * transmitted(t1) * np.sin(t1) / (rho * spread)
+    return INTENSITY * transmitted(t1) * np.sin(t1) / (rho * spread)
+
+
+def flat_pool_radiance(samples: int = 8) -> np.ndarray:
+    """What the camera sees of `flat_pool`, (8, 8): its rays are refracted as well."""
+    at = (np.arange(8 * samples) + 0.5) / (4 * samples) - 1.0
+    x, z = np.meshgrid(-at, -at)  # of the film, mirrored as a camera's +x is to the left
+    slope = np.tan(np.radians(8.0)) * np.hypot(x, z)
+    across = np.arctan2(z, x)
+    out = np.arctan(slope)
+    inside = np.arcsin(np.sin(out) / WATER)
+    far = HEIGHT * np.tan(out) + DEEP * np.tan(inside)
+    irradiance = flat_pool_irradiance(far * np.cos(across), far * np.sin(across))
     seen = ALBEDO / np.pi * irradiance * transmitted(out) / WATER**2
     return seen.reshape(8, samples, 8, samples).mean(axis=(1, 3))
 
@@ -113,7 +125,7 @@ def test_the_bias_falls_with_the_square_of_the_radius() -> None:
 
 def agrees_with_path(scene: Scene, spp: int, what: str, **integrator: Any) -> None:
     depth = {"max_depth": integrator.pop("max_depth", 6)}
-    alone = dataclasses.replace(scene, integrator=Path(**depth))
+    alone = dataclasses.replace(scene, integrator=Path(light_paths=0, **depth))
     reference = blocks(exposures(alone, 12, 4 * spp, device=narrow()))
     merged = with_vcm(scene, light_paths=4, radius=0.04, **depth, **integrator)
     ours = blocks(exposures(merged, 12, spp, first_seed=101, device=narrow()))
@@ -158,39 +170,92 @@ def test_instances() -> None:
     agrees_with_path(corner({}, lamp(), *placed), 128, "instances")
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("switch", SWITCHES)
-def test_furnace(switch: str) -> None:
-    """What absorbs nothing is as bright as the sky around it."""
-    glass = m.Dielectric(int_ior=1.5)
-    scene = Scene(
-        camera=Perspective(to_world=tf.look_at([0, 0, 3], [0, 0, 0], UP), fov=50),
-        shapes=[
-            Sphere(radius=0.4, material=glass),
-            Cube(to_world=tf.translate([0.8, 0, 0]) @ tf.scale(0.2), material=glass),
-            Cube(to_world=tf.translate([-0.8, 0, 0]) @ tf.scale(0.2), material=m.Conductor()),
-            Sphere(center=(0, 0.8, 0), radius=0.3, material=m.Diffuse(reflectance=1.0)),
-        ],
-        lights=[Constant(radiance=(1.0, 1.0, 1.0))],
-        film=Film(width=8, height=8, mode="rgb"),
-        integrator=Vcm(max_depth=-1, rr_depth=20, radius=0.05, **SWITCHES[switch]),
-    )
-    made = exposures(scene, 12, 64, device=narrow())
-    assert_mean(made, (1.0, 1.0, 1.0), 2e-3, 1e-3)
+CAMERAS = {
+    "orthographic": Orthographic(to_world=VIEW @ tf.scale([1.2, 1.2, 1.0])),
+    "spherical": Spherical(to_world=VIEW),
+    "a lens that disperses": ThinLens(to_world=VIEW, fov=50, aperture_radius=0.01, glass="sf11"),
+}
 
 
-@pytest.mark.slow
-def test_cameras_that_cannot_be_joined_still_gather() -> None:
-    to_world = VIEW @ tf.scale([1.2, 1.2, 1.0])
+def beside(camera: Camera) -> Scene:
+    """A ball of glass under a lamp, seen by a camera that no light path can be joined to."""
+    mode = "spectral" if isinstance(camera, ThinLens) else "rgb"
     ball = Sphere(center=(0.1, 0.45, 0.2), radius=0.4, material=m.Dielectric(int_ior=1.5))
-    scene = dataclasses.replace(corner({}, lamp(), ball), camera=Orthographic(to_world=to_world))
-    lowered = lower(with_vcm(scene))
-    assert lowered.features.merged and not lowered.features.joined
-    agrees_with_path(scene, 128, "orthographic")
+    return dataclasses.replace(corner({}, lamp(), ball, mode=mode), camera=camera)
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_cameras_that_cannot_be_joined(camera: str) -> None:
+    """Light paths leave photons alone; without merging there are none."""
+    lowered = lower(with_vcm(beside(CAMERAS[camera])))
+    assert lowered.features.merged and lowered.features.weighed and not lowered.features.joined
+    assert [w for w in lowered.warnings if w.startswith("vcm.light_tracing: left aside")]
+    alone = lower(with_vcm(beside(CAMERAS[camera]), merging=False)).features
+    assert not (alone.merged or alone.weighed or alone.joined)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_cameras_that_cannot_be_joined_still_gather(camera: str) -> None:
+    agrees_with_path(beside(CAMERAS[camera]), 128, camera)
+
+
+DYE = Fluorophore(LED(450.0, 60.0), LED(560.0, 60.0), 0.9)
+FUR = np.array(
+    [[(x, 0.2 * i, 0.7 + 0.05 * i, 0.03) for i in range(4)] for x in np.linspace(0.5, 1.0, 6)],
+    np.float32,
+).reshape(-1, 4)
+BEHIND = tf.translate([-0.7, 0.4, 0.3]) @ tf.rotate([0, 1, 0], 40) @ tf.scale(0.35)
+ENDS: dict[str, tuple[str, Shape]] = {  # kinds that end light paths, and what a report calls them
+    "hair": ("hair", Curves(points=FUR, lengths=(4,) * 6, material=m.Hair())),
+    "grating": ("grating", Rectangle(to_world=BEHIND, material=m.TwoSided(front=m.Grating()))),
+    "paint": (
+        "fluorescent",
+        Rectangle(to_world=BEHIND, material=m.Fluorescent(reflectance=0.1, reradiation=DYE)),
+    ),
+    "bumps": (
+        "normal maps",
+        Rectangle(
+            to_world=BEHIND,
+            material=m.NormalMap(
+                material=m.Diffuse(),
+                map=Bitmap(image=np.full((2, 2, 3), (0.7, 0.5, 0.9), np.float32), raw=True),
+            ),
+        ),
+    ),
+}
+
+
+def beside_what_ends_light_paths(kind: str) -> Scene:
+    """It and a ball of glass on a floor, under a lamp."""
+    ball = Sphere(center=(0.1, 0.45, 0.2), radius=0.4, material=m.Dielectric(int_ior=1.5))
+    return corner({}, lamp(), ball, ENDS[kind][1], mode="spectral")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ENDS)
+def test_what_ends_light_paths(kind: str) -> None:
+    """What is behind it is left to the camera's paths, all else is as bright."""
+    scene = beside_what_ends_light_paths(kind)
+    agrees_with_path(scene, 256, kind)
+    integrator = Path(light_paths=4, max_depth=6)
+    renderer = clpt.Renderer(dataclasses.replace(scene, integrator=integrator), narrow())
+    assert renderer.stats.light_paths_end == (ENDS[kind][0],)
+
+
+@pytest.mark.slow
+def test_a_light_that_has_no_light_paths() -> None:
+    """Its light does not fall with distance: paths from the camera choose it as ever."""
+    lights = [Point(position=(0.5, 1.7, 0.9), intensity=2.0, falloff=False)]
+    ball = Sphere(center=(0.1, 0.45, 0.2), radius=0.4, material=m.Dielectric(int_ior=1.5))
+    scene = dataclasses.replace(corner({}, lamp(), ball), lights=lights)
+    told = [w for w in lower(with_vcm(scene)).warnings if w.startswith("vcm.light_paths: none")]
+    assert len(told) == 1 and "lights[0]" in told[0]
+    agrees_with_path(scene, 128, "without falloff")
 
 
 def picture(scene: Scene, *runs: int, lanes: int = 1, **options: Any) -> np.ndarray:
-    device = choose()
+    device = dev.choose()
     device.lanes = lanes
     renderer = clpt.Renderer(scene, device, **options)
     for samples in runs:
@@ -219,20 +284,61 @@ def test_bits() -> None:
     assert not np.array_equal(picture(with_vcm(caustic(), merging=False), 7), whole)
 
 
+def test_stopped_early_is_as_bright() -> None:
+    """A pass that was left has fewer samples of some pixels, and its light paths are all there."""
+    scene = with_film(with_vcm(caustic(), max_depth=6, radius=0.05), width=80, height=60)
+    whole = picture(scene, 64).mean()
+    renderer = clpt.Renderer(scene, narrow())
+    assert not renderer.run(512, lambda progress: progress.samples < 64)
+    assert 16 < renderer.film.get()[..., 3].mean() < 400
+    assert np.isclose(renderer.image().mean(), whole, rtol=0.03)
+
+
+@pytest.mark.slow
+def test_bands() -> None:
+    """Bands of 2 nm, weighted by the observer, are the picture beside them, in each pixel; and
+    keep their bits however samples are split."""
+    scene = with_vcm(caustic(mode="spectral", bands=235, output_space="xyz"), radius=0.05)
+    renderer = clpt.Renderer(scene, narrow())
+    renderer.run(64)
+    middles = np.arange(361.0, 830.0, 2.0)
+    summed = renderer.image() @ cie.cie_xyz(middles) * 2.0 / cie.CIE_Y_INTEGRAL
+    np.testing.assert_allclose(summed, renderer.colours(), rtol=0.03, atol=1e-4)
+    few = with_film(scene, bands=3)
+    one = clpt.Renderer(few, narrow())
+    one.run(7)
+    whole = one.image()
+    assert whole.shape[-1] == 3 and whole.all(axis=2).any()
+    one.reset()
+    one.run(3)
+    state = one.film_state()
+    one.step(4).wait()
+    assert np.array_equal(one.image(), whole)
+    later = clpt.Renderer(few, narrow(), first_sample=3)
+    later.run(4)
+    later.merge(state)
+    assert np.array_equal(later.image(), whole)
+    np.testing.assert_allclose(picture(few, 7, halves=True), whole, rtol=1e-5)
+
+
 def test_photons_that_do_not_fit_are_left_out() -> None:
     """Fewer light paths leave some; all are joined to the camera."""
     scene = with_vcm(caustic(), max_depth=16, light_paths=64, photon_memory=1)
     settings = lower(scene).settings
     assert 0 < settings["photon_pixels"] < settings["padded_pixels"]
-    few = dataclasses.replace(scene, integrator=Vcm(max_depth=-1, light_paths=64, photon_memory=1))
-    assert lower(few).settings["max_depth"] == 64
+    deep = lower(with_vcm(caustic(), max_depth=-1, light_paths=64, photon_memory=1)).settings
+    assert deep["max_depth"] == 64 and deep["photon_pixels"] >= 1, "1 MiB is enough for any"
 
 
 def test_what_cannot_be_is_refused_or_left_aside() -> None:
     with pytest.raises(SceneError, match=r"vcm.light_paths: must be a whole number from 1 to 64"):
         Vcm(light_paths=0)
-    with pytest.raises(SceneError, match=r"vcm.photon_memory: must be a whole number"):
+    with pytest.raises(SceneError, match=r"vcm.photon_memory: must be a whole number from 1 to"):
         Vcm(photon_memory=0)
+    beam = Disk(emission=DirectionalArea(), name="beam")
+    for integrator in (Vcm(), Path(light_paths=1)):
+        with pytest.raises(SceneError, match=r"disk 'beam': only .*particle_tracer"):
+            lower(dataclasses.replace(corner({}, beam), integrator=integrator))
     with pytest.raises(SceneError, match=r"vcm.radius"):
         Vcm(radius=-1.0)
     paint = Rectangle(material=m.Fluorescent(reflectance=0.5), to_world=tf.scale(0.1))
