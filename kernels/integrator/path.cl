@@ -14,7 +14,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
 
     /* The light that this ray has met; the camera's ray goes on behind one that is to be hidden. */
     mask hidden = mask_of(0);
-#if USES_SURFACE_LIGHTS
+#if BSDF_SHINES
     hidden = active & (s.light >= 0) & (depth == 0) & mask_of(settings->hide_lights != 0);
     if (any(hidden)) {
         store_path_o(path, at, hidden, surface_offset(s, v.d));
