@@ -126,9 +126,10 @@ class Wavefront:
         if looped is None:
             looped = strategy.use_loop(on)
         if looped:  # beside the trees
-            for features in lowered.features.passes:
-                texts = programs.loop_sources(features, chosen.layout, on.lanes, chosen.interleaved)
-                device.compile_ahead(on, texts, "loop")
+            texts = programs.loop_sources(
+                lowered.features, chosen.layout, on.lanes, chosen.interleaved
+            )
+            device.compile_ahead(on, texts, "loop")
         stream, buffers = device.Stream(on.queue), device.Buffers(on)
         settings, kinds = lowered.settings, len(lowered.features.materials)
         padded_pixels = int(settings["padded_pixels"])
