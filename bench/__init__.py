@@ -1,6 +1,6 @@
 """What clpt is measured by, one module a question; `python -m bench` asks them all.
 
-traversal: rays against Embree; building: how fast trees are made; renders: pictures against
-Mitsuba's; startup: a whole process, its seconds and its memory. Records go to bench/results as JSON
-lines; bench.report makes a page of them.
+traversal: rays against Embree; builders: how fast trees are made; renders: pictures against
+Mitsuba's; startup: a whole process, its seconds and its memory; compiling: what light paths and
+photons add to it. Records go to bench/results as JSON lines; bench.report makes a page of them.
 """

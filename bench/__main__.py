@@ -33,6 +33,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "instancing": (),
     "embedding": (),
     "startup": (),
+    "compiling": (),
     "shares": (),
     "sizes": ("--plot", str(report.RESULTS / "sizes.png")),
 }

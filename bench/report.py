@@ -233,6 +233,7 @@ TABLES: dict[str, Callable[[Sequence[Row]], str]] = {
     "soak": plain,
     "beside": plain,
     "startup": startup,
+    "compiling": plain,
     "traversal": plain,
     "building": plain,
     "refit": plain,

@@ -13,10 +13,9 @@
 #include "lighting/light_path.cl"
 #include "generated/rivals.cl"
 
-void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, mask active)
+inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask active, Vertex v)
 {
     global const Settings *settings = scene.settings;
-    Vertex v = vertex_load(scene, path, hit, at, active);
     Surface s = v.s;
     Spectrum beta = v.beta, ratio = hero_ratio(path, at);
     integer state = v.state, depth = v.depth;
@@ -89,3 +88,11 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
     hero_keep(path, at, next, ratio);
     vertex_end(path, at, active, next, state);
 }
+
+#if !SHADES_BOTH
+void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, mask active)
+{
+    Vertex v = vertex_load(scene, path, hit, at, active);
+    light_path_vertex(scene, path, shadow, at, active, v);
+}
+#endif

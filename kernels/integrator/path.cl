@@ -1,20 +1,20 @@
 /* One vertex of a path from the camera: the light that is met, next-event estimation, and the direction to go on.
  * Light is found both by meeting it and by choosing it; the two are weighted by the power heuristic (Veach 1997,
  * 9.2.4), and against paths from lights where there are some (lighting/rivals.cl). */
+#include "path/met_light.cl"
 #include "generated/rivals.cl"
 #include "generated/gather.cl"
 
-void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, mask active MERGE_ARGS)
+inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask active, Vertex v MERGE_ARGS)
 {
     global const Settings *settings = scene.settings;
-    Vertex v = vertex_load(scene, path, hit, at, active);
     Surface s = v.s;
     Spectrum beta = v.beta, ratio = hero_ratio(path, at);
     integer state = v.state, depth = v.depth;
 
     /* The light that this ray has met; the camera's ray goes on behind one that is to be hidden. */
     mask hidden = mask_of(0);
-#if USES_SURFACE_LIGHTS
+#if BSDF_SHINES
     hidden = active & (s.light >= 0) & (depth == 0) & mask_of(settings->hide_lights != 0);
     if (any(hidden)) {
         store_path_o(path, at, hidden, surface_offset(s, v.d));
@@ -31,8 +31,8 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
         real other = light_pdf(scene, light, from, side, v.d, v.t + null_distance, s.n);
         real w = sel(pdf < 0.0f, (real)(1.0f), mis_weight(pdf, other));
 #if WEIGHS_LIGHT_PATHS
-        real rival = sel(depth > 1, load_path_rival(path, at), (real)(0.0f));
-        w = mis_weight_of_three(pdf, other, rival * light_path_pdf(scene, light, v.o, v.d, v.t, s.n));
+        real emission = light_path_pdf(scene, light, v.o, v.d, v.t, s.n);
+        w = mis_weight_of_three(pdf, other, path_rival(path, at, depth) * emission);
 #endif
         Spectrum le = emission_load(scene, light_at(scene, light).radiance, surface_texture_point(s), v.lambdas);
         le = spectrum_scale(spectrum_mul(beta, le), w);
@@ -130,3 +130,11 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
     hero_keep(path, at, next, ratio);
     vertex_end(path, at, met, next, state);
 }
+
+#if !SHADES_BOTH
+void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, mask active MERGE_ARGS)
+{
+    Vertex v = vertex_load(scene, path, hit, at, active);
+    path_vertex(scene, path, shadow, at, active, v MERGE_PASSED);
+}
+#endif

@@ -8,7 +8,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
     Surface s = v.s;
     Spectrum beta = v.beta, radiance = load_path_radiance(path, at);
     integer state = v.state, depth = v.depth;
-#if USES_SURFACE_LIGHTS
+#if BSDF_SHINES
     mask lit = active & (s.light >= 0) & light_shows(scene, s.light, v.front);
     if (any(lit)) {
         integer light = sel_i(lit, s.light, (integer)(0));

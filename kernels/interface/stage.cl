@@ -3,7 +3,6 @@
  *
  *     STAGE(name)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG) { SLABS SCENE STAGE_AT ... } */
 #include "bvh/no_vectorize.cl"
-#include "generated/stage_args.cl"
 
 #ifdef PART
 #define STAGE(name) void PART

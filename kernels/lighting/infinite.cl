@@ -2,12 +2,6 @@
  * with `pdf` [1/sr] (below 0: delta) at a point p of a surface that sends light to `hemisphere`, see
  * interface/light.cl; the power heuristic weighs that against its choice on the light (Veach 1997, 9.2.4), and, by the
  * path's `rival`, against paths from the light (lighting/rivals.cl). */
-#if WEIGHS_LIGHT_PATHS
-#define path_rival(path, at) load_path_rival(path, at)
-#else
-#define path_rival(path, at) ((real)(0.0f))
-#endif
-
 inline Spectrum infinite_gather(Scene scene, vec3 p, vec3 hemisphere, vec3 d, real pdf, real rival,
                                 Wavelengths lambdas)
 {

@@ -80,10 +80,10 @@ typedef struct {
 #endif
 } Rival;
 
-/* The rival that arrives, if the vertex scatters with these densities. */
+/* The rival of a camera's path that arrives, if the vertex scatters with these densities. */
 inline real rival_arrives(Rival r, mask delta, real p, real p_back)
 {
-#if MERGES && !LIGHT_PATHS
+#if MERGES
     real more = sel(rival_sharp(delta, p, p_back), r.pending, (real)(0.0f));
     return sqrt(sqr(r.arrives) + sqr(more));
 #else
@@ -100,7 +100,7 @@ inline Rival rival_of_camera(Scene scene, Slab path, uint at, Vertex v, Sampler 
     r.met = mask_of(1);
     r.found = 0.0f;
     if (any(r.first)) {
-#if JOINS_CAMERA
+#if JOINS_CAMERA && !BSDF_DELTA
         CameraPoint c = camera_connect(scene, v.s.p, mask_of(0), sampler_pair(sampler, (natural)(DIMENSION_LENS)));
         real seen = sel(c.seen, rival / max_r(c.importance, (real)(1e-30f)), (real)(0.0f));
         rival = sel(r.first, seen, rival);
@@ -114,7 +114,7 @@ inline Rival rival_of_camera(Scene scene, Slab path, uint at, Vertex v, Sampler 
     r.pending = load_path_pending(path, at) * goes_on;
     r.merges = 0.0f;
 #if BSDF_MERGES
-    real area = merging_area(scene, merging_pass(scene, load_path_sample(path, at)));
+    real area = merging_area(scene, load_path_sample(path, at));
     r.merges = sel(merging_here(v.state, v.depth), area, (real)(0.0f));
 #endif
 #endif

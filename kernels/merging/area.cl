@@ -3,14 +3,10 @@
 
 #include "core/sobol.cl"
 
-/* The pass of a sample of the camera, or of a light path. */
-inline integer merging_pass(Scene scene, integer sample)
+/* The pass of a light path. That of a sample of the camera has the sample's number. */
+inline integer merging_pass(Scene scene, integer light_path)
 {
-#if LIGHT_PATHS
-    return divide(sample, (int)scene.settings->light_paths);
-#else
-    return sample;
-#endif
+    return divide(light_path, (int)scene.settings->light_paths);
 }
 
 /* The radius in a pass [m]: the first one over the eighth root of the pass's number from 1, so that radius squared
@@ -46,9 +42,9 @@ inline integer merging_group(Scene scene, real u)
 
 /* What stands for u where wavelengths are drawn: the same for all of a group. From pass to pass it goes through the
  * group's part of the unit interval as van der Corput's sequence, whose beginning the seed chooses. */
-inline real merging_wavelength(Scene scene, real u, integer sample)
+inline real merging_wavelength(Scene scene, real u, integer pass)
 {
-    natural bits = reverse_bits(as_natural(merging_pass(scene, sample)));
+    natural bits = reverse_bits(as_natural(pass));
     real inside = unit_interval(bits + hash_natural((natural)(scene.settings->seed)));
     return (to_real(merging_group(scene, u)) + inside) / (float)scene.settings->wavelength_groups;
 }

@@ -35,7 +35,7 @@ inline Spectrum merge_photons(Scene scene, mask active, Vertex v, Scattering sca
                               integer sample MERGE_ARGS)
 {
     global const Settings *settings = scene.settings;
-    integer pass = merging_pass(scene, sample), group = 0;
+    integer pass = sample, group = 0;
     real radius = merging_radius(scene, pass), area = merging_area(scene, pass);
     real number = settings->light_paths;
 #if SPECTRUM_SIZE == 4

@@ -29,13 +29,6 @@
 #define DIMENSION_ROULETTE 3 /* whether to go on; which part of a mixture */
 #define DIMENSION_TEXEL 0x10000 /* which texel stands for those around */
 
-/* Where lights are chosen by it, the hemisphere to which the surface sends light where the ray was chosen. */
-#if USES_HEMISPHERE
-#define path_hemisphere(path, at) load_path_sampled_hemisphere(path, at)
-#else
-#define path_hemisphere(path, at) v3(0.0f, 0.0f, 0.0f)
-#endif
-
 /* To weigh a light that a ray has met, the pdf of the ray's direction counts, and the point where it was chosen: that
  * lies `null_distance` [m] before the ray's origin if the path has crossed null boundaries since. */
 #if USES_NULL_SURFACES

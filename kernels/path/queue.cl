@@ -5,7 +5,7 @@
 
 /* Of the slots from `first` to `end`, those that wait for kind k go to queue[starts[k]] and further, below
  * queue[starts[k + 1]], in ascending order: a counting sort. The entries from `first` to `end` are theirs alone. */
-inline void queue_sort(Slab path, Slab hit, global uint *queue, uint *starts, uint first, uint end)
+called void queue_sort(Slab path, Slab hit, global uint *queue, uint *starts, uint first, uint end)
 {
     uint next[BSDF_COUNT], total = first;
     union { integer all; int each[LANES]; } kinds;
@@ -35,19 +35,21 @@ inline int queue_is_dense(uint waiting, uint slots) { return 4 * waiting > 3 * s
 
 /* Brings the paths from `entry` of the queue on, of which the last one is before `end`, to a block; that one fills what
  * is left. Of the shadow ray only t is brought, by which the others are known to hold nothing. */
-inline void queue_take(Slab path, Slab hit, Slab shadow, global const uint *queue, uint entry, uint end, uint block)
+called void queue_take(Slab path, Slab hit, Slab shadow, constant BlockWords *words, global const uint *queue,
+                       uint entry, uint end, uint block)
 {
     integer slots = gather_i(queue, min_i(LANE_INDEX + (int)entry, (integer)((int)end - 1)));
-    for (uint i = 0; i < BLOCK_PATH; i++) slab_gather(path, BLOCK_PATH_WORDS[i], slots, block);
-    for (uint i = 0; i < BLOCK_HIT; i++) slab_gather(hit, BLOCK_HIT_WORDS[i], slots, block);
+    for (uint i = 0; i < words->path; i++) slab_gather(path, words->path_words[i], slots, block);
+    for (uint i = 0; i < words->hit; i++) slab_gather(hit, words->hit_words[i], slots, block);
     slab_gather(shadow, SHADOW_T, slots, block);
 }
 
 /* Brings back what shading may have changed. */
-inline void queue_return(Slab path, Slab shadow, global const uint *queue, uint entry, uint end, uint block)
+called void queue_return(Slab path, Slab shadow, constant BlockWords *words, global const uint *queue, uint entry,
+                         uint end, uint block)
 {
     integer index = LANE_INDEX + (int)entry, slots = gather_i(queue, min_i(index, (integer)((int)end - 1)));
     mask active = index < (int)end;
-    for (uint i = 0; i < BLOCK_PATH_CHANGED; i++) slab_scatter(path, BLOCK_PATH_WORDS[i], block, slots, active);
-    for (uint i = 0; i < BLOCK_SHADOW; i++) slab_scatter(shadow, BLOCK_SHADOW_WORDS[i], block, slots, active);
+    for (uint i = 0; i < words->changed; i++) slab_scatter(path, words->path_words[i], block, slots, active);
+    for (uint i = 0; i < words->shadow; i++) slab_scatter(shadow, words->shadow_words[i], block, slots, active);
 }

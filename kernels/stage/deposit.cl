@@ -3,6 +3,7 @@
 #include "core/base.cl"
 #include "core/octahedral.cl"
 #include "interface/stage.cl"
+#include "generated/deposit_args.cl"
 #include "generated/sampler.cl"
 #include "interface/shape.cl"
 #include "generated/shapes.cl"

@@ -3,6 +3,7 @@
  * stage/splat.cl to the pixel where the camera sees it. */
 #include "core/base.cl"
 #include "interface/stage.cl"
+#include "generated/begin_args.cl"
 #include "generated/sampler.cl"
 #include "interface/camera.cl"
 #include "generated/camera.cl"
@@ -30,7 +31,7 @@ inline integer begin_light_path(Scene scene, Slab path, Slab shadow, uint at, ma
     Sampler sampler = light_path_sampler(settings, pixel_index, sample);
     vec2 u = sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH));
 #if MERGES
-    u.x = merging_wavelength(scene, u.x, sample);
+    u.x = merging_wavelength(scene, u.x, merging_pass(scene, sample));
 #endif
     Wavelengths lambdas = wavelengths_sample(scene, u.x);
     LightRay r = light_emit(scene, u.y, sampler_pair(sampler, (natural)(DIMENSION_FILM)),

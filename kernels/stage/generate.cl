@@ -3,6 +3,7 @@
  * from the camera. */
 #include "core/base.cl"
 #include "interface/stage.cl"
+#include "generated/begin_args.cl"
 #include "generated/sampler.cl"
 #include "interface/camera.cl"
 #include "generated/camera.cl"
@@ -14,6 +15,7 @@
 #include "generated/medium.cl"
 #include "generated/merging.cl"
 #include "path/path_end.cl"
+#include "path/met_light.cl"
 
 /* The radiance of the paths, with what those that left the scene gather there. */
 inline Spectrum path_radiance(Scene scene, Slab path, uint at, PathEnd end, Wavelengths lambdas)
@@ -25,7 +27,7 @@ inline Spectrum path_radiance(Scene scene, Slab path, uint at, PathEnd end, Wave
         real pdf = load_path_pdf(path, at);
         vec3 d = sel3(sky, load_path_d(path, at), v3(0.0f, 0.0f, 1.0f)); /* a slot without a pixel has none */
         vec3 from = madd3(d, -path_null_distance(path, at), load_path_o(path, at)), side = path_hemisphere(path, at);
-        real rival = sel(end.depth > 1, path_rival(path, at), (real)(0.0f));
+        real rival = path_rival(path, at, end.depth);
         Spectrum arrives = infinite_gather(scene, from, side, d, pdf, rival, lambdas);
 #if USES_ABSORPTION
         integer medium = sel_i(sky, load_path_medium(path, at), (integer)(0));

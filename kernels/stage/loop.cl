@@ -1,17 +1,18 @@
 /* The bounce loop on the device: every work-item takes `share` neighbouring slots through all stages, again and again
  * until they are at the end of their work lists, or `bounces` times. On a CPU it is a core's own small wavefront: its
  * paths stay in the core's cache, and are sorted by material before they are shaded. The host need not wait for a count
- * of what is left, so it can enqueue a whole exposure at once; `restart` begins the lists. The stages are those of the
- * other files here, each compiled by itself as a function (interface/stage.cl), in its own number of lanes, and linked.
+ * of what is left, so it can enqueue a whole exposure at once; `restart` begins the lists. `which` says what kind of
+ * paths is traced, where a scene has paths from lights (0) and from the camera (1). The stages are those of the other
+ * files here, each compiled by itself as a function (interface/stage.cl), in its own number of lanes, and linked.
  */
 #include "core/base.cl"
 #include "interface/stage.cl"
-#include "generated/trace_args.cl"
+#include "generated/loop_args.cl"
 #include "path/queue.cl"
 #include "generated/loop.cl"
 
-kernel NO_VECTORIZE void loop(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS, BEGIN_ARGS DEPOSIT_ARGS MERGE_ARGS,
-                              global uint *queue, uint share, uint bounces, uint restart)
+kernel NO_VECTORIZE void loop(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, global uint *queue, uint share, uint bounces,
+                              uint restart, uint which)
 {
     SLABS
     uint first = get_global_id(0) * share, end = min(first + share, (uint)settings->slots);
@@ -21,11 +22,10 @@ kernel NO_VECTORIZE void loop(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS, BEGIN_ARGS DEPO
     for (uint bounce = 0; bounce < bounces; bounce++) {
         int left = 0;
         for (uint at = first; at < end; at += LANES) {
-            loop_begin(SLAB_PASSED, SCENE_PASSED, BEGIN_PASSED, at);
+            loop_begin(SLAB_PASSED, SCENE_PASSED, LOOP_PASSED, which, at);
             left |= any((load_path_state(path, at) & PATH_DONE) == 0);
         }
         if (!left) break;
-        loop_bounce(SLAB_PASSED, SCENE_PASSED, TRACE_PASSED, BEGIN_PASSED DEPOSIT_PASSED MERGE_PASSED, queue, first,
-                    end);
+        loop_bounce(SLAB_PASSED, SCENE_PASSED, LOOP_PASSED, which, queue, first, end);
     }
 }

@@ -2,6 +2,7 @@
  * in which other kinds are masked out, or, where QUEUED, one slot of the kind's queue. */
 #include "core/base.cl"
 #include "interface/stage.cl"
+#include "generated/merge_args.cl"
 #include "generated/sampler.cl"
 #include "interface/shape.cl"
 #include "interface/light.cl"
@@ -27,7 +28,15 @@
 #define QUEUE_ARGS STAGE_AT_ARG
 #endif
 
-STAGE(shade)(SLAB_ARGS, SCENE_ARGS MERGE_ARGS QUEUE_ARGS)
+#if SHADES_BOTH /* paths from the camera and from lights */
+#define WHICH_ARG , uint which
+#define WHICH_PASSED , which
+#else
+#define WHICH_ARG
+#define WHICH_PASSED
+#endif
+
+STAGE(shade)(SLAB_ARGS, SCENE_ARGS MERGE_ARGS WHICH_ARG QUEUE_ARGS)
 {
     SLABS
     SCENE
@@ -42,6 +51,6 @@ STAGE(shade)(SLAB_ARGS, SCENE_ARGS MERGE_ARGS QUEUE_ARGS)
 #if BSDF_COUNT > 1
     active = active & (MATERIAL_KIND(load_hit_material(hit, at)) == BSDF_KIND);
 #endif
-    if (any(active)) integrator_vertex(scene, path, hit, shadow, at, active MERGE_PASSED);
+    if (any(active)) integrator_vertex(scene, path, hit, shadow, at, active MERGE_PASSED WHICH_PASSED);
 #endif
 }

@@ -1,6 +1,7 @@
 /* Tests the rays that wait to reach a light, and adds to their paths' radiance what arrives of what they carry. */
 #include "core/base.cl"
 #include "interface/stage.cl"
+#include "generated/join_args.cl"
 #include "path/shadow_ray.cl"
 
 STAGE(shadow)(SLAB_ARGS, SCENE_ARGS, JOIN_ARGS STAGE_AT_ARG)

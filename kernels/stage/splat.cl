@@ -2,6 +2,7 @@
  * filters hold the point where it is seen. No sample is counted here: stage/emit.cl counts paths. */
 #include "core/base.cl"
 #include "interface/stage.cl"
+#include "generated/join_args.cl"
 #include "path/shadow_ray.cl"
 #include "film/spread.cl"
 #include "film/work_list.cl"

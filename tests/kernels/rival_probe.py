@@ -145,7 +145,7 @@ class VertexProbe:
         names = ["lamp_row" if name == "lamp" else name for name in GIVEN]
         reads = "".join(f"    real {name} = x[{i}];\n" for i, name in enumerate(names))
         writes = "".join(f"    r[{i}] = {name};\n" for i, name in enumerate(self.results))
-        flags = {"LIGHT_PATHS": from_light, "JOINS_CAMERA": joined, "MERGES": merged}
+        flags = {"JOINS_CAMERA": joined, "MERGES": merged}
         flags |= {"WEIGHS_LIGHT_PATHS": True, "BSDF_MERGES": merged}
         self.probe = SceneProbe(
             reads + (LIGHT if from_light else CAMERA) + writes,

@@ -18,6 +18,7 @@ from clpt import device as dev
 from clpt import transforms as tf
 from clpt.errors import SceneError
 from clpt.render.lowering.scene import lower
+from clpt.render.wavefront.bounce_loop import BounceLoop
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m
 from clpt.scene.cameras import Camera, Orthographic, Perspective, Spherical, ThinLens
@@ -348,3 +349,20 @@ def test_what_cannot_be_is_refused_or_left_aside() -> None:
     assert any("vcm.merging: left aside" in warning for warning in lowered.warnings)
     with pytest.raises(SceneError, match="photons"):
         clpt.Renderer(with_vcm(caustic()), narrow()).run(4, noise=0.1)
+
+
+def test_everything_is_built_before_the_first_sample(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`prepare` runs all of it once, with nothing to do."""
+    renderer = clpt.Renderer(with_vcm(caustic(), max_depth=4), narrow())
+    built, traced, run = renderer.device.builds.programs, [], BounceLoop.run
+    assert "photons" in renderer.wavefronts[0].programs
+
+    def noted(loop: BounceLoop, *given: Any) -> bool:
+        traced.append(loop.features.light_paths)
+        return run(loop, *given)
+
+    monkeypatch.setattr(BounceLoop, "run", noted)
+    renderer.prepare()
+    assert traced == [True, False] and not renderer.image().any()
+    renderer.run(2)
+    assert renderer.image().any() and renderer.device.builds.programs == built

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from clpt.layout import Record
-from clpt.records import HIT, PATH, SHADOW, SLABS
+from clpt.records import HIT, SHADOW, SLABS
 from clpt.render.codegen import flags
 from clpt.render.contract.features import Features
 
@@ -50,20 +49,28 @@ def members(features: Features) -> dict[str, list[str]]:
     }
 
 
-def block_text(features: Features) -> str:
-    """Return the words of each slab that a block takes."""
-    kept = members(features)
+def blocks_text(kinds: Iterable[Features]) -> str:
+    """Return `blocks_0` and further, for each kind of paths: the words of a slot's state that a
+    block takes, of a path first those that shading may change."""
+    numbers = "".join(f"    uint {name};\n" for name in ("path", "changed", "hit", "shadow"))
+    arrays = "".join(f"    uchar {r.name.lower()}_words[{r.words}];\n" for r in SLABS)
+    t = next(m.word for m in SHADOW.members if m.name == "t")
+    rows = [f"typedef struct {{\n{numbers}{arrays}}} BlockWords;", f"#define SHADOW_T {t}"]
+    for which, features in enumerate(kinds):
+        kept = members(features)
+        own = {name: _words(features, name, names) for name, names in kept.items()}
+        counts = [str(len(own[name])) for name in ("path", "changed", "hit", "shadow")]
+        lists = (", ".join(map(str, own[record.name.lower()])) for record in SLABS)
+        values = ", ".join([*counts, *(f"{{{words}}}" for words in lists)])
+        rows.append(f"constant BlockWords blocks_{which} = {{{values}}};")
+    return "\n".join([*rows, ""])
 
-    def words(record: Record, names: Iterable[str]) -> list[int]:
-        found = []
-        for member in (next(m for m in record.members if m.name == name) for name in names):
-            count = member.words - (member.type == "spectrum" and features.mode == "rgb")
-            found += [member.word + i for i in range(count)]
-        return found
 
-    lines = [f"#define BLOCK_PATH_CHANGED {len(words(PATH, kept['changed']))}"]
-    for record in SLABS:
-        name, own = record.name.upper(), words(record, kept[record.name.lower()])
-        lines.append(f"#define BLOCK_{name} {len(own)}")
-        lines.append(f"constant uchar BLOCK_{name}_WORDS[] = {{{', '.join(map(str, own))}}};")
-    return "\n".join([*lines, f"#define SHADOW_T {words(SHADOW, ['t'])[0]}", ""])
+def _words(features: Features, slab: str, names: Iterable[str]) -> list[int]:
+    """The words of a slab's members; "changed" is a part of a path's."""
+    record = next(r for r in SLABS if r.name.lower() == ("path" if slab == "changed" else slab))
+    found = []
+    for member in (next(m for m in record.members if m.name == name) for name in names):
+        count = member.words - (member.type == "spectrum" and features.mode == "rgb")
+        found += [member.word + i for i in range(count)]
+    return found

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from clpt.render.contract import shape_records
 from clpt.render.contract.features import Features
 from clpt.render.contract.parameter_words import RERADIATION_STEP
 from clpt.render.contract.texture_records import IMAGES
@@ -62,7 +61,6 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "USES_INFINITE": lambda f: f.infinite,
     "USES_HEMISPHERE": lambda f: f.infinite or f.light_tree or (f.weighed and f.light_paths),
     "USES_LIGHTS": lambda f: bool(f.lights),
-    "USES_SURFACE_LIGHTS": lambda f: not shape_records.RECORDS.keys().isdisjoint(f.lights),
     "USES_VISIBLE_LIGHTS": lambda f: f.shows_lights,
     "FEW_LIGHTS": lambda f: not f.many_lights,
     "LIGHT_PATHS": lambda f: f.light_paths,
@@ -90,6 +88,7 @@ MATERIAL: dict[str, Callable[[Features, type[Material]], str | int]] = {
     "BSDF_KIND": lambda f, cls: f.leaves.index(cls),
     "BSDF_DELTA": lambda f, cls: cls.delta,
     "BSDF_TRANSMITS": lambda f, cls: int(cls.kind in f.transmitting),  # kernels calculate with it
+    "BSDF_SHINES": lambda f, cls: cls.kind in f.shining,
     "BSDF_ABSORBS": lambda f, cls: cls.absorbs,
     "BSDF_CHROMATIC": lambda f, cls: cls.chromatic,
     "BSDF_FLUORESCES": fluoresces,

@@ -30,20 +30,19 @@ def args_text(name: str, args: dict[str, str], behind: bool = False) -> list[str
 
 
 def virtual_files(features: Features, layout: str) -> dict[str, str]:
-    """Return the generated files that define the groups of arguments."""
+    """Return the generated files that define the groups of arguments: a file each, so that a stage
+    that takes none of a group has the same text whatever is in it."""
     groups = {
-        "trace_args": {"TRACE": trace_args(features, layout)},
-        "stage_args": {
-            "BEGIN": begin_args(features),
-            "JOIN": join_args(features, layout),
-        },
+        "trace": (trace_args(features, layout), False),
+        "begin": (begin_args(features), False),
+        "join": (join_args(features, layout), False),
+        "deposit": (deposit_args(features), True),
+        "merge": (merge_args(features), True),
     }
     files = {"generated/scene.cl": scene_text()}
-    for file, args in groups.items():
-        rows = [row for name, own in args.items() for row in args_text(name, own)]
-        files[f"generated/{file}.cl"] = "\n".join([*rows, ""])
-    for name, own in {"DEPOSIT": deposit_args(features), "MERGE": merge_args(features)}.items():
-        files["generated/stage_args.cl"] += "\n".join([*args_text(name, own, behind=True), ""])
+    for name, (args, behind) in groups.items():
+        rows = args_text(name.upper(), args, behind)
+        files[f"generated/{name}_args.cl"] = "\n".join([*rows, ""])
     return files
 
 
@@ -122,11 +121,25 @@ def merge_args(features: Features) -> dict[str, str]:
     return dict.fromkeys(("photons", "photon_order", "photon_cells"), "global const uint *")
 
 
+def loop_files(features: Features, layout: str) -> dict[str, str]:
+    """Return the generated file that defines what all stages of a loop take."""
+    return {
+        "generated/loop_args.cl": "\n".join([*args_text("LOOP", loop_args(features, layout)), ""])
+    }
+
+
+def loop_args(features: Features, layout: str) -> dict[str, str]:
+    """Return what the stages of a loop take, of all kinds of paths, beside slabs and scene."""
+    args = trace_args(features, layout)
+    for own in features.passes:  # deposit last, which writes what others read
+        args |= {**merge_args(own), **begin_args(own), **join_args(own, layout)}
+    return {**args, **{n: t for own in features.passes for n, t in deposit_args(own).items()}}
+
+
 def loop_arguments(features: Features, layout: str) -> tuple[device.Argument, ...]:
     """Return what the kernel of stage/loop.cl takes: a linked kernel has no argument names."""
-    args = {**SLAB_ARGS, **SCENE_ARGS, **trace_args(features, layout), **begin_args(features)}
-    args |= {**deposit_args(features), **merge_args(features), "queue": "global uint *"}
-    args |= dict.fromkeys(("share", "bounces", "restart"), "uint ")
+    args = {**SLAB_ARGS, **SCENE_ARGS, **loop_args(features, layout), "queue": "global uint *"}
+    args |= dict.fromkeys(("share", "bounces", "restart", "which"), "uint ")
     return tuple(
         device.Argument(
             name,

@@ -46,6 +46,7 @@ class Features:
     integrator: str
     leaves: tuple[type[Material], ...]
     transmitting: tuple[str, ...] = ()  # kinds of leaves of which some let light through
+    shining: tuple[str, ...] = ()  # kinds of leaves on shapes that are lights
     lights: tuple[str, ...] = ()
     textures: tuple[str, ...] = ()
     texture_roles: tuple[tuple[str, str], ...] = ()

@@ -45,6 +45,7 @@ def features_of(
         integrator=INTEGRATORS.get(scene.integrator.kind, scene.integrator.kind),
         leaves=index.leaves,
         transmitting=tuple(sorted(materials.transmitting)),
+        shining=index.shining,
         lights=lights.kinds,
         textures=tuple(sorted({kind for kind, _ in textures.roles})),
         texture_roles=tuple(sorted(textures.roles)),

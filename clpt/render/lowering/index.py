@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -52,6 +53,13 @@ class SceneIndex:
             normal_mapped=any(any_of(shape.material, mt.NormalMapped) for shape in distinct),
             warnings=tuple(warnings),
         )
+
+    @property
+    def shining(self) -> tuple[str, ...]:
+        """The kinds of leaves on shapes that are lights."""
+        lights = (shape for shape in self.shapes if shape.emission is not None)
+        found = {cls for shape in lights for cls in _leaves_of(shape.material)}
+        return tuple(cls.kind for cls in self.leaves if cls in found)
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -144,11 +152,17 @@ def _leaf_kinds(shapes_: tuple[Shape, ...]) -> tuple[type[mt.Material], ...]:
         where = shapes.where(shape)
         if not isinstance(shape.material, mt.Material):
             raise SceneError(f"{shape.material!r} is not a material", where=where)
-        for material in mt.parts(shape.material):
-            if isinstance(material, mt.Mask) or material.no_back:
-                found.setdefault(mt.Null, where)
-            if not isinstance(material, mt.COMPOSITES):
-                found.setdefault(type(material), where)
-        if any_of(shape.material, mt.TwoSided) and not isinstance(shape.material, mt.TwoSided):
-            found.setdefault(mt.Diffuse, where)  # the black back of a part that is not two-sided
+        for leaf in _leaves_of(shape.material):
+            found.setdefault(leaf, where)
     return custom_materials.ordered(found) or (mt.Diffuse,)
+
+
+def _leaves_of(material: mt.Material) -> Iterator[type[mt.Material]]:
+    """The kinds of leaves that paths may meet where a shape has a material."""
+    for part in mt.parts(material):
+        if isinstance(part, mt.Mask) or part.no_back:
+            yield mt.Null
+        if not isinstance(part, mt.COMPOSITES):
+            yield type(part)
+    if any_of(material, mt.TwoSided) and not isinstance(material, mt.TwoSided):
+        yield mt.Diffuse  # the black back of a part that is not two-sided

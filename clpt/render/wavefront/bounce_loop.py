@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from clpt import device
 from clpt.device.timing import Timings
-from clpt.render.codegen import programs, signatures
+from clpt.render.codegen import bounce, programs, signatures
 from clpt.render.contract.features import Features
 from clpt.render.lowering.scene import Lowered
 from clpt.render.wavefront import queues, strategy
@@ -118,9 +118,10 @@ class BounceLoop:
     def loop(self) -> device.BoundKernel:
         """The kernel of the bounce loop on the device, for a host that does not wait."""
         if self._loop is None:
-            name, scene = f"{self._label}loop", self.scene
-            self.kernels.keep(name, lambda: self._link(scene.lowered, scene.strategy))
-            self._loop = self.kernels.bind(name, "loop", **IDLE, share=self._share)
+            scene = self.scene
+            self.kernels.keep("loop", lambda: self._link(scene.lowered, scene.strategy))
+            own = {"share": self._share, "which": self._which}
+            self._loop = self.kernels.bind("loop", "loop", **IDLE, **own)
         return self._loop
 
     def prepare(self) -> None:
@@ -193,7 +194,7 @@ class BounceLoop:
         features, chosen, label = self.features, self.scene.strategy, self._label
         self.kernels.build(self._texts(self.scene.lowered, chosen))
         steps: list[Step] = []
-        for stage in programs.order(features, chosen.layout, self.lanes, chosen.interleaved):
+        for stage in bounce.order(features, chosen.layout, self.lanes, chosen.interleaved):
             if stage.kernel == "shade" and steps[-1].bound.kernel.name != "shade":
                 steps += self._bind_queues(chosen.queued, len(features.materials))
             samples = {} if steps else {"samples": (0, 0)}
@@ -219,7 +220,7 @@ class BounceLoop:
         return {self._label + name: text for name, text in texts.items()}
 
     def _link(self, lowered: Lowered, chosen: Strategy) -> device.Program:
-        features, layout = self._own(lowered), chosen.layout
+        features, layout = self._features_of(lowered), chosen.layout
         texts = programs.loop_sources(features, layout, self.lanes, chosen.interleaved)
         known = {"loop": signatures.loop_arguments(features, layout)}
         return device.link(self.device, texts, "loop", known)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from clpt import device
 from clpt.device.buffers import Buffers
 from clpt.records import PHOTON
-from clpt.render.wavefront.bounce_loop import Kernels
+from clpt.render.wavefront.bounce_loop import Kernels, Step
 
 NONE = 0xFFFFFFFF  # kernels/merging/none.cl
 RUN = 1024  # kernels/merging/sort.cl
@@ -46,6 +46,7 @@ class Photons:
             "photon_order": words(self.places),
             "photon_cells": self._cells,
         }
+        self._sorting: list[Step] = []
         stream.fill(self._cells, 0, 0, 4 * (self.cells + 1))
 
     @property
@@ -57,21 +58,30 @@ class Photons:
         """Enqueue that there are none."""
         self.stream.fill(self._numbers, NONE, 0, 4 * self.places)
 
-    def sort(self, kernels: Kernels) -> None:
-        """Enqueue that the photons of a pass are sorted, for paths from the camera to find."""
-        kernels.keep(PROGRAM, lambda: device.build(kernels.device, device.assemble(ROOT)))
-        order = self.arguments["photon_order"]
-        self.stream.fill(self._cells, 0, 0, 4 * (self.cells + 1))
+    def prepare(self, kernels: Kernels) -> None:
+        """Build what `sort` runs. Raises KernelBuildError."""
+        if self._sorting:
+            return
+        kernels.build({PROGRAM: device.assemble(ROOT)})
+        program, order = kernels.programs[PROGRAM], self.arguments["photon_order"]
         place = {"numbers": self._numbers, "count": self.places, "cells": self._cells}
         cell = {"count": self.cells, "cells": self._cells}
-        self._run(kernels, "photons_count", self.places, **place)
-        self._run(kernels, "photons_sum", self._runs, **cell, sums=self._sums)
-        self._run(kernels, "photons_scan", 1, sums=self._sums, runs=self._runs)
-        self._run(kernels, "photons_begin", self._runs, **cell, sums=self._sums)
-        self._run(kernels, "photons_place", self.places, **place, order=order)
-        self._run(kernels, "photons_order", self.cells, **cell, order=order)
+        steps: list[tuple[str, int, dict[str, Any]]] = [
+            ("photons_count", self.places, place),
+            ("photons_sum", self._runs, {**cell, "sums": self._sums}),
+            ("photons_scan", 1, {"sums": self._sums, "runs": self._runs}),
+            ("photons_begin", self._runs, {**cell, "sums": self._sums}),
+            ("photons_place", self.places, {**place, "order": order}),
+            ("photons_order", self.cells, {**cell, "order": order}),
+        ]
+        for name, items, given in steps:
+            group = GROUP if items > 1 else 1
+            bound = program.kernel(name).bind(**given)
+            self._sorting.append(Step(name, bound, (-(-items // group) * group,), (group,)))
 
-    def _run(self, kernels: Kernels, name: str, items: int, **arguments: Any) -> None:
-        bound = kernels.bind(PROGRAM, name, **arguments)
-        group = GROUP if items > 1 else 1
-        self.stream.run(bound, (-(-items // group) * group,), (group,))
+    def sort(self, kernels: Kernels) -> None:
+        """Enqueue that the photons of a pass are sorted, for paths from the camera to find."""
+        self.prepare(kernels)
+        self.stream.fill(self._cells, 0, 0, 4 * (self.cells + 1))
+        for step in self._sorting:
+            self.stream.run(step.bound, step.size, step.group)

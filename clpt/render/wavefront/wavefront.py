@@ -126,9 +126,10 @@ class Wavefront:
         if looped is None:
             looped = strategy.use_loop(on)
         if looped:  # beside the trees
-            for features in lowered.features.passes:
-                texts = programs.loop_sources(features, chosen.layout, on.lanes, chosen.interleaved)
-                device.compile_ahead(on, texts, "loop")
+            texts = programs.loop_sources(
+                lowered.features, chosen.layout, on.lanes, chosen.interleaved
+            )
+            device.compile_ahead(on, texts, "loop")
         stream, buffers = device.Stream(on.queue), device.Buffers(on)
         settings, kinds = lowered.settings, len(lowered.features.materials)
         padded_pixels = int(settings["padded_pixels"])
@@ -191,6 +192,8 @@ class Wavefront:
         """Build what `render_samples` runs, so that its first samples come at once."""
         for loop in self.loops:
             loop.prepare()
+        if self.photons is not None:
+            self.photons.prepare(self.kernels)
 
     def build_ahead(self, lowered: Lowered, chosen: Strategy) -> None:
         """Build the programs that are in use for another lowering, so that no later build fails."""
@@ -329,12 +332,10 @@ class Wavefront:
 
     def _turns(self, first: int, end: int) -> list[tuple[int, int]]:
         """The numbers of samples that all kinds of paths take one after the other: few at a time,
-        so that the film is balanced whenever a render stops."""
-        if len(self.loops) == 1:
+        so that the film is balanced whenever a render stops. No samples are one turn of none."""
+        if len(self.loops) == 1 or first == end:
             return [(first, end)]
-        step = max(TURN_SAMPLES, TURN_PATHS // self.paths.pixels)
-        if self.photons is not None:
-            step = 1
+        step = 1 if self.photons else max(TURN_SAMPLES, TURN_PATHS // self.paths.pixels)
         return [(at, min(at + step, end)) for at in range(first, end, step)]
 
     def _run(

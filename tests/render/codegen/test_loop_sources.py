@@ -1,10 +1,12 @@
-"""Programs that are linked to the loop: nothing but the stages is seen outside of its program.
+"""Programs that are linked to the loop: no more than there must be, and nothing but the stages is
+seen outside of its program.
 
 `Source.with_private` finds definitions by how they are written; this test finds them by braces.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,6 +19,8 @@ from clpt.device import Source
 from clpt.render.codegen import programs
 from clpt.render.contract.features import Features
 from clpt.render.lowering.scene import lower
+from clpt.scene.integrators import Path as PathTracer
+from clpt.scene.integrators import Vcm
 
 ROOT = Path(__file__).resolve().parents[3]
 SCENES = [
@@ -24,6 +28,7 @@ SCENES = [
     "scenes/oil_film/scene.json",
     "scenes/fluorescent_paint/scene.json",
     "scenes/rainbow/scene.json",
+    "scenes/bulb/scene.json",
     "tests/scenes/instances.xml",
     "tests/scenes/light_tracing.xml",
     "tests/scenes/textures.xml",
@@ -55,8 +60,9 @@ def definitions(source: Source) -> Iterator[tuple[str, str]]:
     assert depth == 0
 
 
-def features_of(name: str) -> Features:
-    return lower(clpt.load(ROOT / name)).features
+def features_of(name: str, integrator: PathTracer | Vcm | None = None) -> Features:
+    scene = clpt.load(ROOT / name)
+    return lower(dataclasses.replace(scene, integrator=integrator or scene.integrator)).features
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -77,8 +83,9 @@ def test_only_stages_are_seen_outside(name: str) -> None:
                 else:
                     assert head.startswith("kernel "), f"{program}: {head} is not private"
                     outside.append(own)
-        bounce = {stage.program for stage in programs.order(features, layout, lanes, interleaved)}
-        assert sorted(outside) == sorted({"loop", *(f"loop_{stage}" for stage in bounce)})
+        assert sorted(outside) == sorted(
+            {"loop", *(f"loop_{name}" for name in made.keys() - {"loop"})}
+        )
 
 
 def test_definitions_are_found_by_their_braces() -> None:
@@ -97,3 +104,27 @@ def test_definitions_are_found_by_their_braces() -> None:
         }
     """
     assert [name for _, name in definitions(Source("text", text, ()))] == ["table", "one", "two"]
+
+
+def test_kinds_of_paths_share_what_is_the_same() -> None:
+    """Light paths and photons add what only they have."""
+    name = "scenes/bulb/scene.json"
+    alone = features_of(name, PathTracer(light_paths=0))
+    shading = {f"shade_{kind}" for kind in alone.materials}
+    camera = {"generate", "intersect", "shadow", "loop", *shading}
+    beside = {"emit", "splat"}
+    assert programs.loop_sources(alone, "wide8", 8).keys() == camera
+    with_light_paths = features_of(name, PathTracer(light_paths=1))
+    assert programs.loop_sources(with_light_paths, "wide8", 8).keys() == camera | beside
+    with_photons = features_of(name, Vcm())
+    assert programs.loop_sources(with_photons, "wide8", 8).keys() == camera | beside | {"deposit"}
+
+
+@pytest.mark.parametrize("integrator", [PathTracer(light_paths=1), Vcm()])
+def test_rays_of_all_paths_are_traced_by_one_text(integrator: PathTracer | Vcm) -> None:
+    """Also where stages are programs of their own, so that it is built once; a mixture's too."""
+    for name in ("scenes/bulb/scene.json", "tests/scenes/plastic.xml"):
+        passes = features_of(name, integrator).passes
+        lights, camera = (programs.sources(own, "wide8", 8, queued=False) for own in passes)
+        same = {program for program in lights.keys() & camera if lights[program] == camera[program]}
+        assert same == {"intersect", *({"mix"} & camera.keys())}

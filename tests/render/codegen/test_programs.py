@@ -9,6 +9,7 @@ import pytest
 
 from clpt import device, spectra
 from clpt import scene as sc
+from clpt.benchmark.traffic import kept_lines
 from clpt.render.codegen import parameters, programs
 from clpt.render.lowering.scene import Lowered, lower
 from clpt.scene import Film, Scene, textures
@@ -94,6 +95,23 @@ def test_text_holds_only_what_the_scene_has() -> None:
     shade = texts["shade_diffuse"].text
     assert not any(f"{kind}_row(" in shade for kind in ("bitmap", "checkerboard", "cylinder"))
     assert "rough_conductor" not in shade
+
+
+def test_only_materials_of_lights_look_for_light() -> None:
+    """Those of surfaces that shine: masks and what is in them among them."""
+    glow = Area(radiance=1.0)
+    shapes = [
+        Rectangle(material=m.Mask(material=m.Plastic()), emission=glow),
+        Sphere(material=m.Diffuse()),
+        Cube(material=m.TwoSided(front=m.Conductor())),
+    ]
+    film = Film(width=4, height=4, mode="rgb")
+    features = lower(Scene(camera=Perspective(), shapes=shapes, film=film)).features
+    assert sorted(features.shining) == ["null", "plastic"]
+    texts = programs.sources(features, "wide8", 8, queued=False)
+    for kind in features.materials:
+        kept = "\n".join(kept_lines(texts[f"shade_{kind}"].text))
+        assert ("light_shows(scene, s.light" in kept) == (kind in features.shining), kind
 
 
 @pytest.mark.parametrize("mode", ["rgb", "spectral"])

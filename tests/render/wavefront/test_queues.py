@@ -16,7 +16,7 @@ from clpt.benchmark.traffic import kept_lines
 from clpt.device import Source
 from clpt.records import HIT, PATH, SHADOW, SLABS
 from clpt.render.codegen import programs
-from clpt.render.codegen.blocks import block_text, members
+from clpt.render.codegen.blocks import blocks_text, members
 from clpt.render.codegen.signatures import scene_text
 from clpt.render.lowering.scene import lower
 from clpt.render.wavefront import queues
@@ -40,7 +40,7 @@ VIRTUAL = {
     "generated/scene.cl": scene_text(),
     "generated/spectrum.cl": '#include "spectrum/rgb.cl"\n',
     "generated/spectrum_read.cl": '#include "spectrum/rgb_read.cl"\n',
-    "generated/block.cl": block_text(lower(Scene(camera=Perspective())).features),
+    "generated/block.cl": blocks_text([lower(Scene(camera=Perspective())).features]),
     "sorting.cl": """
 #include "core/base.cl"
 #include "path/queue.cl"
@@ -58,13 +58,13 @@ kernel void probe(SLAB_ARGS, global uint *queue, global uint *queue_starts, uint
 kernel void probe(SLAB_ARGS, global const uint *queue, uint entry, uint end, uint block)
 {
     SLABS
-    queue_take(path, hit, shadow, queue, entry, end, block);
+    queue_take(path, hit, shadow, &blocks_0, queue, entry, end, block);
     mask all = mask_of(1);
     store_path_state(path, block, all, load_path_sample(path, block) + load_hit_prim(hit, block));
     store_path_pdf(path, block, all, load_path_pdf(path, block) * 2.0f);
     store_shadow_t(shadow, block, all, load_shadow_t(shadow, block) * 2.0f);
     store_hit_t(hit, block, all, (real)(-1.0f));
-    queue_return(path, shadow, queue, entry, end, block);
+    queue_return(path, shadow, &blocks_0, queue, entry, end, block);
 }
 """,
 }

@@ -1,0 +1,176 @@
+"""The stages of a bounce in their order, and the text that takes paths through them in the loop."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from clpt.render.codegen import signatures
+from clpt.render.codegen.dispatch import indented
+from clpt.render.contract.features import Features
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A stage of a bounce: its program, its kernel there, how many slots a work-item serves."""
+
+    program: str
+    kernel: str
+    lanes: int
+
+
+def order(features: Features, layout: str, lanes: int, interleaved: bool = False) -> list[Stage]:
+    """Return the stages of a bounce in their order, but for sorting."""
+    tracing = trace_lanes(layout, lanes)
+    begin, join = begin_and_join(features)
+    bounce = [Stage(begin, begin, lanes)]
+    if features.shows_lights:
+        bounce.append(Stage(join, join, tracing))
+    bounce.append(Stage("intersect", "intersect", lanes if interleaved else tracing))
+    if deposits(features):
+        bounce.append(Stage("deposit", "deposit", lanes))
+    if features.mixtures:
+        bounce.append(Stage("mix", "mix_materials", lanes))
+    bounce += [Stage(f"shade_{kind}", "shade", lanes) for kind in features.materials]
+    if joins(features) and any(not cls.delta for cls in features.leaves):
+        bounce.append(Stage(join, join, tracing))
+    return bounce
+
+
+def begin_and_join(features: Features) -> tuple[str, str]:
+    """Return the stage that begins paths, and the one that tests the rays that join them to a light
+    or, of paths that start at lights, to the camera."""
+    return ("emit", "splat") if features.light_paths else ("generate", "shadow")
+
+
+def joins(features: Features) -> bool:
+    """Whether paths are joined to lights or, those that start at lights, to the camera."""
+    return not features.light_paths or features.joined
+
+
+def deposits(features: Features) -> bool:
+    """Whether paths leave photons."""
+    return features.light_paths and features.merged
+
+
+def trace_lanes(layout: str, lanes: int) -> int:
+    """How many rays a work-item traces: those of one path, but where there is no tree."""
+    return lanes if layout == "brute" else 1
+
+
+def has_both(features: Features) -> bool:
+    """Whether there are paths from the camera and from lights."""
+    return len(features.passes) > 1
+
+
+def loop_text(features: Features, layout: str, lanes: int, interleaved: bool) -> str:
+    """Return what stage/loop.cl calls: `loop_begin`, and `loop_bounce`, all other stages in their
+    order; of the kind of paths `which`, where a scene has two."""
+    bounces = [
+        [
+            _call(features, own, layout, stage, which)
+            for stage in order(own, layout, lanes, interleaved)
+        ]
+        for which, own in enumerate(features.passes)
+    ]
+    lines = list(dict.fromkeys(call.declaration for calls in bounces for call in calls))
+    head = "(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, uint which, "
+    begins = [[calls[0].at("at")] for calls in bounces]
+    lines += [f"inline void loop_begin{head}uint at)", "{", *_of_each(begins), "}"]
+    rests = [calls[1:] for calls in bounces]
+    same = _same(rests)
+    own = [_bounce_text(rest[same:], f"blocks_{which}") for which, rest in enumerate(rests)]
+    lines += [
+        f"inline void loop_bounce{head}global uint *queue, uint first, uint end)",
+        "{",
+        "    SLABS",
+        "    uint starts[BSDF_COUNT + 1], block = settings->slots + get_global_id(0) * LANES;",
+        *indented(*_bounce_text(rests[0][:same], "")),
+        *_of_each(own),
+        "}",
+    ]
+    return "\n".join([*lines, ""])
+
+
+@dataclass(frozen=True)
+class _Call:
+    """A call of a stage in the loop, where it is a function.
+
+    args: what it takes beside slabs and scene, each a type and what is passed.
+    """
+
+    stage: Stage
+    args: tuple[tuple[str, str], ...]
+
+    @property
+    def declaration(self) -> str:
+        own = "".join(f", {type_}" for type_, _ in self.args)
+        return f"void loop_{self.stage.program}(SLAB_ARGS, SCENE_ARGS{own}, uint at);"
+
+    def at(self, slot: str) -> str:
+        """Return the call for the slots from `slot` on."""
+        own = "".join(f", {passed}" for _, passed in self.args)
+        return f"loop_{self.stage.program}(SLAB_PASSED, SCENE_PASSED{own}, {slot});"
+
+
+def _call(features: Features, own: Features, layout: str, stage: Stage, which: int) -> _Call:
+    """The call of a stage for one kind of paths, whose features are `own`."""
+    begin, join = begin_and_join(own)
+    groups = {
+        begin: signatures.begin_args(own),
+        "intersect": signatures.trace_args(own, layout),
+        "deposit": signatures.deposit_args(own),
+        join: signatures.join_args(own, layout),
+        "shade": signatures.merge_args(features),
+    }
+    args = [(type_, name) for name, type_ in groups.get(stage.kernel, {}).items()]
+    if stage.kernel == "shade" and has_both(features):
+        args.append(("uint ", str(which)))
+    return _Call(stage, tuple(args))
+
+
+def _same(bounces: list[list[_Call]]) -> int:
+    """How many calls all kinds of paths have first, before they shade. What is called in one place
+    alone compilers put into the loop, which saves some hundredths of the time."""
+    first, *others = bounces
+    same = 0
+    while first[same].stage.kernel != "shade" and all(o[same] == first[same] for o in others):
+        same += 1
+    return same
+
+
+def _of_each(texts: list[list[str]]) -> list[str]:
+    """Statements for each kind of paths, of which `which` is traced."""
+    if len(texts) == 1:
+        return indented(*texts[0])
+    rows = []
+    for which, text in enumerate(texts):
+        rows += [f"if (which == {which}) {{", *indented(*text), "}"]
+    return indented(*rows)
+
+
+def _bounce_text(calls: list[_Call], words: str) -> list[str]:
+    """Statements that take slots through stages; words: of a slot's state, which are sorted."""
+    shading = [call for call in calls if call.stage.kernel == "shade"]
+    lines = []
+    for call in calls:
+        step = "LANES" if call.stage.lanes > 1 else "1"
+        plain = f"for (uint at = first; at < end; at += {step}) {call.at('at')}"
+        if call not in shading:
+            lines.append(plain)
+            continue
+        kind = shading.index(call)
+        if kind == 0:
+            lines.append("queue_sort(path, hit, queue, starts, first, end);")
+        begins, ends = f"starts[{kind}]", f"starts[{kind + 1}]"
+        lines += [
+            f"if (queue_is_dense({ends} - {begins}, end - first)) {{",
+            f"    {plain}",
+            "} else {",
+            f"    for (uint entry = {begins}; entry < {ends}; entry += LANES) {{",
+            f"        queue_take(path, hit, shadow, &{words}, queue, entry, {ends}, block);",
+            f"        {call.at('block')}",
+            f"        queue_return(path, shadow, &{words}, queue, entry, {ends}, block);",
+            "    }",
+            "}",
+        ]
+    return lines

@@ -1,0 +1,16 @@
+/* What a path from the camera tells of a light that it meets. */
+
+/* Where lights are chosen by it, the hemisphere to which the surface sends light where the ray was chosen. */
+#if USES_HEMISPHERE
+#define path_hemisphere(path, at) load_path_sampled_hemisphere(path, at)
+#else
+#define path_hemisphere(path, at) v3(0.0f, 0.0f, 0.0f)
+#endif
+
+/* What light paths do, over the path's own density (lighting/rivals.cl): nothing where the camera or its first surface
+ * sees the light, which is left to paths from the camera. */
+#if WEIGHS_LIGHT_PATHS
+#define path_rival(path, at, depth) sel((depth) > 1, load_path_rival(path, at), (real)(0.0f))
+#else
+#define path_rival(path, at, depth) ((real)(0.0f))
+#endif
