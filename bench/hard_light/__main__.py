@@ -29,7 +29,8 @@ from bench.workers import find_llvm
 
 REFERENCES = Path(__file__).parent / "references"
 METHODS = (
-    *("clpt:path", "clpt:path,--light-paths,1", "clpt:vcm", "clpt:particle_tracer"),
+    *("clpt:auto", "clpt:path,--light-paths,0", "clpt:path,--light-paths,1", "clpt:vcm"),
+    "clpt:particle_tracer",
     *("mitsuba:path", "mitsuba:ptracer"),
     *(f"luxcore:{name}" for name in peers.LUXCORE),
 )

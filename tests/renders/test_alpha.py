@@ -15,7 +15,7 @@ from clpt.errors import SceneError
 from clpt.render.lowering.scene import lower
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Perspective
-from clpt.scene.integrators import Aov
+from clpt.scene.integrators import Aov, Path
 from clpt.scene.lights import Area, Constant
 from clpt.scene.materials import Dielectric, Diffuse, Mask
 from clpt.scene.shapes import Rectangle, Sphere
@@ -37,6 +37,7 @@ def still_life(**film: object) -> Scene:
             Rectangle(to_world=lamp, emission=Area(radiance=(2.0, 2.0, 1.0))),
         ],
         lights=[Constant(radiance=tuple(SKY.tolist()))],
+        integrator=Path(light_paths=0),
         film=Film(**{"width": 22, "height": 20, "mode": "rgb", **film}),
     )
 

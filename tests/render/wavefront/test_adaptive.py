@@ -43,7 +43,7 @@ def bulb(radius=0.1, **changes) -> Scene:
             Sphere(material=materials.Diffuse(reflectance=0.0), **lamp),
             Sphere(center=(0, 1, 0), radius=1.5 * radius, material=materials.Dielectric()),
         ],
-        integrator=Path(max_depth=5),
+        integrator=Path(max_depth=5, light_paths=0),
         film=Film(width=16, height=16, mode="rgb"),
     )
     return dataclasses.replace(scene, **changes)
