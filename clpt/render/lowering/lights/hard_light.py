@@ -36,6 +36,7 @@ SUN = 0.25  # of an image's power: where it comes from a small part the image is
 FEWEST = 3  # edges of a path from a light over two surfaces to the camera: the shortest caustic
 MOSTLY = 0.5  # of the power of all lights: where small ones have less, few paths start at lights
 FEW = 0.25  # a sample
+SOME = 0.5  # where they have more; `vcm` has one, as its photons are these
 SEEN = 0.02  # of the picture: where what is sharp fills more, caustics may be seen through it
 
 Ball = tuple[NDArray[np.float64], float]  # centre and radius
@@ -89,11 +90,11 @@ def _choice(
     if sum(share for _, share in small) < MOSTLY:
         return Path(light_paths=FEW), f"{reason}, though most light is of large ones"
     if not isinstance(scene.integrator, Auto):
-        return Path(light_paths=1), reason
+        return Path(light_paths=SOME), reason
     if scene.noise is not None:
-        return Path(light_paths=1), f"{reason}; noise is not measured with photons"
+        return Path(light_paths=SOME), f"{reason}; noise is not measured with photons"
     if index.shifts or _share_seen(index, geometry) < SEEN:
-        return Path(light_paths=1), reason
+        return Path(light_paths=SOME), reason
     return Vcm(), f"{reason}; the camera sees what is sharp"
 
 
