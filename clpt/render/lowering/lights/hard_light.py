@@ -62,7 +62,8 @@ def decided(
     if former is None:
         chosen, reason = _choice(index, geometry, encoder, lights, sphere)
     else:
-        chosen = former if isinstance(former, (Path, Vcm)) else Path(light_paths=0)
+        keeps = isinstance(former, Vcm) and isinstance(given, Auto)
+        chosen = former if keeps else Path(light_paths=getattr(former, "light_paths", 0))
         reason = "as before the scene was edited"
     own = {name: getattr(given, name) for name in ("max_depth", "rr_depth", "hide_lights")}
     chosen = replace(chosen, **own)

@@ -222,6 +222,9 @@ def test_an_edit_keeps_the_integrator() -> None:
         edited = scene_of(ROOM, BALL, camera=AT_WALL, integrator=Auto(max_depth=7))
         made = lower(edited, former=former)
         assert type(made.integrator) is type(former.integrator)
+        path = lower(dataclasses.replace(edited, integrator=Path()), former=former).integrator
+        assert isinstance(path, Path)
+        assert path.light_paths == former.integrator.light_paths  # type: ignore[attr-defined]
         assert made.integrator.max_depth == 7
 
 
