@@ -35,7 +35,7 @@
  *
  *     pending' = e c' / p,    then pending / c p_back c' / p,
  *
- * and where it meets something sharp the square of its rival gains that of what is pending. A light path that has met
+ * and where it meets something sharp the square of its rival gains the square of `pending`. A light path that has met
  * something sharp begins, at each vertex that is not, with pending' = e / l c' / p, and goes on as above while all that
  * follows is sharp; it counts at a joint to a sharp x_1.
  *

@@ -32,10 +32,10 @@ inline Spectrum merge_photon(Photon photon, mask near, Vertex v, Scattering scat
 /* The light of all photons around a vertex, by the share of it that merging takes, without what the path carries.
  * ratio: of the camera's path, see path/hero.cl. */
 inline Spectrum merge_photons(Scene scene, mask active, Vertex v, Scattering scatter, Rival rival, Spectrum ratio,
-                              integer sample MERGE_ARGS)
+                              integer pass MERGE_ARGS)
 {
     global const Settings *settings = scene.settings;
-    integer pass = sample, group = 0;
+    integer group = 0;
     real radius = merging_radius(scene, pass), area = merging_area(scene, pass);
     real number = settings->light_paths;
 #if SPECTRUM_SIZE == 4

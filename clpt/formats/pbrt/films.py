@@ -201,14 +201,13 @@ def integrator(definition: Definition | None, film: Film) -> Integrator:
     known = (*LIGHT_PATHS, *OTHERS, "sppm")
     if definition.kind not in known:
         raise UnknownKindError("integrator", definition.kind, known, **params.location())
-    if definition.kind in OTHERS:
-        state.warn(params, CHOSEN)
     params.ignore(*IGNORED, *OTHERS.get(definition.kind, ()))
     depth = params.one("maxdepth", "integer", 5)
     if depth < 0:
         raise params.error(f"'maxdepth' cannot be negative: {depth}")
     longest = min(depth, MOST_DEPTH) + 1
     if definition.kind in OTHERS:
+        state.warn(params, CHOSEN)
         return integrators.Auto(max_depth=longest)
     if definition.kind != "sppm":
         return integrators.Path(max_depth=longest)

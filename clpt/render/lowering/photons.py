@@ -58,13 +58,11 @@ def first_radius(
     power of the square root of 2, so that small changes of a scene rarely change it.
     """
     least, most = LEAST * scene_radius, MOST * scene_radius
-    lens = cameras.MEMBERS[type(camera)](camera, *film)
-    if "extent" not in lens:
+    view = cameras.view_of(camera, *film)
+    if view is None:
         return _rounded(math.sqrt(least * most))
-    matrix, extent = lens["to_world"], np.array(lens["extent"])  # of the film a metre away
-    angle = math.atan(np.linalg.norm(extent) / 2.0)
-    far = _median_distance(_triangles(geometry) - matrix[:3, 3], matrix[:3, 2], angle)
-    pixel = far * extent[0] / film[0]
+    far = _median_distance(_triangles(geometry) - view.place, view.axis, view.angle)
+    pixel = far * view.width / film[0]
     return _rounded(float(np.clip(RADIUS * pixel, least, most)) if far else least)
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -27,6 +29,29 @@ def dispersive_glass(camera: Camera) -> Spectrum | None:
 def is_connected(camera: Camera, mode: str) -> bool:
     """Return whether paths from lights can be joined to a camera, in the mode of the film."""
     return camera.kind in CONNECTED and (mode == "rgb" or dispersive_glass(camera) is None)
+
+
+@dataclass(frozen=True)
+class View:
+    """What a camera sees from a point.
+
+    place: that point (3,) [m]; axis: from it to the middle of the film (3,), unit length; width: of
+    the film a metre away [m]; angle: from the axis to the film's corners [rad].
+    """
+
+    place: NDArray[np.float64]
+    axis: NDArray[np.float64]
+    width: float
+    angle: float
+
+
+def view_of(camera: Camera, width: int, height: int) -> View | None:
+    """Return what a camera sees, None if not from a point; width, height: of the film [pixels]."""
+    lens = MEMBERS[type(camera)](camera, width, height)
+    if "extent" not in lens:
+        return None
+    matrix, extent = lens["to_world"], lens["extent"]
+    return View(matrix[:3, 3], matrix[:3, 2], extent[0], math.atan(math.hypot(*extent) / 2.0))
 
 
 def lower_camera(

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.render.contract import shape_records
-from clpt.render.contract.light_records import INFINITE
 from clpt.render.lowering.camera import cameras
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.geometry import analytic, shapes, triangles
@@ -24,7 +23,7 @@ from clpt.render.lowering.geometry.geometry import Geometry
 from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.lights import image_lights
 from clpt.render.lowering.lights.aims import is_sharp, sharp_pieces
-from clpt.render.lowering.lights.lights import Emitter, LightRows
+from clpt.render.lowering.lights.lights import Emitter, LightRows, row_order
 from clpt.scene import materials as mt
 from clpt.scene.integrators import AUTO, Auto, Integrator, Path, Vcm
 from clpt.scene.lights import CubeMap, Envmap
@@ -101,20 +100,19 @@ def _choice(
 
 def _share_seen(index: SceneIndex, geometry: Geometry) -> float:
     """The share of the picture that sharp things fill: as if nothing hid them, with all sides."""
-    film = index.scene.film
-    lens = cameras.MEMBERS[type(index.scene.camera)](index.scene.camera, film.width, film.height)
-    matrix, extent = lens["to_world"], np.array(lens["extent"])  # of the film a metre away
-    angle = math.atan(float(np.linalg.norm(extent)) / 2.0)
+    view = cameras.view_of(index.scene.camera, index.scene.film.width, index.scene.film.height)
+    assert view is not None, "a camera that can be joined has a point"
     pieces = np.concatenate([np.zeros((0, 10)), *sharp_pieces(geometry)])
-    a, b, c = (pieces[:, i : i + 3] - matrix[:3, 3] for i in (0, 3, 6))
+    a, b, c = (pieces[:, i : i + 3] - view.place for i in (0, 3, 6))
     middle, reach = (a + b + c) / 3.0, pieces[:, 9]
     away = np.maximum(np.linalg.norm(middle, axis=1), 1e-30)
     size = reach + np.max([np.linalg.norm(p - middle, axis=1) for p in (a, b, c)], axis=0)
     around = np.arcsin(np.minimum(size / away, 1.0))
-    apart = np.arccos(np.clip(middle @ matrix[:3, 2] / away, -1.0, 1.0))
+    apart = np.arccos(np.clip(middle @ view.axis / away, -1.0, 1.0))
     facing = np.abs(np.einsum("ij,ij->i", np.cross(b - a, c - a), middle)) / (2.0 * away**3)
-    solid = np.minimum(facing + np.pi * (reach / away) ** 2, 2.0 * np.pi)[apart < angle + around]
-    return float(solid.sum() / (2.0 * np.pi * (1.0 - math.cos(angle))))
+    solid = np.minimum(facing + np.pi * (reach / away) ** 2, 2.0 * np.pi)
+    solid = solid[apart < view.angle + around]
+    return float(solid.sum() / (2.0 * np.pi * (1.0 - math.cos(view.angle))))
 
 
 def _first_with(all_: Iterable[Shape], wanted: Any) -> Shape | None:
@@ -141,8 +139,7 @@ def _small_lights(
 ) -> Iterator[tuple[str, float]]:
     """The names of small lights, and the share of all light that comes from each."""
     lamps, share = index.scene.lights, lights.power / max(lights.power.sum(), 1e-300)
-    order = sorted(range(len(lamps)), key=lambda i: lamps[i].kind not in INFINITE)
-    for row, i in enumerate(order):
+    for row, i in enumerate(row_order(lamps)):
         lamp = lamps[i]
         if isinstance(lamp, (Envmap, CubeMap)):
             small = image_lights.extent(lamp, encoder, SUN) < SMALL

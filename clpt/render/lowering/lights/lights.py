@@ -82,6 +82,14 @@ class Block(NamedTuple):
     importance: np.ndarray | None = None
 
 
+def row_order(lamps: Sequence[Light]) -> list[int]:
+    """Return the index of each light that is no shape, in the order of their rows: infinite first.
+
+    Each of them has one row; those of emitters follow.
+    """
+    return sorted(range(len(lamps)), key=lambda i: lamps[i].kind not in INFINITE)
+
+
 def light_rows(
     lamps: Sequence[Light],
     emitters: Sequence[Emitter],
@@ -97,7 +105,7 @@ def light_rows(
     """
     if encoder.store.append("light_params", blank_row()) != 0:
         raise ValueError("`light_params` must be empty before the lights are put in")
-    ordered = sorted(lamps, key=lambda lamp: lamp.kind not in INFINITE)
+    ordered = [lamps[i] for i in row_order(lamps)]
     infinite = sum(lamp.kind in INFINITE for lamp in ordered)
     blocks = [_lamp_block(lamp, encoder, scene_radius) for lamp in ordered]
     blocks += [_emitter_block(emitter, encoder) for emitter in emitters]
