@@ -6,7 +6,8 @@ ClptError
 │   └── UnusedParameterError  a parameter that the kind does not have
 ├── DeviceError             a RuntimeError: no OpenCL device, or one that cannot do what is asked
 │   └── MemoryBudgetError   a MemoryError too: asked, available, what to lower
-└── KernelBuildError        a RuntimeError: a kernel did not compile: stage, file, line, log
+├── KernelBuildError        a RuntimeError: a kernel did not compile: stage, file, line, log
+└── ClusterError            a RuntimeError: workers that cannot go on, or that disagree
 
 All of them can be pickled, with their attributes: an error of a worker reaches its parent whole.
 """
@@ -99,3 +100,7 @@ class KernelBuildError(ClptError, RuntimeError):
         text = f"; its text is in {kept}" if kept else ""
         first = next((row for row in log.splitlines() if "error" in row), "no log")
         super().__init__(f"kernel program {stage!r} did not build{place}: {first.strip()}{text}")
+
+
+class ClusterError(ClptError, RuntimeError):
+    """A render on several devices or machines that cannot go on; what was done is kept."""

@@ -1,0 +1,1 @@
+"""Many devices and machines: who renders which samples, and what travels between them."""
