@@ -9,8 +9,10 @@
 import logging
 from importlib import metadata
 
+from clpt.colour.view import View
 from clpt.errors import (
     ClptError,
+    ClusterError,
     DeviceError,
     KernelBuildError,
     MemoryBudgetError,
@@ -43,6 +45,7 @@ __all__ = [
     "Accel",
     "AllHits",
     "ClptError",
+    "ClusterError",
     "DeviceError",
     "FilmState",
     "Hits",
@@ -57,6 +60,7 @@ __all__ = [
     "SpectralImage",
     "UnknownKindError",
     "UnusedParameterError",
+    "View",
     "__version__",
     "kernel_source",
     "load",

@@ -20,6 +20,8 @@ import OpenEXR
 from numpy.typing import ArrayLike, NDArray
 
 from . import output_files
+from .colour import tones
+from .colour.view import View
 from .errors import SceneError
 from .spectra.spaces import between, chromaticities
 
@@ -105,6 +107,8 @@ def write(
     exposure: float = 0.0,
     layers: Mapping[str, ArrayLike] | None = None,
     space: str = "rec709",
+    tone: str = "none",
+    view: View | None = None,
 ) -> None:
     """Write a linear (h, w), (h, w, 1), (h, w, 3) or (h, w, 4) image in the format of the suffix.
 
@@ -112,10 +116,11 @@ def write(
     the channel of that name, or (h, w, 3) as its .R, .G, .B. .png: sRGB transfer, 8 bit, scaled by
     2^exposure; NaN is black there, values beyond [0, 1] are clipped. .hdr, .pfm, .npy: as it is.
     space: of the colours, see clpt.spectra.spaces; an .exr states it by its chromaticities, a .png
-    is converted to sRGB, white to white.
+    is converted to sRGB, white to white. tone: of a .png, see clpt.colour.tones; view: of a .png,
+    a `clpt.View` of OpenColorIO, in the place of tone and sRGB transfer.
 
-    Raises SceneError if the suffix or the space is unknown, the shape does not fit or the file
-    cannot be made.
+    Raises SceneError if the suffix, the space or the tone is unknown, the shape does not fit or the
+    file cannot be made.
     """
     path = check_output(path)
     pixels = np.asarray(image, np.float32)
@@ -129,7 +134,7 @@ def write(
         if suffix == ".exr":
             _write_exr(path, pixels, half, {**stated, **(metadata or {})}, layers or {})
         elif suffix == ".png":
-            write_stored(path, to_srgb8(_to_rec709(pixels, space), exposure))
+            write_stored(path, to_codes(_to_rec709(pixels, space), exposure, tone, view))
         elif suffix == ".hdr":
             _write_hdr(path, pixels)
         elif suffix == ".pfm":
@@ -269,6 +274,24 @@ def to_srgb8(image: Array, exposure: float = 0.0) -> NDArray[np.uint8]:
     codes[close] = np.searchsorted(srgb8_steps(), shown[close], side="right") - 1
     stored = np.round(np.clip(alpha, 0, 1) * 255)
     return np.concatenate([codes, stored], axis=2).astype(np.uint8)
+
+
+def to_codes(
+    image: Array, exposure: float = 0.0, tone: str = "none", view: View | None = None
+) -> NDArray[np.uint8]:
+    """Linear Rec. 709 (h, w, c), scaled by 2^exposure, as 8-bit codes of a display.
+
+    tone: see clpt.colour.tones, then sRGB; view: in the place of both. Raises UnknownKindError.
+    """
+    if view is None and tone == "none":
+        return to_srgb8(image, exposure)
+    colour = np.repeat(image, 3, axis=2) if image.shape[2] == 1 else image[..., :3]
+    brought = colour * np.float32(2.0**exposure)
+    if view is None:
+        shown = np.concatenate([tones.apply(brought, tone), image[..., 3:]], axis=2)
+        return to_srgb8(shown)
+    codes = np.concatenate([view.codes(brought), np.clip(image[..., 3:], 0, 1)], axis=2)
+    return np.round(codes * 255).astype(np.uint8)
 
 
 def straight(image: Array) -> Array:

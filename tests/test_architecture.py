@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE, KERNELS = ROOT / "clpt", ROOT / "kernels"
 
 BASE = {
-    "errors", "layout", "records", "transforms", "images", "output_files", "spectra",
+    "colour", "errors", "layout", "records", "transforms", "images", "output_files", "spectra",
     "spectral_exr",
 }  # fmt: skip
 # What a part may import of the others; itself always.
@@ -36,8 +36,8 @@ OPENCL = {"device", "bvh", "rays", "render"}  # only these import pyopencl
 FLOORS = ({"contract"}, {"lowering", "codegen"}, {"wavefront"}, {"editing"})
 # What kinds share, by what a reader looks for.
 SHARED = {
-    "core", "film", "interface", "lighting", "merging", "optics", "path", "spectrum", "texturing",
-    "tracing",
+    "colour", "core", "film", "interface", "lighting", "merging", "optics", "path", "spectrum",
+    "texturing", "tracing",
 }  # fmt: skip
 KINDS = {"bsdf", "camera", "emission", "light", "medium", "sampler", "shape", "texture"}
 # kernels/<folder>: the folders that its files may include; generated text stands between them.

@@ -160,6 +160,14 @@ def test_the_code_of_architecture(run: Run, capsys: pytest.CaptureFixture):
     assert capsys.readouterr().out == "real True\n"
 
 
+def test_the_code_of_colour(run: Run):
+    pytest.importorskip("PyOpenColorIO", reason="OpenColorIO is not installed")
+    names = run("colour.md")
+    assert names["view"].name.startswith("ACES 2.0")
+    agx, aces = (clpt.read_image(f"cornell{name}.png").mean() for name in ("", "_aces"))
+    assert agx > 1.5 * aces > 0.0  # half a stop more, and other curves
+
+
 def test_the_code_of_limits(run: Run):
     messages = run("limits.md")["messages"]
     assert "must be 1 to 65536" in messages[0] and "are more than 64 Mi pixels" in messages[1]

@@ -17,6 +17,7 @@ from ..render.renderer import Renderer
 from ..scene import Scene
 from ..scene.integrators import Aov
 from ..spectra.spaces import chromaticities
+from .grading import Grading
 
 AOV_FORMATS = (".exr", ".png")
 BAND_FORMATS = (".npy", ".exr")  # with all bands; others get the colours
@@ -70,7 +71,7 @@ def write_all(
     paths: tuple[Path, ...],
     renderer: Renderer,
     stats: dict[str, str | int | float],
-    exposure: float,
+    grading: Grading,
     tell: Callable[[str], None],
 ) -> None:
     """Write the picture so far to every path, and tell of each.
@@ -81,12 +82,12 @@ def write_all(
     failures = []
     for path in paths:
         try:
-            write(path, renderer, stats, exposure)
+            write(path, renderer, stats, grading)
             tell(f"{path}  {stats['spp']:.4g} spp, {stats['seconds']:.1f} s")
         except (SceneError, OSError) as error:
             other = Path(tempfile.gettempdir()) / f"{path.stem}-{secrets.token_hex(4)}{path.suffix}"
             try:
-                write(other, renderer, stats, exposure)
+                write(other, renderer, stats, grading)
                 failures.append(f"{_named(path, error)}; the picture is in {other}")
             except (SceneError, OSError) as second:
                 failures.append(f"{_named(path, error)}; nor can {_named(other, second)}")
@@ -100,7 +101,7 @@ def _named(path: Path, error: Exception) -> str:
 
 
 def write(
-    path: Path, renderer: Renderer, stats: dict[str, str | int | float], exposure: float
+    path: Path, renderer: Renderer, stats: dict[str, str | int | float], grading: Grading
 ) -> None:
     """Write the picture so far. Raises SceneError, OSError."""
     film = renderer.scene.film
@@ -112,10 +113,11 @@ def write(
             picture = images.straight(picture)
         layers = {} if renderer.scene.noise is None else {"samples": renderer.film.get()[..., 3]}
         images.write(
-            path, picture, metadata=stats, exposure=exposure, layers=layers, space=film.output_space
-        )
+            path, picture, metadata=stats, layers=layers, space=film.output_space,
+            exposure=grading.exposure, tone=grading.tone, view=grading.view,
+        )  # fmt: skip
     elif path.suffix.lower() == ".png":
-        images.write(path, sheet(renderer.layers()), exposure=exposure)
+        images.write(path, sheet(renderer.layers()), exposure=grading.exposure)
     else:
         _write_layers(path, renderer.layers(), stats)
 

@@ -12,7 +12,8 @@ import click
 
 from ..scene import Scene
 from . import outputs, report
-from .display import display
+from .display import display as display_of
+from .grading import grading, grading_options
 from .rendering import render_samples
 from .scene_options import open_renderer, scene_options
 from .stopping import STATUS, stops
@@ -52,7 +53,7 @@ class Duration(click.ParamType):
 @click.option("--time", "limit", type=Duration(), help="Stop after 30s, 5m, 1h30m.")
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), help="Seed of the random numbers.")
 @scene_options
-@click.option("--exposure", type=float, default=0.0, help="Brighten .png by this many stops.")
+@grading_options
 @verbose_option("Print memory, trees, programs and stages; log more, twice for everything.")
 @click.option("--quiet", is_flag=True, help="Show no progress and no warnings.")
 def render(
@@ -60,6 +61,11 @@ def render(
     paths: tuple[Path, ...],
     limit: float | None,
     exposure: float,
+    tone: str | None,
+    view: str | None,
+    display: str | None,
+    look: str | None,
+    ocio: str,
     verbose: int,
     quiet: bool,
     **options: Any,
@@ -71,8 +77,9 @@ def render(
     start, kernels included. Ctrl-C stops it within a second; the picture so far is written, and the
     exit status is 130. SIGTERM and SIGHUP do the same, with the statuses 143 and 129.
     """
+    graded = grading(exposure=exposure, tone=tone, view=view, display=display, look=look, ocio=ocio)
     targets = outputs.checked(paths or outputs.default(scene))
-    shown = display(quiet, limit)
+    shown = display_of(quiet, limit)
     began = time.perf_counter()
 
     def accept(plan: Scene) -> None:
@@ -93,7 +100,7 @@ def render(
         with shown.rendering():
             render_samples(renderer, spp, left, shown.show, renderer.scene.noise, stopped)
         stats = outputs.metadata(renderer, scene, time.perf_counter() - ready)
-        outputs.write_all(targets, renderer, stats, exposure, shown.note)
+        outputs.write_all(targets, renderer, stats, graded, shown.note)
     share = float(stats["spp"])
     if share < 1.0:
         shown.note(f"clpt: warning: only {share:.1%} of the pixels have a sample; others are black")

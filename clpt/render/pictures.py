@@ -11,6 +11,7 @@ from pyopencl.array import Array
 
 from clpt import device as dev
 from clpt import images
+from clpt.colour.view import View
 from clpt.errors import SceneError, UnknownKindError
 from clpt.render.aov_preview import sheet
 from clpt.render.locking import DeviceOwner, synchronized
@@ -63,14 +64,17 @@ class Pictures(DeviceOwner):
         tone: str = "none",
         srgb: bool | None = None,
         flip: bool = False,
+        view: View | None = None,
         wait_for: dev.Events = None,
     ) -> Any:
         """Enqueue a picture (h, w, 4) for a screen, opaque, from the film as it then is.
 
         into: the caller's Array or Buffer, or 2D Image of 8-bit or float RGBA, as OpenGL shares
         them; None makes an Array. dtype: uint8 (the default, the bytes of a .png) or float32.
-        exposure [stops]; tone: none, reinhard or aces; srgb: whether the sRGB transfer is applied,
-        by default to uint8 only; colours become Rec. 709. flip: the first row is the lowest.
+        exposure [stops]; tone: none, reinhard, aces, agx or neutral, see clpt.colour.tones; srgb:
+        whether the sRGB transfer is applied, by default to uint8 only; colours become Rec. 709.
+        view: of OpenColorIO, in the place of tone and transfer: a table of it, right to 1/512 for
+        98 of 100 colours. flip: the first row is the lowest.
         channel: of the `aov` integrator, by default its first; values stay as they are.
 
         Returns the Array, whose `events` hold the event of the picture; for an Image the event.
@@ -82,7 +86,7 @@ class Pictures(DeviceOwner):
             self._resolve = Resolve(self.device, self.wavefronts[0].stream)
         return self._resolve(
             self.films[channel] if channel else self.film, into, dtype=dtype, exposure=exposure,
-            tone=tone, srgb=srgb, flip=flip, wait_for=wait_for,
+            tone=tone, srgb=srgb, flip=flip, view=view, wait_for=wait_for,
             space="rec709" if self.channels else self.scene.film.output_space,
         )  # fmt: skip
 

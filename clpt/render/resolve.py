@@ -11,12 +11,15 @@ import pyopencl as cl
 from pyopencl.array import Array
 
 from clpt import device
+from clpt.colour.tones import TONES, check_tone
+from clpt.colour.view import View
 from clpt.device import DeviceArray
-from clpt.errors import DeviceError, UnknownKindError
+from clpt.errors import DeviceError
 from clpt.images import srgb8_steps
 from clpt.spectra.spaces import between
 
-TONES = ("none", "reinhard", "aces")  # kernels/stage/resolve.cl
+TONE_NUMBERS = {name: number for number, name in enumerate(TONES)}  # kernels/colour/tone.cl
+NO_TABLE = np.zeros(4, np.float32)
 BYTES, FLOATS = np.dtype(np.uint8), np.dtype(np.float32)
 _ORDERS = (cl.channel_order.RGBA, cl.channel_order.BGRA)
 _IMAGE_TYPES: dict[Any, np.dtype] = {
@@ -60,6 +63,9 @@ class Resolve:
         self.program = device.build(on, device.assemble("stage/resolve.cl"))
         self.steps = device.Buffers(on).upload("the sRGB transfer", srgb8_steps())
         self._bound: dict[str, device.BoundKernel] = {}
+        self._view: View | None = None  # that the table is of
+        self._no_table = device.Buffers(on).upload("no table", NO_TABLE)
+        self._table: dict[str, Any] = {}
 
     def __call__(
         self,
@@ -72,22 +78,25 @@ class Resolve:
         srgb: bool | None = None,
         flip: bool = False,
         space: str = "rec709",
+        view: View | None = None,
         wait_for: device.Events = None,
     ) -> Array | cl.Event:
         """Enqueue that a film (h, w, 4) float32 becomes a picture; see `Renderer.resolve`.
 
         space: of the film's colours, see clpt.spectra.spaces.
         """
-        if tone not in TONES:
-            raise UnknownKindError("tone curve", tone, TONES)
+        check_tone(tone)
+        if view is not None and (tone != "none" or srgb is not None):
+            raise DeviceError("a view has its own tone curve and transfer; leave out tone and srgb")
         target = self._target(film, into, dtype)
         named = {
             **_to_rec709(space),
             "film": film.base_data,
             "steps": self.steps,
             "scale": 2.0**exposure,
-            "tone": TONES.index(tone),
-            "encoded": int(target.dtype == BYTES if srgb is None else srgb),
+            **self._looked_up(view),
+            "tone": TONE_NUMBERS[tone],
+            "encoded": int(view is None and (target.dtype == BYTES if srgb is None else srgb)),
             "flip": int(flip),
             "into": target.data,
         }
@@ -102,6 +111,17 @@ class Resolve:
             return event
         device.supersede(target.memory, event)
         return target.memory
+
+    def _looked_up(self, view: View | None) -> dict[str, Any]:
+        """The arguments of a view's table, which is made when the view is first used."""
+        if view is None:
+            return {"table": self._no_table, "size": 0, "bounds": (0.0, 1.0, 1.0, 0.0)}
+        if view is not self._view:
+            table = view.table()
+            values = device.Buffers(self.device).upload("a view's table", table.values)
+            self._table = {"table": values, "size": len(table.values), "bounds": table.bounds}
+            self._view = view
+        return self._table
 
     def _bind(self, kernel: str, named: dict[str, Any]) -> device.BoundKernel:
         """A kernel with its arguments. It is made once: that takes longer than to set them."""

@@ -1,28 +1,24 @@
 /* From a film (r g b linear, samples) to a picture for a screen or a program: exposure, a tone curve,
  * the sRGB transfer (IEC 61966-2-1), opaque alpha. NaN is black. Codes of 8 bits come from a table of
  * the least linear value of each, clpt.images.srgb8_steps, so they are those of a written .png to the bit.
- *
- * Reinhard: Reinhard et al. 2002, "Photographic Tone Reproduction", eq. 3, of the luminance of Rec. 709.
- * Aces: the rational fit to the curve of ACES by Narkowicz 2015, "ACES Filmic Tone Mapping Curve". */
-#define TONE_REINHARD 1
-#define TONE_ACES 2
-#define LARGEST 1e18f /* its square is finite */
+ * With a table of a display's codes (`size` points on an axis, else 0) these take the place of curve and
+ * transfer. */
+#include "colour/table.cl"
+#include "colour/tone.cl"
 
-inline float4 tone_curve(float4 c, int tone)
-{
-    if (tone == 0) return c;
-    c = clamp(c, 0.0f, LARGEST);
-    if (tone == TONE_REINHARD) return c / (1.0f + 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z);
-    return clamp(c * (2.51f * c + 0.03f) / (c * (2.43f * c + 0.59f) + 0.14f), 0.0f, 1.0f);
-}
-
-/* The colour of a pixel; rows: of the matrix to Rec. 709, used where `converted`. */
-inline float4 shown(float4 v, int converted, float4 red, float4 green, float4 blue, float scale, int tone)
+/* The colour of a pixel in linear Rec. 709; rows: of the matrix to it, used where `converted`. */
+inline float4 exposed(float4 v, int converted, float4 red, float4 green, float4 blue, float scale)
 {
     v.w = 0.0f;
     if (converted) v = (float4)(dot(red, v), dot(green, v), dot(blue, v), 0.0f);
-    v = tone_curve(select(v, (float4)(0.0f), isnan(v)) * scale, tone);
+    v = select(v, (float4)(0.0f), isnan(v)) * scale;
     return select(v, (float4)(0.0f), isnan(v)); /* infinity times 0 */
+}
+
+inline float4 shown(float4 v, int tone, global const float4 *table, int size, float4 bounds)
+{
+    v = size ? clamp(table_colour(table, size, bounds, v), 0.0f, 1.0f) : tone_curve(v, tone);
+    return select(v, (float4)(0.0f), isnan(v));
 }
 
 inline float srgb_transfer(float v)
@@ -60,11 +56,12 @@ inline float4 as_floats(float4 v, int encoded)
 
 #define PICTURE_ARGS                                                                                            \
     global const float4 *film, global const float *steps, int converted, float4 red, float4 green, float4 blue, \
-    float scale, int tone, int encoded, int flip
+    float scale, int tone, global const float4 *table, int size, float4 bounds, int encoded, int flip
 #define PICTURE_PIXEL                                                                               \
     int x = get_global_id(0), y = get_global_id(1), w = get_global_size(0), h = get_global_size(1); \
     int row = flip ? h - 1 - y : y;                                                                 \
-    float4 v = shown(film[(size_t)y * w + x], converted, red, green, blue, scale, tone)
+    float4 v = exposed(film[(size_t)y * w + x], converted, red, green, blue, scale);                \
+    v = shown(v, tone, table, size, bounds)
 
 /* at: where the picture begins in `into` [elements]. */
 kernel void resolve_bytes(PICTURE_ARGS, global uchar *into, ulong at)

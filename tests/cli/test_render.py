@@ -20,6 +20,7 @@ from clpt import __version__, device, images, spectral_exr
 from clpt.__main__ import run
 from clpt.cli import outputs, stopping
 from clpt.cli.scene_options import changed
+from clpt.colour.view import View
 from clpt.errors import SceneError
 from clpt.formats import load
 from clpt.render.renderer import Renderer
@@ -360,3 +361,32 @@ def test_bad_input_is_one_line_before_anything_is_rendered(
     assert error.startswith("clpt: error: ") and error.count("\n") == 1
     assert words in error
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("given", "how"),
+    [(["--tone", "agx"], {"tone": "agx"}), (["--view", "Un-tone-mapped"], {"view": ...})],
+)
+def test_a_tone_curve_or_a_view_of_the_png(given, how, tmp_path):
+    if "view" in how:
+        pytest.importorskip("PyOpenColorIO", reason="OpenColorIO is not installed")
+        how = {"view": View("Un-tone-mapped")}
+    png, npy = tmp_path / "a.png", tmp_path / "a.npy"
+    outputs_ = ["-o", str(png), "-o", str(npy), "--size", "16x16", "--spp", "2"]
+    assert run(["render", CORNELL, *outputs_, "--exposure", "3", *given]) == 0
+    want = images.to_codes(images.read(npy), 3.0, **how)
+    np.testing.assert_array_equal(images.read_stored(png).values, want)
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        (["--view", "Un-tone-mapped", "--tone", "aces"], "a view has its own tone curve"),
+        (["--ocio", "config.ocio"], "--ocio needs --view or --display"),
+        (["--view", "none"], "unknown view of 'sRGB - Display' 'none'"),
+    ],
+)
+def test_a_view_that_cannot_be_is_told(given, told, tmp_path, capsys):
+    pytest.importorskip("PyOpenColorIO", reason="OpenColorIO is not installed")
+    assert run(["render", CORNELL, "-o", str(tmp_path / "a.png"), *given]) == 2
+    assert told in capsys.readouterr().err

@@ -11,6 +11,7 @@ import clpt
 from clpt import images
 from clpt import transforms as tf
 from clpt.cli import outputs
+from clpt.cli.grading import Grading
 from clpt.errors import SceneError
 from clpt.render.lowering.scene import lower
 from clpt.scene import Film, Scene
@@ -83,7 +84,7 @@ def test_files(tmp_path, transparent):
     with clpt.Renderer(still_life(alpha=True)) as renderer:
         renderer.run(16)
         for name in ("a.exr", "a.png"):
-            outputs.write(tmp_path / name, renderer, {"spp": 16}, 0.0)
+            outputs.write(tmp_path / name, renderer, {"spp": 16}, Grading())
     exr, png = images.read(tmp_path / "a.exr"), images.read(tmp_path / "a.png")
     np.testing.assert_allclose(exr, transparent, rtol=1e-3, atol=1e-4)
     covered = transparent[..., 3] > 0.25

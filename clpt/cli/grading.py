@@ -1,0 +1,66 @@
+"""Options that say how light becomes the colours of a .png."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import click
+
+from ..colour.tones import TONES
+from ..colour.view import DEFAULT_CONFIG, View
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+@dataclass(frozen=True)
+class Grading:
+    """exposure [stops]; tone: a curve of clpt.colour.tones; view: of OpenColorIO, instead."""
+
+    exposure: float = 0.0
+    tone: str = "none"
+    view: View | None = None
+
+
+_OPTIONS = (
+    click.option("--exposure", type=float, default=0.0, help="Brighten .png by this many stops."),
+    click.option(
+        "--tone", type=click.Choice([*TONES]), help="Tone curve of .png.  [default: none]"
+    ),
+    click.option(
+        "--view", metavar="NAME", help="Make .png by this view of OpenColorIO: clpt[colour]."
+    ),
+    click.option("--display", metavar="NAME", help="The display of the view."),
+    click.option("--look", metavar="NAME", help="A look before the view."),
+    click.option(
+        "--ocio", metavar="CONFIG", default=DEFAULT_CONFIG, show_default=True,
+        help="Where views are from: a config.ocio, ocio://NAME, or $OCIO.",
+    ),
+)  # fmt: skip
+
+
+def grading_options(command: Command) -> Command:
+    """Give a command the options that `grading` takes."""
+    for option in reversed(_OPTIONS):
+        command = option(command)
+    return command
+
+
+def grading(
+    *,
+    exposure: float,
+    tone: str | None,
+    view: str | None,
+    display: str | None,
+    look: str | None,
+    ocio: str,
+) -> Grading:
+    """Return what these options say. Raises SceneError, click.UsageError."""
+    if not (view or display or look):
+        if ocio != DEFAULT_CONFIG:
+            raise click.UsageError("--ocio needs --view or --display")
+        return Grading(exposure, tone or "none")
+    if tone is not None:
+        raise click.UsageError("a view has its own tone curve; leave out --tone")
+    return Grading(exposure, view=View(view, display=display, look=look, config=ocio))
