@@ -131,8 +131,9 @@ class _Walk:
 
     def _fields(self, thing: Any, where: str) -> Values:
         """The parameters of a kind, or the fields of another dataclass."""
-        found: Values = {".type": thing.kind if isinstance(thing, Kind) else type(thing).__name__}
-        for name, form in _plan(type(thing)):
+        cls: Any = type(thing)
+        found: Values = {".type": thing.kind if isinstance(thing, Kind) else cls.__name__}
+        for name, form in _plan(cls):
             inner = self.values(getattr(thing, name), f"{where}.{name}", form)
             for below, value in inner.items():
                 found[f".{name}{below}"] = value
