@@ -167,8 +167,8 @@ class Resumable(Pictures):
         self._taken, self._adaptive, self._sessions = saved.film.taken, adaptive, saved.sessions
         others = saved.other_devices(self.device_class())
         if others:
-            told = "samples of several classes of devices are in one film: "
-            self.warnings.append(told + "; ".join(others))
+            message = "samples of several classes of devices are in one film: "
+            self.warnings.append(message + "; ".join(others))
             log.warning("%s", self.warnings[-1])
 
     def _progress_so_far(self) -> dict[str, Any]:

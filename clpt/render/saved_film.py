@@ -77,9 +77,9 @@ class Origin:
         """Raise SceneError, which says what differs, if the samples of another film are others."""
         found = self.differences(other)
         if found:
-            told = "; ".join(found[:MOST_TOLD])
+            named = "; ".join(found[:MOST_TOLD])
             more = f"; and {len(found) - MOST_TOLD} more" if len(found) > MOST_TOLD else ""
-            raise SceneError(f"the film is of something else: {told}{more}; {advice}")
+            raise SceneError(f"the film is of something else: {named}{more}; {advice}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,12 +104,12 @@ class SavedFilm:
 
     def other_devices(self, device: Mapping[str, Plain]) -> list[str]:
         """Return how devices that took its samples differ from another one, perhaps nothing."""
-        told: dict[str, None] = {}
+        named: dict[str, None] = {}
         for session in self.sessions:
             for name, value in session.device.items():
                 if value != device.get(name):
-                    told[f"{name}: {value} -> {device.get(name)}"] = None
-        return list(told)
+                    named[f"{name}: {value} -> {device.get(name)}"] = None
+        return list(named)
 
     def merged(self, other: SavedFilm) -> SavedFilm:
         """Return the film of the samples of both.

@@ -39,7 +39,7 @@ class Film:
         self.band_count = int(settings["bands"]) if features.bands else 0
         self._band_sums = self.band_count * features.film_groups  # of a pixel
         self.halves = int(settings["halves"])
-        self._padded_pixels = int(settings["padded_pixels"])
+        self._settings, self._padded_pixels = settings, int(settings["padded_pixels"])
         x, y = work_list.pixels(settings)
         self._inside = work_list.inside(settings)
         self._at = (y * self.size[0] + x)[self._inside]  # in a picture, of each of these
@@ -141,8 +141,7 @@ class Film:
             streams = np.zeros((self.halves * each, self._padded_pixels), np.uint32)
             if each:
                 streams = self.stream.read(sums[name], streams)
-            pixels = np.empty((len(streams), width * height), np.uint32)
-            pixels[:, self._at] = streams[:, self._inside]
+            pixels = work_list.picture(self._settings, streams)
             found.append(pixels.reshape(self.halves, -1, height, width))
         film, bands = found
         return film, bands.reshape(self.halves, self._band_sums, SUM_WORDS, height, width)
