@@ -14,9 +14,9 @@ import hashlib
 import json
 import math
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeVar
 
 import numpy as np
 import OpenEXR
@@ -31,6 +31,9 @@ from clpt.render.wavefront.film_state import FilmState
 from clpt.scene.fingerprint import Fingerprint
 from clpt.spectra.spaces import chromaticities
 
+_Parts = Mapping[str, Mapping[str, NDArray[np.uint32]]]  # channels by name, of parts by name
+_T = TypeVar("_T")
+
 FORMAT = 1
 ATTRIBUTE = "clpt"
 SUFFIXES = (".film", ".exr")
@@ -40,7 +43,8 @@ EXR_MAGIC = b"\x76\x2f\x31\x01"
 PIECE = 1 << 20  # bytes that are read at once
 ROW = 1024  # words of a row, of arrays that are no pictures
 HALF_MAX = 65504.0
-LOST = "it was not written to its end, or was damaged since"
+LOST = "it was not written to its end, or was damaged later"
+ADVICE = "use a copy, or render it again"
 
 
 def write(path: str | Path, saved: SavedFilm) -> None:
@@ -65,33 +69,30 @@ def read(path: str | Path) -> SavedFilm:
     Raises SceneError for a file that is not there, is no film, is damaged, or comes from a later
     version of clpt.
     """
-    path = Path(path)
+    return _read(Path(path), _restored)
+
+
+def read_header(path: str | Path) -> dict[str, Any]:
+    """Return what a film file says of itself, without its words. Raises as `read` does."""
+    return _read(Path(path), lambda header, parts: header, header_only=True)
+
+
+def _read(path: Path, made: Callable[[dict[str, Any], _Parts], _T], **options: bool) -> _T:
+    """What is made of a file's header and its parts, whose seal is whole. Raises SceneError."""
     _check_seal(path)
     try:
-        with OpenEXR.File(images.exr_name(path), separate_channels=True) as file:
+        with OpenEXR.File(images.exr_name(path), separate_channels=True, **options) as file:
             header = _header(path, file.parts[0].header.get(ATTRIBUTE))
             parts = {
                 part.name(): {name: channel.pixels for name, channel in part.channels.items()}
                 for part in file.parts[1:]
             }
-        return _restored(header, parts)
+        return made(header, parts)
     except SceneError:
         raise
-    except Exception as error:  # of a sealed file that clpt did not write as it does now
-        message = str(error).splitlines()[0] if str(error) else type(error).__name__
+    except Exception as error:  # of a sealed file that clpt does not write
+        message = str(error).splitlines()[0] if str(error) else ""
         _fail(path, f"no readable film: {type(error).__name__}: {message}")
-
-
-def read_header(path: str | Path) -> dict[str, Any]:
-    """Return what a film file says of itself, without its words. Raises as `read` does."""
-    path = Path(path)
-    _check_seal(path)
-    try:
-        with OpenEXR.File(images.exr_name(path), header_only=True) as file:
-            text = file.parts[0].header.get(ATTRIBUTE)
-    except Exception as error:
-        _fail(path, f"no readable film: {error}")
-    return _header(path, text)
 
 
 def _check_seal(path: Path) -> None:
@@ -105,17 +106,14 @@ def _check_seal(path: Path) -> None:
             seal = file.read()
             if not seal.startswith(SEAL) or len(seal) != SEAL_BYTES:
                 what = f"a picture without a film, or {LOST}" if is_exr else "not a film of clpt"
-                _fail(path, f"{what}: {_ADVICE}")
+                _fail(path, f"{what}: {ADVICE}")
             length, digest = seal[len(SEAL) :][:8], seal[-32:]
             if int.from_bytes(length, "little") != size - SEAL_BYTES:
-                _fail(path, f"its length is wrong: {LOST}: {_ADVICE}")
+                _fail(path, f"its length is wrong: {LOST}: {ADVICE}")
             if _hashed(file, size - SEAL_BYTES) != digest:
-                _fail(path, f"its checksum is wrong: it was damaged later: {_ADVICE}")
+                _fail(path, f"its checksum is wrong: it was damaged later: {ADVICE}")
     except OSError as error:
         _fail(path, f"cannot be read: {error.strerror}")
-
-
-_ADVICE = "use a copy, or render it again"
 
 
 def _hashed(file: Any, size: int) -> bytes:
@@ -211,12 +209,12 @@ def _arrays(saved: SavedFilm) -> Iterator[Any]:
 
 
 def _part(saved: SavedFilm, name: str, channels: Mapping[str, NDArray[np.uint32]]) -> Any:
-    header = _header_of_part(saved, OpenEXR.ZIPS_COMPRESSION)
+    header = _header_of_part(saved, OpenEXR.RLE_COMPRESSION)
     stored = {n: np.ascontiguousarray(plane, np.uint32) for n, plane in channels.items()}
     return OpenEXR.Part(header, stored, name)
 
 
-def _restored(header: dict[str, Any], parts: Mapping[str, Mapping[str, Any]]) -> SavedFilm:
+def _restored(header: dict[str, Any], parts: _Parts) -> SavedFilm:
     """The film that a header and the words of parts say."""
 
     def words(name: str) -> NDArray[np.uint32]:
