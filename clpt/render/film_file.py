@@ -147,7 +147,7 @@ def _header(path: Path, text: Any) -> dict[str, Any]:
 
 def _picture(saved: SavedFilm) -> Any:
     """The picture so far, with the header: what viewers show."""
-    form, made = saved.form, HostPicture(saved.film, saved.form)
+    form, made = saved.form, HostPicture(saved)
     if made.channels:
         layers = made.layers()
         name = "albedo" if "albedo" in layers else next(iter(layers))

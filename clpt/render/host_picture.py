@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.render.contract.features import SUM_WORDS
-from clpt.render.saved_film import PictureForm
+from clpt.render.saved_film import SavedFilm
 from clpt.render.wavefront.film_state import (
     FILM_WORDS,
     SAMPLES_WORD,
-    FilmState,
     Words,
     add_films,
     add_sums,
@@ -30,16 +29,23 @@ UNIT = 2.0**-48  # of a sum, kernels/core/fixed.cl
 class HostPicture:
     """The picture of a film, with the methods of `Renderer` that make it; equal but for an ulp.
 
-    state: the film; form: how its picture is made. channels: as of a renderer.
+    saved: the film. channels, form: as of a renderer; is_adaptive: whether pixels differ in their
+    numbers of samples.
     """
 
-    def __init__(self, state: FilmState, form: PictureForm):
-        self.state, self.form, self.channels = state, form, form.channels
+    def __init__(self, saved: SavedFilm):
+        self.saved, self.form, self.channels = saved, saved.form, saved.form.channels
+        self.is_adaptive = bool(saved.adaptive)
+        state = saved.film
         films, bands = state.words[:, 0], state.bands[0]
         for half in range(1, state.words.shape[1]):
             films = add_films(films, state.words[:, half])
             bands = add_sums(bands, state.bands[half])
         self._films, self._bands = films, bands
+
+    def saved_film(self, *, held: bool = False) -> SavedFilm:
+        """The film; held: as of a renderer, here without a meaning."""
+        return self.saved
 
     def image(self) -> Image:
         """The picture, as `Renderer.image` returns it."""
@@ -85,7 +91,7 @@ class HostPicture:
 
     def _mean_bands(self) -> Image:
         words, count = self._films[0], self.form.bands
-        scale = np.float32(self.state.scale)
+        scale = np.float32(self.saved.film.scale)
         sums = _numbers(np.moveaxis(self._bands, 1, 0))
         total = sums[:count] * (self._mean(words) / scale)
         if self.form.weighed:

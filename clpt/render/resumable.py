@@ -29,7 +29,6 @@ from clpt.version import VERSION
 
 log = logging.getLogger(__name__)
 
-RESUME_ADVICE = "render what it is of, or begin anew without it"
 TO_OUTPUT = ("to_first", "to_second", "to_third")
 
 
@@ -41,6 +40,7 @@ class Resumable(Pictures):
 
     warnings: list[str]
     _taken: Ranges
+    _first_sample: int
     _adaptive: Adaptive | None
 
     def __init__(self) -> None:
@@ -55,6 +55,21 @@ class Resumable(Pictures):
         self._seconds_rendered = 0.0
         self._sessions: tuple[Session, ...] = ()
         self._held = None
+
+    @property
+    def is_adaptive(self) -> bool:
+        """Whether pixels may differ in their numbers of samples."""
+        return self.scene.noise is not None
+
+    @property
+    def former_seconds(self) -> float:
+        """How long others rendered the film, before this renderer went on with it."""
+        return sum(session.seconds for session in self._sessions)
+
+    @property
+    def first_sample(self) -> int:
+        """The number of the first sample of the film, or of the first one to come."""
+        return self._taken[0][0] if self._taken else self._first_sample
 
     @synchronized
     def film_state(self) -> FilmState:
@@ -86,7 +101,7 @@ class Resumable(Pictures):
         kept = self._held if held else None
         so_far = dict(self._progress_so_far() if kept is None else kept)
         state = self._film_state(so_far.pop("taken"), held=kept is not None)
-        return SavedFilm(state, self.origin(), self._picture_form(), **so_far)
+        return SavedFilm(state, self.origin(), self.form, **so_far)
 
     @synchronized
     def origin(self) -> Origin:
@@ -147,7 +162,7 @@ class Resumable(Pictures):
     @synchronized
     def restore(self, saved: SavedFilm) -> None:
         """Go on from a saved film, as `load_state` does. Raises SceneError."""
-        saved.origin.check_same(self.origin(), RESUME_ADVICE)
+        saved.origin.check_same(self.origin())
         own = self.film_state()
         if (own.words.shape, own.bands.shape) != (saved.film.words.shape, saved.film.bands.shape):
             raise SceneError("the film has another form than this scene's")
@@ -181,7 +196,10 @@ class Resumable(Pictures):
             "adaptive": {} if self._adaptive is None else self._adaptive.arrays(),
         }
 
-    def _picture_form(self) -> PictureForm:
+    @property
+    @synchronized
+    def form(self) -> PictureForm:
+        """How the film's words become a picture."""
         first, film = self.wavefronts[0], self.scene.film
         settings, features = first.paths.settings, first.features
         return PictureForm(

@@ -13,7 +13,7 @@ from clpt.errors import SceneError
 from clpt.render.wavefront.film_state import FilmState, Ranges
 from clpt.scene.fingerprint import Fingerprint, Plain
 
-MOST_TOLD = 8  # differences that an error names
+MOST_NAMED = 8  # differences that an error names
 
 
 @dataclass(frozen=True)
@@ -73,13 +73,10 @@ class Origin:
             found.append(f"kernels: of clpt {self.clpt} -> others, of clpt {other.clpt}")
         return found
 
-    def check_same(self, other: Origin, advice: str) -> None:
+    def check_same(self, other: Origin) -> None:
         """Raise SceneError, which says what differs, if the samples of another film are others."""
-        found = self.differences(other)
-        if found:
-            named = "; ".join(found[:MOST_TOLD])
-            more = f"; and {len(found) - MOST_TOLD} more" if len(found) > MOST_TOLD else ""
-            raise SceneError(f"the film is of something else: {named}{more}; {advice}")
+        if found := self.differences(other):
+            raise SceneError(f"the film is of something else: {differences_text(found)}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +113,7 @@ class SavedFilm:
 
         Raises SceneError where they are not of the same scene, or a sample is in both.
         """
-        self.origin.check_same(other.origin, "only films of one scene and version can be added")
+        self.origin.check_same(other.origin)
         counts = tuple(
             {name: a[name] + b[name] for name in a}
             for a, b in zip(self.counts, other.counts, strict=True)
@@ -128,6 +125,12 @@ class SavedFilm:
             sessions=(*self.sessions, *other.sessions),
             adaptive={},
         )
+
+
+def differences_text(differences: list[str]) -> str:
+    """Return differences for people, no more than a few."""
+    more = len(differences) - MOST_NAMED
+    return "; ".join(differences[:MOST_NAMED]) + (f"; and {more} more" if more > 0 else "")
 
 
 def ranges_text(taken: Ranges) -> str:

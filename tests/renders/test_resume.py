@@ -110,7 +110,7 @@ def test_the_picture_of_the_host_is_that_of_the_device(mode, tmp_path: Path):
     with clpt.Renderer(scene, **options) as renderer:
         renderer.run(FIRST + SECOND, noise=noise)
         saved = renderer.saved_film()
-        made = HostPicture(saved.film, saved.form)
+        made = HostPicture(saved)
         image = renderer.image()
         top = np.abs(image).max()
         np.testing.assert_allclose(made.image(), image, rtol=1e-6, atol=1e-7 * top)
