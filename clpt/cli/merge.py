@@ -43,7 +43,7 @@ def merge(films: tuple[Path, ...], paths: tuple[Path, ...], quiet: bool, **grade
         note(f"clpt: warning: the films are of several classes of devices: {change}")
     made = HostPicture(total)
     origin = total.origin.scene.values
-    stats = {
+    stats: dict[str, str | int | float] = {
         "software": f"clpt {__version__}",
         "integrator": str(origin["integrator.type"]),
         "sampler": str(origin["sampler.type"]),
