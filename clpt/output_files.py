@@ -65,6 +65,22 @@ def check_writable(path: str | Path) -> None:
             raise PermissionError(message) from error
 
 
+def link(path: str | Path, other: str | Path) -> None:
+    """Give the file at `path` a second name, so that it stays there when it is replaced.
+
+    What had that name is gone. Nothing happens where there is no file, or no links can be made.
+    """
+    path = Path(os.path.realpath(path))
+    name = path.with_name(f"{_partial(path)}{secrets.token_hex(6)}")
+    try:
+        if os.path.exists(other) and os.path.samefile(path, other):
+            return  # to rename one to the other would do nothing
+        os.link(path, name)
+        os.replace(name, other)
+    except OSError:  # a file system without links
+        name.unlink(missing_ok=True)
+
+
 def remove_partials(path: str | Path) -> None:
     """Remove what processes that were killed have left of this file. Raises OSError."""
     path = Path(os.path.realpath(path))

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
-import os
-import secrets
 import threading
 import time
 from collections.abc import Callable, Iterable
@@ -187,7 +184,7 @@ class Checkpoints:
         try:
             if not self._written:
                 output_files.remove_partials(self._path)
-            _keep_former(self._path)
+            output_files.link(self._path, former_of(self._path))
             film_file.write(self._path, saved)
             self._written = True
         except OSError as error:
@@ -197,19 +194,6 @@ class Checkpoints:
         failure, self._failure = self._failure, None
         if failure:
             self._note(f"clpt: warning: {failure}; what was there stays, and the render goes on")
-
-
-def _keep_former(path: Path) -> None:
-    """Give the file that is there its second name, so that it stays when it is replaced."""
-    if not path.exists():
-        return
-    name = path.with_name(f"{output_files.PARTIAL}{secrets.token_hex(6)}.1")
-    try:
-        os.link(path, name)
-        os.replace(name, former_of(path))
-    except OSError:  # a file system without links
-        with contextlib.suppress(OSError):
-            name.unlink(missing_ok=True)
 
 
 def summary(saved: SavedFilm) -> str:
