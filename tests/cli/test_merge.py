@@ -30,7 +30,8 @@ def render(output, *more: str) -> int:
 
 
 @pytest.mark.parametrize(
-    "kind", [*KINDS][:-1] + [pytest.param("aov", marks=pytest.mark.slow)]  # eight kernels to build
+    "kind",
+    [*[*KINDS][:-1], pytest.param("aov", marks=pytest.mark.slow)],  # eight kernels to build
 )
 def test_ranges_add_to_one_render(tmp_path, kind):
     for name, given in (("a", "0:5"), ("b", "5:6"), ("c", "6:12")):
