@@ -96,11 +96,13 @@ class Resumable(Pictures):
     def saved_film(self, *, held: bool = False) -> SavedFilm:
         """Return the film with all that it takes to go on with it; wait for the device.
 
-        held: as it was at the last `hold`. Raises SceneError for a scene that cannot be read.
+        held: as it was at the last `hold`. Raises SceneError for a scene that cannot be read, and
+        without a `hold`.
         """
-        kept = self._held if held else None
-        so_far = dict(self._progress_so_far() if kept is None else kept)
-        state = self._film_state(so_far.pop("taken"), held=kept is not None)
+        if held and self._held is None:
+            raise SceneError("no film is held; call hold() first")
+        so_far = dict(self._progress_so_far() if self._held is None or not held else self._held)
+        state = self._film_state(so_far.pop("taken"), held=held)
         return SavedFilm(state, self.origin(), self.form, **so_far)
 
     @synchronized
@@ -140,9 +142,13 @@ class Resumable(Pictures):
     def save_state(self, path: str | Path) -> None:
         """Write the film to a file, from which `load_state` goes on, in another process too.
 
-        Raises OSError: the former file is then as it was. SceneError as `saved_film` does.
+        Raises SceneError for a file that cannot be written: the former one is then as it was.
         """
-        film_file.write(path, self.saved_film())
+        saved = self.saved_film()
+        try:
+            film_file.write(path, saved)
+        except OSError as error:
+            raise SceneError(f"cannot be written: {error}", file=path) from error
 
     def load_state(self, path: str | Path) -> None:
         """Go on from a file of `save_state`: what the film held before is gone.

@@ -86,8 +86,7 @@ def test_going_on_is_as_one_run(mode, tmp_path: Path):
     scene, options, noise = mode
     more = 40 if noise is not None else SECOND
     with clpt.Renderer(scene, **options) as whole:
-        for samples in (FIRST, more, 3):
-            whole.run(samples, noise=noise)
+        whole.run(FIRST + more + 3, noise=noise)
         path = tmp_path / "a.resume.exr"
         with clpt.Renderer(scene, **options) as renderer:
             renderer.run(FIRST, noise=noise)
@@ -195,8 +194,15 @@ def test_another_class_of_device_is_told(tmp_path: Path, caplog):
         assert len(sessions) == 3 and sessions[0].device["device"] == "X"
 
 
+def test_what_cannot_be_written_is_told(tmp_path: Path):
+    with clpt.Renderer(sky()) as renderer, pytest.raises(SceneError, match="cannot be written"):
+        renderer.save_state(tmp_path / "no_folder" / "a.film")
+
+
 def test_what_begins_anew_has_no_history():
     with clpt.Renderer(sky()) as renderer:
+        with pytest.raises(SceneError, match="no film is held"):
+            renderer.saved_film(held=True)
         renderer.run(2)
         renderer.restore(renderer.saved_film())
         assert len(renderer.saved_film().sessions) == 2
