@@ -33,7 +33,7 @@ def spent(work: Callable[[], object]) -> float:
 
 
 def parts(renderer: clpt.Renderer, path: Path, times: int) -> dict[str, float]:
-    """Medians of what a copy on the device, one to the host, and a file take [s]."""
+    """Medians of what a copy on the device, one to the host, and a file take [s], after a pass."""
 
     def hold() -> None:
         renderer.hold()
@@ -46,9 +46,12 @@ def parts(renderer: clpt.Renderer, path: Path, times: int) -> dict[str, float]:
         "to_host": lambda: renderer.saved_film(held=True),
         "file": lambda: film_file.write(path, saved),
     }
-    return {
-        name: statistics.median(spent(work) for _ in range(times)) for name, work in works.items()
-    }
+    times_of: dict[str, list[float]] = {name: [] for name in works}
+    for _ in range(times):
+        renderer.run(1)
+        for name, work in works.items():
+            times_of[name].append(spent(work))
+    return {name: statistics.median(each) for name, each in times_of.items()}
 
 
 def passes(renderer: clpt.Renderer, samples: int, count: int, after: Callable[[], None]) -> float:

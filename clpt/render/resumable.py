@@ -79,7 +79,8 @@ class Resumable(Pictures):
     def _film_state(self, taken: Ranges, *, held: bool) -> FilmState:
         films, bands = zip(*(one.film.words(held=held) for one in self.wavefronts), strict=True)
         scale = float(self.wavefronts[0].paths.settings["film_scale"])
-        return FilmState(np.stack(films), bands[0], taken, scale)
+        words = np.stack(films) if len(films) > 1 else films[0][None]
+        return FilmState(words, bands[0], taken, scale)
 
     @synchronized
     def hold(self) -> None:

@@ -138,10 +138,11 @@ class Film:
         sums = self._held if held else self.sums
         found = []
         for name, each in (("film", self._words), ("bands", SUM_WORDS * self._band_sums)):
-            streams = np.zeros((self.halves * each, self._padded_pixels), np.uint32)
-            if each:
-                streams = self.stream.read(sums[name], streams)
-            pixels = work_list.picture(self._settings, streams)
+            pixels = np.empty((self.halves * each, height, width), np.uint32)
+            stored = np.empty(self._padded_pixels, np.uint32)  # of one word: memory is dear
+            for i, plane in enumerate(pixels):
+                self.stream.read(sums[name], stored, i * stored.nbytes)
+                plane[:] = work_list.picture(self._settings, stored)
             found.append(pixels.reshape(self.halves, -1, height, width))
         film, bands = found
         return film, bands.reshape(self.halves, self._band_sums, SUM_WORDS, height, width)
