@@ -172,6 +172,7 @@ def open_renderer(
     *,
     profiling: bool = False,
     keep: bool = False,
+    first_sample: int = 0,
     device: str | None,
     threads: int | None,
     layout: str | None,
@@ -184,8 +185,8 @@ def open_renderer(
     """Return a renderer of a scene file, and the seconds that the file took.
 
     resources: get the processes that compile beside this one; accept: called with the scene, before
-    anything is built for it; keep: wait for what they keep for the next time; changes: see
-    `changed`.
+    anything is built for it; keep: wait for what they keep for the next time; first_sample: see
+    `RenderOptions`; changes: see `changed`.
     """
     began = time.perf_counter()
     with ThreadPoolExecutor(max_workers=1) as beside:
@@ -205,8 +206,9 @@ def open_renderer(
         shown.note(f"clpt: warning: {warning}")
     with shown.phase(f"building kernels for {on.info.name}"):
         renderer = Renderer(
-            plan, on, texture_budget=texture_budget, layout=layout, tree_quality=tree_quality
-        )
+            plan, on, texture_budget=texture_budget, layout=layout, tree_quality=tree_quality,
+            first_sample=first_sample,
+        )  # fmt: skip
     for warning in renderer.warnings:
         shown.note(f"clpt: warning: {warning}")
     return renderer, loading

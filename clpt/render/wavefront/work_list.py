@@ -22,6 +22,14 @@ def inside(settings: NDArray[np.void]) -> PixelIndices:
     return _within(settings, 0)
 
 
+def picture(settings: NDArray[np.void], stored: NDArray[np.uint32]) -> NDArray[np.uint32]:
+    """Return what pixels have (padded_pixels,), as they are stored, row by row: (h, w)."""
+    across, margin = int(settings["tiles_x"]), int(settings["margin"])
+    rows = stored.reshape(-1, across, 4, 4).swapaxes(1, 2).reshape(-1, 4 * across)
+    width, height = int(settings["width"]), int(settings["height"])
+    return rows[margin : margin + height, margin : margin + width]
+
+
 def sampled(settings: NDArray[np.void]) -> PixelIndices:
     """Return the pixels that have samples, ascending: those of the picture and its margin."""
     return _within(settings, int(settings["margin"]))
