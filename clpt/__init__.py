@@ -9,6 +9,7 @@
 import logging
 from importlib import metadata
 
+from clpt.cluster.multi_renderer import MultiRenderer
 from clpt.colour.view import View
 from clpt.errors import (
     ClptError,
@@ -52,6 +53,7 @@ __all__ = [
     "InstancedAccel",
     "KernelBuildError",
     "MemoryBudgetError",
+    "MultiRenderer",
     "Progress",
     "RenderOptions",
     "Renderer",

@@ -17,7 +17,7 @@ from clpt.render.wavefront.film_state import Ranges, join_ranges
 GROWTH = 3  # times the size of a worker's last block
 LAST_SHARE = 0.5  # of what a worker's rate lets it do of all that is left: blocks shrink at the end
 PATIENCE = 1.5  # times what a block should take, after which another worker begins it too
-COPIES = 2  # of a block at a time, at most
+COPIES = 2  # of a block at a time, at most, where films of a block can be dropped
 MOST_FAILURES = 3  # of a block, before the render ends
 MEMORY = 0.5  # part of the last block in a worker's rate
 
@@ -84,15 +84,24 @@ class Blocks:
     taken: ranges that are done; end: the number after the last sample, which `extend` may raise;
     seconds: what a block should take; check_every: of the blocks, one in so many is done by two
     workers and compared, beside the first block of each worker that has an equal; 0: none.
+    copies: of a block that workers do at a time, at most; 1 where a film cannot be dropped.
 
     counts of what went wrong: lost (blocks of workers that are gone), repeated (blocks that a
     second worker began since the first was slow), dropped (films that were there already).
     refused: why, by worker.
     """
 
-    def __init__(self, end: int, taken: Ranges = (), *, seconds: float = 1.0, check_every: int = 0):
+    def __init__(
+        self,
+        end: int,
+        taken: Ranges = (),
+        *,
+        seconds: float = 1.0,
+        check_every: int = 0,
+        copies: int = COPIES,
+    ):
         self.taken, self.end = taken, end
-        self.seconds, self.check_every = seconds, check_every
+        self.seconds, self.check_every, self.copies = seconds, check_every, copies
         self.workers: dict[Worker, WorkerRecord] = {}
         self.refused: dict[Worker, str] = {}
         self.lost = self.repeated = self.dropped = 0
@@ -270,7 +279,7 @@ class Blocks:
         waiting = [
             f for f in self._flights.values()
             if f.since and worker not in f.since and worker not in f.films
-            and len(f.since) < COPIES and not f.compared and worker not in f.failed_at
+            and len(f.since) < self.copies and not f.compared and worker not in f.failed_at
         ]  # fmt: skip
         if not waiting or not record.rate:
             return None

@@ -18,6 +18,7 @@ from clpt.render.editing import parameter_patch, rebuild
 from clpt.render.editing.moving import Moving
 from clpt.render.editing.scene_edit import (
     MaterialKey,
+    Replacements,
     ShapeKey,
     Successors,
     edit_scene,
@@ -25,14 +26,14 @@ from clpt.render.editing.scene_edit import (
     resolve_device_arrays,
 )
 from clpt.render.locking import synchronized
-from clpt.render.lowering.scene import lower
+from clpt.render.lowering.scene import Lowered, lower
 from clpt.render.options import RenderOptions, check_changes, check_options, check_scene
 from clpt.render.pictures import Image, Pictures
 from clpt.render.progress import Progress
 from clpt.render.stats import RenderStats, collect
 from clpt.render.wavefront import adaptive
 from clpt.render.wavefront.film_state import FilmState, Ranges, join_ranges
-from clpt.render.wavefront.wavefront import Wavefront
+from clpt.render.wavefront.wavefront import Counts, Wavefront
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
 from clpt.scene.integrators import Aov
@@ -91,9 +92,9 @@ class Renderer(Pictures):
         before = device.builds.programs, device.builds.cached
         texture_budget = options.get("texture_budget")
         if texture_budget is None:
-            texture_budget = _texture_budget(device)
+            texture_budget = texture_budget_of(device)
         self._texture_budget, self._successors = texture_budget, Successors()
-        lowered = lower(resolve_device_arrays(scene, device.queue), texture_budget)
+        lowered = self._lower(scene)
         self._seconds = {"lower": time.perf_counter() - self._start}
         first = Wavefront.create(
             device,
@@ -140,7 +141,7 @@ class Renderer(Pictures):
 
         Raises SceneError for a number that is none, DeviceError if the driver refuses.
         """
-        first, end = self._next_range(samples)
+        first, end = next_range(self.samples, samples)
         stream = self.wavefronts[0].stream
         stream.after(wait_for)
         for wavefront in self.wavefronts:
@@ -193,11 +194,11 @@ class Renderer(Pictures):
         samples.
         """
         start = time.perf_counter()
-        first, end = self._next_range(samples)
+        first, end = next_range(self.samples, samples)
         raised: list[BaseException] = []
 
         def on_batch(_: Any) -> bool:
-            counts = [w.counts for w in self.wavefronts]
+            counts = self.counts
             paths = sum(c.samples for c in counts)
             if paths:
                 self._seconds.setdefault("first_sample", time.perf_counter() - self._start)
@@ -239,6 +240,11 @@ class Renderer(Pictures):
             self._adaptive = adaptive.Adaptive(self.wavefronts[0])
             self._adaptive.skip(first)
         return self._adaptive.run(end, noise, on_batch)
+
+    @property
+    def counts(self) -> tuple[Counts, ...]:
+        """What has happened so far, of each film: one, or one for each channel of `aov`."""
+        return tuple(wavefront.counts for wavefront in self.wavefronts)
 
     @property
     def active(self) -> float:
@@ -311,11 +317,6 @@ class Renderer(Pictures):
             raise SceneError("even and odd samples are not kept apart; give Renderer halves=True")
         return first.half(0), first.half(1)
 
-    def _next_range(self, samples: int) -> tuple[int, int]:
-        """The numbers of the next samples, first and end. Raises SceneError."""
-        first = self.samples
-        return first, _sample_number(first + _whole(samples))
-
     def close(self) -> None:
         """Give the device's memory back; the renderer is of no use afterwards.
 
@@ -383,7 +384,7 @@ class Renderer(Pictures):
         new = self.scene if scene is None else scene
         replaced = {} if scene is None else match_replacements(self.scene, new)
         if materials or transforms or vertices:
-            new, more = edit_scene(new, self._successors, materials, transforms, vertices)
+            new, more = self._edit(new, materials, transforms, vertices)
             replaced |= more
         if camera is not None:
             new = dataclasses.replace(new, camera=camera)
@@ -394,11 +395,26 @@ class Renderer(Pictures):
         self._successors.note(replaced)
         return self.reset()
 
+    def _lower(self, scene: Scene, former: Lowered | None = None) -> Lowered:
+        """Return the tables of a scene; former: of the scene before it."""
+        readable = resolve_device_arrays(scene, self.device.queue)
+        return lower(readable, self._texture_budget, former)
+
+    def _edit(
+        self,
+        scene: Scene,
+        materials: Mapping[MaterialKey, Material] | None,
+        transforms: Mapping[ShapeKey, Any] | None,
+        vertices: Mapping[ShapeKey, Any] | None,
+    ) -> tuple[Scene, Replacements]:
+        """Return a scene with these changes, and what stands for what; see `edit_scene`."""
+        return edit_scene(scene, self._successors, materials, transforms, vertices)
+
     def _move(self, transforms: Mapping[ShapeKey, Any], vertices: Mapping[ShapeKey, Any]) -> bool:
         """Move shapes on the device; return whether they could."""
         if self._moving is None:
             self._moving = Moving(self.wavefronts[0].scene, self.scene)
-        moved, replaced = edit_scene(self.scene, self._successors, None, transforms, vertices)
+        moved, replaced = self._edit(self.scene, None, transforms, vertices)
         refusal = self._moving.move(self.scene, replaced)
         if refusal is not None:
             log.debug("shapes cannot move on the device: %s", refusal)
@@ -424,8 +440,7 @@ class Renderer(Pictures):
         for event in events:
             dev.wait(event)
         first = self.wavefronts[0]
-        readable = resolve_device_arrays(scene, first.stream.queue)
-        lowered = lower(readable, self._texture_budget, first.scene.lowered)
+        lowered = self._lower(scene, first.scene.lowered)
         rebuild.take(self.wavefronts, lowered, refit)
         self._moving = None
         self.warnings = list(lowered.warnings)
@@ -435,6 +450,11 @@ class Renderer(Pictures):
     def stats(self) -> RenderStats:
         """What the render took so far: numbers of things, bytes by table and tree, seconds."""
         return collect(self.wavefronts, *self._built, dict(self._seconds))
+
+
+def next_range(first: int, samples: int) -> tuple[int, int]:
+    """Return the numbers, first and end, of so many samples from the first. Raises SceneError."""
+    return first, _sample_number(first + _whole(samples))
 
 
 def _sample_number(number: int) -> int:
@@ -451,8 +471,8 @@ def _whole(samples: int) -> int:
     return int(samples)
 
 
-def _texture_budget(device: dev.Device) -> int:
-    """Half of a device's free memory, in one buffer."""
+def texture_budget_of(device: dev.Device) -> int:
+    """Return what bitmaps may take on a device [bytes]: half of what is free, in one buffer."""
     return min(int(TEXTURE_SHARE * device.free_memory()), device.info.max_alloc)
 
 
