@@ -13,11 +13,11 @@ from clpt.render.aov_preview import sheet
 from .. import __version__, images, output_files, spectral_exr
 from ..errors import SceneError
 from ..render.pictures import Image
-from ..render.renderer import Renderer
 from ..scene import Scene
 from ..scene.integrators import Aov
 from ..spectra.spaces import chromaticities
 from .grading import Grading
+from .scene_options import AnyRenderer
 
 AOV_FORMATS = (".exr", ".png")
 BAND_FORMATS = (".npy", ".exr")  # with all bands; others get the colours
@@ -50,10 +50,10 @@ def check_contents(paths: tuple[Path, ...], scene: Scene) -> None:
             raise SceneError(f"the integrator aov is written to {formats}", file=path)
 
 
-def metadata(renderer: Renderer, scene: Path, seconds: float) -> dict[str, str | int | float]:
+def metadata(renderer: AnyRenderer, scene: Path, seconds: float) -> dict[str, str | int | float]:
     """Return the metadata of an .exr: how it was made. spp is the mean over all pixels."""
     plan = renderer.scene
-    samples = max(wavefront.counts.samples for wavefront in renderer.wavefronts)
+    samples = max(counts.samples for counts in renderer.counts)
     return {
         "software": f"clpt {__version__}",
         "scene": os.fsencode(scene).decode("utf-8", "replace"),
@@ -62,14 +62,14 @@ def metadata(renderer: Renderer, scene: Path, seconds: float) -> dict[str, str |
         "sampler": plan.sampler.kind,
         "seed": plan.seed,
         "spp": samples / renderer.wavefronts[0].paths.pixels,
-        "device": renderer.device.info.label,
+        "device": " and ".join(on.info.label for on in renderer.devices),
         "seconds": round(seconds, 3),
     }
 
 
 def write_all(
     paths: tuple[Path, ...],
-    renderer: Renderer,
+    renderer: AnyRenderer,
     stats: dict[str, str | int | float],
     grading: Grading,
     tell: Callable[[str], None],
@@ -101,7 +101,7 @@ def _named(path: Path, error: Exception) -> str:
 
 
 def write(
-    path: Path, renderer: Renderer, stats: dict[str, str | int | float], grading: Grading
+    path: Path, renderer: AnyRenderer, stats: dict[str, str | int | float], grading: Grading
 ) -> None:
     """Write the picture so far. Raises SceneError, OSError."""
     film = renderer.scene.film
@@ -122,7 +122,7 @@ def write(
         _write_layers(path, renderer.layers(), stats)
 
 
-def _write_bands(path: Path, renderer: Renderer, stats: dict[str, str | int | float]) -> None:
+def _write_bands(path: Path, renderer: AnyRenderer, stats: dict[str, str | int | float]) -> None:
     """Write all bands: an array, or a spectral .exr with a preview in the film's colours."""
     if path.suffix.lower() == ".npy":
         images.write_npy(path, renderer.image())

@@ -104,15 +104,16 @@ def render(
     share = float(stats["spp"])
     if share < 1.0:
         shown.note(f"clpt: warning: only {share:.1%} of the pixels have a sample; others are black")
-    rejected = sum(wavefront.counts.rejected for wavefront in renderer.wavefronts)
+    rejected = sum(counts.rejected for counts in renderer.counts)
     if rejected:
         shown.note(
             f"clpt: warning: {rejected} samples were not finite, or too bright, and count as black"
         )
-    if any(wavefront.counts.full for wavefront in renderer.wavefronts):
+    if any(counts.full for counts in renderer.counts):
         shown.note("clpt: warning: pixels are too bright for the film: lower film.exposure")
     if verbose:
         report.after(renderer)
-    if stopped and renderer.device.compilers is not None:
-        renderer.device.compilers.kill()
+    for on in renderer.devices:
+        if stopped and on.compilers is not None:
+            on.compilers.kill()
     return STATUS + stopped[0] if stopped else 0

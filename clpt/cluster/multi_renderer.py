@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import logging
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
@@ -32,8 +31,6 @@ from clpt.scene.materials import Material
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
-
-log = logging.getLogger(__name__)
 
 Call = tuple[int, int, float | None]
 Calls = list[Call]
@@ -114,7 +111,6 @@ class MultiRenderer(Pictures):
                 workers.append(DeviceWorker(name, result))
             else:
                 warnings.append(f"{name} failed and is left out: {result}")
-                log.warning("%s", warnings[-1])
         self._crew = Crew(workers, self._stop)
         self._lost_at_first = warnings
         self.channels = workers[0].renderer.channels

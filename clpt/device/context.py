@@ -236,23 +236,22 @@ def names_several(which: str | None) -> bool:
 
 def _group(name: str) -> Iterator[DeviceInfo]:
     """All devices, or all GPUs, that work. Raises DeviceError where there is none."""
-    found, taken = devices(), list[DeviceInfo]()
-    for info in by_preference(found):
-        if name == "gpu" and info.kind != "gpu":
+    found, taken = by_preference(devices()), 0
+    processors = [info for info in found if info.is_cpu]
+    best = _by_speed(processors)[0][0] if processors and name != "gpu" else None
+    for info in found:
+        slower = best is not None and info.platform != best.platform and _same_processor(info, best)
+        if slower or (name == "gpu" and info.kind != "gpu"):
             continue
-        if any(_same_processor(info, other) for other in taken):
-            continue
-        if info.is_cpu:
-            info = _by_speed([info, *(i for i in found if i != info and i.is_cpu)])[0][0]
         failure = None if _key(info) in _opened else trial(info)
         if failure is None:
-            taken.append(info)
+            taken += 1
             yield info
         else:
             log.warning("%s is passed over: %s", info.label, failure)
     if not taken:
         what = "GPU" if name == "gpu" else "OpenCL device"
-        raise DeviceError(f"no {what} works; there is {_listing(found) or 'none'}")
+        raise DeviceError(f"no {what} works; there is {_listing(tuple(found)) or 'none'}")
 
 
 def selection(which: str | int | None = None) -> Choice:

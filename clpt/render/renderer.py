@@ -242,6 +242,11 @@ class Renderer(Pictures):
         return self._adaptive.run(end, noise, on_batch)
 
     @property
+    def devices(self) -> tuple[dev.Device, ...]:
+        """Where it renders: its device."""
+        return (self.device,)
+
+    @property
     def counts(self) -> tuple[Counts, ...]:
         """What has happened so far, of each film: one, or one for each channel of `aov`."""
         return tuple(wavefront.counts for wavefront in self.wavefronts)
