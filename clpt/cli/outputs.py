@@ -117,7 +117,7 @@ def write(
             exposure=grading.exposure, tone=grading.tone, view=grading.view,
         )  # fmt: skip
     elif path.suffix.lower() == ".png":
-        images.write(path, sheet(renderer.layers()), exposure=grading.exposure)
+        images.write(path, sheet(renderer.layers()), metadata=stats, exposure=grading.exposure)
     else:
         _write_layers(path, renderer.layers(), stats)
 

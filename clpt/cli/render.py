@@ -13,6 +13,8 @@ import click
 from ..scene import Scene
 from . import outputs, report
 from .display import display as display_of
+from .frame_values import Frames
+from .frames import render_frames
 from .grading import grading, grading_options
 from .rendering import render_samples
 from .scene_options import open_renderer, scene_options
@@ -52,6 +54,15 @@ class Duration(click.ParamType):
 )  # fmt: skip
 @click.option("--time", "limit", type=Duration(), help="Stop after 30s, 5m, 1h30m.")
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), help="Seed of the random numbers.")
+@click.option(
+    "--frames", type=Frames(),
+    help="Render an animation: 1:240, with the last one. Complete frames stay.",
+)  # fmt: skip
+@click.option(
+    "--fps", type=click.FloatRange(0.0, min_open=True), default=24.0, show_default=True,
+    help="Frames a second, of {time} and of the video.",
+)  # fmt: skip
+@click.option("--video", type=click.Path(path_type=Path), help="Write the frames as .mp4 too.")
 @scene_options
 @grading_options
 @verbose_option("Print memory, trees, programs and stages; log more, twice for everything.")
@@ -60,6 +71,9 @@ def render(
     scene: Path,
     paths: tuple[Path, ...],
     limit: float | None,
+    frames: range | None,
+    fps: float,
+    video: Path | None,
     exposure: float,
     tone: str | None,
     view: str | None,
@@ -76,8 +90,20 @@ def render(
     until the time is over, or the noise is below the limit. The time counts from the command's
     start, kernels included. Ctrl-C stops it within a second; the picture so far is written, and the
     exit status is 130. SIGTERM and SIGHUP do the same, with the statuses 143 and 129.
+
+    With --frames every frame gets files of its own: name.0001.exr, or what #### or %04d in -o says.
+    -D values may have {frame}, {time} in seconds, and arithmetic of them such as {360*frame/240};
+    SCENE may be scene.####.json. Frames that are complete, and of the same scene and options, are
+    not rendered again. A frame is a device's; --time is that of each.
     """
     graded = grading(exposure=exposure, tone=tone, view=view, display=display, look=look, ocio=ocio)
+    if frames is not None:
+        return render_frames(
+            scene, paths, frames, fps, video, graded, limit, display_of(quiet, None),
+            profiling=bool(verbose), **options,
+        )  # fmt: skip
+    if video is not None:
+        raise click.UsageError("--video needs --frames")
     targets = outputs.checked(paths or outputs.default(scene))
     shown = display_of(quiet, limit)
     began = time.perf_counter()

@@ -209,15 +209,18 @@ def open_renderer(
     made: dict[str, Any] = {
         "texture_budget": texture_budget, "layout": layout, "tree_quality": tree_quality
     }  # fmt: skip
-    renderer: AnyRenderer
     with shown.phase(f"building kernels for {' and '.join(on.info.name for on in devices)}"):
-        if len(devices) > 1:
-            renderer = MultiRenderer(plan, devices, **made)
-        else:
-            renderer = Renderer(plan, devices[0], **made)
+        renderer = new_renderer(plan, devices, **made)
     for warning in renderer.warnings:
         shown.note(f"clpt: warning: {warning}")
     return renderer, loading
+
+
+def new_renderer(plan: Scene, devices: list[dev.Device], **made: Any) -> AnyRenderer:
+    """Return a renderer on one device, or on several."""
+    if len(devices) > 1:
+        return MultiRenderer(plan, devices, **made)
+    return Renderer(plan, devices[0], **made)
 
 
 def choose_devices(which: str | None, *, profiling: bool, threads: int | None) -> list[dev.Device]:
