@@ -252,7 +252,7 @@ class Blocks:
         return {name for name, record in self.workers.items() if record.kind == kind}
 
     def _new(self, worker: Worker) -> _Flight | None:
-        if not self._free:
+        if not self._free or self._leaves_to_others(self.workers[worker]):
             return None
         first, end = self._free[0]
         size = min(self._size(self.workers[worker]), end - first)
@@ -262,6 +262,14 @@ class Blocks:
         self._flights[flight.block.number] = flight
         self._choose_compared(flight, worker)
         return flight
+
+    def _leaves_to_others(self, record: WorkerRecord) -> bool:
+        """Whether others do all that is left before this worker does one sample.
+
+        Only where nobody would begin the block that it takes a second time.
+        """
+        left, others = sum(end - first for first, end in self._free), self.rate - record.rate
+        return self.copies == 1 and record.rate > 0.0 and left * record.rate < others
 
     def _size(self, record: WorkerRecord) -> int:
         """How many samples the next block of a worker has."""

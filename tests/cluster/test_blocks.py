@@ -70,6 +70,20 @@ def test_a_lost_workers_blocks_go_to_others():
     assert taken(blocks) == ((0, 2),)
 
 
+def test_a_block_has_one_worker_where_films_cannot_be_dropped():
+    """Then a slow worker leaves the last samples to others, as long as there are others."""
+    blocks = Blocks(12, copies=1)
+    blocks.join("slow"), blocks.join("fast")
+    first = blocks.take("slow", 0.0)
+    blocks.finish("fast", blocks.take("fast", 0.0), 0.1)
+    blocks.finish("slow", first, 1.0)  # ten left, which take the fast one a second
+    assert blocks.take("slow", 1.0) == Block(2, 2, 3)
+    assert blocks.take("fast", 1.0).first == 3
+    assert blocks.take("slow", 99.0) is None and not blocks.repeated
+    blocks.lose("fast")
+    assert blocks.take("slow", 99.0).first == 3
+
+
 def test_a_slow_workers_block_is_begun_by_another_and_added_once():
     blocks = Blocks(2, seconds=1.0)
     blocks.join("slow"), blocks.join("b")

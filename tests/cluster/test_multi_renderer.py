@@ -89,6 +89,11 @@ class FailsAfter:
             raise cl.RuntimeError("clEnqueueNDRangeKernel failed: DEVICE_NOT_AVAILABLE")
 
 
+def slow() -> None:
+    """What makes a device slow."""
+    time.sleep(0.002)
+
+
 @pytest.fixture(scope="module")
 def scene(scenes: Path) -> Scene:
     return small(scenes)
@@ -192,6 +197,7 @@ def test_a_device_that_fails_is_replaced(scene, whole, pair, faults, caplog, whi
     after = {
         "start": ready // 2, "first": ready, "middle": ready + 12, "end": None
     }[when]  # fmt: skip
+    faults[pair[1 - which].queue] = slow  # so that the other one gets its blocks
     if after is not None:
         faults[pair[which].queue] = FailsAfter(after)
     with clpt.MultiRenderer(scene, pair) as several:
@@ -227,6 +233,7 @@ def test_random_failures_change_nothing(scene, whole, faults):
         with clpt.MultiRenderer(scene, devices) as several:
             for device in devices[:2]:
                 faults[device.queue] = FailsAfter(int(random.integers(30)))
+            faults[devices[2].queue] = slow
             for samples in (1, 4, 7):
                 assert several.run(samples)
             assert same(several.film_state(), whole)
@@ -247,6 +254,7 @@ def test_failures_with_noise(scenes, faults, kind, which):
         devices = [dev.choose() for _ in range(2)]
         with clpt.MultiRenderer(scene, devices) as several:
             faults[devices[which].queue] = FailsAfter(commands)
+            faults[devices[1 - which].queue] = slow
             for samples in (30, 300):
                 assert several.run(samples, noise=NOISE)
             assert same(several.film_state(), state)
