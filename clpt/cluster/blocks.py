@@ -15,6 +15,7 @@ from clpt.errors import ClusterError
 from clpt.render.wavefront.film_state import Ranges, join_ranges
 
 GROWTH = 3  # times the size of a worker's last block
+LEAST = 0.1  # of the seconds that a block should take: a smaller one costs more than it helps
 LAST_SHARE = 0.5  # of what a worker's rate lets it do of all that is left: blocks shrink at the end
 PATIENCE = 1.5  # times what a block should take, after which another worker begins it too
 COPIES = 2  # of a block at a time, at most, where films of a block can be dropped
@@ -277,9 +278,8 @@ class Blocks:
             return 1
         left = sum(end - first for first, end in self._free)
         share = LAST_SHARE * left * record.rate / self.rate
-        return max(
-            1, min(GROWTH * max(record.size, 1), int(self.seconds * record.rate), int(share))
-        )
+        usual = self.seconds * record.rate
+        return max(1, min(GROWTH * max(record.size, 1), int(usual), int(max(share, LEAST * usual))))
 
     def _slow(self, worker: Worker, now: float) -> _Flight | None:
         """The block that is longest on its way at another worker, if that is slow with it."""

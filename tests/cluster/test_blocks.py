@@ -25,7 +25,7 @@ def test_one_worker_gets_all_samples_in_order():
         assert blocks.finish("a", block, now) is Outcome.ADD
     assert blocks.taken == ((0, 100),)
     assert sizes[:3] == [1, 3, 9]  # grows to a second's samples
-    assert max(sizes) <= 20 and sizes[-1] == 1  # and shrinks at the end
+    assert max(sizes) <= 20 and sizes[-1] <= 2  # and shrinks at the end, to a tenth
     assert blocks.workers["a"].rate == pytest.approx(20)
 
 
