@@ -36,6 +36,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "compiling": (),
     "shares": (),
     "devices": (),
+    "checkpoints": (),
     "sizes": ("--plot", str(report.RESULTS / "sizes.png")),
 }
 

@@ -7,7 +7,6 @@
 """
 
 import logging
-from importlib import metadata
 
 from clpt.cluster.multi_renderer import MultiRenderer
 from clpt.colour.view import View
@@ -34,13 +33,9 @@ from clpt.scene import Scene
 from clpt.spectral_exr import SpectralImage
 from clpt.spectral_exr import read as read_spectral
 from clpt.spectral_exr import write as write_spectral
+from clpt.version import VERSION as __version__
 
 logging.getLogger("clpt").addHandler(logging.NullHandler())  # quiet until the program asks
-
-try:
-    __version__ = metadata.version("clpt")
-except metadata.PackageNotFoundError:  # a checkout that is not installed
-    __version__ = "0.0.0"
 
 __all__ = [
     "Accel",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import secrets
 from collections.abc import Iterator
@@ -64,9 +65,37 @@ def check_writable(path: str | Path) -> None:
             raise PermissionError(message) from error
 
 
+def link(path: str | Path, other: str | Path) -> None:
+    """Give the file at `path` a second name, so that it stays there when it is replaced.
+
+    What had that name is gone. Nothing happens where there is no file, or no links can be made.
+    """
+    path = Path(os.path.realpath(path))
+    name = path.with_name(f"{_partial(path)}{secrets.token_hex(6)}")
+    try:
+        if os.path.exists(other) and os.path.samefile(path, other):
+            return  # to rename one to the other would do nothing
+        os.link(path, name)
+        os.replace(name, other)
+    except OSError:  # a file system without links
+        name.unlink(missing_ok=True)
+
+
+def remove_partials(path: str | Path) -> None:
+    """Remove what processes that were killed have left of this file. Raises OSError."""
+    path = Path(os.path.realpath(path))
+    for partial in path.parent.glob(f"{_partial(path)}*"):
+        partial.unlink(missing_ok=True)
+
+
+def _partial(path: Path) -> str:
+    """How the names begin of files that are to become this one: of one length for all names."""
+    return f"{PARTIAL}{hashlib.sha256(os.fsencode(path.name)).hexdigest()[:12]}-"
+
+
 def _new_file(path: Path) -> Path:
     """Make an empty file beside `path`, with its suffix and with its permissions if it exists."""
-    partial = path.with_name(f"{PARTIAL}{secrets.token_hex(6)}{path.suffix}")
+    partial = path.with_name(f"{_partial(path)}{secrets.token_hex(6)}{path.suffix}")
     os.close(os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
     if path.exists():
         partial.chmod(path.stat().st_mode & 0o777)

@@ -129,3 +129,35 @@ def test_targets_are_tried(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setattr(output_files.os, "access", lambda *_: False)  # root may write everything
     with pytest.raises(OSError, match="read-only"):
         output_files.check_writable(path)
+
+
+def test_what_was_left_behind_is_removed(tmp_path):
+    path, other = tmp_path / "a.resume.exr", tmp_path / "b.resume.exr"
+    for one in (path, other):
+        with pytest.raises(KeyboardInterrupt), output_files.replacing(one) as partial:
+            partial.rename(partial.with_name(partial.name.replace(".exr", ".x.exr")))
+            raise KeyboardInterrupt
+    assert len(list(tmp_path.iterdir())) == 2
+    output_files.remove_partials(path)
+    (left,) = tmp_path.iterdir()
+    output_files.remove_partials(other)
+    assert left.name.startswith(output_files.PARTIAL) and not left.exists()
+
+
+def test_a_second_name_stays_when_the_file_is_replaced(tmp_path, monkeypatch):
+    path, other = tmp_path / "a", tmp_path / "a.1"
+    output_files.link(path, other)
+    assert not list(tmp_path.iterdir())  # there is nothing to keep
+    for content in (b"1", b"2", b"3"):
+        output_files.link(path, other)
+        output_files.link(path, other)  # as after a failure
+        output_files.write(path, content)
+    assert (path.read_bytes(), other.read_bytes()) == (b"3", b"2")
+
+    def refused(*names):
+        raise OSError(1, "not permitted")
+
+    monkeypatch.setattr(os, "link", refused)
+    output_files.link(path, other)
+    assert (path.read_bytes(), other.read_bytes()) == (b"3", b"2")
+    assert len(list(tmp_path.iterdir())) == 2

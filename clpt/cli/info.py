@@ -16,9 +16,12 @@ from clpt.formats import load
 from clpt.formats.meshes import framing
 from clpt.render.lowering.geometry.triangles import triangulate
 
+from ..render import film_file
 from ..scene import Scene, materials, shapes, textures
 from ..scene.params import Kind
+from . import checkpoints
 from .output_console import output_console
+from .outputs import FILM
 from .scene_variables import scene_variables
 
 FLAT_TRIANGLES = {shapes.Rectangle: 2, shapes.Cube: 12}
@@ -29,8 +32,9 @@ FLAT_TRIANGLES = {shapes.Rectangle: 2, shapes.Cube: 12}
 @scene_variables
 @click.option("--json", "as_json", is_flag=True, help="Write JSON instead of a table.")
 def info(scene: Path, variables: dict[str, Any], as_json: bool) -> None:
-    """Show what the file or folder SCENE holds, without rendering it."""
-    contents = summary(load(scene, **variables))
+    """Show what the file or folder SCENE holds, without rendering it; or a film, or checkpoint."""
+    is_film = scene.suffix.lower() == FILM or scene.name.endswith(checkpoints.SUFFIX)
+    contents = film_summary(scene) if is_film else summary(load(scene, **variables))
     if as_json:
         click.echo(json.dumps(contents, indent=2))
         return
@@ -38,6 +42,27 @@ def info(scene: Path, variables: dict[str, Any], as_json: bool) -> None:
     for name, value in contents.items():
         table.add_row(name.replace("_", " "), _shown(value))
     output_console().print(table)
+
+
+def film_summary(path: Path) -> dict[str, Any]:
+    """Return what a film file says of itself."""
+    header = film_file.read_header(path)
+    height, width = header["shapes"]["words"][-2:]
+    origin, sessions = header["scene"], header["sessions"]
+    return {
+        "format": "film",
+        "clpt": header["clpt"],
+        "samples": [f"{first} to {end - 1}" for first, end in header["taken"]],
+        "film": {"width": width, "height": height, "bands": header["form"]["bands"]},
+        "integrator": header["settings"]["chosen.integrator"],
+        "sampler": origin["sampler.type"],
+        "seed": origin["seed"],
+        "noise": "noise" in header["adaptive"],
+        "seconds": round(sum(one["seconds"] for one in sessions), 3),
+        "sessions": [
+            f"{one['began']}  {one['seconds']:.1f} s  {one['device']['device']}" for one in sessions
+        ],
+    }
 
 
 def summary(scene: Scene) -> dict[str, Any]:

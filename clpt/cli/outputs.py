@@ -12,6 +12,8 @@ from clpt.render.aov_preview import sheet
 
 from .. import __version__, images, output_files, spectral_exr
 from ..errors import SceneError
+from ..render import film_file
+from ..render.host_picture import HostPicture
 from ..render.pictures import Image
 from ..scene import Scene
 from ..scene.integrators import Aov
@@ -19,7 +21,10 @@ from ..spectra.spaces import chromaticities
 from .grading import Grading
 from .scene_options import AnyRenderer
 
-AOV_FORMATS = (".exr", ".png")
+FILM = ".film"  # suffix of films, which hold all that a picture was made of
+Source = AnyRenderer | HostPicture  # what pictures are taken of
+
+AOV_FORMATS = (".exr", ".png", FILM)
 BAND_FORMATS = (".npy", ".exr")  # with all bands; others get the colours
 
 
@@ -34,7 +39,8 @@ def default(scene: Path) -> tuple[Path, ...]:
 def checked(paths: tuple[Path, ...]) -> tuple[Path, ...]:
     """Return the paths if files of these names can be written there. Raises SceneError."""
     for path in paths:
-        images.check_output(path)
+        if path.suffix.lower() != FILM:
+            images.check_output(path)
         try:
             output_files.check_writable(path)
         except OSError as error:
@@ -51,7 +57,10 @@ def check_contents(paths: tuple[Path, ...], scene: Scene) -> None:
 
 
 def metadata(renderer: AnyRenderer, scene: Path, seconds: float) -> dict[str, str | int | float]:
-    """Return the metadata of an .exr: how it was made. spp is the mean over all pixels."""
+    """Return the metadata of an .exr: how it was made. spp is the mean over all pixels.
+
+    seconds: of this session; those of former ones are added.
+    """
     plan = renderer.scene
     samples = max(counts.samples for counts in renderer.counts)
     return {
@@ -63,13 +72,13 @@ def metadata(renderer: AnyRenderer, scene: Path, seconds: float) -> dict[str, st
         "seed": plan.seed,
         "spp": samples / renderer.wavefronts[0].paths.pixels,
         "device": " and ".join(on.info.label for on in renderer.devices),
-        "seconds": round(seconds, 3),
+        "seconds": round(seconds + renderer.former_seconds, 3),
     }
 
 
 def write_all(
     paths: tuple[Path, ...],
-    renderer: AnyRenderer,
+    source: Source,
     stats: dict[str, str | int | float],
     grading: Grading,
     tell: Callable[[str], None],
@@ -82,12 +91,12 @@ def write_all(
     failures = []
     for path in paths:
         try:
-            write(path, renderer, stats, grading)
+            write(path, source, stats, grading)
             tell(f"{path}  {stats['spp']:.4g} spp, {stats['seconds']:.1f} s")
         except (SceneError, OSError) as error:
             other = Path(tempfile.gettempdir()) / f"{path.stem}-{secrets.token_hex(4)}{path.suffix}"
             try:
-                write(other, renderer, stats, grading)
+                write(other, source, stats, grading)
                 failures.append(f"{_named(path, error)}; the picture is in {other}")
             except (SceneError, OSError) as second:
                 failures.append(f"{_named(path, error)}; nor can {_named(other, second)}")
@@ -101,35 +110,40 @@ def _named(path: Path, error: Exception) -> str:
 
 
 def write(
-    path: Path, renderer: AnyRenderer, stats: dict[str, str | int | float], grading: Grading
+    path: Path, source: Source, stats: dict[str, str | int | float], grading: Grading
 ) -> None:
-    """Write the picture so far. Raises SceneError, OSError."""
-    film = renderer.scene.film
-    if film.bands and path.suffix.lower() in BAND_FORMATS and not renderer.channels:
-        _write_bands(path, renderer, stats)
-    elif not renderer.channels:
-        picture = renderer.colours() if film.bands else renderer.image()
+    """Write the picture so far, or the film. Raises SceneError, OSError."""
+    form = source.form
+    if path.suffix.lower() == FILM:
+        saved = source.saved_film(held=True)
+        if not saved.film.taken:
+            raise SceneError("no pass has come to its end: there is no film yet", file=path)
+        film_file.write(path, saved)
+    elif form.bands and path.suffix.lower() in BAND_FORMATS and not form.channels:
+        _write_bands(path, source, stats)
+    elif not form.channels:
+        picture = source.colours() if form.bands else source.image()
         if path.suffix.lower() == ".png":
             picture = images.straight(picture)
-        layers = {} if renderer.scene.noise is None else {"samples": renderer.film.get()[..., 3]}
+        layers = {"samples": source.samples_per_pixel()} if source.is_adaptive else {}
         images.write(
-            path, picture, metadata=stats, layers=layers, space=film.output_space,
+            path, picture, metadata=stats, layers=layers, space=form.output_space,
             exposure=grading.exposure, tone=grading.tone, view=grading.view,
         )  # fmt: skip
     elif path.suffix.lower() == ".png":
-        images.write(path, sheet(renderer.layers()), metadata=stats, exposure=grading.exposure)
+        images.write(path, sheet(source.layers()), metadata=stats, exposure=grading.exposure)
     else:
-        _write_layers(path, renderer.layers(), stats)
+        _write_layers(path, source.layers(), stats)
 
 
-def _write_bands(path: Path, renderer: AnyRenderer, stats: dict[str, str | int | float]) -> None:
+def _write_bands(path: Path, source: Source, stats: dict[str, str | int | float]) -> None:
     """Write all bands: an array, or a spectral .exr with a preview in the film's colours."""
     if path.suffix.lower() == ".npy":
-        images.write_npy(path, renderer.image())
+        images.write_npy(path, source.image())
         return
-    stated = {**stats, "chromaticities": chromaticities(renderer.scene.film.output_space)}
-    preview = renderer.colours()
-    spectral_exr.write(path, renderer.spectral_image(), preview=preview, metadata=stated)
+    stated = {**stats, "chromaticities": chromaticities(source.form.output_space)}
+    preview = source.colours()
+    spectral_exr.write(path, source.spectral_image(), preview=preview, metadata=stated)
 
 
 def _write_layers(

@@ -10,8 +10,10 @@ from typing import Any
 
 import click
 
+from ..errors import SceneError
+from ..render.renderer import MOST_SAMPLES
 from ..scene import Scene
-from . import outputs, report
+from . import checkpoints, outputs, report
 from .display import display as display_of
 from .frame_values import Frames
 from .frames import render_frames
@@ -22,10 +24,23 @@ from .stopping import STATUS, stops
 from .verbosity import verbose_option
 
 
+class SampleRange(click.ParamType):
+    """FIRST:END, numbers of samples without the last; returned as two numbers."""
+
+    name = "FIRST:END"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[int, int]:
+        found = re.fullmatch(r"(\d{1,10}):(\d{1,10})", str(value).strip())
+        if not found or not int(found[1]) < int(found[2]) <= MOST_SAMPLES:
+            self.fail(f"{value!r} is no range of samples such as 0:1024", param, ctx)
+        return int(found[1]), int(found[2])
+
+
 class Duration(click.ParamType):
     """A time such as 30s, 5m, 1h30m or 2.5; returned in seconds."""
 
     name = "TIME"
+    least = 1e-6
 
     def convert(self, value: Any, param: Any, ctx: Any) -> float:
         text = str(value).strip().lower()
@@ -35,9 +50,15 @@ class Duration(click.ParamType):
             self.fail(f"{value!r} does not look like 30s, 5m or 1h30m", param, ctx)
         hours, minutes, rest = (float(n or 0) for n in found.groups())
         seconds = 3600 * hours + 60 * minutes + rest
-        if not 0 < seconds < 1e9:
+        if not self.least <= seconds < 1e9:
             self.fail(f"{value!r} is no time to render in", param, ctx)
         return seconds
+
+
+class Period(Duration):
+    """A time, or 0."""
+
+    least = 0.0
 
 
 @click.command()
@@ -53,6 +74,25 @@ class Duration(click.ParamType):
     help="Stop sampling pixels with less noise, such as 0.02 of their light; 0: never.",
 )  # fmt: skip
 @click.option("--time", "limit", type=Duration(), help="Stop after 30s, 5m, 1h30m.")
+@click.option(
+    "--samples",
+    "numbers",
+    type=SampleRange(),
+    help="Take samples of these numbers only, END without: -o a.film, for `clpt merge`.",
+)
+@click.option(
+    "--checkpoint",
+    "period",
+    type=Period(),
+    help="How often to save what there is beside the picture, as NAME.resume.exr, and keep that "
+    "file; 0: never.  [default: 5m, after ten minutes; removed at the end]",
+)
+@click.option(
+    "--resume/--no-resume",
+    default=None,
+    help="Go on from NAME.resume.exr, which must be there; or leave it alone.  [default: go on if "
+    "it is there]",
+)
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), help="Seed of the random numbers.")
 @click.option(
     "--frames", type=Frames(),
@@ -74,6 +114,9 @@ def render(
     frames: range | None,
     fps: float,
     video: Path | None,
+    numbers: tuple[int, int] | None,
+    period: float | None,
+    resume: bool | None,
     exposure: float,
     tone: str | None,
     view: str | None,
@@ -91,6 +134,9 @@ def render(
     start, kernels included. Ctrl-C stops it within a second; the picture so far is written, and the
     exit status is 130. SIGTERM and SIGHUP do the same, with the statuses 143 and 129.
 
+    A render with checkpoints goes on where it was saved, to the bit, also with more samples; with
+    another scene, setting or version it says what differs, and ends.
+
     With --frames every frame gets files of its own: name.0001.exr, or what #### or %04d in -o says.
     -D values may have {frame}, {time} in seconds, and arithmetic of them such as {360*frame/240};
     SCENE may be scene.####.json. Frames that are complete, and of the same scene and options, are
@@ -98,6 +144,8 @@ def render(
     """
     graded = grading(exposure=exposure, tone=tone, view=view, display=display, look=look, ocio=ocio)
     if frames is not None:
+        if numbers or period is not None or resume is not None:
+            raise click.UsageError("frames go on by themselves: leave out what saves one picture")
         return render_frames(
             scene, paths, frames, fps, video, graded, limit, display_of(quiet, None),
             profiling=bool(verbose), **options,
@@ -105,28 +153,46 @@ def render(
     if video is not None:
         raise click.UsageError("--video needs --frames")
     targets = outputs.checked(paths or outputs.default(scene))
+    if numbers and (options["spp"] or options["noise"]):
+        raise click.UsageError("--samples says how many there are; leave out --spp and --noise")
     shown = display_of(quiet, limit)
     began = time.perf_counter()
+    saved_at = checkpoints.path_of(targets[0])
+    saved = checkpoints.find(saved_at, resume, shown.note)
+    first, end = numbers or (0, None)
 
     def accept(plan: Scene) -> None:
         outputs.check_contents(targets, plan)
+        if numbers and plan.noise is not None:
+            raise SceneError("it would choose other samples of each film", where="noise")
+        if saved is not None:
+            checkpoints.check(saved, saved_at, plan, first, end)
 
     resources = click.get_current_context().with_resource(ExitStack())
     renderer, loading = open_renderer(
-        scene, shown, resources, accept, profiling=bool(verbose), **options
+        scene, shown, resources, accept, profiling=bool(verbose), first_sample=first, **options
     )
-    spp = options["spp"]
-    if limit is None and not options["noise"]:
-        spp = renderer.scene.spp
+    if saved is not None:
+        checkpoints.go_on(renderer, saved, saved_at, shown.note)
+    end = end or options["spp"]
+    if end is None and limit is None and not options["noise"]:
+        end = renderer.scene.spp
     if verbose:
         report.before(renderer, loading)
     ready = time.perf_counter()
     left = shown.limit = None if limit is None else max(began + limit - ready, 0.0)
+    writer = checkpoints.Checkpoints(
+        renderer, saved_at, period, saved is not None, targets, shown.note
+    )
     with stops() as stopped:
         with shown.rendering():
-            render_samples(renderer, spp, left, shown.show, renderer.scene.noise, stopped)
+            render_samples(
+                renderer, end, left, shown.show, renderer.scene.noise, stopped, writer.after_pass
+            )
+        writer.save(bool(stopped))
         stats = outputs.metadata(renderer, scene, time.perf_counter() - ready)
         outputs.write_all(targets, renderer, stats, graded, shown.note)
+        writer.finish(bool(stopped))
     share = float(stats["spp"])
     if share < 1.0:
         shown.note(f"clpt: warning: only {share:.1%} of the pixels have a sample; others are black")

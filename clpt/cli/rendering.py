@@ -17,36 +17,50 @@ GROWTH = 3  # times what has been rendered so far
 
 def render_samples(
     renderer: AnyRenderer,
-    spp: int | None,
+    end: int | None,
     limit: float | None,
     show: Callable[[Progress], None],
     noise: float | None = None,
     stopped: Sequence[int] = (),
+    after_pass: Callable[[], None] = lambda: None,
 ) -> None:
-    """Render until every pixel has `spp` samples or `limit` [s] is over; None means no limit.
+    """Render until the next sample is number `end` or `limit` [s] is over; None means no limit.
 
-    With `noise` the rendering also ends when no pixel has more noise.
+    With `noise` the rendering also ends when no pixel has more noise. after_pass: is called when a
+    pass has come to its end.
 
     It ends soon after the limit, perhaps before every pixel has a sample, and within a second when
     `stopped` gets an entry, see clpt.cli.stopping.
     """
     began = time.perf_counter()
+    first, last = renderer.first_sample, end or MOST_SAMPLES
+    total = 0 if end is None else end - first
+    resumed = renderer.samples > first
+
+    before: list[Progress] = []  # what others have done, for the speed
 
     def tell(progress: Progress) -> bool:
         seconds = time.perf_counter() - began
-        show(dataclasses.replace(progress, total=spp or 0, seconds=seconds))
+        if resumed and not before:
+            before.append(progress)
+        paths = progress.paths - sum(one.paths for one in before)
+        rays = progress.rays - sum(one.rays for one in before)
+        show(dataclasses.replace(progress, total=total, seconds=seconds, paths=paths, rays=rays))
         over = limit is not None and seconds >= limit
         return not (stopped or over)
 
-    size, end = 1, began
+    if renderer.samples >= last:
+        return
+    size, now = 1, began
     while renderer.run(size, tell, noise=noise):
-        start, end = end, time.perf_counter()
-        seconds_left = math.inf if limit is None else began + limit - end
-        samples_left = (spp or MOST_SAMPLES) - renderer.samples
-        if samples_left <= 0 or seconds_left <= 0 or renderer.active == 0.0:
+        after_pass()
+        start, now = now, time.perf_counter()
+        seconds_left = math.inf if limit is None else began + limit - now
+        samples_left = last - renderer.samples
+        if stopped or samples_left <= 0 or seconds_left <= 0 or renderer.active == 0.0:
             break
-        rate = size / max(end - start, 1e-9)
-        size = pass_size(renderer.samples, rate, samples_left, seconds_left)
+        rate = size / max(now - start, 1e-9)
+        size = pass_size(renderer.samples - first, rate, samples_left, seconds_left)
 
 
 def pass_size(samples: int, rate: float, samples_left: float, seconds_left: float) -> int:

@@ -177,6 +177,7 @@ def open_renderer(
     *,
     profiling: bool = False,
     keep: bool = False,
+    first_sample: int = 0,
     device: str | None,
     threads: int | None,
     layout: str | None,
@@ -189,8 +190,8 @@ def open_renderer(
     """Return a renderer of a scene file, and the seconds that the file took.
 
     resources: get the processes that compile beside this one; accept: called with the scene, before
-    anything is built for it; keep: wait for what they keep for the next time; changes: see
-    `changed`.
+    anything is built for it; keep: wait for what they keep for the next time; first_sample: see
+    `RenderOptions`; changes: see `changed`.
     """
     began = time.perf_counter()
     with ThreadPoolExecutor(max_workers=1) as beside:
@@ -207,7 +208,8 @@ def open_renderer(
     for warning in plan.warnings:
         shown.note(f"clpt: warning: {warning}")
     made: dict[str, Any] = {
-        "texture_budget": texture_budget, "layout": layout, "tree_quality": tree_quality
+        "texture_budget": texture_budget, "layout": layout, "tree_quality": tree_quality,
+        "first_sample": first_sample,
     }  # fmt: skip
     with shown.phase(f"building kernels for {' and '.join(on.info.name for on in devices)}"):
         renderer = new_renderer(plan, devices, **made)

@@ -10,15 +10,19 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from numpy.typing import NDArray
+
 from clpt import device as dev
 from clpt.cluster.crew import Crew, LostPicture
 from clpt.cluster.device_worker import DeviceWorker, Job, Once, SharingRenderer
+from clpt.cluster.multi_resumable import MultiResumable
 from clpt.errors import DeviceError, SceneError
 from clpt.render.editing.scene_edit import MaterialKey, ShapeKey
 from clpt.render.options import RenderOptions, check_options, check_scene
-from clpt.render.pictures import Image, Pictures
+from clpt.render.pictures import Image
 from clpt.render.progress import Progress
 from clpt.render.renderer import next_range, texture_budget_of
+from clpt.render.saved_film import SavedFilm
 from clpt.render.stats import RenderStats
 from clpt.render.wavefront import adaptive
 from clpt.render.wavefront.film_state import FilmState, Ranges, join_ranges
@@ -34,6 +38,7 @@ if TYPE_CHECKING:
 
 Call = tuple[int, int, float | None]
 Calls = list[Call]
+Arrays = Mapping[str, NDArray[Any]]
 _Result = TypeVar("_Result")
 
 
@@ -55,15 +60,17 @@ class DeviceShare:
 class _Noise:
     """Adaptive sampling on the first device, with the help of the others.
 
-    base: the film before; calls: of `run` since, first, end and noise, None for all pixels.
+    base: the film before; arrays: the state then, see `Adaptive.arrays`; calls: of `run` since,
+    first, end and noise, None for all pixels.
     """
 
     adaptive: adaptive.Adaptive
     base: FilmState
     calls: Calls
+    arrays: Arrays
 
 
-class MultiRenderer(Pictures):
+class MultiRenderer(MultiResumable):
     """Renders a scene on several devices; its picture so far is available between runs.
 
     devices: "all", "gpu", or names or indexes as `clpt.device.choose_all` takes them, and
@@ -87,7 +94,7 @@ class MultiRenderer(Pictures):
         **options: Unpack[RenderOptions],
     ):
         super().__init__()
-        self._began = time.perf_counter()
+        self._start = time.perf_counter()
         check_scene(scene)
         check_options(scene, options)
         if options.pop("queue", None) is not None:
@@ -205,7 +212,7 @@ class MultiRenderer(Pictures):
                 noise = adaptive.checked(noise, self._crew.first.renderer.wavefronts[0].features)
             raised: list[BaseException] = []
             tick = self._ticker(end, progress, raised)
-            finished = False
+            finished, began = False, time.perf_counter()
             try:
                 if noise is None and self._noise is None:
                     finished = self._crew.run(self._whole_job, ((first, end),), tick)
@@ -213,6 +220,7 @@ class MultiRenderer(Pictures):
                     finished = self._run_adaptively((first, end, noise), tick)
             finally:
                 self._stop.clear()
+                self._seconds_rendered += time.perf_counter() - began
                 if self._noise is None:
                     self._taken = self._crew.ranges
                 else:
@@ -326,6 +334,25 @@ class MultiRenderer(Pictures):
 
     # ---- inside
 
+    @property
+    def _adaptive(self) -> adaptive.Adaptive | None:
+        return None if self._noise is None else self._noise.adaptive
+
+    def _go_on(self, state: FilmState, saved: SavedFilm) -> None:
+        """Take the place of what there is by a film; the first device's counts are the film's."""
+        crew = self._crew
+        crew.keeper, self._noise = None, None
+        crew.lost.clear()
+        crew.empty(worker for worker in crew.workers if worker is not crew.first)
+        crew.first.unsaved, crew.first.shows = [], True
+        for counts in crew.first.past:
+            counts.__init__()  # type: ignore[misc]
+        self._taken = state.taken
+        if saved.adaptive:
+            self._begin_adaptively(state, [], saved.adaptive)
+        else:
+            crew.saved, crew.saved_ranges = state, state.taken
+
     def _check_open(self) -> None:
         if self._closed:
             raise DeviceError("this MultiRenderer is closed; make another one")
@@ -338,6 +365,7 @@ class MultiRenderer(Pictures):
         self._crew.saved, self._crew.saved_ranges, self._crew.keeper = None, (), None
         self._crew.lost.clear()
         self._taken, self._noise = (), None
+        self._held, self._sessions, self._seconds_rendered = None, (), 0.0
 
     @property
     def _whole_job(self) -> Job:
@@ -359,7 +387,7 @@ class MultiRenderer(Pictures):
             paths, rays = sum(c.samples for c in counts), sum(c.rays for c in counts)
             now = time.perf_counter()
             if paths:
-                self._seconds.setdefault("first_sample", now - self._began)
+                self._seconds.setdefault("first_sample", now - self._start)
             if raised or self._stop.is_set() or progress is None:
                 return not raised and not self._stop.is_set()
             self._telling = True
@@ -432,7 +460,7 @@ class MultiRenderer(Pictures):
         """
         if self._noise is None:
             base = self.film_state()
-            self._begin_adaptively(base, [])
+            self._begin_adaptively(base, [], {})
         while True:
             try:
                 if not self._restart_if_lost(tick):
@@ -445,8 +473,8 @@ class MultiRenderer(Pictures):
         self._noise.calls.append(call)
         return finished
 
-    def _begin_adaptively(self, base: FilmState, calls: Calls) -> None:
-        """Begin adaptive sampling on the first device, over a film; calls: see `_Noise`."""
+    def _begin_adaptively(self, base: FilmState, calls: Calls, arrays: Arrays) -> None:
+        """Begin adaptive sampling on the first device, over a film; calls, arrays: see `_Noise`."""
         crew = self._crew
         while True:
             crew.empty(crew.workers)
@@ -455,12 +483,15 @@ class MultiRenderer(Pictures):
                 first.show(base)
                 wavefront = first.renderer.wavefronts[0]
                 begun = adaptive.Adaptive(wavefront, _CrewTracer(wavefront, self))
+                if arrays:
+                    begun.restore(arrays)
                 break
             except Exception as error:
                 crew.drop(first, error)
-        begun.skip(base.taken[-1][1] if base.taken else self._first_sample)
+        if not arrays:
+            begun.skip(base.taken[-1][1] if base.taken else self._first_sample)
         crew.keeper = first
-        self._noise = _Noise(begun, base, calls)
+        self._noise = _Noise(begun, base, calls, arrays)
 
     def _restart_if_lost(self, tick: Callable[[], bool]) -> bool:
         """Begin again where the first device has failed; return whether it was not stopped."""
@@ -470,7 +501,7 @@ class MultiRenderer(Pictures):
             return True
         crew.lost.clear()
         crew.keeper = None
-        self._begin_adaptively(noise.base, noise.calls)
+        self._begin_adaptively(noise.base, noise.calls, noise.arrays)
         return all(self._call(call, tick) for call in noise.calls)
 
     def _call(self, call: Call, tick: Callable[[], bool]) -> bool:

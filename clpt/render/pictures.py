@@ -132,6 +132,11 @@ class Pictures(DeviceOwner):
         return SpectralImage(self.image(), self.scene.film.band_centres, emissive=True)
 
     @synchronized
+    def samples_per_pixel(self) -> Image:
+        """How many samples each pixel has, (h, w) float32."""
+        return np.ascontiguousarray(self.wavefronts[0].film.picture.get()[..., 3])
+
+    @synchronized
     def layers(self) -> dict[str, Image]:
         """The values of the `aov` integrator by name, (h, w, 1 to 3) float32."""
         return {

@@ -28,8 +28,9 @@ from clpt.render.editing.scene_edit import (
 from clpt.render.locking import synchronized
 from clpt.render.lowering.scene import Lowered, lower
 from clpt.render.options import RenderOptions, check_changes, check_options, check_scene
-from clpt.render.pictures import Image, Pictures
+from clpt.render.pictures import Image
 from clpt.render.progress import Progress
+from clpt.render.resumable import Resumable
 from clpt.render.stats import RenderStats, collect
 from clpt.render.wavefront import adaptive
 from clpt.render.wavefront.film_state import FilmState, Ranges, join_ranges
@@ -48,7 +49,7 @@ MOST_SAMPLES = 2**31 - 1
 TEXTURE_SHARE = 0.5  # of a device's free memory, for bitmaps
 
 
-class Renderer(Pictures):
+class Renderer(Resumable):
     """Renders a scene; its picture so far is available at any time.
 
     device: where to render, a name or index (see clpt.device.choose), or a clpt.device.Device.
@@ -221,6 +222,7 @@ class Renderer(Pictures):
             finished = self._render_samples(first, end, noise, on_batch)
             self._taken = join_ranges(self._taken, ((first, end),))
         finally:
+            self._seconds_rendered += time.perf_counter() - start
             self._stop.clear()
         if raised:
             raise raised.pop()
@@ -281,6 +283,7 @@ class Renderer(Pictures):
         for wavefront in self.wavefronts:
             wavefront.clear()
         self._taken, self._adaptive = (), None
+        self._begin_anew()
         stream.flush()
         return stream.last
 
@@ -288,13 +291,6 @@ class Renderer(Pictures):
     def samples(self) -> int:
         """The number of the next sample: of all so far, where they began at number 0."""
         return self._taken[-1][1] if self._taken else self._first_sample
-
-    @synchronized
-    def film_state(self) -> FilmState:
-        """Return what the film holds, as whole numbers on the host; wait for it."""
-        films, bands = zip(*(one.film.words() for one in self.wavefronts), strict=True)
-        scale = float(self.wavefronts[0].paths.settings["film_scale"])
-        return FilmState(np.stack(films), bands[0], self._taken, scale)
 
     @synchronized
     def merge(self, state: FilmState) -> None:

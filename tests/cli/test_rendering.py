@@ -20,7 +20,8 @@ class Counting:
     """Takes `seconds` for a sample and asks after each."""
 
     def __init__(self, seconds: float = 0.0):
-        self.samples, self.seconds, self.passes = 0, seconds, []
+        self.first_sample = self.samples = 0
+        self.seconds, self.passes = seconds, []
         self.active = 1.0
 
     def run(self, samples, progress, noise=None):

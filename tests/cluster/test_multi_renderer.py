@@ -17,6 +17,7 @@ from clpt import device as dev
 from clpt.cluster import crew
 from clpt.device.stream import Stream
 from clpt.errors import ClusterError, DeviceError, SceneError
+from clpt.render import film_file
 from clpt.scene import Scene
 from clpt.scene.integrators import Aov, Mitchell, ParticleTracer, Vcm
 from clpt.scene.integrators import Path as PathIntegrator
@@ -327,6 +328,50 @@ def test_films_merge(scene, whole, pair):
     with clpt.MultiRenderer(scene, pair, first_sample=7) as several:
         several.run(2)
         assert several.film_state().taken == ((7, 9),)
+
+
+@pytest.mark.parametrize("kind", ["path", "light_paths", "aov"])
+@pytest.mark.parametrize("noise", [None, NOISE])
+def test_saved_films_go_on_on_one_device_and_on_several(
+    scenes, tmp_path, pair, faults, kind, noise
+):
+    if kind == "aov" and noise:
+        pytest.skip("its values are no light")
+    scene, path = small(scenes, kind), tmp_path / "a.film"
+
+    def makers():
+        return clpt.Renderer(scene), clpt.MultiRenderer(scene, pair)
+
+    with clpt.Renderer(scene) as one:
+        one.run(20, noise=noise)
+        one.run(100, noise=noise)
+        state, counts = one.film_state(), one.counts[0].samples
+    for saving in makers():
+        with saving:
+            saving.run(20, noise=noise)
+            saving.hold()
+            saving.run(7)
+            saving.save_state(tmp_path / "later.film")
+            film_file.write(path, saving.saved_film(held=True))
+        for loading in makers():
+            with loading:
+                loading.run(3)
+                loading.load_state(path)
+                assert loading.samples == 20 and loading.former_seconds > 0.0
+                loading.run(100, noise=noise)
+                assert same(loading.film_state(), state)
+                assert loading.counts[0].samples == counts
+    with clpt.MultiRenderer(scene, pair) as several:  # whose first device then fails
+        several.load_state(path)
+        several.run(5, noise=noise)
+        faults[pair[0].queue] = FailsAfter(4)
+        several.run(95, noise=noise)
+        assert same(several.film_state(), state) and len(several.devices) == 1
+        assert len(several.saved_film().sessions) == 2
+    other = with_film(scene, exposure=2.0)
+    with clpt.MultiRenderer(other, pair[1:]) as several:
+        with pytest.raises(SceneError, match="film.exposure"):
+            several.load_state(path)
 
 
 def test_updates_reach_all_devices(scene, pair):

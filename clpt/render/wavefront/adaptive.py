@@ -16,7 +16,7 @@ Light paths, where the scene has them, reach all pixels: see clpt.render.wavefro
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -109,6 +109,27 @@ class Adaptive:
         self.stop[self.stop < samples] = samples
         if self._lights is not None:
             self._lights.skip(samples)
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return the state, for `restore`: arrays by name; wait for the device."""
+        own = {
+            "next": self.next, "stop": self.stop, "measured_at": self._measured_at,
+            "variance": self._variance, "noise": np.float64(self.noise),
+            "level": np.int64(self._level), **self._meter.arrays(),
+        }  # fmt: skip
+        if self._lights is not None:
+            own |= {f"lights_{name}": array for name, array in self._lights.arrays().items()}
+        return {name: np.array(array) for name, array in own.items()}
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from a state of the same film. Raises KeyError, ValueError for another one."""
+        self.next[:], self.stop[:] = arrays["next"], arrays["stop"]
+        self._measured_at[:], self._variance[:] = arrays["measured_at"], arrays["variance"]
+        self.noise, self._level = float(arrays["noise"]), int(arrays["level"])
+        self._meter.restore(arrays)
+        if self._lights is not None:
+            own = {n.removeprefix("lights_"): a for n, a in arrays.items() if n[:7] == "lights_"}
+            self._lights.restore(own)
 
     def run(self, end: int, noise: float, on_batch: OnBatch) -> bool:
         """Add samples until the noise is below a limit, or all pixels have `end`.

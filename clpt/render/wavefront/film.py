@@ -34,11 +34,12 @@ class Film:
         features: Features,
     ):
         self.stream, self.has_bands, self._words = stream, features.bands, features.film_words
+        self._allocate = buffers.allocate
         self.size = int(settings["width"]), int(settings["height"])
         self.band_count = int(settings["bands"]) if features.bands else 0
         self._band_sums = self.band_count * features.film_groups  # of a pixel
         self.halves = int(settings["halves"])
-        self._padded_pixels = int(settings["padded_pixels"])
+        self._settings, self._padded_pixels = settings, int(settings["padded_pixels"])
         x, y = work_list.pixels(settings)
         self._inside = work_list.inside(settings)
         self._at = (y * self.size[0] + x)[self._inside]  # in a picture, of each of these
@@ -54,6 +55,7 @@ class Film:
             for sizes in (sums, images)
         )
         self._sum_bytes = sums
+        self._held: dict[str, cl.Buffer] = {}
         shape = (*self.size[::-1], 4)
         self.picture = device.DeviceArray(
             stream.queue, shape, np.float32, data=self._images["image"]
@@ -119,17 +121,27 @@ class Film:
         """Return the mean radiance in each band, (h, w, bands) float32; wait for it."""
         return self.made(kernel, self._images["band_image"], self.band_count)
 
-    def words(self) -> tuple[Words, Words]:
+    def hold(self) -> None:
+        """Enqueue a copy of what the film holds, for `words`. Raises MemoryBudgetError."""
+        if not self._held:
+            self._held = {
+                name: self._allocate(f"a copy of the {name}", sums.size, "save no films")
+                for name, sums in self.sums.items()
+            }
+        for name, copy in self._held.items():
+            self.stream.copy(copy, self.sums[name])
+
+    def words(self, *, held: bool = False) -> tuple[Words, Words]:
         """Return what the film holds, as `FilmState` has it of one film: (halves, 10 to 26, h, w)
-        uint32, and of bands (halves, sums, 3, h, w); wait for it."""
+        uint32, and of bands (halves, sums, 3, h, w); wait for it. held: what it held at `hold`."""
         width, height = self.size
+        sums = self._held if held else self.sums
         found = []
         for name, each in (("film", self._words), ("bands", SUM_WORDS * self._band_sums)):
             streams = np.zeros((self.halves * each, self._padded_pixels), np.uint32)
             if each:
-                streams = self.stream.read(self.sums[name], streams)
-            pixels = np.empty((len(streams), width * height), np.uint32)
-            pixels[:, self._at] = streams[:, self._inside]
+                streams = self.stream.read(sums[name], streams)
+            pixels = work_list.picture(self._settings, streams)
             found.append(pixels.reshape(self.halves, -1, height, width))
         film, bands = found
         return film, bands.reshape(self.halves, self._band_sums, SUM_WORDS, height, width)

@@ -17,7 +17,7 @@ colour take their n. The picture gets the larger m, which leaves less noise.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -49,6 +49,26 @@ class LightRounds:
         self._sums = self.wavefront.buffers.allocate(
             "the film of light paths that are guides", size
         )
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return the state, for `restore`: arrays by name; wait for the device."""
+        sums = np.zeros(self._sums.size // 4, np.uint32)
+        if self._guides:
+            sums = self.wavefront.stream.read(self._sums, sums)
+        return {
+            "next": np.int64(self.next), "stop": self.stop, "variance": self.variance,
+            "measured_at": self._measured_at, "guides": np.int64(self._guides),
+            "sums": sums,
+        }  # fmt: skip
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from a state of the same film."""
+        if arrays["sums"].nbytes != self._sums.size:
+            raise ValueError("the guides are of another film")
+        self.next, self._guides = int(arrays["next"]), int(arrays["guides"])
+        self.stop[:], self.variance[:] = arrays["stop"], arrays["variance"]
+        self._measured_at[:] = arrays["measured_at"]
+        self.wavefront.stream.write(self._sums, arrays["sums"])
 
     @property
     def wanted(self) -> int:

@@ -5,6 +5,7 @@ The film is cut into squares, and their pixels into the two colours of a chessbo
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -51,17 +52,31 @@ class NoiseMeter:
         self._active_cells = allocate("the cells of the film", 4 * count)
         self._noise_sums = allocate("the film's noise", 24 * self._tiles)
         streams = 2 * features.film_groups
-        previous_mean = allocate("the film's former luminance", 4 * streams * padded_pixels)
-        wavefront.stream.fill(previous_mean, 0, 0, previous_mean.size)
+        self._previous_mean = allocate("the film's former luminance", 4 * streams * padded_pixels)
+        wavefront.stream.fill(self._previous_mean, 0, 0, self._previous_mean.size)
         self._kernel = wavefront.auxiliary_kernel(
             texts, "noise", active_cells=self._active_cells, noise_sums=self._noise_sums,
-            previous_mean=previous_mean, side=SIDE, light_paths=0.0,
+            previous_mean=self._previous_mean, side=SIDE, light_paths=0.0,
         )  # fmt: skip
 
     @property
     def knows_brightness(self) -> bool:
         """Whether the camera's paths have been measured, and so how bright the picture is."""
         return self._dark is not None
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return what was measured so far, for `restore`; wait for the device."""
+        mean = np.empty(self._previous_mean.size // 4, np.float32)
+        mean = self.wavefront.stream.read(self._previous_mean, mean)
+        return {"previous_mean": mean, "dark": np.zeros(0) if self._dark is None else self._dark}
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from what was measured."""
+        mean, dark = arrays["previous_mean"], arrays["dark"]
+        if mean.nbytes != self._previous_mean.size:
+            raise ValueError("the noise was measured of another film")
+        self.wavefront.stream.write(self._previous_mean, mean)
+        self._dark = dark if len(dark) else None
 
     def measure(self, cells: NDArray[np.bool_]) -> Values:
         """Return the relative variance of what the camera's paths bring, (cells,) float64.

@@ -22,6 +22,16 @@ def inside(settings: NDArray[np.void]) -> PixelIndices:
     return _within(settings, 0)
 
 
+def picture(settings: NDArray[np.void], streams: NDArray[np.uint32]) -> NDArray[np.uint32]:
+    """Return what pixels have (n, padded_pixels), as they are stored, row by row: (n, h, w)."""
+    across, margin = int(settings["tiles_x"]), int(settings["margin"])
+    down = int(settings["padded_pixels"]) // (16 * across)
+    tiles = streams[:, : 16 * across * down].reshape(-1, down, across, 4, 4)
+    rows = tiles.swapaxes(2, 3).reshape(-1, 4 * down, 4 * across)
+    width, height = int(settings["width"]), int(settings["height"])
+    return np.ascontiguousarray(rows[:, margin : margin + height, margin : margin + width])
+
+
 def sampled(settings: NDArray[np.void]) -> PixelIndices:
     """Return the pixels that have samples, ascending: those of the picture and its margin."""
     return _within(settings, int(settings["margin"]))

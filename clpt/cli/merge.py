@@ -1,0 +1,71 @@
+"""`clpt merge`: films of different samples of one scene to one film, and to its picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .. import __version__
+from ..errors import SceneError
+from ..render import film_file
+from ..render.host_picture import HostPicture
+from ..render.saved_film import SavedFilm
+from . import checkpoints, outputs
+from .grading import grading, grading_options
+
+
+@click.command()
+@click.argument("films", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option(
+    "-o", "--output", "paths", multiple=True, required=True, type=click.Path(path_type=Path),
+    help="Where to write: .film .exr .png .hdr .pfm .npy; may be given several times.",
+)  # fmt: skip
+@grading_options
+@click.option("--quiet", is_flag=True, help="Print no warnings.")
+def merge(films: tuple[Path, ...], paths: tuple[Path, ...], quiet: bool, **graded: Any) -> None:
+    """Add FILMS, of `clpt render --samples FIRST:END -o NAME.film`, and write the picture.
+
+    The order does not matter: the film is to the bit that of one render of all samples. Checkpoints
+    (NAME.resume.exr) are films too. Films of another scene, setting or version are refused, and
+    those that have a sample that another one has. No device is needed.
+    """
+    how = grading(**graded)
+    targets = outputs.checked(paths)
+
+    def note(text: str) -> None:
+        if not quiet:
+            click.echo(text, err=True)
+
+    total = added(films)
+    for change in total.other_devices(total.sessions[0].device):
+        note(f"clpt: warning: the films are of several classes of devices: {change}")
+    made = HostPicture(total)
+    origin = total.origin.scene.values
+    stats: dict[str, str | int | float] = {
+        "software": f"clpt {__version__}",
+        "integrator": str(origin["integrator.type"]),
+        "sampler": str(origin["sampler.type"]),
+        "seed": int(origin["seed"] or 0),
+        "spp": float(made.samples_per_pixel().mean(dtype=float)),
+        "films": len(films),
+        "seconds": round(total.seconds, 3),
+    }
+    outputs.write_all(targets, made, stats, how, note)
+    note(checkpoints.summary(total))
+
+
+def added(films: tuple[Path, ...]) -> SavedFilm:
+    """Return the film of the samples of all. Raises SceneError, which names files."""
+    total = film_file.read(films[0])
+    for path in films[1:]:
+        try:
+            total = total.merged(film_file.read(path))
+        except SceneError as error:
+            if error.file is not None:
+                raise
+            others = films[0] if path is films[1] else f"those before, such as {films[0]}"
+            message = f"cannot be added to {others}: {error.message}"
+            raise SceneError(message, file=path, where=error.where) from None
+    return total

@@ -1,0 +1,245 @@
+"""Films as files, `NAME.film` and `NAME.resume.exr`: one format, exact, sealed by a checksum.
+
+A file is an OpenEXR image of several parts. The first is the picture so far, which any viewer
+opens; its attribute `clpt` says in JSON what the film is of. The others hold words as channels of
+type UINT: those of the film, one channel for each, and the state of adaptive sampling. Behind the
+image stands a seal of fixed length: SEAL, the number of bytes before it, and their SHA-256. It is
+checked before anything else is read.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import math
+import os
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, NoReturn, TypeVar
+
+import numpy as np
+import OpenEXR
+from numpy.typing import NDArray
+
+from clpt import images, output_files
+from clpt.errors import SceneError
+from clpt.render.aov_preview import viewable
+from clpt.render.host_picture import HostPicture
+from clpt.render.saved_film import Origin, PictureForm, SavedFilm, Session
+from clpt.render.wavefront.film_state import FilmState
+from clpt.scene.fingerprint import Fingerprint
+from clpt.spectra.spaces import chromaticities
+
+_Parts = Mapping[str, Mapping[str, NDArray[np.uint32]]]  # channels by name, of parts by name
+_T = TypeVar("_T")
+
+FORMAT = 1
+ATTRIBUTE = "clpt"
+SUFFIXES = (".film", ".exr")
+SEAL = b"clpt film"
+SEAL_BYTES = len(SEAL) + 8 + 32
+EXR_MAGIC = b"\x76\x2f\x31\x01"
+PIECE = 1 << 20  # bytes that are read at once
+ROW = 1024  # words of a row, of arrays that are no pictures
+HALF_MAX = 65504.0
+LOST = "it was not written to its end, or was damaged later"
+ADVICE = "use a copy, or render it again"
+
+
+def write(path: str | Path, saved: SavedFilm) -> None:
+    """Write a film, in the place of the file that is there.
+
+    Raises OSError: the former file is then as it was.
+    """
+    with output_files.replacing(path) as partial:
+        parts = [_picture(saved), *_words(saved), *_arrays(saved)]
+        try:
+            OpenEXR.File(parts).write(images.exr_name(partial))
+        except RuntimeError as error:
+            raise OSError(f"cannot be written: {error}") from error
+        with partial.open("r+b") as file:
+            size = file.seek(0, os.SEEK_END)
+            file.write(SEAL + size.to_bytes(8, "little") + _hashed(file, size))
+
+
+def read(path: str | Path) -> SavedFilm:
+    """Read a film; what `write` was given comes back to the bit.
+
+    Raises SceneError for a file that is not there, is no film, is damaged, or comes from a later
+    version of clpt.
+    """
+    return _read(Path(path), _restored)
+
+
+def read_header(path: str | Path) -> dict[str, Any]:
+    """Return what a film file says of itself, without its words. Raises as `read` does."""
+    return _read(Path(path), lambda header, parts: header, header_only=True)
+
+
+def _read(path: Path, made: Callable[[dict[str, Any], _Parts], _T], **options: bool) -> _T:
+    """What is made of a file's header and its parts, whose seal is whole. Raises SceneError."""
+    _check_seal(path)
+    try:
+        with OpenEXR.File(images.exr_name(path), separate_channels=True, **options) as file:
+            header = _header(path, file.parts[0].header.get(ATTRIBUTE))
+            parts = {
+                part.name(): {name: channel.pixels for name, channel in part.channels.items()}
+                for part in file.parts[1:]
+            }
+        return made(header, parts)
+    except SceneError:
+        raise
+    except Exception as error:  # of a sealed file that clpt does not write
+        message = str(error).splitlines()[0] if str(error) else ""
+        _fail(path, f"no readable film: {type(error).__name__}: {message}")
+
+
+def _check_seal(path: Path) -> None:
+    """Raise SceneError for a file that is not, to the bit, what was written."""
+    try:
+        with path.open("rb") as file:
+            size = file.seek(0, os.SEEK_END)
+            file.seek(0)
+            is_exr = file.read(len(EXR_MAGIC)) == EXR_MAGIC
+            file.seek(max(size - SEAL_BYTES, 0))
+            seal = file.read()
+            if not seal.startswith(SEAL) or len(seal) != SEAL_BYTES:
+                what = f"a picture without a film, or {LOST}" if is_exr else "not a film of clpt"
+                _fail(path, f"{what}: {ADVICE}")
+            length, digest = seal[len(SEAL) :][:8], seal[-32:]
+            if int.from_bytes(length, "little") != size - SEAL_BYTES:
+                _fail(path, f"its length is wrong: {LOST}: {ADVICE}")
+            if _hashed(file, size - SEAL_BYTES) != digest:
+                _fail(path, f"its checksum is wrong: it was damaged later: {ADVICE}")
+    except OSError as error:
+        _fail(path, f"cannot be read: {error.strerror}")
+
+
+def _hashed(file: Any, size: int) -> bytes:
+    """The SHA-256 of the first bytes of a file."""
+    hashed = hashlib.sha256()
+    file.seek(0)
+    while size > 0 and (piece := file.read(min(PIECE, size))):
+        hashed.update(piece)
+        size -= len(piece)
+    file.seek(0, os.SEEK_END)
+    return hashed.digest()
+
+
+def _fail(path: Path, message: str) -> NoReturn:
+    raise SceneError(message, file=path)
+
+
+def _header(path: Path, text: Any) -> dict[str, Any]:
+    """The content of the attribute. Raises SceneError."""
+    if not isinstance(text, str):
+        _fail(path, "not a film of clpt: its header does not say what it is of")
+    header = json.loads(text)
+    if header["format"] > FORMAT:
+        _fail(
+            path,
+            f"its format is {header['format']}, of clpt {header['clpt']}; this clpt reads "
+            f"{FORMAT} and older: use a newer clpt",
+        )
+    return dict(header)
+
+
+def _picture(saved: SavedFilm) -> Any:
+    """The picture so far, with the header: what viewers show."""
+    form, made = saved.form, HostPicture(saved)
+    if made.channels:
+        layers = made.layers()
+        name = "albedo" if "albedo" in layers else next(iter(layers))
+        pixels = viewable(name, layers[name])
+    else:
+        pixels = made.colours() if form.bands else made.image()
+    letters = "RGBA"[: pixels.shape[2]]
+    stored = np.clip(np.nan_to_num(pixels), -HALF_MAX, HALF_MAX).astype(np.float16)
+    channels = {n: np.ascontiguousarray(stored[..., i]) for i, n in enumerate(letters)}
+    header = {
+        **_header_of_part(saved, OpenEXR.ZIP_COMPRESSION),
+        "chromaticities": chromaticities(form.output_space),
+        ATTRIBUTE: json.dumps(_header_of(saved)),
+    }
+    return OpenEXR.Part(header, channels, "picture")
+
+
+def _header_of(saved: SavedFilm) -> dict[str, Any]:
+    state = saved.film
+    return {
+        "format": FORMAT,
+        "clpt": saved.origin.clpt,
+        "taken": [list(one) for one in state.taken],
+        "scale": state.scale,
+        "shapes": {"words": state.words.shape, "bands": state.bands.shape},
+        "scene": dict(saved.origin.scene.values),
+        "settings": dict(saved.origin.settings),
+        "kernels": saved.origin.kernels,
+        "form": dataclasses.asdict(saved.form),
+        "counts": [dict(one) for one in saved.counts],
+        "sessions": [dataclasses.asdict(one) for one in saved.sessions],
+        "adaptive": {n: [a.dtype.str, a.shape] for n, a in saved.adaptive.items()},
+    }
+
+
+def _header_of_part(saved: SavedFilm, compression: Any) -> dict[str, Any]:
+    """What every part says: those of one file have one display window."""
+    height, width = saved.film.words.shape[-2:]
+    window = np.zeros(2, np.int32), np.array([width - 1, height - 1], np.int32)
+    return {"compression": compression, "type": OpenEXR.scanlineimage, "displayWindow": window}
+
+
+def _words(saved: SavedFilm) -> Iterator[Any]:
+    """The film's words, one channel each: the parts "words", and "bands" where there are some."""
+    for name in ("words", "bands"):
+        planes = getattr(saved.film, name)
+        planes = planes.reshape(-1, *planes.shape[-2:])
+        if len(planes):
+            yield _part(saved, name, {f"{i:05d}": plane for i, plane in enumerate(planes)})
+
+
+def _arrays(saved: SavedFilm) -> Iterator[Any]:
+    """Arrays that are no pictures: a part each, whose rows have ROW words."""
+    for name, array in saved.adaptive.items():
+        words = np.ascontiguousarray(array).reshape(-1).view(np.uint32)
+        rows = np.zeros((max(-(-len(words) // ROW), 1), ROW), np.uint32)
+        rows.reshape(-1)[: len(words)] = words
+        yield _part(saved, f"adaptive.{name}", {"0": rows})
+
+
+def _part(saved: SavedFilm, name: str, channels: Mapping[str, NDArray[np.uint32]]) -> Any:
+    header = _header_of_part(saved, OpenEXR.RLE_COMPRESSION)
+    stored = {n: np.ascontiguousarray(plane, np.uint32) for n, plane in channels.items()}
+    return OpenEXR.Part(header, stored, name)
+
+
+def _restored(header: dict[str, Any], parts: _Parts) -> SavedFilm:
+    """The film that a header and the words of parts say."""
+
+    def words(name: str) -> NDArray[np.uint32]:
+        shape = tuple(header["shapes"][name])
+        if not math.prod(shape):
+            return np.zeros(shape, np.uint32)
+        planes = [parts[name][f"{i:05d}"] for i in range(math.prod(shape[:-2]))]
+        return np.stack(planes).astype(np.uint32, copy=False).reshape(shape)
+
+    def array(name: str, kind: str, shape: list[int]) -> NDArray[Any]:
+        dtype = np.dtype(kind)
+        stored = parts[f"adaptive.{name}"]["0"].reshape(-1)
+        size = math.prod(shape) * dtype.itemsize // 4
+        return stored[:size].copy().view(dtype).reshape(shape)
+
+    form = header["form"]
+    matrix = tuple(tuple(row) for row in form["to_output"])
+    taken = tuple((int(first), int(end)) for first, end in header["taken"])
+    return SavedFilm(
+        film=FilmState(words("words"), words("bands"), taken, float(header["scale"])),
+        origin=Origin(
+            Fingerprint(header["scene"]), header["settings"], header["kernels"], header["clpt"]
+        ),
+        form=PictureForm(**{**form, "to_output": matrix, "channels": tuple(form["channels"])}),
+        counts=tuple(header["counts"]),
+        sessions=tuple(Session(**one) for one in header["sessions"]),
+        adaptive={n: array(n, *about) for n, about in header["adaptive"].items()},
+    )

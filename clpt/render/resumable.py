@@ -1,0 +1,232 @@
+"""Renderers whose film can be saved, and gone on with in another process."""
+
+from __future__ import annotations
+
+import datetime
+import hashlib
+import logging
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from clpt import device as dev
+from clpt.errors import SceneError
+from clpt.render import film_file
+from clpt.render.contract import custom_materials
+from clpt.render.editing.scene_edit import resolve_device_arrays
+from clpt.render.locking import synchronized
+from clpt.render.pictures import Pictures
+from clpt.render.saved_film import Origin, PictureForm, SavedFilm, Session
+from clpt.render.wavefront.adaptive import Adaptive
+from clpt.render.wavefront.film_state import FilmState, Ranges
+from clpt.scene import Scene
+from clpt.scene.fingerprint import Fingerprint, Plain, fingerprint
+from clpt.scene.integrators import PIXELWISE
+from clpt.scene.materials import LEAVES
+from clpt.version import VERSION
+
+log = logging.getLogger(__name__)
+
+TO_OUTPUT = ("to_first", "to_second", "to_third")
+
+
+class Resumable(Pictures):
+    """Base of renderers whose film can be saved.
+
+    warnings: for people; the others are the renderer's own.
+    """
+
+    warnings: list[str]
+    _taken: Ranges
+    _first_sample: int
+    _adaptive: Adaptive | None
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._scene_read: tuple[Scene, Fingerprint] | None = None
+        self._held: dict[str, Any] | None = None
+        self._begin_anew()
+
+    def _begin_anew(self) -> None:
+        """Note that the film is empty."""
+        self._began = datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds")
+        self._seconds_rendered = 0.0
+        self._sessions: tuple[Session, ...] = ()
+        self._held = None
+
+    @property
+    def is_adaptive(self) -> bool:
+        """Whether pixels may differ in their numbers of samples."""
+        return self.scene.noise is not None
+
+    @property
+    def former_seconds(self) -> float:
+        """How long others rendered the film, before this renderer went on with it."""
+        return sum(session.seconds for session in self._sessions)
+
+    @property
+    def first_sample(self) -> int:
+        """The number of the first sample of the film, or of the first one to come."""
+        return self._taken[0][0] if self._taken else self._first_sample
+
+    @synchronized
+    def film_state(self) -> FilmState:
+        """Return what the film holds, as whole numbers on the host; wait for it."""
+        return self._film_state(self._taken, held=False)
+
+    def _film_state(self, taken: Ranges, *, held: bool) -> FilmState:
+        films, bands = zip(*(one.film.words(held=held) for one in self.wavefronts), strict=True)
+        scale = float(self.wavefronts[0].paths.settings["film_scale"])
+        return FilmState(np.stack(films), bands[0], taken, scale)
+
+    @synchronized
+    def hold(self) -> None:
+        """Keep a copy of the film on the device, as it is now, for `saved_film`.
+
+        So a render that is stopped in the middle of a `run` can be saved as it was before: without
+        samples that some pixels have and others have not. Raises MemoryBudgetError.
+        """
+        for one in self.wavefronts:
+            one.film.hold()
+        self._held = self._progress_so_far()
+
+    @synchronized
+    def saved_film(self, *, held: bool = False) -> SavedFilm:
+        """Return the film with all that it takes to go on with it; wait for the device.
+
+        held: as it was at the last `hold`. Raises SceneError for a scene that cannot be read, and
+        without a `hold`.
+        """
+        if held and self._held is None:
+            raise SceneError("no film is held; call hold() first")
+        so_far = dict(self._progress_so_far() if self._held is None or not held else self._held)
+        state = self._film_state(so_far.pop("taken"), held=held)
+        return SavedFilm(state, self.origin(), self.form, **so_far)
+
+    @synchronized
+    def origin(self) -> Origin:
+        """Return what the samples are of. Raises SceneError for a scene that cannot be read."""
+        if self._scene_read is None or self._scene_read[0] is not self.scene:
+            readable = resolve_device_arrays(self.scene, self.wavefronts[0].stream.queue)
+            self._scene_read = self.scene, fingerprint(readable)
+        first = self.wavefronts[0]
+        lowered, features = first.scene.lowered, first.features
+        settings: dict[str, Plain] = {
+            "chosen.integrator": lowered.integrator.kind,
+            "chosen.light_paths": float(lowered.settings["light_paths"]),
+            "chosen.splatting": features.filter_reach > 0,
+            "chosen.texels": int(lowered.tables["texels"].size),
+            "halves": first.film.halves == 2,
+        }
+        if type(self.scene.sampler) not in PIXELWISE:  # their points are for some number of samples
+            settings["sampler.points"] = 1 << int(lowered.settings["sample_bits"])
+        outside = [cls for cls in features.leaves if cls not in LEAVES]
+        texts = [custom_materials.text(cls).text for cls in outside]
+        digest = hashlib.sha256("\0".join([_kernels_digest(), *texts]).encode()).hexdigest()
+        return Origin(self._scene_read[1], settings, digest, VERSION)
+
+    @synchronized
+    def device_class(self) -> dict[str, Plain]:
+        """Return what decides the last bits of samples: equal classes give equal films."""
+        first, info = self.wavefronts[0], self.device.info
+        return {
+            "device": info.label,
+            "driver": f"{info.version} {info.driver}",
+            "lanes": first.lanes,
+            "layout": first.scene.strategy.layout,
+            "tree_quality": first.scene.tree_quality,
+        }
+
+    def save_state(self, path: str | Path) -> None:
+        """Write the film to a file, from which `load_state` goes on, in another process too.
+
+        Raises SceneError for a file that cannot be written: the former one is then as it was.
+        """
+        saved = self.saved_film()
+        try:
+            film_file.write(path, saved)
+        except OSError as error:
+            raise SceneError(f"cannot be written: {error}", file=path) from error
+
+    def load_state(self, path: str | Path) -> None:
+        """Go on from a file of `save_state`: what the film held before is gone.
+
+        All that follows is to the bit as if nothing had been interrupted, where the device is of
+        the class that took the samples; `warnings` tells where it is not.
+
+        Raises SceneError for a file that cannot be read, is damaged, or is of another scene, other
+        settings or other kernels: it says what differs, and nothing has changed.
+        """
+        saved = film_file.read(path)
+        try:
+            self.restore(saved)
+        except SceneError as error:
+            raise SceneError(error.message, file=path) from None
+
+    @synchronized
+    def restore(self, saved: SavedFilm) -> None:
+        """Go on from a saved film, as `load_state` does. Raises SceneError."""
+        saved.origin.check_same(self.origin())
+        own = self.film_state()
+        if (own.words.shape, own.bands.shape) != (saved.film.words.shape, saved.film.bands.shape):
+            raise SceneError("the film has another form than this scene's")
+        adaptive = None
+        if saved.adaptive:
+            adaptive = Adaptive(self.wavefronts[0])
+            try:
+                adaptive.restore(saved.adaptive)
+            except (KeyError, ValueError) as error:
+                message = f"the state of adaptive sampling does not fit: {error}"
+                raise SceneError(message) from error
+        for one, words, counts in zip(self.wavefronts, saved.film.words, saved.counts, strict=True):
+            one.set_words(words, saved.film.bands)
+            for name, number in counts.items():
+                setattr(one.counts, name, number)
+        self._begin_anew()
+        self._taken, self._adaptive, self._sessions = saved.film.taken, adaptive, saved.sessions
+        others = saved.other_devices(self.device_class())
+        if others:
+            message = "samples of several classes of devices are in one film: "
+            self.warnings.append(message + "; ".join(others))
+            log.warning("%s", self.warnings[-1])
+
+    def _progress_so_far(self) -> dict[str, Any]:
+        """What changes while samples are taken, but for the film's words."""
+        session = Session(self._began, self._seconds_rendered, VERSION, self.device_class())
+        return {
+            "taken": self._taken,
+            "counts": tuple(dict(vars(one.counts)) for one in self.wavefronts),
+            "sessions": (*self._sessions, session),
+            "adaptive": {} if self._adaptive is None else self._adaptive.arrays(),
+        }
+
+    @property
+    @synchronized
+    def form(self) -> PictureForm:
+        """How the film's words become a picture."""
+        first, film = self.wavefronts[0], self.scene.film
+        settings, features = first.paths.settings, first.features
+        return PictureForm(
+            tuple(tuple(float(v) for v in np.ravel(settings[name])[:3]) for name in TO_OUTPUT),
+            self.channels,
+            light_paths=features.light_paths,
+            weighed=features.weighed,
+            weights=features.film_weights,
+            alpha=features.alpha,
+            bands=first.film.band_count,
+            lambda_min=film.lambda_min,
+            lambda_max=film.lambda_max,
+            output_space="rec709" if self.channels else film.output_space,
+            exposure=film.exposure,
+        )
+
+
+@cache
+def _kernels_digest() -> str:
+    """The SHA-256 of all kernels' texts."""
+    folder, hashed = dev.kernels_folder(), hashlib.sha256()
+    for path in sorted(folder.rglob("*.cl")):
+        hashed.update(path.relative_to(folder).as_posix().encode() + b"\0" + path.read_bytes())
+    return hashed.hexdigest()

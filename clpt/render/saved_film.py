@@ -1,0 +1,138 @@
+"""A film with all that it takes to go on with it: what its samples are of, and what was done."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from numpy.typing import NDArray
+
+from clpt.errors import SceneError
+from clpt.render.wavefront.film_state import FilmState, Ranges
+from clpt.scene.fingerprint import Fingerprint, Plain
+
+MOST_NAMED = 8  # differences that an error names
+
+
+@dataclass(frozen=True)
+class PictureForm:
+    """How a film's words become a picture.
+
+    to_output: (3, 3), rows of the matrix from the sums to the output space; channels: of the `aov`
+    integrator; light_paths: all paths start at lights; weighed: some do, beside the camera's;
+    weights: samples serve several pixels; the others are those of `clpt.scene.Film`.
+    """
+
+    to_output: tuple[tuple[float, ...], ...]
+    channels: tuple[str, ...] = ()
+    light_paths: bool = False
+    weighed: bool = False
+    weights: bool = False
+    alpha: bool = False
+    bands: int = 0
+    lambda_min: float = 360.0
+    lambda_max: float = 830.0
+    output_space: str = "rec709"
+    exposure: float = 1.0
+
+
+@dataclass(frozen=True)
+class Session:
+    """What one process added to a film.
+
+    began: when, as ISO 8601 in UTC; seconds: that it rendered; clpt: its version; device: by a
+    label, driver, lanes of its kernels and layout of its trees: what decides the last bits.
+    """
+
+    began: str
+    seconds: float
+    clpt: str
+    device: Mapping[str, Plain]
+
+
+@dataclass(frozen=True)
+class Origin:
+    """What the samples of a film are of.
+
+    scene: as `clpt.scene.fingerprint` has it; settings: what was chosen for it, such as the
+    integrator of `auto`; kernels: the digest of their texts; clpt: the version that has them.
+    """
+
+    scene: Fingerprint
+    settings: Mapping[str, Plain]
+    kernels: str
+    clpt: str
+
+    def differences(self, other: Origin) -> list[str]:
+        """Return why the samples of another film are others, such as "seed: 0 -> 3"."""
+        found = self.scene.differences(other.scene)
+        found += Fingerprint(self.settings).differences(Fingerprint(other.settings))
+        if self.kernels != other.kernels:
+            found.append(f"kernels: of clpt {self.clpt} -> others, of clpt {other.clpt}")
+        return found
+
+    def check_same(self, other: Origin) -> None:
+        """Raise SceneError, which says what differs, if the samples of another film are others."""
+        if found := self.differences(other):
+            raise SceneError(f"the film is of something else: {differences_text(found)}")
+
+
+@dataclass(frozen=True, eq=False)
+class SavedFilm:
+    """A film, and all that it takes to go on with it, from `Renderer.saved_film`.
+
+    form: how its picture is made; counts: paths and rays of each film by name; sessions: what was
+    done; adaptive: the state of adaptive sampling, arrays by name, empty without.
+    """
+
+    film: FilmState
+    origin: Origin
+    form: PictureForm
+    counts: tuple[Mapping[str, int], ...]
+    sessions: tuple[Session, ...]
+    adaptive: Mapping[str, NDArray[Any]]
+
+    @property
+    def seconds(self) -> float:
+        """How long all sessions have rendered."""
+        return sum(session.seconds for session in self.sessions)
+
+    def other_devices(self, device: Mapping[str, Plain]) -> list[str]:
+        """Return how devices that took its samples differ from another one, perhaps nothing."""
+        named: dict[str, None] = {}
+        for session in self.sessions:
+            for name, value in session.device.items():
+                if value != device.get(name):
+                    named[f"{name}: {value} -> {device.get(name)}"] = None
+        return list(named)
+
+    def merged(self, other: SavedFilm) -> SavedFilm:
+        """Return the film of the samples of both.
+
+        Raises SceneError where they are not of the same scene, or a sample is in both.
+        """
+        self.origin.check_same(other.origin)
+        counts = tuple(
+            {name: a[name] + b[name] for name in a}
+            for a, b in zip(self.counts, other.counts, strict=True)
+        )
+        return dataclasses.replace(
+            self,
+            film=self.film.merged(other.film),
+            counts=counts,
+            sessions=(*self.sessions, *other.sessions),
+            adaptive={},
+        )
+
+
+def differences_text(differences: list[str]) -> str:
+    """Return differences for people, no more than a few."""
+    more = len(differences) - MOST_NAMED
+    return "; ".join(differences[:MOST_NAMED]) + (f"; and {more} more" if more > 0 else "")
+
+
+def ranges_text(taken: Ranges) -> str:
+    """Return ranges of samples for people, such as "0 to 1023"."""
+    return ", ".join(f"{first} to {end - 1}" for first, end in taken) or "none"
