@@ -231,6 +231,7 @@ class MultiRenderer(Pictures):
             self._check_open()
             self._on_each(lambda renderer: renderer.reset(seed=seed).wait())
             self._forget()
+            self._crew.clear_counts()
 
     def update(
         self,
@@ -258,6 +259,7 @@ class MultiRenderer(Pictures):
 
             self._on_each(change)
             self._forget()
+            self._crew.clear_counts()
 
     # ---- the film
 
