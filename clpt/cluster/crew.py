@@ -115,6 +115,12 @@ class Crew:
             except Exception as error:
                 self.drop(worker, error)
 
+    def clear_counts(self) -> None:
+        """Count from zero, but for what films on devices have."""
+        self._past = [Counts() for _ in self._past]
+        for worker in self.workers:
+            worker.past = [Counts() for _ in worker.past]
+
     def drop(self, worker: DeviceWorker, error: BaseException) -> None:
         """Leave a device out from now on."""
         with self._changed:

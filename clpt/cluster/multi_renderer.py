@@ -239,6 +239,7 @@ class MultiRenderer(MultiResumable):
             self._check_open()
             self._on_each(lambda renderer: renderer.reset(seed=seed).wait())
             self._forget()
+            self._crew.clear_counts()
 
     def update(
         self,
@@ -266,6 +267,7 @@ class MultiRenderer(MultiResumable):
 
             self._on_each(change)
             self._forget()
+            self._crew.clear_counts()
 
     # ---- the film
 

@@ -394,6 +394,7 @@ def test_updates_reach_all_devices(scene, pair):
             one.run(4)
             several.run(4)
             assert same(several.film_state(), one.film_state()), change
+            assert several.counts[0].samples == one.counts[0].samples
         several.update(transforms={several.scene.shapes[0]: moved})
         several.reset(seed=5)
         one.reset(seed=5).wait()
