@@ -347,8 +347,7 @@ class MultiRenderer(MultiResumable):
         crew.lost.clear()
         crew.empty(worker for worker in crew.workers if worker is not crew.first)
         crew.first.unsaved, crew.first.shows = [], True
-        for counts in crew.first.past:
-            counts.__init__()  # type: ignore[misc]
+        crew.clear_counts()
         self._taken = state.taken
         if saved.adaptive:
             self._begin_adaptively(state, [], saved.adaptive)

@@ -369,9 +369,9 @@ def test_saved_films_go_on_on_one_device_and_on_several(
         assert same(several.film_state(), state) and len(several.devices) == 1
         assert len(several.saved_film().sessions) == 2
     other = with_film(scene, exposure=2.0)
-    with clpt.MultiRenderer(other, pair[1:]) as several:
-        with pytest.raises(SceneError, match="film.exposure"):
-            several.load_state(path)
+    several = clpt.MultiRenderer(other, pair[1:])
+    with several, pytest.raises(SceneError, match=r"film\.exposure"):
+        several.load_state(path)
 
 
 def test_updates_reach_all_devices(scene, pair):
