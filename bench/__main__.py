@@ -35,6 +35,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "startup": (),
     "compiling": (),
     "shares": (),
+    "devices": (),
     "checkpoints": (),
     "sizes": ("--plot", str(report.RESULTS / "sizes.png")),
 }

@@ -232,6 +232,7 @@ TABLES: dict[str, Callable[[Sequence[Row]], str]] = {
     "embedding": plain,
     "soak": plain,
     "beside": plain,
+    "devices": plain,
     "startup": startup,
     "compiling": plain,
     "traversal": plain,

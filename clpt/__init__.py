@@ -8,6 +8,7 @@
 
 import logging
 
+from clpt.cluster.multi_renderer import MultiRenderer
 from clpt.colour.view import View
 from clpt.errors import (
     ClptError,
@@ -47,6 +48,7 @@ __all__ = [
     "InstancedAccel",
     "KernelBuildError",
     "MemoryBudgetError",
+    "MultiRenderer",
     "Progress",
     "RenderOptions",
     "Renderer",

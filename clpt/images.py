@@ -114,7 +114,8 @@ def write(
 
     .exr: half or float, with attributes from `metadata` and further `layers`, name -> (h, w) as
     the channel of that name, or (h, w, 3) as its .R, .G, .B. .png: sRGB transfer, 8 bit, scaled by
-    2^exposure; NaN is black there, values beyond [0, 1] are clipped. .hdr, .pfm, .npy: as it is.
+    2^exposure, with texts from `metadata`; NaN is black there, values beyond [0, 1] are clipped.
+    .hdr, .pfm, .npy: as it is.
     space: of the colours, see clpt.spectra.spaces; an .exr states it by its chromaticities, a .png
     is converted to sRGB, white to white. tone: of a .png, see clpt.colour.tones; view: of a .png,
     a `clpt.View` of OpenColorIO, in the place of tone and sRGB transfer.
@@ -134,7 +135,8 @@ def write(
         if suffix == ".exr":
             _write_exr(path, pixels, half, {**stated, **(metadata or {})}, layers or {})
         elif suffix == ".png":
-            write_stored(path, to_codes(_to_rec709(pixels, space), exposure, tone, view))
+            codes = to_codes(_to_rec709(pixels, space), exposure, tone, view)
+            output_files.write(path, png(codes, metadata))
         elif suffix == ".hdr":
             _write_hdr(path, pixels)
         elif suffix == ".pfm":
@@ -172,14 +174,25 @@ def write_channels(
         OpenEXR.File({**metadata, **header}, dict(channels)).write(exr_name(partial))
 
 
-def png(values: NDArray[np.uint8]) -> bytes:
-    """A .png file of (h, w) or (h, w, 1, 3 or 4), stored as they are."""
+def png(values: NDArray[np.uint8], metadata: Metadata | None = None) -> bytes:
+    """A .png file of (h, w) or (h, w, 1, 3 or 4), stored as they are; metadata: its texts."""
+    from PIL import Image
+    from PIL.PngImagePlugin import PngInfo
+
+    file, texts = BytesIO(), PngInfo()
+    for name, value in (metadata or {}).items():
+        texts.add_itxt(name, str(value))
+    grey = values.ndim == 3 and values.shape[2] == 1
+    Image.fromarray(values[..., 0] if grey else values).save(file, "png", pnginfo=texts)
+    return file.getvalue()
+
+
+def png_text(path: Path) -> dict[str, str]:
+    """The texts of a .png by name."""
     from PIL import Image
 
-    file = BytesIO()
-    grey = values.ndim == 3 and values.shape[2] == 1
-    Image.fromarray(values[..., 0] if grey else values).save(file, "png")
-    return file.getvalue()
+    with Image.open(path) as image:
+        return {name: str(text) for name, text in getattr(image, "text", {}).items()}
 
 
 def check_output(path: str | Path) -> Path:

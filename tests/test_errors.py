@@ -19,6 +19,7 @@ MADE = {
     errors.DeviceError: errors.DeviceError("no device"),
     errors.MemoryBudgetError: errors.MemoryBudgetError("film", 2**30, 2**20, "make it smaller"),
     errors.KernelBuildError: errors.KernelBuildError("shade", "shade.cl", 3, "error: x", "kept.cl"),
+    errors.ClusterError: errors.ClusterError("no device is left"),
 }
 
 

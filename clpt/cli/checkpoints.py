@@ -11,12 +11,12 @@ from pathlib import Path
 from .. import output_files
 from ..errors import MemoryBudgetError, SceneError
 from ..render import film_file
-from ..render.renderer import Renderer
 from ..render.saved_film import SavedFilm, differences_text, ranges_text
 from ..scene import Scene
 from ..scene.fingerprint import fingerprint
 from . import outputs
 from .display import clock
+from .scene_options import AnyRenderer
 
 SUFFIX = ".resume.exr"
 PERIOD = 300.0  # seconds from one checkpoint to the next
@@ -86,7 +86,7 @@ def check(saved: SavedFilm, path: Path, plan: Scene, first: int, end: int | None
         raise SceneError(message, file=path)
 
 
-def go_on(renderer: Renderer, saved: SavedFilm, path: Path, note: Callable[[str], None]) -> None:
+def go_on(renderer: AnyRenderer, saved: SavedFilm, path: Path, note: Callable[[str], None]) -> None:
     """Let a renderer go on from a film, and say so. Raises SceneError, which says what differs."""
     known = len(renderer.warnings)
     refuse(saved.origin.differences(renderer.origin()), path)
@@ -108,7 +108,7 @@ class Checkpoints:
 
     def __init__(
         self,
-        renderer: Renderer,
+        renderer: AnyRenderer,
         path: Path,
         period: float | None,
         resumed: bool,

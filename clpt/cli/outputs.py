@@ -15,14 +15,14 @@ from ..errors import SceneError
 from ..render import film_file
 from ..render.host_picture import HostPicture
 from ..render.pictures import Image
-from ..render.renderer import Renderer
 from ..scene import Scene
 from ..scene.integrators import Aov
 from ..spectra.spaces import chromaticities
 from .grading import Grading
+from .scene_options import AnyRenderer
 
 FILM = ".film"  # suffix of films, which hold all that a picture was made of
-Source = Renderer | HostPicture  # what pictures are taken of
+Source = AnyRenderer | HostPicture  # what pictures are taken of
 
 AOV_FORMATS = (".exr", ".png", FILM)
 BAND_FORMATS = (".npy", ".exr")  # with all bands; others get the colours
@@ -56,13 +56,13 @@ def check_contents(paths: tuple[Path, ...], scene: Scene) -> None:
             raise SceneError(f"the integrator aov is written to {formats}", file=path)
 
 
-def metadata(renderer: Renderer, scene: Path, seconds: float) -> dict[str, str | int | float]:
+def metadata(renderer: AnyRenderer, scene: Path, seconds: float) -> dict[str, str | int | float]:
     """Return the metadata of an .exr: how it was made. spp is the mean over all pixels.
 
     seconds: of this session; those of former ones are added.
     """
     plan = renderer.scene
-    samples = max(wavefront.counts.samples for wavefront in renderer.wavefronts)
+    samples = max(counts.samples for counts in renderer.counts)
     return {
         "software": f"clpt {__version__}",
         "scene": os.fsencode(scene).decode("utf-8", "replace"),
@@ -71,7 +71,7 @@ def metadata(renderer: Renderer, scene: Path, seconds: float) -> dict[str, str |
         "sampler": plan.sampler.kind,
         "seed": plan.seed,
         "spp": samples / renderer.wavefronts[0].paths.pixels,
-        "device": renderer.device.info.label,
+        "device": " and ".join(on.info.label for on in renderer.devices),
         "seconds": round(seconds + renderer.former_seconds, 3),
     }
 
@@ -131,7 +131,7 @@ def write(
             exposure=grading.exposure, tone=grading.tone, view=grading.view,
         )  # fmt: skip
     elif path.suffix.lower() == ".png":
-        images.write(path, sheet(source.layers()), exposure=grading.exposure)
+        images.write(path, sheet(source.layers()), metadata=stats, exposure=grading.exposure)
     else:
         _write_layers(path, source.layers(), stats)
 

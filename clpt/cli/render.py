@@ -15,6 +15,8 @@ from ..render.renderer import MOST_SAMPLES
 from ..scene import Scene
 from . import checkpoints, outputs, report
 from .display import display as display_of
+from .frame_values import Frames
+from .frames import render_frames
 from .grading import grading, grading_options
 from .rendering import render_samples
 from .scene_options import open_renderer, scene_options
@@ -92,6 +94,15 @@ class Period(Duration):
     "it is there]",
 )
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), help="Seed of the random numbers.")
+@click.option(
+    "--frames", type=Frames(),
+    help="Render an animation: 1:240, with the last one. Complete frames stay.",
+)  # fmt: skip
+@click.option(
+    "--fps", type=click.FloatRange(0.0, min_open=True), default=24.0, show_default=True,
+    help="Frames a second, of {time} and of the video.",
+)  # fmt: skip
+@click.option("--video", type=click.Path(path_type=Path), help="Write the frames as .mp4 too.")
 @scene_options
 @grading_options
 @verbose_option("Print memory, trees, programs and stages; log more, twice for everything.")
@@ -100,6 +111,9 @@ def render(
     scene: Path,
     paths: tuple[Path, ...],
     limit: float | None,
+    frames: range | None,
+    fps: float,
+    video: Path | None,
     numbers: tuple[int, int] | None,
     period: float | None,
     resume: bool | None,
@@ -122,8 +136,22 @@ def render(
 
     A render with checkpoints goes on where it was saved, to the bit, also with more samples; with
     another scene, setting or version it says what differs, and ends.
+
+    With --frames every frame gets files of its own: name.0001.exr, or what #### or %04d in -o says.
+    -D values may have {frame}, {time} in seconds, and arithmetic of them such as {360*frame/240};
+    SCENE may be scene.####.json. Frames that are complete, and of the same scene and options, are
+    not rendered again. A frame is a device's; --time is that of each.
     """
     graded = grading(exposure=exposure, tone=tone, view=view, display=display, look=look, ocio=ocio)
+    if frames is not None:
+        if numbers or period is not None or resume is not None:
+            raise click.UsageError("frames go on by themselves: leave out what saves one picture")
+        return render_frames(
+            scene, paths, frames, fps, video, graded, limit, display_of(quiet, None),
+            profiling=bool(verbose), **options,
+        )  # fmt: skip
+    if video is not None:
+        raise click.UsageError("--video needs --frames")
     targets = outputs.checked(paths or outputs.default(scene))
     if numbers and (options["spp"] or options["noise"]):
         raise click.UsageError("--samples says how many there are; leave out --spp and --noise")
@@ -168,15 +196,16 @@ def render(
     share = float(stats["spp"])
     if share < 1.0:
         shown.note(f"clpt: warning: only {share:.1%} of the pixels have a sample; others are black")
-    rejected = sum(wavefront.counts.rejected for wavefront in renderer.wavefronts)
+    rejected = sum(counts.rejected for counts in renderer.counts)
     if rejected:
         shown.note(
             f"clpt: warning: {rejected} samples were not finite, or too bright, and count as black"
         )
-    if any(wavefront.counts.full for wavefront in renderer.wavefronts):
+    if any(counts.full for counts in renderer.counts):
         shown.note("clpt: warning: pixels are too bright for the film: lower film.exposure")
     if verbose:
         report.after(renderer)
-    if stopped and renderer.device.compilers is not None:
-        renderer.device.compilers.kill()
+    for on in renderer.devices:
+        if stopped and on.compilers is not None:
+            on.compilers.kill()
     return STATUS + stopped[0] if stopped else 0

@@ -8,14 +8,15 @@ import time
 from collections.abc import Callable, Sequence
 
 from ..render.progress import Progress
-from ..render.renderer import MOST_SAMPLES, Renderer
+from ..render.renderer import MOST_SAMPLES
+from .scene_options import AnyRenderer
 
 PASS_SECONDS = 5.0  # at the end of a pass few paths are left: long passes make that rare
 GROWTH = 3  # times what has been rendered so far
 
 
 def render_samples(
-    renderer: Renderer,
+    renderer: AnyRenderer,
     end: int | None,
     limit: float | None,
     show: Callable[[Progress], None],

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import click
 
-from ..render.renderer import Renderer
+from ..cluster.multi_renderer import MultiRenderer
+from .scene_options import AnyRenderer
 
 
-def before(renderer: Renderer, loading: float) -> None:
+def before(renderer: AnyRenderer, loading: float) -> None:
     """Print what was made of the scene, and the time; loading: seconds for its file."""
     first, stats = renderer.wavefronts[0], renderer.stats
-    _line("device", renderer.device.info.label)
+    for on in renderer.devices:
+        _line("device", on.info.label)
     parts = [f"{stats.triangles:,} triangles"]
     if stats.instances:
         seen = f"{stats.triangles_instanced:,} triangles seen"
@@ -45,8 +47,12 @@ def before(renderer: Renderer, loading: float) -> None:
         )
 
 
-def after(renderer: Renderer) -> None:
-    """Print the time of the first sample and of each stage."""
+def after(renderer: AnyRenderer) -> None:
+    """Print the time of the first sample, what each device did, and each stage of the first."""
+    if isinstance(renderer, MultiRenderer):
+        for one in renderer.shares:
+            lost = f", failed: {one.failure}" if one.failure else ""
+            _line(f"share {one.share:.1%}", f"{one.rate * 1e-6:.3g} Mpaths/s, {one.name}{lost}")
     _line("seconds until a sample", f"{renderer.stats.seconds.get('first_sample', 0.0):.2f}")
     if renderer.scene.noise is not None:
         samples = renderer.film.get()[..., 3]

@@ -11,12 +11,13 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import Any, TypeAlias, TypeVar, get_args
 
 import click
 
 from .. import device as dev
 from ..bvh import LAYOUTS, Quality
+from ..cluster.multi_renderer import MultiRenderer
 from ..formats import load
 from ..formats.missing import Missing
 from ..render.lowering.checks import check
@@ -31,6 +32,7 @@ from .scene_variables import scene_variables
 
 LARGEST = 65536  # pixels of a side
 
+AnyRenderer: TypeAlias = Renderer | MultiRenderer
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 
@@ -97,7 +99,10 @@ _OPTIONS = (
         "--mode", type=click.Choice(["spectral", "rgb"]), help="Whether light is spectra or RGB."
     ),
     click.option("--size", type=Size(), help="Size of the picture."),
-    click.option("--device", metavar="NAME-OR-INDEX", help="Where to render: see `clpt devices`."),
+    click.option(
+        "--device", metavar="NAME-OR-INDEX",
+        help="Where to render, see `clpt devices`: one, or 0,2, all, gpu (all GPUs).",
+    ),
     click.option("--threads", type=click.IntRange(1), help="Cores of a CPU to use, at most."),
     click.option(
         "--bvh", "layout", type=click.Choice([*LAYOUTS]),
@@ -181,7 +186,7 @@ def open_renderer(
     texture_budget: int | None,
     missing_textures: Missing,
     **changes: Any,
-) -> tuple[Renderer, float]:
+) -> tuple[AnyRenderer, float]:
     """Return a renderer of a scene file, and the seconds that the file took.
 
     resources: get the processes that compile beside this one; accept: called with the scene, before
@@ -190,7 +195,7 @@ def open_renderer(
     """
     began = time.perf_counter()
     with ThreadPoolExecutor(max_workers=1) as beside:
-        chosen = beside.submit(dev.choose, device, profiling=profiling, threads=threads)
+        chosen = beside.submit(choose_devices, device, profiling=profiling, threads=threads)
         with shown.loading(scene.name) as tell:
             loaded = load(scene, progress=tell, missing_textures=missing_textures, **variables)
             plan = changed(loaded, **changes)
@@ -198,20 +203,45 @@ def open_renderer(
         if accept is not None:
             accept(plan)
         check(plan)
-        on = chosen.result()
-    spare = min(dev.spare_cores(), (threads or on.info.compute_units) - 1)
-    if spare and on.info.compiles_singly:
-        on.compilers = resources.enter_context(dev.Compilers(spare, wait_for_kept=keep))
+        devices = chosen.result()
+    share_compilers(devices, threads, resources, keep=keep)
     for warning in plan.warnings:
         shown.note(f"clpt: warning: {warning}")
-    with shown.phase(f"building kernels for {on.info.name}"):
-        renderer = Renderer(
-            plan, on, texture_budget=texture_budget, layout=layout, tree_quality=tree_quality,
-            first_sample=first_sample,
-        )  # fmt: skip
+    made: dict[str, Any] = {
+        "texture_budget": texture_budget, "layout": layout, "tree_quality": tree_quality,
+        "first_sample": first_sample,
+    }  # fmt: skip
+    with shown.phase(f"building kernels for {' and '.join(on.info.name for on in devices)}"):
+        renderer = new_renderer(plan, devices, **made)
     for warning in renderer.warnings:
         shown.note(f"clpt: warning: {warning}")
     return renderer, loading
+
+
+def new_renderer(plan: Scene, devices: list[dev.Device], **made: Any) -> AnyRenderer:
+    """Return a renderer on one device, or on several."""
+    if len(devices) > 1:
+        return MultiRenderer(plan, devices, **made)
+    return Renderer(plan, devices[0], **made)
+
+
+def choose_devices(which: str | None, *, profiling: bool, threads: int | None) -> list[dev.Device]:
+    """Open what --device names."""
+    if which is not None and dev.names_several(which):
+        return dev.choose_all(which, profiling=profiling, threads=threads)
+    return [dev.choose(which, profiling=profiling, threads=threads)]
+
+
+def share_compilers(
+    devices: list[dev.Device], threads: int | None, resources: ExitStack, *, keep: bool = False
+) -> None:
+    """Let other processes compile for devices whose driver compiles one text at a time."""
+    slow = [on for on in devices if on.info.compiles_singly]
+    spare = min([dev.spare_cores(), *((threads or on.info.compute_units) - 1 for on in slow)])
+    if slow and spare > 0:
+        compilers = resources.enter_context(dev.Compilers(spare, wait_for_kept=keep))
+        for on in slow:
+            on.compilers = compilers
 
 
 def changed(

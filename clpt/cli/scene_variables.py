@@ -33,5 +33,5 @@ scene_variables = click.option(
     multiple=True,
     metavar="NAME=VALUE",
     callback=_parse,
-    help="Set a $name of an .xml; of glTF camera, scene or time.",
+    help="Set a $name of an .xml; of glTF camera, scene or time. See --frames for {frame}.",
 )

@@ -31,9 +31,10 @@ def warm(scenes: tuple[Path, ...], verbose: int, quiet: bool, **options: Any) ->
             renderer, loading = open_renderer(scene, shown, resources, keep=True, **options)
             with shown.phase("compiling for the first samples"):
                 renderer.prepare()
-        builds, seconds = renderer.device.builds, time.perf_counter() - began
+        builds, seconds = [on.builds for on in renderer.devices], time.perf_counter() - began
+        programs, found = sum(b.programs for b in builds), sum(b.cached for b in builds)
         click.echo(
-            f"{scene}: {builds.programs} programs, {builds.cached} of them found, in {seconds:.1f}"
+            f"{scene}: {programs} programs, {found} of them found, in {seconds:.1f}"
             f" s; the scene took {loading:.1f} s of it"
         )
         renderer.close()

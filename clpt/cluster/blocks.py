@@ -15,9 +15,10 @@ from clpt.errors import ClusterError
 from clpt.render.wavefront.film_state import Ranges, join_ranges
 
 GROWTH = 3  # times the size of a worker's last block
+LEAST = 0.1  # of the seconds that a block should take: a smaller one costs more than it helps
 LAST_SHARE = 0.5  # of what a worker's rate lets it do of all that is left: blocks shrink at the end
 PATIENCE = 1.5  # times what a block should take, after which another worker begins it too
-COPIES = 2  # of a block at a time, at most
+COPIES = 2  # of a block at a time, at most, where films of a block can be dropped
 MOST_FAILURES = 3  # of a block, before the render ends
 MEMORY = 0.5  # part of the last block in a worker's rate
 
@@ -84,15 +85,24 @@ class Blocks:
     taken: ranges that are done; end: the number after the last sample, which `extend` may raise;
     seconds: what a block should take; check_every: of the blocks, one in so many is done by two
     workers and compared, beside the first block of each worker that has an equal; 0: none.
+    copies: of a block that workers do at a time, at most; 1 where a film cannot be dropped.
 
     counts of what went wrong: lost (blocks of workers that are gone), repeated (blocks that a
     second worker began since the first was slow), dropped (films that were there already).
     refused: why, by worker.
     """
 
-    def __init__(self, end: int, taken: Ranges = (), *, seconds: float = 1.0, check_every: int = 0):
+    def __init__(
+        self,
+        end: int,
+        taken: Ranges = (),
+        *,
+        seconds: float = 1.0,
+        check_every: int = 0,
+        copies: int = COPIES,
+    ):
         self.taken, self.end = taken, end
-        self.seconds, self.check_every = seconds, check_every
+        self.seconds, self.check_every, self.copies = seconds, check_every, copies
         self.workers: dict[Worker, WorkerRecord] = {}
         self.refused: dict[Worker, str] = {}
         self.lost = self.repeated = self.dropped = 0
@@ -243,7 +253,7 @@ class Blocks:
         return {name for name, record in self.workers.items() if record.kind == kind}
 
     def _new(self, worker: Worker) -> _Flight | None:
-        if not self._free:
+        if not self._free or self._leaves_to_others(self.workers[worker]):
             return None
         first, end = self._free[0]
         size = min(self._size(self.workers[worker]), end - first)
@@ -254,15 +264,22 @@ class Blocks:
         self._choose_compared(flight, worker)
         return flight
 
+    def _leaves_to_others(self, record: WorkerRecord) -> bool:
+        """Whether others do all that is left before this worker does one sample.
+
+        Only where nobody would begin the block that it takes a second time.
+        """
+        left, others = sum(end - first for first, end in self._free), self.rate - record.rate
+        return self.copies == 1 and record.rate > 0.0 and left * record.rate < others
+
     def _size(self, record: WorkerRecord) -> int:
         """How many samples the next block of a worker has."""
         if not record.rate:
             return 1
         left = sum(end - first for first, end in self._free)
         share = LAST_SHARE * left * record.rate / self.rate
-        return max(
-            1, min(GROWTH * max(record.size, 1), int(self.seconds * record.rate), int(share))
-        )
+        usual = self.seconds * record.rate
+        return max(1, min(GROWTH * max(record.size, 1), int(usual), int(max(share, LEAST * usual))))
 
     def _slow(self, worker: Worker, now: float) -> _Flight | None:
         """The block that is longest on its way at another worker, if that is slow with it."""
@@ -270,7 +287,7 @@ class Blocks:
         waiting = [
             f for f in self._flights.values()
             if f.since and worker not in f.since and worker not in f.films
-            and len(f.since) < COPIES and not f.compared and worker not in f.failed_at
+            and len(f.since) < self.copies and not f.compared and worker not in f.failed_at
         ]  # fmt: skip
         if not waiting or not record.rate:
             return None

@@ -4,7 +4,7 @@ from .array import DeviceArray, supersede
 from .buffers import Buffers, host_buffer
 from .building import build, build_all, compile_ahead, link
 from .compilers import Compilers, spare_cores
-from .context import Device, DeviceInfo, choose, devices
+from .context import Device, DeviceInfo, choose, choose_all, devices, names_several
 from .program import Argument, BoundKernel, Kernel, Program
 from .refusals import refused, wait
 from .source import Part, Source, Virtual, assemble, kernels_folder
@@ -32,11 +32,13 @@ __all__ = [
     "build",
     "build_all",
     "choose",
+    "choose_all",
     "compile_ahead",
     "devices",
     "host_buffer",
     "kernels_folder",
     "link",
+    "names_several",
     "refused",
     "spare_cores",
     "supersede",

@@ -7,9 +7,10 @@ import functools
 import logging
 import os
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import pyopencl as cl
@@ -22,6 +23,7 @@ from .compilers import Compilers
 log = logging.getLogger(__name__)
 
 ENVIRONMENT = "CLPT_DEVICE"
+GROUPS = ("all", "gpu")  # of devices, for `choose_all`
 _ORDER = ("gpu", "accelerator", "cpu")
 _TRIAL = "__kernel void trial(__global uint *out) { out[get_global_id(0)] = 7u; }"
 
@@ -188,6 +190,68 @@ def choose(
     log.info("%s: %s", choice.info.label, choice.reason)
     info = choice.info if threads is None else _limited(choice.info, threads)
     return Device.open(info, profiling=profiling, context=_first(info).context)
+
+
+def choose_all(
+    which: str | Iterable[Device | str | int] = "all",
+    *,
+    profiling: bool = False,
+    threads: int | None = None,
+) -> list[Device]:
+    """Open several devices.
+
+    which: "all", where of the runtimes of one CPU the fastest is taken; "gpu", all GPUs; or names
+    or indexes as `choose` takes them, a sequence, or a text with commas such as "0,2". Devices that
+    are open already stay as they are. threads: of each of those that are CPUs.
+
+    Raises DeviceError as `choose` does, where a device is named twice, and where there is none.
+    """
+    if isinstance(which, str) and which.strip().casefold() in GROUPS:
+        named: list[Any] = list(_group(which.strip().casefold()))
+    else:
+        parts = which.split(",") if isinstance(which, str) else which
+        named = [one if isinstance(one, Device) else selection(one).info for one in parts]
+    if not named:
+        raise DeviceError("give at least one device")
+    infos = [one for one in named if isinstance(one, DeviceInfo)]
+    for info in infos:
+        if infos.count(info) > 1:
+            raise DeviceError(f"{info.label} is named twice")
+    if threads is not None and not any(info.is_cpu for info in infos):
+        raise DeviceError("threads are of a CPU that is chosen here, and there is none")
+    opened = []
+    for one in named:
+        if isinstance(one, DeviceInfo):
+            info = _limited(one, threads) if threads is not None and one.is_cpu else one
+            log.info("%s: one of several devices", info.label)
+            one = Device.open(info, profiling=profiling, context=_first(info).context)
+        opened.append(one)
+    return opened
+
+
+def names_several(which: str | None) -> bool:
+    """Whether a text is for `choose_all`, and not for `choose`."""
+    return which is not None and ("," in which or which.strip().casefold() in GROUPS)
+
+
+def _group(name: str) -> Iterator[DeviceInfo]:
+    """All devices, or all GPUs, that work. Raises DeviceError where there is none."""
+    found, taken = by_preference(devices()), 0
+    processors = [info for info in found if info.is_cpu]
+    best = _by_speed(processors)[0][0] if processors and name != "gpu" else None
+    for info in found:
+        slower = best is not None and info.platform != best.platform and _same_processor(info, best)
+        if slower or (name == "gpu" and info.kind != "gpu"):
+            continue
+        failure = None if _key(info) in _opened else trial(info)
+        if failure is None:
+            taken += 1
+            yield info
+        else:
+            log.warning("%s is passed over: %s", info.label, failure)
+    if not taken:
+        what = "GPU" if name == "gpu" else "OpenCL device"
+        raise DeviceError(f"no {what} works; there is {_listing(tuple(found)) or 'none'}")
 
 
 def selection(which: str | int | None = None) -> Choice:

@@ -18,6 +18,7 @@ from clpt.render.editing import parameter_patch, rebuild
 from clpt.render.editing.moving import Moving
 from clpt.render.editing.scene_edit import (
     MaterialKey,
+    Replacements,
     ShapeKey,
     Successors,
     edit_scene,
@@ -25,7 +26,7 @@ from clpt.render.editing.scene_edit import (
     resolve_device_arrays,
 )
 from clpt.render.locking import synchronized
-from clpt.render.lowering.scene import lower
+from clpt.render.lowering.scene import Lowered, lower
 from clpt.render.options import RenderOptions, check_changes, check_options, check_scene
 from clpt.render.pictures import Image
 from clpt.render.progress import Progress
@@ -33,7 +34,7 @@ from clpt.render.resumable import Resumable
 from clpt.render.stats import RenderStats, collect
 from clpt.render.wavefront import adaptive
 from clpt.render.wavefront.film_state import FilmState, Ranges, join_ranges
-from clpt.render.wavefront.wavefront import Wavefront
+from clpt.render.wavefront.wavefront import Counts, Wavefront
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
 from clpt.scene.integrators import Aov
@@ -92,9 +93,9 @@ class Renderer(Resumable):
         before = device.builds.programs, device.builds.cached
         texture_budget = options.get("texture_budget")
         if texture_budget is None:
-            texture_budget = _texture_budget(device)
+            texture_budget = texture_budget_of(device)
         self._texture_budget, self._successors = texture_budget, Successors()
-        lowered = lower(resolve_device_arrays(scene, device.queue), texture_budget)
+        lowered = self._lower(scene)
         self._seconds = {"lower": time.perf_counter() - self._start}
         first = Wavefront.create(
             device,
@@ -141,7 +142,7 @@ class Renderer(Resumable):
 
         Raises SceneError for a number that is none, DeviceError if the driver refuses.
         """
-        first, end = self._next_range(samples)
+        first, end = next_range(self.samples, samples)
         stream = self.wavefronts[0].stream
         stream.after(wait_for)
         for wavefront in self.wavefronts:
@@ -194,11 +195,11 @@ class Renderer(Resumable):
         samples.
         """
         start = time.perf_counter()
-        first, end = self._next_range(samples)
+        first, end = next_range(self.samples, samples)
         raised: list[BaseException] = []
 
         def on_batch(_: Any) -> bool:
-            counts = [w.counts for w in self.wavefronts]
+            counts = self.counts
             paths = sum(c.samples for c in counts)
             if paths:
                 self._seconds.setdefault("first_sample", time.perf_counter() - self._start)
@@ -241,6 +242,16 @@ class Renderer(Resumable):
             self._adaptive = adaptive.Adaptive(self.wavefronts[0])
             self._adaptive.skip(first)
         return self._adaptive.run(end, noise, on_batch)
+
+    @property
+    def devices(self) -> tuple[dev.Device, ...]:
+        """Where it renders: its device."""
+        return (self.device,)
+
+    @property
+    def counts(self) -> tuple[Counts, ...]:
+        """What has happened so far, of each film: one, or one for each channel of `aov`."""
+        return tuple(wavefront.counts for wavefront in self.wavefronts)
 
     @property
     def active(self) -> float:
@@ -306,11 +317,6 @@ class Renderer(Resumable):
         if first.film.halves != 2:
             raise SceneError("even and odd samples are not kept apart; give Renderer halves=True")
         return first.half(0), first.half(1)
-
-    def _next_range(self, samples: int) -> tuple[int, int]:
-        """The numbers of the next samples, first and end. Raises SceneError."""
-        first = self.samples
-        return first, _sample_number(first + _whole(samples))
 
     def close(self) -> None:
         """Give the device's memory back; the renderer is of no use afterwards.
@@ -379,7 +385,7 @@ class Renderer(Resumable):
         new = self.scene if scene is None else scene
         replaced = {} if scene is None else match_replacements(self.scene, new)
         if materials or transforms or vertices:
-            new, more = edit_scene(new, self._successors, materials, transforms, vertices)
+            new, more = self._edit(new, materials, transforms, vertices)
             replaced |= more
         if camera is not None:
             new = dataclasses.replace(new, camera=camera)
@@ -390,11 +396,26 @@ class Renderer(Resumable):
         self._successors.note(replaced)
         return self.reset()
 
+    def _lower(self, scene: Scene, former: Lowered | None = None) -> Lowered:
+        """Return the tables of a scene; former: of the scene before it."""
+        readable = resolve_device_arrays(scene, self.device.queue)
+        return lower(readable, self._texture_budget, former)
+
+    def _edit(
+        self,
+        scene: Scene,
+        materials: Mapping[MaterialKey, Material] | None,
+        transforms: Mapping[ShapeKey, Any] | None,
+        vertices: Mapping[ShapeKey, Any] | None,
+    ) -> tuple[Scene, Replacements]:
+        """Return a scene with these changes, and what stands for what; see `edit_scene`."""
+        return edit_scene(scene, self._successors, materials, transforms, vertices)
+
     def _move(self, transforms: Mapping[ShapeKey, Any], vertices: Mapping[ShapeKey, Any]) -> bool:
         """Move shapes on the device; return whether they could."""
         if self._moving is None:
             self._moving = Moving(self.wavefronts[0].scene, self.scene)
-        moved, replaced = edit_scene(self.scene, self._successors, None, transforms, vertices)
+        moved, replaced = self._edit(self.scene, None, transforms, vertices)
         refusal = self._moving.move(self.scene, replaced)
         if refusal is not None:
             log.debug("shapes cannot move on the device: %s", refusal)
@@ -420,8 +441,7 @@ class Renderer(Resumable):
         for event in events:
             dev.wait(event)
         first = self.wavefronts[0]
-        readable = resolve_device_arrays(scene, first.stream.queue)
-        lowered = lower(readable, self._texture_budget, first.scene.lowered)
+        lowered = self._lower(scene, first.scene.lowered)
         rebuild.take(self.wavefronts, lowered, refit)
         self._moving = None
         self.warnings = list(lowered.warnings)
@@ -431,6 +451,11 @@ class Renderer(Resumable):
     def stats(self) -> RenderStats:
         """What the render took so far: numbers of things, bytes by table and tree, seconds."""
         return collect(self.wavefronts, *self._built, dict(self._seconds))
+
+
+def next_range(first: int, samples: int) -> tuple[int, int]:
+    """Return the numbers, first and end, of so many samples from the first. Raises SceneError."""
+    return first, _sample_number(first + _whole(samples))
 
 
 def _sample_number(number: int) -> int:
@@ -447,8 +472,8 @@ def _whole(samples: int) -> int:
     return int(samples)
 
 
-def _texture_budget(device: dev.Device) -> int:
-    """Half of a device's free memory, in one buffer."""
+def texture_budget_of(device: dev.Device) -> int:
+    """Return what bitmaps may take on a device [bytes]: half of what is free, in one buffer."""
     return min(int(TEXTURE_SHARE * device.free_memory()), device.info.max_alloc)
 
 

@@ -27,6 +27,7 @@ from clpt.errors import SceneError
 from clpt.render.contract.features import Features
 from clpt.render.wavefront.light_rounds import LightRounds
 from clpt.render.wavefront.noise_meter import Cells, NoiseMeter, Values, divide
+from clpt.render.wavefront.tracer import Tracer
 from clpt.render.wavefront.wavefront import Wavefront
 from clpt.render.wavefront.work_list import FOREVER
 from clpt.scene import check_noise
@@ -68,15 +69,18 @@ class Adaptive:
     beside it.
 
     noise: the limit; next: (cells,) the first sample that a cell's pixels do not have;
-    stop: (cells,) how many samples they will have.
+    stop: (cells,) how many samples they will have. tracer: adds samples to the film.
     """
 
-    def __init__(self, wavefront: Wavefront):
+    def __init__(self, wavefront: Wavefront, tracer: Tracer | None = None):
         self.wavefront, self._meter = wavefront, NoiseMeter(wavefront)
+        self._tracer = tracer or Tracer(wavefront)
         self._pixels = self._meter.pixels
         count = len(self._pixels)
         self._partner = _partners(self._pixels, self._meter.across)
-        self._lights = LightRounds(self._meter) if wavefront.features.weighed else None
+        self._lights = (
+            LightRounds(self._meter, self._tracer) if wavefront.features.weighed else None
+        )
         self.noise = 0.0
         self.next = np.zeros(count, np.int64)
         self.stop = np.full(count, OPEN)
@@ -145,7 +149,7 @@ class Adaptive:
                 if not self._round(end, on_batch):
                     return False
         finally:
-            self.wavefront.paths.set_work_list(self._meter.inside)
+            self._tracer.use_all_pixels(self._meter.inside)
         return True
 
     def _goes_on(self, end: int) -> bool:
@@ -170,11 +174,13 @@ class Adaptive:
         guide_cells[self._partner[(self.stop == OPEN) & (self._pixels > 0)]] = True
         overrun = guide_cells & (self.next < look)  # finished, and still a guide
         lights = self._lights if self._lights is not None and self._lights.open else None
+        self._tracer.gather()
         with self._film_restored(lights is not None or bool(overrun.any())):
             if lights is not None and not lights.measure(look, on_batch):
                 return False
             if not self._sample(np.where(overrun, look, 0), on_batch):
                 return False
+            self._tracer.gather()
             self._measure(guide_cells)
         self._decide()
         return True
@@ -190,8 +196,8 @@ class Adaptive:
             cells = behind & (self.next == first)
             pixels = self._meter.inside[cells[self._meter.cell[self._meter.inside]]]
             own = ends[self._meter.cell[pixels]]
-            self.wavefront.paths.set_work_list(pixels, own)
-            if not self.wavefront.render_from_camera(int(first), int(own.max()), on_batch):
+            end = int(own.max())
+            if not self._tracer.from_camera(pixels, own, int(first), end, on_batch):
                 return False
         return True
 
@@ -232,6 +238,7 @@ class Adaptive:
         try:
             yield
         finally:
+            self._tracer.discard()
             for name, sums in film.sums.items():
                 stream.copy(sums, self._film_copies[name])
             self.wavefront.refresh()

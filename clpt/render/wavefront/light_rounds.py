@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.render.wavefront.noise_meter import NoiseMeter, Values, divide
+from clpt.render.wavefront.tracer import Tracer
 from clpt.render.wavefront.work_list import FOREVER
 
 GUIDES = 4  # light paths for each that is a guide
@@ -37,8 +38,8 @@ class LightRounds:
     each colour's pixels want; variance: (cells,) of a sample's light paths, relative.
     """
 
-    def __init__(self, meter: NoiseMeter):
-        self.wavefront, self.meter = meter.wavefront, meter
+    def __init__(self, meter: NoiseMeter, tracer: Tracer):
+        self.wavefront, self.meter, self._tracer = meter.wavefront, meter, tracer
         self.next = 0
         self.stop = np.full(2, FOREVER)
         self.variance = np.zeros(len(meter.pixels))
@@ -94,8 +95,7 @@ class LightRounds:
         if first >= end:
             return True
         self.next = end
-        self.wavefront.paths.set_work_list(self.meter.inside)
-        return self.wavefront.render_from_lights(first, end, on_batch)
+        return self._tracer.from_lights(self.meter.inside, first, end, on_batch)
 
     def measure(self, look: int, on_batch: Callable[[Any], bool]) -> bool:
         """Estimate the variance by guides, at a look after some number of samples.
@@ -105,11 +105,12 @@ class LightRounds:
         """
         wavefront, loop = self.wavefront, self.wavefront.loops[0]
         first, end = self._guides, look // GUIDES
-        wavefront.paths.set_work_list(self.meter.inside)
         wavefront.film.set_group(wavefront.light_group, self._sums if first else None)
         start = math.ceil(GUIDE_NUMBERS / loop.per_sample)
-        if not wavefront.trace_from_lights(start + first, start + end, on_batch):
+        guides = start + first, start + end
+        if not self._tracer.guides(self.meter.inside, *guides, on_batch):
             return False
+        self._tracer.gather()
         self._guides = end
         wavefront.film.copy_group(wavefront.light_group, self._sums)
         undecided = np.tile(self.stop == FOREVER, len(self.variance) // 2)

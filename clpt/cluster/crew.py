@@ -1,0 +1,250 @@
+"""Devices that share the samples of a picture: a thread each, which takes blocks while it is free.
+
+Each device adds its blocks to its own film, so that a block costs nothing beside its samples. A
+device that fails is dropped, and what only its film held is done again by the others.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable, Iterable
+from typing import NoReturn
+
+from clpt.cluster.blocks import Block, Blocks, WorkerRecord
+from clpt.cluster.device_worker import DeviceWorker, Job, added
+from clpt.errors import ClusterError
+from clpt.render.wavefront.film_state import FilmState, Ranges, join_ranges
+from clpt.render.wavefront.wavefront import Counts
+
+log = logging.getLogger(__name__)
+
+BLOCK_SECONDS = 1.0  # that a block should take
+SAVE_SECONDS = 60.0  # of a device's work, after which its film goes to the host: no more is lost
+TICK = 0.05  # seconds between two looks at the progress
+
+
+class LostPicture(Exception):
+    """The device failed whose film held the whole picture."""
+
+
+class Crew:
+    """Devices that work together.
+
+    workers: those that have not failed; failed: the names and errors of the others. saved: the film
+    on the host of what they took, None for an empty one, and saved_ranges: its samples. lost: jobs
+    and ranges of samples that no film holds any more. keeper: whose film holds the whole picture
+    beside its own samples, if there is one. stop: ends what is being done.
+    """
+
+    def __init__(self, workers: Iterable[DeviceWorker], stop: threading.Event):
+        self.workers, self.stop = list(workers), stop
+        self.failed: list[tuple[DeviceWorker, BaseException]] = []
+        self.saved: FilmState | None = None
+        self.saved_ranges: Ranges = ()
+        self.lost: list[tuple[Job, int, int]] = []
+        self.keeper: DeviceWorker | None = None
+        self._changed = threading.Condition()
+        self._ending = False
+        self._past = [Counts() for _ in self.workers[0].past]  # of devices that failed
+
+    @property
+    def first(self) -> DeviceWorker:
+        """The first device that has not failed. Raises ClusterError if all have."""
+        if not self.workers:
+            self._give_up()
+        return self.workers[0]
+
+    @property
+    def counts(self) -> tuple[Counts, ...]:
+        """What all devices together have done so far, of each film."""
+        total = self._past
+        for worker in self.workers:
+            total = [added(*pair) for pair in zip(total, worker.counts, strict=True)]
+        return tuple(total)
+
+    @property
+    def ranges(self) -> Ranges:
+        """The samples that are in a film."""
+        ranges = self.saved_ranges
+        for worker in self.workers:
+            ranges = join_ranges(ranges, worker.ranges)
+        return ranges
+
+    def run(self, job: Job, ranges: Ranges, tick: Callable[[], bool]) -> bool:
+        """Do a job for ranges of samples; return whether it was not stopped.
+
+        tick: called all the while; if it returns False, devices stop. What it raises is raised when
+        they have. Raises ClusterError when no device is left, LostPicture without the keeper.
+        """
+        finished = self._share(job, ranges, tick)
+        while finished and self.lost:
+            finished = self.repeat(tick)
+        return finished
+
+    def repeat(self, tick: Callable[[], bool]) -> bool:
+        """Do again what was lost, as `run` does it."""
+        job = self.lost[0][0]
+        again: Ranges = ()
+        for other, first, end in self.lost:
+            if other is job:
+                again = join_ranges(again, ((first, end),))
+        self.lost = [entry for entry in self.lost if entry[0] is not job]
+        return self._share(job, again, tick)
+
+    def save(self) -> None:
+        """Bring to the host what only films on devices hold; do again what cannot be read."""
+        while True:
+            for worker in [w for w in self.workers if w.unsaved]:
+                try:
+                    self._save(worker)
+                except Exception as error:
+                    self.drop(worker, error)
+            if not self.lost:
+                return
+            if not self.repeat(lambda: True):
+                self.lost.clear()
+
+    def empty(self, workers: Iterable[DeviceWorker]) -> None:
+        """Forget what films of devices hold."""
+        for worker in list(workers):
+            worker.unsaved = []
+            try:
+                worker.clear()
+            except Exception as error:
+                self.drop(worker, error)
+
+    def clear_counts(self) -> None:
+        """Count from zero, but for what films on devices have."""
+        self._past = [Counts() for _ in self._past]
+        for worker in self.workers:
+            worker.past = [Counts() for _ in worker.past]
+
+    def drop(self, worker: DeviceWorker, error: BaseException) -> None:
+        """Leave a device out from now on."""
+        with self._changed:
+            if worker not in self.workers:
+                return
+            self.workers.remove(worker)
+            self.failed.append((worker, error))
+            if worker is self.keeper:
+                self._ending = True
+            else:
+                self.lost += worker.unsaved
+            self._past = [added(*pair) for pair in zip(self._past, worker.past, strict=True)]
+            self._changed.notify_all()
+        others = "others do its part" if self.workers else "no other is left"
+        log.warning("%s failed and is left out, %s: %s", worker.name, others, error)
+
+    def _give_up(self) -> NoReturn:
+        worker, error = self.failed[-1]
+        message = f"no device is left; the last one, {worker.name}, failed: {error}"
+        raise ClusterError(message) from error
+
+    def _share(self, job: Job, ranges: Ranges, tick: Callable[[], bool]) -> bool:
+        """Do a job for ranges of samples once, perhaps with losses."""
+        blocks = Blocks(
+            ranges[-1][1], between(ranges), seconds=BLOCK_SECONDS, copies=1
+        )  # films that are added cannot be dropped
+        self._ending = False
+        for worker in self.workers:
+            blocks.join(worker, worker.name)
+            size = int(BLOCK_SECONDS * worker.rate / job.paths)
+            blocks.workers[worker] = WorkerRecord(worker.name, worker.rate / job.paths, size=size)
+        threads = [
+            threading.Thread(target=self._work, args=(worker, blocks, job), daemon=True)
+            for worker in self.workers
+        ]
+        try:
+            for thread in threads:
+                thread.start()
+            while not self._over(blocks):
+                with self._changed:
+                    if not self._over(blocks):
+                        self._changed.wait(TICK)
+                if not tick():
+                    break
+        finally:
+            self._end()
+            for thread in threads:
+                thread.join()
+        if self.keeper is not None and self.keeper not in self.workers:
+            raise LostPicture
+        tick()
+        if not self.workers:
+            self._give_up()
+        return blocks.done
+
+    def _over(self, blocks: Blocks) -> bool:
+        return self._ending or self.stop.is_set() or blocks.done or not self.workers
+
+    def _end(self) -> None:
+        with self._changed:
+            self._ending = True
+            self._changed.notify_all()
+
+    def _work(self, worker: DeviceWorker, blocks: Blocks, job: Job) -> None:
+        """Take blocks until none is left: a device's thread."""
+        try:
+            if worker.shows and worker is not self.keeper:
+                worker.clear()
+            while (block := self._next(worker, blocks)) is not None:
+                began = time.perf_counter()
+                finished = worker.do(job, block.first, block.end, lambda _: self._goes_on())
+                self._note(worker, blocks, job, block, time.perf_counter() - began, finished)
+                if worker.unsaved_seconds > SAVE_SECONDS and self.keeper is None:
+                    self._save(worker)
+        except Exception as error:
+            self.drop(worker, error)
+            with self._changed:
+                blocks.lose(worker)
+                self._changed.notify_all()
+
+    def _goes_on(self) -> bool:
+        return not (self._ending or self.stop.is_set())
+
+    def _next(self, worker: DeviceWorker, blocks: Blocks) -> Block | None:
+        """Wait for a block; return None when there is nothing more to do."""
+        with self._changed:
+            while self._goes_on() and not blocks.done:
+                block = blocks.take(worker, time.perf_counter())
+                if block is not None:
+                    return block
+                self._changed.wait()
+        return None
+
+    def _note(
+        self,
+        worker: DeviceWorker,
+        blocks: Blocks,
+        job: Job,
+        block: Block,
+        seconds: float,
+        finished: bool,
+    ) -> None:
+        """Note that a block is in a device's film, wholly or, where it was stopped, in part."""
+        with self._changed:
+            worker.unsaved.append((job, block.first, block.end))
+            worker.unsaved_seconds += seconds
+            if finished:
+                blocks.finish(worker, block, time.perf_counter(), seconds=seconds)
+                worker.paths += block.samples * job.paths
+                worker.rate = blocks.workers[worker].rate * job.paths
+            self._changed.notify_all()
+
+    def _save(self, worker: DeviceWorker) -> None:
+        """Add a device's film to the one on the host."""
+        ranges = worker.ranges
+        state = worker.take()
+        with self._changed:
+            given = FilmState(state.words, state.bands, ranges, state.scale)
+            self.saved = given if self.saved is None else self.saved.merged(given)
+            self.saved_ranges = self.saved.taken
+
+
+def between(ranges: Ranges) -> Ranges:
+    """Return what is before and between ranges that ascend."""
+    firsts = [0, *(end for _, end in ranges[:-1])]
+    gaps = zip(firsts, (first for first, _ in ranges), strict=True)
+    return tuple((first, end) for first, end in gaps if first < end)
