@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import count
 from typing import Any
 
@@ -77,15 +77,20 @@ def _roughness(material: mt.Material) -> float:
     return roughness**2
 
 
-def sharp_pieces(geometry: Geometry) -> Iterator[Pieces]:
-    """Yield what every sharp shape consists of, in the world: a row for each triangle or ball."""
+def sharp_pieces(
+    geometry: Geometry, wanted: Callable[[mt.Material], bool] = is_sharp
+) -> Iterator[Pieces]:
+    """Yield what every sharp shape consists of, in the world: a row for each triangle or ball.
+
+    wanted: tells of a material whether a shape of it is meant.
+    """
     own, placed = geometry.owners, geometry.instances
     ends = [*(face for _, _, _, face in own[1:]), len(geometry.faces)]
     firsts = len(geometry.faces) - sum(placed.triangles) + np.cumsum((0, *placed.triangles))[:-1]
     boxes = geometry.boxes.astype(np.float64)
     shape: Any
     for i, ((row, shape, _, face), end) in enumerate(zip(own, ends, strict=True)):
-        if not is_sharp(shape.material):
+        if not wanted(shape.material):
             continue
         if row["kind"]:
             many = shape.kind in shape_records.ONE_OF

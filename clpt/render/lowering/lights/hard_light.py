@@ -21,7 +21,7 @@ from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.geometry import analytic, shapes, triangles
 from clpt.render.lowering.geometry.geometry import Geometry
 from clpt.render.lowering.index import SceneIndex
-from clpt.render.lowering.lights import image_lights
+from clpt.render.lowering.lights import image_lights, light_bounds
 from clpt.render.lowering.lights.aims import is_sharp, sharp_pieces
 from clpt.render.lowering.lights.lights import Emitter, LightRows, row_order
 from clpt.scene import materials as mt
@@ -36,6 +36,9 @@ FEWEST = 3  # edges of a path from a light over two surfaces to the camera: the 
 MOSTLY = 0.5  # of the power of all lights: where small ones have less, few paths start at lights
 FEW = 0.25  # a sample
 SOME = 0.5  # where they have more; `vcm` has one, as its photons are these
+MANY = 4  # where they are in bulbs: the camera's paths find next to nothing there
+DIRECTIONS = 128  # in which a light looks for what is sharp
+BULB = 0.75  # of them: where what is sharp fills more, the light is in a bulb
 SEEN = 0.02  # of the picture: where what is sharp fills more, caustics may be seen through it
 
 Ball = tuple[NDArray[np.float64], float]  # centre and radius
@@ -87,15 +90,39 @@ def _choice(
     if not small:
         return without, "no light is small"
     reason = f"{shapes.where(sharp)} is sharp, and {small[0][0]} is a small light"
-    if sum(share for _, share in small) < MOSTLY:
+    if sum(share for *_, share in small) < MOSTLY:
         return Path(light_paths=FEW), f"{reason}, though most light is of large ones"
+    number = SOME
+    if sum(share for _, place, share in small if _is_enclosed(geometry, place)) >= MOSTLY:
+        number, reason = MANY, f"{reason}, in a bulb"
     if not isinstance(scene.integrator, Auto):
-        return Path(light_paths=SOME), reason
+        return Path(light_paths=number), reason
     if scene.noise is not None:
-        return Path(light_paths=SOME), f"{reason}; noise is not measured with photons"
+        return Path(light_paths=number), f"{reason}; noise is not measured with photons"
     if index.shifts or _share_seen(index, geometry) < SEEN:
-        return Path(light_paths=SOME), reason
-    return Vcm(), f"{reason}; the camera sees what is sharp"
+        return Path(light_paths=number), reason
+    whole = max(1, int(number))
+    return Vcm(light_paths=whole), f"{reason}; the camera sees what is sharp"
+
+
+def _is_enclosed(geometry: Geometry, place: NDArray[np.float64] | None) -> bool:
+    """Whether a light is in a bulb: what is only sharp fills most directions from its place [m]."""
+    if place is None:
+        return False
+    number = np.arange(DIRECTIONS) + 0.5  # spread evenly, on a spiral
+    z, turn = 1.0 - 2.0 * number / DIRECTIONS, np.pi * (1.0 + math.sqrt(5.0)) * number
+    level = np.sqrt(1.0 - z * z)
+    directions = np.stack([level * np.cos(turn), level * np.sin(turn), z])
+    covered = np.zeros(DIRECTIONS, bool)
+    for pieces in sharp_pieces(geometry, lambda one: is_sharp(one) and not _is_dull(one)):
+        a, b, c = (pieces[:, i : i + 3] - place for i in (0, 3, 6))
+        ahead = np.sign(np.einsum("ij,ij->i", a, np.cross(b, c)))[:, None]
+        edges = [np.cross(p, q) @ directions * ahead for p, q in ((a, b), (b, c), (c, a))]
+        middle, reach = (a + b + c) / 3.0, pieces[:, 9:]
+        along = np.maximum(middle @ directions, 0.0)
+        apart = (middle * middle).sum(axis=1, keepdims=True) - along * along
+        covered |= ((apart <= reach * reach) | (np.minimum.reduce(edges) > 0.0)).any(axis=0)
+    return bool(covered.mean() > BULB)
 
 
 def _share_seen(index: SceneIndex, geometry: Geometry) -> float:
@@ -136,8 +163,8 @@ def _is_dull(material: mt.Material) -> bool:
 
 def _small_lights(
     index: SceneIndex, geometry: Geometry, encoder: Encoder, lights: LightRows, sphere: Ball
-) -> Iterator[tuple[str, float]]:
-    """The names of small lights, and the share of all light that comes from each."""
+) -> Iterator[tuple[str, NDArray[np.float64] | None, float]]:
+    """The names of small lights, where they are [m], and the share of all light that is theirs."""
     lamps, share = index.scene.lights, lights.power / max(lights.power.sum(), 1e-300)
     for row, i in enumerate(row_order(lamps)):
         lamp = lamps[i]
@@ -146,14 +173,16 @@ def _small_lights(
         else:
             small = lamp.reach in ("placed", "distant") and getattr(lamp, "falloff", True)
         if small:
-            yield f"lights[{i}]", float(share[row])
+            bounds = light_bounds.of_lamp(lamp)
+            place = (bounds.low + bounds.high)[0] / 2.0 if lamp.reach == "placed" else None
+            yield f"lights[{i}]", place, float(share[row])
     middle, radius = sphere
     ends = (*lights.first, len(share))[1:]
     for emitter, first, end in zip(geometry.emitters, lights.first, ends, strict=True):
         area, place = _area_and_place(emitter, encoder)
         far = max(float(np.linalg.norm(place - middle)), NEAR * radius)
         if area < SMALL * 4.0 * np.pi * far**2:
-            yield shapes.where(emitter.shape), float(share[first:end].sum())
+            yield shapes.where(emitter.shape), place, float(share[first:end].sum())
 
 
 def _area_and_place(emitter: Emitter, encoder: Encoder) -> tuple[float, NDArray[Any]]:

@@ -153,6 +153,32 @@ def test_one_material_may_be_sharp_and_dull() -> None:
     assert chosen(scene_of(dataclasses.replace(ROOM, material=waxed)))[0] == 0.5
 
 
+AT_LAMP = tf.translate(LAMP.position) @ tf.scale(0.1)
+PANE = tf.translate([0.0, 0.79, 0.0]) @ tf.rotate([1.0, 0.0, 0.0], 90.0)
+GLASS_BALL = Sphere(radius=1.0, material=m.Dielectric())
+
+
+@pytest.mark.parametrize(
+    ("bulb", "number"),
+    [
+        (Sphere(center=LAMP.position, radius=0.1, material=m.Dielectric()), 4),
+        (Sphere(center=LAMP.position, radius=0.1, material=m.Diffuse()), 0),
+        (Cube(to_world=AT_LAMP, material=m.Dielectric()), 4),
+        (Instance(group=Group(shapes=[GLASS_BALL]), to_world=AT_LAMP), 4),
+        (Rectangle(to_world=PANE, material=m.Dielectric()), 0.5),
+        (Sphere(center=(0.0, 0.5, 0.0), radius=0.2, material=m.Dielectric()), 0.5),
+    ],
+    ids=["ball", "dull", "cube", "instance", "pane", "beside"],
+)
+def test_a_light_in_a_bulb_has_many_light_paths(bulb: Shape, number: float) -> None:
+    found, reason = chosen(scene_of(ROOM, bulb))
+    assert found == number and ("in a bulb" in reason) == (number == 4)
+    lamp = dataclasses.replace(LAMP, position=(0.0, 0.0, 0.0), intensity=3.0)  # has most power
+    assert chosen(scene_of(ROOM, bulb, lights=[LAMP, lamp]))[0] in (0, 0.5)
+    made = lower(scene_of(ROOM, bulb, camera=looking(*LAMP.position), integrator=Auto()))
+    assert made.settings["light_paths"] == {4: 4, 0.5: 1, 0: 0}[number]
+
+
 def test_what_instances_show_counts() -> None:
     group = Group(shapes=[BALL])
     copies = [Instance(group=group, to_world=tf.translate([x, 0.0, 0.0])) for x in (-0.3, 0.3)]
