@@ -41,6 +41,7 @@ PATH = Record(
         "density of what the other side does over the path's own, see kernels/lighting/rivals.cl",
     ),
     pending=("real", "what joins it if the next surface is sharp, see kernels/lighting/rivals.cl"),
+    expected=("real", "light that a guide knows where the path met it first, times throughput"),
     light=("integer", "row in `lights` of the light where the path began"),
     state=("integer", "PATH_ bits and depth, see kernels/path/path_state.cl"),
     pixel_index=("integer", "where the film stores the path's pixel, see kernels/film/pixel.cl"),
@@ -115,6 +116,8 @@ SETTINGS = Record(
     photon_pixels=("integer", "light paths whose index is below this leave photons"),
     photon_paths=("real", "how many these are in a pass, for each group of wavelengths"),
     photon_cells=("integer", "cells that are told apart, a power of two"),
+    guide_side=("real", "of the cells of a guide, see kernels/guiding/guide.cl [m]"),
+    guide_paths=("integer", "light paths from which it learns"),
     wavelength_groups=("integer", "groups of paths that have the same wavelengths, in a pass"),
     aims=(
         "integer",

@@ -36,8 +36,8 @@ OPENCL = {"device", "bvh", "rays", "render"}  # only these import pyopencl
 FLOORS = ({"contract"}, {"lowering", "codegen"}, {"wavefront"}, {"editing"})
 # What kinds share, by what a reader looks for.
 SHARED = {
-    "colour", "core", "film", "interface", "lighting", "merging", "optics", "path", "spectrum",
-    "texturing", "tracing",
+    "colour", "core", "film", "guiding", "interface", "lighting", "merging", "optics", "path",
+    "spectrum", "texturing", "tracing",
 }  # fmt: skip
 KINDS = {"bsdf", "camera", "emission", "light", "medium", "sampler", "shape", "texture"}
 # kernels/<folder>: the folders that its files may include; generated text stands between them.

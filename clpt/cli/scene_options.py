@@ -128,6 +128,10 @@ _OPTIONS = (
         "auto: some where something is sharp and a light is small.",
     ),
     click.option(
+        "--guiding", is_flag=True, default=None,
+        help="Of path: learn first where light comes from, for rooms that are lit through a door.",
+    ),
+    click.option(
         "--radius", type=click.FloatRange(0.0),
         help="Of vcm: where photons are gathered in the first pass [m]; 0: as suits the picture.",
     ),
@@ -257,6 +261,7 @@ def changed(
     max_depth: int | None = None,
     light_paths: float | str | None = None,
     radius: float | None = None,
+    guiding: bool | None = None,
     **film: Any,
 ) -> Scene:
     """Return the scene with those settings replaced that are not None; `film`: of its film.
@@ -274,11 +279,12 @@ def changed(
         given["integrator"] = _integrator(integrator, scene.integrator)
     how: Any = given.get("integrator", scene.integrator)
     if isinstance(how, Auto):  # a number of light paths, or a radius, is a choice
-        wanted = "vcm" if radius is not None else "path" if light_paths is not None else "auto"
+        of_path = light_paths is not None or guiding is not None
+        wanted = "vcm" if radius is not None else "path" if of_path else "auto"
         how = _integrator(wanted, how)
     for name, value, what in (
         ("max_depth", max_depth, "depth"), ("light_paths", light_paths, "light paths beside it"),
-        ("radius", radius, "photons"),
+        ("radius", radius, "photons"), ("guiding", guiding, "guiding"),
     ):  # fmt: skip
         if value is None:
             continue

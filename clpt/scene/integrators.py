@@ -72,10 +72,16 @@ class Path(Integrator):
         "paths from lights for each sample, weighed against it; 0: none; auto: as suits the scene",
         form="number_or_auto",
     )
+    guiding: bool = host(
+        False, "directions are learned from light paths before the first sample; without others"
+    )
 
     def check(self) -> None:
         super().check()
         given: Any = self.light_paths
+        if self.guiding and given not in (0, AUTO):
+            message = "guiding is for paths from the camera alone: ask for no light_paths"
+            raise SceneError(message, where=f"{self.kind}.guiding")
         if isinstance(given, str) and given == AUTO:
             return
         number = isinstance(given, (int, float)) and not isinstance(given, bool)

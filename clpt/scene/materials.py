@@ -86,6 +86,7 @@ class Material(Kind):
     is_null: ClassVar[bool] = False  # light goes on as if nothing were there, to lights as well
     no_back: ClassVar[bool] = False  # its back is not there
     absorbs: ClassVar[bool] = False  # all light, where its albedo is 0: none is sought there
+    guided: ClassVar[bool] = False  # light goes to all of a hemisphere: its directions are learned
     reversible: ClassVar[bool] = True  # light that comes the other way takes the same paths
 
     @property
@@ -107,6 +108,7 @@ class Diffuse(Material):
     """Lambertian reflection of the front side."""
 
     absorbs = True
+    guided = True
 
     reflectance: Textured = reflectance(0.5, "albedo", linear=True)
 

@@ -4,6 +4,7 @@
 #include "path/met_light.cl"
 #include "generated/rivals.cl"
 #include "generated/gather.cl"
+#include "generated/guide.cl"
 
 inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask active, Vertex v MERGE_ARGS)
 {
@@ -62,6 +63,9 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     }
 #endif
 
+#if BSDF_GUIDED
+    Guided guided = guide_at(scene, guide, s, v.d);
+#endif
 #if USES_LIGHTS && !BSDF_DELTA
     /* Next-event estimation. */
     vec3 hemisphere = vertex_hemisphere(frame, wo);
@@ -77,6 +81,9 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     real p = rival_pdf(m, wo, wi);
     real third = rival_of_light_sample(scene, rival, s, ls, p, rival_pdf(m, wi, wo));
     real w = mis_weight_of_three(ls.pdf, p, third);
+#elif BSDF_GUIDED
+    real p = guide_pdf(guide, guided, ls.wi, hero_pdf(m, wo, wi, ratio));
+    real w = sel(ls.pdf < 0.0f, (real)(1.0f), mis_weight(ls.pdf, p));
 #else
     real w = sel(ls.pdf < 0.0f, (real)(1.0f), mis_weight(ls.pdf, hero_pdf(m, wo, wi, ratio)));
 #endif
@@ -89,7 +96,12 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
 
     /* The next direction. */
     vec2 uv = sampler_pair(sampler, scatter.dimension + DIMENSION_BSDF);
+#if BSDF_GUIDED
+    real pick = sampler_pair(sampler, scatter.dimension + DIMENSION_CHOICE).y;
+    BsdfSample bs = guide_sample(guide, guided, m, frame, wo, uv, pick, &ratio);
+#else
     BsdfSample bs = hero_sample(m, wo, v3(uv.x, uv.y, scatter.choice.y), &ratio);
+#endif
 #if USES_LIGHTS && !BSDF_DELTA /* after the sample: between them compilers would read tables of materials again */
     shadow_toward(shadow, at, active, shine, s, ls, value);
 #endif
@@ -102,6 +114,11 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     mask play = depth + 1 >= settings->rr_depth;
     real strength = spectrum_max(beta);
     next = next & (strength > 0.0f);
+#if BSDF_GUIDED
+    real brings = spectrum_max(spectrum_mul(v.beta, bsdf_albedo(m)));
+    real chance = sampler_pair(sampler, scatter.dimension + DIMENSION_ROULETTE).x;
+    play = play & !guide_roulette(path, at, guided, brings, chance, &next, &beta);
+#endif
     if (any(next & play)) {
         vec2 u = sampler_pair(sampler, scatter.dimension + DIMENSION_ROULETTE);
         next = roulette(next, play, strength * eta * eta, u.x, &beta);

@@ -37,6 +37,9 @@ inline integer begin_light_path(Scene scene, Slab path, Slab shadow, uint at, ma
     LightRay r = light_emit(scene, u.y, sampler_pair(sampler, (natural)(DIMENSION_FILM)),
                             sampler_pair(sampler, (natural)(DIMENSION_LENS)), lambdas);
     real strength = spectrum_max(r.power);
+#if USES_GUIDE
+    go = go & (light_path_number(settings, pixel_index, sample) < settings->guide_paths);
+#endif
     mask alive = go & (strength > 0.0f) & mask_of(settings->max_depth > 1);
     Surface s;
     s.p = r.o;
@@ -90,11 +93,13 @@ STAGE(emit)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
     STAGE_AT
     PathEnd end = path_end(path, hit, at);
     if (path_end_of_half(end)) {
-        path_end_count(counters, end, end.depth - 1 + path_nulls(path, at));
         integer slot = LANE_INDEX + (int)at;
         integer pixel_index = load_path_pixel_index(path, at), sample = load_path_sample(path, at);
         integer plane = slot_plane(settings, slot);
+#if !USES_GUIDE /* which leave nothing on the film */
+        path_end_count(counters, end, end.depth - 1 + path_nulls(path, at));
         film_count(settings, film, end.ended & end.begun, plane, film_nearest_index(settings, pixel_index));
+#endif
         NextSample next = next_sample(settings, work_list, samples, slot, end.ended, end.begun, pixel_index, sample);
         count(counters, COUNTER_DONE, next.done, (integer)(1));
         mask go = end.ended & !next.done;

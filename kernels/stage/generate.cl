@@ -97,6 +97,9 @@ inline void begin_path(Scene scene, Slab path, uint at, mask go, integer pixel_i
 #if WEIGHS_LIGHT_PATHS
     store_path_rival(path, at, go, (real)(settings->light_paths));
 #endif
+#if USES_GUIDE
+    store_path_expected(path, at, go, (real)(0.0f));
+#endif
 #if MERGES
     store_path_pending(path, at, go, (real)(0.0f));
 #endif

@@ -10,7 +10,7 @@ from clpt.render.contract.features import Features
 
 CHANGED = (
     "o", "d", "beta", "radiance", "lambdas", "pdf", "sampled_hemisphere", "null_distance", "nulls",
-    "ratio", "eta", "medium", "lead", "rival", "pending", "state",
+    "ratio", "eta", "medium", "lead", "rival", "pending", "expected", "state",
 )  # fmt: skip
 READ = ("weight", "light", "pixel_index", "pixel_key", "sample")  # and not changed
 # members that a scene has only with a flag
@@ -24,6 +24,7 @@ NEEDED = {
     "lead": "USES_ABSORPTION",
     "rival": "WEIGHS_LIGHT_PATHS",
     "pending": "MERGES",
+    "expected": "USES_GUIDE",
     "weight": "LIGHT_PATHS",
     "light": "WEIGHS_LIGHT_PATHS",
     "pixel_index": "LIGHT_PATHS",

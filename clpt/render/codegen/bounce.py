@@ -28,6 +28,8 @@ def order(features: Features, layout: str, lanes: int, interleaved: bool = False
     bounce.append(Stage("intersect", "intersect", lanes if interleaved else tracing))
     if deposits(features):
         bounce.append(Stage("deposit", "deposit", lanes))
+    if trains(features):
+        bounce.append(Stage("train", "train", lanes))
     if features.mixtures:
         bounce.append(Stage("mix", "mix_materials", lanes))
     bounce += [Stage(f"shade_{kind}", "shade", lanes) for kind in features.materials]
@@ -50,6 +52,11 @@ def joins(features: Features) -> bool:
 def deposits(features: Features) -> bool:
     """Whether paths leave photons."""
     return features.light_paths and features.merged
+
+
+def trains(features: Features) -> bool:
+    """Whether paths leave what a guide learns from."""
+    return features.light_paths and features.guided
 
 
 def trace_lanes(layout: str, lanes: int) -> int:
@@ -119,6 +126,7 @@ def _call(features: Features, own: Features, layout: str, stage: Stage, which: i
         begin: signatures.begin_args(own),
         "intersect": signatures.trace_args(own, layout),
         "deposit": signatures.deposit_args(own),
+        "train": signatures.deposit_args(own),
         join: signatures.join_args(own, layout),
         "shade": signatures.merge_args(features),
     }

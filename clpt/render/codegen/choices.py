@@ -21,6 +21,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/bands.cl": lambda f, _: ("film/bands.cl",) * f.bands,
     "generated/integrator.cl": lambda f, _: (f"integrator/{f.integrator}.cl",),
     "generated/merging.cl": lambda f, _: ("merging/area.cl",) * f.merged,
+    "generated/guide.cl": lambda f, _: ("guiding/guide.cl",) * f.guided,
     "generated/gather.cl": lambda f, _: (
         ("generated/photon.cl", "merging/gather.cl") * (f.merged and not f.light_paths)
     ),

@@ -67,6 +67,8 @@ def _stages(
         texts[join] = _source(join, files, defines, trace_lanes)
     if bounce.deposits(features):
         texts["deposit"] = _source("deposit", files, defines, lanes)
+    if bounce.trains(features):
+        texts["train"] = _source("train", files, defines, lanes)
     if features.mixtures:
         texts["mix"] = _source("mix", files, defines, lanes)
     return texts

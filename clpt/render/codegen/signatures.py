@@ -109,6 +109,8 @@ def join_args(features: Features, layout: str) -> dict[str, str]:
 
 def deposit_args(features: Features) -> dict[str, str]:
     """Return what the stage takes that keeps light paths as photons."""
+    if features.guided and features.light_paths:
+        return {"guide": "global uint *"}
     if not (features.merged and features.light_paths):
         return {}
     return dict.fromkeys(("photons", "photon_numbers"), "global uint *")
@@ -116,6 +118,8 @@ def deposit_args(features: Features) -> dict[str, str]:
 
 def merge_args(features: Features) -> dict[str, str]:
     """Return what shading takes that gathers photons."""
+    if features.guided and not features.light_paths:
+        return {"guide": "global const uint *"}
     if not features.merged or features.light_paths:
         return {}
     return dict.fromkeys(("photons", "photon_order", "photon_cells"), "global const uint *")

@@ -66,6 +66,7 @@ class Features:
     weighed: bool = False  # paths from the camera are weighed against some from lights
     joined: bool = False  # those are joined to the camera
     merged: bool = False  # those leave photons, which paths from the camera gather
+    guided: bool = False  # directions of the camera's paths are learned
     aimed: bool = False  # some of these start toward what is sharp
     light_filter: tuple[int, int, int] = (0, 0, 0)  # of those: taps, reach and profile
     film_group: int = 0  # words of a pixel before those that paths add to
@@ -93,6 +94,8 @@ class Features:
     @property
     def passes(self) -> tuple[Features, ...]:
         """The features of each kind of paths, in their order; those of the film are the last."""
+        if self.guided:
+            return replace(self, integrator="particle_tracer", light_paths=True, alpha=False), self
         if not self.weighed:
             return (self,)
         taps, reach, profile = self.light_filter
@@ -111,7 +114,7 @@ class Features:
     @property
     def shows_lights(self) -> bool:
         """Whether paths that start at lights join these to the camera."""
-        return self.light_paths and self.visible_lights and not self.weighed
+        return self.joined and self.light_paths and self.visible_lights and not self.weighed
 
     @property
     def group_words(self) -> int:

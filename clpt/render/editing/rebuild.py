@@ -34,6 +34,7 @@ FIXED = (
     "bands",
     "alpha",
     "light_paths",
+    "guide_paths",
     "photon_places",
     "photon_pixels",
 )
@@ -77,8 +78,8 @@ def take(wavefronts: Sequence[Wavefront], lowered: Lowered, refit: bool = False)
     scene, paths = first.scene, first.paths
     if any(scene.lowered.settings[name] != lowered.settings[name] for name in FIXED):
         raise SceneError(
-            "its size, bands, alpha, the reach of its filter and light paths stay; make a new "
-            "Renderer",
+            "its size, bands, alpha, the reach of its filter, light paths and guiding stay; make a "
+            "new Renderer",
             where="film",
         )
     changes = _changes(first, lowered, refit)

@@ -65,6 +65,7 @@ def features_of(
         weighed=index.weighed > 0,
         joined=index.joined and (index.light_paths or index.weighed > 0),
         merged=index.merged,
+        guided=index.guided,
         aimed=aimed,
         light_filter=(*index.spread, profile) if index.weighed else (0, 0, 0),
         visible_lights=lights.visible,

@@ -97,6 +97,11 @@ class SceneIndex:
         return integrator.merging and integrator.max_depth not in (1, 2)
 
     @property
+    def guided(self) -> bool:
+        """Whether directions of the camera's paths are learned from light paths."""
+        return getattr(self.scene.integrator, "guiding", False) and not self.weighed
+
+    @property
     def shifts(self) -> bool:
         """Whether some material gives light another wavelength."""
         return self.spectral and any(cls.fluoresces for cls in self.leaves)

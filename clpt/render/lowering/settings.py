@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.records import SETTINGS
-from clpt.render.lowering import photons
+from clpt.render.lowering import guides, photons
 from clpt.render.lowering.camera.colour import film_scale, output_matrix
 from clpt.render.lowering.camera.wavelengths import Density
 from clpt.render.lowering.geometry.geometry import Geometry
@@ -58,6 +58,10 @@ def settings_of(
     settings["light_paths"] = index.weighed
     if index.merged:
         _set_photons(settings, index, geometry, sphere[1], disperses)
+    if index.guided:
+        settings["photon_cells"] = guides.CELLS
+        settings["guide_paths"] = guides.PATHS
+        settings["guide_side"] = guides.SIDE * sphere[1]
     settings["aims"], settings["aim_count"] = aims
     settings["light_count"] = len(lights.rows)
     settings["infinite_count"] = lights.infinite

@@ -96,7 +96,7 @@ class BounceLoop:
         self.lanes = self.device.lanes
         self._features_of, self._which = features_of, which
         self.is_last = which == len(features_of(scene.lowered).passes) - 1
-        self.per_sample = 1 if self.is_last else float(scene.lowered.settings["light_paths"])
+        self.per_sample = 1 if self.is_last else float(scene.lowered.settings["light_paths"]) or 1
         self._label = "" if self.is_last else "light "
         self._share = strategy.loop_share(self.device)
         self._stages: list[Step] | None = None

@@ -27,6 +27,7 @@ from clpt.render.wavefront.bounce_loop import BounceLoop, Kernels, Step
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.render.wavefront.film import Film
 from clpt.render.wavefront.film_state import SAMPLES_WORD, Words
+from clpt.render.wavefront.guide import Guide
 from clpt.render.wavefront.path_buffers import PathBuffers, divide_film
 from clpt.render.wavefront.photons import Photons
 from clpt.render.wavefront.strategy import Strategy, Tuning
@@ -82,12 +83,16 @@ class Wavefront:
         features = self.features
         self.film = film = Film(self.stream, self.buffers, paths.settings, features)
         photons = Photons(self.stream, self.buffers, paths.settings) if features.merged else None
-        self.photons, photon_arguments = photons, photons.arguments if photons else {}
+        guide = None
+        if features.guided:
+            guide = Guide(self.stream, self.buffers, paths.settings, paths.pixels)
+        self.photons, self.guide = photons, guide
+        own = (photons.arguments if photons else {}) | (guide.arguments if guide else {})
         # What follows knows nothing of this wavefront: memory is given back without a collector.
         self.kernels = Kernels(
             self.device,
             lambda: {
-                **scene.arguments, **paths.arguments, **film.arguments, **photon_arguments
+                **scene.arguments, **paths.arguments, **film.arguments, **own
             },
         )  # fmt: skip
         own_features = functools.partial(_features_of, channel)
@@ -95,6 +100,7 @@ class Wavefront:
             BounceLoop(self.kernels, scene, paths, self.timings, looped, own_features, which)
             for which in range(len(features.passes))
         ]
+        self._trainer = self.loops.pop(0) if guide else None  # of the guide
         self._bind_film()
         self.clear()
 
@@ -157,7 +163,7 @@ class Wavefront:
     @property
     def has_light_paths(self) -> bool:
         """Whether the film has sums of paths that start at lights."""
-        return self.features.passes[0].light_paths
+        return self.features.light_paths or self.features.weighed
 
     @property
     def light_group(self) -> int:
@@ -190,16 +196,17 @@ class Wavefront:
 
     def prepare(self) -> None:
         """Build what `render_samples` runs, so that its first samples come at once."""
-        for loop in self.loops:
+        for loop in self._all_loops:
             loop.prepare()
-        if self.photons is not None:
-            self.photons.prepare(self.kernels)
+        for one in (self.photons, self.guide):
+            if one is not None:
+                one.prepare(self.kernels)
 
     def build_ahead(self, lowered: Lowered, chosen: Strategy) -> None:
         """Build the programs that are in use for another lowering, so that no later build fails."""
         features = _features_of(self.channel, lowered)
         device.build_all(self.device, programs.film_sources(features, chosen.layout))
-        for loop in self.loops:
+        for loop in self._all_loops:
             loop.build_ahead(lowered, chosen)
 
     def bind_again(self, rebuilt: bool) -> None:
@@ -207,7 +214,7 @@ class Wavefront:
         if rebuilt:
             self.kernels.programs.clear()
         self._bind_film()
-        for loop in self.loops:
+        for loop in self._all_loops:
             loop.bind_again()
 
     def auxiliary_kernel(
@@ -223,10 +230,13 @@ class Wavefront:
         self._paths = [0] * self.film.halves  # that began at lights, in each half of the film
         self.paths.clear_counters()
         self.film.clear()
+        if self.guide is not None:
+            self.guide.trained = False
 
     def enqueue(self, first: int, end: int) -> None:
         """Enqueue that samples first to end - 1 of every pixel are added; wait for nothing."""
         first, end = self._range(first, end)
+        self._train(first, end, looped=True)
         for turn in self._turns(first, end) if self.photons else [(first, end)]:
             for loop in self.loops:
                 self._before(loop)
@@ -343,6 +353,7 @@ class Wavefront:
     ) -> bool:
         """Trace one kind of paths for samples first to end - 1; return whether all were traced."""
         wanted = True
+        self._train(first, end, self.looped)
         self._before(loop)
 
         def count(counters: NDArray[np.uint64]) -> bool:
@@ -352,6 +363,22 @@ class Wavefront:
             return wanted
 
         return loop.run(first, end, count)
+
+    @property
+    def _all_loops(self) -> list[BounceLoop]:
+        """All that trace paths."""
+        return [*([self._trainer] if self._trainer else []), *self.loops]
+
+    def _train(self, first: int, end: int, looped: bool) -> None:
+        """Let the guide learn, if there are samples to come and it has not yet."""
+        if self.guide is None or self._trainer is None or self.guide.trained or first == end:
+            return
+        self.guide.clear()
+        if looped:
+            self._trainer.enqueue(0, self.guide.samples)
+        else:
+            self._trainer.run(0, self.guide.samples, lambda _: True)
+        self.guide.sum(self.kernels)
 
     def _before(self, loop: BounceLoop) -> None:
         """Enqueue what paths of a kind need of the photons of their pass."""

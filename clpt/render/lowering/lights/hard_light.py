@@ -67,6 +67,8 @@ def decided(
         keeps = isinstance(former, Vcm) and isinstance(given, Auto)
         chosen = former if keeps else Path(light_paths=getattr(former, "light_paths", 0))
         reason = "as before the scene was edited"
+    if getattr(given, "guiding", False):
+        chosen, reason = Path(light_paths=0, guiding=True), "directions are guided"
     own = {name: getattr(given, name) for name in ("max_depth", "rr_depth", "hide_lights")}
     chosen = replace(chosen, **own)
     return replace(index, scene=replace(index.scene, integrator=chosen)), reason

@@ -1,0 +1,13 @@
+/* What light paths have left in each part of a row, as sums of the parts so far: see guiding/guide.cl. */
+#include "bvh/no_vectorize.cl"
+#include "guiding/bins.cl"
+
+kernel NO_VECTORIZE void guide_sum(global uint *restrict guide)
+{
+    global uint *row = guide + get_global_id(0) * GUIDE_BINS;
+    float sum = 0.0f;
+    for (uint k = 0; k < GUIDE_BINS; k++) {
+        sum += (float)row[k];
+        row[k] = as_uint(sum);
+    }
+}
