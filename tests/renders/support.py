@@ -10,7 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
 import clpt
+from clpt.device import Device
 from clpt.scene import Scene, integrators
+from clpt.spectra import cie
 
 SIGNIFICANCE = 1e-4  # of every statistical test here: how often a right program would fail it
 ROUNDING = 1e-5  # relative error of a picture in float32
@@ -89,3 +91,34 @@ def assert_mean(ours: ArrayLike, expected: ArrayLike, within: float, allowed: fl
     mean = means.mean(axis=0)
     assert p > SIGNIFICANCE, f"p = {p:.1e}; mean {mean}, expected {exact}, ratio {mean / exact}"
     assert np.allclose(mean, exact, rtol=within, atol=1e-9), f"mean {mean}, expected {exact}"
+
+
+def assert_bands_are_the_colour(scene: Scene, device: Device) -> None:
+    """Bands of 2 nm from 360 nm on, weighted by the observer, are the picture beside them, in each
+    pixel."""
+    renderer = clpt.Renderer(scene, device)
+    renderer.run(64)
+    middles = np.arange(361.0, 830.0, 2.0)
+    summed = renderer.image() @ cie.cie_xyz(middles) * 2.0 / cie.CIE_Y_INTEGRAL
+    np.testing.assert_allclose(summed, renderer.colours(), rtol=0.03, atol=1e-4)
+
+
+def assert_bands_keep_their_bits(scene: Scene, device: Device) -> None:
+    """However samples are split: runs, steps, films that are merged; halves are the whole but for
+    rounding."""
+    one = clpt.Renderer(scene, device)
+    one.run(7)
+    whole = one.image()
+    assert whole.shape[-1] == 3 and whole.all(axis=2).any()
+    one.reset()
+    one.run(3)
+    state = one.film_state()
+    one.step(4).wait()
+    assert np.array_equal(one.image(), whole)
+    later = clpt.Renderer(scene, device, first_sample=3)
+    later.run(4)
+    later.merge(state)
+    assert np.array_equal(later.image(), whole)
+    halves = clpt.Renderer(scene, device, halves=True)
+    halves.run(7)
+    np.testing.assert_allclose(halves.image(), whole, rtol=1e-5)

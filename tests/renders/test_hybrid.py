@@ -26,9 +26,10 @@ from clpt.scene.integrators import Box, Direct, Filter, Gaussian, Path
 from clpt.scene.lights import Area, Constant, Directional, Light, Point
 from clpt.scene.shapes import Cube, Disk, Group, Instance, Rectangle, Shape, Sphere
 from clpt.scene.textures import Bitmap
-from clpt.spectra import cie
 from tests.renders.support import (
     assert_agree,
+    assert_bands_are_the_colour,
+    assert_bands_keep_their_bits,
     assert_mean,
     blocks,
     exposures,
@@ -407,34 +408,13 @@ BANDS = caustic(mode="spectral", bands=235, output_space="xyz", filter=Gaussian(
 @pytest.mark.slow
 @pytest.mark.parametrize("filtering", ["importance", pytest.param("auto", marks=pytest.mark.slow)])
 def test_bands_add_up_to_the_colour(filtering: str) -> None:
-    """Bands of 2 nm, weighted by the observer, are the picture beside them, in each pixel that
-    light paths light: what both groups of sums bring is in both."""
-    scene = with_film(with_light_paths(BANDS), filtering=filtering)
-    renderer = clpt.Renderer(scene, narrow())
-    renderer.run(64)
-    middles = np.arange(361.0, 830.0, 2.0)
-    summed = renderer.image() @ cie.cie_xyz(middles) * 2.0 / cie.CIE_Y_INTEGRAL
-    np.testing.assert_allclose(summed, renderer.colours(), rtol=0.03, atol=1e-4)
+    """In each pixel that light paths light: what both groups of sums bring is in both."""
+    assert_bands_are_the_colour(with_film(with_light_paths(BANDS), filtering=filtering), narrow())
 
 
 @pytest.mark.slow
 def test_bands_keep_their_bits_however_samples_are_split() -> None:
-    """Runs, and films that are merged; halves are the whole but for rounding."""
-    scene = with_film(with_light_paths(BANDS), bands=3)
-    one = clpt.Renderer(scene, narrow())
-    one.run(7)
-    whole = one.image()
-    assert whole.shape[-1] == 3 and whole.all(axis=2).any()
-    one.reset()
-    one.run(3)
-    state = one.film_state()
-    one.run(4)
-    assert np.array_equal(one.image(), whole)
-    later = clpt.Renderer(scene, narrow(), first_sample=3)
-    later.run(4)
-    later.merge(state)
-    assert np.array_equal(later.image(), whole)
-    np.testing.assert_allclose(picture(scene, 7, halves=True), whole, rtol=1e-5)
+    assert_bands_keep_their_bits(with_film(with_light_paths(BANDS), bands=3), narrow())
 
 
 @pytest.mark.slow

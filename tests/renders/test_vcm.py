@@ -26,8 +26,16 @@ from clpt.scene.integrators import Path, Vcm
 from clpt.scene.lights import DirectionalArea, Point
 from clpt.scene.shapes import Cube, Curves, Disk, Group, Instance, Rectangle, Shape, Sphere
 from clpt.scene.textures import Bitmap
-from clpt.spectra import LED, Fluorophore, cie
-from tests.renders.support import assert_agree, assert_mean, blocks, exposures, with_film
+from clpt.spectra import LED, Fluorophore
+from tests.renders.support import (
+    assert_agree,
+    assert_bands_are_the_colour,
+    assert_bands_keep_their_bits,
+    assert_mean,
+    blocks,
+    exposures,
+    with_film,
+)
 from tests.renders.test_hybrid import FLAT, MATERIALS, VIEW, caustic, corner, lamp, narrow
 
 WATER = 1.33
@@ -297,29 +305,9 @@ def test_stopped_early_is_as_bright() -> None:
 
 @pytest.mark.slow
 def test_bands() -> None:
-    """Bands of 2 nm, weighted by the observer, are the picture beside them, in each pixel; and
-    keep their bits however samples are split."""
     scene = with_vcm(caustic(mode="spectral", bands=235, output_space="xyz"), radius=0.05)
-    renderer = clpt.Renderer(scene, narrow())
-    renderer.run(64)
-    middles = np.arange(361.0, 830.0, 2.0)
-    summed = renderer.image() @ cie.cie_xyz(middles) * 2.0 / cie.CIE_Y_INTEGRAL
-    np.testing.assert_allclose(summed, renderer.colours(), rtol=0.03, atol=1e-4)
-    few = with_film(scene, bands=3)
-    one = clpt.Renderer(few, narrow())
-    one.run(7)
-    whole = one.image()
-    assert whole.shape[-1] == 3 and whole.all(axis=2).any()
-    one.reset()
-    one.run(3)
-    state = one.film_state()
-    one.step(4).wait()
-    assert np.array_equal(one.image(), whole)
-    later = clpt.Renderer(few, narrow(), first_sample=3)
-    later.run(4)
-    later.merge(state)
-    assert np.array_equal(later.image(), whole)
-    np.testing.assert_allclose(picture(few, 7, halves=True), whole, rtol=1e-5)
+    assert_bands_are_the_colour(scene, narrow())
+    assert_bands_keep_their_bits(with_film(scene, bands=3), narrow())
 
 
 def test_photons_that_do_not_fit_are_left_out() -> None:
