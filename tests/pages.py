@@ -6,6 +6,8 @@ import re
 import shlex
 from pathlib import Path
 
+import click
+
 from clpt.cli import cli
 
 FENCED = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -30,6 +32,9 @@ def check_command(line: str) -> None:
     if name == "--version":
         return
     command = cli.get_command(context, name)
+    while isinstance(command, click.Group):
+        name, *words = words
+        command = command.get_command(context, name)
     assert command is not None, line
     known = {option for parameter in command.params for option in parameter.opts}
     given = {word for word in words if re.match(r"-{1,2}[A-Za-z]", word)}  # not a number below zero

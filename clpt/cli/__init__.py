@@ -9,7 +9,10 @@ import click
 
 from .verbosity import verbose_option
 
-COMMANDS = ("render", "merge", "warm", "devices", "info", "inspect", "kernels", "bench")
+COMMANDS = (
+    "render", "merge", "warm", "worker", "cluster", "devices", "info", "inspect", "kernels",
+    "bench",
+)  # fmt: skip
 
 
 class _Commands(click.Group):

@@ -18,6 +18,7 @@ from .display import display as display_of
 from .frame_values import Frames
 from .frames import render_frames
 from .grading import grading, grading_options
+from .on_cluster import Where, render_on_cluster
 from .rendering import render_samples
 from .scene_options import open_renderer, scene_options
 from .stopping import STATUS, stops
@@ -104,6 +105,12 @@ class Period(Duration):
 )  # fmt: skip
 @click.option("--video", type=click.Path(path_type=Path), help="Write the frames as .mp4 too.")
 @scene_options
+@click.option(
+    "--cluster", type=Where(), help="Render on the workers of tls://HOST:PORT, or of local:N."
+)
+@click.option(
+    "--keys", type=click.Path(path_type=Path), help="Folder of the cluster's keys, for tls://."
+)
 @grading_options
 @verbose_option("Print memory, trees, programs and stages; log more, twice for everything.")
 @click.option("--quiet", is_flag=True, help="Show no progress and no warnings.")
@@ -117,6 +124,8 @@ def render(
     numbers: tuple[int, int] | None,
     period: float | None,
     resume: bool | None,
+    cluster: str | None,
+    keys: Path | None,
     exposure: float,
     tone: str | None,
     view: str | None,
@@ -144,6 +153,8 @@ def render(
     """
     graded = grading(exposure=exposure, tone=tone, view=view, display=display, look=look, ocio=ocio)
     if frames is not None:
+        if cluster is not None:
+            raise click.UsageError("not with --cluster yet: --frames")
         if numbers or period is not None or resume is not None:
             raise click.UsageError("frames go on by themselves: leave out what saves one picture")
         return render_frames(
@@ -157,6 +168,12 @@ def render(
         raise click.UsageError("--samples says how many there are; leave out --spp and --noise")
     shown = display_of(quiet, limit)
     began = time.perf_counter()
+    if cluster is not None:
+        if numbers or period is not None or resume is not None:
+            raise click.UsageError("not with --cluster yet: --samples, --checkpoint, --resume")
+        return render_on_cluster(
+            scene, targets, shown, cluster, keys=keys, limit=limit, graded=graded, **options
+        )
     saved_at = checkpoints.path_of(targets[0])
     saved = checkpoints.find(saved_at, resume, shown.note)
     first, end = numbers or (0, None)

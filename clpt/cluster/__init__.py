@@ -1,1 +1,12 @@
 """Many devices and machines: who renders which samples, and what travels between them."""
+
+from typing import Any
+
+
+def __getattr__(name: str) -> Any:
+    """Import `ClusterRenderer` when it is used, not with clpt."""
+    if name == "ClusterRenderer":
+        from clpt.cluster.cluster_renderer import ClusterRenderer
+
+        return ClusterRenderer
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

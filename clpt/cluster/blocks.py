@@ -7,12 +7,13 @@ argument: a test or a simulation gives its own.
 
 from __future__ import annotations
 
+from bisect import bisect
 from collections.abc import Hashable
 from dataclasses import dataclass, field
 from enum import Enum
 
 from clpt.errors import ClusterError
-from clpt.render.wavefront.film_state import Ranges, join_ranges
+from clpt.render.wavefront.film_state import Ranges
 
 GROWTH = 3  # times the size of a worker's last block
 LEAST = 0.1  # of the seconds that a block should take: a smaller one costs more than it helps
@@ -83,8 +84,9 @@ class Blocks:
     """The samples of a render: done, handed out, and left.
 
     taken: ranges that are done; end: the number after the last sample, which `extend` may raise;
-    seconds: what a block should take; check_every: of the blocks, one in so many is done by two
-    workers and compared, beside the first block of each worker that has an equal; 0: none.
+    seconds: what a block should take; least_seconds: what it should at the end too; check_every: of
+    the blocks, one in so many is done by two workers and compared, beside the first block of each
+    worker that has an equal; 0: none.
     copies: of a block that workers do at a time, at most; 1 where a film cannot be dropped.
 
     counts of what went wrong: lost (blocks of workers that are gone), repeated (blocks that a
@@ -103,9 +105,11 @@ class Blocks:
     ):
         self.taken, self.end = taken, end
         self.seconds, self.check_every, self.copies = seconds, check_every, copies
+        self.least_seconds = 0.0
         self.workers: dict[Worker, WorkerRecord] = {}
         self.refused: dict[Worker, str] = {}
         self.lost = self.repeated = self.dropped = 0
+        self._rate = 0.0
         self._free = _gaps(taken, 0, end)
         self._flights: dict[int, _Flight] = {}
         self._again: list[_Flight] = []  # blocks that came back
@@ -132,7 +136,7 @@ class Blocks:
     @property
     def rate(self) -> float:
         """Of all workers together [samples/s]."""
-        return sum(record.rate for record in self.workers.values())
+        return self._rate
 
     def extend(self, end: int) -> None:
         """Add samples up to another end. Does nothing where that is no later."""
@@ -154,6 +158,7 @@ class Blocks:
     def lose(self, worker: Worker) -> list[Block]:
         """A worker is gone: return its blocks, which others get."""
         self.workers.pop(worker, None)
+        self._rate = sum(record.rate for record in self.workers.values())
         blocks = [f.block for f in self._flights.values() if worker in f.since]
         for block in blocks:
             self.lost += 1
@@ -181,6 +186,8 @@ class Blocks:
         if flight is None:
             return None
         flight.since[worker] = now
+        number = flight.block.number
+        self._flights[number] = self._flights.pop(number)  # in the order in which they go out
         record.size = flight.block.samples
         return flight.block
 
@@ -201,16 +208,24 @@ class Blocks:
         if worker in self.workers:
             record = self.workers[worker]
             took = seconds or (0.0 if since is None else now - since)
+            self._rate -= record.rate
             _note_rate(record, block.samples, took)
+            self._rate += record.rate
         if flight.compared and not self._agreed(flight, worker, digest):
             return Outcome.HOLD
         del self._flights[block.number]
         self._again = [other for other in self._again if other is not flight]
-        self.taken = join_ranges(self.taken, ((block.first, block.end),))
+        self.taken = _with_range(self.taken, block.first, block.end)
         if worker in self.workers:
             record.blocks += 1
             record.samples += block.samples
         return Outcome.ADD
+
+    def give_back(self, worker: Worker, block: Block) -> None:
+        """A worker did not do a block, and it is nobody's fault: another gets it."""
+        flight = self._flights.get(block.number)
+        if flight is not None:
+            self._give_back(flight, worker)
 
     def fail(self, worker: Worker, block: Block, reason: str) -> None:
         """A worker could not do a block: another gets it.
@@ -277,26 +292,31 @@ class Blocks:
         if not record.rate:
             return 1
         left = sum(end - first for first, end in self._free)
-        share = LAST_SHARE * left * record.rate / self.rate
         usual = self.seconds * record.rate
-        return max(1, min(GROWTH * max(record.size, 1), int(usual), int(max(share, LEAST * usual))))
+        share = max(
+            LAST_SHARE * left * record.rate / self.rate,
+            LEAST * usual,
+            self.least_seconds * record.rate,
+        )
+        return max(1, min(GROWTH * max(record.size, 1), int(usual), int(share)))
 
     def _slow(self, worker: Worker, now: float) -> _Flight | None:
         """The block that is longest on its way at another worker, if that is slow with it."""
         record = self.workers[worker]
-        waiting = [
-            f for f in self._flights.values()
-            if f.since and worker not in f.since and worker not in f.films
-            and len(f.since) < self.copies and not f.compared and worker not in f.failed_at
-        ]  # fmt: skip
-        if not waiting or not record.rate:
+        if not record.rate:
             return None
-        oldest = min(waiting, key=lambda f: min(f.since.values()))
-        expected = oldest.block.samples / record.rate
-        if now - min(oldest.since.values()) < PATIENCE * max(expected, self.seconds):
-            return None
-        self.repeated += 1
-        return oldest
+        for flight in self._flights.values():
+            since = flight.since
+            if not since or len(since) >= self.copies or flight.compared:
+                continue
+            waited = now - min(since.values())
+            if waited < PATIENCE * self.seconds:
+                return None  # those after it went out later
+            tried = worker in since or worker in flight.films or worker in flight.failed_at
+            if not tried and waited >= PATIENCE * flight.block.samples / record.rate:
+                self.repeated += 1
+                return flight
+        return None
 
     def _give_back(self, flight: _Flight, worker: Worker) -> None:
         flight.since.pop(worker, None)
@@ -308,9 +328,9 @@ class Blocks:
     def _choose_compared(self, flight: _Flight, worker: Worker) -> None:
         """Decide whether a new block is done by two workers."""
         record = self.workers[worker]
-        if not self.check_every or len(self._equals(record.kind)) < 2:
+        if not self.check_every or (record.checked and flight.block.number % self.check_every):
             return
-        if not record.checked or flight.block.number % self.check_every == 0:
+        if len(self._equals(record.kind)) > 1:
             record.checked = flight.compared = True
             flight.kind = record.kind
             self._again.append(flight)  # for a second worker
@@ -348,6 +368,18 @@ def _note_rate(record: WorkerRecord, samples: int, seconds: float) -> None:
     if seconds > 0.0:
         rate = samples / seconds
         record.rate = rate if not record.rate else (1 - MEMORY) * record.rate + MEMORY * rate
+
+
+def _with_range(taken: Ranges, first: int, end: int) -> Ranges:
+    """Return ranges and one more, which is apart from them; neighbours become one range."""
+    before = after = bisect(taken, (first, end))
+    if before and taken[before - 1][1] == first:
+        before -= 1
+        first = taken[before][0]
+    if after < len(taken) and taken[after][0] == end:
+        end = taken[after][1]
+        after += 1
+    return (*taken[:before], (first, end), *taken[after:])
 
 
 def _gaps(taken: Ranges, first: int, end: int) -> list[tuple[int, int]]:

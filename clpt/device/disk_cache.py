@@ -124,13 +124,13 @@ def keep_failed(source: Source) -> str | None:
     return str(path)
 
 
-def prune(root: Path, limit: int = LIMIT) -> None:
+def prune(root: Path, limit: int = LIMIT, parts: tuple[str, ...] = _PARTS) -> None:
     """Delete the files that were used longest ago, until all take at most `limit` bytes.
 
-    What processes that have died left behind is deleted too.
+    parts: their folders in `root`. What processes that have died left behind is deleted too.
     """
     found, now = [], time.time()
-    for path in (path for part in _PARTS for path in (root / part).glob("*")):
+    for path in (path for part in parts for path in (root / part).glob("*")):
         try:
             facts = path.stat()
             if not path.name.startswith(output_files.PARTIAL):

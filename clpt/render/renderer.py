@@ -267,11 +267,18 @@ class Renderer(Resumable):
         self._stop.set()
 
     @synchronized
-    def reset(self, wait_for: dev.Events = None, *, seed: int | None = None) -> cl.Event:
+    def reset(
+        self,
+        wait_for: dev.Events = None,
+        *,
+        seed: int | None = None,
+        first_sample: int | None = None,
+    ) -> cl.Event:
         """Enqueue that the film is emptied; the next sample is the first one again.
 
-        seed: of the samples from now on, which `self.scene` then has; by default as before. Raises
-        SceneError for a seed that is no whole number.
+        first_sample: its number from now on, by default as before. seed: of the samples from now
+        on, which `self.scene` then has; by default as before. Raises SceneError for a seed that is
+        no whole number, and for a number that is too large.
         """
         if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int)):
             raise SceneError(f"must be a whole number, not {seed!r}", where="seed")
@@ -282,6 +289,8 @@ class Renderer(Resumable):
             self.wavefronts[0].paths.set_seed(seed)
         for wavefront in self.wavefronts:
             wavefront.clear()
+        if first_sample is not None:
+            self._first_sample = _sample_number(first_sample)
         self._taken, self._adaptive = (), None
         self._begin_anew()
         stream.flush()

@@ -125,7 +125,7 @@ class Resumable(Pictures):
             settings["sampler.points"] = 1 << int(lowered.settings["sample_bits"])
         outside = [cls for cls in features.leaves if cls not in LEAVES]
         texts = [custom_materials.text(cls).text for cls in outside]
-        digest = hashlib.sha256("\0".join([_kernels_digest(), *texts]).encode()).hexdigest()
+        digest = hashlib.sha256("\0".join([kernels_digest(), *texts]).encode()).hexdigest()
         return Origin(self._scene_read[1], settings, digest, VERSION)
 
     @synchronized
@@ -225,8 +225,8 @@ class Resumable(Pictures):
 
 
 @cache
-def _kernels_digest() -> str:
-    """The SHA-256 of all kernels' texts."""
+def kernels_digest() -> str:
+    """Return the SHA-256 of all kernels' texts."""
     folder, hashed = dev.kernels_folder(), hashlib.sha256()
     for path in sorted(folder.rglob("*.cl")):
         hashed.update(path.relative_to(folder).as_posix().encode() + b"\0" + path.read_bytes())

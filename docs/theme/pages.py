@@ -125,7 +125,14 @@ def command_line() -> str:
     for name in cli.list_commands(context):
         command = cli.get_command(context, name)
         if command is not None:
-            parts += [f"## clpt {name}", _help(command, click.Context(command, context, name))]
+            own = click.Context(command, context, name)
+            parts += [f"## clpt {name}", _help(command, own)]
+            if isinstance(command, click.Group):
+                for part, inner in command.commands.items():
+                    parts += [
+                        f"### clpt {name} {part}",
+                        _help(inner, click.Context(inner, own, part)),
+                    ]
     return "\n\n".join(parts)
 
 

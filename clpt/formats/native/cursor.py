@@ -34,12 +34,16 @@ class DuplicateKey:
 
 @dataclass(frozen=True)
 class Cursor(Located):
-    """A value of a JSON file and the keys that lead to it."""
+    """A value of a JSON file and the keys that lead to it.
+
+    confined: whether it can name only files of its own folder.
+    """
 
     value: Any
     file: Path
     text: str
     path: tuple[str | int, ...] = ()
+    confined: bool = False
 
     def location(self) -> dict[str, Any]:
         where = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in self.path)
@@ -72,7 +76,7 @@ class Cursor(Located):
 
     def at(self, key: str | int) -> Cursor:
         """Return the value of a key or an index."""
-        return Cursor(self.value[key], self.file, self.text, (*self.path, key))
+        return Cursor(self.value[key], self.file, self.text, (*self.path, key), self.confined)
 
     def items(self) -> Iterator[tuple[str, Cursor]]:
         """Yield the keys and values of an object."""
@@ -111,10 +115,11 @@ class Cursor(Located):
         return [entry.number() for entry in self.entries(count)]
 
 
-def parse(path: Path) -> Cursor:
+def parse(path: Path, confined: bool = False) -> Cursor:
     """Read a JSON file whose outermost value is an object.
 
-    Raises SceneError with the line for what is not JSON.
+    confined: whether it can name only files of its own folder. Raises SceneError with the line for
+    what is not JSON.
     """
     try:
         text = path.read_text("utf-8-sig")
@@ -127,7 +132,7 @@ def parse(path: Path) -> Cursor:
         raise SceneError("is nested too deeply", file=path) from None
     except ValueError as error:
         raise SceneError(f"is not JSON: {str(error)[:100]}", file=path) from None
-    cursor = Cursor(value, path, text)
+    cursor = Cursor(value, path, text, confined=confined)
     cursor.expect(dict)
     return cursor
 

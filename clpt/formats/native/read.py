@@ -26,14 +26,19 @@ KEYS = (
 
 
 def load(
-    path: Path, outside: Iterable[type[materials.Material]] = (), missing: Missing = "error"
+    path: Path,
+    outside: Iterable[type[materials.Material]] = (),
+    missing: Missing = "error",
+    *,
+    confined: bool = False,
 ) -> Scene:
     """Read a scene.json.
 
-    outside: material kinds that are not clpt's own; missing: see clpt.load. Raises SceneError,
-    UnknownKindError and UnusedParameterError with file, line and path of the value.
+    outside: material kinds that are not clpt's own; missing: see clpt.load; confined: whether it
+    can name only files of its own folder. Raises SceneError, UnknownKindError and
+    UnusedParameterError with file, line and path of the value.
     """
-    return _Reader(parse(path), outside, missing).scene()
+    return _Reader(parse(path, confined), outside, missing).scene()
 
 
 class _Reader:

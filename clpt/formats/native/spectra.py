@@ -123,6 +123,8 @@ def kind_name(cursor: Cursor, category: str, known: Any) -> str:
 def find_file(cursor: Cursor) -> Any:
     """Return the path of an existing file; names are relative to the JSON file's folder."""
     path = cursor.file.parent / cursor.expect(str)
+    if cursor.confined and path.name != cursor.value:
+        raise cursor.error(f"{cursor.value!r} is not in the folder of this file")
     try:
         if path.is_file():
             return path

@@ -6,6 +6,7 @@ import dataclasses
 import json
 import os
 import re
+import shutil
 from collections.abc import Callable, Container, Sequence
 from itertools import groupby
 from pathlib import Path
@@ -18,17 +19,21 @@ from clpt.errors import SceneError
 from clpt.formats.meshes import particles, strands
 from clpt.formats.native import forms
 from clpt.formats.native.shape_files import MESH_ARRAYS, in_file
-from clpt.scene import Scene, materials, shapes
+from clpt.scene import Scene, kinds, materials, shapes
 from clpt.scene.params import Kind, defaults, params
 
 MANY = 16  # from so many instances in a row on, a file holds their matrices
 NUMBERS = re.compile(r"\[\s+([^\[\]{}\"]*?)\s+\]")
 
 
-def save(scene: Scene, path: str | Path) -> None:
-    """Write a scene as `clpt.save` does, to the .json at `path`. Raises SceneError."""
+def save(scene: Scene, path: str | Path, *, copies: bool = False) -> None:
+    """Write a scene as `clpt.save` does, to the .json at `path`. Raises SceneError.
+
+    copies: whether images that the scene has by their paths are copied beside it, so that another
+    machine can read the folder; materials that are not clpt's own are then refused.
+    """
     path = Path(path)
-    writer = _Writer(path)
+    writer = _Writer(path, copies)
     try:
         text = json.dumps(writer.scene(scene), indent=2)
         output_files.write_text(path, NUMBERS.sub(_on_one_line, text) + "\n")
@@ -39,8 +44,8 @@ def save(scene: Scene, path: str | Path) -> None:
 class _Writer:
     """Writes one scene; materials, groups and arrays that several shapes share are written once."""
 
-    def __init__(self, path: Path):
-        self.path = path
+    def __init__(self, path: Path, copies: bool = False):
+        self.path, self.copies = path, copies
         self.array_files: dict[type[Kind], Callable[[Any], str]] = {
             shapes.Mesh: self.mesh,
             shapes.Curves: self.curves,
@@ -106,6 +111,8 @@ class _Writer:
         The material of a shape is always written: without one a mesh has that of its file.
         """
         cls, thing = type(thing), _on_host(thing)
+        if self.copies and issubclass(cls, materials.Material) and not _is_known(cls):
+            raise SceneError(f"the material {cls.kind!r} is not clpt's own: it stays here")
         written: dict[str, Any] = {"type": thing.kind}
         if cls in self.array_files:
             written["file"] = self.array_files[cls](thing)
@@ -152,7 +159,9 @@ class _Writer:
         """Return the name of an image's file; an array is written to one."""
         spectral = isinstance(image, spectral_exr.SpectralImage)
         if not spectral and not isinstance(image, np.ndarray):
-            return os.path.relpath(image, self.path.parent)
+            return (
+                self.copy(Path(image)) if self.copies else os.path.relpath(image, self.path.parent)
+            )
         if id(image) not in self.files:
             bytes_ = not spectral and image.dtype == np.uint8
             suffix = "exr" if spectral else "png" if bytes_ else "npy"
@@ -165,6 +174,15 @@ class _Writer:
                 images.write_npy(self.path.parent / name, np.asarray(image, np.float32))
             self.files[id(image)] = name
         return self.files[id(image)]
+
+    def copy(self, path: Path) -> str:
+        """Copy a file, once; return its name."""
+        key = os.path.realpath(path)
+        if key not in self.files:
+            name = self.file_name("image", path.suffix.lstrip("."))
+            shutil.copyfile(path, self.path.parent / name)
+            self.files[key] = name
+        return self.files[key]
 
     def curves(self, curves: shapes.Curves) -> str:
         """Write strands, unless another shape shares them; return the file's name."""
@@ -211,6 +229,11 @@ def _on_host(thing: Kind) -> Kind:
             raise SceneError(message, where=f"{thing.kind}.{name}")
         on_device[name] = value.get()
     return dataclasses.replace(thing, **on_device) if on_device else thing
+
+
+def _is_known(cls: type[materials.Material]) -> bool:
+    """Whether a kind of material is clpt's own."""
+    return kinds("material").get(cls.kind) is cls
 
 
 def _group_of_run(shape: shapes.Shape) -> int | None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +15,7 @@ from clpt.render.contract.features import GROUP_WORDS, SUM_WORDS
 SAMPLES_WORD = 3 * SUM_WORDS  # after three sums, kernels/film/film.cl
 FILM_WORDS = GROUP_WORDS  # of a pixel; one of weights and one of alpha may follow
 LEAST_WITH_LIGHT_PATHS = 2 * FILM_WORDS  # from which a pixel's last words are those of light paths
+STRIP = 16384  # pixels whose words are added at a time
 
 Words = NDArray[np.uint32]
 Ranges = tuple[tuple[int, int], ...]
@@ -67,14 +70,16 @@ class FilmState:
 
 def add_films(a: Words, b: Words) -> Words:
     """Return the sums and numbers of samples, (..., 10 to 26, h, w) each, of two films."""
-    total = a + b
+    total = np.empty_like(a)
     group = light_group(a.shape[-3])
     firsts = [*range(0, SAMPLES_WORD, SUM_WORDS), *range(FILM_WORDS, group, SUM_WORDS)]
     if group < a.shape[-3]:
         firsts += range(group, group + SAMPLES_WORD, SUM_WORDS)
-    for first in firsts:
-        part = np.s_[..., first : first + SUM_WORDS, :, :]
-        total[part] = add_sums(a[part], b[part])
+    for rows in _strips(a):
+        np.add(a[rows], b[rows], out=total[rows])
+        for first in firsts:
+            part = np.s_[..., first : first + SUM_WORDS, :, :]
+            _carry(total[rows][part], a[rows][part])
     return total
 
 
@@ -86,12 +91,31 @@ def light_group(words: int) -> int:
 def add_sums(a: Words, b: Words) -> Words:
     """Return the sums of 96-bit numbers, (..., 3, h, w) each."""
     total = np.empty_like(a)
-    carry = np.zeros((), np.uint64)
-    for i in range(SUM_WORDS):
-        word = a[..., i, :, :].astype(np.uint64) + b[..., i, :, :] + carry
-        total[..., i, :, :] = word & 0xFFFFFFFF
-        carry = word >> np.uint64(32)
+    for rows in _strips(a):
+        np.add(a[rows], b[rows], out=total[rows])
+        _carry(total[rows], a[rows])
     return total
+
+
+def _strips(words: Words) -> Iterator[tuple[Any, ...]]:
+    """Yield the rows of words (..., h, w) in pieces that fit a cache."""
+    height, width = words.shape[-2:]
+    step = max(1, STRIP // max(width, 1))
+    for i in range(0, height, step):
+        yield np.s_[..., i : i + step, :]
+
+
+def _carry(total: Words, a: Words) -> None:
+    """Carry between the words of sums, (..., 3, h, w), whose words were added to those of `a`.
+
+    A sum that wrapped around is less than what it was made of.
+    """
+    low, middle, high = (total[..., i, :, :] for i in range(SUM_WORDS))
+    carry = low < a[..., 0, :, :]
+    carry_high = middle < a[..., 1, :, :]
+    middle += carry
+    carry_high |= carry & (middle == 0)
+    high += carry_high
 
 
 def join_ranges(a: Ranges, b: Ranges) -> Ranges:

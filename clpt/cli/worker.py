@@ -1,0 +1,45 @@
+"""`clpt worker`: render for a cluster."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from .verbosity import verbose_option
+
+
+@click.command()
+@click.argument("address")
+@click.option("--device", metavar="NAME-OR-INDEX", help="Where to render: see `clpt devices`.")
+@click.option("--threads", type=click.IntRange(1), help="Cores of a CPU to use, at most.")
+@click.option("--host", metavar="ADDRESS", help="Address of this machine for the others.")
+@click.option(
+    "--keys", type=click.Path(path_type=Path), help="Folder of the cluster's keys, for tls://."
+)
+@click.option("--name", help="What the worker is called.  [default: its address]")
+@verbose_option("Log more; twice for everything.")
+@click.option("--quiet", is_flag=True, help="Print nothing.")
+def worker(
+    address: str,
+    device: str | None,
+    threads: int | None,
+    host: str | None,
+    keys: Path | None,
+    name: str | None,
+    verbose: int,
+    quiet: bool,
+) -> int:
+    """Render for the scheduler at ADDRESS, such as tls://192.168.1.5:8786, until it ends.
+
+    A worker renders with one device; start one for each. It runs nothing but clpt.
+    """
+    from ..cluster import processes, tasks
+
+    info = tasks.choose_device(device, threads).info
+
+    def tell(text: str) -> None:
+        if not quiet:
+            click.echo(f"{text}, on {info.label}", err=True)
+
+    return processes.run_worker(address, host=host, folder=keys, name=name, tell=tell)

@@ -1,0 +1,167 @@
+"""Scenes that travel: files by the SHA-256 of their content, and a list of their names.
+
+A bundle is bytes and JSON; nothing in it is executed. Whoever receives it keeps its files in the
+cache folder, so that a file comes once, and reads a file only if its digest is right.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import shutil
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from clpt import output_files
+from clpt.device import disk_cache
+from clpt.errors import ClusterError
+from clpt.formats import native
+from clpt.scene import Scene
+
+VERSION = 1
+LIMIT = 8 * 2**30  # bytes of files that are kept
+SCENE = "scene.json"
+FOLDER = "bundles"  # in clpt's cache folder
+_OPENED = "opened-"  # begins the name of the folder of a scene that is open
+_STALE = 86400.0  # [s] after which it belongs to a process that has died
+_NAME = re.compile(r"[A-Za-z0-9_][\w.-]{0,199}", re.ASCII)
+_DIGEST = re.compile(r"[0-9a-f]{64}")
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """The files of a scene: digests by name, one of which is that of scene.json."""
+
+    files: dict[str, str]
+
+    @property
+    def digests(self) -> set[str]:
+        return set(self.files.values())
+
+    def to_json(self) -> dict[str, Any]:
+        """Return what `from_json` reads."""
+        return {"format": "clpt bundle", "version": VERSION, "files": self.files}
+
+    @classmethod
+    def from_json(cls, document: Any) -> Bundle:
+        """Read a bundle's list.
+
+        Raises ClusterError for a version that is not known, a name that is no plain file name, and
+        what is no digest.
+        """
+        if not isinstance(document, dict) or document.get("format") != "clpt bundle":
+            raise ClusterError("this is no bundle of a scene")
+        version, files = document.get("version"), document.get("files")
+        if version != VERSION:
+            raise ClusterError(f"the bundle has version {version!r}; this clpt reads {VERSION}")
+        if not isinstance(files, dict) or SCENE not in files:
+            raise ClusterError(f"the bundle has no {SCENE}")
+        for name, digest in files.items():
+            if not _NAME.fullmatch(name):
+                raise ClusterError(f"the bundle names a file outside of its folder: {name!r}")
+            check_digest(digest)
+        return cls(dict(files))
+
+
+def pack(scene: Scene, folder: Path) -> Bundle:
+    """Write a scene and all that it needs into a folder; return its bundle.
+
+    Raises SceneError for what cannot be written, and for materials that are not clpt's own:
+    workers run nothing but clpt.
+    """
+    native.save(scene, folder / SCENE, copies=True)
+    return Bundle({path.name: file_digest(path) for path in sorted(folder.iterdir())})
+
+
+class Store:
+    """Files by their digests, in clpt's cache folder or another; at most `limit` bytes.
+
+    Several processes may use it at once.
+    """
+
+    def __init__(self, folder: Path | None = None, limit: int = LIMIT):
+        self.folder, self.limit = folder or disk_cache.folder() / FOLDER, limit
+
+    def lacks(self, bundle: Bundle) -> list[str]:
+        """Return the digests of the files that are not here; one that is damaged goes."""
+        return sorted(digest for digest in bundle.digests if not self._holds(digest))
+
+    def add(self, digest: str, content: bytes) -> None:
+        """Keep a file. Raises ClusterError if it is not what the digest says, OSError."""
+        check_digest(digest)
+        found = hashlib.sha256(content).hexdigest()
+        if found != digest:
+            raise ClusterError(f"a file of the bundle is damaged: {found[:12]} for {digest[:12]}")
+        self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        output_files.write(self.folder / digest, content)
+        disk_cache.prune(self.folder.parent, self.limit, (self.folder.name,))
+
+    @contextmanager
+    def opened(self, bundle: Bundle) -> Iterator[Scene]:
+        """Yield the scene of a bundle, whose files are there until the end of the context.
+
+        Raises ClusterError if a file is missing, SceneError for what cannot be read.
+        """
+        self._clear_old()
+        with tempfile.TemporaryDirectory(prefix=_OPENED, dir=self.folder) as folder:
+            for name, digest in bundle.files.items():
+                try:
+                    _link(self.folder / digest, Path(folder) / name)
+                except FileNotFoundError:
+                    raise ClusterError(f"the file {name} of the bundle is missing") from None
+            yield native.load(Path(folder) / SCENE, confined=True)
+
+    def _clear_old(self) -> None:
+        """Delete the folders of scenes that processes had open which have died."""
+        for path in self.folder.glob(f"{_OPENED}*"):
+            with suppress(OSError):
+                if time.time() - path.stat().st_mtime > _STALE:
+                    shutil.rmtree(path)
+
+    def _holds(self, digest: str) -> bool:
+        path = self.folder / digest
+        try:
+            if file_digest(path) == digest:
+                os.utime(path)  # it is used now
+                return True
+            path.unlink()
+        except OSError:
+            pass
+        return False
+
+
+def check_digest(digest: Any) -> None:
+    """Raise ClusterError for what is no SHA-256 in hexadecimal."""
+    if not isinstance(digest, str) or not _DIGEST.fullmatch(digest):
+        raise ClusterError(f"this is no digest: {str(digest)[:80]!r}")
+
+
+def file_digest(path: Path) -> str:
+    """Return the SHA-256 of a file's content. Raises OSError."""
+    hashed = hashlib.sha256()
+    with path.open("rb") as file:
+        while piece := file.read(1 << 20):
+            hashed.update(piece)
+    return hashed.hexdigest()
+
+
+def canonical(document: Any) -> str:
+    """Return JSON that is the same for the same content."""
+    return json.dumps(document, sort_keys=True, separators=(",", ":"))
+
+
+def _link(source: Path, target: Path) -> None:
+    """Give a file a second name, or copy it where the file system has no links."""
+    try:
+        os.link(source, target)
+    except FileNotFoundError:
+        raise
+    except OSError:
+        shutil.copyfile(source, target)

@@ -1,0 +1,284 @@
+"""What a worker does: the functions that a client calls by their names, one process a worker.
+
+They take and return numbers, texts, bytes and arrays, and keep what was opened for the next call.
+What goes wrong comes back as a text: a worker outlives whatever it is asked.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import time
+import traceback
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from clpt import device as dev
+from clpt.cluster.bundle import Bundle, Store, canonical
+from clpt.errors import ClptError, ClusterError, MemoryBudgetError
+from clpt.render.renderer import Renderer
+from clpt.render.resumable import kernels_digest
+from clpt.render.wavefront.film_state import FilmState
+from clpt.scene import Scene
+from clpt.version import VERSION as VERSION_OF_CLPT
+
+log = logging.getLogger(__name__)
+
+VERSION = 1  # of what client and worker say to each other
+OPTIONS = ("halves", "layout", "queued", "looped", "slots", "texture_budget", "tree_quality")
+MOST_OPEN = 2  # jobs of a worker, each with its memory on the device
+
+Reply = dict[str, Any]
+
+_device: dict[str, Any] = {"which": None, "threads": None}  # where this worker renders
+_open: dict[str, _Job] = {}  # by digest, the last used at the end
+_stopped: set[str] = set()  # jobs that are to end soon
+
+
+class _Job:
+    """A renderer of a job's scene, kept between tasks."""
+
+    def __init__(self, scene: Scene, on: dev.Device, options: dict[str, Any]):
+        self.renderer = Renderer(scene, on, **options)
+
+    def block(self, first: int, end: int, wanted: Callable[[], bool]) -> Reply:
+        """Render samples first to end - 1 of every pixel; a film and what it took."""
+        began, renderer = time.perf_counter(), self.renderer
+        renderer.reset(first_sample=first)
+        before = [replace(wavefront.counts) for wavefront in renderer.wavefronts]
+        whole = renderer.run(end - first, lambda _: wanted())
+        state = renderer.film_state()
+        after = [wavefront.counts for wavefront in renderer.wavefronts]
+        pairs = list(zip(before, after, strict=True))
+        return {
+            **state_to_arrays(state),
+            "whole": whole,
+            "seconds": time.perf_counter() - began,
+            **{
+                name: sum(getattr(b, name) - getattr(a, name) for a, b in pairs)
+                for name in ("samples", "rays", "rejected", "full")
+            },
+        }
+
+
+def choose_device(which: str | int | None, threads: int | None = None) -> dev.Device:
+    """Settle where this worker renders; return that. Raises DeviceError."""
+    _device.update(which=which, threads=threads)
+    return dev.choose(which, threads=threads)
+
+
+def describe_job(bundle: Bundle, options: dict[str, Any]) -> str:
+    """Return what workers need to open a job, as JSON; its SHA-256 is the job's digest."""
+    return canonical({
+        "format": "clpt job", "version": VERSION, "clpt": VERSION_OF_CLPT,
+        "kernels": kernels_digest(), "bundle": bundle.to_json(), "options": options,
+    })  # fmt: skip
+
+
+def digest_of(job: str) -> str:
+    """Return the digest by which a job is known."""
+    return hashlib.sha256(job.encode()).hexdigest()
+
+
+def give(content: bytes) -> bytes:
+    """Return a file of a bundle: workers that lack it get the result."""
+    return content
+
+
+def open_job(job: str, files: dict[str, bytes]) -> Reply:
+    """Open a job's scene, so that its blocks can be rendered.
+
+    job: from `describe_job`; files: contents by digest, to keep. Returns "lacks", digests of files
+    that are needed; or "kind", the class of this device, and "device", its name, and the seconds
+    that it took; or "refused", why this worker cannot take part.
+    """
+    try:
+        return _open_job(job, files)
+    except OSError as error:
+        return {"refused": f"its disk: {error.strerror or error}"}
+    except Exception as error:
+        return {"refused": _told(error)}
+
+
+def _open_job(job: str, files: dict[str, bytes]) -> Reply:
+    began, document = time.perf_counter(), _parsed(job)
+    for what, own in (("clpt", VERSION_OF_CLPT), ("kernels", kernels_digest())):
+        if document.get(what) != own:
+            theirs, ours = (str(v)[:12] for v in (document.get(what), own))
+            raise ClusterError(f"it has {what} {ours}, the client {theirs}")
+    bundle, store = Bundle.from_json(document.get("bundle")), Store()
+    options = document.get("options")
+    if not isinstance(options, dict) or not options.keys() <= set(OPTIONS):
+        raise ClusterError("the job has unknown options")
+    digest = digest_of(job)
+    _stopped.discard(digest)
+    on = dev.choose(_device["which"], threads=_device["threads"])
+    if digest not in _open:
+        for one in files:
+            store.add(one, files[one])
+        lacks = store.lacks(bundle)
+        if lacks:
+            return {"lacks": lacks}
+        with store.opened(bundle) as scene:
+            _open_renderer(digest, scene, on, options)
+    _open[digest] = _open.pop(digest)
+    seconds = time.perf_counter() - began
+    return {
+        "kind": device_class(_open[digest].renderer),
+        "device": on.info.label,
+        "seconds": seconds,
+    }
+
+
+def _open_renderer(digest: str, scene: Scene, on: dev.Device, options: dict[str, Any]) -> None:
+    """Make a job's renderer; the jobs that were used longest ago make room for it."""
+    while len(_open) >= MOST_OPEN:
+        _close_oldest()
+    while True:
+        try:
+            with ExitStack() as resources:
+                spare = min(dev.spare_cores(), (_device["threads"] or on.info.compute_units) - 1)
+                if spare and on.info.compiles_singly:
+                    on.compilers = resources.enter_context(dev.Compilers(spare))
+                job = _Job(scene, on, options)
+                job.renderer.prepare()
+        except MemoryBudgetError:
+            if not _open:
+                raise
+            _close_oldest()
+            continue
+        finally:
+            on.compilers = None
+        _open[digest] = job
+        return
+
+
+def _close_oldest() -> None:
+    _open.pop(next(iter(_open))).renderer.close()
+
+
+def render_block(digest: str, first: int, end: int) -> Reply:
+    """Render samples first to end - 1 of a job that `open_job` opened.
+
+    Returns the arrays of `state_to_arrays`; "whole", whether it came to its end; "seconds" and
+    counts of samples, rays, and of what the film refused. Or "closed": the job is not open here; or
+    "error": what went wrong.
+    """
+    try:
+        job = _open.get(digest)
+        if job is None or digest in _stopped:
+            return {"closed": True}
+        _open[digest] = _open.pop(digest)
+        wanted = _wanted()
+        return job.block(first, end, lambda: digest not in _stopped and wanted())
+    except Exception as error:
+        return {"error": _told(error)}
+
+
+def stop_job(digest: str) -> None:
+    """Let a job's block end soon with the film that it has; called beside it."""
+    _stopped.add(digest)
+
+
+def close_job(digest: str) -> None:
+    """Give back a job's memory, once it is not in use; called beside it."""
+    _stopped.add(digest)
+    job = _open.pop(digest, None)
+    if job is not None:
+        job.renderer.cancel()
+
+
+def state_to_arrays(state: FilmState) -> Reply:
+    """Return a film as arrays, with a checksum of all of it."""
+    parts: Reply = {
+        "words": state.words, "bands": state.bands, "scale": state.scale,
+        "taken": [list(pair) for pair in state.taken],
+    }  # fmt: skip
+    return {**parts, "sha256": film_digest(state)}
+
+
+def state_from_arrays(reply: Reply) -> FilmState:
+    """Return the film of a reply. Raises ClusterError if it is not what its worker sent."""
+    try:
+        words, bands = (np.asarray(reply[name]) for name in ("words", "bands"))
+        taken = tuple((int(first), int(end)) for first, end in reply["taken"])
+        state = FilmState(words, bands, taken, float(reply["scale"]))
+    except (KeyError, TypeError, ValueError) as error:
+        raise ClusterError(f"this is no film: {error}") from None
+    if words.dtype != np.uint32 or bands.dtype != np.uint32 or words.ndim != 5 or bands.ndim != 5:
+        raise ClusterError(f"this is no film: {words.dtype} {words.shape}")
+    if film_digest(state) != reply.get("sha256"):
+        raise ClusterError("the checksum of the film is wrong")
+    return state
+
+
+def film_digest(state: FilmState) -> str:
+    """Return the SHA-256 of all that a film holds."""
+    hashed = hashlib.sha256(f"{state.taken} {state.scale} ".encode())
+    for array in (state.words, state.bands):
+        hashed.update(f"{array.shape} ".encode())
+        if array.size:
+            hashed.update(np.ascontiguousarray(array).data.cast("B"))
+    return hashed.hexdigest()
+
+
+def device_class(renderer: Renderer) -> str:
+    """Return what decides the last bits of a film beside its scene.
+
+    Device, driver, lanes and trees; and what was chosen to suit the device, such as how many texels
+    its memory lets images have.
+    """
+    found = {**renderer.device_class(), **renderer.origin().settings}
+    return ", ".join(f"{name} {value}" for name, value in found.items())
+
+
+def _parsed(job: str) -> dict[str, Any]:
+    """The JSON of a job. Raises ClusterError."""
+    try:
+        document = json.loads(job)
+    except (TypeError, ValueError):
+        document = None
+    if not isinstance(document, dict) or document.get("format") != "clpt job":
+        raise ClusterError("this is no job of clpt")
+    if document.get("version") != VERSION:
+        raise ClusterError(
+            f"the client speaks version {document.get('version')!r}, this worker {VERSION}"
+        )
+    return document
+
+
+def _wanted() -> Callable[[], bool]:
+    """Return a function that tells whether somebody waits for the task of this thread.
+
+    A task whose client is gone, or has the block from another worker, is told so by nothing but the
+    state that Dask's worker has noted for it.
+    """
+    from distributed.core import Status
+    from distributed.worker import get_worker, thread_state
+
+    try:
+        worker, key = get_worker(), thread_state.key
+    except (ValueError, AttributeError):  # called without Dask
+        return lambda: True
+
+    def wanted() -> bool:
+        task = worker.state.tasks.get(key)
+        if task is None or task.state not in ("executing", "long-running"):
+            return False
+        return worker.status in (Status.running, Status.paused)
+
+    return wanted
+
+
+def _told(error: Exception) -> str:
+    """Return what went wrong, in a line for the client; a fault of clpt's is logged in full."""
+    if isinstance(error, ClptError):
+        return str(error)
+    log.error("a task failed", exc_info=error)
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{type(error).__name__}: {error} ({last.name}, line {last.lineno})"
