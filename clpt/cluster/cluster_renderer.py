@@ -97,7 +97,7 @@ class ClusterRenderer:
         self._local: Renderer | None = None  # makes pictures
         self._developed: FilmState | None = None  # that it has
         self._totals = dict.fromkeys(("samples", "rays", "rejected", "full"), 0)
-        self._blocks, self._add_seconds = Blocks(0), 0.0
+        self._blocks, self._total, self._add_seconds = Blocks(0), 0, 0.0
         self._began = time.perf_counter()
 
     # ---- rendering
@@ -162,6 +162,7 @@ class ClusterRenderer:
             self._stop.clear()
             return False
         films: queue.Queue[Film] = queue.Queue()
+        self._total = self.samples + samples
         self._blocks = self._next_blocks(samples)
         feeder = Feeder(
             self.client, self._blocks, self._job, self._bundle, Path(self._folder.name),
@@ -175,7 +176,7 @@ class ClusterRenderer:
             self._stop.clear()
             self._end(driven, films)
         driven.result()
-        return self._blocks.samples_done == self._blocks.end
+        return self.samples == self._total
 
     def _collect(
         self, films: queue.Queue[Film], driven: Any, feeder: Feeder, progress: Any
@@ -208,9 +209,13 @@ class ClusterRenderer:
     def _next_blocks(self, samples: int) -> Blocks:
         """The blocks of a run, which fill the gaps of those before."""
         taken: Ranges = () if self._film is None else self._film.taken
-        done = sum(end - first for first, end in taken)
-        end = max(done + samples, taken[-1][1] if taken else 0)
-        return Blocks(end, taken, seconds=FIRST_SECONDS, check_every=self.check_every)
+        end, left = 0, samples
+        for first, after in taken:
+            gap = first - end
+            if gap >= left:
+                break
+            end, left = after, left - gap
+        return Blocks(end + left, taken, seconds=FIRST_SECONDS, check_every=self.check_every)
 
     def _add(self, film: Film) -> None:
         began = time.perf_counter()
@@ -221,7 +226,7 @@ class ClusterRenderer:
 
     def _so_far(self, seconds: float) -> Progress:
         totals = self._totals
-        return Progress(self.samples, self._blocks.end, totals["samples"], totals["rays"], seconds)
+        return Progress(self.samples, self._total, totals["samples"], totals["rays"], seconds)
 
     def cancel(self) -> None:
         """Let the run, or else the next one, stop soon and return False."""
