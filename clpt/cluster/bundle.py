@@ -101,7 +101,7 @@ class Store:
             raise ClusterError(f"a file of the bundle is damaged: {found[:12]} for {digest[:12]}")
         self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         output_files.write(self.folder / digest, content)
-        disk_cache.prune(self.folder.parent, self.limit, (self.folder.name,))
+        disk_cache.prune(self.folder.parent, self.limit, parts=(self.folder.name,))
 
     @contextmanager
     def opened(self, bundle: Bundle) -> Iterator[Scene]:

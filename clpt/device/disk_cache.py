@@ -124,7 +124,7 @@ def keep_failed(source: Source) -> str | None:
     return str(path)
 
 
-def prune(root: Path, limit: int = LIMIT, parts: tuple[str, ...] = _PARTS) -> None:
+def prune(root: Path, limit: int = LIMIT, *, parts: tuple[str, ...] = _PARTS) -> None:
     """Delete the files that were used longest ago, until all take at most `limit` bytes.
 
     parts: their folders in `root`. What processes that have died left behind is deleted too.
