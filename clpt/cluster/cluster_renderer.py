@@ -253,6 +253,10 @@ class ClusterRenderer:
         if self._developed is not self._film and self._film is not None:
             self._local.reset()
             self._local.merge(self._film)
+            films = len(self._local.wavefronts)
+            for one in self._local.wavefronts:  # each has its share of what all workers counted
+                for name, value in self._totals.items():
+                    setattr(one.counts, "closest" if name == "rays" else name, value // films)
             self._developed = self._film
         return self._local
 
@@ -268,6 +272,8 @@ class ClusterRenderer:
         self._film = None
         self.merge(state)
         self._developed = self._film
+        for name in self._totals:
+            self._totals[name] = sum(getattr(counts, name) for counts in local.counts)
 
     def image(self) -> Image:
         """The picture so far, see `Renderer.image`; made on this machine."""

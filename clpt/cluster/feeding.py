@@ -295,7 +295,8 @@ class Feeder:
                 raise
             return {"error": "the scheduler cancelled a task"}
         except Exception as error:
-            return {"error": f"{type(error).__name__}: {error}"}
+            first = next(iter(str(error).splitlines()), "")
+            return {"error": f"{type(error).__name__}: {first}"}
         finally:
             future.release()
         return reply if isinstance(reply, dict) else {"error": "it sent what is no reply"}

@@ -17,6 +17,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSI
 sys.path.insert(0, str(Path(__file__).parent))
 from machines import digest_of_one_process, machines, scene, wait_until  # noqa: E402
 
+import clpt  # noqa: E402
 from clpt.cluster import tasks  # noqa: E402
 from clpt.cluster.cluster_renderer import ClusterRenderer  # noqa: E402
 from clpt.errors import ClusterError  # noqa: E402
@@ -71,6 +72,25 @@ def test_a_run_that_is_stopped_leaves_a_picture(two):
         assert not renderer.run(1)
         assert renderer.run(10)
         assert renderer.samples == stopped + 10
+
+
+def test_a_saved_film_is_gone_on_with(two, expected, tmp_path):
+    """By a cluster, and by one process: the film of a render that was never stopped."""
+    path = tmp_path / "a.resume.exr"
+    with ClusterRenderer(scene(), two.client) as renderer:
+        assert renderer.run(SAMPLES // 2)
+        renderer.save_state(path)
+    with ClusterRenderer(scene(), two.client) as renderer:
+        renderer.load_state(path)
+        assert renderer.samples == SAMPLES // 2
+        assert renderer.counts["samples"] == SAMPLES // 2 * 32 * 24
+        assert renderer.run(SAMPLES - SAMPLES // 2)
+        assert digest(renderer) == expected
+    with clpt.Renderer(scene(), threads=1) as renderer:
+        renderer.load_state(path)
+        assert renderer.counts[0].samples == SAMPLES // 2 * 32 * 24
+        renderer.run(SAMPLES - SAMPLES // 2)
+        assert digest(renderer) == expected
 
 
 def test_a_killed_worker_is_not_missed(two):
