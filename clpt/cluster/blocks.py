@@ -109,7 +109,6 @@ class Blocks:
         self.workers: dict[Worker, WorkerRecord] = {}
         self.refused: dict[Worker, str] = {}
         self.lost = self.repeated = self.dropped = 0
-        self._rate = 0.0
         self._free = _gaps(taken, 0, end)
         self._flights: dict[int, _Flight] = {}
         self._again: list[_Flight] = []  # blocks that came back
@@ -136,7 +135,7 @@ class Blocks:
     @property
     def rate(self) -> float:
         """Of all workers together [samples/s]."""
-        return self._rate
+        return sum(record.rate for record in self.workers.values())
 
     def extend(self, end: int) -> None:
         """Add samples up to another end. Does nothing where that is no later."""
@@ -158,7 +157,6 @@ class Blocks:
     def lose(self, worker: Worker) -> list[Block]:
         """A worker is gone: return its blocks, which others get."""
         self.workers.pop(worker, None)
-        self._rate = sum(record.rate for record in self.workers.values())
         blocks = [f.block for f in self._flights.values() if worker in f.since]
         for block in blocks:
             self.lost += 1
@@ -208,9 +206,7 @@ class Blocks:
         if worker in self.workers:
             record = self.workers[worker]
             took = seconds or (0.0 if since is None else now - since)
-            self._rate -= record.rate
             _note_rate(record, block.samples, took)
-            self._rate += record.rate
         if flight.compared and not self._agreed(flight, worker, digest):
             return Outcome.HOLD
         del self._flights[block.number]
