@@ -9,7 +9,7 @@ import click
 
 from .verbosity import verbose_option
 
-COMMANDS = ("render", "merge", "warm", "devices", "info", "inspect", "kernels", "bench")
+COMMANDS = ("render", "view", "merge", "warm", "devices", "info", "inspect", "kernels", "bench")
 
 
 class _Commands(click.Group):
