@@ -73,6 +73,7 @@ def view(
     from ..view.session import Session
 
     file = locate(scene)
+    graded = grading(**{name: options.pop(name) for name in OF_GRADING})
     resources = click.get_current_context().with_resource(ExitStack())
     server = Server(host, port)
     resources.callback(server.close)
@@ -86,7 +87,6 @@ def view(
     def write_exr(path: Path, renderer: Renderer, seconds: float) -> None:
         outputs.write(path, renderer, outputs.metadata(renderer, file, seconds), Grading())
 
-    graded = grading(**{name: options.pop(name) for name in OF_GRADING})
     of_renderer = {name: options.pop(name) for name in OF_RENDERER}
     plan, devices, _ = open_scene(scene, display(quiet, None), resources, **options)
     device = devices[0]

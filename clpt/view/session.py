@@ -48,8 +48,9 @@ class Source:
 class Session:
     """A scene that is rendered while it is watched and steered.
 
-    scene: at the start; device: where; outlet: gets pictures and messages; folder: gets what is
-    saved, and source tells when the file has changed, where they are given; display: at the start. options: of `Renderer`.
+    scene, display: at the start; device: where; outlet: gets pictures and messages; folder: gets
+    what is saved, and source tells when the file has changed, where they are given. options: of
+    `Renderer`.
 
     `post`, `watched` and `state` may be called from any thread.
     """
