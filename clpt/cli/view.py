@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 import webbrowser
 from contextlib import ExitStack
@@ -24,6 +25,7 @@ from .verbosity import verbose_option
 if TYPE_CHECKING:
     from ..view.session import Source
 
+CLOSE_SECONDS = 3.0  # in which a session ends that waits for no compiler
 OF_RENDERER = ("layout", "tree_quality", "texture_budget")
 OF_DEVICE = ("device", "threads")
 OF_GRADING = ("exposure", "tone", "view", "display", "look", "ocio")
@@ -107,7 +109,12 @@ def view(
             time.sleep(0.05)
     if session.error is not None:
         raise session.error
-    return STATUS + stopped[0]
+    status = STATUS + stopped[0]
+    if device.compilers is not None:
+        device.compilers.kill()
+    if not session.close(CLOSE_SECONDS):
+        os._exit(status)  # a driver compiles; nothing else ends it
+    return status
 
 
 def _source(

@@ -89,14 +89,18 @@ class Session:
         """Begin to render."""
         self._thread.start()
 
-    def close(self) -> None:
-        """Stop, and give the device's memory back."""
+    def close(self, timeout: float | None = None) -> bool:
+        """Stop, and give the device's memory back; return whether that was done.
+
+        timeout: [s] to wait at most: a driver that compiles cannot be stopped.
+        """
         with self._wake:
             self._closing = True
             self._wake.notify_all()
         self._loop.stop()
         if self._thread.ident is not None:
-            self._thread.join()
+            self._thread.join(timeout)
+        return not self._thread.is_alive()
 
     def post(self, request: Request, reply: Reply) -> None:
         """Ask for something; reply: gets messages for the viewer alone."""

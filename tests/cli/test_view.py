@@ -29,7 +29,10 @@ def test_it_prints_one_line_and_ends_by_ctrl_c(tmp_path):
         with urllib.request.urlopen(line.strip()) as answer:
             assert b"<!doctype html>" in answer.read()
         process.send_signal(signal.SIGINT)
-        assert process.wait(120) == 130
+        try:
+            assert process.wait(60) == 130
+        finally:
+            process.kill()
         assert process.stdout.read() == ""
 
 

@@ -78,12 +78,12 @@ def opened(
     raw = socket.create_connection((server.host, server.port), timeout=10)
     with connect(
         address, sock=raw, origin=given, additional_headers=headers, compression=None,
-        max_size=None, open_timeout=10, ping_interval=None,
+        max_size=None, open_timeout=10, close_timeout=1, ping_interval=None,
     ) as client:  # fmt: skip
         yield client
 
 
-def do(client: ClientConnection, name: str, **values: Any) -> None:
+def do(client: ClientConnection, name: str, /, **values: Any) -> None:
     """Send a command."""
     client.send(json.dumps({"do": name, **values}))
 

@@ -57,7 +57,7 @@ def invalid(kind: Type) -> list[Any]:
     return wrong[type(kind)]
 
 
-def message(name: str, **changed: Any) -> str:
+def message(name: str, /, **changed: Any) -> str:
     values = {key: valid(kind) for key, kind in COMMANDS[name].parameters.items()}
     return json.dumps({"do": name, **values, **changed})
 

@@ -116,7 +116,7 @@ def opened(on: device.Device, audience: Audience) -> Iterator[Open]:
         session.close()
 
 
-def ask(session: Session, audience: Audience, name: str, **values: Any) -> None:
+def ask(session: Session, audience: Audience, name: str, /, **values: Any) -> None:
     """Ask as a page does; what is left out is null."""
     request = parse(json.dumps({"do": name, **values}))
     session.post(request, audience.message)
