@@ -91,6 +91,8 @@ def view(
 
     of_renderer = {name: options.pop(name) for name in OF_RENDERER}
     plan, devices, _ = open_scene(scene, display(quiet, None), resources, **options)
+    if len(devices) > 1:
+        raise click.BadParameter("the page renders on one device", param_hint="--device")
     device = devices[0]
     session = Session(
         plan,
