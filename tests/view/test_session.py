@@ -349,6 +349,13 @@ def test_files_are_saved_in_the_folder(opened, audience, tmp_path, on) -> None:
     assert {path.parent for path in tmp_path.parent.rglob("a_b_c*")} == {tmp_path}
 
 
+def test_a_view_of_opencolorio_has_to_be_given_at_the_start(opened, audience) -> None:
+    session = opened(small())
+    ask(session, audience, "display", exposure=0.0, tone="view")
+    assert "no view" in audience.answer("error")["text"]
+    assert "view" not in session.state()["names"]["tones"]
+
+
 def test_without_a_folder_nothing_is_saved(opened, audience) -> None:
     session = opened(small())
     ask(session, audience, "save", what="exr")
