@@ -29,6 +29,7 @@ MAY_IMPORT = {
     "trimesh_ray": BASE | {"device", "rays"},
     "render": BASE | {"scene", "device", "bvh"},
     "formats": BASE | {"scene"},
+    "view": BASE | {"scene", "device", "render", "formats"},
     "benchmark": BASE | {"scene", "device", "bvh", "rays", "render", "formats"},
 }
 OPENCL = {"device", "bvh", "rays", "render"}  # only these import pyopencl

@@ -10,7 +10,7 @@ import click
 from .verbosity import verbose_option
 
 COMMANDS = (
-    "render", "merge", "warm", "worker", "cluster", "devices", "info", "inspect", "kernels",
+    "render", "view", "merge", "warm", "worker", "cluster", "devices", "info", "inspect", "kernels",
     "bench",
 )  # fmt: skip
 

@@ -179,23 +179,47 @@ def open_renderer(
     resources: ExitStack,
     accept: Callable[[Scene], None] | None = None,
     *,
-    profiling: bool = False,
-    keep: bool = False,
     first_sample: int = 0,
-    device: str | None,
-    threads: int | None,
     layout: str | None,
     tree_quality: Quality,
-    variables: dict[str, Any],
     texture_budget: int | None,
-    missing_textures: Missing,
-    **changes: Any,
+    **options: Any,
 ) -> tuple[AnyRenderer, float]:
     """Return a renderer of a scene file, and the seconds that the file took.
 
-    resources: get the processes that compile beside this one; accept: called with the scene, before
-    anything is built for it; keep: wait for what they keep for the next time; first_sample: see
-    `RenderOptions`; changes: see `changed`.
+    accept: called with the scene, before anything is built for it; first_sample: see
+    `RenderOptions`; the others as of `open_scene`.
+    """
+    plan, devices, loading = open_scene(scene, shown, resources, accept, **options)
+    made: dict[str, Any] = {
+        "texture_budget": texture_budget, "layout": layout, "tree_quality": tree_quality,
+        "first_sample": first_sample,
+    }  # fmt: skip
+    with shown.phase(f"building kernels for {' and '.join(on.info.name for on in devices)}"):
+        renderer = new_renderer(plan, devices, **made)
+    for warning in renderer.warnings:
+        shown.note(f"clpt: warning: {warning}")
+    return renderer, loading
+
+
+def open_scene(
+    scene: Path,
+    shown: Display,
+    resources: ExitStack,
+    accept: Callable[[Scene], None] | None = None,
+    *,
+    profiling: bool = False,
+    keep: bool = False,
+    device: str | None,
+    threads: int | None,
+    variables: dict[str, Any],
+    missing_textures: Missing,
+    **changes: Any,
+) -> tuple[Scene, list[dev.Device], float]:
+    """Return the scene of a file, the devices, and the seconds that the file took.
+
+    resources: get the processes that compile beside this one; accept: called with the scene; keep:
+    wait for what they keep for the next time; changes: see `changed`.
     """
     began = time.perf_counter()
     with ThreadPoolExecutor(max_workers=1) as beside:
@@ -211,15 +235,7 @@ def open_renderer(
     share_compilers(devices, threads, resources, keep=keep)
     for warning in plan.warnings:
         shown.note(f"clpt: warning: {warning}")
-    made: dict[str, Any] = {
-        "texture_budget": texture_budget, "layout": layout, "tree_quality": tree_quality,
-        "first_sample": first_sample,
-    }  # fmt: skip
-    with shown.phase(f"building kernels for {' and '.join(on.info.name for on in devices)}"):
-        renderer = new_renderer(plan, devices, **made)
-    for warning in renderer.warnings:
-        shown.note(f"clpt: warning: {warning}")
-    return renderer, loading
+    return plan, devices, loading
 
 
 def new_renderer(plan: Scene, devices: list[dev.Device], **made: Any) -> AnyRenderer:

@@ -31,7 +31,7 @@ IN_FOLDERS = ("scene.json", "scene.xml", "scene.pbrt", "scene-v4.pbrt")
 SCENES = (".xml", ".pbrt", ".pbrt.gz", ".glb", ".gltf")
 MOST_NAMED = 8  # scenes of a folder that a message names
 
-__all__ = ["FORMATS", "load", "save"]
+__all__ = ["FORMATS", "load", "locate", "save"]
 
 
 def load(
@@ -51,7 +51,7 @@ def load(
     `missing_textures`: "grey" puts grey in the place of images that are not there, with a warning.
     Raises SceneError with the file and, where it is known, the line.
     """
-    path = _existing(Path(path))
+    path = locate(path)
     name = path.name.lower()
     kind = next((kind for suffix, kind in FORMATS.items() if name.endswith(suffix)), None)
     if kind is None:
@@ -97,7 +97,9 @@ def save(scene: Scene, path: str | Path, /) -> None:
     importlib.import_module("clpt.formats.native").save(scene, path)
 
 
-def _existing(path: Path) -> Path:
+def locate(path: str | Path, /) -> Path:
+    """Return the file that `load` reads: of a folder the scene in it. Raises SceneError."""
+    path = Path(path)
     try:
         if path.is_dir():
             return _inside(path)

@@ -1,0 +1,67 @@
+"""Who may see the page: one-time tokens, cookies, and the names under which it may be asked for."""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import ipaddress
+import secrets
+
+MOST_COOKIES = 64
+MOST_TOKENS = 16
+LOOPBACK = ("127.0.0.1", "localhost")
+
+
+def is_loopback(host: str) -> bool:
+    """Return whether a host is this machine alone."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+class Access:
+    """The secrets of one server; only their digests are kept.
+
+    A token of 256 bits stands in an address, opens the page once, and becomes a cookie.
+    """
+
+    def __init__(self, port: int):
+        self.cookie_name = f"clpt-{port}"  # browsers send cookies to all ports of a host
+        self._tokens: list[bytes] = []
+        self._cookies: list[bytes] = []
+
+    def new_token(self) -> str:
+        """Return a token that opens the page once."""
+        token = secrets.token_urlsafe(32)
+        self._tokens = [*self._tokens, _digest(token)][-MOST_TOKENS:]
+        return token
+
+    def exchange(self, token: str) -> str | None:
+        """Return a new cookie's value for a token, which is used up; None for a wrong one."""
+        found = _find(token, self._tokens)
+        if found is None:
+            return None
+        self._tokens.remove(found)
+        cookie = secrets.token_urlsafe(32)
+        self._cookies = [*self._cookies, _digest(cookie)][-MOST_COOKIES:]
+        return cookie
+
+    def allows(self, cookies: str) -> bool:
+        """Return whether a header `Cookie` has a cookie that was given out."""
+        for part in cookies.split(";"):
+            name, _, value = part.strip().partition("=")
+            if name == self.cookie_name and _find(value, self._cookies) is not None:
+                return True
+        return False
+
+
+def _digest(secret: str) -> bytes:
+    return hashlib.sha256(secret.encode("utf-8", "surrogateescape")).digest()
+
+
+def _find(secret: str, known: list[bytes]) -> bytes | None:
+    """Return the digest of a secret among known ones; the time tells nothing of how they differ."""
+    digest = _digest(secret)
+    found = [one for one in known if hmac.compare_digest(one, digest)]
+    return found[0] if found else None

@@ -1,0 +1,275 @@
+"""All that a page may ask for: names, types and ranges. What is not in COMMANDS is refused."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from clpt.colour.tones import TONES
+from clpt.errors import ClptError
+from clpt.spectra import illuminants
+
+OF_VIEW = "view"  # of OpenColorIO, in the place of a tone curve
+TARGETS = ("camera", "film", "light", "emission", "material", "integrator")
+FILES = ("png", "exr", "scene", "view")
+LARGEST_MESSAGE = 64 * 1024  # [bytes]
+DEEPEST = 16  # levels of a value
+
+
+class CommandError(ClptError):
+    """A message that is no command, or one that cannot be done; its text is for the viewer."""
+
+
+class Type(Protocol):
+    """A type of a parameter."""
+
+    def check(self, value: Any) -> Any:
+        """Return the value. Raises CommandError."""
+
+
+@dataclass(frozen=True)
+class Number:
+    """A finite number from low to high."""
+
+    low: float
+    high: float
+
+    def check(self, value: Any) -> float:
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise CommandError(f"must be a number, not {_shown(value)}")
+        if not self.low <= value <= self.high:  # a NaN is neither
+            raise CommandError(f"must be {self.low:g} to {self.high:g}, not {_shown(value)}")
+        return float(value)
+
+
+@dataclass(frozen=True)
+class Whole:
+    """A whole number from low to high."""
+
+    low: int
+    high: int
+
+    def check(self, value: Any) -> int:
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise CommandError(f"must be a whole number, not {_shown(value)}")
+        if not self.low <= value <= self.high:
+            raise CommandError(f"must be {self.low} to {self.high}, not {_shown(value)}")
+        return value
+
+
+@dataclass(frozen=True)
+class Flag:
+    """True or false."""
+
+    def check(self, value: Any) -> bool:
+        if not isinstance(value, bool):
+            raise CommandError(f"must be true or false, not {_shown(value)}")
+        return value
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One of some names."""
+
+    names: tuple[str, ...]
+
+    def check(self, value: Any) -> str:
+        if not isinstance(value, str) or value not in self.names:
+            raise CommandError(f"must be one of {', '.join(self.names)}, not {_shown(value)}")
+        return value
+
+
+@dataclass(frozen=True)
+class Name:
+    """A word of letters, digits, _ and -, which names no folder."""
+
+    longest: int = 40
+
+    def check(self, value: Any) -> str:
+        pattern = rf"[A-Za-z0-9_][A-Za-z0-9_-]{{0,{self.longest - 1}}}"
+        if not isinstance(value, str) or not re.fullmatch(pattern, value):
+            raise CommandError(f"must be a word, not {_shown(value)}")
+        return value
+
+
+@dataclass(frozen=True)
+class Value:
+    """A JSON value for a parameter of the scene, whose own declaration checks it.
+
+    It names no file: whoever opens the page may not read what lies on the disk.
+    """
+
+    def check(self, value: Any) -> Any:
+        _check_value(value, DEEPEST)
+        return value
+
+
+@dataclass(frozen=True)
+class Optional:
+    """A value of a type, or null, which is the default."""
+
+    type: Type
+
+    def check(self, value: Any) -> Any:
+        return None if value is None else self.type.check(value)
+
+
+@dataclass(frozen=True)
+class Command:
+    """One command.
+
+    parameters: types by name; all but `Optional` ones must be given. steers: only the viewer who
+    steers may send it. restarts: the picture so far is of no use afterwards.
+    """
+
+    doc: str
+    parameters: Mapping[str, Type] = field(default_factory=dict)
+    steers: bool = True
+    restarts: bool = False
+
+
+@dataclass(frozen=True)
+class Request:
+    """A command that has passed all checks."""
+
+    name: str
+    values: dict[str, Any]
+
+
+DRAG = Number(-20.0, 20.0)  # heights of the picture
+PIXEL = Whole(0, 65535)
+SIDE = Whole(1, 65536)
+MANY = Whole(0, 2**31 - 1)
+
+COMMANDS: dict[str, Command] = {
+    # of a viewer
+    "shown": Command("a frame is on the screen", {"frame": Whole(0, 2**53)}, steers=False),
+    "steer": Command("take the wheel", steers=False),
+    "invite": Command("make an address that opens the page once, for somebody else"),
+    # the camera
+    "orbit": Command("turn about the pivot", {"dx": DRAG, "dy": DRAG}, restarts=True),
+    "look": Command("turn the head", {"dx": DRAG, "dy": DRAG}, restarts=True),
+    "pan": Command("move across the view", {"dx": DRAG, "dy": DRAG}, restarts=True),
+    "dolly": Command("come nearer, in powers of e", {"by": Number(-5.0, 5.0)}, restarts=True),
+    "fly": Command(
+        "move by shares of the distance to the pivot",
+        {"right": DRAG, "up": DRAG, "forward": DRAG},
+        restarts=True,
+    ),
+    "home": Command("the camera that the scene's file has", restarts=True),
+    "field_of_view": Command(
+        "of a perspective camera", {"degrees": Number(0.1, 170.0)}, restarts=True
+    ),
+    "pick": Command("let the pivot be what a pixel shows", {"x": PIXEL, "y": PIXEL}),
+    "focus": Command("focus on what a pixel shows", {"x": PIXEL, "y": PIXEL}),
+    # pixels
+    "inspect": Command(
+        "tell what is in a pixel, and its spectrum", {"x": PIXEL, "y": PIXEL}, steers=False
+    ),
+    # the scene
+    "edit": Command(
+        "give a parameter another value",
+        {"target": Choice(TARGETS), "index": MANY, "key": Name(), "value": Value()},
+        restarts=True,
+    ),
+    "restore": Command("the scene as its file has it", restarts=True),
+    "hide": Command("leave an object out", {"shape": MANY, "hidden": Flag()}, restarts=True),
+    "hide_at": Command("leave out what a pixel shows", {"x": PIXEL, "y": PIXEL}),
+    "show_all": Command("leave no object out", restarts=True),
+    "lamp": Command(
+        "give all lights the spectrum of a lamp",
+        {"name": Optional(Choice(illuminants()))},
+        restarts=True,
+    ),
+    "wavelength": Command(
+        "show one wavelength alone [nm]",
+        {"nm": Optional(Number(300.0, 830.0)), "width": Number(0.5, 100.0)},
+        restarts=True,
+    ),
+    "region": Command(
+        "render a part of the film, or all of it",
+        {
+            "x": Optional(PIXEL),
+            "y": Optional(PIXEL),
+            "width": Optional(SIDE),
+            "height": Optional(SIDE),
+        },
+        restarts=True,
+    ),
+    # the render
+    "display": Command(
+        "how the picture is shown",
+        {"exposure": Number(-20.0, 20.0), "tone": Choice((*TONES, OF_VIEW))},
+    ),
+    "pause": Command("let the picture rest, or go on", {"paused": Flag()}),
+    "stop_at": Command(
+        "where the render ends: samples, and perhaps noise",
+        {"spp": Whole(1, 2**31 - 1), "noise": Optional(Number(1e-4, 1.0))},
+    ),
+    "restart": Command("begin again", restarts=True),
+    "keep": Command("keep the picture to compare with, or keep none", {"kept": Flag()}),
+    "statistics": Command("tell what the render takes", steers=False),
+    "save": Command("write a new file into the folder", {"what": Choice(FILES)}),
+}
+
+
+def parse(message: str | bytes) -> Request:
+    """Return the command that a message is. Raises CommandError."""
+    if not isinstance(message, str):
+        raise CommandError("a message is text")
+    if len(message) > LARGEST_MESSAGE:
+        raise CommandError("the message is too long")
+    try:
+        found = json.loads(message, parse_constant=_no_constant)
+    except (ValueError, RecursionError):
+        raise CommandError("the message is not JSON") from None
+    if not isinstance(found, dict) or not isinstance(found.get("do"), str):
+        raise CommandError("a message is an object that says what to do")
+    name = found.pop("do")
+    command = COMMANDS.get(name)
+    if command is None:
+        raise CommandError(f"there is no command {_shown(name)}")
+    for key in found:
+        if key not in command.parameters:
+            raise CommandError(f"{name} has no parameter {_shown(key)}")
+    values = {}
+    for key, kind in command.parameters.items():
+        if key not in found and not isinstance(kind, Optional):
+            raise CommandError(f"{name} needs {key}")
+        try:
+            values[key] = kind.check(found.get(key))
+        except CommandError as error:
+            raise CommandError(f"{name}: {key} {error}") from None
+    return Request(name, values)
+
+
+def _no_constant(name: str) -> Any:
+    raise ValueError(f"{name} is not JSON")
+
+
+def _shown(value: Any) -> str:
+    """Return a value for a message, cut short."""
+    try:
+        text = json.dumps(value)
+    except (ValueError, RecursionError):  # a number of thousands of digits
+        return "that"
+    return text if len(text) <= 40 else f"{text[:40]}..."
+
+
+def _check_value(value: Any, levels: int) -> None:
+    """Raise CommandError for a value that is nested too deeply, not finite, or names a file."""
+    if levels == 0:
+        raise CommandError("is nested too deeply")
+    if isinstance(value, dict):
+        if "file" in value:
+            raise CommandError("names a file; a page cannot")
+        for child in value.values():
+            _check_value(child, levels - 1)
+    elif isinstance(value, list):
+        for child in value:
+            _check_value(child, levels - 1)
+    elif isinstance(value, (int, float)) and not -1e30 <= value <= 1e30:
+        raise CommandError("has a number that is too large")

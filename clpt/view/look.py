@@ -1,0 +1,91 @@
+"""How a scene is looked at: what is hidden, under which lamp, at which wavelengths, which region.
+
+A look changes no scene: it makes another one of it for the renderers.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, Final
+
+import numpy as np
+
+from clpt.scene import Film, Scene
+from clpt.scene.lights import Light
+from clpt.scene.params import params
+from clpt.spectra import Constant, Illuminant, Spectrum, illuminant, on_grid
+from clpt.spectra.cie import CIE_Y_INTEGRAL, LAMBDA_MAX, LAMBDA_MIN, cie_xyz
+
+Region = tuple[int, int, int, int]
+
+GRID: Final = np.arange(LAMBDA_MIN, LAMBDA_MAX + 1.0)
+
+
+@dataclasses.dataclass(frozen=True)
+class Look:
+    """hidden: indices of shapes; lamp: whose spectrum all lights have, each as bright as its own;
+    wavelength, width: [nm] of the only light, None for all; region: of the film, see `Film.crop`.
+    """
+
+    hidden: frozenset[int] = frozenset()
+    lamp: str | None = None
+    wavelength: float | None = None
+    width: float = 5.0
+    region: Region | None = None
+
+    def apply(self, scene: Scene) -> Scene:
+        """Return the scene that this look shows of a scene."""
+        shapes, lights = scene.shapes, scene.lights
+        if self.lamp is not None:
+            exchanged = {
+                id(s.emission): with_spectrum(s.emission, self.lamp) for s in shapes if s.emission
+            }
+            shapes = [
+                dataclasses.replace(s, emission=exchanged[id(s.emission)]) if s.emission else s
+                for s in shapes
+            ]
+            lights = [with_spectrum(light, self.lamp) for light in lights]
+        if self.hidden:
+            shapes = [shape for i, shape in enumerate(shapes) if i not in self.hidden]
+        film = self._film(scene.film)
+        return dataclasses.replace(scene, shapes=shapes, lights=lights, film=film)
+
+    def shape(self, number: int) -> int:
+        """Return the index in the scene of the shape that has this index in what is shown."""
+        for hidden in sorted(self.hidden):
+            number += hidden <= number
+        return number
+
+    def _film(self, film: Film) -> Film:
+        changes: dict[str, Any] = {}
+        if self.region is not None:
+            changes["crop"] = self.region
+        if self.wavelength is not None and film.mode == "spectral":
+            low, high = film.lambda_min, film.lambda_max
+            width = min(self.width, high - low)
+            first = float(np.clip(self.wavelength - width / 2, low, high - width))
+            changes |= {
+                "lambda_min": first,
+                "lambda_max": first + width,
+                # as bright as if all wavelengths were this one
+                "exposure": film.exposure * (high - low) / width,
+            }
+        return dataclasses.replace(film, **changes) if changes else film
+
+
+def with_spectrum(light: Light, lamp: str) -> Light:
+    """Return a light with a lamp's spectrum and its own luminance; textures and images stay."""
+    changes = {}
+    for name, param in params(type(light)).items():
+        value = getattr(light, name)
+        if param.role == "emission" and isinstance(value, Spectrum):
+            changes[name] = illuminant(lamp, _luminance(value))
+    return dataclasses.replace(light, **changes) if changes else light
+
+
+def _luminance(spectrum: Spectrum) -> float:
+    """Return the luminance of an emission; that of the constant 1 is 1."""
+    if isinstance(spectrum, (Constant, Illuminant)):
+        return float(getattr(spectrum, "value", getattr(spectrum, "scale", 1.0)))
+    values = np.asarray(on_grid(spectrum, LAMBDA_MIN, LAMBDA_MAX), float)
+    return float(values @ cie_xyz(GRID)[..., 1] / CIE_Y_INTEGRAL)

@@ -1,0 +1,284 @@
+"""Panels for what a scene has, made from the declarations of `clpt.scene`; and edits by them."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+
+from clpt import spectra
+from clpt.colour.tones import TONES
+from clpt.errors import SceneError
+from clpt.formats.native import forms
+from clpt.formats.native.cursor import Cursor
+from clpt.render.editing.scene_edit import Successors, edit_scene
+from clpt.scene import Scene
+from clpt.scene.materials import Material, parts
+from clpt.scene.params import SPECTRUM_ROLES, Kind, Param, defaults, params
+from clpt.scene.shapes import Group, Instance, Shape
+from clpt.scene.textures import Texture
+from clpt.spectra.sensors import OBSERVERS
+from clpt.view.commands import OF_VIEW, CommandError
+from clpt.view.target import Change
+
+# Controls of the page by roles, and by forms of host parameters; others cannot be edited there.
+CONTROLS = {
+    **dict.fromkeys(SPECTRUM_ROLES, "spectrum"),
+    "real": "number",
+    "flag": "flag",
+    "choice": "choice",
+    "orders": "numbers",
+    "boolean": "flag",
+    "integer": "whole",
+    "number": "number",
+    "numbers": "numbers",
+    "vector": "vector",
+    "direction": "vector",
+    "white_balance": "white",
+    "sensor": "choice",
+    "number_or_auto": "number_or_auto",
+}
+MOST_OBJECTS = 500  # that a page lists
+MOST_PANELS = 300
+CURVE_AT = range(380, 781, 20)  # [nm]
+OF_FILM = (  # what can change while the renderers stay
+    "sensor", "white_balance", "exposure", "lambda_min", "lambda_max", "wavelengths",
+)  # fmt: skip
+
+
+def panels(scene: Scene) -> list[dict[str, Any]]:
+    """Return a description of a panel for each thing that can be edited.
+
+    target, index: what `edited` takes; title, kind, doc: for people; shapes: indices of those that
+    have a material or an emission; parameters: see `_parameter`.
+    """
+    found: list[dict[str, Any]] = []
+    for target, things in _targets(scene).items():
+        for index, (thing, owners) in enumerate(things[: MOST_PANELS - len(found)]):
+            found.append(
+                {
+                    "target": target,
+                    "index": index,
+                    "title": _title(target, thing, owners, scene),
+                    "kind": thing.kind,
+                    "doc": (type(thing).__doc__ or "").strip().splitlines()[0],
+                    "shapes": owners[:MOST_OBJECTS],
+                    "parameters": _parameters(target, thing),
+                }
+            )
+    return found
+
+
+def names(with_view: bool) -> dict[str, list[str]]:
+    """Return the names that the page offers, by what they are of; with_view: of OpenColorIO."""
+    return {
+        "tones": [*TONES, *[OF_VIEW] * with_view],
+        "illuminants": list(spectra.illuminants()),
+        "glasses": list(spectra.glasses()),
+    }
+
+
+def objects(scene: Scene) -> list[dict[str, Any]]:
+    """Return the shapes of a scene for people: names, kinds, and the index of their material."""
+    number = {id(m): i for i, (m, _) in enumerate(_targets(scene)["material"])}
+    return [
+        {
+            "name": shape.name or f"{shape.kind} {i + 1}",
+            "kind": shape.kind,
+            "material": number.get(id(shape.material)),
+        }
+        for i, shape in enumerate(scene.shapes[:MOST_OBJECTS])
+    ]
+
+
+def object_of(scene: Scene, index: int) -> dict[str, Any]:
+    """Return a shape for people: name, kind, and what its material is."""
+    shape = scene.shapes[index]
+    made_of = getattr(shape.material, "name", "") or getattr(shape.material, "kind", "")
+    name = shape.name or f"{shape.kind} {index + 1}"
+    return {"name": name, "kind": shape.kind, "made_of": made_of}
+
+
+def edited(scene: Scene, target: str, index: int, key: str, value: Any) -> tuple[Scene, Change]:
+    """Return a scene in which a parameter has another value, and how it differs.
+
+    value: as in scene.json, but it names no file. Raises CommandError, SceneError.
+    """
+    things = _targets(scene).get(target, [])
+    if index >= len(things):
+        raise CommandError(f"the scene has no {target} {index + 1}")
+    thing = things[index][0]
+    param = params(type(thing)).get(key)
+    if param is None or not _editable(target, key, param):
+        raise CommandError(f"{thing.kind}.{key} cannot be edited")
+    new = dataclasses.replace(thing, **{key: _read(key, value, param)})
+    return _replaced(scene, target, thing, new)
+
+
+def written(thing: Kind) -> dict[str, Any]:
+    """Return a camera or a light as scene.json has it, without what cannot be shown."""
+    declared = params(type(thing)).items()
+    known = {name: _shown(getattr(thing, name), param) for name, param in declared}
+    return {"type": thing.kind, **{key: value for key, value in known.items() if value is not None}}
+
+
+def _targets(scene: Scene) -> dict[str, list[tuple[Any, list[int]]]]:
+    """Return what can be edited: things, and the indices of the shapes that have them."""
+    materials: dict[int, tuple[Material, list[int]]] = {}
+    emissions: dict[int, tuple[Any, list[int]]] = {}
+    for i, shape in enumerate(scene.shapes):
+        for member in _members(shape):
+            for part in parts(member.material):
+                owners = materials.setdefault(id(part), (part, []))[1]
+                if not owners or owners[-1] != i:
+                    owners.append(i)
+            if member.emission is not None:
+                emissions.setdefault(id(member.emission), (member.emission, []))[1].append(i)
+    return {
+        "camera": [(scene.camera, [])],
+        "film": [(scene.film, [])],
+        "integrator": [(scene.integrator, [])],
+        "light": [(light, []) for light in scene.lights],
+        "emission": [*emissions.values()],
+        "material": [*materials.values()],
+    }
+
+
+def _members(shape: Shape) -> tuple[Shape, ...]:
+    return shape.group.shapes if isinstance(shape, Instance) else (shape,)
+
+
+def _title(target: str, thing: Any, owners: list[int], scene: Scene) -> str:
+    if getattr(thing, "name", ""):
+        return str(thing.name)
+    named = [scene.shapes[i].name for i in owners if scene.shapes[i].name]
+    return named[0] if named else thing.kind.replace("_", " ")
+
+
+def _parameters(target: str, thing: Kind) -> list[dict[str, Any]]:
+    default = defaults(type(thing))
+    return [
+        _parameter(name, param, getattr(thing, name), default[name])
+        for name, param in params(type(thing)).items()
+        if _editable(target, name, param)
+    ]
+
+
+def _editable(target: str, key: str, param: Param) -> bool:
+    if target == "film" and key not in OF_FILM:
+        return False
+    return (param.form or param.role) in CONTROLS
+
+
+def _parameter(name: str, param: Param, value: Any, default: Any) -> dict[str, Any]:
+    """Return what the page has to know: control, words, unit, limits, choices, value."""
+    form = param.form or param.role
+    choices = list(OBSERVERS) if form == "sensor" else list(param.choices)
+    if form == "white_balance":
+        choices = ["none", *spectra.illuminants()]
+    return {
+        "key": name,
+        "control": CONTROLS[form],
+        "doc": param.doc,
+        "unit": param.unit,
+        "low": param.low if math.isfinite(param.low) else None,
+        "high": param.high if math.isfinite(param.high) else None,
+        "choices": choices,
+        "optional": param.optional,
+        "role": param.role,
+        "value": _shown(value, param),
+        "default": _shown(default, param),
+        "curve": _curve(value, param),
+        "texture": value.kind if isinstance(value, Texture) else None,
+    }
+
+
+def _curve(value: Any, param: Param) -> list[float] | None:
+    """Return a spectrum at CURVE_AT, for a small plot; None for what is none."""
+    if param.role not in SPECTRUM_ROLES or isinstance(value, Texture):
+        return None
+    try:
+        if param.role == "index":
+            spectrum: Any = spectra.index(value)
+        else:
+            plain = isinstance(value, (int, float))
+            spectrum = spectra.Constant(float(value)) if plain else value
+        return [float(f"{one:.4g}") for one in spectrum.sample(np.array(CURVE_AT, float))]
+    except (SceneError, AttributeError):
+        return None
+
+
+def _shown(value: Any, param: Param) -> Any:
+    """Return a value as scene.json has it, None where the page cannot show it."""
+    if isinstance(value, (Texture, Material, Group)) or (param.form or param.role) not in (
+        *CONTROLS,
+        "matrix4",
+        "text",
+    ):
+        return None
+    shown = forms.write(value, param, _WRITER)
+    try:
+        return json.loads(json.dumps(shown, allow_nan=False))
+    except (TypeError, ValueError):
+        return None
+
+
+def _read(key: str, value: Any, param: Param) -> Any:
+    """Return the value of a parameter that a page gave. Raises SceneError."""
+    if value is None and param.optional:
+        return None
+    document = {key: value}
+    cursor = Cursor(document, Path("page"), json.dumps(document)).at(key)
+    try:
+        if param.form == "sensor" and not isinstance(value, str):
+            raise CommandError("must be the name of an observer")
+        return forms.read(cursor, param, _READER)
+    except SceneError as error:
+        raise CommandError(f"{key}: {error.message}") from None
+
+
+def _replaced(scene: Scene, target: str, old: Any, new: Any) -> tuple[Scene, Change]:
+    if target == "camera":
+        return dataclasses.replace(scene, camera=new), Change(camera=new)
+    if target in ("film", "integrator"):
+        return dataclasses.replace(scene, **{target: new}), Change(whole=True)
+    if target == "light":
+        lights = [new if light is old else light for light in scene.lights]
+        return dataclasses.replace(scene, lights=lights), Change(whole=True)
+    if target == "material":
+        changed, _ = edit_scene(scene, Successors(), {old: new})
+        return changed, Change(materials={old: new})
+    groups: dict[int, Group] = {}
+    shapes = [_with_emission(shape, old, new, groups) for shape in scene.shapes]
+    return dataclasses.replace(scene, shapes=shapes), Change(whole=True)
+
+
+def _with_emission(shape: Shape, old: Any, new: Any, groups: dict[int, Group]) -> Shape:
+    if isinstance(shape, Instance):
+        group = shape.group
+        if all(member.emission is not old for member in group.shapes):
+            return shape
+        if id(group) not in groups:
+            members = tuple(_with_emission(member, old, new, groups) for member in group.shapes)
+            groups[id(group)] = dataclasses.replace(group, shapes=members)
+        return dataclasses.replace(shape, group=groups[id(group)])
+    return dataclasses.replace(shape, emission=new) if shape.emission is old else shape
+
+
+class _NoParts:
+    """Reads and writes no part of a scene but values: a page names no file and no other thing."""
+
+    def _refuse(self, *_: Any) -> NoReturn:
+        raise CommandError("only a value can stand here")
+
+    kind = layer = material = area_light = group = image = _refuse
+
+
+_READER: Any = _NoParts()
+_WRITER: Any = _NoParts()
+
+__all__ = ["edited", "objects", "panels", "written"]

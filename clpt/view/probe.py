@@ -1,0 +1,242 @@
+"""What is in one pixel: its first hit, and its spectrum with the error that is left.
+
+A probe has renderers of a film of one pixel, and a thread and a queue of its own: it works while
+the picture goes on. The camera is turned into one that sees that pixel alone.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import transforms
+from clpt.device import Device
+from clpt.errors import ClptError
+from clpt.render.renderer import Renderer
+from clpt.scene import Film, Scene
+from clpt.scene.cameras import Camera, Matrix, Orthographic, Perspective
+from clpt.scene.integrators import Aov, Direct, Path, Whitted
+
+log = logging.getLogger(__name__)
+
+BANDS = 47  # of 10 nm, of all light
+BATCH = 256  # samples
+BATCHES = (4, 8, 16, 32, 64)  # after which a spectrum is told, each time with less error
+CHANNELS = ("depth", "position", "shading_normal", "uv", "albedo", "shape_id", "primitive_id")
+
+Reply = Callable[[dict[str, Any]], None]
+
+
+def window(camera: Camera, film: Film, x: int, y: int) -> Camera | None:
+    """Return a camera whose film of one pixel is the pixel (x, y) of a film; None if none is."""
+    width, height = film.width, film.height
+    if isinstance(camera, Perspective):
+        along_x = {"smaller": width <= height, "larger": width >= height}.get(
+            camera.fov_axis, camera.fov_axis == "x"
+        )
+        pixel = np.tan(np.radians(camera.fov) / 2.0) / (width if along_x else height)
+        fov = float(np.degrees(2.0 * np.arctan(pixel)))
+        if fov < 1e-3:
+            return None
+        return dataclasses.replace(
+            camera,
+            fov=fov,
+            fov_axis="x",
+            offset_x=0.5 - width * (0.5 - camera.offset_x) + x,
+            offset_y=0.5 - height * (0.5 - camera.offset_y) + y,
+        )
+    if isinstance(camera, Orthographic):
+        centre = [1.0 - (2 * x + 1) / width, (height - (2 * y + 1)) / width, 0.0]
+        scale = np.diag([1.0 / width, 1.0 / width, 1.0, 1.0])
+        matrix = np.asarray(camera.to_world, float) @ transforms.translate(centre) @ scale
+        return dataclasses.replace(camera, to_world=matrix)
+    if isinstance(camera, Matrix):
+        zoom = np.eye(4)
+        zoom[0, 0], zoom[0, 3] = width, width - (2 * x + 1)
+        zoom[1, 1], zoom[1, 3] = height, (2 * y + 1) - height
+        return dataclasses.replace(camera, projection=zoom @ np.asarray(camera.projection, float))
+    return None
+
+
+def pixel_of(scene: Scene, x: int, y: int, bands: int, integrator: Any) -> Scene:
+    """Return a scene that shows the pixel (x, y) of another one alone."""
+    camera = window(scene.camera, scene.film, x, y)
+    size: dict[str, Any] = {"width": 1, "height": 1, "crop": None}
+    if camera is None:
+        camera, size = scene.camera, {"crop": (x, y, 1, 1)}
+    film = dataclasses.replace(scene.film, **size, bands=bands, alpha=False, filtering="importance")
+    return dataclasses.replace(scene, camera=camera, film=film, integrator=integrator, noise=None)
+
+
+def plain(integrator: Any) -> tuple[Any, str]:
+    """Return an integrator that renders one pixel well, and what to say if it is another."""
+    if isinstance(integrator, (Direct, Whitted)):
+        return integrator, ""
+    shared = {name: getattr(integrator, name) for name in ("max_depth", "rr_depth", "hide_lights")
+              if hasattr(integrator, name)}  # fmt: skip
+    alone = isinstance(integrator, Path) and integrator.light_paths == 0
+    return Path(**shared, light_paths=0), "" if alone else "by paths from the camera alone"
+
+
+class Follower:
+    """A renderer of one pixel, of whatever scene it is asked for next."""
+
+    def __init__(self, device: Device):
+        self.device = device
+        self.renderer: Renderer | None = None
+        self._former: Scene | None = None
+
+    def follow(self, whole: Scene, pixel: Scene) -> Renderer:
+        """Return the renderer, with an empty film, of a pixel of a whole scene."""
+        parts = ("shapes", "lights", "film", "integrator", "sampler", "seed")
+        former, self._former = self._former, whole
+        try:
+            if self.renderer is None or _frame(self.renderer.scene) != _frame(pixel):
+                self.close()
+                self.renderer = Renderer(pixel, self.device)
+            elif all(getattr(former, part) is getattr(whole, part) for part in parts):
+                self.renderer.update(camera=pixel.camera)
+            else:
+                self.renderer.update(scene=pixel)
+        except BaseException:
+            self.close()
+            raise
+        return self.renderer
+
+    def close(self) -> None:
+        """Give the device's memory back."""
+        if self.renderer is not None:
+            self.renderer.close()
+            self.renderer = None
+
+
+def _frame(scene: Scene) -> tuple[Any, ...]:
+    """What a renderer cannot change: its film's size and kind."""
+    film = scene.film
+    return film.width, film.height, film.crop, film.bands, film.mode, type(scene.integrator)
+
+
+@dataclasses.dataclass(frozen=True)
+class Question:
+    """What is asked of a pixel of a scene; then: gets the first hit, if it is given."""
+
+    scene: Scene
+    x: int
+    y: int
+    reply: Reply
+    spectrum: bool = True
+    then: Callable[[dict[str, Any]], None] | None = None
+
+
+class Probe:
+    """Answers questions in a thread of its own; a new one ends the work on an older one."""
+
+    def __init__(self, device: Device):
+        self._device = device
+        self._hits: Follower | None = None
+        self._spectra: Follower | None = None
+        self._waiting: dict[bool, Question] = {}  # by whether somebody acts on the hit
+        self._wake = threading.Condition()
+        self._closing = False
+        self._thread = threading.Thread(target=self._main, name="clpt view probe", daemon=True)
+        self._thread.start()
+
+    def ask(self, question: Question) -> None:
+        """Let a question be answered, in the place of one of the same sort that waits."""
+        with self._wake:
+            self._waiting[question.then is not None] = question
+            self._wake.notify_all()
+
+    def close(self) -> None:
+        """Stop, and give the device's memory back."""
+        with self._wake:
+            self._closing = True
+            self._wake.notify_all()
+        self._thread.join()
+
+    def _main(self) -> None:
+        while True:
+            with self._wake:
+                while not self._waiting and not self._closing:
+                    self._wake.wait()
+                if self._closing:
+                    break
+                question = self._waiting.pop(True, None) or self._waiting.pop(False)
+            try:
+                self._answer(question)
+            except ClptError as error:
+                question.reply({"type": "error", "text": f"the pixel: {error}"})
+            except Exception:
+                log.exception("the probe failed")
+        for follower in (self._hits, self._spectra):
+            if follower is not None:
+                follower.close()
+
+    def _answer(self, question: Question) -> None:
+        if self._hits is None:
+            own = Device.open(self._device.info, context=self._device.context)
+            own.compilers = self._device.compilers  # else the picture waits for the driver's lock
+            self._hits, self._spectra = Follower(own), Follower(own)
+        scene, x, y = question.scene, question.x, question.y
+        hit = first_hit(self._hits, scene, x, y)
+        if question.then is not None:
+            question.then(hit)
+            return
+        at = {"x": x, "y": y}
+        question.reply({"type": "hit", **at, **hit})
+        if not question.spectrum or scene.film.mode != "spectral":
+            return
+        integrator, note = plain(scene.integrator)
+        assert self._spectra is not None
+        renderer = self._spectra.follow(scene, pixel_of(scene, x, y, BANDS, integrator))
+        centres = renderer.scene.film.band_centres.round(2).tolist()
+        means: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
+        before: Any = (0.0, 0.0)
+        for batch in range(1, BATCHES[-1] + 1):
+            if self._waiting or self._closing:
+                return
+            renderer.run(BATCH)
+            total = tuple(
+                np.asarray(one, float).ravel() * batch
+                for one in (renderer.image(), renderer.colours())
+            )
+            means.append((total[0] - before[0], total[1] - before[1]))
+            before = total
+            if batch in BATCHES:
+                question.reply(
+                    {
+                        "type": "spectrum", **at, "lambdas": centres, "note": note,
+                        "samples": batch * BATCH, "last": batch == BATCHES[-1],
+                        **_estimate("", [m[0] for m in means]),
+                        **_estimate("rgb_", [m[1] for m in means]),
+                    }
+                )  # fmt: skip
+
+
+AOV = Aov(channels=CHANNELS)
+
+
+def first_hit(follower: Follower, scene: Scene, x: int, y: int) -> dict[str, Any]:
+    """Return what a pixel's centre meets: depth and position [m], normal, uv, albedo, numbers."""
+    renderer = follower.follow(scene, pixel_of(scene, x, y, 0, AOV))
+    renderer.run(1)
+    layers = {name: values[0, 0].tolist() for name, values in renderer.layers().items()}
+    shape = round(layers.pop("shape_id")[0])
+    primitive = round(layers.pop("primitive_id")[0])
+    if shape < 0:
+        return {"shape": None}
+    layers["depth"] = layers["depth"][0]
+    return {"shape": shape, "primitive": primitive, **layers}
+
+
+def _estimate(name: str, batches: list[NDArray[np.float64]]) -> dict[str, list[float]]:
+    """Return the mean of batches and its standard error, by their differences."""
+    values = np.stack(batches)
+    error = values.std(axis=0, ddof=1) / np.sqrt(len(values))
+    return {f"{name}mean": values.mean(axis=0).tolist(), f"{name}error": error.tolist()}

@@ -1,0 +1,245 @@
+"""The two renderers behind a page, the whole picture and a smaller one, and what goes out of them.
+
+While something moves, the smaller one makes a picture at every step. Then the whole picture
+begins, in passes that grow, so that few ends of passes cost time; it is offered as often as
+`Budget` lets it.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.device import Device
+from clpt.render.progress import Progress
+from clpt.render.renderer import Renderer
+from clpt.scene import Scene
+from clpt.view import pictures
+from clpt.view.pictures import Display
+from clpt.view.target import Change, Target, smaller
+
+PREVIEW_PIXELS = 64_000  # about, of the picture while it moves
+PREVIEW_SAMPLES = 4  # of it, before the whole picture begins
+SLOW = 0.12  # [s] of a preview, beyond which the next ones are smaller
+DIVIDERS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 128, 256)
+PASS_SECONDS = 2.0
+STATUS_SECONDS = 0.25  # between messages of progress
+
+Film = NDArray[np.float32]
+
+
+class Outlet(Protocol):
+    """Where pictures and messages go: to all viewers."""
+
+    def picture(self, header: dict[str, Any], data: bytes) -> None:
+        """Offer a picture; whoever is slow does without it."""
+
+    def message(self, message: dict[str, Any]) -> None:
+        """Tell all viewers something."""
+
+
+class RenderLoop:
+    """Renders a scene step by step.
+
+    One thread calls its methods; but for `cancel` and `close`, which any may call.
+    """
+
+    def __init__(
+        self, scene: Scene, device: Device, outlet: Outlet, display: Display, **options: Any
+    ):
+        self.scene, self.device, self.outlet = scene, device, outlet
+        self.display = display
+        self.paused = False
+        self.watched = True
+        self.film: Film | None = None  # of the last whole picture that was offered
+        self.kept: Film | None = None  # a picture to compare with
+        self.seconds = 0.0  # of rendering the whole picture
+        self._options = options
+        self._divider = first_divider(scene)
+        self._full = Target(device, lambda scene: scene, **options)
+        self._preview = Target(device, smaller(self._divider), **options)
+        self._previews_left, self._begins = PREVIEW_SAMPLES, True
+        self._stale = self._offered = False
+        self._budget = pictures.Budget()
+        self._frame = 0
+        self._told = 0.0
+        self._rates = 0.0, 0.0
+        self._closing = False
+
+    def begin(self, scene: Scene, change: Change) -> None:
+        """Render another scene from now on."""
+        if (scene.film.width, scene.film.height) != (self.scene.film.width, self.scene.film.height):
+            self._resize_preview(first_divider(scene))
+        self.scene = scene
+        self._full.note(change)
+        self._preview.note(change)
+        self._previews_left, self._begins = PREVIEW_SAMPLES, True
+        self.film = None
+
+    def show(self, display: Display) -> None:
+        """Show the picture in another way."""
+        self.display, self._stale = display, True
+
+    def advance(self) -> bool:
+        """Do the next piece of work; return whether there was any.
+
+        Raises what `Renderer` raises for a scene that it cannot render.
+        """
+        if self._previews_left:
+            self._previews_left -= 1
+            self._render_preview()
+        elif self._wants_samples():
+            self._render_pass()
+            if self._budget.due() or self._stale:
+                self._offer(self._full.follow(self.scene), 1)
+        elif self._stale or not self._offered:
+            self._offer(self._full.follow(self.scene), 1, rest=True)
+        else:
+            return False
+        return True
+
+    def renderer(self) -> Renderer:
+        """Return the renderer of the whole picture, of the present scene."""
+        return self._full.follow(self.scene)
+
+    def wants_more(self) -> None:
+        """Note that the end of the render has moved."""
+        self._offered = False
+
+    def cancel(self) -> None:
+        """Let a pass end soon."""
+        self._full.cancel()
+
+    def stop(self) -> None:
+        """Let all work end soon, for good."""
+        self._closing = True
+        self._full.cancel()
+        self._preview.cancel()
+
+    def close(self) -> None:
+        """Give the device's memory back."""
+        self._full.close()
+        self._preview.close()
+
+    @property
+    def done(self) -> bool:
+        """Whether the whole picture has all the samples that it is to get."""
+        renderer = self._full.renderer
+        if renderer is None or self._begins:
+            return False
+        return renderer.samples >= self.scene.spp or renderer.active == 0.0
+
+    def _wants_samples(self) -> bool:
+        if not self.watched or self._closing:
+            return False
+        return self._begins or not (self.paused or self.done)
+
+    def _render_preview(self) -> None:
+        began = time.perf_counter()
+        built = self._preview.is_slow
+        renderer = self._follow(self._preview)
+        if not renderer.run(1) and renderer.samples == 0:  # it was cancelled
+            return
+        self._offer(renderer, self._divider)
+        took = time.perf_counter() - began
+        if not built and took > SLOW and self._divider < DIVIDERS[-1]:
+            self._resize_preview(next(n for n in DIVIDERS if n > self._divider))
+
+    def _follow(self, target: Target) -> Renderer:
+        """Return a target's renderer, of the present scene; tell viewers that it may take long."""
+        if target.is_slow:
+            self.outlet.message({"type": "status", "phase": "preparing"})
+        return target.follow(self.scene)
+
+    def _resize_preview(self, divider: int) -> None:
+        self._preview.close()
+        self._divider = divider
+        self._preview = Target(self.device, smaller(divider), **self._options)
+
+    def _render_pass(self) -> None:
+        renderer = self._follow(self._full)
+        if self._begins:
+            self._begins, self.seconds = False, 0.0
+            self._budget.restart()
+        size = 1
+        if self.seconds > 0.0:
+            in_time = int(renderer.samples / self.seconds * PASS_SECONDS)
+            size = max(1, min(in_time, renderer.samples))
+        size = min(size, max(1, self.scene.spp - renderer.samples))
+        before = self.seconds
+
+        def tell(progress: Progress) -> bool:
+            self.seconds = before + progress.seconds
+            if progress.seconds > 0.0:
+                self._rates = progress.paths / progress.seconds, progress.rays / progress.seconds
+            if time.perf_counter() - self._told > STATUS_SECONDS:
+                self.tell(renderer)
+            return not self._closing
+
+        renderer.run(size, tell, noise=self.scene.noise)
+        self._offered = False
+
+    def _offer(self, renderer: Renderer, divider: int, rest: bool = False) -> None:
+        """Offer the picture as it is; rest: equal to `Renderer.resolve` to the byte."""
+        began = time.perf_counter()
+        pixels = pictures.shown(renderer, self.display)
+        data = pictures.png(pixels) if rest else pictures.jpeg(pixels)
+        if divider == 1 and renderer is self._full.renderer:
+            self.film = renderer.film.get()
+        self._frame += 1
+        film = self.scene.film
+        header = {
+            "frame": self._frame,
+            "format": "png" if rest else "jpeg",
+            "size": [pixels.shape[1], pixels.shape[0]],
+            "film": [film.width, film.height],
+            "crop": film.crop,
+            "divider": divider,
+            "samples": renderer.samples,
+            "rest": rest,
+            "difference": self._difference(),
+        }
+        self.outlet.picture(header, data)
+        self._stale, self._offered = False, rest
+        self._budget.spend(time.perf_counter() - began)
+        self.tell(renderer)
+
+    def _difference(self) -> dict[str, float] | None:
+        """Return how much the picture differs from the one that is kept, if they are as large."""
+        if self.kept is None or self.film is None or self.kept.shape != self.film.shape:
+            return None
+        kept, now = (one[..., :3].astype(np.float64) for one in (self.kept, self.film))
+        error, mean = np.abs(now - kept), max(float(kept.mean()), 1e-30)
+        return {
+            "relative_mean": float(error.mean()) / mean,
+            "relative_rms": float(np.sqrt((error**2).mean())) / mean,
+            "bias": float((now - kept).mean()) / mean,
+        }
+
+    def tell(self, renderer: Renderer) -> None:
+        """Tell all viewers how far the render is."""
+        self._told = time.perf_counter()
+        phase = "done" if self.done else "paused" if self.paused else "rendering"
+        self.outlet.message(
+            {
+                "type": "status",
+                "phase": "moving" if self._previews_left else phase,
+                "samples": 0 if self._begins else renderer.samples,
+                "spp": self.scene.spp,
+                "noise": self.scene.noise,
+                "active": renderer.active,
+                "seconds": round(self.seconds, 2),
+                "samples_per_second": self._rates[0],
+                "rays_per_second": self._rates[1],
+            }
+        )
+
+
+def first_divider(scene: Scene) -> int:
+    """Return by how much the first preview of a scene is smaller."""
+    width, height = scene.film.size
+    fitting = (n for n in DIVIDERS if width * height / n**2 <= PREVIEW_PIXELS)
+    return next(fitting, DIVIDERS[-1])

@@ -1,0 +1,371 @@
+"""Serves the page and its socket to browsers, of which none is trusted.
+
+Every connection must ask for a name under which the server listens (or a page elsewhere could
+reach it by a name of its own, "DNS rebinding"), and have a cookie that a one-time token became.
+A socket must also come from the server's own page.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import http
+import json
+import logging
+import math
+import struct
+import threading
+import time
+from collections import deque
+from concurrent.futures import Future
+from importlib import resources
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+from websockets.asyncio.server import Server as SocketServer
+from websockets.asyncio.server import ServerConnection, serve
+from websockets.datastructures import Headers
+from websockets.exceptions import ConnectionClosed
+from websockets.http11 import Request as HttpRequest
+from websockets.http11 import Response
+
+from clpt.errors import ClptError
+from clpt.view.access import LOOPBACK, Access, is_loopback
+from clpt.view.commands import COMMANDS, LARGEST_MESSAGE, CommandError, parse
+from clpt.view.session import Session
+
+log = logging.getLogger(__name__)
+quiet = logging.getLogger(f"{__name__}.connections")
+quiet.setLevel(logging.CRITICAL)  # what strangers send is nothing to report
+
+MOST_VIEWERS = 8
+MOST_FRAMES = 2  # on their way to a viewer, who has not confirmed them
+MOST_MESSAGES = 256  # that wait for a viewer
+RATE, BURST = 60.0, 120.0  # messages a second of one viewer, and how many at once
+SEND_SECONDS = 20.0  # after which a viewer who takes nothing is left
+SOCKET = "/socket"
+TYPES = {
+    ".html": "text/html; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".svg": "image/svg+xml",
+}
+SAFETY = {
+    "Content-Security-Policy": (
+        "default-src 'self'; img-src 'self' blob:; base-uri 'none'; form-action 'none'; "
+        "frame-ancestors 'none'; object-src 'none'"
+    ),
+    "X-Frame-Options": "DENY",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cache-Control": "no-store",
+}
+
+
+def page_files() -> dict[str, tuple[str, bytes]]:
+    """Return the files of the page: type and content by path; no other path exists."""
+    folder = resources.files("clpt.view") / "static"
+    files = {}
+    for file in folder.iterdir():
+        kind = TYPES.get(f".{file.name.rpartition('.')[2]}")
+        if kind is not None:
+            files[f"/{file.name}"] = kind, file.read_bytes()
+    files["/"] = files["/index.html"]
+    return files
+
+
+class Viewer:
+    """A socket of a page: what waits to be sent to it."""
+
+    def __init__(self, connection: ServerConnection):
+        self.connection = connection
+        self.messages: deque[str] = deque()
+        self.frame: tuple[int, bytes] | None = None  # the newest that was not sent
+        self.unconfirmed: deque[int] = deque()
+        self.wake = asyncio.Event()
+        self._tokens, self._at = BURST, time.monotonic()
+
+    def may_send(self) -> bool:
+        """Return whether a message is within the rate, and count it."""
+        now = time.monotonic()
+        self._tokens = min(BURST, self._tokens + RATE * (now - self._at)) - 1.0
+        self._at = now
+        return self._tokens >= 0.0
+
+    def tell(self, message: dict[str, Any]) -> None:
+        """Let a message be sent."""
+        self.messages.append(as_json(message))
+        if len(self.messages) > MOST_MESSAGES:  # it takes nothing
+            self.messages.clear()
+            self.leave()
+        self.wake.set()
+
+    def leave(self) -> None:
+        """End the socket at once."""
+        self.connection.transport.abort()
+
+    def offer(self, frame: int, data: bytes) -> None:
+        """Let a picture be sent, in the place of one that waits."""
+        self.frame = frame, data
+        self.wake.set()
+
+    def confirm(self, frame: int) -> None:
+        """Note that the viewer has a frame, and those before it."""
+        while self.unconfirmed and self.unconfirmed[0] <= frame:
+            self.unconfirmed.popleft()
+        self.wake.set()
+
+    async def send_all(self) -> None:
+        """Send what waits, until the viewer is gone."""
+        while True:
+            await self.wake.wait()
+            self.wake.clear()
+            while self.messages:
+                await self._send(self.messages.popleft())
+            if self.frame is not None and len(self.unconfirmed) < MOST_FRAMES:
+                (number, data), self.frame = self.frame, None
+                self.unconfirmed.append(number)
+                await self._send(data)
+                self.wake.set()
+
+    async def _send(self, data: str | bytes) -> None:
+        try:
+            await asyncio.wait_for(self.connection.send(data), SEND_SECONDS)
+        except asyncio.TimeoutError:
+            self.leave()
+            raise
+
+
+class Server:
+    """A server in a thread of its own; an `Outlet` of a session.
+
+    host: where it listens; port: 0 for any that is free. Raises ClptError where it cannot listen.
+    """
+
+    def __init__(self, host: str = "127.0.0.1", port: int = 0):
+        self.host = host
+        self.session: Session | None = None
+        self._files = page_files()
+        self._viewers: list[Viewer] = []
+        self._steers: Viewer | None = None
+        self._last_frame: tuple[int, bytes] | None = None
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(
+            target=self._main, args=(port,), name="clpt view server", daemon=True
+        )
+        self._listening: Future[int] = Future()
+        self._thread.start()
+        self.port = self._listening.result()
+        self.access = Access(self.port)
+        names = (*LOOPBACK, host) if is_loopback(host) else (host, *LOOPBACK)
+        self._hosts = {f"{_bracketed(name)}:{self.port}" for name in names}
+
+    @property
+    def address(self) -> str:
+        """An address that opens the page, once."""
+        return f"http://{_bracketed(self.host)}:{self.port}/?token={self.access.new_token()}"
+
+    def close(self) -> None:
+        """Leave all viewers, and listen no more."""
+        if self._thread.is_alive():
+            self._loop.call_soon_threadsafe(self._stop.set)
+            self._thread.join()
+
+    def show(self, session: Session) -> None:
+        """Let viewers see and steer a session."""
+        self.session = session
+        self._call(self._begin)
+
+    # what a session calls, from its thread
+
+    def picture(self, header: dict[str, Any], data: bytes) -> None:
+        """Offer a picture to all viewers: the header's length, the header as JSON, the file."""
+        text = as_json(header).encode()
+        packed = struct.pack("<I", len(text)) + text + data
+        self._call(self._offer, header["frame"], packed)
+
+    def message(self, message: dict[str, Any]) -> None:
+        """Tell all viewers something."""
+        self._call(self._tell, message)
+
+    def _call(self, function: Any, *arguments: Any) -> None:
+        if not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(function, *arguments)
+
+    def _begin(self) -> None:
+        assert self.session is not None
+        self._tell(self.session.state())
+        self._tell_wheel()
+
+    def _offer(self, frame: int, data: bytes) -> None:
+        self._last_frame = frame, data
+        for viewer in self._viewers:
+            viewer.offer(frame, data)
+
+    def _tell(self, message: dict[str, Any]) -> None:
+        for viewer in self._viewers:
+            viewer.tell(message)
+
+    # the thread
+
+    def _main(self, port: int) -> None:
+        asyncio.set_event_loop(self._loop)
+        try:
+            self._loop.run_until_complete(self._serve(port))
+        except BaseException as error:
+            if not self._listening.done():
+                self._listening.set_exception(error)
+            else:
+                log.exception("the server ended")
+        finally:
+            self._loop.close()
+
+    async def _serve(self, port: int) -> None:
+        self._stop = asyncio.Event()
+        try:
+            server: SocketServer = await serve(
+                self._talk, self.host, port,
+                process_request=self._answer, compression=None, max_size=LARGEST_MESSAGE,
+                max_queue=16, server_header=None, logger=quiet, close_timeout=1.0,
+            )  # fmt: skip
+        except OSError as error:
+            reason = error.strerror or str(error)
+            raise ClptError(f"cannot listen at {self.host}:{port}: {reason}") from None
+        async with server:
+            self._listening.set_result(server.sockets[0].getsockname()[1])
+            await self._stop.wait()
+
+    def _answer(self, connection: ServerConnection, request: HttpRequest) -> Response | None:
+        """Answer a request; None lets a socket be opened."""
+        try:
+            return self._checked_answer(request)
+        except Exception:  # of headers that are given twice, of paths that are none
+            return _response(http.HTTPStatus.BAD_REQUEST, "the request makes no sense")
+
+    def _checked_answer(self, request: HttpRequest) -> Response | None:
+        headers, url = request.headers, urlsplit(request.path)
+        if getattr(request, "method", "GET") != "GET":  # older releases read nothing else
+            return _response(http.HTTPStatus.METHOD_NOT_ALLOWED, "only GET is answered")
+        if headers.get("Host", "") not in self._hosts:
+            return _response(http.HTTPStatus.FORBIDDEN, "this server has another name")
+        tokens = parse_qs(url.query).get("token")
+        if url.path == "/" and tokens:
+            cookie = self.access.exchange(tokens[0])
+            if cookie is not None:
+                page = self._file("/")
+                page.headers["Set-Cookie"] = (
+                    f"{self.access.cookie_name}={cookie}; HttpOnly; SameSite=Strict; Path=/"
+                )
+                return page
+        if not self.access.allows(headers.get("Cookie", "")):
+            text = "Open the address that clpt has printed; it opens the page once."
+            return _response(http.HTTPStatus.FORBIDDEN, text)
+        if url.path != SOCKET:
+            return self._file(url.path)
+        host = headers["Host"]
+        if headers.get("Origin") != f"http://{host}":
+            return _response(http.HTTPStatus.FORBIDDEN, "the socket is for the page alone")
+        if len(self._viewers) >= MOST_VIEWERS:
+            return _response(http.HTTPStatus.SERVICE_UNAVAILABLE, "there are too many viewers")
+        return None
+
+    def _file(self, path: str) -> Response:
+        if path not in self._files:
+            return _response(http.HTTPStatus.NOT_FOUND, "there is no such page")
+        kind, content = self._files[path]
+        return _response(http.HTTPStatus.OK, content, kind)
+
+    async def _talk(self, connection: ServerConnection) -> None:
+        if len(self._viewers) >= MOST_VIEWERS:  # several may have asked at once
+            await connection.close(1013, "there are too many viewers")
+            return
+        viewer = Viewer(connection)
+        self._viewers.append(viewer)
+        if self._steers is None:
+            self._steers = viewer
+        self._welcome(viewer)
+        sender = asyncio.ensure_future(viewer.send_all())
+        try:
+            async for message in connection:
+                if not viewer.may_send():
+                    await connection.close(1008, "too many messages")
+                    break
+                self._obey(viewer, message)
+        except ConnectionClosed:
+            pass
+        finally:
+            sender.cancel()
+            self._viewers.remove(viewer)
+            if self._steers is viewer:
+                self._steers = self._viewers[0] if self._viewers else None
+            self._tell_wheel()
+
+    def _welcome(self, viewer: Viewer) -> None:
+        if self.session is not None:
+            viewer.tell(self.session.state())
+        else:
+            viewer.tell({"type": "status", "phase": "preparing"})
+        if self._last_frame is not None:
+            viewer.offer(*self._last_frame)
+        self._tell_wheel()
+
+    def _tell_wheel(self) -> None:
+        """Tell each viewer who steers; tell the session how many watch."""
+        for viewer in self._viewers:
+            steers = viewer is self._steers
+            viewer.tell({"type": "wheel", "steers": steers, "viewers": len(self._viewers)})
+        if self.session is not None:
+            self.session.watched(len(self._viewers))
+
+    def _obey(self, viewer: Viewer, message: str | bytes) -> None:
+        """Do what a message asks for, or say why not."""
+        try:
+            request = parse(message)
+            if request.name == "shown":
+                viewer.confirm(request.values["frame"])
+            elif request.name == "steer":
+                self._steers = viewer
+                self._tell_wheel()
+            elif request.name == "invite":
+                viewer.tell({"type": "invitation", "address": self.address})
+            elif COMMANDS[request.name].steers and viewer is not self._steers:
+                raise CommandError("another viewer steers")
+            elif self.session is not None:
+                self.session.post(request, lambda reply: self._call(viewer.tell, reply))
+        except CommandError as error:
+            viewer.tell({"type": "error", "text": str(error)})
+
+
+def as_json(message: Any) -> str:
+    """Return a message as JSON; what is no finite number is null."""
+    try:
+        return json.dumps(message, allow_nan=False)
+    except ValueError:
+        return json.dumps(_finite(message))
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {key: _finite(child) for key, child in value.items()}
+    return [_finite(child) for child in value] if isinstance(value, (list, tuple)) else value
+
+
+def _response(status: http.HTTPStatus, body: str | bytes, kind: str = "") -> Response:
+    content = body.encode() if isinstance(body, str) else body
+    headers = Headers(
+        {
+            **SAFETY,
+            "Content-Type": kind or "text/plain; charset=utf-8",
+            "Content-Length": str(len(content)),
+            "Connection": "close",
+        }
+    )
+    return Response(status.value, status.phrase, headers, content)
+
+
+def _bracketed(host: str) -> str:
+    """Return a host as it stands in an address."""
+    return f"[{host}]" if ":" in host else host

@@ -1,0 +1,515 @@
+"""The session behind a page: a thread that does what viewers ask for, and renders meanwhile."""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from clpt.device import Device
+from clpt.errors import ClptError
+from clpt.scene import Scene
+from clpt.scene.cameras import Camera, Perspective, ThinLens
+from clpt.scene.params import params
+from clpt.view import navigation, panels
+from clpt.view.commands import COMMANDS, CommandError, Request
+from clpt.view.look import Look
+from clpt.view.pictures import Display
+from clpt.view.probe import Probe, Question
+from clpt.view.render_loop import Outlet, RenderLoop
+from clpt.view.saving import Folder
+from clpt.view.target import Change
+
+log = logging.getLogger(__name__)
+
+MOST_WAITING = 1024  # requests; beyond, the oldest are dropped
+EDITABLE = ("shapes", "lights", "film", "integrator")  # parts of a scene, but the camera
+MOVES = ("orbit", "look", "pan", "dolly", "fly")
+WATCH_SECONDS = 1.0  # between looks at the scene's file
+LENS_SHARE = 0.01  # of the distance in focus: the radius that a pinhole gets as a lens
+
+Reply = Callable[[dict[str, Any]], None]
+
+
+@dataclasses.dataclass(frozen=True)
+class Source:
+    """Where the scene comes from, to be read again: `stamp` differs when it has changed."""
+
+    stamp: Callable[[], Any]
+    load: Callable[[], Scene]
+
+
+class Session:
+    """A scene that is rendered while it is watched and steered.
+
+    scene, display: at the start; device: where; outlet: gets pictures and messages; folder: gets
+    what is saved, and source tells when the file has changed, where they are given. options: of
+    `Renderer`.
+
+    `post`, `watched` and `state` may be called from any thread.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        device: Device,
+        outlet: Outlet,
+        *,
+        folder: Folder | None = None,
+        source: Source | None = None,
+        display: Display | None = None,
+        **options: Any,
+    ):
+        self.device, self.outlet, self.folder, self.source = device, outlet, folder, source
+        self.scene = self._first = self._works = scene
+        self.look = Look()
+        self.error: BaseException | None = None
+        self._loop = RenderLoop(scene, device, outlet, display or Display(), **options)
+        self._probe: Probe | None = None
+        self._requests: deque[tuple[Request, Reply]] = deque()
+        self._wake = threading.Condition()
+        self._closing = False
+        self._viewers = -1  # nobody has come yet: the picture begins before
+        self._pivot: navigation.Vector = np.zeros(3)
+        self._up: navigation.Vector = np.zeros(3)
+        self._aimed = False  # the pivot lies on a surface
+        self._set_pivot()
+        self._stamp = source.stamp() if source is not None else None
+        self._looked = time.monotonic()
+        self._revision = 0
+        self._thread = threading.Thread(target=self._main, name="clpt view", daemon=True)
+
+    def start(self) -> None:
+        """Begin to render."""
+        self._thread.start()
+
+    def close(self, timeout: float | None = None) -> bool:
+        """Stop, and give the device's memory back; return whether that was done.
+
+        timeout: [s] to wait at most: a driver that compiles cannot be stopped.
+        """
+        with self._wake:
+            self._closing = True
+            self._wake.notify_all()
+        self._loop.stop()
+        if self._thread.ident is not None:
+            self._thread.join(timeout)
+        return not self._thread.is_alive()
+
+    def post(self, request: Request, reply: Reply) -> None:
+        """Ask for something; reply: gets messages for the viewer alone."""
+        with self._wake:
+            if len(self._requests) >= MOST_WAITING:
+                self._requests.popleft()
+            self._requests.append((request, reply))
+            self._wake.notify_all()
+        command = COMMANDS.get(request.name)  # None for what the probe asks for
+        if command is not None and command.restarts:
+            self._loop.cancel()
+
+    def watched(self, viewers: int) -> None:
+        """Note how many viewers there are; when the last one has left the render waits."""
+        with self._wake:
+            if viewers or self._viewers > 0:
+                self._viewers = viewers
+            self._wake.notify_all()
+        if not self._viewers:
+            self._loop.cancel()
+
+    def state(self) -> dict[str, Any]:
+        """Return what a viewer has to know of the scene, and how it is looked at."""
+        scene, film = self.scene, self.scene.film
+        return {
+            "type": "state",
+            "revision": self._revision,
+            "name": scene.name,
+            "film": [film.width, film.height],
+            "mode": film.mode,
+            "lambdas": [film.lambda_min, film.lambda_max],
+            "spp": scene.spp,
+            "noise": scene.noise,
+            "paused": self._loop.paused,
+            "display": self._display(),
+            "look": {**dataclasses.asdict(self.look), "hidden": sorted(self.look.hidden)},
+            "device": self.device.info.label,
+            "names": panels.names(self._loop.display.view is not None),
+            "objects": panels.objects(scene),
+            "panels": panels.panels(scene),
+            "folder": None if self.folder is None else str(self.folder.folder),
+            "compares": self._loop.kept is not None,
+            "edited": any(
+                getattr(scene, part) is not getattr(self._first, part) for part in EDITABLE
+            ),
+        }
+
+    # the thread
+
+    def _main(self) -> None:
+        try:
+            while not self._closing:
+                self._handle_requests()
+                self._watch()
+                self._loop.watched = self._viewers != 0
+                if not self._closing and not self._try_to_advance():
+                    with self._wake:
+                        if not self._requests and not self._closing:
+                            self._wake.wait(0.25)
+        except BaseException as error:
+            log.debug("the session ended", exc_info=True)
+            self.error = error
+            self.outlet.message({"type": "error", "text": f"the render ended: {error}"})
+        finally:
+            if self._probe is not None:
+                self._probe.close()
+            self._loop.close()
+
+    def _try_to_advance(self) -> bool:
+        """Go on; a scene that cannot be rendered is given up for the last one that could."""
+        try:
+            advanced = self._loop.advance()
+        except ClptError as error:
+            if self.scene is self._works:
+                raise
+            self._tell_error(error)
+            self.look = Look()
+            self._show(self._works, Change(whole=True))
+            self._tell_state()
+            return True
+        if self._loop.film is not None:
+            self._works = self.scene
+            if not self._aimed:
+                self._aim()
+        return advanced
+
+    def _handle_requests(self) -> None:
+        with self._wake:
+            requests = list(self._requests)
+            self._requests.clear()
+        for request, reply in merged(requests):
+            try:
+                getattr(self, f"_do_{request.name}")(reply, **request.values)
+            except (ClptError, OSError) as error:
+                reply({"type": "error", "text": str(error)})
+
+    def _watch(self) -> None:
+        """Read the scene again if its file has changed."""
+        if self.source is None or time.monotonic() - self._looked < WATCH_SECONDS:
+            return
+        self._looked = time.monotonic()
+        stamp = self.source.stamp()
+        if stamp == self._stamp or stamp is None:
+            return
+        self._stamp = stamp
+        try:
+            scene = self.source.load()
+        except ClptError as error:
+            self._tell_error(error)
+            return
+        same_camera = panels.written(scene.camera) == panels.written(self._first.camera)
+        self._first = scene
+        if same_camera:  # the viewer's stays
+            scene = dataclasses.replace(scene, camera=self.scene.camera)
+        self.look = Look(lamp=self.look.lamp, wavelength=self.look.wavelength)
+        self._show(scene, Change(whole=True))
+        if not same_camera:
+            self._set_pivot()
+        self._tell_state()
+        self.outlet.message({"type": "note", "text": "the scene's file was read again"})
+
+    def _show(self, scene: Scene, change: Change) -> None:
+        """Render another scene, as it is looked at."""
+        self.scene = scene
+        self._loop.begin(self.look.apply(scene), change)
+
+    def _display(self) -> dict[str, Any]:
+        display = self._loop.display
+        return {"exposure": display.exposure, "tone": display.tone}
+
+    def _tell_state(self) -> None:
+        self._revision += 1
+        self.outlet.message(self.state())
+
+    def _tell_error(self, error: BaseException) -> None:
+        self.outlet.message({"type": "error", "text": str(error)})
+
+    # the camera
+
+    def _do_orbit(self, reply: Reply, dx: float, dy: float) -> None:
+        self._move(navigation.orbit(self.scene.camera, self._pivot, self._up, dx, dy))
+
+    def _do_look(self, reply: Reply, dx: float, dy: float) -> None:
+        self._move(
+            navigation.look(self.scene.camera, self._up, dx, dy, self._aspect()), takes_pivot=True
+        )
+
+    def _do_pan(self, reply: Reply, dx: float, dy: float) -> None:
+        camera = navigation.pan(self.scene.camera, self._distance(), dx, dy, self._aspect())
+        self._move(camera, takes_pivot=True)
+
+    def _do_dolly(self, reply: Reply, by: float) -> None:
+        self._move(navigation.dolly(self.scene.camera, self._pivot, by))
+
+    def _do_fly(self, reply: Reply, right: float, up: float, forward: float) -> None:
+        camera = navigation.fly(self.scene.camera, self._distance(), right, up, forward)
+        self._move(camera, takes_pivot=True)
+
+    def _do_home(self, reply: Reply) -> None:
+        self._move(self._first.camera)
+        self._set_pivot()
+        self._tell_state()
+
+    def _do_field_of_view(self, reply: Reply, degrees: float) -> None:
+        if not isinstance(self.scene.camera, Perspective):
+            raise CommandError(f"the camera {self.scene.camera.kind} has no field of view")
+        self._move(dataclasses.replace(self.scene.camera, fov=degrees))
+        self._tell_state()
+
+    def _do_pick(self, reply: Reply, x: int, y: int) -> None:
+        self._ask_hit(x, y, reply, lambda hit: self._aim_at(hit, reply))
+
+    def _do_focus(self, reply: Reply, x: int, y: int) -> None:
+        self._ask_hit(x, y, reply, lambda hit: self._focus_on(hit, reply))
+
+    def _do_pivot(self, reply: Reply, position: list[float]) -> None:
+        self._pivot, self._aimed = np.array(position), True
+
+    def _do_focus_at(self, reply: Reply, distance: float) -> None:
+        camera: Any = self.scene.camera
+        if isinstance(camera, ThinLens):
+            camera = dataclasses.replace(camera, focus_distance=distance)
+        elif isinstance(camera, Perspective):
+            given = {name: getattr(camera, name) for name in params(type(camera))}
+            radius = LENS_SHARE * distance
+            camera = ThinLens(**given, focus_distance=distance, aperture_radius=radius)
+        else:
+            raise CommandError(f"the camera {camera.kind} has no lens")
+        self._move(camera)
+        self._tell_state()
+
+    def _aim_at(self, hit: dict[str, Any], reply: Reply) -> None:
+        """In the probe's thread: let the pivot be where a pixel looks."""
+        if hit["shape"] is None:
+            reply({"type": "note", "text": "there is nothing to turn about"})
+            return
+        self.post(Request("pivot", {"position": hit["position"]}), reply)
+        reply({"type": "pivot", "position": hit["position"], "depth": hit["depth"]})
+
+    def _focus_on(self, hit: dict[str, Any], reply: Reply) -> None:
+        """In the probe's thread: let the lens focus where a pixel looks."""
+        if hit["shape"] is None:
+            reply({"type": "note", "text": "there is nothing to focus on"})
+            return
+        at = navigation.pose(self.scene.camera)
+        distance = float(np.dot(np.array(hit["position"]) - at.origin, at.forward))
+        self.post(Request("focus_at", {"distance": max(distance, 1e-6)}), reply)
+
+    def _aim(self) -> None:
+        """Let the pivot be what is in the middle of the picture."""
+        self._aimed = True
+        film = self.scene.film
+
+        def silent(message: dict[str, Any]) -> None:
+            log.debug("%s", message)
+
+        def aim(hit: dict[str, Any]) -> None:
+            if hit["shape"] is not None:
+                self.post(Request("pivot", {"position": hit["position"]}), silent)
+
+        self._ask_hit(film.width // 2, film.height // 2, silent, aim)
+
+    def _move(self, camera: Camera, takes_pivot: bool = False) -> None:
+        """Let another camera look; takes_pivot: the pivot goes where the camera goes."""
+        if takes_pivot:
+            old, new = navigation.pose(self.scene.camera), navigation.pose(camera)
+            away = self._pivot - old.origin
+            parts = [float(np.dot(away, axis)) for axis in (old.left, old.up, old.forward)]
+            axes = (new.left, new.up, new.forward)
+            self._pivot = new.origin + sum(
+                part * axis for part, axis in zip(parts, axes, strict=True)
+            )
+        self.scene = dataclasses.replace(self.scene, camera=camera)
+        shown = dataclasses.replace(self._loop.scene, camera=camera)
+        self._loop.begin(shown, Change(camera=camera))
+
+    def _set_pivot(self) -> None:
+        """Let the pivot be where the camera focuses, or as far away as the world's origin."""
+        camera = self.scene.camera
+        at = navigation.pose(camera)
+        distance = float(getattr(camera, "focus_distance", np.linalg.norm(at.origin))) or 1.0
+        self._pivot, self._up = at.origin + distance * at.forward, navigation.upright(camera)
+        self._aimed = False
+
+    def _distance(self) -> float:
+        away = self._pivot - navigation.pose(self.scene.camera).origin
+        return float(np.linalg.norm(away)) or 1.0
+
+    def _aspect(self) -> float:
+        return self.scene.film.width / self.scene.film.height
+
+    # pixels
+
+    def _do_inspect(self, reply: Reply, x: int, y: int) -> None:
+        self._check_pixel(x, y)
+        reply({"type": "value", "x": x, "y": y, **self._value(x, y)})
+        self._ask(Question(self._loop.scene, x, y, self._named(reply)))
+
+    def _value(self, x: int, y: int) -> dict[str, Any]:
+        """Return what the last whole picture has in a pixel of the film."""
+        film, crop = self._loop.film, self._loop.scene.film.crop
+        x, y = (x, y) if crop is None else (x - crop[0], y - crop[1])
+        if film is None or not (0 <= x < film.shape[1] and 0 <= y < film.shape[0]):
+            return {"rgb": None, "samples": 0}
+        *rgb, samples = film[y, x].tolist()
+        return {"rgb": rgb, "samples": round(samples)}
+
+    def _named(self, reply: Reply) -> Reply:
+        """Return a reply that adds which shape of the scene a hit is of."""
+        scene, look = self.scene, self.look
+
+        def named(message: dict[str, Any]) -> None:
+            if message["type"] == "hit" and message["shape"] is not None:
+                number = look.shape(message["shape"])
+                message["shape"] = number
+                if number < len(scene.shapes):
+                    message["object"] = panels.object_of(scene, number)
+            reply(message)
+
+        return named
+
+    def _check_pixel(self, x: int, y: int) -> None:
+        film = self.scene.film
+        if not (x < film.width and y < film.height):
+            raise CommandError(f"the film has {film.width}x{film.height} pixels")
+
+    def _ask_hit(self, x: int, y: int, reply: Reply, then: Callable[[Any], None]) -> None:
+        self._check_pixel(x, y)
+        self._ask(Question(self._loop.scene, x, y, reply, then=then))
+
+    def _ask(self, question: Question) -> None:
+        if self._probe is None:
+            self._probe = Probe(self.device)
+        self._probe.ask(question)
+
+    # the scene
+
+    def _do_edit(self, reply: Reply, target: str, index: int, key: str, value: Any) -> None:
+        scene, change = panels.edited(self.scene, target, index, key, value)
+        if target == "camera":
+            self._move(scene.camera)
+            return
+        self._show(scene, change)
+
+    def _do_restore(self, reply: Reply) -> None:
+        self.look = Look()
+        self._show(self._first, Change(whole=True))
+        self._set_pivot()
+        self._tell_state()
+
+    def _do_hide(self, reply: Reply, shape: int, hidden: bool) -> None:
+        if shape >= len(self.scene.shapes):
+            raise CommandError(f"the scene has {len(self.scene.shapes)} objects")
+        one = {shape}
+        self._look(hidden=self.look.hidden | one if hidden else self.look.hidden - one)
+
+    def _do_hide_at(self, reply: Reply, x: int, y: int) -> None:
+        look = self.look
+
+        def hide(hit: dict[str, Any]) -> None:
+            if hit["shape"] is None:
+                reply({"type": "note", "text": "there is nothing to hide"})
+            else:
+                values = {"shape": look.shape(hit["shape"]), "hidden": True}
+                self.post(Request("hide", values), reply)
+
+        self._ask_hit(x, y, reply, hide)
+
+    def _do_show_all(self, reply: Reply) -> None:
+        self._look(hidden=frozenset())
+
+    def _do_lamp(self, reply: Reply, name: str | None) -> None:
+        self._look(lamp=name)
+
+    def _do_wavelength(self, reply: Reply, nm: float | None, width: float) -> None:
+        if nm is not None and self.scene.film.mode != "spectral":
+            raise CommandError("a picture in RGB has no wavelengths")
+        self._look(wavelength=nm, width=width)
+
+    def _do_region(
+        self, reply: Reply, x: int | None, y: int | None, width: int | None, height: int | None
+    ) -> None:
+        if x is None or y is None or width is None or height is None:
+            self._look(region=None)
+            return
+        film = self.scene.film
+        if x + width > film.width or y + height > film.height:
+            raise CommandError("the region does not lie in the film")
+        self._look(region=(x, y, width, height))
+
+    def _look(self, **changes: Any) -> None:
+        self.look = dataclasses.replace(self.look, **changes)
+        self._show(self.scene, Change(whole=True))
+        self._tell_state()
+
+    # the render
+
+    def _do_display(self, reply: Reply, exposure: float, tone: str) -> None:
+        self._loop.show(Display(exposure, tone, self._loop.display.view))
+
+    def _do_pause(self, reply: Reply, paused: bool) -> None:
+        self._loop.paused = paused
+        self._tell_state()
+
+    def _do_stop_at(self, reply: Reply, spp: int, noise: float | None) -> None:
+        for name, value in (("scene", self.scene), ("_first", self._first)):
+            setattr(self, name, dataclasses.replace(value, spp=spp, noise=noise))
+        before = self._loop.scene.noise
+        shown = dataclasses.replace(self._loop.scene, spp=spp, noise=noise)
+        if noise != before:  # filters and light paths may depend on it
+            self._loop.begin(shown, Change(whole=True))
+        else:
+            self._loop.scene = shown
+            self._loop.wants_more()
+        self._tell_state()
+
+    def _do_restart(self, reply: Reply) -> None:
+        self._show(self.scene, Change(whole=True))
+
+    def _do_keep(self, reply: Reply, kept: bool) -> None:
+        self._loop.kept = self._loop.film if kept else None
+        self._tell_state()
+
+    def _do_statistics(self, reply: Reply) -> None:
+        stats = dataclasses.asdict(self._loop.renderer().stats)
+        reply({"type": "statistics", "stats": stats, "device": self.device.info.label})
+
+    def _do_save(self, reply: Reply, what: str) -> None:
+        if self.folder is None:
+            raise CommandError("no folder was given to save in")
+        if what == "scene":
+            path = self.folder.save_scene(self.scene)
+        elif what == "view":
+            path = self.folder.save_view(self.scene, self._display())
+        elif what == "png":
+            path = self.folder.save_png(self._loop.renderer(), self._loop.display)
+        else:
+            path = self.folder.save_exr(self._loop.renderer(), self._loop.seconds)
+        reply({"type": "saved", "what": what, "name": str(path.relative_to(self.folder.folder))})
+
+
+def merged(requests: list[tuple[Request, Reply]]) -> list[tuple[Request, Reply]]:
+    """Return requests with moves of one kind that follow each other added up."""
+    found: list[tuple[Request, Reply]] = []
+    for request, reply in requests:
+        last = found[-1][0] if found else None
+        if last is not None and request.name == last.name and request.name in MOVES:
+            values = {key: last.values[key] + value for key, value in request.values.items()}
+            found[-1] = Request(request.name, values), reply
+        else:
+            found.append((request, reply))
+    return found

@@ -1,0 +1,218 @@
+// The page: it wires the socket, the picture, the steering and the side together.
+
+import { Connection } from "./connection.js";
+import { clock, h } from "./dom.js";
+import { Inspector } from "./inspector.js";
+import { Tabs, renderPane, scenePane, viewPane } from "./panes.js";
+import { Picture } from "./picture.js";
+import { GESTURES, Steering } from "./steering.js";
+
+history.replaceState(null, "", "/"); // the token is used up; nobody need see it
+
+const $ = (id) => document.getElementById(id);
+const connection = new Connection();
+const picture = new Picture($("picture"), $("overlay"), connection);
+const open = new Set(["camera", "material"]);
+const figures = { frames: 0, perSecond: 0, times: [] };
+let state = null;
+let steers = true;
+
+const display = {
+  exposure: 0,
+  tone: "none",
+  set(changes) {
+    Object.assign(display, changes);
+    connection.set("display", { exposure: display.exposure, tone: display.tone });
+  },
+};
+
+function note(text, kind = "") {
+  const item = h("li", { class: kind }, text);
+  $("notes").append(item);
+  setTimeout(() => item.remove(), kind === "error" ? 8000 : 4000);
+  while ($("notes").children.length > 4) $("notes").firstChild.remove();
+}
+
+// What keys and buttons do. button: the sign in the header, if it has one.
+const actions = [
+  { keys: [" "], text: "pause, go on", run: () => connection.send("pause", { paused: !state?.paused }), button: "pause" },
+  { keys: ["h"], text: "the camera of the file", run: () => connection.send("home"), button: "home" },
+  { keys: ["p"], text: "pick the pivot", run: () => steering.choose("pivot"), tool: "pivot", button: "pivot" },
+  { keys: ["f"], text: "focus the lens by a click", run: () => steering.choose("focus"), tool: "focus", button: "focus" },
+  { keys: ["x"], text: "hide the object that is clicked next", run: () => steering.choose("hide"), tool: "hide", button: "hide" },
+  { keys: ["X"], text: "show all objects", run: () => connection.send("show_all") },
+  { keys: ["r"], text: "render a region, or the whole picture again", run: region, tool: "region", button: "region" },
+  { keys: ["c"], text: "keep the picture, and wipe between both", run: compare, button: "compare" },
+  { keys: ["v"], text: "the difference from the kept picture, eight times as bright", run: differ },
+  { keys: ["+", "="], text: "brighter by a third of a stop", run: () => expose(1 / 3) },
+  { keys: ["-"], text: "darker by a third of a stop", run: () => expose(-1 / 3) },
+  { keys: ["0"], text: "exposure 0", run: () => expose(-display.exposure) },
+  { keys: ["t"], text: "the next tone curve", run: nextTone },
+  { keys: ["1"], text: "one pixel for one of the screen, or all of the picture", run: () => { picture.actual = !picture.actual; $("stage").classList.toggle("actual", picture.actual); picture.fit(); } },
+  { keys: ["g"], text: "save a .png", run: () => connection.send("save", { what: "png" }), button: "save" },
+  { keys: ["i"], text: "an address for another viewer", run: () => connection.send("invite") },
+  { keys: ["Escape"], text: "leave a tool", run: () => { if (steering.tool) steering.choose(steering.tool); } },
+  { keys: ["?"], text: "these keys", run: help, button: "keys" },
+];
+const steering = new Steering(picture, connection, actions);
+
+const tabs = new Tabs($("tabs"), $("panes"), [["pixel", "Pixel"], ["view", "View"], ["scene", "Scene"], ["render", "Render"]]);
+const inspector = new Inspector(tabs.panes.pixel, picture, connection, steering);
+tabs.onopen = (name) => {
+  if (name === "render") connection.send("statistics");
+  draw(name);
+};
+
+for (const action of actions.filter(({ button }) => button)) {
+  action.element = h("button", { title: `${action.text} (${action.keys[0] === " " ? "space" : action.keys[0]})`, onclick: () => { action.run(); } }, action.button);
+  $("tools").append(action.element);
+}
+
+function draw(name = tabs.current) {
+  if (!state) return;
+  const pane = tabs.panes[name];
+  if (name !== "pixel" && pane.contains(document.activeElement) && document.activeElement.matches("input[type=number], input[type=range], input[type=color]") && name !== "render") return;
+  const top = $("panes").scrollTop;
+  if (name === "view") pane.replaceChildren(...viewPane(state, connection, display));
+  if (name === "scene") pane.replaceChildren(...scenePane(state, connection, open));
+  if (name === "render") pane.replaceChildren(...renderPane(state, connection, figures));
+  $("panes").scrollTop = top;
+}
+
+function region() {
+  if (picture.region) {
+    picture.region = null;
+    connection.send("region");
+    picture.paintOverlay();
+  } else steering.choose("region");
+}
+
+function compare() {
+  if (picture.kept && picture.wipe !== null) {
+    picture.kept = picture.wipe = null;
+    picture.differs = false;
+    connection.send("keep", { kept: false });
+  } else {
+    picture.keep();
+    picture.wipe = 0.5;
+    connection.send("keep", { kept: true });
+    note("This picture is kept. Drag the line to wipe; v shows the difference.");
+  }
+  picture.paint();
+}
+
+function differ() {
+  if (!picture.kept) { note("Keep a picture first: c"); return; }
+  picture.differs = !picture.differs;
+  picture.paint();
+}
+
+function expose(by) {
+  display.set({ exposure: Math.round(Math.max(-20, Math.min(20, display.exposure + by)) * 1000) / 1000 });
+  draw();
+}
+
+function nextTone() {
+  const { tones } = state.names;
+  display.set({ tone: tones[(tones.indexOf(display.tone) + 1) % tones.length] });
+  note(`tone curve: ${display.tone}`);
+  draw();
+}
+
+function help() {
+  const dialog = $("help");
+  if (dialog.open) { dialog.close(); return; }
+  const key = (name) => h("kbd", {}, name === " " ? "space" : name === "Escape" ? "Esc" : name);
+  const rows = (pairs) => h("dl", {}, pairs.map(([keys, text]) => [h("dt", {}, keys), h("dd", {}, text)]));
+  dialog.replaceChildren(
+    h("div", { class: "columns" },
+      h("div", {}, h("h2", {}, "Pointer"), rows(GESTURES.map(([gesture, text]) => [gesture, text])),
+        h("h2", {}, "Moving"), rows([[["W", "A", "S", "D", "Q", "E"].map(key), "fly; Q and E: down, up"], [["←", "→", "↑", "↓"].map(key), "orbit"]])),
+      h("div", {}, h("h2", {}, "Keys"), rows(actions.map(({ keys, text }) => [keys.map(key), text])))),
+    h("button", { class: "wide", onclick: () => dialog.close() }, "close"));
+  dialog.showModal();
+}
+
+steering.addEventListener("tool", ({ detail }) => {
+  const hints = { pivot: "click what to turn about", focus: "click what is to be sharp", hide: "click what to hide", region: "drag a rectangle" };
+  $("hint").hidden = !detail;
+  $("hint").textContent = hints[detail] ?? "";
+  for (const { tool, element } of actions) if (tool && element) element.setAttribute("aria-pressed", tool === detail);
+});
+steering.addEventListener("hide", ({ detail }) => connection.send("hide_at", detail));
+steering.addEventListener("zoom", ({ detail }) => {
+  const camera = state?.panels.find(({ target }) => target === "camera");
+  const fov = camera?.parameters.find(({ key }) => key === "fov");
+  if (!fov) return;
+  fov.value = Math.min(170, Math.max(0.1, fov.value * Math.exp(-detail)));
+  connection.set("field_of_view", { degrees: fov.value });
+});
+
+connection.addEventListener("state", ({ detail }) => {
+  state = detail;
+  Object.assign(display, detail.display);
+  document.title = `${detail.name || "scene"} – clpt`;
+  $("name").textContent = detail.name || "scene";
+  picture.region = detail.look.region;
+  if (!detail.compares && !picture.kept) picture.wipe = null;
+  for (const { button, element } of actions) if (button === "pause") { element.textContent = detail.paused ? "go on" : "pause"; }
+  picture.paintOverlay();
+  draw();
+});
+
+connection.addEventListener("status", ({ detail }) => {
+  Object.assign(figures, detail);
+  if (detail.phase === "preparing") {
+    $("phase").textContent = "preparing kernels";
+    return;
+  }
+  const share = detail.spp ? Math.min(1, detail.samples / detail.spp) : 0;
+  $("progress").firstElementChild.style.width = `${100 * share}%`;
+  $("phase").textContent = detail.phase === "moving" ? "moving" : `${detail.phase}  ${detail.samples}/${detail.spp}  ${clock(detail.seconds)}`;
+  if (tabs.current === "render" && !tabs.panes.render.contains(document.activeElement)) draw("render");
+});
+
+picture.addEventListener("shown", ({ detail }) => {
+  figures.frames += 1;
+  figures.difference = detail.difference;
+  figures.times = [...figures.times.slice(-19), performance.now()];
+  const span = figures.times.at(-1) - figures.times[0];
+  figures.perSecond = span ? ((figures.times.length - 1) / span) * 1000 : 0;
+  document.body.classList.add("shows");
+});
+
+connection.addEventListener("wheel", ({ detail }) => {
+  if (steers && !detail.steers) note("Another viewer steers. Take the wheel by the button above.");
+  steers = detail.steers;
+  document.body.classList.toggle("watches", !steers);
+  let button = $("steer");
+  if (!steers && !button) {
+    button = h("button", { id: "steer", onclick: () => connection.send("steer") }, "take the wheel");
+    $("tools").prepend(button);
+  }
+  if (steers) button?.remove();
+});
+connection.addEventListener("statistics", ({ detail }) => { figures.statistics = detail; if (tabs.current === "render") draw(); });
+connection.addEventListener("saved", ({ detail }) => note(`saved ${detail.name}`));
+connection.addEventListener("pivot", () => note("The pivot is there."));
+connection.addEventListener("invitation", async ({ detail }) => {
+  try {
+    await navigator.clipboard.writeText(detail.address);
+    note("An address for one more viewer is in the clipboard.");
+  } catch {
+    note(detail.address);
+  }
+});
+connection.addEventListener("error", ({ detail }) => note(detail.text, "error"));
+connection.addEventListener("note", ({ detail }) => note(detail.text));
+connection.addEventListener("closed", ({ detail }) => {
+  $("phase").textContent = detail.code === 1013 ? "there are too many viewers" : "the server is away";
+  document.body.classList.add("away");
+});
+connection.addEventListener("open", () => { document.body.classList.remove("away"); picture.latest = 0; });
+
+// The picture has an outline only where Tab has led to it.
+window.addEventListener("keydown", ({ key }) => { if (key === "Tab") document.body.classList.add("tabs"); });
+window.addEventListener("pointerdown", () => document.body.classList.remove("tabs"));
+
+window.clpt = { connection, picture, inspector, tabs, figures, get state() { return state; } };

@@ -1,0 +1,342 @@
+"""The server of the page, as an attacker meets it."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import random
+import socket
+import time
+from collections.abc import Iterator
+
+import pytest
+
+pytest.importorskip("websockets", reason="the extra clpt[view] is not installed")
+
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+
+from clpt.errors import ClptError
+from clpt.view import server as serving
+from clpt.view.access import Access, is_loopback
+from clpt.view.commands import LARGEST_MESSAGE
+from clpt.view.server import MOST_FRAMES, MOST_VIEWERS, SAFETY, Server
+from tests.view.attacker import Recorder, answer_to, ask, cookie, do, frame, message, opened
+
+ELSEWHERE = "http://evil.example"
+
+
+@pytest.fixture
+def server() -> Iterator[Server]:
+    """A server with a session that only notes requests."""
+    made = Server()
+    made.show(Recorder())  # type: ignore[arg-type]
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def key(server: Server) -> str:
+    """The cookie of a viewer."""
+    return cookie(server)
+
+
+def wait_for(true: object) -> None:
+    """Wait until a function returns something true."""
+    end = time.monotonic() + 10
+    while not true():  # type: ignore[operator]
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def test_it_listens_on_this_machine_alone(server: Server) -> None:
+    addresses = {info[4][0] for info in socket.getaddrinfo(socket.gethostname(), None)}
+    for address in {one for one in addresses if not is_loopback(one)}:
+        with pytest.raises(OSError):
+            socket.create_connection((address, server.port), timeout=2).close()
+
+
+def test_a_port_that_is_taken_is_one_line(server: Server) -> None:
+    with pytest.raises(ClptError, match=f"cannot listen at 127.0.0.1:{server.port}"):
+        Server(port=server.port)
+
+
+@pytest.mark.parametrize(
+    "path", ["/", "/index.html", "/main.js", "/socket", "/?token=", "/?token=x"]
+)
+def test_without_a_cookie_there_is_nothing(server: Server, path: str) -> None:
+    status, headers, content = ask(server, path, f"Cookie: {server.access.cookie_name}=x; other=y")
+    assert status == 403 and b"<" not in content and "set-cookie" not in headers
+
+
+def test_a_token_opens_the_page_once(server: Server) -> None:
+    path = server.address.split(str(server.port), 1)[1]
+    status, headers, content = ask(server, path)
+    assert status == 200 and b"<!doctype html>" in content
+    name, *attributes = headers["set-cookie"].split("; ")
+    assert {"HttpOnly", "SameSite=Strict", "Path=/"} == set(attributes)
+    assert ask(server, "/", f"Cookie: {name}")[0] == 200
+    assert path.split("=", 1)[1] not in name
+    again = ask(server, path)
+    assert again[0] == 403 and "set-cookie" not in again[1]
+
+
+def test_tokens_and_cookies_are_long_and_few() -> None:
+    access = Access(1)
+    tokens = [access.new_token() for _ in range(100)]
+    assert len(set(tokens)) == 100 and min(map(len, tokens)) >= 43  # 256 bits in base 64
+    assert access.exchange(tokens[0]) is None  # the oldest are dropped: nothing grows
+    made = access.exchange(tokens[-1])
+    assert made and access.allows(f"a=b; clpt-1={made}") and not access.allows(f"clpt-2={made}")
+    assert tokens[-2] not in repr(vars(access)) and made not in repr(vars(access))
+
+
+@pytest.mark.parametrize(
+    "host", ["evil.example", "evil.example:{}", "127.0.0.1", "localhost:1", None]
+)
+def test_another_host_name_is_refused(server: Server, key: str, host: str | None) -> None:
+    """A page elsewhere that lets its own name mean 127.0.0.1 sends that name."""
+    named = None if host is None else host.format(server.port)
+    status, _, content = ask(server, "/", f"Cookie: {key}", host=named)
+    assert status in (0, 400, 403) and b"<!doctype" not in content
+
+
+def test_two_hosts_are_refused(server: Server, key: str) -> None:
+    status, _, content = ask(server, "/", "Host: evil.example", f"Cookie: {key}")
+    assert status == 400 and b"<!doctype" not in content
+
+
+@pytest.mark.parametrize(
+    "origin", [None, ELSEWHERE, "null", "https://127.0.0.1:{}", "http://localhost:{}"]
+)
+def test_a_socket_of_another_page_is_refused(server: Server, key: str, origin: str | None) -> None:
+    given = None if origin is None else origin.format(server.port)
+    with pytest.raises(InvalidStatus) as refused, opened(server, key, origin=given):
+        pass
+    assert refused.value.response.status_code == 403
+
+
+def test_a_socket_needs_a_cookie(server: Server, key: str) -> None:
+    for wrong in ("", f"{server.access.cookie_name}=", key[:-1], key.replace("=", "=x")):
+        with pytest.raises(InvalidStatus), opened(server, wrong):
+            pass
+    with opened(server, key) as client:
+        assert message(client, "wheel")["steers"]
+
+
+def test_every_answer_is_safe(server: Server, key: str) -> None:
+    for path in ("/", "/main.js", "/nothing", "/?token=x"):
+        for sent in (key, ""):
+            _, headers, _ = ask(server, path, f"Cookie: {sent}")
+            for name, value in SAFETY.items():
+                assert headers[name.lower()] == value
+            assert not any(name.startswith("access-control") for name in headers)
+    policy = SAFETY["Content-Security-Policy"]
+    assert "default-src 'self'" in policy and "unsafe" not in policy and "http" not in policy
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["/../session.py", "/..%2fserver.py", "/%2e%2e/server.py", "//etc/passwd", "/etc/passwd",
+     "/static/main.js", "/main.js/", "/main.js%00", "/.", "/\\..\\server.py"],
+)  # fmt: skip
+def test_no_path_leads_elsewhere(server: Server, key: str, path: str) -> None:
+    status, _, content = ask(server, path, f"Cookie: {key}")
+    assert status in (400, 404) and b"import" not in content and b"root:" not in content
+
+
+@pytest.mark.parametrize("verb", ["POST", "PUT", "DELETE", "OPTIONS", "CONNECT", "TRACE", "get"])
+def test_only_get_is_answered(server: Server, key: str, verb: str) -> None:
+    assert ask(server, "/", f"Cookie: {key}", verb=verb)[0] in (0, 400, 405)
+
+
+def test_noise_on_the_port(server: Server, key: str) -> None:
+    """Bytes that are no HTTP, and requests without an end, are dropped; the server goes on."""
+    chance = random.Random(1)
+    for size in (1, 10, 1000, 100_000):
+        assert answer_to(server, chance.randbytes(size) + b"\r\n\r\n")[0] in (0, 400)
+    assert answer_to(server, b"GET /" + b"a" * 100_000 + b" HTTP/1.1\r\n\r\n")[0] in (0, 400, 414)
+    many = b"".join(b"A%d: b\r\n" % i for i in range(10_000))
+    assert answer_to(server, b"GET / HTTP/1.1\r\n" + many + b"\r\n")[0] in (0, 400, 431)
+    assert ask(server, "/", f"Cookie: {key}")[0] == 200
+
+
+def test_a_long_message_ends_the_socket(server: Server, key: str) -> None:
+    with opened(server, key) as client:
+        do(client, "pause", paused=True)
+        client.send(json.dumps({"do": "x" * (LARGEST_MESSAGE - 20)}))
+        assert "there is no command" in message(client, "error")["text"]
+        with pytest.raises(ConnectionClosed) as closed:
+            client.send("x" * (LARGEST_MESSAGE + 1))
+            message(client, "never")
+    assert closed.value.rcvd is not None and closed.value.rcvd.code == 1009
+
+
+def test_a_message_of_a_gigabyte_is_not_read(server: Server, key: str) -> None:
+    """Its head says how long it is: the socket ends before anything is kept."""
+    with opened(server, key) as client:
+        client.socket.sendall(b"\x81\xff" + (1 << 30).to_bytes(8, "big") + b"mask" + b"x" * 1000)
+        with pytest.raises(ConnectionClosed) as closed:
+            message(client, "never")
+    assert closed.value.rcvd is not None and closed.value.rcvd.code == 1009
+
+
+def test_a_flood_ends_the_socket(server: Server, key: str) -> None:
+    with opened(server, key) as client, pytest.raises(ConnectionClosed) as closed:
+        for _ in range(1000):
+            do(client, "pause", paused=True)
+        message(client, "never")
+    assert closed.value.rcvd is not None and closed.value.rcvd.code == 1008
+    most = serving.BURST + 10 * serving.RATE
+    assert 0 < len(server.session.requests) <= most  # type: ignore[union-attr]
+
+
+def test_sixty_a_second_are_let_through(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = 0.0
+    monkeypatch.setattr(serving.time, "monotonic", lambda: clock)
+    viewer = serving.Viewer(None)  # type: ignore[arg-type]
+    for _ in range(600):
+        clock += 1 / serving.RATE
+        assert viewer.may_send()
+    allowed = sum(viewer.may_send() for _ in range(1000))
+    assert serving.BURST - 2 < allowed <= serving.BURST
+
+
+def test_there_is_room_for_eight(server: Server, key: str) -> None:
+    with contextlib.ExitStack() as all_viewers:
+        for _ in range(MOST_VIEWERS):
+            message(all_viewers.enter_context(opened(server, key)), "wheel")
+        with pytest.raises(InvalidStatus) as refused, opened(server, key):
+            pass
+        assert refused.value.response.status_code == 503
+    wait_for(lambda: server.session.viewers == 0)  # type: ignore[union-attr]
+    with opened(server, key) as client:
+        assert message(client, "wheel")["viewers"] == 1
+
+
+def test_one_steers(server: Server, key: str) -> None:
+    with opened(server, key) as first:
+        assert message(first, "wheel")["steers"]
+        with opened(server, key) as second:
+            assert not message(second, "wheel")["steers"]
+            do(second, "orbit", dx=1.0, dy=0.0)
+            assert "another viewer steers" in message(second, "error")["text"]
+            assert server.session.requests == []  # type: ignore[union-attr]
+            do(second, "steer")
+            assert message(second, "wheel")["steers"]
+            do(first, "orbit", dx=1.0, dy=0.0)
+            assert "another viewer steers" in message(first, "error")["text"]
+        while not message(first, "wheel")["steers"]:  # the second has left
+            pass
+
+
+def test_a_slow_viewer_gets_the_newest_of_few_frames(server: Server, key: str) -> None:
+    with opened(server, key) as slow, opened(server, key) as quick:
+        message(slow, "wheel"), message(quick, "wheel")
+        for number in range(1, 101):
+            server.picture({"frame": number}, b"x" * 100_000)
+            if number % 10 == 0:
+                got = frame(quick)
+                while got < number:  # what it has not confirmed in time is left out
+                    do(quick, "shown", frame=got)
+                    got = frame(quick)
+                do(quick, "shown", frame=got)
+        first, *rest = [frame(slow) for _ in range(MOST_FRAMES)]
+        with pytest.raises(TimeoutError):
+            frame(slow, timeout=0.3)
+        do(slow, "shown", frame=max([first, *rest]))
+        assert frame(slow) == 100
+
+
+def test_a_viewer_who_reads_nothing_is_left(server: Server, key: str) -> None:
+    with opened(server, key) as client:
+        message(client, "wheel")
+        for number in range(1, 1000):  # more than any buffer on the way holds
+            server.picture({"frame": number}, b"x" * 1_000_000)
+            server.message({"type": "status", "text": "x" * 100_000})
+            if not server._viewers:
+                break
+            time.sleep(0.005)
+        wait_for(lambda: not server._viewers)
+
+
+def test_ten_thousand_random_messages(
+    server: Server, key: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each gets a refusal or is a command; the server lives, and the last one is served."""
+    monkeypatch.setattr(serving, "RATE", 1e9)
+    monkeypatch.setattr(serving, "BURST", 1e9)
+    monkeypatch.setattr(serving, "MOST_MESSAGES", 1 << 30)
+    chance = random.Random(2)
+    with opened(server, key) as client:
+        refused = 0
+        for i in range(10_000):
+            client.send(random_message(chance))
+            if i % 100 == 99:
+                do(client, "nothing", last=i)
+                while "nothing" not in message(client, "error")["text"]:
+                    refused += 1
+        do(client, "pause", paused=True)
+        wait_for(lambda: server.session.requests)  # type: ignore[union-attr]
+        assert refused > 5000
+
+
+NAMES = [
+    "orbit",
+    "pan",
+    "display",
+    "pause",
+    "shown",
+    "steer",
+    "edit",
+    "save",
+    "__class__",
+    "",
+    "do",
+]
+KEYS = [
+    "dx",
+    "dy",
+    "by",
+    "exposure",
+    "tone",
+    "paused",
+    "frame",
+    "value",
+    "name",
+    "__init__",
+    "file",
+]
+
+
+def random_value(chance: random.Random, levels: int = 3) -> object:
+    kinds = ["number", "text", "none", "flag", "whole"] + ["list", "object"] * (levels > 0)
+    kind = chance.choice(kinds)
+    if kind == "number":
+        return chance.choice([chance.uniform(-30, 30), float("nan"), float("inf"), 1e308, -0.0])
+    if kind == "text":
+        return "".join(map(chr, chance.choices(range(1, 0xD800), k=chance.randrange(20))))
+    if kind == "whole":
+        return chance.choice([0, -1, 2**31, 2**64, 10**400, chance.randrange(100)])
+    if kind == "list":
+        return [random_value(chance, levels - 1) for _ in range(chance.randrange(4))]
+    if kind == "object":
+        return {
+            chance.choice(KEYS): random_value(chance, levels - 1)
+            for _ in range(chance.randrange(4))
+        }
+    return {"none": None, "flag": chance.random() < 0.5}[kind]
+
+
+def random_message(chance: random.Random) -> str | bytes:
+    """Bytes, broken text, JSON of any shape, or commands with wrong values."""
+    kind = chance.randrange(8)
+    if kind == 0:
+        return chance.randbytes(chance.randrange(200))
+    if kind == 1:
+        return "".join(map(chr, chance.choices(range(1, 0xD800), k=chance.randrange(100))))
+    if kind == 2:
+        return chance.choice(["[" * 30_000, "{" * 30_000, '{"do":' * 9_000, "1" * 60_000])
+    if kind == 3:
+        return json.dumps(random_value(chance))
+    pairs = {chance.choice(KEYS): random_value(chance) for _ in range(chance.randrange(4))}
+    return json.dumps({"do": chance.choice(NAMES), **pairs})

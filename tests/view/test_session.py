@@ -1,0 +1,475 @@
+"""The session behind the page: its pictures, its numbers, and what it makes of requests."""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import json
+import random
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from clpt import device, images, load, spectra
+from clpt.cli import outputs
+from clpt.cli.grading import Grading
+from clpt.render.renderer import Renderer
+from clpt.scene import Scene, cameras, lights, shapes
+from clpt.view import panels, probe
+from clpt.view.commands import COMMANDS, CommandError, Request, parse
+from clpt.view.look import Look
+from clpt.view.saving import Folder
+from clpt.view.session import Session, Source, merged
+from clpt.view.target import Change
+from tests.view.test_commands import message, valid
+
+CORNELL = Path(__file__).resolve().parents[2] / "scenes" / "cornell_box"
+WAIT = 120.0  # [s] at most, for kernels that are compiled on a busy machine
+
+
+class Audience:
+    """An outlet that keeps what it is given."""
+
+    def __init__(self) -> None:
+        self.frames: list[tuple[dict[str, Any], bytes]] = []
+        self.messages: list[dict[str, Any]] = []
+        self._news = threading.Condition()
+
+    def picture(self, header: dict[str, Any], data: bytes) -> None:
+        with self._news:
+            self.frames.append((header, data))
+            self._news.notify_all()
+
+    def message(self, message: dict[str, Any]) -> None:
+        with self._news:
+            self.messages.append(message)
+            self._news.notify_all()
+
+    def wait(self, true: Callable[[], Any]) -> Any:
+        """Return what a function returns, once that is true."""
+        with self._news:
+            end = time.monotonic() + WAIT
+            while not (found := true()):
+                assert self._news.wait(end - time.monotonic()), "nothing came"
+            return found
+
+    def rest(self) -> tuple[dict[str, Any], np.ndarray]:
+        """Return the next final picture (h, w, 3) uint8 from now on."""
+        seen = len(self.frames)
+        header, data = self.wait(
+            lambda: next((one for one in self.frames[seen:] if one[0]["rest"]), None)
+        )
+        return header, np.asarray(Image.open(io.BytesIO(data)))
+
+    def answer(self, kind: str, **wanted: Any) -> dict[str, Any]:
+        """Return the first message of a type with these values, and forget those before it."""
+
+        def found() -> Any:
+            for at, one in enumerate(self.messages):
+                if one["type"] == kind and wanted.items() <= one.items():
+                    del self.messages[: at + 1]
+                    return one
+            return None
+
+        return self.wait(found)
+
+
+def small(mode: str = "rgb", spp: int = 4) -> Scene:
+    scene = load(CORNELL)
+    film = dataclasses.replace(scene.film, width=32, height=24, mode=mode)
+    return dataclasses.replace(scene, film=film, spp=spp)
+
+
+@pytest.fixture(scope="module")
+def on() -> device.Device:
+    return device.choose()
+
+
+@pytest.fixture
+def audience() -> Audience:
+    return Audience()
+
+
+Open = Callable[..., Session]
+
+
+@pytest.fixture
+def opened(on: device.Device, audience: Audience) -> Iterator[Open]:
+    """Open a session of a scene, which one viewer watches."""
+    made: list[Session] = []
+
+    def open_session(scene: Scene, **options: Any) -> Session:
+        session = Session(scene, on, audience, **options)
+        session.watched(1)
+        session.start()
+        made.append(session)
+        return session
+
+    yield open_session
+    for session in made:
+        session.close()
+
+
+def ask(session: Session, audience: Audience, name: str, /, **values: Any) -> None:
+    """Ask as a page does; what is left out is null."""
+    request = parse(json.dumps({"do": name, **values}))
+    session.post(request, audience.message)
+
+
+def expected(scene: Scene, on: device.Device, **how: Any) -> np.ndarray:
+    """Return the picture of a new renderer, (h, w, 3) uint8."""
+    with Renderer(scene, on) as renderer:
+        renderer.run(scene.spp)
+        return renderer.resolve(**how).get()[..., :3]
+
+
+def test_the_picture_at_rest_is_resolve_to_the_byte(opened, audience, on) -> None:
+    """At first, in another display, after a drag, and of a region."""
+    session = opened(small())
+    header, pixels = audience.rest()
+    assert header["samples"] == 4 and header["size"] == [32, 24]
+    assert np.array_equal(pixels, expected(small(), on))
+    ask(session, audience, "display", exposure=1.5, tone="aces")
+    assert np.array_equal(audience.rest()[1], expected(small(), on, exposure=1.5, tone="aces"))
+    ask(session, audience, "orbit", dx=0.1, dy=0.0)
+    _, turned = audience.rest()
+    how = {"exposure": 1.5, "tone": "aces"}
+    assert not np.array_equal(turned, pixels)
+    assert np.array_equal(turned, expected(session.scene, on, **how))
+    ask(session, audience, "region", x=4, y=6, width=10, height=8)
+    header, part = audience.rest()
+    assert header["crop"] == (4, 6, 10, 8) and np.array_equal(part, turned[6:14, 4:14])
+
+
+def test_coarse_pictures_come_first(opened, audience, monkeypatch) -> None:
+    monkeypatch.setattr("clpt.view.render_loop.PREVIEW_PIXELS", 200)
+    session = opened(small())
+    audience.rest()
+    first, _ = audience.frames[0]
+    assert first["divider"] == 2 and first["size"] == [16, 12] and first["film"] == [32, 24]
+    seen = len(audience.frames)
+    ask(session, audience, "dolly", by=0.1)
+    audience.rest()
+    assert [one["divider"] for one, _ in audience.frames[seen:]][:2] == [2, 2]
+    assert audience.frames[-1][0]["divider"] == 1
+
+
+def test_values_are_those_of_image(opened, audience, on) -> None:
+    session = opened(small("spectral", 16))
+    audience.rest()
+    with Renderer(small("spectral", 16), on) as renderer:
+        renderer.run(16)
+        image = renderer.image()
+    ask(session, audience, "inspect", x=20, y=15)
+    value = audience.answer("value")
+    assert value["rgb"] == image[15, 20].tolist() and value["samples"] == 16
+    hit = audience.answer("hit")
+    shape = session.scene.shapes[hit["shape"]]
+    assert hit["object"]["name"] == shape.name and hit["depth"] > 0
+    told = audience.answer("spectrum", last=True)
+    assert len(told["lambdas"]) == len(told["mean"]) == len(told["error"]) == probe.BANDS
+    ask(session, audience, "inspect", x=32, y=0)
+    assert "32x24" in audience.answer("error")["text"]
+
+
+@pytest.mark.slow
+def test_error_bars_hold_what_they_say(on) -> None:
+    """Of 47 bands, at 16 pixels: |mean - truth| / error is at most 6, and below 2 for 90 %.
+
+    With 64 batches it has a t distribution of 63 degrees: P(> 6) is 1e-7 each, 1e-4 for all; of
+    700 bands 95.0 % are below 2, and 90 % would be 6 standard deviations away (bands of a batch
+    are almost independent).
+    """
+    scene = small("spectral")
+    film = dataclasses.replace(scene.film, bands=probe.BANDS)
+    integrator, _ = probe.plain(scene.integrator)
+    whole = dataclasses.replace(scene, film=film, integrator=integrator)
+    with Renderer(whole, on) as renderer:
+        renderer.run(65536)
+        truth = renderer.image()
+    asked = probe.Probe(on)
+    answers: list[dict[str, Any]] = []
+    for x, y in [(3 + 7 * i, 2 + 6 * j) for i in range(4) for j in range(4)]:
+        done = threading.Event()
+
+        def reply(message: dict[str, Any], done: threading.Event = done) -> None:
+            if message.get("last"):
+                answers.append(message)
+                done.set()
+
+        asked.ask(probe.Question(scene, x, y, reply))
+        assert done.wait(WAIT)
+    asked.close()
+    z = np.concatenate(
+        [
+            (np.array(one["mean"]) - truth[one["y"], one["x"]]) / np.maximum(one["error"], 1e-12)
+            for one in answers
+            if max(one["mean"]) > 0
+        ]
+    )
+    assert len(z) > 400 and np.abs(z).max() < 6.0 and (np.abs(z) < 2.0).mean() > 0.9
+
+
+CAMERAS = [
+    cameras.Perspective(fov=50.0, fov_axis="smaller", offset_x=0.1, offset_y=-0.2),
+    cameras.ThinLens(fov=40.0, fov_axis="y", aperture_radius=0.0, focus_distance=3.0),
+    cameras.Orthographic(),
+    cameras.Spherical(),
+    cameras.Matrix(
+        projection=[[1.2, 0, 0.1, 0], [0, 1.6, -0.2, 0], [0, 0, -1.1, -1], [0, 0, -1, 0]]
+    ),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("camera", CAMERAS, ids=lambda camera: camera.kind)
+def test_a_pixel_alone_is_that_pixel(camera, on) -> None:
+    """The position that the window of one pixel sees is the one in the whole film."""
+    if not isinstance(camera, cameras.Matrix):
+        camera = dataclasses.replace(camera, to_world=np.diag([-1.0, 1.0, -1.0, 1.0]))
+    wall = shapes.Cube(to_world=np.diag([20.0, 20.0, 4.0, 1.0]), flip_normals=True)
+    scene = small()
+    film = dataclasses.replace(scene.film, width=12, height=9)
+    scene = dataclasses.replace(scene, camera=camera, shapes=[wall], film=film)
+    follower = probe.Follower(on)
+    whole = dataclasses.replace(scene, integrator=probe.AOV, noise=None)
+    with Renderer(whole, on) as renderer:
+        renderer.run(64)
+        positions = renderer.layers()["position"]
+    for x, y in ((0, 0), (11, 8), (5, 3), (9, 1)):
+        found = probe.first_hit(follower, scene, x, y)["position"]
+        pixel = np.ptp(positions[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2], axis=(0, 1))
+        away = np.abs(np.array(found) - positions[y, x])
+        assert (away <= 0.6 * pixel.max() + 1e-3).all()
+    follower.close()
+
+
+def test_a_material_is_edited(opened, audience, on) -> None:
+    session = opened(small())
+    _, before = audience.rest()
+    described = session.state()["panels"]
+    red = next(one for one in described if one["title"] == "red")
+    which = {"target": "material", "index": red["index"], "key": "reflectance"}
+    ask(session, audience, "edit", **which, value=[0.1, 0.2, 0.8])
+    _, after = audience.rest()
+    assert not np.array_equal(before, after)
+    assert np.array_equal(after, expected(session.scene, on))
+    ask(session, audience, "restore")
+    assert np.array_equal(audience.rest()[1], before)
+
+
+def test_objects_are_hidden_and_come_back(opened, audience) -> None:
+    session = opened(small())
+    _, before = audience.rest()
+    ask(session, audience, "hide", shape=7, hidden=True)
+    assert not np.array_equal(audience.rest()[1], before)
+    assert session.state()["look"]["hidden"] == [7]
+    ask(session, audience, "show_all")
+    assert np.array_equal(audience.rest()[1], before)
+
+
+def test_a_scene_that_cannot_be_rendered_is_given_up(opened, audience) -> None:
+    """All shapes are hidden, and no light is left: whatever happens, the next request works."""
+    session = opened(small())
+    audience.rest()
+    for i in range(len(session.scene.shapes)):
+        ask(session, audience, "hide", shape=i, hidden=True)
+    audience.rest()
+    ask(session, audience, "show_all")
+    audience.rest()
+    assert session.error is None
+
+
+def test_without_viewers_it_waits(opened, audience) -> None:
+    session = opened(small(spp=1 << 20))
+    audience.wait(lambda: any(one["divider"] == 1 for one, _ in audience.frames))
+    session.watched(0)
+    time.sleep(0.5)
+    seen = len(audience.frames)
+    cpu = time.process_time()
+    time.sleep(1.0)
+    assert time.process_time() - cpu < 0.5 and len(audience.frames) <= seen + 1
+    session.watched(1)
+    audience.wait(lambda: len(audience.frames) > seen + 1)
+
+
+def test_pause_and_where_it_stops(opened, audience) -> None:
+    session = opened(small(spp=1 << 20))
+    ask(session, audience, "pause", paused=True)
+    header, _ = audience.rest()
+    assert 0 < header["samples"] < 1 << 20
+    ask(session, audience, "stop_at", spp=header["samples"] + 3, noise=None)
+    ask(session, audience, "pause", paused=False)
+    assert audience.rest()[0]["samples"] == header["samples"] + 3
+    ask(session, audience, "stop_at", spp=4096, noise=0.5)
+    assert audience.answer("status", phase="done")["active"] <= 1.0
+
+
+def test_the_file_is_watched(opened, audience) -> None:
+    """The viewer's camera stays, unless the file's is another."""
+    current, stamp = [small()], [1]
+    source = Source(lambda: stamp[0], lambda: current[0])
+    session = opened(small(), source=source)
+    audience.rest()
+    ask(session, audience, "orbit", dx=0.1, dy=0.0)
+    audience.rest()
+    turned = session.scene.camera
+    current[0], stamp[0] = dataclasses.replace(small(), seed=5), 2
+    audience.rest()
+    assert session.scene.seed == 5 and session.scene.camera is turned
+    moved = dataclasses.replace(small().camera, fov=60.0)
+    current[0], stamp[0] = dataclasses.replace(small(), camera=moved), 3
+    audience.rest()
+    assert session.scene.camera.fov == 60.0
+
+
+def test_files_are_saved_in_the_folder(opened, audience, tmp_path, on) -> None:
+    def write_exr(path: Path, renderer: Renderer, seconds: float) -> None:
+        outputs.write(path, renderer, outputs.metadata(renderer, path, seconds), Grading())
+
+    session = opened(small(), folder=Folder(tmp_path, "../a b/c", write_exr))
+    _, pixels = audience.rest()
+    names = []
+    for what in ("png", "exr", "scene", "view", "png"):
+        ask(session, audience, "save", what=what)
+        names.append(audience.answer("saved")["name"])
+    ends = ["-001.png", "-001.exr", "-001/scene.json", "-001.view.json", "-002.png"]
+    assert names == [f"a_b_c{end}" for end in ends]
+    assert np.array_equal(np.asarray(Image.open(tmp_path / names[0])), pixels)
+    assert images.read(tmp_path / names[1]).shape == (24, 32, 3)
+    again = load(tmp_path / names[2])
+    again = dataclasses.replace(again, spp=4)
+    assert np.array_equal(expected(again, on), pixels)
+    assert json.loads((tmp_path / names[3]).read_text())["camera"]["type"] == "perspective"
+    assert {path.parent for path in tmp_path.parent.rglob("a_b_c*")} == {tmp_path}
+
+
+def test_a_view_of_opencolorio_has_to_be_given_at_the_start(opened, audience) -> None:
+    session = opened(small())
+    ask(session, audience, "display", exposure=0.0, tone="view")
+    assert "no view" in audience.answer("error")["text"]
+    assert "view" not in session.state()["names"]["tones"]
+
+
+def test_without_a_folder_nothing_is_saved(opened, audience) -> None:
+    session = opened(small())
+    ask(session, audience, "save", what="exr")
+    assert "no folder" in audience.answer("error")["text"]
+
+
+def test_random_requests_end_nothing(opened, audience) -> None:
+    """300 commands with random values of their types; then the session still renders."""
+    session = opened(small(spp=2))
+    audience.rest()
+    chance = random.Random(3)
+    names = [name for name in COMMANDS if name not in ("shown", "steer", "invite", "save")]
+    for _ in range(300):
+        name = chance.choice(names)
+        values = {key: _random(kind, chance) for key, kind in COMMANDS[name].parameters.items()}
+        session.post(Request(name, values), audience.message)
+    ask(session, audience, "stop_at", spp=2, noise=None)
+    ask(session, audience, "pause", paused=False)
+    ask(session, audience, "restore")
+    ask(session, audience, "display", exposure=0.0, tone="none")
+    audience.answer("state", edited=False, paused=False)
+    audience.rest()
+    assert session.error is None
+
+
+def _random(kind: Any, chance: random.Random) -> Any:
+    name = type(kind).__name__
+    if name == "Number":
+        return (
+            chance.uniform(max(kind.low, -2.0), min(kind.high, 2.0)) if kind.low < 2 else kind.low
+        )
+    if name == "Whole":
+        return chance.randint(kind.low, min(kind.high, 31))
+    if name == "Choice":
+        return chance.choice(kind.names)
+    if name == "Flag":
+        return chance.random() < 0.5
+    if name == "Optional":
+        return None if chance.random() < 0.5 else _random(kind.type, chance)
+    if name == "Name":
+        return chance.choice(["fov", "reflectance", "radiance", "max_depth", "sensor", "to_world"])
+    return chance.choice([0.5, -1, 1e9, "D65", [0.1, 0.2, 0.3], {"values": [[400, 0.5]]}, None, []])
+
+
+# plain data
+
+
+def test_every_parameter_has_a_panel_and_goes_round() -> None:
+    """What a panel shows of a value, given back, is the same value."""
+    scene = small("spectral")
+    for panel in panels.panels(scene):
+        for one in panel["parameters"]:
+            if one["value"] is None or one["texture"]:
+                continue
+            new, _ = panels.edited(scene, panel["target"], panel["index"], one["key"], one["value"])
+            again = panels.panels(new)
+            found = next(
+                p for p in again if (p["target"], p["index"]) == (panel["target"], panel["index"])
+            )
+            value = next(p["value"] for p in found["parameters"] if p["key"] == one["key"])
+            assert value == one["value"], one["key"]
+
+
+@pytest.mark.parametrize(
+    ("target", "index", "key", "value"),
+    [
+        ("material", 0, "reflectance", {"file": "/etc/passwd"}),
+        ("material", 0, "reflectance", {"type": "bitmap", "image": "/etc/passwd"}),
+        ("material", 0, "reflectance", 7.0),
+        ("material", 0, "name", "x"),
+        ("material", 999, "reflectance", 0.5),
+        ("camera", 0, "to_world", [[1, 0, 0, 0]] * 4),
+        ("film", 0, "width", 60000),
+        ("film", 0, "bands", 1024),
+        ("film", 0, "sensor", {"file": "/etc/passwd"}),
+        ("film", 0, "sensor", "/etc/passwd"),
+        ("film", 0, "white_balance", "/etc/passwd"),
+        ("integrator", 0, "__class__", 1),
+        ("camera", 0, "fov", "wide"),
+        ("camera", 0, "fov", 1e6),
+    ],
+)
+def test_what_a_page_may_not_edit(target: str, index: int, key: str, value: Any) -> None:
+    with pytest.raises(Exception) as refused:
+        panels.edited(small(), target, index, key, value)
+    assert refused.type.__name__ in ("CommandError", "SceneError", "UnknownKindError")
+
+
+def test_a_lamp_keeps_the_luminance_of_lights() -> None:
+    red = lights.Point(intensity=spectra.RGBIlluminant(2.0, 0.5, 0.1))
+    scene = dataclasses.replace(small(), lights=[red, lights.Constant(radiance=3.0)])
+    exchanged = Look(lamp="A").apply(scene).lights
+    expected_y = float(spectra.luminance([2.0, 0.5, 0.1]))
+    assert exchanged[0].intensity.name == "A"
+    assert exchanged[0].intensity.scale == pytest.approx(expected_y, rel=0.02)
+    assert exchanged[1].radiance.scale == pytest.approx(3.0, rel=1e-3)
+
+
+def test_changes_add_up() -> None:
+    a, b, c, d = (shapes.Diffuse(reflectance=0.1 * i) for i in range(4))
+    both = Change(materials={a: b}).then(Change(materials={b: c, d: a}))
+    assert both.materials == {a: c, d: a}
+    assert Change(whole=True).then(Change(camera=CAMERAS[0])).whole
+
+
+def test_moves_of_one_kind_are_added() -> None:
+    moves = [Request("orbit", {"dx": 1.0, "dy": 2.0})] * 3 + [Request("dolly", {"by": 1.0})] * 2
+    found = [request for request, _ in merged([(one, print) for one in moves])]
+    assert found == [Request("orbit", {"dx": 3.0, "dy": 6.0}), Request("dolly", {"by": 2.0})]
+
+
+def test_the_table_of_commands_is_whole() -> None:
+    assert all(
+        valid(kind) is not ... for one in COMMANDS.values() for kind in one.parameters.values()
+    )
+    with pytest.raises(CommandError):
+        parse(message("orbit", dx=1e9))
