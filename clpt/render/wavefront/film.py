@@ -50,6 +50,9 @@ class Film:
             advice += " or the number of bands"
             sums["bands"] = SUM_WORDS * self._band_sums * words
             images["band_image"] = 4 * self.band_count * pixels
+        if features.layers:
+            sums["layers"] = 4 * features.layer_words * self._padded_pixels
+        self._layer_words = features.layer_words
         self.sums, self._images = (
             {name: buffers.allocate(f"the {name}", size, advice) for name, size in sizes.items()}
             for sizes in (sums, images)
@@ -146,6 +149,14 @@ class Film:
             found.append(pixels.reshape(self.halves, -1, height, width))
         film, bands = found
         return film, bands.reshape(self.halves, self._band_sums, SUM_WORDS, height, width)
+
+    def layer_words(self) -> Words:
+        """Return the words of the layers beside the picture, (words, h, w) uint32; wait for it."""
+        width, height = self.size
+        streams = np.empty((self._layer_words, self._padded_pixels), np.uint32)
+        pixels = np.empty((self._layer_words, width * height), np.uint32)
+        pixels[:, self._at] = self.stream.read(self.sums["layers"], streams)[:, self._inside]
+        return pixels.reshape(-1, height, width)
 
     def set_words(self, film: Words, bands: Words) -> None:
         """Enqueue that the film holds these words, of the form that `words` returns."""
