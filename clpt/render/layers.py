@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Iterable, Mapping
 
-from clpt.render.contract.features import SUM_WORDS, Features
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from clpt.render.contract.features import layer_places
 from clpt.render.lowering.camera.colour import output_matrix, sensor
 from clpt.scene.integrators import LAYERS, Film
 from clpt.spectra import cie
@@ -14,25 +16,34 @@ Words = NDArray[np.uint32]
 Image = NDArray[np.float32]
 
 UNITS = 2.0**22  # kernels/film/layers.cl
-SUM_UNITS = 2.0**48
+LONG_UNITS = (2.0**8, 2.0**-16, 2.0**-40)
 
 
-def layers(film: Film, features: Features, words: Words) -> dict[str, Image]:
+def layers_of(names: Iterable[str], paper: ArrayLike, words: Words) -> dict[str, Image]:
     """Return the mean of each layer by name, (h, w, 1 to 3) float32.
 
-    words: (layer_words, h, w) uint32. Where nothing was seen, as in the sky, a layer is 0.
+    names: in the order of their words; paper: the matrix of `white_paper`; words: (n, h, w) uint32.
+    Where nothing was seen, as in the sky, a layer is 0.
     """
-    count = np.maximum(words[0], 1)[..., None]
-    made = {}
-    for name, place in features.layer_places.items():
+    made, places = {}, layer_places(names)
+    for name, place in places.items():
         layer = LAYERS[name]
         own = words[place : place + layer.words]
         sums = _near_one(own) if layer.near_one else _long(own)
-        mean = np.moveaxis(sums, 0, -1) / count
+        mean = np.moveaxis(sums, 0, -1) / np.maximum(words[0], 1)[..., None]
         if layer.is_colour:
-            mean = mean @ white_paper(film, features.mode).T
+            mean = mean @ np.asarray(paper).T
         made[name] = mean.astype(np.float32)
     return made
+
+
+def channels_of(layers: Mapping[str, Image]) -> dict[str, Image]:
+    """Return the channels of layers as an .exr has them, (h, w) by names such as depth.Z."""
+    return {
+        f"{name}.{letter}": image[..., i]
+        for name, image in layers.items()
+        for i, letter in enumerate(LAYERS[name].channels)
+    }
 
 
 def white_paper(film: Film, mode: str) -> NDArray[np.float64]:
@@ -51,6 +62,5 @@ def _near_one(words: Words) -> NDArray[np.float64]:
 
 
 def _long(words: Words) -> NDArray[np.float64]:
-    low, middle, high = (words[i::SUM_WORDS] for i in range(SUM_WORDS))
-    top = high.view(np.int32).astype(np.float64)
-    return (top * 2.0**64 + middle * 2.0**32 + low) / SUM_UNITS
+    parts = words.view(np.int32).reshape(-1, len(LONG_UNITS), *words.shape[1:])
+    return np.tensordot(np.array(LONG_UNITS), parts.astype(np.float64), (0, 1))

@@ -14,7 +14,7 @@ from clpt import images
 from clpt.colour.view import View
 from clpt.errors import SceneError, UnknownKindError
 from clpt.render.aov_preview import sheet
-from clpt.render.layers import layers as layers_of
+from clpt.render.layers import layers_of, white_paper
 from clpt.render.locking import DeviceOwner, synchronized
 from clpt.render.resolve import Resolve
 from clpt.render.wavefront.wavefront import Wavefront
@@ -147,12 +147,8 @@ class Pictures(DeviceOwner):
         """
         if not self.channels:
             first = self.wavefronts[0]
-            names = first.features.layers
-            return (
-                layers_of(self.scene.film, first.features, first.film.layer_words())
-                if names
-                else {}
-            )
+            paper = white_paper(self.scene.film, first.features.mode)
+            return layers_of(first.features.layers, paper, first.film.layer_words())
         return {
             name: wavefront.image()[:, :, : CHANNELS[name]]
             for name, wavefront in zip(self.channels, self.wavefronts, strict=True)

@@ -1,8 +1,9 @@
 /* Layers beside the picture, in memory: sums over the first LAYER_SAMPLES samples of each pixel, so that they cost little;
  * whole numbers, which add in any order. What is summed is in path/layers.cl.
  *
- * `layers` is LAYER_WORDS streams of padded_pixels words: how many samples, then a word for each number that is near 1
- * (in units of 2^-22), and three for others, as film/sums.cl has them. LAYER_<NAME> is the first word of a layer. */
+ * `layers` is a stream of padded_pixels words for each of these: how many samples; a word for each number that is near
+ * 1, in units of 2^-22; three for others, in units of 2^8, 2^-16 and 2^-40, the lower ones below 2^24. No word leaves its
+ * 32 bits, so words add without a carry. LAYER_<NAME> is the first word of a layer. */
 #include "film/sums.cl"
 #define LAYER_SAMPLES 64
 #define LAYER_UNITS 0x1p22f
@@ -26,14 +27,10 @@ inline void layers_count(Scene scene, global uint *layers, mask m, integer pixel
         if (at_lane[i]) sums_add_word(layers + pixels[i], 1u);
 }
 
-/* Adds three numbers that are near 1. */
-inline void layer_add(Scene scene, global uint *layers, mask m, integer pixel_index, int word, vec3 v)
+/* Adds a whole number to each of three neighbouring words. */
+inline void layer_add_words(global uint *first, size_t stream, mask m, integer pixel_index, vec3 v)
 {
-    size_t stream = scene.settings->padded_pixels;
-    global uint *first = layers + word * stream;
-    integer x = to_integer(clamp_r(v.x, (real)(-LAYER_LARGEST), (real)(LAYER_LARGEST)) * LAYER_UNITS);
-    integer y = to_integer(clamp_r(v.y, (real)(-LAYER_LARGEST), (real)(LAYER_LARGEST)) * LAYER_UNITS);
-    integer z = to_integer(clamp_r(v.z, (real)(-LAYER_LARGEST), (real)(LAYER_LARGEST)) * LAYER_UNITS);
+    integer x = to_integer(v.x), y = to_integer(v.y), z = to_integer(v.z);
     const int *at_lane = (const int *)&m, *pixels = (const int *)&pixel_index;
     const uint *xs = (const uint *)&x, *ys = (const uint *)&y, *zs = (const uint *)&z;
     for (int i = 0; i < LANES; i++) {
@@ -44,13 +41,21 @@ inline void layer_add(Scene scene, global uint *layers, mask m, integer pixel_in
     }
 }
 
-/* Adds a number of any size. */
+/* Adds three numbers that are near 1. */
+inline void layer_add(Scene scene, global uint *layers, mask m, integer pixel_index, int word, vec3 v)
+{
+    size_t stream = scene.settings->padded_pixels;
+    vec3 low = v3(-LAYER_LARGEST, -LAYER_LARGEST, -LAYER_LARGEST), high = scale3(low, -1.0f);
+    v = v3(clamp_r(v.x, low.x, high.x), clamp_r(v.y, low.y, high.y), clamp_r(v.z, low.z, high.z));
+    layer_add_words(layers + word * stream, stream, m, pixel_index, scale3(v, LAYER_UNITS));
+}
+
+/* Adds a number of any size below 2^31. */
 inline void layer_add_long(Scene scene, global uint *layers, mask m, integer pixel_index, int word, real v)
 {
     size_t stream = scene.settings->padded_pixels;
-    Fixed f = fixed_of(sel(fabs(v) < FIXED_LARGEST, v, (real)(0.0f)));
-    const int *at_lane = (const int *)&m, *pixels = (const int *)&pixel_index;
-    const uint *low = (const uint *)&f.low, *middle = (const uint *)&f.middle, *high = (const uint *)&f.high;
-    for (int i = 0; i < LANES; i++)
-        if (at_lane[i]) sums_add(layers + word * stream + pixels[i], stream, low[i], middle[i], high[i]);
+    v = sel(fabs(v) < 0x1p31f, v, (real)(0.0f));
+    real high = floor(v * 0x1p-8f), rest = v - high * 0x1p8f, middle = floor(rest * 0x1p16f);
+    vec3 parts = v3(high, middle, floor((rest - middle * 0x1p-16f) * 0x1p40f));
+    layer_add_words(layers + word * stream, stream, m, pixel_index, parts);
 }

@@ -27,6 +27,15 @@ def disperses(leaves: Iterable[type[Material]], sources: Sources) -> bool:
     return any(cls.disperses for cls in leaves) or not sources.isdisjoint(indices)
 
 
+def layer_places(names: Iterable[str]) -> dict[str, int]:
+    """Return the first of a pixel's words for each layer, after the number of samples."""
+    places, word = {}, 1
+    for name in names:
+        places[name] = word
+        word += LAYERS[name].words
+    return places
+
+
 @dataclass(frozen=True)
 class Features:
     """What occurs in a scene.
@@ -143,12 +152,8 @@ class Features:
 
     @property
     def layer_places(self) -> dict[str, int]:
-        """The first word of each layer, after the number of samples."""
-        places, word = {}, 1
-        for name in self.layers:
-            places[name] = word
-            word += LAYERS[name].words
-        return places
+        """The first word of each layer."""
+        return layer_places(self.layers)
 
     @property
     def layer_words(self) -> int:
