@@ -23,7 +23,8 @@ class PictureForm:
     to_output: (3, 3), rows of the matrix from the sums to the output space; channels: of the `aov`
     integrator; light_paths: all paths start at lights; weighed: some do, beside the camera's;
     weights: samples serve several pixels; paper: the matrix (3, 3) from sums of layers that are
-    colours to the output space, see `clpt.render.layers.white_paper`; the others are those of `clpt.scene.Film`.
+    colours to the output space, see `clpt.render.layers.white_paper`; the others are those of
+    `clpt.scene.Film`.
     """
 
     to_output: tuple[tuple[float, ...], ...]

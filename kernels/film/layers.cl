@@ -1,9 +1,9 @@
-/* Layers beside the picture, in memory: sums over the first LAYER_SAMPLES samples of each pixel, so that they cost little;
- * whole numbers, which add in any order. What is summed is in path/layers.cl.
+/* Layers beside the picture, in memory: sums over the first LAYER_SAMPLES samples of each pixel, so that they cost
+ * little; whole numbers, which add in any order. What is summed is in path/layers.cl.
  *
- * `layers` is a stream of padded_pixels words for each of these: how many samples; a word for each number that is near
- * 1, in units of 2^-22; three for others, in units of 2^8, 2^-16 and 2^-40, the lower ones below 2^24. No word leaves its
- * 32 bits, so words add without a carry. LAYER_<NAME> is the first word of a layer. */
+ * `layers` is a stream of padded_pixels words for each of these: how many samples; a word for each number that is
+ * near 1, in units of 2^-22; three for others, in units of 2^8, 2^-16 and 2^-40, the lower ones below 2^24. No word
+ * leaves its 32 bits, so words add without a carry. LAYER_<NAME> is the first word of a layer. */
 #include "film/sums.cl"
 #define LAYER_SAMPLES 64
 #define LAYER_UNITS 0x1p22f

@@ -1,5 +1,5 @@
-/* Layers beside the picture: what the camera sees at a path's first surface and, for denoisers, at the first one that is
- * not a mirror or smooth glass, as dark and as coloured as what is before lets it through. */
+/* Layers beside the picture: what the camera sees at a path's first surface and, for denoisers, at the first one that
+ * is not a mirror or smooth glass, as dark and as coloured as what is before lets it through. */
 #include "film/layers.cl"
 
 #if LAYER_ALBEDO || LAYER_DENOISING_ALBEDO
@@ -22,7 +22,8 @@ inline integer layers_record(Scene scene, Slab path, uint at, global uint *layer
     if (any(first)) {
         real weight = layer_weight(path, at);
 #if LAYER_ALBEDO
-        layer_add_albedo(scene, layers, first, pixel_index, LAYER_ALBEDO, scatter, v.lambdas, spectrum_of(1.0f), weight);
+        Spectrum nothing_before = spectrum_of(1.0f);
+        layer_add_albedo(scene, layers, first, pixel_index, LAYER_ALBEDO, scatter, v.lambdas, nothing_before, weight);
 #endif
 #if LAYER_SHADING_NORMAL
         layer_add(scene, layers, first, pixel_index, LAYER_SHADING_NORMAL, scale3(scatter.shading.frame.n, weight));

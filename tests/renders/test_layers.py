@@ -9,7 +9,10 @@ import numpy as np
 import pytest
 
 import clpt
+from clpt import device as dev
+from clpt import images
 from clpt import transforms as tf
+from clpt.__main__ import run
 from clpt.errors import SceneError, UnknownKindError
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Orthographic, Perspective
@@ -164,3 +167,45 @@ def test_names_and_changes(scenes):
         assert not renderer.layers()["depth"].any()
         renderer.run(2)
         assert (renderer.layers()["depth"] != before).any()
+
+
+def test_layers_are_saved_merged_and_written(tmp_path):
+    """In ranges of samples, by files, and to an .exr without a device: as in one render."""
+    scene = room(layers=LAYERS)
+    wanted = layers_of(scene, 20)
+    for first, end in ((0, 8), (8, 20)):
+        with clpt.Renderer(scene, first_sample=first) as renderer:
+            renderer.run(end - first)
+            renderer.save_state(tmp_path / f"{first}.film")
+    with clpt.Renderer(scene) as renderer:
+        renderer.load_state(tmp_path / "0.film")
+        renderer.run(12)
+        resumed = renderer.layers()
+    films = [str(tmp_path / f"{first}.film") for first in (0, 8)]
+    assert run(["merge", *films, "-o", str(tmp_path / "all.exr")]) == 0
+    written = images.read_layers(tmp_path / "all.exr")
+    for name, values in wanted.items():
+        np.testing.assert_array_equal(resumed[name], values)
+        for i, letter in enumerate(LAYERS[name].channels):
+            np.testing.assert_array_equal(written[f"{name}.{letter}"], values[..., i])
+
+
+def test_several_devices_have_the_layers_of_one():
+    devices = [dev.choose(threads=1), dev.choose(threads=1)]
+    with clpt.MultiRenderer(room(layers=DENOISING), devices) as renderer:
+        renderer.run(12)
+        together = renderer.layers()
+    alone = layers_of(room(layers=DENOISING), 12, device=dev.choose(threads=1))
+    for name in DENOISING:
+        np.testing.assert_array_equal(together[name], alone[name])
+
+
+def test_the_command_line_writes_layers(tmp_path, scenes, capsys):
+    path = tmp_path / "a.exr"
+    given = ["render", str(scenes / "cornell.xml"), "--size", "16x16", "--spp", "2"]
+    assert run([*given, "--layers", "depth,albedo", "-o", str(path)]) == 0
+    written = images.read_layers(path)
+    assert {"depth.Z", "albedo.R", "albedo.B"} <= written.keys()
+    assert 1.0 < np.median(written["depth.Z"]) < 4.0  # metres; a corner may see past the box
+    assert run([*given, "--layers", "height", "-o", str(path)]) == 2
+    assert "'height' is unknown" in capsys.readouterr().err

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -48,7 +48,7 @@ class FilmState:
     bands: Words
     taken: Ranges
     scale: float = 1.0
-    layers: Words = NO_LAYERS
+    layers: Words = field(default_factory=lambda: NO_LAYERS)
 
     @property
     def arrays(self) -> dict[str, Words]:
