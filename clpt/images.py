@@ -112,10 +112,10 @@ def write(
 ) -> None:
     """Write a linear (h, w), (h, w, 1), (h, w, 3) or (h, w, 4) image in the format of the suffix.
 
-    .exr: half or float, with attributes from `metadata` and further `layers`, name -> (h, w) as
-    the channel of that name, or (h, w, 3) as its .R, .G, .B. .png: sRGB transfer, 8 bit, scaled by
-    2^exposure, with texts from `metadata`; NaN is black there, values beyond [0, 1] are clipped.
-    .hdr, .pfm, .npy: as it is.
+    .exr: half or float, with attributes from `metadata` and further `layers` in float, name ->
+    (h, w) as the channel of that name, or (h, w, 3) as its .R, .G, .B. .png: sRGB transfer, 8 bit,
+    scaled by 2^exposure, with texts from `metadata`; NaN is black there, values beyond [0, 1] are
+    clipped. .hdr, .pfm, .npy: as it is.
     space: of the colours, see clpt.spectra.spaces; an .exr states it by its chromaticities, a .png
     is converted to sRGB, white to white. tone: of a .png, see clpt.colour.tones; view: of a .png,
     a `clpt.View` of OpenColorIO, in the place of tone and sRGB transfer.
@@ -381,7 +381,8 @@ def _write_exr(
         letters = (".R", ".G", ".B", ".A")[: layer.shape[2]] if layer.shape[2] > 1 else ("",)
         parts.append((name, letters, layer))
     for name, letters, layer in parts:
-        stored = np.clip(layer, -_HALF_MAX, _HALF_MAX).astype(np.float16) if half else layer
+        narrow = half and not name
+        stored = np.clip(layer, -_HALF_MAX, _HALF_MAX).astype(np.float16) if narrow else layer
         for index, letter in enumerate(letters):
             channels[name + letter] = np.ascontiguousarray(stored[..., index])
     write_channels(path, metadata, channels)

@@ -17,7 +17,7 @@ PACKAGE, KERNELS = ROOT / "clpt", ROOT / "kernels"
 
 BASE = {
     "colour", "errors", "layout", "records", "transforms", "images", "output_files", "spectra",
-    "spectral_exr", "version",
+    "spectral_exr", "tev", "version",
 }  # fmt: skip
 # What a part may import of the others; itself always.
 MAY_IMPORT = {

@@ -168,6 +168,12 @@ def test_the_code_of_colour(run: Run):
     assert agx > 1.5 * aces > 0.0  # half a stop more, and other curves
 
 
+def test_the_code_of_layers(run: Run, capsys: pytest.CaptureFixture):
+    layers = run("layers.md")["layers"]
+    assert [*layers] == ["albedo", "depth"]
+    assert layers["albedo"].shape == (30, 40, 3) and layers["depth"].max() > 1.0
+
+
 def test_the_code_of_limits(run: Run):
     messages = run("limits.md")["messages"]
     assert "must be 1 to 65536" in messages[0] and "are more than 64 Mi pixels" in messages[1]

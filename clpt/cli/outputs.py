@@ -14,6 +14,7 @@ from .. import __version__, images, output_files, spectral_exr
 from ..errors import SceneError
 from ..render import film_file
 from ..render.host_picture import HostPicture
+from ..render.layers import channels_of
 from ..render.pictures import Image
 from ..scene import Scene
 from ..scene.integrators import Aov
@@ -125,7 +126,8 @@ def write(
         picture = source.colours() if form.bands else source.image()
         if path.suffix.lower() == ".png":
             picture = images.straight(picture)
-        layers = {"samples": source.samples_per_pixel()} if source.is_adaptive else {}
+        layers = channels_of(source.layers()) if path.suffix.lower() == ".exr" else {}
+        layers |= {"samples": source.samples_per_pixel()} if source.is_adaptive else {}
         images.write(
             path, picture, metadata=stats, layers=layers, space=form.output_space,
             exposure=grading.exposure, tone=grading.tone, view=grading.view,

@@ -22,6 +22,7 @@ from .on_cluster import Where, render_on_cluster
 from .rendering import render_samples
 from .scene_options import open_renderer, scene_options
 from .stopping import STATUS, stops
+from .tev_viewer import EVERYWHERE, Address, showing
 from .verbosity import verbose_option
 
 
@@ -111,6 +112,10 @@ class Period(Duration):
 @click.option(
     "--keys", type=click.Path(path_type=Path), help="Folder of the cluster's keys, for tls://."
 )
+@click.option(
+    "--tev", type=Address(), is_flag=False, flag_value=EVERYWHERE,
+    help="Show the picture in tev or HDRView while it is rendered.  [default: 127.0.0.1:14158]",
+)  # fmt: skip
 @grading_options
 @verbose_option("Print memory, trees, programs and stages; log more, twice for everything.")
 @click.option("--quiet", is_flag=True, help="Show no progress and no warnings.")
@@ -126,6 +131,7 @@ def render(
     resume: bool | None,
     cluster: str | None,
     keys: Path | None,
+    tev: tuple[str, int] | None,
     exposure: float,
     tone: str | None,
     view: str | None,
@@ -152,6 +158,10 @@ def render(
     not rendered again. A frame is a device's; --time is that of each.
     """
     graded = grading(exposure=exposure, tone=tone, view=view, display=display, look=look, ocio=ocio)
+    if tev is not None and (frames is not None or cluster is not None):
+        raise click.UsageError(
+            "--tev shows one picture of this machine: not with these options yet"
+        )
     if frames is not None:
         if cluster is not None:
             raise click.UsageError("not with --cluster yet: --frames")
@@ -201,10 +211,16 @@ def render(
     writer = checkpoints.Checkpoints(
         renderer, saved_at, period, saved is not None, targets, shown.note
     )
-    with stops() as stopped:
+    viewed = showing(tev, scene.name, renderer, shown.note)
+    with stops() as stopped, viewed as show_picture:
+
+        def after_pass() -> None:
+            writer.after_pass()
+            show_picture()
+
         with shown.rendering():
             render_samples(
-                renderer, end, left, shown.show, renderer.scene.noise, stopped, writer.after_pass
+                renderer, end, left, shown.show, renderer.scene.noise, stopped, after_pass
             )
         writer.save(bool(stopped))
         stats = outputs.metadata(renderer, scene, time.perf_counter() - ready)

@@ -7,7 +7,7 @@ from __future__ import annotations
 import dataclasses
 import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
@@ -18,12 +18,13 @@ import click
 from .. import device as dev
 from ..bvh import LAYOUTS, Quality
 from ..cluster.multi_renderer import MultiRenderer
+from ..errors import nearest
 from ..formats import load
 from ..formats.missing import Missing
 from ..render.lowering.checks import check
 from ..render.renderer import Renderer
 from ..scene import Scene, kinds
-from ..scene.integrators import AUTO, MOST_LIGHT_PATHS, Auto
+from ..scene.integrators import AUTO, LAYERS, MOST_LIGHT_PATHS, Auto
 from ..scene.params import Kind, params
 from ..spectra import read_sensor, spaces
 from ..spectra.sensors import OBSERVERS
@@ -79,6 +80,22 @@ class LightPaths(click.ParamType):
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
         return AUTO if value == AUTO else click.FloatRange(0.0, MOST_LIGHT_PATHS)(value, param, ctx)
+
+
+class Names(click.ParamType):
+    """Names of a table, with commas between them."""
+
+    name = "NAMES"
+
+    def __init__(self, known: Iterable[str]):
+        self.known = tuple(known)
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        given = tuple(str(value).split(","))
+        for name in given:
+            if name not in self.known:
+                self.fail(f"{name!r} is unknown{nearest(name, self.known)}", param, ctx)
+        return given
 
 
 class White(click.ParamType):
@@ -150,6 +167,10 @@ _OPTIONS = (
     click.option("--lambda-min", type=float, help="Shortest wavelength of the light [nm]."),
     click.option(
         "--lambda-max", type=float, help="Longest wavelength; fluorescence needs 300 to 830."
+    ),
+    click.option(
+        "--layers", type=Names(LAYERS), metavar="NAME,..",
+        help=f"Pictures beside the picture, for .exr: {', '.join(LAYERS)}.",
     ),
     click.option(
         "--alpha", is_flag=True, default=None, help="Leave the sky out, and write what is covered."

@@ -10,6 +10,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from typing import NoReturn
 
 from clpt.cluster.blocks import Block, Blocks, WorkerRecord
@@ -238,7 +239,7 @@ class Crew:
         ranges = worker.ranges
         state = worker.take()
         with self._changed:
-            given = FilmState(state.words, state.bands, ranges, state.scale)
+            given = replace(state, taken=ranges)
             self.saved = given if self.saved is None else self.saved.merged(given)
             self.saved_ranges = self.saved.taken
 

@@ -139,7 +139,7 @@ class DeviceWorker:
     def show(self, state: FilmState) -> None:
         """Let the film hold a whole picture."""
         for wavefront, words in zip(self.renderer.wavefronts, state.words, strict=True):
-            wavefront.set_words(words, state.bands)
+            wavefront.set_words(words, state.bands, state.layers)
         self.shows = True
 
 

@@ -38,6 +38,7 @@ Reply = dict[str, Any]
 _device: dict[str, Any] = {"which": None, "threads": None}  # where this worker renders
 _open: dict[str, _Job] = {}  # by digest, the last used at the end
 _stopped: set[str] = set()  # jobs that are to end soon
+FORMS = {"words": 5, "bands": 5, "layers": 3}  # of a film: dimensions of its arrays
 
 
 class _Job:
@@ -195,23 +196,22 @@ def close_job(digest: str) -> None:
 
 def state_to_arrays(state: FilmState) -> Reply:
     """Return a film as arrays, with a checksum of all of it."""
-    parts: Reply = {
-        "words": state.words, "bands": state.bands, "scale": state.scale,
-        "taken": [list(pair) for pair in state.taken],
-    }  # fmt: skip
+    taken = [list(pair) for pair in state.taken]
+    parts: Reply = {**state.arrays, "scale": state.scale, "taken": taken}
     return {**parts, "sha256": film_digest(state)}
 
 
 def state_from_arrays(reply: Reply) -> FilmState:
     """Return the film of a reply. Raises ClusterError if it is not what its worker sent."""
     try:
-        words, bands = (np.asarray(reply[name]) for name in ("words", "bands"))
+        arrays = {name: np.asarray(reply[name]) for name in FORMS}
         taken = tuple((int(first), int(end)) for first, end in reply["taken"])
-        state = FilmState(words, bands, taken, float(reply["scale"]))
+        state = FilmState(taken=taken, scale=float(reply["scale"]), **arrays)
     except (KeyError, TypeError, ValueError) as error:
         raise ClusterError(f"this is no film: {error}") from None
-    if words.dtype != np.uint32 or bands.dtype != np.uint32 or words.ndim != 5 or bands.ndim != 5:
-        raise ClusterError(f"this is no film: {words.dtype} {words.shape}")
+    for name, array in arrays.items():
+        if array.dtype != np.uint32 or array.ndim != FORMS[name]:
+            raise ClusterError(f"this is no film: {name} are {array.dtype} {array.shape}")
     if film_digest(state) != reply.get("sha256"):
         raise ClusterError("the checksum of the film is wrong")
     return state
@@ -220,7 +220,7 @@ def state_from_arrays(reply: Reply) -> FilmState:
 def film_digest(state: FilmState) -> str:
     """Return the SHA-256 of all that a film holds."""
     hashed = hashlib.sha256(f"{state.taken} {state.scale} ".encode())
-    for array in (state.words, state.bands):
+    for array in state.arrays.values():
         hashed.update(f"{array.shape} ".encode())
         if array.size:
             hashed.update(np.ascontiguousarray(array).data.cast("B"))

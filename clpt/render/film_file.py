@@ -172,7 +172,7 @@ def _header_of(saved: SavedFilm) -> dict[str, Any]:
         "clpt": saved.origin.clpt,
         "taken": [list(one) for one in state.taken],
         "scale": state.scale,
-        "shapes": {"words": state.words.shape, "bands": state.bands.shape},
+        "shapes": {name: array.shape for name, array in state.arrays.items()},
         "scene": dict(saved.origin.scene.values),
         "settings": dict(saved.origin.settings),
         "kernels": saved.origin.kernels,
@@ -191,9 +191,8 @@ def _header_of_part(saved: SavedFilm, compression: Any) -> dict[str, Any]:
 
 
 def _words(saved: SavedFilm) -> Iterator[Any]:
-    """The film's words, one channel each: the parts "words", and "bands" where there are some."""
-    for name in ("words", "bands"):
-        planes = getattr(saved.film, name)
+    """The film's words, one channel each: the parts "words", and others where there are some."""
+    for name, planes in saved.film.arrays.items():
         planes = planes.reshape(-1, *planes.shape[-2:])
         if len(planes):
             yield _part(saved, name, {f"{i:05d}": plane for i, plane in enumerate(planes)})
@@ -231,14 +230,17 @@ def _restored(header: dict[str, Any], parts: _Parts) -> SavedFilm:
         return stored[:size].copy().view(dtype).reshape(shape)
 
     form = header["form"]
-    matrix = tuple(tuple(row) for row in form["to_output"])
+    rows = {name: tuple(map(tuple, form[name])) for name in ("to_output", "paper")}
+    names = {name: tuple(form[name]) for name in ("channels", "layers")}
     taken = tuple((int(first), int(end)) for first, end in header["taken"])
     return SavedFilm(
-        film=FilmState(words("words"), words("bands"), taken, float(header["scale"])),
+        film=FilmState(
+            words("words"), words("bands"), taken, float(header["scale"]), words("layers")
+        ),
         origin=Origin(
             Fingerprint(header["scene"]), header["settings"], header["kernels"], header["clpt"]
         ),
-        form=PictureForm(**{**form, "to_output": matrix, "channels": tuple(form["channels"])}),
+        form=PictureForm(**{**form, **rows, **names}),
         counts=tuple(header["counts"]),
         sessions=tuple(Session(**one) for one in header["sessions"]),
         adaptive={n: array(n, *about) for n, about in header["adaptive"].items()},

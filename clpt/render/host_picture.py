@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.render.contract.features import SUM_WORDS
+from clpt.render.layers import layers_of
 from clpt.render.saved_film import SavedFilm
 from clpt.render.wavefront.film_state import (
     FILM_WORDS,
@@ -62,7 +63,9 @@ class HostPicture:
         return self._colours(self._films[0])
 
     def layers(self) -> dict[str, Image]:
-        """The values of the `aov` integrator by name, (h, w, 1 to 3) float32."""
+        """The layers by name, (h, w, 1 to 3) float32, as `Renderer.layers` returns them."""
+        if not self.channels:
+            return layers_of(self.form.layers, self.form.paper, self.saved.film.layers)
         return {
             name: self._colours(words)[:, :, : CHANNELS[name]]
             for name, words in zip(self.channels, self._films, strict=True)

@@ -14,6 +14,7 @@ from clpt import images
 from clpt.colour.view import View
 from clpt.errors import SceneError, UnknownKindError
 from clpt.render.aov_preview import sheet
+from clpt.render.layers import layers_of, white_paper
 from clpt.render.locking import DeviceOwner, synchronized
 from clpt.render.resolve import Resolve
 from clpt.render.wavefront.wavefront import Wavefront
@@ -138,7 +139,16 @@ class Pictures(DeviceOwner):
 
     @synchronized
     def layers(self) -> dict[str, Image]:
-        """The values of the `aov` integrator by name, (h, w, 1 to 3) float32."""
+        """The layers of the film by name, (h, w, 1 to 3) float32: what `film.layers` names.
+
+        Colours are in the film's output space, white paper is (1, 1, 1); lengths are in metres.
+        They are of the first 64 samples of a pixel. Where nothing is seen they are 0. Of the `aov`
+        integrator, its values.
+        """
+        if not self.channels:
+            first = self.wavefronts[0]
+            paper = white_paper(self.scene.film, first.features.mode)
+            return layers_of(first.features.layers, paper, first.film.layer_words())
         return {
             name: wavefront.image()[:, :, : CHANNELS[name]]
             for name, wavefront in zip(self.channels, self.wavefronts, strict=True)

@@ -312,7 +312,7 @@ class Renderer(Resumable):
         """
         merged = self.film_state().merged(state)
         for one, words in zip(self.wavefronts, merged.words, strict=True):
-            one.set_words(words, merged.bands)
+            one.set_words(words, merged.bands, merged.layers)
         self._taken, self._adaptive = merged.taken, None
 
     @synchronized

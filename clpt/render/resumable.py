@@ -16,6 +16,7 @@ from clpt.errors import SceneError
 from clpt.render import film_file
 from clpt.render.contract import custom_materials
 from clpt.render.editing.scene_edit import resolve_device_arrays
+from clpt.render.layers import white_paper
 from clpt.render.locking import synchronized
 from clpt.render.pictures import Pictures
 from clpt.render.saved_film import Origin, PictureForm, SavedFilm, Session
@@ -77,10 +78,12 @@ class Resumable(Pictures):
         return self._film_state(self._taken, held=False)
 
     def _film_state(self, taken: Ranges, *, held: bool) -> FilmState:
-        films, bands = zip(*(one.film.words(held=held) for one in self.wavefronts), strict=True)
+        films, bands, layers = zip(
+            *(one.film.words(held=held) for one in self.wavefronts), strict=True
+        )
         scale = float(self.wavefronts[0].paths.settings["film_scale"])
         words = np.stack(films) if len(films) > 1 else films[0][None]
-        return FilmState(words, bands[0], taken, scale)
+        return FilmState(words, bands[0], taken, scale, layers[0])
 
     @synchronized
     def hold(self) -> None:
@@ -170,8 +173,8 @@ class Resumable(Pictures):
     def restore(self, saved: SavedFilm) -> None:
         """Go on from a saved film, as `load_state` does. Raises SceneError."""
         saved.origin.check_same(self.origin())
-        own = self.film_state()
-        if (own.words.shape, own.bands.shape) != (saved.film.words.shape, saved.film.bands.shape):
+        own, given = self.film_state().arrays, saved.film.arrays
+        if any(own[name].shape != given[name].shape for name in own):
             raise SceneError("the film has another form than this scene's")
         adaptive = None
         if saved.adaptive:
@@ -182,7 +185,7 @@ class Resumable(Pictures):
                 message = f"the state of adaptive sampling does not fit: {error}"
                 raise SceneError(message) from error
         for one, words, counts in zip(self.wavefronts, saved.film.words, saved.counts, strict=True):
-            one.set_words(words, saved.film.bands)
+            one.set_words(words, saved.film.bands, saved.film.layers)
             for name, number in counts.items():
                 setattr(one.counts, name, number)
         self._begin_anew()
@@ -221,6 +224,8 @@ class Resumable(Pictures):
             lambda_max=film.lambda_max,
             output_space="rec709" if self.channels else film.output_space,
             exposure=film.exposure,
+            layers=features.layers,
+            paper=tuple(map(tuple, white_paper(film, features.mode).tolist())),
         )
 
 

@@ -22,7 +22,9 @@ class PictureForm:
 
     to_output: (3, 3), rows of the matrix from the sums to the output space; channels: of the `aov`
     integrator; light_paths: all paths start at lights; weighed: some do, beside the camera's;
-    weights: samples serve several pixels; the others are those of `clpt.scene.Film`.
+    weights: samples serve several pixels; paper: the matrix (3, 3) from sums of layers that are
+    colours to the output space, see `clpt.render.layers.white_paper`; the others are those of
+    `clpt.scene.Film`.
     """
 
     to_output: tuple[tuple[float, ...], ...]
@@ -36,6 +38,8 @@ class PictureForm:
     lambda_max: float = 830.0
     output_space: str = "rec709"
     exposure: float = 1.0
+    layers: tuple[str, ...] = ()
+    paper: tuple[tuple[float, ...], ...] = ()
 
 
 @dataclass(frozen=True)

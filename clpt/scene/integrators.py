@@ -28,6 +28,39 @@ CHANNELS = {  # of the aov integrator: how many values each has
 IDS = ("shape_id", "primitive_id")  # of these, which are names: a mean of them would be none
 
 
+@dataclass(frozen=True)
+class Layer:
+    """A picture beside the picture, see kernels/path/layers.cl.
+
+    channels: their names in an .exr; near_one: whether its numbers are; denoising: of the first
+    surface that is neither a mirror nor smooth glass, else of the first; colour: its channels are.
+    """
+
+    channels: str
+    near_one: bool = True
+    denoising: bool = False
+
+    @property
+    def is_colour(self) -> bool:
+        return self.channels == "RGB"
+
+    @property
+    def words(self) -> int:
+        """Words of a pixel that hold it."""
+        return len(self.channels) * (1 if self.near_one else 3)
+
+
+LAYERS = {
+    "albedo": Layer("RGB"),
+    "shading_normal": Layer("XYZ"),
+    "geometric_normal": Layer("XYZ"),
+    "depth": Layer("Z", near_one=False),
+    "position": Layer("XYZ", near_one=False),
+    "uv": Layer("UV", near_one=False),
+    "denoising_albedo": Layer("RGB", denoising=True),
+    "denoising_normal": Layer("XYZ", denoising=True),
+}
+
 MOST_BANDS = 1024
 MOST_LIGHT_PATHS = 64  # for a sample of the camera
 FEWEST_LIGHT_PATHS = 1.0 / 64
@@ -317,6 +350,7 @@ class Film(Kind):
     alpha: bool = host(
         False, "transparent: the camera sees no sky, and a fourth channel tells what is covered"
     )
+    layers: tuple[str, ...] = host((), f"beside the picture: any of {', '.join(LAYERS)}")
 
     @property
     def size(self) -> tuple[int, int]:
@@ -352,6 +386,11 @@ class Film(Kind):
             known = f"{', '.join(OBSERVERS)}, nor a Sensor"
             raise SceneError(f"{self.sensor!r} is none of {known}", where="film.sensor")
         object.__setattr__(self, "white_balance", _white_balance(self.white_balance))
+        given: Any = self.layers
+        object.__setattr__(self, "layers", (given,) if isinstance(given, str) else tuple(given))
+        for name in self.layers:
+            if name not in LAYERS:
+                raise UnknownKindError("layer", str(name), LAYERS, where="film.layers")
 
     def _checked_crop(self) -> tuple[int, int, int, int]:
         """The crop as whole numbers. Raises SceneError where it does not lie in the film."""

@@ -5,8 +5,9 @@
 #include "generated/rivals.cl"
 #include "generated/gather.cl"
 #include "generated/guide.cl"
+#include "generated/layers.cl"
 
-inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask active, Vertex v MERGE_ARGS)
+inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask active, Vertex v SHADE_ARGS)
 {
     global const Settings *settings = scene.settings;
     Surface s = v.s;
@@ -47,6 +48,9 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     Bsdf m = scatter.bsdf;
     Frame frame = scatter.shading.frame;
     vec3 wo = scatter.wo;
+#if USES_LAYERS && !BSDF_IS_NULL
+    state = layers_record(scene, path, at, layers, met, v, scatter, state);
+#endif
 #if BSDF_ABSORBS /* as the surfaces of lights mostly do */
     next = next & (spectrum_max(bsdf_albedo(m)) > 0.0f);
 #endif
@@ -149,9 +153,9 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
 }
 
 #if !SHADES_BOTH
-void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, mask active MERGE_ARGS)
+void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, mask active SHADE_ARGS)
 {
     Vertex v = vertex_load(scene, path, hit, at, active);
-    path_vertex(scene, path, shadow, at, active, v MERGE_PASSED);
+    path_vertex(scene, path, shadow, at, active, v SHADE_PASSED);
 }
 #endif

@@ -33,5 +33,5 @@ inline void path_end_count(global uint *counters, PathEnd e, integer rays)
     mask finished = e.ended & e.begun;
     count(counters, COUNTER_SAMPLES, finished, (integer)(1));
     count(counters, COUNTER_CLOSEST, finished, rays + sel_i(e.missed, (integer)(1), (integer)(0)));
-    count(counters, COUNTER_SHADOW, finished, e.state >> 16);
+    count(counters, COUNTER_SHADOW, finished, (e.state & (PATH_SEEN - 1)) >> 16);
 }

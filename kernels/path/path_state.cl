@@ -1,11 +1,12 @@
-/* What Path.state holds: depth in bits 0 to 11, flags, and the number of shadow rays from bit 16 up; and the dimensions
- * of a sample. */
+/* What Path.state holds: depth in bits 0 to 11, flags, and the number of shadow rays in bits 16 to 27; and the
+ * dimensions of a sample. */
 #define PATH_DEPTH 0x0fff
 #define PATH_ALIVE 0x1000 /* a ray is in flight */
 #define PATH_FRESH 0x2000 /* no sample has been begun: there is nothing to deposit */
 #define PATH_DONE 0x4000  /* the slot is at the end of its work list */
 #define PATH_SHARP 0x8000 /* a surface of a light path was sharp, or all of a camera's path were */
 #define PATH_SHADOW 0x10000
+#define PATH_SEEN 0x10000000 /* layers for denoisers have the path, see path/layers.cl */
 
 /* A null surface (a hole of a mask, a boundary that neither bends nor scatters) is no step of a path: it adds nothing
  * to the depth. A path crosses this many of them, and then ends; a shadow ray that meets more is blocked. */

@@ -16,6 +16,7 @@
 #include "generated/merging.cl"
 #include "path/path_end.cl"
 #include "path/met_light.cl"
+#include "generated/layer_sums.cl"
 
 /* The radiance of the paths, with what those that left the scene gather there. */
 inline Spectrum path_radiance(Scene scene, Slab path, uint at, PathEnd end, Wavelengths lambdas)
@@ -142,6 +143,10 @@ STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
         mask go = end.ended & !next.done;
         store_path_sample(path, at, go, next.sample);
         begin_path(scene, path, at, go, next.pixel_index, next.sample);
+#if USES_LAYERS
+        mask counted = layers_want(path, at, go);
+        if (any(counted)) layers_count(scene, layers, counted, next.pixel_index);
+#endif
 #if MERGES
         integer begun = PATH_ALIVE | PATH_SHARP;
 #else

@@ -3,6 +3,7 @@
 #include "core/base.cl"
 #include "interface/stage.cl"
 #include "generated/merge_args.cl"
+#include "generated/shade_args.cl"
 #include "generated/sampler.cl"
 #include "interface/shape.cl"
 #include "interface/light.cl"
@@ -36,14 +37,14 @@
 #define WHICH_PASSED
 #endif
 
-STAGE(shade)(SLAB_ARGS, SCENE_ARGS MERGE_ARGS WHICH_ARG QUEUE_ARGS)
+STAGE(shade)(SLAB_ARGS, SCENE_ARGS SHADE_ARGS WHICH_ARG QUEUE_ARGS)
 {
     SLABS
     SCENE
 #if QUEUED
     uint entry = get_global_id(0);
     if (entry < queue_counts[BSDF_KIND]) {
-        integrator_vertex(scene, path, hit, shadow, queue[queue_starts[BSDF_KIND] + entry], mask_of(1) MERGE_PASSED);
+        integrator_vertex(scene, path, hit, shadow, queue[queue_starts[BSDF_KIND] + entry], mask_of(1) SHADE_PASSED);
     }
 #else
     STAGE_AT
@@ -51,6 +52,6 @@ STAGE(shade)(SLAB_ARGS, SCENE_ARGS MERGE_ARGS WHICH_ARG QUEUE_ARGS)
 #if BSDF_COUNT > 1
     active = active & (MATERIAL_KIND(load_hit_material(hit, at)) == BSDF_KIND);
 #endif
-    if (any(active)) integrator_vertex(scene, path, hit, shadow, at, active MERGE_PASSED WHICH_PASSED);
+    if (any(active)) integrator_vertex(scene, path, hit, shadow, at, active SHADE_PASSED WHICH_PASSED);
 #endif
 }

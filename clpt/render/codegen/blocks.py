@@ -13,7 +13,7 @@ CHANGED = (
     "ratio", "eta", "medium", "lead", "rival", "pending", "expected", "state",
 )  # fmt: skip
 READ = ("weight", "light", "pixel_index", "pixel_key", "sample")  # and not changed
-# members that a scene has only with a flag
+# members that a scene has only with a flag, or one of two
 NEEDED = {
     "lambdas": "SPECTRAL",
     "sampled_hemisphere": "USES_HEMISPHERE",
@@ -25,9 +25,9 @@ NEEDED = {
     "rival": "WEIGHS_LIGHT_PATHS",
     "pending": "MERGES",
     "expected": "USES_GUIDE",
-    "weight": "LIGHT_PATHS",
+    "weight": "LIGHT_PATHS USES_LAYERS",
     "light": "WEIGHS_LIGHT_PATHS",
-    "pixel_index": "LIGHT_PATHS",
+    "pixel_index": "LIGHT_PATHS USES_LAYERS",
     "film": "LIGHT_PATHS",
     "instance": "USES_INSTANCES",
 }
@@ -40,7 +40,8 @@ def members(features: Features) -> dict[str, list[str]]:
 
     def there(names: Iterable[str]) -> list[str]:
         has = {"SPECTRAL": features.mode == "spectral", "": True, **defined}
-        return [name for name in names if has.get(NEEDED.get(name, ""))]
+        wanted = {name: NEEDED[name].split() if name in NEEDED else [""] for name in names}
+        return [name for name, of in wanted.items() if any(has.get(flag) for flag in of)]
 
     return {
         "changed": there(CHANGED),

@@ -128,7 +128,7 @@ def _call(features: Features, own: Features, layout: str, stage: Stage, which: i
         "deposit": signatures.deposit_args(own),
         "train": signatures.deposit_args(own),
         join: signatures.join_args(own, layout),
-        "shade": signatures.merge_args(features),
+        "shade": signatures.shade_args(features),
     }
     args = [(type_, name) for name, type_ in groups.get(stage.kernel, {}).items()]
     if stage.kernel == "shade" and has_both(features):

@@ -25,6 +25,8 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/gather.cl": lambda f, _: (
         ("generated/photon.cl", "merging/gather.cl") * (f.merged and not f.light_paths)
     ),
+    "generated/layer_sums.cl": lambda f, _: ("film/layers.cl",) * bool(f.layers),
+    "generated/layers.cl": lambda f, _: ("path/layers.cl",) * bool(f.layers),
     "generated/rivals.cl": lambda f, _: (
         (
             "generated/merging.cl",

@@ -12,7 +12,7 @@ from typing import Any
 from clpt.render.contract.features import Features
 from clpt.render.contract.parameter_words import RERADIATION_STEP
 from clpt.render.contract.texture_records import IMAGES
-from clpt.scene.integrators import IDS
+from clpt.scene.integrators import IDS, LAYERS
 from clpt.scene.materials import Material
 from clpt.scene.params import device_params
 
@@ -41,6 +41,11 @@ def filters_at_random(features: Features, cls: type[Material]) -> bool:
         return False
     sources, declared = features.sources_of(cls.kind), device_params(cls)
     return any(p.linear and "texture" in sources.get(n, ()) for n, p in declared.items())
+
+
+def _layer_place(name: str) -> Callable[[Features], int | bool]:
+    """The first word of a layer, False where there is none."""
+    return lambda features: features.layer_places.get(name, False)
 
 
 # name: its value, of a scene's features
@@ -77,6 +82,10 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "FILM_GROUP": lambda f: f.weighed and f.film_group,
     "FILM_WORDS": lambda f: f.weighed and f.film_words,
     "FILM_WEIGHTS": lambda f: f.film_weights,
+    "USES_LAYERS": lambda f: bool(f.layers),
+    "LAYER_FIRST": lambda f: any(not LAYERS[name].denoising for name in f.layers),
+    "LAYER_DENOISING": lambda f: any(LAYERS[name].denoising for name in f.layers),
+    **{f"LAYER_{name.upper()}": _layer_place(name) for name in LAYERS},
     "CHANNEL": lambda f: bool(f.channel) and f"CHANNEL_{f.channel.upper()}",
     "CHANNEL_IS_ID": lambda f: f.channel in IDS,
     "SPECTRA_SIZE": lambda f: f.spectra_size,

@@ -38,6 +38,7 @@ def virtual_files(features: Features, layout: str) -> dict[str, str]:
         "join": (join_args(features, layout), False),
         "deposit": (deposit_args(features), True),
         "merge": (merge_args(features), True),
+        "shade": (shade_args(features), True),
     }
     files = {"generated/scene.cl": scene_text()}
     for name, (args, behind) in groups.items():
@@ -97,7 +98,8 @@ def begin_args(features: Features) -> dict[str, str]:
     film = ["film", "bands"] if features.bands else ["film"]
     own = {"footprints": "global long *"} if features.film_weights else {}
     rest = {"counters": "global uint *", "work_list": "global const uint *", "samples": "int2 "}
-    return {**dict.fromkeys(film, "global uint *"), **own, **rest}
+    layers = layer_args(features)
+    return {**dict.fromkeys(film, "global uint *"), **layers, **own, **rest}
 
 
 def join_args(features: Features, layout: str) -> dict[str, str]:
@@ -125,6 +127,16 @@ def merge_args(features: Features) -> dict[str, str]:
     return dict.fromkeys(("photons", "photon_order", "photon_cells"), "global const uint *")
 
 
+def layer_args(features: Features) -> dict[str, str]:
+    """Return what stages take that add to layers beside the picture."""
+    return {"layers": "global uint *"} if features.layers else {}
+
+
+def shade_args(features: Features) -> dict[str, str]:
+    """Return what shading takes beside slabs and scene."""
+    return {**merge_args(features), **layer_args(features)}
+
+
 def loop_files(features: Features, layout: str) -> dict[str, str]:
     """Return the generated file that defines what all stages of a loop take."""
     return {
@@ -136,7 +148,7 @@ def loop_args(features: Features, layout: str) -> dict[str, str]:
     """Return what the stages of a loop take, of all kinds of paths, beside slabs and scene."""
     args = trace_args(features, layout)
     for own in features.passes:  # deposit last, which writes what others read
-        args |= {**merge_args(own), **begin_args(own), **join_args(own, layout)}
+        args |= {**shade_args(own), **begin_args(own), **join_args(own, layout)}
     return {**args, **{n: t for own in features.passes for n, t in deposit_args(own).items()}}
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
+from clpt.scene.integrators import LAYERS
 from clpt.scene.materials import Material
 from clpt.scene.params import device_params
 
@@ -24,6 +25,15 @@ def disperses(leaves: Iterable[type[Material]], sources: Sources) -> bool:
         if param.role == "index"
     )
     return any(cls.disperses for cls in leaves) or not sources.isdisjoint(indices)
+
+
+def layer_places(names: Iterable[str]) -> dict[str, int]:
+    """Return the first of a pixel's words for each layer, after the number of samples."""
+    places, word = {}, 1
+    for name in names:
+        places[name] = word
+        word += LAYERS[name].words
+    return places
 
 
 @dataclass(frozen=True)
@@ -80,6 +90,7 @@ class Features:
     channel: str = ""
     bands: bool = False  # a spectral film
     alpha: bool = False  # a film that tells what is covered
+    layers: tuple[str, ...] = ()  # beside the picture
     tabulated_density: bool = False  # of wavelengths
     filter_profile: int = 0  # where in `distributions` its values begin
     spectra_size: int = 0
@@ -108,6 +119,7 @@ class Features:
             filter_profile=profile,
             film_group=self.group_words,
             alpha=False,
+            layers=(),
         )
         return from_lights, self
 
@@ -137,6 +149,16 @@ class Features:
         """Words of what a slot sums around its pixel, see kernels/film/splatting.cl."""
         side = 2 * self.filter_reach + 1
         return side * side * 8 * (1 + self.alpha) if self.film_weights else 0
+
+    @property
+    def layer_places(self) -> dict[str, int]:
+        """The first word of each layer."""
+        return layer_places(self.layers)
+
+    @property
+    def layer_words(self) -> int:
+        """Words of a pixel that layers have."""
+        return 1 + sum(LAYERS[name].words for name in self.layers) if self.layers else 0
 
     @property
     def materials(self) -> tuple[str, ...]:

@@ -10,12 +10,24 @@ from clpt.render.lowering.geometry import shapes
 from clpt.render.lowering.geometry.instancing import distinct
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
-from clpt.scene.integrators import Aov, Film, Filter, Integrator, ParticleTracer, Sampler
+from clpt.scene.integrators import (
+    Aov,
+    Auto,
+    Direct,
+    Film,
+    Filter,
+    Integrator,
+    ParticleTracer,
+    Path,
+    Sampler,
+    Vcm,
+)
 from clpt.scene.lights import ON_SHAPES, DirectionalArea, Light, Point
 from clpt.scene.materials import Material
 from clpt.scene.params import params
 from clpt.scene.shapes import Shape
 
+HAVE_LAYERS = (Auto, Path, Vcm, Direct)
 LARGEST = 1 << 26  # pixels of a film; its tiles are divided in float32, see kernels/film/film.cl
 
 
@@ -44,6 +56,9 @@ def check(scene: Scene) -> None:
     width, height = scene.film.size
     if width * height > LARGEST:
         raise SceneError(f"{width}x{height} are more than {LARGEST >> 20} Mi pixels", where="film")
+    if scene.film.layers and not isinstance(scene.integrator, HAVE_LAYERS):
+        names = ", ".join(cls.kind for cls in HAVE_LAYERS)
+        raise SceneError(f"only the integrators {names} have layers", where="film.layers")
     _check_light_paths(scene, shapes_)
 
 

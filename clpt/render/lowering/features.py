@@ -33,7 +33,7 @@ def features_of(
     scene, textures, channels = index.scene, encoder.textures, index.channels
     sources = encoder.sources
     tangents = materials.tangents or index.normal_mapped
-    uvs = materials.uvs or geometry.uvs or tangents or "uv" in channels
+    uvs = materials.uvs or geometry.uvs or tangents or "uv" in (*channels, *index.layers)
     glass_lens = index.spectral and bool(dispersive_glass(scene.camera))
     return Features(
         mode=index.mode,
@@ -78,6 +78,7 @@ def features_of(
         channel=channels[0] if channels else "",
         bands=bool(scene.film.bands) and not channels,
         alpha=index.alpha,
+        layers=index.layers,
         tabulated_density=tabulated_density,
         spectra_size=encoder.spectra.samples,
         spectra_step=encoder.spectra.step,

@@ -13,7 +13,7 @@ from clpt.render.lowering.geometry import instancing, shapes
 from clpt.render.lowering.geometry.instancing import Placed, Prototype
 from clpt.scene import Scene
 from clpt.scene import materials as mt
-from clpt.scene.integrators import ParticleTracer, Vcm
+from clpt.scene.integrators import LAYERS, ParticleTracer, Vcm
 from clpt.scene.shapes import Shape
 
 
@@ -110,6 +110,12 @@ class SceneIndex:
     def alpha(self) -> bool:
         """Whether the film tells what is covered."""
         return self.scene.film.alpha and not self.channels
+
+    @property
+    def layers(self) -> tuple[str, ...]:
+        """What the film has beside the picture, in the order of LAYERS."""
+        wanted = () if self.channels else self.scene.film.layers
+        return tuple(name for name in LAYERS if name in wanted)
 
     @property
     def splatting(self) -> bool:

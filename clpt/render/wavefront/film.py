@@ -13,7 +13,7 @@ from clpt import device
 from clpt.device.buffers import Buffers
 from clpt.render.contract.features import GROUP_WORDS, SUM_WORDS, Features
 from clpt.render.wavefront import work_list
-from clpt.render.wavefront.film_state import SAMPLES_WORD, Words
+from clpt.render.wavefront.film_state import NO_LAYERS, SAMPLES_WORD, Words
 
 
 class Film:
@@ -50,6 +50,9 @@ class Film:
             advice += " or the number of bands"
             sums["bands"] = SUM_WORDS * self._band_sums * words
             images["band_image"] = 4 * self.band_count * pixels
+        if features.layers:
+            sums["layers"] = 4 * features.layer_words * self._padded_pixels
+        self._layer_words = features.layer_words
         self.sums, self._images = (
             {name: buffers.allocate(f"the {name}", size, advice) for name, size in sizes.items()}
             for sizes in (sums, images)
@@ -131,25 +134,37 @@ class Film:
         for name, copy in self._held.items():
             self.stream.copy(copy, self.sums[name])
 
-    def words(self, *, held: bool = False) -> tuple[Words, Words]:
+    def words(self, *, held: bool = False) -> tuple[Words, Words, Words]:
         """Return what the film holds, as `FilmState` has it of one film: (halves, 10 to 26, h, w)
-        uint32, and of bands (halves, sums, 3, h, w); wait for it. held: what it held at `hold`."""
+        uint32, of bands (halves, sums, 3, h, w), and of layers; wait for it. held: what it held at
+        `hold`."""
+        width, height = self.size
+        film = self._planes("film", self.halves * self._words, held)
+        bands = self._planes("bands", self.halves * SUM_WORDS * self._band_sums, held)
+        return (
+            film.reshape(self.halves, -1, height, width),
+            bands.reshape(self.halves, self._band_sums, SUM_WORDS, height, width),
+            self.layer_words(held=held),
+        )
+
+    def layer_words(self, *, held: bool = False) -> Words:
+        """Return the words of the layers beside the picture, (words, h, w) uint32; wait for it."""
+        return self._planes("layers", self._layer_words, held) if self._layer_words else NO_LAYERS
+
+    def _planes(self, name: str, count: int, held: bool) -> Words:
+        """Return the first streams of a buffer as pictures, (count, h, w) uint32."""
         width, height = self.size
         sums = self._held if held else self.sums
-        found = []
-        for name, each in (("film", self._words), ("bands", SUM_WORDS * self._band_sums)):
-            pixels = np.empty((self.halves * each, height, width), np.uint32)
-            stored = np.empty(self._padded_pixels, np.uint32)  # of one word: memory is dear
-            for i, plane in enumerate(pixels):
-                self.stream.read(sums[name], stored, i * stored.nbytes)
-                plane[:] = work_list.picture(self._settings, stored)
-            found.append(pixels.reshape(self.halves, -1, height, width))
-        film, bands = found
-        return film, bands.reshape(self.halves, self._band_sums, SUM_WORDS, height, width)
+        pixels = np.empty((count, height, width), np.uint32)
+        stored = np.empty(self._padded_pixels, np.uint32)  # of one word: memory is dear
+        for i, plane in enumerate(pixels):
+            self.stream.read(sums[name], stored, i * stored.nbytes)
+            plane[:] = work_list.picture(self._settings, stored)
+        return pixels
 
-    def set_words(self, film: Words, bands: Words) -> None:
+    def set_words(self, film: Words, bands: Words, layers: Words) -> None:
         """Enqueue that the film holds these words, of the form that `words` returns."""
-        for name, values in (("film", film), ("bands", bands)):
+        for name, values in (("film", film), ("bands", bands), ("layers", layers)):
             if values.size:
                 pixels = values.reshape(-1, math.prod(self.size))
                 streams = np.zeros((len(pixels), self._padded_pixels), np.uint32)

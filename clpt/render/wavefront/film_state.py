@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,10 @@ Words = NDArray[np.uint32]
 Ranges = tuple[tuple[int, int], ...]
 
 
+NO_LAYERS = np.zeros((0, 1, 1), np.uint32)
+NO_LAYERS.setflags(write=False)
+
+
 @dataclass(frozen=True, eq=False)
 class FilmState:
     """The film of a renderer as whole numbers, from `Renderer.film_state`.
@@ -36,13 +40,20 @@ class FilmState:
     uint32, a sum for each band, then, where light paths are weighed, one of theirs for each; sums
     may be 0. taken: first and end of each range of sample
     numbers that were taken, ascending and apart. scale: of a value of 1, a power of two that
-    follows from the film's exposure.
+    follows from the film's exposure. layers: (words, h, w) uint32, those beside the picture, see
+    kernels/film/layers.cl.
     """
 
     words: Words
     bands: Words
     taken: Ranges
     scale: float = 1.0
+    layers: Words = field(default_factory=lambda: NO_LAYERS)
+
+    @property
+    def arrays(self) -> dict[str, Words]:
+        """All words by name."""
+        return {"words": self.words, "bands": self.bands, "layers": self.layers}
 
     @property
     def samples(self) -> NDArray[np.uint32]:
@@ -55,8 +66,8 @@ class FilmState:
 
         Raises SceneError where films differ in their form, or a sample is in both.
         """
-        for name in ("words", "bands"):
-            own, given = getattr(self, name).shape, getattr(other, name).shape
+        for name, array in self.arrays.items():
+            own, given = array.shape, other.arrays[name].shape
             if own != given:
                 raise SceneError(
                     f"films of another form cannot be merged: {name} are {own} and {given}"
@@ -65,7 +76,7 @@ class FilmState:
             raise SceneError("films of another exposure cannot be merged", where="film.exposure")
         taken = join_ranges(self.taken, other.taken)
         words, bands = add_films(self.words, other.words), add_sums(self.bands, other.bands)
-        return FilmState(words, bands, taken, self.scale)
+        return FilmState(words, bands, taken, self.scale, self.layers + other.layers)
 
 
 def add_films(a: Words, b: Words) -> Words:

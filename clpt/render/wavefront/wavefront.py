@@ -324,9 +324,9 @@ class Wavefront:
         self._accumulate_bands.set_args(**self._samples(0, self.film.halves))
         return self.film.bands(self._accumulate_bands)
 
-    def set_words(self, film: Words, bands: Words) -> None:
+    def set_words(self, film: Words, bands: Words, layers: Words) -> None:
         """Enqueue that the film holds these words, of the form that `Film.words` returns."""
-        self.film.set_words(film, bands)
+        self.film.set_words(film, bands, layers)
         count = SAMPLES_WORD + (self.light_group if self.has_light_paths else 0)
         self._paths = [int(half[count].sum(dtype=np.uint64)) for half in film]
         self.accumulate_film()

@@ -1,0 +1,69 @@
+"""`--tev`: the picture so far for tev or HDRView, after each pass of a render."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import click
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import tev
+from ..render.layers import channels_of
+from .outputs import Source
+
+EVERYWHERE = tev.HOST  # what --tev without a value means
+
+
+class Address(click.ParamType):
+    """HOST, HOST:PORT or :PORT."""
+
+    name = "HOST:PORT"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        if not isinstance(value, str):
+            return value
+        try:
+            return tev.address(value)
+        except ValueError as error:
+            self.fail(f"{value!r} is no address of a viewer: {error}", param, ctx)
+
+
+@contextmanager
+def showing(
+    address: tuple[str, int] | None, name: str, source: Source, note: Callable[[str], None]
+) -> Iterator[Callable[[], None]]:
+    """Yield what sends the picture so far, in a thread; it does nothing without an address.
+
+    A viewer that goes away stops nothing. Raises tev.TevError where none is at first.
+    """
+    if address is None:
+        yield lambda: None
+        return
+    viewer = tev.Viewer(name, *address, tell=note)
+    try:
+        yield lambda: viewer.show(shown(source))
+    finally:
+        viewer.close()
+
+
+def shown(source: Source) -> dict[str, NDArray[np.float32]]:
+    """Return all channels of the picture so far, (h, w) by name: colours, layers, bands."""
+    if source.channels:
+        return {
+            f"{name}.{i}": layer[..., i]
+            for name, layer in source.layers().items()
+            for i in range(layer.shape[2])
+        }
+    picture = source.colours() if source.form.bands else source.image()
+    made = {letter: picture[..., i] for i, letter in enumerate("RGBA"[: picture.shape[2]])}
+    made |= channels_of(source.layers())
+    if source.is_adaptive:
+        made["samples"] = source.samples_per_pixel()
+    if source.form.bands:
+        spectral = source.spectral_image()
+        for nm, band in zip(spectral.lambdas, np.moveaxis(spectral.values, 2, 0), strict=True):
+            made[f"bands.{nm:g}nm"] = band
+    return made

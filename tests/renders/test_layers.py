@@ -1,0 +1,211 @@
+"""Layers beside the picture: equal to those of the integrator `aov`, closed forms through mirrors
+and glass, the same bits however a render is split, and no change of the picture."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import clpt
+from clpt import device as dev
+from clpt import images
+from clpt import transforms as tf
+from clpt.__main__ import run
+from clpt.errors import SceneError, UnknownKindError
+from clpt.scene import Film, Scene
+from clpt.scene.cameras import Orthographic, Perspective
+from clpt.scene.integrators import (
+    CHANNELS,
+    LAYERS,
+    Aov,
+    Auto,
+    Direct,
+    Mitchell,
+    ParticleTracer,
+    Path,
+    Vcm,
+    Whitted,
+)
+from clpt.scene.lights import Area, Constant, Point
+from clpt.scene.materials import Conductor, Dielectric, Diffuse, Mask, RoughPlastic
+from clpt.scene.shapes import Rectangle, Sphere
+
+FIRST = [name for name, layer in LAYERS.items() if not layer.denoising]
+DENOISING = ("denoising_albedo", "denoising_normal")
+RED, BLUE = (0.7, 0.2, 0.1), (0.1, 0.2, 0.6)
+
+
+def room(integrator=None, **film) -> Scene:
+    """Balls of glass, metal, plastic and with holes over a floor, under a lamp and a sky."""
+    balls = [Dielectric(), Conductor(), RoughPlastic(), Mask(opacity=0.5, material=Diffuse())]
+    shapes = [
+        Sphere(center=(1.2 * i - 1.8, 0.5, 0.2 * i), radius=0.5, material=material)
+        for i, material in enumerate(balls)
+    ]
+    floor = Rectangle(
+        to_world=tf.rotate([1, 0, 0], -90) @ tf.scale(6), material=Diffuse(reflectance=RED)
+    )
+    lamp = Sphere(center=(0, 3, 0), radius=0.3, emission=Area(radiance=20.0))
+    return Scene(
+        camera=Perspective(to_world=tf.look_at([0, 2, 6], [0, 0.5, 0], [0, 1, 0]), fov=40),
+        shapes=[*shapes, floor, lamp],
+        lights=[Constant(radiance=0.3), Point(position=(2, 4, 2), intensity=3.0)],
+        film=Film(**{"width": 40, "height": 30, "mode": "rgb", **film}),
+        integrator=integrator or Path(light_paths=0),
+    )
+
+
+def layers_of(scene: Scene, samples: int = 16, **options) -> dict[str, np.ndarray]:
+    with clpt.Renderer(scene, **options) as renderer:
+        renderer.run(samples)
+        return renderer.layers()
+
+
+def test_layers_are_those_of_aov():
+    """The same samples see the same: equal to what float32 sums of another order may differ by."""
+    made = layers_of(room(layers=FIRST))
+    wanted = layers_of(room(Aov(channels=tuple(FIRST))))
+    assert list(made) == FIRST and set(FIRST) < set(CHANNELS)
+    for name in FIRST:
+        assert made[name].shape == (30, 40, CHANNELS[name])
+        np.testing.assert_allclose(made[name], wanted[name], atol=2e-5, rtol=2e-6, err_msg=name)
+
+
+def test_a_spectral_albedo_is_the_colour_of_the_paint():
+    """To what 64 samples of four wavelengths tell, under light of equal energy in place of D65."""
+    spectral = layers_of(room(mode="spectral", layers=("albedo",)), 64)["albedo"]
+    rgb = layers_of(room(layers=("albedo",)), 64)["albedo"]
+    assert np.abs(spectral - rgb).mean() < 0.01
+    np.testing.assert_allclose(spectral[-3:].mean(axis=(0, 1)), RED, atol=0.035)
+
+
+@pytest.mark.parametrize("how", [Path(light_paths=0), Path(light_paths=1), Vcm(), Direct(), Auto()])
+def test_the_picture_has_the_same_bits(how):
+    with clpt.Renderer(room(how)) as plain, clpt.Renderer(room(how, layers=LAYERS)) as layered:
+        plain.run(6)
+        layered.run(6)
+        np.testing.assert_array_equal(layered.image(), plain.image())
+        assert plain.layers() == {} and list(layered.layers()) == list(LAYERS)
+
+
+@pytest.mark.parametrize("film", [{}, {"filter": Mitchell()}, {"filtering": "importance"}])
+def test_layers_have_the_same_bits_however_they_are_rendered(film):
+    scene = room(Path(light_paths=1), layers=LAYERS, **film)
+    once = layers_of(scene, 70)
+    with clpt.Renderer(scene, looped=False, slots=128) as other:
+        other.run(3)
+        other.step(60)
+        other.run(7)
+        split = other.layers()
+    assert once.keys() == split.keys()
+    for name, values in once.items():
+        np.testing.assert_array_equal(split[name], values)
+    np.testing.assert_array_equal(layers_of(scene, 64)["depth"], once["depth"])  # of the first 64
+
+
+def test_a_mirror_shows_what_denoisers_need():
+    """A mirror that takes half of the light, before a blue wall: half of its paint, its normal."""
+    mirror = Rectangle(
+        to_world=tf.rotate([0, 1, 0], 45), material=Conductor(specular_reflectance=0.5)
+    )
+    wall = Rectangle(
+        to_world=tf.translate([4, 0, 0]) @ tf.rotate([0, 1, 0], -90) @ tf.scale(8),
+        material=Diffuse(reflectance=BLUE),
+    )
+    scene = Scene(
+        camera=Orthographic(to_world=tf.look_at([0, 0, 4], [0, 0, 0], [0, 1, 0]) @ tf.scale(0.4)),
+        shapes=[mirror, wall],
+        lights=[Constant(radiance=1.0)],
+        film=Film(width=8, height=8, mode="rgb", layers=LAYERS),
+        integrator=Path(light_paths=0),
+    )
+    made = layers_of(scene)
+    half = np.broadcast_to(0.5 * np.array(BLUE), (8, 8, 3))
+    np.testing.assert_allclose(made["denoising_albedo"], half, atol=1e-5)
+    np.testing.assert_allclose(made["denoising_normal"][..., 0], -1.0, atol=1e-5)
+    np.testing.assert_allclose(np.abs(made["shading_normal"][..., 0]), np.sqrt(0.5), atol=1e-5)
+    np.testing.assert_allclose(made["position"][..., 0], -made["position"][..., 2], atol=1e-5)
+
+
+def test_glass_lets_all_through():
+    """A ball of glass in a white room: what is behind it, of each path one surface, is 1."""
+    glass = Sphere(radius=1.0, material=Dielectric())
+    walls = Sphere(radius=9.0, material=Diffuse(reflectance=1.0))
+    scene = Scene(
+        camera=Perspective(to_world=tf.look_at([0, 0, 4], [0, 0, 0], [0, 1, 0]), fov=20),
+        shapes=[glass, walls],
+        lights=[Constant(radiance=1.0)],
+        film=Film(width=8, height=8, mode="rgb", layers=DENOISING),
+        integrator=Path(light_paths=0, max_depth=200, rr_depth=1000),
+    )
+    np.testing.assert_allclose(layers_of(scene)["denoising_albedo"], 1.0, atol=1e-4)
+
+
+def test_nothing_is_seen_in_the_sky():
+    made = layers_of(dataclasses.replace(room(layers=LAYERS), shapes=[]), 4)
+    assert all(not values.any() for values in made.values())
+
+
+@pytest.mark.parametrize("how", [Aov(), Whitted(), ParticleTracer()])
+def test_integrators_without_layers_are_refused(how):
+    with pytest.raises(SceneError, match=r"film.layers: only the integrators auto, path, vcm"):
+        clpt.Renderer(room(how, layers="albedo"))
+
+
+def test_names_and_changes(scenes):
+    with pytest.raises(UnknownKindError, match=r"unknown layer 'normal'.*shading_normal"):
+        Film(layers=("normal",))
+    with clpt.Renderer(room(layers=("depth",))) as renderer:
+        with pytest.raises(SceneError, match="other layers need a new Renderer"):
+            renderer.update(scene=room(layers=("depth", "uv")))
+        renderer.run(2)
+        before = renderer.layers()["depth"]
+        camera = dataclasses.replace(renderer.scene.camera, fov=20.0)
+        renderer.update(camera=camera)
+        assert not renderer.layers()["depth"].any()
+        renderer.run(2)
+        assert (renderer.layers()["depth"] != before).any()
+
+
+def test_layers_are_saved_merged_and_written(tmp_path):
+    """In ranges of samples, by files, and to an .exr without a device: as in one render."""
+    scene = room(layers=LAYERS)
+    wanted = layers_of(scene, 20)
+    for first, end in ((0, 8), (8, 20)):
+        with clpt.Renderer(scene, first_sample=first) as renderer:
+            renderer.run(end - first)
+            renderer.save_state(tmp_path / f"{first}.film")
+    with clpt.Renderer(scene) as renderer:
+        renderer.load_state(tmp_path / "0.film")
+        renderer.run(12)
+        resumed = renderer.layers()
+    films = [str(tmp_path / f"{first}.film") for first in (0, 8)]
+    assert run(["merge", *films, "-o", str(tmp_path / "all.exr")]) == 0
+    written = images.read_layers(tmp_path / "all.exr")
+    for name, values in wanted.items():
+        np.testing.assert_array_equal(resumed[name], values)
+        for i, letter in enumerate(LAYERS[name].channels):
+            np.testing.assert_array_equal(written[f"{name}.{letter}"], values[..., i])
+
+
+def test_several_devices_have_the_layers_of_one():
+    devices = [dev.choose(threads=1), dev.choose(threads=1)]
+    with clpt.MultiRenderer(room(layers=DENOISING), devices) as renderer:
+        renderer.run(12)
+        together = renderer.layers()
+    alone = layers_of(room(layers=DENOISING), 12, device=dev.choose(threads=1))
+    for name in DENOISING:
+        np.testing.assert_array_equal(together[name], alone[name])
+
+
+def test_the_command_line_writes_layers(tmp_path, scenes, capsys):
+    path = tmp_path / "a.exr"
+    given = ["render", str(scenes / "cornell.xml"), "--size", "16x16", "--spp", "2"]
+    assert run([*given, "--layers", "depth,albedo", "-o", str(path)]) == 0
+    written = images.read_layers(path)
+    assert {"depth.Z", "albedo.R", "albedo.B"} <= written.keys()
+    assert 1.0 < np.median(written["depth.Z"]) < 4.0  # metres; a corner may see past the box
+    assert run([*given, "--layers", "height", "-o", str(path)]) == 2
+    assert "'height' is unknown" in capsys.readouterr().err
