@@ -252,7 +252,10 @@ def test_two_viewers_and_a_lost_socket(shown: Shown) -> None:
     shown.errors.clear()
     before = other.evaluate("clpt.picture.latest")
     drag(other, 60, 0)
-    shown.rest(before)
+    number = shown.rest(before)
+    wait(other, f"clpt.picture.header.rest && clpt.picture.latest >= {number}")
+    last = other.evaluate("clpt.picture.latest")  # each viewer gets a picture in its own time
+    wait(shown.page, f"clpt.picture.header.rest && clpt.picture.latest >= {last}")
     assert np.array_equal(shown.pixels(), np.asarray(_decoded(other.evaluate(PIXELS))))
     shown.page.evaluate("clpt.connection.socket.close()")  # it comes back by itself
     wait(shown.page, "clpt.connection.socket.readyState === 1")
