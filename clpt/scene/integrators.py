@@ -350,7 +350,9 @@ class Film(Kind):
     alpha: bool = host(
         False, "transparent: the camera sees no sky, and a fourth channel tells what is covered"
     )
-    layers: tuple[str, ...] = host((), f"beside the picture: any of {', '.join(LAYERS)}")
+    layers: tuple[str, ...] = host(
+        (), f"beside the picture: any of {', '.join(LAYERS)}", form="names"
+    )
 
     @property
     def size(self) -> tuple[int, int]:

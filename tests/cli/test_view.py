@@ -8,6 +8,7 @@ import socket
 import subprocess
 import sys
 import urllib.request
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -22,7 +23,8 @@ def test_it_prints_one_line_and_ends_by_ctrl_c(tmp_path):
     pytest.importorskip("websockets", reason="the extra clpt[view] is not installed")
     options = ["--no-browser", "--size", "16x12", "--mode", "rgb", "--quiet", "-o", str(tmp_path)]
     command = [sys.executable, "-m", "clpt", "view", CORNELL, *options]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+    heeds = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)  # a background job ignores it
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, preexec_fn=heeds) as process:
         assert process.stdout is not None
         line = process.stdout.readline()
         assert re.fullmatch(r"http://127\.0\.0\.1:\d+/\?token=[\w-]{43}\n", line)

@@ -43,12 +43,18 @@ def digest(renderer):
 
 
 def test_two_workers_are_one(two, expected):
-    told = []
+    for _ in range(10):  # until both had a block: one may be busy with what others run here
+        with ClusterRenderer(scene(), two.client) as renderer:
+            assert renderer.run(SAMPLES)
+            assert digest(renderer) == expected
+            took_part = len(renderer.workers)
+        if took_part == 2:
+            break
+    assert took_part == 2
     with ClusterRenderer(scene(), two.client) as renderer:
+        told = []
         assert renderer.run(SAMPLES, lambda progress: told.append(progress.samples))
-        assert digest(renderer) == expected
         assert renderer.samples == SAMPLES
-        assert len(renderer.workers) == 2
         assert sum(record.samples for record in renderer.workers.values()) == SAMPLES
         assert renderer.counts["samples"] == SAMPLES * 32 * 24
         assert told == sorted(told) and told[-1] == SAMPLES

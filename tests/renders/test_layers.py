@@ -34,6 +34,7 @@ from clpt.scene.shapes import Rectangle, Sphere
 
 FIRST = [name for name, layer in LAYERS.items() if not layer.denoising]
 DENOISING = ("denoising_albedo", "denoising_normal")
+FILTERED = ({"filter": Mitchell()}, {"filter": Mitchell(), "filtering": "importance"})
 RED, BLUE = (0.7, 0.2, 0.1), (0.1, 0.2, 0.6)
 
 
@@ -81,7 +82,10 @@ def test_a_spectral_albedo_is_the_colour_of_the_paint():
     np.testing.assert_allclose(spectral[-3:].mean(axis=(0, 1)), RED, atol=0.035)
 
 
-@pytest.mark.parametrize("how", [Path(light_paths=0), Path(light_paths=1), Vcm(), Direct(), Auto()])
+LONG = [pytest.param(how, marks=pytest.mark.slow) for how in (Vcm(), Direct(), Auto())]
+
+
+@pytest.mark.parametrize("how", [Path(light_paths=0), Path(light_paths=1), *LONG])
 def test_the_picture_has_the_same_bits(how):
     with clpt.Renderer(room(how)) as plain, clpt.Renderer(room(how, layers=LAYERS)) as layered:
         plain.run(6)
@@ -90,7 +94,7 @@ def test_the_picture_has_the_same_bits(how):
         assert plain.layers() == {} and list(layered.layers()) == list(LAYERS)
 
 
-@pytest.mark.parametrize("film", [{}, {"filter": Mitchell()}, {"filtering": "importance"}])
+@pytest.mark.parametrize("film", [{}, *(pytest.param(f, marks=pytest.mark.slow) for f in FILTERED)])
 def test_layers_have_the_same_bits_however_they_are_rendered(film):
     scene = room(Path(light_paths=1), layers=LAYERS, **film)
     once = layers_of(scene, 70)

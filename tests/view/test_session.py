@@ -227,7 +227,16 @@ CAMERAS = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("camera", CAMERAS, ids=lambda camera: camera.kind)
+QUICK = ("perspective", "thin_lens")
+
+
+@pytest.mark.parametrize(
+    "camera",
+    [
+        pytest.param(camera, marks=() if camera.kind in QUICK else pytest.mark.slow, id=camera.kind)
+        for camera in CAMERAS
+    ],
+)
 def test_a_pixel_alone_is_that_pixel(camera, on) -> None:
     """The position that the window of one pixel sees is the one in the whole film."""
     if not isinstance(camera, cameras.Matrix):
