@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from .. import output_files
+from ..cluster.cluster_renderer import ClusterRenderer
 from ..errors import MemoryBudgetError, SceneError
 from ..render import film_file
 from ..render.saved_film import SavedFilm, differences_text, ranges_text
@@ -21,6 +22,7 @@ from .scene_options import AnyRenderer
 SUFFIX = ".resume.exr"
 PERIOD = 300.0  # seconds from one checkpoint to the next
 PATIENCE = 600.0  # seconds of a render after which it has checkpoints unasked
+Saving = AnyRenderer | ClusterRenderer
 ADVICE = "render that again, or begin anew with --no-resume"
 
 
@@ -69,24 +71,28 @@ def refuse(differences: list[str], path: Path) -> None:
         raise SceneError(f"{message}; {ADVICE}", file=path)
 
 
-def check(saved: SavedFilm, path: Path, plan: Scene, first: int, end: int | None) -> None:
+def check(
+    saved: SavedFilm, path: Path, plan: Scene, first: int, end: int | None, *, gaps: bool = False
+) -> None:
     """Raise SceneError for a film of another scene, or of other samples than those from `first` on.
 
-    end: of samples that are asked for, where no more are allowed; else None.
+    end: of samples that are asked for, where no more are allowed; else None. gaps: whether samples
+    may be missing, as workers of a cluster leave them.
     """
     refuse(saved.origin.scene.differences(fingerprint(plan)), path)
     taken = saved.film.taken
     if not taken:
         return
-    if len(taken) > 1 or taken[0][0] != first:
-        message = f"it has samples {ranges_text(taken)}, not those from {first} on; {ADVICE}"
+    if taken[0][0] < first if gaps else len(taken) > 1 or taken[0][0] != first:
+        can = "; --cluster local:1 takes those that are missing" if taken[0][0] >= first else ""
+        message = f"it has samples {ranges_text(taken)}, not those from {first} on{can}; {ADVICE}"
         raise SceneError(message, file=path)
-    if end is not None and taken[0][1] > end:
+    if end is not None and taken[-1][1] > end:
         message = f"it has samples {ranges_text(taken)}, more than to {end - 1}; {ADVICE}"
         raise SceneError(message, file=path)
 
 
-def go_on(renderer: AnyRenderer, saved: SavedFilm, path: Path, note: Callable[[str], None]) -> None:
+def go_on(renderer: Saving, saved: SavedFilm, path: Path, note: Callable[[str], None]) -> None:
     """Let a renderer go on from a film, and say so. Raises SceneError, which says what differs."""
     known = len(renderer.warnings)
     refuse(saved.origin.differences(renderer.origin()), path)
@@ -108,7 +114,7 @@ class Checkpoints:
 
     def __init__(
         self,
-        renderer: AnyRenderer,
+        renderer: Saving,
         path: Path,
         period: float | None,
         resumed: bool,
@@ -139,13 +145,14 @@ class Checkpoints:
         self._due = time.monotonic() + self._period
         self._begin_to_write()
 
-    def save(self, stopped: bool) -> None:
+    def save(self, stopped: bool, *, failed: bool = False) -> None:
         """Write the film of the last whole pass, if it stays.
 
-        stopped: whether a signal ended the render: then it stays too where checkpoints had begun.
+        stopped: whether a signal ended the render: then it stays too where checkpoints had begun;
+        failed: whether an error did: then it stays.
         """
         self._wait()
-        if self._keep or (stopped and self._written):
+        if self._keep or (stopped and self._written) or failed:
             self._begin_to_write()
             self._wait()
         self._tell_failure()

@@ -11,7 +11,7 @@ from .. import __version__
 from ..errors import SceneError
 from ..render import film_file
 from ..render.host_picture import HostPicture
-from ..render.saved_film import SavedFilm
+from ..render.saved_film import SavedFilm, other_devices
 from . import checkpoints, outputs
 from .grading import grading, grading_options
 
@@ -39,7 +39,7 @@ def merge(films: tuple[Path, ...], paths: tuple[Path, ...], quiet: bool, **grade
             click.echo(text, err=True)
 
     total = added(films)
-    for change in total.other_devices(total.sessions[0].device):
+    for change in other_devices(total.sessions, total.sessions[0].device):
         note(f"clpt: warning: the films are of several classes of devices: {change}")
     made = HostPicture(total)
     origin = total.origin.scene.values

@@ -20,6 +20,7 @@ from ..formats import load
 from ..render.lowering.checks import check
 from ..render.progress import Progress
 from ..render.renderer import MOST_SAMPLES
+from ..render.saved_film import SavedFilm
 from ..scene import Scene
 from . import checkpoints, outputs
 from .display import Display
@@ -55,6 +56,9 @@ def render_on_cluster(
     keys: Path | None,
     limit: float | None,
     graded: Grading,
+    numbers: tuple[int, int] | None,
+    period: float | None,
+    saved: SavedFilm | None,
     device: str | None,
     threads: int | None,
     variables: dict[str, Any],
@@ -64,8 +68,9 @@ def render_on_cluster(
 ) -> int:
     """Render a scene on the workers at an address; return the exit status.
 
-    limit [s]: of the whole command. Raises ClusterError when the cluster is lost, after the picture
-    so far is written.
+    limit [s]: of the whole command; numbers: first and end of the samples to take; period: of
+    checkpoints, see `Checkpoints`; saved: to go on from. Raises ClusterError when the cluster is
+    lost, after the picture so far and the film are written.
     """
     began = time.perf_counter()
     if options["noise"]:
@@ -75,42 +80,57 @@ def render_on_cluster(
         loaded = load(scene, progress=tell, missing_textures=missing_textures, **variables)
     plan = dataclasses.replace(changed(loaded, spp=spp, **options), noise=None)
     outputs.check_contents(targets, plan)
+    saved_at, (first, end) = checkpoints.path_of(targets[0]), numbers or (0, None)
+    if saved is not None:
+        checkpoints.check(saved, saved_at, plan, first, end, gaps=True)
     check(plan)
     for warning in plan.warnings:
         shown.note(f"clpt: warning: {warning}")
-    samples = plan.spp if spp is None and limit is None else spp or MOST_SAMPLES
+    wanted = plan.spp if spp is None and limit is None else spp or MOST_SAMPLES
+    wanted = wanted if end is None else end - first
     chosen = {name: value for name, value in given.items() if value is not None}
     with _connected(where, keys, device, threads, shown) as client, stops() as stopped:
         local = device if where.startswith("local:") else None
-        with ClusterRenderer(plan, client, device=local, **chosen) as renderer:
+        with ClusterRenderer(plan, client, device=local, first_sample=first, **chosen) as renderer:
+            if saved is not None:
+                checkpoints.go_on(renderer, saved, saved_at, shown.note)
+                taken = saved.film.taken  # also what is missing before its last one
+                wanted = max(wanted, taken[-1][1] - first if taken else 0)
+            former, missing = renderer.counts, wanted - renderer.samples
+            writer = checkpoints.Checkpoints(
+                renderer, saved_at, period, saved is not None, targets, shown.note
+            )
             ready = time.perf_counter()
             shown.limit = None if limit is None else max(began + limit - ready, 0.0)
             watch = _Watch(renderer, shown)
 
             def tell_progress(progress: Progress) -> bool:
                 watch.look()
-                total = 0 if samples == MOST_SAMPLES else progress.total
-                shown.show(dataclasses.replace(progress, total=total))
+                writer.after_pass()
+                total = 0 if wanted == MOST_SAMPLES else progress.total
+                paths = progress.paths - former["samples"]
+                rays = progress.rays - former["rays"]
+                shown.show(dataclasses.replace(progress, total=total, paths=paths, rays=rays))
                 over = limit is not None and time.perf_counter() - began >= limit
                 return not (stopped or over)
 
             error: ClusterError | None = None
             try:
-                with shown.rendering():
-                    renderer.run(samples, tell_progress)
+                if missing > 0:
+                    with shown.rendering():
+                        renderer.run(missing, tell_progress)
             except ClusterError as lost:
                 error = lost
             watch.report()
             seconds = time.perf_counter() - ready
+            renderer.hold()
+            writer.save(bool(stopped), failed=error is not None)
             if renderer.samples:
                 _write(renderer, plan, scene, targets, graded, seconds, shown.note)
             elif error is None:
                 raise ClusterError("no worker sent anything in this time")
+            writer.finish(bool(stopped) or error is not None)
             if error is not None:
-                saved_at = checkpoints.path_of(targets[0])
-                if renderer.samples:
-                    renderer.save_state(saved_at)
-                    shown.note(f"{saved_at}  clpt render goes on from it, without --cluster")
                 raise error
     return STATUS + stopped[0] if stopped else 0
 
@@ -145,6 +165,7 @@ class _Watch:
         self._renderer, self._shown = renderer, shown
         self._known: set[str] = set()
         self._refused: set[str] = set()
+        self._warned = 0
 
     def look(self) -> None:
         """Note what has changed since the last look."""
@@ -155,7 +176,10 @@ class _Watch:
             self._shown.note(f"clpt: warning: {name} is gone; others render its samples")
         for name in sorted(workers.keys() - self._known):
             self._shown.note(f"{name} renders")
+        for warning in self._renderer.warnings[self._warned :]:
+            self._shown.note(f"clpt: warning: {warning}")
         self._known, self._refused = set(workers), set(refused)
+        self._warned = len(self._renderer.warnings)
 
     def report(self) -> None:
         """Note what each worker has done."""
@@ -187,7 +211,8 @@ def _write(
     stats["spp"] = counts["samples"] / pixels / max(len(local.channels), 1)
     kinds = {record.kind for record in renderer.workers.values()}
     stats["device"] = "; ".join(sorted(kinds)) or stats["device"]
-    outputs.write_all(targets, local, stats, graded, tell)
+    stats["seconds"] = round(seconds + renderer.former_seconds, 3)
+    outputs.write_all(targets, renderer, stats, graded, tell)
     if counts["rejected"]:
         tell(
             f"clpt: warning: {counts['rejected']} samples were not finite, or too bright, and "

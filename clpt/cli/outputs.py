@@ -11,6 +11,7 @@ from pathlib import Path
 from clpt.render.aov_preview import sheet
 
 from .. import __version__, images, output_files, spectral_exr
+from ..cluster.cluster_renderer import ClusterRenderer
 from ..errors import SceneError
 from ..render import film_file
 from ..render.host_picture import HostPicture
@@ -23,7 +24,7 @@ from .grading import Grading
 from .scene_options import AnyRenderer
 
 FILM = ".film"  # suffix of films, which hold all that a picture was made of
-Source = AnyRenderer | HostPicture  # what pictures are taken of
+Source = AnyRenderer | ClusterRenderer | HostPicture  # what pictures are taken of
 
 AOV_FORMATS = (".exr", ".png", FILM)
 BAND_FORMATS = (".npy", ".exr")  # with all bands; others get the colours

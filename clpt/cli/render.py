@@ -178,14 +178,13 @@ def render(
         raise click.UsageError("--samples says how many there are; leave out --spp and --noise")
     shown = display_of(quiet, limit)
     began = time.perf_counter()
-    if cluster is not None:
-        if numbers or period is not None or resume is not None:
-            raise click.UsageError("not with --cluster yet: --samples, --checkpoint, --resume")
-        return render_on_cluster(
-            scene, targets, shown, cluster, keys=keys, limit=limit, graded=graded, **options
-        )
     saved_at = checkpoints.path_of(targets[0])
     saved = checkpoints.find(saved_at, resume, shown.note)
+    if cluster is not None:
+        return render_on_cluster(
+            scene, targets, shown, cluster, keys=keys, limit=limit, graded=graded, numbers=numbers,
+            period=period, saved=saved, **options,
+        )  # fmt: skip
     first, end = numbers or (0, None)
 
     def accept(plan: Scene) -> None:

@@ -83,10 +83,10 @@ class _Flight:
 class Blocks:
     """The samples of a render: done, handed out, and left.
 
-    taken: ranges that are done; end: the number after the last sample, which `extend` may raise;
-    seconds: what a block should take; least_seconds: what it should at the end too; check_every: of
-    the blocks, one in so many is done by two workers and compared, beside the first block of each
-    worker that has an equal; 0: none.
+    taken: ranges that are done; first: the number of the first sample; end: that after the last
+    one, which `extend` may raise; seconds: what a block should take; least_seconds: what it should
+    at the end too; check_every: of the blocks, one in so many is done by two workers and compared,
+    beside the first block of each worker that has an equal; 0: none.
     copies: of a block that workers do at a time, at most; 1 where a film cannot be dropped.
 
     counts of what went wrong: lost (blocks of workers that are gone), repeated (blocks that a
@@ -102,6 +102,7 @@ class Blocks:
         seconds: float = 1.0,
         check_every: int = 0,
         copies: int = COPIES,
+        first: int = 0,
     ):
         self.taken, self.end = taken, end
         self.seconds, self.check_every, self.copies = seconds, check_every, copies
@@ -109,7 +110,7 @@ class Blocks:
         self.workers: dict[Worker, WorkerRecord] = {}
         self.refused: dict[Worker, str] = {}
         self.lost = self.repeated = self.dropped = 0
-        self._free = _gaps(taken, 0, end)
+        self._free = _gaps(taken, first, end)
         self._flights: dict[int, _Flight] = {}
         self._again: list[_Flight] = []  # blocks that came back
         self._numbers = 0

@@ -18,6 +18,7 @@ from clpt.cluster.blocks import Block, Blocks, Outcome
 from clpt.cluster.bundle import Bundle
 from clpt.errors import ClusterError
 from clpt.render.wavefront.film_state import FilmState
+from clpt.scene.fingerprint import Plain
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -38,10 +39,15 @@ GONE = "the scheduler is gone"
 
 @dataclass(frozen=True)
 class Film:
-    """What a worker sent; counts: samples, rays, rejected, full."""
+    """What a worker sent.
+
+    counts: samples, rays, rejected, full; whole: whether all pixels have the samples of its ranges,
+    as they have unless a stop cut the block.
+    """
 
     state: FilmState
     counts: dict[str, int]
+    whole: bool = True
 
 
 class Feeder:
@@ -61,6 +67,7 @@ class Feeder:
         self.loop: asyncio.AbstractEventLoop = client.loop.asyncio_loop
         self._serving: dict[str, asyncio.Task[None]] = {}
         self._changed = asyncio.Event()
+        self.classes: dict[str, dict[str, Plain]] = {}  # of devices, by what they are called
         self.film_seconds = 0.0  # in which a film comes in, beside others
         self._stopping = self._ended = False
         self._kind = ""
@@ -198,6 +205,7 @@ class Feeder:
             if kind != self._kind:
                 reason = f"it is of another class of device: {kind}, others: {self._kind}"
         if reason is None:
+            self.classes[kind] = dict(reply.get("class", {}))
             log.info("the worker %s is ready in %.2f s: %s", address, reply["seconds"], kind)
             return kind
         self._refuse(address, reason)
@@ -256,7 +264,7 @@ class Feeder:
         )  # fmt: skip
         if outcome is Outcome.ADD:
             counts = {name: int(reply[name]) for name in ("samples", "rays", "rejected", "full")}
-            self.films.put(Film(state, counts))
+            self.films.put(Film(state, counts, bool(reply["whole"])))
 
     def _check(self, state: FilmState, block: Block) -> None:
         """Raise ClusterError for a film that is not of a block."""

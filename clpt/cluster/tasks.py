@@ -95,8 +95,8 @@ def open_job(job: str, files: dict[str, bytes]) -> Reply:
     """Open a job's scene, so that its blocks can be rendered.
 
     job: from `describe_job`; files: contents by digest, to keep. Returns "lacks", digests of files
-    that are needed; or "kind", the class of this device, and "device", its name, and the seconds
-    that it took; or "refused", why this worker cannot take part.
+    that are needed; or "kind", the class of this device, "class", the same by names, "device", what
+    it is called, and the seconds that it took; or "refused", why this worker cannot take part.
     """
     try:
         return _open_job(job, files)
@@ -131,6 +131,7 @@ def _open_job(job: str, files: dict[str, bytes]) -> Reply:
     seconds = time.perf_counter() - began
     return {
         "kind": device_class(_open[digest].renderer),
+        "class": _open[digest].renderer.device_class(),
         "device": on.info.label,
         "seconds": seconds,
     }

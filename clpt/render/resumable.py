@@ -19,7 +19,14 @@ from clpt.render.editing.scene_edit import resolve_device_arrays
 from clpt.render.layers import white_paper
 from clpt.render.locking import synchronized
 from clpt.render.pictures import Pictures
-from clpt.render.saved_film import Origin, PictureForm, SavedFilm, Session
+from clpt.render.saved_film import (
+    Origin,
+    PictureForm,
+    SavedFilm,
+    Session,
+    classes_text,
+    other_devices,
+)
 from clpt.render.wavefront.adaptive import Adaptive
 from clpt.render.wavefront.film_state import FilmState, Ranges
 from clpt.scene import Scene
@@ -190,10 +197,9 @@ class Resumable(Pictures):
                 setattr(one.counts, name, number)
         self._begin_anew()
         self._taken, self._adaptive, self._sessions = saved.film.taken, adaptive, saved.sessions
-        others = saved.other_devices(self.device_class())
+        others = other_devices(saved.sessions, self.device_class())
         if others:
-            message = "samples of several classes of devices are in one film: "
-            self.warnings.append(message + "; ".join(others))
+            self.warnings.append(classes_text(others))
             log.warning("%s", self.warnings[-1])
 
     def _progress_so_far(self) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -103,15 +103,6 @@ class SavedFilm:
         """How long all sessions have rendered."""
         return sum(session.seconds for session in self.sessions)
 
-    def other_devices(self, device: Mapping[str, Plain]) -> list[str]:
-        """Return how devices that took its samples differ from another one, perhaps nothing."""
-        named: dict[str, None] = {}
-        for session in self.sessions:
-            for name, value in session.device.items():
-                if value != device.get(name):
-                    named[f"{name}: {value} -> {device.get(name)}"] = None
-        return list(named)
-
     def merged(self, other: SavedFilm) -> SavedFilm:
         """Return the film of the samples of both.
 
@@ -129,6 +120,21 @@ class SavedFilm:
             sessions=(*self.sessions, *other.sessions),
             adaptive={},
         )
+
+
+def other_devices(sessions: Iterable[Session], device: Mapping[str, Plain]) -> list[str]:
+    """Return how devices that took a film's samples differ from another one, perhaps nothing."""
+    named: dict[str, None] = {}
+    for session in sessions:
+        for name, value in session.device.items():
+            if value != device.get(name):
+                named[f"{name}: {value} -> {device.get(name)}"] = None
+    return list(named)
+
+
+def classes_text(others: list[str]) -> str:
+    """Return a warning of devices that differ, from `other_devices`."""
+    return "samples of several classes of devices are in one film: " + "; ".join(others)
 
 
 def differences_text(differences: list[str]) -> str:
