@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from .. import device as dev
 from ..cluster import keys as cluster_keys
 from ..cluster import processes
 from ..cluster.cluster_renderer import ClusterRenderer
@@ -90,7 +91,8 @@ def render_on_cluster(
     wanted = wanted if end is None else end - first
     chosen = {name: value for name, value in given.items() if value is not None}
     with _connected(where, keys, device, threads, shown) as client, stops() as stopped:
-        local = device if where.startswith("local:") else None
+        several = not where.startswith("local:") or dev.names_several(device)
+        local = None if several else device  # one device makes the picture
         with ClusterRenderer(plan, client, device=local, first_sample=first, **chosen) as renderer:
             if saved is not None:
                 checkpoints.go_on(renderer, saved, saved_at, shown.note)

@@ -11,7 +11,10 @@ from .verbosity import verbose_option
 
 @click.command()
 @click.argument("address")
-@click.option("--device", metavar="NAME-OR-INDEX", help="Where to render: see `clpt devices`.")
+@click.option(
+    "--device", metavar="NAME-OR-INDEX",
+    help="Where to render: see `clpt devices`; all, gpu, or several as 0,2.",
+)  # fmt: skip
 @click.option("--threads", type=click.IntRange(1), help="Cores of a CPU to use, at most.")
 @click.option("--host", metavar="ADDRESS", help="Address of this machine for the others.")
 @click.option(
@@ -32,14 +35,15 @@ def worker(
 ) -> int:
     """Render for the scheduler at ADDRESS, such as tls://192.168.1.5:8786, until it ends.
 
-    A worker renders with one device; start one for each. It runs nothing but clpt.
+    It renders with one device, or with several: --device all, gpu, or 0,2. It runs nothing but
+    clpt.
     """
     from ..cluster import processes, tasks
 
-    info = tasks.choose_device(device, threads).info
+    chosen = " and ".join(on.info.label for on in tasks.choose_devices(device, threads))
 
     def tell(text: str) -> None:
         if not quiet:
-            click.echo(f"{text}, on {info.label}", err=True)
+            click.echo(f"{text}, on {chosen}", err=True)
 
     return processes.run_worker(address, host=host, folder=keys, name=name, tell=tell)

@@ -31,6 +31,7 @@ from clpt.render.wavefront.wavefront import Counts, Wavefront
 from clpt.render.wavefront.work_list import PixelIndices
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
+from clpt.scene.fingerprint import Plain
 from clpt.scene.materials import Material
 
 if TYPE_CHECKING:
@@ -143,6 +144,16 @@ class MultiRenderer(MultiResumable):
         """The devices that have not failed."""
         return tuple(worker.renderer.device for worker in self._crew.workers)
 
+    def device_class(self) -> dict[str, Plain]:
+        """Return what decides the last bits of samples, of all devices; see `Renderer`."""
+        first = self._crew.first.renderer.device_class()
+        each = [worker.renderer.device_class() for worker in self._crew.workers]
+        for name in first:
+            values = list(dict.fromkeys(str(one[name]) for one in each))
+            if len(values) > 1:
+                first[name] = " and ".join(values)
+        return first
+
     @property
     def shares(self) -> tuple[DeviceShare, ...]:
         """What each device has done so far, those that failed last."""
@@ -233,13 +244,15 @@ class MultiRenderer(MultiResumable):
         """Let the `run` of another thread, or else the next one, stop soon and return False."""
         self._stop.set()
 
-    def reset(self, *, seed: int | None = None) -> None:
+    def reset(self, *, seed: int | None = None, first_sample: int | None = None) -> None:
         """Empty the film; the next sample is the first one again; see `Renderer.reset`."""
         with self._lock:
             self._check_open()
             self._on_each(lambda renderer: renderer.reset(seed=seed).wait())
             self._forget()
             self._crew.clear_counts()
+            if first_sample is not None:
+                self._first_sample = first_sample
 
     def update(
         self,

@@ -20,6 +20,7 @@ import numpy as np
 
 from clpt import device as dev
 from clpt.cluster.bundle import Bundle, Store, canonical
+from clpt.cluster.multi_renderer import MultiRenderer
 from clpt.errors import ClptError, ClusterError, MemoryBudgetError
 from clpt.render.renderer import Renderer
 from clpt.render.resumable import kernels_digest
@@ -44,18 +45,23 @@ FORMS = {"words": 5, "bands": 5, "layers": 3}  # of a film: dimensions of its ar
 class _Job:
     """A renderer of a job's scene, kept between tasks."""
 
-    def __init__(self, scene: Scene, on: dev.Device, options: dict[str, Any]):
-        self.renderer = Renderer(scene, on, **options)
+    def __init__(self, scene: Scene, devices: list[dev.Device], options: dict[str, Any]):
+        self.renderer: Renderer | MultiRenderer = (
+            MultiRenderer(scene, devices, **options)
+            if len(devices) > 1
+            else Renderer(scene, devices[0], **options)
+        )
 
     def block(self, first: int, end: int, wanted: Callable[[], bool]) -> Reply:
         """Render samples first to end - 1 of every pixel; a film and what it took."""
         began, renderer = time.perf_counter(), self.renderer
         renderer.reset(first_sample=first)
-        before = [replace(wavefront.counts) for wavefront in renderer.wavefronts]
+        before = [replace(counts) for counts in renderer.counts]
         whole = renderer.run(end - first, lambda _: wanted())
         state = renderer.film_state()
-        after = [wavefront.counts for wavefront in renderer.wavefronts]
-        pairs = list(zip(before, after, strict=True))
+        if not whole:
+            state = replace(state, taken=((first, end),))
+        pairs = list(zip(before, renderer.counts, strict=True))
         return {
             **state_to_arrays(state),
             "whole": whole,
@@ -67,10 +73,17 @@ class _Job:
         }
 
 
-def choose_device(which: str | int | None, threads: int | None = None) -> dev.Device:
-    """Settle where this worker renders; return that. Raises DeviceError."""
+def choose_devices(which: str | None, threads: int | None = None) -> list[dev.Device]:
+    """Settle where this worker renders; return its devices. Raises DeviceError."""
     _device.update(which=which, threads=threads)
-    return dev.choose(which, threads=threads)
+    return _devices()
+
+
+def _devices() -> list[dev.Device]:
+    which, threads = _device["which"], _device["threads"]
+    if dev.names_several(which):
+        return dev.choose_all(which, threads=threads)
+    return [dev.choose(which, threads=threads)]
 
 
 def describe_job(bundle: Bundle, options: dict[str, Any]) -> str:
@@ -118,7 +131,7 @@ def _open_job(job: str, files: dict[str, bytes]) -> Reply:
         raise ClusterError("the job has unknown options")
     digest = digest_of(job)
     _stopped.discard(digest)
-    on = dev.choose(_device["which"], threads=_device["threads"])
+    devices = _devices()
     if digest not in _open:
         for one in files:
             store.add(one, files[one])
@@ -126,28 +139,34 @@ def _open_job(job: str, files: dict[str, bytes]) -> Reply:
         if lacks:
             return {"lacks": lacks}
         with store.opened(bundle) as scene:
-            _open_renderer(digest, scene, on, options)
+            _open_renderer(digest, scene, devices, options)
     _open[digest] = _open.pop(digest)
     seconds = time.perf_counter() - began
     return {
         "kind": device_class(_open[digest].renderer),
         "class": _open[digest].renderer.device_class(),
-        "device": on.info.label,
+        "device": " and ".join(on.info.label for on in devices),
         "seconds": seconds,
     }
 
 
-def _open_renderer(digest: str, scene: Scene, on: dev.Device, options: dict[str, Any]) -> None:
+def _open_renderer(
+    digest: str, scene: Scene, devices: list[dev.Device], options: dict[str, Any]
+) -> None:
     """Make a job's renderer; the jobs that were used longest ago make room for it."""
     while len(_open) >= MOST_OPEN:
         _close_oldest()
     while True:
         try:
             with ExitStack() as resources:
-                spare = min(dev.spare_cores(), (_device["threads"] or on.info.compute_units) - 1)
-                if spare and on.info.compiles_singly:
-                    on.compilers = resources.enter_context(dev.Compilers(spare))
-                job = _Job(scene, on, options)
+                slow = [on for on in devices if on.info.compiles_singly]
+                units = [_device["threads"] or on.info.compute_units for on in slow]
+                spare = min([dev.spare_cores(), *(number - 1 for number in units)])
+                if slow and spare > 0:
+                    compilers = resources.enter_context(dev.Compilers(spare))
+                    for on in slow:
+                        on.compilers = compilers
+                job = _Job(scene, devices, options)
                 job.renderer.prepare()
         except MemoryBudgetError:
             if not _open:
@@ -155,7 +174,8 @@ def _open_renderer(digest: str, scene: Scene, on: dev.Device, options: dict[str,
             _close_oldest()
             continue
         finally:
-            on.compilers = None
+            for on in devices:
+                on.compilers = None
         _open[digest] = job
         return
 
@@ -228,7 +248,7 @@ def film_digest(state: FilmState) -> str:
     return hashed.hexdigest()
 
 
-def device_class(renderer: Renderer) -> str:
+def device_class(renderer: Renderer | MultiRenderer) -> str:
     """Return what decides the last bits of a film beside its scene.
 
     Device, driver, lanes and trees; and what was chosen to suit the device, such as how many texels

@@ -160,6 +160,57 @@ def test_a_worker_that_is_wrong_is_refused(how, two, expected):
         two.end(third)
 
 
+TWO_DEVICES = "tasks._devices = lambda: [dev.choose(threads=1), dev.choose(threads=1)]"
+FAILS = """
+from clpt.cluster import crew
+whole, numbers = crew.DeviceWorker.do, iter(range(10**9))
+def do(self, job, first, end, on_batch):
+    if self.name.endswith("#2") and next(numbers) == 2:
+        open({path!r}, "w").close()
+        raise RuntimeError("the card is gone")
+    return whole(self, job, first, end, on_batch)
+crew.DeviceWorker.do = do
+"""
+
+
+@pytest.mark.parametrize("more", ["", FAILS], ids=["both", "one fails"])
+def test_a_worker_with_two_devices(more, two, expected, tmp_path):
+    """Beside workers with one, with which its films are compared: to the bit."""
+    gone, more = tmp_path / "gone", more.format(path=str(tmp_path / "gone"))
+    third = two.start(
+        f"from clpt import device as dev\nfrom clpt.cluster import tasks\n{TWO_DEVICES}\n{more}"
+    )
+    known = set(two.client.nthreads())
+    two.wait(3)
+    [third_address] = set(two.client.nthreads()) - known
+    try:
+        with ClusterRenderer(scene(), two.client, check_every=1) as renderer:
+            assert renderer.run(SAMPLES)
+            assert digest(renderer) == expected
+            while third_address not in renderer.workers:
+                assert renderer.run(1)
+            assert renderer.workers[third_address].kind in {
+                record.kind for name, record in renderer.workers.items() if name in known
+            }
+            for _ in range(10):
+                assert renderer.run(1000)
+                if renderer.workers[third_address].samples and gone.exists() == bool(more):
+                    break
+            assert renderer.workers[third_address].samples > 0
+            assert renderer.workers[third_address].failures == 0
+            assert gone.exists() == bool(more)
+            before = renderer.samples
+            assert digest(renderer) == digest_of_one_process(before)
+            stops = iter((True, False))
+            assert not renderer.run(10**6, lambda progress: next(stops, False))
+            assert not renderer.refused
+            renderer.hold()
+            held = renderer.saved_film(held=True).film
+            assert held.samples.max() == held.samples.min() >= before
+    finally:
+        two.end(third)
+
+
 def test_no_worker_that_can(two):
     plan = scene()
     with ClusterRenderer(plan, two.client) as renderer:
