@@ -20,6 +20,7 @@ from machines import ENVIRONMENT, LONGEST, ROOT, machines, wait_until  # noqa: E
 from machines import scene as box  # noqa: E402
 
 from clpt.__main__ import run  # noqa: E402
+from clpt.cluster import processes  # noqa: E402
 from clpt.cluster.cluster_renderer import ClusterRenderer  # noqa: E402
 from clpt.cluster.tasks import film_digest  # noqa: E402
 from clpt.render import film_file  # noqa: E402
@@ -168,3 +169,35 @@ def test_a_client_that_ends_goes_on(how, hub, folder, capsys):
     assert "of the pixels have a sample" not in capsys.readouterr().err
     assert film_file.read(SAVED).film.taken == ((0, last + 10),)
     np.testing.assert_array_equal(np.load("a.npy"), whole(last + 10))
+
+
+@pytest.mark.slow
+def test_a_lost_scheduler(hub, folder, capsys):
+    """The command ends with a message and the film, also without checkpoints; it goes on."""
+    command = [sys.executable, "-m", "clpt", "cluster", "start", "--port", "0"]
+    more = {"env": ENVIRONMENT, "stderr": subprocess.DEVNULL, "text": True}
+    scheduler = subprocess.Popen(command, stdout=subprocess.PIPE, **more)
+    ended = [scheduler]
+    try:
+        address = scheduler.stdout.readline().strip()
+        ended.append(processes.start_worker(address, "--threads", "1", env=ENVIRONMENT))
+        command = [sys.executable, "-m", "clpt", "render", BOX, *COMMON, "--spp", "1000000"]
+        client = subprocess.Popen(
+            [*command, "--cluster", address, "--checkpoint", "0"], cwd=folder,
+            **more | {"stderr": subprocess.PIPE},
+        )  # fmt: skip
+        ended.append(client)
+        lines = [client.stderr.readline()]
+        while "samples/s" not in lines[-1] or lines[-1].startswith("0/"):
+            lines.append(client.stderr.readline())
+            assert lines[-1], lines
+        scheduler.kill()
+        told = client.communicate(timeout=LONGEST)[1]
+    finally:
+        processes.end(ended)
+    assert client.returncode == 2, told
+    assert "scheduler is gone" in told and f"{SAVED}  --resume goes on from it" in told
+    last = film_file.read(SAVED).film.taken[-1][1]
+    assert render("--spp", str(last + 5), "--cluster", hub.address, "--resume") == 0
+    assert "of the pixels have a sample" not in capsys.readouterr().err
+    np.testing.assert_array_equal(np.load("a.npy"), whole(last + 5))
