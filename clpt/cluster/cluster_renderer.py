@@ -360,6 +360,11 @@ class ClusterRenderer:
         return self._here.form
 
     @property
+    def channels(self) -> tuple[str, ...]:
+        """Of the `aov` integrator, else none."""
+        return self.form.channels
+
+    @property
     def is_adaptive(self) -> bool:
         """False: all pixels have the same number of samples."""
         return False
