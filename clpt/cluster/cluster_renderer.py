@@ -21,7 +21,7 @@ from clpt.cluster.blocks import Blocks, WorkerRecord
 from clpt.cluster.bundle import pack
 from clpt.cluster.feeding import Feeder, Film
 from clpt.errors import ClusterError, SceneError
-from clpt.render import film_file
+from clpt.render.film_keeping import FilmKeeping
 from clpt.render.options import check_options, check_scene
 from clpt.render.pictures import Image
 from clpt.render.progress import Progress
@@ -93,7 +93,7 @@ class _Sum:
         return Counts(samples=samples, closest=rays, rejected=rejected, full=full)
 
 
-class ClusterRenderer:
+class ClusterRenderer(FilmKeeping):
     """Renders a scene on the workers of a cluster, with the methods of `Renderer`.
 
     client: of Dask, of any cluster whose workers have clpt installed. mixed: whether workers of
@@ -399,22 +399,6 @@ class ClusterRenderer:
         self._here.reset()
         self._developed = None
         return self._here.film_state()
-
-    def save_state(self, path: str | Path) -> None:
-        """Write the film to a file, see `Renderer.save_state`."""
-        saved = self.saved_film()
-        try:
-            film_file.write(path, saved)
-        except OSError as error:
-            raise SceneError(f"cannot be written: {error}", file=path) from error
-
-    def load_state(self, path: str | Path) -> None:
-        """Go on from a file of `save_state`, of any renderer, see `Renderer.load_state`."""
-        saved = film_file.read(path)
-        try:
-            self.restore(saved)
-        except SceneError as error:
-            raise SceneError(error.message, file=path) from None
 
     def restore(self, saved: SavedFilm) -> None:
         """Go on from a saved film, as `load_state` does. Raises SceneError.

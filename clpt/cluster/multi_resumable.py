@@ -5,12 +5,11 @@ from __future__ import annotations
 import dataclasses
 from abc import abstractmethod
 from collections.abc import Callable
-from pathlib import Path
 from typing import TypeVar
 
 from clpt.cluster.device_worker import DeviceWorker
 from clpt.errors import SceneError
-from clpt.render import film_file
+from clpt.render.film_keeping import FilmKeeping
 from clpt.render.pictures import Pictures
 from clpt.render.saved_film import Origin, PictureForm, SavedFilm, Session
 from clpt.render.wavefront.adaptive import Adaptive
@@ -20,7 +19,7 @@ from clpt.render.wavefront.wavefront import Counts
 _Result = TypeVar("_Result")
 
 
-class MultiResumable(Pictures):
+class MultiResumable(FilmKeeping, Pictures):
     """Base of renderers on several devices whose film can be saved.
 
     The first device stands for all: its film then holds the whole picture, and its renderer knows
@@ -97,18 +96,6 @@ class MultiResumable(Pictures):
 
         saved = self._on_first(save)
         return dataclasses.replace(saved, counts=tuple(dict(vars(one)) for one in self.counts))
-
-    def save_state(self, path: str | Path) -> None:
-        """Write the film to a file, from which `load_state` goes on; see `Renderer.save_state`."""
-        film_file.write(path, self.saved_film())
-
-    def load_state(self, path: str | Path) -> None:
-        """Go on from a file of `save_state`, of one device or several; see `Renderer`."""
-        saved = film_file.read(path)
-        try:
-            self.restore(saved)
-        except SceneError as error:
-            raise SceneError(error.message, file=path) from None
 
     def restore(self, saved: SavedFilm) -> None:
         """Go on from a saved film, as `load_state` does. Raises SceneError."""

@@ -6,16 +6,15 @@ import datetime
 import hashlib
 import logging
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from clpt import device as dev
 from clpt.errors import SceneError
-from clpt.render import film_file
 from clpt.render.contract import custom_materials
 from clpt.render.editing.scene_edit import resolve_device_arrays
+from clpt.render.film_keeping import FilmKeeping
 from clpt.render.layers import white_paper
 from clpt.render.locking import synchronized
 from clpt.render.pictures import Pictures
@@ -40,7 +39,7 @@ log = logging.getLogger(__name__)
 TO_OUTPUT = ("to_first", "to_second", "to_third")
 
 
-class Resumable(Pictures):
+class Resumable(FilmKeeping, Pictures):
     """Base of renderers whose film can be saved.
 
     warnings: for people; the others are the renderer's own.
@@ -149,32 +148,6 @@ class Resumable(Pictures):
             "layout": first.scene.strategy.layout,
             "tree_quality": first.scene.tree_quality,
         }
-
-    def save_state(self, path: str | Path) -> None:
-        """Write the film to a file, from which `load_state` goes on, in another process too.
-
-        Raises SceneError for a file that cannot be written: the former one is then as it was.
-        """
-        saved = self.saved_film()
-        try:
-            film_file.write(path, saved)
-        except OSError as error:
-            raise SceneError(f"cannot be written: {error}", file=path) from error
-
-    def load_state(self, path: str | Path) -> None:
-        """Go on from a file of `save_state`: what the film held before is gone.
-
-        All that follows is to the bit as if nothing had been interrupted, where the device is of
-        the class that took the samples; `warnings` tells where it is not.
-
-        Raises SceneError for a file that cannot be read, is damaged, or is of another scene, other
-        settings or other kernels: it says what differs, and nothing has changed.
-        """
-        saved = film_file.read(path)
-        try:
-            self.restore(saved)
-        except SceneError as error:
-            raise SceneError(error.message, file=path) from None
 
     @synchronized
     def restore(self, saved: SavedFilm) -> None:
