@@ -37,6 +37,8 @@ PARTS: dict[str, tuple[str, ...]] = {
     "shares": (),
     "devices": (),
     "checkpoints": (),
+    "layers": (),
+    "viewing": (),
     "sizes": ("--plot", str(report.RESULTS / "sizes.png")),
 }
 

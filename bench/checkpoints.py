@@ -4,6 +4,9 @@ The same samples in passes of some seconds, in one process; with checkpoints eac
 by a copy of the film on the device, and every `period` seconds a file is written by a thread. The
 parts are measured by themselves too, and tell the share at the default period. Processor time
 includes the threads of the driver and of the writer.
+
+With --workers the same of a cluster on this machine: the client holds its film with each progress,
+and writes it. Processor time is that of the client, the scheduler in it, and the workers.
 """
 
 from __future__ import annotations
@@ -20,9 +23,14 @@ from rich.table import Table
 
 import clpt
 from bench import machine
+from bench.cluster import processor_time
 from clpt.cli.checkpoints import PERIOD, Checkpoints, path_of
 from clpt.cli.rendering import PASS_SECONDS
+from clpt.cluster import processes
+from clpt.cluster.cluster_renderer import ClusterRenderer
 from clpt.render import film_file
+
+Record = dict[str, object]
 
 
 def spent(work: Callable[[], object]) -> float:
@@ -66,12 +74,28 @@ def passes(renderer: clpt.Renderer, samples: int, count: int, after: Callable[[]
     return spent(work)
 
 
-def compare(size: tuple[int, int], period: float, rounds: int, folder: Path) -> dict[str, object]:
-    """A record of a scene at some size."""
+def resized(size: tuple[int, int]) -> clpt.Scene:
+    """The scene that is rendered, at some size."""
     scene = clpt.load(machine.ROOT / "scenes" / "three_spheres")
     film = dataclasses.replace(scene.film, width=size[0], height=size[1])
+    return dataclasses.replace(scene, film=film)
+
+
+def figures(size: tuple[int, int], where: str, period: float, shares: list[float]) -> Record:
+    """What records of both kinds have in common."""
+    return {
+        "size": f"{size[0]}x{size[1]}",
+        "where": where,
+        "period": period,
+        "share": round(statistics.median(shares), 4),
+        "shares": [round(share, 4) for share in shares],
+    }
+
+
+def compare(size: tuple[int, int], period: float, rounds: int, folder: Path) -> Record:
+    """A record of one device."""
     target = folder / "a.png"
-    with clpt.Renderer(dataclasses.replace(scene, film=film)) as renderer:
+    with clpt.Renderer(resized(size)) as renderer:
         renderer.run(1)
         start = time.perf_counter()
         renderer.run(2)
@@ -81,40 +105,82 @@ def compare(size: tuple[int, int], period: float, rounds: int, folder: Path) -> 
         for _ in range(rounds):
             without = passes(renderer, samples, count, lambda: None)
             renderer.reset().wait()
-            saving = Checkpoints(renderer, path_of(target), period, False, [target], print)
+            saving = Checkpoints(
+                renderer, path_of(target, (target,)), period, False, [target], print
+            )
             began = time.perf_counter()
             with_them = passes(renderer, samples, count, saving.after_pass)
             seconds = time.perf_counter() - began
             shares.append(with_them / without - 1.0)
-        each = parts(renderer, path_of(target), 5)
-        size_of_file = path_of(target).stat().st_size
+        each = parts(renderer, path_of(target, (target,)), 5)
+        size_of_file = path_of(target, (target,)).stat().st_size
     cores = without / seconds
     total = each["copy"] * PERIOD / PASS_SECONDS + each["to_host"] + each["file"]
     return {
-        "size": f"{size[0]}x{size[1]}",
-        "period": period,
-        "share": round(statistics.median(shares), 4),
-        "shares": [round(share, 4) for share in shares],
+        **figures(size, "one device", period, shares),
         **{f"{name}_ms": round(1e3 * value, 1) for name, value in each.items()},
         "file_mb": round(size_of_file / 1e6, 1),
         "share_at_default": round(total / (PERIOD * max(cores, 1.0)), 5),
     }
 
 
+def compare_on_cluster(
+    size: tuple[int, int], workers: int, period: float, rounds: int, folder: Path
+) -> Record:
+    """A record of workers on this machine, which render the same samples in turns."""
+    scene, target, shares = resized(size), folder / "a.png", []
+    with processes.local_cluster(workers) as (client, started):
+        client.wait_for_workers(workers)
+
+        def render(samples: int, saves: bool) -> float:
+            with ClusterRenderer(scene, client) as renderer:
+                renderer.run(1)  # the scene is opened
+                renderer.image()  # and what makes pictures is there, which every render needs
+
+                def after(_: object) -> None:
+                    if saving is not None:
+                        saving.after_pass()
+
+                before, saving = processor_time(started), None
+                if saves:
+                    saving = Checkpoints(
+                        renderer, path_of(target, (target,)), period, False, [target], print
+                    )
+                renderer.run(samples, after)
+                if saving is not None:
+                    saving.save(False)
+                return processor_time(started) - before
+
+        render(4, True)
+        start = time.perf_counter()
+        render(8, False)
+        samples = max(8, int(8 * 2.0 * period / (time.perf_counter() - start)))
+        for _ in range(rounds):
+            without = render(samples, False)
+            shares.append(render(samples, True) / without - 1.0)
+    return figures(size, f"local:{workers}", period, shares)
+
+
 @click.command(help=__doc__)
 @click.option("--size", "sizes", multiple=True, default=("640x360", "1920x1080"))
 @click.option("--period", default=20.0, help="Seconds between checkpoints of the renders.")
 @click.option("--rounds", default=3)
+@click.option("--workers", default=1, help="Of a cluster; 0: one device alone.")
 @click.option("--json", "path", help="Append records to this file.")
-def main(sizes: tuple[str, ...], period: float, rounds: int, path: str | None) -> None:
+def main(
+    sizes: tuple[str, ...], period: float, rounds: int, workers: int, path: str | None
+) -> None:
     rows = []
-    for size in sizes:
-        width, height = (int(side) for side in size.split("x"))
+    for text in sizes:
+        width, height = (int(side) for side in text.split("x"))
         with tempfile.TemporaryDirectory() as folder:
-            rows.append(compare((width, height), period, rounds, Path(folder)))
+            size, where = (width, height), Path(folder)
+            rows.append(compare(size, period, rounds, where))
+            if workers:
+                rows.append(compare_on_cluster(size, workers, period, rounds, where))
     table = Table(*rows[0])
     for row in rows:
-        table.add_row(*(str(value) for value in row.values()))
+        table.add_row(*(str(row.get(name, "")) for name in rows[0]))
     machine.console().print(table)
     machine.append(path, "checkpoints", [{**machine.circumstances(), **row} for row in rows])
 

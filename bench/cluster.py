@@ -1,6 +1,6 @@
 """Two workers of this machine, a core each: what a cluster costs, and how soon there is a picture.
 
-    python -m bench.cluster [SCENE] [--seconds 20] [--rounds 3]
+    python -m bench.cluster [SCENE] [--seconds 20] [--rounds 3] [--noise .02]
 
 Workers render one long block each, at the same time, which is what they can do; then a
 `ClusterRenderer` renders as much with them, of the same scene, which is open there. The two
@@ -9,6 +9,9 @@ cluster over the sum of both workers' rates; first: from `run` to the first film
 workers that are warm: the scene is new to them, their kernels are not. cpu: processor time of a
 sample by the workers alone, over that by the cluster, client and scheduler included: other work on
 the machine hardly moves it, but it does not see workers that wait. One JSON line.
+
+With --noise the same scene is rendered by one process till the noise is as low, and by the workers:
+noise_cpu is the processor time of the one over that of the others, and both films must be equal.
 """
 
 from __future__ import annotations
@@ -30,6 +33,7 @@ from clpt.cluster.cluster_renderer import ClusterRenderer
 
 ROOT = Path(__file__).resolve().parents[1]
 WORKERS = 2
+MOST = 4096  # samples of a pixel, with noise
 
 
 def alone(client: Any, digest: str, samples: int, names: Any) -> float:
@@ -57,6 +61,22 @@ def together(scene: Any, client: Any, samples: int) -> tuple[float, float]:
         return samples / (time.perf_counter() - began), first[0]
 
 
+def noisy(scene: Any, client: Any, started: Any, noise: float) -> float:
+    """Processor time of one process over that of a cluster, which render to the same noise."""
+    with clpt.Renderer(scene, threads=WORKERS) as one, ClusterRenderer(scene, client) as several:
+        for renderer in (one, several):
+            renderer.run(1)
+        before = processor_time(started)
+        one.run(MOST, noise=noise)
+        between = processor_time(started)
+        several.run(MOST, noise=noise)
+        after = processor_time(started)
+        films = [tasks.film_digest(renderer.film_state()) for renderer in (one, several)]
+    if films[0] != films[1]:
+        raise SystemExit("the cluster's film differs from that of one process")
+    return (between - before) / (after - between)
+
+
 def processor_time(processes: Any) -> float:
     """Of these processes and this one, so far [s]."""
     times = [psutil.Process(one.pid).cpu_times() for one in processes]
@@ -69,6 +89,7 @@ def main() -> None:
     parser.add_argument("scene", nargs="?", type=Path, default=ROOT / "scenes/cornell_box")
     parser.add_argument("--seconds", type=float, default=20.0, help="of each measurement")
     parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--noise", type=float, default=0.0)
     args = parser.parse_args()
     scene, names = clpt.load(args.scene), itertools.count()
     with processes.local_cluster(WORKERS, threads=1) as (client, started):
@@ -89,6 +110,8 @@ def main() -> None:
             _, first = together(other, client, 8)
             cpu = (between - before) / (after - between)
             rounds.append({"alone": singly, "together": whole, "first": first, "cpu": cpu})
+            if args.noise:
+                rounds[-1]["noise_cpu"] = noisy(scene, client, started, args.noise)
     print(json.dumps({
         "scene": args.scene.name,
         "size": [scene.film.width, scene.film.height],
@@ -96,6 +119,7 @@ def main() -> None:
         "efficiency": round(statistics.median(r["together"] / r["alone"] for r in rounds), 3),
         "cpu": round(statistics.median(r["cpu"] for r in rounds), 3),
         "first": round(statistics.median(r["first"] for r in rounds), 2),
+        **({"noise": args.noise} if args.noise else {}),
         "rounds": [{name: round(value, 3) for name, value in one.items()} for one in rounds],
     }))  # fmt: skip
 

@@ -5,7 +5,7 @@
 Workers differ in speed, die and are replaced; their films come through one network to one client,
 one after the other. Nothing is rendered: what is tried is `clpt.cluster.blocks` itself, with two
 tasks a worker as `clpt.cluster.feeding` gives them, and the length of blocks that
-`clpt.cluster.cluster_renderer` chooses. One JSON line for each case.
+`clpt.cluster.farm` chooses. One JSON line for each case.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from clpt.cluster.blocks import Block, Blocks, Outcome
-from clpt.cluster.cluster_renderer import set_lengths
+from clpt.cluster.farm import set_lengths
 from clpt.cluster.feeding import SLOTS
 
 LOOK = 5.0  # [s] between looks of a worker that has nothing to do

@@ -3,18 +3,11 @@
 from __future__ import annotations
 
 import sys
-import traceback
 from collections.abc import Sequence
-from pathlib import Path
 
 import click
-import platformdirs
 
-from . import output_files
-from .cli import allocator, cli, stopping, streams
-from .errors import ClptError
-
-BAD_INPUT, BUG = 2, 1
+from .cli import allocator, cli, failures, stopping, streams
 
 
 def main() -> None:
@@ -34,32 +27,14 @@ def run(arguments: Sequence[str]) -> int:
     try:
         status = cli.main(args=list(arguments), prog_name="clpt", standalone_mode=False)
         return status if isinstance(status, int) else 0
-    except ClptError as error:
-        return _complain(str(error), BAD_INPUT)
-    except click.ClickException as error:
-        return _complain(error.format_message(), BAD_INPUT)
     except KeyboardInterrupt as error:
-        return _complain("interrupted", stopping.status(error))
+        message, status = "interrupted", stopping.status(error)
     except click.Abort as error:
-        return _complain("interrupted", stopping.status(error.__cause__))
+        message, status = "interrupted", stopping.status(error.__cause__)
     except Exception as error:
-        return _complain(f"{type(error).__name__}: {error}{_keep_traceback()}", BUG)
-
-
-def _complain(message: str, status: int) -> int:
-    click.echo(f"clpt: error: {' '.join(message.split())}", err=True)
+        message, status = failures.message_of(error)
+    failures.complain(message)
     return status
-
-
-def _keep_traceback() -> str:
-    """Write the current traceback to clpt's log folder; a phrase that tells where."""
-    path = Path(platformdirs.user_log_dir("clpt", appauthor=False)) / "traceback.txt"
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        output_files.write_text(path, traceback.format_exc())
-    except OSError:
-        return ""
-    return f" (a fault of clpt; please report it with {path})"
 
 
 if __name__ == "__main__":

@@ -79,14 +79,9 @@ def read(path: str | Path, *, linear: bool = True) -> Array:
 
 def read_stored(path: str | Path) -> Stored:
     """An image file as it is stored; raises as `read` does."""
-    path = Path(path)
-    reader = READERS.get(path.suffix.lower())
-    if reader is None:
-        _fail(path, f"unknown image suffix {path.suffix!r}; known: {', '.join(READERS)}")
-    if not path.is_file():
-        _fail(path, "no such image file")
+    path = check_input(path)
     try:
-        made: Any = reader(path)
+        made: Any = READERS[path.suffix.lower()](path)
     except SceneError:
         raise
     except Exception as error:  # the libraries raise their own, from struct.error to RuntimeError
@@ -109,11 +104,13 @@ def write(
     space: str = "rec709",
     tone: str = "none",
     view: View | None = None,
+    prefix: str = "",
 ) -> None:
     """Write a linear (h, w), (h, w, 1), (h, w, 3) or (h, w, 4) image in the format of the suffix.
 
     .exr: half or float, with attributes from `metadata` and further `layers` in float, name ->
-    (h, w) as the channel of that name, or (h, w, 3) as its .R, .G, .B. .png: sRGB transfer, 8 bit,
+    (h, w) as the channel of that name, or (h, w, 3) as its .R, .G, .B; prefix: before R, G and B of
+    the image, such as "ViewLayer.Combined.". .png: sRGB transfer, 8 bit,
     scaled by 2^exposure, with texts from `metadata`; NaN is black there, values beyond [0, 1] are
     clipped. .hdr, .pfm, .npy: as it is.
     space: of the colours, see clpt.spectra.spaces; an .exr states it by its chromaticities, a .png
@@ -133,9 +130,9 @@ def write(
     try:
         suffix = path.suffix.lower()
         if suffix == ".exr":
-            _write_exr(path, pixels, half, {**stated, **(metadata or {})}, layers or {})
+            _write_exr(path, pixels, half, {**stated, **(metadata or {})}, layers or {}, prefix)
         elif suffix == ".png":
-            codes = to_codes(_to_rec709(pixels, space), exposure, tone, view)
+            codes = to_codes(to_rec709(pixels, space), exposure, tone, view)
             output_files.write(path, png(codes, metadata))
         elif suffix == ".hdr":
             _write_hdr(path, pixels)
@@ -205,8 +202,26 @@ def check_output(path: str | Path) -> Path:
     return path
 
 
+def check_input(path: str | Path) -> Path:
+    """The path, if `read` knows its suffix and there is such a file. Else raises SceneError."""
+    path = Path(path)
+    if path.suffix.lower() not in READERS:
+        _fail(path, f"unknown image suffix {path.suffix!r}; known: {', '.join(READERS)}")
+    if not path.is_file():
+        _fail(path, "no such image file")
+    return path
+
+
 def read_layers(path: str | Path) -> dict[str, Array]:
     """Every channel of an EXR file by name, each (h, w) float32. Raises SceneError."""
+    return {name: np.asarray(c, np.float32) for name, c in read_channels(path).items()}
+
+
+def read_channels(path: str | Path) -> dict[str, NDArray[Any]]:
+    """Every channel of an EXR file by name, (h, w) float16, float32 or uint32, as it is stored.
+
+    Raises SceneError.
+    """
     path = Path(path)
     if not path.is_file():
         _fail(path, "no such image file")
@@ -214,7 +229,7 @@ def read_layers(path: str | Path) -> dict[str, Array]:
         check_exr(path)
         with OpenEXR.File(exr_name(path), separate_channels=True) as file:
             channels = file.channels()
-            return {name: np.asarray(c.pixels, np.float32) for name, c in channels.items()}
+            return {name: np.asarray(c.pixels) for name, c in channels.items()}
     except SceneError:
         raise
     except (OSError, RuntimeError, ValueError) as error:
@@ -225,6 +240,12 @@ def attributes(path: Path) -> dict[str, Any]:
     """The attributes of an EXR file by name."""
     with OpenEXR.File(exr_name(path), header_only=True) as file:
         return dict(file.header())
+
+
+def part_names(path: Path) -> list[str]:
+    """The names of the parts of an EXR file; their numbers where they have none."""
+    with OpenEXR.File(exr_name(path), header_only=True) as file:
+        return [part.name() or str(i) for i, part in enumerate(file.parts)]
 
 
 def check_exr(path: Path) -> None:
@@ -318,7 +339,7 @@ def straight(image: Array) -> Array:
     return np.concatenate([image[..., :3] / np.where(alpha > 0, alpha, 1), alpha], axis=2)
 
 
-def _to_rec709(pixels: Array, space: str) -> Array:
+def to_rec709(pixels: Array, space: str) -> Array:
     """Colours (h, w, 3 or 4) of a space in linear Rec. 709, white to white; alpha stays."""
     if space == "rec709" or pixels.shape[2] == 1:
         return pixels
@@ -358,9 +379,11 @@ def _read_exr(path: Path) -> Array:
 
 
 def _colour_channels(names: Collection[str]) -> list[str]:
-    """R, G, B and A if there; else Y; else those of a single layer; else all, sorted by name."""
+    """R, G, B and A if there; else Y; else those of Blender's picture, or of a single layer; else
+    all, sorted by name."""
     layers = {name.rpartition(".")[0] for name in names}
-    prefixes = ["", *(f"{layer}." for layer in layers if layer and len(layers) == 1)]
+    prefixes = ["", *(f"{layer}." for layer in sorted(layers) if layer.endswith("Combined"))]
+    prefixes += [f"{layer}." for layer in layers if layer and len(layers) == 1]
     for prefix in prefixes:
         for letters in ("RGBA", "RGB", "Y"):
             if all(prefix + letter in names for letter in letters):
@@ -369,10 +392,16 @@ def _colour_channels(names: Collection[str]) -> list[str]:
 
 
 def _write_exr(
-    path: Path, pixels: Array, half: bool, metadata: Metadata, layers: Mapping[str, ArrayLike]
+    path: Path,
+    pixels: Array,
+    half: bool,
+    metadata: Metadata,
+    layers: Mapping[str, ArrayLike],
+    prefix: str,
 ) -> None:
     channels = {}
-    parts = [("", tuple({1: "Y", 3: "RGB", 4: "RGBA"}[pixels.shape[2]]), pixels)]
+    letters_of = {1: "Y", 3: "RGB", 4: "RGBA"}[pixels.shape[2]]
+    parts = [("", tuple(prefix + letter for letter in letters_of), pixels)]
     for name, given in layers.items():
         layer = np.asarray(given, np.float32)
         layer = layer[..., None] if layer.ndim == 2 else layer

@@ -34,7 +34,7 @@ PATH = Record(
     ratio=("spectrum", "density of the path at each wavelength, over the mean of the four"),
     eta=("real", "product of the relative indices so far, for Russian roulette"),
     weight=("real", "sample's weight by the pixel filter; from a light, 1 over its first beta"),
-    medium=("integer", "absorbing medium of the ray, see kernels/optics/medium.cl; 0: none"),
+    medium=("integer", "medium of the ray, see kernels/optics/medium.cl; 0: none"),
     lead=("real", "how far before o the ray's medium begins: o lies off the surface [m]"),
     rival=(
         "real",
@@ -76,6 +76,7 @@ SHADOW = Record(
     d=("vec3", "direction, unit length"),
     t=("real", "distance to its end [m]; 0 or below: no ray waits"),
     value=("spectrum", "what arrives if nothing is between: radiance, or what a pixel gets"),
+    through=("integer", "medium at its beginning, where it may go through several"),
     film=(
         "vec2",
         "where the picture shows its beginning, from the corner [pixels]; of light paths",
@@ -124,6 +125,7 @@ SETTINGS = Record(
         "first float in `distributions` of the spheres at which light paths aim",
     ),
     aim_count=("integer", "number of these spheres, see kernels/lighting/aiming.cl"),
+    camera_medium=("integer", "medium around the camera, see kernels/optics/medium.cl"),
     light_count=("integer", "rows in `lights`"),
     ambient=(
         "integer",
@@ -217,6 +219,7 @@ TABLES: dict[str, tuple[str, str]] = {
     "geometry": ("uint", "parameters of analytic shapes, and of shapes as lights"),
     "spheres": ("float", "x y z and radius per sphere of the shapes `spheres` [m]"),
     "materials": ("uint", "parameters of the leaf materials, a row each"),
+    "media": ("uint", "media inside and outside of each shape, see kernels/optics/medium.cl"),
     "mixtures": ("uint", "rules of masks and blends, see kernels/stage/mix.cl"),
     "lights": ("uint", "LightRow per light, infinite ones first; then a tree over many"),
     "light_params": ("uint", "parameters of the lights that are not shapes, and emissions"),

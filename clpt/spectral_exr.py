@@ -160,11 +160,13 @@ def write(
     half: bool = False,
     preview: Array | None = None,
     metadata: Mapping[str, Any] | None = None,
+    layers: Mapping[str, Array] | None = None,
 ) -> None:
     """Write a spectral EXR file; what `read` gives back is the same to the bit unless `half`.
 
     preview: linear Rec. 709 (h, w, 3) for its R, G, B; the image's own colour, with its exposure,
-    by default. Raises SceneError if the suffix is not .exr or the file cannot be made.
+    by default; layers: further channels, name -> (h, w), in float. Raises SceneError if the suffix
+    is not .exr or the file cannot be made.
     """
     path = Path(path)
     if path.suffix.lower() != ".exr":
@@ -180,6 +182,7 @@ def write(
     if half:
         channels = {name: np.clip(v, -HALF_MAX, HALF_MAX) for name, v in channels.items()}
     stored = {name: np.ascontiguousarray(values, kind) for name, values in channels.items()}
+    stored |= {name: np.ascontiguousarray(v, np.float32) for name, v in (layers or {}).items()}
     header = {**(metadata or {}), "spectralLayoutVersion": VERSION, "EV": float(image.exposure)}
     if image.emissive:
         header["emissiveUnits"] = image.units
@@ -226,6 +229,13 @@ def _parts(path: Path, names: Iterable[str]) -> dict[str, list[tuple[float, str]
     if not parts:
         _fail(path, "not a spectral image: no channel is named like S0.550,0nm or T.550,0nm")
     return {part: sorted(bands) for part, bands in parts.items()}
+
+
+def layer_names(path: str | Path) -> tuple[str, ...]:
+    """Return the channels that a spectral EXR file has beside its bands and its preview."""
+    with OpenEXR.File(images.exr_name(path), header_only=True) as file:
+        names = [channel.name for channel in file.header()["channels"]]
+    return tuple(n for n in names if not _CHANNEL.fullmatch(n) and n not in ("R", "G", "B", "A"))
 
 
 def _other_kind(emissive: bool) -> str:

@@ -25,22 +25,23 @@ MAY_IMPORT = {
     "scene": BASE,
     "device": BASE,
     "bvh": BASE | {"device"},
+    "denoise": BASE | {"scene", "device"},
     "rays": BASE | {"device", "bvh"},
     "trimesh_ray": BASE | {"device", "rays"},
-    "render": BASE | {"scene", "device", "bvh"},
+    "render": BASE | {"scene", "device", "bvh", "denoise"},
     "formats": BASE | {"scene"},
-    "view": BASE | {"scene", "device", "render", "formats"},
+    "view": BASE | {"scene", "device", "denoise", "render", "formats"},
     "benchmark": BASE | {"scene", "device", "bvh", "rays", "render", "formats"},
 }
-OPENCL = {"device", "bvh", "rays", "render"}  # only these import pyopencl
+OPENCL = {"device", "bvh", "denoise", "rays", "render"}  # only these import pyopencl
 # clpt/render/<room>: arrows point down; rooms of one floor do not know each other.
 FLOORS = ({"contract"}, {"lowering", "codegen"}, {"wavefront"}, {"editing"})
 # What kinds share, by what a reader looks for.
 SHARED = {
-    "colour", "core", "film", "guiding", "interface", "lighting", "merging", "optics", "path",
-    "spectrum", "texturing", "tracing",
+    "colour", "core", "denoising", "film", "guiding", "interface", "lighting", "merging", "optics",
+    "path", "spectrum", "texturing", "tracing",
 }  # fmt: skip
-KINDS = {"bsdf", "camera", "emission", "light", "medium", "sampler", "shape", "texture"}
+KINDS = {"bsdf", "phase", "camera", "emission", "light", "medium", "sampler", "shape", "texture"}
 # kernels/<folder>: the folders that its files may include; generated text stands between them.
 MAY_INCLUDE = {
     **dict.fromkeys(SHARED, SHARED | {"generated", "bvh"}),

@@ -46,6 +46,7 @@ def test_what_is_no_scene(function: Any, scene: Any, message: str) -> None:
         ({"layuot": "wide8"}, TypeError, "no option 'layuot'; did you mean 'layout'"),
         ({"queue": 1}, TypeError, r"a pyopencl\.CommandQueue, not int; .* device=1"),
         ({"layout": "wide9"}, UnknownKindError, "unknown layout 'wide9'; did you mean 'wide8'"),
+        ({"cancel_seconds": 0}, SceneError, "seconds above 0"),
         ({"tree_quality": "best"}, UnknownKindError, "unknown quality 'best'"),
         ({"queued": "no"}, SceneError, "queued: must be true or false, not 'no'"),
         ({"slots": 0}, SceneError, "slots: must be a whole number from 1, not 0"),

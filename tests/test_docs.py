@@ -121,6 +121,7 @@ def test_the_tutorial(run: Run, tmp_path: Path):
     assert emitted[0] == pytest.approx(emitted[1])
 
 
+@pytest.mark.slow
 def test_how_to_light_a_scene(run: Run):
     names = run("lighting.md")
     luminances = [names[n].sample(np.array([560.0]))[0] for n in ("lamp_white", "lamp_bright")]

@@ -13,6 +13,7 @@ import pytest
 
 from clpt import __main__ as entry
 from clpt import cli
+from clpt.cli import failures
 from clpt.errors import SceneError
 
 
@@ -47,7 +48,9 @@ def test_status_and_line(failing, capsys, error, status, line):
 
 
 def test_a_fault_of_our_own_keeps_its_traceback(failing, capsys, monkeypatch, tmp_path):
-    monkeypatch.setattr(entry.platformdirs, "user_log_dir", lambda *a, **k: str(tmp_path / "log"))
+    monkeypatch.setattr(
+        failures.platformdirs, "user_log_dir", lambda *a, **k: str(tmp_path / "log")
+    )
     failing(ZeroDivisionError("division by zero"))
     assert entry.run(["fail"]) == 1
     err = capsys.readouterr().err

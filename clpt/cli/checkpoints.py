@@ -18,6 +18,7 @@ from ..scene.fingerprint import fingerprint
 from . import outputs
 from .display import clock
 from .scene_options import AnyRenderer
+from .standard_output import is_standard
 
 SUFFIX = ".resume.exr"
 PERIOD = 300.0  # seconds from one checkpoint to the next
@@ -26,8 +27,13 @@ Saving = AnyRenderer | ClusterRenderer
 ADVICE = "render that again, or begin anew with --no-resume"
 
 
-def path_of(target: Path) -> Path:
-    """Return where the checkpoints of a picture are written: a.resume.exr of a.png."""
+def path_of(scene: Path, targets: tuple[Path, ...]) -> Path:
+    """Return where the checkpoints of a picture are written: a.resume.exr of a.png.
+
+    Of a picture for the standard output alone they have the scene's name.
+    """
+    files = [path for path in targets if not is_standard(path)]
+    target = (files or outputs.default(scene))[0]
     return target.with_name(target.stem + SUFFIX)
 
 
@@ -71,6 +77,12 @@ def refuse(differences: list[str], path: Path) -> None:
         raise SceneError(f"{message}; {ADVICE}", file=path)
 
 
+def check_range(plan: Scene, numbers: tuple[int, int] | None) -> None:
+    """Raise SceneError for a range of samples of a scene that does not have the same everywhere."""
+    if numbers and plan.noise is not None:
+        raise SceneError("it would choose other samples of each film", where="noise")
+
+
 def check(
     saved: SavedFilm, path: Path, plan: Scene, first: int, end: int | None, *, gaps: bool = False
 ) -> None:
@@ -84,7 +96,11 @@ def check(
     if not taken:
         return
     if taken[0][0] < first if gaps else len(taken) > 1 or taken[0][0] != first:
-        can = "; --cluster local:1 takes those that are missing" if taken[0][0] >= first else ""
+        can = (
+            "; --cluster local:1 without --noise takes those that are missing"
+            if taken[0][0] >= first
+            else ""
+        )
         message = f"it has samples {ranges_text(taken)}, not those from {first} on{can}; {ADVICE}"
         raise SceneError(message, file=path)
     if end is not None and taken[-1][1] > end:

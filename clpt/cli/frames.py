@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import threading
 import time
 from collections import deque
@@ -17,24 +18,19 @@ from typing import Any
 import click
 
 from .. import __version__, images
-from .. import device as dev
-from ..errors import SceneError
+from ..cluster.cluster_renderer import ClusterRenderer
+from ..errors import ClusterError, SceneError
 from ..formats import load
 from ..render.lowering.checks import check
 from ..scene import Scene
 from ..scene.fingerprint import fingerprint
 from . import outputs, video
 from .display import Display, clock
+from .frame_crews import Crew, cluster_crews, device_crews
 from .frame_values import expanded, has_number, numbered, varies
 from .grading import Grading
 from .rendering import render_samples
-from .scene_options import (
-    AnyRenderer,
-    changed,
-    choose_devices,
-    new_renderer,
-    share_compilers,
-)
+from .scene_options import AnyRenderer, changed
 from .stopping import STATUS, stops
 
 KEPT = (".exr", ".png")  # formats that keep a frame's fingerprint
@@ -46,8 +42,8 @@ class Animation:
     """What is rendered for each frame.
 
     scene, outputs: names with a place for the frame's number; variables: values perhaps with
-    expressions; changes: see `scene_options.changed`; made: options of the renderer; limit:
-    seconds of a frame; spp: samples, None where the limit or the noise ends a frame.
+    expressions; changes: see `scene_options.changed`; limit: seconds of a frame; spp: samples, None
+    where the limit or the noise ends a frame.
     """
 
     scene: Path
@@ -57,7 +53,6 @@ class Animation:
     variables: Mapping[str, str]
     missing_textures: Any
     changes: Mapping[str, Any]
-    made: Mapping[str, Any]
     grading: Grading
     limit: float | None
 
@@ -79,6 +74,7 @@ class Animation:
         decides = {
             "scene": fingerprint(plan).digest, "spp": self.spp(plan), "noise": plan.noise,
             "time": self.limit, "grading": repr(self.grading), "version": __version__,
+            "denoise": self.changes["denoise"],
         }  # fmt: skip
         return plan, hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
 
@@ -104,6 +100,8 @@ def render_frames(
     limit: float | None,
     shown: Display,
     *,
+    cluster: str | None,
+    keys: Path | None,
     device: str | None,
     threads: int | None,
     variables: Mapping[str, str],
@@ -111,7 +109,10 @@ def render_frames(
     profiling: bool = False,
     **options: Any,
 ) -> int:
-    """Render frames that are not complete; return the exit status. film: of all frames."""
+    """Render frames that are not complete; return the exit status.
+
+    film: of all frames; cluster, keys: see `on_cluster.render_on_cluster`.
+    """
     given = paths or outputs.default(scene if not has_number(scene) else numbered(scene, frames[0]))
     if not paths and film is None:
         given = given[:1]  # .exr
@@ -127,21 +128,19 @@ def render_frames(
         video.check(film)
     outputs.checked(tuple(numbered(path, frames[0]) for path in given))
     made = {name: options.pop(name) for name in ("layout", "tree_quality", "texture_budget")}
-    plan = Animation(
-        scene, given, frames, fps, variables, missing_textures, options,
-        {**made, "profiling": profiling}, graded, limit,
-    )  # fmt: skip
+    made["denoise"] = options["denoise"]
+    plan = Animation(scene, given, frames, fps, variables, missing_textures, options, graded, limit)
     with ExitStack() as resources, stops() as stopped:
-        devices = choose_devices(device, profiling=profiling, threads=threads)
-        share_compilers(devices, threads, resources)
-        together = len(frames) < len(devices)  # else whole frames for each, with nothing to add up
-        crews = [devices] if together else [[one] for one in devices]
-        loop = _FrameLoop(plan, crews, shown, stopped)
-        loop.run()
+        if cluster is None:
+            crews = device_crews(device, threads, len(frames), profiling, made, resources)
+        else:
+            together = 1 if limit is not None else len(frames)  # its time is a frame's own
+            several = cluster_crews(cluster, keys, device, threads, together, made, shown)
+            crews = resources.enter_context(several)
+        _FrameLoop(plan, crews, shown, stopped).run()
         if stopped:
-            for on in devices:
-                if on.compilers is not None:
-                    on.compilers.kill()
+            for crew in crews:
+                crew.stop()
             return STATUS + stopped[0]
     if film is not None:
         with shown.phase(f"writing {film}"):
@@ -151,12 +150,12 @@ def render_frames(
 
 
 class _FrameLoop:
-    """Threads that take frames, one for each crew of devices, and one that reads scenes ahead."""
+    """Threads that take frames, one for each crew, and one that reads scenes ahead."""
 
     def __init__(
         self,
         plan: Animation,
-        crews: list[list[dev.Device]],
+        crews: list[Crew],
         shown: Display,
         stopped: Sequence[int],
     ):
@@ -174,8 +173,8 @@ class _FrameLoop:
         with ThreadPoolExecutor(1) as reader:
             while (self._left or self._ahead) and not (self.errors or self.stopped):
                 threads = [
-                    threading.Thread(target=self._work, args=(devices, reader), daemon=True)
-                    for devices in self.crews
+                    threading.Thread(target=self._work, args=(crew, reader), daemon=True)
+                    for crew in self.crews
                 ]
                 for thread in threads:
                     thread.start()
@@ -197,38 +196,38 @@ class _FrameLoop:
                 self._ahead.append((frame, reader.submit(self.plan.load, frame)))
             return self._ahead.popleft() if self._ahead else None
 
-    def _work(self, devices: list[dev.Device], reader: ThreadPoolExecutor) -> None:
-        """Render frames on a crew of devices, till none is left."""
-        renderer: AnyRenderer | None = None
+    def _work(self, crew: Crew, reader: ThreadPoolExecutor) -> None:
+        """Let a crew render frames, till none is left."""
+        renderer: AnyRenderer | ClusterRenderer | None = None
         try:
             while (taken := self._take(reader)) is not None:
                 frame, scene = taken
                 try:
-                    renderer = self._frame(frame, *scene.result(), devices, renderer)
-                except (SceneError, OSError, click.ClickException):
+                    renderer = self._frame(frame, *scene.result(), crew, renderer)
+                except (SceneError, ClusterError, OSError, click.ClickException):
                     raise
                 except Exception as error:
-                    if not self._lose(devices, error, taken):
+                    if not self._lose(crew, error, taken):
                         raise
                     return
         except BaseException as error:
             self.errors.append(error)
         finally:
+            crew.frame = math.inf
             if renderer is not None:
                 renderer.close()
 
     def _lose(
         self,
-        devices: list[dev.Device],
+        lost: Crew,
         error: BaseException,
         taken: tuple[int, Future[tuple[Scene, str]]],
     ) -> bool:
         """Leave a crew out, of which others get the frame; return whether there are others."""
-        name = " and ".join(on.info.label for on in devices)
         with self._lock:
-            self.crews = [crew for crew in self.crews if crew is not devices]
+            self.crews = [crew for crew in self.crews if crew is not lost]
             self._ahead.appendleft(taken)
-        what = f"{name} failed and is left out, others do its part: {error}"
+        what = f"{lost.name} failed and is left out, others do its part: {error}"
         if self.crews:
             self.shown.note(f"clpt: warning: {what}")
         return bool(self.crews)
@@ -238,9 +237,9 @@ class _FrameLoop:
         frame: int,
         scene: Scene,
         digest: str,
-        devices: list[dev.Device],
-        renderer: AnyRenderer | None,
-    ) -> AnyRenderer | None:
+        crew: Crew,
+        renderer: AnyRenderer | ClusterRenderer | None,
+    ) -> AnyRenderer | ClusterRenderer | None:
         """Render a frame unless it is complete; return the renderer for the next one."""
         plan = self.plan
         if plan.is_complete(frame, digest):
@@ -249,13 +248,18 @@ class _FrameLoop:
         stale = [path for path in plan.targets(frame) if path.is_file()]
         if any(_fingerprint_of(path) not in (None, digest) for path in stale):
             self.shown.note(f"frame {frame}: the scene or an option has changed since {stale[0]}")
-        renderer = _showing(scene, devices, renderer, plan.made, self.shown)
+        crew.frame = frame
+        renderer = _showing(scene, crew, renderer, self.shown)
         began = time.perf_counter()
         render_samples(
-            renderer, plan.spp(scene), plan.limit, lambda progress: None, scene.noise, self.stopped
-        )
+            renderer, plan.spp(scene), plan.limit, crew.tell, scene.noise, self.stopped,
+            pass_seconds=crew.pass_seconds(scene),
+        )  # fmt: skip
         if self.stopped:
             return renderer  # what it has so far is no frame
+        if not any(counts.samples for counts in renderer.counts):
+            message = "in so short a time there was no sample"
+            raise click.BadParameter(message, param_hint="--time")
         seconds = time.perf_counter() - began
         stats = outputs.metadata(renderer, plan.file(frame), seconds)
         stats |= {"frame": frame, "fingerprint": digest}
@@ -279,12 +283,8 @@ class _FrameLoop:
 
 
 def _showing(
-    scene: Scene,
-    devices: list[dev.Device],
-    renderer: AnyRenderer | None,
-    made: Mapping[str, Any],
-    shown: Display,
-) -> AnyRenderer:
+    scene: Scene, crew: Crew, renderer: AnyRenderer | ClusterRenderer | None, shown: Display
+) -> AnyRenderer | ClusterRenderer:
     """Return a renderer of a scene: the one that there is, if it can take the scene."""
     if renderer is not None:
         try:
@@ -292,8 +292,7 @@ def _showing(
             return renderer
         except SceneError:  # a film of another form
             renderer.close()
-    with shown.phase(f"building kernels for {' and '.join(on.info.name for on in devices)}"):
-        renderer = new_renderer(scene, devices, **made)
+    renderer = crew.make(scene, shown)
     for warning in (*scene.warnings, *renderer.warnings):
         shown.note(f"clpt: warning: {warning}")
     return renderer

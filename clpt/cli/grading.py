@@ -10,17 +10,23 @@ import click
 
 from ..colour.tones import TONES
 from ..colour.view import DEFAULT_CONFIG, View
+from ..render.layer_channels import SETS
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 
 @dataclass(frozen=True)
 class Grading:
-    """exposure [stops]; tone: a curve of clpt.colour.tones; view: of OpenColorIO, instead."""
+    """How files say a picture.
+
+    exposure [stops]; tone: a curve of clpt.colour.tones; view: of OpenColorIO, instead; names: of
+    channels of an .exr, a set of clpt.render.layer_channels.SETS.
+    """
 
     exposure: float = 0.0
     tone: str = "none"
     view: View | None = None
+    names: str = SETS[0]
 
 
 _OPTIONS = (
@@ -39,6 +45,11 @@ _OPTIONS = (
     ),
 )  # fmt: skip
 
+names_option = click.option(
+    "--names", type=click.Choice(SETS), default=SETS[0], show_default=True,
+    help="What .exr files call layers: depth.Z, or ViewLayer.Denoising Depth.Z.",
+)  # fmt: skip
+
 
 def grading_options(command: Command) -> Command:
     """Give a command the options that `grading` takes."""
@@ -55,12 +66,14 @@ def grading(
     display: str | None,
     look: str | None,
     ocio: str,
+    names: str = SETS[0],
 ) -> Grading:
     """Return what these options say. Raises SceneError, click.UsageError."""
     if not (view or display or look):
         if ocio != DEFAULT_CONFIG:
             raise click.UsageError("--ocio needs --view or --display")
-        return Grading(exposure, tone or "none")
+        return Grading(exposure, tone or "none", names=names)
     if tone is not None:
         raise click.UsageError("a view has its own tone curve; leave out --tone")
-    return Grading(exposure, view=View(view, display=display, look=look, config=ocio))
+    seen = View(view, display=display, look=look, config=ocio)
+    return Grading(exposure, view=seen, names=names)

@@ -16,14 +16,15 @@ from clpt.formats import load
 from clpt.formats.meshes import framing
 from clpt.render.lowering.geometry.triangles import triangulate
 
-from ..render import film_file
+from ..images import READERS
 from ..scene import Scene, materials, shapes, textures
 from ..scene.params import Kind
-from . import checkpoints
-from .output_console import output_console
-from .outputs import FILM
+from .film_contents import film_summary, is_film
+from .image_contents import read_contents
+from .output_console import output_console, shown
 from .scene_variables import scene_variables
 
+OF_FILES = ("scenes", "variables", "asset")  # what some formats tell besides
 FLAT_TRIANGLES = {shapes.Rectangle: 2, shapes.Cube: 12}
 
 
@@ -32,37 +33,24 @@ FLAT_TRIANGLES = {shapes.Rectangle: 2, shapes.Cube: 12}
 @scene_variables
 @click.option("--json", "as_json", is_flag=True, help="Write JSON instead of a table.")
 def info(scene: Path, variables: dict[str, Any], as_json: bool) -> None:
-    """Show what the file or folder SCENE holds, without rendering it; or a film, or checkpoint."""
-    is_film = scene.suffix.lower() == FILM or scene.name.endswith(checkpoints.SUFFIX)
-    contents = film_summary(scene) if is_film else summary(load(scene, **variables))
+    """Show what the file or folder SCENE holds, without rendering it.
+
+    Of a film, a checkpoint or an image, what it says of itself: see `clpt inspect` for its values.
+    """
+    contents: dict[str, Any]
+    if is_film(scene):
+        contents = film_summary(scene)
+    elif scene.suffix.lower() in READERS:
+        contents = dict(read_contents(scene).facts)
+    else:
+        contents = summary(load(scene, **variables))
     if as_json:
         click.echo(json.dumps(contents, indent=2))
         return
-    table = Table(show_header=False, title=str(scene), title_justify="left")
+    table = Table(show_header=False, title=shown(scene), title_justify="left")
     for name, value in contents.items():
-        table.add_row(name.replace("_", " "), _shown(value))
+        table.add_row(name.replace("_", " "), shown(value))
     output_console().print(table)
-
-
-def film_summary(path: Path) -> dict[str, Any]:
-    """Return what a film file says of itself."""
-    header = film_file.read_header(path)
-    height, width = header["shapes"]["words"][-2:]
-    origin, sessions = header["scene"], header["sessions"]
-    return {
-        "format": "film",
-        "clpt": header["clpt"],
-        "samples": [f"{first} to {end - 1}" for first, end in header["taken"]],
-        "film": {"width": width, "height": height, "bands": header["form"]["bands"]},
-        "integrator": header["settings"]["chosen.integrator"],
-        "sampler": origin["sampler.type"],
-        "seed": origin["seed"],
-        "noise": "noise" in header["adaptive"],
-        "seconds": round(sum(one["seconds"] for one in sessions), 3),
-        "sessions": [
-            f"{one['began']}  {one['seconds']:.1f} s  {one['device']['device']}" for one in sessions
-        ],
-    }
 
 
 def summary(scene: Scene) -> dict[str, Any]:
@@ -100,6 +88,7 @@ def summary(scene: Scene) -> dict[str, Any]:
         "integrator": scene.integrator.kind,
         "sampler": scene.sampler.kind,
         "sampler_in_file": scene.extra.get("sampler", scene.sampler.kind),
+        **{name: scene.extra[name] for name in OF_FILES if scene.extra.get(name)},
         "warnings": scene.warnings,
     }
 
@@ -145,14 +134,7 @@ def _by_kind(things: Iterable[Kind], base: type[Kind]) -> dict[str, int]:
 def _film(scene: Scene) -> dict[str, Any]:
     film = scene.film
     size = dict(zip(("width", "height"), film.size, strict=True))
-    return {**size, "mode": film.mode, "filter": film.filter.kind}
-
-
-def _shown(value: Any) -> str:
-    if isinstance(value, dict):
-        return ", ".join(f"{key}: {count}" for key, count in value.items()) or "none"
-    if isinstance(value, list) and value and isinstance(value[0], list):
-        return " to ".join("(" + ", ".join(f"{x:g}" for x in corner) + ")" for corner in value)
-    if isinstance(value, list):
-        return "\n".join(str(entry) for entry in value) or "none"
-    return f"{value:,}" if isinstance(value, int) else str(value)
+    whole = {} if film.crop is None else {"crop": [*film.crop], "of": [film.width, film.height]}
+    usual = {"bands": 0, "alpha": False, "layers": (), "output_space": "rec709"}
+    unusual = {k: getattr(film, k) for k, usual in usual.items() if getattr(film, k) != usual}
+    return {**size, **whole, "mode": film.mode, "filter": film.filter.kind, **unusual}

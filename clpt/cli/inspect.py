@@ -12,8 +12,9 @@ import numpy as np
 from rich.table import Table
 
 from .extras import extra
+from .film_contents import film_contents, is_film
 from .image_contents import ImageContents, Pixel, read_contents
-from .output_console import output_console
+from .output_console import output_console, shown
 
 
 class PixelType(click.ParamType):
@@ -40,12 +41,12 @@ class PixelType(click.ParamType):
 )  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Write JSON instead of tables.")
 def inspect(file: Path, pixels: tuple[Pixel, ...], output: Path | None, as_json: bool) -> None:
-    """Show what the image FILE holds; plot the spectra of pixels, or their channels.
+    """Show what the image or film FILE holds; plot the spectra of pixels, or their channels.
 
     Of a spectral EXR file the values at its wavelengths are shown, of any other image its channels,
     linear.
     """
-    image = read_contents(file)
+    image = film_contents(file) if is_film(file) else read_contents(file)
     values = {pixel: image.pixel(pixel) for pixel in pixels}
     if as_json:
         click.echo(json.dumps(_as_json(image, values), indent=2))
@@ -71,7 +72,7 @@ def _print(image: ImageContents, values: dict[Pixel, np.ndarray]) -> None:
     console.print(str(image.path), markup=False, highlight=False)
     facts = Table(show_header=False)
     for name, value in image.facts.items():
-        facts.add_row(name, value)
+        facts.add_row(shown(name), shown(value))
     console.print(facts)
     if not values:
         return

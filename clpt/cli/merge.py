@@ -13,7 +13,8 @@ from ..render import film_file
 from ..render.host_picture import HostPicture
 from ..render.saved_film import SavedFilm, other_devices
 from . import checkpoints, outputs
-from .grading import grading, grading_options
+from .grading import grading, grading_options, names_option
+from .scene_options import denoise_option
 
 
 @click.command()
@@ -22,9 +23,17 @@ from .grading import grading, grading_options
     "-o", "--output", "paths", multiple=True, required=True, type=click.Path(path_type=Path),
     help="Where to write: .film .exr .png .hdr .pfm .npy; may be given several times.",
 )  # fmt: skip
+@denoise_option
 @grading_options
+@names_option
 @click.option("--quiet", is_flag=True, help="Print no warnings.")
-def merge(films: tuple[Path, ...], paths: tuple[Path, ...], quiet: bool, **graded: Any) -> None:
+def merge(
+    films: tuple[Path, ...],
+    paths: tuple[Path, ...],
+    denoise: str | None,
+    quiet: bool,
+    **graded: Any,
+) -> None:
     """Add FILMS, of `clpt render --samples FIRST:END -o NAME.film`, and write the picture.
 
     The order does not matter: the film is to the bit that of one render of all samples. Checkpoints
@@ -41,7 +50,7 @@ def merge(films: tuple[Path, ...], paths: tuple[Path, ...], quiet: bool, **grade
     total = added(films)
     for change in other_devices(total.sessions, total.sessions[0].device):
         note(f"clpt: warning: the films are of several classes of devices: {change}")
-    made = HostPicture(total)
+    made = HostPicture(total, denoise)
     origin = total.origin.scene.values
     stats: dict[str, str | int | float] = {
         "software": f"clpt {__version__}",

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
+import math
 import re
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -15,23 +16,25 @@ import click
 from .. import device as dev
 from ..cluster import keys as cluster_keys
 from ..cluster import processes
+from ..cluster.blocks import WorkerRecord
 from ..cluster.cluster_renderer import ClusterRenderer
 from ..errors import ClusterError
 from ..formats import load
 from ..render.lowering.checks import check
 from ..render.progress import Progress
-from ..render.renderer import MOST_SAMPLES
 from ..render.saved_film import SavedFilm
-from ..scene import Scene
 from . import checkpoints, outputs
 from .display import Display
 from .grading import Grading
+from .rendering import render_samples
 from .scene_options import changed
+from .so_far import PictureSoFar
 from .stopping import STATUS, stops
 
 if TYPE_CHECKING:
     from distributed import Client
 
+PASS_SECONDS = 30.0  # of a pass with noise, at the end of which workers wait for each other
 MOST_LISTED = 16  # workers of which each has a line
 OF_RENDERER = ("layout", "texture_budget", "tree_quality")
 
@@ -59,6 +62,7 @@ def render_on_cluster(
     graded: Grading,
     numbers: tuple[int, int] | None,
     period: float | None,
+    every: float | None,
     saved: SavedFilm | None,
     device: str | None,
     threads: int | None,
@@ -70,65 +74,75 @@ def render_on_cluster(
     """Render a scene on the workers at an address; return the exit status.
 
     limit [s]: of the whole command; numbers: first and end of the samples to take; period: of
-    checkpoints, see `Checkpoints`; saved: to go on from. Raises ClusterError when the cluster is
-    lost, after the picture so far and the film are written.
+    checkpoints, see `Checkpoints`; every: of the picture so far; saved: to go on from.
+
+    Raises ClusterError when the cluster is lost, after the picture so far and the film are written.
     """
     began = time.perf_counter()
-    if options["noise"]:
-        raise click.BadParameter("not with --cluster yet", param_hint="--noise")
     given = {name: options.pop(name) for name in OF_RENDERER}
     with shown.loading(scene.name) as tell:
         loaded = load(scene, progress=tell, missing_textures=missing_textures, **variables)
-    plan = dataclasses.replace(changed(loaded, spp=spp, **options), noise=None)
+    plan = changed(loaded, spp=spp, **options)
     outputs.check_contents(targets, plan)
-    saved_at, (first, end) = checkpoints.path_of(targets[0]), numbers or (0, None)
+    checkpoints.check_range(plan, numbers)
+    saved_at, (first, end) = checkpoints.path_of(scene, targets), numbers or (0, None)
     if saved is not None:
-        checkpoints.check(saved, saved_at, plan, first, end, gaps=True)
+        checkpoints.check(saved, saved_at, plan, first, end, gaps=plan.noise is None)
     check(plan)
     for warning in plan.warnings:
         shown.note(f"clpt: warning: {warning}")
-    wanted = plan.spp if spp is None and limit is None else spp or MOST_SAMPLES
-    wanted = wanted if end is None else end - first
+    adaptive = plan.noise is not None or (saved is not None and bool(saved.adaptive))
+    end = end or spp
+    if end is None and limit is None and not options["noise"]:
+        end = plan.spp
+    given["denoise"] = options["denoise"]
     chosen = {name: value for name, value in given.items() if value is not None}
-    with _connected(where, keys, device, threads, shown) as client, stops() as stopped:
-        several = not where.startswith("local:") or dev.names_several(device)
-        local = None if several else device  # one device makes the picture
+    with connected(where, keys, device, threads, shown) as client, stops() as stopped:
+        local = picture_device(where, device)
         with ClusterRenderer(plan, client, device=local, first_sample=first, **chosen) as renderer:
             if saved is not None:
                 checkpoints.go_on(renderer, saved, saved_at, shown.note)
                 taken = saved.film.taken  # also what is missing before its last one
-                wanted = max(wanted, taken[-1][1] - first if taken else 0)
-            former, missing = renderer.counts, wanted - renderer.samples
+                end = max(end, taken[-1][1]) if end and taken else end
             writer = checkpoints.Checkpoints(
                 renderer, saved_at, period, saved is not None, targets, shown.note
             )
             ready = time.perf_counter()
-            shown.limit = None if limit is None else max(began + limit - ready, 0.0)
-            watch = _Watch(renderer, shown)
+            left = shown.limit = None if limit is None else max(began + limit - ready, 0.0)
+            watch = Watch(lambda: [renderer], shown)
 
-            def tell_progress(progress: Progress) -> bool:
-                watch.look()
+            def stats_so_far() -> dict[str, str | int | float]:
+                return outputs.metadata(renderer, scene, time.perf_counter() - ready)
+
+            so_far = PictureSoFar(every, targets, renderer, stats_so_far, graded, shown.note)
+
+            def after_pass() -> None:
                 writer.after_pass()
-                total = 0 if wanted == MOST_SAMPLES else progress.total
-                paths = progress.paths - former["samples"]
-                rays = progress.rays - former["rays"]
-                shown.show(dataclasses.replace(progress, total=total, paths=paths, rays=rays))
-                over = limit is not None and time.perf_counter() - began >= limit
-                return not (stopped or over)
+                if any(counts.samples for counts in renderer.counts):
+                    so_far.after_pass()
+
+            def tell_progress(progress: Progress) -> None:
+                watch.look()
+                if not adaptive:  # else a film is whole at the end of a pass
+                    after_pass()
+                shown.show(progress)
 
             error: ClusterError | None = None
             try:
-                if missing > 0:
-                    with shown.rendering():
-                        renderer.run(missing, tell_progress)
+                with shown.rendering():
+                    render_samples(
+                        renderer, end, left, tell_progress, plan.noise, stopped, after_pass,
+                        pass_seconds=pass_seconds(adaptive, period, every),
+                    )  # fmt: skip
             except ClusterError as lost:
                 error = lost
             watch.report()
-            seconds = time.perf_counter() - ready
-            renderer.hold()
+            if not adaptive:
+                renderer.hold()
             writer.save(bool(stopped), failed=error is not None)
-            if renderer.samples:
-                _write(renderer, plan, scene, targets, graded, seconds, shown.note)
+            if any(counts.samples for counts in renderer.counts):
+                outputs.write_all(targets, renderer, stats_so_far(), graded, shown.note)
+                _warn_of_refused(renderer, shown.note)
             elif error is None:
                 raise ClusterError("no worker sent anything in this time")
             writer.finish(bool(stopped) or error is not None)
@@ -137,8 +151,23 @@ def render_on_cluster(
     return STATUS + stopped[0] if stopped else 0
 
 
+def pass_seconds(adaptive: bool, *periods: float | None) -> float:
+    """Return how long a pass of a render should take, at whose end something is written so often.
+
+    With adaptive sampling workers wait for each other at its end; without there is one pass alone.
+    """
+    wanted = [seconds for seconds in periods if seconds]
+    return min([PASS_SECONDS, *wanted]) if adaptive else math.inf
+
+
+def picture_device(where: str, device: str | None) -> str | None:
+    """Return the device that makes pictures on this machine: one, also beside several workers."""
+    several = not where.startswith("local:") or dev.names_several(device)
+    return None if several else device
+
+
 @contextmanager
-def _connected(
+def connected(
     where: str, keys: Path | None, device: str | None, threads: int | None, shown: Display
 ) -> Iterator[Client]:
     """Yield a client of the scheduler at an address, or of one with workers of our own."""
@@ -160,65 +189,63 @@ def _connected(
         yield client
 
 
-class _Watch:
-    """Tells of workers that come, go, or are refused."""
+class Watch:
+    """Tells of workers that come, go, or are refused; of: returns renderers of one cluster."""
 
-    def __init__(self, renderer: ClusterRenderer, shown: Display):
-        self._renderer, self._shown = renderer, shown
+    def __init__(self, of: Callable[[], list[ClusterRenderer]], shown: Display):
+        self._of, self._shown = of, shown
         self._known: set[str] = set()
         self._refused: set[str] = set()
-        self._warned = 0
+        self._warned: set[str] = set()
+        self._lock = threading.Lock()
 
     def look(self) -> None:
         """Note what has changed since the last look."""
-        workers, refused = self._renderer.workers, self._renderer.refused
-        for name in sorted(refused.keys() - self._refused):
-            self._shown.note(f"clpt: warning: {name} is refused: {refused[name]}")
-        for name in sorted(self._known - workers.keys() - refused.keys()):
-            self._shown.note(f"clpt: warning: {name} is gone; others render its samples")
-        for name in sorted(workers.keys() - self._known):
-            self._shown.note(f"{name} renders")
-        for warning in self._renderer.warnings[self._warned :]:
-            self._shown.note(f"clpt: warning: {warning}")
-        self._known, self._refused = set(workers), set(refused)
-        self._warned = len(self._renderer.warnings)
+        with self._lock:
+            renderers = self._of()
+            refused = {name: why for one in renderers for name, why in one.refused.items()}
+            workers = {name for one in renderers for name in one.workers} - refused.keys()
+            for name in sorted(refused.keys() - self._refused):
+                self._shown.note(f"clpt: warning: {name} is refused: {refused[name]}")
+            for name in sorted(self._known - workers - refused.keys()):
+                self._shown.note(f"clpt: warning: {name} is gone; others render its samples")
+            for name in sorted(workers - self._known):
+                self._shown.note(f"{name} renders")
+            for warning in (text for one in renderers for text in one.warnings):
+                if warning not in self._warned:
+                    self._shown.note(f"clpt: warning: {warning}")
+                self._warned.add(warning)
+            self._known, self._refused = workers, set(refused)
 
     def report(self) -> None:
         """Note what each worker has done."""
-        blocks, workers = self._renderer.blocks, self._renderer.workers
-        for name, record in sorted(workers.items())[:MOST_LISTED]:
+        renderers = self._of()
+        records: dict[str, list[WorkerRecord]] = {}
+        for name, record in (pair for one in renderers for pair in one.workers.items()):
+            records.setdefault(name, []).append(record)
+        for name, of_worker in sorted(records.items())[:MOST_LISTED]:
+            samples = sum(record.samples for record in of_worker)
+            blocks = sum(record.blocks for record in of_worker)
+            failures = sum(record.failures for record in of_worker)
             self._shown.note(
-                f"{name}  {record.samples} spp in {record.blocks} blocks, "
-                f"{record.rate:.3g} spp/s, {record.failures} failures"
+                f"{name}  {samples:.5g} spp in {blocks} blocks, {of_worker[-1].rate:.3g} spp/s, "
+                f"{failures} failures"
             )
+        lost, repeated, dropped = (
+            sum(getattr(one.blocks, name) for one in renderers)
+            for name in ("lost", "repeated", "dropped")
+        )
         self._shown.note(
-            f"{len(workers)} workers; blocks lost {blocks.lost}, repeated {blocks.repeated}, "
-            f"dropped {blocks.dropped}"
+            f"{len(records)} workers; blocks lost {lost}, repeated {repeated}, dropped {dropped}"
         )
 
 
-def _write(
-    renderer: ClusterRenderer,
-    plan: Scene,
-    scene: Path,
-    targets: tuple[Path, ...],
-    graded: Grading,
-    seconds: float,
-    tell: Callable[[str], None],
-) -> None:
-    """Write the picture so far, and warn of what the films refused."""
-    local, counts = renderer.developed(), renderer.counts
-    pixels = plan.film.width * plan.film.height
-    stats = outputs.metadata(local, scene, seconds)
-    stats["spp"] = counts["samples"] / pixels / max(len(local.channels), 1)
-    kinds = {record.kind for record in renderer.workers.values()}
-    stats["device"] = "; ".join(sorted(kinds)) or stats["device"]
-    stats["seconds"] = round(seconds + renderer.former_seconds, 3)
-    outputs.write_all(targets, renderer, stats, graded, tell)
-    if counts["rejected"]:
+def _warn_of_refused(renderer: ClusterRenderer, tell: Callable[[str], None]) -> None:
+    """Warn of samples that the films refused."""
+    rejected = sum(counts.rejected for counts in renderer.counts)
+    if rejected:
         tell(
-            f"clpt: warning: {counts['rejected']} samples were not finite, or too bright, and "
-            "count as black"
+            f"clpt: warning: {rejected} samples were not finite, or too bright, and count as black"
         )
-    if counts["full"]:
+    if any(counts.full for counts in renderer.counts):
         tell("clpt: warning: pixels are too bright for the film: lower film.exposure")

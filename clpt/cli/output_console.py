@@ -2,10 +2,40 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from rich.console import Console
+from rich.text import Text
 
 
 def output_console() -> Console:
     """Return a console on stdout, wide where that is a file or a pipe: these wrap nothing."""
     console = Console()
     return console if console.is_terminal else Console(width=200)
+
+
+def shown(value: Any) -> Text:
+    """Return a value of a table of facts: parts of a list have a line each.
+
+    What a file says is no markup, and controls no terminal.
+    """
+    text = _text(value)
+    return Text("".join(c if c.isprintable() or c == "\n" else "\ufffd" for c in text))
+
+
+def _text(value: Any) -> str:
+    if value is None or isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, dict):
+        return ", ".join(f"{key}: {_part(part)}" for key, part in value.items()) or "none"
+    if isinstance(value, list) and value and isinstance(value[0], list):
+        return " to ".join("(" + ", ".join(f"{x:g}" for x in corner) + ")" for corner in value)
+    if isinstance(value, list):
+        return "\n".join(str(entry) for entry in value) or "none"
+    return f"{value:,}" if isinstance(value, int) else str(value)
+
+
+def _part(value: Any) -> str:
+    """Return a value inside of others."""
+    several = isinstance(value, (list, tuple))
+    return " ".join(str(part) for part in value) if several else str(value)

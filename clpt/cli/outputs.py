@@ -10,24 +10,24 @@ from pathlib import Path
 
 from clpt.render.aov_preview import sheet
 
-from .. import __version__, images, output_files, spectral_exr
+from .. import __version__, images, output_files
 from ..cluster.cluster_renderer import ClusterRenderer
-from ..errors import SceneError
-from ..render import film_file
+from ..errors import ClptError, SceneError
+from ..render import film_file, layer_channels
+from ..render.denoised_picture import DenoisedPicture
 from ..render.host_picture import HostPicture
-from ..render.layers import channels_of
 from ..render.pictures import Image
 from ..scene import Scene
 from ..scene.integrators import Aov
-from ..spectra.spaces import chromaticities
 from .grading import Grading
 from .scene_options import AnyRenderer
+from .standard_output import is_standard
 
 FILM = ".film"  # suffix of films, which hold all that a picture was made of
-Source = AnyRenderer | ClusterRenderer | HostPicture  # what pictures are taken of
+Film = AnyRenderer | ClusterRenderer | HostPicture  # what pictures are taken of
+Source = Film | DenoisedPicture
 
 AOV_FORMATS = (".exr", ".png", FILM)
-BAND_FORMATS = (".npy", ".exr")  # with all bands; others get the colours
 
 
 def default(scene: Path) -> tuple[Path, ...]:
@@ -58,13 +58,20 @@ def check_contents(paths: tuple[Path, ...], scene: Scene) -> None:
             raise SceneError(f"the integrator aov is written to {formats}", file=path)
 
 
-def metadata(renderer: AnyRenderer, scene: Path, seconds: float) -> dict[str, str | int | float]:
+def metadata(
+    renderer: AnyRenderer | ClusterRenderer, scene: Path, seconds: float
+) -> dict[str, str | int | float]:
     """Return the metadata of an .exr: how it was made. spp is the mean over all pixels.
 
     seconds: of this session; those of former ones are added.
     """
-    plan = renderer.scene
-    samples = max(counts.samples for counts in renderer.counts)
+    plan, devices = renderer.scene, ""
+    if isinstance(renderer, ClusterRenderer):
+        pictured: AnyRenderer = renderer.developed()
+        devices = "; ".join(sorted({record.kind for record in renderer.workers.values()}))
+    else:
+        pictured = renderer
+    samples = max(counts.samples for counts in pictured.counts)
     return {
         "software": f"clpt {__version__}",
         "scene": os.fsencode(scene).decode("utf-8", "replace"),
@@ -72,42 +79,50 @@ def metadata(renderer: AnyRenderer, scene: Path, seconds: float) -> dict[str, st
         "integrator": plan.integrator.kind,
         "sampler": plan.sampler.kind,
         "seed": plan.seed,
-        "spp": samples / renderer.wavefronts[0].paths.pixels,
-        "device": " and ".join(on.info.label for on in renderer.devices),
+        "spp": samples / pictured.wavefronts[0].paths.pixels,
+        "device": devices or " and ".join(on.info.label for on in pictured.devices),
         "seconds": round(seconds + renderer.former_seconds, 3),
     }
 
 
 def write_all(
     paths: tuple[Path, ...],
-    source: Source,
+    film: Film,
     stats: dict[str, str | int | float],
     grading: Grading,
     tell: Callable[[str], None],
 ) -> None:
-    """Write the picture so far to every path, and tell of each.
+    """Write the picture so far to every path, denoised where that was asked for; tell of each.
 
     A picture that cannot be written goes to the temporary folder. Raises SceneError at the end,
     which says where it is.
     """
     failures = []
+    source: Source = film
+    if film.denoise is not None and any(path.suffix.lower() != FILM for path in paths):
+        try:
+            source = DenoisedPicture(film)
+            stats = {**stats, "denoised": source.text}
+        except ClptError as error:  # the picture is worth more
+            tell(f"clpt: warning: not denoised: {error}")
     for path in paths:
         try:
             write(path, source, stats, grading)
-            tell(f"{path}  {stats['spp']:.4g} spp, {stats['seconds']:.1f} s")
+            name = "standard output" if is_standard(path) else path
+            tell(f"{name}  {stats['spp']:.4g} spp, {stats['seconds']:.1f} s")
         except (SceneError, OSError) as error:
             other = Path(tempfile.gettempdir()) / f"{path.stem}-{secrets.token_hex(4)}{path.suffix}"
             try:
                 write(other, source, stats, grading)
-                failures.append(f"{_named(path, error)}; the picture is in {other}")
+                failures.append(f"{failure(path, error)}; the picture is in {other}")
             except (SceneError, OSError) as second:
-                failures.append(f"{_named(path, error)}; nor can {_named(other, second)}")
+                failures.append(f"{failure(path, error)}; nor can {failure(other, second)}")
     if failures:
         raise SceneError("; ".join(failures))
 
 
-def _named(path: Path, error: Exception) -> str:
-    """Return a message that names its file."""
+def failure(path: Path, error: Exception) -> str:
+    """Return what to say of a file that cannot be written: it names the file."""
     return str(error) if isinstance(error, SceneError) else f"{path}: cannot be written: {error}"
 
 
@@ -121,32 +136,22 @@ def write(
         if not saved.film.taken:
             raise SceneError("no pass has come to its end: there is no film yet", file=path)
         film_file.write(path, saved)
-    elif form.bands and path.suffix.lower() in BAND_FORMATS and not form.channels:
-        _write_bands(path, source, stats)
+    elif form.bands and path.suffix.lower() == ".npy" and not form.channels:
+        images.write_npy(path, source.image())
+    elif path.suffix.lower() == ".exr" and not form.channels:
+        layer_channels.write_layers(path, source, names=grading.names, metadata=stats)
     elif not form.channels:
         picture = source.colours() if form.bands else source.image()
         if path.suffix.lower() == ".png":
             picture = images.straight(picture)
-        layers = channels_of(source.layers()) if path.suffix.lower() == ".exr" else {}
-        layers |= {"samples": source.samples_per_pixel()} if source.is_adaptive else {}
         images.write(
-            path, picture, metadata=stats, layers=layers, space=form.output_space,
-            exposure=grading.exposure, tone=grading.tone, view=grading.view,
+            path, picture, metadata=stats, space=form.output_space, exposure=grading.exposure,
+            tone=grading.tone, view=grading.view,
         )  # fmt: skip
     elif path.suffix.lower() == ".png":
         images.write(path, sheet(source.layers()), metadata=stats, exposure=grading.exposure)
     else:
         _write_layers(path, source.layers(), stats)
-
-
-def _write_bands(path: Path, source: Source, stats: dict[str, str | int | float]) -> None:
-    """Write all bands: an array, or a spectral .exr with a preview in the film's colours."""
-    if path.suffix.lower() == ".npy":
-        images.write_npy(path, source.image())
-        return
-    stated = {**stats, "chromaticities": chromaticities(source.form.output_space)}
-    preview = source.colours()
-    spectral_exr.write(path, source.spectral_image(), preview=preview, metadata=stated)
 
 
 def _write_layers(

@@ -10,17 +10,19 @@ from typing import Any
 
 import click
 
-from ..errors import SceneError
 from ..render.renderer import MOST_SAMPLES
 from ..scene import Scene
 from . import checkpoints, outputs, report
 from .display import display as display_of
 from .frame_values import Frames
 from .frames import render_frames
-from .grading import grading, grading_options
+from .grading import grading, grading_options, names_option
 from .on_cluster import Where, render_on_cluster
 from .rendering import render_samples
-from .scene_options import open_renderer, scene_options
+from .scene_options import denoise_option, open_renderer, scene_options
+from .several_scenes import one_by_one
+from .so_far import PictureSoFar
+from .standard_output import FORMATS
 from .stopping import STATUS, stops
 from .tev_viewer import EVERYWHERE, Address, showing
 from .verbosity import verbose_option
@@ -64,11 +66,20 @@ class Period(Duration):
 
 
 @click.command()
-@click.argument("scene", type=click.Path(path_type=Path))
+@click.argument(
+    "scenes", metavar="SCENE...", nargs=-1, required=True, type=click.Path(path_type=Path)
+)
 @click.option(
-    "-o", "--output", "paths", multiple=True, type=click.Path(path_type=Path),
-    help="Where to write: .exr .png .hdr .pfm .npy; may be given several times."
-    "  [default: the scene's name, as .exr and .png]",
+    "-o", "--output", "paths", multiple=True, type=click.Path(path_type=Path, allow_dash=True),
+    help="Where to write: .exr .png .hdr .pfm .npy, or - for the standard output; may be given "
+    "several times; {scene} is the scene's name.  [default: {scene}.exr and {scene}.png]",
+)  # fmt: skip
+@click.option(
+    "--format", "form", type=click.Choice(FORMATS), help="Of the picture of -o -.  [default: png]"
+)
+@click.option(
+    "--every", type=Duration(),
+    help="How often to write the picture so far, from the first sample of all pixels on.",
 )  # fmt: skip
 @click.option("--spp", type=click.IntRange(1, 2**31 - 1), help="Samples per pixel.")
 @click.option(
@@ -106,6 +117,7 @@ class Period(Duration):
 )  # fmt: skip
 @click.option("--video", type=click.Path(path_type=Path), help="Write the frames as .mp4 too.")
 @scene_options
+@denoise_option
 @click.option(
     "--cluster", type=Where(), help="Render on the workers of tls://HOST:PORT, or of local:N."
 )
@@ -117,11 +129,14 @@ class Period(Duration):
     help="Show the picture in tev or HDRView while it is rendered.  [default: 127.0.0.1:14158]",
 )  # fmt: skip
 @grading_options
+@names_option
 @verbose_option("Print memory, trees, programs and stages; log more, twice for everything.")
 @click.option("--quiet", is_flag=True, help="Show no progress and no warnings.")
+@one_by_one
 def render(
     scene: Path,
     paths: tuple[Path, ...],
+    every: float | None,
     limit: float | None,
     frames: range | None,
     fps: float,
@@ -138,11 +153,12 @@ def render(
     display: str | None,
     look: str | None,
     ocio: str,
+    names: str,
     verbose: int,
     quiet: bool,
     **options: Any,
 ) -> int:
-    """Render the scene file, mesh or folder SCENE.
+    """Render each SCENE: a scene file, a mesh or a folder.
 
     The scene decides what no option sets. With --time or --noise but no --spp the render goes on
     until the time is over, or the noise is below the limit. The time counts from the command's
@@ -155,21 +171,27 @@ def render(
     With --frames every frame gets files of its own: name.0001.exr, or what #### or %04d in -o says.
     -D values may have {frame}, {time} in seconds, and arithmetic of them such as {360*frame/240};
     SCENE may be scene.####.json. Frames that are complete, and of the same scene and options, are
-    not rendered again. A frame is a device's; --time is that of each.
+    not rendered again. A frame is a device's, or with --cluster of all workers; --time is that of
+    each.
+
+    Of several scenes one that fails does not keep the others from being rendered; the exit status
+    tells of it at the end.
     """
-    graded = grading(exposure=exposure, tone=tone, view=view, display=display, look=look, ocio=ocio)
+    graded = grading(
+        exposure=exposure, tone=tone, view=view, display=display, look=look, ocio=ocio, names=names
+    )
     if tev is not None and (frames is not None or cluster is not None):
         raise click.UsageError(
             "--tev shows one picture of this machine: not with these options yet"
         )
     if frames is not None:
-        if cluster is not None:
-            raise click.UsageError("not with --cluster yet: --frames")
         if numbers or period is not None or resume is not None:
             raise click.UsageError("frames go on by themselves: leave out what saves one picture")
+        if every is not None:
+            raise click.UsageError("each frame is written when it is complete: leave out --every")
         return render_frames(
             scene, paths, frames, fps, video, graded, limit, display_of(quiet, None),
-            profiling=bool(verbose), **options,
+            cluster=cluster, keys=keys, profiling=bool(verbose), **options,
         )  # fmt: skip
     if video is not None:
         raise click.UsageError("--video needs --frames")
@@ -178,19 +200,18 @@ def render(
         raise click.UsageError("--samples says how many there are; leave out --spp and --noise")
     shown = display_of(quiet, limit)
     began = time.perf_counter()
-    saved_at = checkpoints.path_of(targets[0])
+    saved_at = checkpoints.path_of(scene, targets)
     saved = checkpoints.find(saved_at, resume, shown.note)
     if cluster is not None:
         return render_on_cluster(
             scene, targets, shown, cluster, keys=keys, limit=limit, graded=graded, numbers=numbers,
-            period=period, saved=saved, **options,
+            period=period, every=every, saved=saved, **options,
         )  # fmt: skip
     first, end = numbers or (0, None)
 
     def accept(plan: Scene) -> None:
         outputs.check_contents(targets, plan)
-        if numbers and plan.noise is not None:
-            raise SceneError("it would choose other samples of each film", where="noise")
+        checkpoints.check_range(plan, numbers)
         if saved is not None:
             checkpoints.check(saved, saved_at, plan, first, end)
 
@@ -198,6 +219,7 @@ def render(
     renderer, loading = open_renderer(
         scene, shown, resources, accept, profiling=bool(verbose), first_sample=first, **options
     )
+    resources.callback(renderer.close)
     if saved is not None:
         checkpoints.go_on(renderer, saved, saved_at, shown.note)
     end = end or options["spp"]
@@ -211,10 +233,16 @@ def render(
         renderer, saved_at, period, saved is not None, targets, shown.note
     )
     viewed = showing(tev, scene.name, renderer, shown.note)
+
+    def stats_so_far() -> dict[str, str | int | float]:
+        return outputs.metadata(renderer, scene, time.perf_counter() - ready)
+
+    so_far = PictureSoFar(every, targets, renderer, stats_so_far, graded, shown.note)
     with stops() as stopped, viewed as show_picture:
 
         def after_pass() -> None:
             writer.after_pass()
+            so_far.after_pass()
             show_picture()
 
         with shown.rendering():
@@ -222,7 +250,7 @@ def render(
                 renderer, end, left, shown.show, renderer.scene.noise, stopped, after_pass
             )
         writer.save(bool(stopped))
-        stats = outputs.metadata(renderer, scene, time.perf_counter() - ready)
+        stats = stats_so_far()
         outputs.write_all(targets, renderer, stats, graded, shown.note)
         writer.finish(bool(stopped))
     share = float(stats["spp"])

@@ -18,16 +18,19 @@ import click
 from .. import device as dev
 from ..bvh import LAYOUTS, Quality
 from ..cluster.multi_renderer import MultiRenderer
+from ..denoise.needs import METHODS, prepared
 from ..errors import nearest
 from ..formats import load
 from ..formats.missing import Missing
 from ..render.lowering.checks import check
 from ..render.renderer import Renderer
 from ..scene import Scene, kinds
-from ..scene.integrators import AUTO, LAYERS, MOST_LIGHT_PATHS, Auto
+from ..scene.integrators import AUTO, MOST_LIGHT_PATHS, Auto
+from ..scene.layers import LAYERS
 from ..scene.params import Kind, params
 from ..spectra import read_sensor, spaces
 from ..spectra.sensors import OBSERVERS
+from .composition import Orbit, Span, composed, composition_options
 from .display import Display
 from .scene_variables import scene_variables
 
@@ -67,7 +70,8 @@ class Bytes(click.ParamType):
     name = "SIZE"
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        match = re.fullmatch(r"(\d+(?:\.\d+)?)\s*([KMGT]?)i?B?", str(value).strip(), re.IGNORECASE)
+        form, text = r"(\d{1,15}(?:\.\d+)?)\s*([KMGT]?)i?B?", str(value).strip()
+        match = re.fullmatch(form, text, re.IGNORECASE)
         if match is None:
             self.fail(f"{value!r} is no size in memory; write 500M or 2G", param, ctx)
         return int(float(match[1]) * 1024 ** " KMGT".index(match[2].upper() or " "))
@@ -110,6 +114,12 @@ class White(click.ParamType):
             return value
         return numbers[0] if len(numbers) == 1 else tuple(numbers)
 
+
+denoise_option = click.option(
+    "--denoise", type=click.Choice(METHODS), is_flag=False, flag_value=METHODS[0],
+    help="Take noise away: oidn is Open Image Denoise of clpt[denoise]; statistical needs nothing. "
+    f"The noisy picture is kept as a layer of .exr.  [default: none; alone: {METHODS[0]}]",
+)  # fmt: skip
 
 _OPTIONS = (
     click.option(
@@ -189,6 +199,7 @@ _OPTIONS = (
 
 def scene_options(command: Command) -> Command:
     """Give a command the options that `open_renderer` takes."""
+    command = composition_options(command)
     for option in reversed(_OPTIONS):
         command = option(command)
     return command
@@ -214,7 +225,7 @@ def open_renderer(
     plan, devices, loading = open_scene(scene, shown, resources, accept, **options)
     made: dict[str, Any] = {
         "texture_budget": texture_budget, "layout": layout, "tree_quality": tree_quality,
-        "first_sample": first_sample,
+        "first_sample": first_sample, "denoise": options["denoise"],
     }  # fmt: skip
     with shown.phase(f"building kernels for {' and '.join(on.info.name for on in devices)}"):
         renderer = new_renderer(plan, devices, **made)
@@ -256,6 +267,8 @@ def open_scene(
     share_compilers(devices, threads, resources, keep=keep)
     for warning in plan.warnings:
         shown.note(f"clpt: warning: {warning}")
+    if plan.film.filtering != loaded.film.filtering:
+        shown.note("for the denoiser each pixel has its own samples: film.filtering is importance")
     return plan, devices, loading
 
 
@@ -299,14 +312,22 @@ def changed(
     light_paths: float | str | None = None,
     radius: float | None = None,
     guiding: bool | None = None,
+    camera: Orbit | None = None,
+    crop: tuple[Span, Span] | None = None,
+    env: Path | None = None,
+    env_rotation: float | None = None,
+    denoise: str | None = None,
     **film: Any,
 ) -> Scene:
     """Return the scene with those settings replaced that are not None; `film`: of its film.
+
+    camera, crop, env, env_rotation: see `composition.composed`.
 
     Raises click.BadParameter, and SceneError for an invalid film.
     """
     film = {name: value for name, value in {"mode": mode, **film}.items() if value is not None}
     film |= {} if size is None else {"width": size[0], "height": size[1]}
+    film |= {} if crop is None else {"crop": None}  # that of the file may not fit the new size
     if noise is not None:
         scene = dataclasses.replace(scene, noise=noise or None)
     given: dict[str, Any] = {"spp": spp, "seed": seed}
@@ -329,7 +350,9 @@ def changed(
             message = f"the integrator {how.kind} has no {what}"
             raise click.BadParameter(message, param_hint=f"--{name.replace('_', '-')}")
         how = given["integrator"] = dataclasses.replace(how, **{name: value})
-    return dataclasses.replace(scene, **{k: v for k, v in given.items() if v is not None})
+    scene = dataclasses.replace(scene, **{k: v for k, v in given.items() if v is not None})
+    scene = composed(scene, camera=camera, crop=crop, env=env, env_rotation=env_rotation)
+    return prepared(scene, denoise)
 
 
 def _integrator(name: str, old: Kind) -> Any:

@@ -33,5 +33,6 @@ scene_variables = click.option(
     multiple=True,
     metavar="NAME=VALUE",
     callback=_parse,
-    help="Set a $name of an .xml; of glTF camera, scene or time. See --frames for {frame}.",
+    is_eager=True,  # before --camera, which adds to it
+    help="Set a $name of an .xml; of glTF scene, animation or time. See --frames for {frame}.",
 )

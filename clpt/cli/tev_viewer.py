@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import tev
-from ..render.layers import channels_of
-from .outputs import Source
+from ..render.layer_channels import channels_of
+from .outputs import Film
 
 EVERYWHERE = tev.HOST  # what --tev without a value means
 
@@ -33,7 +33,7 @@ class Address(click.ParamType):
 
 @contextmanager
 def showing(
-    address: tuple[str, int] | None, name: str, source: Source, note: Callable[[str], None]
+    address: tuple[str, int] | None, name: str, source: Film, note: Callable[[str], None]
 ) -> Iterator[Callable[[], None]]:
     """Yield what sends the picture so far, in a thread; it does nothing without an address.
 
@@ -49,7 +49,7 @@ def showing(
         viewer.close()
 
 
-def shown(source: Source) -> dict[str, NDArray[np.float32]]:
+def shown(source: Film) -> dict[str, NDArray[np.float32]]:
     """Return all channels of the picture so far, (h, w) by name: colours, layers, bands."""
     if source.channels:
         return {
@@ -61,7 +61,7 @@ def shown(source: Source) -> dict[str, NDArray[np.float32]]:
     made = {letter: picture[..., i] for i, letter in enumerate("RGBA"[: picture.shape[2]])}
     made |= channels_of(source.layers())
     if source.is_adaptive:
-        made["samples"] = source.samples_per_pixel()
+        made["samples.X"] = source.samples_per_pixel()
     if source.form.bands:
         spectral = source.spectral_image()
         for nm, band in zip(spectral.lambdas, np.moveaxis(spectral.values, 2, 0), strict=True):

@@ -6,18 +6,20 @@ import os
 import time
 import webbrowser
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..cluster.multi_renderer import MultiRenderer
 from ..formats import load, locate
-from ..render.renderer import Renderer
 from ..scene import Scene
 from . import outputs
 from .display import display
 from .extras import extra
 from .grading import Grading, grading, grading_options
+from .on_cluster import Where, connected
 from .scene_options import changed, open_scene, scene_options
 from .stopping import STATUS, stops
 from .verbosity import verbose_option
@@ -44,6 +46,14 @@ OF_GRADING = ("exposure", "tone", "view", "display", "look", "ocio")
     type=click.Path(path_type=Path, exists=True, file_okay=False),
     help="Folder that gets what the page saves.",
 )  # fmt: skip
+@click.option(
+    "--open", "opened", type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    metavar="VIEW.json", help="Begin with a view that the page has saved.",
+)  # fmt: skip
+@click.option("--cluster", type=Where(), help="Render on workers, as of `clpt render`.")
+@click.option(
+    "--keys", type=click.Path(path_type=Path), help="Folder of the cluster's keys, for tls://."
+)
 @click.option("--spp", type=click.IntRange(1, 2**31 - 1), help="Samples per pixel.")
 @click.option("--noise", type=click.FloatRange(0.0), metavar="SHARE", help="As of `clpt render`.")
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), help="Seed of the random numbers.")
@@ -57,6 +67,9 @@ def view(
     host: str,
     no_browser: bool,
     folder: Path,
+    opened: Path | None,
+    cluster: str | None,
+    keys: Path | None,
     verbose: int,
     quiet: bool,
     **options: Any,
@@ -73,8 +86,10 @@ def view(
     from ..view.pictures import Display
     from ..view.saving import Folder
     from ..view.session import Session
+    from ..view.views import load as load_view
 
     file = locate(scene)
+    begins = load_view(opened) if opened is not None else None
     graded = grading(**{name: options.pop(name) for name in OF_GRADING})
     resources = click.get_current_context().with_resource(ExitStack())
     server = Server(host, port)
@@ -86,14 +101,24 @@ def view(
     if not no_browser:
         webbrowser.open(address)
 
-    def write_exr(path: Path, renderer: Renderer, seconds: float) -> None:
+    def write_exr(path: Path, renderer: Any, seconds: float) -> None:
+        renderer = renderer.developed() if cluster is not None else renderer
         outputs.write(path, renderer, outputs.metadata(renderer, file, seconds), Grading())
 
     of_renderer = {name: options.pop(name) for name in OF_RENDERER}
-    plan, devices, _ = open_scene(scene, display(quiet, None), resources, **options)
-    if len(devices) > 1:
-        raise click.BadParameter("the page renders on one device", param_hint="--device")
+    shown = display(quiet, None)
+    plan, devices, _ = open_scene(scene, shown, resources, **options)
     device = devices[0]
+    make: Any = None
+    where = " and ".join(one.info.label for one in devices)
+    if cluster is not None:
+        on, threads = options["device"], options["threads"]
+        with extra("cluster", "clpt view --cluster"):
+            from ..cluster.steered import SteeredCluster
+        client = resources.enter_context(connected(cluster, keys, on, threads, shown))
+        make, where = partial(SteeredCluster, client=client, device=device), cluster
+    elif len(devices) > 1:
+        make = partial(MultiRenderer, devices=devices)
     session = Session(
         plan,
         device,
@@ -101,9 +126,13 @@ def view(
         folder=Folder(folder, outputs.default(file)[0].stem, write_exr),
         source=_source(file, **options),
         display=Display(graded.exposure, OF_VIEW if graded.view else graded.tone, graded.view),
+        where=where,
+        make=make,
         **of_renderer,
     )
     resources.callback(session.close)
+    if begins is not None:
+        session.post(begins, server.message)
     server.show(session)
     session.start()
     with stops() as stopped:

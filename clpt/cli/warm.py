@@ -10,13 +10,14 @@ from typing import Any
 import click
 
 from .display import display
-from .scene_options import open_renderer, scene_options
+from .scene_options import denoise_option, open_renderer, scene_options
 from .verbosity import verbose_option
 
 
 @click.command()
 @click.argument("scenes", type=click.Path(path_type=Path), nargs=-1, required=True)
 @scene_options
+@denoise_option
 @verbose_option("Log more; twice for everything.")
 @click.option("--quiet", is_flag=True, help="Show no progress and no warnings.")
 def warm(scenes: tuple[Path, ...], verbose: int, quiet: bool, **options: Any) -> None:

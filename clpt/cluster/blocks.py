@@ -7,11 +7,11 @@ argument: a test or a simulation gives its own.
 
 from __future__ import annotations
 
-from bisect import bisect
 from collections.abc import Hashable
 from dataclasses import dataclass, field
 from enum import Enum
 
+from clpt.cluster.sample_ranges import gaps, with_range
 from clpt.errors import ClusterError
 from clpt.render.wavefront.film_state import Ranges
 
@@ -49,17 +49,17 @@ class Block:
 
 @dataclass
 class WorkerRecord:
-    """What is known of a worker.
+    """What is known of a worker; samples are of the whole picture.
 
     kind: its class of device; workers of one kind have the same bits. rate: [samples/s], 0 when not
-    known; blocks, samples: that it added; size: of its last block; failures: that it had.
+    known; blocks, samples: that it added; size: of its last block [samples]; failures: that it had.
     """
 
     kind: str = ""
     rate: float = 0.0
     blocks: int = 0
-    samples: int = 0
-    size: int = 0
+    samples: float = 0.0
+    size: float = 0.0
     failures: int = 0
     checked: bool = False
 
@@ -87,7 +87,8 @@ class Blocks:
     one, which `extend` may raise; seconds: what a block should take; least_seconds: what it should
     at the end too; check_every: of the blocks, one in so many is done by two workers and compared,
     beside the first block of each worker that has an equal; 0: none.
-    copies: of a block that workers do at a time, at most; 1 where a film cannot be dropped.
+    copies: of a block that workers do at a time, at most; 1 where a film cannot be dropped. share:
+    of the pixels that have these samples. before: blocks that have ended, whose workers are known.
 
     counts of what went wrong: lost (blocks of workers that are gone), repeated (blocks that a
     second worker began since the first was slow), dropped (films that were there already).
@@ -103,14 +104,19 @@ class Blocks:
         check_every: int = 0,
         copies: int = COPIES,
         first: int = 0,
+        share: float = 1.0,
+        before: Blocks | None = None,
     ):
-        self.taken, self.end = taken, end
+        self.taken, self.end, self.share = taken, end, share
         self.seconds, self.check_every, self.copies = seconds, check_every, copies
         self.least_seconds = 0.0
         self.workers: dict[Worker, WorkerRecord] = {}
-        self.refused: dict[Worker, str] = {}
+        self.former = {} if before is None else before.known  # workers that are not here yet
+        self.refused: dict[Worker, str] = {} if before is None else before.refused
         self.lost = self.repeated = self.dropped = 0
-        self._free = _gaps(taken, first, end)
+        if before is not None:
+            self.lost, self.repeated, self.dropped = before.lost, before.repeated, before.dropped
+        self._free = gaps(taken, first, end)
         self._flights: dict[int, _Flight] = {}
         self._again: list[_Flight] = []  # blocks that came back
         self._numbers = 0
@@ -119,10 +125,20 @@ class Blocks:
     # ---- what is left
 
     @property
+    def waiting(self) -> bool:
+        """Whether there are blocks that nobody has."""
+        return not self._closed and bool(self._free or self._again)
+
+    @property
     def done(self) -> bool:
         """Whether nothing is left, or nothing more is handed out and nothing is on its way."""
-        waiting = any(flight.since for flight in self._flights.values())
-        return not waiting if self._closed else not self._flights and not self._free
+        on_their_way = any(flight.since for flight in self._flights.values())
+        return not on_their_way if self._closed else self.complete
+
+    @property
+    def complete(self) -> bool:
+        """Whether all samples are taken."""
+        return not self._flights and not self._free
 
     @property
     def samples_done(self) -> int:
@@ -141,7 +157,7 @@ class Blocks:
     def extend(self, end: int) -> None:
         """Add samples up to another end. Does nothing where that is no later."""
         if end > self.end:
-            self._free += _gaps(self.taken, self.end, end)
+            self._free += gaps(self.taken, self.end, end)
             self.end = end
 
     def close(self) -> None:
@@ -150,14 +166,23 @@ class Blocks:
 
     # ---- workers
 
+    @property
+    def known(self) -> dict[Worker, WorkerRecord]:
+        """The workers that are here, and those of former blocks."""
+        return {**self.former, **self.workers}
+
     def join(self, worker: Worker, kind: str = "") -> None:
         """A worker is there. One that was refused stays so."""
-        if worker not in self.refused:
-            self.workers.setdefault(worker, WorkerRecord(kind))
+        if worker in self.refused or worker in self.workers:
+            return
+        record = self.former.pop(worker, None)
+        same = record is not None and record.kind == kind
+        self.workers[worker] = record if record and same else WorkerRecord(kind)
 
     def lose(self, worker: Worker) -> list[Block]:
         """A worker is gone: return its blocks, which others get."""
         self.workers.pop(worker, None)
+        self.former.pop(worker, None)
         blocks = [f.block for f in self._flights.values() if worker in f.since]
         for block in blocks:
             self.lost += 1
@@ -187,7 +212,7 @@ class Blocks:
         flight.since[worker] = now
         number = flight.block.number
         self._flights[number] = self._flights.pop(number)  # in the order in which they go out
-        record.size = flight.block.samples
+        record.size = self._of_picture(flight.block)
         return flight.block
 
     def finish(
@@ -207,15 +232,15 @@ class Blocks:
         if worker in self.workers:
             record = self.workers[worker]
             took = seconds or (0.0 if since is None else now - since)
-            _note_rate(record, block.samples, took)
+            _note_rate(record, self._of_picture(block), took)
         if flight.compared and not self._agreed(flight, worker, digest):
             return Outcome.HOLD
         del self._flights[block.number]
         self._again = [other for other in self._again if other is not flight]
-        self.taken = _with_range(self.taken, block.first, block.end)
+        self.taken = with_range(self.taken, block.first, block.end)
         if worker in self.workers:
             record.blocks += 1
-            record.samples += block.samples
+            record.samples += self._of_picture(block)
         return Outcome.ADD
 
     def give_back(self, worker: Worker, block: Block) -> None:
@@ -281,21 +306,30 @@ class Blocks:
 
         Only where nobody would begin the block that it takes a second time.
         """
-        left, others = sum(end - first for first, end in self._free), self.rate - record.rate
-        return self.copies == 1 and record.rate > 0.0 and left * record.rate < others
+        others = self.rate - record.rate
+        return self.copies == 1 and record.rate > 0.0 and self.left * record.rate < others
 
     def _size(self, record: WorkerRecord) -> int:
         """How many samples the next block of a worker has."""
         if not record.rate:
             return 1
-        left = sum(end - first for first, end in self._free)
         usual = self.seconds * record.rate
-        share = max(
-            LAST_SHARE * left * record.rate / self.rate,
+        part = max(
+            LAST_SHARE * self.left * self.share * record.rate / self.rate,
             LEAST * usual,
             self.least_seconds * record.rate,
         )
-        return max(1, min(GROWTH * max(record.size, 1), int(usual), int(share)))
+        size = min(GROWTH * max(record.size, self.share), usual, part)
+        return max(1, int(size / self.share))
+
+    @property
+    def left(self) -> int:
+        """How many samples nobody has."""
+        return sum(end - first for first, end in self._free)
+
+    def _of_picture(self, block: Block) -> float:
+        """How many samples of the whole picture a block is worth."""
+        return block.samples * self.share
 
     def _slow(self, worker: Worker, now: float) -> _Flight | None:
         """The block that is longest on its way at another worker, if that is slow with it."""
@@ -310,7 +344,7 @@ class Blocks:
             if waited < PATIENCE * self.seconds:
                 return None  # those after it went out later
             tried = worker in since or worker in flight.films or worker in flight.failed_at
-            if not tried and waited >= PATIENCE * flight.block.samples / record.rate:
+            if not tried and waited >= PATIENCE * self._of_picture(flight.block) / record.rate:
                 self.repeated += 1
                 return flight
         return None
@@ -361,33 +395,7 @@ class Blocks:
         return False
 
 
-def _note_rate(record: WorkerRecord, samples: int, seconds: float) -> None:
+def _note_rate(record: WorkerRecord, samples: float, seconds: float) -> None:
     if seconds > 0.0:
         rate = samples / seconds
         record.rate = rate if not record.rate else (1 - MEMORY) * record.rate + MEMORY * rate
-
-
-def _with_range(taken: Ranges, first: int, end: int) -> Ranges:
-    """Return ranges and one more, which is apart from them; neighbours become one range."""
-    before = after = bisect(taken, (first, end))
-    if before and taken[before - 1][1] == first:
-        before -= 1
-        first = taken[before][0]
-    if after < len(taken) and taken[after][0] == end:
-        end = taken[after][1]
-        after += 1
-    return (*taken[:before], (first, end), *taken[after:])
-
-
-def _gaps(taken: Ranges, first: int, end: int) -> list[tuple[int, int]]:
-    """The ranges of [first, end) that are not taken."""
-    gaps = []
-    for start, stop in taken:
-        if start > first:
-            gaps.append((first, min(start, end)))
-        first = max(first, stop)
-        if first >= end:
-            break
-    if first < end:
-        gaps.append((first, end))
-    return [(a, b) for a, b in gaps if a < b]

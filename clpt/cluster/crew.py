@@ -14,9 +14,11 @@ from dataclasses import replace
 from typing import NoReturn
 
 from clpt.cluster.blocks import Block, Blocks, WorkerRecord
-from clpt.cluster.device_worker import DeviceWorker, Job, added
+from clpt.cluster.device_worker import DeviceWorker, added
+from clpt.cluster.sample_ranges import gaps
 from clpt.errors import ClusterError
 from clpt.render.wavefront.film_state import FilmState, Ranges, join_ranges
+from clpt.render.wavefront.tracer import Selection, use_all_pixels
 from clpt.render.wavefront.wavefront import Counts
 
 log = logging.getLogger(__name__)
@@ -34,9 +36,9 @@ class Crew:
     """Devices that work together.
 
     workers: those that have not failed; failed: the names and errors of the others. saved: the film
-    on the host of what they took, None for an empty one, and saved_ranges: its samples. lost: jobs
-    and ranges of samples that no film holds any more. keeper: whose film holds the whole picture
-    beside its own samples, if there is one. stop: ends what is being done.
+    on the host of what they took, None for an empty one, and saved_ranges: its samples. lost:
+    selections and ranges of samples that no film holds any more. keeper: whose film holds the whole
+    picture beside its own samples, if there is one. stop: ends what is being done.
     """
 
     def __init__(self, workers: Iterable[DeviceWorker], stop: threading.Event):
@@ -44,7 +46,7 @@ class Crew:
         self.failed: list[tuple[DeviceWorker, BaseException]] = []
         self.saved: FilmState | None = None
         self.saved_ranges: Ranges = ()
-        self.lost: list[tuple[Job, int, int]] = []
+        self.lost: list[tuple[Selection, int, int]] = []
         self.keeper: DeviceWorker | None = None
         self._changed = threading.Condition()
         self._ending = False
@@ -56,6 +58,11 @@ class Crew:
         if not self.workers:
             self._give_up()
         return self.workers[0]
+
+    @property
+    def has_losses(self) -> bool:
+        """Whether there is something that no film holds any more."""
+        return bool(self.lost) or not (self.keeper is None or self.keeper in self.workers)
 
     @property
     def counts(self) -> tuple[Counts, ...]:
@@ -73,26 +80,31 @@ class Crew:
             ranges = join_ranges(ranges, worker.ranges)
         return ranges
 
-    def run(self, job: Job, ranges: Ranges, tick: Callable[[], bool]) -> bool:
-        """Do a job for ranges of samples; return whether it was not stopped.
+    @property
+    def whole(self) -> Selection:
+        """Samples of all pixels."""
+        return Selection("all", self.first.renderer.wavefronts[0].paths.pixels)
+
+    def run(self, selection: Selection, ranges: Ranges, tick: Callable[[], bool]) -> bool:
+        """Add ranges of a selection's samples; return whether it was not stopped.
 
         tick: called all the while; if it returns False, devices stop. What it raises is raised when
         they have. Raises ClusterError when no device is left, LostPicture without the keeper.
         """
-        finished = self._share(job, ranges, tick)
+        finished = self._share(selection, ranges, tick)
         while finished and self.lost:
             finished = self.repeat(tick)
         return finished
 
     def repeat(self, tick: Callable[[], bool]) -> bool:
         """Do again what was lost, as `run` does it."""
-        job = self.lost[0][0]
+        selection = self.lost[0][0]
         again: Ranges = ()
         for other, first, end in self.lost:
-            if other is job:
+            if other is selection:
                 again = join_ranges(again, ((first, end),))
-        self.lost = [entry for entry in self.lost if entry[0] is not job]
-        return self._share(job, again, tick)
+        self.lost = [entry for entry in self.lost if entry[0] is not selection]
+        return self._share(selection, again, tick)
 
     def save(self) -> None:
         """Bring to the host what only films on devices hold; do again what cannot be read."""
@@ -113,6 +125,14 @@ class Crew:
             worker.unsaved = []
             try:
                 worker.clear()
+            except Exception as error:
+                self.drop(worker, error)
+
+    def use_all_pixels(self) -> None:
+        """Let later renders sample every pixel, after selections of some."""
+        for worker in list(self.workers):
+            try:
+                use_all_pixels(worker.renderer.wavefronts[0])
             except Exception as error:
                 self.drop(worker, error)
 
@@ -143,18 +163,21 @@ class Crew:
         message = f"no device is left; the last one, {worker.name}, failed: {error}"
         raise ClusterError(message) from error
 
-    def _share(self, job: Job, ranges: Ranges, tick: Callable[[], bool]) -> bool:
-        """Do a job for ranges of samples once, perhaps with losses."""
-        blocks = Blocks(
-            ranges[-1][1], between(ranges), seconds=BLOCK_SECONDS, copies=1
-        )  # films that are added cannot be dropped
+    def _share(self, selection: Selection, ranges: Ranges, tick: Callable[[], bool]) -> bool:
+        """Add ranges of a selection's samples once, perhaps with losses."""
+        end = ranges[-1][1]
+        others = tuple(gaps(ranges, 0, end))
+        # Films that are added cannot be dropped: there is one copy of a block.
+        blocks = Blocks(end, others, seconds=BLOCK_SECONDS, copies=1)
         self._ending = False
         for worker in self.workers:
             blocks.join(worker, worker.name)
-            size = int(BLOCK_SECONDS * worker.rate / job.paths)
-            blocks.workers[worker] = WorkerRecord(worker.name, worker.rate / job.paths, size=size)
+            size = int(BLOCK_SECONDS * worker.rate / selection.pixels)
+            blocks.workers[worker] = WorkerRecord(
+                worker.name, worker.rate / selection.pixels, size=size
+            )
         threads = [
-            threading.Thread(target=self._work, args=(worker, blocks, job), daemon=True)
+            threading.Thread(target=self._work, args=(worker, blocks, selection), daemon=True)
             for worker in self.workers
         ]
         try:
@@ -185,15 +208,16 @@ class Crew:
             self._ending = True
             self._changed.notify_all()
 
-    def _work(self, worker: DeviceWorker, blocks: Blocks, job: Job) -> None:
+    def _work(self, worker: DeviceWorker, blocks: Blocks, selection: Selection) -> None:
         """Take blocks until none is left: a device's thread."""
         try:
             if worker.shows and worker is not self.keeper:
                 worker.clear()
             while (block := self._next(worker, blocks)) is not None:
                 began = time.perf_counter()
-                finished = worker.do(job, block.first, block.end, lambda _: self._goes_on())
-                self._note(worker, blocks, job, block, time.perf_counter() - began, finished)
+                finished = worker.do(selection, block.first, block.end, lambda _: self._goes_on())
+                seconds = time.perf_counter() - began
+                self._note(worker, blocks, selection, block, seconds, finished)
                 if worker.unsaved_seconds > SAVE_SECONDS and self.keeper is None:
                     self._save(worker)
         except Exception as error:
@@ -219,19 +243,19 @@ class Crew:
         self,
         worker: DeviceWorker,
         blocks: Blocks,
-        job: Job,
+        selection: Selection,
         block: Block,
         seconds: float,
         finished: bool,
     ) -> None:
         """Note that a block is in a device's film, wholly or, where it was stopped, in part."""
         with self._changed:
-            worker.unsaved.append((job, block.first, block.end))
+            worker.unsaved.append((selection, block.first, block.end))
             worker.unsaved_seconds += seconds
             if finished:
                 blocks.finish(worker, block, time.perf_counter(), seconds=seconds)
-                worker.paths += block.samples * job.paths
-                worker.rate = blocks.workers[worker].rate * job.paths
+                worker.paths += block.samples * selection.pixels
+                worker.rate = blocks.workers[worker].rate * selection.pixels
             self._changed.notify_all()
 
     def _save(self, worker: DeviceWorker) -> None:
@@ -242,10 +266,3 @@ class Crew:
             given = replace(state, taken=ranges)
             self.saved = given if self.saved is None else self.saved.merged(given)
             self.saved_ranges = self.saved.taken
-
-
-def between(ranges: Ranges) -> Ranges:
-    """Return what is before and between ranges that ascend."""
-    firsts = [0, *(end for _, end in ranges[:-1])]
-    gaps = zip(firsts, (first for first, _ in ranges), strict=True)
-    return tuple((first, end) for first, end in gaps if first < end)

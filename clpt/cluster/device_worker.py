@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
 from clpt.device import Device
@@ -13,26 +13,12 @@ from clpt.render.editing.scene_edit import MaterialKey, Replacements, ShapeKey
 from clpt.render.lowering.scene import Lowered
 from clpt.render.renderer import Renderer
 from clpt.render.wavefront.film_state import FilmState, Ranges, join_ranges
-from clpt.render.wavefront.wavefront import Counts, Wavefront
+from clpt.render.wavefront.tracer import OnBatch, Selection
+from clpt.render.wavefront.wavefront import Counts
 from clpt.scene import Scene
 from clpt.scene.materials import Material
 
-OnBatch = Callable[[Any], bool]
 _Made = TypeVar("_Made")
-
-
-@dataclass(frozen=True, eq=False)
-class Job:
-    """Samples that any device may add to its film.
-
-    do: called with each wavefront of a renderer, the first sample's number, the end, and what
-    `Wavefront.render_samples` calls; returns whether it was not stopped. prepare: called once with
-    a wavefront before. paths: of a sample, as many as pixels.
-    """
-
-    do: Callable[[Wavefront, int, int, OnBatch], bool]
-    paths: int
-    prepare: Callable[[Wavefront], None] | None = None
 
 
 class Once:
@@ -87,19 +73,19 @@ class SharingRenderer(Renderer):
 class DeviceWorker:
     """A device with its renderer.
 
-    name: for people; unsaved: the jobs and ranges of samples that its film holds, and nothing else
-    does; shows: whether its film holds the whole picture, rather than these; paths: that it traced;
-    rate: of paths [1/s], 0 when not known.
+    name: for people; unsaved: the selections and ranges of samples that its film holds, and nothing
+    else does; shows: whether its film holds the whole picture, rather than these; paths: that it
+    traced; rate: of paths [1/s], 0 when not known.
     """
 
     def __init__(self, name: str, renderer: SharingRenderer):
         self.name, self.renderer = name, renderer
-        self.unsaved: list[tuple[Job, int, int]] = []
+        self.unsaved: list[tuple[Selection, int, int]] = []
         self.unsaved_seconds = 0.0
         self.shows = False
         self.paths, self.rate = 0, 0.0
         self.past = [Counts() for _ in renderer.wavefronts]  # before the film was emptied
-        self._job: Job | None = None
+        self._selection: Selection | None = None
 
     @property
     def counts(self) -> list[Counts]:
@@ -114,20 +100,29 @@ class DeviceWorker:
             ranges = join_ranges(ranges, ((first, end),))
         return ranges
 
-    def do(self, job: Job, first: int, end: int, on_batch: OnBatch) -> bool:
-        """Add samples first to end - 1 of a job to the film; return whether it was not stopped."""
+    def do(self, selection: Selection, first: int, end: int, on_batch: OnBatch) -> bool:
+        """Add samples first to end - 1 to the film; return whether it was not stopped."""
         wavefronts = self.renderer.wavefronts
-        if job is not self._job and job.prepare is not None:
+        if selection is not self._selection:
             for wavefront in wavefronts:
-                job.prepare(wavefront)
-        self._job = job
-        return all(job.do(wavefront, first, end, on_batch) for wavefront in wavefronts)
+                selection.prepare(wavefront)
+        self._selection = selection
+        return all(selection.add(wavefront, first, end, on_batch) for wavefront in wavefronts)
 
     def take(self) -> FilmState:
         """Return the film, and empty it."""
         state = self.renderer.film_state()
         self.clear()
         return state
+
+    def hold(self) -> None:
+        """Keep a copy of the film on the device, for `held`. Raises MemoryBudgetError."""
+        for wavefront in self.renderer.wavefronts:
+            wavefront.film.hold()
+
+    def held(self) -> FilmState:
+        """Return what the film was at the last `hold`."""
+        return self.renderer.words((), held=True)
 
     def clear(self) -> None:
         """Empty the film."""
@@ -138,11 +133,42 @@ class DeviceWorker:
 
     def show(self, state: FilmState) -> None:
         """Let the film hold a whole picture."""
-        for wavefront, words in zip(self.renderer.wavefronts, state.words, strict=True):
-            wavefront.set_words(words, state.bands, state.layers)
+        self.renderer.set_words(state)
         self.shows = True
 
 
 def added(a: Counts, b: Counts) -> Counts:
     """Return the sums of what happened."""
     return Counts(**{name: value + getattr(b, name) for name, value in vars(a).items()})
+
+
+def device_names(devices: list[Device]) -> list[str]:
+    """Return what devices are called: those with one label get a number."""
+    labels = [device.info.label for device in devices]
+    return [
+        f"{label} #{labels[: i + 1].count(label)}" if labels.count(label) > 1 else label
+        for i, label in enumerate(labels)
+    ]
+
+
+def on_all(action: Callable[[Any], Any], items: list[Any]) -> list[Any]:
+    """Do something with every item at once; return the results, for some of them exceptions.
+
+    Raises what was raised for the first item, if it is bad input or if all failed.
+    """
+
+    def tried(item: Any) -> Any:
+        try:
+            return action(item)
+        except Exception as error:
+            return error
+
+    with ThreadPoolExecutor(len(items)) as pool:
+        results = list(pool.map(tried, items))
+    errors = [result for result in results if isinstance(result, Exception)]
+    for error in errors:
+        if isinstance(error, (SceneError, TypeError)):
+            raise error
+    if len(errors) == len(items):
+        raise errors[0]
+    return results

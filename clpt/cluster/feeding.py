@@ -8,8 +8,10 @@ import logging
 import queue
 import secrets
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +20,7 @@ from clpt.cluster.blocks import Block, Blocks, Outcome
 from clpt.cluster.bundle import Bundle
 from clpt.errors import ClusterError
 from clpt.render.wavefront.film_state import FilmState
+from clpt.render.wavefront.tracer import Selection
 from clpt.scene.fingerprint import Plain
 
 if TYPE_CHECKING:
@@ -28,6 +31,7 @@ log = logging.getLogger(__name__)
 SLOTS = 2  # tasks of a worker: one is rendered, one waits
 LOOK_SECONDS = 0.5  # between looks at which workers there are
 WAIT_SECONDS = 1.0  # between looks for a slow block, of a worker that has nothing to do
+TURN_SECONDS = 0.1  # between looks whether another render needs workers
 MOST_LOOKS = 200.0  # of these by all workers together [1/s]
 ANSWER_SECONDS = 30.0  # in which a scheduler answers
 LAST_SECONDS = 10.0  # in which workers send what they have, after a stop
@@ -50,27 +54,51 @@ class Film:
     whole: bool = True
 
 
+@dataclass
+class Chosen:
+    """The class of device that takes part: that of the first worker; "" before there is one."""
+
+    kind: str = ""
+
+
+@dataclass(frozen=True)
+class Job:
+    """What workers render: text, from `tasks.describe_job`; the bundle of its scene; and the folder
+    that holds the files of the bundle.
+    """
+
+    text: str
+    bundle: Bundle
+    folder: Path
+
+    @cached_property
+    def digest(self) -> str:
+        """The SHA-256 by which workers know it: of scene, options, kernels and version."""
+        return tasks.digest_of(self.text)
+
+
 class Feeder:
     """One run: every worker gets blocks as long as there are some.
 
-    All of it runs in the event loop of Dask's client, but for `stop`. films: get what is to be
-    added; folder: holds the files of the bundle; mixed: see `ClusterRenderer`.
+    All of it runs in the event loop of Dask's client, but for `stop`. blocks: of a selection's
+    samples; films: get what is to be added, and None at the end; mixed, patience, waits: see
+    `Farm`; chosen: the class of device that takes part.
     """
 
     def __init__(
-        self, client: Client, blocks: Blocks, job: str, bundle: Bundle, folder: Path, *,
-        films: queue.Queue[Film], mixed: bool, patience: float,
+        self, client: Client, blocks: Blocks, job: Job, selection: Selection, *,
+        films: queue.Queue[Film | None], mixed: bool, patience: float, chosen: Chosen,
+        waits: Callable[[], bool] = lambda: False,
     ):  # fmt: skip
-        self.client, self.blocks, self.job, self.bundle = client, blocks, job, bundle
-        self.folder, self.films, self.mixed, self.patience = folder, films, mixed, patience
-        self.digest = tasks.digest_of(job)
+        self.client, self.blocks, self.job = client, blocks, job
+        self.films, self.mixed, self.patience, self.chosen = films, mixed, patience, chosen
+        self.waits, self._selection = waits, tasks.pack_selection(selection)
         self.loop: asyncio.AbstractEventLoop = client.loop.asyncio_loop
         self._serving: dict[str, asyncio.Task[None]] = {}
         self._changed = asyncio.Event()
         self.classes: dict[str, dict[str, Plain]] = {}  # of devices, by what they are called
         self.film_seconds = 0.0  # in which a film comes in, beside others
         self._stopping = self._ended = False
-        self._kind = ""
         self._errors: list[BaseException] = []
         self._failures: dict[str, int] = {}
         self._losses: dict[int, int] = {}  # of a block, by its number
@@ -104,7 +132,10 @@ class Feeder:
             self.blocks.close()
             for task in self._serving.values():
                 task.cancel()
-            await asyncio.gather(*self._serving.values(), return_exceptions=True)
+            try:
+                await asyncio.gather(*self._serving.values(), return_exceptions=True)
+            finally:
+                self.films.put(None)
 
     # ---- who is there
 
@@ -118,6 +149,8 @@ class Feeder:
 
     async def _follow(self, addresses: set[str]) -> None:
         """Serve workers that came; note those that went."""
+        for address in self.blocks.former.keys() - addresses:
+            self.blocks.lose(address)
         for address in self._serving.keys() - addresses:
             self._serving.pop(address).cancel()
             self._lose(address)
@@ -165,7 +198,7 @@ class Feeder:
         """Let blocks end with what they have, and wait for that."""
         self.blocks.close()
         serving = [address for address, task in self._serving.items() if not task.done()]
-        call = self.client.run(tasks.stop_job, self.digest, workers=serving, on_error="ignore")
+        call = self.client.run(tasks.stop_job, self.job.digest, workers=serving, on_error="ignore")
         pending = [self._serving[address] for address in serving]
         try:
             await asyncio.wait_for(call, LAST_SECONDS)
@@ -180,7 +213,9 @@ class Feeder:
     async def _serve(self, address: str) -> None:
         """Open the job at a worker, then give it blocks."""
         try:
-            kind = await self._open(address)
+            while self.waits() and not self._stopping:
+                await self._wait(TURN_SECONDS)
+            kind = None if self._stopping else await self._open(address)
             if kind is None:
                 return
             self.blocks.join(address, kind)
@@ -193,17 +228,18 @@ class Feeder:
 
     async def _open(self, address: str) -> str | None:
         """Open the job at a worker; return its class of device, None if it takes no part."""
-        reply = await self._call(address, tasks.open_job, self.job, {})
+        reply = await self._call(address, tasks.open_job, self.job.text, {})
         if "lacks" in reply:
-            reply = await self._call(address, tasks.open_job, self.job, self._files(reply["lacks"]))
+            files = self._files(reply["lacks"])
+            reply = await self._call(address, tasks.open_job, self.job.text, files)
         reason = reply.get("refused") or reply.get("error")
         kind = str(reply.get("kind", ""))
         if reason is None and not kind:
             reason = "it cannot keep the scene's files"
         if reason is None and not self.mixed:
-            self._kind = self._kind or kind
-            if kind != self._kind:
-                reason = f"it is of another class of device: {kind}, others: {self._kind}"
+            self.chosen.kind = self.chosen.kind or kind
+            if kind != self.chosen.kind:
+                reason = f"it is of another class of device: {kind}, others: {self.chosen.kind}"
         if reason is None:
             self.classes[kind] = dict(reply.get("class", {}))
             log.info("the worker %s is ready in %.2f s: %s", address, reply["seconds"], kind)
@@ -213,7 +249,8 @@ class Feeder:
 
     def _files(self, digests: list[str]) -> dict[str, Future]:
         """Tasks whose results are files of the bundle; workers get them from each other."""
-        paths = {digest: self.folder / name for name, digest in self.bundle.files.items()}
+        named = self.job.bundle.files.items()
+        paths = {digest: self.job.folder / name for name, digest in named}
         return {
             digest: self.client.submit(
                 tasks.give, paths[digest].read_bytes(), key=f"clpt-file-{digest}"
@@ -225,6 +262,9 @@ class Feeder:
     async def _feed(self, address: str) -> None:
         """Give a worker blocks, one after the other."""
         while not (self._stopping or self.blocks.done):
+            if self.waits():
+                await self._wait(TURN_SECONDS)
+                continue
             block = self.blocks.take(address, time.monotonic())
             if block is None:
                 if address in self.blocks.refused:
@@ -232,8 +272,9 @@ class Feeder:
                 await self._wait(max(WAIT_SECONDS, len(self._serving) / MOST_LOOKS))
                 continue
             reply = await self._call(
-                address, tasks.render_block, self.digest, block.first, block.end
-            )
+                address, tasks.render_block, self.job.digest, block.first, block.end,
+                self._selection,
+            )  # fmt: skip
             await self._take_in(address, block, reply)
         self._changed.set()
 

@@ -6,29 +6,24 @@ import dataclasses
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar
-
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Any
 
 from clpt import device as dev
-from clpt.cluster.crew import Crew, LostPicture
-from clpt.cluster.device_worker import DeviceWorker, Job, Once, SharingRenderer
-from clpt.cluster.multi_resumable import MultiResumable
-from clpt.errors import DeviceError, SceneError
+from clpt.cluster.crew import Crew
+from clpt.cluster.device_worker import DeviceWorker, Once, SharingRenderer, device_names, on_all
+from clpt.cluster.multi_film import MultiFilm
+from clpt.cluster.multi_noise import CrewTracer
+from clpt.errors import DeviceError
 from clpt.render.editing.scene_edit import MaterialKey, ShapeKey
 from clpt.render.options import RenderOptions, check_options, check_scene
-from clpt.render.pictures import Image
 from clpt.render.progress import Progress
 from clpt.render.renderer import next_range, texture_budget_of
-from clpt.render.saved_film import SavedFilm
 from clpt.render.stats import RenderStats
 from clpt.render.wavefront import adaptive
-from clpt.render.wavefront.film_state import FilmState, Ranges, join_ranges
+from clpt.render.wavefront.film_state import join_ranges
 from clpt.render.wavefront.tracer import Tracer
-from clpt.render.wavefront.wavefront import Counts, Wavefront
-from clpt.render.wavefront.work_list import PixelIndices
+from clpt.render.wavefront.wavefront import Counts
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
 from clpt.scene.fingerprint import Plain
@@ -36,11 +31,6 @@ from clpt.scene.materials import Material
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
-
-Call = tuple[int, int, float | None]
-Calls = list[Call]
-Arrays = Mapping[str, NDArray[Any]]
-_Result = TypeVar("_Result")
 
 
 @dataclass(frozen=True)
@@ -57,21 +47,7 @@ class DeviceShare:
     failure: str | None
 
 
-@dataclass
-class _Noise:
-    """Adaptive sampling on the first device, with the help of the others.
-
-    base: the film before; arrays: the state then, see `Adaptive.arrays`; calls: of `run` since,
-    first, end and noise, None for all pixels.
-    """
-
-    adaptive: adaptive.Adaptive
-    base: FilmState
-    calls: Calls
-    arrays: Arrays
-
-
-class MultiRenderer(MultiResumable):
+class MultiRenderer(MultiFilm):
     """Renders a scene on several devices; its picture so far is available between runs.
 
     devices: "all", "gpu", or names or indexes as `clpt.device.choose_all` takes them, and
@@ -111,8 +87,8 @@ class MultiRenderer(MultiResumable):
         def make(device: dev.Device) -> SharingRenderer:
             return SharingRenderer(scene, device, shared, **options)
 
-        names = _names(chosen)
-        made = _on_all(make, chosen)
+        names = device_names(chosen)
+        made = on_all(make, chosen)
         workers = []
         for name, result in zip(names, made, strict=True):
             if isinstance(result, SharingRenderer):
@@ -122,10 +98,8 @@ class MultiRenderer(MultiResumable):
         self._crew = Crew(workers, self._stop)
         self._lost_at_first = warnings
         self.channels = workers[0].renderer.channels
-        self._taken: Ranges = ()
-        self._noise: _Noise | None = None
+        self.denoise = options.get("denoise")
         self._seconds: dict[str, float] = {}
-        self._telling = False
 
     # ---- what stands for all devices
 
@@ -226,9 +200,10 @@ class MultiRenderer(MultiResumable):
             finished, began = False, time.perf_counter()
             try:
                 if noise is None and self._noise is None:
-                    finished = self._crew.run(self._whole_job, ((first, end),), tick)
+                    finished = self._crew.run(self._crew.whole, ((first, end),), tick)
                 else:
-                    finished = self._run_adaptively((first, end, noise), tick)
+                    self._noise = self._noise or self._adaptively(self.film_state(), {})
+                    finished = self._noise.run((first, end, noise), tick)
             finally:
                 self._stop.clear()
                 self._seconds_rendered += time.perf_counter() - began
@@ -239,6 +214,10 @@ class MultiRenderer(MultiResumable):
             if raised:
                 raise raised.pop()
             return finished
+
+    def tracer(self) -> Tracer:
+        """Return what adds selections of samples to the films of all devices."""
+        return CrewTracer(self._crew.first.renderer.wavefronts[0], self._crew)
 
     def cancel(self) -> None:
         """Let the `run` of another thread, or else the next one, stop soon and return False."""
@@ -282,57 +261,6 @@ class MultiRenderer(MultiResumable):
             self._forget()
             self._crew.clear_counts()
 
-    # ---- the film
-
-    def film_state(self) -> FilmState:
-        """Return the film of all devices, as whole numbers; see `Renderer.film_state`.
-
-        When all devices have failed it is what was saved of them.
-        """
-        with self._lock:
-            self._check_open()
-            if self._noise is not None and not self._crew.workers:
-                return self._noise.base
-            if self._noise is not None:
-                state = self._on_first(lambda first: first.renderer.film_state())
-                return dataclasses.replace(state, taken=self._taken)
-            if self._crew.workers:
-                self._crew.save()
-            if self._crew.saved is not None:
-                return self._crew.saved
-            return self._on_first(lambda first: first.renderer.film_state())
-
-    def merge(self, state: FilmState) -> None:
-        """Add the samples of another film of the same scene to this one; see `Renderer.merge`."""
-        with self._lock:
-            merged = self.film_state().merged(state)
-            self._forget()
-            self._crew.saved, self._crew.saved_ranges = merged, merged.taken
-            self._taken = merged.taken
-
-    @property
-    def wavefronts(self) -> list[Wavefront]:  # type: ignore[override]
-        """Those of the first device, whose films then hold the picture of all."""
-        with self._lock:
-            self._check_open()
-            return self._on_first(lambda first: first.renderer.wavefronts)
-
-    def image(self) -> Image:
-        """The picture so far of all devices; see `Renderer.image`."""
-        return self._on_first(lambda first: first.renderer.image())
-
-    def colours(self) -> Image:
-        """The picture so far in three colours, (h, w, 3) float32, also of a film with bands."""
-        return self._on_first(lambda first: first.renderer.colours())
-
-    def layers(self) -> dict[str, Image]:
-        """The values of the `aov` integrator by name, (h, w, 1 to 3) float32."""
-        return self._on_first(lambda first: first.renderer.layers())
-
-    def halves(self) -> tuple[Image, Image]:
-        """Return the pictures of the even and of the odd samples; see `Renderer.halves`."""
-        return self._on_first(lambda first: first.renderer.halves())
-
     def close(self) -> None:
         """Give the memory of all devices back; see `Renderer.close`."""
         with self._lock:
@@ -349,43 +277,6 @@ class MultiRenderer(MultiResumable):
 
     # ---- inside
 
-    @property
-    def _adaptive(self) -> adaptive.Adaptive | None:
-        return None if self._noise is None else self._noise.adaptive
-
-    def _go_on(self, state: FilmState, saved: SavedFilm) -> None:
-        """Take the place of what there is by a film; the first device's counts are the film's."""
-        crew = self._crew
-        crew.keeper, self._noise = None, None
-        crew.lost.clear()
-        crew.empty(worker for worker in crew.workers if worker is not crew.first)
-        crew.first.unsaved, crew.first.shows = [], True
-        crew.clear_counts()
-        self._taken = state.taken
-        if saved.adaptive:
-            self._begin_adaptively(state, [], saved.adaptive)
-        else:
-            crew.saved, crew.saved_ranges = state, state.taken
-
-    def _check_open(self) -> None:
-        if self._closed:
-            raise DeviceError("this MultiRenderer is closed; make another one")
-        if self._telling:
-            raise DeviceError("devices are at work; the picture is there when the run has ended")
-
-    def _forget(self) -> None:
-        """Note that all films are empty."""
-        self._crew.empty(self._crew.workers)
-        self._crew.saved, self._crew.saved_ranges, self._crew.keeper = None, (), None
-        self._crew.lost.clear()
-        self._taken, self._noise = (), None
-        self._held, self._sessions, self._seconds_rendered = None, (), 0.0
-
-    @property
-    def _whole_job(self) -> Job:
-        """Samples of all pixels."""
-        return Job(Wavefront.render_samples, self._crew.first.renderer.wavefronts[0].paths.pixels)
-
     def _ticker(
         self,
         end: int,
@@ -394,7 +285,7 @@ class MultiRenderer(MultiResumable):
     ) -> Callable[[], bool]:
         """Return what is called while devices work: it returns whether they go on."""
         began = time.perf_counter()
-        pixels = self._whole_job.paths * len(self.channels or (None,))
+        pixels = self._crew.whole.pixels * len(self.channels or (None,))
 
         def tick() -> bool:
             counts = self._crew.counts
@@ -422,250 +313,8 @@ class MultiRenderer(MultiResumable):
         Raises SceneError, TypeError as the first device does.
         """
         workers = list(self._crew.workers)
-        results = _on_all(lambda worker: action(worker.renderer), workers)
+        results = on_all(lambda worker: action(worker.renderer), workers)
         for worker, result in zip(workers, results, strict=True):
             if isinstance(result, Exception):
                 worker.unsaved.clear()  # of the picture that ends
                 self._crew.drop(worker, result)
-
-    def _on_first(self, action: Callable[[DeviceWorker], _Result]) -> _Result:
-        """Do something on the first device, whose film holds the picture; or else on the next."""
-        with self._lock:
-            self._check_open()
-            while True:
-                first = self._show()
-                try:
-                    return action(first)
-                except SceneError:
-                    raise
-                except Exception as error:
-                    self._crew.drop(first, error)
-
-    def _show(self) -> DeviceWorker:
-        """Let the film of the first device hold the picture; return that device."""
-        crew = self._crew
-        while self._noise is not None:
-            try:
-                self._restart_if_lost(lambda: True)
-                self._gather()
-                return crew.first
-            except LostPicture:
-                continue
-        while True:
-            if any(worker.unsaved for worker in crew.workers):
-                crew.save()
-                crew.empty(worker for worker in crew.workers if worker.shows)
-            first = crew.first
-            if first.shows or crew.saved is None:
-                return first
-            try:
-                first.show(crew.saved)
-                return first
-            except Exception as error:
-                crew.drop(first, error)
-
-    # ---- noise
-
-    def _run_adaptively(self, call: Call, tick: Callable[[], bool]) -> bool:
-        """Add samples to the pixels with noise, or to all; return whether it was not stopped.
-
-        What the first device has of it cannot be done by others alone: when it fails, all begins
-        again on the next one, which takes the same samples and comes to the same decisions.
-        """
-        if self._noise is None:
-            base = self.film_state()
-            self._begin_adaptively(base, [], {})
-        while True:
-            try:
-                if not self._restart_if_lost(tick):
-                    return False
-                finished = self._call(call, tick)
-                break
-            except LostPicture:
-                continue
-        assert self._noise is not None
-        self._noise.calls.append(call)
-        return finished
-
-    def _begin_adaptively(self, base: FilmState, calls: Calls, arrays: Arrays) -> None:
-        """Begin adaptive sampling on the first device, over a film; calls, arrays: see `_Noise`."""
-        crew = self._crew
-        while True:
-            crew.empty(crew.workers)
-            first = crew.first
-            try:
-                first.show(base)
-                wavefront = first.renderer.wavefronts[0]
-                begun = adaptive.Adaptive(wavefront, _CrewTracer(wavefront, self))
-                if arrays:
-                    begun.restore(arrays)
-                break
-            except Exception as error:
-                crew.drop(first, error)
-        if not arrays:
-            begun.skip(base.taken[-1][1] if base.taken else self._first_sample)
-        crew.keeper = first
-        self._noise = _Noise(begun, base, calls, arrays)
-
-    def _restart_if_lost(self, tick: Callable[[], bool]) -> bool:
-        """Begin again where the first device has failed; return whether it was not stopped."""
-        noise, crew = self._noise, self._crew
-        assert noise is not None, "adaptive sampling has begun"
-        if crew.keeper in crew.workers:
-            return True
-        crew.lost.clear()
-        crew.keeper = None
-        self._begin_adaptively(noise.base, noise.calls, noise.arrays)
-        return all(self._call(call, tick) for call in noise.calls)
-
-    def _call(self, call: Call, tick: Callable[[], bool]) -> bool:
-        """What one `run` adds. Raises LostPicture when the first device fails."""
-        first, end, noise = call
-        crew, adaptively = self._crew, self._noise
-        assert adaptively is not None
-        keeper = crew.first
-        try:
-            if noise is not None:
-                return adaptively.adaptive.run(end, noise, lambda _: tick())
-            finished = crew.run(self._whole_job, ((first, end),), tick)
-            if finished:
-                adaptively.adaptive.skip(end)
-            return finished
-        except (LostPicture, SceneError):
-            raise
-        except Exception as error:
-            if not crew.workers:
-                raise
-            crew.drop(keeper, error)
-            raise LostPicture from error
-
-    def _gather(self) -> None:
-        """Add what other devices hold to the film of the first. Raises LostPicture."""
-        crew = self._crew
-        while True:
-            helpers = [w for w in crew.workers if w.unsaved and w is not crew.keeper]
-            if not helpers and not crew.lost:
-                break
-            for worker in helpers:
-                jobs = list(worker.unsaved)
-                try:
-                    state = worker.take()
-                except Exception as error:
-                    worker.unsaved = jobs
-                    crew.drop(worker, error)
-                    continue
-                self._add_to_first(state)
-            if crew.lost and not crew.repeat(lambda: True):
-                crew.lost.clear()
-        crew.first.unsaved.clear()
-
-    def _add_to_first(self, state: FilmState) -> None:
-        """Add a film to that of the first device. Raises LostPicture."""
-        keeper = self._crew.first
-        try:
-            own = keeper.renderer.film_state()
-            keeper.show(
-                dataclasses.replace(own, taken=()).merged(dataclasses.replace(state, taken=()))
-            )
-        except Exception as error:
-            self._crew.drop(keeper, error)
-            raise LostPicture from error
-
-
-class _CrewTracer(Tracer):
-    """Adds samples with the help of all devices."""
-
-    def __init__(self, wavefront: Wavefront, renderer: MultiRenderer):
-        super().__init__(wavefront)
-        self.renderer = renderer
-
-    def from_camera(
-        self,
-        pixels: PixelIndices,
-        ends: PixelIndices,
-        first: int,
-        end: int,
-        on_batch: adaptive.OnBatch,
-    ) -> bool:
-        """Add samples first to end - 1 of these pixels, of each before its own of `ends`."""
-        return self._run(Wavefront.render_from_camera, pixels, ends, first, end, on_batch)
-
-    def from_lights(
-        self, pixels: PixelIndices, first: int, end: int, on_batch: adaptive.OnBatch
-    ) -> bool:
-        """Add the light paths of samples first to end - 1; pixels: all of the picture."""
-        return self._run(Wavefront.render_from_lights, pixels, None, first, end, on_batch)
-
-    def guides(
-        self, pixels: PixelIndices, first: int, end: int, on_batch: adaptive.OnBatch
-    ) -> bool:
-        """As `from_lights`, and leave the film's picture as it is."""
-        return self._run(Wavefront.trace_from_lights, pixels, None, first, end, on_batch)
-
-    def gather(self) -> None:
-        """Let the film hold all that was added so far."""
-        self.renderer._gather()
-
-    def discard(self) -> None:
-        """Forget what was added since `gather`."""
-        crew = self.renderer._crew
-        crew.lost.clear()
-        crew.empty(w for w in crew.workers if w.unsaved and w is not crew.keeper)
-        for worker in crew.workers:
-            worker.unsaved = []
-
-    def use_all_pixels(self, pixels: PixelIndices) -> None:
-        """Let later renders sample every pixel; pixels: all of the picture."""
-        crew = self.renderer._crew
-        for worker in list(crew.workers):
-            try:
-                worker.renderer.wavefronts[0].paths.set_work_list(pixels)
-            except Exception as error:
-                crew.drop(worker, error)
-
-    def _run(
-        self,
-        do: Callable[..., bool],
-        pixels: PixelIndices,
-        ends: PixelIndices | None,
-        first: int,
-        end: int,
-        on_batch: adaptive.OnBatch,
-    ) -> bool:
-        def prepare(wavefront: Wavefront) -> None:
-            wavefront.paths.set_work_list(pixels, ends)
-
-        job = Job(do, len(pixels), prepare)
-        return self.renderer._crew.run(job, ((first, end),), lambda: on_batch(None))
-
-
-def _names(devices: list[dev.Device]) -> list[str]:
-    """What devices are called: those with one label get a number."""
-    labels = [device.info.label for device in devices]
-    return [
-        f"{label} #{labels[: i + 1].count(label)}" if labels.count(label) > 1 else label
-        for i, label in enumerate(labels)
-    ]
-
-
-def _on_all(action: Callable[[Any], Any], items: list[Any]) -> list[Any]:
-    """Do something with every item at once; return the results, for some of them exceptions.
-
-    Raises what was raised for the first item, if it is bad input or if all failed.
-    """
-
-    def tried(item: Any) -> Any:
-        try:
-            return action(item)
-        except Exception as error:
-            return error
-
-    with ThreadPoolExecutor(len(items)) as pool:
-        results = list(pool.map(tried, items))
-    errors = [result for result in results if isinstance(result, Exception)]
-    for error in errors:
-        if isinstance(error, (SceneError, TypeError)):
-            raise error
-    if len(errors) == len(items):
-        raise errors[0]
-    return results

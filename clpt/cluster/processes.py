@@ -57,6 +57,14 @@ def configure() -> None:
     restricted.restrict()
     for name in ("distributed", "tornado", "asyncio"):  # clpt says what there is to know
         logging.getLogger(name).setLevel(max(logging.WARNING, logging.getLogger().level))
+    logging.getLogger("asyncio").addFilter(_is_no_left_over)
+
+
+def _is_no_left_over(record: logging.LogRecord) -> bool:
+    """Whether a record is of something else than a wait that Dask leaves behind: it does so when a
+    film is no longer wanted whose worker has gone.
+    """
+    return not (record.exc_info and getattr(record.exc_info[0], "__name__", "") == "AllExit")
 
 
 def run_worker(

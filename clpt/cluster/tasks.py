@@ -14,36 +14,39 @@ import traceback
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
 from clpt import device as dev
 from clpt.cluster.bundle import Bundle, Store, canonical
 from clpt.cluster.multi_renderer import MultiRenderer
-from clpt.errors import ClptError, ClusterError, MemoryBudgetError
+from clpt.errors import ClptError, ClusterError, MemoryBudgetError, SceneError
 from clpt.render.renderer import Renderer
 from clpt.render.resumable import kernels_digest
-from clpt.render.wavefront.film_state import FilmState
+from clpt.render.wavefront.film_state import DIMENSIONS, FilmState
+from clpt.render.wavefront.tracer import Paths, Selection
 from clpt.scene import Scene
 from clpt.version import VERSION as VERSION_OF_CLPT
 
 log = logging.getLogger(__name__)
 
-VERSION = 1  # of what client and worker say to each other
+VERSION = 2  # of what client and worker say to each other
 OPTIONS = ("halves", "layout", "queued", "looped", "slots", "texture_budget", "tree_quality")
 MOST_OPEN = 2  # jobs of a worker, each with its memory on the device
+ENDS = np.dtype("<u4")  # of cells, where they travel
 
 Reply = dict[str, Any]
 
 _device: dict[str, Any] = {"which": None, "threads": None}  # where this worker renders
 _open: dict[str, _Job] = {}  # by digest, the last used at the end
 _stopped: set[str] = set()  # jobs that are to end soon
-FORMS = {"words": 5, "bands": 5, "layers": 3}  # of a film: dimensions of its arrays
 
 
 class _Job:
-    """A renderer of a job's scene, kept between tasks."""
+    """A renderer of a job's scene, kept between tasks; kind: what decides its last bits."""
+
+    kind = ""
 
     def __init__(self, scene: Scene, devices: list[dev.Device], options: dict[str, Any]):
         self.renderer: Renderer | MultiRenderer = (
@@ -51,16 +54,40 @@ class _Job:
             if len(devices) > 1
             else Renderer(scene, devices[0], **options)
         )
+        self.options, self._tracer = options, self.renderer.tracer()
+        self._packed: Reply | None = None  # the selection that was taken last
+        self._selection: Selection | None = None
 
-    def block(self, first: int, end: int, wanted: Callable[[], bool]) -> Reply:
-        """Render samples first to end - 1 of every pixel; a film and what it took."""
+    def shows(self, scene: Scene) -> bool:
+        """Let the renderer take another scene; return whether it could."""
+        try:
+            self.renderer.update(scene=scene)
+            self.renderer.prepare()
+        except (SceneError, MemoryBudgetError) as error:
+            log.debug("a renderer cannot take the next scene: %s", error)
+            return False
+        return True
+
+    def block(
+        self, first: int, end: int, packed: Reply | None, wanted: Callable[[], bool]
+    ) -> Reply:
+        """Render samples first to end - 1; return a film and what it took.
+
+        packed: which ones, see `pack_selection`; None: those of every pixel.
+        """
         began, renderer = time.perf_counter(), self.renderer
-        renderer.reset(first_sample=first)
+        renderer.reset(first_sample=0 if packed else first)
         before = [replace(counts) for counts in renderer.counts]
-        whole = renderer.run(end - first, lambda _: wanted())
-        state = renderer.film_state()
-        if not whole:
-            state = replace(state, taken=((first, end),))
+        if packed != self._packed:
+            self._selection = None if packed is None else unpack_selection(packed)
+            self._packed = packed
+            if packed is None:
+                self._tracer.use_all_pixels()
+        if self._selection is None:
+            whole = renderer.run(end - first, lambda _: wanted())
+        else:
+            whole = self._tracer.add(self._selection, first, end, lambda _: wanted())
+        state = replace(renderer.film_state(), taken=((first, end),))
         pairs = list(zip(before, renderer.counts, strict=True))
         return {
             **state_to_arrays(state),
@@ -131,7 +158,6 @@ def _open_job(job: str, files: dict[str, bytes]) -> Reply:
         raise ClusterError("the job has unknown options")
     digest = digest_of(job)
     _stopped.discard(digest)
-    devices = _devices()
     if digest not in _open:
         for one in files:
             store.add(one, files[one])
@@ -139,23 +165,32 @@ def _open_job(job: str, files: dict[str, bytes]) -> Reply:
         if lacks:
             return {"lacks": lacks}
         with store.opened(bundle) as scene:
-            _open_renderer(digest, scene, devices, options)
+            _open_renderer(digest, scene, _devices(), options)
+            _open[digest].kind = device_class(_open[digest].renderer)  # which reads files
     _open[digest] = _open.pop(digest)
-    seconds = time.perf_counter() - began
+    renderer = _open[digest].renderer
     return {
-        "kind": device_class(_open[digest].renderer),
-        "class": _open[digest].renderer.device_class(),
-        "device": " and ".join(on.info.label for on in devices),
-        "seconds": seconds,
+        "kind": _open[digest].kind,
+        "class": renderer.device_class(),
+        "device": " and ".join(on.info.label for on in renderer.devices),
+        "seconds": time.perf_counter() - began,
     }
 
 
 def _open_renderer(
     digest: str, scene: Scene, devices: list[dev.Device], options: dict[str, Any]
 ) -> None:
-    """Make a job's renderer; the jobs that were used longest ago make room for it."""
+    """Make a job's renderer; the jobs that were used longest ago make room for it.
+
+    The renderer of one with the same options takes the scene, if it can: so frames of an animation
+    keep the tables and kernels that they share.
+    """
     while len(_open) >= MOST_OPEN:
-        _close_oldest()
+        oldest = _open.pop(next(iter(_open)))
+        if oldest.options == options and oldest.shows(scene):
+            _open[digest] = oldest
+            return
+        oldest.renderer.close()
     while True:
         try:
             with ExitStack() as resources:
@@ -184,12 +219,13 @@ def _close_oldest() -> None:
     _open.pop(next(iter(_open))).renderer.close()
 
 
-def render_block(digest: str, first: int, end: int) -> Reply:
+def render_block(digest: str, first: int, end: int, selection: Reply | None = None) -> Reply:
     """Render samples first to end - 1 of a job that `open_job` opened.
 
-    Returns the arrays of `state_to_arrays`; "whole", whether it came to its end; "seconds" and
-    counts of samples, rays, and of what the film refused. Or "closed": the job is not open here; or
-    "error": what went wrong.
+    selection: which ones, from `pack_selection`; None: those of every pixel. Returns the arrays of
+    `state_to_arrays`; "whole", whether it came to its end; "seconds" and counts of samples, rays,
+    and of what the film refused. Or "closed": the job is not open here; or "error": what went
+    wrong.
     """
     try:
         job = _open.get(digest)
@@ -197,7 +233,7 @@ def render_block(digest: str, first: int, end: int) -> Reply:
             return {"closed": True}
         _open[digest] = _open.pop(digest)
         wanted = _wanted()
-        return job.block(first, end, lambda: digest not in _stopped and wanted())
+        return job.block(first, end, selection, lambda: digest not in _stopped and wanted())
     except Exception as error:
         return {"error": _told(error)}
 
@@ -215,6 +251,26 @@ def close_job(digest: str) -> None:
         job.renderer.cancel()
 
 
+def pack_selection(selection: Selection) -> Reply | None:
+    """Return what `unpack_selection` reads; None for samples of every pixel."""
+    if selection.paths == "all":
+        return None
+    ends = b"" if selection.ends is None else selection.ends.astype(ENDS).tobytes()
+    return {"paths": selection.paths, "pixels": selection.pixels, "ends": ends}
+
+
+def unpack_selection(packed: Reply) -> Selection:
+    """Return a selection. Raises ClusterError for what is none."""
+    try:
+        paths, pixels = packed["paths"], int(packed["pixels"])
+        ends = np.frombuffer(packed["ends"], ENDS).astype(np.int64)
+    except (KeyError, TypeError, ValueError) as error:
+        raise ClusterError(f"this is no selection of samples: {error}") from None
+    if paths not in get_args(Paths):
+        raise ClusterError(f"this is no selection of samples: {str(paths)[:80]!r}")
+    return Selection(paths, pixels, ends if len(ends) else None)
+
+
 def state_to_arrays(state: FilmState) -> Reply:
     """Return a film as arrays, with a checksum of all of it."""
     taken = [list(pair) for pair in state.taken]
@@ -225,13 +281,13 @@ def state_to_arrays(state: FilmState) -> Reply:
 def state_from_arrays(reply: Reply) -> FilmState:
     """Return the film of a reply. Raises ClusterError if it is not what its worker sent."""
     try:
-        arrays = {name: np.asarray(reply[name]) for name in FORMS}
+        arrays = {name: np.asarray(reply[name]) for name in DIMENSIONS}
         taken = tuple((int(first), int(end)) for first, end in reply["taken"])
         state = FilmState(taken=taken, scale=float(reply["scale"]), **arrays)
     except (KeyError, TypeError, ValueError) as error:
         raise ClusterError(f"this is no film: {error}") from None
     for name, array in arrays.items():
-        if array.dtype != np.uint32 or array.ndim != FORMS[name]:
+        if array.dtype != np.uint32 or array.ndim != DIMENSIONS[name]:
             raise ClusterError(f"this is no film: {name} are {array.dtype} {array.shape}")
     if film_digest(state) != reply.get("sha256"):
         raise ClusterError("the checksum of the film is wrong")

@@ -8,7 +8,7 @@ from .context import Device, DeviceInfo, choose, choose_all, devices, names_seve
 from .program import Argument, BoundKernel, Kernel, Program
 from .refusals import refused, wait
 from .source import Part, Source, Virtual, assemble, kernels_folder
-from .stream import Events, Stream
+from .stream import Events, Stream, tiles
 from .timing import Timing, Timings
 
 __all__ = [
@@ -42,5 +42,6 @@ __all__ = [
     "refused",
     "spare_cores",
     "supersede",
+    "tiles",
     "wait",
 ]

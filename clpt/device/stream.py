@@ -14,6 +14,17 @@ from .program import BoundKernel
 from .refusals import refused, wait
 
 Events = Iterable[cl.Event] | None  # as `wait_for` takes them
+TILE = (64, 2)  # work-items of a group of pixels
+
+
+def tiles(width: int, height: int) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Return the global and the local size of a kernel whose work-items are pixels.
+
+    Groups are the same for pictures of every size, for PoCL compiles a kernel once for each size
+    of a group. There are work-items beyond the picture, which the kernel leaves alone.
+    """
+    across, down = TILE
+    return (-(-width // across) * across, -(-height // down) * down), TILE
 
 
 class Stream:

@@ -46,7 +46,8 @@ def load(
     """Read a scene or a bare mesh; a folder means the scene in it (see IN_FOLDERS).
 
     `kinds` are materials that are not clpt's own, of which a scene.json may speak. `variables` set
-    the `$names` of Mitsuba's XML; of glTF they choose camera, scene and time. `progress` is
+    the `$names` of Mitsuba's XML; of glTF they choose scene, animation and time; of both `camera`
+    is the number or name of one of several. `progress` is
     called with the share that is read, from 0 to 1, and a text, for files of many shapes.
     `missing_textures`: "grey" puts grey in the place of images that are not there, with a warning.
     Raises SceneError with the file and, where it is known, the line.
@@ -57,6 +58,9 @@ def load(
     if kind is None:
         known = " ".join(FORMATS)
         raise SceneError(f"unknown format {path.suffix!r}; known: {known}", file=path)
+    if "camera" in variables and kind not in WITH_VARIABLES:
+        message = f"only .xml and glTF have cameras to choose from, no {variables['camera']!r}"
+        raise SceneError(message, file=path)
     if variables and kind not in WITH_VARIABLES:
         raise SceneError(
             f"only .xml and glTF have variables, so {min(variables)!r} means nothing", file=path

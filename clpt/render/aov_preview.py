@@ -22,7 +22,7 @@ def sheet(layers: Mapping[str, Image]) -> Image:
 
 def viewable(name: str, layer: Image) -> Image:
     """Return values (h, w, 1 to 3) as colours in [0, 1], (h, w, 3) float32."""
-    if name == "albedo":
+    if name.endswith("albedo"):
         return layer
     if name.endswith("_normal"):
         return layer * np.float32(0.5) + np.float32(0.5)

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from clpt import images, output_files
 from clpt.errors import SceneError
 from clpt.render.aov_preview import viewable
+from clpt.render.contract.layer_names import LayerNames
 from clpt.render.host_picture import HostPicture
 from clpt.render.saved_film import Origin, PictureForm, SavedFilm, Session
 from clpt.render.wavefront.film_state import FilmState
@@ -231,11 +232,12 @@ def _restored(header: dict[str, Any], parts: _Parts) -> SavedFilm:
 
     form = header["form"]
     rows = {name: tuple(map(tuple, form[name])) for name in ("to_output", "paper")}
-    names = {name: tuple(form[name]) for name in ("channels", "layers")}
+    names: dict[str, Any] = {name: tuple(form[name]) for name in ("channels", "layers")}
+    names["names"] = LayerNames(**{n: tuple(v) for n, v in form.get("names", {}).items()})
     taken = tuple((int(first), int(end)) for first, end in header["taken"])
     return SavedFilm(
         film=FilmState(
-            words("words"), words("bands"), taken, float(header["scale"]), words("layers")
+            taken=taken, scale=float(header["scale"]), **{n: words(n) for n in header["shapes"]}
         ),
         origin=Origin(
             Fingerprint(header["scene"]), header["settings"], header["kernels"], header["clpt"]

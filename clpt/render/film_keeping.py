@@ -1,4 +1,4 @@
-"""What all renderers have in common that keep their film in files."""
+"""What all renderers have in common that keep their film in files: they denoise it too."""
 
 from __future__ import annotations
 
@@ -6,11 +6,30 @@ from pathlib import Path
 
 from clpt.errors import SceneError
 from clpt.render import film_file
-from clpt.render.saved_film import SavedFilm
+from clpt.render.denoised_picture import DenoisedPicture, Image, Source
+from clpt.render.saved_film import SavedFilm, Session
+from clpt.scene import Scene
 
 
 class FilmKeeping:
-    """Base of renderers whose film is saved to a file, and gone on with from one."""
+    """Base of renderers whose film is saved to a file, and gone on with from one.
+
+    denoise: the denoiser that it was made for.
+    """
+
+    scene: Scene
+    denoise: str | None = None
+    _sessions: tuple[Session, ...]  # that the film has from before
+
+    @property
+    def is_adaptive(self) -> bool:
+        """Whether pixels may differ in their numbers of samples."""
+        return self.scene.noise is not None
+
+    @property
+    def former_seconds(self) -> float:
+        """How long others rendered the film, before this renderer went on with it."""
+        return sum(session.seconds for session in self._sessions)
 
     def saved_film(self, *, held: bool = False) -> SavedFilm:
         """Return the film with all that it takes to go on with it; held: as it was when held."""
@@ -19,6 +38,15 @@ class FilmKeeping:
     def restore(self, saved: SavedFilm) -> None:
         """Go on from a saved film. Raises SceneError."""
         raise NotImplementedError
+
+    def denoised(self: Source, method: str | None = None) -> Image:
+        """The picture so far without most of its noise, as `image` returns it.
+
+        method: oidn or statistical, by default what the renderer was made for, else oidn. Make the
+        renderer with the option `denoise`: so the film has what the denoiser wants. See
+        `clpt.DenoisedPicture`, also for what it raises.
+        """
+        return DenoisedPicture(self, method).image()
 
     def save_state(self, path: str | Path) -> None:
         """Write the film to a file, from which `load_state` goes on, in another process too.

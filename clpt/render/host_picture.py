@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.errors import SceneError
 from clpt.render.contract.features import SUM_WORDS
 from clpt.render.layers import layers_of
 from clpt.render.saved_film import SavedFilm
@@ -17,6 +18,7 @@ from clpt.render.wavefront.film_state import (
     add_films,
     add_sums,
     light_group,
+    numbers,
 )
 from clpt.scene import Film
 from clpt.scene.integrators import CHANNELS
@@ -24,17 +26,16 @@ from clpt.spectral_exr import SpectralImage
 
 Image = NDArray[np.float32]
 
-UNIT = 2.0**-48  # of a sum, kernels/core/fixed.cl
-
 
 class HostPicture:
     """The picture of a film, with the methods of `Renderer` that make it; equal but for an ulp.
 
     saved: the film. channels, form: as of a renderer; is_adaptive: whether pixels differ in their
-    numbers of samples.
+    numbers of samples. denoise: the denoiser of its files, None for none.
     """
 
-    def __init__(self, saved: SavedFilm):
+    def __init__(self, saved: SavedFilm, denoise: str | None = None):
+        self.denoise = denoise
         self.saved, self.form, self.channels = saved, saved.form, saved.form.channels
         self.is_adaptive = bool(saved.adaptive)
         state = saved.film
@@ -63,13 +64,26 @@ class HostPicture:
         return self._colours(self._films[0])
 
     def layers(self) -> dict[str, Image]:
-        """The layers by name, (h, w, 1 to 3) float32, as `Renderer.layers` returns them."""
+        """The layers by name, (h, w, 1 to 12) float32, as `Renderer.layers` returns them."""
         if not self.channels:
-            return layers_of(self.form.layers, self.form.paper, self.saved.film.layers)
+            return layers_of(self.form, self.saved.film.arrays, self)
         return {
             name: self._colours(words)[:, :, : CHANNELS[name]]
             for name, words in zip(self.channels, self._films, strict=True)
         }
+
+    def halves(self) -> tuple[Image, Image]:
+        """The pictures of the even and of the odd samples, as `Renderer.halves` returns them.
+
+        Raises SceneError where the film does not keep them apart.
+        """
+        words = self.saved.film.words[0]
+        if len(words) != 2:
+            raise SceneError(
+                "the film does not keep even and odd samples apart; render it with --denoise "
+                "statistical, or give Renderer halves=True"
+            )
+        return self._colours(words[0]), self._colours(words[1])
 
     def spectral_image(self) -> SpectralImage:
         """The picture of a film with bands, at their centres."""
@@ -90,12 +104,12 @@ class HostPicture:
 
     def _alpha(self) -> Image:
         words, first = self._films[0], FILM_WORDS + SUM_WORDS * self.form.weights
-        return _numbers(words[first : first + SUM_WORDS]) * self._mean(words)
+        return numbers(words[first : first + SUM_WORDS]) * self._mean(words)
 
     def _mean_bands(self) -> Image:
         words, count = self._films[0], self.form.bands
         scale = np.float32(self.saved.film.scale)
-        sums = _numbers(np.moveaxis(self._bands, 1, 0))
+        sums = numbers(np.moveaxis(self._bands, 1, 0))
         total = sums[:count] * (self._mean(words) / scale)
         if self.form.weighed:
             total += sums[count:] * (self._light_mean(words) / scale)
@@ -109,7 +123,7 @@ class HostPicture:
     def _mean(self, words: Words) -> Image:
         """One over what a pixel's sums are divided by, 0 where that is nothing."""
         weighed = self.form.weights
-        by = _numbers(words[FILM_WORDS:][:SUM_WORDS]) if weighed else self._samples(words)
+        by = numbers(words[FILM_WORDS:][:SUM_WORDS]) if weighed else self._samples(words)
         return _inverse(by)
 
     def _light_mean(self, words: Words) -> Image:
@@ -127,14 +141,7 @@ class HostPicture:
 def _means(words: Words, first: int) -> Image:
     """The three sums of pixels (n, h, w) from a word on, (3, h, w) float32."""
     sums = words[first : first + 3 * SUM_WORDS].reshape(3, SUM_WORDS, *words.shape[1:])
-    return _numbers(np.moveaxis(sums, 1, 0))
-
-
-def _numbers(sums: Words) -> Image:
-    """Sums as the nearest floats: three words (3, ...), the lowest first, in two's complement."""
-    low, middle, high = sums
-    top = (high.astype(np.int64) << 32) | middle
-    return ((top * 2.0**32 + low) * UNIT).astype(np.float32)
+    return numbers(np.moveaxis(sums, 1, 0))
 
 
 def _inverse(by: Any) -> Image:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
+from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from clpt.render.contract.features import layer_places
+from clpt.render.cryptomatte import pairs_of
 from clpt.render.lowering.camera.colour import output_matrix, sensor
-from clpt.scene.integrators import LAYERS, Film
+from clpt.render.saved_film import PictureForm
+from clpt.render.wavefront.film_state import numbers
+from clpt.scene.integrators import Film
+from clpt.scene.layers import LAYERS
 from clpt.spectra import cie
 
 Words = NDArray[np.uint32]
@@ -17,33 +22,87 @@ Image = NDArray[np.float32]
 
 UNITS = 2.0**22  # kernels/film/layers.cl
 LONG_UNITS = (2.0**8, 2.0**-16, 2.0**-40)
+GROUP = "light_"  # begins the name of a group's picture
 
 
-def layers_of(names: Iterable[str], paper: ArrayLike, words: Words) -> dict[str, Image]:
-    """Return the mean of each layer by name, (h, w, 1 to 3) float32.
+class Pictured(Protocol):
+    """What has pictures."""
 
-    names: in the order of their words; paper: the matrix of `white_paper`; words: (n, h, w) uint32.
-    Where nothing was seen, as in the sky, a layer is 0.
+    def samples_per_pixel(self) -> Image:
+        """How many samples each pixel has, (h, w) float32."""
+
+    def halves(self) -> tuple[Image, Image]:
+        """The pictures of even and of odd samples, (h, w, 3) float32 each."""
+
+
+def layers_of(
+    form: PictureForm, arrays: Mapping[str, Words], picture: Pictured
+) -> dict[str, Image]:
+    """Return the layers of a film by name, (h, w, 1 to 12) float32.
+
+    arrays: its words, as `FilmState` has them. Where nothing was seen, as in the sky, a layer is 0,
+    an id -1. `light_groups` becomes a layer light_NAME for each group.
     """
-    made, places = {}, layer_places(names)
+    made: dict[str, Image] = {}
+    sampled = _sampled(form, arrays["layers"])
+    light = _light(form, arrays["light_layers"], picture)
+    mattes = iter(arrays["mattes"])
+    for name in form.layers:
+        kept = LAYERS[name].form
+        if kept == "light":
+            made |= light[name]
+        elif kept == "matte":
+            made[name] = pairs_of(next(mattes), arrays["layers"][0], matte_names(form, name))
+        elif name == "samples":
+            made[name] = picture.samples_per_pixel()[..., None]
+        elif name == "variance":
+            even, odd = picture.halves()
+            made[name] = ((even - odd) / np.float32(2.0)) ** 2
+        else:
+            made[name] = sampled[name]
+    return made
+
+
+def matte_names(form: PictureForm, layer: str) -> tuple[str, ...]:
+    """The names that a layer of mattes knows, by number."""
+    return form.names.materials if layer == "crypto_material" else form.names.objects
+
+
+def _sampled(form: PictureForm, words: Words) -> dict[str, Image]:
+    """The layers of the first samples."""
+    made, places = {}, layer_places(form.layers)
     for name, place in places.items():
         layer = LAYERS[name]
         own = words[place : place + layer.words]
-        sums = _near_one(own) if layer.near_one else _long(own)
+        if layer.form == "id":
+            made[name] = (own[0].astype(np.float32) - np.float32(1.0))[..., None]
+            continue
+        sums = _near_one(own) if layer.form == "near" else _long(own)
         mean = np.moveaxis(sums, 0, -1) / np.maximum(words[0], 1)[..., None]
         if layer.is_colour:
-            mean = mean @ np.asarray(paper).T
+            mean = mean @ np.asarray(form.paper).T
         made[name] = mean.astype(np.float32)
     return made
 
 
-def channels_of(layers: Mapping[str, Image]) -> dict[str, Image]:
-    """Return the channels of layers as an .exr has them, (h, w) by names such as depth.Z."""
-    return {
-        f"{name}.{letter}": image[..., i]
-        for name, image in layers.items()
-        for i, letter in enumerate(LAYERS[name].channels)
-    }
+def _light(form: PictureForm, words: Words, picture: Pictured) -> dict[str, dict[str, Image]]:
+    """The pictures of each layer of light."""
+    names = [name for name in form.layers if LAYERS[name].form == "light"]
+    if not names:
+        return {}
+    sums = numbers(np.moveaxis(words, 1, 0)).reshape(-1, 3, *words.shape[2:])
+    means = sums / np.maximum(picture.samples_per_pixel(), 1.0)
+    colours = np.einsum("ij,njhw->nhwi", np.asarray(form.to_output), means).astype(np.float32)
+    found: dict[str, dict[str, Image]] = {}
+    for i, name in enumerate(names):  # of which groups come last
+        pictures = colours[i:]
+        groups = form.names.light_groups
+        found[name] = (
+            {f"{GROUP}{group}": one for group, one in zip(groups, pictures, strict=True)}
+            if name == "light_groups"
+            else {name: pictures[0]}
+        )
+    return found
 
 
 def white_paper(film: Film, mode: str) -> NDArray[np.float64]:

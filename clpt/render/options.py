@@ -9,6 +9,7 @@ from typing import Any, TypedDict, get_args
 import pyopencl as cl
 
 from clpt import bvh
+from clpt.denoise import needs, oidn
 from clpt.errors import SceneError, UnknownKindError, nearest
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Camera
@@ -33,6 +34,10 @@ class RenderOptions(TypedDict, total=False):
     first_sample: the number of the first sample, 0 to 2^31 - 1, by default 0. Renderers that take
     other numbers have other samples, and their films merge, see `Renderer.merge`.
     halves: whether even and odd samples are kept apart, for `Renderer.halves`.
+    denoise: oidn or statistical, for `Renderer.denoised`: the scene gets what the denoiser wants,
+    see clpt.denoise.needs.
+    cancel_seconds: [s] in which a `run` is to end after `cancel`, for pictures that people steer:
+    the device gets less to do at once, and is a little slower.
 
     What is left out, or None, is chosen to suit the device and the scene.
     """
@@ -48,6 +53,8 @@ class RenderOptions(TypedDict, total=False):
     looped: bool | None
     first_sample: int
     halves: bool
+    denoise: str | None
+    cancel_seconds: float | None
 
 
 def check_scene(scene: Any) -> None:
@@ -74,12 +81,17 @@ def check_options(scene: Scene, options: Mapping[str, Any]) -> None:
         raise TypeError(f"{found}; a device is chosen by its name or index: device={queue!r}")
     if layout is not None and layout not in bvh.LAYOUTS:
         raise UnknownKindError("layout", str(layout), bvh.LAYOUTS, where="layout")
+    if options.get("denoise") is not None and needs.check_method(options["denoise"]) == "oidn":
+        oidn.check_installed()
     quality = options.get("tree_quality", "high")
     if quality not in get_args(bvh.Quality):
         raise UnknownKindError("quality", str(quality), get_args(bvh.Quality), where="tree_quality")
     for name in ("queued", "looped", "halves", "profiling"):
         if options.get(name) not in (None, False, True):
             raise SceneError(f"must be true or false, not {options[name]!r}", where=name)
+    seconds = options.get("cancel_seconds")
+    if seconds is not None and not (isinstance(seconds, (int, float)) and seconds > 0.0):
+        raise SceneError(f"must be seconds above 0, not {seconds!r}", where="cancel_seconds")
     for name, least in (("slots", 1), ("texture_budget", 0), ("first_sample", 0)):
         number = options.get(name)
         whole = isinstance(number, int) and not isinstance(number, bool)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -12,11 +13,12 @@ from pyopencl.array import Array
 from clpt import device as dev
 from clpt import images
 from clpt.colour.view import View
-from clpt.errors import SceneError, UnknownKindError
+from clpt.errors import ClptError, SceneError, UnknownKindError
 from clpt.render.aov_preview import sheet
-from clpt.render.layers import layers_of, white_paper
+from clpt.render.layers import layers_of
 from clpt.render.locking import DeviceOwner, synchronized
 from clpt.render.resolve import Resolve
+from clpt.render.saved_film import PictureForm
 from clpt.render.wavefront.wavefront import Wavefront
 from clpt.scene import Scene
 from clpt.scene.integrators import CHANNELS
@@ -36,6 +38,11 @@ class Pictures(DeviceOwner):
     channels: tuple[str, ...]
     wavefronts: list[Wavefront]
     _resolve: Resolve | None = None  # built when a picture is first resolved
+
+    @property
+    def form(self) -> PictureForm:
+        """How the film's words become a picture."""
+        raise NotImplementedError
 
     @property
     @synchronized
@@ -91,6 +98,19 @@ class Pictures(DeviceOwner):
             space="rec709" if self.channels else self.scene.film.output_space,
         )  # fmt: skip
 
+    def widget(self, **options: Any) -> Any:
+        """Return a widget for notebooks: the scene, rendered while it is watched and steered.
+
+        It is rendered by another renderer, with these options, in a thread of its own; see
+        clpt.view.widget.Widget. Raises ClptError where clpt[notebook] is not installed.
+        """
+        try:  # by its name: a renderer knows nothing of those who show its pictures
+            room = import_module("clpt.view.widget")
+        except ImportError as error:
+            message = f"a widget needs {error.name}: pip install 'clpt[notebook]'"
+            raise ClptError(message) from error
+        return room.Widget(self.scene, self.device, **options)
+
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         """`image()`, for numpy.asarray(renderer): a copy, which waits."""
         if copy is False:
@@ -138,17 +158,28 @@ class Pictures(DeviceOwner):
         return np.ascontiguousarray(self.wavefronts[0].film.picture.get()[..., 3])
 
     @synchronized
+    def halves(self) -> tuple[Image, Image]:
+        """Return two independent pictures, of the even and of the odd samples; wait for them.
+
+        (h, w, 3) float32 each, in the film's output space, of a Renderer with `halves=True`. Their
+        mean, weighted as samples are, is the whole picture. Raises SceneError without.
+        """
+        first = self.wavefronts[0]
+        if first.film.halves != 2:
+            raise SceneError("even and odd samples are not kept apart; give Renderer halves=True")
+        return first.half(0), first.half(1)
+
+    @synchronized
     def layers(self) -> dict[str, Image]:
-        """The layers of the film by name, (h, w, 1 to 3) float32: what `film.layers` names.
+        """The layers of the film by name, (h, w, 1 to 12) float32: what `film.layers` names.
 
         Colours are in the film's output space, white paper is (1, 1, 1); lengths are in metres.
-        They are of the first 64 samples of a pixel. Where nothing is seen they are 0. Of the `aov`
-        integrator, its values.
+        Where nothing is seen values are 0, ids -1. `light_groups` is a layer light_NAME for each
+        group, `light_rest` of lights that name none; of mattes (h, w, 12), pairs of a name's hash
+        and its coverage; see docs/layers.md. Of the `aov` integrator, its values.
         """
         if not self.channels:
-            first = self.wavefronts[0]
-            paper = white_paper(self.scene.film, first.features.mode)
-            return layers_of(first.features.layers, paper, first.film.layer_words())
+            return layers_of(self.form, self.wavefronts[0].film.layer_words(), self)
         return {
             name: wavefront.image()[:, :, : CHANNELS[name]]
             for name, wavefront in zip(self.channels, self.wavefronts, strict=True)

@@ -13,6 +13,7 @@ import numpy as np
 import pyopencl as cl
 
 from clpt import device as dev
+from clpt.denoise import needs
 from clpt.errors import DeviceError, SceneError
 from clpt.render.editing import parameter_patch, rebuild
 from clpt.render.editing.moving import Moving
@@ -34,6 +35,7 @@ from clpt.render.resumable import Resumable
 from clpt.render.stats import RenderStats, collect
 from clpt.render.wavefront import adaptive
 from clpt.render.wavefront.film_state import FilmState, Ranges, join_ranges
+from clpt.render.wavefront.tracer import Tracer
 from clpt.render.wavefront.wavefront import Counts, Wavefront
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
@@ -74,7 +76,8 @@ class Renderer(Resumable):
         check_scene(scene)
         check_options(scene, options)
         self._stop = threading.Event()
-        self.scene = scene
+        self.denoise = options.get("denoise")
+        self.scene = scene = needs.prepared(scene, self.denoise)
         queue, threads = options.get("queue"), options.get("threads")
         if threads is not None and (queue is not None or isinstance(device, dev.Device)):
             raise DeviceError("threads are of a device that is chosen here; give its name or index")
@@ -105,7 +108,8 @@ class Renderer(Resumable):
             queued=options.get("queued"),
             looped=options.get("looped", None if queue is None else True),
             tree_quality=options.get("tree_quality", "high"),
-            halves=options.get("halves", False),
+            halves=options.get("halves", False) or self.denoise == "statistical",
+            cancel_seconds=options.get("cancel_seconds"),
         )
         self.wavefronts = [first, *(first.with_channel(channel) for channel in self.channels[1:])]
         for one in self.wavefronts:
@@ -118,6 +122,9 @@ class Renderer(Resumable):
         self._first_sample = _sample_number(options.get("first_sample", 0))
         self._taken: Ranges = ()
         self._progress = progress
+        if self.denoise is not None:
+            splats = first.features.filter_reach > 0
+            self.warnings += needs.remarks(lowered.integrator, scene.sampler, splats)
         self._moving: Moving | None = None
         self._adaptive: adaptive.Adaptive | None = None
         log.info("ready in %.2f s", self._seconds["ready"])
@@ -243,6 +250,10 @@ class Renderer(Resumable):
             self._adaptive.skip(first)
         return self._adaptive.run(end, noise, on_batch)
 
+    def tracer(self) -> Tracer:
+        """Return what adds selections of samples to the film."""
+        return Tracer(self.wavefronts[0])
+
     @property
     def devices(self) -> tuple[dev.Device, ...]:
         """Where it renders: its device."""
@@ -311,21 +322,14 @@ class Renderer(Resumable):
         Raises SceneError if the film has another form, or a sample is in both: nothing has changed.
         """
         merged = self.film_state().merged(state)
-        for one, words in zip(self.wavefronts, merged.words, strict=True):
-            one.set_words(words, merged.bands, merged.layers)
+        self.set_words(merged)
         self._taken, self._adaptive = merged.taken, None
 
     @synchronized
-    def halves(self) -> tuple[Image, Image]:
-        """Return two independent pictures, of the even and of the odd samples; wait for them.
-
-        (h, w, 3) float32 each, in the film's output space, of a Renderer with `halves=True`. Their
-        mean, weighted as samples are, is the whole picture. Raises SceneError without.
-        """
-        first = self.wavefronts[0]
-        if first.film.halves != 2:
-            raise SceneError("even and odd samples are not kept apart; give Renderer halves=True")
-        return first.half(0), first.half(1)
+    def set_words(self, state: FilmState) -> None:
+        """Let the film hold the words of another one of its form; `samples` stays."""
+        for one, words in zip(self.wavefronts, state.films, strict=True):
+            one.set_words(words)
 
     def close(self) -> None:
         """Give the device's memory back; the renderer is of no use afterwards.
@@ -382,6 +386,7 @@ class Renderer(Resumable):
         """
         if scene is not None:
             check_scene(scene)
+            scene = needs.prepared(scene, self.denoise)
         check_changes(camera, materials=materials, transforms=transforms, vertices=vertices)
         events = list(wait_for or ())
         self.wavefronts[0].stream.after(events)
@@ -498,11 +503,12 @@ def render(
     """Render a scene: (h, w, 3) float32 linear Rec. 709; else see `Renderer.image`.
 
     spp: samples per pixel, noise and progress: see `Renderer.run`; spp and noise are the scene's
-    own by default. device: see `Renderer`; options: see `RenderOptions`. Raises as `Renderer` does.
+    own by default. device: see `Renderer`; options: see `RenderOptions`; with `denoise` the picture
+    is denoised. Raises as `Renderer` does.
     """
     check_scene(scene)
     spp = _whole(scene.spp if spp is None else spp)
     noise = scene.noise if noise is None else noise
     renderer = Renderer(dataclasses.replace(scene, spp=spp, noise=noise), device, **options)
     renderer.run(spp, progress, noise=noise)
-    return renderer.image()
+    return renderer.image() if renderer.denoise is None else renderer.denoised()

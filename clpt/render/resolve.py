@@ -98,6 +98,8 @@ class Resolve:
             "tone": TONE_NUMBERS[tone],
             "encoded": int(view is None and (target.dtype == BYTES if srgb is None else srgb)),
             "flip": int(flip),
+            "width": film.shape[1],
+            "height": film.shape[0],
             "into": target.data,
         }
         if not target.is_image:
@@ -106,7 +108,7 @@ class Resolve:
         self.stream.after(wait_for)
         if isinstance(target.memory, Array):
             self.stream.after(target.memory.events)
-        event = self.stream.run(bound, (film.shape[1], film.shape[0]))
+        event = self.stream.run(bound, *device.tiles(film.shape[1], film.shape[0]))
         if not isinstance(target.memory, Array):
             return event
         device.supersede(target.memory, event)

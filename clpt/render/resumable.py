@@ -64,16 +64,6 @@ class Resumable(FilmKeeping, Pictures):
         self._held = None
 
     @property
-    def is_adaptive(self) -> bool:
-        """Whether pixels may differ in their numbers of samples."""
-        return self.scene.noise is not None
-
-    @property
-    def former_seconds(self) -> float:
-        """How long others rendered the film, before this renderer went on with it."""
-        return sum(session.seconds for session in self._sessions)
-
-    @property
     def first_sample(self) -> int:
         """The number of the first sample of the film, or of the first one to come."""
         return self._taken[0][0] if self._taken else self._first_sample
@@ -81,15 +71,15 @@ class Resumable(FilmKeeping, Pictures):
     @synchronized
     def film_state(self) -> FilmState:
         """Return what the film holds, as whole numbers on the host; wait for it."""
-        return self._film_state(self._taken, held=False)
+        return self.words(self._taken, held=False)
 
-    def _film_state(self, taken: Ranges, *, held: bool) -> FilmState:
-        films, bands, layers = zip(
-            *(one.film.words(held=held) for one in self.wavefronts), strict=True
-        )
+    def words(self, taken: Ranges, *, held: bool) -> FilmState:
+        """Return what the film holds, or held, as `film_state` does, of samples that are taken."""
+        films = [one.film.words(held=held) for one in self.wavefronts]
         scale = float(self.wavefronts[0].paths.settings["film_scale"])
-        words = np.stack(films) if len(films) > 1 else films[0][None]
-        return FilmState(words, bands[0], taken, scale, layers[0])
+        words = [film.pop("words") for film in films]
+        stacked = np.stack(words) if len(words) > 1 else words[0][None]
+        return FilmState(stacked, taken=taken, scale=scale, **films[0])
 
     @synchronized
     def hold(self) -> None:
@@ -100,7 +90,7 @@ class Resumable(FilmKeeping, Pictures):
         """
         for one in self.wavefronts:
             one.film.hold()
-        self._held = self._progress_so_far()
+        self._held = self.progress_so_far()
 
     @synchronized
     def saved_film(self, *, held: bool = False) -> SavedFilm:
@@ -111,8 +101,8 @@ class Resumable(FilmKeeping, Pictures):
         """
         if held and self._held is None:
             raise SceneError("no film is held; call hold() first")
-        so_far = dict(self._progress_so_far() if self._held is None or not held else self._held)
-        state = self._film_state(so_far.pop("taken"), held=held)
+        so_far = dict(self.progress_so_far() if self._held is None or not held else self._held)
+        state = self.words(so_far.pop("taken"), held=held)
         return SavedFilm(state, self.origin(), self.form, **so_far)
 
     @synchronized
@@ -164,8 +154,8 @@ class Resumable(FilmKeeping, Pictures):
             except (KeyError, ValueError) as error:
                 message = f"the state of adaptive sampling does not fit: {error}"
                 raise SceneError(message) from error
-        for one, words, counts in zip(self.wavefronts, saved.film.words, saved.counts, strict=True):
-            one.set_words(words, saved.film.bands, saved.film.layers)
+        for one, words, counts in zip(self.wavefronts, saved.film.films, saved.counts, strict=True):
+            one.set_words(words)
             for name, number in counts.items():
                 setattr(one.counts, name, number)
         self._begin_anew()
@@ -175,8 +165,8 @@ class Resumable(FilmKeeping, Pictures):
             self.warnings.append(classes_text(others))
             log.warning("%s", self.warnings[-1])
 
-    def _progress_so_far(self) -> dict[str, Any]:
-        """What changes while samples are taken, but for the film's words."""
+    def progress_so_far(self) -> dict[str, Any]:
+        """Return what changes while samples are taken, but for the film's words."""
         session = Session(self._began, self._seconds_rendered, VERSION, self.device_class())
         return {
             "taken": self._taken,
@@ -205,6 +195,7 @@ class Resumable(FilmKeeping, Pictures):
             exposure=film.exposure,
             layers=features.layers,
             paper=tuple(map(tuple, white_paper(film, features.mode).tolist())),
+            names=first.scene.lowered.layer_names,
         )
 
 

@@ -10,6 +10,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from clpt.errors import SceneError
+from clpt.render.contract.layer_names import LayerNames
 from clpt.render.wavefront.film_state import FilmState, Ranges
 from clpt.scene.fingerprint import Fingerprint, Plain
 
@@ -23,8 +24,8 @@ class PictureForm:
     to_output: (3, 3), rows of the matrix from the sums to the output space; channels: of the `aov`
     integrator; light_paths: all paths start at lights; weighed: some do, beside the camera's;
     weights: samples serve several pixels; paper: the matrix (3, 3) from sums of layers that are
-    colours to the output space, see `clpt.render.layers.white_paper`; the others are those of
-    `clpt.scene.Film`.
+    colours to the output space, see `clpt.render.layers.white_paper`; names: what layers tell of;
+    the others are those of `clpt.scene.Film`.
     """
 
     to_output: tuple[tuple[float, ...], ...]
@@ -40,6 +41,7 @@ class PictureForm:
     exposure: float = 1.0
     layers: tuple[str, ...] = ()
     paper: tuple[tuple[float, ...], ...] = ()
+    names: LayerNames = LayerNames()
 
 
 @dataclass(frozen=True)

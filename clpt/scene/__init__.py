@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from clpt.errors import SceneError
-from clpt.scene import cameras, integrators, lights, materials, shapes, textures
+from clpt.scene import cameras, integrators, lights, materials, media, shapes, textures
 from clpt.scene.integrators import Auto, Film, Sobol
 from clpt.scene.params import Kind
 
@@ -21,12 +21,15 @@ __all__ = [
     "kinds",
     "lights",
     "materials",
+    "media",
     "shapes",
     "textures",
 ]
 
 KINDS: dict[str, tuple[type[Kind], ...]] = {
     "material": materials.KINDS,
+    "medium": media.KINDS,
+    "phase": media.PHASES,
     "light": lights.KINDS,
     "shape": shapes.KINDS,
     "camera": cameras.KINDS,

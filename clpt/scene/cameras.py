@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from clpt.scene.media import Medium
 from clpt.scene.params import Kind, choice, host, index, real
 from clpt.scene.values import IndexLike, Matrix4
 
@@ -15,6 +16,7 @@ class Camera(Kind):
     """Base of all cameras."""
 
     to_world: Matrix4 = host(np.eye(4), "camera to world, (4, 4)")
+    medium: Medium | None = host(None, "around the camera; None: none", form="medium")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

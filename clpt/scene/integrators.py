@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from clpt.errors import SceneError, UnknownKindError
+from clpt.scene.layers import LAYERS
 from clpt.scene.params import Kind, choice, emission, flag, host, real
 from clpt.scene.values import SpectrumLike
 from clpt.spectra import Sensor, illuminants, spaces
@@ -26,40 +27,6 @@ CHANNELS = {  # of the aov integrator: how many values each has
     "primitive_id": 1,
 }
 IDS = ("shape_id", "primitive_id")  # of these, which are names: a mean of them would be none
-
-
-@dataclass(frozen=True)
-class Layer:
-    """A picture beside the picture, see kernels/path/layers.cl.
-
-    channels: their names in an .exr; near_one: whether its numbers are; denoising: of the first
-    surface that is neither a mirror nor smooth glass, else of the first; colour: its channels are.
-    """
-
-    channels: str
-    near_one: bool = True
-    denoising: bool = False
-
-    @property
-    def is_colour(self) -> bool:
-        return self.channels == "RGB"
-
-    @property
-    def words(self) -> int:
-        """Words of a pixel that hold it."""
-        return len(self.channels) * (1 if self.near_one else 3)
-
-
-LAYERS = {
-    "albedo": Layer("RGB"),
-    "shading_normal": Layer("XYZ"),
-    "geometric_normal": Layer("XYZ"),
-    "depth": Layer("Z", near_one=False),
-    "position": Layer("XYZ", near_one=False),
-    "uv": Layer("UV", near_one=False),
-    "denoising_albedo": Layer("RGB", denoising=True),
-    "denoising_normal": Layer("XYZ", denoising=True),
-}
 
 MOST_BANDS = 1024
 MOST_LIGHT_PATHS = 64  # for a sample of the camera
@@ -432,6 +399,7 @@ def _white_balance(given: Any) -> Any:
 
 
 KINDS = (Auto, Path, Vcm, Direct, Whitted, ParticleTracer, Aov)
+HAVE_LAYERS = (Auto, Path, Vcm, Direct)  # beside the picture
 SAMPLERS = (Sobol, Zsobol, Independent)
 PIXELWISE = (Sobol, Independent)  # samplers whose pixels do not know of each other
 FILTERS = (Box, Tent, Gaussian, Mitchell, Lanczos, BlackmanHarris)

@@ -28,6 +28,8 @@ class Light(Kind):
 
     reach: ClassVar[Reach] = "placed"
 
+    group: str = host("", "lights of one name share a layer of `light_groups`")
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Area(Light):

@@ -58,7 +58,7 @@ DEVICE_ROLES = (
 HostForm = Literal[
     "boolean", "integer", "number", "text", "names", "numbers",
     "vector", "direction", "matrix3", "matrix4",
-    "material", "texture", "filter", "area_light", "group",
+    "material", "medium", "phase", "texture", "filter", "area_light", "group",
     "rows2", "rows3", "rows4", "normals", "triangles", "attributes", "number_or_list", "lengths",
     "image", "cube_images", "crop", "sensor", "white_balance", "number_or_auto",
 ]  # fmt: skip
@@ -94,15 +94,24 @@ def _field(default: Any, param: Param) -> Any:
 
 
 def reflectance(
-    default: Any, doc: str, *, lobe: bool = False, linear: bool = False, limited: bool = True
+    default: Any,
+    doc: str,
+    *,
+    lobe: bool = False,
+    linear: bool = False,
+    limited: bool = True,
+    textured: bool = True,
 ) -> Any:
-    """Declare a spectrum in [0, 1]; may be a texture. `lobe`, `linear`: see `Param`.
+    """Declare a spectrum in [0, 1]; may be a texture where `textured`. `lobe`, `linear`: see
+    `Param`.
 
     limited: False where it may be a number of any kind, as what textures are made of.
     """
     low, high = (0.0, 1.0) if limited else (-math.inf, math.inf)
-    param = Param("reflectance", doc, low=low, high=high, textured=True, lobe=lobe, linear=linear)
-    return _field(default, param)
+    return _field(
+        default,
+        Param("reflectance", doc, "", low, high, textured=textured, lobe=lobe, linear=linear),
+    )
 
 
 def emission(default: Any, doc: str, unit: str, *, textured: bool = False) -> Any:

@@ -11,6 +11,7 @@ from clpt import images
 from clpt.errors import SceneError
 from clpt.scene.lights import Light
 from clpt.scene.materials import Diffuse, Material, TwoSided
+from clpt.scene.media import Medium
 from clpt.scene.params import Kind, choice, host
 from clpt.scene.textures import MeshAttribute
 from clpt.scene.values import Matrix4, OnDevice, Vector3
@@ -25,6 +26,8 @@ class Shape(Kind):
 
     material: Material = host(Diffuse(), "of the surface", form="material")
     emission: Light | None = host(None, "an `area` light, or None", form="area_light")
+    interior: Medium | None = host(None, "medium behind its front; None: none", form="medium")
+    exterior: Medium | None = host(None, "medium before its front; None: none", form="medium")
     to_world: Matrix4 | OnDevice = host(np.eye(4), "placement, (4, 4)")
     flip_normals: bool = host(False, "turn the front to the other side")
     name: str = host("", "for messages")

@@ -236,5 +236,5 @@ def _is_number(field: str) -> bool:
 def _text(path: str | Path) -> str:
     try:
         return Path(path).read_text("utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, ValueError) as error:  # ValueError: no UTF-8, or no name of a file
         raise SceneError(f"cannot be read: {error}", file=path) from None

@@ -95,7 +95,7 @@ class Probe:
         c = self.components
         virtual: dict[str, str | device.Part] = {"probe.cl": self._text(len(layers), len(given))}
         if self.cls.source is not None:
-            virtual[f"bsdf/{self.cls.kind}.cl"] = custom_materials.text(self.cls)
+            virtual[f"{self.cls.folder}/{self.cls.kind}.cl"] = custom_materials.text(self.cls)
         table = self._table(params, layers)
         out = run(self.on, virtual, self.lanes, given, 8 + 4 * c, table).T
         parts = np.split(out, np.cumsum([3, c, 1, 1, 1, c, 1, c, 1]), axis=1)
@@ -180,7 +180,7 @@ class Probe:
             [
                 root_text(self.mode) + boundary,
                 struct_text(self.cls),
-                f'#include "bsdf/{kind}.cl"',
+                f'#include "{self.cls.folder}/{kind}.cl"',
                 "kernel void probe(global const float *in, global float *out, uint n)",
                 "{",
                 "    uint at = get_global_id(0) * LANES;",

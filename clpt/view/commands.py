@@ -122,13 +122,15 @@ class Command:
     """One command.
 
     parameters: types by name; all but `Optional` ones must be given. steers: only the viewer who
-    steers may send it. restarts: the picture so far is of no use afterwards.
+    steers may send it. restarts: the picture so far is of no use afterwards. quick: it does
+    not wait until samples that are being taken are there.
     """
 
     doc: str
     parameters: Mapping[str, Type] = field(default_factory=dict)
     steers: bool = True
     restarts: bool = False
+    quick: bool = False
 
 
 @dataclass(frozen=True)
@@ -160,14 +162,30 @@ COMMANDS: dict[str, Command] = {
         restarts=True,
     ),
     "home": Command("the camera that the scene's file has", restarts=True),
+    "open_view": Command(
+        "look as a view does that was saved or copied",
+        {
+            "camera": Value(),
+            "exposure": Number(-20.0, 20.0),
+            "tone": Choice((*TONES, OF_VIEW)),
+        },
+        restarts=True,
+    ),
+    "copy_view": Command("tell the view, to be kept elsewhere", steers=False, quick=True),
     "field_of_view": Command(
         "of a perspective camera", {"degrees": Number(0.1, 170.0)}, restarts=True
     ),
-    "pick": Command("let the pivot be what a pixel shows", {"x": PIXEL, "y": PIXEL}),
-    "focus": Command("focus on what a pixel shows", {"x": PIXEL, "y": PIXEL}),
+    "pick": Command("let the pivot be what a pixel shows", {"x": PIXEL, "y": PIXEL}, quick=True),
+    "focus": Command("focus on what a pixel shows", {"x": PIXEL, "y": PIXEL}, quick=True),
     # pixels
     "inspect": Command(
-        "tell what is in a pixel, and its spectrum", {"x": PIXEL, "y": PIXEL}, steers=False
+        "tell what is in a pixel, and its spectrum",
+        {"x": PIXEL, "y": PIXEL},
+        steers=False,
+        quick=True,
+    ),
+    "value": Command(
+        "tell what the picture has in a pixel", {"x": PIXEL, "y": PIXEL}, steers=False, quick=True
     ),
     # the scene
     "edit": Command(
@@ -203,7 +221,9 @@ COMMANDS: dict[str, Command] = {
     "display": Command(
         "how the picture is shown",
         {"exposure": Number(-20.0, 20.0), "tone": Choice((*TONES, OF_VIEW))},
+        quick=True,
     ),
+    "shows": Command("show the picture, a layer or a map", {"name": Name()}),
     "pause": Command("let the picture rest, or go on", {"paused": Flag()}),
     "stop_at": Command(
         "where the render ends: samples, and perhaps noise",
@@ -211,7 +231,7 @@ COMMANDS: dict[str, Command] = {
     ),
     "restart": Command("begin again", restarts=True),
     "keep": Command("keep the picture to compare with, or keep none", {"kept": Flag()}),
-    "statistics": Command("tell what the render takes", steers=False),
+    "statistics": Command("tell what the render takes", steers=False, quick=True),
     "save": Command("write a new file into the folder", {"what": Choice(FILES)}),
 }
 

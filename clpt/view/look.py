@@ -10,11 +10,14 @@ from typing import Any, Final
 
 import numpy as np
 
+from clpt.denoise import needs
 from clpt.scene import Film, Scene
 from clpt.scene.lights import Light
 from clpt.scene.params import params
 from clpt.spectra import Constant, Illuminant, Spectrum, illuminant, on_grid
 from clpt.spectra.cie import CIE_Y_INTEGRAL, LAMBDA_MAX, LAMBDA_MIN, cie_xyz
+from clpt.view.maps import PICTURE
+from clpt.view.pictures import METHOD
 
 Region = tuple[int, int, int, int]
 
@@ -24,7 +27,9 @@ GRID: Final = np.arange(LAMBDA_MIN, LAMBDA_MAX + 1.0)
 @dataclasses.dataclass(frozen=True)
 class Look:
     """hidden: indices of shapes; lamp: whose spectrum all lights have, each as bright as its own;
-    wavelength, width: [nm] of the only light, None for all; region: of the film, see `Film.crop`.
+    wavelength, width: [nm] of the only light, None for all; region: of the film, see `Film.crop`;
+    shows: what of clpt.view.maps; layers: that the film has for it, beside the scene's own;
+    denoises: whether the film is one for denoisers.
     """
 
     hidden: frozenset[int] = frozenset()
@@ -32,6 +37,9 @@ class Look:
     wavelength: float | None = None
     width: float = 5.0
     region: Region | None = None
+    shows: str = PICTURE
+    layers: tuple[str, ...] = ()
+    denoises: bool = False
 
     def apply(self, scene: Scene) -> Scene:
         """Return the scene that this look shows of a scene."""
@@ -47,6 +55,8 @@ class Look:
             lights = [with_spectrum(light, self.lamp) for light in lights]
         if self.hidden:
             shapes = [shape for i, shape in enumerate(shapes) if i not in self.hidden]
+        if self.denoises:
+            scene = needs.prepared(scene, METHOD)
         film = self._film(scene.film)
         return dataclasses.replace(scene, shapes=shapes, lights=lights, film=film)
 
@@ -58,6 +68,9 @@ class Look:
 
     def _film(self, film: Film) -> Film:
         changes: dict[str, Any] = {}
+        more = tuple(name for name in self.layers if name not in film.layers)
+        if more:
+            changes["layers"] = (*film.layers, *more)
         if self.region is not None:
             changes["crop"] = self.region
         if self.wavelength is not None and film.mode == "spectral":
@@ -75,7 +88,7 @@ class Look:
 
 def with_spectrum(light: Light, lamp: str) -> Light:
     """Return a light with a lamp's spectrum and its own luminance; textures and images stay."""
-    changes = {}
+    changes: dict[str, Any] = {}
     for name, param in params(type(light)).items():
         value = getattr(light, name)
         if param.role == "emission" and isinstance(value, Spectrum):

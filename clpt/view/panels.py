@@ -96,11 +96,13 @@ def objects(scene: Scene) -> list[dict[str, Any]]:
 
 
 def object_of(scene: Scene, index: int) -> dict[str, Any]:
-    """Return a shape for people: name, kind, and what its material is."""
+    """Return a shape for people: name, kind, what its material is, and the index of its panel."""
     shape = scene.shapes[index]
+    materials = [id(material) for material, _ in _targets(scene)["material"]]
+    panel = materials.index(id(shape.material)) if id(shape.material) in materials else None
     made_of = getattr(shape.material, "name", "") or getattr(shape.material, "kind", "")
     name = shape.name or f"{shape.kind} {index + 1}"
-    return {"name": name, "kind": shape.kind, "made_of": made_of}
+    return {"name": name, "kind": shape.kind, "made_of": made_of, "material": panel}
 
 
 def edited(scene: Scene, target: str, index: int, key: str, value: Any) -> tuple[Scene, Change]:
@@ -115,7 +117,7 @@ def edited(scene: Scene, target: str, index: int, key: str, value: Any) -> tuple
     param = params(type(thing)).get(key)
     if param is None or not _editable(target, key, param):
         raise CommandError(f"{thing.kind}.{key} cannot be edited")
-    new = dataclasses.replace(thing, **{key: _read(key, value, param)})
+    new = dataclasses.replace(thing, **{key: read(key, value, param)})
     return _replaced(scene, target, thing, new)
 
 
@@ -227,7 +229,7 @@ def _shown(value: Any, param: Param) -> Any:
         return None
 
 
-def _read(key: str, value: Any, param: Param) -> Any:
+def read(key: str, value: Any, param: Param) -> Any:
     """Return the value of a parameter that a page gave. Raises SceneError."""
     if value is None and param.optional:
         return None
@@ -281,4 +283,4 @@ class _NoParts:
 _READER: Any = _NoParts()
 _WRITER: Any = _NoParts()
 
-__all__ = ["edited", "objects", "panels", "written"]
+__all__ = ["edited", "objects", "panels", "read", "written"]

@@ -7,7 +7,11 @@ begins, in passes that grow, so that few ends of passes cost time; it is offered
 
 from __future__ import annotations
 
+import dataclasses
+import math
 import time
+from collections.abc import Callable
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -17,15 +21,17 @@ from clpt.device import Device
 from clpt.render.progress import Progress
 from clpt.render.renderer import Renderer
 from clpt.scene import Scene
-from clpt.view import pictures
+from clpt.view import maps, pictures
 from clpt.view.pictures import Display
-from clpt.view.target import Change, Target, smaller
+from clpt.view.target import Change, Make, Target, smaller
 
 PREVIEW_PIXELS = 64_000  # about, of the picture while it moves
 PREVIEW_SAMPLES = 4  # of it, before the whole picture begins
-SLOW = 0.12  # [s] of a preview, beyond which the next ones are smaller
+SLOW = 0.06  # [s] of two previews, beyond which the next ones are smaller
+CANCEL_SECONDS = 0.1  # in which a pass ends when something moves
 DIVIDERS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 128, 256)
-PASS_SECONDS = 2.0
+PASS_SECONDS = 2.0  # of a pass; and more when the render has lasted, since ends of passes are dear
+PASS_SHARE, LONGEST_PASS = 0.5, 10.0  # of the time so far, and [s]
 STATUS_SECONDS = 0.25  # between messages of progress
 
 Film = NDArray[np.float32]
@@ -44,27 +50,45 @@ class Outlet(Protocol):
 class RenderLoop:
     """Renders a scene step by step.
 
+    make: of the whole picture's renderer, called with the scene and options; by default it is a
+    `Renderer` on the device, as that of smaller pictures always is. options: of renderers.
+
     One thread calls its methods; but for `cancel` and `close`, which any may call.
     """
 
     def __init__(
-        self, scene: Scene, device: Device, outlet: Outlet, display: Display, **options: Any
+        self,
+        scene: Scene,
+        device: Device,
+        outlet: Outlet,
+        display: Display,
+        make: Make | None = None,
+        **options: Any,
     ):
         self.scene, self.device, self.outlet = scene, device, outlet
         self.display = display
+        self.shows = maps.PICTURE  # or a map, or a layer of the film
+        self.meanwhile: Callable[[], None] = lambda: None  # called while samples are taken
         self.paused = False
         self.watched = True
-        self.film: Film | None = None  # of the last whole picture that was offered
+        self.has_shown = False  # the whole picture of the present scene
         self.kept: Film | None = None  # a picture to compare with
         self.seconds = 0.0  # of rendering the whole picture
-        self._options = options
+        self._film: Film | None = None
+        self._errors = maps.ErrorMap()
+        options = {"cancel_seconds": CANCEL_SECONDS, **options}
+        self._make = partial(Renderer, device=device, **options)
         self._divider = first_divider(scene)
-        self._full = Target(device, lambda scene: scene, **options)
-        self._preview = Target(device, smaller(self._divider), **options)
+        whole = self._make if make is None else partial(make, **options)
+        self._full = Target(whole, lambda scene: scene)
+        self._preview = Target(self._make, smaller(self._divider))
         self._previews_left, self._begins = PREVIEW_SAMPLES, True
         self._stale = self._offered = False
         self._budget = pictures.Budget()
-        self._frame = 0
+        self._frame = self._changes = 0
+        self._asked: float | None = None  # when something was that restarts
+        self._waited = self._samples = 0.0
+        self._slow_previews = 0
         self._told = 0.0
         self._rates = 0.0, 0.0
         self._closing = False
@@ -77,11 +101,26 @@ class RenderLoop:
         self._full.note(change)
         self._preview.note(change)
         self._previews_left, self._begins = PREVIEW_SAMPLES, True
-        self.film = None
+        self._film, self.has_shown = None, False
+        self._errors = maps.ErrorMap()
+        self._changes += 1
+        asked, self._asked = self._asked, None
+        self._waited = 0.0 if asked is None else time.perf_counter() - asked
 
-    def show(self, display: Display) -> None:
-        """Show the picture in another way."""
-        self.display, self._stale = display, True
+    @property
+    def film(self) -> Film | None:
+        """The whole picture so far, (h, w, 4) float32 as `Renderer.film`; None if there is none."""
+        if self._film is None and self.has_shown:
+            self._film = self.renderer().film.get()
+        return self._film
+
+    def show(self, display: Display, shows: str) -> None:
+        """Show the picture in another way, or a map in its place."""
+        self.display, self.shows, self._stale = display, shows, True
+
+    def pixels(self) -> NDArray[np.uint8]:
+        """Return the whole picture as it is shown, (h, w, 3 or 4) uint8."""
+        return self._shown(self.renderer(), whole=True)[0]
 
     def advance(self) -> bool:
         """Do the next piece of work; return whether there was any.
@@ -111,6 +150,8 @@ class RenderLoop:
 
     def cancel(self) -> None:
         """Let a pass end soon."""
+        if self._asked is None:
+            self._asked = time.perf_counter()
         self._full.cancel()
 
     def stop(self) -> None:
@@ -143,10 +184,16 @@ class RenderLoop:
         renderer = self._follow(self._preview)
         if not renderer.run(1) and renderer.samples == 0:  # it was cancelled
             return
-        self._offer(renderer, self._divider)
+        self._offer(renderer, self._divider, rendered=time.perf_counter() - began)
         took = time.perf_counter() - began
-        if not built and took > SLOW and self._divider < DIVIDERS[-1]:
-            self._resize_preview(next(n for n in DIVIDERS if n > self._divider))
+        if built:
+            return
+        self._slow_previews = self._slow_previews + 1 if took > SLOW else 0
+        if self._slow_previews == 2 and self._divider < DIVIDERS[-1]:
+            fitting = self._divider * math.sqrt(took / SLOW)
+            self._resize_preview(next((n for n in DIVIDERS if n >= fitting), DIVIDERS[-1]))
+            self._follow(self._preview)  # now, not in a drag
+            self._previews_left = 0
 
     def _follow(self, target: Target) -> Renderer:
         """Return a target's renderer, of the present scene; tell viewers that it may take long."""
@@ -156,39 +203,51 @@ class RenderLoop:
 
     def _resize_preview(self, divider: int) -> None:
         self._preview.close()
-        self._divider = divider
-        self._preview = Target(self.device, smaller(divider), **self._options)
+        self._divider, self._slow_previews = divider, 0
+        self._preview = Target(self._make, smaller(divider))
 
     def _render_pass(self) -> None:
         renderer = self._follow(self._full)
         if self._begins:
-            self._begins, self.seconds = False, 0.0
+            self._begins, self.seconds, self._samples = False, 0.0, 0.0
             self._budget.restart()
         size = 1
         if self.seconds > 0.0:
-            in_time = int(renderer.samples / self.seconds * PASS_SECONDS)
+            limit = max(PASS_SECONDS, min(PASS_SHARE * self.seconds, LONGEST_PASS))
+            in_time = int(renderer.samples / self.seconds * limit)
             size = max(1, min(in_time, renderer.samples))
         size = min(size, max(1, self.scene.spp - renderer.samples))
         before = self.seconds
 
         def tell(progress: Progress) -> bool:
-            self.seconds = before + progress.seconds
-            if progress.seconds > 0.0:
-                self._rates = progress.paths / progress.seconds, progress.rays / progress.seconds
+            self.seconds, self._samples = before + progress.seconds, progress.samples
+            if self.seconds > 0.0:
+                self._rates = progress.paths / self.seconds, progress.rays / self.seconds
             if time.perf_counter() - self._told > STATUS_SECONDS:
                 self.tell(renderer)
+            if self.has_shown and isinstance(renderer, Renderer):
+                self.meanwhile()
+                if self._stale:
+                    self._offer(renderer, 1)
             return not self._closing
 
         renderer.run(size, tell, noise=self.scene.noise)
         self._offered = False
+        if self._errors.wants(self._samples):
+            self._errors.note(renderer.film.get())
 
-    def _offer(self, renderer: Renderer, divider: int, rest: bool = False) -> None:
-        """Offer the picture as it is; rest: equal to `Renderer.resolve` to the byte."""
+    def _offer(
+        self, renderer: Renderer, divider: int, rest: bool = False, rendered: float = 0.0
+    ) -> None:
+        """Offer the picture as it is; rest: equal to `Renderer.resolve` to the byte.
+
+        rendered: what a preview took [s].
+        """
         began = time.perf_counter()
-        pixels = pictures.shown(renderer, self.display)
+        pixels, legend = self._shown(renderer, whole=divider == 1)
         data = pictures.png(pixels) if rest else pictures.jpeg(pixels)
         if divider == 1 and renderer is self._full.renderer:
-            self.film = renderer.film.get()
+            self.has_shown, self._film = True, None
         self._frame += 1
         film = self.scene.film
         header = {
@@ -201,17 +260,36 @@ class RenderLoop:
             "samples": renderer.samples,
             "rest": rest,
             "difference": self._difference(),
+            "changes": self._changes,
+            "waited": self._waited,
+            "rendered": rendered,
+            "shows": self.shows,
+            "legend": None if legend is None else dataclasses.asdict(legend),
         }
         self.outlet.picture(header, data)
         self._stale, self._offered = False, rest
         self._budget.spend(time.perf_counter() - began)
         self.tell(renderer)
 
+    def _shown(self, renderer: Renderer, whole: bool) -> tuple[NDArray[np.uint8], Any]:
+        """Return what a renderer has for the screen, and the legend of its colours or None."""
+        if self.shows in (*renderer.scene.film.layers, *renderer.channels):
+            return maps.layer(self.shows, renderer.layers()[self.shows]), None
+        if whole and self.shows == maps.DENOISED:
+            return pictures.denoised(renderer, self.display), None
+        if whole and self.shows == maps.SAMPLES:
+            return maps.samples(renderer.film.get())
+        found = self._errors.shown(renderer.film.get()) if self.shows == maps.ERROR else None
+        if found is not None and whole:
+            return found
+        return pictures.shown(renderer, self.display), None
+
     def _difference(self) -> dict[str, float] | None:
         """Return how much the picture differs from the one that is kept, if they are as large."""
-        if self.kept is None or self.film is None or self.kept.shape != self.film.shape:
+        film = None if self.kept is None else self.film
+        if self.kept is None or film is None or self.kept.shape != film.shape:
             return None
-        kept, now = (one[..., :3].astype(np.float64) for one in (self.kept, self.film))
+        kept, now = (one[..., :3].astype(np.float64) for one in (self.kept, film))
         error, mean = np.abs(now - kept), max(float(kept.mean()), 1e-30)
         return {
             "relative_mean": float(error.mean()) / mean,
@@ -227,7 +305,7 @@ class RenderLoop:
             {
                 "type": "status",
                 "phase": "moving" if self._previews_left else phase,
-                "samples": 0 if self._begins else renderer.samples,
+                "samples": 0 if self._begins else self._samples,
                 "spp": self.scene.spp,
                 "noise": self.scene.noise,
                 "active": renderer.active,

@@ -8,13 +8,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from clpt import output_files
 from clpt.formats import save as save_scene
 from clpt.render.renderer import Renderer
 from clpt.scene import Scene
 from clpt.view import pictures
 from clpt.view.commands import CommandError
-from clpt.view.panels import written
 
 MOST_FILES = 10_000
 
@@ -37,10 +39,10 @@ class Folder:
                 return path
         raise CommandError(f"the folder has {MOST_FILES} files already")
 
-    def save_png(self, renderer: Renderer, display: pictures.Display) -> Path:
-        """Write the picture so far as it is shown."""
+    def save_png(self, pixels: NDArray[np.uint8]) -> Path:
+        """Write a picture (h, w, 3 or 4) as it is shown."""
         path = self.new(".png")
-        output_files.write(path, pictures.png(pictures.shown(renderer, display)))
+        output_files.write(path, pictures.png(pixels))
         return path
 
     def save_exr(self, renderer: Renderer, seconds: float) -> Path:
@@ -57,9 +59,8 @@ class Folder:
         save_scene(scene, path)
         return path
 
-    def save_view(self, scene: Scene, display: dict[str, Any]) -> Path:
-        """Write the camera, as scene.json has it, and how the picture is shown."""
+    def save_view(self, view: dict[str, Any]) -> Path:
+        """Write a view, see clpt.view.views."""
         path = self.new(".view.json")
-        text = json.dumps({"camera": written(scene.camera), "display": display}, indent=2)
-        output_files.write_text(path, text + "\n")
+        output_files.write_text(path, json.dumps(view, indent=2) + "\n")
         return path

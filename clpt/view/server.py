@@ -9,9 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import http
-import json
 import logging
-import math
 import struct
 import threading
 import time
@@ -31,6 +29,7 @@ from websockets.http11 import Response
 from clpt.errors import ClptError
 from clpt.view.access import LOOPBACK, Access, is_loopback
 from clpt.view.commands import COMMANDS, LARGEST_MESSAGE, CommandError, parse
+from clpt.view.messages import as_json
 from clpt.view.session import Session
 
 log = logging.getLogger(__name__)
@@ -111,9 +110,10 @@ class Viewer:
         self.wake.set()
 
     def confirm(self, frame: int) -> None:
-        """Note that the viewer has a frame, and those before it."""
+        """Note that the viewer has a frame, and those before it; such a message is not counted."""
         while self.unconfirmed and self.unconfirmed[0] <= frame:
             self.unconfirmed.popleft()
+            self._tokens += 1.0
         self.wake.set()
 
     async def send_all(self) -> None:
@@ -335,22 +335,6 @@ class Server:
                 self.session.post(request, lambda reply: self._call(viewer.tell, reply))
         except CommandError as error:
             viewer.tell({"type": "error", "text": str(error)})
-
-
-def as_json(message: Any) -> str:
-    """Return a message as JSON; what is no finite number is null."""
-    try:
-        return json.dumps(message, allow_nan=False)
-    except ValueError:
-        return json.dumps(_finite(message))
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, dict):
-        return {key: _finite(child) for key, child in value.items()}
-    return [_finite(child) for child in value] if isinstance(value, (list, tuple)) else value
 
 
 def _response(status: http.HTTPStatus, body: str | bytes, kind: str = "") -> Response:

@@ -10,14 +10,12 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
+from clpt.denoise import oidn
 from clpt.device import Device
-from clpt.errors import ClptError
+from clpt.errors import ClptError, SceneError
 from clpt.scene import Scene
-from clpt.scene.cameras import Camera, Perspective, ThinLens
-from clpt.scene.params import params
-from clpt.view import navigation, panels
+from clpt.view import maps, panels, views
+from clpt.view.camera_work import CameraWork, Reply
 from clpt.view.commands import COMMANDS, CommandError, Request
 from clpt.view.look import Look
 from clpt.view.pictures import Display
@@ -32,9 +30,6 @@ MOST_WAITING = 1024  # requests; beyond, the oldest are dropped
 EDITABLE = ("shapes", "lights", "film", "integrator")  # parts of a scene, but the camera
 MOVES = ("orbit", "look", "pan", "dolly", "fly")
 WATCH_SECONDS = 1.0  # between looks at the scene's file
-LENS_SHARE = 0.01  # of the distance in focus: the radius that a pinhole gets as a lens
-
-Reply = Callable[[dict[str, Any]], None]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,12 +40,12 @@ class Source:
     load: Callable[[], Scene]
 
 
-class Session:
+class Session(CameraWork):
     """A scene that is rendered while it is watched and steered.
 
     scene, display: at the start; device: where; outlet: gets pictures and messages; folder: gets
-    what is saved, and source tells when the file has changed, where they are given. options: of
-    `Renderer`.
+    what is saved, and source tells when the file has changed, where they are given; where: what
+    renders, for people. options: of `RenderLoop` and renderers.
 
     `post`, `watched` and `state` may be called from any thread.
     """
@@ -64,21 +59,22 @@ class Session:
         folder: Folder | None = None,
         source: Source | None = None,
         display: Display | None = None,
+        where: str | None = None,
         **options: Any,
     ):
         self.device, self.outlet, self.folder, self.source = device, outlet, folder, source
-        self.scene = self._first = self._works = scene
+        self.where = where or device.info.label
+        self.scene = self._first = scene
         self.look = Look()
+        self._works = self.scene, self.look  # the last ones that could be rendered
         self.error: BaseException | None = None
         self._loop = RenderLoop(scene, device, outlet, display or Display(), **options)
+        self._loop.meanwhile = self._handle_quick_ones
         self._probe: Probe | None = None
         self._requests: deque[tuple[Request, Reply]] = deque()
         self._wake = threading.Condition()
         self._closing = False
         self._viewers = -1  # nobody has come yet: the picture begins before
-        self._pivot: navigation.Vector = np.zeros(3)
-        self._up: navigation.Vector = np.zeros(3)
-        self._aimed = False  # the pivot lies on a surface
         self._set_pivot()
         self._stamp = source.stamp() if source is not None else None
         self._looked = time.monotonic()
@@ -137,8 +133,11 @@ class Session:
             "paused": self._loop.paused,
             "display": self._display(),
             "look": {**dataclasses.asdict(self.look), "hidden": sorted(self.look.hidden)},
-            "device": self.device.info.label,
-            "names": panels.names(self._loop.display.view is not None),
+            "device": self.where,
+            "names": {
+                **panels.names(self._loop.display.view is not None),
+                "maps": list(maps.available(scene)),
+            },
             "objects": panels.objects(scene),
             "panels": panels.panels(scene),
             "folder": None if self.folder is None else str(self.folder.folder),
@@ -174,15 +173,16 @@ class Session:
         try:
             advanced = self._loop.advance()
         except ClptError as error:
-            if self.scene is self._works:
+            scene, look = self._works
+            if self.scene is scene and self.look == look:
                 raise
             self._tell_error(error)
-            self.look = Look()
-            self._show(self._works, Change(whole=True))
+            self.look = look
+            self._show(scene, Change(whole=True))
             self._tell_state()
             return True
-        if self._loop.film is not None:
-            self._works = self.scene
+        if self._loop.has_shown:
+            self._works = self.scene, self.look
             if not self._aimed:
                 self._aim()
         return advanced
@@ -191,6 +191,19 @@ class Session:
         with self._wake:
             requests = list(self._requests)
             self._requests.clear()
+        self._handle(requests)
+
+    def _handle_quick_ones(self) -> None:
+        """While samples are taken: do what need not wait for them."""
+        if not self._requests:
+            return
+        with self._wake:
+            requests = [one for one in self._requests if is_quick(one[0])]
+            kept = [one for one in self._requests if not is_quick(one[0])]
+            self._requests = deque(kept)
+        self._handle(requests)
+
+    def _handle(self, requests: list[tuple[Request, Reply]]) -> None:
         for request, reply in merged(requests):
             try:
                 getattr(self, f"_do_{request.name}")(reply, **request.values)
@@ -225,6 +238,7 @@ class Session:
     def _show(self, scene: Scene, change: Change) -> None:
         """Render another scene, as it is looked at."""
         self.scene = scene
+        self._loop.shows = self.look.shows
         self._loop.begin(self.look.apply(scene), change)
 
     def _display(self) -> dict[str, Any]:
@@ -238,125 +252,14 @@ class Session:
     def _tell_error(self, error: BaseException) -> None:
         self.outlet.message({"type": "error", "text": str(error)})
 
-    # the camera
-
-    def _do_orbit(self, reply: Reply, dx: float, dy: float) -> None:
-        self._move(navigation.orbit(self.scene.camera, self._pivot, self._up, dx, dy))
-
-    def _do_look(self, reply: Reply, dx: float, dy: float) -> None:
-        self._move(
-            navigation.look(self.scene.camera, self._up, dx, dy, self._aspect()), takes_pivot=True
-        )
-
-    def _do_pan(self, reply: Reply, dx: float, dy: float) -> None:
-        camera = navigation.pan(self.scene.camera, self._distance(), dx, dy, self._aspect())
-        self._move(camera, takes_pivot=True)
-
-    def _do_dolly(self, reply: Reply, by: float) -> None:
-        self._move(navigation.dolly(self.scene.camera, self._pivot, by))
-
-    def _do_fly(self, reply: Reply, right: float, up: float, forward: float) -> None:
-        camera = navigation.fly(self.scene.camera, self._distance(), right, up, forward)
-        self._move(camera, takes_pivot=True)
-
-    def _do_home(self, reply: Reply) -> None:
-        self._move(self._first.camera)
-        self._set_pivot()
-        self._tell_state()
-
-    def _do_field_of_view(self, reply: Reply, degrees: float) -> None:
-        if not isinstance(self.scene.camera, Perspective):
-            raise CommandError(f"the camera {self.scene.camera.kind} has no field of view")
-        self._move(dataclasses.replace(self.scene.camera, fov=degrees))
-        self._tell_state()
-
-    def _do_pick(self, reply: Reply, x: int, y: int) -> None:
-        self._ask_hit(x, y, reply, lambda hit: self._aim_at(hit, reply))
-
-    def _do_focus(self, reply: Reply, x: int, y: int) -> None:
-        self._ask_hit(x, y, reply, lambda hit: self._focus_on(hit, reply))
-
-    def _do_pivot(self, reply: Reply, position: list[float]) -> None:
-        self._pivot, self._aimed = np.array(position), True
-
-    def _do_focus_at(self, reply: Reply, distance: float) -> None:
-        camera: Any = self.scene.camera
-        if isinstance(camera, ThinLens):
-            camera = dataclasses.replace(camera, focus_distance=distance)
-        elif isinstance(camera, Perspective):
-            given = {name: getattr(camera, name) for name in params(type(camera))}
-            radius = LENS_SHARE * distance
-            camera = ThinLens(**given, focus_distance=distance, aperture_radius=radius)
-        else:
-            raise CommandError(f"the camera {camera.kind} has no lens")
-        self._move(camera)
-        self._tell_state()
-
-    def _aim_at(self, hit: dict[str, Any], reply: Reply) -> None:
-        """In the probe's thread: let the pivot be where a pixel looks."""
-        if hit["shape"] is None:
-            reply({"type": "note", "text": "there is nothing to turn about"})
-            return
-        self.post(Request("pivot", {"position": hit["position"]}), reply)
-        reply({"type": "pivot", "position": hit["position"], "depth": hit["depth"]})
-
-    def _focus_on(self, hit: dict[str, Any], reply: Reply) -> None:
-        """In the probe's thread: let the lens focus where a pixel looks."""
-        if hit["shape"] is None:
-            reply({"type": "note", "text": "there is nothing to focus on"})
-            return
-        at = navigation.pose(self.scene.camera)
-        distance = float(np.dot(np.array(hit["position"]) - at.origin, at.forward))
-        self.post(Request("focus_at", {"distance": max(distance, 1e-6)}), reply)
-
-    def _aim(self) -> None:
-        """Let the pivot be what is in the middle of the picture."""
-        self._aimed = True
-        film = self.scene.film
-
-        def silent(message: dict[str, Any]) -> None:
-            log.debug("%s", message)
-
-        def aim(hit: dict[str, Any]) -> None:
-            if hit["shape"] is not None:
-                self.post(Request("pivot", {"position": hit["position"]}), silent)
-
-        self._ask_hit(film.width // 2, film.height // 2, silent, aim)
-
-    def _move(self, camera: Camera, takes_pivot: bool = False) -> None:
-        """Let another camera look; takes_pivot: the pivot goes where the camera goes."""
-        if takes_pivot:
-            old, new = navigation.pose(self.scene.camera), navigation.pose(camera)
-            away = self._pivot - old.origin
-            parts = [float(np.dot(away, axis)) for axis in (old.left, old.up, old.forward)]
-            axes = (new.left, new.up, new.forward)
-            self._pivot = new.origin + sum(
-                part * axis for part, axis in zip(parts, axes, strict=True)
-            )
-        self.scene = dataclasses.replace(self.scene, camera=camera)
-        shown = dataclasses.replace(self._loop.scene, camera=camera)
-        self._loop.begin(shown, Change(camera=camera))
-
-    def _set_pivot(self) -> None:
-        """Let the pivot be where the camera focuses, or as far away as the world's origin."""
-        camera = self.scene.camera
-        at = navigation.pose(camera)
-        distance = float(getattr(camera, "focus_distance", np.linalg.norm(at.origin))) or 1.0
-        self._pivot, self._up = at.origin + distance * at.forward, navigation.upright(camera)
-        self._aimed = False
-
-    def _distance(self) -> float:
-        away = self._pivot - navigation.pose(self.scene.camera).origin
-        return float(np.linalg.norm(away)) or 1.0
-
-    def _aspect(self) -> float:
-        return self.scene.film.width / self.scene.film.height
-
     # pixels
 
-    def _do_inspect(self, reply: Reply, x: int, y: int) -> None:
+    def _do_value(self, reply: Reply, x: int, y: int) -> None:
         self._check_pixel(x, y)
         reply({"type": "value", "x": x, "y": y, **self._value(x, y)})
+
+    def _do_inspect(self, reply: Reply, x: int, y: int) -> None:
+        self._do_value(reply, x, y)
         self._ask(Question(self._loop.scene, x, y, self._named(reply)))
 
     def _value(self, x: int, y: int) -> dict[str, Any]:
@@ -458,8 +361,31 @@ class Session:
 
     # the render
 
+    def _do_copy_view(self, reply: Reply) -> None:
+        reply({"type": "view", "view": self._view()})
+
+    def _view(self) -> dict[str, Any]:
+        return views.written(self.scene, self._loop.display)
+
     def _do_display(self, reply: Reply, exposure: float, tone: str) -> None:
-        self._loop.show(Display(exposure, tone, self._loop.display.view))
+        self._loop.show(Display(exposure, tone, self._loop.display.view), self.look.shows)
+
+    def _do_shows(self, reply: Reply, name: str) -> None:
+        if name not in maps.available(self.scene):
+            raise CommandError(f"there is no {name} to show")
+        if name == maps.DENOISED and not self.look.denoises:
+            try:
+                oidn.check_installed()
+            except SceneError as error:
+                raise CommandError(error.message) from error
+            self._look(shows=name, denoises=True)
+            return
+        if name in maps.SURFACES and name not in (*self.scene.film.layers, *self.look.layers):
+            self._look(shows=name, layers=(*self.look.layers, name))
+            return
+        self.look = dataclasses.replace(self.look, shows=name)
+        self._loop.show(self._loop.display, name)
+        self._tell_state()
 
     def _do_pause(self, reply: Reply, paused: bool) -> None:
         self._loop.paused = paused
@@ -486,7 +412,7 @@ class Session:
 
     def _do_statistics(self, reply: Reply) -> None:
         stats = dataclasses.asdict(self._loop.renderer().stats)
-        reply({"type": "statistics", "stats": stats, "device": self.device.info.label})
+        reply({"type": "statistics", "stats": stats, "device": self.where})
 
     def _do_save(self, reply: Reply, what: str) -> None:
         if self.folder is None:
@@ -494,12 +420,18 @@ class Session:
         if what == "scene":
             path = self.folder.save_scene(self.scene)
         elif what == "view":
-            path = self.folder.save_view(self.scene, self._display())
+            path = self.folder.save_view(self._view())
         elif what == "png":
-            path = self.folder.save_png(self._loop.renderer(), self._loop.display)
+            path = self.folder.save_png(self._loop.pixels())
         else:
             path = self.folder.save_exr(self._loop.renderer(), self._loop.seconds)
         reply({"type": "saved", "what": what, "name": str(path.relative_to(self.folder.folder))})
+
+
+def is_quick(request: Request) -> bool:
+    """Return whether a request can be done while samples are taken."""
+    command = COMMANDS.get(request.name)
+    return command is not None and command.quick
 
 
 def merged(requests: list[tuple[Request, Reply]]) -> list[tuple[Request, Reply]]:

@@ -6,7 +6,6 @@ import dataclasses
 from collections.abc import Callable
 from typing import Any
 
-from clpt.device import Device
 from clpt.errors import SceneError
 from clpt.render.renderer import Renderer
 from clpt.scene import Scene
@@ -14,6 +13,7 @@ from clpt.scene.cameras import Camera
 from clpt.scene.materials import Material
 
 Variant = Callable[[Scene], Scene]
+Make = Callable[..., Renderer]  # called with a scene
 
 
 @dataclasses.dataclass(frozen=True)
@@ -38,8 +38,8 @@ class Change:
 class Target:
     """A renderer of a variant of the scene, such as a smaller one; made when it is needed."""
 
-    def __init__(self, device: Device, variant: Variant, **options: Any):
-        self.device, self.variant, self._options = device, variant, options
+    def __init__(self, make: Make, variant: Variant):
+        self.make, self.variant = make, variant
         self.renderer: Renderer | None = None
         self._pending: Change | None = None
 
@@ -63,7 +63,7 @@ class Target:
         change, self._pending = self._pending, None
         try:
             if self.renderer is None:
-                self.renderer = Renderer(self.variant(scene), self.device, **self._options)
+                self.renderer = self.make(self.variant(scene))
             elif change is not None:
                 self._update(self.renderer, scene, change)
         except BaseException:
@@ -85,10 +85,10 @@ class Target:
         try:
             renderer.update(scene=variant)
         except SceneError as error:
-            if error.where not in ("film", "integrator.channels"):
+            if error.where not in ("film", "film.layers", "integrator.channels"):
                 raise
             self.close()  # another film, which a renderer cannot get
-            self.renderer = Renderer(variant, self.device, **self._options)
+            self.renderer = self.make(variant)
 
     def cancel(self) -> None:
         """Let a run end soon."""

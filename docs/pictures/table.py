@@ -8,6 +8,7 @@ from .cameras import CAMERAS
 from .integrators import FILTERS, INTEGRATORS, SAMPLERS
 from .lights import LIGHTS
 from .materials import MATERIALS
+from .media import MEDIA, PHASES
 from .shapes import SHAPES
 from .studio import Picture
 from .textures import TEXTURES
@@ -16,6 +17,8 @@ FOLDER = Path(__file__).parent / "kinds"
 CAPTIONS = FOLDER / "captions.json"  # for clpt.formats.native.reference, which imports none of this
 PICTURES = {
     "material": MATERIALS,
+    "medium": MEDIA,
+    "phase": PHASES,
     "light": LIGHTS,
     "shape": SHAPES,
     "camera": CAMERAS,

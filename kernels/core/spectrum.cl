@@ -64,6 +64,14 @@ inline Spectrum spectrum_sel(mask m, Spectrum a, Spectrum b)
 #undef C
     return r;
 }
+inline Spectrum spectrum_exp(Spectrum a)
+{
+    Spectrum r;
+#define C(c) r.c = exp_r(a.c);
+    SPECTRUM_EACH(C)
+#undef C
+    return r;
+}
 inline Spectrum spectrum_clamped(Spectrum a) /* to [0, 1] */
 {
     Spectrum r;

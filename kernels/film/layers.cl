@@ -1,9 +1,10 @@
 /* Layers beside the picture, in memory: sums over the first LAYER_SAMPLES samples of each pixel, so that they cost
  * little; whole numbers, which add in any order. What is summed is in path/layers.cl.
  *
- * `layers` is a stream of padded_pixels words for each of these: how many samples; a word for each number that is
- * near 1, in units of 2^-22; three for others, in units of 2^8, 2^-16 and 2^-40, the lower ones below 2^24. No word
- * leaves its 32 bits, so words add without a carry. LAYER_<NAME> is the first word of a layer. */
+ * `layers` has LAYER_WORDS words for each pixel, side by side, as its samples then touch one line of a cache:
+ * how many samples; a word for each number that is near 1, in units of 2^-22; three for others, in units of 2^8, 2^-16
+ * and 2^-40, the lower ones below 2^24; one for an id, 1 more than it, of the sample of number 0. No word leaves its
+ * 32 bits, so words add without a carry. LAYER_<NAME> is the first word of a layer. */
 #include "film/sums.cl"
 #define LAYER_SAMPLES 64
 #define LAYER_UNITS 0x1p22f
@@ -19,43 +20,88 @@ inline mask layers_want(Slab path, uint at, mask m) { return m & (load_path_samp
 #define layer_weight(path, at) load_path_weight(path, at)
 #endif
 
-/* Counts a sample of each path. */
-inline void layers_count(Scene scene, global uint *layers, mask m, integer pixel_index)
+/* Adds `count` words, each of all lanes, to the first ones of their pixels. Lanes that add are told first, as a branch
+ * for each lane would take longer. Where there is one plane a slot owns its pixel, and needs no atomic operation. */
+inline void layers_add(Scene scene, global uint *layers, mask m, integer pixel_index, const integer *words, int count)
 {
-    const int *at_lane = (const int *)&m, *pixels = (const int *)&pixel_index;
-    for (int i = 0; i < LANES; i++)
-        if (at_lane[i]) sums_add_word(layers + pixels[i], 1u);
-}
-
-/* Adds a whole number to each of three neighbouring words. */
-inline void layer_add_words(global uint *first, size_t stream, mask m, integer pixel_index, vec3 v)
-{
-    integer x = to_integer(v.x), y = to_integer(v.y), z = to_integer(v.z);
-    const int *at_lane = (const int *)&m, *pixels = (const int *)&pixel_index;
-    const uint *xs = (const uint *)&x, *ys = (const uint *)&y, *zs = (const uint *)&z;
+    const int *adds = (const int *)&m, *pixels = (const int *)&pixel_index;
+    const uint *added = (const uint *)words;
+    int lanes[LANES], n = 0;
     for (int i = 0; i < LANES; i++) {
-        if (!at_lane[i]) continue;
-        sums_add_word(first + pixels[i], xs[i]);
-        sums_add_word(first + stream + pixels[i], ys[i]);
-        sums_add_word(first + 2 * stream + pixels[i], zs[i]);
+        lanes[n] = i;
+        n += adds[i] != 0;
+    }
+    for (int j = 0; j < n; j++) {
+        int i = lanes[j];
+        global uint *at = layers + (size_t)pixels[i] * LAYER_WORDS;
+        if (scene.settings->planes == 1)
+            for (int k = 0; k < count; k++) at[k] += added[k * LANES + i];
+        else
+            for (int k = 0; k < count; k++) sums_add_word(at + k, added[k * LANES + i]);
     }
 }
 
-/* Adds three numbers that are near 1. */
-inline void layer_add(Scene scene, global uint *layers, mask m, integer pixel_index, int word, vec3 v)
+/* Counts the `unseen` paths, which have met nothing; others are counted where they meet the first surface. */
+inline void layers_count(Scene scene, Slab path, uint at, global uint *layers, mask unseen)
 {
-    size_t stream = scene.settings->padded_pixels;
-    vec3 low = v3(-LAYER_LARGEST, -LAYER_LARGEST, -LAYER_LARGEST), high = scale3(low, -1.0f);
-    v = v3(clamp_r(v.x, low.x, high.x), clamp_r(v.y, low.y, high.y), clamp_r(v.z, low.z, high.z));
-    layer_add_words(layers + word * stream, stream, m, pixel_index, scale3(v, LAYER_UNITS));
+    const integer one = 1;
+    mask m = layers_want(path, at, unseen);
+    if (any(m)) layers_add(scene, layers, m, load_path_pixel_index(path, at), &one, 1);
 }
 
-/* Adds a number of any size below 2^31. */
-inline void layer_add_long(Scene scene, global uint *layers, mask m, integer pixel_index, int word, real v)
+/* Puts three numbers that are near 1, of the lanes of m, into words that are to be added. */
+inline void layer_put(integer *words, mask m, vec3 v)
 {
-    size_t stream = scene.settings->padded_pixels;
-    v = sel(fabs(v) < 0x1p31f, v, (real)(0.0f));
-    real high = floor(v * 0x1p-8f), rest = v - high * 0x1p8f, middle = floor(rest * 0x1p16f);
-    vec3 parts = v3(high, middle, floor((rest - middle * 0x1p-16f) * 0x1p40f));
-    layer_add_words(layers + word * stream, stream, m, pixel_index, parts);
+    real most = sel(m, (real)(LAYER_LARGEST), (real)(0.0f));
+    words[0] = to_integer(clamp_r(v.x, -most, most) * LAYER_UNITS);
+    words[1] = to_integer(clamp_r(v.y, -most, most) * LAYER_UNITS);
+    words[2] = to_integer(clamp_r(v.z, -most, most) * LAYER_UNITS);
 }
+
+/* Puts a number of any size below 2^31. */
+inline void layer_put_long(integer *words, mask m, real v)
+{
+    v = sel(m & (fabs(v) < 0x1p31f), v, (real)(0.0f));
+    real high = floor(v * 0x1p-8f), rest = v - high * 0x1p8f, middle = floor(rest * 0x1p16f);
+    words[0] = to_integer(high);
+    words[1] = to_integer(middle);
+    words[2] = to_integer(floor((rest - middle * 0x1p-16f) * 0x1p40f));
+}
+
+/* Puts an id. */
+inline void layer_put_id(integer *words, mask m, integer id) { words[0] = sel_i(m, id + 1, (integer)(0)); }
+
+#if MATTES
+/* Names that a pixel's samples have met, and how often: MATTE_SLOTS words a list, ascending. A word has 1 more than the
+ * name's number in its upper 25 bits and how often in its lower 7; 0 is none. Of more names the first ones of the scene
+ * are kept: a slot keeps the least that comes to it, with all its counts, and hands the others to the next slot. So
+ * what it ends with depends neither on the order of samples nor on who adds them, and lists of films add likewise. */
+inline void matte_add(global uint *list, uint number)
+{
+    uint word = ((number + 1u) << 7) | 1u;
+    for (int i = 0; i < MATTE_SLOTS && word; i++) {
+        volatile global uint *slot = list + i;
+        uint held = *slot;
+        for (;;) {
+            uint kept = held, onward = word;
+            if (!held || (held >> 7) == (word >> 7)) kept = held ? held + (word & 127u) : word, onward = 0u;
+            else if (word < held) kept = word, onward = held;
+            uint found = kept == held ? held : atomic_cmpxchg(slot, held, kept);
+            if (found == held) {
+                word = onward;
+                break;
+            }
+            held = found;
+        }
+    }
+}
+
+/* Adds the names with these numbers to the list `which` of the pixels. */
+inline void mattes_add(global uint *mattes, mask m, integer pixel_index, int which, integer number)
+{
+    const int *adds = (const int *)&m, *pixels = (const int *)&pixel_index;
+    const uint *numbers = (const uint *)&number;
+    for (int i = 0; i < LANES; i++)
+        if (adds[i]) matte_add(mattes + ((size_t)pixels[i] * MATTES + which) * MATTE_SLOTS, numbers[i]);
+}
+#endif

@@ -6,6 +6,7 @@
 #include "generated/gather.cl"
 #include "generated/guide.cl"
 #include "generated/layers.cl"
+#include "generated/light_layers.cl"
 
 inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask active, Vertex v SHADE_ARGS)
 {
@@ -39,6 +40,9 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
         Spectrum le = emission_load(scene, light_at(scene, light).radiance, surface_texture_point(s), v.lambdas);
         le = spectrum_scale(spectrum_mul(beta, le), w);
         store_path_radiance(path, at, lit, spectrum_add(load_path_radiance(path, at), le));
+#if LIGHT_LAYERS
+        light_layers_add(scene, path, at, lit, depth, light, le, light_layers);
+#endif
     }
 #endif
     mask met = active & !hidden, next = met & vertex_continues(scene, v);
@@ -49,7 +53,7 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     Frame frame = scatter.shading.frame;
     vec3 wo = scatter.wo;
 #if USES_LAYERS && !BSDF_IS_NULL
-    state = layers_record(scene, path, at, layers, met, v, scatter, state);
+    state = layers_record(scene, path, at, LAYER_PASSED, met, v, scatter, state);
 #endif
 #if BSDF_ABSORBS /* as the surfaces of lights mostly do */
     next = next & (spectrum_max(bsdf_albedo(m)) > 0.0f);
@@ -108,6 +112,12 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
 #endif
 #if USES_LIGHTS && !BSDF_DELTA /* after the sample: between them compilers would read tables of materials again */
     shadow_toward(shadow, at, active, shine, s, ls, value);
+#if LIGHT_LAYER_GROUPS
+    store_path_light(path, at, shine, ls.row);
+#endif
+#if SHADOW_MEDIA
+    store_shadow_through(shadow, at, shine, vertex_medium(v, ls.wi));
+#endif
 #endif
     next = next & (bs.pdf > 0.0f);
     vec3 onward = normalize3(to_world(frame, bs.wi));

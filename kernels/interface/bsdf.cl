@@ -1,4 +1,4 @@
-/* The contract of a material kind: kernels/bsdf/<kind>.cl has
+/* The contract of a material kind, kernels/bsdf/<kind>.cl, and of a phase function, kernels/phase/<kind>.cl:
  *
  *   BsdfSample <kind>_sample(<Kind> m, vec3 wo, vec3 u);     u.z chooses a lobe, u.x and u.y a direction
  *   Spectrum   <kind>_eval  (<Kind> m, vec3 wo, vec3 wi);    f |cos|, of the lobes that are not delta

@@ -19,3 +19,14 @@ inline Spectrum infinite_gather(Scene scene, vec3 p, vec3 hemisphere, vec3 d, re
     }
     return sum;
 }
+
+#if LIGHT_LAYERS /* which know of no paths from lights */
+/* What one infinite light adds. */
+inline Spectrum infinite_weighed(Scene scene, int row, vec3 p, vec3 hemisphere, vec3 d, real pdf, Wavelengths lambdas)
+{
+    Spectrum radiance;
+    real other;
+    infinite_light(scene, row, p, hemisphere, d, lambdas, &radiance, &other);
+    return spectrum_scale(radiance, sel(pdf < 0.0f, (real)(1.0f), mis_weight(pdf, other)));
+}
+#endif

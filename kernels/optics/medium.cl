@@ -1,15 +1,30 @@
-/* Media that absorb, inside of dielectrics: exp(-a t) of the light is left after t metres, a [1/m]
- * (Bouguer 1729, Lambert 1760, Beer 1852). A medium is named by 1 + the first word of its coefficient in
- * `materials`; 0 is none. A path is in the medium of the dielectric that it went into last, and in none
- * once it has left one: bodies may touch what is no dielectric, but not hold each other. */
+/* Media: what light does between surfaces. Its absorption and scattering [1/m] are those of a row in `materials`, and a
+ * medium is named by 1 + the first word of that row; 0 is none.
+ *
+ * The inside of a dielectric that absorbs is one: exp(-a t) of the light is left after t metres (Bouguer 1729, Lambert
+ * 1760, Beer 1852). A path is in the medium of the dielectric that it went into last, and in none once it has left one:
+ * bodies may touch what is no dielectric, but not hold each other. Its coefficient alone is in the row.
+ *
+ * Media that shapes have inside and outside, or the camera around it, have MEDIUM_FLIES in their names: stage/flight.cl
+ * dims what rays bring through them. Their rows hold sigma_a and sigma_s, and before them the word of their phase
+ * function. */
+#define MEDIUM_FLIES 0x40000000
+#define MEDIUM_ROW(name) (((name) & 0xffffff) - 1)
 
-/* What is left of light after t metres, t up to FAR; medium_absorption is generated. */
+/* What is left of light after t metres, t up to FAR; medium_absorption and medium_scattering are generated. */
 inline Spectrum medium_transmittance(Scene scene, integer medium, real t, Wavelengths lambdas)
 {
     Spectrum r = spectrum_of(1.0f);
     mask inside = medium != 0;
     if (any(inside)) {
-        Spectrum a = medium_absorption(scene, max_i(medium - 1, (integer)(0)), texture_point_nowhere(), lambdas);
+        integer row = max_i(MEDIUM_ROW(medium), (integer)(0));
+        Spectrum a = medium_absorption(scene, row, texture_point_nowhere(), lambdas);
+#if USES_MEDIA
+        mask flies = (medium & MEDIUM_FLIES) != 0;
+        row = sel_i(flies, row + MEDIUM_SCATTERING, (integer)(0));
+        Spectrum s = medium_scattering(scene, row, texture_point_nowhere(), lambdas);
+        a = spectrum_sel(flies, spectrum_add(a, s), a);
+#endif
 #define C(c) r.c = sel(inside, exp_r(-a.c * t), r.c);
         SPECTRUM_EACH(C)
 #undef C
@@ -17,15 +32,48 @@ inline Spectrum medium_transmittance(Scene scene, integer medium, real t, Wavele
     return r;
 }
 
+#if USES_MEDIA
+typedef struct {
+    Spectrum sigma_t, sigma_s; /* [1/m] */
+    integer phase;             /* material word of its phase function */
+} Medium;
+
+/* A medium that flies, in the lanes that have one. */
+inline Medium medium_load(Scene scene, integer name, Wavelengths lambdas)
+{
+    integer row = max_i(MEDIUM_ROW(name), (integer)(1));
+    Medium m;
+    m.sigma_s = medium_scattering(scene, row + MEDIUM_SCATTERING, texture_point_nowhere(), lambdas);
+    m.sigma_t = spectrum_add(m.sigma_s, medium_absorption(scene, row, texture_point_nowhere(), lambdas));
+    m.phase = gather_i(scene.materials, row - 1);
+    return m;
+}
+
+/* The names of the media behind the front of a shape and before it. */
+typedef struct { integer inside, outside; } ShapeMedia;
+
+inline ShapeMedia shape_media(Scene scene, integer shape)
+{
+    ShapeMedia m = {gather_i(scene.media, 2 * shape), gather_i(scene.media, 2 * shape + 1)};
+    return m;
+}
+
+/* The medium that a surface has still to dim a ray by: none that it has flown through. */
+#define MEDIUM_LEFT(medium) sel_i(((medium) & MEDIUM_FLIES) != 0, (integer)(0), medium)
+#else
+#define MEDIUM_LEFT(medium) (medium)
+#endif
+
 /* The medium of a ray that ends on a boundary whose inside is `own` (0: it has none). A ray that knows
  * of no medium but meets the back began inside, as the camera's may. */
 inline integer medium_met(integer medium, integer own, mask front)
 {
     return sel_i(!front & (medium == 0), own, medium);
 }
-/* The medium of the ray that goes on from there; inward: to the back of the boundary. */
-inline integer medium_beyond(integer medium, integer own, mask front, mask inward)
+/* The medium of the ray that goes on from there; inward: to the back of the boundary; outside: what is before its
+ * front, where a shape says so. */
+inline integer medium_beyond(integer medium, integer own, integer outside, mask front, mask inward)
 {
-    integer outside = sel_i(front, medium, (integer)(0));
-    return sel_i(own == 0, medium, sel_i(inward, own, outside));
+    mask boundary = (own | outside) != 0;
+    return sel_i(boundary, sel_i(inward, own, sel_i(front, medium, outside)), medium);
 }

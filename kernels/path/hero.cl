@@ -5,18 +5,14 @@
  * four, so the pdf of a direction is the mean of ratio p, and ratio becomes ratio p over that mean. A
  * direction that holds for the hero alone leaves (4, 0, 0, 0), and the path goes on with one wavelength.
  */
-#if USES_DISPERSION
-#define hero_ratio(path, at) load_path_ratio(path, at)
-#define hero_keep(path, at, m, ratio) store_path_ratio(path, at, m, ratio)
-#else
-#define hero_ratio(path, at) spectrum_of(1.0f)
-#define hero_keep(path, at, m, ratio)
-#endif
+#include "path/ratio.cl"
+
+#define HERO_CHROMATIC (USES_RATIO && BSDF_CHROMATIC && SPECTRUM_SIZE == 4)
 
 /* pdf of the directions that are not delta [1/sr]. */
 inline real hero_pdf(Bsdf m, vec3 wo, vec3 wi, Spectrum ratio)
 {
-#if USES_DISPERSION && BSDF_CHROMATIC
+#if HERO_CHROMATIC
     return spectrum_mean(spectrum_mul(ratio, bsdf_pdfs(m, wo, wi)));
 #else
     return bsdf_pdf(m, wo, wi);
@@ -29,8 +25,7 @@ inline BsdfSample hero_sample(Bsdf m, vec3 wo, vec3 u, Spectrum *ratio)
 {
     BsdfSample s = bsdf_sample(m, wo, u);
     s.pdf = sel(dot3(s.wi, s.wi) < 4.0f, s.pdf, (real)(0.0f)); /* NaN fails the comparison */
-#if USES_DISPERSION
-#if BSDF_CHROMATIC
+#if HERO_CHROMATIC
     Spectrum pdfs = spectrum_mul(*ratio, bsdf_pdfs(m, wo, s.wi));
     real pdf = spectrum_mean(pdfs);
     mask usable = (s.pdf > 0.0f) & (pdf > 0.0f);
@@ -39,6 +34,7 @@ inline BsdfSample hero_sample(Bsdf m, vec3 wo, vec3 u, Spectrum *ratio)
     s.weight = spectrum_scale(s.weight, sel(usable, s.pdf * inv, (real)(1.0f)));
     s.pdf = sel(usable, pdf, (real)(0.0f));
 #endif
+#if USES_DISPERSION
     mask alone = (s.lobe & LOBE_DISPERSE) != 0;
     if (any(alone)) {
         Spectrum hero = {(real)(4.0f), (real)(0.0f), (real)(0.0f), (real)(0.0f)};

@@ -2,62 +2,85 @@
  * is not a mirror or smooth glass, as dark and as coloured as what is before lets it through. */
 #include "film/layers.cl"
 
-#if LAYER_ALBEDO || LAYER_DENOISING_ALBEDO
-/* What a surface reflects, as the film's sensor tells it; `before`: of what is before it. */
-inline void layer_add_albedo(Scene scene, global uint *layers, mask m, integer pixel_index, int word,
-                             Scattering scatter, Wavelengths lambdas, Spectrum before, real weight)
-{
-    Spectrum albedo = spectrum_mul(bsdf_albedo(scatter.bsdf), before);
-    layer_add(scene, layers, m, pixel_index, word, scale3(film_value(scene, albedo, lambdas), weight));
-}
+/* Points of media have no normal, and no name. */
+#if BSDF_IS_PHASE
+#define LAYER_NORMAL(scatter) v3(0.0f, 0.0f, 0.0f)
+#else
+#define LAYER_NORMAL(scatter) (scatter).shading.frame.n
 #endif
 
-/* Adds what the `met` paths see here. Returns the paths' state, which says whether denoisers have got theirs. */
-inline integer layers_record(Scene scene, Slab path, uint at, global uint *layers, mask met, Vertex v,
-                             Scattering scatter, integer state)
+/* What a surface reflects, as the film's sensor tells it; `before`: of what is before it. */
+inline vec3 layer_albedo(Scene scene, Scattering scatter, Wavelengths lambdas, Spectrum before, real weight)
 {
-    mask wanted = layers_want(path, at, met), first = wanted & (v.depth == 0);
-    integer pixel_index = load_path_pixel_index(path, at);
-#if LAYER_FIRST
-    if (any(first)) {
-        real weight = layer_weight(path, at);
+    Spectrum albedo = spectrum_mul(bsdf_albedo(scatter.bsdf), before);
+    return scale3(film_value(scene, albedo, lambdas), weight);
+}
+
+/* Adds what the `met` paths see here. Returns the paths' state, which says whether denoisers have got theirs. */
+inline integer layers_record(Scene scene, Slab path, uint at, LAYER_ARGS, mask met, Vertex v, Scattering scatter,
+                             integer state)
+{
+    mask wanted = layers_want(path, at, met), first = wanted & (v.depth == 0), adds = first;
+#if LAYER_DENOISING && !BSDF_DELTA
+    mask seen = wanted & ((state & PATH_SEEN) == 0); /* those that are here first are among them */
+    state |= sel_i(met, (integer)(PATH_SEEN), (integer)(0));
+    adds = seen;
+#endif
+    if (!any(adds)) return state;
+    real weight = layer_weight(path, at);
+    integer words[LAYER_WORDS];
+    int count = LAYER_WORDS;
+    words[0] = sel_i(first, (integer)(1), (integer)(0));
 #if LAYER_ALBEDO
-        Spectrum nothing_before = spectrum_of(1.0f);
-        layer_add_albedo(scene, layers, first, pixel_index, LAYER_ALBEDO, scatter, v.lambdas, nothing_before, weight);
+    layer_put(words + LAYER_ALBEDO, first, layer_albedo(scene, scatter, v.lambdas, spectrum_of(1.0f), weight));
 #endif
 #if LAYER_SHADING_NORMAL
-        layer_add(scene, layers, first, pixel_index, LAYER_SHADING_NORMAL, scale3(scatter.shading.frame.n, weight));
+    layer_put(words + LAYER_SHADING_NORMAL, first, scale3(LAYER_NORMAL(scatter), weight));
 #endif
 #if LAYER_GEOMETRIC_NORMAL
-        layer_add(scene, layers, first, pixel_index, LAYER_GEOMETRIC_NORMAL, scale3(v.s.n, weight));
+    layer_put(words + LAYER_GEOMETRIC_NORMAL, first, scale3(v.s.n, weight));
 #endif
 #if LAYER_DEPTH
-        real t = v.t + path_null_distance(path, at);
-        layer_add_long(scene, layers, first, pixel_index, LAYER_DEPTH, t * weight);
+    layer_put_long(words + LAYER_DEPTH, first, (v.t + path_null_distance(path, at)) * weight);
 #endif
 #if LAYER_POSITION
-        layer_add_long(scene, layers, first, pixel_index, LAYER_POSITION, v.s.p.x * weight);
-        layer_add_long(scene, layers, first, pixel_index, LAYER_POSITION + 3, v.s.p.y * weight);
-        layer_add_long(scene, layers, first, pixel_index, LAYER_POSITION + 6, v.s.p.z * weight);
+    layer_put_long(words + LAYER_POSITION, first, v.s.p.x * weight);
+    layer_put_long(words + LAYER_POSITION + 3, first, v.s.p.y * weight);
+    layer_put_long(words + LAYER_POSITION + 6, first, v.s.p.z * weight);
 #endif
 #if LAYER_UV
-        layer_add_long(scene, layers, first, pixel_index, LAYER_UV, v.s.uv.x * weight);
-        layer_add_long(scene, layers, first, pixel_index, LAYER_UV + 3, v.s.uv.y * weight);
+    layer_put_long(words + LAYER_UV, first, v.s.uv.x * weight);
+    layer_put_long(words + LAYER_UV + 3, first, v.s.uv.y * weight);
 #endif
-    }
+#if LAYER_IDS
+    mask zeroth = first & (load_path_sample(path, at) == 0);
+#if LAYER_SHAPE_ID
+    layer_put_id(words + LAYER_SHAPE_ID, zeroth, v.object);
 #endif
-#if LAYER_DENOISING && !BSDF_DELTA
-    mask seen = wanted & ((state & PATH_SEEN) == 0);
-    if (any(seen)) {
-        real weight = layer_weight(path, at);
+#if LAYER_PRIMITIVE_ID
+    layer_put_id(words + LAYER_PRIMITIVE_ID, zeroth, v.primitive);
+#endif
+#if LAYER_MATERIAL_ID
+    layer_put_id(words + LAYER_MATERIAL_ID, zeroth, v.material);
+#endif
+#endif
+#if LAYER_DENOISING && BSDF_DELTA /* which come last */
+    count = LAYER_DENOISING;
+#elif LAYER_DENOISING
 #if LAYER_DENOISING_ALBEDO
-        layer_add_albedo(scene, layers, seen, pixel_index, LAYER_DENOISING_ALBEDO, scatter, v.lambdas, v.beta, weight);
+    layer_put(words + LAYER_DENOISING_ALBEDO, seen, layer_albedo(scene, scatter, v.lambdas, v.beta, weight));
 #endif
 #if LAYER_DENOISING_NORMAL
-        layer_add(scene, layers, seen, pixel_index, LAYER_DENOISING_NORMAL, scale3(scatter.shading.frame.n, weight));
+    layer_put(words + LAYER_DENOISING_NORMAL, seen, scale3(LAYER_NORMAL(scatter), weight));
 #endif
-        state |= sel_i(met, (integer)(PATH_SEEN), (integer)(0));
-    }
+#endif
+    integer pixel_index = load_path_pixel_index(path, at);
+    layers_add(scene, layers, adds, pixel_index, words, count);
+#if MATTE_OBJECT && !BSDF_IS_PHASE
+    mattes_add(mattes, first, pixel_index, MATTE_OBJECT - 1, v.object);
+#endif
+#if MATTE_MATERIAL && !BSDF_IS_PHASE
+    mattes_add(mattes, first, pixel_index, MATTE_MATERIAL - 1, v.material);
 #endif
     return state;
 }

@@ -42,7 +42,7 @@ called void queue_take(Slab path, Slab hit, Slab shadow, constant BlockWords *wo
     for (uint i = 0; i < words->path; i++) slab_gather(path, words->path_words[i], slots, block);
     for (uint i = 0; i < words->hit; i++) slab_gather(hit, words->hit_words[i], slots, block);
     slab_gather(shadow, SHADOW_T, slots, block);
-#if USES_LAYERS /* shading adds to pixels: the last path only once */
+#if USES_LAYERS || LIGHT_LAYERS /* shading adds to pixels: the last path only once */
     store_path_state(path, block, LANE_INDEX + (int)entry >= (int)end, (integer)(0));
 #endif
 }

@@ -129,6 +129,28 @@ inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, 
     return s;
 }
 
+/* A point of a medium, as a surface without extent: it has no normal. */
+inline Surface surface_of_point(vec3 p)
+{
+    Surface s;
+    s.p = p;
+    s.size = 0.0f;
+    s.n = v3(0.0f, 0.0f, 0.0f);
+    s.ns = s.n;
+    s.dpdu = s.n;
+    s.dpdv = s.n;
+    s.uv.x = 0.0f;
+    s.uv.y = 0.0f;
+    s.flipped = mask_of(0);
+    s.light = -1;
+#if USES_ATTRIBUTES
+    s.attributes = 0;
+    s.face = 0;
+    s.b = s.uv;
+#endif
+    return s;
+}
+
 /* The same from what the intersect stage has kept. */
 inline Surface surface_load(Scene scene, Slab hit, uint at, mask active, vec3 o, vec3 d, mask *front)
 {

@@ -10,9 +10,13 @@ typedef struct {
     Surface s;
     mask front;           /* the front was hit */
     integer row;          /* of the material */
+#if NAMES_SURFACES
+    integer object, primitive, material; /* index in the scene's shapes, number in the shape, number of the material */
+#endif
 #if USES_ABSORPTION
     integer medium;       /* that the ray has come through */
     integer inside;       /* what is behind the surface */
+    integer outside;      /* and before it, where its shape says so */
 #endif
 } Vertex;
 
@@ -38,13 +42,41 @@ inline Vertex vertex_load(Scene scene, Slab path, Slab hit, uint at, mask active
     v.state = load_path_state(path, at);
     v.depth = v.state & PATH_DEPTH;
     v.met = v.depth + path_nulls(path, at);
+#if BSDF_IS_PHASE
+    v.s = surface_of_point(madd3(v.d, v.t, v.o));
+    v.front = mask_of(1);
+#else
     v.s = surface_load(scene, hit, at, active, v.o, v.d, &v.front);
+#endif
     v.row = MATERIAL_ROW(sel_i(active, load_hit_material(hit, at), (integer)(0)));
+#if NAMES_SURFACES && BSDF_IS_PHASE
+    v.object = v.primitive = v.material = -1;
+#elif NAMES_SURFACES
+    integer row = sel_i(active, load_hit_shape(hit, at), (integer)(0));
+    ShapeRow shape = shape_row_row(scene.shapes, row * SHAPE_ROW_WORDS);
+#if MATERIAL_NUMBERS
+    v.material = to_integer(gather(scene.distributions, MATERIAL_NUMBERS + row));
+#endif
+    v.object = shape.number;
+#if USES_INSTANCES
+    integer instance = sel_i(active, load_hit_instance(hit, at), (integer)(0));
+    integer placed = sel_i(instance > 0, instance - 1, (integer)(0)) * INSTANCE_ROW_WORDS;
+    v.object = sel_i(instance > 0, instance_row_row(scene.instances, placed).number, v.object);
+#endif
+    mask many = (shape.kind == 0) | ((shape.flags & SHAPE_MANY) != 0);
+    v.primitive = sel_i(active & many, load_hit_prim(hit, at) - shape.prim, (integer)(0));
+#endif
 #if USES_ABSORPTION
     v.inside = BSDF_INTERIOR(v.row);
+    v.outside = 0;
+#if USES_MEDIA && !BSDF_IS_PHASE
+    ShapeMedia own = shape_media(scene, sel_i(active, load_hit_shape(hit, at), (integer)(0)));
+    v.inside = sel_i(own.inside != 0, own.inside, v.inside);
+    v.outside = own.outside;
+#endif
     v.medium = medium_met(sel_i(active, load_path_medium(path, at), (integer)(0)), v.inside, v.front);
     real through = v.t + sel(active, load_path_lead(path, at), (real)(0.0f));
-    v.beta = spectrum_mul(v.beta, medium_transmittance(scene, v.medium, through, v.lambdas));
+    v.beta = spectrum_mul(v.beta, medium_transmittance(scene, MEDIUM_LEFT(v.medium), through, v.lambdas));
 #endif
     return v;
 }
@@ -82,11 +114,19 @@ inline vec3 vertex_hemisphere(Frame frame, vec3 wo)
     return scale3(frame.n, sign);
 }
 
+#if USES_ABSORPTION
+/* The medium along w, which leads away from the vertex. */
+inline integer vertex_medium(Vertex v, vec3 w)
+{
+    return medium_beyond(v.medium, v.inside, v.outside, v.front, dot3(v.s.n, w) < 0.0f);
+}
+#endif
+
 /* `value` after t metres along w, which leads away from the vertex. */
 inline Spectrum vertex_beyond(Scene scene, Vertex v, vec3 w, real t, Wavelengths lambdas, Spectrum value)
 {
-#if USES_ABSORPTION
-    integer medium = medium_beyond(v.medium, v.inside, v.front, dot3(v.s.n, w) < 0.0f);
+#if USES_ABSORPTION && !SHADOW_MEDIA /* else the ray itself is dimmed, see tracing/transmittance_media.cl */
+    integer medium = vertex_medium(v, w);
     value = spectrum_mul(value, medium_transmittance(scene, medium, t, lambdas));
 #endif
     return value;
@@ -114,7 +154,7 @@ inline void vertex_leave(Slab path, uint at, mask next, Vertex v, vec3 d, Spectr
     store_path_d(path, at, next, d);
     store_path_beta(path, at, next, beta);
 #if USES_ABSORPTION
-    store_path_medium(path, at, next, medium_beyond(v.medium, v.inside, v.front, dot3(v.s.n, d) < 0.0f));
+    store_path_medium(path, at, next, vertex_medium(v, d));
     store_path_lead(path, at, next, surface_lead(v.s, d));
 #endif
 }

@@ -70,7 +70,7 @@ inline integer begin_light_path(Scene scene, Slab path, Slab shadow, uint at, ma
     store_path_medium(path, at, go, (integer)(0));
     store_path_lead(path, at, go, (real)(0.0f));
 #endif
-#if USES_DISPERSION
+#if USES_RATIO
     store_path_ratio(path, at, go, spectrum_of(1.0f));
 #endif
     integer state = sel_i(alive, (integer)(PATH_ALIVE), (integer)(0));

@@ -17,6 +17,7 @@
 #include "path/path_end.cl"
 #include "path/met_light.cl"
 #include "generated/layer_sums.cl"
+#include "generated/light_layers.cl"
 
 /* The radiance of the paths, with what those that left the scene gather there. */
 inline Spectrum path_radiance(Scene scene, Slab path, uint at, PathEnd end, Wavelengths lambdas)
@@ -31,7 +32,7 @@ inline Spectrum path_radiance(Scene scene, Slab path, uint at, PathEnd end, Wave
         real rival = path_rival(path, at, end.depth);
         Spectrum arrives = infinite_gather(scene, from, side, d, pdf, rival, lambdas);
 #if USES_ABSORPTION
-        integer medium = sel_i(sky, load_path_medium(path, at), (integer)(0));
+        integer medium = sel_i(sky, MEDIUM_LEFT(load_path_medium(path, at)), (integer)(0));
         arrives = spectrum_mul(arrives, medium_transmittance(scene, medium, (real)(FAR), lambdas));
 #endif
         radiance = spectrum_sel(sky, spectrum_add(radiance, spectrum_mul(load_path_beta(path, at), arrives)), radiance);
@@ -40,6 +41,27 @@ inline Spectrum path_radiance(Scene scene, Slab path, uint at, PathEnd end, Wave
     return radiance;
 }
 
+#if LIGHT_LAYERS && USES_INFINITE
+/* Adds what paths gather that left the scene to layers of light, light by light. */
+inline void sky_layers(Scene scene, Slab path, uint at, PathEnd end, Wavelengths lambdas, global uint *light_layers)
+{
+    mask sky = end.missed & ((end.depth > 0) | mask_of(scene.settings->hide_lights + scene.settings->alpha == 0));
+    if (!any(sky)) return;
+    real pdf = load_path_pdf(path, at);
+    vec3 d = sel3(sky, load_path_d(path, at), v3(0.0f, 0.0f, 1.0f));
+    vec3 from = madd3(d, -path_null_distance(path, at), load_path_o(path, at)), side = path_hemisphere(path, at);
+    Spectrum beta = load_path_beta(path, at);
+#if USES_ABSORPTION
+    integer medium = sel_i(sky, load_path_medium(path, at), (integer)(0));
+    beta = spectrum_mul(beta, medium_transmittance(scene, medium, (real)(FAR), lambdas));
+#endif
+    for (int row = 0; row < scene.settings->infinite_count; row++) {
+        Spectrum light = spectrum_mul(beta, infinite_weighed(scene, row, from, side, d, pdf, lambdas));
+        light_layers_add(scene, path, at, sky, end.depth, (integer)(row), light, light_layers);
+    }
+}
+#endif
+
 /* Adds the finished paths to the sums of their pixels. What is not finite counts as black, at its own wavelength. */
 inline void add_sample(Scene scene, Slab path, uint at, BEGIN_ARGS, PathEnd end, integer slot, integer pixel_index,
                        integer sample)
@@ -47,6 +69,9 @@ inline void add_sample(Scene scene, Slab path, uint at, BEGIN_ARGS, PathEnd end,
     Wavelengths lambdas = load_path_lambdas(path, at);
     Spectrum radiance = path_radiance(scene, path, at, end, lambdas);
     mask finished = end.ended & end.begun;
+#if LIGHT_LAYERS && USES_INFINITE
+    sky_layers(scene, path, at, end, lambdas, light_layers);
+#endif
 #if USES_FLUORESCENCE /* the film sees the camera's wavelengths, not those by which the light came */
     Sampler begun_with = pixel_sampler(scene.settings, load_path_pixel_key(path, at), sample);
     lambdas = wavelengths_sample(scene, sampler_pair(begun_with, (natural)(DIMENSION_WAVELENGTH)).x);
@@ -109,10 +134,10 @@ inline void begin_path(Scene scene, Slab path, uint at, mask go, integer pixel_i
     store_path_null_distance(path, at, go, (real)(0.0f));
 #endif
 #if USES_ABSORPTION
-    store_path_medium(path, at, go, (integer)(0));
+    store_path_medium(path, at, go, (integer)(settings->camera_medium));
     store_path_lead(path, at, go, (real)(0.0f));
 #endif
-#if USES_DISPERSION
+#if USES_RATIO
     store_path_ratio(path, at, go, camera_start());
 #endif
 }
@@ -132,6 +157,9 @@ STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
         integer slot = LANE_INDEX + (int)at;
         integer pixel_index = load_path_pixel_index(path, at), sample = load_path_sample(path, at);
         add_sample(scene, path, at, BEGIN_PASSED, end, slot, pixel_index, sample);
+#if USES_LAYERS
+        layers_count(scene, path, at, layers, end.ended & end.begun & (end.depth == 0));
+#endif
         NextSample next = next_sample(settings, work_list, samples, slot, end.ended, end.begun, pixel_index, sample);
         if (any(next.leaves)) {
             mask leaves = next.leaves & end.begun, enters = next.leaves & !next.done;
@@ -143,10 +171,6 @@ STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
         mask go = end.ended & !next.done;
         store_path_sample(path, at, go, next.sample);
         begin_path(scene, path, at, go, next.pixel_index, next.sample);
-#if USES_LAYERS
-        mask counted = layers_want(path, at, go);
-        if (any(counted)) layers_count(scene, layers, counted, next.pixel_index);
-#endif
 #if MERGES
         integer begun = PATH_ALIVE | PATH_SHARP;
 #else

@@ -56,24 +56,26 @@ inline float4 as_floats(float4 v, int encoded)
 
 #define PICTURE_ARGS                                                                                            \
     global const float4 *film, global const float *steps, int converted, float4 red, float4 green, float4 blue, \
-    float scale, int tone, global const float4 *table, int size, float4 bounds, int encoded, int flip
-#define PICTURE_PIXEL                                                                               \
-    int x = get_global_id(0), y = get_global_id(1), w = get_global_size(0), h = get_global_size(1); \
-    int row = flip ? h - 1 - y : y;                                                                 \
-    float4 v = exposed(film[(size_t)y * w + x], converted, red, green, blue, scale);                \
+    float scale, int tone, global const float4 *table, int size, float4 bounds, int encoded, int flip,          \
+    int width, int height
+#define PICTURE_PIXEL                                                                    \
+    int x = get_global_id(0), y = get_global_id(1);                                      \
+    if (x >= width || y >= height) return;                                               \
+    int row = flip ? height - 1 - y : y;                                                 \
+    float4 v = exposed(film[(size_t)y * width + x], converted, red, green, blue, scale); \
     v = shown(v, tone, table, size, bounds)
 
 /* at: where the picture begins in `into` [elements]. */
 kernel void resolve_bytes(PICTURE_ARGS, global uchar *into, ulong at)
 {
     PICTURE_PIXEL;
-    vstore4(as_bytes(v, steps, encoded), (size_t)row * w + x, into + at);
+    vstore4(as_bytes(v, steps, encoded), (size_t)row * width + x, into + at);
 }
 
 kernel void resolve_floats(PICTURE_ARGS, global float *into, ulong at)
 {
     PICTURE_PIXEL;
-    vstore4(as_floats(v, encoded), (size_t)row * w + x, into + at);
+    vstore4(as_floats(v, encoded), (size_t)row * width + x, into + at);
 }
 
 #ifdef __IMAGE_SUPPORT__

@@ -3,7 +3,7 @@
 #include "core/base.cl"
 #include "interface/stage.cl"
 #include "generated/join_args.cl"
-#include "path/shadow_ray.cl"
+#include "generated/shadow_ray.cl"
 #include "film/spread.cl"
 #include "film/work_list.cl"
 

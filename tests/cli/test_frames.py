@@ -13,6 +13,7 @@ import pytest
 
 from clpt import device, images
 from clpt.__main__ import run
+from clpt.cli import frame_crews
 from clpt.cli import frames as frames_module
 from clpt.cli.frame_values import Frames, expanded, numbered
 from clpt.device.stream import Stream
@@ -136,20 +137,20 @@ def test_a_signal_keeps_whole_frames_only(scene, tmp_path, capsys, monkeypatch):
 @pytest.fixture
 def two_devices(monkeypatch) -> list[device.Device]:
     pair = [device.choose(), device.choose()]
-    monkeypatch.setattr(frames_module, "choose_devices", lambda *args, **named: pair)
+    monkeypatch.setattr(frame_crews, "choose_devices", lambda *args, **named: pair)
     return pair
 
 
 @pytest.mark.parametrize("count", [1, 5])
 def test_several_devices(scene, tmp_path, two_devices, monkeypatch, count):
     """A frame is a device's, but where there are fewer frames than devices."""
-    used, original = set(), frames_module.new_renderer
+    used, original = set(), frame_crews.new_renderer
 
     def note(plan, devices, **made):
         used.add(len(devices))
         return original(plan, devices, **made)
 
-    monkeypatch.setattr(frames_module, "new_renderer", note)
+    monkeypatch.setattr(frame_crews, "new_renderer", note)
     assert run(["render", "turn.xml", "--frames", f"1:{count}", *TURN, *SIZE]) == 0
     assert used == {2 if count == 1 else 1}
     for frame in range(1, count + 1):

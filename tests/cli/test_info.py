@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import dataclasses
 import json
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from clpt.__main__ import run
 from clpt.cli.info import summary
 from clpt.formats import load
+from clpt.scene import Film
 
 
 def test_the_cornell_box(scenes, capsys):
@@ -88,3 +90,25 @@ def test_animations(tmp_path):
     }  # fmt: skip
     (tmp_path / "a.gltf").write_text(json.dumps(document))
     assert summary(load(tmp_path / "a.gltf"))["animations"] == ["walk", "1"]
+    document["accessors"][0] |= {"type": "SCALAR", "min": [0], "max": [1.5]}
+    document["meshes"] = document["nodes"][0] = {}
+    document["animations"][0]["samplers"] = [{"input": 0, "output": 0}]
+    document["asset"] |= {"generator": "a program", "copyright": 7}
+    document["scenes"] *= 2
+    del document["meshes"]
+    (tmp_path / "a.gltf").write_text(json.dumps(document))
+    found = summary(load(tmp_path / "a.gltf"))
+    assert found["animations"] == ["walk, 1.5 s", "1"]
+    assert (found["asset"], found["scenes"]) == ({"generator": "a program"}, ["0", "1"])
+
+
+def test_what_a_file_may_say_besides(scenes, tmp_path):
+    found = summary(load(scenes / "cornell.xml", res=9))
+    assert found["variables"] == {"spp": "16", "res": "9", "max_depth": "6"}
+    scene = load(scenes / "bowl.obj")
+    film = Film(width=9, height=8, crop=(1, 2, 3, 4), bands=5, alpha=True)
+    found = summary(dataclasses.replace(scene, film=film))["film"]
+    assert found == {
+        "width": 3, "height": 4, "crop": [1, 2, 3, 4], "of": [9, 8], "mode": "spectral",
+        "filter": "box", "bands": 5, "alpha": True,
+    }  # fmt: skip

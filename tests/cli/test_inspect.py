@@ -6,12 +6,17 @@ import json
 import sys
 
 import numpy as np
+import OpenEXR
 import pytest
 from PIL import Image
 
 from clpt import images, spectral_exr
 from clpt.__main__ import run
 from clpt.cli.plots import strip
+from clpt.render.renderer import Renderer
+from clpt.scene import Film, Scene
+from clpt.scene.cameras import Perspective
+from clpt.scene.shapes import Sphere
 from clpt.spectral_exr import SpectralImage
 
 NM = np.linspace(400.0, 700.0, 7)
@@ -141,3 +146,78 @@ def test_channels_and_how_it_was_made(here, capsys, spectral):
     assert all(word in told for word in words)
     for word in ("pixelAspectRatio", "spectralLayoutVersion", "chunkCount"):
         assert word not in told
+
+
+def test_each_layer_has_a_line(here, capsys):
+    """Its channels, how they are stored, their values; and how the picture is stored."""
+    picture = np.full((2, 3, 4), [0.25, 0.5, 1.0, 1.0])
+    depth = np.array([[1.0, 2.0, 3.0], [4.0, np.inf, np.nan]])
+    layers = {"albedo": picture[..., :3] / 2, "depth.Z": depth, "samples": np.full((2, 3), 16.0)}
+    images.write("a.exr", picture, layers=layers, space="acescg")
+    assert run(["inspect", "a.exr", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["layers"].splitlines() == [
+        "picture R G B A: half, 0.25 to 1",
+        "albedo R G B: float, 0.125 to 0.5",
+        "depth Z: float, 1 to 4, 2 not finite",
+        "samples: float, 16 to 16",
+    ]
+    assert (told["colours"], told["compression"]) == ("acescg", "zip")
+
+
+def test_parts_are_named(here, capsys):
+    header = {"type": OpenEXR.scanlineimage, "compression": OpenEXR.NO_COMPRESSION}
+    parts = [
+        OpenEXR.Part({**header, "name": name}, {letter: np.zeros((2, 3), np.float32)}, name)
+        for name, letter in (("beauty", "Y"), ("deep", "Z"))
+    ]
+    OpenEXR.File(parts).write("a.exr")
+    assert run(["info", "a.exr", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["parts"] == "beauty, deep; the first one is shown"
+    assert (told["layers"], told["compression"]) == ("picture Y: float, 0 to 0", "no")
+
+
+def test_a_png_tells_how_it_was_made(here, capsys):
+    images.write("a.png", np.zeros((2, 3, 3)), metadata={"spp": 21.5, "scene": "box.xml"})
+    for command in ("inspect", "info"):
+        assert run([command, "a.png"]) == 0
+        out = capsys.readouterr().out
+        assert "21.5" in out and "box.xml" in out and "3 x 2" in out
+
+
+def test_texts_of_a_file_neither_style_nor_control(here, capsys):
+    images.write("a.exr", np.zeros((2, 3, 3)), metadata={"note": "[red]x[/green]\x1b[2J"})
+    for command in ("inspect", "info"):
+        assert run([command, "a.exr"]) == 0
+        out = capsys.readouterr().out
+        assert "[red]x[/green]\ufffd[2J" in out and "\x1b[2J" not in out
+
+
+@pytest.mark.parametrize(
+    ("name", "film"),
+    [
+        ("a.film", {"alpha": True, "mode": "rgb"}),
+        pytest.param("a.resume.exr", {"bands": 4, "crop": (1, 0, 2, 2)}, marks=pytest.mark.slow),
+    ],
+)
+def test_a_film_is_an_image_too(here, capsys, name, film):
+    film = Film(width=4, height=2, layers=("depth",), **film)
+    scene = Scene(camera=Perspective(), shapes=[Sphere(center=(0, 0, 3))], film=film)
+    with Renderer(scene) as renderer:
+        renderer.run(2)
+        renderer.save_state(name)
+        picture = renderer.image()
+    assert run(["inspect", name, "--at", "1,1", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    values = told["pixels"][0]["values"]
+    assert told["samples"] == "0 to 1" and told["sessions"]
+    assert "depth" in told["holds"].splitlines()
+    np.testing.assert_allclose(values[: picture.shape[2]], picture[1, 1], rtol=1e-6)
+    if film.bands:
+        assert len(told["wavelengths"]) == 4 and "crop: 1 0 2 2" in told["film"]
+    else:
+        labels = [*"RGBA"[: picture.shape[2]], "depth.Z"]
+        assert told["channels"] == labels and len(values) == len(labels)
+    assert run(["info", name]) == 0
+    assert "depth" in capsys.readouterr().out

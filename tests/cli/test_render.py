@@ -61,7 +61,7 @@ def test_noise_ends_a_render(tmp_path, capsys):
     common = ["--size", "17x9", "--mode", "rgb", "-o", str(path)]
     assert run(["render", CORNELL, *common, "--noise", "0.5", "--verbose"]) == 0
     assert "below 0.5 in 100.0% of the pixels" in capsys.readouterr().err
-    samples = images.read_layers(path)["samples"]
+    samples = images.read_layers(path)["samples.X"]
     assert samples.shape == (9, 17) and samples.min() >= 16
     assert changed(changed(load(CORNELL), noise=0.5), noise=0.0).noise is None
 
@@ -249,6 +249,7 @@ def test_a_quality_of_trees_that_there_is_not(capsys):
     assert "'high', 'fast'" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_aov_has_its_layers(tmp_path):
     path, picture = tmp_path / "out.exr", tmp_path / "out.png"
     common = ["--size", "8x8", "--spp", "2", "--quiet", "--integrator", "aov"]

@@ -43,6 +43,7 @@ def test_a_second_process_compiles_nothing(tmp_path):
     assert programs(tmp_path) == before
 
 
+@pytest.mark.slow
 def test_it_tells_of_each_scene_and_writes_nothing(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert run(["warm", CORNELL, SPHERES, *OPTIONS]) == 0

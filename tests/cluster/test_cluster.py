@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import pickle
 import sys
@@ -15,7 +16,7 @@ pytest.importorskip("distributed")
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 
 sys.path.insert(0, str(Path(__file__).parent))
-from machines import digest_of_one_process, machines, scene, wait_until  # noqa: E402
+from machines import ROOT, digest_of_one_process, machines, scene, wait_until  # noqa: E402
 
 import clpt  # noqa: E402
 from clpt.cluster import tasks  # noqa: E402
@@ -56,9 +57,21 @@ def test_two_workers_are_one(two, expected):
         assert renderer.run(SAMPLES, lambda progress: told.append(progress.samples))
         assert renderer.samples == SAMPLES
         assert sum(record.samples for record in renderer.workers.values()) == SAMPLES
-        assert renderer.counts["samples"] == SAMPLES * 32 * 24
+        assert renderer.counts[0].samples == SAMPLES * 32 * 24
         assert told == sorted(told) and told[-1] == SAMPLES
         assert renderer.image().shape == (24, 32, 3)
+
+
+@pytest.mark.slow
+def test_images_travel(two):
+    """They are files, of which workers keep no copy in the folder of an open scene."""
+    whole = clpt.load(ROOT / "scenes/three_spheres")
+    film = dataclasses.replace(whole.film, width=16, height=12, mode="rgb")
+    integrator = clpt.scene.integrators.Path(light_paths=0)
+    plan = dataclasses.replace(whole, film=film, integrator=integrator)
+    with ClusterRenderer(plan, two.client) as renderer:
+        assert renderer.run(2)
+        assert digest(renderer) == digest_of_one_process(2, plan)
 
 
 def test_runs_go_on_where_the_last_one_ended(two, expected):
@@ -89,7 +102,7 @@ def test_a_saved_film_is_gone_on_with(two, expected, tmp_path):
     with ClusterRenderer(scene(), two.client) as renderer:
         renderer.load_state(path)
         assert renderer.samples == SAMPLES // 2
-        assert renderer.counts["samples"] == SAMPLES // 2 * 32 * 24
+        assert renderer.counts[0].samples == SAMPLES // 2 * 32 * 24
         assert renderer.run(SAMPLES - SAMPLES // 2)
         assert digest(renderer) == expected
     with clpt.Renderer(scene(), threads=1) as renderer:
@@ -214,7 +227,8 @@ def test_a_worker_with_two_devices(more, two, expected, tmp_path):
 def test_no_worker_that_can(two):
     plan = scene()
     with ClusterRenderer(plan, two.client) as renderer:
-        renderer._job = renderer._job.replace('"format":"clpt job"', '"format":"other"')
+        text = renderer._job.text.replace('"format":"clpt job"', '"format":"other"')
+        renderer._job = dataclasses.replace(renderer._job, text=text)
         with pytest.raises(ClusterError, match=r"no worker can render this: .* is no job of clpt"):
             renderer.run(1)
 
@@ -237,7 +251,7 @@ def test_a_task_that_nobody_waits_for_ends(two):
     with ClusterRenderer(scene(), two.client) as renderer:
         renderer.run(4)
         address = next(iter(two.client.nthreads()))
-        job = tasks.digest_of(renderer._job)
+        job = renderer.digest
         future = two.client.submit(tasks.render_block, job, 0, 2**30, workers=[address])
         time.sleep(1.0)
         assert not future.done()

@@ -20,6 +20,7 @@ from machines import ENVIRONMENT, LONGEST, ROOT, machines, wait_until  # noqa: E
 from machines import scene as box  # noqa: E402
 
 from clpt.__main__ import run  # noqa: E402
+from clpt.cli import outputs  # noqa: E402
 from clpt.cluster import processes  # noqa: E402
 from clpt.cluster.cluster_renderer import ClusterRenderer  # noqa: E402
 from clpt.cluster.tasks import film_digest  # noqa: E402
@@ -52,6 +53,22 @@ def whole(spp: int) -> np.ndarray:
     """The picture of one process."""
     assert run(["render", BOX, *COMMON[:2], "-o", "whole.npy", "--spp", str(spp), "--quiet"]) == 0
     return np.load("whole.npy")
+
+
+def test_the_picture_so_far_and_a_part_of_it(hub, folder, monkeypatch):
+    """--every writes it while workers render; spp is the mean over the pixels of the crop."""
+    written: list[float] = []
+    write = outputs.write
+
+    def count(path, source, stats, grading):
+        write(path, source, stats, grading)
+        written.append(stats["spp"])
+
+    monkeypatch.setattr(outputs, "write", count)
+    more = ["--every", "0.01s", "--crop", "25%:75%,4:"]
+    assert render("--spp", "20", "--cluster", hub.address, *more) == 0
+    assert len(written) > 1 and written == sorted(written) and written[-1] == 20.0
+    np.testing.assert_array_equal(np.load("a.npy"), whole(20)[4:, 8:24])
 
 
 def test_a_cluster_goes_on_where_it_was_saved(hub, folder, capsys):

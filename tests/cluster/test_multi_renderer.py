@@ -108,7 +108,12 @@ def whole(scene: Scene) -> clpt.FilmState:
         return renderer.film_state()
 
 
-@pytest.mark.parametrize("kind", KINDS)
+LONG = ("vcm", "particle_tracer", "aov")
+
+
+@pytest.mark.parametrize(
+    "kind", [pytest.param(k, marks=[pytest.mark.slow] if k in LONG else []) for k in KINDS]
+)
 def test_films_and_pictures_are_those_of_one_renderer(scenes, pair, kind):
     scene, halves = small(scenes, kind), kind == "halves"
     with clpt.Renderer(scene, halves=halves) as one:
@@ -438,3 +443,34 @@ def quick_blocks(monkeypatch) -> Iterator[None]:
     """Blocks of few samples, so that small pictures have many."""
     monkeypatch.setattr(crew, "BLOCK_SECONDS", 0.005)
     yield
+
+
+@pytest.mark.parametrize("noise", [None, NOISE])
+@pytest.mark.parametrize("when", ["never", "before", "after", "in a run"])
+def test_films_are_held_on_their_devices(scene, pair, faults, monkeypatch, noise, when):
+    """Nothing goes to the host before it is asked for; a device that fails is made up for."""
+    with clpt.Renderer(scene) as one:
+        one.run(20, noise=noise)
+        state = one.film_state()
+    with clpt.MultiRenderer(scene, pair) as several:
+        several.run(20, noise=noise)
+        with monkeypatch.context() as patched:
+            if when == "before":
+                faults[pair[0].queue] = FailsAfter(0)
+            else:
+                patched.setattr(crew.DeviceWorker, "take", None)
+                patched.setattr(crew.DeviceWorker, "show", None)
+            several.hold()
+        if when in ("never", "in a run"):
+            little = noise and 1e-4
+            assert not several.run(10**6, lambda progress: progress.samples < 40, noise=little)
+        if when in ("after", "in a run"):
+            faults[pair[0].queue] = FailsAfter(0)
+        if when == "in a run":
+            with pytest.raises(SceneError, match="had a part of the film"):
+                several.saved_film(held=True)
+            return
+        saved = several.saved_film(held=True)
+        assert same(saved.film, state) and saved.counts[0]["samples"] >= state.samples.sum()
+        assert several.saved_film(held=True) is saved
+        assert len(several.devices) == (2 if when == "never" else 1)

@@ -33,7 +33,7 @@ def transmittance(lanes: int, medium: np.ndarray, t: np.ndarray, lambdas: np.nda
         mode="spectral",
         lanes=lanes,
         virtual={
-            "generated/medium.cl": medium_text(frozenset({"constant", "table"}))
+            "generated/medium.cl": medium_text({"absorption": frozenset({"constant", "table"})})
             + '#include "optics/medium.cl"\n'
         },
         tables=encoder.store.arrays(),
@@ -65,21 +65,26 @@ MEDIA = """
     mask front = x[2] > 0.0f, inward = x[3] > 0.0f;
     integer met = medium_met(m, own, front);
     r[0] = to_real(met);
-    r[1] = to_real(medium_beyond(met, own, front, inward));
+    r[1] = to_real(medium_beyond(met, own, to_integer(x[4]), front, inward));
 """
-# medium of the ray, of the boundary, front met, goes inward: medium met, medium beyond
+# medium of the ray, inside the boundary, front met, goes inward, outside: medium met, beyond
 CASES = [
-    (0, 7, 1, 1, 0, 7),  # refracted into a body
-    (0, 7, 1, 0, 0, 0),  # reflected by it
-    (7, 7, 0, 1, 7, 7),  # reflected inside
-    (7, 7, 0, 0, 7, 0),  # refracted out
-    (0, 7, 0, 0, 7, 0),  # the camera was inside
-    (0, 7, 0, 1, 7, 7),
-    (3, 7, 1, 1, 3, 7),  # into a body within another
-    (3, 7, 1, 0, 3, 3),  # reflected by it
-    (3, 0, 1, 1, 3, 3),  # what is no dielectric changes nothing
-    (3, 0, 0, 0, 3, 3),
-    (0, 0, 0, 1, 0, 0),
+    (0, 7, 1, 1, 0, 0, 7),  # refracted into a body
+    (0, 7, 1, 0, 0, 0, 0),  # reflected by it
+    (7, 7, 0, 1, 0, 7, 7),  # reflected inside
+    (7, 7, 0, 0, 0, 7, 0),  # refracted out
+    (0, 7, 0, 0, 0, 7, 0),  # the camera was inside
+    (0, 7, 0, 1, 0, 7, 7),
+    (3, 7, 1, 1, 0, 3, 7),  # into a body within another
+    (3, 7, 1, 0, 0, 3, 3),  # reflected by it
+    (3, 0, 1, 1, 0, 3, 3),  # what is no dielectric changes nothing
+    (3, 0, 0, 0, 0, 3, 3),
+    (0, 0, 0, 1, 0, 0, 0),
+    (9, 7, 1, 1, 9, 9, 7),  # into a body that says what is around it
+    (9, 7, 1, 0, 9, 9, 9),  # reflected by it
+    (7, 7, 0, 0, 9, 7, 9),  # out again
+    (9, 0, 1, 1, 9, 9, 0),  # into a bubble
+    (0, 0, 0, 0, 9, 0, 9),  # out of it
 ]
 
 
@@ -91,7 +96,7 @@ def test_which_medium(lanes: int) -> None:
     )
     probe = SceneProbe(
         MEDIA,
-        4,
+        5,
         2,
         files=("generated/medium.cl",),
         lanes=lanes,

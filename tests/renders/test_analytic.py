@@ -78,7 +78,8 @@ def test_small_and_huge_sphere_lights(radius: float) -> None:
     assert_mean(exposures(scene, 24, 64), [ALBEDO * RADIANCE * radius**2] * 3, 0.005, 5e-4)
 
 
-@pytest.mark.parametrize("kind", [pytest.param("rectangle", marks=pytest.mark.slow), "mesh"])
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["rectangle", "mesh"])
 def test_textured_light(kind: str) -> None:
     """Small squares by turns bright and dim shine like their mean."""
     uv = np.diag([32.0, 32.0, 1.0])

@@ -111,6 +111,7 @@ def slit() -> Scene:
     )
 
 
+@pytest.mark.slow
 def test_noise_falls_where_light_comes_through_a_slit(monkeypatch: pytest.MonkeyPatch) -> None:
     """Seventeen exposures of each: that their variances differ by chance as much has a probability
     below 1e-6, by the F distribution of a few hundred pixels' means."""

@@ -38,6 +38,7 @@ LEFT += [("principled", "rgb")]  # tests/kernels/test_bsdf_mitsuba.py compares t
 LEFT += [(name, "spectral") for name in ("plastic", "instances", "principled", "principled_thin")]
 LEFT += [(name, "spectral") for name in ("glass_metal", "thin_lens", "light_tracing")]
 LEFT += [(name, "rgb") for name in ("light_tracing", "thrown_images", "thin_lens")]
+LEFT += [(name, "rgb") for name in ("envmap", "bent")]
 LEFT += [(name, "spectral") for name in ("orthographic", "delta_lights", "cornell")]
 QUICK = [case for case in CASES if case not in LEFT]
 MEAN_WITHIN = 0.015  # relative; at a quick test's number of samples most of it is noise

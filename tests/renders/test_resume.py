@@ -64,7 +64,12 @@ def box(scenes: Path, film: dict, changes: dict, noise: float | None) -> Scene:
     )
 
 
-@pytest.fixture(params=MODES)
+LONG = ("aov",)
+
+
+@pytest.fixture(
+    params=[pytest.param(m, marks=[pytest.mark.slow] if m in LONG else []) for m in MODES]
+)
 def mode(request, scenes: Path) -> tuple[Scene, dict, float | None]:
     film, changes, options, noise = MODES[request.param]
     return box(scenes, film, changes, noise), options, noise

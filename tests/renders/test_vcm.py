@@ -272,6 +272,7 @@ def picture(scene: Scene, *runs: int, lanes: int = 1, **options: Any) -> np.ndar
     return renderer.image()
 
 
+@pytest.mark.slow
 def test_bits() -> None:
     """Runs, slots, steps, stages that the host enqueues, numbers of lanes, a merge."""
     scene = with_vcm(caustic(), max_depth=6, light_paths=4, radius=0.05)

@@ -6,7 +6,7 @@ import base64
 import contextlib
 import dataclasses
 import io
-import shutil
+import json
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -24,32 +24,20 @@ from clpt.scene.lights import ON_SHAPES
 from clpt.view import panels
 
 pytest.importorskip("websockets", reason="the extra clpt[view] is not installed")
-pytest.importorskip("playwright", reason="playwright is not installed")
-
-from playwright import sync_api as playwright
 
 from clpt.view.server import Server
 from clpt.view.session import Session
+from tests.view.browsers import launched
 
 CORNELL = Path(__file__).resolve().parents[2] / "scenes" / "cornell_box"
-BROWSERS = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
-FLAGS = (
-    "--no-sandbox", "--disable-gpu", "--disable-3d-apis", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync", "--force-color-profile=srgb",
-)  # fmt: skip
 WAIT = 60_000  # [ms] at most, for kernels that are compiled on a busy machine
 PIXELS = "() => clpt.picture.now.toDataURL('image/png')"
 
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    path = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if path is None:
-        pytest.skip(f"there is no browser: none of {', '.join(BROWSERS)}")
-    with playwright.sync_playwright() as started:
-        opened = started.chromium.launch(executable_path=path, args=[*FLAGS])
+    with launched() as opened:
         yield opened
-        opened.close()
 
 
 def small() -> Scene:
@@ -227,6 +215,41 @@ def test_the_inspector_shows_the_values_of_the_picture(shown: Shown) -> None:
     assert film is not None
     assert told["rgb"] == pytest.approx(film[at["y"], at["x"], :3].tolist(), rel=1e-6)
     assert str(told["samples"]) in page.inner_text("#pane-pixel")
+    name = page.inner_text("#pane-pixel .link")
+    page.click("#pane-pixel .link")  # leads to the panel of the material
+    page.wait_for_selector(f"#pane-scene details.inner[open] summary:has-text('{name}')")
+
+
+def test_maps_are_chosen_and_have_a_legend(shown: Shown) -> None:
+    page = shown.page
+    page.click("#tab-view")
+    page.select_option("select[aria-label='show']", '"samples"')
+    page.wait_for_selector("#legend:not([hidden]) >> text=4 samples")
+    page.keyboard.press("Tab")
+    page.evaluate("document.activeElement.blur()")
+    page.keyboard.press("m")
+    page.wait_for_selector("#legend >> text=100 % error")
+    page.select_option("select[aria-label='show']", '"picture"')
+    page.wait_for_selector("#legend", state="hidden")
+
+
+def test_a_view_that_is_pasted_opens(shown: Shown, on: device.Device) -> None:
+    page = shown.page
+    camera = panels.written(small().camera) | {"fov": 80.0}
+    text = json.dumps({"camera": camera, "display": {"exposure": 0.5, "tone": "aces"}})
+    before = page.evaluate("clpt.picture.latest")
+    paste = """(text) => {
+        const data = new DataTransfer();
+        data.setData("text", text);
+        document.body.dispatchEvent(
+            new ClipboardEvent("paste", { clipboardData: data, bubbles: true }));
+    }"""
+    page.evaluate(paste, text)
+    shown.rest(before)
+    assert shown.session.scene.camera.fov == 80.0
+    assert page.evaluate("clpt.state.display.tone") == "aces"
+    page.evaluate(paste, "no view")
+    page.wait_for_selector("text=That is no view.")
 
 
 def test_keys_are_told_and_the_phone_fits(shown: Shown) -> None:

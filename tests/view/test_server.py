@@ -100,6 +100,17 @@ def test_another_host_name_is_refused(server: Server, key: str, host: str | None
     assert status in (0, 400, 403) and b"<!doctype" not in content
 
 
+def test_confirmations_of_frames_are_not_counted(server: Server, key: str) -> None:
+    """As many frames as a fast device makes; other messages keep to their rate."""
+    with opened(server, key) as client:
+        for number in range(1, 301):
+            server.picture({"frame": number}, b"")
+            assert frame(client) == number
+            do(client, "shown", frame=number)
+        server.picture({"frame": 301}, b"")
+        assert frame(client) == 301
+
+
 def test_two_hosts_are_refused(server: Server, key: str) -> None:
     status, _, content = ask(server, "/", "Host: evil.example", f"Cookie: {key}")
     assert status == 400 and b"<!doctype" not in content

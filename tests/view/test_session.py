@@ -9,6 +9,7 @@ import random
 import threading
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +20,11 @@ from PIL import Image
 from clpt import device, images, load, spectra
 from clpt.cli import outputs
 from clpt.cli.grading import Grading
+from clpt.cluster.multi_renderer import MultiRenderer
+from clpt.errors import SceneError
 from clpt.render.renderer import Renderer
 from clpt.scene import Scene, cameras, lights, shapes
-from clpt.view import panels, probe
+from clpt.view import panels, probe, views
 from clpt.view.commands import COMMANDS, CommandError, Request, parse
 from clpt.view.look import Look
 from clpt.view.saving import Folder
@@ -227,7 +230,7 @@ CAMERAS = [
 ]  # fmt: skip
 
 
-QUICK = ("perspective", "thin_lens")
+QUICK = ("perspective",)
 
 
 @pytest.mark.parametrize(
@@ -363,6 +366,153 @@ def test_a_view_of_opencolorio_has_to_be_given_at_the_start(opened, audience) ->
     ask(session, audience, "display", exposure=0.0, tone="view")
     assert "no view" in audience.answer("error")["text"]
     assert "view" not in session.state()["names"]["tones"]
+
+
+def test_the_picture_can_be_denoised(opened, audience, on) -> None:
+    """It is that of `Renderer.denoised` on the display; the picture itself stays noisy."""
+    pytest.importorskip("pyoidn", reason="Open Image Denoise is not installed")
+    session = opened(small())
+    audience.rest()
+    ask(session, audience, "shows", name="denoised")
+    header, shown = audience.rest()
+    assert header["shows"] == "denoised" and session.scene.film.layers == ()
+    with Renderer(small(), on, denoise="oidn") as renderer:
+        renderer.run(4)
+        expected = images.to_srgb8(renderer.denoised())
+        noisy = renderer.resolve().get()[..., :3]
+    assert np.array_equal(shown, expected) and not np.array_equal(shown, noisy)
+    ask(session, audience, "shows", name="picture")
+    assert np.array_equal(audience.rest()[1], noisy)
+
+
+def test_layers_and_maps_take_the_place_of_the_picture(opened, audience, on) -> None:
+    """A layer that the film has not begins the render again; a map does not."""
+    session = opened(small())
+    _, pixels = audience.rest()
+    ask(session, audience, "shows", name="albedo")
+    header, shown = audience.rest()
+    assert header["shows"] == "albedo" and session.scene.film.layers == ()
+    film = dataclasses.replace(small().film, layers=("albedo",))
+    with Renderer(dataclasses.replace(small(), film=film), on) as renderer:
+        renderer.run(4)
+        assert np.array_equal(shown, images.to_srgb8(renderer.layers()["albedo"]))
+    changes = header["changes"]
+    ask(session, audience, "shows", name="samples")
+    header, shown = audience.rest()
+    assert (
+        header["legend"]["high"] == "4 samples"
+        and len(np.unique(shown.reshape(-1, 3), axis=0)) == 1
+    )
+    ask(session, audience, "shows", name="error")
+    header, shown = audience.rest()
+    assert header["legend"]["high"] == "100 % error" and not np.array_equal(shown, pixels)
+    ask(session, audience, "shows", name="picture")
+    header, shown = audience.rest()
+    assert header["changes"] == changes and header["legend"] is None
+    assert np.array_equal(shown, pixels)
+    ask(session, audience, "shows", name="thoughts")
+    assert "no thoughts" in audience.answer("error")["text"]
+
+
+def test_a_view_is_copied_saved_and_opened(opened, audience, tmp_path) -> None:
+    session = opened(small(), folder=Folder(tmp_path, "a", lambda *_: None))
+    audience.rest()
+    ask(session, audience, "orbit", dx=0.2, dy=0.1)
+    ask(session, audience, "display", exposure=1.0, tone="aces")
+    _, turned = audience.rest()
+    camera = session.scene.camera
+    ask(session, audience, "copy_view")
+    copied = audience.answer("view")["view"]
+    ask(session, audience, "save", what="view")
+    saved = tmp_path / audience.answer("saved")["name"]
+    assert json.loads(saved.read_text()) == copied
+    ask(session, audience, "home")
+    ask(session, audience, "display", exposure=0.0, tone="none")
+    assert not np.array_equal(audience.rest()[1], turned)
+    session.post(views.load(saved), audience.message)
+    _, again = audience.rest()
+    assert np.allclose(session.scene.camera.to_world, camera.to_world)
+    assert np.array_equal(again, turned) and session.state()["display"]["tone"] == "aces"
+
+
+@pytest.mark.parametrize(
+    ("document", "told"),
+    [
+        ([], "no view"),
+        ({"display": {}}, "no camera"),
+        ({"camera": {"type": "perspectiv"}}, "did you mean 'perspective'"),
+        ({"camera": {"type": "perspective", "fow": 3}}, "no 'fow'"),
+        ({"camera": {"type": "perspective", "fov": -3}}, "fov"),
+        ({"camera": {"type": "perspective", "to_world": {"file": "x"}}}, "names a file"),
+        ({"camera": {"type": "perspective"}, "display": {"exposure": 99}}, "-20 to 20"),
+    ],
+)
+def test_what_is_no_view_is_told(tmp_path, document, told) -> None:
+    path = tmp_path / "a.view.json"
+    path.write_text(json.dumps(document))
+    with pytest.raises(SceneError, match=told):
+        views.load(path)
+
+
+def test_what_changes_no_sample_does_not_wait_for_them(opened, audience, monkeypatch) -> None:
+    """A pass that would never end: display, values and figures come all the same, and a drag."""
+    monkeypatch.setattr("clpt.view.render_loop.PASS_SECONDS", 1e9)
+    monkeypatch.setattr("clpt.view.pictures.SHARE", 0.0)
+    session = opened(small(spp=1 << 30))
+    audience.wait(lambda: audience.frames and audience.frames[-1][0]["divider"] == 1)
+    time.sleep(2.0)  # passes double each time
+    ask(session, audience, "value", x=20, y=15)
+    assert audience.answer("value")["samples"] > 0
+    seen = len(audience.frames)
+    ask(session, audience, "display", exposure=2.0, tone="none")
+    header, data = audience.wait(lambda: audience.frames[seen:] and audience.frames[seen])
+    assert header["divider"] == 1 and np.asarray(Image.open(io.BytesIO(data))).mean() > 1.0
+    ask(session, audience, "statistics")
+    audience.answer("statistics")
+    seen = len(audience.frames)
+    ask(session, audience, "orbit", dx=0.1, dy=0.0)
+    audience.wait(lambda: audience.frames[seen:])
+
+
+def test_several_devices_make_the_same_picture(audience, on) -> None:
+    """Two queues of one device stand for two; the picture is that of one, also after a drag."""
+    pair = [device.Device.open(on.info, context=on.context) for _ in range(2)]
+    session = Session(small(), on, audience, make=partial(MultiRenderer, devices=pair))
+    session.watched(1)
+    session.start()
+    try:
+        assert np.array_equal(audience.rest()[1], expected(small(), on))
+        ask(session, audience, "orbit", dx=0.1, dy=0.0)
+        _, turned = audience.rest()
+        assert np.array_equal(turned, expected(session.scene, on))
+        ask(session, audience, "shows", name="albedo")
+        audience.rest()
+        ask(session, audience, "statistics")
+        assert audience.answer("statistics")["stats"]["integrator"] == "path"
+        assert len(session._loop.renderer().devices) == 2 and session.error is None
+    finally:
+        session.close()
+
+
+@pytest.mark.slow
+def test_the_merged_picture_of_a_cluster(audience, on) -> None:
+    pytest.importorskip("distributed", reason="the extra clpt[cluster] is not installed")
+    from clpt.cluster import processes
+    from clpt.cluster.steered import SteeredCluster
+
+    with processes.local_cluster(1) as (client, _):
+        make = partial(SteeredCluster, client=client, device=on)
+        session = Session(small(), on, audience, make=make)
+        session.watched(1)
+        session.start()
+        try:
+            assert np.array_equal(audience.rest()[1], expected(small(), on))
+            ask(session, audience, "orbit", dx=0.1, dy=0.0)
+            _, turned = audience.rest()
+            assert np.array_equal(turned, expected(session.scene, on))
+            assert session.error is None
+        finally:
+            session.close()
 
 
 def test_without_a_folder_nothing_is_saved(opened, audience) -> None:

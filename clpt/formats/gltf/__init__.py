@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -55,13 +56,26 @@ def load(path: Path, missing: Missing = "error", /, **variables: Any) -> Scene:
         file=path,
     )
     scene.warnings = document.warnings
-    scene.extra["cameras"] = [camera.text("type") for _, camera in cameras.cameras_of(graph)]
-    animations = document.root.children("animations")
-    scene.extra["animations"] = [a.text("name", str(i)) for i, a in enumerate(animations)]
+    scene.extra["cameras"] = cameras.descriptions(graph)
+    scene.extra["animations"] = animation.descriptions(document)
+    scene.extra |= _provenance(document)
     if chosen:
         width, height = chosen[1]
         scene.film = dataclasses.replace(scene.film, width=width, height=height)
     return scene
+
+
+def _provenance(document: Document) -> dict[str, Any]:
+    """Return the names of several scenes, and who made the file, for people."""
+    scenes = document.root.children("scenes")
+    found: dict[str, Any] = {"scenes": [], "asset": {}}
+    with suppress(SceneError):  # texts that are none harm no picture
+        if len(scenes) > 1:
+            found["scenes"] = [scene.text("name", str(i)) for i, scene in enumerate(scenes)]
+    for key in ("generator", "copyright"):
+        with suppress(SceneError):
+            found["asset"] |= {key: document.root.needed("asset").text(key)}
+    return found
 
 
 def read_mesh(path: Path) -> MeshFile:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.errors import SceneError
 from clpt.formats.gltf.accessors import floats
 from clpt.formats.gltf.document import Document, Element
 
@@ -33,6 +36,22 @@ def pose(document: Document, chosen: str | None, time: float) -> dict[tuple[int,
             continue
         found[node, path] = _sampled(channel, path, time)
     return found
+
+
+def descriptions(document: Document) -> list[str]:
+    """Return the name of each animation, or its number, and the time of its last key [s]."""
+    animations = document.root.children("animations")
+    return [f"{a.text('name', str(i))}{_length(a)}" for i, a in enumerate(animations)]
+
+
+def _length(animation: Element) -> str:
+    """Return how long an animation takes, for people; nothing where the file does not say."""
+    ends: list[float] = []
+    with suppress(SceneError):  # one that is broken is told when it is chosen
+        for sampler in animation.children("samplers"):
+            times = sampler.entry("input", "accessors")
+            ends += () if times is None else times.numbers("max", None, ())
+    return f", {max(ends):g} s" if ends else ""
 
 
 def _chosen(document: Document, chosen: str | None) -> Element:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +24,13 @@ def cameras_of(graph: Graph) -> list[tuple[int, Element]]:
     """Return (node, camera) of every camera in the scene, in order."""
     pairs = [(i, graph.node(i).entry("camera", "cameras")) for i in graph.shown]
     return [(node, camera) for node, camera in pairs if camera is not None]
+
+
+def descriptions(graph: Graph) -> list[str]:
+    """Return the kind and, where it has one, the name of every camera in the scene."""
+    names = [c.text("name", None) or graph.node(i).text("name", None) for i, c in cameras_of(graph)]
+    kinds = [camera.text("type") for _, camera in cameras_of(graph)]
+    return [f"{kind} {name or ''}".strip() for kind, name in zip(kinds, names, strict=True)]
 
 
 def chosen(graph: Graph, name: str | None) -> tuple[Camera, Size] | None:
@@ -78,7 +86,7 @@ def rigid(element: Element, node: Matrix) -> Matrix:
     return made
 
 
-def _planes(lens: Element, needed: bool) -> dict[str, float]:
+def _planes(lens: Element, needed: bool) -> dict[str, Any]:
     near = lens.number("znear", low=0.0)
     far = lens.number("zfar") if needed else lens.number("zfar", FAR)
     if far <= near:

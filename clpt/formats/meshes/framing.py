@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,8 +35,7 @@ def load(path: Path) -> Scene:
     file = mesh.read_mesh(path)
     if not any(mesh.has_area(part) for part in file.meshes):
         raise SceneError("none of its triangles has an area", file=path)
-    up = Z_UP if path.suffix.lower() == ".stl" else np.eye(4)
-    scene = show(file.meshes, file=path, up=up)
+    scene = show(file.meshes, file=path, up=up_of(_format(path)))
     scene.warnings = file.warnings
     return scene
 
@@ -55,9 +55,7 @@ def show(
     what was added. Raises SceneError for shapes too large to be framed.
     """
     low, high = world_bounds(things)
-    centre, radius = (low + high) / 2.0, _radius(low, high)
-    if not np.isfinite(radius):
-        raise SceneError("is too large to be framed", file=file)
+    centre, radius = _middle(low, high, file=file)
     extra_shapes: list[shapes.Shape] = []
     extra_lights: list[lights.Light] = []
     if not own_lights:
@@ -75,7 +73,7 @@ def show(
         film=integrators.Film(filter=integrators.Gaussian()),
         name=file.stem,
         extra={
-            "format": file.suffix.lower()[1:],
+            "format": _format(file),
             "studio": {
                 "camera": camera is None,
                 "shapes": len(extra_shapes),
@@ -85,25 +83,43 @@ def show(
     )
 
 
+def up_of(format_: str) -> transforms.Matrix:
+    """Return the rotation (4, 4) from a space whose up is +y and whose front is +z to a format's.
+
+    format_: the suffix of its files, without the dot.
+    """
+    return Z_UP if format_ == "stl" else transforms.IDENTITY
+
+
 def framing_camera(
-    things: Sequence[shapes.Shape], up: transforms.Matrix = transforms.IDENTITY
+    things: Sequence[shapes.Shape],
+    up: transforms.Matrix = transforms.IDENTITY,
+    *,
+    from_: Sequence[float] = FROM,
+    top: Sequence[float] = (0.0, 1.0, 0.0),
+    distance: float = 1.0,
 ) -> Perspective:
-    """Return a camera from the front and above; all shapes together fill its shorter side."""
-    low, high = world_bounds(things)
-    centre, radius = (low + high) / 2.0, _radius(low, high)
-    view = transforms.look_at(_direction(FROM, up), np.zeros(3), up[:3, 1])[:3, :3]
-    distance = 1.5 * radius
+    """Return a camera that looks at the middle of shapes; together they fill its shorter side.
+
+    from_: the direction in which it stands, from the front and above by default; top: what is up
+    in its picture, both before the rotation `up`; distance: a factor on the one that frames all.
+    Raises SceneError for shapes too large to be framed.
+    """
+    centre, radius = _middle(*world_bounds(things), where="the scene")
+    upward = transforms.transform_vectors(up, top)
+    view = transforms.look_at(_direction(from_, up), np.zeros(3), upward)[:3, :3]
+    all_seen = 1.5 * radius
     for points in _outlines(things):
         local = (points - centre) @ view
         aside = np.abs(local[:, :2]).max(axis=1) / np.tan(np.radians(FOV / 2.0))
-        distance = max(distance, MARGIN * float(np.max(aside - local[:, 2])))
-    origin = centre + distance * _direction(FROM, up)
+        all_seen = max(all_seen, MARGIN * float(np.max(aside - local[:, 2])))
+    origin = centre + distance * all_seen * _direction(from_, up)
     return Perspective(
-        to_world=transforms.look_at(origin, centre, up[:3, 1]),
+        to_world=transforms.look_at(origin, centre, upward),
         fov=FOV,
         fov_axis="smaller",
-        near=1e-3 * distance,
-        far=1e3 * distance,
+        near=1e-3 * min(distance, 1.0) * all_seen,
+        far=1e3 * max(distance, 1.0) * all_seen,
     )
 
 
@@ -149,6 +165,10 @@ def shape_bounds(thing: shapes.Shape) -> tuple[NDArray[np.float64], NDArray[np.f
     return points.min(axis=0) - reach, points.max(axis=0) + reach
 
 
+def _format(path: Path) -> str:
+    return path.suffix.lower()[1:]
+
+
 def _outlines(things: Sequence[shapes.Shape]) -> Iterator[NDArray[np.float64]]:
     """Yield for each shape points (n, 3) in world space whose hull contains it."""
     for thing in things:
@@ -185,6 +205,17 @@ def _corners(thing: shapes.Shape) -> NDArray[np.float64]:
         return np.asarray(thing.vertices, np.float64)
     depth = (-1.0, 1.0) if isinstance(thing, shapes.Cube) else (0.0,)
     return np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in depth])
+
+
+def _middle(
+    low: NDArray[np.float64], high: NDArray[np.float64], **location: Any
+) -> tuple[NDArray[np.float64], float]:
+    """Return the middle (3,) and the radius of a box. Raises SceneError where it has none."""
+    with np.errstate(over="ignore"):
+        centre, radius = (low + high) / 2.0, _radius(low, high)
+    if not np.isfinite(radius):
+        raise SceneError("is too large to be framed", **location)
+    return centre, radius
 
 
 def _radius(low: NDArray[np.float64], high: NDArray[np.float64]) -> float:

@@ -6,6 +6,7 @@ line; so a picture is never silently a different one.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from clpt.formats.meshes.framing import framing_camera
@@ -17,7 +18,7 @@ from clpt.formats.mitsuba.properties import Context, Properties
 from clpt.formats.mitsuba.sensors import sensor
 from clpt.formats.mitsuba.shapes import shapes_of
 from clpt.formats.mitsuba.spectra import texture
-from clpt.formats.mitsuba.xml import Element, parse
+from clpt.formats.mitsuba.xml import Document, Element, parse
 from clpt.scene import Scene, integrators
 
 __all__ = ["load"]
@@ -29,7 +30,9 @@ REFERENCED = ("spectrum", "volume", "film", "sampler", "rfilter", "medium", "pha
 def load(path: Path, missing: Missing = "error", /, **variables: object) -> Scene:
     """Read a Mitsuba scene; `variables` stand for its `$names`; missing: see clpt.load.
 
-    Raises SceneError with file, line and element for anything broken or not supported.
+    Of several sensors the variable `camera` chooses one by its number or id, unless the file has a
+    $camera of its own. Raises SceneError with file, line and element for anything broken or not
+    supported.
     """
     document = parse(path, variables)
     context = Context(document, missing)
@@ -45,7 +48,11 @@ def load(path: Path, missing: Missing = "error", /, **variables: object) -> Scen
         props.objects(tag)
     integrator = props.object("integrator")
     all_sensors = _sensors(props, context)
-    first = all_sensors[0] if all_sensors else None
+    number = _chosen(all_sensors, document)
+    first = None if number is None else all_sensors[number]
+    if document.camera is None and len(all_sensors) > 1:
+        names = ", ".join(one.name or str(i) for i, one in enumerate(all_sensors))
+        context.warn(props.element, f"the first of several cameras is used; there are: {names}")
     props.finish()
     camera = framing_camera(shapes) if first is None else first.camera
     return Scene(
@@ -61,7 +68,8 @@ def load(path: Path, missing: Missing = "error", /, **variables: object) -> Scen
         warnings=context.warnings,
         extra={
             "format": "mitsuba",
-            "cameras": [one.camera.kind for one in all_sensors],
+            "variables": dict(document.variables),
+            "cameras": [f"{one.camera.kind} {one.name}".strip() for one in all_sensors],
             "sampler": sensors.DEFAULT_SAMPLER if first is None else first.sampler,
         },
     )
@@ -81,8 +89,21 @@ def _textures(props: Properties) -> list[Element]:
 
 def _sensors(props: Properties, context: Context) -> list[sensors.Sensor]:
     all_sensors = [sensor(element, context) for element in props.objects("sensor")]
-    if len(all_sensors) > 1:
-        context.warn(props.element, f"only the first of {len(all_sensors)} sensors is used")
     if not all_sensors:
         context.warn(props.element, "has no sensor; a camera that sees everything is used")
     return all_sensors
+
+
+def _chosen(all_sensors: Sequence[sensors.Sensor], document: Document) -> int | None:
+    """Return the index of the sensor that is asked for, None where there is none.
+
+    Raises SceneError where none has that number or id.
+    """
+    wanted = document.camera
+    if wanted is None:
+        return 0 if all_sensors else None
+    for number, one in enumerate(all_sensors):
+        if wanted in (str(number), one.name):
+            return number
+    names = ", ".join(one.name or str(i) for i, one in enumerate(all_sensors)) or "none"
+    raise document.root.error(f"has no camera {wanted!r}; it has: {names}")

@@ -11,6 +11,7 @@ import numpy as np
 
 from clpt import images
 from clpt.formats.mitsuba.limits import within
+from clpt.formats.mitsuba.media import around
 from clpt.formats.mitsuba.properties import Context, Properties, unknown
 from clpt.formats.mitsuba.sensors import from_focal_length
 from clpt.formats.mitsuba.spectra import TOP_DOWN, emission, reflectance
@@ -49,6 +50,7 @@ def _make(
 ) -> Light:
     props = Properties(element, context)
     props.ignore("sampling_weight")
+    around(props)  # a ray to it knows its medium from where it begins
     with element.locating():
         made = cls(**within(cls, read(props), props))
     props.finish()

@@ -253,9 +253,6 @@ class Properties:
     def finish(self) -> None:
         """Raise UnusedParameterError or SceneError for what nothing has read."""
         label = f"{self.element.tag} {self.element.type!r}".replace(" ''", "")
-        for child in (*self.named.values(), *self.nested):
-            if self.context.resolve(child).tag in ("medium", "phase"):
-                raise child.error("is not supported: clpt has no participating media")
         for name, child in self.named.items():
             raise UnusedParameterError(label, name, set(self.read), **child.location())
         for child in self.nested:

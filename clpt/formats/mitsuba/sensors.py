@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from clpt.errors import UnknownKindError
+from clpt.formats.mitsuba.media import around
 from clpt.formats.mitsuba.properties import Context, Properties, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene import cameras, integrators
@@ -35,13 +36,14 @@ CHANNELS = {
 
 @dataclass
 class Sensor:
-    """What a <sensor> and its children describe; sampler: its name in the file."""
+    """What a <sensor> and its children describe; sampler: its name there; name: its id, or ""."""
 
     camera: cameras.Camera
     film: Film
     sampler: str
     spp: int
     seed: int
+    name: str = ""
 
 
 def sensor(element: Element, context: Context) -> Sensor:
@@ -56,8 +58,9 @@ def sensor(element: Element, context: Context) -> Sensor:
         props.ignore("focus_distance")
     with element.locating():
         camera = CAMERAS[element.type](props, film)
+    camera = replace(camera, medium=around(props))
     props.finish()
-    return Sensor(camera, film, sampler, spp, seed)
+    return Sensor(camera, film, sampler, spp, seed, element.attributes.get("id", ""))
 
 
 def default_film() -> Film:
@@ -313,7 +316,7 @@ def _particle_tracer(props: Properties) -> Integrator:
 
 
 def _volume_path(props: Properties) -> Integrator:
-    """Without media, which are refused where they are used, this is the path integrator."""
+    """The path integrator follows light through media too."""
     props.ignore("use_spectral_mis")
     return _path(props)
 

@@ -15,6 +15,7 @@ from clpt.formats.meshes import mesh, strands
 from clpt.formats.mitsuba import serialized
 from clpt.formats.mitsuba.bsdfs import bsdf
 from clpt.formats.mitsuba.emitters import area
+from clpt.formats.mitsuba.media import side
 from clpt.formats.mitsuba.properties import Context, NoArea, Properties, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene import shapes
@@ -64,6 +65,8 @@ def shape(element: Element, context: Context) -> Shape:
     parameters: Parameters = {
         "material": _default_material(emitter) if material is None else bsdf(material, context),
         "emission": None if emitter is None else area(emitter, context),
+        "interior": side(props, "interior"),
+        "exterior": side(props, "exterior"),
         "flip_normals": props.flag("flip_normals", False),
         "name": element.attributes.get("id", ""),
     }

@@ -64,9 +64,9 @@ def factor(props: Properties, name: str, default: Any) -> Any:
     return _take(props, name, "factor", default)
 
 
-def coefficient(props: Properties, name: str) -> Any:
-    """Take an absorption coefficient [1/m]: a number, a colour or a spectrum; 0 if not given."""
-    value = _take(props, name, "coefficient", 0.0)
+def coefficient(props: Properties, name: str, default: float = 0.0) -> Any:
+    """Take a coefficient of a medium [1/m]: a number, a colour or a spectrum."""
+    value = _take(props, name, "coefficient", default)
     if isinstance(value, Texture):
         raise props.element.error(f"{name!r} cannot be a texture")
     return value

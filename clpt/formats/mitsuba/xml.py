@@ -20,6 +20,7 @@ MAX_NESTING = 64
 MAX_INCLUDES = 16  # of files inside each other
 MAX_FILES = 4096  # of one scene
 MAX_TEXT = 1 << 24  # characters of an attribute after its variables
+CAMERA = "camera"
 VARIABLE = re.compile(r"\\\$|\$(?:\{(\w+)\}|(\w*))")
 # Before Mitsuba 2, names were written in camel case.
 HUMP = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
@@ -69,10 +70,15 @@ class Element(Located):
 
 @dataclass
 class Document:
-    """An expanded scene file: its root, and the folders of file names: the scene's, its <path>s."""
+    """An expanded scene file: its root, and the folders of file names: the scene's, its <path>s.
+
+    camera: a number or id by which one of several sensors is chosen; variables: values by name.
+    """
 
     root: Element
     folders: list[Path]
+    camera: str | None = None
+    variables: Mapping[str, str] = field(default_factory=dict)
 
     def find_file(self, element: Element, name: str) -> Path:
         """Resolve a file name that `element` gives: <path>s come first, the last one before all.
@@ -85,20 +91,23 @@ class Document:
 def parse(path: Path, variables: Mapping[str, object]) -> Document:
     """Read a scene file and all that it includes; `variables` stand for its `$names`.
 
-    Raises SceneError for broken XML, undefined or unused variables and missing includes.
+    `camera` chooses a sensor in a file that has no variable of this name. Raises SceneError for
+    broken XML, undefined or unused variables and missing includes.
     """
     expander = _Expander(path, variables)
     root = _read(path)
     if root.tag != "scene":
         raise root.error("the outermost element must be <scene>")
     expander.expand(root, 0)
-    unused = sorted(set(variables) - expander.used)
+    unused = sorted(set(variables) - expander.used - {CAMERA})
     if unused:
         known = (
             ", ".join(sorted(expander.used | expander.values.keys() - variables.keys())) or "none"
         )
         raise SceneError(f"has no variable {unused[0]!r}; variables: {known}", file=path)
-    return Document(root, expander.folders)
+    chosen = expander.values[CAMERA] if CAMERA in set(variables) - expander.used else None
+    own = {name: value for name, value in expander.values.items() if name in expander.used}
+    return Document(root, expander.folders, chosen, own)
 
 
 def _find(element: Element, name: str, folders: list[Path]) -> Path:

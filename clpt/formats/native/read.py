@@ -15,13 +15,13 @@ from clpt.formats.missing import EVEN, GREY, Missing, grey_for
 from clpt.formats.native import forms, shape_files
 from clpt.formats.native.cursor import Cursor, parse
 from clpt.formats.native.spectra import find_file, kind_name
-from clpt.scene import Scene, check_noise, integrators, kinds, lights, materials, shapes
+from clpt.scene import Scene, check_noise, integrators, kinds, lights, materials, media, shapes
 from clpt.scene.params import Kind, params
 
 ON_SHAPES = tuple(cls.kind for cls in lights.ON_SHAPES)
 KEYS = (
-    "$schema", "name", "camera", "film", "integrator", "sampler", "materials", "groups", "shapes",
-    "lights", "spp", "noise", "seed",
+    "$schema", "name", "camera", "film", "integrator", "sampler", "materials", "media", "groups",
+    "shapes",    "lights", "spp", "noise", "seed",
 )  # fmt: skip
 
 
@@ -53,6 +53,7 @@ class _Reader:
             self.outside[cls.kind] = cls
         # None while one is being read: it refers to itself then
         self.materials: dict[str, materials.Material | None] = {}
+        self.media: dict[str, media.Medium] = {}
         self.groups: dict[str, shapes.Group | None] = {}
         self.warnings: list[str] = []
 
@@ -77,6 +78,8 @@ class _Reader:
         parts = {key: read(root.at(key)) for key, read in readers.items() if key in root.value}
         for _, cursor in root.at("materials").items() if "materials" in root.value else ():
             self.material(cursor)
+        for name, cursor in root.at("media").items() if "media" in root.value else ():
+            self.named_medium(name, cursor)
         for name, cursor in root.at("groups").items() if "groups" in root.value else ():
             self.named_group(name, cursor)
         parts.setdefault("name", root.file.stem)
@@ -158,6 +161,21 @@ class _Reader:
         if self.materials[name] is None:
             raise referrer.error(f"the material {name!r} refers to itself")
         return self.materials[name]
+
+    def medium(self, cursor: Cursor) -> Any:
+        """Read a medium, or find the one of that name; null is none."""
+        if cursor.value is None:
+            return None
+        if isinstance(cursor.value, dict):
+            return self.kind(cursor, "medium")
+        return self.named_medium(cursor.expect(str, "a medium or its name"), cursor)
+
+    def named_medium(self, name: str, referrer: Cursor) -> media.Medium:
+        """Read the medium of that name, once."""
+        if name not in self.media:
+            made = self.kind(self._entry("media", "medium name", name, referrer), "medium")
+            self.media[name] = made if made.name else dataclasses.replace(made, name=name)
+        return self.media[name]
 
     def group(self, cursor: Cursor) -> shapes.Group:
         """Find the group of a name."""

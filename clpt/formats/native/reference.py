@@ -50,6 +50,7 @@ says the same to an editor: begin a file with `"$schema": "../schema.json"`.
 | `integrator` | how light is followed: [integrators](#integrators) |
 | `sampler` | where random numbers come from: [samplers](#samplers) |
 | `materials` | name -> [material](#materials); shapes refer to them by name |
+| `media` | name -> [medium](#media); shapes and cameras refer to them by name |
 | `groups` | name -> a list of shapes; an [instance](#instance) places all of them |
 | `shapes` | a list of [shapes](#shapes) |
 | `lights` | a list of [lights](#lights); area lights stand on shapes, as `emission` |
@@ -90,6 +91,7 @@ reflectances hold, and those of light are dark.
 
 HEADINGS = {
     "camera": "Cameras", "shape": "Shapes", "material": "Materials", "texture": "Textures",
+    "medium": "Media", "phase": "Phase functions",
     "light": "Lights", "integrator": "Integrators", "sampler": "Samplers", "filter": "Filters",
 }  # fmt: skip
 

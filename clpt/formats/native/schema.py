@@ -55,6 +55,7 @@ def schema() -> Schema:
             "integrator": ref("integrator"),
             "sampler": ref("sampler"),
             "materials": {"type": "object", "additionalProperties": ref("material")},
+            "media": {"type": "object", "additionalProperties": ref("medium")},
             "groups": {
                 "type": "object",
                 "additionalProperties": {"type": "array", "items": ref("shape")},

@@ -52,7 +52,8 @@ class _Writer:
             shapes.Spheres: self.spheres,
         }
         self.materials: dict[str, Any] = {}
-        self.names: dict[int, str] = {}
+        self.media: dict[str, Any] = {}
+        self.names: dict[int, str] = {}  # of materials and media
         self.groups: dict[str, Any] = {}
         self.group_names: dict[int, str] = {}
         self.files: dict[Any, str] = {}  # names by what they hold
@@ -69,12 +70,14 @@ class _Writer:
             **({} if scene.noise is None else {"noise": scene.noise}),
             "seed": scene.seed,
             "materials": self.materials,
+            "media": self.media,
             "groups": self.groups,
             "shapes": self.entries(scene.shapes),
             "lights": [self.kind(light) for light in scene.lights],
         }
-        if not self.groups:
-            del document["groups"]
+        for name in ("media", "groups"):
+            if not document[name]:
+                del document[name]
         return document
 
     def entries(self, members: Sequence[shapes.Shape]) -> list[dict[str, Any]]:
@@ -138,17 +141,25 @@ class _Writer:
 
     def material(self, material: materials.Material) -> Any:
         """Return a material, or its name in the table of named ones."""
-        if not material.name:
-            return self.kind(material)
-        if id(material) not in self.names:
-            key = unused_name(material.name, self.materials)
-            self.names[id(material)] = key
-            self.materials[key] = None
-            written = self.kind(material)
-            if key == material.name:
+        return self._named(material, self.materials)
+
+    def medium(self, medium: Any) -> Any:
+        """Return a medium, or its name in the table of named ones."""
+        return self._named(medium, self.media)
+
+    def _named(self, thing: Any, table: dict[str, Any]) -> Any:
+        """Return a thing, or its name in the table where it is written once."""
+        if not thing.name:
+            return self.kind(thing)
+        if id(thing) not in self.names:
+            key = unused_name(thing.name, table)
+            self.names[id(thing)] = key
+            table[key] = None
+            written = self.kind(thing)
+            if key == thing.name:
                 del written["name"]
-            self.materials[key] = written
-        return self.names[id(material)]
+            table[key] = written
+        return self.names[id(thing)]
 
     def file_name(self, label: str, suffix: str) -> str:
         """Return the name of a new file beside the scene's."""

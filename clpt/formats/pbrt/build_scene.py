@@ -11,6 +11,7 @@ from clpt.formats.pbrt.curves import joined
 from clpt.formats.pbrt.files import Contents
 from clpt.formats.pbrt.lights import area_light, light
 from clpt.formats.pbrt.materials import material
+from clpt.formats.pbrt.media import medium
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.shapes import Geometry, geometry, with_uvs
 from clpt.formats.pbrt.state import Definition, State, nearest
@@ -90,7 +91,12 @@ def _shape(definition: Definition, body: Geometry | None) -> Shape | None:
             state.warn(params, "textures run around and along curves, not along and across")
         body = with_uvs(body)
     with params.locating():
-        return body.made(material=surface, emission=emission)
+        return body.made(
+            material=surface,
+            emission=emission,
+            interior=medium(state.inside, params, state),
+            exterior=medium(state.outside, params, state),
+        )
 
 
 def _material(source: Parameters, state: State) -> Material:

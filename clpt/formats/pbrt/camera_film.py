@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from clpt import transforms
 from clpt.errors import UnknownKindError
+from clpt.formats.pbrt.media import medium
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.state import Definition, State
 from clpt.scene import cameras
@@ -32,7 +34,8 @@ def camera(definition: Definition, film: Film) -> cameras.Camera:
     params, state = definition.params, definition.state
     exposure_time(params)
     with params.locating():
-        return CAMERAS[definition.kind](params, state, film)
+        made = CAMERAS[definition.kind](params, state, film)
+    return replace(made, medium=medium(state.outside, params, state))
 
 
 def exposure_time(params: Parameters) -> float:

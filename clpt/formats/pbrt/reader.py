@@ -245,14 +245,12 @@ class _Reader(TransformDirectives):
 
     def make_named_medium(self) -> None:
         definition = self._definition('MakeNamedMedium "{}"', "medium", "a name")
-        self.contents.shared.media[definition.kind] = definition.params
+        self.contents.shared.media[definition.kind] = definition
 
     def medium_interface(self) -> None:
         inside = self.lexer.string("the name of a medium")
         outside = self.lexer.string("") if self.lexer.peek().startswith(b'"') else inside
         self.state.inside, self.state.outside = inside, outside
-        if inside or outside:
-            self.warn_once("participating media are left out")
 
 
 DIRECTIVES: dict[str, Callable[[_Reader], None]] = {

@@ -40,7 +40,7 @@ class Shared:
     warnings: list[str] = field(default_factory=list)
     textures: dict[tuple[str, str], Definition] = field(default_factory=dict)
     materials: dict[str, Definition] = field(default_factory=dict)
-    media: dict[str, Parameters] = field(default_factory=dict)
+    media: dict[str, Definition] = field(default_factory=dict)
     systems: dict[str, transforms.Matrix] = field(default_factory=dict)
     files: dict[str, State] = field(default_factory=dict)  # the names, and where each stands
     made: dict[Any, Any] = field(default_factory=dict)

@@ -19,15 +19,16 @@ NEEDED = {
     "sampled_hemisphere": "USES_HEMISPHERE",
     "null_distance": "USES_NULL_SURFACES",
     "nulls": "USES_NULL_SURFACES",
-    "ratio": "USES_DISPERSION",
+    "ratio": "USES_RATIO",
     "medium": "USES_ABSORPTION",
     "lead": "USES_ABSORPTION",
+    "through": "SHADOW_MEDIA",
     "rival": "WEIGHS_LIGHT_PATHS",
     "pending": "MERGES",
     "expected": "USES_GUIDE",
-    "weight": "LIGHT_PATHS USES_LAYERS",
+    "weight": "LIGHT_PATHS USES_LAYERS LIGHT_LAYERS",
     "light": "WEIGHS_LIGHT_PATHS",
-    "pixel_index": "LIGHT_PATHS USES_LAYERS",
+    "pixel_index": "LIGHT_PATHS USES_LAYERS LIGHT_LAYERS",
     "film": "LIGHT_PATHS",
     "instance": "USES_INSTANCES",
 }
@@ -43,9 +44,11 @@ def members(features: Features) -> dict[str, list[str]]:
         wanted = {name: NEEDED[name].split() if name in NEEDED else [""] for name in names}
         return [name for name, of in wanted.items() if any(has.get(flag) for flag in of)]
 
+    chosen = ("light",) if "LIGHT_LAYER_GROUPS" in defined else ()  # by next-event estimation
+    changed = [*there(CHANGED), *chosen]
     return {
-        "changed": there(CHANGED),
-        "path": there((*CHANGED, *READ)),
+        "changed": changed,
+        "path": [*changed, *(name for name in there(READ) if name not in chosen)],
         "hit": there(m.name for m in HIT.members),
         "shadow": there(m.name for m in SHADOW.members),
     }

@@ -30,6 +30,8 @@ def order(features: Features, layout: str, lanes: int, interleaved: bool = False
         bounce.append(Stage("deposit", "deposit", lanes))
     if trains(features):
         bounce.append(Stage("train", "train", lanes))
+    if features.media:
+        bounce.append(Stage("flight", "flight", lanes))
     if features.mixtures:
         bounce.append(Stage("mix", "mix_materials", lanes))
     bounce += [Stage(f"shade_{kind}", "shade", lanes) for kind in features.materials]

@@ -25,8 +25,14 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/gather.cl": lambda f, _: (
         ("generated/photon.cl", "merging/gather.cl") * (f.merged and not f.light_paths)
     ),
-    "generated/layer_sums.cl": lambda f, _: ("film/layers.cl",) * bool(f.layers),
-    "generated/layers.cl": lambda f, _: ("path/layers.cl",) * bool(f.layers),
+    "generated/layer_sums.cl": lambda f, _: ("film/layers.cl",) * (f.layer_words > 0),
+    "generated/layers.cl": lambda f, _: (
+        ("generated/layer_args.cl", "path/layers.cl") * (f.layer_words > 0)
+    ),
+    "generated/light_layers.cl": lambda f, _: (
+        ("generated/light_layer_args.cl", "generated/sampler.cl", "film/light_layers.cl")
+        * bool(f.light_layers)
+    ),
     "generated/rivals.cl": lambda f, _: (
         (
             "generated/merging.cl",
@@ -40,16 +46,15 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         else ()
     ),
     "generated/medium.cl": lambda f, _: (
-        ("generated/medium_absorption.cl", "optics/medium.cl") if f.absorption else ()
+        ("generated/medium_coefficients.cl", "optics/medium.cl") * (f.absorption or f.media)
     ),
     "generated/shading_frame.cl": lambda f, _: (
         ("generated/normal_map.cl", "path/shading_frame_mapped.cl")
         if f.normal_mapped
         else ("path/shading_frame.cl",)
     ),
-    "generated/transmittance.cl": lambda f, _: (
-        f"tracing/transmittance{'' if f.null_surfaces else '_opaque'}.cl",
-    ),
+    "generated/transmittance.cl": lambda f, _: (f"tracing/transmittance{_passing(f)}.cl",),
+    "generated/shadow_ray.cl": lambda f, _: (f"path/shadow_ray{'_media' * f.shadow_media}.cl",),
     "generated/trace.cl": lambda _, layout: (
         f"tracing/trace_{'lanes' if layout == 'brute' else 'one'}.cl",
     ),
@@ -61,6 +66,13 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         (f"tracing/instances_{layout}.cl", "tracing/trace_instances.cl") * f.instances
     ),
 }
+
+
+def _passing(features: Features) -> str:
+    """How the name of what tells which light passes ends."""
+    if features.shadow_media:
+        return "_media"
+    return "" if features.null_surfaces else "_opaque"
 
 
 def _spectrum_read(features: Features) -> tuple[str, ...]:

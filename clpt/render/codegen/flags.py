@@ -12,29 +12,30 @@ from typing import Any
 from clpt.render.contract.features import Features
 from clpt.render.contract.parameter_words import RERADIATION_STEP
 from clpt.render.contract.texture_records import IMAGES
-from clpt.scene.integrators import IDS, LAYERS
-from clpt.scene.materials import Material
+from clpt.scene.integrators import IDS
+from clpt.scene.layers import LAYERS, MATTE_SLOTS, WORDS
 from clpt.scene.params import device_params
+from clpt.scene.scatterer import Scatterer
 
 Defines = dict[str, str | int]
 
 
-def fluoresces(features: Features, cls: type[Material]) -> bool:
+def fluoresces(features: Features, cls: type[Scatterer]) -> bool:
     """Whether light may leave a material at another wavelength than it came."""
     return cls.fluoresces and features.mode == "spectral"
 
 
-def ends_light_paths(features: Features, cls: type[Material]) -> bool:
+def ends_light_paths(features: Features, cls: type[Scatterer]) -> bool:
     """Whether a material does not do to light that comes the other way what it does to this."""
     return not cls.reversible or fluoresces(features, cls)
 
 
-def gathers_photons(features: Features, cls: type[Material]) -> bool:
+def gathers_photons(features: Features, cls: type[Scatterer]) -> bool:
     """Whether paths from the camera are merged with photons at a material."""
     return not (cls.delta or cls.is_null or ends_light_paths(features, cls))
 
 
-def filters_at_random(features: Features, cls: type[Material]) -> bool:
+def filters_at_random(features: Features, cls: type[Scatterer]) -> bool:
     """Whether a random texel stands for some parameter of a material."""
     images = {(kind, "reflectance") for kind in IMAGES}
     if features.channel or images.isdisjoint(features.texture_roles):
@@ -48,6 +49,17 @@ def _layer_place(name: str) -> Callable[[Features], int | bool]:
     return lambda features: features.layer_places.get(name, False)
 
 
+def _number(name: str, names: tuple[str, ...]) -> int | bool:
+    """1 more than where a name stands, False where it does not."""
+    return names.index(name) + 1 if name in names else False
+
+
+def _first_for_denoisers(features: Features) -> int | bool:
+    """The first word of the layers for denoisers, which come last; False where there is none."""
+    places = features.layer_places
+    return min((places[name] for name in places if LAYERS[name].denoising), default=False)
+
+
 # name: its value, of a scene's features
 SCENE: dict[str, Callable[[Features], str | int]] = {
     "BSDF_COUNT": lambda f: len(f.materials),
@@ -58,8 +70,11 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "USES_ANALYTIC": lambda f: bool(f.analytic),
     "USES_INSTANCES": lambda f: f.instances,
     "USES_NULL_SURFACES": lambda f: f.null_surfaces,
-    "USES_ABSORPTION": lambda f: f.absorption,
+    "USES_ABSORPTION": lambda f: f.absorption or f.media,
+    "USES_MEDIA": lambda f: f.media,
+    "SHADOW_MEDIA": lambda f: f.shadow_media,
     "USES_DISPERSION": lambda f: f.dispersion and f.mode == "spectral",
+    "USES_RATIO": lambda f: f.chromatic_media or (f.dispersion and f.mode == "spectral"),
     "USES_FLUORESCENCE": lambda f: any(fluoresces(f, cls) for cls in f.leaves),
     "USES_BANDS": lambda f: f.bands,
     "USES_ALPHA": lambda f: f.alpha,
@@ -82,10 +97,22 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "FILM_GROUP": lambda f: f.weighed and f.film_group,
     "FILM_WORDS": lambda f: f.weighed and f.film_words,
     "FILM_WEIGHTS": lambda f: f.film_weights,
-    "USES_LAYERS": lambda f: bool(f.layers),
-    "LAYER_FIRST": lambda f: any(not LAYERS[name].denoising for name in f.layers),
-    "LAYER_DENOISING": lambda f: any(LAYERS[name].denoising for name in f.layers),
-    **{f"LAYER_{name.upper()}": _layer_place(name) for name in LAYERS},
+    "USES_LAYERS": lambda f: f.layer_words > 0,
+    "LAYER_IDS": lambda f: any(LAYERS[name].form == "id" for name in f.layers),
+    "NAMES_SURFACES": lambda f: any(LAYERS[name].form in ("id", "matte") for name in f.layers),
+    "MATTES": lambda f: len(f.mattes) or False,
+    "MATTE_SLOTS": lambda f: bool(f.mattes) and MATTE_SLOTS,
+    "MATTE_OBJECT": lambda f: _number("crypto_object", f.mattes),
+    "MATTE_MATERIAL": lambda f: _number("crypto_material", f.mattes),
+    "MATERIAL_NUMBERS": lambda f: f.material_numbers or False,
+    "LIGHT_LAYERS": lambda f: f.light_pictures or False,
+    "LIGHT_LAYER_DIRECT": lambda f: _number("direct", f.light_layers),
+    "LIGHT_LAYER_INDIRECT": lambda f: _number("indirect", f.light_layers),
+    "LIGHT_LAYER_GROUPS": lambda f: _number("light_groups", f.light_layers),
+    "LIGHT_GROUPS": lambda f: f.light_groups > 0 and f.light_group_row,
+    "LAYER_WORDS": lambda f: f.layer_words or False,
+    "LAYER_DENOISING": lambda f: _first_for_denoisers(f),
+    **{f"LAYER_{n.upper()}": _layer_place(n) for n in LAYERS if LAYERS[n].form in WORDS},
     "CHANNEL": lambda f: bool(f.channel) and f"CHANNEL_{f.channel.upper()}",
     "CHANNEL_IS_ID": lambda f: f.channel in IDS,
     "SPECTRA_SIZE": lambda f: f.spectra_size,
@@ -94,7 +121,7 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
 }
 
 # likewise, of the features and the kind of material that a program shades
-MATERIAL: dict[str, Callable[[Features, type[Material]], str | int]] = {
+MATERIAL: dict[str, Callable[[Features, type[Scatterer]], str | int]] = {
     "BSDF_KIND": lambda f, cls: f.leaves.index(cls),
     "BSDF_DELTA": lambda f, cls: cls.delta,
     "BSDF_TRANSMITS": lambda f, cls: int(cls.kind in f.transmitting),  # kernels calculate with it
@@ -105,6 +132,7 @@ MATERIAL: dict[str, Callable[[Features, type[Material]], str | int]] = {
     "BSDF_ENDS_LIGHT_PATHS": lambda f, cls: f.weighed and ends_light_paths(f, cls),
     "BSDF_MERGES": lambda f, cls: f.merged and gathers_photons(f, cls),
     "BSDF_GUIDED": lambda f, cls: f.guided and cls.guided,
+    "BSDF_IS_PHASE": lambda f, cls: cls.is_phase,
     "BSDF_IS_NULL": lambda f, cls: cls.is_null and f.null_surfaces,
     "STOCHASTIC_FILTERING": filters_at_random,
     "USES_CHOICE": lambda f, cls: cls.uses_lobe_sample or cls.fluoresces or f.many_lights,

@@ -38,14 +38,15 @@ def dispatch_text(
     tree: bool = False,
     densities: str = "",
     aimed: bool = False,
+    grouped: bool = False,
 ) -> str:
     """Return the functions over all lights, for the kinds in the scene (`LightRows.kinds`).
 
     textured: some emission is a texture, so that triangles need the uv of their mesh; two_sided:
     some shape emits from its back too; tree: the rows are followed by a tree that chooses among
     them; densities: the functions that weigh light paths, where there are some; aimed: some of
-    these start toward what is sharp. It includes the files of `virtual_files`, here and in
-    clpt.render.codegen.shapes.
+    these start toward what is sharp; grouped: a sample tells its light.
+    It includes the files of `virtual_files`, here and in clpt.render.codegen.shapes.
 
     light_sample(scene, p, hemisphere, pick, u, lambdas): chooses a light and a direction to it
     light_pdf(scene, row, p, hemisphere, wi, t, n): of it, [1/sr], for a ray that met a shape
@@ -67,7 +68,7 @@ def dispatch_text(
     parts += _tree_text() if tree else []
     parts.append(_sides_text(two_sided))
     weighed = bool(densities)
-    parts.append(_sample_text(others, surfaces, textured, two_sided, tree, weighed, aimed))
+    parts.append(_sample_text(others, surfaces, textured, two_sided, tree, weighed, aimed, grouped))
     parts += [_pdf_text(surfaces, tree), densities]
     parts += _infinite_text([kind for kind in others if kind in INFINITE], tree)
     return "\n".join(parts) + "\n"
@@ -125,6 +126,7 @@ def _sample_text(
     tree: bool,
     weighed: bool,
     aimed: bool,
+    grouped: bool,
 ) -> str:
     kinds = [*others, *surfaces]
     head = (
@@ -165,8 +167,10 @@ def _sample_text(
         ]
     pmf = "pmf" if tree else "l.pmf"
     rows.append(f"s = light_chosen(s, {pmf});")
+    if weighed or grouped:
+        rows.append("s.row = row;")
     if weighed:
-        rows += ["s.row = row;", f"s.chance = {pmf};"]
+        rows.append(f"s.chance = {pmf};")
     if aimed:
         rows.append(f"s.n = {'q.n' if surfaces else NOWHERE};")
     return function(head, *rows, "return s;")

@@ -17,6 +17,7 @@ from clpt.render.contract.parameter_words import (
     NORMAL_MAP_WORDS,
     ORDERS_WORDS,
     SPECTRAL,
+    SPECTRUM_WORDS,
     words,
 )
 from clpt.scene.params import Kind, Param, device_params
@@ -180,19 +181,34 @@ def factor_text(sources: frozenset[str]) -> str:
     )
 
 
-def medium_text(sources: frozenset[str]) -> str:
-    """Return `medium_absorption(scene, at, point, lambdas)`: five words of `materials`."""
-    return value_text("medium_absorption", Param("coefficient", ""), sources)
+def medium_text(sources: Mapping[str, frozenset[str]]) -> str:
+    """Return `medium_absorption(scene, at, point, lambdas)`: five words of `materials`.
+
+    sources: of "absorption"; where there is "scattering", `medium_scattering` reads what stands
+    MEDIUM_SCATTERING words behind it.
+    """
+    coefficient = Param("coefficient", "")
+    head = f"#define MEDIUM_SCATTERING {SPECTRUM_WORDS}\n" if "scattering" in sources else ""
+    return head + "".join(
+        value_text(f"medium_{name}", coefficient, own) for name, own in sources.items()
+    )
+
+
+def _medium_sources(features: Features) -> dict[str, frozenset[str]]:
+    names = ("absorption", "scattering") if features.media else ("absorption",)
+    return {
+        name: frozenset(source for _, found, source in features.sources if found == name)
+        for name in names
+    }
 
 
 def virtual_files(features: Features) -> dict[str, str]:
     """Return the loaders of what surfaces have besides their materials' own parameters."""
-    absorptions = {source for _, name, source in features.sources if name == "absorption"}
     weights = features.sources_of("mixture").get("weight")
     maps = features.sources_of("perturbation").get("value")
     real = Param("real", "", textured=True)
     return {
-        "generated/medium_absorption.cl": medium_text(frozenset(absorptions)),
+        "generated/medium_coefficients.cl": medium_text(_medium_sources(features)),
         "generated/mixture.cl": value_text("mixture_weight", real, weights, "mixtures"),
         "generated/normal_map.cl": f"#define NORMAL_MAP_WORDS {NORMAL_MAP_WORDS}\n"
         + value_text("normal_map_real", real, maps),

@@ -69,6 +69,8 @@ def _stages(
         texts["deposit"] = _source("deposit", files, defines, lanes)
     if bounce.trains(features):
         texts["train"] = _source("train", files, defines, lanes)
+    if features.media:
+        texts["flight"] = _source("flight", files, defines, lanes)
     if features.mixtures:
         texts["mix"] = _source("mix", files, defines, lanes)
     return texts
@@ -82,8 +84,10 @@ def _shading(
     texts = {}
     for cls in features.leaves:
         own = {**files, "generated/bsdf.cl": stages.bsdf_text(features, cls)}
+        if cls.is_phase:
+            own["generated/shading_frame.cl"] = ("path/phase_frame.cl",)
         if cls.source is not None:
-            own[f"bsdf/{cls.kind}.cl"] = custom_materials.text(cls)
+            own[f"{cls.folder}/{cls.kind}.cl"] = custom_materials.text(cls)
         kind = {**flags.defines(flags.MATERIAL, features, cls), "QUEUED": int(queued)}
         if both:
             own["generated/integrator.cl"] = BOTH

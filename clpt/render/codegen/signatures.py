@@ -39,6 +39,8 @@ def virtual_files(features: Features, layout: str) -> dict[str, str]:
         "deposit": (deposit_args(features), True),
         "merge": (merge_args(features), True),
         "shade": (shade_args(features), True),
+        "layer": (layer_args(features), False),
+        "light_layer": (light_layer_args(features), True),
     }
     files = {"generated/scene.cl": scene_text()}
     for name, (args, behind) in groups.items():
@@ -98,7 +100,7 @@ def begin_args(features: Features) -> dict[str, str]:
     film = ["film", "bands"] if features.bands else ["film"]
     own = {"footprints": "global long *"} if features.film_weights else {}
     rest = {"counters": "global uint *", "work_list": "global const uint *", "samples": "int2 "}
-    layers = layer_args(features)
+    layers = layer_args(features) | light_layer_args(features)
     return {**dict.fromkeys(film, "global uint *"), **layers, **own, **rest}
 
 
@@ -106,7 +108,7 @@ def join_args(features: Features, layout: str) -> dict[str, str]:
     """Return what the stage takes that tests rays to lights or, in `splat`, to the camera."""
     own = begin_args(features) if features.light_paths else {}
     splats = {n: type_ for n, type_ in own.items() if n in ("film", "bands", "counters")}
-    return {**trace_args(features, layout), **splats}
+    return {**trace_args(features, layout), **splats, **light_layer_args(features)}
 
 
 def deposit_args(features: Features) -> dict[str, str]:
@@ -128,13 +130,19 @@ def merge_args(features: Features) -> dict[str, str]:
 
 
 def layer_args(features: Features) -> dict[str, str]:
-    """Return what stages take that add to layers beside the picture."""
-    return {"layers": "global uint *"} if features.layers else {}
+    """Return what stages take that add to layers of the first samples, and to mattes."""
+    names = ["layers"] * (features.layer_words > 0) + ["mattes"] * bool(features.mattes)
+    return dict.fromkeys(names, "global uint *")
+
+
+def light_layer_args(features: Features) -> dict[str, str]:
+    """Return what stages take that add to layers of light."""
+    return {"light_layers": "global uint *"} if features.light_layers else {}
 
 
 def shade_args(features: Features) -> dict[str, str]:
     """Return what shading takes beside slabs and scene."""
-    return {**merge_args(features), **layer_args(features)}
+    return {**merge_args(features), **layer_args(features), **light_layer_args(features)}
 
 
 def loop_files(features: Features, layout: str) -> dict[str, str]:

@@ -11,8 +11,8 @@ from clpt.render.codegen.dispatch import Case, Function, active, function
 from clpt.render.contract import camera_records
 from clpt.render.contract.features import Features
 from clpt.render.contract.parameter_words import MIXTURE, row_words, words
-from clpt.scene.materials import Material
 from clpt.scene.params import device_params, interior_params
+from clpt.scene.scatterer import Scatterer
 
 
 def camera_text(kind: str, glass: bool) -> str:
@@ -77,6 +77,7 @@ def lights_text(features: Features) -> str:
             features.light_tree,
             densities,
             features.aimed,
+            features.light_groups > 0,
         )
     )
 
@@ -107,7 +108,7 @@ def null_transmittance_text(features: Features) -> str:
     return "".join([*parts, f"#define null_transmittance null_transmittance_{features.mixtures}\n"])
 
 
-def functions_text(cls: type[Material], mode: str, features: Features | None = None) -> str:
+def functions_text(cls: type[Scatterer], mode: str, features: Features | None = None) -> str:
     """Return a kind's struct and functions, with what its boundary needs.
 
     features: where its parameters come from; without, all are constants.
@@ -115,10 +116,10 @@ def functions_text(cls: type[Material], mode: str, features: Features | None = N
     own, layer = (features.sources_of(kind) if features else {} for kind in (cls.kind, "layer"))
     boundary = thin_films.boundary_text(cls, mode, own, layer)
     struct, declared = parameters.struct_text(cls, own), _declared_text(cls)
-    return f'{boundary}{struct}{declared}#include "bsdf/{cls.kind}.cl"\n'
+    return f'{boundary}{struct}{declared}#include "{cls.folder}/{cls.kind}.cl"\n'
 
 
-def _declared_text(cls: type[Material]) -> str:
+def _declared_text(cls: type[Scatterer]) -> str:
     """Declare a kind's costly functions as inline.
 
     Only so do compilers see which lobes a scene leaves out, and what the functions have in common.
@@ -133,7 +134,7 @@ def _declared_text(cls: type[Material]) -> str:
     )
 
 
-def bsdf_text(features: Features, cls: type[Material]) -> str:
+def bsdf_text(features: Features, cls: type[Scatterer]) -> str:
     """Return a kind's struct, functions and loader, under the names that the integrators use."""
     kind = cls.kind
     reflectivity = "(m).reflectivity" if "reflectivity" in device_params(cls) else "(real)(0.0f)"
@@ -150,14 +151,14 @@ def bsdf_text(features: Features, cls: type[Material]) -> str:
             f"typedef {cls.__name__} Bsdf;",
             f"#define BSDF_REFLECTIVITY(m) {reflectivity}",
             *(f"#define bsdf_{verb} {kind}_{verb}" for verb in verbs),
-            *(_interior_text(cls) if features.absorption else ()),
+            *(_interior_text(cls) if features.absorption or features.media else ()),
             *(_shift_text(cls) if flags.fluoresces(features, cls) else ()),
             "",
         ]
     )
 
 
-def _interior_text(cls: type[Material]) -> list[str]:
+def _interior_text(cls: type[Scatterer]) -> list[str]:
     """`BSDF_INTERIOR`: the name of the medium inside, see kernels/optics/medium.cl."""
     interior = interior_params(cls)
     first = row_words(cls) - sum(map(words, interior.values()))
@@ -169,7 +170,7 @@ def _interior_text(cls: type[Material]) -> list[str]:
     return [f"#define BSDF_INTERIOR(row) {inside}"]
 
 
-def _shift_text(cls: type[Material]) -> list[str]:
+def _shift_text(cls: type[Scatterer]) -> list[str]:
     """`bsdf_shift`: the wavelengths by which light comes to a surface at `row`."""
     at = parameters.word_before(cls, "reradiation")
     table = f"gather_i((scene).materials, (row) + {at})"

@@ -19,6 +19,7 @@ from clpt.records import INSTANCE, LIGHT, SETTINGS, SHAPE, SLABS
 from clpt.render.contract import light_records, shape_records
 from clpt.scene import KINDS
 from clpt.scene.materials import LEAVES, Material
+from clpt.scene.scatterer import Scatterer
 
 MOST = 255  # kinds in a scene: what the upper bits of a material word count, but for mixtures
 CONTRACT = ("sample", "eval", "pdf", "albedo")  # what each has, see kernels/interface/bsdf.cl
@@ -75,7 +76,7 @@ def check(cls: type[Material], where: str | None = None) -> None:
         raise SceneError(f"has no {', '.join(sorted(missing))}", file=part.file, where=where)
 
 
-def text(cls: type[Material]) -> device.Part:
+def text(cls: type[Scatterer]) -> device.Part:
     """Return a kind's OpenCL text, and the place at which compilers shall find faults with it.
 
     Raises SceneError for a file that cannot be read.

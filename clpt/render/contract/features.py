@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from clpt.scene.integrators import LAYERS
-from clpt.scene.materials import Material
+from clpt.scene.layers import LAYERS, WORDS, Form
 from clpt.scene.params import device_params
+from clpt.scene.scatterer import Scatterer
 
 Sources = frozenset[tuple[str, str, str]]
 
@@ -15,7 +15,7 @@ SUM_WORDS = 3  # kernels/core/fixed.cl
 GROUP_WORDS = 3 * SUM_WORDS + 1  # of a pixel: three sums and a count, see kernels/film/film.cl
 
 
-def disperses(leaves: Iterable[type[Material]], sources: Sources) -> bool:
+def disperses(leaves: Iterable[type[Scatterer]], sources: Sources) -> bool:
     """Whether the direction of light depends on its wavelength at some material."""
     indices = (
         (cls.kind, name, "table")
@@ -28,11 +28,13 @@ def disperses(leaves: Iterable[type[Material]], sources: Sources) -> bool:
 
 
 def layer_places(names: Iterable[str]) -> dict[str, int]:
-    """Return the first of a pixel's words for each layer, after the number of samples."""
+    """Return the first of a pixel's words for each layer of the first samples, after their number;
+    those for denoisers come last."""
     places, word = {}, 1
     for name in names:
-        places[name] = word
-        word += LAYERS[name].words
+        if LAYERS[name].form in WORDS:
+            places[name] = word
+            word += LAYERS[name].words
     return places
 
 
@@ -40,7 +42,8 @@ def layer_places(names: Iterable[str]) -> dict[str, int]:
 class Features:
     """What occurs in a scene.
 
-    leaves: classes of leaf materials in their order, a material word's upper bits count in it;
+    leaves: classes of leaf materials in their order, then of phase functions: a material word's
+    upper bits count in it;
     lights: device kinds of lights (see clpt.render.contract.light_records); textures,
     texture_roles: kinds and (kind, role) pairs; analytic: kinds of shapes that rays meet as they
     are; sources: (kind, parameter, source) of all that is loaded, see
@@ -54,7 +57,7 @@ class Features:
     filter_taps: int  # pixels of an axis that light may serve; 0: a sample serves its own
     filter_reach: int  # how far these are from its own
     integrator: str
-    leaves: tuple[type[Material], ...]
+    leaves: tuple[type[Scatterer], ...]
     transmitting: tuple[str, ...] = ()  # kinds of leaves of which some let light through
     shining: tuple[str, ...] = ()  # kinds of leaves on shapes that are lights
     lights: tuple[str, ...] = ()
@@ -86,11 +89,16 @@ class Features:
     many_lights: bool = False  # too many to be chosen by the number that also places the point
     dispersion: bool = False
     absorption: bool = False  # inside of a dielectric
+    media: bool = False  # inside or outside of shapes, or around the camera
+    chromatic_media: bool = False  # of which some extinction depends on the wavelength
     glass_lens: bool = False  # of a glass that disperses
     channel: str = ""
     bands: bool = False  # a spectral film
     alpha: bool = False  # a film that tells what is covered
     layers: tuple[str, ...] = ()  # beside the picture
+    material_numbers: int = 0  # where in `distributions` that of each row of `shapes` stands
+    light_groups: int = 0  # of lights, where there is a layer for each
+    light_group_row: int = 0  # where in `distributions` the group of each light stands
     tabulated_density: bool = False  # of wavelengths
     filter_profile: int = 0  # where in `distributions` its values begin
     spectra_size: int = 0
@@ -103,25 +111,33 @@ class Features:
         return self.filter_reach > 0 and not self.light_paths
 
     @property
+    def shadow_media(self) -> bool:
+        """Whether rays to lights may go through several media."""
+        return self.media and self.null_surfaces
+
+    @property
     def passes(self) -> tuple[Features, ...]:
         """The features of each kind of paths, in their order; those of the film are the last."""
         if self.guided:
-            return replace(self, integrator="particle_tracer", light_paths=True, alpha=False), self
+            return self._from_lights(), self
         if not self.weighed:
             return (self,)
         taps, reach, profile = self.light_filter
         from_lights = replace(
-            self,
-            integrator="particle_tracer",
-            light_paths=True,
+            self._from_lights(),
             filter_taps=taps,
             filter_reach=reach,
             filter_profile=profile,
             film_group=self.group_words,
-            alpha=False,
-            layers=(),
         )
         return from_lights, self
+
+    def _from_lights(self) -> Features:
+        """The features of paths that start at lights beside those of the camera."""
+        return replace(
+            self, integrator="particle_tracer", light_paths=True, alpha=False, layers=(),
+            light_groups=0, material_numbers=0, light_group_row=0,
+        )  # fmt: skip
 
     @property
     def shows_lights(self) -> bool:
@@ -152,13 +168,34 @@ class Features:
 
     @property
     def layer_places(self) -> dict[str, int]:
-        """The first word of each layer."""
+        """The first word of each layer of the first samples."""
         return layer_places(self.layers)
 
     @property
     def layer_words(self) -> int:
-        """Words of a pixel that layers have."""
-        return 1 + sum(LAYERS[name].words for name in self.layers) if self.layers else 0
+        """Words of a pixel that these have, with the number of samples, which mattes need too."""
+        if not self.layer_places and not self.mattes:
+            return 0
+        return 1 + sum(LAYERS[name].words for name in self.layers)
+
+    @property
+    def mattes(self) -> tuple[str, ...]:
+        """The layers that are lists of names."""
+        return self._layers_of("matte")
+
+    @property
+    def light_layers(self) -> tuple[str, ...]:
+        """The layers of light; `light_groups`, which comes last, is a picture for each group."""
+        return self._layers_of("light")
+
+    @property
+    def light_pictures(self) -> int:
+        """How many pictures of light there are beside the picture."""
+        groups = self.light_groups if "light_groups" in self.light_layers else 1
+        return len(self.light_layers) - 1 + groups if self.light_layers else 0
+
+    def _layers_of(self, form: Form) -> tuple[str, ...]:
+        return tuple(name for name in self.layers if LAYERS[name].form == form)
 
     @property
     def materials(self) -> tuple[str, ...]:

@@ -82,7 +82,8 @@ def take(wavefronts: Sequence[Wavefront], lowered: Lowered, refit: bool = False)
             "new Renderer",
             where="film",
         )
-    if scene.lowered.features.layers != lowered.features.layers:
+    former, new = scene.lowered.features, lowered.features
+    if (former.layers, former.light_groups) != (new.layers, new.light_groups):
         raise SceneError("other layers need a new Renderer", where="film.layers")
     changes = _changes(first, lowered, refit)
     with scene.buffers.all_or_nothing():

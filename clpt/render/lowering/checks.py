@@ -11,23 +11,22 @@ from clpt.render.lowering.geometry.instancing import distinct
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
 from clpt.scene.integrators import (
+    AUTO,
+    HAVE_LAYERS,
     Aov,
-    Auto,
-    Direct,
     Film,
     Filter,
     Integrator,
     ParticleTracer,
-    Path,
     Sampler,
     Vcm,
 )
+from clpt.scene.layers import LAYERS
 from clpt.scene.lights import ON_SHAPES, DirectionalArea, Light, Point
 from clpt.scene.materials import Material
 from clpt.scene.params import params
 from clpt.scene.shapes import Shape
 
-HAVE_LAYERS = (Auto, Path, Vcm, Direct)
 LARGEST = 1 << 26  # pixels of a film; its tiles are divided in float32, see kernels/film/film.cl
 
 
@@ -59,7 +58,22 @@ def check(scene: Scene) -> None:
     if scene.film.layers and not isinstance(scene.integrator, HAVE_LAYERS):
         names = ", ".join(cls.kind for cls in HAVE_LAYERS)
         raise SceneError(f"only the integrators {names} have layers", where="film.layers")
+    _check_light_layers(scene)
     _check_light_paths(scene, shapes_)
+
+
+def _check_light_layers(scene: Scene) -> None:
+    """Raise SceneError for layers of light that the integrator or the filter cannot make."""
+    names = [name for name in scene.film.layers if LAYERS[name].form == "light"]
+    if not names:
+        return
+    from_lights = getattr(scene.integrator, "light_paths", 0)
+    if isinstance(scene.integrator, Vcm) or from_lights not in (0, AUTO):
+        message = f"{names[0]} is of paths from the camera alone: use path with light_paths 0"
+        raise SceneError(message, where="film.layers")
+    if scene.film.filtering == "splatting":
+        message = f'{names[0]} needs samples that serve one pixel: leave it out, or "importance"'
+        raise SceneError(message, where="film.filtering")
 
 
 def _check_light_paths(scene: Scene, shapes_: list[Shape]) -> None:
@@ -74,6 +88,11 @@ def _check_light_paths(scene: Scene, shapes_: list[Shape]) -> None:
                 )
         return
     spectral = scene.film.mode == "spectral"
+    for shape in shapes_:
+        if shape.interior is not None or shape.exterior is not None:
+            _refuse("a scene without media", shapes.where(shape))
+    if scene.camera.medium is not None:
+        _refuse("a scene without media", "camera.medium")
     if scene.camera.kind not in CONNECTED:
         names = " and ".join(CONNECTED)
         _refuse(f"the cameras {names}, not {scene.camera.kind}", "camera")

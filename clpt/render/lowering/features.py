@@ -73,6 +73,8 @@ def features_of(
         light_tree=lights.tree is not None,
         many_lights=len(lights.rows) > FEW_LIGHTS,
         absorption=materials.absorption and not channels,
+        media=bool(index.media),
+        chromatic_media=any(medium.is_chromatic for medium in index.media),
         dispersion=glass_lens or disperses(index.leaves, sources),
         glass_lens=glass_lens,
         channel=channels[0] if channels else "",

@@ -13,7 +13,10 @@ from clpt.render.lowering.geometry import instancing, shapes
 from clpt.render.lowering.geometry.instancing import Placed, Prototype
 from clpt.scene import Scene
 from clpt.scene import materials as mt
-from clpt.scene.integrators import LAYERS, ParticleTracer, Vcm
+from clpt.scene.integrators import ParticleTracer, Vcm
+from clpt.scene.layers import LAYERS
+from clpt.scene.media import PHASES, Medium
+from clpt.scene.scatterer import Scatterer
 from clpt.scene.shapes import Shape
 
 
@@ -31,7 +34,7 @@ class SceneIndex:
     shapes: tuple[Shape, ...]
     placed: tuple[Placed, ...]
     prototypes: tuple[Prototype, ...]
-    leaves: tuple[type[mt.Material], ...]
+    leaves: tuple[type[Scatterer], ...]
     normal_mapped: bool
     warnings: tuple[str, ...]
 
@@ -49,7 +52,7 @@ class SceneIndex:
             shapes=distinct,
             placed=tuple(placed),
             prototypes=tuple(prototypes),
-            leaves=_leaf_kinds(distinct),
+            leaves=(*_leaf_kinds(distinct), *_phase_kinds(scene, distinct)),
             normal_mapped=any(any_of(shape.material, mt.NormalMapped) for shape in distinct),
             warnings=tuple(warnings),
         )
@@ -60,6 +63,11 @@ class SceneIndex:
         lights = (shape for shape in self.shapes if shape.emission is not None)
         found = {cls for shape in lights for cls in _leaves_of(shape.material)}
         return tuple(cls.kind for cls in self.leaves if cls in found)
+
+    @property
+    def media(self) -> tuple[Medium, ...]:
+        """The media of a scene; the `aov` integrator sees none."""
+        return () if self.channels else tuple(_media(self.scene, self.shapes))
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -78,7 +86,7 @@ class SceneIndex:
         Where the scene says "auto" nothing may ask before `hard_light.decided` has chosen.
         """
         wanted: float = getattr(self.scene.integrator, "light_paths", 0)
-        return wanted if self.joined or self.merged else 0
+        return wanted if (self.joined or self.merged) and not self.media else 0
 
     @property
     def joined(self) -> bool:
@@ -92,14 +100,15 @@ class SceneIndex:
     def merged(self) -> bool:
         """Whether light paths leave photons, which paths from the camera gather."""
         integrator = self.scene.integrator
-        if not isinstance(integrator, Vcm) or self.shifts:
+        if not isinstance(integrator, Vcm) or self.shifts or self.media:
             return False
         return integrator.merging and integrator.max_depth not in (1, 2)
 
     @property
     def guided(self) -> bool:
         """Whether directions of the camera's paths are learned from light paths."""
-        return getattr(self.scene.integrator, "guiding", False) and not self.weighed
+        wanted: bool = getattr(self.scene.integrator, "guiding", False)
+        return wanted and not self.weighed and not self.media
 
     @property
     def shifts(self) -> bool:
@@ -118,10 +127,16 @@ class SceneIndex:
         return tuple(name for name in LAYERS if name in wanted)
 
     @property
+    def light_layers(self) -> bool:
+        """Whether the film has layers of light."""
+        return any(LAYERS[name].form == "light" for name in self.layers)
+
+    @property
     def splatting(self) -> bool:
         """Whether light serves all pixels whose filters hold it; else a sample serves its own."""
         film = self.scene.film
         wanted = film.filtering != "importance" and self.scene.noise is None
+        wanted = wanted and not self.light_layers
         reaches = filters.reach(film.filter) > 0 and wanted and not self.channels
         return reaches or self.light_paths
 
@@ -166,6 +181,20 @@ def _leaf_kinds(shapes_: tuple[Shape, ...]) -> tuple[type[mt.Material], ...]:
         for leaf in _leaves_of(shape.material):
             found.setdefault(leaf, where)
     return custom_materials.ordered(found) or (mt.Diffuse,)
+
+
+def _media(scene: Scene, shapes_: tuple[Shape, ...]) -> list[Medium]:
+    """The media of a scene, each once."""
+    found = [m for shape in shapes_ for m in (shape.interior, shape.exterior)]
+    return list(dict.fromkeys(m for m in (scene.camera.medium, *found) if m is not None))
+
+
+def _phase_kinds(scene: Scene, shapes_: tuple[Shape, ...]) -> tuple[type[Scatterer], ...]:
+    """The kinds of phase functions of a scene, in the order of their table."""
+    if getattr(scene.integrator, "channels", ()):
+        return ()
+    found = {type(medium.phase) for medium in _media(scene, shapes_) if medium.scatters}
+    return tuple(cls for cls in PHASES if cls in found)
 
 
 def _leaves_of(material: mt.Material) -> Iterator[type[mt.Material]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.render.contract import shape_records
 from clpt.render.contract.features import Features
+from clpt.render.contract.layer_names import LayerNames
 from clpt.render.contract.parameter_words import row_words
 from clpt.render.lowering import photons
 from clpt.render.lowering.camera import cameras, filters
@@ -29,11 +30,13 @@ from clpt.render.lowering.geometry.geometry import (
 )
 from clpt.render.lowering.geometry.instancing import Instances
 from clpt.render.lowering.index import SceneIndex
+from clpt.render.lowering.layer_names import lower_names
 from clpt.render.lowering.lights.aims import aims
 from clpt.render.lowering.lights.hard_light import decided
 from clpt.render.lowering.lights.lights import LightRows, light_rows
 from clpt.render.lowering.lowering_cache import LoweringCache
 from clpt.render.lowering.materials.material_words import MaterialWords
+from clpt.render.lowering.media import MediumWords
 from clpt.render.lowering.settings import DEEPEST, settings_of
 from clpt.render.lowering.textures.attributes import Owner, lower_attributes
 from clpt.scene import Scene
@@ -52,10 +55,10 @@ class Lowered:
     vertices (n, 3) float32, faces (m, 3) uint32, tags (m,) uint32, boxes (k, 2, 3) float32 and
     instances: what trees are built of, see `Geometry`. tables: every other read-only array by name;
     where an instance's tree begins is filled in when trees are built. zero_copy: tables that are
-    the caller's buffers. owners: of each row of `shapes`. glass_row: of the camera, see
-    `lower_camera`. integrator: of the scene, or what was chosen; reason: why, "" where there was
-    no choice. encoder: what made the tables, for values that are edited. cache: what the next
-    lowering need not make again.
+    the caller's buffers. owners: of each row of `shapes`. layer_names: what layers tell of.
+    glass_row: of the camera, see `lower_camera`. integrator: of the scene, or what was chosen;
+    reason: why, "" where there was no choice. encoder: what made the tables, for values that are
+    edited. cache: what the next lowering need not make again.
     """
 
     features: Features
@@ -68,6 +71,7 @@ class Lowered:
     instances: Instances
     zero_copy: dict[str, Any]
     owners: tuple[Owner, ...]
+    layer_names: LayerNames
     glass_row: int
     warnings: tuple[str, ...]
     integrator: Integrator
@@ -111,6 +115,8 @@ def lower(
     filters.lower_filter(film.filter, encoder.store, index.splatting)
     materials = _begin_materials(index, encoder)
     geometry = lower_geometry(index, encoder, materials)
+    media = MediumWords(index, encoder, materials)
+    encoder.store.append("media", media.of_shapes([shape for _, shape, _, _ in geometry.owners]))
     sphere = geometry.bounding_sphere()
     lights = _lower_lights(index, encoder, geometry, sphere[1])
     before = former.integrator if former else None
@@ -128,9 +134,11 @@ def lower(
     )  # fmt: skip
     aimed = len(targets) > 0
     features = features_of(index, encoder, materials, geometry, lights, tabulated, profile, aimed)
+    names, for_layers = lower_names(index, geometry, lights, encoder.store)
+    features = replace(features, **for_layers)
     settings = settings_of(
         index, geometry, lights, wavelengths, density_row, ambient_row, sphere,
-        features.dispersion, (first_aim, len(targets)),
+        features.dispersion, (first_aim, len(targets)), media.word(scene.camera.medium),
     )  # fmt: skip
     cache.settle()
     tables = encoder.store.arrays()
@@ -146,6 +154,7 @@ def lower(
         instances=geometry.instances,
         zero_copy=_zero_copy_tables(index, geometry),
         owners=geometry.owners,
+        layer_names=names,
         glass_row=glass_row,
         warnings=warnings,
         integrator=index.scene.integrator,

@@ -16,7 +16,7 @@ Light paths, where the scene has them, reach all pixels: see clpt.render.wavefro
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -25,9 +25,10 @@ from numpy.typing import NDArray
 
 from clpt.errors import SceneError
 from clpt.render.contract.features import Features
+from clpt.render.wavefront.cells import Cells
 from clpt.render.wavefront.light_rounds import LightRounds
-from clpt.render.wavefront.noise_meter import Cells, NoiseMeter, Values, divide
-from clpt.render.wavefront.tracer import Tracer
+from clpt.render.wavefront.noise_meter import NoiseMeter, Values, divide
+from clpt.render.wavefront.tracer import OnBatch, Selection, Tracer
 from clpt.render.wavefront.wavefront import Wavefront
 from clpt.render.wavefront.work_list import FOREVER
 from clpt.scene import check_noise
@@ -37,8 +38,6 @@ LEAST = 8  # samples of a pixel at the first look at the film; the second look t
 AHEAD = 4  # a look decides where up to as many times its own samples are needed
 STEPS = 4  # a number of samples is decided in steps of this part of those at the look
 OPEN = FOREVER  # of a cell whose number of samples is not decided
-
-OnBatch = Callable[[Any], bool]
 
 
 def checked(noise: float, features: Features) -> float:
@@ -149,7 +148,7 @@ class Adaptive:
                 if not self._round(end, on_batch):
                     return False
         finally:
-            self._tracer.use_all_pixels(self._meter.inside)
+            self._tracer.use_all_pixels()
         return True
 
     def _goes_on(self, end: int) -> bool:
@@ -191,13 +190,11 @@ class Adaptive:
 
     def _sample(self, ends: Cells, on_batch: OnBatch) -> bool:
         """Add samples to every cell up to its end; return whether it was not stopped."""
-        behind = self.next < ends
+        behind = (self.next < ends) & (self._pixels > 0)
         for first in np.unique(self.next[behind]):
-            cells = behind & (self.next == first)
-            pixels = self._meter.inside[cells[self._meter.cell[self._meter.inside]]]
-            own = ends[self._meter.cell[pixels]]
-            end = int(own.max())
-            if not self._tracer.from_camera(pixels, own, int(first), end, on_batch):
+            own = np.where(behind & (self.next == first), ends, 0)
+            chosen = Selection("camera", int(self._pixels[own > 0].sum()), own)
+            if not self._tracer.add(chosen, int(first), int(own.max()), on_batch):
                 return False
         return True
 

@@ -28,6 +28,8 @@ from clpt.render.wavefront.strategy import Strategy
 
 BATCH = 8  # bounces that are enqueued between two reads of the counters
 CORE_BOUNCES = 1 << 16  # of all slots, that a core's part of a loop takes at once
+LEAST_LAUNCH = 1 / 2  # of the usual one: shorter ones cost too much
+LAUNCHES = 3  # that a run has to wait for, about, before it ends
 ENDLESS = 0xFFFFFFFF  # bounces of a loop that goes on till all paths have ended
 IDLE = {"samples": (0, 0), "bounces": 0, "restart": 0}  # of a loop that has nothing to do
 
@@ -78,7 +80,8 @@ class BounceLoop:
     """The bounce loop of one kind of paths in a scene.
 
     which: of `Features.passes`; per_sample: how many of its paths are traced for a sample;
-    features_of: returns the features of a lowering, for the film's channel.
+    features_of: returns the features of a lowering, for the film's channel; cancel_seconds: in
+    which a run is to end that is stopped [s], None for what suits the device.
     """
 
     def __init__(
@@ -90,6 +93,7 @@ class BounceLoop:
         looped: bool,
         features_of: Callable[[Lowered], Features],
         which: int,
+        cancel_seconds: float | None = None,
     ):
         self.kernels, self.scene, self.paths, self.timings = kernels, scene, paths, timings
         self.device, self.stream, self.looped = scene.device, scene.stream, looped
@@ -101,6 +105,8 @@ class BounceLoop:
         self._share = strategy.loop_share(self.device)
         self._stages: list[Step] | None = None
         self._loop: device.BoundKernel | None = None
+        self._cancel_seconds = cancel_seconds
+        self._bounces = self._most_bounces()
 
     @property
     def features(self) -> Features:
@@ -166,9 +172,10 @@ class BounceLoop:
         self.paths.restart()
         begin.set_args(samples=numbers)
         if self.looped:
-            begin.set_args(bounces=self._loop_bounces(), restart=0)
+            begin.set_args(bounces=self._bounces, restart=0)
         finished = True
         reads: deque[tuple[NDArray[np.uint64], cl.Event]] = deque()
+        before = time.perf_counter()
         while True:
             for step in steps:
                 self.timings.add(step.name, self.stream.run(step.bound, step.size, step.group))
@@ -183,6 +190,8 @@ class BounceLoop:
                 finished = False
             if counters[0] >= self.paths.slots:
                 break
+            before, took = time.perf_counter(), time.perf_counter() - before
+            self._adjust(begin, took)
         for _, event in reads:
             device.wait(event)
         return finished
@@ -231,7 +240,17 @@ class BounceLoop:
             return [Step(f"{self._label}loop", self.loop, *self._loop_sizes())]
         return self.stages * BATCH
 
-    def _loop_bounces(self) -> int:
+    def _adjust(self, loop: device.BoundKernel, took: float) -> None:
+        """Let launches of the loop take so long that a run ends in time; took: the last one [s]."""
+        if self._cancel_seconds is None or not self.looped:
+            return
+        fitting = int(self._bounces * self._cancel_seconds / LAUNCHES / max(took, 1e-6))
+        fitting = min(max(fitting, self._bounces // 2), 2 * self._bounces)  # others take time too
+        most = self._most_bounces()
+        self._bounces = max(min(fitting, most), math.ceil(most * LEAST_LAUNCH))
+        loop.set_args(bounces=self._bounces)
+
+    def _most_bounces(self) -> int:
         """Bounces of a loop between two reads of the counters: some hundredths of a second."""
         info, slots = self.device.info, self.paths.slots
         return max(BATCH, CORE_BOUNCES * info.compute_units // slots) if info.is_cpu else BATCH

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,16 @@ from clpt import device
 from clpt.device.buffers import Buffers
 from clpt.render.contract.features import GROUP_WORDS, SUM_WORDS, Features
 from clpt.render.wavefront import work_list
-from clpt.render.wavefront.film_state import NO_LAYERS, SAMPLES_WORD, Words
+from clpt.render.wavefront.film_state import (
+    NO_LAYERS,
+    NO_LIGHT_LAYERS,
+    NO_MATTES,
+    SAMPLES_WORD,
+    Words,
+)
+from clpt.scene.layers import MATTE_SLOTS
+
+SIDE_BY_SIDE = ("layers", "mattes")  # whose pixels have their words together
 
 
 class Film:
@@ -50,9 +60,15 @@ class Film:
             advice += " or the number of bands"
             sums["bands"] = SUM_WORDS * self._band_sums * words
             images["band_image"] = 4 * self.band_count * pixels
-        if features.layers:
-            sums["layers"] = 4 * features.layer_words * self._padded_pixels
-        self._layer_words = features.layer_words
+        self._layer_words, self._mattes = features.layer_words, len(features.mattes)
+        self._light_sums = 3 * features.light_pictures
+        for name, count in (
+            ("layers", self._layer_words),
+            ("light_layers", SUM_WORDS * self._light_sums),
+            ("mattes", MATTE_SLOTS * self._mattes),
+        ):
+            if count:
+                sums[name] = 4 * count * self._padded_pixels
         self.sums, self._images = (
             {name: buffers.allocate(f"the {name}", size, advice) for name, size in sizes.items()}
             for sizes in (sums, images)
@@ -105,7 +121,7 @@ class Film:
     def accumulate(self, kernel: device.BoundKernel) -> cl.Event:
         """Enqueue that `picture` becomes the mean of the samples, once its readers have ended."""
         self.stream.after([e for e in self.picture.events if e is not self._written])
-        self._written = self.stream.run(kernel, self.size)
+        self._written = self.stream.run(kernel, *device.tiles(*self.size))
         device.supersede(self.picture, self._written)
         return self._written
 
@@ -117,7 +133,7 @@ class Film:
         self, kernel: device.BoundKernel, image: cl.Buffer, channels: int
     ) -> NDArray[np.float32]:
         """Return what a kernel makes in a buffer, (h, w, channels) float32; wait for it."""
-        self.stream.run(kernel, self.size)
+        self.stream.run(kernel, *device.tiles(*self.size))
         return self._read(image, channels)
 
     def bands(self, kernel: device.BoundKernel) -> NDArray[np.float32]:
@@ -134,22 +150,37 @@ class Film:
         for name, copy in self._held.items():
             self.stream.copy(copy, self.sums[name])
 
-    def words(self, *, held: bool = False) -> tuple[Words, Words, Words]:
-        """Return what the film holds, as `FilmState` has it of one film: (halves, 10 to 26, h, w)
-        uint32, of bands (halves, sums, 3, h, w), and of layers; wait for it. held: what it held at
-        `hold`."""
+    def words(self, *, held: bool = False) -> dict[str, Words]:
+        """Return what the film holds by name, as `FilmState` has it of one film: words (halves, 10
+        to 26, h, w) uint32, bands (halves, sums, 3, h, w), and `layer_words`; wait for it. held:
+        what it held at `hold`."""
         width, height = self.size
         film = self._planes("film", self.halves * self._words, held)
         bands = self._planes("bands", self.halves * SUM_WORDS * self._band_sums, held)
-        return (
-            film.reshape(self.halves, -1, height, width),
-            bands.reshape(self.halves, self._band_sums, SUM_WORDS, height, width),
-            self.layer_words(held=held),
-        )
+        return {
+            "words": film.reshape(self.halves, -1, height, width),
+            "bands": bands.reshape(self.halves, self._band_sums, SUM_WORDS, height, width),
+            **self.layer_words(held=held),
+        }
 
-    def layer_words(self, *, held: bool = False) -> Words:
-        """Return the words of the layers beside the picture, (words, h, w) uint32; wait for it."""
-        return self._planes("layers", self._layer_words, held) if self._layer_words else NO_LAYERS
+    def layer_words(self, *, held: bool = False) -> dict[str, Words]:
+        """Return the words of layers beside the picture, as `FilmState` has them; wait for it."""
+        found = {"layers": NO_LAYERS, "light_layers": NO_LIGHT_LAYERS, "mattes": NO_MATTES}
+        if self._layer_words:
+            found["layers"] = self._pixels("layers", self._layer_words, held)
+        if self._light_sums:
+            sums = self._planes("light_layers", SUM_WORDS * self._light_sums, held)
+            found["light_layers"] = sums.reshape(-1, SUM_WORDS, *sums.shape[1:])
+        if self._mattes:
+            slots = self._pixels("mattes", MATTE_SLOTS * self._mattes, held)
+            found["mattes"] = slots.reshape(self._mattes, MATTE_SLOTS, *slots.shape[1:])
+        return found
+
+    def _pixels(self, name: str, count: int, held: bool) -> Words:
+        """Return a buffer whose pixels have their words side by side as pictures, (count, h, w)."""
+        stored = np.empty((self._padded_pixels, count), np.uint32)
+        self.stream.read((self._held if held else self.sums)[name], stored)
+        return np.stack([work_list.picture(self._settings, words) for words in stored.T])
 
     def _planes(self, name: str, count: int, held: bool) -> Words:
         """Return the first streams of a buffer as pictures, (count, h, w) uint32."""
@@ -162,14 +193,16 @@ class Film:
             plane[:] = work_list.picture(self._settings, stored)
         return pixels
 
-    def set_words(self, film: Words, bands: Words, layers: Words) -> None:
+    def set_words(self, arrays: Mapping[str, Words]) -> None:
         """Enqueue that the film holds these words, of the form that `words` returns."""
-        for name, values in (("film", film), ("bands", bands), ("layers", layers)):
+        for array, values in arrays.items():
+            name = "film" if array == "words" else array
             if values.size:
                 pixels = values.reshape(-1, math.prod(self.size))
                 streams = np.zeros((len(pixels), self._padded_pixels), np.uint32)
                 streams[:, self._inside] = pixels[:, self._at]
-                self.stream.write(self.sums[name], streams)
+                stored = np.ascontiguousarray(streams.T) if name in SIDE_BY_SIDE else streams
+                self.stream.write(self.sums[name], stored)
 
     def count_samples(self, group: int) -> list[int]:
         """Return how many samples the film has in a group of words, in each half; wait for it."""

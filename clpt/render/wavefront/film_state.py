@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -15,14 +15,22 @@ from clpt.render.contract.features import GROUP_WORDS, SUM_WORDS
 SAMPLES_WORD = 3 * SUM_WORDS  # after three sums, kernels/film/film.cl
 FILM_WORDS = GROUP_WORDS  # of a pixel; one of weights and one of alpha may follow
 LEAST_WITH_LIGHT_PATHS = 2 * FILM_WORDS  # from which a pixel's last words are those of light paths
+UNIT = 2.0**-48  # of a sum, kernels/core/fixed.cl
 STRIP = 16384  # pixels whose words are added at a time
 
 Words = NDArray[np.uint32]
 Ranges = tuple[tuple[int, int], ...]
 
 
-NO_LAYERS = np.zeros((0, 1, 1), np.uint32)
-NO_LAYERS.setflags(write=False)
+def _none(*shape: int) -> Words:
+    """An array of no words."""
+    none = np.zeros((0, *shape), np.uint32)
+    none.setflags(write=False)
+    return none
+
+
+NO_LAYERS, NO_LIGHT_LAYERS, NO_MATTES = _none(1, 1), _none(SUM_WORDS, 1, 1), _none(1, 1, 1)
+DIMENSIONS = {"words": 5, "bands": 5, "layers": 3, "light_layers": 4, "mattes": 4}
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +48,9 @@ class FilmState:
     uint32, a sum for each band, then, where light paths are weighed, one of theirs for each; sums
     may be 0. taken: first and end of each range of sample
     numbers that were taken, ascending and apart. scale: of a value of 1, a power of two that
-    follows from the film's exposure. layers: (words, h, w) uint32, those beside the picture, see
-    kernels/film/layers.cl.
+    follows from the film's exposure. layers: (words, h, w) uint32, those of the first samples, see
+    kernels/film/layers.cl; light_layers: (sums, 3, h, w) uint32; mattes: (lists, slots, h, w)
+    uint32, names and how often they were met, the first ones of the scene.
     """
 
     words: Words
@@ -49,11 +58,18 @@ class FilmState:
     taken: Ranges
     scale: float = 1.0
     layers: Words = field(default_factory=lambda: NO_LAYERS)
+    light_layers: Words = field(default_factory=lambda: NO_LIGHT_LAYERS)
+    mattes: Words = field(default_factory=lambda: NO_MATTES)
 
     @property
     def arrays(self) -> dict[str, Words]:
         """All words by name."""
-        return {"words": self.words, "bands": self.bands, "layers": self.layers}
+        return {name: getattr(self, name) for name in DIMENSIONS}
+
+    @property
+    def films(self) -> tuple[dict[str, Words], ...]:
+        """All words by name, of each film."""
+        return tuple({**self.arrays, "words": words} for words in self.words)
 
     @property
     def samples(self) -> NDArray[np.uint32]:
@@ -75,8 +91,18 @@ class FilmState:
         if self.scale != other.scale:
             raise SceneError("films of another exposure cannot be merged", where="film.exposure")
         taken = join_ranges(self.taken, other.taken)
-        words, bands = add_films(self.words, other.words), add_sums(self.bands, other.bands)
-        return FilmState(words, bands, taken, self.scale, self.layers + other.layers)
+        return replace(self.plus(other), taken=taken)
+
+    def plus(self, other: FilmState) -> FilmState:
+        """Return the sums of both films, of one form, whatever samples they are of."""
+        return replace(
+            self,
+            words=add_films(self.words, other.words),
+            bands=add_sums(self.bands, other.bands),
+            layers=self.layers + other.layers,
+            light_layers=add_sums(self.light_layers, other.light_layers),
+            mattes=add_mattes(self.mattes, other.mattes),
+        )
 
 
 def add_films(a: Words, b: Words) -> Words:
@@ -106,6 +132,33 @@ def add_sums(a: Words, b: Words) -> Words:
         np.add(a[rows], b[rows], out=total[rows])
         _carry(total[rows], a[rows])
     return total
+
+
+def add_mattes(a: Words, b: Words) -> Words:
+    """Return the lists of names, (..., slots, h, w) each, of two films: see matte_add in
+    kernels/film/layers.cl."""
+    total = np.empty_like(a)
+    for rows in _strips(a):
+        both = np.concatenate([a[rows], b[rows]], axis=-3)
+        both -= 1  # so that no name, which is 0, comes last
+        both.sort(axis=-3)
+        both += 1
+        first, second = both[..., :-1, :, :], both[..., 1:, :, :]
+        same = (first >> 7 == second >> 7) & (first > 0)
+        first += np.where(same, second & 127, 0).astype(np.uint32)
+        second[same] = 0
+        both -= 1
+        both.sort(axis=-3)
+        both += 1
+        total[rows] = both[..., : a.shape[-3], :, :]
+    return total
+
+
+def numbers(sums: Words) -> NDArray[np.float32]:
+    """Return sums as the nearest floats: three words (3, ...), the lowest first."""
+    low, middle, high = sums
+    top = (high.astype(np.int64) << 32) | middle
+    return ((top * 2.0**32 + low) * UNIT).astype(np.float32)
 
 
 def _strips(words: Words) -> Iterator[tuple[Any, ...]]:

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.render.wavefront.noise_meter import NoiseMeter, Values, divide
-from clpt.render.wavefront.tracer import Tracer
+from clpt.render.wavefront.tracer import Selection, Tracer
 from clpt.render.wavefront.work_list import FOREVER
 
 GUIDES = 4  # light paths for each that is a guide
@@ -41,6 +41,7 @@ class LightRounds:
     def __init__(self, meter: NoiseMeter, tracer: Tracer):
         self.wavefront, self.meter, self._tracer = meter.wavefront, meter, tracer
         self.next = 0
+        self._pixels = int(meter.pixels.sum())
         self.stop = np.full(2, FOREVER)
         self.variance = np.zeros(len(meter.pixels))
         self._measured_at = np.zeros(2, np.int64)  # samples when each colour was measured last
@@ -95,7 +96,7 @@ class LightRounds:
         if first >= end:
             return True
         self.next = end
-        return self._tracer.from_lights(self.meter.inside, first, end, on_batch)
+        return self._tracer.add(Selection("lights", self._pixels), first, end, on_batch)
 
     def measure(self, look: int, on_batch: Callable[[Any], bool]) -> bool:
         """Estimate the variance by guides, at a look after some number of samples.
@@ -107,8 +108,8 @@ class LightRounds:
         first, end = self._guides, look // GUIDES
         wavefront.film.set_group(wavefront.light_group, self._sums if first else None)
         start = math.ceil(GUIDE_NUMBERS / loop.per_sample)
-        guides = start + first, start + end
-        if not self._tracer.guides(self.meter.inside, *guides, on_batch):
+        guides = Selection("guides", self._pixels)
+        if not self._tracer.add(guides, start + first, start + end, on_batch):
             return False
         self._tracer.gather()
         self._guides = end

@@ -1,7 +1,4 @@
-"""Cells of a film, and how much noise each has.
-
-The film is cut into squares, and their pixels into the two colours of a chessboard: two cells.
-"""
+"""How much noise each cell of a film has; see clpt.render.wavefront.cells."""
 
 from __future__ import annotations
 
@@ -12,36 +9,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.render.codegen import programs
-from clpt.render.wavefront import work_list
+from clpt.render.wavefront.cells import SIDE
 from clpt.render.wavefront.wavefront import Wavefront
 
-SIDE = 16  # pixels of a square's side, a multiple of four
 DARK = 0.01  # of the picture's mean luminance: a darker tile counts as if it were as bright
 
-Cells = NDArray[np.int64]
 Values = NDArray[np.float64]
 
 
 class NoiseMeter:
     """Tells the variance of a wavefront's film since it was measured last, cell by cell.
 
-    Cells are (2 * squares,): a square's two colours after each other.
-
-    across: squares in a row; inside: the pixels of the picture, see `work_list.inside`; cell:
-    (padded_pixels,) of each pixel; pixels: (cells,) how many each has.
+    pixels: (cells,) how many each has; cell: (padded_pixels,) of each pixel.
     """
 
     def __init__(self, wavefront: Wavefront):
         self.wavefront = wavefront
-        settings = wavefront.paths.settings
-        x, y = work_list.pixels(settings)
-        self.inside = work_list.inside(settings)
-        self.across, down = (-(-int(settings[name]) // SIDE) for name in ("width", "height"))
-        self.cell: Cells = 2 * (y // SIDE * self.across + x // SIDE) + (x + y) % 2
-        count = 2 * self.across * down
-        self.pixels: Cells = np.bincount(self.cell[self.inside], minlength=count)
+        grid = wavefront.paths.cells
+        self.across, self.cell, self.pixels = grid.across, grid.cell, grid.pixels
         self._dark: Values | None = None  # luminance, for each of the two colours
-        self._allocate(int(settings["padded_pixels"]), count)
+        self._allocate(len(self.cell), len(self.pixels))
 
     def _allocate(self, padded_pixels: int, count: int) -> None:
         """Make the buffers and the kernel that measures noise."""

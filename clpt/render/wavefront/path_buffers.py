@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from clpt.device.buffers import Buffers
 from clpt.errors import MemoryBudgetError
 from clpt.records import PATH, SLABS
 from clpt.render.wavefront import queues, work_list
+from clpt.render.wavefront.cells import CellGrid
 
 COUNTERS = ("done", "samples", "closest", "shadow", "rejected", "full")  # kernels/film/film.cl
 PADDING = 80  # words between streams: powers of two collide in a cache
@@ -145,6 +147,11 @@ class PathBuffers:
     def arguments(self) -> dict[str, Any]:
         """The kernels' arguments by name."""
         return {**self._fixed, **self.queue}
+
+    @cached_property
+    def cells(self) -> CellGrid:
+        """The cells of the film."""
+        return CellGrid(self.settings)
 
     def new_queue(self, queued: bool, kinds: int) -> dict[str, Any]:
         """Return what the kernels take that queue slots by material, with new buffers."""

@@ -21,11 +21,12 @@ SHARE = 512  # slots of a work-item of the loop on a CPU, which fit into the sec
 class Tuning:
     """What the caller wants of a `Strategy`; None for what suits the device and the scene.
 
-    Members are those of `Strategy`.
+    Members are those of `Strategy`; cancel_seconds: in which a run is to end that is stopped [s].
     """
 
     layout: str | None = None
     queued: bool | None = None
+    cancel_seconds: float | None = None
 
 
 @dataclass(frozen=True)

@@ -1,43 +1,76 @@
-"""How adaptive sampling adds samples to a film: by the film's own wavefront, or with the help of
-other devices, whose films are added to it.
+"""Which samples adaptive sampling adds to a film, and who does so: the film's own wavefront, or
+other devices and machines, whose films are added to it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Literal
 
+from clpt.render.wavefront.cells import Cells
 from clpt.render.wavefront.wavefront import Wavefront
-from clpt.render.wavefront.work_list import PixelIndices
 
 OnBatch = Callable[[Any], bool]
+# Of all kinds and pixels, see `Wavefront.render_samples`; or of one kind: those of the camera,
+# those of lights, and those of lights that leave the picture as it is.
+Paths = Literal["all", "camera", "lights", "guides"]
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """Samples that any wavefront of a scene may add to its film, number by number.
+
+    pixels: how many have these samples. ends: (cells,) the sample before which the pixels of each
+    cell are left, 0 for a cell that has none; None: all pixels have all of them.
+    """
+
+    paths: Paths
+    pixels: int
+    ends: Cells | None = None
+
+    def prepare(self, wavefront: Wavefront) -> None:
+        """Enqueue that the wavefront samples these pixels, until `use_all_pixels`."""
+        if self.paths == "all":
+            return
+        grid = wavefront.paths.cells
+        if self.ends is None:
+            wavefront.paths.set_work_list(grid.inside)
+            return
+        ends = self.ends[grid.cell[grid.inside]]
+        chosen = ends > 0
+        wavefront.paths.set_work_list(grid.inside[chosen], ends[chosen])
+
+    def add(self, wavefront: Wavefront, first: int, end: int, on_batch: OnBatch) -> bool:
+        """Add samples first to end - 1, after `prepare`; return whether it was not stopped.
+
+        on_batch: see `Wavefront.render_samples`.
+        """
+        render = {
+            "all": wavefront.render_samples, "camera": wavefront.render_from_camera,
+            "lights": wavefront.render_from_lights, "guides": wavefront.trace_from_lights,
+        }[self.paths]  # fmt: skip
+        return render(first, end, on_batch)
+
+
+def use_all_pixels(wavefront: Wavefront) -> None:
+    """Enqueue that later renders sample every pixel of the picture."""
+    wavefront.paths.set_work_list(wavefront.paths.cells.inside)
 
 
 class Tracer:
-    """Adds samples to a wavefront's film; each method returns whether it was not stopped.
-
-    on_batch: see `Wavefront.render_samples`. Pixels are numbered as in a work list.
-    """
+    """Adds samples to a wavefront's film."""
 
     def __init__(self, wavefront: Wavefront):
         self.wavefront = wavefront
+        self._prepared: Selection | None = None
 
-    def from_camera(
-        self, pixels: PixelIndices, ends: PixelIndices, first: int, end: int, on_batch: OnBatch
-    ) -> bool:
-        """Add samples first to end - 1 of these pixels, of each before its own of `ends`."""
-        self.wavefront.paths.set_work_list(pixels, ends)
-        return self.wavefront.render_from_camera(first, end, on_batch)
-
-    def from_lights(self, pixels: PixelIndices, first: int, end: int, on_batch: OnBatch) -> bool:
-        """Add the light paths of samples first to end - 1; pixels: all of the picture."""
-        self.wavefront.paths.set_work_list(pixels)
-        return self.wavefront.render_from_lights(first, end, on_batch)
-
-    def guides(self, pixels: PixelIndices, first: int, end: int, on_batch: OnBatch) -> bool:
-        """As `from_lights`, and leave the film's picture as it is."""
-        self.wavefront.paths.set_work_list(pixels)
-        return self.wavefront.trace_from_lights(first, end, on_batch)
+    def add(self, selection: Selection, first: int, end: int, on_batch: OnBatch) -> bool:
+        """Add samples first to end - 1 of a selection; return whether it was not stopped."""
+        if selection is not self._prepared:
+            selection.prepare(self.wavefront)
+        self._prepared = selection
+        return selection.add(self.wavefront, first, end, on_batch)
 
     def gather(self) -> None:
         """Let the film hold all that was added so far."""
@@ -45,6 +78,7 @@ class Tracer:
     def discard(self) -> None:
         """Forget what was added since `gather`."""
 
-    def use_all_pixels(self, pixels: PixelIndices) -> None:
-        """Let later renders sample every pixel; pixels: all of the picture."""
-        self.wavefront.paths.set_work_list(pixels)
+    def use_all_pixels(self) -> None:
+        """Let later renders sample every pixel."""
+        self._prepared = None
+        use_all_pixels(self.wavefront)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -97,9 +97,12 @@ class Wavefront:
         )  # fmt: skip
         own_features = functools.partial(_features_of, channel)
         self.loops = [
-            BounceLoop(self.kernels, scene, paths, self.timings, looped, own_features, which)
+            BounceLoop(
+                self.kernels, scene, paths, self.timings, looped, own_features, which,
+                tuning.cancel_seconds,
+            )
             for which in range(len(features.passes))
-        ]
+        ]  # fmt: skip
         self._trainer = self.loops.pop(0) if guide else None  # of the guide
         self._bind_film()
         self.clear()
@@ -116,6 +119,7 @@ class Wavefront:
         looped: bool | None = None,
         tree_quality: bvh.Quality = "high",
         halves: bool = False,
+        cancel_seconds: float | None = None,
     ) -> Wavefront:
         """Return a wavefront of a lowered scene, which others may render too.
 
@@ -123,11 +127,12 @@ class Wavefront:
         queued: whether slots are queued by material before they are shaded; looped: whether a
         kernel on the device runs all bounces. Each is chosen to suit the device and the scene where
         it is None. tree_quality: see clpt.bvh.build; halves: whether even and odd samples are kept
-        apart.
+        apart, as they are for the layer `variance`. cancel_seconds: in which `render_samples` is to
+        end that is stopped [s].
 
         Raises as `Wavefront` does, SceneError for a layout that cannot hold the scene.
         """
-        tuning = Tuning(layout, queued)
+        tuning = Tuning(layout, queued, cancel_seconds)
         chosen = strategy.choose(on, lowered, tuning)
         if looped is None:
             looped = strategy.use_loop(on)
@@ -140,6 +145,7 @@ class Wavefront:
         settings, kinds = lowered.settings, len(lowered.features.materials)
         padded_pixels = int(settings["padded_pixels"])
         footprint = lowered.features.footprint_words
+        halves = halves or "variance" in lowered.features.layers
         divided = divide_film(
             on.info, padded_pixels, buffers.limit, slots, looped, halves, footprint
         )
@@ -324,9 +330,10 @@ class Wavefront:
         self._accumulate_bands.set_args(**self._samples(0, self.film.halves))
         return self.film.bands(self._accumulate_bands)
 
-    def set_words(self, film: Words, bands: Words, layers: Words) -> None:
+    def set_words(self, arrays: Mapping[str, Words]) -> None:
         """Enqueue that the film holds these words, of the form that `Film.words` returns."""
-        self.film.set_words(film, bands, layers)
+        self.film.set_words(arrays)
+        film = arrays["words"]
         count = SAMPLES_WORD + (self.light_group if self.has_light_paths else 0)
         self._paths = [int(half[count].sum(dtype=np.uint64)) for half in film]
         self.accumulate_film()

@@ -136,7 +136,7 @@ function spectrum(parameter, names, change) {
       }
     }
   }
-  if (curve && form !== "curve") parts.push(sparkline(curve));
+  if (curve && form !== "curve" && curve.some((v) => v !== curve[0])) parts.push(sparkline(curve));
   return { parts, below };
 }
 

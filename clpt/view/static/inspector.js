@@ -7,8 +7,9 @@ const SAMPLE = Object.assign(document.createElement("canvas"), { width: 1, heigh
 const REST_MS = 140; // the cursor rests before a spectrum is asked for
 
 export class Inspector {
-  constructor(pane, picture, connection, steering) {
-    Object.assign(this, { pane, picture, connection });
+  // edit: opens the panel of a material, where there are panels.
+  constructor(pane, picture, connection, steering, edit = null) {
+    Object.assign(this, { pane, picture, connection, edit });
     this.at = this.held = this.compared = null;
     this.found = {};
     steering.addEventListener("hover", ({ detail }) => this.hover(detail));
@@ -46,6 +47,7 @@ export class Inspector {
 
   ask() {
     if (!this.at) return;
+    this.found = { value: this.found.value, spectrum: this.found.spectrum };
     this.connection.send("inspect", this.at);
   }
 
@@ -54,12 +56,13 @@ export class Inspector {
     if (!this.at || !this.visible) return;
     const samples = this.picture.header.samples;
     if (samples < (this.seen ?? 0) || this.picture.header.rest) this.ask();
+    else if (this.picture.header.divider === 1) this.connection.send("value", this.at);
     this.seen = samples;
   }
 
   take(type, detail) {
     if (!this.at || detail.x !== this.at.x || detail.y !== this.at.y) return;
-    if (type === "value") this.found = { value: detail, spectrum: this.found.spectrum };
+    if (type === "value") this.found = { ...this.found, value: detail };
     this.found[type] = detail;
     this.draw();
   }
@@ -87,7 +90,10 @@ export class Inspector {
       if (hit.shape === null) add("shows", "nothing");
       else {
         add("shows", `${hit.object?.name ?? "shape"} (${hit.shape}), part ${hit.primitive}`);
-        if (hit.object?.made_of) add("material", hit.object.made_of.replaceAll("_", " "));
+        const { made_of: material, material: panel = null } = hit.object ?? {};
+        const name = material?.replaceAll("_", " ");
+        if (name && this.edit && panel !== null) add("material", h("button", { class: "link", title: "its panel", onclick: () => this.edit(panel) }, name));
+        else if (name) add("material", name);
         add("depth", `${short(hit.depth)} m`);
         add("position", hit.position.map((v) => short(v)).join("  "));
         add("normal", hit.shading_normal.map((v) => short(v, 3)).join("  "));

@@ -1,17 +1,17 @@
 // The page: it wires the socket, the picture, the steering and the side together.
 
-import { Connection } from "./connection.js";
 import { clock, h } from "./dom.js";
 import { Inspector } from "./inspector.js";
 import { Tabs, renderPane, scenePane, viewPane } from "./panes.js";
 import { Picture } from "./picture.js";
+import { Socket } from "./socket.js";
 import { GESTURES, Steering } from "./steering.js";
 
 history.replaceState(null, "", "/"); // the token is used up; nobody need see it
 
 const $ = (id) => document.getElementById(id);
-const connection = new Connection();
-const picture = new Picture($("picture"), $("overlay"), connection);
+const connection = new Socket();
+const picture = new Picture($("picture"), $("overlay"), connection, $("stage"));
 const open = new Set(["camera", "material"]);
 const figures = { frames: 0, perSecond: 0, times: [] };
 let state = null;
@@ -48,16 +48,18 @@ const actions = [
   { keys: ["-"], text: "darker by a third of a stop", run: () => expose(-1 / 3) },
   { keys: ["0"], text: "exposure 0", run: () => expose(-display.exposure) },
   { keys: ["t"], text: "the next tone curve", run: nextTone },
+  { keys: ["m"], text: "the next map or layer in the place of the picture", run: nextMap, button: "maps" },
   { keys: ["1"], text: "one pixel for one of the screen, or all of the picture", run: () => { picture.actual = !picture.actual; $("stage").classList.toggle("actual", picture.actual); picture.fit(); } },
   { keys: ["g"], text: "save a .png", run: () => connection.send("save", { what: "png" }), button: "save" },
+  { keys: ["y"], text: "copy the view as text; paste it, or drop its file, to open it", run: () => connection.send("copy_view") },
   { keys: ["i"], text: "an address for another viewer", run: () => connection.send("invite") },
   { keys: ["Escape"], text: "leave a tool", run: () => { if (steering.tool) steering.choose(steering.tool); } },
   { keys: ["?"], text: "these keys", run: help, button: "keys" },
 ];
-const steering = new Steering(picture, connection, actions);
+const steering = new Steering(picture, connection, actions, window);
 
 const tabs = new Tabs($("tabs"), $("panes"), [["pixel", "Pixel"], ["view", "View"], ["scene", "Scene"], ["render", "Render"]]);
-const inspector = new Inspector(tabs.panes.pixel, picture, connection, steering);
+const inspector = new Inspector(tabs.panes.pixel, picture, connection, steering, editMaterial);
 tabs.onopen = (name) => {
   if (name === "render") connection.send("statistics");
   draw(name);
@@ -77,6 +79,14 @@ function draw(name = tabs.current) {
   if (name === "scene") pane.replaceChildren(...scenePane(state, connection, open));
   if (name === "render") pane.replaceChildren(...renderPane(state, connection, figures));
   $("panes").scrollTop = top;
+}
+
+// Open the panel of a material, and show it.
+function editMaterial(index) {
+  const key = `material.${index}`;
+  for (const one of ["material", key]) open.add(one);
+  tabs.open("scene");
+  tabs.panes.scene.querySelector(`[data-key="${key}"]`)?.scrollIntoView({ block: "start" });
 }
 
 function region() {
@@ -117,6 +127,22 @@ function nextTone() {
   display.set({ tone: tones[(tones.indexOf(display.tone) + 1) % tones.length] });
   note(`tone curve: ${display.tone}`);
   draw();
+}
+
+// What the colours of a map mean, below it.
+function legend({ legend: told }) {
+  const [low, bar, high] = $("legend").children;
+  $("legend").hidden = !told;
+  if (!told) return;
+  [low.textContent, high.textContent] = [told.low, told.high];
+  bar.style.background = `linear-gradient(90deg, ${told.colours.join(", ")})`;
+}
+
+function nextMap() {
+  const { maps } = state.names;
+  const name = maps[(maps.indexOf(state.look.shows) + 1) % maps.length];
+  connection.send("shows", { name });
+  note(name.replaceAll("_", " "));
 }
 
 function help() {
@@ -168,7 +194,7 @@ connection.addEventListener("status", ({ detail }) => {
   }
   const share = detail.spp ? Math.min(1, detail.samples / detail.spp) : 0;
   $("progress").firstElementChild.style.width = `${100 * share}%`;
-  $("phase").textContent = detail.phase === "moving" ? "moving" : `${detail.phase}  ${detail.samples}/${detail.spp}  ${clock(detail.seconds)}`;
+  $("phase").textContent = detail.phase === "moving" ? "moving" : `${detail.phase}  ${Math.floor(detail.samples)}/${detail.spp}  ${clock(detail.seconds)}`;
   if (tabs.current === "render" && !tabs.panes.render.contains(document.activeElement)) draw("render");
 });
 
@@ -179,6 +205,7 @@ picture.addEventListener("shown", ({ detail }) => {
   const span = figures.times.at(-1) - figures.times[0];
   figures.perSecond = span ? ((figures.times.length - 1) / span) * 1000 : 0;
   document.body.classList.add("shows");
+  legend(detail);
 });
 
 connection.addEventListener("wheel", ({ detail }) => {
@@ -195,14 +222,8 @@ connection.addEventListener("wheel", ({ detail }) => {
 connection.addEventListener("statistics", ({ detail }) => { figures.statistics = detail; if (tabs.current === "render") draw(); });
 connection.addEventListener("saved", ({ detail }) => note(`saved ${detail.name}`));
 connection.addEventListener("pivot", () => note("The pivot is there."));
-connection.addEventListener("invitation", async ({ detail }) => {
-  try {
-    await navigator.clipboard.writeText(detail.address);
-    note("An address for one more viewer is in the clipboard.");
-  } catch {
-    note(detail.address);
-  }
-});
+connection.addEventListener("invitation", ({ detail }) => copy(detail.address, "An address for one more viewer is in the clipboard."));
+connection.addEventListener("view", ({ detail }) => copy(JSON.stringify(detail.view), "The view is in the clipboard; paste it here to come back."));
 connection.addEventListener("error", ({ detail }) => note(detail.text, "error"));
 connection.addEventListener("note", ({ detail }) => note(detail.text));
 connection.addEventListener("closed", ({ detail }) => {
@@ -210,6 +231,36 @@ connection.addEventListener("closed", ({ detail }) => {
   document.body.classList.add("away");
 });
 connection.addEventListener("open", () => { document.body.classList.remove("away"); picture.latest = 0; });
+
+async function copy(text, told) {
+  try {
+    await navigator.clipboard.writeText(text);
+    note(told);
+  } catch {
+    note(text);
+  }
+}
+
+// A view that was copied or saved: its text.
+function openView(text) {
+  let view;
+  try {
+    view = JSON.parse(text);
+  } catch {
+    view = null;
+  }
+  if (view?.camera) connection.send("open_view", { camera: view.camera, exposure: 0, tone: "none", ...view.display });
+  else note("That is no view.", "error");
+}
+window.addEventListener("paste", (event) => {
+  if (!event.target.closest?.("input, select, textarea")) openView(event.clipboardData.getData("text"));
+});
+window.addEventListener("dragover", (event) => event.preventDefault());
+window.addEventListener("drop", async (event) => {
+  event.preventDefault();
+  const [file] = event.dataTransfer.files;
+  if (file) openView(await file.text());
+});
 
 // The picture has an outline only where Tab has led to it.
 window.addEventListener("keydown", ({ key }) => { if (key === "Tab") document.body.classList.add("tabs"); });

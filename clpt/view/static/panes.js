@@ -42,14 +42,15 @@ export function section(title, open, ...children) {
 
 // How the picture is shown, and under which light.
 export function viewPane(state, connection, display) {
+  const { look } = state;
   const film = state.panels.find(({ target }) => target === "film");
   const send = (key, value) => connection.set("edit", { target: "film", index: 0, key, value }, `film.${key}`);
   const filmRow = (key) => parameterRow(film.parameters.find((one) => one.key === key), state.names, (value) => send(key, value));
-  const { look } = state;
   const [low, high] = state.lambdas;
   const wavelength = (nm, width = look.width) => connection.set("wavelength", { nm, width });
   const parts = [
     section("Display", true,
+      row("show", "the picture; how many samples each pixel has; how far it may be from the right value; or a layer of the film", choice(state.names.maps, look.shows, (name) => connection.send("shows", { name }), "show")),
       row("exposure", "brightness of the screen, in stops; the file is not changed", number(display.exposure, { low: -8, high: 8, label: "exposure" }, (v) => display.set({ exposure: v })), h("i", { class: "unit" }, "EV")),
       row("tone", "how brightness beyond the screen's is treated", choice(state.names.tones, display.tone, (v) => display.set({ tone: v }), "tone curve")),
       filmRow("white_balance"), filmRow("sensor")),

@@ -1,11 +1,13 @@
 // The picture on plain 2D canvases: frames of any size are drawn to the film's; beside it a kept one.
 
 export class Picture extends EventTarget {
-  constructor(canvas, overlay, connection) {
+  // room: the element that it fits into.
+  constructor(canvas, overlay, connection, room) {
     super();
     this.canvas = canvas;
     this.overlay = overlay;
     this.connection = connection;
+    this.room = room;
     this.film = [1, 1];
     this.latest = 0;
     this.actual = false; // one pixel of the film for one of the screen
@@ -16,7 +18,7 @@ export class Picture extends EventTarget {
     this.now = document.createElement("canvas"); // the newest frame, in the film's size
     this.kept = null;
     connection.addEventListener("frame", ({ detail }) => this.show(detail));
-    new ResizeObserver(() => this.fit()).observe(canvas.closest("main"));
+    new ResizeObserver(() => this.fit()).observe(room);
   }
 
   async show({ header, file }) {
@@ -111,7 +113,7 @@ export class Picture extends EventTarget {
   }
 
   fit() {
-    const box = this.canvas.closest("main").getBoundingClientRect();
+    const box = this.room.getBoundingClientRect();
     const fitting = Math.min(box.width / this.film[0], box.height / this.film[1]);
     const scale = this.actual ? 1 / (window.devicePixelRatio || 1) : fitting;
     for (const one of [this.canvas, this.overlay]) {

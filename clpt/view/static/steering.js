@@ -18,7 +18,8 @@ export const GESTURES = [
 ];
 
 export class Steering extends EventTarget {
-  constructor(picture, connection, actions) {
+  // keys: what keys are heard of, the window or an element that may have the focus.
+  constructor(picture, connection, actions, keys) {
     super();
     Object.assign(this, { picture, connection, actions });
     this.tool = null; // what the next click does: pivot, focus, hide, region
@@ -32,9 +33,9 @@ export class Steering extends EventTarget {
     canvas.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
     canvas.addEventListener("contextmenu", (event) => event.preventDefault());
     canvas.addEventListener("dblclick", (event) => this.pick("pick", event));
-    window.addEventListener("keydown", (event) => this.key(event));
-    window.addEventListener("keyup", ({ code }) => this.pressed.delete(code));
-    window.addEventListener("blur", () => this.pressed.clear());
+    keys.addEventListener("keydown", (event) => this.key(event));
+    keys.addEventListener("keyup", ({ code }) => this.pressed.delete(code));
+    keys.addEventListener("blur", () => this.pressed.clear());
   }
 
   emit(name, detail) {
@@ -147,6 +148,7 @@ export class Steering extends EventTarget {
     const sliding = event.target.closest?.("input, button, summary, [role=tab]");
     if ((FLY[event.code] && !event.shiftKey) || (TURN[event.code] && !sliding)) {
       event.preventDefault();
+      event.stopPropagation();
       if (!this.pressed.size) this.last = performance.now();
       this.pressed.add(event.code);
       this.glide();

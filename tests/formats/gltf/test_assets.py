@@ -43,7 +43,7 @@ def test_many_copies_are_instances(assets):
 
 def test_cameras_and_lights(assets):
     found = summary(load(assets / "gltf" / "derived-extension-grid" / "extension_grid.glb"))
-    assert found["cameras"] == ["perspective", "orthographic"]
+    assert found["cameras"] == ["perspective cam", "orthographic ortho"]
     assert found["lights"] == {"area": 1, "directional": 1, "point": 1, "spot": 1}
     assert (found["film"]["width"], found["film"]["height"]) == (768, 576)
 

@@ -234,7 +234,7 @@ def test_cameras(read, build):
     assert np.allclose(scene.camera.to_world @ [0, 0, 1, 1], [0, 0, 2, 1])  # looks along -z
     assert np.allclose(scene.camera.to_world @ [1, 0, 0, 0], [-1, 0, 0, 0])
     assert scene.film.width * 2 == scene.film.height
-    assert scene.extra["cameras"] == ["perspective", "orthographic"]
+    assert scene.extra["cameras"] == ["perspective", "orthographic above"]
     other = read(made, camera="above")
     assert isinstance(other.camera, cameras.Orthographic)
     assert np.allclose(np.abs(other.camera.to_world[0, 0]), 4.0)

@@ -569,10 +569,15 @@ ERRORS = {
     '<integrator type="path"><boolean name="hide_emitters" value="1"/></integrator>': "true or",
     '<integrator type="path"><integer name="rr_depth" value="1"/>'
     '<integer name="rr_depth" value="2"/></integrator>': "given twice",
-    '<shape type="cube"><medium type="homogeneous" name="interior"/></shape>':
-        "<medium type=.homogeneous.>: is not supported",
-    '<medium type="homogeneous" id="m"/><shape type="cube"><ref name="interior" id="m"/></shape>':
-        "<ref name=.interior.>: is not supported",
+    '<shape type="cube"><medium type="homogenous" name="interior"/></shape>':
+        "<medium type=.homogenous.>: .*did you mean 'homogeneous'",
+    '<shape type="cube"><medium type="homogeneous" name="inside"/></shape>': "cannot stand in",
+    '<phase type="hg" id="m"/><shape type="cube"><ref name="interior" id="m"/></shape>':
+        "<ref name=.interior.>: .*must be a <medium>",
+    '<shape type="cube"><medium type="homogeneous" name="interior"><float name="albedo" value="2"/>'
+    '</medium></shape>': "<medium type=.homogeneous.>: homogeneous.albedo: 2",
+    '<shape type="cube"><medium type="homogeneous" name="interior"><phase type="hg">'
+    '<float name="g" value="1.5"/></phase></medium></shape>': "<phase type=.hg.>: .*outside",
     '<alias id="no" as="a"/>': "no object with the id 'no'",
     '<bsdf type="null" id="a"/><alias id="a" as="a"/>': "already used",
     '<shape type="cube"><bsdf type="normalmap"><texture type="checkerboard" name="normalmap"/>'

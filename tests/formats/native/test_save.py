@@ -14,7 +14,17 @@ import pytest
 import clpt
 from clpt import device, spectra
 from clpt.errors import SceneError
-from clpt.scene import KINDS, Scene, cameras, integrators, lights, materials, shapes, textures
+from clpt.scene import (
+    KINDS,
+    Scene,
+    cameras,
+    integrators,
+    lights,
+    materials,
+    media,
+    shapes,
+    textures,
+)
 from clpt.scene.params import Kind, Param, defaults, params
 from clpt.spectra import reradiation
 
@@ -59,6 +69,8 @@ VALUES: dict[str, Any] = {
     "texture": textures.Bitmap(image=TEXELS),
     "filter": integrators.Tent(radius=1.5),
     "area_light": lights.Area(radiance=3.0),
+    "medium": media.Homogeneous(sigma_s=2.0, phase=media.HenyeyGreenstein(g=0.4), name="fog"),
+    "phase": media.Rayleigh(),
     "crop": (1, 2, 3, 4),
     "sensor": SENSOR,
     "white_balance": (0.3, 0.35),

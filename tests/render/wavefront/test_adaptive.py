@@ -18,8 +18,8 @@ from clpt.device import Device, choose
 from clpt.errors import SceneError
 from clpt.render.lowering.scene import lower
 from clpt.render.wavefront.adaptive import LEAST, _partners, checked
+from clpt.render.wavefront.cells import SIDE
 from clpt.render.wavefront.light_rounds import LightRounds
-from clpt.render.wavefront.noise_meter import SIDE
 from clpt.render.wavefront.work_list import FOREVER, inside, pixels, table
 from clpt.scene import Film, Scene, materials
 from clpt.scene.cameras import Perspective

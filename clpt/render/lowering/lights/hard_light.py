@@ -67,6 +67,8 @@ def decided(
         keeps = isinstance(former, Vcm) and isinstance(given, Auto)
         chosen = former if keeps else Path(light_paths=getattr(former, "light_paths", 0))
         reason = "as before the scene was edited"
+    if index.light_layers:
+        chosen, reason = Path(light_paths=0), "layers of light are of paths from the camera"
     if getattr(given, "guiding", False):
         chosen, reason = Path(light_paths=0, guiding=True), "directions are guided"
     own = {name: getattr(given, name) for name in ("max_depth", "rr_depth", "hide_lights")}
@@ -79,6 +81,8 @@ def _choice(
 ) -> tuple[Integrator, str]:
     """The integrator but for its depths, and why; what is cheap to know is asked first."""
     scene, without = index.scene, Path(light_paths=0)
+    if index.media:
+        return without, "light paths do not go through media"
     if not cameras.is_connected(scene.camera, scene.film.mode):
         return without, "points cannot be joined to this camera"
     if 0 <= scene.integrator.max_depth < FEWEST:  # type: ignore[attr-defined]

@@ -17,7 +17,9 @@ from clpt.render.lowering.geometry import shapes
 from clpt.render.lowering.index import any_of
 from clpt.render.lowering.materials.normal_maps import NormalPerturbation
 from clpt.scene import materials as mt
+from clpt.scene.media import Phase
 from clpt.scene.params import device_params
+from clpt.scene.scatterer import Scatterer
 from clpt.scene.shapes import Shape
 from clpt.spectra import Constant
 
@@ -50,9 +52,7 @@ class MaterialWords:
     some let light through; mixture_depth: how deep masks and blends nest.
     """
 
-    def __init__(
-        self, encoder: Encoder, leaves: tuple[type[mt.Material], ...], normal_mapped: bool
-    ):
+    def __init__(self, encoder: Encoder, leaves: tuple[type[Scatterer], ...], normal_mapped: bool):
         self._encoder, self._leaves, self._normal_mapped = encoder, leaves, normal_mapped
         self._words: dict[tuple[int, tuple[Any, ...]], int] = {}
         self._depths: dict[int, int] = {}  # of mixtures, by their words
@@ -74,6 +74,11 @@ class MaterialWords:
         front = self._word(shape.material, _Side(front=True, two_sided=two_sided))
         back = self._word(shape.material, _Side(front=False, two_sided=two_sided))
         return front, back, two_sided
+
+    def phase(self, phase: Phase) -> int:
+        """Return the word of a phase function, which is found as the material of a side is."""
+        self.transmitting.add(phase.kind)
+        return self._leaf(phase, _Side(front=True, two_sided=False))
 
     def _word(self, material: Any, side: _Side) -> int:
         """The word of a material on a side; the same pair has the same word."""

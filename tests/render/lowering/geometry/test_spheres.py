@@ -171,6 +171,7 @@ def test_an_instance_must_not_stretch_them() -> None:
         lower(Scene(camera=SCENE.camera, shapes=[placed]))
 
 
+@pytest.mark.slow
 def test_they_move_on_the_device(monkeypatch: pytest.MonkeyPatch) -> None:
     """After a move the picture is that of a new renderer; nothing is read, nothing waited for."""
     before, after = (RNG.normal(size=(300, 3)).astype(np.float32) for _ in range(2))

@@ -1,0 +1,294 @@
+"""The film of a cluster on the client: added up, saved, gone on with, made to pictures."""
+
+from __future__ import annotations
+
+import datetime
+import logging
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import device as dev
+from clpt.cluster.cluster_noise import FarmTracer
+from clpt.errors import ClusterError, SceneError
+from clpt.render.film_keeping import FilmKeeping
+from clpt.render.pictures import Image
+from clpt.render.renderer import Renderer
+from clpt.render.saved_film import (
+    Origin,
+    PictureForm,
+    SavedFilm,
+    Session,
+    classes_text,
+    other_devices,
+)
+from clpt.render.wavefront.adaptive import Adaptive
+from clpt.render.wavefront.film_state import FilmState, Ranges
+from clpt.render.wavefront.tracer import OnBatch, Selection
+from clpt.render.wavefront.wavefront import Counts
+from clpt.scene import Scene
+from clpt.scene.fingerprint import Plain
+from clpt.spectral_exr import SpectralImage
+from clpt.version import VERSION
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False)
+class FilmSum:
+    """Films that were added up, None before there is one, and what happened for all of them."""
+
+    film: FilmState | None = None
+    totals: Mapping[str, int] = field(
+        default_factory=lambda: dict.fromkeys(("samples", "rays", "rejected", "full"), 0)
+    )
+
+    def plus(self, state: FilmState, counts: Mapping[str, int] | None = None) -> FilmSum:
+        """Return the sum with one film more."""
+        film = state if self.film is None else self.film.merged(state)
+        return FilmSum(film, self.counting(counts or {}).totals)
+
+    def counting(self, counts: Mapping[str, int]) -> FilmSum:
+        """Return the same film, for which more has happened."""
+        return FilmSum(
+            self.film, {name: n + counts.get(name, 0) for name, n in self.totals.items()}
+        )
+
+    @property
+    def taken(self) -> Ranges:
+        return () if self.film is None else self.film.taken
+
+    def counts(self, films: int) -> Counts:
+        """The share of one of so many films."""
+        samples, rays, rejected, full = (value // films for value in self.totals.values())
+        return Counts(samples=samples, closest=rays, rejected=rejected, full=full)
+
+
+class ClusterFilm(FilmKeeping):
+    """Base of a renderer whose samples come from elsewhere.
+
+    device: where pictures are made, and noise is measured; options: of the renderer that does so.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        device: dev.Device | str | int | None,
+        first_sample: int,
+        options: Mapping[str, Any],
+    ):
+        self.scene = scene
+        self.warnings: list[str] = []
+        self._device, self._options = device, options
+        self._first_sample = first_sample
+        self._local: Renderer | None = None
+        self._begin_anew()
+
+    def _begin_anew(self) -> None:
+        """Note that there is no film."""
+        self._sum = self._whole = FilmSum()  # of all films, and of those of whole blocks
+        self._held: tuple[FilmSum, Mapping[str, NDArray[Any]]] | None = None
+        self._developed: FilmState | None = None  # that the local renderer has
+        self._tracer: FarmTracer | None = None
+        self._noise: Adaptive | None = None  # adds to the local renderer's film
+        self._began = datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds")
+        self._seconds_rendered = 0.0
+        self._sessions: tuple[Session, ...] = ()  # before
+        self._classes: dict[str, Mapping[str, Plain]] = {}  # of devices that take part
+
+    @abstractmethod
+    def _take_selection(
+        self, selection: Selection, first: int, end: int, add: Callable[[FilmState], None],
+        on_batch: OnBatch,
+    ) -> bool:  # fmt: skip
+        """Take samples of adaptive sampling, see `FarmTracer`."""
+
+    # ---- what there is
+
+    @property
+    def samples(self) -> int:
+        """The number of the next sample, if none before it is missing; see `Renderer.samples`."""
+        return self._first_sample + sum(end - first for first, end in self._sum.taken)
+
+    @property
+    def active(self) -> float:
+        """The share of the pixels that would get more samples; see `Renderer.active`."""
+        return 1.0 if self._noise is None else self._noise.active
+
+    @property
+    def first_sample(self) -> int:
+        """The number of the first sample."""
+        return self._first_sample
+
+    @property
+    def counts(self) -> tuple[Counts, ...]:
+        """What has happened for all blocks that were added, of each film; see `Renderer.counts`."""
+        films = 1 if self._sum.film is None else len(self._sum.film.words)
+        return (self._sum.counts(films),) * films
+
+    # ---- the film
+
+    def film_state(self) -> FilmState:
+        """Return what all workers have rendered so far. Raises ClusterError before there is any."""
+        if self._sum.film is None:
+            raise ClusterError("no worker has sent a film yet")
+        return self._sum.film
+
+    def merge(self, state: FilmState) -> None:
+        """Add the samples of another film of the same scene. Raises as `Renderer.merge` does."""
+        nothing_cut = self._whole is self._sum
+        whole = None if nothing_cut else self._whole.plus(state)
+        self._begin_with(self._sum.plus(state), whole)
+
+    def _begin_with(self, films: FilmSum, whole: FilmSum | None = None) -> None:
+        self._sum, self._whole = films, films if whole is None else whole
+        self._noise = self._tracer = None
+
+    def _begin_adaptively(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Begin adaptive sampling over the film; arrays: the state, if there is one."""
+        taken = self._sum.taken
+        if len(taken) > 1:
+            message = "samples are missing before the last one; add them first, without noise"
+            raise SceneError(message, where="noise")
+        local = self.developed()
+        tracer = FarmTracer(local, self._take_selection)
+        begun = Adaptive(local.wavefronts[0], tracer)
+        if arrays:
+            begun.restore(arrays)
+        else:
+            begun.skip(taken[-1][1] if taken else self._first_sample)
+        self._tracer, self._noise = tracer, begun
+
+    @property
+    def _here(self) -> Renderer:
+        """A renderer on this machine, which renders nothing."""
+        if self._local is None:
+            self._local = Renderer(self.scene, self._device, **self._options)
+        return self._local
+
+    def developed(self) -> Renderer:
+        """Return a renderer on this machine that holds the film so far, for its pictures."""
+        local, film = self._here, self._sum.film
+        if self._developed is not film:
+            local.reset()
+            if film is not None:
+                local.merge(film)
+            self._developed = film
+        for one in local.wavefronts:
+            one.counts = self._sum.counts(len(local.wavefronts))
+        return local
+
+    # ---- saved films
+
+    def origin(self) -> Origin:
+        """Return what the samples are of. Raises SceneError for a scene that cannot be read."""
+        return self._here.origin()
+
+    def hold(self) -> None:
+        """Keep the film of all whole blocks so far, for `saved_film`.
+
+        Blocks that a stop cut are in the picture, but not in what is held; with noise, what a run
+        added that was stopped is in both.
+        """
+        self._held = self._whole, {} if self._noise is None else self._noise.arrays()
+
+    def saved_film(self, *, held: bool = False) -> SavedFilm:
+        """Return the film with all that it takes to go on with it; see `Renderer.saved_film`.
+
+        It may lack samples before its last one, which `ClusterRenderer` takes when it goes on.
+        """
+        if held and self._held is None:
+            raise SceneError("no film is held; call hold() first")
+        adaptive = {} if self._noise is None or held else self._noise.arrays()
+        films, arrays = self._held if held and self._held else (self._sum, adaptive)
+        state = self._empty() if films.film is None else films.film
+        number = len(state.words)
+        counts = tuple(dict(vars(films.counts(number))) for _ in range(number))
+        seconds = [self._seconds_rendered] + [0.0] * len(self._classes)  # each second once
+        sessions = [
+            Session(self._began, took, VERSION, device)
+            for device, took in zip(self._classes.values(), seconds, strict=False)
+        ]
+        sessions = [*self._sessions, *sessions]
+        return SavedFilm(state, self.origin(), self.form, counts, tuple(sessions), arrays)
+
+    def _empty(self) -> FilmState:
+        """A film without samples."""
+        state = self._here.film_state()
+        arrays = {name: np.zeros_like(array) for name, array in state.arrays.items()}
+        return FilmState(taken=(), scale=state.scale, **arrays)
+
+    def restore(self, saved: SavedFilm) -> None:
+        """Go on from a saved film, as `load_state` does. Raises SceneError.
+
+        `warnings` tells, once a worker is there, where another class of device took the samples.
+        """
+        saved.origin.check_same(self.origin())
+        own, film, former = self._empty().arrays, saved.film, (self._sum, self._whole)
+        if any(own[name].shape != array.shape for name, array in film.arrays.items()):
+            raise SceneError("the film has another form than this scene's")
+        totals = dict.fromkeys(self._sum.totals, 0)
+        for one in (Counts(**counts) for counts in saved.counts):
+            for name in totals:
+                totals[name] += getattr(one, name)
+        self._begin_with(FilmSum(film if film.taken else None, totals))
+        if saved.adaptive:
+            try:
+                self._begin_adaptively(saved.adaptive)
+            except (KeyError, ValueError) as error:
+                self._begin_with(*former)
+                message = f"the state of adaptive sampling does not fit: {error}"
+                raise SceneError(message) from error
+        self._held, self._sessions, self._seconds_rendered = None, saved.sessions, 0.0
+        self._classes = {}
+
+    def _note_classes(self, classes: Mapping[str, Mapping[str, Plain]]) -> None:
+        """Note the classes of devices that take part, and warn where others took samples before."""
+        for kind, device in list(classes.items()):
+            if kind in self._classes:
+                continue
+            self._classes[kind] = device
+            others = other_devices(self._sessions, device)
+            if others:
+                self.warnings.append(classes_text(others))
+                log.warning("%s", self.warnings[-1])
+
+    # ---- pictures
+
+    @property
+    def form(self) -> PictureForm:
+        """What makes a picture of the film; see `Renderer.form`."""
+        return self._here.form
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Of the `aov` integrator, else none."""
+        return self.form.channels
+
+    def image(self) -> Image:
+        """The picture so far, see `Renderer.image`; made on this machine."""
+        return self.developed().image()
+
+    def colours(self) -> Image:
+        """The picture so far in three colours, see `Renderer.colours`."""
+        return self.developed().colours()
+
+    def layers(self) -> dict[str, Image]:
+        """The values of the `aov` integrator by name, see `Renderer.layers`."""
+        return self.developed().layers()
+
+    def halves(self) -> tuple[Image, Image]:
+        """The pictures of the even and of the odd samples, see `Renderer.halves`."""
+        return self.developed().halves()
+
+    def spectral_image(self) -> SpectralImage:
+        """The picture so far of a film with bands, see `Renderer.spectral_image`."""
+        return self.developed().spectral_image()
+
+    def samples_per_pixel(self) -> Image:
+        """How many samples each pixel has, (h, w) float32."""
+        return self.developed().samples_per_pixel()

@@ -1,0 +1,280 @@
+"""The film of several devices: added up, made to pictures, saved, gone on with."""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from numpy.typing import NDArray
+
+from clpt.cluster.crew import Crew
+from clpt.cluster.device_worker import DeviceWorker
+from clpt.cluster.multi_noise import AdaptiveCrew
+from clpt.errors import ClusterError, DeviceError, MemoryBudgetError, SceneError
+from clpt.render.film_keeping import FilmKeeping
+from clpt.render.pictures import Image, Pictures
+from clpt.render.saved_film import Origin, PictureForm, SavedFilm, Session
+from clpt.render.wavefront.adaptive import Adaptive
+from clpt.render.wavefront.film_state import FilmState, Ranges
+from clpt.render.wavefront.wavefront import Counts, Wavefront
+
+log = logging.getLogger(__name__)
+
+_Result = TypeVar("_Result")
+
+
+@dataclass(frozen=True, eq=False)
+class _Held:
+    """A film that is held where it is: copies on devices, and what is on the host.
+
+    workers: that have a copy of what only they have; saved: the rest, None without; so_far: of the
+    film, see `Renderer.progress_so_far`.
+    """
+
+    workers: list[DeviceWorker]
+    saved: FilmState | None
+    so_far: Mapping[str, Any]
+
+    def film(self) -> FilmState:
+        """Return the film; wait for the devices, of which one may have failed."""
+        total = self.saved
+        for worker in self.workers:
+            film = worker.held()
+            total = film if total is None else total.plus(film)
+        assert total is not None, "something is held"
+        return dataclasses.replace(total, taken=self.so_far["taken"])
+
+
+class MultiFilm(FilmKeeping, Pictures):
+    """Base of renderers on several devices.
+
+    The first device stands for all: its film then holds the whole picture, and its renderer knows
+    what was taken.
+    """
+
+    _first_sample: int
+    _crew: Crew
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._taken: Ranges = ()
+        self._noise: AdaptiveCrew | None = None
+        self._telling = False  # whether devices are at work
+        self._held: SavedFilm | _Held | None = None
+        self._sessions: tuple[Session, ...] = ()  # before
+        self._seconds_rendered = 0.0  # since the film was empty, or gone on with
+
+    @property
+    @abstractmethod
+    def counts(self) -> tuple[Counts, ...]:
+        """What has happened so far, of each film."""
+
+    def film_state(self) -> FilmState:
+        """Return the film of all devices, as whole numbers; see `Renderer.film_state`.
+
+        When all devices have failed it is what was saved of them.
+        """
+        with self._lock:
+            self._check_open()
+            if self._noise is not None and not self._crew.workers:
+                return self._noise.base
+            if self._noise is not None:
+                state = self._on_first(lambda first: first.renderer.film_state())
+                return dataclasses.replace(state, taken=self._taken)
+            if self._crew.workers:
+                self._crew.save()
+            if self._crew.saved is not None:
+                return self._crew.saved
+            return self._on_first(lambda first: first.renderer.film_state())
+
+    def merge(self, state: FilmState) -> None:
+        """Add the samples of another film of the same scene to this one; see `Renderer.merge`."""
+        with self._lock:
+            merged = self.film_state().merged(state)
+            self._forget()
+            self._crew.saved, self._crew.saved_ranges = merged, merged.taken
+            self._taken = merged.taken
+
+    @property
+    def wavefronts(self) -> list[Wavefront]:  # type: ignore[override]
+        """Those of the first device, whose films then hold the picture of all."""
+        with self._lock:
+            self._check_open()
+            return self._on_first(lambda first: first.renderer.wavefronts)
+
+    def image(self) -> Image:
+        """The picture so far of all devices; see `Renderer.image`."""
+        return self._on_first(lambda first: first.renderer.image())
+
+    def colours(self) -> Image:
+        """The picture so far in three colours, (h, w, 3) float32, also of a film with bands."""
+        return self._on_first(lambda first: first.renderer.colours())
+
+    def layers(self) -> dict[str, Image]:
+        """The values of the `aov` integrator by name, (h, w, 1 to 3) float32."""
+        return self._on_first(lambda first: first.renderer.layers())
+
+    def halves(self) -> tuple[Image, Image]:
+        """Return the pictures of the even and of the odd samples; see `Renderer.halves`."""
+        return self._on_first(lambda first: first.renderer.halves())
+
+    # ---- saved films
+
+    @property
+    def form(self) -> PictureForm:
+        """What makes a picture of the film; see `Renderer.form`."""
+        return self._crew.first.renderer.form
+
+    @property
+    def first_sample(self) -> int:
+        """The number of the first sample of the film, or of the first one to come."""
+        return self._taken[0][0] if self._taken else self._first_sample
+
+    def origin(self) -> Origin:
+        """Return what the samples are of. Raises SceneError for a scene that cannot be read."""
+        return self._crew.first.renderer.origin()
+
+    def hold(self) -> None:
+        """Keep a copy of the film as it is now, for `saved_film`; see `Renderer.hold`.
+
+        Each device keeps what only it has, in its own memory.
+        """
+        with self._lock:
+            crew = self._crew
+            workers = [w for w in crew.workers if w.unsaved or w is crew.keeper]
+            saved = crew.saved if crew.keeper is None else None
+            if not workers and saved is None:
+                workers = [crew.first]  # an empty film
+            try:
+                if crew.has_losses:
+                    raise ClusterError("a device has failed: others do its part first")
+                for worker in workers:
+                    worker.hold()
+                self._held = _Held(workers, saved, self._so_far(crew.first))
+            except MemoryBudgetError:
+                raise
+            except Exception as error:
+                log.debug("a film cannot be held on devices: %s", error)
+                self._held = self.saved_film()
+
+    def saved_film(self, *, held: bool = False) -> SavedFilm:
+        """Return the film with all that it takes to go on with it; see `Renderer.saved_film`.
+
+        held: raises SceneError also where a device has failed since that had a part of it.
+        """
+        if held:
+            if self._held is None:
+                raise SceneError("no film is held; call hold() first")
+            if isinstance(self._held, _Held):
+                self._held = self._read(self._held)
+            return self._held
+        state, so_far = self._on_first(
+            lambda first: (first.renderer.film_state(), self._so_far(first))
+        )
+        return self._film_with(dataclasses.replace(state, taken=self._taken), so_far)
+
+    def _so_far(self, first: DeviceWorker) -> dict[str, Any]:
+        """What changes while samples are taken, but for the film's words."""
+        renderer = first.renderer
+        renderer._taken, renderer._adaptive = self._taken, self._adaptive
+        renderer._sessions, renderer._seconds_rendered = self._sessions, self._seconds_rendered
+        counts = tuple(dict(vars(one)) for one in self.counts)
+        return {**renderer.progress_so_far(), "counts": counts}
+
+    def _film_with(self, state: FilmState, so_far: Mapping[str, Any]) -> SavedFilm:
+        others = {name: value for name, value in so_far.items() if name != "taken"}
+        return SavedFilm(state, self.origin(), self.form, **others)
+
+    def _read(self, held: _Held) -> SavedFilm:
+        """Bring what is held to the host."""
+        try:
+            return self._film_with(held.film(), held.so_far)
+        except Exception as error:
+            if held.so_far["taken"] != self._taken:
+                message = f"a device has failed that had a part of the film: {error}"
+                raise SceneError(message) from error
+        return self.saved_film()  # nothing was added since: others do its part
+
+    def restore(self, saved: SavedFilm) -> None:
+        """Go on from a saved film, as `load_state` does. Raises SceneError."""
+
+        def load(first: DeviceWorker) -> FilmState:
+            first.renderer.restore(saved)
+            return first.renderer.film_state()
+
+        with self._lock:
+            self._go_on(self._on_first(load), saved)
+            self._sessions, self._seconds_rendered, self._held = saved.sessions, 0.0, None
+
+    # ---- inside
+
+    @property
+    def _adaptive(self) -> Adaptive | None:
+        return None if self._noise is None else self._noise.adaptive
+
+    def _go_on(self, state: FilmState, saved: SavedFilm) -> None:
+        """Take the place of what there is by a film; the first device's counts are the film's."""
+        crew = self._crew
+        crew.keeper, self._noise = None, None
+        crew.lost.clear()
+        crew.empty(worker for worker in crew.workers if worker is not crew.first)
+        crew.first.unsaved, crew.first.shows = [], True
+        crew.clear_counts()
+        self._taken = state.taken
+        if saved.adaptive:
+            self._noise = self._adaptively(state, saved.adaptive)
+        else:
+            crew.saved, crew.saved_ranges = state, state.taken
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise DeviceError("this MultiRenderer is closed; make another one")
+        if self._telling:
+            raise DeviceError("devices are at work; the picture is there when the run has ended")
+
+    def _forget(self) -> None:
+        """Note that all films are empty."""
+        self._crew.empty(self._crew.workers)
+        self._crew.saved, self._crew.saved_ranges, self._crew.keeper = None, (), None
+        self._crew.lost.clear()
+        self._taken, self._noise = (), None
+        self._held, self._sessions, self._seconds_rendered = None, (), 0.0
+
+    def _adaptively(self, base: FilmState, arrays: Mapping[str, NDArray[Any]]) -> AdaptiveCrew:
+        """Begin adaptive sampling over a film; arrays: the state, if there is one."""
+        return AdaptiveCrew(self._crew, base, self._first_sample, arrays)
+
+    def _on_first(self, action: Callable[[DeviceWorker], _Result]) -> _Result:
+        """Do something on the first device, whose film holds the picture; or else on the next."""
+        with self._lock:
+            self._check_open()
+            while True:
+                first = self._show()
+                try:
+                    return action(first)
+                except SceneError:
+                    raise
+                except Exception as error:
+                    self._crew.drop(first, error)
+
+    def _show(self) -> DeviceWorker:
+        """Let the film of the first device hold the picture; return that device."""
+        crew = self._crew
+        if self._noise is not None:
+            return self._noise.shown()
+        while True:
+            if any(worker.unsaved for worker in crew.workers):
+                crew.save()
+                crew.empty(worker for worker in crew.workers if worker.shows)
+            first = crew.first
+            if first.shows or crew.saved is None:
+                return first
+            try:
+                first.show(crew.saved)
+                return first
+            except Exception as error:
+                crew.drop(first, error)

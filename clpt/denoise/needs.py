@@ -1,0 +1,74 @@
+"""What denoisers want of a scene, and of which scenes they make poor pictures."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from clpt.errors import SceneError, UnknownKindError
+from clpt.scene import Scene
+from clpt.scene.integrators import (
+    HAVE_LAYERS,
+    PIXELWISE,
+    Aov,
+    Integrator,
+    ParticleTracer,
+    Sampler,
+    Vcm,
+)
+
+METHODS = ("oidn", "statistical")
+LAYERS = ("denoising_albedo", "denoising_normal")
+
+
+def check_method(method: str) -> str:
+    """Return the name of a denoiser. Raises UnknownKindError."""
+    if method not in METHODS:
+        raise UnknownKindError("denoiser", str(method), METHODS, where="denoise")
+    return method
+
+
+def prepared(scene: Scene, method: str | None) -> Scene:
+    """Return the scene with what denoisers want: layers, and pixels with samples of their own.
+
+    method: of denoising; None: the scene stays as it is.
+
+    Where the film splats, neighbours share samples, and denoisers take what noise they have in
+    common for detail. So `film.filtering` becomes importance, where the scene does not ask for
+    splatting. Integrators without layers are left without. Raises SceneError for the channels of
+    `aov`, which are no picture that could be denoised.
+    """
+    if method is None:
+        return scene
+    if isinstance(scene.integrator, Aov):
+        message = "the integrator aov makes values, no picture that could be denoised"
+        raise SceneError(message, where="denoise")
+    film = scene.film
+    layers = LAYERS if isinstance(scene.integrator, HAVE_LAYERS) else ()
+    wanted = (*film.layers, *(name for name in layers if name not in film.layers))
+    filtering = "importance" if film.filtering == "auto" else film.filtering
+    film = dataclasses.replace(film, layers=wanted, filtering=filtering)
+    return dataclasses.replace(scene, film=film)
+
+
+def remarks(integrator: Integrator, sampler: Sampler, splats: bool) -> list[str]:
+    """Return why a denoised picture may keep noise, for people.
+
+    integrator: that renders it; splats: whether samples serve several pixels.
+    """
+    advice = "denoisers take what noise they share for detail"
+    found = []
+    if splats:
+        found.append(
+            f"the film splats, so neighbouring pixels share samples, and {advice}: set "
+            "film.filtering to importance"
+        )
+    if isinstance(integrator, Vcm) and integrator.merging:
+        found.append(f"pixels share photons of vcm, and {advice}; compare the integrator path")
+    if not isinstance(sampler, PIXELWISE):
+        found.append(
+            f"with the sampler {sampler.kind} neighbouring pixels err together, and {advice}: "
+            "choose sobol"
+        )
+    if isinstance(integrator, ParticleTracer):
+        found.append("particle_tracer has no layers, so edges in the picture are less sharp")
+    return found

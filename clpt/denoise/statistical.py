@@ -1,0 +1,176 @@
+"""A denoiser without anything learned: averages over pixels that see the same light, by statistics.
+
+It runs on any OpenCL device. Two halves of a picture's samples tell the noise of each pixel; which
+pixels are alike, and how that decides, is in kernels/denoising/likeness.cl. It averages twice: the
+averages of the first time, which have less noise, decide the second time. The halves then tell the
+error of both averages, and the picture is what has the least of the averages and the noisy one: so
+it is not worse than that where errors can be told.
+
+All weights follow from colours, and are the same for bands: so spectra keep their shape.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import device
+
+Image = NDArray[np.float32]
+
+# What was tried is in bench/NOTES.md.
+SCALE = 0.2  # of the mean light, from which statistics are those of logarithms
+NOISE_RADIUS = 3  # pixels around one whose variance tells its own
+ERROR_RADIUS = 4  # likewise of errors
+LEAST_VARIANCES = (1e-4, 3e-4)  # of transformed light: what the eye does not see
+LIMITS, SHARPNESS = (1.3, 2.5), (3, 2)  # of both averages, see `likeness`
+ALBEDO, NORMAL = 0.05, 0.2  # differences of surfaces that count, beside three times their noise
+DARK = 0.1  # of the mean light: what is darker counts as if it were so bright
+VECTORS = 8  # MOST_VALUES, kernels/stage/denoise.cl
+
+
+class Statistical:
+    """Denoises pictures of one view.
+
+    on: where; halves: (h, w, 3) float32 each, of even and of odd samples; albedo, normal: likewise,
+    or None. colours: (h, w, 3) float32, their picture without most of its noise; error: (h, w)
+    float32, what is left in it, relative to its light.
+
+    Raises KernelBuildError, MemoryBudgetError.
+    """
+
+    def __init__(
+        self,
+        on: device.Device,
+        halves: tuple[Image, Image],
+        albedo: Image | None = None,
+        normal: Image | None = None,
+    ):
+        self._height, self._width = halves[0].shape[:2]
+        self._stream, self._buffers = device.Stream(on.queue), device.Buffers(on)
+        self._program = device.build(on, device.assemble("stage/denoise.cl"))
+        mean = float(np.mean(halves, dtype=float))
+        self._light = max(mean, 1e-12)
+        empty = np.zeros_like(halves[0])
+        pair = (np.clip(empty if albedo is None else albedo, 0.0, 1.0), normal)
+        surfaces = [empty if image is None else image for image in pair]
+        self._surfaces = [self._upload(_padded(image)) for image in surfaces]
+        widths = (
+            least + 3.0 * noise_of(image)
+            for least, image in zip((ALBEDO, NORMAL), surfaces, strict=True)
+        )
+        self._features = tuple(0.5 / width**2 for width in widths)
+        both = np.stack([_padded(half) for half in halves], axis=2)
+        given = self._upload(both)
+        self._guides = [self._guide(both, 0)]
+        once = self._average(0, given, 2)
+        self._guides.append(self._guide(self._download(once, both.shape), 1))
+        twice = self._average(1, given, 2)
+        self._shares = self._decide(given, once, twice)
+        self.error = np.ascontiguousarray(self._shares[..., 3])
+        pairs = self._download(once, both.shape), self._download(twice, both.shape), both
+        first, second, noisy = (pair.mean(axis=2)[..., :3] for pair in pairs)
+        self.colours = self._mixed(first, second, noisy)
+
+    def bands(self, image: Image) -> Image:
+        """Return a picture (h, w, n) float32 of the same samples without most of its noise."""
+        count = image.shape[2]
+        parts = [image[..., i : i + 4 * VECTORS] for i in range(0, count, 4 * VECTORS)]
+        return np.concatenate([self._some_bands(part) for part in parts], axis=2)
+
+    def _some_bands(self, image: Image) -> Image:
+        vectors = -(-image.shape[2] // 4)
+        padded = np.zeros((self._height, self._width, 4 * vectors), np.float32)
+        padded[..., : image.shape[2]] = image
+        values = self._upload(padded)
+        once, twice = (
+            self._download(self._average(which, values, vectors), padded.shape) for which in (0, 1)
+        )
+        return self._mixed(once, twice, padded)[..., : image.shape[2]]
+
+    def _mixed(self, once: Image, twice: Image, noisy: Image) -> Image:
+        """Both averages and the noisy picture, by their shares."""
+        first, second, kept = np.moveaxis(self._shares[..., :3, None], 2, 0)
+        return np.asarray(first * once + second * twice + kept * noisy, np.float32)
+
+    def _guide(self, both: Image, which: int) -> tuple[Any, Any]:
+        """Transformed means of two halves (h, w, 2, 4), and their variances."""
+        halves = [self._upload(np.ascontiguousarray(both[:, :, i])) for i in range(2)]
+        guide, variance = self._allocate(1), self._allocate(1)
+        self._run(
+            "denoise_guide", flat=True, first=halves[0], second=halves[1], guide=guide,
+            variance=variance, scale=SCALE * self._light,
+        )  # fmt: skip
+        return guide, self._blurred(variance, NOISE_RADIUS, LEAST_VARIANCES[which])
+
+    def _average(self, which: int, values: Any, count: int) -> Any:
+        """Averages of `count` vectors a pixel; which: by the first or the second guide."""
+        (guide, variance), (albedo, normal) = self._guides[which], self._surfaces
+        made = self._allocate(count)
+        self._run(
+            "denoise_average", guide=guide, variance=variance, albedo=albedo, normal=normal,
+            values=values, averaged=made, size=self._size, count=count, features=self._features,
+            limit=LIMITS[which], sharpness=SHARPNESS[which],
+        )  # fmt: skip
+        return made
+
+    def _decide(self, halves: Any, once: Any, twice: Any) -> Image:
+        """How much of each picture is taken, and the error, (h, w, 4)."""
+        errors, shares = self._allocate(1), self._allocate(1)
+        self._run(
+            "denoise_errors", flat=True, halves=halves, once=once, twice=twice, errors=errors,
+            dark=(DARK * self._light) ** 2,
+        )  # fmt: skip
+        around = self._blurred(errors, ERROR_RADIUS, 0.0)
+        self._run("denoise_shares", flat=True, errors=around, shares=shares)
+        return self._download(shares, (self._height, self._width, 4))
+
+    def _blurred(self, image: Any, radius: int, least: float) -> Any:
+        """The mean over a square; least: is added."""
+        across, made = self._allocate(1), self._allocate(1)
+        rows, columns = (image, across, (1, 0), 0.0), (across, made, (0, 1), least)
+        for source, into, step, more in (rows, columns):
+            self._run(
+                "denoise_blur", **{"from": source}, into=into, size=self._size, step=step,
+                radius=radius, least=more,
+            )  # fmt: skip
+        return made
+
+    @property
+    def _size(self) -> tuple[int, int]:
+        return self._width, self._height
+
+    def _run(self, kernel: str, *, flat: bool = False, **named: Any) -> None:
+        bound = self._program.kernel(kernel).bind(**named)
+        self._stream.run(bound, (self._width * self._height,) if flat else self._size)
+
+    def _allocate(self, vectors: int) -> Any:
+        advice = "denoise a smaller picture"
+        nbytes = 16 * vectors * self._width * self._height
+        return self._buffers.allocate("a denoised picture", nbytes, advice)
+
+    def _upload(self, image: Image) -> Any:
+        return self._buffers.upload("a picture to denoise", image)
+
+    def _download(self, buffer: Any, shape: tuple[int, ...]) -> Image:
+        return self._stream.read(buffer, np.empty(shape, np.float32))
+
+
+def noise_of(image: Image) -> float:
+    """Return the standard deviation of a picture's noise, where that is more than its edges.
+
+    It is that of second differences along rows, by their median: edges are few.
+    """
+    if image.shape[1] < 3:
+        return 0.0
+    second = np.diff(image, n=2, axis=1)
+    return float(np.median(np.sqrt(np.mean(second**2, axis=2)))) / 6.0**0.5
+
+
+def _padded(image: Image) -> Image:
+    """A picture (h, w, 3) with a fourth channel of 0."""
+    made = np.zeros((*image.shape[:2], 4), np.float32)
+    made[..., :3] = image
+    return made

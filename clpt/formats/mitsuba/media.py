@@ -1,0 +1,72 @@
+"""Media and phase functions of a Mitsuba scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from clpt.formats.mitsuba import spectra
+from clpt.formats.mitsuba.properties import Context, Properties, unknown
+from clpt.formats.mitsuba.xml import Element
+from clpt.scene import media
+from clpt.scene.media import Homogeneous, Medium, Phase
+
+
+def medium(element: Element, context: Context) -> Medium:
+    """Make the medium that a <medium> describes, the same for every reference."""
+    return context.once(element, lambda one: _made(one, context, MEDIA))
+
+
+def phase(element: Element, context: Context) -> Phase:
+    """Make the phase function that a <phase> describes."""
+    return context.once(element, lambda one: _made(one, context, PHASES))
+
+
+def side(props: Properties, name: str) -> Medium | None:
+    """Take the medium of a side of a shape, `interior` or `exterior`, or of a sensor."""
+    found = [child for child in props.nested if child.name == name and child.tag == "medium"]
+    child = props.take(name) if not found else found[0]
+    if child is None:
+        return None
+    if found:
+        props.nested.remove(child)
+    target = props.context.resolve(child)
+    if target.tag != "medium":
+        raise child.error(f"{name!r} must be a <medium>, or a <ref> to one")
+    return medium(target, props.context)
+
+
+def around(props: Properties) -> Medium | None:
+    """Take the medium around a sensor or an emitter, which need not be named."""
+    named, child = side(props, "medium"), props.object("medium")
+    return named if child is None else medium(child, props.context)
+
+
+def _made(element: Element, context: Context, plugins: dict[str, Any]) -> Any:
+    if element.type not in plugins:
+        raise unknown(element, plugins)
+    props = Properties(element, context)
+    with element.locating():
+        made = plugins[element.type](props)
+    props.finish()
+    return made
+
+
+def _homogeneous(props: Properties) -> Medium:
+    props.ignore("has_spectral_extinction", "sample_emitters")  # both are found
+    child = props.object("phase")
+    return Homogeneous(
+        sigma_t=spectra.coefficient(props, "sigma_t", 1.0),
+        albedo=spectra.reflectance(props, "albedo", 0.75),
+        scale=props.number("scale", 1.0),
+        phase=media.Isotropic() if child is None else phase(child, props.context),
+        name=props.element.attributes.get("id", ""),
+    )
+
+
+MEDIA: dict[str, Callable[[Properties], Medium]] = {"homogeneous": _homogeneous}
+PHASES: dict[str, Callable[[Properties], Phase]] = {
+    "isotropic": lambda props: media.Isotropic(),
+    "hg": lambda props: media.HenyeyGreenstein(g=props.number("g", 0.8)),
+    "rayleigh": lambda props: media.Rayleigh(),
+}

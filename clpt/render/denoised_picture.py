@@ -1,0 +1,120 @@
+"""The picture of a renderer, or of a film in a file, without most of its noise."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import device
+from clpt.denoise import needs
+from clpt.denoise.oidn import Oidn
+from clpt.denoise.statistical import Statistical
+from clpt.errors import SceneError
+from clpt.render.saved_film import PictureForm, SavedFilm
+from clpt.scene import Film
+from clpt.spectral_exr import SpectralImage
+
+Image = NDArray[np.float32]
+
+
+class Source(Protocol):
+    """What a picture is taken of, such as a `Renderer`. denoise: the denoiser it is for."""
+
+    denoise: str | None
+
+    @property
+    def form(self) -> PictureForm: ...
+    @property
+    def is_adaptive(self) -> bool: ...
+    def colours(self) -> Image: ...
+    def image(self) -> Image: ...
+    def layers(self) -> dict[str, Image]: ...
+    def samples_per_pixel(self) -> Image: ...
+    def halves(self) -> tuple[Image, Image]: ...
+    def saved_film(self, *, held: bool = False) -> SavedFilm: ...
+
+
+class DenoisedPicture:
+    """The picture of a source as it is now, with the source's methods that make pictures.
+
+    method: a name of clpt.denoise.needs.METHODS, by default the source's own. Layers help where the
+    film has them, see clpt.denoise.needs. A film of bands is denoised in all of them, and its
+    colours by themselves. The picture is not in the promise of equal bits.
+
+    text: how it was denoised, for headers of files; error: of `statistical`, (h, w) float32, what
+    is left in the colours, relative to their light; else None.
+
+    Raises UnknownKindError for a method, SceneError for the channels of `aov` and where the
+    denoiser is not installed, DeviceError where it fails.
+    """
+
+    def __init__(self, source: Source, method: str | None = None):
+        self.method = needs.check_method(method or source.denoise or needs.METHODS[0])
+        self.form, self.is_adaptive = source.form, source.is_adaptive
+        if self.form.channels:
+            message = "the channels of the integrator aov are no picture that could be denoised"
+            raise SceneError(message, where="denoise")
+        self._source, self._layers = source, source.layers()
+        self._noisy, self._image = source.colours(), source.image()
+        self._samples = source.samples_per_pixel()
+        surfaces = [self._layers.get(name) for name in needs.LAYERS]
+        with_layers = [name for name in needs.LAYERS if name in self._layers]
+        name = self.method
+        self.error: Image | None = None
+        if self.method == "oidn":
+            with Oidn(*surfaces) as oidn:
+                name += f" {oidn.version}"
+                self._colours = oidn.colours(self._noisy)
+                bands = oidn.bands(self._image) if self.form.bands else None
+        else:
+            on = getattr(source, "device", None) or device.choose()
+            made = Statistical(on, self._halves(), *surfaces)
+            self._colours, self.error = made.colours, made.error
+            bands = made.bands(self._image) if self.form.bands else None
+        alpha = self._image[..., 3:] if self.form.alpha else self._image[..., :0]
+        self._denoised = np.concatenate([self._colours, alpha], axis=2) if bands is None else bands
+        self.text = name + (f" with {', '.join(with_layers)}" if with_layers else "")
+
+    def _halves(self) -> tuple[Image, Image]:
+        """The pictures of even and odd samples. Raises SceneError where they are not both there."""
+        if self._samples.min() < 2:
+            raise SceneError("needs two samples of every pixel or more", where="denoise")
+        return self._source.halves()
+
+    def colours(self) -> Image:
+        """The picture in three colours, (h, w, 3) float32, also of a film with bands."""
+        return self._colours
+
+    def image(self) -> Image:
+        """The picture, as `Renderer.image` returns it; alpha is as it was."""
+        return self._denoised
+
+    def spectral_image(self) -> SpectralImage:
+        """The picture of a film with bands, at their centres."""
+        form = self.form
+        film = Film(bands=form.bands, lambda_min=form.lambda_min, lambda_max=form.lambda_max)
+        return SpectralImage(self.image(), film.band_centres, emissive=True)
+
+    def layers(self) -> dict[str, Image]:
+        """The layers of the film by name, (h, w, 1 to 3) float32."""
+        return self._layers
+
+    def noisy(self) -> Image:
+        """The picture as it was before, in three colours, (h, w, 3) float32."""
+        return self._noisy
+
+    @property
+    def beside(self) -> dict[str, Image]:
+        """What files have beside the picture: `noisy`, and `denoised_error` where it is known."""
+        error = {} if self.error is None else {"denoised_error": self.error}
+        return {"noisy": self._noisy} | error
+
+    def samples_per_pixel(self) -> Image:
+        """How many samples each pixel has, (h, w) float32."""
+        return self._samples
+
+    def saved_film(self, *, held: bool = False) -> SavedFilm:
+        """The film of the source, which has its noise; see `Renderer.saved_film`."""
+        return self._source.saved_film(held=held)

@@ -1,0 +1,137 @@
+"""Pictures with their layers as .exr files, by one of two sets of names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import images, spectral_exr
+from clpt.render import cryptomatte
+from clpt.render.denoised_picture import DenoisedPicture
+from clpt.render.layers import GROUP, matte_names
+from clpt.render.saved_film import PictureForm
+from clpt.scene.layers import LAYERS
+from clpt.spectra.spaces import chromaticities
+from clpt.spectral_exr import SpectralImage
+
+Image = NDArray[np.float32]
+
+VIEW_LAYER = "ViewLayer."  # what Blender's names begin with
+PICTURE = {"clpt": "", "blender": f"{VIEW_LAYER}Combined."}  # before R, G and B of the picture
+SETS = tuple(PICTURE)
+BESIDE = {"noisy": "Noisy Image", "denoised_error": "Denoised Error"}  # Blender's names
+
+
+class Source(Protocol):
+    """A renderer, or a film on the host."""
+
+    @property
+    def form(self) -> PictureForm:
+        """How the film becomes a picture."""
+
+    @property
+    def is_adaptive(self) -> bool:
+        """Whether pixels may differ in their numbers of samples."""
+
+    def image(self) -> Image:
+        """The picture."""
+
+    def colours(self) -> Image:
+        """The picture in three colours."""
+
+    def layers(self) -> dict[str, Image]:
+        """The layers by name."""
+
+    def samples_per_pixel(self) -> Image:
+        """How many samples each pixel has."""
+
+    def spectral_image(self) -> SpectralImage:
+        """The picture of a film with bands."""
+
+
+def write_layers(
+    path: str | Path,
+    source: Source,
+    *,
+    names: str = "clpt",
+    metadata: Mapping[str, str | int | float] | None = None,
+) -> None:
+    """Write the picture of a renderer and its layers as an .exr: the picture in half floats, or its
+    bands in float32, layers in float32.
+
+    names: a set of SETS; "blender" gives names such as ViewLayer.Combined.R. Raises SceneError.
+    """
+    layers, form = source.layers(), source.form
+    if source.is_adaptive:
+        layers.setdefault("samples", source.samples_per_pixel()[..., None])
+    channels = channels_of(layers, names)
+    if isinstance(source, DenoisedPicture):
+        channels |= _beside(source, names)
+    stated = {**(metadata or {}), **attributes_of(form, names)}
+    if form.bands:
+        said = {**stated, "chromaticities": chromaticities(form.output_space)}
+        spectral, preview = source.spectral_image(), source.colours()
+        spectral_exr.write(path, spectral, preview=preview, metadata=said, layers=channels)
+    else:
+        images.write(
+            path, source.image(), metadata=stated, layers=channels, space=form.output_space,
+            prefix=PICTURE[names],
+        )  # fmt: skip
+
+
+def channels_of(layers: Mapping[str, Image], names: str = "clpt") -> dict[str, Image]:
+    """Return the channels of layers as an .exr has them, (h, w) by names such as depth.Z.
+
+    layers: as `Renderer.layers` returns them; names: a set of SETS, "blender" gives names such as
+    ViewLayer.Position.X.
+    """
+    made: dict[str, Image] = {}
+    for name, image in layers.items():
+        prefix, form = _prefix(name, names), LAYERS[_owner(name)].form
+        if form == "matte":
+            blender = names == "blender"
+            of_pairs = cryptomatte.SHORT_LETTERS if blender else cryptomatte.LETTERS
+            made |= cryptomatte.channels_of(prefix, image, of_pairs)
+            continue
+        letters = LAYERS[_owner(name)].channels
+        made |= {f"{prefix}.{letter}": image[..., i] for i, letter in enumerate(letters)}
+    return made
+
+
+def _beside(denoised: DenoisedPicture, names: str) -> dict[str, Image]:
+    """The channels of the picture with its noise, and of what is known of errors."""
+    made: dict[str, Image] = {}
+    for name, picture in denoised.beside.items():
+        prefix = VIEW_LAYER + BESIDE[name] if names == "blender" else name
+        if picture.ndim == 2:
+            made[f"{prefix}.X" if names == "blender" else prefix] = picture
+        else:
+            made |= {f"{prefix}.{letter}": picture[..., i] for i, letter in enumerate("RGB")}
+    return made
+
+
+def attributes_of(form: PictureForm, names: str = "clpt") -> dict[str, str]:
+    """Return what an .exr says of the layers of a film: the names of mattes."""
+    found: dict[str, str] = {}
+    for name in form.layers:
+        if LAYERS[name].form == "matte":
+            found |= cryptomatte.attributes_of(_prefix(name, names), matte_names(form, name))
+    return found
+
+
+def _owner(name: str) -> str:
+    """The name in LAYERS of a layer."""
+    return name if name in LAYERS else "light_groups"
+
+
+def _prefix(name: str, names: str) -> str:
+    """What the channels of a layer begin with."""
+    layer = LAYERS[_owner(name)]
+    if names == "blender":
+        group = "" if name in LAYERS else f"_{name.removeprefix(GROUP)}"
+        return f"{VIEW_LAYER}{layer.blender}{group}"
+    return layer.blender if layer.form == "matte" else name

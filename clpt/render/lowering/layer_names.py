@@ -1,0 +1,85 @@
+"""What layers call shapes, materials and groups of lights."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from clpt.errors import SceneError
+from clpt.render.contract.layer_names import LayerNames
+from clpt.render.lowering.geometry import instancing
+from clpt.render.lowering.geometry.geometry import Geometry
+from clpt.render.lowering.index import SceneIndex
+from clpt.render.lowering.lights.lights import LightRows, row_order
+from clpt.render.lowering.tables import TableStore
+from clpt.scene import materials as mt
+from clpt.scene.layers import MOST_NAMED
+from clpt.scene.shapes import Instance, Shape
+
+REST = "rest"  # the group of lights that name none
+
+
+def lower_names(
+    index: SceneIndex, geometry: Geometry, lights: LightRows, store: TableStore
+) -> tuple[LayerNames, dict[str, Any]]:
+    """Return the names that the layers of a film need, and what features say of them.
+
+    The numbers of materials and groups go to `distributions`, for each row of `shapes` and of
+    `lights`. Raises SceneError for more shapes than a matte can tell apart.
+    """
+    layers, things = index.layers, index.scene.shapes
+    names: dict[str, tuple[str, ...]] = {}
+    rows: dict[str, Any] = {}
+    if "crypto_object" in layers:
+        if len(things) > MOST_NAMED:
+            message = f"mattes are for {MOST_NAMED:,} shapes, not {len(things):,}"
+            raise SceneError(message, where="film.layers")
+        names["objects"] = tuple(_object_name(shape, i) for i, shape in enumerate(things))
+    if "crypto_material" in layers or "material_id" in layers:
+        numbers, found = _materials(instancing.distinct(things))
+        of_rows = [numbers[id(shape.material)] for _, shape, _, _ in geometry.owners]
+        rows["material_numbers"] = store.append_floats("distributions", np.array([*of_rows, 0.0]))
+        names["materials"] = tuple(_material_name(one, i) for i, one in enumerate(found))
+    if "light_groups" in layers:
+        groups = _groups(index, geometry, lights)
+        names["light_groups"] = tuple(sorted({*groups})) or (REST,)
+        numbers_of = np.searchsorted(names["light_groups"], np.array(groups, str))
+        rows["light_groups"] = len(names["light_groups"])
+        rows["light_group_row"] = store.append_floats("distributions", np.array([*numbers_of, 0.0]))
+    return LayerNames(**names), rows
+
+
+def _materials(shapes: Iterable[Shape]) -> tuple[dict[int, int], list[mt.Material]]:
+    """The number of each material by its identity, and all of them."""
+    numbers: dict[int, int] = {}
+    found: list[mt.Material] = []
+    for shape in shapes:
+        if id(shape.material) not in numbers:
+            numbers[id(shape.material)] = len(found)
+            found.append(shape.material)
+    return numbers, found
+
+
+def _groups(index: SceneIndex, geometry: Geometry, lights: LightRows) -> list[str]:
+    """The group of each row of `lights`."""
+    lamps: Any = index.scene.lights
+    groups = [lamps[i].group or REST for i in row_order(lamps)]
+    ends = (*lights.first, len(lights.rows))[1:]
+    for emitter, first, end in zip(geometry.emitters, lights.first, ends, strict=True):
+        emission: Any = emitter.shape.emission
+        groups += [emission.group or REST] * (end - first)
+    return groups
+
+
+def _object_name(shape: Shape, number: int) -> str:
+    """The name of one of the scene's shapes; of an instance without one, that of its group."""
+    group = shape.group.name if isinstance(shape, Instance) else ""
+    return shape.name or group or f"{shape.kind}{number}"
+
+
+def _material_name(material: mt.Material, number: int) -> str:
+    """The name of a material, or of the first one inside it that has one."""
+    names = (part.name for part in mt.parts(material) if part.name)
+    return next(names, f"{material.kind}{number}")

@@ -1,0 +1,49 @@
+"""Media as words: what a path knows its medium by, see kernels/optics/medium.cl."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.render.lowering.encoder import Encoder
+from clpt.render.lowering.index import SceneIndex
+from clpt.render.lowering.materials.material_words import MaterialWords
+from clpt.scene.media import Medium
+from clpt.scene.shapes import Shape
+
+FLIES = 0x40000000  # in a medium's word: the stage `flight` takes rays through it
+
+
+class MediumWords:
+    """Makes the words of media, each once."""
+
+    def __init__(self, index: SceneIndex, encoder: Encoder, materials: MaterialWords):
+        self._index, self._encoder, self._materials = index, encoder, materials
+        self._words: dict[Medium, int] = {}
+        self._has_media = bool(index.media)
+
+    def word(self, medium: Medium | None) -> int:
+        """Return the word of a medium, 0 of None."""
+        if medium is None or not self._has_media:
+            return 0
+        if medium not in self._words:
+            self._words[medium] = self._new_word(medium)
+        return self._words[medium]
+
+    def of_shapes(self, shapes: Iterable[Shape]) -> NDArray[np.uint32]:
+        """Return the words of shapes' insides and outsides (2 n,), () where there are no media."""
+        if not self._has_media:
+            return np.zeros(0, np.uint32)
+        sides = [self.word(side) for s in shapes for side in (s.interior, s.exterior)]
+        return np.array(sides, np.uint32)
+
+    def _new_word(self, medium: Medium) -> int:
+        phase = self._materials.phase(medium.phase) if medium.scatters else 0
+        absorbs, scatters = medium.coefficients(self._index.spectral)
+        rows = [np.array([phase], np.uint32)]
+        for name, value in (("absorption", absorbs), ("scattering", scatters)):
+            rows.append(self._encoder.named_words("medium", name, value, "coefficient")[0])
+        first = self._encoder.store.append("materials", np.concatenate(rows))
+        return FLIES | (2 + first)

@@ -1,0 +1,40 @@
+"""What materials and phase functions have in common: they say where light goes from a point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+from clpt.scene.params import Kind
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Scatterer(Kind):
+    """Base of materials and phase functions, with what kernels ask of a kind."""
+
+    folder: ClassVar[str] = "bsdf"  # of its file in the kernels folder
+    is_phase: ClassVar[bool] = False  # it scatters in a medium, not at a surface
+    source: ClassVar[str | Path | None] = None
+    delta: ClassVar[bool] = False  # every lobe is one: a light cannot be sampled through it
+    uses_lobe_sample: ClassVar[bool] = False  # `sample` uses u.z
+    chromatic: ClassVar[bool] = False  # the pdf differs between wavelengths: it has `pdfs`
+    disperses: ClassVar[bool] = False  # whatever its parameters, directions depend on wavelength
+    refracts: ClassVar[bool] = False  # they do so where a parameter of the role index does
+    fluoresces: ClassVar[bool] = False  # light may leave at another wavelength: it has `shift`
+    is_null: ClassVar[bool] = False  # light goes on as if nothing were there, to lights as well
+    no_back: ClassVar[bool] = False  # its back is not there
+    absorbs: ClassVar[bool] = False  # all light, where its albedo is 0: none is sought there
+    guided: ClassVar[bool] = False  # light goes to all of a hemisphere: its directions are learned
+    reversible: ClassVar[bool] = True  # light that comes the other way takes the same paths
+
+    @property
+    def transmits(self) -> bool:
+        """Whether light goes through it."""
+        return False
+
+    @property
+    def uses_tangents(self) -> bool:
+        """Whether what it does differs between the tangent and across."""
+        u, v = (getattr(self, name, None) for name in ("alpha_u", "alpha_v"))
+        return u is not v and u != v

@@ -1,0 +1,167 @@
+"""The part of a session that moves the camera: what drags, keys and clicks ask for."""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from clpt.scene import Scene
+from clpt.scene.cameras import Camera, Perspective, ThinLens
+from clpt.scene.params import params
+from clpt.view import navigation, views
+from clpt.view.commands import OF_VIEW, CommandError, Request
+from clpt.view.render_loop import RenderLoop
+from clpt.view.target import Change
+
+log = logging.getLogger(__name__)
+
+LENS_SHARE = 0.01  # of the distance in focus: the radius that a pinhole gets as a lens
+
+Reply = Callable[[dict[str, Any]], None]
+
+
+class CameraWork:
+    """Base of a session: its methods `_do_<command>` that concern the camera, and the pivot.
+
+    scene: the present one; _first: that of the file; the methods without a body are the session's.
+    """
+
+    scene: Scene
+    _first: Scene
+    _loop: RenderLoop
+    _pivot: navigation.Vector
+    _up: navigation.Vector
+    _aimed: bool  # the pivot lies on a surface
+
+    def post(self, request: Request, reply: Reply) -> None: ...
+
+    def _ask_hit(self, x: int, y: int, reply: Reply, then: Callable[[Any], None]) -> None: ...
+
+    def _do_display(self, reply: Reply, exposure: float, tone: str) -> None: ...
+
+    def _tell_state(self) -> None: ...
+
+    def _do_orbit(self, reply: Reply, dx: float, dy: float) -> None:
+        self._move(navigation.orbit(self.scene.camera, self._pivot, self._up, dx, dy))
+
+    def _do_look(self, reply: Reply, dx: float, dy: float) -> None:
+        self._move(
+            navigation.look(self.scene.camera, self._up, dx, dy, self._aspect()), takes_pivot=True
+        )
+
+    def _do_pan(self, reply: Reply, dx: float, dy: float) -> None:
+        camera = navigation.pan(self.scene.camera, self._distance(), dx, dy, self._aspect())
+        self._move(camera, takes_pivot=True)
+
+    def _do_dolly(self, reply: Reply, by: float) -> None:
+        self._move(navigation.dolly(self.scene.camera, self._pivot, by))
+
+    def _do_fly(self, reply: Reply, right: float, up: float, forward: float) -> None:
+        camera = navigation.fly(self.scene.camera, self._distance(), right, up, forward)
+        self._move(camera, takes_pivot=True)
+
+    def _do_home(self, reply: Reply) -> None:
+        self._move(self._first.camera)
+        self._set_pivot()
+        self._tell_state()
+
+    def _do_open_view(self, reply: Reply, camera: Any, exposure: float, tone: str) -> None:
+        opened = views.camera_of(camera)
+        if tone == OF_VIEW and self._loop.display.view is None:
+            tone = "none"  # it was of another start
+        self._do_display(reply, exposure, tone)
+        self._move(opened)
+        self._set_pivot()
+        self._tell_state()
+
+    def _do_field_of_view(self, reply: Reply, degrees: float) -> None:
+        if not isinstance(self.scene.camera, Perspective):
+            raise CommandError(f"the camera {self.scene.camera.kind} has no field of view")
+        self._move(dataclasses.replace(self.scene.camera, fov=degrees))
+        self._tell_state()
+
+    def _do_pick(self, reply: Reply, x: int, y: int) -> None:
+        self._ask_hit(x, y, reply, lambda hit: self._aim_at(hit, reply))
+
+    def _do_focus(self, reply: Reply, x: int, y: int) -> None:
+        self._ask_hit(x, y, reply, lambda hit: self._focus_on(hit, reply))
+
+    def _do_pivot(self, reply: Reply, position: list[float]) -> None:
+        self._pivot, self._aimed = np.array(position), True
+
+    def _do_focus_at(self, reply: Reply, distance: float) -> None:
+        camera: Any = self.scene.camera
+        if isinstance(camera, ThinLens):
+            camera = dataclasses.replace(camera, focus_distance=distance)
+        elif isinstance(camera, Perspective):
+            given = {name: getattr(camera, name) for name in params(type(camera))}
+            radius = LENS_SHARE * distance
+            camera = ThinLens(**given, focus_distance=distance, aperture_radius=radius)
+        else:
+            raise CommandError(f"the camera {camera.kind} has no lens")
+        self._move(camera)
+        self._tell_state()
+
+    def _aim_at(self, hit: dict[str, Any], reply: Reply) -> None:
+        """In the probe's thread: let the pivot be where a pixel looks."""
+        if hit["shape"] is None:
+            reply({"type": "note", "text": "there is nothing to turn about"})
+            return
+        self.post(Request("pivot", {"position": hit["position"]}), reply)
+        reply({"type": "pivot", "position": hit["position"], "depth": hit["depth"]})
+
+    def _focus_on(self, hit: dict[str, Any], reply: Reply) -> None:
+        """In the probe's thread: let the lens focus where a pixel looks."""
+        if hit["shape"] is None:
+            reply({"type": "note", "text": "there is nothing to focus on"})
+            return
+        at = navigation.pose(self.scene.camera)
+        distance = float(np.dot(np.array(hit["position"]) - at.origin, at.forward))
+        self.post(Request("focus_at", {"distance": max(distance, 1e-6)}), reply)
+
+    def _aim(self) -> None:
+        """Let the pivot be what is in the middle of the picture."""
+        self._aimed = True
+        film = self.scene.film
+
+        def silent(message: dict[str, Any]) -> None:
+            log.debug("%s", message)
+
+        def aim(hit: dict[str, Any]) -> None:
+            if hit["shape"] is not None:
+                self.post(Request("pivot", {"position": hit["position"]}), silent)
+
+        self._ask_hit(film.width // 2, film.height // 2, silent, aim)
+
+    def _move(self, camera: Camera, takes_pivot: bool = False) -> None:
+        """Let another camera look; takes_pivot: the pivot goes where the camera goes."""
+        if takes_pivot:
+            old, new = navigation.pose(self.scene.camera), navigation.pose(camera)
+            away = self._pivot - old.origin
+            parts = [float(np.dot(away, axis)) for axis in (old.left, old.up, old.forward)]
+            axes = (new.left, new.up, new.forward)
+            self._pivot = new.origin + sum(
+                part * axis for part, axis in zip(parts, axes, strict=True)
+            )
+        self.scene = dataclasses.replace(self.scene, camera=camera)
+        shown = dataclasses.replace(self._loop.scene, camera=camera)
+        self._loop.begin(shown, Change(camera=camera))
+
+    def _set_pivot(self) -> None:
+        """Let the pivot be where the camera focuses, or as far away as the world's origin."""
+        camera = self.scene.camera
+        at = navigation.pose(camera)
+        distance = float(getattr(camera, "focus_distance", np.linalg.norm(at.origin))) or 1.0
+        self._pivot, self._up = at.origin + distance * at.forward, navigation.upright(camera)
+        self._aimed = False
+
+    def _distance(self) -> float:
+        away = self._pivot - navigation.pose(self.scene.camera).origin
+        return float(np.linalg.norm(away)) or 1.0
+
+    def _aspect(self) -> float:
+        return self.scene.film.width / self.scene.film.height

@@ -1,0 +1,55 @@
+"""Pictures of media and phase functions: three balls each, of what scatters, before a lamp."""
+
+from __future__ import annotations
+
+from clpt.scene import Scene, integrators, media, shapes
+from clpt.scene.materials import Null
+
+from .studio import PLACES, Picture, studio
+
+WHITE, AMBER, WINE = (5.0, 5.0, 5.0), (1.5, 4.0, 9.0), (0.4, 5.0, 4.4)
+
+
+def balls(caption: str, *made: media.Medium, spp: int = 128) -> Picture:
+    """Balls of three media, from left to right."""
+
+    def scene() -> Scene:
+        things = [
+            shapes.Sphere(center=(x, 0.56, 0.0), radius=0.55, material=Null(), interior=medium)
+            for medium, x in zip(made, PLACES, strict=True)
+        ]
+        made_scene = studio(list(things))
+        made_scene.integrator = integrators.Path(max_depth=100)
+        return made_scene
+
+    return Picture(caption, scene, spp)
+
+
+def _phases(caption: str, *made: media.Phase) -> Picture:
+    return balls(caption, *(media.Homogeneous(sigma_s=3.0, phase=one) for one in made))
+
+
+MEDIA = {
+    "homogeneous": balls(
+        "mist; amber, whose extinction depends on the wavelength; wine, which only absorbs",
+        media.Homogeneous(sigma_s=WHITE),
+        media.Homogeneous(sigma_t=AMBER, albedo=(0.999, 0.99, 0.96)),
+        media.Homogeneous(sigma_a=WINE),
+    ),
+}
+PHASES = {
+    "isotropic": balls(
+        "extinction of 1, 4 and 16 a metre",
+        *(media.Homogeneous(sigma_s=each) for each in (1.0, 4.0, 16.0)),
+    ),
+    "henyey_greenstein": _phases(
+        "`g` of -0.6, 0.3 and 0.9", *(media.HenyeyGreenstein(g=g) for g in (-0.6, 0.3, 0.9))
+    ),
+    "rayleigh": balls(
+        "`sigma_s` by the fourth power of the wavelength: 0.5, 2 and 8 times",
+        *(
+            media.Homogeneous(sigma_s=(0.55, 1.1, 2.6), scale=k, phase=media.Rayleigh())
+            for k in (0.5, 2.0, 8.0)
+        ),
+    ),
+}

@@ -1,0 +1,49 @@
+/* Light beside the picture, by the surfaces that it has met and by the lights that it comes from: sums over all samples
+ * as those of the film, LIGHT_LAYERS pictures of nine streams of words (core/fixed.cl). Each part of a path's light is
+ * added when it is found. The sums of all groups, and direct with indirect light, are the picture. */
+#include "film/sums.cl"
+#define LIGHT_PICTURE_WORDS 9
+
+inline void light_layer_sum(Scene scene, mask m, integer pixel_index, integer picture, vec3 value,
+                            global uint *light_layers)
+{
+    size_t stream = scene.settings->padded_pixels;
+    Fixed sums[3] = {fixed_of(value.x), fixed_of(value.y), fixed_of(value.z)};
+    const int *adds = (const int *)&m, *pixels = (const int *)&pixel_index, *pictures = (const int *)&picture;
+    const uint *words = (const uint *)sums;
+    for (int i = 0; i < LANES; i++) {
+        if (!adds[i]) continue;
+        global uint *at = light_layers + pictures[i] * LIGHT_PICTURE_WORDS * stream + pixels[i];
+        for (int k = 0; k < LIGHT_PICTURE_WORDS; k += 3) {
+            const uint *w = words + k * LANES + i;
+            sums_add(at + k * stream, stream, w[0], w[LANES], w[2 * LANES]);
+        }
+    }
+}
+
+/* Adds light that arrives at the camera from the light in row `row` of `lights`, after as many surfaces. */
+inline void light_layers_add(Scene scene, Slab path, uint at, mask m, integer surfaces, integer row, Spectrum light,
+                             global uint *light_layers)
+{
+    Wavelengths lambdas = load_path_lambdas(path, at);
+#if USES_FLUORESCENCE /* the film sees the camera's wavelengths */
+    Sampler begun = pixel_sampler(scene.settings, load_path_pixel_key(path, at), load_path_sample(path, at));
+    lambdas = wavelengths_sample(scene, sampler_pair(begun, (natural)(DIMENSION_WAVELENGTH)).x);
+#endif
+    vec3 v = scale3(film_value(scene, light, lambdas), load_path_weight(path, at) * scene.settings->film_scale);
+    m = m & (fabs(v.x) + fabs(v.y) + fabs(v.z) < FIXED_LARGEST); /* false for what is not finite */
+    if (!any(m)) return;
+    v = sel3(m, v, v3(0.0f, 0.0f, 0.0f));
+    integer pixel_index = load_path_pixel_index(path, at);
+    mask direct = surfaces <= 1;
+#if LIGHT_LAYER_DIRECT
+    light_layer_sum(scene, m & direct, pixel_index, (integer)(LIGHT_LAYER_DIRECT - 1), v, light_layers);
+#endif
+#if LIGHT_LAYER_INDIRECT
+    light_layer_sum(scene, m & !direct, pixel_index, (integer)(LIGHT_LAYER_INDIRECT - 1), v, light_layers);
+#endif
+#if LIGHT_LAYER_GROUPS
+    integer group = to_integer(gather(scene.distributions, LIGHT_GROUPS + sel_i(m, row, (integer)(0))));
+    light_layer_sum(scene, m, pixel_index, LIGHT_LAYER_GROUPS - 1 + group, v, light_layers);
+#endif
+}

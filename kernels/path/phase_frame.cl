@@ -1,0 +1,9 @@
+/* The frame in which a point of a medium scatters: z points to where the ray comes from. */
+typedef struct { Frame frame; } ShadingFrame;
+
+inline ShadingFrame shading_frame_load(Scene scene, integer row, Surface s, vec3 d, Wavelengths lambdas)
+{
+    ShadingFrame f = {frame_of(neg3(d))};
+    return f;
+}
+inline real shading_frame_share(ShadingFrame f, vec3 w) { return 1.0f; }

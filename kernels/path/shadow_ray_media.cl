@@ -1,0 +1,13 @@
+/* The ray that waits in the shadow slab of a path to a light, where it may go through several media. */
+#include "interface/shape.cl"
+#include "generated/trace.cl"
+#include "generated/transmittance.cl"
+
+/* How much of the light between the two points of each active ray passes. The rays wait no longer. */
+inline Spectrum shadow_ray_transmittance(TRACE_ARGS, Scene scene, Slab path, Slab shadow, uint at, real t, mask active)
+{
+    vec3 o = load_shadow_o(shadow, at), d = load_shadow_d(shadow, at);
+    store_shadow_t(shadow, at, active, (real)(-1.0f));
+    integer medium = sel_i(active, load_shadow_through(shadow, at), (integer)(0));
+    return trace_transmittance(TRACE_PASSED, scene, o, d, t, medium, load_path_lambdas(path, at), active);
+}

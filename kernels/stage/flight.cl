@@ -1,0 +1,61 @@
+/* Takes rays through media: a ray either comes to where it ends, or meets the medium before. Then that is where it
+ * ends, and the medium's phase function is its material. Both are chosen by the extinction at the hero wavelength, and
+ * weighed over all of the path's wavelengths (Miller, Georgiev and Jarosz 2019, with one sample): `ratio` does it as
+ * for directions, see path/hero.cl. Light that is absorbed is a weight, never an end. */
+#include "core/base.cl"
+#include "interface/stage.cl"
+#include "generated/sampler.cl"
+#include "path/path_state.cl"
+#include "path/ratio.cl"
+#include "generated/textures.cl"
+#include "generated/medium.cl"
+
+/* The medium of a ray; one that knows of none is in that of the side of the surface that it meets. */
+inline integer flight_medium(Scene scene, Slab path, Slab hit, uint at, mask met)
+{
+    ShapeMedia own = shape_media(scene, sel_i(met, load_hit_shape(hit, at), (integer)(0)));
+    mask front = dot3(load_hit_n(hit, at), load_path_d(path, at)) < 0.0f;
+    integer medium = load_path_medium(path, at);
+    return sel_i(met & (medium == 0), sel_i(front, own.outside, own.inside), medium);
+}
+
+STAGE(flight)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
+{
+    SLABS
+    SCENE
+    STAGE_AT
+    integer state = load_path_state(path, at);
+    mask alive = (state & PATH_ALIVE) != 0, met = alive & (load_hit_prim(hit, at) >= 0);
+    integer name = flight_medium(scene, path, hit, at, met);
+    store_path_medium(path, at, alive, name);
+    mask flies = alive & ((name & MEDIUM_FLIES) != 0);
+    if (any(flies)) {
+        Wavelengths lambdas = load_path_lambdas(path, at);
+        Medium m = medium_load(scene, sel_i(flies, name, (integer)(0)), lambdas);
+        Spectrum ratio = hero_ratio(path, at);
+        Sampler sampler = pixel_sampler(settings, load_path_pixel_key(path, at), load_path_sample(path, at));
+        integer vertex = (state & PATH_DEPTH) + path_nulls(path, at);
+        vec2 u = sampler_pair(sampler, as_natural(DIMENSION_FLIGHT + vertex));
+        mask scatters = flies & (spectrum_max(m.sigma_s) > 0.0f);
+        real sigma = spectrum_pick(m.sigma_t, ratio, u.y), end = sel(met, load_hit_t(hit, at), (real)(FAR));
+        real t = -log_r(max_r(1.0f - u.x, (real)(1e-9f))) / max_r(sigma, (real)(1e-30f));
+        mask collides = scatters & (t < end);
+        t = sel(collides, t, end);
+        Spectrum passes = spectrum_exp(spectrum_scale(m.sigma_t, -t));
+        Spectrum f = spectrum_sel(collides, spectrum_mul(m.sigma_s, passes), passes);
+        Spectrum pdf = spectrum_sel(collides, spectrum_mul(m.sigma_t, passes), passes);
+        pdf = spectrum_sel(scatters, pdf, spectrum_of(1.0f));
+#if USES_RATIO
+        Spectrum pdfs = spectrum_mul(ratio, pdf);
+        real mean = spectrum_mean(pdfs), inverse = sel(mean > 1e-30f, 1.0f / mean, (real)(0.0f));
+        hero_keep(path, at, flies, spectrum_scale(pdfs, inverse));
+        Spectrum weight = spectrum_scale(f, inverse);
+#else
+        Spectrum weight = spectrum_scale(f, 1.0f / max_r(pdf.x, (real)(1e-30f)));
+#endif
+        store_path_beta(path, at, flies, spectrum_mul(load_path_beta(path, at), weight));
+        store_hit_t(hit, at, collides, t);
+        store_hit_prim(hit, at, collides, (integer)(0));
+        store_hit_material(hit, at, collides, m.phase);
+    }
+}

@@ -1,0 +1,43 @@
+/* How much of the light between two points passes, where some surfaces transmit a part of it as if nothing were there,
+ * and media dim it between them. Each surface is met in turn; it may be where one medium ends and another begins. */
+#include "interface/shape.cl"
+#include "generated/textures.cl"
+#include "generated/mixture.cl"
+#include "generated/shapes.cl"
+#include "path/surface.cl"
+#include "generated/medium.cl"
+#include "generated/null_transmittance.cl"
+
+inline Spectrum trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real t, integer medium,
+                                    Wavelengths lambdas, mask active)
+{
+    Spectrum passes = spectrum_sel(active, spectrum_of(1.0f), spectrum_of(0.0f));
+    int surfaces = 0;
+    while (any(active)) {
+        TraceHit h = trace_closest(TRACE_PASSED, scene, o, d, t, active);
+        mask met = active & (h.prim >= 0) & (t > 0.0f);
+        real way = sel(met, h.t, max_r(t, (real)(0.0f)));
+        Spectrum dims = medium_transmittance(scene, sel_i(active, medium, (integer)(0)), way, lambdas);
+        passes = spectrum_mul(passes, dims);
+        active = met;
+        if (any(active)) {
+            integer row = sel_i(active, h.shape, (integer)(0));
+            ShapeRow shape = shape_row_row(scene.shapes, row * SHAPE_ROW_WORDS);
+            mask front;
+            Surface s = surface_at(scene, h, active, o, d, &front);
+            integer word = sel_i(active, sel_i(front, shape.front, shape.back), (integer)(0));
+            real own = null_transmittance(scene, word, surface_texture_point(s), lambdas) *
+                       (surfaces < MOST_NULL_SURFACES ? 1.0f : 0.0f);
+            passes = spectrum_sel(active, spectrum_scale(passes, own), passes);
+            active = active & (own > 0.0f);
+            ShapeMedia sides = shape_media(scene, row);
+            medium = sel_i(active, medium_beyond(medium, sides.inside, sides.outside, front, front), medium);
+            /* On along d: beside it, the ray would miss its end, and a round light would shade itself. */
+            real on = h.t * (1.0f + SURFACE_ROUNDING) + surface_lead(s, d);
+            o = sel3(active, madd3(d, on, o), o);
+            t = sel(active, t - on, t);
+            surfaces++;
+        }
+    }
+    return passes;
+}

@@ -1,0 +1,285 @@
+"""Adaptive sampling by several workers: the film of one process, whatever they do."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("distributed")
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+
+sys.path.insert(0, str(Path(__file__).parent))
+from machines import ENVIRONMENT, LONGEST, ROOT, machines, scene, wait_until  # noqa: E402
+
+import clpt  # noqa: E402
+from clpt import images  # noqa: E402
+from clpt.__main__ import run  # noqa: E402
+from clpt.cluster import blocks, tasks  # noqa: E402
+from clpt.cluster.cluster_renderer import ClusterRenderer  # noqa: E402
+from clpt.errors import ClusterError, SceneError  # noqa: E402
+from clpt.render import film_file  # noqa: E402
+from clpt.scene.integrators import Path as PathIntegrator  # noqa: E402
+
+NOISE, MOST = 0.1, 300
+KINDS = ("path", "light_paths")
+TWO_DEVICES = (
+    "from clpt import device as dev\nfrom clpt.cluster import tasks\n"
+    "tasks._devices = lambda: [dev.choose(threads=1), dev.choose(threads=1)]"
+)
+
+
+def plan(kind="path"):
+    """A box, of which some cells are calm long before others."""
+    light_paths = 0.5 if kind == "light_paths" else 0
+    return dataclasses.replace(
+        scene(), integrator=PathIntegrator(light_paths=light_paths, max_depth=4)
+    )
+
+
+@pytest.fixture(scope="module")
+def two():
+    """Two workers."""
+    with machines(2) as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def expected():
+    """The digests of films of one process, by what it was asked to do."""
+    found: dict[str, str] = {}
+    for kind in KINDS:
+        with clpt.Renderer(plan(kind), threads=1) as one:
+            one.run(3)
+            one.run(60, noise=NOISE)
+            one.run(1)
+            one.run(MOST, noise=NOISE)
+            state = one.film_state()
+            assert len(np.unique(state.samples)) > 2
+            found[kind] = tasks.film_digest(state)
+            one.reset()
+            one.run(MOST, noise=NOISE)
+            found[f"{kind} at once"] = tasks.film_digest(one.film_state())
+            found[f"{kind} samples"] = one.counts[0].samples
+    return found
+
+
+def digest(renderer):
+    return tasks.film_digest(renderer.film_state())
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_film_is_that_of_one_process(kind, two, expected):
+    """However runs are cut; all of it is told too."""
+    with ClusterRenderer(plan(kind), two.client) as renderer:
+        told = []
+        assert renderer.run(MOST, lambda p: told.append((p.samples, p.active)), noise=NOISE)
+        assert digest(renderer) == expected[f"{kind} at once"]
+        assert renderer.counts[0].samples == expected[f"{kind} samples"]
+        assert told == sorted(told, key=lambda pair: pair[0]) and told[-1][1] < 1.0
+        assert renderer.samples == MOST and renderer.blocks.dropped == 0
+    with ClusterRenderer(plan(kind), two.client) as renderer:
+        renderer.run(3)
+        renderer.run(60, noise=NOISE)
+        renderer.run(1)
+        renderer.run(MOST, noise=NOISE)
+        assert digest(renderer) == expected[kind]
+        image, samples = renderer.image(), renderer.samples_per_pixel()
+        np.testing.assert_array_equal(samples, renderer.film_state().samples)
+    with clpt.Renderer(plan(kind), threads=1) as one:
+        one.merge(renderer.film_state())
+        np.testing.assert_array_equal(image, one.image())
+
+
+@pytest.mark.parametrize("kind", ["path", pytest.param("light_paths", marks=pytest.mark.slow)])
+def test_a_worker_with_two_devices(kind, two, expected):
+    """Beside workers with one, with which all of its films are compared."""
+    third = two.start(TWO_DEVICES)
+    known = set(two.client.nthreads())
+    two.wait(3)
+    [address] = set(two.client.nthreads()) - known
+    try:
+        for _ in range(20):
+            with ClusterRenderer(plan(kind), two.client, check_every=1) as renderer:
+                assert renderer.run(MOST, noise=NOISE)
+                assert digest(renderer) == expected[f"{kind} at once"]
+                assert not renderer.refused
+                if address in renderer.workers and renderer.workers[address].samples:
+                    break
+        assert renderer.workers[address].samples > 0
+    finally:
+        two.end(third)
+
+
+def test_saved_films_go_on_by_a_cluster_and_by_one_process(two, expected, tmp_path):
+    """What a stop cut is in the picture, and not in what is held."""
+    path = tmp_path / "a.film"
+    with ClusterRenderer(plan(), two.client) as renderer:
+        assert renderer.run(40, noise=NOISE)
+        renderer.hold()
+        assert not renderer.run(10**6, lambda p: p.samples < 60, noise=1e-4)
+        assert renderer.film_state().samples.max() > 40
+        assert renderer.run(2, noise=NOISE)
+        film_file.write(path, renderer.saved_film(held=True))
+    for loading in (ClusterRenderer(plan(), two.client), clpt.Renderer(plan(), threads=1)):
+        with loading:
+            loading.load_state(path)
+            assert loading.samples == 40
+            loading.run(MOST - 40, noise=NOISE)
+            assert digest(loading) == expected["path at once"]
+            assert loading.counts[0].samples == expected["path samples"]
+    with clpt.Renderer(plan(), threads=1) as one:
+        one.run(40, noise=NOISE)
+        one.save_state(path)
+    with ClusterRenderer(plan(), two.client) as renderer:
+        renderer.load_state(path)
+        renderer.run(MOST - 40, noise=NOISE)
+        assert digest(renderer) == expected["path at once"]
+
+
+def test_what_makes_no_sense(two):
+    with ClusterRenderer(plan(), two.client) as renderer:
+        with pytest.raises(SceneError, match="noise"):
+            renderer.run(4, noise=-1.0)
+        renderer.run(2)
+        with clpt.Renderer(plan(), first_sample=5, threads=1) as later:
+            later.run(2)
+            renderer.merge(later.film_state())
+        with pytest.raises(SceneError, match="samples are missing"):
+            renderer.run(4, noise=NOISE)
+        assert renderer.run(3)
+        assert renderer.run(4, noise=NOISE)
+
+        def fail(progress):
+            raise KeyError("here")
+
+        with pytest.raises(KeyError, match="here"):
+            renderer.run(4, fail, noise=NOISE)
+        assert renderer.run(4, noise=NOISE)
+
+
+def test_selections_that_are_none(two):
+    for wrong in ({"paths": "all", "ends": b""}, {"paths": "x", "pixels": 1, "ends": b""}, {}):
+        with pytest.raises(ClusterError, match="no selection"):
+            tasks.unpack_selection(wrong)
+    assert tasks.unpack_selection({"paths": "lights", "pixels": 3, "ends": b""}).ends is None
+
+
+def test_workers_are_known_from_one_run_to_the_next():
+    """And those that are gone are not waited for."""
+    first = blocks.Blocks(100)
+    for name in ("a", "b"):
+        first.join(name, "cpu")
+    block = first.take("a", 0.0)
+    first.finish("a", block, 1.0, seconds=0.5)
+    second = blocks.Blocks(100, first=40, share=0.25, before=first, check_every=1)
+    assert second.known.keys() == {"a", "b"} and not second.workers
+    second.lose("b")
+    second.join("a", "cpu")
+    assert second.workers["a"].rate == 2.0 * block.samples
+    again = second.take("a", 0.0)
+    assert again.samples > 1 and again.first == 40
+    assert second.finish("a", again, 1.0, digest="x") is blocks.Outcome.ADD  # there is no other
+    assert second.workers["a"].samples == block.samples + 0.25 * again.samples
+    second.join("a", "gpu")
+    third = blocks.Blocks(100, before=second)
+    third.join("a", "gpu")
+    assert third.workers["a"].rate == 0.0  # it is another device
+
+
+LONG = {"samples": 8000, "noise": 0.005}
+
+
+@pytest.fixture(scope="module")
+def of_long():
+    """The digest of a film that takes some seconds."""
+    with clpt.Renderer(plan(), threads=1) as one:
+        one.run(LONG["samples"], noise=LONG["noise"])
+        return tasks.film_digest(one.film_state())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "stopped"])
+def test_workers_that_end_or_hang(number, two, of_long):
+    """In the middle of a round: others take its blocks, and the film is the same."""
+    others = [two.start(), two.start()]
+    two.wait(4)
+    left = list(others)
+    try:
+        with ClusterRenderer(plan(), two.client) as renderer:
+            while len(renderer.workers) < 4:
+                assert renderer.run(50)
+            renderer.update(scene=plan())
+            looks = iter(range(10**9))
+
+            def disturb(progress):
+                if left and next(looks) % 2:
+                    os.kill(left.pop().pid, number)
+
+            assert renderer.run(LONG["samples"], disturb, noise=LONG["noise"])
+            assert not left
+            assert digest(renderer) == of_long
+    finally:
+        for process in others:
+            two.end(process)
+
+
+def render(*more: str) -> int:
+    return run(["render", str(ROOT / "scenes/cornell_box"), "--size", "32x24", *more])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
+def test_a_client_that_ends_goes_on(how, two, tmp_path, monkeypatch):
+    """To the film of `clpt render --noise` in one process; and a worker dies meanwhile."""
+    monkeypatch.chdir(tmp_path)
+    third = two.start()
+    two.wait(3)
+    noisy = ["--noise", "0.01", "--spp", "6000", "-o", "a.film", "--checkpoint", "1s"]
+    command = ["render", str(ROOT / "scenes/cornell_box"), "--size", "32x24", *noisy]
+    command += ["--cluster", two.address]
+    client = subprocess.Popen(
+        [sys.executable, "-m", "clpt", *command], env=ENVIRONMENT, cwd=tmp_path,
+        stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    try:
+        wait_until((tmp_path / "a.resume.exr").exists, "a checkpoint")
+        two.end(third)
+        client.send_signal(how)
+        told = client.communicate(timeout=LONGEST)[1]
+    finally:
+        client.kill()
+        client.wait()
+    assert client.returncode == (-how if how == signal.SIGKILL else 128 + how), told
+    assert "Traceback" not in told
+    saved = film_file.read("a.resume.exr")
+    assert saved.adaptive and saved.film.samples.max() < 6000
+    assert run([*command, "--resume"]) == 0
+    assert render(*noisy[:4], "-o", "whole.film") == 0
+    digests = [tasks.film_digest(film_file.read(name).film) for name in ("a.film", "whole.film")]
+    assert digests[0] == digests[1]
+
+
+def test_the_command_line(two, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    on = ["--cluster", two.address]
+    noisy = ["--noise", "0.05", "--spp", "200"]
+    assert render(*noisy, *on, "-o", "a.exr", "-o", "a.film", "--checkpoint", "1h") == 0
+    told = capsys.readouterr().err
+    assert "2 workers; blocks lost 0" in told
+    assert render(*noisy, "-o", "b.exr", "-o", "b.film") == 0
+    films = [film_file.read(name).film for name in ("a.film", "b.film", "a.resume.exr")]
+    assert len({tasks.film_digest(film) for film in films}) == 1
+    assert len(np.unique(films[0].samples)) > 1
+    for name in ("spp", "seed"):
+        found = [images.attributes(Path(f"{which}.exr"))[name] for which in "ab"]
+        assert found[0] == found[1]
+    np.testing.assert_array_equal(images.read("a.exr"), images.read("b.exr"))
+    assert render("--noise", "0.05", "--samples", "0:4", *on, "-o", "a.film") == 2
+    assert render("--noise", "0.05", *on, "-o", "c.exr", "--time", "3s") == 0

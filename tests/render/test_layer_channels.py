@@ -1,0 +1,94 @@
+"""Layers as channels of files: each of the table, by both names, beside colours and bands."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import OpenEXR
+import pytest
+
+import clpt
+from clpt import images, spectral_exr
+from clpt.__main__ import run
+from clpt.render.contract.layer_names import LayerNames
+from clpt.render.cryptomatte import RANKS
+from clpt.render.layer_channels import SETS, channels_of
+from clpt.render.saved_film import PictureForm
+from clpt.scene.layers import LAYERS
+
+SIZE = (3, 5)
+
+
+def pictures() -> dict[str, np.ndarray]:
+    """A picture of every layer of the table, of numbers that halves cannot hold."""
+    rng = np.random.default_rng(2)
+    made = {}
+    for name, layer in LAYERS.items():
+        channels = 2 * RANKS if layer.form == "matte" else len(layer.channels)
+        image = rng.uniform(70_000.0, 70_001.0, (*SIZE, channels)).astype(np.float32)
+        made["light_key" if name == "light_groups" else name] = image
+    return made
+
+
+class Source:
+    """What a renderer has to show, without one."""
+
+    is_adaptive = False
+
+    def __init__(self, bands: int = 0):
+        names = LayerNames(objects=("a ball", "a ball", "floor"), materials=("ink",))
+        output = tuple(tuple(row) for row in np.eye(3).tolist())
+        self.form = PictureForm(output, bands=bands, layers=tuple(LAYERS), names=names)
+
+    def image(self):
+        return np.full((*SIZE, 3), 0.5, np.float32)
+
+    colours = image
+
+    def layers(self):
+        return pictures()
+
+    def spectral_image(self):
+        lambdas = np.linspace(400.0, 700.0, self.form.bands)
+        return clpt.SpectralImage(np.ones((*SIZE, len(lambdas)), np.float32), lambdas, True)
+
+
+@pytest.mark.parametrize("names", SETS)
+def test_every_layer_comes_back(names, tmp_path):
+    """In 32 bits, each channel under a name of its own, beside half colours."""
+    path = tmp_path / "a.exr"
+    clpt.write_layers(path, Source(), names=names)
+    wanted = channels_of(pictures(), names)
+    assert len(wanted) == sum(image.shape[2] for image in pictures().values())
+    with OpenEXR.File(str(path), separate_channels=True) as file:
+        found = {name: channel.pixels for name, channel in file.channels().items()}
+    for name, values in wanted.items():
+        assert found[name].dtype == np.float32
+        np.testing.assert_array_equal(found[name], values)
+    picture = "" if names == "clpt" else "ViewLayer.Combined."
+    assert found.keys() - wanted.keys() == {f"{picture}{letter}" for letter in "RGB"}
+    assert found[f"{picture}R"].dtype == np.float16
+    np.testing.assert_array_equal(images.read(path), Source().image())
+
+
+def test_names_of_blender():
+    made = channels_of(pictures(), "blender")
+    for name in (
+        "Position.X", "Denoising Albedo.R", "Denoising Normal.Z", "IndexOB.X", "IndexMA.X",
+        "Combined_key.G", "CryptoObject00.r", "CryptoMaterial02.a", "Debug Sample Count.X",
+    ):  # fmt: skip
+        assert f"ViewLayer.{name}" in made
+    assert all(name.startswith("ViewLayer.") for name in made)
+
+
+def test_a_spectral_file_has_layers_too(tmp_path, capsys):
+    path = tmp_path / "a.exr"
+    clpt.write_layers(path, Source(bands=4))
+    assert spectral_exr.read(path).values.shape == (*SIZE, 4)
+    channels = images.read_layers(path)
+    np.testing.assert_array_equal(channels["depth.Z"], pictures()["depth"][..., 0])
+    assert run(["inspect", str(path), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert "depth.Z" in said["layers"] and "S0" not in said["layers"]
+    assert said["CryptoObject"] == "Cryptomatte, 2 names"

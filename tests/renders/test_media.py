@@ -1,0 +1,183 @@
+"""Media: invisible where nothing absorbs, exponential where nothing scatters, and the same bits
+however a render is split.
+
+Significance as in tests/renders/support.py.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import clpt
+from clpt import spectra
+from clpt import transforms as tf
+from clpt.errors import SceneError
+from clpt.scene import Film, Scene, media
+from clpt.scene.cameras import Perspective
+from clpt.scene.integrators import Box, ParticleTracer
+from clpt.scene.integrators import Path as PathIntegrator
+from clpt.scene.lights import Constant, Point
+from clpt.scene.materials import Dielectric, Diffuse, Null
+from clpt.scene.shapes import Cube, Rectangle, Sphere
+from tests.renders.support import assert_mean, exposures
+
+SHARED = Path(__file__).resolve().parents[3] / "shared" / "bench" / "media"
+LONG = PathIntegrator(max_depth=-1, rr_depth=1000, light_paths=0)
+CHROMATIC = (0.5, 2.0, 3.0)  # [1/m]
+MODES = ("rgb", "spectral")
+WITHIN = 0.02  # relative; most of it is noise
+
+
+def ball(medium: media.Medium, material=None, **more) -> Scene:
+    """A ball that fills the picture, under the same light from everywhere."""
+    body = Sphere(material=material or Null(), interior=medium, **more)
+    return Scene(
+        camera=Perspective(fov=12.0, to_world=tf.look_at([0, 0, 5], [0, 0, 0], [0, 1, 0])),
+        shapes=[body],
+        lights=[Constant(radiance=1.0)],
+        film=Film(width=8, height=8, filter=Box()),
+        integrator=LONG,
+    )
+
+
+def with_mode(scene: Scene, mode: str) -> Scene:
+    return dataclasses.replace(scene, film=dataclasses.replace(scene.film, mode=mode))
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("phase", [cls() for cls in media.PHASES], ids=lambda p: p.kind)
+def test_furnace(phase: media.Phase, mode: str) -> None:
+    """What scatters all light cannot be seen under the same light from everywhere."""
+    scene = ball(media.Homogeneous(sigma_s=CHROMATIC, phase=phase))
+    assert_mean(exposures(with_mode(scene, mode), 8, 64), 1.0, WITHIN)
+
+
+def test_furnace_behind_glass() -> None:
+    scene = ball(media.Homogeneous(sigma_s=4.0), Dielectric(int_ior=1.3, ext_ior=1.0))
+    assert_mean(exposures(with_mode(scene, "rgb"), 8, 128), 1.0, WITHIN)
+
+
+def test_camera_in_a_medium() -> None:
+    """It is told, or known from the boundary that its first ray meets from inside."""
+    fog = media.Homogeneous(sigma_t=0.7, albedo=1.0)
+    scene = with_mode(ball(fog, to_world=tf.scale(9.0)), "rgb")
+    assert_mean(exposures(scene, 8, 64), 1.0, WITHIN)
+    told = dataclasses.replace(scene, camera=dataclasses.replace(scene.camera, medium=fog))
+    assert np.array_equal(exposures(told, 1, 16), exposures(scene, 1, 16))
+
+
+def test_absorbs_as_beer_and_lambert_say() -> None:
+    """exp(-sigma_a t) through a cube, without any noise, and for each wavelength of its own."""
+    dye = spectra.Tabulated((360.0, 500.0, 560.0, 830.0), (0.1, 0.4, 1.5, 0.2))
+    film = Film(width=4, height=4, filter=Box(), bands=16, lambda_min=420, lambda_max=680)
+    scene = dataclasses.replace(ball(media.Homogeneous(sigma_a=dye)), film=film)
+    scene.shapes = [Cube(material=Null(), interior=media.Homogeneous(sigma_a=dye))]
+    scene.lights = [Constant(radiance=spectra.Constant(1.0))]
+    scene.camera = Perspective(fov=0.1, to_world=tf.look_at([0, 0, 5], [0, 0, 0], [0, 1, 0]))
+    with clpt.Renderer(scene) as renderer:
+        renderer.run(256)
+        bands = renderer.image().mean(axis=(0, 1))
+    edges = np.linspace(420, 680, 17)
+    fine = [np.linspace(a, b, 201) for a, b in pairwise(edges)]
+    expected = [np.exp(-2.0 * dye.sample(one)).mean() for one in fine]
+    np.testing.assert_allclose(bands, expected, rtol=0.02)
+
+
+def test_light_through_boundaries() -> None:
+    """A lamp seen through two balls, one in the other: the sum of the ways through each."""
+    outer, inner = (media.Homogeneous(sigma_a=a) for a in (0.3, 1.1))
+    shapes = [
+        Sphere(material=Null(), interior=outer, to_world=tf.scale(2.0)),
+        Sphere(material=Null(), interior=inner, exterior=outer),
+        Rectangle(
+            to_world=tf.translate([0, 0, -4]) @ tf.scale(9.0),
+            material=Diffuse(reflectance=1.0),
+        ),
+    ]
+    scene = dataclasses.replace(ball(outer), shapes=shapes, lights=[])
+    scene.lights = [Point(position=(0.0, 0.0, 3.0), intensity=1.0)]
+    scene.camera = Perspective(fov=0.1, to_world=tf.look_at([5, 0, 0], [0, 0, -4], [0, 1, 0]))
+    scene.integrator = dataclasses.replace(LONG, max_depth=2)
+    with clpt.Renderer(with_mode(scene, "rgb")) as renderer:
+        renderer.run(4)
+        got = renderer.image().mean()
+    lost = np.exp(-(0.3 * 2.0 + 1.1 * 2.0))
+    # the camera's own way: from (5, 0, 0) to (0, 0, -4), nearest to the centre at 20 / sqrt 41
+    near = 20.0 / np.sqrt(41.0)
+    seen = np.exp(-0.3 * 2.0 * np.sqrt(max(4.0 - near**2, 0.0)))
+    assert got == pytest.approx(lost * seen / (np.pi * 49.0), rel=1e-3)
+
+
+def test_same_bits_however_split() -> None:
+    scene = with_mode(ball(media.Homogeneous(sigma_t=CHROMATIC, albedo=0.9)), "spectral")
+    films = []
+    for parts in ((12,), (1, 4, 7)):
+        with clpt.Renderer(scene) as renderer:
+            for part in parts:
+                renderer.run(part)
+            films.append(renderer.image())
+    assert np.array_equal(*films)
+
+
+def test_layers_of_what_scatters() -> None:
+    """Every sample counts: an opaque mist has the albedo of its light, a depth, and no normal."""
+    scene = with_mode(ball(media.Homogeneous(sigma_s=5000.0)), "rgb")
+    wanted = ("albedo", "depth", "shading_normal", "shape_id")
+    film = dataclasses.replace(scene.film, layers=wanted, filtering="importance")
+    scene = dataclasses.replace(scene, film=film)
+    scene.integrator = dataclasses.replace(LONG, max_depth=2)
+    with clpt.Renderer(scene) as renderer:
+        renderer.run(8)
+        layers = renderer.layers()
+    assert layers["albedo"] == pytest.approx(1.0, abs=1e-5)
+    assert layers["depth"].mean() == pytest.approx(4.0, abs=0.1)
+    assert not layers["shading_normal"].any()
+    assert (layers["shape_id"] == -1).all()
+
+
+def test_depth_counts_collisions() -> None:
+    """With max_depth 1 light is only met; dark beyond what passes unscattered."""
+    scene = with_mode(ball(media.Homogeneous(sigma_s=1.0)), "rgb")
+    scene.integrator = dataclasses.replace(LONG, max_depth=1)
+    scene.camera = Perspective(fov=0.1, to_world=tf.look_at([0, 0, 5], [0, 0, 0], [0, 1, 0]))
+    assert_mean(exposures(scene, 8, 256), np.exp(-2.0), WITHIN)
+
+
+def test_what_media_may_be() -> None:
+    with pytest.raises(SceneError, match="not both"):
+        media.Homogeneous(sigma_a=1.0, sigma_t=1.0)
+    with pytest.raises(SceneError, match="outside"):
+        media.Homogeneous(sigma_t=1.0, albedo=1.5)
+    scene = ball(media.Homogeneous(sigma_s=1.0))
+    scene.integrator = ParticleTracer()
+    with pytest.raises(SceneError, match="without media"):
+        clpt.render(scene, spp=1)
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason="the benchmark's scenes are not there")
+@pytest.mark.parametrize("name", ["iso_a0.99_t2", "hg8_a0.9_t2", "rayleigh_a0.99_t2", "iso_a1_t2"])
+def test_slab_against_adding_and_doubling(name: str) -> None:
+    """Reflectance of a slab seen from above, under radiance 1."""
+    case = json.loads((SHARED / "references" / "slab.json").read_text())["cases"][name]
+    phases = {"iso": media.Isotropic(), "hg8": media.HenyeyGreenstein(g=0.8)}
+    slab = media.Homogeneous(
+        sigma_t=case["tau"],
+        albedo=case["albedo"],
+        phase=phases.get(case["phase"], media.Rayleigh()),
+    )
+    scene = with_mode(ball(slab), "rgb")
+    scene.shapes = [
+        Cube(material=Null(), interior=slab, to_world=tf.scale([500, 500, 0.5])),
+        Rectangle(to_world=tf.translate([0, 0, -0.6]) @ tf.scale(9e2), material=BLACK),
+    ]
+    scene.camera = Perspective(fov=0.5, to_world=tf.look_at([0, 0, 5], [0, 0, 0], [0, 1, 0]))
+    assert_mean(exposures(scene, 8, 256), case["R_normal"], WITHIN)
+
+
+BLACK = Diffuse(reflectance=0.0)
