@@ -112,6 +112,7 @@ class Blocks:
         self.least_seconds = 0.0
         self.workers: dict[Worker, WorkerRecord] = {}
         self.former = {} if before is None else before.known  # workers that are not here yet
+        self.coming: set[Worker] = set()  # workers that get ready
         self.refused: dict[Worker, str] = {} if before is None else before.refused
         self.lost = self.repeated = self.dropped = 0
         if before is not None:
@@ -171,8 +172,13 @@ class Blocks:
         """The workers that are here, and those of former blocks."""
         return {**self.former, **self.workers}
 
+    def expect(self, worker: Worker) -> None:
+        """A worker gets ready, and joins or is refused."""
+        self.coming.add(worker)
+
     def join(self, worker: Worker, kind: str = "") -> None:
         """A worker is there. One that was refused stays so."""
+        self.coming.discard(worker)
         if worker in self.refused or worker in self.workers:
             return
         record = self.former.pop(worker, None)
@@ -183,6 +189,7 @@ class Blocks:
         """A worker is gone: return its blocks, which others get."""
         self.workers.pop(worker, None)
         self.former.pop(worker, None)
+        self.coming.discard(worker)
         blocks = [f.block for f in self._flights.values() if worker in f.since]
         for block in blocks:
             self.lost += 1
@@ -283,7 +290,9 @@ class Blocks:
         """Whether a worker is one to do a block again: one that did not do it, if there is one."""
         tried = flight.failed_at | flight.films.keys() | flight.since.keys()
         fit = self._equals(flight.kind) if flight.films else self.workers.keys()
-        return worker in fit and (worker not in tried or not fit - tried)
+        differ = len(set(flight.films.values())) > 1
+        others = fit - tried or (differ and self.coming)
+        return worker in fit and (worker not in tried or not others)
 
     def _equals(self, kind: str) -> set[Worker]:
         """The workers of a kind."""
@@ -369,7 +378,8 @@ class Blocks:
     def _agreed(self, flight: _Flight, worker: Worker, digest: str) -> bool:
         """Note a film; return whether it is right, and refuse workers whose films are not.
 
-        Of two equal films both are right. A worker that has no equal left is believed.
+        Of two equal films both are right. A worker that has no equal left is believed. Where
+        films differ, and a worker gets ready that may tell whose is right, it is waited for.
         """
         again = flight.films.get(worker) == digest
         flight.films[worker] = digest
@@ -384,7 +394,7 @@ class Blocks:
             return True
         if len(flight.films) == 1 and (again or not (left or flight.since)):
             return True
-        if not left and not flight.since:
+        if not (left or flight.since or self.coming):
             named = " and ".join(str(other) for other in flight.films)
             raise ClusterError(
                 f"{named} have different films of samples {block.first} to {block.end - 1}, though "

@@ -156,6 +156,7 @@ class Feeder:
             self._lose(address)
         for address in sorted(addresses - self._serving.keys()):
             if address not in self.blocks.refused:
+                self.blocks.expect(address)
                 self._serving[address] = asyncio.create_task(self._serve(address))
 
     def _lose(self, address: str) -> None:
