@@ -166,6 +166,7 @@ def test_a_signal_saves_whole_passes(tmp_path, number):
     np.testing.assert_array_equal(saved.film.words, film.film.words)
 
 
+@pytest.mark.slow
 def test_renders_that_are_killed(tmp_path):
     """A handful of kills at random moments, also while a file is written."""
     figures = killing.kill_and_resume(tmp_path, 3, seed=5)

@@ -140,6 +140,34 @@ def test_two_that_differ_end_the_render():
         compared(a="1", b="2")
 
 
+def test_where_films_differ_a_worker_that_gets_ready_is_waited_for():
+    blocks = Blocks(1, check_every=1)
+    for worker in "abc":
+        blocks.expect(worker)
+    blocks.join("a"), blocks.join("b")
+    for worker in "ab":
+        block = blocks.take(worker, 0.0)
+        assert blocks.finish(worker, block, 1.0, digest=worker) is Outcome.HOLD
+    assert blocks.take("a", 2.0) is None  # c does it
+    blocks.join("c")
+    assert blocks.take("c", 3.0) == block
+    assert blocks.finish("c", block, 4.0, digest="a") is Outcome.ADD
+    assert list(blocks.refused) == ["b"]
+
+
+def test_where_films_differ_and_nobody_comes_the_render_ends():
+    blocks = Blocks(1, check_every=1)
+    for worker in "abc":
+        blocks.expect(worker)
+    blocks.join("a"), blocks.join("b")
+    for worker in "ab":
+        blocks.finish(worker, blocks.take(worker, 0.0), 1.0, digest=worker)
+    blocks.refuse("c", "it has no disk")
+    block = blocks.take("a", 2.0)
+    with pytest.raises(ClusterError, match="a and b have different films of samples 0 to 0"):
+        blocks.finish("a", block, 3.0, digest="a")
+
+
 def test_films_of_other_kinds_are_not_compared():
     blocks = Blocks(2, check_every=1)
     blocks.join("cpu", "cpu"), blocks.join("gpu", "gpu")

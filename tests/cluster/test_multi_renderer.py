@@ -248,7 +248,7 @@ def test_random_failures_change_nothing(scene, whole, faults):
 
 
 @pytest.mark.parametrize("kind", ["path", "light_paths"])
-@pytest.mark.parametrize("which", [0, 1])
+@pytest.mark.parametrize("which", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_failures_with_noise(scenes, faults, kind, which):
     """The first device decides; another one only takes samples."""
     scene = small(scenes, kind)

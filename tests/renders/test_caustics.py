@@ -187,7 +187,9 @@ def cardioid() -> tuple[Scene, float, Callable[[Values], Values]]:
 
 
 @with_path_and_photons
-@pytest.mark.parametrize(("curve", "paths"), [(nephroid, 2e5), (cardioid, 5e5)])
+@pytest.mark.parametrize(
+    ("curve", "paths"), [(nephroid, 2e5), pytest.param(cardioid, 5e5, marks=pytest.mark.slow)]
+)
 def test_a_ring_has_its_cusp_where_light_has_no_width(way: str, curve: Any, paths: float) -> None:
     """The width of light along the axis is a line from 1 in the middle to 0 at the cusp.
 

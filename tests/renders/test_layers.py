@@ -68,6 +68,7 @@ def layers_of(scene: Scene, samples: int = 16, **options) -> dict[str, np.ndarra
         return renderer.layers()
 
 
+@pytest.mark.slow
 def test_layers_are_those_of_aov():
     """The same samples see the same: equal to what float32 sums of another order may differ by."""
     made = layers_of(room(layers=FIRST))

@@ -49,7 +49,7 @@ def rendered(scene: Scene, samples: int = 32):
 @pytest.mark.parametrize(
     ("how", "film"),
     [
-        (Path(light_paths=0), {}),
+        pytest.param(Path(light_paths=0), {}, marks=pytest.mark.slow),
         (Auto(), {"mode": "spectral", "filter": Gaussian(), "white_balance": "A"}),
         pytest.param(Path(light_paths=0, guiding=True), {"alpha": True}, marks=pytest.mark.slow),
     ],

@@ -64,7 +64,7 @@ def box(scenes: Path, film: dict, changes: dict, noise: float | None) -> Scene:
     )
 
 
-LONG = ("aov",)
+LONG = ("aov", "zsobol", "independent", "importance", "halves", "vcm")
 
 
 @pytest.fixture(
