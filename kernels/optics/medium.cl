@@ -49,12 +49,13 @@ inline Medium medium_load(Scene scene, integer name, Wavelengths lambdas)
     return m;
 }
 
-/* The names of the media behind the front of a shape and before it. */
+/* The names of the media behind the front of a shape and before it; optics/equiangular.cl has what stands before. */
 typedef struct { integer inside, outside; } ShapeMedia;
 
 inline ShapeMedia shape_media(Scene scene, integer shape)
 {
-    ShapeMedia m = {gather_i(scene.media, 2 * shape), gather_i(scene.media, 2 * shape + 1)};
+    integer row = 4 * MEDIUM_AIMS + 2 * shape;
+    ShapeMedia m = {gather_i(scene.media, row), gather_i(scene.media, row + 1)};
     return m;
 }
 

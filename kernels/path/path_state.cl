@@ -18,7 +18,7 @@
 #endif
 
 /* Dimensions of a sample, in pairs: film, lens, wavelength, then DIMENSIONS_A_VERTEX per surface that is met, null
- * ones among them; beyond all these DIMENSION_TEXEL and DIMENSION_FLIGHT, one pair per surface each. */
+ * ones among them; beyond all these DIMENSION_TEXEL, DIMENSION_FLIGHT and DIMENSION_AIM, one pair per surface each. */
 #define DIMENSION_FILM 0
 #define DIMENSION_LENS 1
 #define DIMENSION_WAVELENGTH 2
@@ -30,6 +30,7 @@
 #define DIMENSION_ROULETTE 3 /* whether to go on; which part of a mixture */
 #define DIMENSION_TEXEL 0x10000 /* which texel stands for those around */
 #define DIMENSION_FLIGHT 0x20000 /* how far a ray flies through a medium */
+#define DIMENSION_AIM 0x30000 /* near which lamp */
 
 /* To weigh a light that a ray has met, the pdf of the ray's direction counts, and the point where it was chosen: that
  * lies `null_distance` [m] before the ray's origin if the path has crossed null boundaries since. */

@@ -1,7 +1,8 @@
 /* Takes rays through media: a ray either comes to where it ends, or meets the medium before. Then that is where it
  * ends, and the medium's phase function is its material. Both are chosen by the extinction at the hero wavelength, and
  * weighed over all of the path's wavelengths (Miller, Georgiev and Jarosz 2019, with one sample): `ratio` does it as
- * for directions, see path/hero.cl. Light that is absorbed is a weight, never an end. */
+ * for directions, see path/hero.cl. Light that is absorbed is a weight, never an end. Some flights end near lamps, see
+ * optics/equiangular.cl; both ways to choose are weighed by their sum. */
 #include "core/base.cl"
 #include "interface/stage.cl"
 #include "generated/sampler.cl"
@@ -9,6 +10,7 @@
 #include "path/ratio.cl"
 #include "generated/textures.cl"
 #include "generated/medium.cl"
+#include "optics/equiangular.cl"
 
 /* The medium of a ray; one that knows of none is in that of the side of the surface that it meets. */
 inline integer flight_medium(Scene scene, Slab path, Slab hit, uint at, mask met)
@@ -38,12 +40,27 @@ STAGE(flight)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
         vec2 u = sampler_pair(sampler, as_natural(DIMENSION_FLIGHT + vertex));
         mask scatters = flies & (spectrum_max(m.sigma_s) > 0.0f);
         real sigma = spectrum_pick(m.sigma_t, ratio, u.y), end = sel(met, load_hit_t(hit, at), (real)(FAR));
+#if MEDIUM_AIMS
+        real choice = MEDIUM_AIMS > 1 ? sampler_pair(sampler, as_natural(DIMENSION_AIM + vertex)).x : (real)(0.0f);
+        Equiangular near = equiangular(scene, load_path_o(path, at), load_path_d(path, at), end,
+                                       spectrum_mean(m.sigma_t), choice);
+        mask aims = scatters & (u.x < near.share);
+        real left = 1.0f - near.share, by_angle = equiangular_distance(near, u.x / max_r(near.share, (real)(1e-9f)));
+        u.x = max_r(u.x - near.share, (real)(0.0f)) / left;
+#endif
         real t = -log_r(max_r(1.0f - u.x, (real)(1e-9f))) / max_r(sigma, (real)(1e-30f));
+#if MEDIUM_AIMS
+        t = sel(aims, by_angle, t);
+#endif
         mask collides = scatters & (t < end);
         t = sel(collides, t, end);
         Spectrum passes = spectrum_exp(spectrum_scale(m.sigma_t, -t));
         Spectrum f = spectrum_sel(collides, spectrum_mul(m.sigma_s, passes), passes);
         Spectrum pdf = spectrum_sel(collides, spectrum_mul(m.sigma_t, passes), passes);
+#if MEDIUM_AIMS
+        real nearby = sel(collides, near.share * equiangular_pdf(near, t), (real)(0.0f));
+        pdf = spectrum_add(spectrum_scale(pdf, left), spectrum_of(nearby));
+#endif
         pdf = spectrum_sel(scatters, pdf, spectrum_of(1.0f));
 #if USES_RATIO
         Spectrum pdfs = spectrum_mul(ratio, pdf);

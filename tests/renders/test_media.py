@@ -89,6 +89,40 @@ def test_absorbs_as_beer_and_lambert_say() -> None:
     np.testing.assert_allclose(bands, expected, rtol=0.02)
 
 
+LAMPS = {
+    "near": [((0.3, 0.0, -1.0), 1.0)],
+    "three": [((0.2, 0.1, -2.0), 1.0), ((0.0, -0.8, 2.0), 0.5), ((-4.0, 0.0, 1.0), 9.0)],
+}
+
+
+@pytest.mark.parametrize("lamps", LAMPS)
+def test_light_scattered_once_is_an_integral_over_the_ray(lamps: str) -> None:
+    """Of lamps in haze that flights end near: sigma_s p I / r^2 exp(-sigma_t (t + r))."""
+    sigma, albedo, g, end = np.array([0.05, 0.2, 0.3]), 0.8, 0.5, 10.0
+    phase = media.HenyeyGreenstein(g=g)
+    haze = media.Homogeneous(sigma_t=tuple(sigma), albedo=albedo, phase=phase)
+    wall = Rectangle(
+        to_world=tf.translate([0, 0, 5 - end]) @ tf.scale(9.0), material=Diffuse(reflectance=0.0)
+    )
+    scene = with_mode(ball(haze), "rgb")
+    scene.shapes = [wall]
+    scene.lights = [Point(position=at, intensity=power) for at, power in LAMPS[lamps]]
+    scene.integrator = dataclasses.replace(LONG, max_depth=2)
+    scene.camera = Perspective(
+        fov=0.01, to_world=tf.look_at([0, 0, 5], [0, 0, 0], [0, 1, 0]), medium=haze
+    )
+    t = (np.arange(200_000) + 0.5) / 200_000 * end
+    expected = np.zeros(3)
+    for at, power in LAMPS[lamps]:
+        to = np.array(at) - np.column_stack([0 * t, 0 * t, 5.0 - t])
+        r = np.linalg.norm(to, axis=1)
+        cosine = -to[:, 2] / r  # of how far it turns
+        hg = (1 - g * g) / (4 * np.pi * (1 + g * g - 2 * g * cosine) ** 1.5)
+        lit = hg[:, None] * power / r[:, None] ** 2 * np.exp(-sigma * (t + r)[:, None])
+        expected += (sigma * albedo * lit).mean(axis=0) * end
+    assert_mean(exposures(scene, 8, 256), expected, WITHIN)
+
+
 def test_light_through_boundaries() -> None:
     """A lamp seen through two balls, one in the other: the sum of the ways through each."""
     outer, inner = (media.Homogeneous(sigma_a=a) for a in (0.3, 1.1))

@@ -73,6 +73,7 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "USES_ABSORPTION": lambda f: f.absorption or f.media,
     "USES_MEDIA": lambda f: f.media,
     "SHADOW_MEDIA": lambda f: f.shadow_media,
+    "MEDIUM_AIMS": lambda f: f.medium_aims,
     "USES_DISPERSION": lambda f: f.dispersion and f.mode == "spectral",
     "USES_RATIO": lambda f: f.chromatic_media or (f.dispersion and f.mode == "spectral"),
     "USES_FLUORESCENCE": lambda f: any(fluoresces(f, cls) for cls in f.leaves),

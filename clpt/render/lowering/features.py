@@ -24,11 +24,13 @@ def features_of(
     tabulated_density: bool,
     profile: int,
     aimed: bool,
+    medium_aims: int,
 ) -> Features:
     """Return the features of a scene, from what each step of its lowering has met.
 
     profile: where in `distributions` the values of the pixel filter begin;
-    aimed: whether light paths aim.
+    aimed: whether light paths aim;
+    medium_aims: places of lamps that flights through media aim at.
     """
     scene, textures, channels = index.scene, encoder.textures, index.channels
     sources = encoder.sources
@@ -75,6 +77,7 @@ def features_of(
         absorption=materials.absorption and not channels,
         media=bool(index.media),
         chromatic_media=any(medium.is_chromatic for medium in index.media),
+        medium_aims=medium_aims,
         dispersion=glass_lens or disperses(index.leaves, sources),
         glass_lens=glass_lens,
         channel=channels[0] if channels else "",

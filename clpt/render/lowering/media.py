@@ -9,11 +9,36 @@ from numpy.typing import NDArray
 
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.index import SceneIndex
+from clpt.render.lowering.lights.lights import LightRows
 from clpt.render.lowering.materials.material_words import MaterialWords
 from clpt.scene.media import Medium
 from clpt.scene.shapes import Shape
 
+MOST_AIMS = 8  # lamps near which flights end, see kernels/optics/equiangular.cl
 FLIES = 0x40000000  # in a medium's word: the stage `flight` takes rays through it
+
+
+def medium_aims(lights: LightRows) -> NDArray[np.float32]:
+    """Return the places of the lamps that flights through media may end near.
+
+    (n, 4) float32: x, y, z [m], and the sum of the shares of those up to it; n is 0, 1 or
+    MOST_AIMS, so that kernels do not change with the number of lamps. The lamps of most power are
+    taken, each in its middle; the share is that of its power.
+    """
+    places, powers, row = [], [], 0
+    for bounds in lights.bounds:
+        power = lights.power[row : row + len(bounds)]
+        row += len(bounds)
+        if bounds.placed.all() and power.sum() > 0.0:
+            places.append(np.average((bounds.low + bounds.high) / 2.0, axis=0, weights=power))
+            powers.append(power.sum())
+    if not places:
+        return np.zeros((0, 4), np.float32)
+    first = np.argsort(-np.array(powers), kind="stable")[:MOST_AIMS]
+    sums = np.cumsum(np.array(powers)[first])
+    rows = np.column_stack([np.array(places)[first], sums / sums[-1]]).astype(np.float32)
+    count = 1 if len(rows) == 1 else MOST_AIMS
+    return np.concatenate([rows, np.repeat(rows[-1:], count - len(rows), axis=0)])
 
 
 class MediumWords:

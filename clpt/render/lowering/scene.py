@@ -36,7 +36,7 @@ from clpt.render.lowering.lights.hard_light import decided
 from clpt.render.lowering.lights.lights import LightRows, light_rows
 from clpt.render.lowering.lowering_cache import LoweringCache
 from clpt.render.lowering.materials.material_words import MaterialWords
-from clpt.render.lowering.media import MediumWords
+from clpt.render.lowering.media import MediumWords, medium_aims
 from clpt.render.lowering.settings import DEEPEST, settings_of
 from clpt.render.lowering.textures.attributes import Owner, lower_attributes
 from clpt.scene import Scene
@@ -116,9 +116,12 @@ def lower(
     materials = _begin_materials(index, encoder)
     geometry = lower_geometry(index, encoder, materials)
     media = MediumWords(index, encoder, materials)
-    encoder.store.append("media", media.of_shapes([shape for _, shape, _, _ in geometry.owners]))
     sphere = geometry.bounding_sphere()
     lights = _lower_lights(index, encoder, geometry, sphere[1])
+    near = medium_aims(lights) if any(medium.scatters for medium in index.media) else ()
+    encoder.store.append("media", np.array(near, np.float32).view(np.uint32))
+    encoder.store.append("media", media.of_shapes([shape for _, shape, _, _ in geometry.owners]))
+    around = media.word(scene.camera.medium)
     before = former.integrator if former else None
     index, why = decided(index, geometry, encoder, lights, sphere, before)
     density_row, tabulated, profile = _lower_film(index, encoder, wavelengths)
@@ -133,12 +136,14 @@ def lower(
         *encoder.textures.finish(),
     )  # fmt: skip
     aimed = len(targets) > 0
-    features = features_of(index, encoder, materials, geometry, lights, tabulated, profile, aimed)
+    features = features_of(
+        index, encoder, materials, geometry, lights, tabulated, profile, aimed, len(near)
+    )  # fmt: skip
     names, for_layers = lower_names(index, geometry, lights, encoder.store)
     features = replace(features, **for_layers)
     settings = settings_of(
         index, geometry, lights, wavelengths, density_row, ambient_row, sphere,
-        features.dispersion, (first_aim, len(targets)), media.word(scene.camera.medium),
+        features.dispersion, (first_aim, len(targets)), around,
     )  # fmt: skip
     cache.settle()
     tables = encoder.store.arrays()

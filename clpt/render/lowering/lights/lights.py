@@ -55,7 +55,8 @@ class LightRows:
     unit of all of them; infinite: how many of them, the first ones, are infinite;
     kinds: those that occur, for `dispatch_text`; first: per emitter, its first row; whole: per
     emitter, whether that one row stands for all of it; visible: whether one is no delta light;
-    two_sided: whether one shines from the back of its shape too; tree: the words of the tree that
+    two_sided: whether one shines from the back of its shape too; bounds: of the rows of each lamp
+    and emitter; tree: the words of the tree that
     stand behind the rows, None where the alias table chooses.
     """
 
@@ -67,6 +68,7 @@ class LightRows:
     whole: tuple[bool, ...]
     visible: bool
     two_sided: bool
+    bounds: tuple[light_bounds.Bounds, ...]
     tree: NDArray[np.uint32] | None
 
 
@@ -135,6 +137,7 @@ def light_rows(
         visible=infinite > 0
         or bool(((rows["shape"] >= 0) & (rows["emission_mode"] != ALONG)).any()),
         two_sided=bool((rows["emission_mode"] == BOTH).any()),
+        bounds=tuple(block.bounds for block in blocks),
         tree=tree,
     )
 
