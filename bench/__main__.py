@@ -29,6 +29,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "effects": (),
     "lights": (),
     "hard_light": (),
+    "media": (),
     "noise": (),
     "instancing": (),
     "embedding": (),

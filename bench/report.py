@@ -163,6 +163,24 @@ def hard_light(rows: Sequence[Row]) -> str:
     return table([*headings, "relMSE, sharp", "light"], map(cells, rows))
 
 
+def media(rows: Sequence[Row]) -> str:
+    """Light in media beside Mitsuba's, without the worst hundredth of the pixels."""
+
+    def cells(row: Row) -> list[str]:
+        ratio = row.get("efficiency_ratio")
+        return [
+            *(str(row[name]) for name in ("scene", "mode", "renderer", "spp")),
+            f"{row['msamples']:.3f}",
+            f"{row['relmse_99']:.4g}",
+            f"{row['efficiency_99']:.3g}",
+            "" if ratio is None else f"**{ratio:.2f}**",
+            f"{row['bias'] * 100:+.2f} ± {row['bias_se'] * 100:.2f} %",
+        ]
+
+    headings = ["scene", "mode", "renderer", "samples", "Msamples/s", "relMSE", "efficiency"]
+    return table([*headings, "over the best of Mitsuba's", "bias"], map(cells, rows))
+
+
 def geometric_means(rows: Sequence[Row]) -> str:
     """Efficiency over all scenes, by mode, threads and filter."""
     groups: dict[tuple[object, ...], list[float]] = {}
@@ -223,6 +241,7 @@ TABLES: dict[str, Callable[[Sequence[Row]], str]] = {
     "renders": renders,
     "efficiency": efficiency,
     "hard_light": hard_light,
+    "media": media,
     "spectral": plain,
     "effects": plain,
     "lights": plain,

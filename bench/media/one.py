@@ -1,4 +1,6 @@
-"""Passes of one renderer over one file: `python -m bench.media.one RENDERER FILE MODE SPP SECONDS OUT`.
+"""Passes of one renderer over one file.
+
+`python -m bench.media.one RENDERER FILE MODE SPP SECONDS OUT`
 
 RENDERER is clpt or an integrator of Mitsuba. Passes of SPP samples with different seeds are made
 until they took SECONDS of processor time; the first, which compiles, does not count. OUT (.npz)
@@ -55,7 +57,8 @@ def main(renderer: str, file: str, mode: str, spp: str, seconds: str, out: str) 
     count = int(spp)
     render = _clpt(file, mode, count) if ours else _mitsuba(file, mode, count, renderer)
     render(0)
-    passes, begin = [], time.process_time()
+    passes: list[NDArray[np.float32]] = []
+    begin = time.process_time()
     while len(passes) < FEWEST or time.process_time() - begin < float(seconds):
         passes.append(render(1 + len(passes)))
     took = (time.process_time() - begin) / len(passes)
