@@ -31,6 +31,12 @@ SHARED = Path(__file__).resolve().parents[3] / "shared" / "bench" / "media"
 LONG = PathIntegrator(max_depth=-1, rr_depth=1000, light_paths=0)
 CHROMATIC = (0.5, 2.0, 3.0)  # [1/m]
 MODES = ("rgb", "spectral")
+# one part of which differs between wavelengths
+VARIED = media.Blend(
+    weight=0.4,
+    first=media.HenyeyGreenstein(g=spectra.Tabulated((400.0, 700.0), (-0.3, 0.8), "hold")),
+    second=media.Draine(g=0.3, alpha=2.0),
+)
 WITHIN = 0.02  # relative; most of it is noise
 
 
@@ -51,7 +57,7 @@ def with_mode(scene: Scene, mode: str) -> Scene:
 
 
 @pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("phase", [cls() for cls in media.PHASES], ids=lambda p: p.kind)
+@pytest.mark.parametrize("phase", [*(cls() for cls in media.PHASES), VARIED], ids=lambda p: p.kind)
 def test_furnace(phase: media.Phase, mode: str) -> None:
     """What scatters all light cannot be seen under the same light from everywhere."""
     scene = ball(media.Homogeneous(sigma_s=CHROMATIC, phase=phase))
