@@ -37,7 +37,9 @@ DIGITS = 6  # of the table in a file
 @click.option("--index", default="water", show_default=True, metavar="N", help="Of the drops: a number, water, a glass, a file.")  # fmt: skip
 @click.option("--k", default="0", show_default=True, metavar="K", help="Their absorption: a number, or a file.")  # fmt: skip
 @click.option("--host", default="1", show_default=True, metavar="N", help="The index of what is around them.")  # fmt: skip
-@click.option("--wavelengths", default="360,830,10", show_default=True, metavar="FROM,TO,STEP", help="[nm]")
+@click.option(
+    "--wavelengths", default="360,830,10", show_default=True, metavar="FROM,TO,STEP", help="[nm]"
+)
 @click.option("--radii", type=click.IntRange(2, 10000), default=200, show_default=True, help="That stand for all.")  # fmt: skip
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="The medium as .json, for `media` of a scene.")  # fmt: skip
 @click.option("--plot", type=click.Path(path_type=Path), help="The phase function by angle and wavelength, .png, .svg or .pdf.")  # fmt: skip

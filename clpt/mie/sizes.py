@@ -44,7 +44,9 @@ def sizes(law: str, radius: float, spread: float = 0.0, count: int = 200) -> Siz
         return Sizes(np.array([radius], np.float64), np.ones(1))
     most = 0.5 if law == "gamma" else WIDEST
     if not 0.0 < spread < most:
-        raise SceneError(f"{spread:g}; of the law {law!r} it is above 0 and below {most:g}", where="spread")
+        raise SceneError(
+            f"{spread:g}; of the law {law!r} it is above 0 and below {most:g}", where="spread"
+        )
     if count < 2:
         raise SceneError("must be 2 or more", where="count")
     # in s = ln(r / radius): shares of spheres, of whose weight r^2 nearly all is kept

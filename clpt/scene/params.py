@@ -142,9 +142,7 @@ def coefficient(default: Any, doc: str, unit: str = "1/m") -> Any:
     return _field(default, Param("coefficient", doc, unit, low=0.0))
 
 
-def quantity(
-    default: Any, doc: str, low: float = -math.inf, high: float = math.inf
-) -> Any:
+def quantity(default: Any, doc: str, low: float = -math.inf, high: float = math.inf) -> Any:
     """Declare a number that may depend on the wavelength and is no colour, with its limits."""
     return _field(default, Param("quantity", doc, low=low, high=high))
 

@@ -1,6 +1,6 @@
 """Writes scene.json: a layer of fog under a clear sky, seen from above with the sun behind.
 
-The fog's drops have 10 um of radius; where its light goes follows from the index of water by Mie's
+The fog's drops have 8 um of radius; where its light goes follows from the index of water by Mie's
 theory (`clpt mie`), for each wavelength. So there is the fogbow, a rainbow almost without colour,
 and around the point opposite to the sun the glory. y is up, lengths are in metres.
 """
@@ -18,7 +18,8 @@ from clpt.formats.native.write import write_medium
 HERE = Path(__file__).parent
 TOP, DEEP, WIDE = 0.0, 40.0, 4000.0
 HEIGHT, DOWN = 60.0, 40.0  # of the eye above the fog; degrees by which it looks down, as the sun
-RADIUS, VARIANCE, SHARE = 1e-5, 0.01, 1.2e-7
+SUN, ACROSS, IRRADIANCE = 3e4, 0.53, 12.0  # its distance; degrees
+RADIUS, VARIANCE, SHARE = 8e-6, 0.01, 1e-7
 
 
 def main() -> None:
@@ -29,10 +30,11 @@ def main() -> None:
         mie.sizes("gamma", RADIUS, VARIANCE, 100), SHARE, lambdas=np.arange(380.0, 741.0, 12.0)
     )
     scene = {
+        "$schema": "../schema.json",
         "name": "fogbow",
         "camera": {
             "type": "perspective",
-            "fov": 96,
+            "fov": 94,
             "to_world": [
                 {"look_at": {
                     "origin": [0, HEIGHT, 0],
@@ -41,11 +43,11 @@ def main() -> None:
                 }},
             ],
         },
-        "film": {"width": 480, "height": 400, "exposure": 1.0},
-        "integrator": {"type": "path", "max_depth": 24},
-        "spp": 256,
+        "film": {"width": 384, "height": 320, "exposure": 0.7},
+        "integrator": {"type": "path", "max_depth": 16},
+        "spp": 512,
         "materials": {"moor": {"type": "diffuse", "reflectance": [0.025, 0.03, 0.02]}},
-        "media": {"fog": json.loads(write_medium(fog, 6))},
+        "media": {"fog": "FOG"},
         "shapes": [
             {
                 "type": "cube",
@@ -64,16 +66,21 @@ def main() -> None:
                 ],
                 "material": "moor",
             },
+            {
+                "type": "sphere",
+                "name": "sun",
+                "center": [-SUN * one for one in look],
+                "radius": SUN * np.radians(0.5 * ACROSS),
+                "material": "moor",
+                "emission": {"type": "area", "radiance": IRRADIANCE / (np.pi * np.radians(0.5 * ACROSS) ** 2)},
+            },
         ],
         "lights": [
-            {"type": "directional", "direction": look, "irradiance": 12.0},
             {"type": "constant", "radiance": [0.12, 0.2, 0.4]},
         ],
     }  # fmt: skip
-    text = json.dumps(scene, indent=1)
-    from clpt.formats.native.write import NUMBERS, _on_one_line  # as `clpt.save` writes rows
-
-    (HERE / "scene.json").write_text(NUMBERS.sub(_on_one_line, text) + "\n", "utf-8")
+    text = json.dumps(scene, indent=2).replace('"FOG"', write_medium(fog, 6))
+    (HERE / "scene.json").write_text(text + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

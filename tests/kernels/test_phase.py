@@ -26,7 +26,14 @@ SETTINGS = {
     media.Rayleigh: [{}],
     media.Draine: [
         {"g": g, "alpha": alpha}
-        for g, alpha in ((0.0, 1.0), (-0.9, 0.5), (0.1, 0.0), (0.249, 3.0), (0.7, 250.0), (0.97, 1.0))
+        for g, alpha in (
+            (0.0, 1.0),
+            (-0.9, 0.5),
+            (0.1, 0.0),
+            (0.249, 3.0),
+            (0.7, 250.0),
+            (0.97, 1.0),
+        )
     ],
     media.Tabulated: [
         {"values": (1.0, 1.0)},
@@ -91,7 +98,10 @@ def test_is_its_formula(cls, lanes):
             bound = 1e-3  # by what the cosine is rounded, in its steepest cell
         np.testing.assert_allclose(got["pdf"], expected, rtol=bound, atol=bound * expected.mean())
         np.testing.assert_allclose(
-            got["eval"], np.repeat(expected[:, None], 3, 1), rtol=bound, atol=bound * expected.mean()
+            got["eval"],
+            np.repeat(expected[:, None], 3, 1),
+            rtol=bound,
+            atol=bound * expected.mean(),
         )
 
 

@@ -149,7 +149,9 @@ class SpectraTable:
         if role == "emission" and isinstance(value, RGB):
             value = RGBIlluminant(value.r, value.g, value.b)
         words = np.zeros(SPECTRUM_WORDS, np.uint32)
-        given = "grey" if role in ("index", "quantity") and isinstance(value, Constant) else "constant"
+        given = (
+            "grey" if role in ("index", "quantity") and isinstance(value, Constant) else "constant"
+        )
         if not self.spectral:
             words[:3] = as_words(value.to_rgb(RGB_ROLES[role]))
             return words, given
