@@ -34,15 +34,34 @@ DIGITS = 6  # of the table in a file
     "--share", type=float, default=1e-7, show_default=True,
     help="Of the volume; 1e-7 is 0.1 g of water in a cubic metre.",
 )  # fmt: skip
-@click.option("--index", default="water", show_default=True, metavar="N", help="Of the drops: a number, water, a glass, a file.")  # fmt: skip
-@click.option("--k", default="0", show_default=True, metavar="K", help="Their absorption: a number, or a file.")  # fmt: skip
-@click.option("--host", default="1", show_default=True, metavar="N", help="The index of what is around them.")  # fmt: skip
 @click.option(
-    "--wavelengths", default="360,830,10", show_default=True, metavar="FROM,TO,STEP", help="[nm]"
-)
-@click.option("--radii", type=click.IntRange(2, 10000), default=200, show_default=True, help="That stand for all.")  # fmt: skip
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="The medium as .json, for `media` of a scene.")  # fmt: skip
-@click.option("--plot", type=click.Path(path_type=Path), help="The phase function by angle and wavelength, .png, .svg or .pdf.")  # fmt: skip
+    "--index", default="water", show_default=True, metavar="N",
+    help="Of the drops: a number, water, a glass, a file.",
+)  # fmt: skip
+@click.option(
+    "--k", default="0", show_default=True, metavar="K",
+    help="Their absorption: a number, or a file.",
+)  # fmt: skip
+@click.option(
+    "--host", default="1", show_default=True, metavar="N",
+    help="The index of what is around them.",
+)  # fmt: skip
+@click.option(
+    "--wavelengths", default="360,830,10", show_default=True, metavar="FROM,TO,STEP",
+    help="Of the table [nm].",
+)  # fmt: skip
+@click.option(
+    "--radii", type=click.IntRange(2, 10000), default=200, show_default=True,
+    help="That stand for all.",
+)  # fmt: skip
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path),
+    help="The medium as .json, for `media` of a scene.",
+)  # fmt: skip
+@click.option(
+    "--plot", type=click.Path(path_type=Path),
+    help="The phase function by angle and wavelength, .png, .svg or .pdf.",
+)  # fmt: skip
 def mie(
     radius: float, law: str, spread: float, share: float, index: str, k: str, host: str,
     wavelengths: str, radii: int, output: Path | None, plot: Path | None,
@@ -100,7 +119,8 @@ def _print(medium: Any, at: np.ndarray) -> None:
     for heading in ("nm", "sigma_t [1/m]", "albedo", "mean cosine", "back [1/sr]"):
         table.add_column(heading, justify="right")
     phase = medium.phase
-    g = 2.0 * np.pi * np.trapezoid(phase.values * phase.cosines, phase.cosines, axis=1)
+    moment = phase.values * phase.cosines
+    g = np.pi * ((moment[:, 1:] + moment[:, :-1]) @ np.diff(phase.cosines))
     sigma_t, albedo = (each.sample(at) for each in (medium.sigma_t, medium.albedo))
     for row in zip(at, sigma_t, albedo, g, phase.values[:, 0], strict=True):
         table.add_row(*(f"{value:.6g}" for value in row))

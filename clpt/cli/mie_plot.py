@@ -1,4 +1,4 @@
-"""The plot of `clpt mie`, by matplotlib: where light goes, by angle, in the colour of its wavelength."""
+"""The plot of `clpt mie`, by matplotlib: how much light goes where, a curve for a wavelength."""
 
 from __future__ import annotations
 

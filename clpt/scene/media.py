@@ -102,7 +102,7 @@ class Tabulated(Phase):
             raise self._error("wavelengths", "must ascend, and be above 0")
         if (values < 0.0).any():
             raise self._error("values", f"{values.min():g} is negative")
-        whole = 2.0 * np.pi * np.trapezoid(values, cosines, axis=1)
+        whole = _whole(values, cosines)
         if not (whole > 0.0).all():
             raise self._error("values", f"row {int(np.argmin(whole))} holds nothing but 0")
         object.__setattr__(self, "values", values / whole[:, None])
@@ -132,7 +132,7 @@ class Tabulated(Phase):
             return self.cosines, rows, float(even[0]), float(even[1] - even[0])
         colours = [spectra.Tabulated(lambdas, v, "hold").to_rgb("unbounded") for v in values.T]
         rows = np.maximum(np.array(colours, np.float64).T, 0.0)
-        whole = 2.0 * np.pi * np.trapezoid(rows, self.cosines, axis=1)
+        whole = _whole(rows, self.cosines)
         return self.cosines, rows / whole[:, None], 0.0, 1.0
 
     def _numbers(self, name: str) -> NDArray[np.float64]:
@@ -235,6 +235,11 @@ class Homogeneous(Medium):
             return a, s
         scaled = [_combined([value], lambda v: self.scale * v[0], spectral) for value in (a, s)]
         return scaled[0], scaled[1]
+
+
+def _whole(rows: Any, cosines: Any) -> NDArray[np.float64]:
+    """Integrals over directions of rows (m, n) that are linear between cosines (n,)."""
+    return np.pi * ((rows[:, 1:] + rows[:, :-1]) @ np.diff(cosines))
 
 
 def _combined(values: list[Any], combine: Callable[[list[Any]], Any], spectral: bool) -> Spectrum:

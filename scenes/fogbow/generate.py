@@ -29,6 +29,7 @@ def main() -> None:
     fog = mie.droplets(
         mie.sizes("gamma", RADIUS, VARIANCE, 100), SHARE, lambdas=np.arange(380.0, 741.0, 12.0)
     )
+    angle = np.pi * np.radians(0.5 * ACROSS) ** 2  # the sun's solid angle
     scene = {
         "$schema": "../schema.json",
         "name": "fogbow",
@@ -72,7 +73,7 @@ def main() -> None:
                 "center": [-SUN * one for one in look],
                 "radius": SUN * np.radians(0.5 * ACROSS),
                 "material": "moor",
-                "emission": {"type": "area", "radiance": IRRADIANCE / (np.pi * np.radians(0.5 * ACROSS) ** 2)},
+                "emission": {"type": "area", "radiance": IRRADIANCE / angle},
             },
         ],
         "lights": [

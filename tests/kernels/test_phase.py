@@ -1,9 +1,7 @@
 """Every phase function integrates to one, and samples what it says.
 
-The table of kinds is clpt.scene.media.PHASE_LEAVES: a kind is tested by being listed. Each is tested
-with the same parameters at all wavelengths, and in both modes with others at each: then what a
-sample stands for is the density of the wavelength that was sampled, and of the others by its
-weight.
+The table of kinds is clpt.scene.media.PHASE_LEAVES: a kind is tested by being listed, with the same
+parameters at all wavelengths, and in both modes with others at each.
 """
 
 from __future__ import annotations

@@ -57,8 +57,8 @@ def test_water_has_the_index_of_the_release():
 
 @pytest.mark.parametrize("nm, low, high", [(650.0, 137.5, 139.0), (450.0, 138.9, 140.6)])
 def test_rainbow(nm, low, high):
-    """Drops of .3 mm: Descartes puts the bow at 137.6 degrees in red, 139.4 in violet; waves put its
-    crest .5 to 1 degree further in (Airy 1838)."""
+    """Drops of .3 mm: Descartes puts the bow at 137.6 degrees in red, 139.4 in violet; waves put
+    its crest .5 to 1 degree further in (Airy 1838)."""
     of = mie.sizes("log_normal", 3e-4, 0.05, 40)
     theta = np.radians(np.linspace(130.0, 150.0, 401))
     waves = 2.0e9 * np.pi / nm * of.radii
@@ -68,8 +68,8 @@ def test_rainbow(nm, low, high):
 
 
 def test_fogbow_and_glory():
-    """Drops of 10 um: the bow is wide and lies further in (about 142 degrees from the forward
-    direction), and there is a glory, whose first ring lies at 3 / size [rad] (van de Hulst 1957)."""
+    """Drops of 10 um: the bow is wide and lies further in, at about 142 degrees, and there is a
+    glory, whose first ring lies at 3 / size [rad] (van de Hulst 1957)."""
     of = mie.sizes("gamma", 1e-5, 0.01, 60)
     theta = np.linspace(120.0, 180.0, 1201)
     rings = []

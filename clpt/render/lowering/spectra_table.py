@@ -141,7 +141,7 @@ class SpectraTable:
     def words(self, value: Spectrum | str, role: str) -> tuple[Words, str]:
         """Return the five words of a spectrum and its source: "constant" or "table".
 
-        An index or a quantity that is the same at all wavelengths is "grey", so that kernels see it.
+        An index or a quantity without colour is "grey", so that kernels see it.
         role: one of SPECTRUM_ROLES in clpt.scene.params; an index may be a glass's name.
         """
         if isinstance(value, str) or role in ("index", "coefficient", "quantity"):
