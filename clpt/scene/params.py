@@ -367,7 +367,10 @@ def _spectrum(value: Any, param: Param, where: str) -> Any:
     if isinstance(value, (list, tuple, np.ndarray)) and len(value) == 3:
         bounded = param.role not in ("factor", "quantity") and max(value) <= 1.0
         made = RGB if bounded or param.role == "emission" else RGBUnbounded
-        return made(*(_number(v, param, where) for v in value))
+        colour = made(*(_number(v, param, where) for v in value))
+        if param.role == "quantity":
+            _check_spectrum(colour, param, where)
+        return colour
     if isinstance(value, (int, float, np.number)):
         number = _number(value, param, where)
         return RGBIlluminant(*[number] * 3) if param.role == "emission" else Constant(number)

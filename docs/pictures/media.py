@@ -56,6 +56,13 @@ PHASES = {
     "henyey_greenstein": _phases(
         "`g` of -0.6, 0.3 and 0.9", *(media.HenyeyGreenstein(g=g) for g in (-0.6, 0.3, 0.9))
     ),
+    "rayleigh": balls(
+        "`sigma_s` by the fourth power of the wavelength: 0.5, 2 and 8 times",
+        *(
+            media.Homogeneous(sigma_s=(0.55, 1.1, 2.6), scale=k, phase=media.Rayleigh())
+            for k in (0.5, 2.0, 8.0)
+        ),
+    ),
     "draine": _phases(
         "`g` of 0.6 and `alpha` of 0, 1 and 30",
         *(media.Draine(g=0.6, alpha=alpha) for alpha in (0.0, 1.0, 30.0)),
@@ -73,13 +80,6 @@ PHASES = {
                 second=media.HenyeyGreenstein(g=0.9),
             )
             for weight in (0.0, 0.5, 1.0)
-        ),
-    ),
-    "rayleigh": balls(
-        "`sigma_s` by the fourth power of the wavelength: 0.5, 2 and 8 times",
-        *(
-            media.Homogeneous(sigma_s=(0.55, 1.1, 2.6), scale=k, phase=media.Rayleigh())
-            for k in (0.5, 2.0, 8.0)
         ),
     ),
 }
