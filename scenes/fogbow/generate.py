@@ -2,7 +2,8 @@
 
 The fog's drops have 8 um of radius; where its light goes follows from the index of water by Mie's
 theory (`clpt mie`), for each wavelength. So there is the fogbow, a rainbow almost without colour,
-and around the point opposite to the sun the glory. y is up, lengths are in metres.
+and around the point opposite to the sun the glory. The fog is thin, and light is followed through one collision: what is scattered
+twice is even, but its bright pixels last for long (`max_depth`). y is up, lengths are in metres.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ HERE = Path(__file__).parent
 TOP, DEEP, WIDE = 0.0, 40.0, 4000.0
 HEIGHT, DOWN = 60.0, 40.0  # of the eye above the fog; degrees by which it looks down, as the sun
 SUN, ACROSS, IRRADIANCE = 3e4, 0.53, 12.0  # its distance; degrees
-RADIUS, VARIANCE, SHARE = 8e-6, 0.01, 1e-7
+RADIUS, VARIANCE, SHARE = 8e-6, 0.01, 5e-8
 
 
 def main() -> None:
@@ -44,9 +45,9 @@ def main() -> None:
                 }},
             ],
         },
-        "film": {"width": 384, "height": 320, "exposure": 0.7},
-        "integrator": {"type": "path", "max_depth": 16},
-        "spp": 512,
+        "film": {"width": 384, "height": 320, "exposure": 1.4},
+        "integrator": {"type": "path", "max_depth": 2},
+        "spp": 256,
         "materials": {"moor": {"type": "diffuse", "reflectance": [0.025, 0.03, 0.02]}},
         "media": {"fog": "FOG"},
         "shapes": [
