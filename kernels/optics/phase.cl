@@ -36,6 +36,9 @@ inline BsdfSample phase_turned(real cosine, real u)
 inline BsdfSample phase_weighed(BsdfSample s, Spectrum densities, mask same)
 {
     s.pdf = phase_pdf(densities, same);
-    s.weight = spectrum_scale(densities, 1.0f / max_r(s.pdf, (real)(1e-30f)));
+    real pdf = max_r(s.pdf, (real)(1e-30f));
+#define C(c) s.weight.c = densities.c / pdf; /* exactly 1 of the wavelength that was sampled */
+    SPECTRUM_EACH(C)
+#undef C
     return s;
 }

@@ -2,8 +2,9 @@
 
 The fog's drops have 8 um of radius; where its light goes follows from the index of water by Mie's
 theory (`clpt mie`), for each wavelength. So there is the fogbow, a rainbow almost without colour,
-and around the point opposite to the sun the glory. The fog is thin, and light is followed through one collision: what is scattered
-twice is even, but its bright pixels last for long (`max_depth`). y is up, lengths are in metres.
+and around the point opposite to the sun the glory. The fog is thin, and light is followed through
+one collision: what is scattered twice is even, but its bright pixels last long. y is up, lengths
+are in metres.
 """
 
 from __future__ import annotations
