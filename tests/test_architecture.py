@@ -30,6 +30,7 @@ MAY_IMPORT = {
     "trimesh_ray": BASE | {"device", "rays"},
     "render": BASE | {"scene", "device", "bvh", "denoise"},
     "formats": BASE | {"scene"},
+    "mie": BASE | {"scene"},
     "view": BASE | {"scene", "device", "denoise", "render", "formats"},
     "benchmark": BASE | {"scene", "device", "bvh", "rays", "render", "formats"},
 }

@@ -12,6 +12,7 @@ COLOURS: dict[str, type[Any]] = {
     "index": RGBUnbounded,
     "factor": RGBUnbounded,
     "coefficient": RGBUnbounded,
+    "quantity": RGBUnbounded,
     "emission": RGBIlluminant,
 }
 

@@ -10,12 +10,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import spectra
 from clpt.errors import SceneError
-from clpt.scene.params import Kind, coefficient, host, real, reflectance
+from clpt.scene.params import Kind, angular, coefficient, host, quantity, real, reflectance
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.values import SpectrumLike
-from clpt.spectra import RGB, Constant, RGBUnbounded, Spectrum, Tabulated
+from clpt.spectra import RGB, Constant, RGBUnbounded, Spectrum
 from clpt.spectra.spectrum import WIDEST
+
+MOST_ROWS = 512  # of a table by wavelength
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -24,6 +30,11 @@ class Phase(Scatterer):
 
     folder: ClassVar[str] = "phase"
     is_phase = True
+
+    @property
+    def leaves(self) -> tuple[Phase, ...]:
+        """The phase functions that it is made of: itself, but of a blend."""
+        return (self,)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -35,7 +46,126 @@ class Isotropic(Phase):
 class HenyeyGreenstein(Phase):
     """Henyey and Greenstein 1941: one number tells how much goes forward."""
 
-    g: float = real(0.0, "mean cosine: 1 is forward, -1 back", low=-0.999, high=0.999)
+    chromatic = True
+
+    g: SpectrumLike = quantity(0.0, "mean cosine: 1 is forward, -1 back", low=-0.999, high=0.999)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Draine(Phase):
+    """Draine 2003: from Henyey and Greenstein's, with alpha 0, to Cornette and Shanks's, with 1.
+
+    With g of 0 and alpha of 1 it is Rayleigh's. Jendersie and d'Eon 2023 fit water drops by it.
+    """
+
+    chromatic = True
+
+    g: SpectrumLike = quantity(0.0, "shape: 1 is forward, -1 back", low=-0.999, high=0.999)
+    alpha: SpectrumLike = quantity(1.0, "how much more goes forward and back", low=0.0, high=1e4)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Tabulated(Phase):
+    """Measured or calculated: a table over the cosine of the angle by which light turns.
+
+    values: numbers (n,) from 0, in any unit, or a row for each wavelength (m, n); cosines: of each
+    number, ascending from -1 to 1, by default even; wavelengths: of each row [nm], ascending. It is
+    linear between, holds its end rows, and is scaled so that its integral over directions is 1. Its
+    parameters are then float64 arrays, (m, n) and (n,) and (m,).
+
+    Raises SceneError where it is none.
+    """
+
+    chromatic = True
+
+    values: Any = angular("how much goes where, over the cosine; a row for each wavelength")
+    cosines: Any = host((), "of each value, from -1 to 1; none: even", form="numbers")
+    wavelengths: Any = host((), "of each row; none: one row is of all", "nm", form="numbers")
+
+    def check(self) -> None:
+        """Check the three arrays, and scale the rows."""
+        values = np.atleast_2d(self._numbers("values"))
+        cosines, lambdas = self._numbers("cosines"), self._numbers("wavelengths")
+        if values.ndim != 2 or values.shape[1] < 2:
+            raise self._error("values", "must be two numbers or more, or rows of them")
+        if not cosines.size:
+            cosines = np.linspace(-1.0, 1.0, values.shape[1])
+        if len(cosines) != values.shape[1]:
+            message = f"{len(cosines)} for {values.shape[1]} values: there must be one of each"
+            raise self._error("cosines", message)
+        if (cosines[0], cosines[-1]) != (-1.0, 1.0) or not (np.diff(cosines) > 0.0).all():
+            raise self._error("cosines", "must ascend from -1 to 1")
+        if len(lambdas) != len(values) and (len(values) > 1 or len(lambdas) > 1):
+            message = f"{len(lambdas)} for {len(values)} rows: there must be one of each"
+            raise self._error("wavelengths", message)
+        if not (np.diff(lambdas) > 0.0).all() or not (lambdas > 0.0).all():
+            raise self._error("wavelengths", "must ascend, and be above 0")
+        if (values < 0.0).any():
+            raise self._error("values", f"{values.min():g} is negative")
+        whole = _whole(values, cosines)
+        if not (whole > 0.0).all():
+            raise self._error("values", f"row {int(np.argmin(whole))} holds nothing but 0")
+        object.__setattr__(self, "values", values / whole[:, None])
+        object.__setattr__(self, "cosines", cosines)
+        object.__setattr__(self, "wavelengths", lambdas)
+
+    def device_rows(
+        self, spectral: bool
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], float, float]:
+        """Return cosines (n,), densities (m, n) [1/sr], and the first row's wavelength and the
+        distance of two rows [nm].
+
+        spectral: the rows are even in wavelength; else they are of the three colours, or there is
+        one.
+        """
+        values, lambdas = self.values, self.wavelengths
+        if len(values) == 1:
+            return self.cosines, values, 0.0, 1.0
+        if spectral:
+            gaps = np.diff(lambdas)
+            step = max(float(gaps.min()), float(lambdas[-1] - lambdas[0]) / (MOST_ROWS - 1))
+            count = round(float(lambdas[-1] - lambdas[0]) / step) + 1
+            even = np.linspace(lambdas[0], lambdas[-1], count)
+            at = np.clip(np.searchsorted(lambdas, even, "right") - 1, 0, len(lambdas) - 2)
+            share = ((even - lambdas[at]) / gaps[at])[:, None]
+            rows = values[at] * (1.0 - share) + values[at + 1] * share
+            return self.cosines, rows, float(even[0]), float(even[1] - even[0])
+        colours = [spectra.Tabulated(lambdas, v, "hold").to_rgb("unbounded") for v in values.T]
+        rows = np.maximum(np.array(colours, np.float64).T, 0.0)
+        whole = _whole(rows, self.cosines)
+        return self.cosines, rows / whole[:, None], 0.0, 1.0
+
+    def _numbers(self, name: str) -> NDArray[np.float64]:
+        try:
+            made = np.array(getattr(self, name), np.float64)
+        except (TypeError, ValueError):
+            raise self._error(name, "must be numbers, in rows of one length") from None
+        if not np.isfinite(made).all():
+            raise self._error(name, "must be finite")
+        return made
+
+    def _error(self, name: str, message: str) -> SceneError:
+        return SceneError(message, where=f"{self.kind}.{name}")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Blend(Phase):
+    """Two phase functions, of which each scatters its share of the light."""
+
+    weight: float = real(0.5, "share of the second", low=0.0, high=1.0)
+    first: Phase = host(Isotropic(), "a phase function", form="phase")
+    second: Phase = host(Isotropic(), "another one", form="phase")
+
+    def check(self) -> None:
+        """Raise SceneError for what is no phase function."""
+        for name in ("first", "second"):
+            if not isinstance(getattr(self, name), Phase):
+                message = f"must be a phase function, not {getattr(self, name)!r}"
+                raise SceneError(message, where=f"{self.kind}.{name}")
+
+    @property
+    def leaves(self) -> tuple[Phase, ...]:
+        return (*self.first.leaves, *self.second.leaves)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -107,13 +237,18 @@ class Homogeneous(Medium):
         return scaled[0], scaled[1]
 
 
+def _whole(rows: Any, cosines: Any) -> NDArray[np.float64]:
+    """Integrals over directions of rows (m, n) that are linear between cosines (n,)."""
+    return np.pi * ((rows[:, 1:] + rows[:, :-1]) @ np.diff(cosines))
+
+
 def _combined(values: list[Any], combine: Callable[[list[Any]], Any], spectral: bool) -> Spectrum:
     """What becomes of spectra at each wavelength, or of each of three numbers."""
     if all(isinstance(value, Constant) for value in values):
         return Constant(float(combine([value.value for value in values])))
     if not spectral:
         return RGBUnbounded(*map(float, combine([value.to_rgb("unbounded") for value in values])))
-    return Tabulated(WIDEST, combine([value.sample(WIDEST) for value in values]), "hold")
+    return spectra.Tabulated(WIDEST, combine([value.sample(WIDEST) for value in values]), "hold")
 
 
 def _is_grey(value: Any) -> bool:
@@ -125,5 +260,6 @@ def _is_zero(value: Any) -> bool:
     return _is_grey(value) and not value.to_rgb("unbounded").any()
 
 
-PHASES: tuple[type[Phase], ...] = (Isotropic, HenyeyGreenstein, Rayleigh)
+PHASE_LEAVES: tuple[type[Phase], ...] = (Isotropic, HenyeyGreenstein, Rayleigh, Draine, Tabulated)
+PHASES: tuple[type[Phase], ...] = (*PHASE_LEAVES, Blend)
 KINDS: tuple[type[Medium], ...] = (Homogeneous,)

@@ -12,6 +12,8 @@ emission       number, name, (r, g, b), ...           Spectrum, rgb times D65   
 index          number, name, Spectrum, Texture        Spectrum, unbounded         conductors
 factor         number, (r, g, b), Spectrum, Texture   Spectrum, unbounded         yes
 coefficient    number, (r, g, b), Spectrum            of the inside, in [1/m]     no
+quantity       number, (r, g, b), Spectrum            Spectrum within its limits  no
+angular        rows of numbers                        AngularTable                no
 real           number, Texture                        real                        yes
 reradiation    Reradiation, None                      Spectrum, its rows' sums    no
 flag           bool                                   int                         no
@@ -49,10 +51,10 @@ from clpt.spectra import (
 from clpt.spectra import index as index_of
 from clpt.spectra.spectrum import check_reach, extremes
 
-SPECTRUM_ROLES = ("reflectance", "emission", "index", "factor", "coefficient")
+SPECTRUM_ROLES = ("reflectance", "emission", "index", "factor", "coefficient", "quantity")
 DEVICE_ROLES = (
     "reflectance", "emission", "index", "factor", "reradiation", "real", "flag", "choice", "orders",
-    "layers",
+    "layers", "quantity", "angular",
 )  # fmt: skip
 # What a host parameter holds. clpt/formats/native/forms.py reads, writes and describes each form.
 HostForm = Literal[
@@ -138,6 +140,16 @@ def coefficient(default: Any, doc: str, unit: str = "1/m") -> Any:
     It acts between surfaces: kernels/optics/medium.cl reads it after the kind's row.
     """
     return _field(default, Param("coefficient", doc, unit, low=0.0))
+
+
+def quantity(default: Any, doc: str, low: float = -math.inf, high: float = math.inf) -> Any:
+    """Declare a number that may depend on the wavelength and is no colour, with its limits."""
+    return _field(default, Param("quantity", doc, low=low, high=high))
+
+
+def angular(doc: str) -> Any:
+    """Declare a table over the cosine of an angle; `clpt.scene.media.Tabulated` says of what."""
+    return _field((1.0, 1.0), Param("angular", doc))
 
 
 def reradiation(default: Any, doc: str) -> Any:
@@ -282,7 +294,7 @@ def interior_params(cls: type) -> Mapping[str, Param]:
 
 
 def _checked(value: Any, param: Param, where: str) -> Any:
-    if param.role == "host":
+    if param.role in ("host", "angular"):
         return value
     if param.role == "flag":
         if not isinstance(value, (bool, np.bool_)):
@@ -353,9 +365,12 @@ def _spectrum(value: Any, param: Param, where: str) -> Any:
         _check_spectrum(value, param, where)
         return value
     if isinstance(value, (list, tuple, np.ndarray)) and len(value) == 3:
-        bounded = param.role != "factor" and max(value) <= 1.0
+        bounded = param.role not in ("factor", "quantity") and max(value) <= 1.0
         made = RGB if bounded or param.role == "emission" else RGBUnbounded
-        return made(*(_number(v, param, where) for v in value))
+        colour = made(*(_number(v, param, where) for v in value))
+        if param.role == "quantity":
+            _check_spectrum(colour, param, where)
+        return colour
     if isinstance(value, (int, float, np.number)):
         number = _number(value, param, where)
         return RGBIlluminant(*[number] * 3) if param.role == "emission" else Constant(number)
@@ -375,10 +390,11 @@ def _check_spectrum(value: Spectrum, param: Param, where: str) -> None:
             raise SceneError(error.message, where=where) from None
     if math.isinf(param.low) and math.isinf(param.high):
         return
-    if isinstance(value, RGBUnbounded) and min(value.r, value.g, value.b) < param.low:
+    least = 0.0 if param.role == "quantity" else param.low
+    if isinstance(value, RGBUnbounded) and min(value.r, value.g, value.b) < least:
         shown = ", ".join(f"{part:g}" for part in (value.r, value.g, value.b))
         raise SceneError(f"a colour cannot be negative here: {shown}", where=where)
-    meant = index_of(value) if param.role in ("index", "coefficient") else value
+    meant = index_of(value) if param.role in ("index", "coefficient", "quantity") else value
     for found, at in extremes(meant):
         if not param.low - ROUNDING <= found <= param.high + ROUNDING:
             raise SceneError(

@@ -14,6 +14,7 @@ from clpt.render.codegen.parameters import array_size, lane_type, struct_text
 from clpt.render.contract import custom_materials
 from clpt.render.contract.parameter_words import FILM_COSINES
 from clpt.render.lowering.materials.thin_films import film_colours
+from clpt.render.lowering.spectra_table import angular_values
 from clpt.scene.materials import Layer, Material
 from clpt.scene.params import Param, device_params
 
@@ -93,7 +94,10 @@ class Probe:
             columns.append(np.broadcast_to(np.asarray(value, float), (n, self.components)))
         given = np.concatenate(columns, axis=1).T.astype(np.float32)
         c = self.components
-        virtual: dict[str, str | device.Part] = {"probe.cl": self._text(len(layers), len(given))}
+        extra = self._angular_text(params, len(given))
+        if extra == ["", ""]:
+            extra = self._layers_text(len(layers), len(given))
+        virtual: dict[str, str | device.Part] = {"probe.cl": self._text(*extra)}
         if self.cls.source is not None:
             virtual[f"{self.cls.folder}/{self.cls.kind}.cl"] = custom_materials.text(self.cls)
         table = self._table(params, layers)
@@ -103,11 +107,35 @@ class Probe:
         named["lobe"] = named["lobe"].astype(int)
         return {k: v[:, 0] if v.shape[1] == 1 else v for k, v in named.items()}
 
+    def _angular(self) -> list[str]:
+        return [k for k, p in device_params(self.cls).items() if p.role == "angular"]
+
+    def _angular_text(self, params: Mapping[str, Any], rows: int) -> list[str]:
+        """What an AngularTable is, and setting m's, which stands in `in` after its rows."""
+        if not (names := self._angular()):
+            return ["", ""]
+        spectral = self.mode == "spectral"
+        kind: Any = self.cls(**params)
+        cosines, values, start, step = kind.device_rows(spectral)
+        last = len(values) - 1
+        at = (np.array(LAMBDAS) - start) / step if spectral else np.arange(3.0)
+        row = ", ".join(f"(real)({one:.9e}f)" for one in np.clip(at, 0.0, last) + 0.0)
+        counts = f"(integer)({len(cosines)}), (integer)({len(values)})"
+        made = f"{{in + {rows} * n, (integer)(0), {counts}, {{{row}}}}}"
+        return [
+            '#include "optics/angular_table.cl"',
+            f"    AngularTable table = {made};\n    m.{names[0]} = table;",
+        ]
+
     def _streamed(self) -> list[tuple[str, Param]]:
-        return [(k, p) for k, p in device_params(self.cls).items() if p.role != "layers"]
+        beside = ("layers", "angular")
+        return [(k, p) for k, p in device_params(self.cls).items() if p.role not in beside]
 
     def _table(self, params: Mapping[str, Any], layers: Sequence[Layer]) -> NDArray:
         """What stands in `in` after the streams: the layers, or in RGB mode their colours."""
+        if self._angular():
+            kind: Any = self.cls(**params)
+            return angular_values(*kind.device_rows(self.mode == "spectral")[:2])
         if not layers:
             return NOTHING
         if self.mode == "spectral":
@@ -148,8 +176,7 @@ class Probe:
             "    m.layers = layers;",
         ]
 
-    def _text(self, layers: int, rows: int) -> str:
-        boundary, film = self._layers_text(layers, rows)
+    def _text(self, boundary: str, film: str) -> str:
         kind, names = self.cls.kind, "xyzw"[: self.components]
         at, reads = 9, []
         for name, param in self._streamed():

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from clpt import mie
 from clpt.scene import Scene, integrators, media, shapes
 from clpt.scene.materials import Null
 
@@ -29,6 +32,14 @@ def _phases(caption: str, *made: media.Phase) -> Picture:
     return balls(caption, *(media.Homogeneous(sigma_s=3.0, phase=one) for one in made))
 
 
+def _drops(radius: float) -> media.Medium:
+    """Mist of drops of water of a radius [m], as dense for all."""
+    fog = mie.droplets(
+        mie.sizes("log_normal", radius, 0.05, 24), 1e-7, lambdas=np.arange(390.0, 721.0, 30.0)
+    )
+    return media.Homogeneous(sigma_s=3.0, phase=fog.phase)
+
+
 MEDIA = {
     "homogeneous": balls(
         "mist; amber, whose extinction depends on the wavelength; wine, which only absorbs",
@@ -50,6 +61,25 @@ PHASES = {
         *(
             media.Homogeneous(sigma_s=(0.55, 1.1, 2.6), scale=k, phase=media.Rayleigh())
             for k in (0.5, 2.0, 8.0)
+        ),
+    ),
+    "draine": _phases(
+        "`g` of 0.6 and `alpha` of 0, 1 and 30",
+        *(media.Draine(g=0.6, alpha=alpha) for alpha in (0.0, 1.0, 30.0)),
+    ),
+    "tabulated": balls(
+        "drops of water of 0.05, 0.5 and 5 um of radius, by `clpt mie`",
+        *(_drops(radius) for radius in (5e-8, 5e-7, 5e-6)),
+    ),
+    "blend": _phases(
+        "of `g` of -0.7 and 0.9, with a `weight` of 0, 0.5 and 1",
+        *(
+            media.Blend(
+                weight=weight,
+                first=media.HenyeyGreenstein(g=-0.7),
+                second=media.HenyeyGreenstein(g=0.9),
+            )
+            for weight in (0.0, 0.5, 1.0)
         ),
     ),
 }

@@ -25,12 +25,18 @@ from clpt.scene.integrators import Path as PathIntegrator
 from clpt.scene.lights import Constant, Point
 from clpt.scene.materials import Dielectric, Diffuse, Null
 from clpt.scene.shapes import Cube, Rectangle, Sphere
-from tests.renders.support import assert_mean, exposures
+from tests.renders.support import assert_agree, assert_mean, blocks, exposures
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "bench" / "media"
 LONG = PathIntegrator(max_depth=-1, rr_depth=1000, light_paths=0)
 CHROMATIC = (0.5, 2.0, 3.0)  # [1/m]
 MODES = ("rgb", "spectral")
+# one part of which differs between wavelengths
+VARIED = media.Blend(
+    weight=0.4,
+    first=media.HenyeyGreenstein(g=spectra.Tabulated((400.0, 700.0), (-0.3, 0.8), "hold")),
+    second=media.Draine(g=0.3, alpha=2.0),
+)
 WITHIN = 0.02  # relative; most of it is noise
 
 
@@ -51,7 +57,7 @@ def with_mode(scene: Scene, mode: str) -> Scene:
 
 
 @pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("phase", [cls() for cls in media.PHASES], ids=lambda p: p.kind)
+@pytest.mark.parametrize("phase", [*(cls() for cls in media.PHASES), VARIED], ids=lambda p: p.kind)
 def test_furnace(phase: media.Phase, mode: str) -> None:
     """What scatters all light cannot be seen under the same light from everywhere."""
     scene = ball(media.Homogeneous(sigma_s=CHROMATIC, phase=phase))
@@ -215,3 +221,32 @@ def test_slab_against_adding_and_doubling(name: str) -> None:
 
 
 BLACK = Diffuse(reflectance=0.0)
+
+
+MITSUBA = """<scene version="3.0.0">
+<integrator type="volpath"><integer name="max_depth" value="6"/></integrator>
+<sensor type="perspective"><float name="fov" value="30"/>
+<transform name="to_world"><lookat origin="0,0,5" target="0,0,0" up="0,1,0"/></transform>
+<film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="8"/>
+<rfilter type="box"/></film></sensor>
+<emitter type="directional"><vector name="direction" x="1" y="-0.3" z="-0.8"/></emitter>
+<shape type="sphere"><bsdf type="null"/><medium type="homogeneous" name="interior">
+<float name="sigma_t" value="2"/><float name="albedo" value="0.9"/>
+<phase type="blendphase"><float name="weight" value="0.7"/>
+<phase type="hg"><float name="g" value="-0.4"/></phase>
+<phase type="tabphase"><string name="values" value="0.3, 0.1, 0.4, 1.5, 6"/></phase>
+</phase></medium></shape></scene>"""
+
+
+@pytest.mark.peers
+@pytest.mark.slow
+def test_tables_and_blends_are_mitsubas(tmp_path: Path) -> None:
+    """The same picture, and a table that looks forward where Mitsuba's does."""
+    mi = pytest.importorskip("mitsuba", reason="the renderer that we compare with")
+    mi.set_variant("scalar_rgb")
+    path = tmp_path / "blend.xml"
+    path.write_text(MITSUBA)
+    loaded = mi.load_file(str(path))
+    theirs = np.array([np.array(mi.render(loaded, spp=64, seed=i))[:, :, :3] for i in range(24)])
+    ours = exposures(with_mode(clpt.load(path), "rgb"), 24, 64)
+    assert_agree(blocks(ours), blocks(theirs.astype(np.float64)), "a blend of hg and a table")

@@ -64,9 +64,42 @@ def _homogeneous(props: Properties) -> Medium:
     )
 
 
+def _tabulated(props: Properties) -> Phase:
+    """Values over the cosine, even from -1 to 1; light that goes on straight is at 1."""
+    child = props.take("values")
+    if child is None:
+        raise props.element.error("needs its 'values', two numbers or more")
+    try:
+        values = [float(one) for one in child.attributes.get("value", "").replace(",", " ").split()]
+    except ValueError:
+        raise child.error("must be numbers, with commas between them") from None
+    with child.locating():
+        return media.Tabulated(values=values)
+
+
+def _blend(props: Properties) -> Phase:
+    parts = [phase(one, props.context) for one in props.objects("phase")]
+    if len(parts) != 2:
+        raise props.element.error(f"must hold two phase functions, not {len(parts)}")
+    if any(one.name == "weight" for one in props.nested):
+        raise props.element.error("'weight' must be a number: grids are not read here")
+    weight = props.number("weight", 0.5)
+    return media.Blend(weight=weight, first=parts[0], second=parts[1])
+
+
+def _sggx(props: Properties) -> Phase:
+    raise props.element.error(
+        "is not supported: its density depends on how flakes lie, which media of clpt do not tell;"
+        ' "hg" stands for round particles'
+    )
+
+
 MEDIA: dict[str, Callable[[Properties], Medium]] = {"homogeneous": _homogeneous}
 PHASES: dict[str, Callable[[Properties], Phase]] = {
     "isotropic": lambda props: media.Isotropic(),
     "hg": lambda props: media.HenyeyGreenstein(g=props.number("g", 0.8)),
     "rayleigh": lambda props: media.Rayleigh(),
+    "tabphase": _tabulated,
+    "blendphase": _blend,
+    "sggx": _sggx,
 }

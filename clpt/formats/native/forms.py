@@ -182,6 +182,12 @@ def _numbers(cursor: Cursor) -> tuple[float, ...]:
     return tuple(cursor.numbers())
 
 
+def _angular(cursor: Cursor) -> Any:
+    given = cursor.expect(list)
+    rows = any(isinstance(entry, list) for entry in given)
+    return [row.numbers() for row in cursor.entries()] if rows else cursor.numbers()
+
+
 def _number_or_list(cursor: Cursor) -> Any:
     return cursor.numbers() if isinstance(cursor.value, list) else cursor.number()
 
@@ -261,6 +267,11 @@ FORMS: dict[str, Form] = {
         {"type": "array", "items": ref("layer")},
         lambda cursor, reader: [reader.layer(entry) for entry in cursor.entries()],
         lambda value, writer: [writer.layer(layer) for layer in value],
+    ),
+    "angular": _of_cursor(
+        "list of numbers, or of rows of them",
+        {"anyOf": [NUMBERS, {"type": "array", "items": NUMBERS}]},
+        _angular,
     ),
     "host": _of_cursor("nothing", {"not": {}}, _not_in_files),
     # forms of a host parameter: plain values

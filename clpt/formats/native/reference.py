@@ -81,6 +81,7 @@ an object. What a number or a colour means depends on the parameter's role:
 | index | even | a smooth unbounded spectrum | a glass or liquid | its end values |
 | factor | even | a smooth unbounded spectrum | - | 0 |
 | coefficient | even | a smooth unbounded spectrum | - | its end values |
+| quantity | even | a smooth unbounded spectrum | - | its end values |
 
 Light of the same strength at every wavelength is the illuminant `"E"`; it looks pink beside D65.
 Tables have the limits that numbers have, at every wavelength from 200 to 2000 nm. An index is above

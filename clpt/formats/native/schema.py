@@ -115,7 +115,7 @@ def _parameter(param: Param, default: Any) -> Schema:
 
 
 def _spectrum(role: str) -> Schema:
-    number: Schema = NUMBER if role == "factor" else {**NUMBER, "minimum": 0}
+    number: Schema = NUMBER if role in ("factor", "quantity") else {**NUMBER, "minimum": 0}
     one_of = [number, {**TRIPLE, "description": "linear Rec. 709"}, ref("spectrum")]
     if role == "reflectance":
         number["maximum"] = 1

@@ -50,7 +50,7 @@ def _read(cursor: Cursor, role: str) -> Any:
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return cursor.number()
     cursor.expect(dict, "a number, [r, g, b] or a spectrum")
-    outside: Any = "hold" if role in ("index", "coefficient") else "zero"
+    outside: Any = "hold" if role in ("index", "coefficient", "quantity") else "zero"
     if "file" in value:
         return _from_file(cursor, role, outside)
     if "values" in value and "type" not in value:

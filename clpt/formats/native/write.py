@@ -20,6 +20,7 @@ from clpt.formats.meshes import particles, strands
 from clpt.formats.native import forms
 from clpt.formats.native.shape_files import MESH_ARRAYS, in_file
 from clpt.scene import Scene, kinds, materials, shapes
+from clpt.scene.media import Medium
 from clpt.scene.params import Kind, defaults, params
 
 MANY = 16  # from so many instances in a row on, a file holds their matrices
@@ -39,6 +40,22 @@ def save(scene: Scene, path: str | Path, *, copies: bool = False) -> None:
         output_files.write_text(path, NUMBERS.sub(_on_one_line, text) + "\n")
     except OSError as error:
         raise SceneError(f"cannot be written: {error.strerror}", file=path) from None
+
+
+def write_medium(medium: Medium, digits: int) -> str:
+    """Return a medium as it stands in `media` of a scene.json; digits: of numbers in its tables."""
+
+    def rounded(value: Any, key: str = "") -> Any:
+        if isinstance(value, dict):
+            return {name: rounded(part, name) for name, part in value.items()}
+        if isinstance(value, list):
+            return [rounded(part, key) for part in value]
+        kept = digits + 4 if key == "cosines" else digits  # those near 1 are close to each other
+        return float(f"{value:.{kept}g}") if isinstance(value, float) else value
+
+    written = _Writer(Path("medium.json")).kind(medium)
+    written.pop("name", None)
+    return NUMBERS.sub(_on_one_line, json.dumps(rounded(written), indent=2))
 
 
 class _Writer:

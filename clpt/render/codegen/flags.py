@@ -35,6 +35,12 @@ def gathers_photons(features: Features, cls: type[Scatterer]) -> bool:
     return not (cls.delta or cls.is_null or ends_light_paths(features, cls))
 
 
+def phase_varies(features: Features, cls: type[Scatterer]) -> bool:
+    """Whether a phase function of a scene differs between wavelengths."""
+    found = features.sources_of(cls.kind).values()
+    return cls.is_phase and any(source not in ("grey", "row") for one in found for source in one)
+
+
 def filters_at_random(features: Features, cls: type[Scatterer]) -> bool:
     """Whether a random texel stands for some parameter of a material."""
     images = {(kind, "reflectance") for kind in IMAGES}
@@ -75,7 +81,10 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "SHADOW_MEDIA": lambda f: f.shadow_media,
     "MEDIUM_AIMS": lambda f: f.medium_aims,
     "USES_DISPERSION": lambda f: f.dispersion and f.mode == "spectral",
-    "USES_RATIO": lambda f: f.chromatic_media or (f.dispersion and f.mode == "spectral"),
+    "USES_RATIO": lambda f: (
+        f.chromatic_media
+        or (f.mode == "spectral" and (f.dispersion or any(phase_varies(f, c) for c in f.leaves)))
+    ),
     "USES_FLUORESCENCE": lambda f: any(fluoresces(f, cls) for cls in f.leaves),
     "USES_BANDS": lambda f: f.bands,
     "USES_ALPHA": lambda f: f.alpha,
@@ -128,7 +137,7 @@ MATERIAL: dict[str, Callable[[Features, type[Scatterer]], str | int]] = {
     "BSDF_TRANSMITS": lambda f, cls: int(cls.kind in f.transmitting),  # kernels calculate with it
     "BSDF_SHINES": lambda f, cls: cls.kind in f.shining,
     "BSDF_ABSORBS": lambda f, cls: cls.absorbs,
-    "BSDF_CHROMATIC": lambda f, cls: cls.chromatic,
+    "BSDF_CHROMATIC": lambda f, cls: phase_varies(f, cls) if cls.is_phase else cls.chromatic,
     "BSDF_FLUORESCES": fluoresces,
     "BSDF_ENDS_LIGHT_PATHS": lambda f, cls: f.weighed and ends_light_paths(f, cls),
     "BSDF_MERGES": lambda f, cls: f.merged and gathers_photons(f, cls),

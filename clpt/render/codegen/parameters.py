@@ -30,6 +30,7 @@ def lane_type(param: Param) -> str:
     if param.role in SPECTRAL:
         return "Spectrum"
     given = {"real": "real", "orders": "real", "layers": "Layers"}
+    given["angular"] = "AngularTable"
     return given.get(param.role, "integer")
 
 
@@ -137,6 +138,8 @@ def _member(
     if form == "Layers":
         loaded = f"layers_load(scene, {at}, point, lambdas)"
         return [f"{target} = {loaded if 'layers' in present else 'layers_none()'};"]
+    if form == "AngularTable":
+        return [f"{target} = angular_load(scene, {at}, lambdas);"]
     if present == {"none"}:
         return [f"{target} = {'spectrum_of(0.0f)' if form == 'Spectrum' else '(real)(0.0f)'};"]
     *own, source = given

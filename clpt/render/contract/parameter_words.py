@@ -21,6 +21,7 @@ SPECTRAL = (*SPECTRUM_ROLES, "reradiation")  # roles whose values are spectra in
 SPECTRUM_WORDS = 5  # x y z w and where the value comes from: 0 here, > 0 texture, < 0 table
 REAL_WORDS = 2  # the value, and 0 or 1 + the texture
 ORDERS_WORDS = 2 * ORDERS + 1
+ANGULAR_WORDS = 5  # of the table: first value, cosines, rows; first wavelength, rows a nm
 LAYERS_WORDS = 2  # where the layers lie, see clpt.render.lowering.materials.thin_films; how many
 
 
@@ -29,6 +30,7 @@ def words(param: Param) -> int:
     if param.role in SPECTRAL:
         return SPECTRUM_WORDS
     given = {"real": REAL_WORDS, "orders": ORDERS_WORDS, "layers": LAYERS_WORDS}
+    given["angular"] = ANGULAR_WORDS
     return given.get(param.role, 1)
 
 

@@ -116,6 +116,8 @@ class Encoder:
         for name, param in read.items():
             if param.role == "layers":
                 value, source = self._layers_words(kind)
+            elif param.role == "angular":
+                value, source = self.spectra.angular_words(kind)
             else:
                 given = getattr(kind, name)
                 self._check(given, param, _where(kind, name))

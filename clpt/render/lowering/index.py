@@ -15,7 +15,7 @@ from clpt.scene import Scene
 from clpt.scene import materials as mt
 from clpt.scene.integrators import ParticleTracer, Vcm
 from clpt.scene.layers import LAYERS
-from clpt.scene.media import PHASES, Medium
+from clpt.scene.media import PHASE_LEAVES, Medium
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.shapes import Shape
 
@@ -193,8 +193,9 @@ def _phase_kinds(scene: Scene, shapes_: tuple[Shape, ...]) -> tuple[type[Scatter
     """The kinds of phase functions of a scene, in the order of their table."""
     if getattr(scene.integrator, "channels", ()):
         return ()
-    found = {type(medium.phase) for medium in _media(scene, shapes_) if medium.scatters}
-    return tuple(cls for cls in PHASES if cls in found)
+    scattering = (medium for medium in _media(scene, shapes_) if medium.scatters)
+    found = {type(leaf) for medium in scattering for leaf in medium.phase.leaves}
+    return tuple(cls for cls in PHASE_LEAVES if cls in found)
 
 
 def _leaves_of(material: mt.Material) -> Iterator[type[mt.Material]]:

@@ -37,6 +37,7 @@ RGB_ROLES: dict[str, Role] = {
     "index": "unbounded",
     "factor": "unbounded",
     "coefficient": "unbounded",
+    "quantity": "unbounded",
 }
 
 
@@ -44,6 +45,13 @@ RGB_ROLES: dict[str, Role] = {
 def _uplifted(value: RGB) -> tuple[float, ...]:
     """The coefficients of a colour; scenes of many materials have few."""
     return tuple(spectra.uplift(value.to_rgb()).tolist())
+
+
+def angular_values(cosines: NDArray, rows: NDArray) -> NDArray[np.float64]:
+    """Return what kernels/optics/angular_table.cl reads, of cosines (n,) and densities (m, n)."""
+    cells = np.pi * np.diff(cosines) * (rows[:, 1:] + rows[:, :-1])
+    running = np.hstack([np.zeros((len(rows), 1)), np.cumsum(cells, axis=1)])
+    return np.concatenate([cosines, np.hstack([rows, running]).ravel()])
 
 
 class SpectraTable:
@@ -133,15 +141,17 @@ class SpectraTable:
     def words(self, value: Spectrum | str, role: str) -> tuple[Words, str]:
         """Return the five words of a spectrum and its source: "constant" or "table".
 
-        An index that does not disperse is "grey", so that kernels see it.
+        An index or a quantity without colour is "grey", so that kernels see it.
         role: one of SPECTRUM_ROLES in clpt.scene.params; an index may be a glass's name.
         """
-        if isinstance(value, str) or role in ("index", "coefficient"):
+        if isinstance(value, str) or role in ("index", "coefficient", "quantity"):
             value = spectra.index(value)
         if role == "emission" and isinstance(value, RGB):
             value = RGBIlluminant(value.r, value.g, value.b)
         words = np.zeros(SPECTRUM_WORDS, np.uint32)
-        given = "grey" if role == "index" and isinstance(value, Constant) else "constant"
+        given = (
+            "grey" if role in ("index", "quantity") and isinstance(value, Constant) else "constant"
+        )
         if not self.spectral:
             words[:3] = as_words(value.to_rgb(RGB_ROLES[role]))
             return words, given
@@ -161,6 +171,17 @@ class SpectraTable:
         words[3] = as_words([factor])[0]
         words[4] = np.int32(-1 - self.row(spectrum)).view(np.uint32)
         return words
+
+    def angular_words(self, kind: Any) -> tuple[Words, str]:
+        """Return the words of a table over cosines, and its source: "row", or "rows" where it
+        depends on the wavelength; see kernels/optics/angular_table.cl.
+        """
+        cosines, rows, start, step = kind.device_rows(self.spectral)
+        first = self._store.append_floats("distributions", angular_values(cosines, rows))
+        whole = np.array([first, len(cosines), len(rows)], np.uint32)
+        return np.concatenate([whole, as_words([start, 1.0 / step])]), (
+            "rows" if len(rows) > 1 else "row"
+        )
 
     def expect_light(self, lights: Iterable[Spectrum]) -> None:
         """Note what light fluorescent materials will meet; see `reradiation.expected`."""

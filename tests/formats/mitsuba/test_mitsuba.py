@@ -578,6 +578,14 @@ ERRORS = {
     '</medium></shape>': "<medium type=.homogeneous.>: homogeneous.albedo: 2",
     '<shape type="cube"><medium type="homogeneous" name="interior"><phase type="hg">'
     '<float name="g" value="1.5"/></phase></medium></shape>': "<phase type=.hg.>: .*outside",
+    '<phase type="sggx" id="p"/><shape type="cube"><medium type="homogeneous" name="interior">'
+    '<ref id="p"/></medium></shape>': "<phase type=.sggx.>: is not supported: its density",
+    '<shape type="cube"><medium type="homogeneous" name="interior"><phase type="tabphase">'
+    '<string name="values" value="1, x"/></phase></medium></shape>': "must be numbers, with commas",
+    '<shape type="cube"><medium type="homogeneous" name="interior"><phase type="tabphase"/>'
+    "</medium></shape>": "needs its 'values'",
+    '<shape type="cube"><medium type="homogeneous" name="interior"><phase type="blendphase">'
+    '<phase type="hg"/></phase></medium></shape>': "two phase functions, not 1",
     '<alias id="no" as="a"/>': "no object with the id 'no'",
     '<bsdf type="null" id="a"/><alias id="a" as="a"/>': "already used",
     '<shape type="cube"><bsdf type="normalmap"><texture type="checkerboard" name="normalmap"/>'

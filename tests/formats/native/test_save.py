@@ -87,6 +87,8 @@ VALUES: dict[str, Any] = {
     "cube_images": NEEDED[lights.CubeMap]["image"],
     "group": GROUP,
     "text": "vertex_named",
+    "quantity": 0.4,
+    "angular": (1.0, 3.0, 2.0),
 }
 
 
@@ -112,7 +114,8 @@ def variants(cls: type[Kind]) -> Iterator[Kind]:
         try:
             yield cls(**{**needed, name: other(param, default[name])})
         except SceneError:  # it does not go with the defaults of the others
-            assert cls in (cameras.Matrix, integrators.Film, lights.Spot), (cls, name)
+            beside = (cameras.Matrix, integrators.Film, lights.Spot, media.Tabulated)
+            assert cls in beside, (cls, name)
 
 
 def same(a: Any, b: Any) -> bool:

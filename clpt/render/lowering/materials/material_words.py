@@ -17,7 +17,7 @@ from clpt.render.lowering.geometry import shapes
 from clpt.render.lowering.index import any_of
 from clpt.render.lowering.materials.normal_maps import NormalPerturbation
 from clpt.scene import materials as mt
-from clpt.scene.media import Phase
+from clpt.scene.media import Blend, Phase
 from clpt.scene.params import device_params
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.shapes import Shape
@@ -77,6 +77,9 @@ class MaterialWords:
 
     def phase(self, phase: Phase) -> int:
         """Return the word of a phase function, which is found as the material of a side is."""
+        if isinstance(phase, Blend):
+            children = [self.phase(part) for part in (phase.first, phase.second)]
+            return self._mixture_of(phase.weight, children)
         self.transmitting.add(phase.kind)
         return self._leaf(phase, _Side(front=True, two_sided=False))
 
@@ -118,9 +121,11 @@ class MaterialWords:
         return self._leaves.index(type(material)) << 24 | row
 
     def _mixture(self, weight: Any, first: Any, second: Any, side: _Side) -> int:
+        return self._mixture_of(weight, [self._word(one, side) for one in (first, second)])
+
+    def _mixture_of(self, weight: Any, children: list[int]) -> int:
         words, source = self._encoder.named_words("mixture", "weight", weight, "real")
         self.uvs |= source == "texture"
-        children = [self._word(material, side) for material in (first, second)]
         word = MIXTURE << 24 | self._encoder.store.append("mixtures", [*words, *children])
         self._depths[word] = 1 + max(self._depths.get(child, 0) for child in children)
         return word

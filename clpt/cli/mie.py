@@ -1,0 +1,127 @@
+"""`clpt mie`: a medium of droplets, from their index and sizes, for a scene file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+from rich.table import Table
+
+from .. import mie as theory
+from .. import output_files, spectra
+from ..errors import SceneError
+from ..formats.native.write import write_medium
+from .extras import extra
+from .output_console import output_console
+
+DIGITS = 6  # of the table in a file
+
+
+@click.command()
+@click.argument("radius", type=float)
+@click.option(
+    "--law", default="log_normal", show_default=True, type=click.Choice(theory.LAWS),
+    help="How many drops have which radius: RADIUS is that of all, the median, or the effective"
+    " radius (Hansen and Travis 1974).",
+)  # fmt: skip
+@click.option(
+    "--spread", type=float, default=0.1, show_default=True,
+    help="Of log_normal the standard deviation of ln(radius), of gamma the effective variance.",
+)  # fmt: skip
+@click.option(
+    "--share", type=float, default=1e-7, show_default=True,
+    help="Of the volume; 1e-7 is 0.1 g of water in a cubic metre.",
+)  # fmt: skip
+@click.option(
+    "--index", default="water", show_default=True, metavar="N",
+    help="Of the drops: a number, water, a glass, a file.",
+)  # fmt: skip
+@click.option(
+    "--k", default="0", show_default=True, metavar="K",
+    help="Their absorption: a number, or a file.",
+)  # fmt: skip
+@click.option(
+    "--host", default="1", show_default=True, metavar="N",
+    help="The index of what is around them.",
+)  # fmt: skip
+@click.option(
+    "--wavelengths", default="360,830,10", show_default=True, metavar="FROM,TO,STEP",
+    help="Of the table [nm].",
+)  # fmt: skip
+@click.option(
+    "--radii", type=click.IntRange(2, 10000), default=200, show_default=True,
+    help="That stand for all.",
+)  # fmt: skip
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path),
+    help="The medium as .json, for `media` of a scene.",
+)  # fmt: skip
+@click.option(
+    "--plot", type=click.Path(path_type=Path),
+    help="The phase function by angle and wavelength, .png, .svg or .pdf.",
+)  # fmt: skip
+def mie(
+    radius: float, law: str, spread: float, share: float, index: str, k: str, host: str,
+    wavelengths: str, radii: int, output: Path | None, plot: Path | None,
+) -> None:  # fmt: skip
+    """Make the medium of spheres of RADIUS micrometres: fog, mist, milk.
+
+    It follows from Mie's theory (1908), for each wavelength. Without -o, a table of it is shown.
+    """
+    at = _wavelengths(wavelengths)
+    medium = theory.droplets(
+        theory.sizes(law, radius * 1e-6, spread, radii), share,
+        index=_index(index, "eta"), k=_index(k, "k"), host=_index(host, "eta"), lambdas=at,
+    )  # fmt: skip
+    if output is not None:
+        if output.suffix.lower() != ".json":
+            raise SceneError("a medium is written as .json", file=output)
+        try:
+            output_files.write_text(output, write_medium(medium, DIGITS) + "\n")
+        except OSError as error:
+            raise SceneError(f"cannot be written: {error.strerror}", file=output) from None
+        click.echo(str(output), err=True)
+    if plot is not None:
+        with extra("plot", "a plot"):
+            from . import mie_plot  # here: matplotlib is an extra, and slow to import
+
+        mie_plot.write(plot, medium, f"{law}, {radius:g} um, {index} in {host}")
+        click.echo(str(plot), err=True)
+    if output is None and plot is None:
+        _print(medium, at)
+
+
+def _wavelengths(text: str) -> np.ndarray:
+    try:
+        first, last, step = map(float, text.split(","))
+        if not (0.0 < first <= last and step > 0.0 and (last - first) / step < 2000.0):
+            raise ValueError
+    except ValueError:
+        message = f"{text!r} does not look like 360,830,10 with a first, a last and a step"
+        raise SceneError(message, where="--wavelengths") from None
+    return np.arange(first, last + 1e-6 * step, step)
+
+
+def _index(text: str, column: Any) -> Any:
+    try:
+        return float(text)
+    except ValueError:
+        pass
+    if Path(text).suffix:
+        return spectra.read_index(Path(text), column)
+    return text
+
+
+def _print(medium: Any, at: np.ndarray) -> None:
+    table = Table(box=None, pad_edge=False)
+    for heading in ("nm", "sigma_t [1/m]", "albedo", "mean cosine", "back [1/sr]"):
+        table.add_column(heading, justify="right")
+    phase = medium.phase
+    moment = phase.values * phase.cosines
+    g = np.pi * ((moment[:, 1:] + moment[:, :-1]) @ np.diff(phase.cosines))
+    sigma_t, albedo = (each.sample(at) for each in (medium.sigma_t, medium.albedo))
+    for row in zip(at, sigma_t, albedo, g, phase.values[:, 0], strict=True):
+        table.add_row(*(f"{value:.6g}" for value in row))
+    output_console().print(table)
