@@ -17,7 +17,7 @@ from clpt import spectra
 from clpt.errors import SceneError
 from clpt.scene.params import Kind, angular, coefficient, host, quantity, real, reflectance
 from clpt.scene.scatterer import Scatterer
-from clpt.scene.values import SpectrumLike
+from clpt.scene.values import Matrix4, SpectrumLike
 from clpt.spectra import RGB, Constant, RGBUnbounded, Spectrum
 from clpt.spectra.spectrum import WIDEST
 
@@ -242,6 +242,62 @@ def _whole(rows: Any, cosines: Any) -> NDArray[np.float64]:
     return np.pi * ((rows[:, 1:] + rows[:, :-1]) @ np.diff(cosines))
 
 
+@dataclass(frozen=True, eq=False)
+class Volume:
+    """Numbers on a grid, and where its box is.
+
+    values: (nx, ny, nz), in a numpy array or a pyopencl.array.Array; to_world: 4x4, which takes the
+    unit cube from (0, 0, 0) to (1, 1, 1) to the grid's box.
+    """
+
+    values: Any
+    to_world: Matrix4
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Grid(Homogeneous):
+    """A homogeneous medium whose coefficients are multiplied by a density on a grid.
+
+    The density (nx, ny, nz) is that at the centres of the cells of a box, trilinear between these;
+    beyond the outermost ones it is theirs, and outside of the box there is nothing. It is an array
+    of numpy or of pyopencl, or a `Volume`, whose box `to_world` then moves.
+
+    Raises SceneError for a density with less or more than three axes, or with numbers that are
+    negative or not finite.
+    """
+
+    density: Any = host(None, "numbers (nx, ny, nz) that multiply the coefficients", form="volume")
+    to_world: Matrix4 = host(np.eye(4), "takes the unit cube to the grid's box")
+
+    def check(self) -> None:
+        super().check()
+        if isinstance(self.density, Volume):
+            moved = np.asarray(self.to_world, float) @ np.asarray(self.density.to_world, float)
+            object.__setattr__(self, "to_world", moved)
+            object.__setattr__(self, "density", self.density.values)
+        where = f"{self.kind}.density"
+        if not hasattr(self.density, "shape"):
+            raise SceneError("must be an array with the axes x, y and z", where=where)
+        if len(self.density.shape) != 3 or not all(self.density.shape):
+            message = f"must be an array (nx, ny, nz), not of the shape {self.density.shape}"
+            raise SceneError(message, where=where)
+        if isinstance(self.density, np.ndarray):
+            check_density(self.density, where)
+        if not abs(np.linalg.det(np.asarray(self.to_world, float)[:3, :3])) > 0.0:
+            raise SceneError("has no inverse", where=f"{self.kind}.to_world")
+
+
+def check_density(values: np.ndarray, where: str) -> None:
+    """Raise SceneError for numbers that no density can be."""
+    if values.dtype.kind not in "fui":
+        raise SceneError(f"must hold numbers, not {values.dtype}", where=where)
+    low, high = float(values.min()), float(values.max())
+    if not (np.isfinite(low) and np.isfinite(high)):
+        raise SceneError("has numbers that are not finite", where=where)
+    if low < 0.0:
+        raise SceneError(f"is negative somewhere: {low:g}", where=where)
+
+
 def _combined(values: list[Any], combine: Callable[[list[Any]], Any], spectral: bool) -> Spectrum:
     """What becomes of spectra at each wavelength, or of each of three numbers."""
     if all(isinstance(value, Constant) for value in values):
@@ -262,4 +318,4 @@ def _is_zero(value: Any) -> bool:
 
 PHASE_LEAVES: tuple[type[Phase], ...] = (Isotropic, HenyeyGreenstein, Rayleigh, Draine, Tabulated)
 PHASES: tuple[type[Phase], ...] = (*PHASE_LEAVES, Blend)
-KINDS: tuple[type[Medium], ...] = (Homogeneous,)
+KINDS: tuple[type[Medium], ...] = (Homogeneous, Grid)

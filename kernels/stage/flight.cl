@@ -44,6 +44,9 @@ STAGE(flight)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
         real choice = MEDIUM_AIMS > 1 ? sampler_pair(sampler, as_natural(DIMENSION_AIM + vertex)).x : (real)(0.0f);
         Equiangular near = equiangular(scene, load_path_o(path, at), load_path_d(path, at), end,
                                        spectrum_mean(m.sigma_t), choice);
+#if USES_GRIDS
+        near.share = sel((name & MEDIUM_GRID) != 0, (real)(0.0f), near.share);
+#endif
         mask aims = scatters & (u.x < near.share);
         real left = 1.0f - near.share, by_angle = equiangular_distance(near, u.x / max_r(near.share, (real)(1e-9f)));
         u.x = max_r(u.x - near.share, (real)(0.0f)) / left;
@@ -69,6 +72,18 @@ STAGE(flight)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
         Spectrum weight = spectrum_scale(f, inverse);
 #else
         Spectrum weight = spectrum_scale(f, 1.0f / max_r(pdf.x, (real)(1e-30f)));
+#endif
+#if USES_GRIDS
+        mask gridded = flies & ((name & MEDIUM_GRID) != 0);
+        if (any(gridded)) {
+            natural key = grid_key(scene, load_path_pixel_key(path, at), load_path_sample(path, at), vertex);
+            GridFlight own = grid_flight(scene, name, m, load_path_o(path, at), load_path_d(path, at), end, ratio, u,
+                                         key, gridded);
+            weight = spectrum_sel(gridded, own.weight, weight);
+            collides = sel_i(gridded, own.collides, collides);
+            t = sel(gridded, own.t, t);
+            hero_keep(path, at, gridded, own.ratio);
+        }
 #endif
         store_path_beta(path, at, flies, spectrum_mul(load_path_beta(path, at), weight));
         store_hit_t(hit, at, collides, t);

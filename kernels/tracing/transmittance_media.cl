@@ -8,8 +8,13 @@
 #include "generated/medium.cl"
 #include "generated/null_transmittance.cl"
 
+#if USES_GRIDS
+#define GRID_KEY_ARG , natural key
+#else
+#define GRID_KEY_ARG
+#endif
 inline Spectrum trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real t, integer medium,
-                                    Wavelengths lambdas, mask active)
+                                    Wavelengths lambdas, mask active GRID_KEY_ARG)
 {
     Spectrum passes = spectrum_sel(active, spectrum_of(1.0f), spectrum_of(0.0f));
     int surfaces = 0;
@@ -18,6 +23,14 @@ inline Spectrum trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, rea
         mask met = active & (h.prim >= 0) & (t > 0.0f);
         real way = sel(met, h.t, max_r(t, (real)(0.0f)));
         Spectrum dims = medium_transmittance(scene, sel_i(active, medium, (integer)(0)), way, lambdas);
+#if USES_GRIDS
+        mask gridded = active & ((medium & MEDIUM_GRID) != 0);
+        if (any(gridded)) {
+            Medium m = medium_load(scene, sel_i(gridded, medium, (integer)(0)), lambdas);
+            natural own = hash_natural(key + 1u + (uint)surfaces);
+            dims = spectrum_sel(gridded, grid_transmittance(scene, medium, m, o, d, way, own, gridded), dims);
+        }
+#endif
         passes = spectrum_mul(passes, dims);
         active = met;
         if (any(active)) {

@@ -78,6 +78,7 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "USES_NULL_SURFACES": lambda f: f.null_surfaces,
     "USES_ABSORPTION": lambda f: f.absorption or f.media,
     "USES_MEDIA": lambda f: f.media,
+    "USES_GRIDS": lambda f: f.grids,
     "SHADOW_MEDIA": lambda f: f.shadow_media,
     "MEDIUM_AIMS": lambda f: f.medium_aims,
     "USES_DISPERSION": lambda f: f.dispersion and f.mode == "spectral",

@@ -92,6 +92,7 @@ class Features:
     media: bool = False  # inside or outside of shapes, or around the camera
     chromatic_media: bool = False  # of which some extinction depends on the wavelength
     medium_aims: int = 0  # places of lamps near which flights through media end
+    grids: bool = False  # of which some have a density on a grid
     glass_lens: bool = False  # of a glass that disperses
     channel: str = ""
     bands: bool = False  # a spectral film
@@ -114,7 +115,7 @@ class Features:
     @property
     def shadow_media(self) -> bool:
         """Whether rays to lights may go through several media."""
-        return self.media and self.null_surfaces
+        return self.media and (self.null_surfaces or self.grids)
 
     @property
     def passes(self) -> tuple[Features, ...]:

@@ -10,6 +10,7 @@ from clpt.render.lowering.geometry.geometry import Geometry
 from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.lights.lights import LightRows
 from clpt.render.lowering.materials.material_words import MaterialWords
+from clpt.scene.media import Grid
 
 FEW_LIGHTS = 256  # up to which one random number chooses a light and a point on it
 INTEGRATORS = {"direct": "path", "vcm": "path"}  # kinds that have the kernels of another one
@@ -78,6 +79,7 @@ def features_of(
         media=bool(index.media),
         chromatic_media=any(medium.is_chromatic for medium in index.media),
         medium_aims=medium_aims,
+        grids=any(isinstance(medium, Grid) for medium in index.media),
         dispersion=glass_lens or disperses(index.leaves, sources),
         glass_lens=glass_lens,
         channel=channels[0] if channels else "",

@@ -7,15 +7,17 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.render.lowering import grids
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.lights.lights import LightRows
 from clpt.render.lowering.materials.material_words import MaterialWords
-from clpt.scene.media import Medium
+from clpt.scene.media import Grid, Medium
 from clpt.scene.shapes import Shape
 
 MOST_AIMS = 8  # lamps near which flights end, see kernels/optics/equiangular.cl
 FLIES = 0x40000000  # in a medium's word: the stage `flight` takes rays through it
+GRID = 0x20000000  # a density on a grid multiplies its coefficients
 
 
 def medium_aims(lights: LightRows) -> NDArray[np.float32]:
@@ -70,5 +72,8 @@ class MediumWords:
         rows = [np.array([phase], np.uint32)]
         for name, value in (("absorption", absorbs), ("scattering", scatters)):
             rows.append(self._encoder.named_words("medium", name, value, "coefficient")[0])
+        gridded = isinstance(medium, Grid)
+        if gridded:
+            rows.append(grids.row(medium, self._encoder))
         first = self._encoder.store.append("materials", np.concatenate(rows))
-        return FLIES | (2 + first)
+        return FLIES | GRID * gridded | (2 + first)

@@ -1,0 +1,235 @@
+/* A medium whose coefficients a density multiplies, which is given at the points of a lattice and trilinear between.
+ * Bricks of 8^3 cells hold the density of their 9^3 points over the brick's highest, in 16 bits each. A ray goes from
+ * brick to brick by integer steps (Amanatides and Woo 1987), and the highest density of each bounds the extinction
+ * there. Flights are sampled by delta tracking (Woodcock 1965), rays to lights by ratio tracking (Novak et al. 2014);
+ * null collisions are weighed over the path's wavelengths as all else is (Miller, Georgiev and Jarosz 2019).
+ *
+ * All that follows is linear in the density: one of the eight points around stands for it, each with its trilinear
+ * weight as its chance. In `materials` there stand behind a medium's coefficients: the first word in `images`, the
+ * number of bricks along x, y and z, a matrix of three rows from the world to the lattice, and the upper corner of the
+ * box there; the lower one is (1/2, 1/2, 1/2). In `images` each brick has two words: where its points begin, counted from the
+ * first word, and its highest density. */
+#define MEDIUM_GRID 0x20000000
+#define GRID_CELLS 8
+#define GRID_POINTS 9
+#define GRID_ROULETTE 0.05f /* what passes below this is at stake */
+
+/* A ray in the lattice, and the brick where it is. */
+typedef struct {
+    vec3 o, d, inverse;
+    real t, end; /* [m] */
+    integer first, nx, ny, nz, x, y, z;
+} GridWalk;
+
+/* The brick of a walk: where its points begin, its highest density, where the ray leaves it and along which axis. */
+typedef struct {
+    integer points;
+    real most, exit;
+    mask across_x, across_y;
+} GridBrick;
+
+/* A number by which the random numbers of a ray are known. */
+inline natural grid_key(Scene scene, natural pixel_key, integer sample, integer vertex)
+{
+    natural key = hash_natural(as_natural(sample) + 0x9e3779b9u * scene.settings->seed);
+    return hash_natural(pixel_key + hash_natural(key + as_natural(vertex)));
+}
+
+/* Whether the ray from o along d, t metres long, is in the box; where it begins there. */
+inline mask grid_begin(Scene scene, integer name, vec3 o, vec3 d, real t, mask active, GridWalk *w)
+{
+    integer at = sel_i(active, MEDIUM_ROW(name) + 2 * MEDIUM_SCATTERING, (integer)(0));
+    w->first = gather_i(scene.materials, at);
+    w->nx = gather_i(scene.materials, at + 1);
+    w->ny = gather_i(scene.materials, at + 2);
+    w->nz = gather_i(scene.materials, at + 3);
+    real lo = 0.0f, hi = t;
+#define AXIS(a, n)                                                                \
+    vec4 row_##a = gather_w4(scene.materials, at + 4 + 4 * n);                    \
+    real top_##a = gather_w(scene.materials, at + 16 + n);                        \
+    w->o.a = row_##a.x * o.x + row_##a.y * o.y + row_##a.z * o.z + row_##a.w;     \
+    w->d.a = row_##a.x * d.x + row_##a.y * d.y + row_##a.z * d.z;                 \
+    w->inverse.a = 1.0f / sel(fabs(w->d.a) > 1e-20f, w->d.a, (real)(1e-20f));     \
+    real from_##a = (0.5f - w->o.a) * w->inverse.a;                               \
+    real to_##a = (top_##a - w->o.a) * w->inverse.a;                              \
+    lo = max_r(lo, min_r(from_##a, to_##a));                                      \
+    hi = min_r(hi, max_r(from_##a, to_##a));
+    AXIS(x, 0)
+    AXIS(y, 1)
+    AXIS(z, 2)
+#undef AXIS
+    w->t = lo;
+    w->end = hi;
+    mask inside = active & (lo < hi);
+#define AXIS(a) \
+    w->a = clamp_i(to_integer(sel(inside, w->o.a + lo * w->d.a, (real)(0.0f)) * (1.0f / GRID_CELLS)), w->n##a - 1);
+    AXIS(x)
+    AXIS(y)
+    AXIS(z)
+#undef AXIS
+    return inside;
+}
+
+inline GridBrick grid_brick(Scene scene, GridWalk w, mask active)
+{
+    GridBrick b;
+    integer at = w.first + 2 * ((w.z * w.ny + w.y) * w.nx + w.x);
+    at = sel_i(active, at, (integer)(0));
+    b.points = w.first + gather_i(scene.images, at);
+    b.most = gather_w(scene.images, at + 1);
+    real end_x, end_y, end_z;
+#define AXIS(a)                                                                                                \
+    end_##a = to_real(GRID_CELLS * (w.a + sel_i(w.d.a > 0.0f, (integer)(1), (integer)(0)))) - w.o.a;          \
+    end_##a = sel(fabs(w.d.a) > 1e-20f, end_##a * w.inverse.a, (real)(FAR));
+    AXIS(x)
+    AXIS(y)
+    AXIS(z)
+#undef AXIS
+    b.across_x = (end_x <= end_y) & (end_x <= end_z);
+    b.across_y = !b.across_x & (end_y <= end_z);
+    b.exit = max_r(min_r(min_r(end_x, end_y), min_r(end_z, w.end)), w.t);
+    return b;
+}
+
+/* Goes to the next brick; returns the rays that are still in the box. */
+inline mask grid_next(GridWalk *w, GridBrick b, mask active)
+{
+    mask across_z = !b.across_x & !b.across_y, inside = active & (b.exit < w->end);
+#define AXIS(a, m)                                                                                        \
+    w->a += sel_i(active & (m), sel_i(w->d.a > 0.0f, (integer)(1), (integer)(-1)), (integer)(0));          \
+    inside = inside & (w->a >= 0) & (w->a < w->n##a);
+    AXIS(x, b.across_x)
+    AXIS(y, b.across_y)
+    AXIS(z, across_z)
+#undef AXIS
+    return inside;
+}
+
+/* Density at t over the brick's highest: of one of the points around, which `bits` choose. */
+inline real grid_density(Scene scene, GridWalk w, GridBrick b, mask active, natural bits)
+{
+    integer at = 0;
+#define AXIS(a, shift, step)                                                                                      \
+    real p_##a = clamp_r(w.o.a + w.t * w.d.a - to_real(GRID_CELLS * w.a), (real)(0.0f), (real)(GRID_CELLS));      \
+    integer c_##a = clamp_i(to_integer(p_##a), (integer)(GRID_CELLS - 1));                                        \
+    real u_##a = (to_real(as_integer((bits >> shift) & 1023u)) + 0.5f) * (1.0f / 1024.0f);                        \
+    at += step * (c_##a + sel_i(u_##a < p_##a - to_real(c_##a), (integer)(1), (integer)(0)));
+    AXIS(x, 0u, 1)
+    AXIS(y, 10u, GRID_POINTS)
+    AXIS(z, 20u, GRID_POINTS * GRID_POINTS)
+#undef AXIS
+    integer word = gather_i(scene.images, sel_i(active, b.points + (at >> 1), (integer)(0)));
+    return to_real((word >> ((at & 1) << 4)) & 0xffff) * (1.0f / 65535.0f);
+}
+
+inline real grid_length(natural bits) { return -log_r(1.0f - unit_interval(bits)); }
+
+/* Where a flight ends, and what its sample weighs; `ratio` as in path/hero.cl. */
+typedef struct {
+    mask collides;
+    real t; /* [m] */
+    Spectrum weight, ratio;
+} GridFlight;
+
+/* After so much of the highest density, times metres, since the last collision the path is as likely as `pdf` at each
+ * wavelength, and `value` of light is left; both lack what passes at the least extinction. */
+inline void grid_weigh(Medium m, real thickness, Spectrum value, Spectrum pdf, mask active, GridFlight *f)
+{
+#if USES_RATIO
+    real least = min_r(min_r(m.sigma_t.x, m.sigma_t.y), m.sigma_t.z);
+#if SPECTRUM_SIZE == 4
+    least = min_r(least, m.sigma_t.w);
+#endif
+    Spectrum passes = spectrum_exp(spectrum_scale(spectrum_sub(m.sigma_t, spectrum_of(least)), -thickness));
+    Spectrum pdfs = spectrum_mul(f->ratio, spectrum_mul(pdf, passes));
+    real mean = spectrum_mean(pdfs), inverse = sel(mean > 1e-30f, 1.0f / mean, (real)(0.0f));
+    Spectrum weight = spectrum_scale(spectrum_mul(value, passes), inverse);
+    f->ratio = spectrum_sel(active, spectrum_scale(pdfs, inverse), f->ratio);
+#else
+    Spectrum weight = spectrum_scale(value, 1.0f / max_r(pdf.x, (real)(1e-30f)));
+#endif
+    f->weight = spectrum_sel(active, spectrum_mul(f->weight, weight), f->weight);
+}
+
+/* A flight from o along d through the medium `name`, at most t metres; u: of its first way. */
+inline GridFlight grid_flight(Scene scene, integer name, Medium m, vec3 o, vec3 d, real t, Spectrum ratio, vec2 u,
+                              natural key, mask active)
+{
+    GridFlight f = {mask_of(0), t, spectrum_of(1.0f), ratio};
+    GridWalk w;
+    mask all = active;
+    active = grid_begin(scene, name, o, d, t, active, &w);
+    real left = -log_r(max_r(1.0f - u.x, (real)(1e-9f))) / max_r(spectrum_pick(m.sigma_t, ratio, u.y), (real)(1e-30f));
+    real passed = 0.0f;
+    natural count = 0u;
+    while (any(active)) {
+        GridBrick b = grid_brick(scene, w, active);
+        real thick = b.most * (b.exit - w.t);
+        mask meets = active & (thick > left);
+        passed += sel(active, sel(meets, left, thick), (real)(0.0f));
+        w.t = sel(active, sel(meets, min_r(w.t + left / max_r(b.most, (real)(1e-30f)), b.exit), b.exit), w.t);
+        left -= sel(active, thick, (real)(0.0f));
+        if (any(meets)) {
+            natural bits = hash_natural(key + count * 0x9e3779b9u), more = hash_natural(bits ^ 0x68bc21ebu);
+            real density = grid_density(scene, w, b, meets, more);
+            Spectrum scatters = spectrum_scale(m.sigma_s, density), lacks = spectrum_scale(m.sigma_t, 1.0f - density);
+            real chance = spectrum_mean(spectrum_mul(f.ratio, spectrum_div(scatters,
+                spectrum_add(spectrum_add(scatters, lacks), spectrum_of(1e-30f)))));
+            more = hash_natural(more ^ 0x2f6e2b1u);
+            mask real_one = meets & (unit_interval(more) < chance);
+            chance = 1.0f / max_r(sel(real_one, chance, 1.0f - chance), (real)(1e-30f));
+            Spectrum value = spectrum_scale(spectrum_sel(real_one, scatters, lacks), chance);
+            grid_weigh(m, passed, value, m.sigma_t, meets, &f);
+            f.collides = f.collides | real_one;
+            f.t = sel(real_one, w.t, f.t);
+            passed = sel(meets, (real)(0.0f), passed);
+            active = active & !real_one & (spectrum_max(f.weight) > 0.0f);
+            real pick = 0.0f;
+#if USES_RATIO
+            pick = unit_interval(hash_natural(more ^ 0x51ed270bu));
+#endif
+            real sigma = max_r(spectrum_pick(m.sigma_t, f.ratio, pick), (real)(1e-30f));
+            left = sel(meets, grid_length(bits) / sigma, left);
+            count += sel_n(meets, (natural)(1u), (natural)(0u));
+        }
+        active = sel_i(meets, active, grid_next(&w, b, active & !meets));
+    }
+#if USES_RATIO
+    grid_weigh(m, passed, spectrum_of(1.0f), spectrum_of(1.0f), all & !f.collides, &f);
+#endif
+    return f;
+}
+
+/* How much of the light passes t metres from o along d through the medium `name`: an estimate. */
+inline Spectrum grid_transmittance(Scene scene, integer name, Medium m, vec3 o, vec3 d, real t, natural key,
+                                   mask active)
+{
+    GridWalk w;
+    active = grid_begin(scene, name, o, d, t, active, &w);
+    real most = max_r(spectrum_max(m.sigma_t), (real)(1e-30f)), inverse = 1.0f / most;
+    Spectrum share = spectrum_scale(m.sigma_t, inverse), passes = spectrum_of(1.0f);
+    natural count = 1u, bits = hash_natural(key);
+    real left = grid_length(bits) * inverse;
+    while (any(active)) {
+        GridBrick b = grid_brick(scene, w, active);
+        real thick = b.most * (b.exit - w.t);
+        mask meets = active & (thick > left);
+        w.t = sel(active, sel(meets, min_r(w.t + left / max_r(b.most, (real)(1e-30f)), b.exit), b.exit), w.t);
+        left -= sel(active, thick, (real)(0.0f));
+        if (any(meets)) {
+            bits = hash_natural(key + count * 0x9e3779b9u);
+            natural more = hash_natural(bits ^ 0x68bc21ebu);
+            real density = grid_density(scene, w, b, meets, more);
+            Spectrum kept = spectrum_sub(spectrum_of(1.0f), spectrum_scale(share, density));
+            passes = spectrum_sel(meets, spectrum_mul(passes, kept), passes);
+            mask staked = meets & (spectrum_max(passes) < GRID_ROULETTE);
+            mask won = staked & (unit_interval(hash_natural(more ^ 0x2f6e2b1u)) < 0.25f);
+            passes = spectrum_sel(staked, spectrum_scale(passes, sel(won, (real)(4.0f), (real)(0.0f))), passes);
+            active = active & (spectrum_max(passes) > 0.0f);
+            left = sel(meets, grid_length(bits) * inverse, left);
+            count += sel_n(meets, (natural)(1u), (natural)(0u));
+        }
+        active = sel_i(meets, active, grid_next(&w, b, active & !meets));
+    }
+    return passes;
+}
