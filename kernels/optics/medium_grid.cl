@@ -7,8 +7,8 @@
  * All that follows is linear in the density: one of the eight points around stands for it, each with its trilinear
  * weight as its chance. In `materials` there stand behind a medium's coefficients: the first word in `images`, the
  * number of bricks along x, y and z, a matrix of three rows from the world to the lattice, and the upper corner of the
- * box there; the lower one is (1/2, 1/2, 1/2). In `images` each brick has two words: where its points begin, counted from the
- * first word, and its highest density. */
+ * box there; the lower one is (1/2, 1/2, 1/2). In `images` each brick has two words: where its points begin from the
+ * first word on, and its highest density. */
 #define MEDIUM_GRID 0x20000000
 #define GRID_CELLS 8
 #define GRID_POINTS 9

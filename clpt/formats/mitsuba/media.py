@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from clpt.formats.mitsuba import spectra
 from clpt.formats.mitsuba.properties import Context, Properties, unknown
 from clpt.formats.mitsuba.xml import Element
+from clpt.formats.volumes import vol
 from clpt.scene import media
-from clpt.scene.media import Homogeneous, Medium, Phase
+from clpt.scene.media import Grid, Homogeneous, Medium, Phase, Volume
+from clpt.spectra import RGBUnbounded
 
 
 def medium(element: Element, context: Context) -> Medium:
@@ -94,7 +98,54 @@ def _sggx(props: Properties) -> Phase:
     )
 
 
-MEDIA: dict[str, Callable[[Properties], Medium]] = {"homogeneous": _homogeneous}
+def _heterogeneous(props: Properties) -> Medium:
+    child = props.named.get("sigma_t")
+    volume = None if child is None else props.context.resolve(child)
+    even = volume is None or volume.tag != "volume" or volume.type != "gridvolume"
+    if even or volume is None:  # constvolume, or a number
+        return _homogeneous(props)
+    props.take("sigma_t")
+    colour, density = props.context.once(volume, lambda one: _grid_volume(one, props.context))
+    medium = _homogeneous(props)
+    return Grid(
+        sigma_t=colour,
+        albedo=medium.albedo,
+        scale=medium.scale,
+        phase=medium.phase,
+        name=medium.name,
+        density=density,
+    )
+
+
+def _grid_volume(element: Element, context: Context) -> tuple[Any, Volume]:
+    """What a <volume type="gridvolume"> has: one colour, and a density that multiplies it."""
+    props = Properties(element, context)
+    props.ignore("raw", "accel")
+    path, to_world = props.file(), props.placement()
+    with element.locating():
+        values, box = vol.read_channels(path)
+    if props.flag("use_grid_bbox", False):
+        to_world = to_world @ box
+    if props.text("wrap_mode", "clamp", ("clamp", "repeat", "mirror")) != "clamp":
+        context.warn(element, "at its ends the grid goes on as 'clamp'")
+    if props.text("filter_type", "trilinear", ("trilinear", "nearest")) != "trilinear":
+        context.warn(element, "the grid is trilinear, not 'nearest'")
+    props.finish()
+    if values.shape[3] not in (1, 3):
+        raise element.error(f"its file has {values.shape[3]} channels; read are 1 and 3")
+    most = values.max(axis=(0, 1, 2)).astype(float)
+    if len(most) == 1 or not most.max() > 0.0:
+        return 1.0, Volume(values[..., 0], to_world)
+    density = values.mean(axis=3) / most.mean()
+    if not np.allclose(values, density[..., None] * most, rtol=1e-4, atol=1e-5 * most.max()):
+        raise element.error("its colours differ by more than a factor; give one channel")
+    return RGBUnbounded(*most.tolist()), Volume(density, to_world)
+
+
+MEDIA: dict[str, Callable[[Properties], Medium]] = {
+    "homogeneous": _homogeneous,
+    "heterogeneous": _heterogeneous,
+}
 PHASES: dict[str, Callable[[Properties], Phase]] = {
     "isotropic": lambda props: media.Isotropic(),
     "hg": lambda props: media.HenyeyGreenstein(g=props.number("g", 0.8)),

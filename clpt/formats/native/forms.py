@@ -37,6 +37,7 @@ class Reader(Protocol):
     def area_light(self, cursor: Cursor) -> Any: ...
     def group(self, cursor: Cursor) -> Any: ...
     def image(self, cursor: Cursor) -> Any: ...
+    def volume(self, cursor: Cursor) -> Any: ...
 
 
 class Writer(Protocol):
@@ -48,6 +49,7 @@ class Writer(Protocol):
     def medium(self, value: Any) -> Any: ...
     def group(self, value: Any) -> Any: ...
     def image(self, value: Any) -> Any: ...
+    def volume(self, value: Any) -> Any: ...
 
 
 def plain(value: Any) -> Any:
@@ -334,6 +336,12 @@ FORMS: dict[str, Form] = {
         STRING,
         lambda cursor, reader: reader.image(cursor),
         lambda value, writer: writer.image(value),
+    ),
+    "volume": Form(
+        "name of a `.npy`, `.vol` or `.nvdb` file; of a `.nvdb` with `#name` behind it that grid",
+        STRING,
+        lambda cursor, reader: reader.volume(cursor),
+        lambda value, writer: writer.volume(value),
     ),
     "cube_images": Form(
         "name of an image file, or a list of six",

@@ -11,6 +11,7 @@ import numpy as np
 
 from clpt import spectra
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
+from clpt.formats import volumes
 from clpt.formats.missing import EVEN, GREY, Missing, grey_for
 from clpt.formats.native import forms, shape_files
 from clpt.formats.native.cursor import Cursor, parse
@@ -54,6 +55,7 @@ class _Reader:
         # None while one is being read: it refers to itself then
         self.materials: dict[str, materials.Material | None] = {}
         self.media: dict[str, media.Medium] = {}
+        self.volumes: dict[str, media.Volume] = {}
         self.groups: dict[str, shapes.Group | None] = {}
         self.warnings: list[str] = []
 
@@ -121,6 +123,16 @@ class _Reader:
             if grey_for(cursor.value) not in self.warnings:
                 self.warnings.append(grey_for(cursor.value))
             return EVEN if cursor.path[-2:] == ("map", "image") else GREY
+
+    def volume(self, cursor: Cursor) -> Any:
+        """Read a density and its box, once for each name."""
+        name = cursor.expect(str, "the name of a file")
+        if name not in self.volumes:
+            file, _, grid = name.partition("#")
+            path = find_file(cursor, file)
+            with cursor.locating():
+                self.volumes[name] = volumes.read(path, grid)
+        return self.volumes[name]
 
     def layer(self, cursor: Cursor) -> Any:
         """Read a thin film."""

@@ -120,14 +120,18 @@ def kind_name(cursor: Cursor, category: str, known: Any) -> str:
     return child.value
 
 
-def find_file(cursor: Cursor) -> Any:
-    """Return the path of an existing file; names are relative to the JSON file's folder."""
-    path = cursor.file.parent / cursor.expect(str)
-    if cursor.confined and path.name != cursor.value:
-        raise cursor.error(f"{cursor.value!r} is not in the folder of this file")
+def find_file(cursor: Cursor, name: str | None = None) -> Any:
+    """Return the path of an existing file; names are relative to the JSON file's folder.
+
+    name: of the file, None where it is all that stands there.
+    """
+    name = cursor.expect(str) if name is None else name
+    path = cursor.file.parent / name
+    if cursor.confined and path.name != name:
+        raise cursor.error(f"{name!r} is not in the folder of this file")
     try:
         if path.is_file():
             return path
     except (OSError, ValueError):
         pass
-    raise cursor.error(f"there is no file {cursor.value!r}")
+    raise cursor.error(f"there is no file {name!r}")

@@ -203,6 +203,14 @@ class _Writer:
             self.files[id(image)] = name
         return self.files[id(image)]
 
+    def volume(self, values: Any) -> str:
+        """Return the name of the file that a density is written to; its box is the unit cube."""
+        if id(values) not in self.files:
+            name = self.file_name("density", "npy")
+            images.write_npy(self.path.parent / name, np.asarray(values, np.float32))
+            self.files[id(values)] = name
+        return self.files[id(values)]
+
     def copy(self, path: Path) -> str:
         """Copy a file, once; return its name."""
         key = os.path.realpath(path)

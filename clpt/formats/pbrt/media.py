@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
+from clpt import transforms
 from clpt.errors import UnknownKindError
+from clpt.formats import volumes
 from clpt.formats.pbrt import coated_albedo
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.spectra import spectrum
 from clpt.formats.pbrt.state import Definition, State, nearest
-from clpt.scene.media import HenyeyGreenstein, Homogeneous, Isotropic, Medium
-from clpt.spectra import RGBUnbounded
+from clpt.scene.media import Grid, HenyeyGreenstein, Homogeneous, Isotropic, Medium, Volume
+from clpt.spectra import Constant, RGBUnbounded
 
-GRIDS = ("uniformgrid", "rgbgrid", "cloud", "nanovdb")
+GRIDS = ("uniformgrid", "nanovdb")
+LEFT_OUT = ("rgbgrid", "cloud")
 MILK = "Wholemilk"  # of which a medium is that says nothing
 
 
@@ -34,25 +39,54 @@ def _made(name: str, definition: Definition) -> Medium | None:
     params, state = definition.params, definition.state
     kind = params.one("type", "string", "homogeneous")
     with params.locating():
-        if kind in GRIDS:
+        if kind in LEFT_OUT:
             state.warn(params, f"a medium of the type {kind!r} is left out")
             return None
-        if kind != "homogeneous":
-            raise UnknownKindError("medium", kind, ("homogeneous", *GRIDS))
-        if "Le" in params:
+        if kind not in ("homogeneous", *GRIDS):
+            raise UnknownKindError("medium", kind, ("homogeneous", *GRIDS, *LEFT_OUT))
+        density = _density(kind, params, state) if kind in GRIDS else None
+        if "Le" in params or "temperature" in params:
             state.warn(params, "its light is left out")
-        params.ignore("Le", "Lescale")
+        params.ignore("Le", "Lescale", "temperature", "temperaturename", "temperatureoffset")
+        params.ignore("temperaturescale", "temperaturecutoff", "LeScale")
         g = params.one("g", "float", 0.0)
         phase = HenyeyGreenstein(g=g) if g else Isotropic()
         scale = params.one("scale", "float", 1.0)
-        absorbs, scatters = _coefficients(params, state)
-        made = Homogeneous(sigma_a=absorbs, sigma_s=scatters, scale=scale, phase=phase, name=name)
+        absorbs, scatters = _coefficients(params, state, density is not None)
+        own = {"sigma_a": absorbs, "sigma_s": scatters, "scale": scale, "phase": phase}
+        made = Homogeneous(**own, name=name)
+        if density is not None:
+            made = Grid(**own, name=name, density=density)
     for given in params.unused():
         state.warn(params, f"{given.name!r} is left out")
     return made
 
 
-def _coefficients(params: Parameters, state: State) -> tuple[Any, Any]:
+def _density(kind: str, params: Parameters, state: State) -> Volume:
+    """The density of a medium in the world; a layer without any is put around it."""
+    if kind == "nanovdb":
+        path = state.existing_file(params.one("filename", "string", ""))
+        found = volumes.read(path, params.one("gridname", "string", "density"))
+        return Volume(found.values, state.ctm @ found.to_world)
+    nx, ny, nz = (params.one(n, "integer", 1) for n in ("nx", "ny", "nz"))
+    values = params.several("density", "float")
+    if values is None or min(nx, ny, nz) < 1 or len(values) != nx * ny * nz:
+        count = 0 if values is None else len(values)
+        raise params.error(f"nx, ny and nz are {nx}, {ny}, {nz}, 'density' has {count} numbers")
+    low = params.one("p0", "point3", np.zeros(3))
+    step = (params.one("p1", "point3", np.ones(3)) - low) / (nx, ny, nz)
+    around = np.pad(np.reshape(values, (nz, ny, nx)).T.astype(np.float32), 1)
+    box = transforms.translate(low - step) @ transforms.scale(step * around.shape)
+    return Volume(around, state.ctm @ box)
+
+
+def _coefficients(params: Parameters, state: State, grid: bool) -> tuple[Any, Any]:
+    if grid:
+        one = Constant(1.0)
+        return (
+            spectrum(params, "sigma_a", "coefficient", state, one),
+            spectrum(params, "sigma_s", "coefficient", state, one),
+        )
     preset = params.one("preset", "string", "")
     if preset and preset not in coated_albedo.MEDIA:
         raise UnknownKindError("preset", preset, coated_albedo.MEDIA)

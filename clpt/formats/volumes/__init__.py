@@ -1,0 +1,59 @@
+"""Files of densities: numpy's .npy, Mitsuba's .vol, NanoVDB's .nvdb."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from clpt.errors import SceneError
+from clpt.formats.volumes import nvdb, vol
+from clpt.scene.media import Volume, check_density
+from clpt.transforms import IDENTITY
+
+MOST_BYTES = 1 << 32  # of a file
+
+
+def read(path: str | Path, grid: str = "") -> Volume:
+    """Read the density in a file, with its box: float32 values (nx, ny, nz).
+
+    grid: its name in a .nvdb of several; "" is "density", else the first. A .npy has the box of the
+    unit cube. Raises SceneError for what is no such file, and for numbers that are negative or not
+    finite.
+    """
+    path = Path(path)
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        message = f"unknown format {path.suffix!r} of a density; known: {' '.join(READERS)}"
+        raise SceneError(message, file=path)
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise SceneError(f"is larger than {MOST_BYTES >> 30} GiB", file=path)
+        made = reader(path, grid)
+        check_density(made.values, "")
+    except OSError as error:
+        raise SceneError(f"cannot be read: {error.strerror or error}", file=path) from None
+    except MemoryError:
+        raise SceneError("does not fit in memory", file=path) from None
+    except SceneError as error:
+        raise SceneError(error.message, file=path) from None
+    return made
+
+
+def _npy(path: Path, grid: str) -> Volume:
+    try:
+        values = np.load(path, allow_pickle=False)
+    except (ValueError, EOFError) as error:
+        raise SceneError(f"is no .npy file: {error}") from None
+    if not isinstance(values, np.ndarray) or values.ndim != 3 or not values.size:
+        raise SceneError(f"must hold an array (nx, ny, nz), not {getattr(values, 'shape', '')}")
+    check_density(values, "")
+    return Volume(np.ascontiguousarray(values, np.float32), IDENTITY)
+
+
+READERS: dict[str, Callable[[Path, str], Volume]] = {
+    ".npy": _npy,
+    ".vol": lambda path, _: vol.read(path),
+    ".nvdb": nvdb.read,
+}
