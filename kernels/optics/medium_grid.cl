@@ -159,14 +159,16 @@ inline GridFlight grid_flight(Scene scene, integer name, Medium m, vec3 o, vec3 
     GridWalk w;
     mask all = active;
     active = grid_begin(scene, name, o, d, t, active, &w);
-    real left = -log_r(max_r(1.0f - u.x, (real)(1e-9f))) / max_r(spectrum_pick(m.sigma_t, ratio, u.y), (real)(1e-30f));
-    real passed = 0.0f;
+    mask dims = spectrum_max(m.sigma_s) == 0.0f; /* and never scatters: then all wavelengths share the collisions */
+    real most = max_r(spectrum_max(m.sigma_t), (real)(1e-30f)), passed = 0.0f;
+    real sigma = sel(dims, most, max_r(spectrum_pick(m.sigma_t, ratio, u.y), (real)(1e-30f)));
+    real left = -log_r(max_r(1.0f - u.x, (real)(1e-9f))) / sigma;
     natural count = 0u;
     while (any(active)) {
         GridBrick b = grid_brick(scene, w, active);
         real thick = b.most * (b.exit - w.t);
         mask meets = active & (thick > left);
-        passed += sel(active, sel(meets, left, thick), (real)(0.0f));
+        passed += sel(active & !dims, sel(meets, left, thick), (real)(0.0f));
         w.t = sel(active, sel(meets, min_r(w.t + left / max_r(b.most, (real)(1e-30f)), b.exit), b.exit), w.t);
         left -= sel(active, thick, (real)(0.0f));
         if (any(meets)) {
@@ -179,7 +181,9 @@ inline GridFlight grid_flight(Scene scene, integer name, Medium m, vec3 o, vec3 
             mask real_one = meets & (unit_interval(more) < chance);
             chance = 1.0f / max_r(sel(real_one, chance, 1.0f - chance), (real)(1e-30f));
             Spectrum value = spectrum_scale(spectrum_sel(real_one, scatters, lacks), chance);
-            grid_weigh(m, passed, value, m.sigma_t, meets, &f);
+            Spectrum kept = spectrum_sub(spectrum_of(1.0f), spectrum_scale(m.sigma_t, density / most));
+            value = spectrum_sel(dims, kept, value);
+            grid_weigh(m, passed, value, spectrum_sel(dims, spectrum_of(1.0f), m.sigma_t), meets, &f);
             f.collides = f.collides | real_one;
             f.t = sel(real_one, w.t, f.t);
             passed = sel(meets, (real)(0.0f), passed);
@@ -188,7 +192,7 @@ inline GridFlight grid_flight(Scene scene, integer name, Medium m, vec3 o, vec3 
 #if USES_RATIO
             pick = unit_interval(hash_natural(more ^ 0x51ed270bu));
 #endif
-            real sigma = max_r(spectrum_pick(m.sigma_t, f.ratio, pick), (real)(1e-30f));
+            sigma = sel(dims, most, max_r(spectrum_pick(m.sigma_t, f.ratio, pick), (real)(1e-30f)));
             left = sel(meets, grid_length(bits) / sigma, left);
             count += sel_n(meets, (natural)(1u), (natural)(0u));
         }
