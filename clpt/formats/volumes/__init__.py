@@ -43,7 +43,7 @@ def read(path: str | Path, grid: str = "") -> Volume:
 
 def _npy(path: Path, grid: str) -> Volume:
     try:
-        values = np.load(path, allow_pickle=False)
+        values = np.load(path, mmap_mode="r", allow_pickle=False)
     except (ValueError, EOFError) as error:
         raise SceneError(f"is no .npy file: {error}") from None
     if not isinstance(values, np.ndarray) or values.ndim != 3 or not values.size:

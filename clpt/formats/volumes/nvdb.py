@@ -59,6 +59,8 @@ def read(path: Path, grid: str = "") -> Volume:
         if wanted not in names:
             raise SceneError(f"has no grid {wanted!r}; it has {', '.join(map(repr, names))}")
         return _volume(_unpacked(data, entries[names.index(wanted)]))
+    except SceneError:  # which is a ValueError too
+        raise
     except (struct.error, IndexError, ValueError):  # whatever leads beyond the bytes
         raise SceneError("is damaged: it ends too soon, or points beyond its end") from None
 
@@ -67,6 +69,8 @@ def names(path: Path) -> tuple[str, ...]:
     """Return the names of the grids of a file. Raises SceneError, OSError."""
     try:
         return tuple(entry.name for entry in _entries(path.read_bytes()))
+    except SceneError:
+        raise
     except (struct.error, IndexError, ValueError):
         raise SceneError("is damaged: it ends too soon") from None
 
@@ -91,7 +95,9 @@ def _entries(data: bytes) -> Iterator[_Entry]:
             (length,) = struct.unpack_from("<I", data, at + 136)
             (codec,) = struct.unpack_from("<H", data, at + 168)
             at += METADATA
-            heads.append((data[at : at + length].split(b"\0")[0].decode("latin1"), size, packed, codec))
+            heads.append(
+                (data[at : at + length].split(b"\0")[0].decode("latin1"), size, packed, codec)
+            )
             at += length
         for name, size, packed, codec in heads:
             if at + packed > len(data):
@@ -139,7 +145,9 @@ def _of_blosc(packed: bytes, most: int) -> bytes:
     try:
         import blosc
     except ImportError:
-        message = "is packed by Blosc: `pip install blosc`, or convert it with the codec ZIP or none"
+        message = (
+            "is packed by Blosc: `pip install blosc`, or convert it with the codec ZIP or none"
+        )
         raise SceneError(message) from None
     if len(packed) < 16 or struct.unpack_from("<I", packed, 4)[0] > most:
         raise SceneError("is damaged: a packed part is larger than the grid")

@@ -49,7 +49,7 @@ def bricks(density: object) -> Words:
     used = np.flatnonzero(most)
     z, y, x = np.unravel_index(used, counts[::-1])
     scale = MOST / most[used].astype(np.float64)
-    chosen = windows[z, y, x].reshape(len(used), -1)
+    chosen = windows[z, y, x].reshape(-1, POINTS**3)
     points = np.zeros((len(used), POINTS**3 + 1), np.uint16)
     points[:, :-1] = np.rint(chosen * scale[:, None])
     packed = points.view("<u4")
