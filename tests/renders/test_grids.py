@@ -123,7 +123,7 @@ def test_light_comes_through() -> None:
         to_world=tf.look_at([2.8, -2.9, 2.8], [0.1, -3.0, 0.05], [0, 1, 0]) @ tf.scale(1e-4),
     )
     spot = np.array([0.1, -3.0, 0.05])
-    depth = optical_depth(medium, spot, spot + [0.0, 6.0, 0.0])
+    depth = optical_depth(medium, spot, spot + np.array([0.0, 6.0, 0.0]))
     assert depth > 0.2
     assert_mean(exposures(scene, 16, 64), 0.5 * np.exp(-CHROMATIC * depth), 0.05, 2e-3)
 

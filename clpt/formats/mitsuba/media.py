@@ -56,7 +56,7 @@ def _made(element: Element, context: Context, plugins: dict[str, Any]) -> Any:
     return made
 
 
-def _homogeneous(props: Properties) -> Medium:
+def _homogeneous(props: Properties) -> Homogeneous:
     props.ignore("has_spectral_extinction", "sample_emitters")  # both are found
     child = props.object("phase")
     return Homogeneous(

@@ -115,13 +115,14 @@ def _unpacked(data: bytes, entry: _Entry) -> bytes:
     if CODECS[entry.codec] == "none":
         made = data[entry.begin : entry.end]
     else:
-        chunks, at = [], entry.begin
+        chunks: list[bytes] = []
+        at = entry.begin
         while at < entry.end and len(chunks) < 64:
             (packed,) = struct.unpack_from("<Q", data, at)
             if at + 8 + packed > entry.end:
                 raise SceneError(f"is damaged: the grid {entry.name!r} goes beyond its end")
             part = data[at + 8 : at + 8 + packed]
-            left = entry.size - sum(map(len, chunks))
+            left = entry.size - sum(len(chunk) for chunk in chunks)
             zipped = CODECS[entry.codec] == "ZIP"
             chunks.append(_inflated(part, left) if zipped else _of_blosc(part, left))
             at += 8 + packed
@@ -143,7 +144,7 @@ def _inflated(packed: bytes, most: int) -> bytes:
 def _of_blosc(packed: bytes, most: int) -> bytes:
     """What Blosc has packed."""
     try:
-        import blosc
+        import blosc  # type: ignore[import-not-found]
     except ImportError:
         message = (
             "is packed by Blosc: `pip install blosc`, or convert it with the codec ZIP or none"
@@ -153,7 +154,7 @@ def _of_blosc(packed: bytes, most: int) -> bytes:
         raise SceneError("is damaged: a packed part is larger than the grid")
     try:
         made: bytes = blosc.decompress(packed)
-    except Exception as error:  # noqa: BLE001  the package raises a class of its own
+    except Exception as error:  # the package has a class of its own
         raise SceneError(f"is damaged: {error}") from None
     return made
 

@@ -72,8 +72,9 @@ class MediumWords:
         rows = [np.array([phase], np.uint32)]
         for name, value in (("absorption", absorbs), ("scattering", scatters)):
             rows.append(self._encoder.named_words("medium", name, value, "coefficient")[0])
-        gridded = isinstance(medium, Grid)
-        if gridded:
+        word = FLIES
+        if isinstance(medium, Grid):
             rows.append(grids.row(medium, self._encoder))
+            word |= GRID
         first = self._encoder.store.append("materials", np.concatenate(rows))
-        return FLIES | GRID * gridded | (2 + first)
+        return word | (2 + first)

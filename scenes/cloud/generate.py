@@ -1,0 +1,55 @@
+"""Makes the density of a cumulus: balls that grow on balls, frayed by noise. density.npy, 8 bits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+SIZE = (112, 64, 80)  # cells along x, y and z, of 1/40 each
+
+
+def noise(points: Array, seed: int) -> Array:
+    """Smooth noise in [-1, 1]: random numbers on a lattice, interpolated."""
+    lattice = np.random.default_rng(seed).uniform(-1.0, 1.0, (16, 16, 16))
+    low = np.floor(points).astype(int)
+    share = points - low
+    share = share * share * (3.0 - 2.0 * share)
+    value = np.zeros(points.shape[:-1])
+    for corner in np.ndindex(2, 2, 2):
+        index = np.moveaxis((low + corner) % 16, -1, 0)
+        value += lattice[tuple(index)] * np.where(corner, share, 1.0 - share).prod(axis=-1)
+    return value
+
+
+def cumulus() -> Array:
+    """The density (nx, ny, nz), from 0 to 1."""
+    axes = [(np.arange(n) + 0.5 - 0.5 * n) / 40.0 for n in SIZE]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    rng = np.random.default_rng(4)
+    balls = [(np.array([x, -0.5, z]), r) for x, z, r in (
+        (-0.75, 0.0, 0.34), (-0.25, 0.2, 0.48), (0.2, -0.15, 0.55), (0.7, 0.1, 0.38),
+    )]  # fmt: skip
+    for center, radius in [*balls]:
+        for _ in range(9):
+            way = rng.normal(size=3)
+            way[1] = abs(way[1]) * 1.2
+            way /= np.linalg.norm(way)
+            balls.append((center + 0.8 * radius * way, radius * rng.uniform(0.3, 0.62)))
+    frayed = points + 0.05 * np.stack([noise(points * 6.0, seed) for seed in (1, 2, 3)], axis=-1)
+    depth = np.full(SIZE, -1.0)
+    for center, radius in balls:
+        depth = np.maximum(depth, radius - np.linalg.norm(frayed - center, axis=-1))
+    detail = sum(noise(points * 7.0 * 2.1**k, 10 + k) * 0.55**k for k in range(4))
+    flat = np.clip((points[..., 1] + 0.56) * 14.0, 0.0, 1.0)  # clouds of one kind begin at one height
+    density = np.clip((depth + 0.055 * detail) * 16.0, 0.0, 1.0) * flat
+    for axis in range(3):  # nothing at the ends of the box
+        np.moveaxis(density, axis, 0)[[0, -1]] = 0.0
+    return density
+
+
+if __name__ == "__main__":
+    made = np.rint(255.0 * cumulus()).astype(np.uint8)
+    np.save(Path(__file__).parent / "density.npy", made)
