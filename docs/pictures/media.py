@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from clpt import mie
 from clpt.scene import Scene, integrators, media, shapes
 from clpt.scene.materials import Null
+from clpt.transforms import scale, translate
 
-from .studio import PLACES, Picture, studio
+from .studio import PLACES, Array, Picture, studio
 
 WHITE, AMBER, WINE = (5.0, 5.0, 5.0), (1.5, 4.0, 9.0), (0.4, 5.0, 4.4)
 
@@ -26,6 +29,12 @@ def balls(caption: str, *made: media.Medium, spp: int = 128) -> Picture:
         return made_scene
 
     return Picture(caption, scene, spp)
+
+
+def _ball(density: Array, x: float, **given: Any) -> media.Grid:
+    """A density in the box around one of the balls."""
+    box = translate([x - 0.55, 0.01, -0.55]) @ scale(1.1)
+    return media.Grid(density=density, to_world=box, scale=2.0, albedo=0.95, **given)
 
 
 def _phases(caption: str, *made: media.Phase) -> Picture:
@@ -46,6 +55,13 @@ MEDIA = {
         media.Homogeneous(sigma_s=WHITE),
         media.Homogeneous(sigma_t=AMBER, albedo=(0.999, 0.99, 0.96)),
         media.Homogeneous(sigma_a=WINE),
+    ),
+    "grid": balls(
+        "a density of 12^3 random numbers; bands; smoke that thins out upward, and absorbs by "
+        "wavelength",
+        _ball(np.random.default_rng(3).random((12, 12, 12)) ** 4, -1.42, sigma_s=40.0),
+        _ball((np.arange(9) % 2.0)[None, :, None], 0.0, sigma_s=14.0),
+        _ball((1.0 - np.linspace(0.0, 1.0, 24))[None, :, None] ** 2, 1.42, sigma_t=AMBER),
     ),
 }
 PHASES = {

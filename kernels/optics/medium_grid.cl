@@ -44,15 +44,15 @@ inline mask grid_begin(Scene scene, integer name, vec3 o, vec3 d, real t, mask a
     w->ny = gather_i(scene.materials, at + 2);
     w->nz = gather_i(scene.materials, at + 3);
     real lo = 0.0f, hi = t;
-#define AXIS(a, n)                                                                \
-    vec4 row_##a = gather_w4(scene.materials, at + 4 + 4 * n);                    \
-    real top_##a = gather_w(scene.materials, at + 16 + n);                        \
-    w->o.a = row_##a.x * o.x + row_##a.y * o.y + row_##a.z * o.z + row_##a.w;     \
-    w->d.a = row_##a.x * d.x + row_##a.y * d.y + row_##a.z * d.z;                 \
-    w->inverse.a = 1.0f / sel(fabs(w->d.a) > 1e-20f, w->d.a, (real)(1e-20f));     \
-    real from_##a = (0.5f - w->o.a) * w->inverse.a;                               \
-    real to_##a = (top_##a - w->o.a) * w->inverse.a;                              \
-    lo = max_r(lo, min_r(from_##a, to_##a));                                      \
+#define AXIS(a, n)                                                            \
+    vec4 row_##a = gather_w4(scene.materials, at + 4 + 4 * n);                \
+    real top_##a = gather_w(scene.materials, at + 16 + n);                    \
+    w->o.a = row_##a.x * o.x + row_##a.y * o.y + row_##a.z * o.z + row_##a.w; \
+    w->d.a = row_##a.x * d.x + row_##a.y * d.y + row_##a.z * d.z;             \
+    w->inverse.a = 1.0f / sel(fabs(w->d.a) > 1e-20f, w->d.a, (real)(1e-20f)); \
+    real from_##a = (0.5f - w->o.a) * w->inverse.a;                           \
+    real to_##a = (top_##a - w->o.a) * w->inverse.a;                          \
+    lo = max_r(lo, min_r(from_##a, to_##a));                                  \
     hi = min_r(hi, max_r(from_##a, to_##a));
     AXIS(x, 0)
     AXIS(y, 1)
@@ -78,8 +78,8 @@ inline GridBrick grid_brick(Scene scene, GridWalk w, mask active)
     b.points = w.first + gather_i(scene.images, at);
     b.most = gather_w(scene.images, at + 1);
     real end_x, end_y, end_z;
-#define AXIS(a)                                                                                                \
-    end_##a = to_real(GRID_CELLS * (w.a + sel_i(w.d.a > 0.0f, (integer)(1), (integer)(0)))) - w.o.a;          \
+#define AXIS(a)                                                                                      \
+    end_##a = to_real(GRID_CELLS * (w.a + sel_i(w.d.a > 0.0f, (integer)(1), (integer)(0)))) - w.o.a; \
     end_##a = sel(fabs(w.d.a) > 1e-20f, end_##a * w.inverse.a, (real)(FAR));
     AXIS(x)
     AXIS(y)
@@ -95,8 +95,8 @@ inline GridBrick grid_brick(Scene scene, GridWalk w, mask active)
 inline mask grid_next(GridWalk *w, GridBrick b, mask active)
 {
     mask across_z = !b.across_x & !b.across_y, inside = active & (b.exit < w->end);
-#define AXIS(a, m)                                                                                        \
-    w->a += sel_i(active & (m), sel_i(w->d.a > 0.0f, (integer)(1), (integer)(-1)), (integer)(0));          \
+#define AXIS(a, m)                                                                                \
+    w->a += sel_i(active & (m), sel_i(w->d.a > 0.0f, (integer)(1), (integer)(-1)), (integer)(0)); \
     inside = inside & (w->a >= 0) & (w->a < w->n##a);
     AXIS(x, b.across_x)
     AXIS(y, b.across_y)
@@ -109,10 +109,10 @@ inline mask grid_next(GridWalk *w, GridBrick b, mask active)
 inline real grid_density(Scene scene, GridWalk w, GridBrick b, mask active, natural bits)
 {
     integer at = 0;
-#define AXIS(a, shift, step)                                                                                      \
-    real p_##a = clamp_r(w.o.a + w.t * w.d.a - to_real(GRID_CELLS * w.a), (real)(0.0f), (real)(GRID_CELLS));      \
-    integer c_##a = clamp_i(to_integer(p_##a), (integer)(GRID_CELLS - 1));                                        \
-    real u_##a = (to_real(as_integer((bits >> shift) & 1023u)) + 0.5f) * (1.0f / 1024.0f);                        \
+#define AXIS(a, shift, step)                                                                                 \
+    real p_##a = clamp_r(w.o.a + w.t * w.d.a - to_real(GRID_CELLS * w.a), (real)(0.0f), (real)(GRID_CELLS)); \
+    integer c_##a = clamp_i(to_integer(p_##a), (integer)(GRID_CELLS - 1));                                   \
+    real u_##a = (to_real(as_integer((bits >> shift) & 1023u)) + 0.5f) * (1.0f / 1024.0f);                   \
     at += step * (c_##a + sel_i(u_##a < p_##a - to_real(c_##a), (integer)(1), (integer)(0)));
     AXIS(x, 0u, 1)
     AXIS(y, 10u, GRID_POINTS)

@@ -1,4 +1,4 @@
-"""Makes the density of a cumulus: balls that grow on balls, frayed by noise. density.npy, 8 bits."""
+"""Makes the density of a cumulus, in 8 bits: balls that grow on balls, frayed by noise."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-SIZE = (112, 64, 80)  # cells along x, y and z, of 1/40 each
+SIZE = (112, 80, 80)  # cells along x, y and z, of 1/40 each
 
 
 def noise(points: Array, seed: int) -> Array:
@@ -29,22 +29,25 @@ def cumulus() -> Array:
     axes = [(np.arange(n) + 0.5 - 0.5 * n) / 40.0 for n in SIZE]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     rng = np.random.default_rng(4)
-    balls = [(np.array([x, -0.5, z]), r) for x, z, r in (
-        (-0.75, 0.0, 0.34), (-0.25, 0.2, 0.48), (0.2, -0.15, 0.55), (0.7, 0.1, 0.38),
+    balls = [(np.array([x, y, z]), r) for x, y, z, r in (
+        (-0.8, -0.62, 0.0, 0.3), (-0.3, -0.5, 0.1, 0.44), (0.2, -0.4, -0.1, 0.52),
+        (0.35, 0.1, 0.0, 0.4), (0.85, -0.6, 0.1, 0.3), (-0.25, -0.1, -0.1, 0.34),
     )]  # fmt: skip
     for center, radius in [*balls]:
-        for _ in range(9):
+        for _ in range(14):
             way = rng.normal(size=3)
-            way[1] = abs(way[1]) * 1.2
+            way[1] = abs(way[1])
             way /= np.linalg.norm(way)
-            balls.append((center + 0.8 * radius * way, radius * rng.uniform(0.3, 0.62)))
-    frayed = points + 0.05 * np.stack([noise(points * 6.0, seed) for seed in (1, 2, 3)], axis=-1)
+            balls.append((center + 0.92 * radius * way, radius * rng.uniform(0.22, 0.5)))
+    frayed = points + 0.035 * np.stack([noise(points * 6.0, seed) for seed in (1, 2, 3)], axis=-1)
     depth = np.full(SIZE, -1.0)
     for center, radius in balls:
         depth = np.maximum(depth, radius - np.linalg.norm(frayed - center, axis=-1))
     detail = sum(noise(points * 7.0 * 2.1**k, 10 + k) * 0.55**k for k in range(4))
-    flat = np.clip((points[..., 1] + 0.56) * 14.0, 0.0, 1.0)  # clouds of one kind begin at one height
-    density = np.clip((depth + 0.055 * detail) * 16.0, 0.0, 1.0) * flat
+    flat = np.clip(
+        (points[..., 1] + 0.72) * 14.0, 0.0, 1.0
+    )  # clouds of one kind begin at one height
+    density = np.clip((depth + 0.04 * detail) * 20.0, 0.0, 1.0) * flat
     for axis in range(3):  # nothing at the ends of the box
         np.moveaxis(density, axis, 0)[[0, -1]] = 0.0
     return density
