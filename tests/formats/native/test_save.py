@@ -44,6 +44,7 @@ NEEDED: dict[type, dict[str, Any]] = {
     shapes.Spheres: {"centers": POINTS, "radii": np.full(4, 0.5, np.float32)},
     shapes.Instance: {"group": GROUP},
     textures.Bitmap: {"image": TEXELS},
+    media.Grid: {"density": TEXELS},
     lights.Envmap: {"image": TEXELS},
     lights.CubeMap: {"image": [TEXELS + i for i in range(6)]},
 }
@@ -84,6 +85,7 @@ VALUES: dict[str, Any] = {
     "number_or_list": 0.5,
     "number_or_auto": "auto",
     "image": TEXELS,
+    "volume": TEXELS,
     "cube_images": NEEDED[lights.CubeMap]["image"],
     "group": GROUP,
     "text": "vertex_named",
@@ -146,6 +148,8 @@ def scene_of(category: str, one: Kind) -> Scene:
         made.shapes = [shapes.Sphere(emission=one)]
     elif category == "light":
         made.lights = [one]
+    elif category == "medium":
+        made.shapes = [shapes.Sphere(interior=one)]
     elif category == "filter":
         made.film = integrators.Film(filter=one)
     else:
