@@ -43,6 +43,7 @@ from clpt.scene import Scene
 from clpt.scene import materials as mt
 from clpt.scene.integrators import Film, Integrator
 from clpt.scene.lights import Point
+from clpt.scene.media import Grid
 from clpt.scene.shapes import Mesh
 
 TREE_FROM = 16  # lights from which a tree chooses among them, see bench/lights.py
@@ -118,7 +119,8 @@ def lower(
     media = MediumWords(index, encoder, materials)
     sphere = geometry.bounding_sphere()
     lights = _lower_lights(index, encoder, geometry, sphere[1])
-    near = medium_aims(lights) if any(medium.scatters for medium in index.media) else ()
+    homogeneous = (one for one in index.media if not isinstance(one, Grid))
+    near = medium_aims(lights) if any(one.scatters for one in homogeneous) else ()
     encoder.store.append("media", np.array(near, np.float32).view(np.uint32))
     encoder.store.append("media", media.of_shapes([shape for _, shape, _, _ in geometry.owners]))
     around = media.word(scene.camera.medium)
