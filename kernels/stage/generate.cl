@@ -52,7 +52,7 @@ inline void sky_layers(Scene scene, Slab path, uint at, PathEnd end, Wavelengths
     vec3 from = madd3(d, -path_null_distance(path, at), load_path_o(path, at)), side = path_hemisphere(path, at);
     Spectrum beta = load_path_beta(path, at);
 #if USES_ABSORPTION
-    integer medium = sel_i(sky, load_path_medium(path, at), (integer)(0));
+    integer medium = sel_i(sky, MEDIUM_LEFT(load_path_medium(path, at)), (integer)(0));
     beta = spectrum_mul(beta, medium_transmittance(scene, medium, (real)(FAR), lambdas));
 #endif
     for (int row = 0; row < scene.settings->infinite_count; row++) {
