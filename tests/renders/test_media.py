@@ -22,7 +22,7 @@ from clpt.scene import Film, Scene, media
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Box, ParticleTracer
 from clpt.scene.integrators import Path as PathIntegrator
-from clpt.scene.lights import Constant, Point
+from clpt.scene.lights import Area, Constant, Point
 from clpt.scene.materials import Dielectric, Diffuse, Null
 from clpt.scene.shapes import Cube, Rectangle, Sphere
 from tests.renders.support import assert_agree, assert_mean, blocks, exposures
@@ -76,6 +76,26 @@ def test_camera_in_a_medium() -> None:
     assert_mean(exposures(scene, 8, 64), 1.0, WITHIN)
     told = dataclasses.replace(scene, camera=dataclasses.replace(scene.camera, medium=fog))
     assert np.array_equal(exposures(told, 1, 16), exposures(scene, 1, 16))
+
+
+def test_camera_enters_a_medium_and_leaves_it() -> None:
+    """Of a wall within fog no boundary tells; the camera's medium follows it, and the boundary."""
+    fog = media.Homogeneous(sigma_a=0.5, name="fog")
+    scene = with_mode(ball(fog, to_world=tf.scale(3.0)), "rgb")
+    scene.camera = dataclasses.replace(scene.camera, fov=1.0, near=0.0)
+    wall = Rectangle(emission=Area(radiance=1.0), material=BLACK, to_world=tf.scale(2.0))
+    scene.shapes, scene.lights = [*scene.shapes, wall], []
+    inside = dataclasses.replace(
+        scene.camera, to_world=tf.look_at([0, 0, 2.0], [0, 0, 0], [0, 1, 0])
+    )
+    with clpt.Renderer(scene) as renderer:
+        for camera, way in ((inside, 2.0), (scene.camera, 3.0), (inside, 2.0)):
+            renderer.update(camera=camera)
+            renderer.run(4)
+            assert renderer.image().mean() == pytest.approx(np.exp(-0.5 * way), rel=1e-3)
+        renderer.update(transforms={0: tf.translate([0, 0, 9]) @ tf.scale(3.0)})
+        renderer.run(4)
+        assert renderer.image().mean() == pytest.approx(1.0, rel=1e-3)
 
 
 def test_absorbs_as_beer_and_lambert_say() -> None:

@@ -16,6 +16,7 @@ from clpt.render.contract.parameter_words import row_words
 from clpt.render.lowering import photons
 from clpt.render.lowering.camera import cameras, filters
 from clpt.render.lowering.camera.colour import sensor
+from clpt.render.lowering.camera.surroundings import media_around, warnings_of
 from clpt.render.lowering.camera.wavelengths import Density, density, emissions
 from clpt.render.lowering.checks import check
 from clpt.render.lowering.device_arrays import is_table
@@ -43,6 +44,7 @@ from clpt.scene import Scene
 from clpt.scene import materials as mt
 from clpt.scene.integrators import Film, Integrator
 from clpt.scene.lights import Point
+from clpt.scene.media import Medium
 from clpt.scene.shapes import Mesh
 
 TREE_FROM = 16  # lights from which a tree chooses among them, see bench/lights.py
@@ -58,7 +60,7 @@ class Lowered:
     the caller's buffers. owners: of each row of `shapes`. layer_names: what layers tell of.
     glass_row: of the camera, see `lower_camera`. integrator: of the scene, or what was chosen;
     reason: why, "" where there was no choice. encoder: what made the tables, for values that are
-    edited. cache: what the next lowering need not make again.
+    edited. cache: what the next lowering need not make again. around: media at the camera.
     """
 
     features: Features
@@ -78,6 +80,7 @@ class Lowered:
     reason: str
     encoder: Encoder
     cache: LoweringCache
+    around: tuple[Medium, ...] = ()
 
     def __post_init__(self) -> None:
         own = (self.vertices, self.faces, self.tags, self.boxes, self.settings)
@@ -121,7 +124,8 @@ def lower(
     near = medium_aims(lights) if any(medium.scatters for medium in index.media) else ()
     encoder.store.append("media", np.array(near, np.float32).view(np.uint32))
     encoder.store.append("media", media.of_shapes([shape for _, shape, _, _ in geometry.owners]))
-    around = media.word(scene.camera.medium)
+    around = media_around(scene, cache) if index.media else ()
+    camera = media.word(next(iter(around), None))
     before = former.integrator if former else None
     index, why = decided(index, geometry, encoder, lights, sphere, before)
     density_row, tabulated, profile = _lower_film(index, encoder, wavelengths)
@@ -132,7 +136,7 @@ def lower(
     glass_row = _lower_camera(index, encoder)
     ambient_row = _lower_ambient(index, encoder)
     warnings = (
-        *_warnings(index), *sorted(encoder.warnings), *geometry.warnings,
+        *_warnings(index), *warnings_of(around), *sorted(encoder.warnings), *geometry.warnings,
         *encoder.textures.finish(),
     )  # fmt: skip
     aimed = len(targets) > 0
@@ -143,7 +147,7 @@ def lower(
     features = replace(features, **for_layers)
     settings = settings_of(
         index, geometry, lights, wavelengths, density_row, ambient_row, sphere,
-        features.dispersion, (first_aim, len(targets)), around,
+        features.dispersion, (first_aim, len(targets)), camera,
     )  # fmt: skip
     cache.settle()
     tables = encoder.store.arrays()
@@ -164,6 +168,7 @@ def lower(
         warnings=warnings,
         integrator=index.scene.integrator,
         reason=why,
+        around=around,
         encoder=encoder,
         cache=cache,
     )
