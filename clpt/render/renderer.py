@@ -27,7 +27,8 @@ from clpt.render.editing.scene_edit import (
     resolve_device_arrays,
 )
 from clpt.render.locking import synchronized
-from clpt.render.lowering.camera.surroundings import media_around
+from clpt.render.lowering.bodies import matter_of
+from clpt.render.lowering.camera.surroundings import bodies_around, media_around
 from clpt.render.lowering.scene import Lowered, lower
 from clpt.render.options import RenderOptions, check_changes, check_options, check_scene
 from clpt.render.pictures import Image
@@ -456,7 +457,9 @@ class Renderer(Resumable):
         if not lowered.features.media:
             return False
         readable = resolve_device_arrays(scene, self.device.queue)
-        return media_around(readable, lowered.cache) != lowered.around
+        if not lowered.features.bodies:
+            return media_around(readable, lowered.cache) != lowered.around
+        return bodies_around(readable, matter_of, lowered.cache) != lowered.around
 
     def _rebuild(self, scene: Scene, events: list[cl.Event], refit: bool) -> None:
         """Lower a scene and render it from now on; see `rebuild.take`.

@@ -92,6 +92,7 @@ class Features:
     media: bool = False  # inside or outside of shapes, or around the camera
     chromatic_media: bool = False  # of which some extinction depends on the wavelength
     medium_aims: int = 0  # places of lamps near which flights through media end
+    bodies: bool = False  # that may overlap, of different priorities
     glass_lens: bool = False  # of a glass that disperses
     channel: str = ""
     bands: bool = False  # a spectral film

@@ -14,9 +14,10 @@ from clpt.render.contract.features import Features
 from clpt.render.contract.layer_names import LayerNames
 from clpt.render.contract.parameter_words import row_words
 from clpt.render.lowering import photons
+from clpt.render.lowering.bodies import BodyWords, matter_of
 from clpt.render.lowering.camera import cameras, filters
 from clpt.render.lowering.camera.colour import sensor
-from clpt.render.lowering.camera.surroundings import media_around, warnings_of
+from clpt.render.lowering.camera.surroundings import bodies_around, media_around, warnings_of
 from clpt.render.lowering.camera.wavelengths import Density, density, emissions
 from clpt.render.lowering.checks import check
 from clpt.render.lowering.device_arrays import is_table
@@ -44,7 +45,6 @@ from clpt.scene import Scene
 from clpt.scene import materials as mt
 from clpt.scene.integrators import Film, Integrator
 from clpt.scene.lights import Point
-from clpt.scene.media import Medium
 from clpt.scene.shapes import Mesh
 
 TREE_FROM = 16  # lights from which a tree chooses among them, see bench/lights.py
@@ -60,7 +60,8 @@ class Lowered:
     the caller's buffers. owners: of each row of `shapes`. layer_names: what layers tell of.
     glass_row: of the camera, see `lower_camera`. integrator: of the scene, or what was chosen;
     reason: why, "" where there was no choice. encoder: what made the tables, for values that are
-    edited. cache: what the next lowering need not make again. around: media at the camera.
+    edited. cache: what the next lowering need not make again. around: media at the camera, or the
+    matter of bodies.
     """
 
     features: Features
@@ -80,7 +81,7 @@ class Lowered:
     reason: str
     encoder: Encoder
     cache: LoweringCache
-    around: tuple[Medium, ...] = ()
+    around: tuple[Any, ...] = ()
 
     def __post_init__(self) -> None:
         own = (self.vertices, self.faces, self.tags, self.boxes, self.settings)
@@ -123,9 +124,17 @@ def lower(
     lights = _lower_lights(index, encoder, geometry, sphere[1])
     near = medium_aims(lights) if any(medium.scatters for medium in index.media) else ()
     encoder.store.append("media", np.array(near, np.float32).view(np.uint32))
-    encoder.store.append("media", media.of_shapes([shape for _, shape, _, _ in geometry.owners]))
-    around = media_around(scene, cache) if index.media else ()
-    camera = media.word(next(iter(around), None))
+    bounding = [shape for _, shape, _, _ in geometry.owners]
+    around: tuple[Any, ...] = ()
+    if index.nested:
+        bodies = BodyWords(bounding)
+        encoder.store.append("media", bodies.rows(bounding, encoder, materials, media))
+        around = bodies_around(scene, matter_of, cache)
+        camera = bodies.around(around, media)
+    else:
+        encoder.store.append("media", media.of_shapes(bounding))
+        around = media_around(scene, cache) if index.media else ()
+        camera = 0, media.word(next(iter(around), None))
     before = former.integrator if former else None
     index, why = decided(index, geometry, encoder, lights, sphere, before)
     density_row, tabulated, profile = _lower_film(index, encoder, wavelengths)
@@ -136,7 +145,8 @@ def lower(
     glass_row = _lower_camera(index, encoder)
     ambient_row = _lower_ambient(index, encoder)
     warnings = (
-        *_warnings(index), *warnings_of(around), *sorted(encoder.warnings), *geometry.warnings,
+        *_warnings(index), *(() if index.nested else warnings_of(around)),
+        *sorted(encoder.warnings), *geometry.warnings,
         *encoder.textures.finish(),
     )  # fmt: skip
     aimed = len(targets) > 0

@@ -37,7 +37,7 @@ def media_around(scene: Scene, cached: Callable[..., Any] | None = None) -> tupl
     """
     if scene.camera.medium is not None:
         return (scene.camera.medium,)
-    bounding = [shape for shape in _every(scene) if shape.interior or shape.exterior]
+    bounding = [shape for shape in _every(scene) if _bounds_media(shape)]
     if not bounding:
         return ()
     p = _origin(scene)
@@ -64,7 +64,27 @@ def media_around(scene: Scene, cached: Callable[..., Any] | None = None) -> tupl
     return tuple(sorted(found, key=lambda medium: extents[medium]))
 
 
-def warnings_of(found: tuple[Medium, ...]) -> list[str]:
+def bodies_around(
+    scene: Scene,
+    matter: Callable[[Shape], tuple[Any, ...] | None],
+    cached: Callable[..., Any] | None = None,
+) -> tuple[tuple[Any, ...], ...]:
+    """Return the matter of the bodies that the camera is in. Raises as `media_around`.
+
+    matter: of a shape's body, None of a shape that is none. What a body has inside of it faces it,
+    as the inner side of a glass does.
+    """
+    p, turns = _origin(scene), dict[tuple[Any, ...], float]()
+    for shape in _every(scene, lambda one: matter(one) is not None):
+        own = matter(shape)
+        if own is not None:
+            low, high = _box(shape, cached)
+            within = ((p >= low) & (p <= high)).all()
+            turns[own] = turns.get(own, 0.0) + (_winding(shape, p, cached) if within else 0.0)
+    return tuple(own for own, number in turns.items() if number > 0.5)
+
+
+def warnings_of(found: tuple[Any, ...]) -> list[str]:
     """Return a warning where a camera is in several media, else none."""
     if len(found) < 2:
         return []
@@ -75,14 +95,18 @@ def warnings_of(found: tuple[Medium, ...]) -> list[str]:
     ]
 
 
-def _every(scene: Scene) -> Iterator[Shape]:
+def _bounds_media(shape: Shape) -> bool:
+    return shape.interior is not None or shape.exterior is not None
+
+
+def _every(scene: Scene, bounds: Callable[[Shape], bool] = _bounds_media) -> Iterator[Shape]:
     """The shapes of a scene that may bound media, those of instances where they are placed."""
     for thing in scene.shapes:
         if not isinstance(thing, Instance):
             yield thing
             continue
         for shape in thing.group.shapes:
-            if shape.interior or shape.exterior:
+            if bounds(shape):
                 matrix = shapes.placement(thing) @ shapes.placement(shape)
                 yield dataclasses.replace(shape, to_world=matrix)
 
