@@ -13,6 +13,7 @@ import pytest
 import clpt
 from clpt import transforms as tf
 from clpt.errors import SceneError
+from clpt.render.lowering.scene import lower
 from clpt.scene import Film, Scene, media
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Box, ParticleTracer, Path
@@ -143,6 +144,15 @@ def test_light_through_what_is_hidden() -> None:
 def test_what_priorities_may_be(shapes, message) -> None:
     with pytest.raises(SceneError, match=message):
         clpt.render(scene(*shapes), spp=1)
+
+
+def test_one_priority_twice_is_told() -> None:
+    one, far = Sphere(material=GLASS, priority=1, name="a"), tf.translate([3, 0, 0])
+    other = Sphere(material=WATER, priority=1, name="b")
+    told = lower(scene(one, other)).warnings
+    assert any("'a' and sphere 'b'" in line and "the latter" in line for line in told)
+    for apart in (dataclasses.replace(other, to_world=far), dataclasses.replace(other, priority=2)):
+        assert not any("overlap" in line for line in lower(scene(one, apart)).warnings)
 
 
 def test_light_paths_meet_no_bodies() -> None:

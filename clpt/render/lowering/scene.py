@@ -17,7 +17,12 @@ from clpt.render.lowering import photons
 from clpt.render.lowering.bodies import BodyWords, matter_of
 from clpt.render.lowering.camera import cameras, filters
 from clpt.render.lowering.camera.colour import sensor
-from clpt.render.lowering.camera.surroundings import bodies_around, media_around, warnings_of
+from clpt.render.lowering.camera.surroundings import (
+    bodies_around,
+    contested,
+    media_around,
+    warnings_of,
+)
 from clpt.render.lowering.camera.wavelengths import Density, density, emissions
 from clpt.render.lowering.checks import check
 from clpt.render.lowering.device_arrays import is_table
@@ -127,14 +132,16 @@ def lower(
     bounding = [shape for _, shape, _, _ in geometry.owners]
     around: tuple[Any, ...] = ()
     if index.nested:
-        bodies = BodyWords(bounding)
+        bodies = BodyWords(index.shapes)
         encoder.store.append("media", bodies.rows(bounding, encoder, materials, media))
         around = bodies_around(scene, matter_of, cache)
         camera = bodies.around(around, media)
+        noted = contested(scene, matter_of, cache)
     else:
         encoder.store.append("media", media.of_shapes(bounding))
         around = media_around(scene, cache) if index.media else ()
         camera = 0, media.word(next(iter(around), None))
+        noted = warnings_of(around)
     before = former.integrator if former else None
     index, why = decided(index, geometry, encoder, lights, sphere, before)
     density_row, tabulated, profile = _lower_film(index, encoder, wavelengths)
@@ -145,7 +152,7 @@ def lower(
     glass_row = _lower_camera(index, encoder)
     ambient_row = _lower_ambient(index, encoder)
     warnings = (
-        *_warnings(index), *(() if index.nested else warnings_of(around)),
+        *_warnings(index), *noted,
         *sorted(encoder.warnings), *geometry.warnings,
         *encoder.textures.finish(),
     )  # fmt: skip

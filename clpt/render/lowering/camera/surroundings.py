@@ -26,6 +26,7 @@ from clpt.scene.shapes import Cylinder, Disk, Instance, Mesh, Shape, Sphere, Sph
 
 Triangles = tuple[NDArray[np.float32], NDArray[np.uint32]]
 AROUND = 96  # corners of what stands for a disk
+MOST_COMPARED = 500  # bodies whose boxes are compared
 CHUNK = 1 << 18  # triangles that are summed at a time
 
 
@@ -97,6 +98,35 @@ def warnings_of(found: tuple[Any, ...]) -> list[str]:
 
 def _bounds_media(shape: Shape) -> bool:
     return shape.interior is not None or shape.exterior is not None
+
+
+def contested(
+    scene: Scene,
+    matter: Callable[[Shape], tuple[Any, ...] | None],
+    cached: Callable[..., Any] | None = None,
+) -> list[str]:
+    """Return a warning where bodies of one priority, but not of one matter, may overlap.
+
+    matter: as of `bodies_around`; its first entry is the priority.
+    """
+    boxes: list[tuple[tuple[Any, ...], Shape, NDArray[Any], NDArray[Any]]] = []
+    for shape in _every(scene, lambda one: matter(one) is not None):
+        own = matter(shape)
+        if own is None or len(boxes) >= MOST_COMPARED:
+            continue
+        low, high = _box(shape, cached)
+        for other, second, other_low, other_high in boxes:
+            if other[0] != own[0] or other == own:
+                continue
+            common = np.minimum(high, other_high) - np.maximum(low, other_low)
+            if (common > 1e-5 * (high - low)).all():
+                return [
+                    f"{shapes.where(second)} and {shapes.where(shape)}: their boxes overlap, and "
+                    f"both have the priority {own[0]}; where the bodies overlap too, the latter "
+                    "fills the place"
+                ]
+        boxes.append((own, shape, low, high))
+    return []
 
 
 def _every(scene: Scene, bounds: Callable[[Shape], bool] = _bounds_media) -> Iterator[Shape]:

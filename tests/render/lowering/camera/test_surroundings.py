@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -35,7 +33,7 @@ BODIES = {
     "sphere": (Sphere(**IN),),
     "spheres": (Spheres(centers=BALLS, **IN),),
     "cube": (Cube(**IN),),
-    "mesh": (dataclasses.replace(tessellate(Sphere()), **IN),),
+    "mesh": (tessellate(Sphere(**IN)),),
     "stretched sphere": (Sphere(to_world=tf.scale([1, 2, 3]), **IN),),
     "mirrored": (Cube(to_world=tf.scale([-1, 1, 1]), **IN),),
     "tube": TUBE,
