@@ -75,7 +75,7 @@ def features_of(
         light_tree=lights.tree is not None,
         many_lights=len(lights.rows) > FEW_LIGHTS,
         absorption=materials.absorption and not channels,
-        media=index.flies,
+        media=index.has_media,
         bodies=index.nested,
         chromatic_media=any(medium.is_chromatic for medium in index.media),
         medium_aims=medium_aims,

@@ -75,7 +75,7 @@ class SceneIndex:
         return not self.channels and any(shape.priority for shape in self.shapes)
 
     @property
-    def flies(self) -> bool:
+    def has_media(self) -> bool:
         """Whether rays go through media, which may be different from the two sides' of a shape."""
         return bool(self.media) or self.nested
 
@@ -96,7 +96,7 @@ class SceneIndex:
         Where the scene says "auto" nothing may ask before `hard_light.decided` has chosen.
         """
         wanted: float = getattr(self.scene.integrator, "light_paths", 0)
-        return wanted if (self.joined or self.merged) and not self.flies else 0
+        return wanted if (self.joined or self.merged) and not self.has_media else 0
 
     @property
     def joined(self) -> bool:
@@ -110,7 +110,7 @@ class SceneIndex:
     def merged(self) -> bool:
         """Whether light paths leave photons, which paths from the camera gather."""
         integrator = self.scene.integrator
-        if not isinstance(integrator, Vcm) or self.shifts or self.flies:
+        if not isinstance(integrator, Vcm) or self.shifts or self.has_media:
             return False
         return integrator.merging and integrator.max_depth not in (1, 2)
 
@@ -118,7 +118,7 @@ class SceneIndex:
     def guided(self) -> bool:
         """Whether directions of the camera's paths are learned from light paths."""
         wanted: bool = getattr(self.scene.integrator, "guiding", False)
-        return wanted and not self.weighed and not self.flies
+        return wanted and not self.weighed and not self.has_media
 
     @property
     def shifts(self) -> bool:
