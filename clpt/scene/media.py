@@ -18,7 +18,7 @@ from clpt.errors import SceneError
 from clpt.scene.params import Kind, angular, coefficient, host, quantity, real, reflectance
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.values import SpectrumLike
-from clpt.spectra import RGB, Constant, RGBUnbounded, Spectrum, Tabulated
+from clpt.spectra import RGB, Constant, RGBUnbounded, Spectrum
 from clpt.spectra.spectrum import WIDEST, extremes
 
 MOST_ROWS = 512  # of a table by wavelength
@@ -286,7 +286,7 @@ def _mapped(value: Any, function: Callable[[Any], Any]) -> Spectrum:
         return type(value)(*(float(function(v)) for v in (value.r, value.g, value.b)))
     if isinstance(value, Constant):
         return Constant(float(function(value.value)))
-    return Tabulated(WIDEST, function(value.sample(WIDEST)), "hold")
+    return spectra.Tabulated(WIDEST, function(value.sample(WIDEST)), "hold")
 
 
 def _unbounded(value: Any) -> Any:
