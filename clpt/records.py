@@ -35,6 +35,7 @@ PATH = Record(
     eta=("real", "product of the relative indices so far, for Russian roulette"),
     weight=("real", "sample's weight by the pixel filter; from a light, 1 over its first beta"),
     medium=("integer", "medium of the ray, see kernels/optics/medium.cl; 0: none"),
+    bodies=("integer", "bodies around the ray, see kernels/optics/bodies.cl"),
     lead=("real", "how far before o the ray's medium begins: o lies off the surface [m]"),
     rival=(
         "real",
@@ -76,7 +77,10 @@ SHADOW = Record(
     d=("vec3", "direction, unit length"),
     t=("real", "distance to its end [m]; 0 or below: no ray waits"),
     value=("spectrum", "what arrives if nothing is between: radiance, or what a pixel gets"),
-    through=("integer", "medium at its beginning, where it may go through several"),
+    through=(
+        "integer",
+        "medium at its beginning, where it may go through several; or bodies, where these overlap",
+    ),
     film=(
         "vec2",
         "where the picture shows its beginning, from the corner [pixels]; of light paths",
@@ -126,6 +130,7 @@ SETTINGS = Record(
     ),
     aim_count=("integer", "number of these spheres, see kernels/lighting/aiming.cl"),
     camera_medium=("integer", "medium around the camera, see kernels/optics/medium.cl"),
+    camera_bodies=("integer", "bodies around it, see kernels/optics/bodies.cl"),
     light_count=("integer", "rows in `lights`"),
     ambient=(
         "integer",

@@ -27,6 +27,8 @@ from clpt.render.editing.scene_edit import (
     resolve_device_arrays,
 )
 from clpt.render.locking import synchronized
+from clpt.render.lowering.bodies import matter_of
+from clpt.render.lowering.camera.surroundings import bodies_around, media_around
 from clpt.render.lowering.scene import Lowered, lower
 from clpt.render.options import RenderOptions, check_changes, check_options, check_scene
 from clpt.render.pictures import Image
@@ -430,6 +432,8 @@ class Renderer(Resumable):
         if self._moving is None:
             self._moving = Moving(self.wavefronts[0].scene, self.scene)
         moved, replaced = self._edit(self.scene, None, transforms, vertices)
+        if self._enters_a_medium(moved):
+            return False
         refusal = self._moving.move(self.scene, replaced)
         if refusal is not None:
             log.debug("shapes cannot move on the device: %s", refusal)
@@ -440,10 +444,22 @@ class Renderer(Resumable):
 
     def _patch(self, scene: Scene) -> bool:
         """Write the words of parameters that differ; return whether nothing else does."""
+        if self._enters_a_medium(scene):
+            return False
         refusal = parameter_patch.patch(self.wavefronts[0].scene, self.scene, scene)
         if refusal is not None:
             log.debug("words alone do not change the scene: %s", refusal)
         return refusal is None
+
+    def _enters_a_medium(self, scene: Scene) -> bool:
+        """Whether the camera of a changed scene is in other media than that of the one before."""
+        lowered = self.wavefronts[0].scene.lowered
+        if not lowered.features.media:
+            return False
+        readable = resolve_device_arrays(scene, self.device.queue)
+        if not lowered.features.bodies:
+            return media_around(readable, lowered.cache) != lowered.around
+        return bodies_around(readable, matter_of, lowered.cache) != lowered.around
 
     def _rebuild(self, scene: Scene, events: list[cl.Event], refit: bool) -> None:
         """Lower a scene and render it from now on; see `rebuild.take`.

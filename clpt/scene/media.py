@@ -19,7 +19,7 @@ from clpt.scene.params import Kind, angular, coefficient, host, quantity, real, 
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.values import Matrix4, SpectrumLike
 from clpt.spectra import RGB, Constant, RGBUnbounded, Spectrum
-from clpt.spectra.spectrum import WIDEST
+from clpt.spectra.spectrum import WIDEST, extremes
 
 MOST_ROWS = 512  # of a table by wavelength
 
@@ -208,6 +208,35 @@ class Homogeneous(Medium):
     albedo: SpectrumLike = reflectance(1.0, "share of `sigma_t` that is scattered", textured=False)
     scale: float = real(1.0, "factor of all coefficients", low=0.0)
 
+    @classmethod
+    def from_albedo(
+        cls, albedo: Any, mean_free_path: Any, g: float = 0.0, **parameters: Any
+    ) -> Homogeneous:
+        """Return a medium by how it looks: a thick body of it reflects `albedo` of even light.
+
+        albedo: a number, a colour or a spectrum in [0, 1], of light that comes evenly from all
+        sides and of a body without a reflecting boundary, right within .005; mean_free_path: how
+        far light goes before it scatters or is absorbed, likewise [m]; g: of Henyey and
+        Greenstein; parameters: of the medium, such as `name` or `phase`.
+
+        The inverse of van de Hulst 1980: (1 - s) (1 - 0.139 s) / (1 + 1.17 s), with s = sqrt((1 -
+        a) / (1 - a g)) of a medium that scatters the share a.
+
+        Raises SceneError for values outside.
+        """
+        checked = cls(albedo=albedo, sigma_t=mean_free_path)
+        path: Any = checked.sigma_t
+        if any(low <= 0.0 for low, _ in extremes(path)):
+            raise SceneError("must be above 0", where="homogeneous.mean_free_path")
+        if not (isinstance(g, int | float) and -1.0 < g < 1.0):
+            raise SceneError(f"must be between -1 and 1, not {g!r}", where="homogeneous.g")
+        parameters.setdefault("phase", HenyeyGreenstein(g=g) if g else Isotropic())
+        return cls(
+            albedo=_mapped(checked.albedo, lambda r: _single_albedo(r, g)),
+            sigma_t=_mapped(_unbounded(path), lambda v: 1.0 / v),
+            **parameters,
+        )
+
     def check(self) -> None:
         """Raise SceneError where coefficients are given in both ways."""
         both = not (_is_zero(self.sigma_a) and _is_zero(self.sigma_s))
@@ -305,6 +334,27 @@ def _combined(values: list[Any], combine: Callable[[list[Any]], Any], spectral: 
     if not spectral:
         return RGBUnbounded(*map(float, combine([value.to_rgb("unbounded") for value in values])))
     return spectra.Tabulated(WIDEST, combine([value.sample(WIDEST) for value in values]), "hold")
+
+
+def _mapped(value: Any, function: Callable[[Any], Any]) -> Spectrum:
+    """What becomes of a spectrum at each wavelength, or of a colour's three numbers."""
+    if isinstance(value, RGB | RGBUnbounded):
+        return type(value)(*(float(function(v)) for v in (value.r, value.g, value.b)))
+    if isinstance(value, Constant):
+        return Constant(float(function(value.value)))
+    return spectra.Tabulated(WIDEST, function(value.sample(WIDEST)), "hold")
+
+
+def _unbounded(value: Any) -> Any:
+    return RGBUnbounded(value.r, value.g, value.b) if isinstance(value, RGB) else value
+
+
+def _single_albedo(reflected: Any, g: float) -> Any:
+    """The share that a medium scatters, of which a thick body reflects so much of even light."""
+    r = np.clip(np.asarray(reflected, np.float64), 0.0, 1.0)
+    b = 1.139 + 1.17 * r
+    s2 = (2.0 * (1.0 - r) / (b + np.sqrt(b * b - 0.556 * (1.0 - r)))) ** 2
+    return (1.0 - s2) / (1.0 - g * s2)
 
 
 def _is_grey(value: Any) -> bool:

@@ -28,6 +28,7 @@ class Shape(Kind):
     emission: Light | None = host(None, "an `area` light, or None", form="area_light")
     interior: Medium | None = host(None, "medium behind its front; None: none", form="medium")
     exterior: Medium | None = host(None, "medium before its front; None: none", form="medium")
+    priority: int = host(0, "where bodies overlap, that of the highest fills the place")
     to_world: Matrix4 | OnDevice = host(np.eye(4), "placement, (4, 4)")
     flip_normals: bool = host(False, "turn the front to the other side")
     name: str = host("", "for messages")

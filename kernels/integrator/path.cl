@@ -116,7 +116,11 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     store_path_light(path, at, shine, ls.row);
 #endif
 #if SHADOW_MEDIA
+#if USES_BODIES
+    store_shadow_through(shadow, at, shine, bodies_beyond(v.bodies, dot3(s.n, ls.wi) < 0.0f));
+#else
     store_shadow_through(shadow, at, shine, vertex_medium(v, ls.wi));
+#endif
 #endif
 #endif
     next = next & (bs.pdf > 0.0f);

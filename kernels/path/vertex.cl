@@ -18,6 +18,9 @@ typedef struct {
     integer inside;       /* what is behind the surface */
     integer outside;      /* and before it, where its shape says so */
 #endif
+#if USES_BODIES
+    BodyBoundary bodies;  /* then `inside` and `outside` are what rays come into, to the back and to the front */
+#endif
 } Vertex;
 
 /* The material at a vertex, and the random numbers of the vertex. */
@@ -66,7 +69,20 @@ inline Vertex vertex_load(Scene scene, Slab path, Slab hit, uint at, mask active
     mask many = (shape.kind == 0) | ((shape.flags & SHAPE_MANY) != 0);
     v.primitive = sel_i(active & many, load_hit_prim(hit, at) - shape.prim, (integer)(0));
 #endif
-#if USES_ABSORPTION
+#if USES_BODIES
+    integer bodies = sel_i(active, load_path_bodies(path, at), (integer)(0)), shape_row = 0;
+#if !BSDF_IS_PHASE
+    shape_row = sel_i(active, load_hit_shape(hit, at), (integer)(0));
+#endif
+    v.bodies = body_boundary(scene, shape_row, bodies, v.front);
+#if BSDF_IS_PHASE
+    v.bodies.body = 0;
+    v.bodies.others = bodies;
+#endif
+    v.inside = body_medium(scene, bodies_top(bodies_beyond(v.bodies, mask_of(1))));
+    v.outside = body_medium(scene, bodies_top(v.bodies.others));
+    v.medium = sel_i(active, load_path_medium(path, at), (integer)(0));
+#elif USES_ABSORPTION
     v.inside = BSDF_INTERIOR(v.row);
     v.outside = 0;
 #if USES_MEDIA && !BSDF_IS_PHASE
@@ -75,6 +91,8 @@ inline Vertex vertex_load(Scene scene, Slab path, Slab hit, uint at, mask active
     v.outside = own.outside;
 #endif
     v.medium = medium_met(sel_i(active, load_path_medium(path, at), (integer)(0)), v.inside, v.front);
+#endif
+#if USES_ABSORPTION
     real through = v.t + sel(active, load_path_lead(path, at), (real)(0.0f));
     v.beta = spectrum_mul(v.beta, medium_transmittance(scene, MEDIUM_LEFT(v.medium), through, v.lambdas));
 #endif
@@ -98,6 +116,14 @@ inline Scattering vertex_scattering(Scene scene, Slab path, uint at, mask active
     point.u = sampler_pair(sampler, as_natural(DIMENSION_TEXEL + v.met));
 #endif
     scatter.bsdf = bsdf_load(scene, v.row, point, v.lambdas);
+#if BSDF_BETWEEN_BODIES
+    integer index = body_word(scene, v.bodies.next, 1);
+    mask known = active & (v.bodies.next != 0) & (index != 0);
+    if (any(known)) {
+        Spectrum outside = body_index(scene, sel_i(known, index, (integer)(0)), texture_point_nowhere(), v.lambdas);
+        scatter.bsdf.ext_ior = spectrum_sel(known, outside, scatter.bsdf.ext_ior);
+    }
+#endif
 #if BSDF_FLUORESCES
     scatter.lambdas = bsdf_shift(scene, v.row, scatter.bsdf, v.lambdas, scatter.choice.y, v.depth);
     store_path_lambdas(path, at, active, scatter.lambdas);
@@ -118,7 +144,11 @@ inline vec3 vertex_hemisphere(Frame frame, vec3 wo)
 /* The medium along w, which leads away from the vertex. */
 inline integer vertex_medium(Vertex v, vec3 w)
 {
+#if USES_BODIES
+    return sel_i(dot3(v.s.n, w) < 0.0f, v.inside, v.outside);
+#else
     return medium_beyond(v.medium, v.inside, v.outside, v.front, dot3(v.s.n, w) < 0.0f);
+#endif
 }
 #endif
 
@@ -156,6 +186,9 @@ inline void vertex_leave(Slab path, uint at, mask next, Vertex v, vec3 d, Spectr
 #if USES_ABSORPTION
     store_path_medium(path, at, next, vertex_medium(v, d));
     store_path_lead(path, at, next, surface_lead(v.s, d));
+#endif
+#if USES_BODIES
+    store_path_bodies(path, at, next, bodies_beyond(v.bodies, dot3(v.s.n, d) < 0.0f));
 #endif
 }
 

@@ -12,6 +12,7 @@
 #include "generated/medium.cl"
 #include "optics/equiangular.cl"
 
+#if !USES_BODIES
 /* The medium of a ray; one that knows of none is in that of the side of the surface that it meets. */
 inline integer flight_medium(Scene scene, Slab path, Slab hit, uint at, mask met)
 {
@@ -20,6 +21,7 @@ inline integer flight_medium(Scene scene, Slab path, Slab hit, uint at, mask met
     integer medium = load_path_medium(path, at);
     return sel_i(met & (medium == 0), sel_i(front, own.outside, own.inside), medium);
 }
+#endif
 
 STAGE(flight)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
 {
@@ -28,8 +30,15 @@ STAGE(flight)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
     STAGE_AT
     integer state = load_path_state(path, at);
     mask alive = (state & PATH_ALIVE) != 0, met = alive & (load_hit_prim(hit, at) >= 0);
+#if USES_BODIES /* of a surface in a body of higher priority nothing is seen */
+    integer name = load_path_medium(path, at), shape = sel_i(met, load_hit_shape(hit, at), (integer)(0));
+    mask front = dot3(load_hit_n(hit, at), load_path_d(path, at)) < 0.0f;
+    BodyBoundary boundary = body_boundary(scene, shape, load_path_bodies(path, at), front);
+    store_hit_material(hit, at, met & boundary.hidden, body_word(scene, (integer)(0), 0));
+#else
     integer name = flight_medium(scene, path, hit, at, met);
     store_path_medium(path, at, alive, name);
+#endif
     mask flies = alive & ((name & MEDIUM_FLIES) != 0);
     if (any(flies)) {
         Wavelengths lambdas = load_path_lambdas(path, at);

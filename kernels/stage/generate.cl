@@ -136,6 +136,9 @@ inline void begin_path(Scene scene, Slab path, uint at, mask go, integer pixel_i
 #if USES_ABSORPTION
     store_path_medium(path, at, go, (integer)(settings->camera_medium));
     store_path_lead(path, at, go, (real)(0.0f));
+#if USES_BODIES
+    store_path_bodies(path, at, go, (integer)(settings->camera_bodies));
+#endif
 #endif
 #if USES_RATIO
     store_path_ratio(path, at, go, camera_start());

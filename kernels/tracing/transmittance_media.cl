@@ -18,6 +18,10 @@ inline Spectrum trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, rea
 {
     Spectrum passes = spectrum_sel(active, spectrum_of(1.0f), spectrum_of(0.0f));
     int surfaces = 0;
+#if USES_BODIES
+    integer bodies = medium;
+    medium = body_medium(scene, bodies_top(sel_i(active, bodies, (integer)(0))));
+#endif
     while (any(active)) {
         TraceHit h = trace_closest(TRACE_PASSED, scene, o, d, t, active);
         mask met = active & (h.prim >= 0) & (t > 0.0f);
@@ -41,10 +45,19 @@ inline Spectrum trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, rea
             integer word = sel_i(active, sel_i(front, shape.front, shape.back), (integer)(0));
             real own = null_transmittance(scene, word, surface_texture_point(s), lambdas) *
                        (surfaces < MOST_NULL_SURFACES ? 1.0f : 0.0f);
+#if USES_BODIES
+            BodyBoundary boundary = body_boundary(scene, row, bodies, front);
+            own = sel(boundary.hidden & mask_of(surfaces < MOST_NULL_SURFACES), (real)(1.0f), own);
+            bodies = bodies_beyond(boundary, front);
+#endif
             passes = spectrum_sel(active, spectrum_scale(passes, own), passes);
             active = active & (own > 0.0f);
+#if USES_BODIES
+            medium = body_medium(scene, bodies_top(sel_i(active, bodies, (integer)(0))));
+#else
             ShapeMedia sides = shape_media(scene, row);
             medium = sel_i(active, medium_beyond(medium, sides.inside, sides.outside, front, front), medium);
+#endif
             /* On along d: beside it, the ray would miss its end, and a round light would shade itself. */
             real on = h.t * (1.0f + SURFACE_ROUNDING) + surface_lead(s, d);
             o = sel3(active, madd3(d, on, o), o);

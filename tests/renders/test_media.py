@@ -19,10 +19,10 @@ from clpt import spectra
 from clpt import transforms as tf
 from clpt.errors import SceneError
 from clpt.scene import Film, Scene, media
-from clpt.scene.cameras import Perspective
+from clpt.scene.cameras import Perspective, Spherical
 from clpt.scene.integrators import Box, ParticleTracer
 from clpt.scene.integrators import Path as PathIntegrator
-from clpt.scene.lights import Constant, Point
+from clpt.scene.lights import Area, Constant, Point
 from clpt.scene.materials import Dielectric, Diffuse, Null
 from clpt.scene.shapes import Cube, Rectangle, Sphere
 from tests.renders.support import assert_agree, assert_mean, blocks, exposures
@@ -76,6 +76,26 @@ def test_camera_in_a_medium() -> None:
     assert_mean(exposures(scene, 8, 64), 1.0, WITHIN)
     told = dataclasses.replace(scene, camera=dataclasses.replace(scene.camera, medium=fog))
     assert np.array_equal(exposures(told, 1, 16), exposures(scene, 1, 16))
+
+
+def test_camera_enters_a_medium_and_leaves_it() -> None:
+    """Of a wall within fog no boundary tells; the camera's medium follows it, and the boundary."""
+    fog = media.Homogeneous(sigma_a=0.5, name="fog")
+    scene = with_mode(ball(fog, to_world=tf.scale(3.0)), "rgb")
+    scene.camera = dataclasses.replace(scene.camera, fov=1.0, near=0.0)
+    wall = Rectangle(emission=Area(radiance=1.0), material=BLACK, to_world=tf.scale(2.0))
+    scene.shapes, scene.lights = [*scene.shapes, wall], []
+    inside = dataclasses.replace(
+        scene.camera, to_world=tf.look_at([0, 0, 2.0], [0, 0, 0], [0, 1, 0])
+    )
+    with clpt.Renderer(scene) as renderer:
+        for camera, way in ((inside, 2.0), (scene.camera, 3.0), (inside, 2.0)):
+            renderer.update(camera=camera)
+            renderer.run(4)
+            assert renderer.image().mean() == pytest.approx(np.exp(-0.5 * way), rel=1e-3)
+        renderer.update(transforms={0: tf.translate([0, 0, 9]) @ tf.scale(3.0)})
+        renderer.run(4)
+        assert renderer.image().mean() == pytest.approx(1.0, rel=1e-3)
 
 
 def test_absorbs_as_beer_and_lambert_say() -> None:
@@ -190,6 +210,13 @@ def test_depth_counts_collisions() -> None:
 
 
 def test_what_media_may_be() -> None:
+    with pytest.raises(SceneError, match="above 0"):
+        media.Homogeneous.from_albedo(0.5, 0.0)
+    with pytest.raises(SceneError, match="between"):
+        media.Homogeneous.from_albedo(0.5, 1.0, g=1.0)
+    white = media.Homogeneous.from_albedo((0.0, 0.5, 1.0), 2.0).coefficients(spectral=False)
+    assert [one.r + two.r for one, two in [white]] == [0.5]
+    assert white[0].b == 0.0 and white[1].r == 0.0
     with pytest.raises(SceneError, match="not both"):
         media.Homogeneous(sigma_a=1.0, sigma_t=1.0)
     with pytest.raises(SceneError, match="outside"):
@@ -198,6 +225,32 @@ def test_what_media_may_be() -> None:
     scene.integrator = ParticleTracer()
     with pytest.raises(SceneError, match="without media"):
         clpt.render(scene, spp=1)
+
+
+@pytest.mark.parametrize("g, mode", [(0.0, "rgb"), (0.6, "spectral")])
+def test_albedo_of_a_thick_body(g: float, mode: str) -> None:
+    """It reflects what was asked for, of even light: 2 mu R(mu) summed over the cosines mu."""
+    wanted = (0.8, 0.5, 0.2)
+    if mode == "spectral":
+        wanted = (0.6,) * 3
+    body = media.Homogeneous.from_albedo(wanted, 0.02, g=g)
+    scene = with_mode(ball(body), mode)
+    deep = tf.translate([0, -1, 0]) @ tf.scale([200.0, 1.0, 200.0])
+    floor = tf.translate([0, -3, 0]) @ tf.rotate([1, 0, 0], -90.0) @ tf.scale(1e3)
+    scene.shapes = [
+        Cube(material=Null(), interior=body, to_world=deep),
+        Rectangle(material=BLACK, to_world=floor),
+    ]
+    scene.camera = Spherical(to_world=tf.translate([0, 0.01, 0]))
+    scene.film = dataclasses.replace(scene.film, width=16, height=32)
+    scene.integrator = dataclasses.replace(LONG, rr_depth=8)
+    with clpt.Renderer(scene) as renderer:
+        renderer.run(128)
+        rows = np.asarray(renderer.image()).mean(axis=1)[16:]
+    theta = np.pi * (np.arange(16) + 0.5) / 32.0
+    weights = np.sin(theta) * np.cos(theta)
+    found = weights[::-1] @ rows.reshape(16, -1) / weights.sum()
+    assert found[:3] == pytest.approx(wanted, abs=0.01)
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the benchmark's scenes are not there")

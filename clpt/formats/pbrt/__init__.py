@@ -29,6 +29,7 @@ def load(path: Path, progress: Progress | None = None, missing: Missing = "error
     shared = contents.shared
     shared.missing = missing
     shared.make_material = build_scene.make_material
+    shared.walks = all(one.kind in ("infinite", "portal") for one in contents.lights)
     options = contents.options
     camera = options.get("Camera") or _default_camera(path, contents)
     exposure = camera_film.exposure_time(camera.params)

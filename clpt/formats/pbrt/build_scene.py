@@ -9,6 +9,7 @@ from typing import Any
 
 from clpt.formats.pbrt.curves import joined
 from clpt.formats.pbrt.files import Contents
+from clpt.formats.pbrt.layered import body
 from clpt.formats.pbrt.lights import area_light, light
 from clpt.formats.pbrt.materials import material
 from clpt.formats.pbrt.media import medium
@@ -18,6 +19,7 @@ from clpt.formats.pbrt.state import Definition, State, nearest
 from clpt.formats.pbrt.textures import textured
 from clpt.scene.lights import Light
 from clpt.scene.materials import Diffuse, Mask, Material, TwoSided
+from clpt.scene.media import Medium
 from clpt.scene.params import Kind
 from clpt.scene.params import params as declared_params
 from clpt.scene.shapes import Curves, Group, Instance, Shape
@@ -71,30 +73,30 @@ def _make_all(definitions: list[Definition], progress: Progress | None) -> list[
     return made
 
 
-def _shape(definition: Definition, body: Geometry | None) -> Shape | None:
+def _shape(definition: Definition, form: Geometry | None) -> Shape | None:
     params, state = definition.params, definition.state
     opacity = textured(params, "alpha", "real", state, 1.0)
     _warn_of_unused(params, state)
-    if body is None:
+    if form is None:
         state.warn(params, "left out, since it has no area")
         return None
-    for warning in body.warnings:
+    for warning in form.warnings:
         state.warn(params, warning)
     surface = _material(params, state)
-    emission = _emission(state, body)
+    emission = _emission(state, form)
     if not isinstance(opacity, float) or opacity < 1.0:
         surface = Mask(material=surface, opacity=opacity)
         if emission is not None:
             state.warn(params, "'alpha' hides its surface, but not its light")
     if _has_texture(surface) or _has_texture(emission):
-        if body.kind is Curves:
+        if form.kind is Curves:
             state.warn(params, "textures run around and along curves, not along and across")
-        body = with_uvs(body)
+        form = with_uvs(form)
     with params.locating():
-        return body.made(
+        return form.made(
             material=surface,
             emission=emission,
-            interior=medium(state.inside, params, state),
+            interior=_body(params, state) or medium(state.inside, params, state),
             exterior=medium(state.outside, params, state),
         )
 
@@ -113,6 +115,24 @@ def _material(source: Parameters, state: State) -> Material:
     return made
 
 
+def _body(source: Parameters, state: State) -> Medium | None:
+    """Return the medium in a body of the state's material, made once; None of all but
+    `subsurface`."""
+    current = state.material
+    if isinstance(current, str):
+        current = state.shared.materials.get(current)
+    if current is None or current.kind != "subsurface":
+        return None
+    params, defined_in = current.params, current.state
+
+    def make() -> list[Medium | None]:
+        with params.locating():
+            return [body(params, defined_in)]
+
+    made: list[Medium | None] = state.shared.once(("body", id(current)), source, make)
+    return made[0]
+
+
 def make_material(kind: str, params: Parameters, state: State, name: str) -> Material:
     """Make a material, and warn of parameters that it does not have."""
     made = material(kind, params, state, name)
@@ -120,13 +140,13 @@ def make_material(kind: str, params: Parameters, state: State, name: str) -> Mat
     return made
 
 
-def _emission(state: State, body: Geometry) -> Light | None:
+def _emission(state: State, form: Geometry) -> Light | None:
     """Return the light of the state: one for all shapes, but one a shape where it has a power."""
     definition = state.area_light
     if definition is None:
         return None
     kind, params, defined_in = definition.kind, definition.params, definition.state
-    area = body.area() if "power" in params else 0.0
+    area = form.area() if "power" in params else 0.0
 
     def make() -> Light:
         made = area_light(kind, params, defined_in, area)

@@ -7,6 +7,7 @@ being the share that the boundary reflects back inside. These functions give r.
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -16,21 +17,16 @@ Values = Any  # a number or an array
 COSINES = (np.arange(1024) + 0.5) / 1024.0
 EVEN = 2.0 * COSINES / len(COSINES)  # shares of diffuse light at these cosines
 
-# Reduced scattering and absorption [1/mm] for red, green and blue (Jensen et al. 2001, figure 5).
-MEDIA = {
-    "Apple": ((2.29, 2.39, 1.97), (0.0030, 0.0034, 0.046)),
-    "Chicken1": ((0.15, 0.21, 0.38), (0.015, 0.077, 0.19)),
-    "Chicken2": ((0.19, 0.25, 0.32), (0.018, 0.088, 0.20)),
-    "Cream": ((7.38, 5.47, 3.15), (0.0002, 0.0028, 0.0163)),
-    "Ketchup": ((0.18, 0.07, 0.03), (0.061, 0.97, 1.45)),
-    "Marble": ((2.19, 2.62, 3.00), (0.0021, 0.0041, 0.0071)),
-    "Potato": ((0.68, 0.70, 0.55), (0.0024, 0.0090, 0.12)),
-    "Skimmilk": ((0.70, 1.22, 1.90), (0.0014, 0.0025, 0.0142)),
-    "Skin1": ((0.74, 0.88, 1.01), (0.032, 0.17, 0.48)),
-    "Skin2": ((1.09, 1.59, 1.79), (0.013, 0.070, 0.145)),
-    "Spectralon": ((11.6, 20.4, 14.9), (0.0, 0.0, 0.0)),
-    "Wholemilk": ((2.55, 3.21, 3.77), (0.0011, 0.0024, 0.014)),
-}
+
+def _measured() -> dict[str, tuple[tuple[float, ...], tuple[float, ...]]]:
+    """Reduced scattering and absorption [1/mm] by name, see measured_media.csv."""
+    text = files("clpt.formats.pbrt").joinpath("measured_media.csv").read_text("utf-8")
+    rows = [line.split(",") for line in text.splitlines() if not line.startswith("#")]
+    values = {name: tuple(map(float, numbers)) for name, *numbers in rows}
+    return {name: (numbers[:3], numbers[3:]) for name, numbers in values.items()}
+
+
+MEDIA = _measured()
 
 
 def internal_fresnel(ior: float) -> np.ndarray:

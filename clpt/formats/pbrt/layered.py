@@ -1,7 +1,8 @@
 """Diffuse bases below dielectric boundaries: coated surfaces and scattering bodies of pbrt.
 
-pbrt walks at random between the layers, and through a body; here our plastics' closed form stands
-for both. It is exact for a smooth coat whose medium does nothing, and for a body seen from afar.
+pbrt walks at random between the layers; here our plastics' closed form stands for that. It is
+exact for a smooth coat whose medium does nothing, and for a body seen from afar. Through bodies
+light walks as through other media.
 """
 
 from __future__ import annotations
@@ -16,12 +17,13 @@ from clpt.errors import SceneError, UnknownKindError
 from clpt.formats.pbrt import coated_albedo
 from clpt.formats.pbrt.map_values import map_values
 from clpt.formats.pbrt.params import Parameters
-from clpt.formats.pbrt.roughness import alphas, isotropic, rough, smooth
+from clpt.formats.pbrt.roughness import alphas, isotropic, rough, smooth, stretched
 from clpt.formats.pbrt.spectra import spectrum
 from clpt.formats.pbrt.state import State
 from clpt.formats.pbrt.textures import textured
 from clpt.scene import materials
 from clpt.scene.materials import Material
+from clpt.scene.media import HenyeyGreenstein, Homogeneous, Isotropic
 from clpt.scene.textures import Texture
 
 THICKNESS = 0.01  # of pbrt's coats, in mean free paths
@@ -68,35 +70,73 @@ def index_at_550(eta: Any) -> float:
 
 
 def subsurface(params: Parameters, state: State) -> Material:
-    """The body's diffuse reflection under its boundary; light leaves where it came in."""
+    """The boundary of a body; or, where light cannot walk in it, what is seen of it from afar.
+
+    Light sources off shapes, which a path inside cannot meet, and a reflectance from a texture ask
+    for the second: light leaves where it came in.
+    """
     eta = spectrum(params, "eta", "index", state, 1.33)
-    g = params.one("g", "float", 0.0)
-    params.ignore("scale", "mfp")
-    medium = params.one("name", "string", "")
-    given = {
-        name: textured(params, name, role, state)
-        for name, role in (
-            ("sigma_a", "coefficient"), ("sigma_s", "coefficient"), ("reflectance", "reflectance"),
-        )
-    }  # fmt: skip
-    scattering, absorption = given["sigma_s"], given["sigma_a"]
-    if medium:
-        if medium not in coated_albedo.MEDIA:
-            raise UnknownKindError("medium", medium, coated_albedo.MEDIA)
-        (scattering, absorption), g = coated_albedo.MEDIA[medium], 0.0
-    elif (scattering is None) != (absorption is None):
-        raise SceneError("'sigma_a' and 'sigma_s' are given together or not at all")
-    elif scattering is None and given["reflectance"] is None:
-        scattering, absorption = coated_albedo.MEDIA["Wholemilk"]
-    if scattering is not None:
+    alpha_u, alpha_v = alphas(params, state)
+    if body(params, state) is not None:
+        given = {"int_ior": eta, "ext_ior": 1.0}
+        if smooth(alpha_u, alpha_v):
+            return materials.Dielectric(**given)
+        return materials.RoughDielectric(**stretched(alpha_u, alpha_v), **given)
+    scattering, absorption, reflectance, g = _given(params, state)
+    if reflectance is None:
         base = _albedo(scattering, absorption, g)
     else:
         looks = coated_albedo.from_body_reflectance(index_at_550(eta))
-        base = map_values(given["reflectance"], looks, bytes_stay=True)
+        base = map_values(reflectance, looks, bytes_stay=True)
     state.warn(
         params, "light leaves a 'subsurface' body where it entered: a diffuse base of its albedo"
     )
-    return plastic(base, eta, isotropic(alphas(params, state), params, state))
+    return plastic(base, eta, isotropic((alpha_u, alpha_v), params, state))
+
+
+def body(params: Parameters, state: State) -> Homogeneous | None:
+    """The medium inside of a `subsurface` material; None where its light does not walk."""
+    scattering, absorption, reflectance, g = _given(params, state)
+    scale, mfp = (
+        params.one("scale", "float", 1.0),
+        spectrum(params, "mfp", "coefficient", state, 1.0),
+    )
+    if not state.shared.walks or isinstance(reflectance, Texture):
+        return None
+    phase = HenyeyGreenstein(g=g) if g else Isotropic()
+    if reflectance is None:
+        scattering, absorption = (_coefficient(one) for one in (scattering, absorption))
+        return Homogeneous(sigma_a=absorption, sigma_s=scattering, scale=scale, phase=phase)
+    eta = spectrum(params, "eta", "index", state, 1.33)
+    inner = map_values(reflectance, coated_albedo.from_body_reflectance(index_at_550(eta)))
+    path = map_values(mfp, lambda v: scale * np.asarray(v))
+    return Homogeneous.from_albedo(inner, path, g=g)
+
+
+def _coefficient(value: Any) -> Any:
+    if isinstance(value, Texture):
+        raise SceneError("'sigma_a' and 'sigma_s' cannot be textures")
+    return spectra.RGBUnbounded(*value) if isinstance(value, tuple) else value
+
+
+def _given(params: Parameters, state: State) -> tuple[Any, Any, Any, float]:
+    """Scattering, absorption, reflectance and g, of one of the four ways to say them."""
+    params.ignore("scale", "mfp")
+    medium, g = params.one("name", "string", ""), params.one("g", "float", 0.0)
+    scattering = textured(params, "sigma_s", "coefficient", state)
+    absorption = textured(params, "sigma_a", "coefficient", state)
+    reflectance = textured(params, "reflectance", "reflectance", state)
+    if medium:
+        if medium not in coated_albedo.MEDIA:
+            raise UnknownKindError("medium", medium, coated_albedo.MEDIA)
+        return *coated_albedo.MEDIA[medium], None, 0.0
+    if (scattering is None) != (absorption is None):
+        raise SceneError("'sigma_a' and 'sigma_s' are given together or not at all")
+    if scattering is not None:
+        return scattering, absorption, None, g
+    if reflectance is not None:
+        return None, None, reflectance, g
+    return *coated_albedo.MEDIA["Wholemilk"], None, g
 
 
 def _albedo(scattering: Any, absorption: Any, g: float) -> Any:

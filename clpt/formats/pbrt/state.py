@@ -46,6 +46,7 @@ class Shared:
     made: dict[Any, Any] = field(default_factory=dict)
     make_material: Callable[..., Material] | None = None
     missing: Missing = "error"
+    walks: bool = False  # light walks at random in bodies: no light is too small to be met
 
     def once(self, key: Any, source: Parameters | Parameter, make: Callable[[], Any]) -> Any:
         """Return make(), called once for each key. Raises SceneError where it needs itself."""

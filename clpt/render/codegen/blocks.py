@@ -10,7 +10,7 @@ from clpt.render.contract.features import Features
 
 CHANGED = (
     "o", "d", "beta", "radiance", "lambdas", "pdf", "sampled_hemisphere", "null_distance", "nulls",
-    "ratio", "eta", "medium", "lead", "rival", "pending", "expected", "state",
+    "ratio", "eta", "medium", "bodies", "lead", "rival", "pending", "expected", "state",
 )  # fmt: skip
 READ = ("weight", "light", "pixel_index", "pixel_key", "sample")  # and not changed
 # members that a scene has only with a flag, or one of two
@@ -21,6 +21,7 @@ NEEDED = {
     "nulls": "USES_NULL_SURFACES",
     "ratio": "USES_RATIO",
     "medium": "USES_ABSORPTION",
+    "bodies": "USES_BODIES",
     "lead": "USES_ABSORPTION",
     "through": "SHADOW_MEDIA",
     "rival": "WEIGHS_LIGHT_PATHS",

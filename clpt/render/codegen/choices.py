@@ -48,6 +48,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/medium.cl": lambda f, _: (
         ("generated/medium_coefficients.cl", "optics/medium.cl") * (f.absorption or f.media)
         + ("optics/medium_grid.cl",) * f.grids
+        + ("generated/body_index.cl", "optics/bodies.cl") * f.bodies
     ),
     "generated/shading_frame.cl": lambda f, _: (
         ("generated/normal_map.cl", "path/shading_frame_mapped.cl")

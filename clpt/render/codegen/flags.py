@@ -66,6 +66,8 @@ def _first_for_denoisers(features: Features) -> int | bool:
     return min((places[name] for name in places if LAYERS[name].denoising), default=False)
 
 
+BETWEEN_BODIES = ("dielectric", "rough_dielectric")  # their index outside is that of a body there
+
 # name: its value, of a scene's features
 SCENE: dict[str, Callable[[Features], str | int]] = {
     "BSDF_COUNT": lambda f: len(f.materials),
@@ -79,6 +81,7 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "USES_ABSORPTION": lambda f: f.absorption or f.media,
     "USES_MEDIA": lambda f: f.media,
     "USES_GRIDS": lambda f: f.grids,
+    "USES_BODIES": lambda f: f.bodies,
     "SHADOW_MEDIA": lambda f: f.shadow_media,
     "MEDIUM_AIMS": lambda f: f.medium_aims,
     "USES_DISPERSION": lambda f: f.dispersion and f.mode == "spectral",
@@ -144,6 +147,7 @@ MATERIAL: dict[str, Callable[[Features, type[Scatterer]], str | int]] = {
     "BSDF_MERGES": lambda f, cls: f.merged and gathers_photons(f, cls),
     "BSDF_GUIDED": lambda f, cls: f.guided and cls.guided,
     "BSDF_IS_PHASE": lambda f, cls: cls.is_phase,
+    "BSDF_BETWEEN_BODIES": lambda f, cls: f.bodies and cls.kind in BETWEEN_BODIES,
     "BSDF_IS_NULL": lambda f, cls: cls.is_null and f.null_surfaces,
     "STOCHASTIC_FILTERING": filters_at_random,
     "USES_CHOICE": lambda f, cls: cls.uses_lobe_sample or cls.fluoresces or f.many_lights,

@@ -208,10 +208,12 @@ def _medium_sources(features: Features) -> dict[str, frozenset[str]]:
 def virtual_files(features: Features) -> dict[str, str]:
     """Return the loaders of what surfaces have besides their materials' own parameters."""
     weights = features.sources_of("mixture").get("weight")
+    bodies = features.sources_of("body").get("index")
     maps = features.sources_of("perturbation").get("value")
     real = Param("real", "", textured=True)
     return {
         "generated/medium_coefficients.cl": medium_text(_medium_sources(features)),
+        "generated/body_index.cl": value_text("body_index", Param("index", ""), bodies),
         "generated/mixture.cl": value_text("mixture_weight", real, weights, "mixtures"),
         "generated/normal_map.cl": f"#define NORMAL_MAP_WORDS {NORMAL_MAP_WORDS}\n"
         + value_text("normal_map_real", real, maps),

@@ -93,6 +93,7 @@ class Features:
     chromatic_media: bool = False  # of which some extinction depends on the wavelength
     medium_aims: int = 0  # places of lamps near which flights through media end
     grids: bool = False  # of which some have a density on a grid
+    bodies: bool = False  # that may overlap, of different priorities
     glass_lens: bool = False  # of a glass that disperses
     channel: str = ""
     bands: bool = False  # a spectral film

@@ -30,6 +30,8 @@ def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> str | None:
         return "a material is of another kind or structure"
     if lowered.features.weighed and any(is_sharp(old) != is_sharp(new) for old, new in pairs):
         return "light paths aim at what is sharp, and a material is so now, or no more"
+    if lowered.features.bodies and pairs:
+        return "bodies that overlap know each other's indices"
     camera = None
     if scene.camera is not former.camera:
         if dispersive_glass(scene.camera) != dispersive_glass(former.camera):

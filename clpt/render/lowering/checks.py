@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, NoReturn
 
 from clpt.errors import SceneError
+from clpt.render.lowering.bodies import check_bodies
 from clpt.render.lowering.camera.cameras import CONNECTED, dispersive_glass
 from clpt.render.lowering.geometry import shapes
 from clpt.render.lowering.geometry.instancing import distinct
@@ -25,7 +26,7 @@ from clpt.scene.layers import LAYERS
 from clpt.scene.lights import ON_SHAPES, DirectionalArea, Light, Point
 from clpt.scene.materials import Material
 from clpt.scene.params import params
-from clpt.scene.shapes import Shape
+from clpt.scene.shapes import Instance, Shape
 
 LARGEST = 1 << 26  # pixels of a film; its tiles are divided in float32, see kernels/film/film.cl
 
@@ -60,6 +61,7 @@ def check(scene: Scene) -> None:
         raise SceneError(f"only the integrators {names} have layers", where="film.layers")
     _check_light_layers(scene)
     _check_light_paths(scene, shapes_)
+    check_bodies([*shapes_, *(one for one in scene.shapes if isinstance(one, Instance))])
 
 
 def _check_light_layers(scene: Scene) -> None:
@@ -89,7 +91,7 @@ def _check_light_paths(scene: Scene, shapes_: list[Shape]) -> None:
         return
     spectral = scene.film.mode == "spectral"
     for shape in shapes_:
-        if shape.interior is not None or shape.exterior is not None:
+        if shape.interior is not None or shape.exterior is not None or shape.priority:
             _refuse("a scene without media", shapes.where(shape))
     if scene.camera.medium is not None:
         _refuse("a scene without media", "camera.medium")

@@ -70,6 +70,16 @@ class SceneIndex:
         return () if self.channels else tuple(_media(self.scene, self.shapes))
 
     @property
+    def nested(self) -> bool:
+        """Whether bodies may overlap, of different priorities."""
+        return not self.channels and any(shape.priority for shape in self.shapes)
+
+    @property
+    def has_media(self) -> bool:
+        """Whether rays go through media, which may be different from the two sides' of a shape."""
+        return bool(self.media) or self.nested
+
+    @property
     def channels(self) -> tuple[str, ...]:
         """The channels of the `aov` integrator; of others none."""
         return getattr(self.scene.integrator, "channels", ())
@@ -86,7 +96,7 @@ class SceneIndex:
         Where the scene says "auto" nothing may ask before `hard_light.decided` has chosen.
         """
         wanted: float = getattr(self.scene.integrator, "light_paths", 0)
-        return wanted if (self.joined or self.merged) and not self.media else 0
+        return wanted if (self.joined or self.merged) and not self.has_media else 0
 
     @property
     def joined(self) -> bool:
@@ -100,7 +110,7 @@ class SceneIndex:
     def merged(self) -> bool:
         """Whether light paths leave photons, which paths from the camera gather."""
         integrator = self.scene.integrator
-        if not isinstance(integrator, Vcm) or self.shifts or self.media:
+        if not isinstance(integrator, Vcm) or self.shifts or self.has_media:
             return False
         return integrator.merging and integrator.max_depth not in (1, 2)
 
@@ -108,7 +118,7 @@ class SceneIndex:
     def guided(self) -> bool:
         """Whether directions of the camera's paths are learned from light paths."""
         wanted: bool = getattr(self.scene.integrator, "guiding", False)
-        return wanted and not self.weighed and not self.media
+        return wanted and not self.weighed and not self.has_media
 
     @property
     def shifts(self) -> bool:
@@ -180,6 +190,8 @@ def _leaf_kinds(shapes_: tuple[Shape, ...]) -> tuple[type[mt.Material], ...]:
             raise SceneError(f"{shape.material!r} is not a material", where=where)
         for leaf in _leaves_of(shape.material):
             found.setdefault(leaf, where)
+    if any(shape.priority for shape in shapes_):
+        found.setdefault(mt.Null, "")  # a surface within a body of higher priority
     return custom_materials.ordered(found) or (mt.Diffuse,)
 
 

@@ -49,7 +49,7 @@ class MediumWords:
     def __init__(self, index: SceneIndex, encoder: Encoder, materials: MaterialWords):
         self._index, self._encoder, self._materials = index, encoder, materials
         self._words: dict[Medium, int] = {}
-        self._has_media = bool(index.media)
+        self._has_media = bool(index.media)  # not of an integrator that sees none
 
     def word(self, medium: Medium | None) -> int:
         """Return the word of a medium, 0 of None."""

@@ -14,8 +14,15 @@ from clpt.render.contract.features import Features
 from clpt.render.contract.layer_names import LayerNames
 from clpt.render.contract.parameter_words import row_words
 from clpt.render.lowering import photons
+from clpt.render.lowering.bodies import BodyWords, matter_of
 from clpt.render.lowering.camera import cameras, filters
 from clpt.render.lowering.camera.colour import sensor
+from clpt.render.lowering.camera.surroundings import (
+    bodies_around,
+    contested,
+    media_around,
+    warnings_of,
+)
 from clpt.render.lowering.camera.wavelengths import Density, density, emissions
 from clpt.render.lowering.checks import check
 from clpt.render.lowering.device_arrays import is_table
@@ -59,7 +66,8 @@ class Lowered:
     the caller's buffers. owners: of each row of `shapes`. layer_names: what layers tell of.
     glass_row: of the camera, see `lower_camera`. integrator: of the scene, or what was chosen;
     reason: why, "" where there was no choice. encoder: what made the tables, for values that are
-    edited. cache: what the next lowering need not make again.
+    edited. cache: what the next lowering need not make again. around: media at the camera, or the
+    matter of bodies.
     """
 
     features: Features
@@ -79,6 +87,7 @@ class Lowered:
     reason: str
     encoder: Encoder
     cache: LoweringCache
+    around: tuple[Any, ...] = ()
 
     def __post_init__(self) -> None:
         own = (self.vertices, self.faces, self.tags, self.boxes, self.settings)
@@ -122,8 +131,19 @@ def lower(
     homogeneous = (one for one in index.media if not isinstance(one, Grid))
     near = medium_aims(lights) if any(one.scatters for one in homogeneous) else ()
     encoder.store.append("media", np.array(near, np.float32).view(np.uint32))
-    encoder.store.append("media", media.of_shapes([shape for _, shape, _, _ in geometry.owners]))
-    around = media.word(scene.camera.medium)
+    bounding = [shape for _, shape, _, _ in geometry.owners]
+    around: tuple[Any, ...] = ()
+    if index.nested:
+        bodies = BodyWords(index.shapes)
+        encoder.store.append("media", bodies.rows(bounding, encoder, materials, media))
+        around = bodies_around(scene, matter_of, cache)
+        camera = bodies.around(around, media)
+        noted = contested(scene, matter_of, cache)
+    else:
+        encoder.store.append("media", media.of_shapes(bounding))
+        around = media_around(scene, cache) if index.media else ()
+        camera = 0, media.word(next(iter(around), None))
+        noted = warnings_of(around)
     before = former.integrator if former else None
     index, why = decided(index, geometry, encoder, lights, sphere, before)
     density_row, tabulated, profile = _lower_film(index, encoder, wavelengths)
@@ -134,7 +154,8 @@ def lower(
     glass_row = _lower_camera(index, encoder)
     ambient_row = _lower_ambient(index, encoder)
     warnings = (
-        *_warnings(index), *sorted(encoder.warnings), *geometry.warnings,
+        *_warnings(index), *noted,
+        *sorted(encoder.warnings), *geometry.warnings,
         *encoder.textures.finish(),
     )  # fmt: skip
     aimed = len(targets) > 0
@@ -145,7 +166,7 @@ def lower(
     features = replace(features, **for_layers)
     settings = settings_of(
         index, geometry, lights, wavelengths, density_row, ambient_row, sphere,
-        features.dispersion, (first_aim, len(targets)), around,
+        features.dispersion, (first_aim, len(targets)), camera,
     )  # fmt: skip
     cache.settle()
     tables = encoder.store.arrays()
@@ -166,6 +187,7 @@ def lower(
         warnings=warnings,
         integrator=index.scene.integrator,
         reason=why,
+        around=around,
         encoder=encoder,
         cache=cache,
     )

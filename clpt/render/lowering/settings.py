@@ -31,14 +31,15 @@ def settings_of(
     sphere: tuple[NDArray[np.float64], float],
     disperses: bool,
     aims: tuple[int, int],
-    camera_medium: int,
+    around: tuple[int, int],
 ) -> NDArray[np.void]:
     """Return the record SETTINGS of a scene; the wavefront adds what depends on the device.
 
     density_row: where the table of `density` begins in `distributions`; ambient_row: in
     `light_params`; sphere: centre and radius of one around the scene [m];
     disperses: whether directions depend on wavelengths; aims: the first of the spheres at which
-    light paths aim, and their number; camera_medium: its word.
+    light paths aim, and their number; around: words of the bodies
+    and of the medium at the camera.
     """
     scene, film, integrator = index.scene, index.scene.film, index.scene.integrator
     settings = np.zeros((), SETTINGS.dtype)
@@ -64,7 +65,7 @@ def settings_of(
         settings["guide_paths"] = guides.PATHS
         settings["guide_side"] = guides.SIDE * sphere[1]
     settings["aims"], settings["aim_count"] = aims
-    settings["camera_medium"] = camera_medium
+    settings["camera_bodies"], settings["camera_medium"] = around
     settings["light_count"] = len(lights.rows)
     settings["infinite_count"] = lights.infinite
     settings["ambient"] = ambient_row

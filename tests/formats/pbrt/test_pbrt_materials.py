@@ -9,6 +9,7 @@ from scipy import integrate
 from clpt import spectra
 from clpt.errors import SceneError
 from clpt.formats.pbrt import coated_albedo
+from clpt.formats.pbrt.layered import body
 from clpt.formats.pbrt.materials import MAKERS, material
 from clpt.formats.pbrt.state import Definition
 from clpt.scene import materials
@@ -167,6 +168,51 @@ def test_scattering_bodies():
     at = state()
     make("subsurface", at, name=("string", "Skin1"))
     assert "where it entered" in at.shared.warnings[0]
+
+
+FORMS = {
+    "name": ({"name": ("string", "Merlot")}, (0.11632, 0.25191, 0.29434), (2.1129e-05, 0.0, 0.0)),
+    "coefficients": (
+        {"sigma_a": ("rgb", 1, 2, 3), "sigma_s": ("rgb", 4, 5, 6), "scale": ("float", 2)},
+        (2, 4, 6),
+        (8, 10, 12),
+    ),
+    "default": ({}, (0.0011, 0.0024, 0.014), (2.55, 3.21, 3.77)),
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_light_walks_in_bodies(form):
+    given, absorbs, scatters = FORMS[form]
+    at = state()
+    at.shared.walks = True
+    boundary = make("subsurface", at, **given)
+    assert isinstance(boundary, materials.Dielectric) and constant(boundary.int_ior) == 1.33
+    assert not at.shared.warnings
+    a, s = body(params(**given), at).coefficients(spectral=False)
+    assert a.to_rgb("unbounded") == pytest.approx(absorbs)
+    assert s.to_rgb("unbounded") == pytest.approx(scatters)
+
+
+def test_bodies_by_their_reflectance():
+    """The single albedo looks as asked for, under the boundary; mfp and scale are its length."""
+    at = state()
+    at.shared.walks = True
+    given = {"reflectance": ("rgb", 0.9, 0.5, 0.1), "mfp": ("float", 2), "g": ("float", 0.3)}
+    a, s = body(params(**given, scale=("float", 2)), at).coefficients(spectral=False)
+    a, s = a.to_rgb("unbounded"), s.to_rgb("unbounded")
+    assert a + s == pytest.approx([0.25] * 3)
+    looks = coated_albedo.body_albedo(s, a, 0.3)
+    wanted = coated_albedo.from_body_reflectance(1.33)(np.array([0.9, 0.5, 0.1]))
+    assert looks == pytest.approx(wanted, abs=1e-6)
+    assert isinstance(
+        make("subsurface", at, roughness=("float", 0.3), **given), materials.RoughDielectric
+    )
+
+
+def test_47_measured_media():
+    assert len(coated_albedo.MEDIA) == 47
+    assert coated_albedo.MEDIA["Pacific Ocean Surface Water"][1][0] == 0.031845
 
 
 def test_scale_of_a_leaf():

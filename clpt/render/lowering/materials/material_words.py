@@ -83,6 +83,10 @@ class MaterialWords:
         self.transmitting.add(phase.kind)
         return self._leaf(phase, _Side(front=True, two_sided=False))
 
+    def null(self) -> int:
+        """Return the word of a surface that is not there."""
+        return self._leaf(_NULL, _Side(front=True, two_sided=False))
+
     def _word(self, material: Any, side: _Side) -> int:
         """The word of a material on a side; the same pair has the same word."""
         key = (id(material), side.key)

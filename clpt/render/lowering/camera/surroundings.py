@@ -1,0 +1,234 @@
+"""The medium around the camera: found by how often boundaries wind around it.
+
+A closed boundary fills the whole sphere of directions around a point inside, 4 pi, and on balance
+nothing of it around a point outside. So a medium fills a point where the shapes that have it inside
+wind once more around it than those that have it outside; of one that nothing encloses, as its
+signed volume tells, they wind as often. A boundary may have several parts, as a
+tube and two disks, and no ray can slip between its triangles.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.render.lowering.camera.cameras import MEMBERS
+from clpt.render.lowering.geometry import analytic, shapes, spheres
+from clpt.render.lowering.geometry.tessellate import keeps_its_kind, tessellate
+from clpt.render.lowering.geometry.triangles import counted, triangulate
+from clpt.scene import Scene
+from clpt.scene.media import Medium
+from clpt.scene.shapes import Cylinder, Disk, Instance, Mesh, Shape, Sphere, Spheres
+
+Triangles = tuple[NDArray[np.float32], NDArray[np.uint32]]
+AROUND = 96  # corners of what stands for a disk
+MOST_COMPARED = 500  # bodies whose boxes are compared
+CHUNK = 1 << 18  # triangles that are summed at a time
+
+
+def media_around(scene: Scene, cached: Callable[..., Any] | None = None) -> tuple[Medium, ...]:
+    """Return the media at the camera, of the smallest extent first; the named one alone.
+
+    cached: `LoweringCache`, which keeps the triangles of boundaries. Raises SceneError for shapes
+    and cameras that make no sense.
+    """
+    if scene.camera.medium is not None:
+        return (scene.camera.medium,)
+    bounding = [shape for shape in _every(scene) if _bounds_media(shape)]
+    if not bounding:
+        return ()
+    p = _origin(scene)
+    turns: dict[Medium, float] = {}
+    extents: dict[Medium, float] = {}
+    bounds: dict[Medium, list[NDArray[np.float64]]] = {}
+    parts: dict[Medium, list[tuple[float, Shape]]] = {}
+    for shape in bounding:
+        low, high = _box(shape, cached)
+        for medium, sign in ((shape.interior, 1.0), (shape.exterior, -1.0)):
+            if medium is not None:
+                parts.setdefault(medium, []).append((sign, shape))
+                bounds.setdefault(medium, []).append(np.stack([low, high]))
+    for medium, own in parts.items():
+        low = np.min([box[0] for box in bounds[medium]], axis=0)
+        high = np.max([box[1] for box in bounds[medium]], axis=0)
+        outside = any(sign < 0.0 for sign, _ in own)
+        endless = outside and sum(sign * _volume(shape, cached) for sign, shape in own) < 0.0
+        turns[medium] = 1.0 if endless else 0.0
+        extents[medium] = np.inf if endless else float(np.linalg.norm(high - low))
+        if ((p >= low) & (p <= high)).all():
+            turns[medium] += sum(sign * _winding(shape, p, cached) for sign, shape in own)
+    found = [medium for medium, number in turns.items() if number > 0.5]
+    return tuple(sorted(found, key=lambda medium: extents[medium]))
+
+
+def bodies_around(
+    scene: Scene,
+    matter: Callable[[Shape], tuple[Any, ...] | None],
+    cached: Callable[..., Any] | None = None,
+) -> tuple[tuple[Any, ...], ...]:
+    """Return the matter of the bodies that the camera is in. Raises as `media_around`.
+
+    matter: of a shape's body, None of a shape that is none. What a body has inside of it faces it,
+    as the inner side of a glass does.
+    """
+    p, turns = _origin(scene), dict[tuple[Any, ...], float]()
+    for shape in _every(scene, lambda one: matter(one) is not None):
+        own = matter(shape)
+        if own is not None:
+            low, high = _box(shape, cached)
+            within = ((p >= low) & (p <= high)).all()
+            turns[own] = turns.get(own, 0.0) + (_winding(shape, p, cached) if within else 0.0)
+    return tuple(own for own, number in turns.items() if number > 0.5)
+
+
+def warnings_of(found: tuple[Any, ...]) -> list[str]:
+    """Return a warning where a camera is in several media, else none."""
+    if len(found) < 2:
+        return []
+    names = " and ".join(repr(medium.name or medium.kind) for medium in found)
+    return [
+        f"camera: it is in {len(found)} media at once, {names}; the one of the smallest extent is "
+        "taken. Name one by camera.medium, or the outer one by the inner shape's exterior"
+    ]
+
+
+def _bounds_media(shape: Shape) -> bool:
+    return shape.interior is not None or shape.exterior is not None
+
+
+def contested(
+    scene: Scene,
+    matter: Callable[[Shape], tuple[Any, ...] | None],
+    cached: Callable[..., Any] | None = None,
+) -> list[str]:
+    """Return a warning where bodies of one priority, but not of one matter, may overlap.
+
+    matter: as of `bodies_around`; its first entry is the priority.
+    """
+    boxes: list[tuple[tuple[Any, ...], Shape, NDArray[Any], NDArray[Any]]] = []
+    for shape in _every(scene, lambda one: matter(one) is not None):
+        own = matter(shape)
+        if own is None or len(boxes) >= MOST_COMPARED:
+            continue
+        low, high = _box(shape, cached)
+        for other, second, other_low, other_high in boxes:
+            if other[0] != own[0] or other == own:
+                continue
+            common = np.minimum(high, other_high) - np.maximum(low, other_low)
+            if (common > 1e-5 * (high - low)).all():
+                return [
+                    f"{shapes.where(second)} and {shapes.where(shape)}: their boxes overlap, and "
+                    f"both have the priority {own[0]}; where the bodies overlap too, the latter "
+                    "fills the place"
+                ]
+        boxes.append((own, shape, low, high))
+    return []
+
+
+def _every(scene: Scene, bounds: Callable[[Shape], bool] = _bounds_media) -> Iterator[Shape]:
+    """The shapes of a scene that may bound media, those of instances where they are placed."""
+    for thing in scene.shapes:
+        if not isinstance(thing, Instance):
+            yield thing
+            continue
+        for shape in thing.group.shapes:
+            if bounds(shape):
+                matrix = shapes.placement(thing) @ shapes.placement(shape)
+                yield dataclasses.replace(shape, to_world=matrix)
+
+
+def _origin(scene: Scene) -> NDArray[np.float64]:
+    """The point from which a camera sees; of one without, that in the middle of its film."""
+    members = MEMBERS[type(scene.camera)](scene.camera, *scene.film.size)
+    if "to_world" in members:
+        return np.asarray(members["to_world"], np.float64)[:3, 3]
+    near = np.asarray(members["near"], np.float64)
+    return near[:3] / near[3]
+
+
+def _box(shape: Shape, cached: Callable[..., Any] | None) -> tuple[NDArray[Any], NDArray[Any]]:
+    """The lowest and the highest corner of a shape's box."""
+    if isinstance(shape, Sphere) and keeps_its_kind(shape):
+        return analytic.bounds(shape)
+    if isinstance(shape, Spheres):
+        centers, radii = _balls(shape)
+        return (centers - radii[:, None]).min(axis=0), (centers + radii[:, None]).max(axis=0)
+    vertices, faces = _triangles(shape, cached)
+    if not len(faces):
+        return np.full(3, np.inf), np.full(3, -np.inf)
+    return vertices.min(axis=0), vertices.max(axis=0)
+
+
+def _winding(shape: Shape, p: NDArray[np.float64], cached: Callable[..., Any] | None) -> float:
+    """How often a shape winds around a point: 1 inside of one that is closed and faces outward."""
+    side = -1.0 if shape.flip_normals else 1.0
+    if isinstance(shape, Sphere) and keeps_its_kind(shape):
+        members = analytic.members_of(shape)
+        return side * float(np.linalg.norm(p - members["center"]) < members["radius"])
+    if isinstance(shape, Spheres):
+        centers, radii = _balls(shape)
+        return side * float((np.linalg.norm(p - centers, axis=1) < radii).sum())
+    return winding_number(*_triangles(shape, cached), p)
+
+
+def _volume(shape: Shape, cached: Callable[..., Any] | None) -> float:
+    """What a shape encloses [m^3], below 0 of one that faces inward."""
+    if isinstance(shape, Spheres):
+        return (-1.0 if shape.flip_normals else 1.0) * 4.2 * float((_balls(shape)[1] ** 3).sum())
+    vertices, faces = _triangles(shape, cached)
+    a, b, c = np.moveaxis(np.asarray(vertices, np.float64)[faces], 1, 0)
+    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
+
+
+def winding_number(vertices: NDArray[Any], faces: NDArray[Any], p: NDArray[np.float64]) -> float:
+    """Return how often triangles wind around a point; those that face away count as 1 in all.
+
+    vertices (n, 3), faces (m, 3), p (3,). Van Oosterom and Strackee 1983, equation 8.
+    """
+    total = 0.0
+    corners = np.asarray(vertices, np.float64) - p
+    for first in range(0, len(faces), CHUNK):
+        a, b, c = np.moveaxis(corners[faces[first : first + CHUNK]], 1, 0)
+        la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
+        volume = np.einsum("ij,ij->i", a, np.cross(b, c))
+        dots = (np.einsum("ij,ij->i", *pair) for pair in ((a, b), (b, c), (c, a)))
+        ab, bc, ca = dots
+        total += 2.0 * float(np.arctan2(volume, la * lb * lc + ab * lc + bc * la + ca * lb).sum())
+    return total / (4.0 * np.pi)
+
+
+def _balls(shape: Spheres) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Centres and radii of many spheres, in the world."""
+    rows = np.asarray(spheres.balls(shape), np.float64)
+    return rows[:, :3], np.abs(rows[:, 3])
+
+
+def _triangles(shape: Shape, cached: Callable[..., Any] | None) -> Triangles:
+    """The triangles of a shape in the world, or those that stand for it."""
+    if isinstance(shape, Disk):
+        shape = _fan(shape)
+    elif isinstance(shape, Cylinder | Sphere):
+        shape = tessellate(shape)
+    elif cached is not None:
+        vertices, faces, *_ = cached(counted, shape, by=shapes.geometry(shape))
+        return vertices, faces
+    vertices, faces, *_ = triangulate(shape)
+    return vertices, faces
+
+
+def _fan(disk: Disk) -> Mesh:
+    """A disk as triangles about its middle."""
+    angle = 2.0 * np.pi * np.arange(AROUND) / AROUND
+    rim = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(AROUND)])
+    i = np.arange(AROUND)
+    faces = np.column_stack([np.zeros(AROUND, int), 1 + i, 1 + (i + 1) % AROUND])
+    return Mesh(
+        vertices=np.concatenate([np.zeros((1, 3)), rim]).astype(np.float32),
+        faces=faces.astype(np.uint32),
+        to_world=disk.to_world,
+        flip_normals=disk.flip_normals,
+    )
