@@ -21,13 +21,11 @@ from clpt.render.lowering.lights.atmosphere import EARTH, TOP, Atmosphere
 Floats = NDArray[np.float64]
 
 DEGREE = 3  # of the harmonics
-HEIGHTS = np.array([0, 0.3, 0.8, 1.6, 3, 5, 8, 12, 17, 23, 30, 38, 48, 60, 78, 99.0])  # [km]
-AROUND, BETWEEN = 15.0, 1.5  # sun angles: on either side of the observer's, apart [degrees]
-SIDE_ANGLES, TURNS = 8, 8  # directions at a place: above and below its horizon, around
+HEIGHTS = np.array([0, 0.5, 1.5, 3, 6, 10, 16, 23, 32, 45, 60, 99.0])  # [km]
+AROUND, BETWEEN = 15.0, 2.5  # sun angles: on either side of the observer's, apart [degrees]
+SIDE_ANGLES, TURNS = 6, 6  # directions at a place: above and below its horizon, around
 FAR_NODES, VIEW_NODES = 8, 24  # of a ray's part: from places of the field, from the observer
-COARSE = np.array(
-    [360, 380, 400, 425, 450, 475, 500, 530, 555, 575, 590, 603, 620, 650, 690, 740, 830.0]
-)  # [nm], of the field
+COARSE = np.array([360, 390, 420, 460, 500, 550, 575, 603, 640, 700, 830.0])  # [nm], of the field
 ORDERS, ENOUGH = 24, 2e-4  # at most; the share of an order at which they end
 
 
@@ -199,6 +197,37 @@ def _summed(out: Floats, ray: NDArray[np.int64], values: Floats) -> Floats:
     return out
 
 
+class Plan(NamedTuple):
+    """How points on rays see a field, all float32: the cells' corners and their shares, 4 of (m,);
+    look (m, 2, harmonics): of both phase functions; weights (m, 2, n): what reaches a ray's start.
+    """
+
+    count: int
+    ray: NDArray[np.int64]
+    corners: list[NDArray[np.int64]]
+    shares: list[NDArray[np.float32]]
+    look: NDArray[np.float32]
+    weights: NDArray[np.float32]
+
+
+def plan(a: Air, angles: Floats, way: Rays, at: Places) -> Plan:
+    """The plan of points on rays for a field of sun angles."""
+    dense = atmosphere.densities(at.height)[:2] * way.weight
+    h, x = _between(HEIGHTS, at.height)
+    s, y = _between(angles, np.arccos(at.sun))
+    pairs = [(i, j) for i in (0, 1) for j in (0, 1)]
+    look = harmonics(at.mu, at.turn).T[:, None] * a.moments[:, DEGREES]
+    share = np.exp(-(way.columns.T @ a.extinct))[:, None]
+    return Plan(
+        len(way.ground),
+        way.ray,
+        [(h + i) * len(angles) + s + j for i, j in pairs],
+        [((x if i else 1 - x) * (y if j else 1 - y)).astype(np.float32) for i, j in pairs],
+        look.astype(np.float32),
+        (share * dense.T[:, :, None] * a.scatter).astype(np.float32),
+    )
+
+
 class Field(NamedTuple):
     """Moments of all light that was scattered, and what falls on the ground.
 
@@ -210,25 +239,12 @@ class Field(NamedTuple):
     moments: Floats
     ground: Floats
 
-    def scattered(self, a: Air, way: Rays, at: Places, count: int) -> Floats:
+    def scattered(self, plan: Plan) -> Floats:
         """The light of this field that is scattered into rays, (count, n)."""
-        out = np.zeros((count, a.extinct.shape[1]))
-        share = np.exp(-(way.columns.T @ a.extinct))
-        dense = (atmosphere.densities(at.height)[:2] * way.weight).T
-        look = harmonics(at.mu, at.turn)
-        h, x = _between(HEIGHTS, at.height)
-        s, y = _between(self.angles, np.arccos(at.sun))
-        source = np.zeros((2, *share.shape))
-        flat = self.moments.reshape(-1, *self.moments.shape[2:])
-        columns = len(self.angles)
-        for i, j in ((0, 0), (0, 1), (1, 0), (1, 1)):
-            weight = (x if i else 1.0 - x) * (y if j else 1.0 - y)
-            there = flat[(h + i) * columns + s + j]
-            for kind in range(2):
-                given = (look * weight * a.moments[kind][DEGREES, None]).T
-                source[kind] += np.einsum("mk,mkn->mn", given, there)
-        value = sum(source[k] * dense[:, k, None] * a.scatter[k] for k in range(2))
-        return _summed(out, way.ray, value * share)
+        flat = self.moments.astype(np.float32).reshape(-1, *self.moments.shape[2:])
+        there = sum(w[:, None, None] * flat[i] for i, w in zip(plan.corners, plan.shares, strict=True))
+        value = (np.matmul(plan.look, there) * plan.weights).sum(axis=1)
+        return _summed(np.zeros((plan.count, value.shape[1])), plan.ray, value.astype(np.float64))
 
     def reflected(
         self, a: Air, way: Rays, sun: Floats, albedo: Floats, mu: Floats, turn: Floats, r: Floats
@@ -284,7 +300,7 @@ def field(a: Air, albedo: Floats, sun: float) -> Field:
     at = places(*(v[way.ray] for v in full), way.t)
     count = radius.size
     bands = a.extinct.shape[1]
-    single = once(a, way, at, count)
+    single, seen = once(a, way, at, count), plan(a, angles, way, at)
     look = harmonics(cosines, turned).reshape(-1, *shape)
     solid = np.broadcast_to((span * 2.0 * np.pi / TURNS)[:, None, :, None], shape)
     above = np.maximum(mu[0], 0.0)[None, :, None, None] * solid[0][..., None]
@@ -294,7 +310,7 @@ def field(a: Air, albedo: Floats, sun: float) -> Field:
         np.zeros((len(angles), bands)),
     )
     for _ in range(ORDERS):
-        light = single + found.scattered(a, way, at, count)
+        light = single + found.scattered(seen)
         light += found.reflected(a, way, suns, albedo, cosines, turned, radius)
         light = light.reshape(*shape, bands)
         moments = np.einsum("kpsdt,psdt,psdtn->pskn", look, solid, light, optimize=True)
@@ -343,7 +359,7 @@ def radiance(
     steep, which = np.unique(mu, return_inverse=True)
     way = _spread(rays(radius[: len(steep)], steep, VIEW_NODES // 2), which)
     at = places(radius[way.ray], suns[way.ray], mu[way.ray], turn[way.ray], way.t)
-    further = found.scattered(dim, way, at, len(mu))
+    further = found.scattered(plan(dim, found.angles, way, at))
     further += found.reflected(dim, way, suns, low, mu, turn, radius)
     fine = air(given, lambdas)
     way = rays(radius, mu, VIEW_NODES, _shadow(radius, suns, mu, turn))
