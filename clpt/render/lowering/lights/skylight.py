@@ -1,11 +1,10 @@
 """Radiance of the sky: sunlight scattered once along each ray, and all further orders.
 
-Light scattered once is integrated along each ray, with the phase functions as they are. What comes
-after is a field of its own: at heights and sun angles around the observer, its moments in spherical
-harmonics up to DEGREE. It is found order by order on rays from those places, with aerosol of which
-the sharp forward peak counts as not scattered (delta-M, Wiscombe 1977), and light scattered once is
-seen through that same air (TMS, Nakajima and Tanaka 1988). The ground reflects evenly.
-Lengths are in km, radiance is per irradiance of the sun above the air [1/sr].
+Light scattered once is integrated along each ray. What comes after is a field of its own: at
+heights and sun angles around the observer, its moments in spherical harmonics up to DEGREE, which
+are all that air needs and most of what haze does. It is found order by order on rays from those
+places. The ground reflects evenly. Lengths are in km, radiance is per irradiance of the sun above
+the air [1/sr]. How far that is from walks of light: docs/sky.md, tests/render/lowering/lights.
 """
 
 from __future__ import annotations
@@ -20,13 +19,16 @@ from clpt.render.lowering.lights.atmosphere import EARTH, TOP, Atmosphere
 
 Floats = NDArray[np.float64]
 
-DEGREE = 3  # of the harmonics
+DEGREE = 5  # of the harmonics
 HEIGHTS = np.array([0, 0.5, 1.5, 3, 6, 10, 16, 23, 32, 45, 60, 99.0])  # [km]
 AROUND, BETWEEN = 15.0, 2.5  # sun angles: on either side of the observer's, apart [degrees]
 SIDE_ANGLES, TURNS = 6, 6  # directions at a place: above and below its horizon, around
 FAR_NODES, VIEW_NODES = 8, 24  # of a ray's part: from places of the field, from the observer
 COARSE = np.array([360, 390, 420, 460, 500, 550, 575, 603, 640, 700, 830.0])  # [nm], of the field
-ORDERS, ENOUGH = 24, 2e-4  # at most; the share of an order at which they end
+HAZY = 12.0  # below, haze counts in the field [km]
+CORNERS = ((0, 0), (0, 1), (1, 0), (1, 1))  # of a cell
+PIECE = 4096  # points that are worked on at a time
+ORDERS, ENOUGH = 24, 1e-3  # at most; the share of an order at which they end
 
 
 class Air(NamedTuple):
@@ -37,21 +39,16 @@ class Air(NamedTuple):
     scatter: Floats
     moments: Floats
     asymmetry: float
-    peak: float
 
 
 def air(given: Atmosphere, lambdas: Floats) -> Air:
-    """The air at wavelengths, without the forward peak of its aerosol."""
-    extinct = given.depths(lambdas)
-    g, degrees = given.asymmetry, np.arange(DEGREE + 1)
-    peak = abs(g) ** (DEGREE + 1)
+    """The air at wavelengths."""
+    extinct, gamma = given.depths(lambdas), atmosphere.DEPOLARISED
     rayleigh = np.zeros(DEGREE + 1)
-    gamma = atmosphere.DEPOLARISED
     rayleigh[0], rayleigh[2] = 1.0, (1.0 - gamma) / (10.0 * (1.0 + 2.0 * gamma))
-    moments = np.stack([rayleigh, (g**degrees - peak) / (1.0 - peak)])
-    scatter = np.stack([extinct[0], given.aerosol_albedo * extinct[1] * (1.0 - peak)])
-    extinct[1] *= 1.0 - given.aerosol_albedo * peak
-    return Air(extinct, scatter, moments, g, peak)
+    moments = np.stack([rayleigh, given.asymmetry ** np.arange(DEGREE + 1)])
+    scatter = np.stack([extinct[0], given.aerosol_albedo * extinct[1]])
+    return Air(extinct, scatter, moments, given.asymmetry)
 
 
 class Rays(NamedTuple):
@@ -181,51 +178,59 @@ def once(a: Air, way: Rays, at: Places, count: int) -> Floats:
         return out
     depth = (way.columns + toward)[:, kept].T @ a.extinct
     dense = atmosphere.densities(at.height[kept]) * way.weight[kept]
-    phases = dense[:2] * np.stack(
-        [
-            atmosphere.rayleigh_phase(at.angle[kept]),
-            atmosphere.aerosol_phase(at.angle[kept], a.asymmetry) / (1.0 - a.peak),
-        ]
-    )
-    return _summed(out, way.ray[kept], np.exp(-depth) * (phases.T @ a.scatter))
-
-
-def _summed(out: Floats, ray: NDArray[np.int64], values: Floats) -> Floats:
-    """Sums of values (m, n) over the points of each ray."""
-    first = np.flatnonzero(np.diff(ray, prepend=-1))
-    out[ray[first]] = np.add.reduceat(values, first, axis=0)
+    angle = at.angle[kept]
+    haze = atmosphere.aerosol_phase(angle, a.asymmetry)
+    phases = dense[:2] * np.stack([atmosphere.rayleigh_phase(angle), haze])
+    _add(out, way.ray[kept], np.exp(-depth) * (phases.T @ a.scatter))
     return out
 
 
+def _add(out: Floats, ray: NDArray[np.int64], values: Floats) -> None:
+    """Add up values (m, n) at the points of each ray."""
+    first = np.flatnonzero(np.diff(ray, prepend=-1))
+    out[ray[first]] += np.add.reduceat(values, first, axis=0)
+
+
 class Plan(NamedTuple):
-    """How points on rays see a field, all float32: the cells' corners and their shares, 4 of (m,);
-    look (m, 2, harmonics): of both phase functions; weights (m, 2, n): what reaches a ray's start.
+    """How some points on rays see a field, all float32: the cells' corners and their shares, 4 of
+    (m,); harmonics: those that count; look (m, 1, harmonics): by a phase function; weights (m, n):
+    what reaches a ray's start.
     """
 
-    count: int
     ray: NDArray[np.int64]
     corners: list[NDArray[np.int64]]
     shares: list[NDArray[np.float32]]
+    harmonics: NDArray[np.int64]
     look: NDArray[np.float32]
     weights: NDArray[np.float32]
 
 
-def plan(a: Air, angles: Floats, way: Rays, at: Places) -> Plan:
-    """The plan of points on rays for a field of sun angles."""
+def plans(a: Air, angles: Floats, way: Rays, at: Places) -> list[Plan]:
+    """How points on rays see a field of sun angles: by the air, and where there is some, by haze."""
     dense = atmosphere.densities(at.height)[:2] * way.weight
     h, x = _between(HEIGHTS, at.height)
     s, y = _between(angles, np.arccos(at.sun))
-    pairs = [(i, j) for i in (0, 1) for j in (0, 1)]
-    look = harmonics(at.mu, at.turn).T[:, None] * a.moments[:, DEGREES]
-    share = np.exp(-(way.columns.T @ a.extinct))[:, None]
-    return Plan(
-        len(way.ground),
-        way.ray,
-        [(h + i) * len(angles) + s + j for i, j in pairs],
-        [((x if i else 1 - x) * (y if j else 1 - y)).astype(np.float32) for i, j in pairs],
-        look.astype(np.float32),
-        (share * dense.T[:, :, None] * a.scatter).astype(np.float32),
-    )
+    share = np.exp(-(way.columns.T @ a.extinct))
+    look = harmonics(at.mu, at.turn)
+    made = []
+    for kind, low in enumerate((at.height < TOP, at.height < HAZY)):
+        own = np.flatnonzero(low)
+        seen = np.flatnonzero(a.moments[kind][DEGREES] != 0.0)
+        if not (len(own) and a.scatter[kind].any()):
+            continue
+        by = [(i, j, x[own] if i else 1.0 - x[own], y[own] if j else 1.0 - y[own]) for i, j in CORNERS]
+        shown = (look[seen][:, own] * a.moments[kind][DEGREES[seen], None]).T[:, None]
+        made.append(
+            Plan(
+                way.ray[own],
+                [(h[own] + i) * len(angles) + s[own] + j for i, j, _, _ in by],
+                [(u * v).astype(np.float32) for _, _, u, v in by],
+                seen,
+                np.ascontiguousarray(shown, np.float32),
+                (share[own] * dense[kind, own, None] * a.scatter[kind]).astype(np.float32),
+            )
+        )
+    return made
 
 
 class Field(NamedTuple):
@@ -239,12 +244,20 @@ class Field(NamedTuple):
     moments: Floats
     ground: Floats
 
-    def scattered(self, plan: Plan) -> Floats:
+    def scattered(self, seen: list[Plan], count: int) -> Floats:
         """The light of this field that is scattered into rays, (count, n)."""
-        flat = self.moments.astype(np.float32).reshape(-1, *self.moments.shape[2:])
-        there = sum(w[:, None, None] * flat[i] for i, w in zip(plan.corners, plan.shares, strict=True))
-        value = (np.matmul(plan.look, there) * plan.weights).sum(axis=1)
-        return _summed(np.zeros((plan.count, value.shape[1])), plan.ray, value.astype(np.float64))
+        out = np.zeros((count, self.moments.shape[-1]))
+        for plan in seen:
+            flat = self.moments[:, :, plan.harmonics].astype(np.float32)
+            flat = flat.reshape(-1, *flat.shape[2:])
+            for first in range(0, len(plan.ray), PIECE):
+                own = slice(first, first + PIECE)
+                there = np.zeros((1, 1, 1), np.float32)
+                for i, w in zip(plan.corners, plan.shares, strict=True):
+                    there = there + w[own, None, None] * flat[i[own]]
+                value = np.matmul(plan.look[own], there)[:, 0] * plan.weights[own]
+                _add(out, plan.ray[own], value.astype(np.float64))
+        return np.maximum(out, 0.0)
 
     def reflected(
         self, a: Air, way: Rays, sun: Floats, albedo: Floats, mu: Floats, turn: Floats, r: Floats
@@ -300,7 +313,7 @@ def field(a: Air, albedo: Floats, sun: float) -> Field:
     at = places(*(v[way.ray] for v in full), way.t)
     count = radius.size
     bands = a.extinct.shape[1]
-    single, seen = once(a, way, at, count), plan(a, angles, way, at)
+    single, seen = once(a, way, at, count), plans(a, angles, way, at)
     look = harmonics(cosines, turned).reshape(-1, *shape)
     solid = np.broadcast_to((span * 2.0 * np.pi / TURNS)[:, None, :, None], shape)
     above = np.maximum(mu[0], 0.0)[None, :, None, None] * solid[0][..., None]
@@ -310,7 +323,7 @@ def field(a: Air, albedo: Floats, sun: float) -> Field:
         np.zeros((len(angles), bands)),
     )
     for _ in range(ORDERS):
-        light = single + found.scattered(seen)
+        light = single + found.scattered(seen, count)
         light += found.reflected(a, way, suns, albedo, cosines, turned, radius)
         light = light.reshape(*shape, bands)
         moments = np.einsum("kpsdt,psdt,psdtn->pskn", look, solid, light, optimize=True)
@@ -359,7 +372,7 @@ def radiance(
     steep, which = np.unique(mu, return_inverse=True)
     way = _spread(rays(radius[: len(steep)], steep, VIEW_NODES // 2), which)
     at = places(radius[way.ray], suns[way.ray], mu[way.ray], turn[way.ray], way.t)
-    further = found.scattered(plan(dim, found.angles, way, at))
+    further = found.scattered(plans(dim, found.angles, way, at), len(mu))
     further += found.reflected(dim, way, suns, low, mu, turn, radius)
     fine = air(given, lambdas)
     way = rays(radius, mu, VIEW_NODES, _shadow(radius, suns, mu, turn))
