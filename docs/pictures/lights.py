@@ -168,4 +168,9 @@ LIGHTS = {
         lights.CubeMap(image=SCENES / "three_spheres" / "sky.png", scale=1.0),
         room=False,
     ),
+    "sky": lit(
+        "The sun at 12 degrees in clear air: `sun_elevation`, `aerosol` and `ozone` make all colours.",
+        lights.Sky(sun_elevation=12.0, sun_azimuth=-118.0),
+        room=False,
+    ),
 }  # fmt: skip

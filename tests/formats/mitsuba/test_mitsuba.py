@@ -537,7 +537,8 @@ ERRORS = {
     '<shape type="shapegroup"><shape type="instance"/></shape>': r":2: <shape type=.instance.>"
     ": cannot stand in a shapegroup",
     '<emitter type="sky"/>': "unknown emitter",
-    '<emitter type="sunsky"/>': "<emitter type=.sunsky.>: is a plugin of Mitsuba that is not supp",
+    '<emitter type="timed_sunsky"/>': "timed_sunsky.>: is a plugin of Mitsuba that is not supp",
+    '<emitter type="sunsky"/>': "<emitter type=.sunsky.>: needs a 'sun_direction'",
     '<integrator type="bdpt"/>': "unknown integrator",
     '<bsdf type="diffuse"><float name="foo" value="1"/></bsdf>': "has no parameter 'foo'",
     '<bsdf type="diffuse"><float name="reflectance" value="x"/></bsdf>': "must be numbers",

@@ -45,15 +45,7 @@ def lower_sky(lamp: Sky, encoder: Encoder) -> tuple[str, dict[str, ArrayLike], f
 
     Raises SceneError for a transform that is more than a rotation.
     """
-    axes, spectra = image_lights.axes_of(lamp), encoder.spectra
-    numbers = (
-        lamp.sun_elevation, lamp.altitude, lamp.aerosol, lamp.exponent, lamp.aerosol_albedo,
-        lamp.asymmetry, lamp.ozone, lamp.sky_scale, lamp.sun_scale,
-    )  # fmt: skip
-    albedo: Any = lamp.ground
-    ground = tuple(np.clip(albedo.sample(atmosphere.LAMBDAS), 0.0, 1.0).tolist())
-    given = numbers, ground, spectra.spectral, *spectra.range
-    made = encoder.cache(_content, *given, by=(repr(given),))
+    axes, spectra, made = image_lights.axes_of(lamp), encoder.spectra, _found(lamp, encoder)
     x, y, z = axes.T
     turn, up = np.radians(lamp.sun_azimuth), np.radians(lamp.sun_elevation)
     members: dict[str, ArrayLike] = {
@@ -85,7 +77,23 @@ def lower_sky(lamp: Sky, encoder: Encoder) -> tuple[str, dict[str, ArrayLike], f
 
 def sun_share(lamp: Sky, encoder: Encoder) -> float:
     """Return the share of a sky's samples that its disc gets, 0 where the sun has set."""
-    return float(np.asarray(lower_sky(lamp, encoder)[1]["sun_share"]))
+    return _found(lamp, encoder).sun_share
+
+
+def _found(lamp: Sky, encoder: Encoder) -> _Content:
+    """The tables of a sky, found once."""
+    given = *_numbers(lamp), encoder.spectra.spectral, *encoder.spectra.range
+    return encoder.cache(_content, *given, by=(repr(given),))
+
+
+def _numbers(lamp: Sky) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """What a sky follows from: its parameters, and the albedo of the ground at LAMBDAS."""
+    albedo: Any = lamp.ground
+    ground = np.clip(albedo.sample(atmosphere.LAMBDAS), 0.0, 1.0)
+    return (
+        lamp.sun_elevation, lamp.altitude, lamp.aerosol, lamp.exponent, lamp.aerosol_albedo,
+        lamp.asymmetry, lamp.ozone, lamp.sky_scale, lamp.sun_scale,
+    ), tuple(ground.tolist())  # fmt: skip
 
 
 def height(altitude: float) -> float:
@@ -116,13 +124,7 @@ def directions(at: float, row: ArrayLike, column: ArrayLike) -> Floats:
 def sky_image(lamp: Sky) -> tuple[Floats, Floats]:
     """Radiance at atmosphere.LAMBDAS of the dome and the ground (2, rows + 1, columns / 2 + 1, n),
     and of the sun's disc (rows, columns, n) [W m^-2 sr^-1 nm^-1]."""
-    albedo: Any = lamp.ground
-    ground = np.clip(albedo.sample(atmosphere.LAMBDAS), 0.0, 1.0)
-    numbers = (
-        lamp.sun_elevation, lamp.altitude, lamp.aerosol, lamp.exponent, lamp.aerosol_albedo,
-        lamp.asymmetry, lamp.ozone, lamp.sky_scale, lamp.sun_scale,
-    )  # fmt: skip
-    return _images(numbers, tuple(ground.tolist()))
+    return _images(*_numbers(lamp))
 
 
 def _images(numbers: tuple[float, ...], ground: tuple[float, ...]) -> tuple[Floats, Floats]:
