@@ -169,8 +169,8 @@ LIGHTS = {
         room=False,
     ),
     "sky": lit(
-        "The sun at 12 degrees in clear air: `sun_elevation`, `aerosol` and `ozone` make all colours.",
-        lights.Sky(sun_elevation=12.0, sun_azimuth=-118.0),
+        "A low sun in clear air, both brightened: `sun_elevation` and `aerosol` make all colours.",
+        lights.Sky(sun_elevation=14.0, sun_azimuth=-70.0, sky_scale=2.5, sun_scale=2.5),
         room=False,
     ),
 }  # fmt: skip

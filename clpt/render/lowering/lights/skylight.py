@@ -22,6 +22,7 @@ Floats = NDArray[np.float64]
 DEGREE = 5  # of the harmonics
 HEIGHTS = np.array([0, 0.5, 1.5, 3, 6, 10, 16, 23, 32, 45, 60, 99.0])  # [km]
 AROUND, BETWEEN = 15.0, 2.5  # sun angles: on either side of the observer's, apart [degrees]
+DUSK, AT_DUSK = 89.0, 1.25  # from what sun angle light falls off fast; apart from there [degrees]
 SIDE_ANGLES, TURNS = 6, 6  # directions at a place: above and below its horizon, around
 FAR_NODES, VIEW_NODES = 8, 24  # of a ray's part: from places of the field, from the observer
 COARSE = np.array([360, 390, 420, 460, 500, 550, 575, 603, 640, 700, 830.0])  # [nm], of the field
@@ -288,7 +289,8 @@ def field(a: Air, albedo: Floats, sun: float) -> Field:
     to the vertical; albedo (n,): of the ground."""
     low = max(np.degrees(sun) - AROUND, 0.0)
     high = min(np.degrees(sun) + AROUND, 180.0)
-    angles = np.radians(np.linspace(low, high, int(np.ceil((high - low) / BETWEEN)) + 1))
+    apart = BETWEEN if np.degrees(sun) < DUSK else AT_DUSK
+    angles = np.radians(np.linspace(low, high, int(np.ceil((high - low) / apart)) + 1))
     x, w = np.polynomial.legendre.leggauss(SIDE_ANGLES)
     turns = np.cos(np.pi * (np.arange(TURNS) + 0.5) / TURNS)
     radii = np.maximum(HEIGHTS, 1e-3) + EARTH
