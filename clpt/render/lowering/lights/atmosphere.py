@@ -2,7 +2,7 @@
 
 Lengths are in km. Extinction has three parts: air that scatters after Rayleigh, aerosol, and ozone,
 which absorbs. Optical depths of air: Bodhaine et al. 1999, eq. 30; its depolarisation 0.0279 as
-there. Aerosol: exponential, power law of wavelength (Angstrom 1929), Henyey and Greenstein's phase
+there; its density by height that of the U.S. Standard Atmosphere 1976. Aerosol: exponential, power law of wavelength (Angstrom 1929), Henyey and Greenstein's phase
 function. Ozone lies in a layer after Green 1964. Air does not bend rays here.
 """
 
@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 EARTH = 6371.0  # radius [km]
 TOP = EARTH + 100.0  # beyond, there is nothing
-AIR_HEIGHT, AEROSOL_HEIGHT = 8.0, 1.2  # in which densities fall to 1/e [km]
+AEROSOL_HEIGHT = 1.2  # in which its density falls to 1/e [km]
 OZONE_MIDDLE, OZONE_WIDTH = 23.25, 4.63  # of the layer [km]
 DOBSON = 2.687e20  # molecules over a square metre
 DEPOLARISED = 0.0279 / (2.0 - 0.0279)  # gamma of the phase function of air
@@ -31,6 +31,14 @@ def _solar() -> tuple[Floats, Floats, Floats]:
     return rows[:, 0], rows[:, 1], rows[:, 2] * 1e-25
 
 
+def _air() -> tuple[Floats, Floats]:
+    """Heights [km], and the logarithm of the share of the column in a km, linear in between."""
+    height, density = table("air.csv").T
+    fall = np.diff(np.log(density))
+    return height, np.log(density / (np.diff(density) / fall * np.diff(height)).sum())
+
+
+AIR = _air()
 LAMBDAS, SUNLIGHT, OZONE = _solar()  # [nm], [W m^-2 nm^-1] above the air, [m^2] a molecule
 
 
@@ -69,7 +77,7 @@ def densities(height: ArrayLike) -> Floats:
     layer = np.exp(-np.abs(h - OZONE_MIDDLE) / OZONE_WIDTH)  # even in its argument
     return np.stack(
         [
-            np.exp(-h / AIR_HEIGHT) / AIR_HEIGHT,
+            np.exp(np.interp(h, *AIR)),
             np.exp(-h / AEROSOL_HEIGHT) / AEROSOL_HEIGHT,
             layer / (OZONE_WIDTH * (1.0 + layer) ** 2),
         ]
