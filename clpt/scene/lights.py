@@ -182,7 +182,9 @@ class Sky(Light):
     )
     altitude: float = real(0.0, "of the observer above the ground", "m", 0.0, 60000.0)
     aerosol: float = real(0.1, "optical depth of haze, straight up at 550 nm", low=0.0, high=2.0)
-    exponent: float = real(1.3, "Angstrom's, by which haze thins with wavelength", low=0.0, high=4.0)
+    exponent: float = real(
+        1.3, "Angstrom's, by which haze thins with wavelength", low=0.0, high=4.0
+    )
     aerosol_albedo: float = real(0.95, "share of it that haze scatters", low=0.0, high=1.0)
     asymmetry: float = real(0.76, "mean cosine of what haze scatters", low=-0.9, high=0.9)
     ozone: float = real(300.0, "column of ozone", "Dobson units", 0.0, 1000.0)

@@ -260,7 +260,9 @@ def skies(seed: int = 3):
         "envmap": Envmap(image=wide, to_world=TURNED),
         "cube_map": CubeMap(image=faces, to_world=TURNED @ T.scale([-1, 1, 1])),
         "one_row": Envmap(image=wide[:1]),
-        "sky": Sky(sun_elevation=6.0, sun_azimuth=70.0, altitude=3000.0, sun_scale=0.0, to_world=TURNED),
+        "sky": Sky(
+            sun_elevation=6.0, sun_azimuth=70.0, altitude=3000.0, sun_scale=0.0, to_world=TURNED
+        ),
         **{
             f"default {kind}": cls()
             for kind, cls in light_records.DECLARED.items()

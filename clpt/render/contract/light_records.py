@@ -144,11 +144,19 @@ RECORDS: dict[str, Record] = {
     **COMPUTED,
 }
 # A ray that leaves the scene meets INFINITE lights; PLACED ones have a position.
-INFINITE = (*(cls.kind for cls in LIGHTS if cls.reach == "infinite"), "spectral_envmap", "spectral_sky")
+INFINITE = (
+    *(cls.kind for cls in LIGHTS if cls.reach == "infinite"),
+    "spectral_envmap",
+    "spectral_sky",
+)
 PLACED = (*(cls.kind for cls in LIGHTS if cls.reach == "placed"), "image_spot")
 FRONT, ALONG, BOTH = range(3)  # LightRow.emission_mode, see kernels/light/area.cl
 
-BASES = {"spectral_envmap": "envmap", "spectral_sky": "sky", "image_spot": "spot"}  # whose functions a kind uses
+BASES = {
+    "spectral_envmap": "envmap",
+    "spectral_sky": "sky",
+    "image_spot": "spot",
+}  # whose functions a kind uses
 
 KINDS = (*RECORDS, *shape_records.RECORDS)  # LightRow.kind is a position in this tuple
 NODE = Record(

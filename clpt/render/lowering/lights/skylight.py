@@ -78,9 +78,7 @@ def rays(radius: Floats, mu: Floats, count: int, after: Floats | None = None) ->
     down = mu < 0.0
     hits = down & (lowest < EARTH)
     turn = np.where(down, -radius * mu, 0.0)
-    ground = np.where(
-        hits, turn - np.sqrt(np.maximum(EARTH**2 - lowest**2, 0.0)), -1.0
-    )
+    ground = np.where(hits, turn - np.sqrt(np.maximum(EARTH**2 - lowest**2, 0.0)), -1.0)
     end = np.where(down, turn + np.sqrt(TOP**2 - lowest**2), atmosphere.to_top(radius, mu))
     low = np.where(hits, np.maximum(ground, 0.0), turn)
     low = low if after is None else np.maximum(low, after)
@@ -219,7 +217,9 @@ def plans(a: Air, angles: Floats, way: Rays, at: Places) -> list[Plan]:
         seen = np.flatnonzero(a.moments[kind][DEGREES] != 0.0)
         if not (len(own) and a.scatter[kind].any()):
             continue
-        by = [(i, j, x[own] if i else 1.0 - x[own], y[own] if j else 1.0 - y[own]) for i, j in CORNERS]
+        by = [
+            (i, j, x[own] if i else 1.0 - x[own], y[own] if j else 1.0 - y[own]) for i, j in CORNERS
+        ]
         shown = (look[seen][:, own] * a.moments[kind][DEGREES[seen], None]).T[:, None]
         made.append(
             Plan(

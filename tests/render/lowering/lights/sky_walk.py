@@ -30,7 +30,9 @@ def radiance(air: Atmosphere, albedo, sun, height, mu, turn, lambda_nm, count, s
         air_hit, ground = alive[state == 1], alive[state == 2]
         beta[ground] *= albedo
         up = p[ground] / np.linalg.norm(p[ground], axis=1, keepdims=True)
-        found[ground] += beta[ground] / np.pi * np.maximum(up @ toward, 0.0) * _lit(depth, p[ground], toward)
+        found[ground] += (
+            beta[ground] / np.pi * np.maximum(up @ toward, 0.0) * _lit(depth, p[ground], toward)
+        )
         d[ground] = _cosine(rng, up)
         scatter = atmosphere.densities(np.linalg.norm(p[air_hit], axis=1) - EARTH) * depth[:, None]
         share = np.stack([scatter[0], scatter[1] * air.aerosol_albedo])
@@ -55,7 +57,9 @@ def _flight(rng, depth, p, d):
     b = (p * d).sum(axis=1)
     c = (p * p).sum(axis=1)
     root = b * b - c + EARTH**2
-    floor = np.where((root > 0.0) & (b < 0.0), np.maximum(-b - np.sqrt(np.maximum(root, 0.0)), 0.0), np.inf)
+    floor = np.where(
+        (root > 0.0) & (b < 0.0), np.maximum(-b - np.sqrt(np.maximum(root, 0.0)), 0.0), np.inf
+    )
     end = -b + np.sqrt(np.maximum(b * b - c + TOP**2, 0.0))
     state, t = np.where(np.isfinite(floor), 2, 0), np.zeros(n)
     end = np.minimum(end, floor)
