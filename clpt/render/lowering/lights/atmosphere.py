@@ -2,8 +2,9 @@
 
 Lengths are in km. Extinction has three parts: air that scatters after Rayleigh, aerosol, and ozone,
 which absorbs. Optical depths of air: Bodhaine et al. 1999, eq. 30; its depolarisation 0.0279 as
-there; its density by height that of the U.S. Standard Atmosphere 1976. Aerosol: exponential, power law of wavelength (Angstrom 1929), Henyey and Greenstein's phase
-function. Ozone lies in a layer after Green 1964. Air does not bend rays here.
+there; its density by height that of the U.S. Standard Atmosphere 1976. Aerosol: exponential, power
+law of wavelength (Angstrom 1929), Henyey and Greenstein's phase function. Ozone lies in a layer
+after Green 1964. Air does not bend rays here.
 """
 
 from __future__ import annotations

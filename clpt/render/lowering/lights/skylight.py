@@ -205,7 +205,7 @@ class Plan(NamedTuple):
 
 
 def plans(a: Air, angles: Floats, way: Rays, at: Places) -> list[Plan]:
-    """How points on rays see a field of sun angles: by the air, and where there is some, by haze."""
+    """How points on rays see a field of sun angles: by the air, and low down by haze."""
     dense = atmosphere.densities(at.height)[:2] * way.weight
     h, x = _between(HEIGHTS, at.height)
     s, y = _between(angles, np.arccos(at.sun))
@@ -302,17 +302,22 @@ def field(a: Air, albedo: Floats, sun: float) -> Field:
         ],
         axis=1,
     )
+    each = w * (0.5 + 0.5 * x)
     span = np.concatenate(
-        [(1.0 - horizon)[:, None] * w * (0.5 + 0.5 * x), (1.0 + horizon)[:, None] * w * (0.5 + 0.5 * x)], 1
-    )  # fmt: skip
+        [(1.0 - horizon)[:, None] * each, (1.0 + horizon)[:, None] * each], axis=1
+    )
     shape = (len(radii), len(angles), 2 * SIDE_ANGLES, TURNS)
     one = rays(np.repeat(radii, 2 * SIDE_ANGLES), mu.ravel(), FAR_NODES)
     number = np.arange(len(radii) * 2 * SIDE_ANGLES).reshape(len(radii), 1, -1, 1)
     way = _spread(one, np.broadcast_to(number, shape).ravel())
-    full = [np.broadcast_to(v, shape).ravel() for v in (
-        radii[:, None, None, None], np.cos(angles)[:, None, None], mu[:, None, :, None], turns)]  # fmt: skip
-    radius, suns, cosines, turned = full
-    at = places(*(v[way.ray] for v in full), way.t)
+    starts = (
+        radii[:, None, None, None],
+        np.cos(angles)[:, None, None],
+        mu[:, None, :, None],
+        turns,
+    )
+    radius, suns, cosines, turned = (np.broadcast_to(v, shape).ravel() for v in starts)
+    at = places(radius[way.ray], suns[way.ray], cosines[way.ray], turned[way.ray], way.t)
     count = radius.size
     bands = a.extinct.shape[1]
     single, seen = once(a, way, at, count), plans(a, angles, way, at)
