@@ -89,6 +89,7 @@ def test_air_masses_and_depths_are_the_published_ones():
     assert CLEAR.depths([600.0])[2] == pytest.approx(0.040, rel=0.08)
 
 
+@pytest.mark.slow
 def test_illuminance_is_that_of_days_and_dusks():
     """On level ground, clear: Seidelmann's table (Explanatory Supplement 1992) within 25 %;
     a high sun gives about 100 klx, of which a tenth to a fourth is the sky's."""
@@ -98,6 +99,7 @@ def test_illuminance_is_that_of_days_and_dusks():
         assert 0.75 < xyz(sum(flux(elevation)))[1] / lux < 1.25, elevation
 
 
+@pytest.mark.slow
 def test_colours_of_the_hours():
     """Blue above at noon, red at a sunset's horizon, and blue above at dusk, by ozone."""
     x, y, z = xyz(image(50.0)[0][0, 0, 0])
@@ -166,6 +168,7 @@ def scene(mode: str) -> Scene:
     return Scene(camera=Perspective(fov=100), lights=[Sky(sun_elevation=8.0)], film=film)
 
 
+@pytest.mark.slow
 def test_colours_agree_in_both_modes_and_splits_give_the_same_bits():
     rgb, spectral = (np.asarray(clpt.render(scene(m), 64))[..., :3] for m in ("rgb", "spectral"))
     np.testing.assert_allclose(spectral.mean(axis=(0, 1)), rgb.mean(axis=(0, 1)), rtol=0.03)
