@@ -164,7 +164,37 @@ class CubeMap(Light):
     to_world: Matrix4 = host(np.eye(4), "rotation, (4, 4)")
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sky(Light):
+    """The sky and the sun of a clear day or dusk, by the physics of air over a round earth.
+
+    In the light's own space +y is up. Below the horizon lies an even ground. Its light is physical:
+    1 is no day's brightness, so an `exposure` goes with it at dusk. See docs/sky.md.
+    """
+
+    reach = "infinite"
+
+    sun_elevation: float = real(
+        30.0, "of the sun's middle above the level; below 0 in twilight", "degrees", -12.0, 90.0
+    )
+    sun_azimuth: float = real(
+        0.0, "of the sun, from +z toward +x of the light", "degrees", -360.0, 360.0
+    )
+    altitude: float = real(0.0, "of the observer above the ground", "m", 0.0, 60000.0)
+    aerosol: float = real(0.1, "optical depth of haze, straight up at 550 nm", low=0.0, high=2.0)
+    exponent: float = real(
+        1.3, "Angstrom's, by which haze thins with wavelength", low=0.0, high=4.0
+    )
+    aerosol_albedo: float = real(0.95, "share of it that haze scatters", low=0.0, high=1.0)
+    asymmetry: float = real(0.76, "mean cosine of what haze scatters", low=-0.9, high=0.9)
+    ozone: float = real(300.0, "column of ozone", "Dobson units", 0.0, 1000.0)
+    ground: SpectrumLike = reflectance(0.2, "albedo of the ground around", textured=False)
+    sky_scale: float = real(1.0, "factor on the sky and the ground", low=0.0)
+    sun_scale: float = real(1.0, "factor on the sun's disc; 0: without it", low=0.0)
+    to_world: Matrix4 = host(np.eye(4), "rotation, (4, 4)")
+
+
 ON_SHAPES = (Area, DirectionalArea)
 KINDS = (
-    *ON_SHAPES, Point, Spot, Projector, Goniometric, Directional, Constant, Envmap, CubeMap,
+    *ON_SHAPES, Point, Spot, Projector, Goniometric, Directional, Constant, Envmap, CubeMap, Sky,
 )  # fmt: skip

@@ -168,4 +168,9 @@ LIGHTS = {
         lights.CubeMap(image=SCENES / "three_spheres" / "sky.png", scale=1.0),
         room=False,
     ),
+    "sky": lit(
+        "A low sun in clear air, both brightened: `sun_elevation` and `aerosol` make all colours.",
+        lights.Sky(sun_elevation=14.0, sun_azimuth=-70.0, sky_scale=2.5, sun_scale=2.5),
+        room=False,
+    ),
 }  # fmt: skip

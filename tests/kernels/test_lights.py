@@ -23,6 +23,7 @@ from clpt.scene.lights import (
     Goniometric,
     Point,
     Projector,
+    Sky,
     Spot,
 )
 from clpt.scene.shapes import Cube, Cylinder, Disk, Mesh, Rectangle, Sphere
@@ -177,7 +178,7 @@ def test_lamps_follow_their_formulas():
 
 
 def test_all_lights_together_are_their_sum():
-    """The choice among fifteen kinds of rows: every pmf counts once."""
+    """The choice among sixteen kinds of rows: every pmf counts once."""
     p, n = np.zeros(3), TILTED
     lamps = [
         Point(position=(1.0, 2.0, 3.0), intensity=(3.0, 1.0, 2.0)),
@@ -189,6 +190,7 @@ def test_all_lights_together_are_their_sum():
         Goniometric(to_world=ABOVE, image=PICTURE, intensity=(1.0, 2.0, 3.0)),
         Envmap(image=np.random.default_rng(1).random((5, 6, 3)), to_world=TURNED, scale=0.3),
         CubeMap(image=np.random.default_rng(2).random((6, 4, 4, 3)), scale=0.2),
+        Sky(sun_azimuth=20.0),
     ]
     glowing = [FORMULAS[k][0] for k in ("disk", "sphere", "rectangle", "triangle")]
     glowing += [glows(Cube, T.translate([2.0, 0.3, 1.0]) @ T.scale(0.4))]
@@ -196,9 +198,8 @@ def test_all_lights_together_are_their_sum():
     alone = [lit([lamp]) for lamp in lamps] + [lit(emitters=[shape]) for shape in glowing]
     parts = [irradiance(scene, p, n, seed=i) for i, scene in enumerate(alone)]
     together = lit(lamps, glowing, radius=3.0)
-    assert set(together.rows.kinds) == set(light_records.KINDS) - {
-        "spectral_envmap"
-    }  # of the other mode
+    other_mode = {"spectral_envmap", "spectral_sky"}
+    assert set(together.rows.kinds) == set(light_records.KINDS) - other_mode
     mean, error = irradiance(together, p, n, count=1 << 18, seed=77)
     expected = np.sum([m for m, _ in parts], axis=0)
     spread = np.sqrt(error**2 + np.sum([e**2 for _, e in parts], axis=0))
@@ -259,6 +260,9 @@ def skies(seed: int = 3):
         "envmap": Envmap(image=wide, to_world=TURNED),
         "cube_map": CubeMap(image=faces, to_world=TURNED @ T.scale([-1, 1, 1])),
         "one_row": Envmap(image=wide[:1]),
+        "sky": Sky(
+            sun_elevation=6.0, sun_azimuth=70.0, altitude=3000.0, sun_scale=0.0, to_world=TURNED
+        ),
         **{
             f"default {kind}": cls()
             for kind, cls in light_records.DECLARED.items()

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from clpt import images
+from clpt import images, transforms
 from clpt.formats.mitsuba.limits import within
 from clpt.formats.mitsuba.media import around
 from clpt.formats.mitsuba.properties import Context, Properties, unknown
@@ -146,6 +146,43 @@ def _envmap(props: Properties) -> Parameters:
     }
 
 
+def _sky(props: Properties) -> Parameters:
+    """Mitsuba's skies, whose up is +z; their turbidity as haze after Angstrom (Preetham 1999)."""
+    element = props.element
+    if "sun_direction" not in props.named:
+        raise element.error(
+            "needs a 'sun_direction'; of a place and a time, compute it: that of the sun in the "
+            "emitter's own space, +z up"
+        )
+    d = np.array(props.vector("sun_direction", None))
+    place = props.placement()
+    if not np.any(d):
+        raise element.error("the sun_direction has no length")
+    d = np.linalg.inv(place[:3, :3]) @ d  # it is given in the world
+    elevation = float(np.degrees(np.arctan2(d[2], np.hypot(d[0], d[1]))))
+    turbidity = props.number("turbidity", 3.0)
+    if not 1.0 <= turbidity <= 10.0:
+        raise element.error("'turbidity' must lie between 1 and 10")
+    haze = max(0.04608 * turbidity - 0.04586, 0.0) * 0.55**-1.3
+    props.ignore("sun_aperture", "complex_sun", "sun_aperture_scale")
+    ground = reflectance(props, "albedo", 0.3)
+    if isinstance(ground, Texture):
+        raise element.error("'albedo' cannot be a texture")
+    props.context.warn(
+        element, f"becomes a sky by physics: turbidity {turbidity:g} as haze of optical depth "
+        f"{haze:.2f}, a sun 0.533 degrees wide, an even ground below the horizon"
+    )  # fmt: skip
+    return {
+        "sun_elevation": elevation,
+        "sun_azimuth": float(np.degrees(np.arctan2(d[0], -d[1]))),
+        "aerosol": min(haze, 2.0),
+        "ground": ground,
+        "sun_scale": props.number("sun_scale", 1.0),
+        "sky_scale": props.number("sky_scale", 1.0),
+        "to_world": place @ transforms.rotate([1, 0, 0], 90.0),  # +y up
+    }
+
+
 ON_SHAPES: dict[str, tuple[type[Light], Callable[[Properties], Parameters]]] = {
     "area": (lights.Area, _area),
     "directionalarea": (lights.DirectionalArea, _directional_area),
@@ -157,4 +194,5 @@ PLUGINS: dict[str, tuple[type[Light], Callable[[Properties], Parameters]]] = {
     "directional": (lights.Directional, _directional),
     "constant": (lights.Constant, _constant),
     "envmap": (lights.Envmap, _envmap),
+    "sunsky": (lights.Sky, _sky),
 }

@@ -26,7 +26,7 @@ OBJECTS = {
 }  # fmt: skip
 UNSUPPORTED = {
     "measured", "measured_polarized", "sdfgrid", "ellipsoids", "ellipsoidsmesh",
-    "sunsky", "timed_sunsky", "distant", "irradiancemeter", "radiancemeter", "batch", "specfilm",
+    "timed_sunsky", "distant", "irradiancemeter", "radiancemeter", "batch", "specfilm",
     "stokes",
 }  # fmt: skip
 FLAT_SIZE = 1e-5  # thickness over size of a shape that is flattened

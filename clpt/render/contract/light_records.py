@@ -35,6 +35,25 @@ IMAGE_RECORDS: dict[str, Record] = {
         number=("integer", "row in `spectra`: the number of the band by wavelength"),
     ),
 }
+_SKY = {
+    **_IMAGE,
+    "horizon": ("real", "above the level [rad]"),
+    "sun_texels": ("integer", "first float of the first texel of the sun's disc"),
+    "sun_cos": ("real", "of the angle of the sun's middle above the level"),
+    "sun_sin": ("real", ""),
+    "sun_radius": ("real", "sine of the radius of its disc"),
+    "sun_share": ("real", "of samples that go to the disc"),
+}
+SKY_RECORDS: dict[str, Record] = {
+    "sky": Record("Sky", "A sky; z is the level direction toward the sun.", **_SKY),
+    "spectral_sky": Record(
+        "SpectralSky",
+        "A sky of spectra.",
+        **_SKY,
+        bands=("integer", "values in a texel"),
+        number=("integer", "row in `spectra`: the number of the band by wavelength"),
+    ),
+}
 _PLACEMENT = {
     "position": ("vec3", "[m]"),
     "x": ("vec3", "the light's own axes in the world"),
@@ -117,6 +136,7 @@ COMPUTED: dict[str, Record] = {
     ),
     **PROJECTED_RECORDS,
     **IMAGE_RECORDS,
+    **SKY_RECORDS,
 }
 DECLARED = {cls.kind: cls for cls in LIGHTS if cls.reach != "surface" and cls.kind not in COMPUTED}
 RECORDS: dict[str, Record] = {
@@ -124,11 +144,19 @@ RECORDS: dict[str, Record] = {
     **COMPUTED,
 }
 # A ray that leaves the scene meets INFINITE lights; PLACED ones have a position.
-INFINITE = (*(cls.kind for cls in LIGHTS if cls.reach == "infinite"), "spectral_envmap")
+INFINITE = (
+    *(cls.kind for cls in LIGHTS if cls.reach == "infinite"),
+    "spectral_envmap",
+    "spectral_sky",
+)
 PLACED = (*(cls.kind for cls in LIGHTS if cls.reach == "placed"), "image_spot")
 FRONT, ALONG, BOTH = range(3)  # LightRow.emission_mode, see kernels/light/area.cl
 
-BASES = {"spectral_envmap": "envmap", "image_spot": "spot"}  # whose functions a kind uses
+BASES = {
+    "spectral_envmap": "envmap",
+    "spectral_sky": "sky",
+    "image_spot": "spot",
+}  # whose functions a kind uses
 
 KINDS = (*RECORDS, *shape_records.RECORDS)  # LightRow.kind is a position in this tuple
 NODE = Record(

@@ -504,6 +504,23 @@ def test_direct_light_by_one_strategy_only_is_a_warning(scene):
     assert "bsdf_samples of 0" in scene(none).warnings[0]
 
 
+def test_a_sunsky_shines_from_where_its_sun_is(scene):
+    """The sun is where sun_direction says in the world, whatever to_world is; up is its +z."""
+    toward = np.array([0.3, -0.5, 0.6])
+    sun = '<vector name="sun_direction" value="0.3, -0.5, 0.6"/><float name="turbidity" value="4"/>'
+    turn = '<transform name="to_world"><rotate x="1" angle="-20"/></transform>'
+    for more in ("", turn):
+        made = scene(f'<emitter type="sunsky">{sun}{more}</emitter>')
+        lamp = made.lights[0]
+        up, around = np.radians([lamp.sun_elevation, lamp.sun_azimuth])
+        own = [np.sin(around) * np.cos(up), np.sin(up), np.cos(around) * np.cos(up)]
+        found = lamp.to_world[:3, :3] @ own
+        np.testing.assert_allclose(found, toward / np.linalg.norm(toward), atol=1e-6)
+        assert "sky by physics" in made.warnings[0] and lamp.aerosol == pytest.approx(
+            0.30, abs=0.01
+        )
+
+
 def test_checkerboard_of_numbers_is_mitsubas(scene):
     """It swaps the two where it asks for a number; a reference elsewhere sees them as they are."""
     mi = pytest.importorskip("mitsuba")
@@ -537,7 +554,8 @@ ERRORS = {
     '<shape type="shapegroup"><shape type="instance"/></shape>': r":2: <shape type=.instance.>"
     ": cannot stand in a shapegroup",
     '<emitter type="sky"/>': "unknown emitter",
-    '<emitter type="sunsky"/>': "<emitter type=.sunsky.>: is a plugin of Mitsuba that is not supp",
+    '<emitter type="timed_sunsky"/>': "timed_sunsky.>: is a plugin of Mitsuba that is not supp",
+    '<emitter type="sunsky"/>': "<emitter type=.sunsky.>: needs a 'sun_direction'",
     '<integrator type="bdpt"/>': "unknown integrator",
     '<bsdf type="diffuse"><float name="foo" value="1"/></bsdf>': "has no parameter 'foo'",
     '<bsdf type="diffuse"><float name="reflectance" value="x"/></bsdf>': "must be numbers",

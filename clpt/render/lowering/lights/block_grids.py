@@ -38,8 +38,13 @@ class BlockGrid(NamedTuple):
     total: float
 
 
-def of(corners: NDArray[Any], directions: Directions) -> BlockGrid:
-    """Return the blocks of grids (k, r + 1, c + 1) of weights at corners, one below the other."""
+def of(
+    corners: NDArray[Any], directions: Directions, angles: tuple[float, float] | None = None
+) -> BlockGrid:
+    """Return the blocks of grids (k, r + 1, c + 1) of weights at corners, one below the other.
+
+    angles: of a row and of a column [rad]; by default those of a sphere, or of a cube's faces.
+    """
     grids, per, columns = corners.shape[0], corners.shape[1] - 1, corners.shape[2] - 1
     rows = grids * per
     down, across = (DOWN, ACROSS) if grids == 1 else (4, 4)
@@ -67,10 +72,8 @@ def of(corners: NDArray[Any], directions: Directions) -> BlockGrid:
         (fine_rows, rows), (fine_columns, columns))]  # fmt: skip
     toward = directions(*np.meshgrid(*places, indexing="ij"))
     owner = (fine_rows // block_rows)[:, None] * strips + fine_columns // block_columns
-    # angles of a row and of a column, of a sphere or of a cube's face
-    row, column = (
-        (np.pi / per, 2.0 * np.pi / columns) if grids == 1 else np.pi / 2.0 / per * np.ones(2)
-    )
+    sphere = (np.pi / per, 2.0 * np.pi / columns)
+    row, column = angles or (sphere if grids == 1 else (np.pi / 2.0 / per,) * 2)
     step = max(block_rows // FINER, 1) * row, max(block_columns // FINER, 1) * column
     lit = np.empty((SIDE * SIDE + 1, bands * strips))
     for index in range(SIDE * SIDE):

@@ -21,12 +21,12 @@ from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.geometry import analytic, shapes, triangles
 from clpt.render.lowering.geometry.geometry import Geometry
 from clpt.render.lowering.index import SceneIndex
-from clpt.render.lowering.lights import image_lights, light_bounds
+from clpt.render.lowering.lights import image_lights, light_bounds, sky
 from clpt.render.lowering.lights.aims import is_sharp, sharp_pieces
 from clpt.render.lowering.lights.lights import Emitter, LightRows, row_order
 from clpt.scene import materials as mt
 from clpt.scene.integrators import AUTO, Auto, Integrator, Path, Vcm
-from clpt.scene.lights import CubeMap, Envmap
+from clpt.scene.lights import CubeMap, Envmap, Sky
 from clpt.scene.shapes import Shape
 
 SMALL = 0.03  # of the sphere that is seen: up to it a light is small
@@ -176,6 +176,8 @@ def _small_lights(
         lamp = lamps[i]
         if isinstance(lamp, (Envmap, CubeMap)):
             small = image_lights.extent(lamp, encoder, SUN) < SMALL
+        elif isinstance(lamp, Sky):
+            small = sky.sun_share(lamp, encoder) >= SUN
         else:
             small = lamp.reach in ("placed", "distant") and getattr(lamp, "falloff", True)
         if small:

@@ -22,7 +22,7 @@ from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.lights import block_grids
 from clpt.render.lowering.lowering_cache import version
 from clpt.render.lowering.textures.texels import bands, texels
-from clpt.scene.lights import CubeMap, Envmap
+from clpt.scene.lights import CubeMap, Envmap, Sky
 from clpt.spectra import Tabulated, luminance
 from clpt.spectral_exr import SpectralImage
 
@@ -59,7 +59,7 @@ def lower_image(lamp: Envmap | CubeMap, encoder: Encoder) -> tuple[dict[str, Arr
     Those of a spectral image have `bands`. Raises SceneError for what is no image, or a transform
     that is more than a rotation.
     """
-    axes, made = _axes(lamp), _content(lamp, encoder)
+    axes, made = axes_of(lamp), _content(lamp, encoder)
     if isinstance(lamp, Envmap):
         cell = np.pi / (made.height - 1) * 2.0 * np.pi / made.width
     else:
@@ -155,7 +155,7 @@ def _cube(given: Any, scale: float, spectral: bool) -> _Content:
     return _Content(size, size, values, corners, block_grids.of(corners, cube_directions))
 
 
-def _axes(lamp: Envmap | CubeMap) -> NDArray[np.float64]:
+def axes_of(lamp: Envmap | CubeMap | Sky) -> NDArray[np.float64]:
     """Where the light's own axes point, the columns of (3, 3)."""
     matrix = np.asarray(lamp.to_world, np.float64)
     where = f"{lamp.kind}.to_world"

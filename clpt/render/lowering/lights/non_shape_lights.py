@@ -11,7 +11,7 @@ from clpt.errors import SceneError
 from clpt.render.contract import light_records
 from clpt.render.contract.light_records import RECORDS
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.lights import image_lights, projected
+from clpt.render.lowering.lights import image_lights, projected, sky
 from clpt.render.lowering.textures.texels import pixels
 from clpt.scene import lights
 from clpt.scene.lights import Light
@@ -56,6 +56,8 @@ def lower_lamp(lamp: Light, encoder: Encoder, scene_radius: float) -> Lowered:
     if isinstance(lamp, (lights.Envmap, lights.CubeMap)):
         members, strength = image_lights.lower_image(lamp, encoder)
         kind = "spectral_envmap" if "bands" in members else kind
+    elif isinstance(lamp, lights.Sky):
+        kind, members, strength = sky.lower_sky(lamp, encoder)
     else:
         emissions = _emissions(lamp)
         rows = {

@@ -1,0 +1,135 @@
+"""The air over a round earth: what scatters and absorbs in it, how deep it is along a ray.
+
+Lengths are in km. Extinction has three parts: air that scatters after Rayleigh, aerosol, and ozone,
+which absorbs. Optical depths of air: Bodhaine et al. 1999, eq. 30; its depolarisation 0.0279 as
+there; its density by height that of the U.S. Standard Atmosphere 1976. Aerosol: exponential, power
+law of wavelength (Angstrom 1929), Henyey and Greenstein's phase function. Ozone lies in a layer
+after Green 1964. Air does not bend rays here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from clpt.spectra.data import table
+
+Floats = NDArray[np.float64]
+
+EARTH = 6371.0  # radius [km]
+TOP = EARTH + 100.0  # beyond, there is nothing
+AEROSOL_HEIGHT = 1.2  # in which its density falls to 1/e [km]
+OZONE_MIDDLE, OZONE_WIDTH = 23.25, 4.63  # of the layer [km]
+DOBSON = 2.687e20  # molecules over a square metre
+DEPOLARISED = 0.0279 / (2.0 - 0.0279)  # gamma of the phase function of air
+NODES = 32  # of a column to the top
+
+
+def _solar() -> tuple[Floats, Floats, Floats]:
+    rows = table("sky.csv")
+    return rows[:, 0], rows[:, 1], rows[:, 2] * 1e-25
+
+
+def _air() -> tuple[Floats, Floats]:
+    """Heights [km], and the logarithm of the share of the column in a km, linear in between."""
+    height, density = table("air.csv").T
+    fall = np.diff(np.log(density))
+    return height, np.log(density / (np.diff(density) / fall * np.diff(height)).sum())
+
+
+AIR = _air()
+LAMBDAS, SUNLIGHT, OZONE = _solar()  # [nm], [W m^-2 nm^-1] above the air, [m^2] a molecule
+
+
+@dataclass(frozen=True)
+class Atmosphere:
+    """What is in the air.
+
+    aerosol: optical depth at 550 nm; exponent: of its fall with wavelength; aerosol_albedo: share
+    that is scattered; asymmetry: g of its phase function; ozone [Dobson units].
+    """
+
+    aerosol: float
+    exponent: float
+    aerosol_albedo: float
+    asymmetry: float
+    ozone: float
+
+    def depths(self, lambdas: ArrayLike) -> Floats:
+        """Optical depths straight up from the sea of air, aerosol and ozone, (3, n)."""
+        nm = np.asarray(lambdas, np.float64)
+        molecule = np.interp(nm, LAMBDAS, OZONE)
+        aerosol = self.aerosol * (nm / 550.0) ** -self.exponent
+        return np.stack([air_depth(nm), aerosol, molecule * DOBSON * self.ozone])
+
+
+def air_depth(lambdas: ArrayLike) -> Floats:
+    """Optical depth of clear air over the sea at lambdas [nm] (Bodhaine et al. 1999, eq. 30)."""
+    square = (np.asarray(lambdas, np.float64) / 1000.0) ** 2
+    above = 1.0455996 - 341.29061 / square - 0.90230850 * square
+    return 0.0021520 * above / (1.0 + 0.0027059889 / square - 85.968563 * square)
+
+
+def densities(height: ArrayLike) -> Floats:
+    """Shares of the columns of air, aerosol and ozone in a km at heights [km], (3, ...)."""
+    h = np.asarray(height, np.float64)
+    layer = np.exp(-np.abs(h - OZONE_MIDDLE) / OZONE_WIDTH)  # even in its argument
+    return np.stack(
+        [
+            np.exp(np.interp(h, *AIR)),
+            np.exp(-h / AEROSOL_HEIGHT) / AEROSOL_HEIGHT,
+            layer / (OZONE_WIDTH * (1.0 + layer) ** 2),
+        ]
+    )
+
+
+def to_top(radius: Floats, cosine: Floats) -> Floats:
+    """How far the top is from points at a radius along rays with a cosine to the vertical [km]."""
+    square = np.maximum(TOP**2 - radius**2 * (1.0 - cosine**2), 0.0)
+    return np.maximum(np.sqrt(square) - radius * cosine, 0.0)
+
+
+def columns(radius: ArrayLike, cosine: ArrayLike) -> Floats:
+    """Columns (3, ...) from a radius [km] up to the top, in those straight up from the sea.
+
+    cosine: to the vertical, 0 to 1.
+    """
+    r, mu = np.broadcast_arrays(np.asarray(radius, np.float64), np.asarray(cosine, np.float64))
+    x, w = np.polynomial.legendre.leggauss(NODES)
+    x, w = 0.5 + 0.5 * x, 0.5 * w
+    far, total = to_top(r, mu), np.zeros((3, *r.shape))
+    for u, weight in zip(x, w, strict=True):
+        t = far * u**3
+        height = np.sqrt(r * r + t * t + 2.0 * r * mu * t) - EARTH
+        total += densities(height) * (weight * 3.0 * u * u * far)
+    return total
+
+
+def sun_columns(radius: ArrayLike, cosine: ArrayLike) -> tuple[Floats, NDArray[np.bool_]]:
+    """Columns (3, ...) toward the sun, and whether it is seen past the earth.
+
+    cosine: of the sun's direction to the vertical, -1 to 1.
+    """
+    r, mu = np.broadcast_arrays(np.asarray(radius, np.float64), np.asarray(cosine, np.float64))
+    nearest = r * np.sqrt(np.maximum(1.0 - mu * mu, 0.0))
+    seen = (mu >= 0.0) | (nearest > EARTH)
+    found = columns(r, np.abs(mu))
+    past = (mu < 0.0) & seen
+    if past.any():
+        found[:, past] = 2.0 * columns(nearest[past], np.zeros(int(past.sum()))) - found[:, past]
+    return found, seen
+
+
+def rayleigh_phase(cosine: ArrayLike) -> Floats:
+    """Phase function of air [1/sr] (Chandrasekhar 1960, with its depolarisation)."""
+    square = np.asarray(cosine, np.float64) ** 2
+    g = DEPOLARISED
+    return 3.0 / (16.0 * np.pi * (1.0 + 2.0 * g)) * ((1.0 + 3.0 * g) + (1.0 - g) * square)
+
+
+def aerosol_phase(cosine: ArrayLike, g: float) -> Floats:
+    """Henyey and Greenstein's phase function [1/sr]."""
+    below = 1.0 + g * g - 2.0 * g * np.asarray(cosine, np.float64)
+    return (1.0 - g * g) / (4.0 * np.pi * below**1.5)
