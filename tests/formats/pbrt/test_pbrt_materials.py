@@ -8,6 +8,7 @@ from scipy import integrate
 
 from clpt import spectra
 from clpt.errors import SceneError
+from clpt.formats import load
 from clpt.formats.pbrt import coated_albedo
 from clpt.formats.pbrt.layered import body
 from clpt.formats.pbrt.materials import MAKERS, material
@@ -208,6 +209,37 @@ def test_bodies_by_their_reflectance():
     assert isinstance(
         make("subsurface", at, roughness=("float", 0.3), **given), materials.RoughDielectric
     )
+
+
+BODIES = """
+MakeNamedMaterial "wax" "string type" "subsurface" "string name" "Skin1" "float scale" 1000
+NamedMaterial "wax"
+Shape "sphere"
+Shape "disk"
+Material "subsurface" "rgb sigma_a" [ 1 2 3 ] "rgb sigma_s" [ 4 5 6 ]
+Shape "sphere"
+Material "diffuse"
+Shape "sphere"
+"""
+
+
+@pytest.mark.parametrize(("lamp", "walks"), [("infinite", True), ("point", False)])
+def test_files_with_bodies(tmp_path, lamp, walks):
+    """Shapes of one material share its medium; a small lamp would not be found through glass."""
+    file = tmp_path / "wax.pbrt"
+    file.write_text(f'WorldBegin\nLightSource "{lamp}"\n{BODIES}')
+    scene = load(file)
+    wax, disk, other, stone = (shape.interior for shape in scene.shapes)
+    assert (wax is not None) == walks and wax is disk and stone is None
+    if walks:
+        assert wax.coefficients(spectral=False)[1].to_rgb("unbounded") == pytest.approx(
+            (740, 880, 1010)
+        )
+        assert other.coefficients(spectral=False)[0].to_rgb("unbounded") == pytest.approx((1, 2, 3))
+    surface = materials.Dielectric if walks else materials.Plastic
+    made = [getattr(shape.material, "front", shape.material) for shape in scene.shapes]
+    assert [isinstance(one, surface) for one in made] == [True] * 3 + [False]
+    assert any("where it entered" in text for text in scene.warnings) != walks
 
 
 def test_47_measured_media():
