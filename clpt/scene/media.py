@@ -289,13 +289,17 @@ class Grid(Homogeneous):
 
     The density (nx, ny, nz) is that at the centres of the cells of a box, trilinear between these;
     beyond the outermost ones it is theirs, and outside of the box there is nothing. It is an array
-    of numpy or of pyopencl, or a `Volume`, whose box `to_world` then moves.
+    of numpy or of pyopencl, or a `Volume`, whose box `to_world` then moves; by default it is 1.
 
     Raises SceneError for a density with less or more than three axes, or with numbers that are
     negative or not finite.
     """
 
-    density: Any = host(None, "numbers (nx, ny, nz) that multiply the coefficients", form="volume")
+    density: Any = host(
+        np.ones((1, 1, 1), np.float32),
+        "numbers (nx, ny, nz) that multiply the coefficients",
+        form="volume",
+    )
     to_world: Matrix4 = host(np.eye(4), "takes the unit cube to the grid's box")
 
     def check(self) -> None:

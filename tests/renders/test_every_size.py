@@ -16,6 +16,7 @@ import clpt
 from clpt import transforms as tf
 from clpt.scene import Film, Scene, kinds, materials, shapes
 from clpt.scene.cameras import Perspective
+from clpt.scene.integrators import Path
 from tests.rotation import rotating
 
 SIDE, SPP = 40, 2
@@ -45,6 +46,7 @@ def scene(sky: str, size: tuple[int, int]) -> Scene:
         shapes=[*copies, mirror],
         lights=[kinds("light")[sky](**given)],
         film=Film(width=SIDE, height=SIDE, crop=(0, 0, *size), mode="rgb"),
+        integrator=Path(light_paths=0),
     )
 
 

@@ -94,6 +94,7 @@ LONG = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", [CAMERA, *LONG])
 def test_the_picture_has_the_same_bits(how):
     names = tuple(LAYERS) if how == CAMERA else WITHOUT_LIGHT

@@ -56,8 +56,15 @@ def with_mode(scene: Scene, mode: str) -> Scene:
     return dataclasses.replace(scene, film=dataclasses.replace(scene.film, mode=mode))
 
 
-@pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("phase", [*(cls() for cls in media.PHASES), VARIED], ids=lambda p: p.kind)
+FURNACES = [
+    pytest.param(phase, mode, id=f"{phase.kind}-{mode}", marks=marks)
+    for phase in (*(cls() for cls in media.PHASES), VARIED)
+    for mode in MODES
+    for marks in (() if mode == "rgb" or phase is VARIED else pytest.mark.slow,)
+]
+
+
+@pytest.mark.parametrize(("phase", "mode"), FURNACES)
 def test_furnace(phase: media.Phase, mode: str) -> None:
     """What scatters all light cannot be seen under the same light from everywhere."""
     scene = ball(media.Homogeneous(sigma_s=CHROMATIC, phase=phase))

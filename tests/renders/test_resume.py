@@ -64,7 +64,10 @@ def box(scenes: Path, film: dict, changes: dict, noise: float | None) -> Scene:
     )
 
 
-LONG = ("aov", "zsobol", "independent", "importance", "halves", "vcm")
+LONG = (
+    "aov", "zsobol", "independent", "importance", "halves", "vcm", "rgb", "weights_alpha",
+    "light_share",
+)  # fmt: skip
 
 
 @pytest.fixture(

@@ -194,7 +194,7 @@ def _shown(value: Any) -> str:
     if value is None:
         return "-"
     if isinstance(value, np.ndarray):
-        return "identity"
+        return "identity" if value.ndim == 2 else f"{value.flat[0]:g}"
     if isinstance(value, Kind):
         return f"`{value.kind}`"
     if isinstance(value, tuple) and value and isinstance(value[0], str):
