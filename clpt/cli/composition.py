@@ -5,10 +5,9 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import click
 import numpy as np
@@ -19,8 +18,7 @@ from ..formats.meshes import framing
 from ..scene import Scene
 from ..scene.lights import Envmap
 from ..view.navigation import upright
-
-Command = TypeVar("Command", bound=Callable[..., Any])
+from .option_sets import Command, with_options
 
 NEAREST, FARTHEST = 1e-3, 1e6  # of an orbit, in distances that frame the scene
 # The scene's up from +y, by its axis and sign; the front is +z where up is +y, -y where it is +z.
@@ -158,9 +156,7 @@ _OPTIONS = (
 
 def composition_options(command: Command) -> Command:
     """Give a command the options that `composed` takes."""
-    for option in reversed(_OPTIONS):
-        command = option(command)
-    return command
+    return with_options(command, _OPTIONS)
 
 
 def composed(

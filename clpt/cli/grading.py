@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, TypeVar
 
 import click
 
 from ..colour.tones import TONES
 from ..colour.view import DEFAULT_CONFIG, View
 from ..render.layer_channels import SETS
-
-Command = TypeVar("Command", bound=Callable[..., Any])
+from .option_sets import Command, with_options
 
 
 @dataclass(frozen=True)
@@ -53,9 +50,7 @@ names_option = click.option(
 
 def grading_options(command: Command) -> Command:
     """Give a command the options that `grading` takes."""
-    for option in reversed(_OPTIONS):
-        command = option(command)
-    return command
+    return with_options(command, _OPTIONS)
 
 
 def grading(

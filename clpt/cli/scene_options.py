@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any, TypeAlias, TypeVar, get_args
+from typing import Any, TypeAlias, get_args
 
 import click
 
@@ -32,12 +32,12 @@ from ..spectra import read_sensor, spaces
 from ..spectra.sensors import OBSERVERS
 from .composition import Orbit, Span, composed, composition_options
 from .display import Display
+from .option_sets import Command, with_options
 from .scene_variables import scene_variables
 
 LARGEST = 65536  # pixels of a side
 
 AnyRenderer: TypeAlias = Renderer | MultiRenderer
-Command = TypeVar("Command", bound=Callable[..., Any])
 
 
 class Size(click.ParamType):
@@ -199,10 +199,7 @@ _OPTIONS = (
 
 def scene_options(command: Command) -> Command:
     """Give a command the options that `open_renderer` takes."""
-    command = composition_options(command)
-    for option in reversed(_OPTIONS):
-        command = option(command)
-    return command
+    return with_options(composition_options(command), _OPTIONS)
 
 
 def open_renderer(

@@ -72,6 +72,20 @@ def wait_until(ready, what: str, seconds: float = LONGEST) -> None:
 
 
 @contextmanager
+def client_of(command: list[str], folder: Path) -> Iterator[subprocess.Popen]:
+    """A process of `clpt` in a folder, that is killed at the end if it still runs."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "clpt", *command], env=ENVIRONMENT, cwd=folder,
+        stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+
+
+@contextmanager
 def machines(workers: int = 0) -> Iterator[Machines]:
     """Yield a scheduler in this process with workers in others; end them all."""
     processes.configure()

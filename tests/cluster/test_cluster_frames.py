@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
 import sys
 from pathlib import Path
 
@@ -15,7 +14,7 @@ pytest.importorskip("distributed")
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 
 sys.path.insert(0, str(Path(__file__).parent))
-from machines import ENVIRONMENT, LONGEST, machines, wait_until  # noqa: E402
+from machines import LONGEST, client_of, machines, wait_until  # noqa: E402
 
 from clpt import images  # noqa: E402
 from clpt.__main__ import run  # noqa: E402
@@ -102,19 +101,12 @@ def test_frames_go_on_after_an_end(how, hub, folder):
     hub.wait(3)
     command = ["render", "turn.xml", "--frames", "1:6", *TURN, *SIZE, "--spp", "1500"]
     command += ["--cluster", hub.address]
-    client = subprocess.Popen(
-        [sys.executable, "-m", "clpt", *command], env=ENVIRONMENT, cwd=folder,
-        stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    try:
+    with client_of(command, folder) as client:
         wait_until((folder / "turn.0001.exr").exists, "a frame")
         hub.end(third)
         wait_until((folder / "turn.0002.exr").exists, "another frame")
         client.send_signal(how)
         told = client.communicate(timeout=LONGEST)[1]
-    finally:
-        client.kill()
-        client.wait()
     assert client.returncode == (-how if how == signal.SIGKILL else 128 + how), told
     assert "Traceback" not in told
     before = {path: path.stat().st_mtime_ns for path in folder.glob("turn.*.exr")}

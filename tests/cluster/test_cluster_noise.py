@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import os
 import signal
-import subprocess
 import sys
 from pathlib import Path
 
@@ -16,7 +15,7 @@ pytest.importorskip("distributed")
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 
 sys.path.insert(0, str(Path(__file__).parent))
-from machines import ENVIRONMENT, LONGEST, ROOT, machines, scene, wait_until  # noqa: E402
+from machines import LONGEST, ROOT, client_of, machines, scene, wait_until  # noqa: E402
 
 import clpt  # noqa: E402
 from clpt import images  # noqa: E402
@@ -244,18 +243,11 @@ def test_a_client_that_ends_goes_on(how, two, tmp_path, monkeypatch):
     noisy = ["--noise", "0.01", "--spp", "6000", "-o", "a.film", "--checkpoint", "1s"]
     command = ["render", str(ROOT / "scenes/cornell_box"), "--size", "32x24", *noisy]
     command += ["--cluster", two.address]
-    client = subprocess.Popen(
-        [sys.executable, "-m", "clpt", *command], env=ENVIRONMENT, cwd=tmp_path,
-        stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    try:
+    with client_of(command, tmp_path) as client:
         wait_until((tmp_path / "a.resume.exr").exists, "a checkpoint")
         two.end(third)
         client.send_signal(how)
         told = client.communicate(timeout=LONGEST)[1]
-    finally:
-        client.kill()
-        client.wait()
     assert client.returncode == (-how if how == signal.SIGKILL else 128 + how), told
     assert "Traceback" not in told
     saved = film_file.read("a.resume.exr")

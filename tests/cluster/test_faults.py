@@ -27,6 +27,7 @@ from machines import (  # noqa: E402
     ENVIRONMENT,
     LONGEST,
     ROOT,
+    client_of,
     digest_of_one_process,
     machines,
     scene,
@@ -220,19 +221,12 @@ def test_a_client_that_is_killed(tmp_path):
     from distributed import Client
 
     processes.configure()
-    command = [sys.executable, "-m", "clpt", "render", str(ROOT / "scenes/cornell_box")]
+    command = ["render", str(ROOT / "scenes/cornell_box"), "-o", str(tmp_path / "a.png")]
     with scheduler() as (_, address), workers(address, 2):
         more = ["--cluster", address, "--spp", "1000000", "--size", "64x48"]
-        client = subprocess.Popen(
-            [*command, *more, "-o", str(tmp_path / "a.png")], env=ENVIRONMENT, cwd=tmp_path,
-            stderr=subprocess.PIPE, text=True,
-        )  # fmt: skip
-        try:
+        with client_of([*command, *more], tmp_path) as client:
             while "spp/s" not in (line := client.stderr.readline()) and "samples" not in line:
                 assert line, client.wait()
-        finally:
-            client.kill()
-            client.wait()
         with Client(address) as other, ClusterRenderer(scene(), other) as renderer:
             began = time.monotonic()
             assert renderer.run(100)

@@ -43,6 +43,17 @@ def exposures(scene: Scene, count: int, spp: int, first_seed: int = 1, **wavefro
     return np.array(images)
 
 
+def pictures_of_parts(scene: Scene) -> list[Values]:
+    """Pictures of twelve samples: rendered in one go, and in parts."""
+    images = []
+    for parts in ((12,), (1, 4, 7)):
+        with clpt.Renderer(scene) as renderer:
+            for part in parts:
+                renderer.run(part)
+            images.append(renderer.image())
+    return images
+
+
 def blocks(images: ArrayLike, size: int = 4) -> Values:
     """Means over blocks of size x size pixels: (..., h, w, c) to (..., h // size, w // size, c)."""
     a = np.asarray(images, np.float64)

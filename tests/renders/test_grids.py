@@ -23,7 +23,7 @@ from clpt.scene.integrators import Path as PathIntegrator
 from clpt.scene.lights import Constant, Directional
 from clpt.scene.materials import Diffuse, Null
 from clpt.scene.shapes import Cube, Rectangle
-from tests.renders.support import assert_agree, assert_mean, exposures, with_film
+from tests.renders.support import assert_agree, assert_mean, exposures, pictures_of_parts, with_film
 
 CHROMATIC = np.array([0.5, 2.0, 3.0])  # [1/m]
 LONG = PathIntegrator(max_depth=-1, rr_depth=1000, light_paths=0)
@@ -138,12 +138,7 @@ def test_bits_and_updates() -> None:
         shapes = [dataclasses.replace(scene.shapes[0], interior=own), scene.shapes[1]]
         return dataclasses.replace(scene, shapes=shapes)
 
-    films = []
-    for parts in ((12,), (1, 4, 7)):
-        with clpt.Renderer(scene) as renderer:
-            for part in parts:
-                renderer.run(part)
-            films.append(renderer.image())
+    films = pictures_of_parts(scene)
     assert np.array_equal(*films)
     with clpt.Renderer(with_density(RANDOM)) as renderer:
         renderer.run(2)

@@ -25,7 +25,7 @@ from clpt.scene.integrators import Path as PathIntegrator
 from clpt.scene.lights import Area, Constant, Point
 from clpt.scene.materials import Dielectric, Diffuse, Null
 from clpt.scene.shapes import Cube, Rectangle, Sphere
-from tests.renders.support import assert_agree, assert_mean, blocks, exposures
+from tests.renders.support import assert_agree, assert_mean, blocks, exposures, pictures_of_parts
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "bench" / "media"
 LONG = PathIntegrator(max_depth=-1, rr_depth=1000, light_paths=0)
@@ -183,13 +183,7 @@ def test_light_through_boundaries() -> None:
 
 def test_same_bits_however_split() -> None:
     scene = with_mode(ball(media.Homogeneous(sigma_t=CHROMATIC, albedo=0.9)), "spectral")
-    films = []
-    for parts in ((12,), (1, 4, 7)):
-        with clpt.Renderer(scene) as renderer:
-            for part in parts:
-                renderer.run(part)
-            films.append(renderer.image())
-    assert np.array_equal(*films)
+    assert np.array_equal(*pictures_of_parts(scene))
 
 
 def test_layers_of_what_scatters() -> None:

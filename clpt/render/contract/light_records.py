@@ -8,6 +8,10 @@ from clpt.scene.lights import KINDS as LIGHTS
 from clpt.scene.lights import Light
 from clpt.scene.params import Param, params
 
+_BANDS = {  # of an image of spectra
+    "bands": ("integer", "values in a texel"),
+    "number": ("integer", "row in `spectra`: the number of the band by wavelength"),
+}
 _IMAGE = {
     "x": ("vec3", "the light's own axes in the world, unit length"),
     "y": ("vec3", "up"),
@@ -31,8 +35,7 @@ IMAGE_RECORDS: dict[str, Record] = {
         "SpectralEnvmap",
         "An image of spectra in latitude and longitude.",
         **_IMAGE,
-        bands=("integer", "values in a texel"),
-        number=("integer", "row in `spectra`: the number of the band by wavelength"),
+        **_BANDS,
     ),
 }
 _SKY = {
@@ -50,8 +53,7 @@ SKY_RECORDS: dict[str, Record] = {
         "SpectralSky",
         "A sky of spectra.",
         **_SKY,
-        bands=("integer", "values in a texel"),
-        number=("integer", "row in `spectra`: the number of the band by wavelength"),
+        **_BANDS,
     ),
 }
 _PLACEMENT = {

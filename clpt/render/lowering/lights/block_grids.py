@@ -9,10 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from clpt.render.lowering.encoder import Encoder
 
 Floats = NDArray[np.float64]
 Directions = Callable[[ArrayLike, ArrayLike], Floats]  # unit (..., 3) of rows and columns 0 to 1
@@ -36,6 +39,20 @@ class BlockGrid(NamedTuple):
     block_rows: int
     block_columns: int
     total: float
+
+
+def members(corners: NDArray[Any], grid: BlockGrid, encoder: Encoder) -> dict[str, ArrayLike]:
+    """Put a grid, and the weights at its corners, into the tables; return a record's members."""
+    append = partial(encoder.store.append_floats, "distributions")
+    return {
+        "corners": append(corners),
+        "marginal": append(grid.marginal),
+        "conditional": append(grid.conditional),
+        "blocks": append(grid.blocks),
+        "block_rows": grid.block_rows,
+        "block_columns": grid.block_columns,
+        "norm": 1.0 / grid.total if grid.total > 0.0 else 0.0,
+    }
 
 
 def of(

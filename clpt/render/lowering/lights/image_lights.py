@@ -69,13 +69,7 @@ def lower_image(lamp: Envmap | CubeMap, encoder: Encoder) -> tuple[dict[str, Arr
         "width": made.width,
         "height": made.height,
         "texels": encoder.store.append_floats("texels", made.texels),
-        "corners": encoder.store.append_floats("distributions", made.corners),
-        "marginal": encoder.store.append_floats("distributions", made.grid.marginal),
-        "conditional": encoder.store.append_floats("distributions", made.grid.conditional),
-        "blocks": encoder.store.append_floats("distributions", made.grid.blocks),
-        "block_rows": made.grid.block_rows,
-        "block_columns": made.grid.block_columns,
-        "norm": 1.0 / made.grid.total if made.grid.total > 0.0 else 0.0,
+        **block_grids.members(made.corners, made.grid, encoder),
     }
     if made.number is not None:
         members |= {"bands": made.bands, "number": encoder.spectra.row(made.number)}
