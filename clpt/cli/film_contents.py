@@ -34,7 +34,7 @@ def film_summary(path: Path) -> dict[str, Any]:
         "clpt": header["clpt"],
         "samples": [f"{first} to {end - 1}" for first, end in header["taken"]],
         "film": film | part,
-        "holds": ["picture", *form["layers"], *form["channels"], *["alpha"] * form["alpha"]],
+        "holds": ["picture", *form["layers"], *["alpha"] * form["alpha"]],
         "integrator": header["settings"]["chosen.integrator"],
         "sampler": origin["sampler.type"],
         "seed": origin["seed"],
@@ -50,12 +50,9 @@ def film_contents(path: Path) -> ImageContents:
     """Return the picture of a film, and what it says of itself. Raises SceneError."""
     picture, summary = HostPicture(film_file.read(path)), film_summary(path)
     form, lambdas, quantity = picture.form, None, "value (linear)"
-    colours = None if picture.channels else picture.colours()
+    colours = picture.colours()
     values = picture.image()
-    if picture.channels:
-        parts = picture.layers().items()
-        labels = [f"{name}.{i}" for name, layer in parts for i in range(layer.shape[2])]
-    elif form.bands:
+    if form.bands:
         lambdas, quantity = picture.spectral_image().lambdas, "radiance [W m^-2 sr^-1 nm^-1]"
         labels = [f"{nm:g} nm" for nm in lambdas]
     else:

@@ -83,7 +83,6 @@ def render_on_cluster(
     with shown.loading(scene.name) as tell:
         loaded = load(scene, progress=tell, missing_textures=missing_textures, **variables)
     plan = changed(loaded, spp=spp, **options)
-    outputs.check_contents(targets, plan)
     checkpoints.check_range(plan, numbers)
     saved_at, (first, end) = checkpoints.path_of(scene, targets), numbers or (0, None)
     if saved is not None:

@@ -8,17 +8,12 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from clpt.render.aov_preview import sheet
-
 from .. import __version__, images, output_files
 from ..cluster.cluster_renderer import ClusterRenderer
 from ..errors import ClptError, SceneError
 from ..render import film_file, layer_channels
 from ..render.denoised_picture import DenoisedPicture
 from ..render.host_picture import HostPicture
-from ..render.pictures import Image
-from ..scene import Scene
-from ..scene.integrators import Aov
 from .grading import Grading
 from .scene_options import AnyRenderer
 from .standard_output import is_standard
@@ -26,8 +21,6 @@ from .standard_output import is_standard
 FILM = ".film"  # suffix of films, which hold all that a picture was made of
 Film = AnyRenderer | ClusterRenderer | HostPicture  # what pictures are taken of
 Source = Film | DenoisedPicture
-
-AOV_FORMATS = (".exr", ".png", FILM)
 
 
 def default(scene: Path) -> tuple[Path, ...]:
@@ -48,14 +41,6 @@ def checked(paths: tuple[Path, ...]) -> tuple[Path, ...]:
         except OSError as error:
             raise SceneError(f"cannot be written: {error}", file=path) from error
     return paths
-
-
-def check_contents(paths: tuple[Path, ...], scene: Scene) -> None:
-    """Raise SceneError for a path whose format cannot hold what the scene is rendered to."""
-    for path in paths:
-        if isinstance(scene.integrator, Aov) and path.suffix.lower() not in AOV_FORMATS:
-            formats = " and ".join(AOV_FORMATS)
-            raise SceneError(f"the integrator aov is written to {formats}", file=path)
 
 
 def metadata(
@@ -136,11 +121,11 @@ def write(
         if not saved.film.taken:
             raise SceneError("no pass has come to its end: there is no film yet", file=path)
         film_file.write(path, saved)
-    elif form.bands and path.suffix.lower() == ".npy" and not form.channels:
+    elif form.bands and path.suffix.lower() == ".npy":
         images.write_npy(path, source.image())
-    elif path.suffix.lower() == ".exr" and not form.channels:
+    elif path.suffix.lower() == ".exr":
         layer_channels.write_layers(path, source, names=grading.names, metadata=stats)
-    elif not form.channels:
+    else:
         picture = source.colours() if form.bands else source.image()
         if path.suffix.lower() == ".png":
             picture = images.straight(picture)
@@ -148,23 +133,3 @@ def write(
             path, picture, metadata=stats, space=form.output_space, exposure=grading.exposure,
             tone=grading.tone, view=grading.view,
         )  # fmt: skip
-    elif path.suffix.lower() == ".png":
-        images.write(path, sheet(source.layers()), metadata=stats, exposure=grading.exposure)
-    else:
-        _write_layers(path, source.layers(), stats)
-
-
-def _write_layers(
-    path: Path, layers: dict[str, Image], stats: dict[str, str | int | float]
-) -> None:
-    """Write one .exr: the first layer of colours as its picture, all layers by their names."""
-    colours = [layer for layer in layers.values() if layer.shape[2] == 3]
-    first = next(iter(layers.values()))
-    picture = layers.get("albedo", colours[0] if colours else first[..., :1])
-    named: dict[str, Image] = {}
-    for name, layer in layers.items():
-        if layer.shape[2] == 2:
-            named |= {f"{name}.u": layer[..., 0], f"{name}.v": layer[..., 1]}
-        else:
-            named[name] = layer
-    images.write(path, picture, half=False, metadata=stats, layers=named)

@@ -210,7 +210,6 @@ def render(
     first, end = numbers or (0, None)
 
     def accept(plan: Scene) -> None:
-        outputs.check_contents(targets, plan)
         checkpoints.check_range(plan, numbers)
         if saved is not None:
             checkpoints.check(saved, saved_at, plan, first, end)

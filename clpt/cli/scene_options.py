@@ -25,7 +25,7 @@ from ..formats.missing import Missing
 from ..render.lowering.checks import check
 from ..render.renderer import Renderer
 from ..scene import Scene, kinds
-from ..scene.integrators import AUTO, MOST_LIGHT_PATHS, Auto
+from ..scene.integrators import AUTO, MOST_LIGHT_PATHS, NO_AOV, Auto
 from ..scene.layers import LAYERS
 from ..scene.params import Kind, params
 from ..spectra import read_sensor, spaces
@@ -356,7 +356,7 @@ def _integrator(name: str, old: Kind) -> Any:
     """Return an integrator of another kind, with the parameters that both have."""
     known = kinds("integrator")
     if name not in known:
-        message = f"{name!r} is none of {', '.join(known)}"
+        message = NO_AOV if name == "aov" else f"{name!r} is none of {', '.join(known)}"
         raise click.BadParameter(message, param_hint="--integrator")
     shared = params(known[name]).keys() & params(type(old)).keys()
     given = {key: getattr(old, key) for key in shared}

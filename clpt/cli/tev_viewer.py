@@ -51,12 +51,6 @@ def showing(
 
 def shown(source: Film) -> dict[str, NDArray[np.float32]]:
     """Return all channels of the picture so far, (h, w) by name: colours, layers, bands."""
-    if source.channels:
-        return {
-            f"{name}.{i}": layer[..., i]
-            for name, layer in source.layers().items()
-            for i in range(layer.shape[2])
-        }
     picture = source.colours() if source.form.bands else source.image()
     made = {letter: picture[..., i] for i, letter in enumerate("RGBA"[: picture.shape[2]])}
     made |= channels_of(source.layers())

@@ -264,11 +264,6 @@ class ClusterFilm(FilmKeeping):
         """What makes a picture of the film; see `Renderer.form`."""
         return self._here.form
 
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """Of the `aov` integrator, else none."""
-        return self.form.channels
-
     def image(self) -> Image:
         """The picture so far, see `Renderer.image`; made on this machine."""
         return self.developed().image()
@@ -278,7 +273,7 @@ class ClusterFilm(FilmKeeping):
         return self.developed().colours()
 
     def layers(self) -> dict[str, Image]:
-        """The values of the `aov` integrator by name, see `Renderer.layers`."""
+        """The layers by name, see `Renderer.layers`."""
         return self.developed().layers()
 
     def halves(self) -> tuple[Image, Image]:

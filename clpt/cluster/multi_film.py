@@ -115,7 +115,7 @@ class MultiFilm(FilmKeeping, Pictures):
         return self._on_first(lambda first: first.renderer.colours())
 
     def layers(self) -> dict[str, Image]:
-        """The values of the `aov` integrator by name, (h, w, 1 to 3) float32."""
+        """The layers by name; see `Renderer.layers`."""
         return self._on_first(lambda first: first.renderer.layers())
 
     def halves(self) -> tuple[Image, Image]:

@@ -97,7 +97,6 @@ class MultiRenderer(MultiFilm):
                 warnings.append(f"{name} failed and is left out: {result}")
         self._crew = Crew(workers, self._stop)
         self._lost_at_first = warnings
-        self.channels = workers[0].renderer.channels
         self.denoise = options.get("denoise")
         self._seconds: dict[str, float] = {}
 
@@ -285,7 +284,7 @@ class MultiRenderer(MultiFilm):
     ) -> Callable[[], bool]:
         """Return what is called while devices work: it returns whether they go on."""
         began = time.perf_counter()
-        pixels = self._crew.whole.pixels * len(self.channels or (None,))
+        pixels = self._crew.whole.pixels
 
         def tick() -> bool:
             counts = self._crew.counts

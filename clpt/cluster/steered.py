@@ -84,11 +84,6 @@ class SteeredCluster:
         return self._renderer.active
 
     @property
-    def channels(self) -> tuple[str, ...]:
-        """Of the `aov` integrator, else none."""
-        return self._renderer.channels
-
-    @property
     def devices(self) -> tuple[str, ...]:
         """The classes of the workers' devices."""
         return tuple(sorted({record.kind for record in self._renderer.workers.values()}))

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 
-from clpt.errors import SceneError, UnknownKindError
+from clpt.errors import UnknownKindError
 from clpt.scene import Scene
 from clpt.scene.integrators import (
     HAVE_LAYERS,
     PIXELWISE,
-    Aov,
     Integrator,
     ParticleTracer,
     Sampler,
@@ -34,14 +33,10 @@ def prepared(scene: Scene, method: str | None) -> Scene:
 
     Where the film splats, neighbours share samples, and denoisers take what noise they have in
     common for detail. So `film.filtering` becomes importance, where the scene does not ask for
-    splatting. Integrators without layers are left without. Raises SceneError for the channels of
-    `aov`, which are no picture that could be denoised.
+    splatting. Integrators without layers are left without.
     """
     if method is None:
         return scene
-    if isinstance(scene.integrator, Aov):
-        message = "the integrator aov makes values, no picture that could be denoised"
-        raise SceneError(message, where="denoise")
     film = scene.film
     layers = LAYERS if isinstance(scene.integrator, HAVE_LAYERS) else ()
     wanted = (*film.layers, *(name for name in layers if name not in film.layers))

@@ -46,16 +46,13 @@ class DenoisedPicture:
     text: how it was denoised, for headers of files; error: of `statistical`, (h, w) float32, what
     is left in the colours, relative to their light; else None.
 
-    Raises UnknownKindError for a method, SceneError for the channels of `aov` and where the
+    Raises UnknownKindError for a method, SceneError where the
     denoiser is not installed, DeviceError where it fails.
     """
 
     def __init__(self, source: Source, method: str | None = None):
         self.method = needs.check_method(method or source.denoise or needs.METHODS[0])
         self.form, self.is_adaptive = source.form, source.is_adaptive
-        if self.form.channels:
-            message = "the channels of the integrator aov are no picture that could be denoised"
-            raise SceneError(message, where="denoise")
         self._source, self._layers = source, source.layers()
         self._noisy, self._image = source.colours(), source.image()
         self._samples = source.samples_per_pixel()

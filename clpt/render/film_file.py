@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 
 from clpt import images, output_files
 from clpt.errors import SceneError
-from clpt.render.aov_preview import viewable
 from clpt.render.contract.layer_names import LayerNames
 from clpt.render.host_picture import HostPicture
 from clpt.render.saved_film import Origin, PictureForm, SavedFilm, Session
@@ -149,12 +148,7 @@ def _header(path: Path, text: Any) -> dict[str, Any]:
 def _picture(saved: SavedFilm) -> Any:
     """The picture so far, with the header: what viewers show."""
     form, made = saved.form, HostPicture(saved)
-    if made.channels:
-        layers = made.layers()
-        name = "albedo" if "albedo" in layers else next(iter(layers))
-        pixels = viewable(name, layers[name])
-    else:
-        pixels = made.colours() if form.bands else made.image()
+    pixels = made.colours() if form.bands else made.image()
     letters = "RGBA"[: pixels.shape[2]]
     stored = np.clip(np.nan_to_num(pixels), -HALF_MAX, HALF_MAX).astype(np.float16)
     channels = {n: np.ascontiguousarray(stored[..., i]) for i, n in enumerate(letters)}
@@ -232,7 +226,7 @@ def _restored(header: dict[str, Any], parts: _Parts) -> SavedFilm:
 
     form = header["form"]
     rows = {name: tuple(map(tuple, form[name])) for name in ("to_output", "paper")}
-    names: dict[str, Any] = {name: tuple(form[name]) for name in ("channels", "layers")}
+    names: dict[str, Any] = {"layers": tuple(form["layers"])}
     names["names"] = LayerNames(**{n: tuple(v) for n, v in form.get("names", {}).items()})
     taken = tuple((int(first), int(end)) for first, end in header["taken"])
     return SavedFilm(

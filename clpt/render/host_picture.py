@@ -21,7 +21,6 @@ from clpt.render.wavefront.film_state import (
     numbers,
 )
 from clpt.scene import Film
-from clpt.scene.integrators import CHANNELS
 from clpt.spectral_exr import SpectralImage
 
 Image = NDArray[np.float32]
@@ -30,13 +29,13 @@ Image = NDArray[np.float32]
 class HostPicture:
     """The picture of a film, with the methods of `Renderer` that make it; equal but for an ulp.
 
-    saved: the film. channels, form: as of a renderer; is_adaptive: whether pixels differ in their
+    saved: the film. form: as of a renderer; is_adaptive: whether pixels differ in their
     numbers of samples. denoise: the denoiser of its files, None for none.
     """
 
     def __init__(self, saved: SavedFilm, denoise: str | None = None):
         self.denoise = denoise
-        self.saved, self.form, self.channels = saved, saved.form, saved.form.channels
+        self.saved, self.form = saved, saved.form
         self.is_adaptive = bool(saved.adaptive)
         state = saved.film
         films, bands = state.words[:, 0], state.bands[0]
@@ -51,8 +50,6 @@ class HostPicture:
 
     def image(self) -> Image:
         """The picture, as `Renderer.image` returns it."""
-        if self.channels:
-            return np.concatenate(list(self.layers().values()), axis=2)
         if self.form.bands:
             return self._mean_bands() * np.float32(self.form.exposure)
         if self.form.alpha:
@@ -65,12 +62,7 @@ class HostPicture:
 
     def layers(self) -> dict[str, Image]:
         """The layers by name, (h, w, 1 to 12) float32, as `Renderer.layers` returns them."""
-        if not self.channels:
-            return layers_of(self.form, self.saved.film.arrays, self)
-        return {
-            name: self._colours(words)[:, :, : CHANNELS[name]]
-            for name, words in zip(self.channels, self._films, strict=True)
-        }
+        return layers_of(self.form, self.saved.film.arrays, self)
 
     def halves(self) -> tuple[Image, Image]:
         """The pictures of the even and of the odd samples, as `Renderer.halves` returns them.

@@ -13,15 +13,13 @@ from pyopencl.array import Array
 from clpt import device as dev
 from clpt import images
 from clpt.colour.view import View
-from clpt.errors import ClptError, SceneError, UnknownKindError
-from clpt.render.aov_preview import sheet
+from clpt.errors import ClptError, SceneError
 from clpt.render.layers import layers_of
 from clpt.render.locking import DeviceOwner, synchronized
 from clpt.render.resolve import Resolve
 from clpt.render.saved_film import PictureForm
 from clpt.render.wavefront.wavefront import Wavefront
 from clpt.scene import Scene
-from clpt.scene.integrators import CHANNELS
 from clpt.spectral_exr import SpectralImage
 
 Image = NDArray[np.float32]
@@ -30,12 +28,11 @@ Image = NDArray[np.float32]
 class Pictures(DeviceOwner):
     """Base of renderers: their picture as an array, on the device or the host.
 
-    channels: of the `aov` integrator, else none; wavefronts: one a channel, at least one.
+    wavefronts: its one.
     """
 
     scene: Scene
     device: dev.Device
-    channels: tuple[str, ...]
     wavefronts: list[Wavefront]
     _resolve: Resolve | None = None  # built when a picture is first resolved
 
@@ -51,22 +48,15 @@ class Pictures(DeviceOwner):
 
         Red, green and blue, linear in the film's output space; last, how many samples the pixel
         has. Always the same memory, on the renderer's queue; steps wait for those of its `events`
-        that readers add, as its `get_async` does. Of `aov`, the first channel.
+        that readers add, as its `get_async` does.
         """
         return self.wavefronts[0].film.picture
-
-    @property
-    @synchronized
-    def films(self) -> dict[str, dev.DeviceArray]:
-        """The values of the `aov` integrator by name, as `film` has them."""
-        return {n: w.film.picture for n, w in zip(self.channels, self.wavefronts, strict=True)}
 
     @synchronized
     def resolve(
         self,
         into: Array | cl.MemoryObject | None = None,
         *,
-        channel: str | None = None,
         dtype: DTypeLike | None = None,
         exposure: float = 0.0,
         tone: str = "none",
@@ -83,19 +73,16 @@ class Pictures(DeviceOwner):
         whether the sRGB transfer is applied, by default to uint8 only; colours become Rec. 709.
         view: of OpenColorIO, in the place of tone and transfer: a table of it, right to 1/512 for
         98 of 100 colours. flip: the first row is the lowest.
-        channel: of the `aov` integrator, by default its first; values stay as they are.
 
         Returns the Array, whose `events` hold the event of the picture; for an Image the event.
         Raises DeviceError if the picture does not fit, UnknownKindError for names.
         """
-        if channel is not None and channel not in self.channels:
-            raise UnknownKindError("channel", channel, self.channels)
         if self._resolve is None:
             self._resolve = Resolve(self.device, self.wavefronts[0].stream)
         return self._resolve(
-            self.films[channel] if channel else self.film, into, dtype=dtype, exposure=exposure,
+            self.film, into, dtype=dtype, exposure=exposure,
             tone=tone, srgb=srgb, flip=flip, view=view, wait_for=wait_for,
-            space="rec709" if self.channels else self.scene.film.output_space,
+            space=self.scene.film.output_space,
         )  # fmt: skip
 
     def widget(self, **options: Any) -> Any:
@@ -120,8 +107,6 @@ class Pictures(DeviceOwner):
 
     def _repr_png_(self) -> bytes:
         """What a notebook shows of a renderer: its picture so far; waits."""
-        if self.channels:
-            return images.png(images.to_srgb8(sheet(self.layers())))
         return images.png(self.resolve().get()[..., :3])
 
     @synchronized
@@ -130,10 +115,8 @@ class Pictures(DeviceOwner):
 
         Of a film with alpha (h, w, 4), colours as they arrive and how much of the pixel is covered:
         to lie over another picture, which adds the rest of its own. Of a film with bands (h, w,
-        bands), the mean radiance in each; of `aov` (h, w, channels).
+        bands), the mean radiance in each.
         """
-        if self.channels:
-            return np.concatenate(list(self.layers().values()), axis=2)
         film = self.scene.film
         if film.bands:
             return self.wavefronts[0].bands() * np.float32(film.exposure)
@@ -148,7 +131,7 @@ class Pictures(DeviceOwner):
 
     def spectral_image(self) -> SpectralImage:
         """The picture so far of a film with bands, at their centres. Raises SceneError without."""
-        if not self.scene.film.bands or self.channels:
+        if not self.scene.film.bands:
             raise SceneError("this picture has no bands; set the film's", where="film.bands")
         return SpectralImage(self.image(), self.scene.film.band_centres, emissive=True)
 
@@ -176,11 +159,6 @@ class Pictures(DeviceOwner):
         Colours are in the film's output space, white paper is (1, 1, 1); lengths are in metres.
         Where nothing is seen values are 0, ids -1. `light_groups` is a layer light_NAME for each
         group, `light_rest` of lights that name none; of mattes (h, w, 12), pairs of a name's hash
-        and its coverage; see docs/layers.md. Of the `aov` integrator, its values.
+        and its coverage; see docs/layers.md.
         """
-        if not self.channels:
-            return layers_of(self.form, self.wavefronts[0].film.layer_words(), self)
-        return {
-            name: wavefront.image()[:, :, : CHANNELS[name]]
-            for name, wavefront in zip(self.channels, self.wavefronts, strict=True)
-        }
+        return layers_of(self.form, self.wavefronts[0].film.layer_words(), self)

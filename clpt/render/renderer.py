@@ -41,7 +41,6 @@ from clpt.render.wavefront.tracer import Tracer
 from clpt.render.wavefront.wavefront import Counts, Wavefront
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
-from clpt.scene.integrators import Aov
 from clpt.scene.materials import Material
 
 if TYPE_CHECKING:
@@ -91,9 +90,6 @@ class Renderer(Resumable):
             profiling = options.get("profiling", False)
             device = dev.choose(device, profiling=profiling, threads=threads)
         self.device = device
-        self.channels: tuple[str, ...] = ()
-        if isinstance(scene.integrator, Aov):
-            self.channels = scene.integrator.channels
         self._start = time.perf_counter()
         before = device.builds.programs, device.builds.cached
         texture_budget = options.get("texture_budget")
@@ -113,7 +109,7 @@ class Renderer(Resumable):
             halves=options.get("halves", False) or self.denoise == "statistical",
             cancel_seconds=options.get("cancel_seconds"),
         )
-        self.wavefronts = [first, *(first.with_channel(channel) for channel in self.channels[1:])]
+        self.wavefronts = [first]
         for one in self.wavefronts:
             one.prepare()
         self._built = device.builds.programs - before[0], device.builds.cached - before[1]
@@ -263,7 +259,7 @@ class Renderer(Resumable):
 
     @property
     def counts(self) -> tuple[Counts, ...]:
-        """What has happened so far, of each film: one, or one for each channel of `aov`."""
+        """What has happened so far, of each film: of its one film."""
         return tuple(wavefront.counts for wavefront in self.wavefronts)
 
     @property
@@ -466,8 +462,6 @@ class Renderer(Resumable):
 
         events: that arrays on the device wait for, which may be read.
         """
-        if getattr(scene.integrator, "channels", ()) != self.channels:
-            raise SceneError("other channels need a new Renderer", where="integrator.channels")
         for event in events:
             dev.wait(event)
         first = self.wavefronts[0]

@@ -183,7 +183,6 @@ class Resumable(FilmKeeping, Pictures):
         settings, features = first.paths.settings, first.features
         return PictureForm(
             tuple(tuple(float(v) for v in np.ravel(settings[name])[:3]) for name in TO_OUTPUT),
-            self.channels,
             light_paths=features.light_paths,
             weighed=features.weighed,
             weights=features.film_weights,
@@ -191,7 +190,7 @@ class Resumable(FilmKeeping, Pictures):
             bands=first.film.band_count,
             lambda_min=film.lambda_min,
             lambda_max=film.lambda_max,
-            output_space="rec709" if self.channels else film.output_space,
+            output_space=film.output_space,
             exposure=film.exposure,
             layers=features.layers,
             paper=tuple(map(tuple, white_paper(film, features.mode).tolist())),

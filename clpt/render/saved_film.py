@@ -21,15 +21,14 @@ MOST_NAMED = 8  # differences that an error names
 class PictureForm:
     """How a film's words become a picture.
 
-    to_output: (3, 3), rows of the matrix from the sums to the output space; channels: of the `aov`
-    integrator; light_paths: all paths start at lights; weighed: some do, beside the camera's;
-    weights: samples serve several pixels; paper: the matrix (3, 3) from sums of layers that are
-    colours to the output space, see `clpt.render.layers.white_paper`; names: what layers tell of;
-    the others are those of `clpt.scene.Film`.
+    to_output: (3, 3), rows of the matrix from the sums to the output space; light_paths: all paths
+    start at lights; weighed: some do, beside the camera's; weights: samples serve several pixels;
+    paper: the matrix (3, 3) from sums of layers that are colours to the output space, see
+    `clpt.render.layers.white_paper`; names: what layers tell of; the others are those of
+    `clpt.scene.Film`.
     """
 
     to_output: tuple[tuple[float, ...], ...]
-    channels: tuple[str, ...] = ()
     light_paths: bool = False
     weighed: bool = False
     weights: bool = False

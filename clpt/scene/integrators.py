@@ -16,18 +16,6 @@ from clpt.spectra.sensors import OBSERVERS
 from clpt.spectra.spaces import TEMPERATURES
 from clpt.spectra.spectrum import LONGEST, SHORTEST
 
-CHANNELS = {  # of the aov integrator: how many values each has
-    "depth": 1,
-    "position": 3,
-    "geometric_normal": 3,
-    "shading_normal": 3,
-    "uv": 2,
-    "albedo": 3,
-    "shape_id": 1,
-    "primitive_id": 1,
-}
-IDS = ("shape_id", "primitive_id")  # of these, which are names: a mean of them would be none
-
 MOST_BANDS = 1024
 MOST_LIGHT_PATHS = 64  # for a sample of the camera
 FEWEST_LIGHT_PATHS = 1.0 / 64
@@ -175,26 +163,6 @@ class ParticleTracer(Integrator):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Aov(Integrator):
-    """Arbitrary output values of the first hit, in the channels named; a pixel holds their mean.
-
-    Ids are those that the pixel's centre sees, by its first sample; -1: it sees no shape.
-    """
-
-    channels: tuple[str, ...] = host(tuple(CHANNELS), f"of {', '.join(CHANNELS)}")
-
-    def check(self) -> None:
-        given: Any = self.channels
-        channels = (given,) if isinstance(given, str) else tuple(given)
-        object.__setattr__(self, "channels", channels)
-        for name in channels:
-            if name not in CHANNELS:
-                raise UnknownKindError("channel", str(name), CHANNELS, where="aov.channels")
-        if not channels:
-            raise SceneError("names no channel", where="aov.channels")
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
 class Sampler(Kind):
     """Base of all samplers: each number is a function of (seed, pixel, sample, dimension)."""
 
@@ -276,8 +244,7 @@ class Film(Kind):
     With `bands` a pixel holds the mean radiance [W m^-2 sr^-1 nm^-1] of as many equal parts of the
     range of wavelengths. `white_balance` makes that illuminant the white of `output_space`
     (Bradford); without it colours are as the sensor tells them. A `sensor` other than cie1931 and
-    `bands` need the spectral mode. The aov integrator records values, no colours: none of this
-    changes them.
+    `bands` need the spectral mode.
     """
 
     width: int = host(768, "pixels")
@@ -398,7 +365,11 @@ def _white_balance(given: Any) -> Any:
     return x, y
 
 
-KINDS = (Auto, Path, Vcm, Direct, Whitted, ParticleTracer, Aov)
+NO_AOV = (  # for scenes of former versions
+    'the integrator aov is gone: name its channels in "film": {"layers": ["depth", ...]}, and '
+    'write "integrator": {"type": "path", "max_depth": 1} where no picture is wanted'
+)
+KINDS = (Auto, Path, Vcm, Direct, Whitted, ParticleTracer)
 HAVE_LAYERS = (Auto, Path, Vcm, Direct)  # beside the picture
 SAMPLERS = (Sobol, Zsobol, Independent)
 PIXELWISE = (Sobol, Independent)  # samplers whose pixels do not know of each other

@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import images
-from clpt.render.aov_preview import viewable
-from clpt.scene import Scene
-from clpt.scene.integrators import Aov
+from clpt.render.layer_preview import viewable
 from clpt.scene.layers import LAYERS
 
 PICTURE, SAMPLES, ERROR, DENOISED = "picture", "samples", "error", "denoised"
@@ -39,13 +37,6 @@ class Legend:
     low: str
     high: str
     colours: tuple[str, ...] = COLOURS
-
-
-def available(scene: Scene) -> tuple[str, ...]:
-    """Return the names of what can be shown of a scene."""
-    if isinstance(scene.integrator, Aov):
-        return (PICTURE, *scene.integrator.channels)
-    return MAPS
 
 
 def layer(name: str, values: NDArray[np.float32]) -> Bytes:

@@ -21,14 +21,16 @@ from clpt.errors import ClptError
 from clpt.render.renderer import Renderer
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Camera, Matrix, Orthographic, Perspective
-from clpt.scene.integrators import Aov, Direct, Path, Whitted
+from clpt.scene.integrators import Box, Direct, Path, Whitted
+from clpt.scene.shapes import Group, Instance, Shape
 
 log = logging.getLogger(__name__)
 
 BANDS = 47  # of 10 nm, of all light
 BATCH = 256  # samples
 BATCHES = (4, 8, 16, 32, 64)  # after which a spectrum is told, each time with less error
-CHANNELS = ("depth", "position", "shading_normal", "uv", "albedo", "shape_id", "primitive_id")
+LAYERS = ("depth", "position", "shading_normal", "uv", "albedo", "shape_id", "primitive_id")
+NARROW = 0.01  # pixels around the centre that a hit is looked for in
 
 Reply = Callable[[dict[str, Any]], None]
 
@@ -219,12 +221,9 @@ class Probe:
                 )  # fmt: skip
 
 
-AOV = Aov(channels=CHANNELS)
-
-
 def first_hit(follower: Follower, scene: Scene, x: int, y: int) -> dict[str, Any]:
     """Return what a pixel's centre meets: depth and position [m], normal, uv, albedo, numbers."""
-    renderer = follower.follow(scene, pixel_of(scene, x, y, 0, AOV))
+    renderer = follower.follow(scene, surfaces_of(scene, x, y))
     renderer.run(1)
     layers = {name: values[0, 0].tolist() for name, values in renderer.layers().items()}
     shape = round(layers.pop("shape_id")[0])
@@ -233,6 +232,34 @@ def first_hit(follower: Follower, scene: Scene, x: int, y: int) -> dict[str, Any
         return {"shape": None}
     layers["depth"] = layers["depth"][0]
     return {"shape": shape, "primitive": primitive, **layers}
+
+
+def surfaces_of(scene: Scene, x: int, y: int) -> Scene:
+    """Return a scene that shows the surface at a pixel's centre, with neither light nor media."""
+    groups: dict[int, Group] = {}
+    shapes: list[Shape] = []
+    for shape in scene.shapes:
+        if isinstance(shape, Instance):
+            group = shape.group
+            if id(group) not in groups:
+                bare = Group(shapes=tuple(map(_bare, group.shapes)), name=group.name)
+                groups[id(group)] = bare
+            shapes.append(dataclasses.replace(shape, group=groups[id(group)]))
+        else:
+            shapes.append(_bare(shape))
+    pixel = pixel_of(scene, x, y, 0, Path(max_depth=1, light_paths=0))
+    middle = Box(radius=NARROW)
+    film = dataclasses.replace(
+        pixel.film, mode="rgb", sensor="cie1931", filter=middle, layers=LAYERS
+    )
+    camera = dataclasses.replace(pixel.camera, medium=None)
+    return dataclasses.replace(pixel, camera=camera, shapes=shapes, lights=[], film=film)
+
+
+def _bare(shape: Shape) -> Shape:
+    plain: dict[str, Any] = {"emission": None, "interior": None, "exterior": None, "priority": 0}
+    own = {name: value for name, value in plain.items() if getattr(shape, name) != value}
+    return dataclasses.replace(shape, **own) if own else shape
 
 
 def _estimate(name: str, batches: list[NDArray[np.float64]]) -> dict[str, list[float]]:

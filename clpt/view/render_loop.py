@@ -273,7 +273,7 @@ class RenderLoop:
 
     def _shown(self, renderer: Renderer, whole: bool) -> tuple[NDArray[np.uint8], Any]:
         """Return what a renderer has for the screen, and the legend of its colours or None."""
-        if self.shows in (*renderer.scene.film.layers, *renderer.channels):
+        if self.shows in renderer.scene.film.layers:
             return maps.layer(self.shows, renderer.layers()[self.shows]), None
         if whole and self.shows == maps.DENOISED:
             return pictures.denoised(renderer, self.display), None

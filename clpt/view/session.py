@@ -136,7 +136,7 @@ class Session(CameraWork):
             "device": self.where,
             "names": {
                 **panels.names(self._loop.display.view is not None),
-                "maps": list(maps.available(scene)),
+                "maps": list(maps.MAPS),
             },
             "objects": panels.objects(scene),
             "panels": panels.panels(scene),
@@ -371,7 +371,7 @@ class Session(CameraWork):
         self._loop.show(Display(exposure, tone, self._loop.display.view), self.look.shows)
 
     def _do_shows(self, reply: Reply, name: str) -> None:
-        if name not in maps.available(self.scene):
+        if name not in maps.MAPS:
             raise CommandError(f"there is no {name} to show")
         if name == maps.DENOISED and not self.look.denoises:
             try:

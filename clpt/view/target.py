@@ -85,7 +85,7 @@ class Target:
         try:
             renderer.update(scene=variant)
         except SceneError as error:
-            if error.where not in ("film", "film.layers", "integrator.channels"):
+            if error.where not in ("film", "film.layers"):
                 raise
             self.close()  # another film, which a renderer cannot get
             self.renderer = self.make(variant)

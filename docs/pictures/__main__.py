@@ -16,7 +16,6 @@ from PIL import Image
 import clpt
 from clpt import images
 from clpt.formats.native import reference
-from clpt.render.aov_preview import sheet as aov_sheet
 
 from . import sheet, table
 
@@ -45,7 +44,7 @@ def main(names: list[str]) -> None:
 def render(picture: table.Picture) -> Image.Image:
     with clpt.Renderer(picture.scene()) as renderer:
         renderer.run(picture.spp)
-        image = aov_sheet(renderer.layers()) if renderer.channels else renderer.image()
+        image = renderer.image()
     return Image.fromarray(images.to_srgb8(image).repeat(picture.zoom, 0).repeat(picture.zoom, 1))
 
 

@@ -140,12 +140,6 @@ INTEGRATORS = {
         integrators.ParticleTracer(),
         spp=192,
     ),
-    "aov": traced(
-        "Channels `shading_normal` and `shape_id`, as colours.",
-        integrators.Aov(channels=("shading_normal", "shape_id")),
-        spp=32,
-        size=(144, 108),
-    ),
 }
 SAMPLERS = {
     "sobol": sampled("Four samples a pixel.", integrators.Sobol()),

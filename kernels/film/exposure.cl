@@ -8,9 +8,7 @@ inline vec2 exposure_begin(Scene scene, Slab path, uint at, mask go, Sampler sam
 {
     vec2 offset = {0.0f, 0.0f};
     real weight = 1.0f;
-#if !CHANNEL_IS_ID /* which has no mean over a filter */
     filter_sample(scene, sampler_pair(sampler, (natural)(DIMENSION_FILM)), &offset, &weight);
-#endif
     store_path_weight(path, at, go, weight);
     return offset;
 }

@@ -101,10 +101,6 @@ inline void begin_path(Scene scene, Slab path, uint at, mask go, integer pixel_i
     vec2 pixel = pixel_of_index(settings, pixel_index);
     natural key = pixel_key(settings, pixel_index);
     Sampler sampler = pixel_sampler(settings, key, sample);
-    real nothing = 0.0f;
-#if CHANNEL_IS_ID
-    nothing = -1.0f;
-#endif
     vec2 offset = exposure_begin(scene, path, at, go, sampler);
     vec2 position = film_position(settings, pixel, offset);
     real u = sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH)).x;
@@ -117,7 +113,7 @@ inline void begin_path(Scene scene, Slab path, uint at, mask go, integer pixel_i
     store_path_d(path, at, go, ray.d);
     store_path_lambdas(path, at, go, lambdas);
     store_path_beta(path, at, go, camera_start());
-    store_path_radiance(path, at, go, spectrum_of(nothing));
+    store_path_radiance(path, at, go, spectrum_of((real)(0.0f)));
     store_path_pdf(path, at, go, -ray.far);
     store_path_eta(path, at, go, (real)(1.0f));
 #if WEIGHS_LIGHT_PATHS

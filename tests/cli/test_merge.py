@@ -19,9 +19,8 @@ KINDS = {
     "alpha": ["--mode", "rgb", "--alpha"],
     "bands": ["--mode", "spectral", "--bands", "4"],
     "light": ["--mode", "rgb", "--light-paths", "1"],
-    "aov": ["--integrator", "aov"],
 }
-SUFFIX = {"bands": ".npy", "aov": ".exr"}
+SUFFIX = {"bands": ".npy"}
 
 
 def render(output, *more: str) -> int:
@@ -31,7 +30,7 @@ def render(output, *more: str) -> int:
 
 @pytest.mark.parametrize(
     "kind",
-    [*[*KINDS][:-1], pytest.param("aov", marks=pytest.mark.slow)],  # eight kernels to build
+    KINDS,
 )
 def test_ranges_add_to_one_render(tmp_path, kind):
     for name, given in (("a", "0:5"), ("b", "5:6"), ("c", "6:12")):

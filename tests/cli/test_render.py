@@ -249,18 +249,6 @@ def test_a_quality_of_trees_that_there_is_not(capsys):
     assert "'high', 'fast'" in capsys.readouterr().err
 
 
-@pytest.mark.slow
-def test_aov_has_its_layers(tmp_path):
-    path, picture = tmp_path / "out.exr", tmp_path / "out.png"
-    common = ["--size", "8x8", "--spp", "2", "--quiet", "--integrator", "aov"]
-    assert run(["render", CORNELL, "-o", str(path), "-o", str(picture), *common]) == 0
-    layers = images.read_layers(path)
-    expected = {"R", "depth", "uv.u", "uv.v", "shading_normal.R", "albedo.G", "shape_id"}
-    assert expected <= layers.keys()
-    assert layers["depth"].min() > 1  # the camera stands in front of the box
-    assert images.read(picture).shape == (16, 32, 3)  # eight values, four in a row
-
-
 def test_a_film_of_bands(tmp_path):
     """All bands where a file holds them, else the colours, in the space asked for."""
     common = ["--size", "8x8", "--spp", "2", "--quiet", "--bands", "6", "--output-space", "xyz"]
@@ -341,7 +329,7 @@ def test_changes_of_a_scene():
         (["--device", "no such device"], "is not there"),
         (["-o", "picture.jpeg"], ".exr"),
         (["-o", "no/such/folder/a.png"], "folder"),
-        (["--integrator", "aov", "-o", "a.hdr"], ".exr and .png"),
+        (["--integrator", "aov"], "film.*layers"),
         (["-D", "spp=3"], "only .xml"),
         (["--sensor", "no.csv"], "no.csv"),
         (["--sensor", "cie1964", "--mode", "rgb"], "film.sensor"),

@@ -19,13 +19,13 @@ from clpt.device.stream import Stream
 from clpt.errors import ClusterError, DeviceError, SceneError
 from clpt.render import film_file
 from clpt.scene import Scene
-from clpt.scene.integrators import Aov, Mitchell, ParticleTracer, Vcm
+from clpt.scene.integrators import Mitchell, ParticleTracer, Vcm
 from clpt.scene.integrators import Path as PathIntegrator
 from tests.renders.support import with_film
 
 SPP = 12
 SIZE = {"width": 26, "height": 18}
-KINDS = ("path", "light_paths", "vcm", "particle_tracer", "aov", "bands", "splat", "halves")
+KINDS = ("path", "light_paths", "vcm", "particle_tracer", "layers", "bands", "splat", "halves")
 NOISE = 0.2
 
 Fault = Callable[[], None]
@@ -35,12 +35,12 @@ def small(scenes: Path, kind: str = "path") -> Scene:
     films = {
         "splat": {"filter": Mitchell(), "alpha": True},
         "bands": {"mode": "spectral", "bands": 4},
+        "layers": {"layers": ("shading_normal", "depth")},
     }
     integrators = {
         "light_paths": PathIntegrator(light_paths=1.0),
         "vcm": Vcm(),
         "particle_tracer": ParticleTracer(),
-        "aov": Aov(channels=("shading_normal", "depth")),
     }
     scene = clpt.load(scenes / "cornell.xml")
     scene = with_film(scene, **{"mode": "rgb", **SIZE, **films.get(kind, {})})
@@ -108,7 +108,7 @@ def whole(scene: Scene) -> clpt.FilmState:
         return renderer.film_state()
 
 
-LONG = ("vcm", "particle_tracer", "aov")
+LONG = ("vcm", "particle_tracer", "layers")
 
 
 @pytest.mark.parametrize(
@@ -127,9 +127,8 @@ def test_films_and_pictures_are_those_of_one_renderer(scenes, pair, kind):
             np.testing.assert_array_equal(several.colours(), one.colours())
             np.testing.assert_array_equal(several.film.get(), one.film.get())
             np.testing.assert_array_equal(several.resolve().get(), one.resolve().get())
-            if several.channels:
-                for name, layer in one.layers().items():
-                    np.testing.assert_array_equal(several.layers()[name], layer)
+            for name, layer in one.layers().items():
+                np.testing.assert_array_equal(several.layers()[name], layer)
             if halves:
                 for ours, theirs in zip(several.halves(), one.halves(), strict=True):
                     np.testing.assert_array_equal(ours, theirs)
@@ -335,13 +334,11 @@ def test_films_merge(scene, whole, pair):
         assert several.film_state().taken == ((7, 9),)
 
 
-@pytest.mark.parametrize("kind", ["path", "light_paths", "aov"])
+@pytest.mark.parametrize("kind", ["path", "light_paths", "layers"])
 @pytest.mark.parametrize("noise", [None, NOISE])
 def test_saved_films_go_on_on_one_device_and_on_several(
     scenes, tmp_path, pair, faults, kind, noise
 ):
-    if kind == "aov" and noise:
-        pytest.skip("its values are no light")
     scene, path = small(scenes, kind), tmp_path / "a.film"
 
     def makers():

@@ -13,10 +13,6 @@ from PIL import Image
 
 import clpt
 from clpt import images
-from clpt.errors import UnknownKindError
-from clpt.render.aov_preview import sheet
-from clpt.scene import Film, Scene, cameras, shapes
-from clpt.scene.integrators import Aov
 from tests.renders.support import with_film
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -79,29 +75,6 @@ def test_readers_of_the_film_come_before_the_next_step(renderer):
     assert (renderer.film.get()[..., 3] == 2 * SAMPLES).all()
     renderer.reset()
     assert not renderer.film.get().any()
-
-
-def test_aov_resolves_by_channel():
-    plan = Scene(
-        camera=cameras.Perspective(),
-        shapes=[shapes.Sphere(center=(0.0, 0.0, 4.0))],
-        integrator=Aov(channels=("depth", "albedo")),
-        film=Film(width=16, height=8, mode="rgb"),
-    )
-    opened = clpt.device.choose()
-    renderer = clpt.Renderer(plan, queue=opened.queue)
-    renderer.step(1)
-    layers = renderer.layers()
-    for name, layer in layers.items():
-        values = renderer.resolve(channel=name, dtype=np.float32).get()
-        np.testing.assert_array_equal(values[..., : layer.shape[2]], layer)
-        film = np.asarray(renderer.films[name])
-        np.testing.assert_array_equal(film[..., : layer.shape[2]], layer)
-    assert renderer.film is renderer.films["depth"]
-    with pytest.raises(UnknownKindError, match=r"'uv'.*albedo"):
-        renderer.resolve(channel="uv")
-    with Image.open(io.BytesIO(renderer._repr_png_())) as png:
-        np.testing.assert_array_equal(np.asarray(png), images.to_srgb8(sheet(layers)))
 
 
 def test_the_page_tells_what_works(renderer):

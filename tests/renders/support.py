@@ -43,6 +43,13 @@ def exposures(scene: Scene, count: int, spp: int, first_seed: int = 1, **wavefro
     return np.array(images)
 
 
+def layers_of(scene: Scene, spp: int, **options: Any) -> dict[str, NDArray[np.float32]]:
+    """Return the layers of a film by name."""
+    with clpt.Renderer(scene, **options) as renderer:
+        renderer.run(spp)
+        return renderer.layers()
+
+
 def pictures_of_parts(scene: Scene) -> list[Values]:
     """Pictures of twelve samples: rendered in one go, and in parts."""
     images = []

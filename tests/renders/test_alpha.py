@@ -13,10 +13,9 @@ from clpt import transforms as tf
 from clpt.cli import outputs
 from clpt.cli.grading import Grading
 from clpt.errors import SceneError
-from clpt.render.lowering.scene import lower
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Perspective
-from clpt.scene.integrators import Aov, Path
+from clpt.scene.integrators import Path
 from clpt.scene.lights import Area, Constant
 from clpt.scene.materials import Dielectric, Diffuse, Mask
 from clpt.scene.shapes import Rectangle, Sphere
@@ -91,11 +90,6 @@ def test_files(tmp_path, transparent):
     straight = np.clip(images.straight(transparent)[..., :3], 0.0, 1.0)
     np.testing.assert_allclose(png[covered][:, :3], straight[covered], atol=0.01)
     np.testing.assert_allclose(png[..., 3], transparent[..., 3], atol=0.003)
-
-
-def test_channels_have_none():
-    scene = dataclasses.replace(still_life(alpha=True), integrator=Aov(channels=("depth",)))
-    assert not lower(scene).features.alpha
 
 
 def test_another_film_needs_another_renderer():

@@ -12,7 +12,6 @@ from clpt import transforms as tf
 from clpt.render.lowering.camera.filters import FUNCTIONS
 from clpt.scene import Film, Scene, cameras
 from clpt.scene.integrators import (
-    Aov,
     BlackmanHarris,
     Box,
     Filter,
@@ -23,6 +22,7 @@ from clpt.scene.integrators import (
 )
 from clpt.scene.lights import Area
 from clpt.scene.shapes import Rectangle, Sphere
+from tests.renders.support import layers_of
 
 WIDTH, HEIGHT = 48, 32
 EYE, TARGET, LAMP = np.array([1.0, 2.0, 6.0]), np.array([0.0, 0.5, 0.0]), np.array([0.8, 1.1, -0.5])
@@ -130,15 +130,16 @@ def test_a_crop_is_a_part_of_the_whole() -> None:
     """Positions seen through the middle of pixels."""
     ground = Rectangle(to_world=tf.scale(10.0))
     view = tf.look_at([1, 2, 5], [0, 0, 0], [0, 1, 0])
-    whole = Film(width=24, height=16, filter=Box(radius=0.01), mode="rgb")
+    whole = Film(width=24, height=16, filter=Box(radius=0.01), mode="rgb", layers="position")
     scene = Scene(
         camera=cameras.Perspective(to_world=view, fov=40.0, offset_x=0.1),
         shapes=[ground],
-        integrator=Aov(channels=("position",)),
+        integrator=Path(max_depth=1, light_paths=0),
         film=whole,
     )
     x, y, width, height = crop = (5, 2, 14, 9)
     part = dataclasses.replace(scene, film=dataclasses.replace(whole, crop=crop))
-    seen = clpt.render(scene, 4)[y : y + height, x : x + width]
-    assert clpt.render(part, 4).shape == (height, width, 3)
-    np.testing.assert_allclose(clpt.render(part, 4), seen, atol=5e-3)
+    seen = layers_of(scene, 4)["position"][y : y + height, x : x + width]
+    found = layers_of(part, 4)["position"]
+    assert found.shape == (height, width, 3)
+    np.testing.assert_allclose(found, seen, atol=5e-3)

@@ -15,7 +15,6 @@ from clpt.__main__ import run
 from clpt.denoise import needs
 from clpt.errors import SceneError, UnknownKindError
 from clpt.scene.integrators import (
-    Aov,
     Film,
     Gaussian,
     ParticleTracer,
@@ -66,11 +65,6 @@ def test_what_the_scene_asks_for_stays(box):
 @pytest.mark.parametrize("integrator", [Whitted(), ParticleTracer()])
 def test_integrators_without_layers_are_denoised_without(box, integrator):
     assert needs.prepared(dataclasses.replace(box, integrator=integrator), "oidn").film.layers == ()
-
-
-def test_what_cannot_be_denoised_is_refused(box):
-    with pytest.raises(SceneError, match="denoise"):
-        clpt.Renderer(dataclasses.replace(box, integrator=Aov()), denoise="oidn")
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,6 @@ from clpt.render.wavefront.film_state import FILM_WORDS, SAMPLES_WORD, SUM_WORDS
 from clpt.scene import Film, Scene, lights
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import (
-    Aov,
     Independent,
     Mitchell,
     ParticleTracer,
@@ -135,15 +134,6 @@ def test_light_paths_repeat(scenes: Path):
             renderer.run(200)
             films.append(renderer.film_state())
     assert same(films[0], films[1]) and same(films[0], films[2])
-
-
-def test_channels_merge():
-    film = Film(width=5, height=4, mode="rgb")
-    scene = Scene(camera=Perspective(), film=film, integrator=Aov(channels=("depth", "albedo")))
-    with clpt.Renderer(scene) as renderer:
-        renderer.run(2)
-        state = renderer.film_state()
-        assert state.words.shape == (2, 1, FILM_WORDS, 4, 5) and (state.samples == 2).all()
 
 
 def sky(**film: object) -> Scene:

@@ -14,14 +14,19 @@ from clpt import transforms as tf
 from clpt.errors import SceneError
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Perspective
-from clpt.scene.integrators import Aov
+from clpt.scene.integrators import Path as PathTracing
 from clpt.scene.shapes import Group, Instance, Mesh, Shape, Sphere
-from tests.renders.support import assert_agree, blocks, exposures, with_film
+from tests.renders.support import assert_agree, blocks, exposures, layers_of, with_film
 
-CHANNELS = ("position", "shading_normal", "uv", "shape_id", "primitive_id")
+LAYERS = ("position", "shading_normal", "uv", "shape_id", "primitive_id")
 SPECK = Group((Mesh(vertices=np.eye(3), faces=np.array([[0, 1, 2]], np.uint32)),))
 # Behind the camera: with them all scenes here have the same programs.
 HIDDEN = [Instance(group=SPECK, to_world=tf.translate([i, 0, 1e6])) for i in (0, 1)]
+
+
+def together(layers: dict[str, np.ndarray]) -> np.ndarray:
+    """The layers side by side, (h, w, 10)."""
+    return np.concatenate([layers[name] for name in LAYERS], axis=2)
 
 
 def bumpy() -> Mesh:
@@ -57,8 +62,8 @@ def scene(shapes: list[Shape], center: float = 0.0, size: float = 1.0) -> Scene:
     return Scene(
         camera=Perspective(to_world=view, fov=40),
         shapes=[*shapes, *HIDDEN],
-        film=Film(width=40, height=32),
-        integrator=Aov(channels=CHANNELS),
+        film=Film(width=40, height=32, layers=LAYERS),
+        integrator=PathTracing(max_depth=1, light_paths=0),
     )
 
 
@@ -75,7 +80,7 @@ def test_values_are_those_of_copies(layout: str) -> None:
     ball = Sphere(radius=0.4)
     renderers = [clpt.Renderer(scene([*s, ball]), layout=layout) for s in (placed, copies)]
     assert all(renderer.run(1) for renderer in renderers)
-    ours, expected = (renderer.image() for renderer in renderers)
+    ours, expected = (together(renderer.layers()) for renderer in renderers)
     assert len(np.unique(expected[..., 8])) > 20  # nearly all are seen
     off = np.abs(ours - expected) > 1e-4 * (1.0 + np.abs(expected))
     assert off.any(axis=2).sum() <= 3
@@ -97,13 +102,13 @@ def test_scales_and_places(center: float, size: float) -> None:
     copies: list[Shape] = [
         dataclasses.replace(mesh, to_world=whole @ m @ mesh.to_world) for m in matrices
     ]
-    expected = clpt.render(scene(copies, center, size), 1)
+    expected = together(layers_of(scene(copies, center, size), 1))
     for own in (1e4, 1e-4):
         away = tf.translate([0, own * 100.0, 0]) @ tf.scale(own)
         group = Group((dataclasses.replace(mesh, to_world=away @ mesh.to_world),))
         back = [whole @ m @ tf.inverse(away) for m in matrices]
         placed: list[Shape] = [Instance(group=group, to_world=m) for m in back]
-        ours = clpt.render(scene(placed, center, size), 1)
+        ours = together(layers_of(scene(placed, center, size), 1))
         reach = np.abs([center, 8 * size]).max()
         off = np.abs(ours[..., :3] - expected[..., :3]).max(axis=2) > 1e-5 * reach
         off |= np.abs(ours[..., 3:8] - expected[..., 3:8]).max(axis=2) > 2e-2

@@ -11,12 +11,12 @@ from clpt import transforms as tf
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m
 from clpt.scene.cameras import Perspective
-from clpt.scene.integrators import Aov, Integrator, ParticleTracer, Path, Whitted
+from clpt.scene.integrators import Integrator, ParticleTracer, Path, Whitted
 from clpt.scene.lights import Area, Constant, Point, Spot
 from clpt.scene.shapes import Rectangle, Shape, Sphere
 from clpt.scene.textures import Checkerboard
 from tests.renders.builders import ALBEDO, BLACK, facing_down
-from tests.renders.support import assert_mean, exposures
+from tests.renders.support import assert_mean, exposures, layers_of, with_film
 
 GROUND = Rectangle(material=m.Diffuse(reflectance=ALBEDO), to_world=tf.scale(100.0))
 HALF = m.Mask(material=BLACK, opacity=0.5)
@@ -149,8 +149,8 @@ def test_a_stack_of_more_than_a_path_crosses_is_black() -> None:
 
 def test_what_lies_behind_a_hole_is_the_first_surface() -> None:
     """Depth of the wall from the near plane at 1 mm, not of the nearest card."""
-    image = exposures(carded(Aov(channels=("depth",)), 20), 2, 4)
-    np.testing.assert_allclose(image, 0.049, rtol=1e-5)
+    scene = with_film(carded(Path(max_depth=1, light_paths=0), 20), layers="depth")
+    np.testing.assert_allclose(layers_of(scene, 4)["depth"], 0.049, rtol=1e-5)
 
 
 def test_the_camera_s_end_and_hidden_lights_hold_behind_holes() -> None:

@@ -16,7 +16,6 @@ from clpt.render.host_picture import HostPicture
 from clpt.scene import Scene, lights, shapes
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import (
-    Aov,
     Box,
     Independent,
     Mitchell,
@@ -47,7 +46,6 @@ MODES: dict[str, tuple[dict, dict, dict, float | None]] = {
     "vcm": ({}, {"integrator": Vcm()}, {}, None),
     "vcm_bands": ({"mode": "spectral", "bands": 4}, {"integrator": Vcm()}, {"halves": True}, None),
     "particle_tracer": ({"filter": Tent()}, {"integrator": ParticleTracer()}, {}, None),
-    "aov": ({}, {"integrator": Aov()}, {}, None),
     "noise": ({"width": 48, "height": 40}, {}, {}, 0.1),
     "noise_lights": (
         {"width": 48, "height": 40}, {"integrator": PathTracing(light_paths=1)}, {}, 0.1
@@ -65,7 +63,7 @@ def box(scenes: Path, film: dict, changes: dict, noise: float | None) -> Scene:
 
 
 LONG = (
-    "aov", "zsobol", "independent", "importance", "halves", "vcm", "rgb", "weights_alpha",
+    "zsobol", "independent", "importance", "halves", "vcm", "rgb", "weights_alpha",
     "light_share",
 )  # fmt: skip
 

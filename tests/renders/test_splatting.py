@@ -48,7 +48,6 @@ def test_what_is_splatted():
     scene = sky(1.0)
     assert not SceneIndex.of(with_film(scene, filtering="importance")).splatting
     assert not SceneIndex.of(dataclasses.replace(scene, noise=0.1)).splatting
-    assert not SceneIndex.of(dataclasses.replace(scene, integrator=it.Aov())).splatting
 
 
 @pytest.mark.parametrize("chosen", WIDE, ids=lambda f: f.kind)

@@ -93,12 +93,6 @@ def _spectral(scene: clpt.Scene) -> clpt.Scene:
     return with_film(scene, mode="spectral")
 
 
-def _aov(scene: clpt.Scene) -> clpt.Scene:
-    return dataclasses.replace(
-        scene, integrator=integrators.Aov(channels=("depth", "shading_normal"))
-    )
-
-
 def _bands(scene: clpt.Scene) -> clpt.Scene:
     return with_film(scene, mode="spectral", bands=5)
 
@@ -115,7 +109,7 @@ def _whitted(scene: clpt.Scene) -> clpt.Scene:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("change", [_spectral, _aov, _bands, _whitted])
+@pytest.mark.parametrize("change", [_spectral, _bands, _whitted])
 @pytest.mark.parametrize("layout", ["brute", "binary", "wide8"])
 def test_every_loop(
     scenes: Path, queue: cl.CommandQueue, change: Callable[[clpt.Scene], clpt.Scene], layout: str

@@ -6,7 +6,6 @@ See tests/renders/support.py for the significance.
 
 from __future__ import annotations
 
-import dataclasses
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,7 @@ from clpt.render.lowering.scene import lower
 from clpt.scene import Film, Scene, textures
 from clpt.scene import materials as m
 from clpt.scene.cameras import Perspective
-from clpt.scene.integrators import Aov, Integrator, Path, Whitted
+from clpt.scene.integrators import Integrator, Path, Whitted
 from clpt.scene.lights import Area, Constant
 from clpt.scene.materials import LEAVES
 from clpt.scene.params import device_params
@@ -99,9 +98,3 @@ def test_only_images_take_part() -> None:
         assert FLAG not in shading(room(m.Diffuse(reflectance=value)))
     plastic = room(m.Plastic(diffuse_reflectance=bitmap))
     assert FLAG not in shading(plastic, "plastic"), "its pdf knows the colour"
-
-
-def test_what_guides_a_denoiser_is_filtered() -> None:
-    scene = room(m.Diffuse(reflectance=textures.Bitmap(image=COLOURS)))
-    aov = dataclasses.replace(scene, integrator=Aov(channels=("albedo",)))
-    assert FLAG not in shading(aov)

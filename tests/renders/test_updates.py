@@ -279,12 +279,3 @@ def test_other_kinds_and_films() -> None:
     ):
         own.update(**edit)
         check(own)
-    views = clpt.Renderer(
-        scene(integrator=clpt.scene.integrators.Aov(channels=("depth", "albedo"))), device.choose()
-    )
-    views.update(materials={RED: m.Diffuse(reflectance=(0.1, 0.2, 0.9))})
-    check(views)
-    views.update(scene=changed(views.scene, 1, material=glass))
-    check(views)
-    with pytest.raises(SceneError, match="other channels need a new Renderer"):
-        views.update(scene=scene())

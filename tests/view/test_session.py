@@ -249,7 +249,8 @@ def test_a_pixel_alone_is_that_pixel(camera, on) -> None:
     film = dataclasses.replace(scene.film, width=12, height=9)
     scene = dataclasses.replace(scene, camera=camera, shapes=[wall], film=film)
     follower = probe.Follower(on)
-    whole = dataclasses.replace(scene, integrator=probe.AOV, noise=None)
+    film = dataclasses.replace(scene.film, layers=("position",))
+    whole = dataclasses.replace(scene, film=film)
     with Renderer(whole, on) as renderer:
         renderer.run(64)
         positions = renderer.layers()["position"]

@@ -7,6 +7,7 @@ line; so a picture is never silently a different one.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from clpt.formats.meshes.framing import framing_camera
@@ -55,13 +56,19 @@ def load(path: Path, missing: Missing = "error", /, **variables: object) -> Scen
         context.warn(props.element, f"the first of several cameras is used; there are: {names}")
     props.finish()
     camera = framing_camera(shapes) if first is None else first.camera
+    how = _default() if integrator is None else sensors.integrator(integrator, context)
+    film = sensors.default_film() if first is None else first.film
+    if context.layers and isinstance(how, integrators.HAVE_LAYERS):
+        film = replace(film, layers=(*context.layers,))
+    elif context.layers:
+        context.warn(props.element, f"the integrator {how.kind} has no layers: aovs are left out")
     return Scene(
         camera=camera,
         shapes=shapes,
         lights=lights,
-        integrator=_default() if integrator is None else sensors.integrator(integrator, context),
+        integrator=how,
         sampler=integrators.Sobol(),
-        film=sensors.default_film() if first is None else first.film,
+        film=film,
         spp=4 if first is None else first.spp,
         seed=0 if first is None else first.seed,
         name=path.stem,

@@ -36,11 +36,15 @@ MAX_PARTS = 1000  # of one material or texture
 
 
 class Context:
-    """What all parts of the loader share: the document, its ids, the objects made, warnings."""
+    """What all parts of the loader share: the document, its ids, the objects made, warnings.
+
+    layers: of the film, which integrators ask for.
+    """
 
     def __init__(self, document: Document, missing: Missing = "error"):
         self.document, self.missing = document, missing
         self.warnings: list[str] = []
+        self.layers: dict[str, None] = {}
         self.ids: dict[str, Element] = {}
         self._made: dict[int, Any] = {}
         self._sizes: dict[int, int] = {}  # parts of each object that is made, counted at every use

@@ -22,7 +22,7 @@ FULL_FRAME = math.hypot(36.0, 24.0)  # diagonal of 35 mm film [mm], which focal_
 FILMS = ("hdrfilm", "clptfilm")
 SAMPLERS = ("independent", "stratified", "multijitter", "orthogonal", "ldsampler")
 DEFAULT_SAMPLER = "independent"
-CHANNELS = {
+LAYERS = {  # of the values that the integrator aov names
     "depth": "depth",
     "position": "position",
     "uv": "uv",
@@ -32,6 +32,7 @@ CHANNELS = {
     "shape_index": "shape_id",
     "prim_index": "primitive_id",
 }
+NO_LAYERS = ("dp_du", "dp_dv", "duv_dx", "duv_dy", "boundary_test")
 
 
 @dataclass
@@ -322,24 +323,27 @@ def _volume_path(props: Properties) -> Integrator:
 
 
 def _aov(props: Properties) -> Integrator:
-    """A nested integrator makes the picture, as in Mitsuba; without one the values do."""
+    """Its values become layers of the film. A nested integrator makes the picture."""
     nested = props.object("integrator")
-    names = props.text("aovs", "")
-    if nested is not None:
-        if names.strip():
-            props.context.warn(props.element, f"its values are left out: {names[:80]}")
-        return integrator(nested, props.context)
-    channels = []
-    for entry in names.split(","):
-        kind = entry.strip().rpartition(":")[2]
-        if kind not in CHANNELS:
-            raise UnknownKindError("aov", kind, CHANNELS, **props.element.location())
-        channels.append(CHANNELS[kind])
-    return integrators.Aov(channels=tuple(dict.fromkeys(channels)))
+    for entry in filter(None, props.text("aovs", "").split(",")):
+        name = entry.strip().rpartition(":")[2]
+        if name in LAYERS:
+            props.context.layers[LAYERS[name]] = None
+        elif name in NO_LAYERS:
+            props.context.warn(props.element, f"the values {name} are left out")
+        else:
+            raise UnknownKindError("aov", name, LAYERS, **props.element.location())
+    return _no_light() if nested is None else integrator(nested, props.context)
 
 
 def _depth(props: Properties) -> Integrator:
-    return integrators.Aov(channels=("depth",))
+    props.context.layers["depth"] = None
+    return _no_light()
+
+
+def _no_light() -> Integrator:
+    """What goes to the first surface only, for the layers of the film."""
+    return integrators.Path(max_depth=1, light_paths=0)
 
 
 def _moment(props: Properties) -> Integrator:

@@ -14,6 +14,7 @@ from clpt import spectra
 from clpt.errors import UnknownKindError
 from clpt.formats.colour import COLOURS, colour
 from clpt.formats.native.cursor import Cursor
+from clpt.scene.integrators import NO_AOV
 from clpt.spectra import Spectrum
 
 SPECTRA: dict[str, type[Spectrum]] = {
@@ -116,6 +117,8 @@ def kind_name(cursor: Cursor, category: str, known: Any) -> str:
         raise cursor.error("needs the key 'type'")
     child = cursor.at("type")
     if child.expect(str) not in known:
+        if (category, child.value) == ("integrator", "aov"):
+            raise child.error(NO_AOV)
         raise UnknownKindError(category, child.value, known, **child.location())
     return child.value
 

@@ -15,6 +15,7 @@ from clpt.scene import integrators
 from clpt.scene.integrators import MOST_LIGHT_PATHS, Film, Filter, Integrator, Sampler
 
 FILMS = ("rgb", "gbuffer", "spectral")
+GBUFFER = ("albedo", "position", "geometric_normal", "shading_normal", "uv")
 SPACES = {"srgb": "rec709", "rec2020": "rec2020", "dci-p3": "display_p3"}
 SAMPLERS = (
     "halton", "sobol", "zsobol", "paddedsobol", "pmj02bn", "stratified", "independent",
@@ -35,8 +36,10 @@ def film(definition: Definition | None, filter: Definition | None, exposure: flo
     if definition.kind not in FILMS:
         raise UnknownKindError("film", definition.kind, FILMS, **params.location())
     params.ignore(*STORED)
-    if definition.kind == "gbuffer":
-        params.ignore("coordinatesystem")
+    if definition.kind == "gbuffer" and "world" not in params.one(
+        "coordinatesystem", "string", "camera"
+    ):
+        state.warn(params, "the layers of the film 'gbuffer' are in the world, not the camera")
     width, height = (params.one(name, "integer", n) for name, n in SIZE)
     with params.locating():
         made_film = Film(
@@ -46,6 +49,7 @@ def film(definition: Definition | None, filter: Definition | None, exposure: flo
             crop=_crop(params, width, height),
             **_colour(params, state, exposure),
             **(_bands(params) if definition.kind == "spectral" else {}),
+            layers=GBUFFER if definition.kind == "gbuffer" else (),
         )
     if params.one("maxcomponentvalue", "float", math.inf) < math.inf:
         state.warn(params, "'maxcomponentvalue' is left out: bright samples are kept as they are")

@@ -12,7 +12,6 @@ from typing import Any
 from clpt.render.contract.features import Features
 from clpt.render.contract.parameter_words import RERADIATION_STEP
 from clpt.render.contract.texture_records import IMAGES
-from clpt.scene.integrators import IDS
 from clpt.scene.layers import LAYERS, MATTE_SLOTS, WORDS
 from clpt.scene.params import device_params
 from clpt.scene.scatterer import Scatterer
@@ -44,7 +43,7 @@ def phase_varies(features: Features, cls: type[Scatterer]) -> bool:
 def filters_at_random(features: Features, cls: type[Scatterer]) -> bool:
     """Whether a random texel stands for some parameter of a material."""
     images = {(kind, "reflectance") for kind in IMAGES}
-    if features.channel or images.isdisjoint(features.texture_roles):
+    if images.isdisjoint(features.texture_roles):
         return False
     sources, declared = features.sources_of(cls.kind), device_params(cls)
     return any(p.linear and "texture" in sources.get(n, ()) for n, p in declared.items())
@@ -127,8 +126,6 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "LAYER_WORDS": lambda f: f.layer_words or False,
     "LAYER_DENOISING": lambda f: _first_for_denoisers(f),
     **{f"LAYER_{n.upper()}": _layer_place(n) for n in LAYERS if LAYERS[n].form in WORDS},
-    "CHANNEL": lambda f: bool(f.channel) and f"CHANNEL_{f.channel.upper()}",
-    "CHANNEL_IS_ID": lambda f: f.channel in IDS,
     "SPECTRA_SIZE": lambda f: f.spectra_size,
     "SPECTRA_STEP": lambda f: f"{f.spectra_step}f",
     "RERADIATION_STEP": lambda f: RERADIATION_STEP,

@@ -95,7 +95,6 @@ class Features:
     grids: bool = False  # of which some have a density on a grid
     bodies: bool = False  # that may overlap, of different priorities
     glass_lens: bool = False  # of a glass that disperses
-    channel: str = ""
     bands: bool = False  # a spectral film
     alpha: bool = False  # a film that tells what is covered
     layers: tuple[str, ...] = ()  # beside the picture

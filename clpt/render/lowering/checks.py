@@ -14,7 +14,6 @@ from clpt.scene.cameras import Camera
 from clpt.scene.integrators import (
     AUTO,
     HAVE_LAYERS,
-    Aov,
     Film,
     Filter,
     Integrator,
@@ -49,7 +48,7 @@ def check(scene: Scene) -> None:
         if not isinstance(shape.emission, (*ON_SHAPES, type(None))):
             names = " or ".join(f"`{cls.kind}`" for cls in ON_SHAPES)
             raise SceneError(f"its emission must be {names}", where=shapes.where(shape))
-    if scene.film.mode == "rgb" and not isinstance(scene.integrator, Aov):
+    if scene.film.mode == "rgb":
         for name, plain in (("sensor", "cie1931"), ("bands", 0)):
             if getattr(scene.film, name) != plain:
                 raise SceneError("needs the mode spectral", where=f"film.{name}")

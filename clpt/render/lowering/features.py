@@ -33,10 +33,10 @@ def features_of(
     aimed: whether light paths aim;
     medium_aims: places of lamps that flights through media aim at.
     """
-    scene, textures, channels = index.scene, encoder.textures, index.channels
+    scene, textures = index.scene, encoder.textures
     sources = encoder.sources
     tangents = materials.tangents or index.normal_mapped
-    uvs = materials.uvs or geometry.uvs or tangents or "uv" in (*channels, *index.layers)
+    uvs = materials.uvs or geometry.uvs or tangents or "uv" in index.layers
     glass_lens = index.spectral and bool(dispersive_glass(scene.camera))
     return Features(
         mode=index.mode,
@@ -61,9 +61,9 @@ def features_of(
         uvs=uvs,
         tangents=tangents,
         mixtures=materials.mixture_depth,
-        normal_mapped=index.normal_mapped and not channels,
+        normal_mapped=index.normal_mapped,
         null_surfaces=any(cls.is_null for cls in index.leaves),
-        infinite=lights.infinite > 0 and not channels,
+        infinite=lights.infinite > 0,
         light_paths=index.light_paths,
         weighed=index.weighed > 0,
         joined=index.joined and (index.light_paths or index.weighed > 0),
@@ -75,7 +75,7 @@ def features_of(
         two_sided_lights=lights.two_sided,
         light_tree=lights.tree is not None,
         many_lights=len(lights.rows) > FEW_LIGHTS,
-        absorption=materials.absorption and not channels,
+        absorption=materials.absorption,
         media=index.has_media,
         bodies=index.nested,
         chromatic_media=any(medium.is_chromatic for medium in index.media),
@@ -83,8 +83,7 @@ def features_of(
         grids=any(isinstance(medium, Grid) for medium in index.media),
         dispersion=glass_lens or disperses(index.leaves, sources),
         glass_lens=glass_lens,
-        channel=channels[0] if channels else "",
-        bands=bool(scene.film.bands) and not channels,
+        bands=bool(scene.film.bands),
         alpha=index.alpha,
         layers=index.layers,
         tabulated_density=tabulated_density,

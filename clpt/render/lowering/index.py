@@ -66,23 +66,18 @@ class SceneIndex:
 
     @property
     def media(self) -> tuple[Medium, ...]:
-        """The media of a scene; the `aov` integrator sees none."""
-        return () if self.channels else tuple(_media(self.scene, self.shapes))
+        """The media of a scene."""
+        return tuple(_media(self.scene, self.shapes))
 
     @property
     def nested(self) -> bool:
         """Whether bodies may overlap, of different priorities."""
-        return not self.channels and any(shape.priority for shape in self.shapes)
+        return any(shape.priority for shape in self.shapes)
 
     @property
     def has_media(self) -> bool:
         """Whether rays go through media, which may be different from the two sides' of a shape."""
         return bool(self.media) or self.nested
-
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """The channels of the `aov` integrator; of others none."""
-        return getattr(self.scene.integrator, "channels", ())
 
     @property
     def light_paths(self) -> bool:
@@ -128,13 +123,12 @@ class SceneIndex:
     @property
     def alpha(self) -> bool:
         """Whether the film tells what is covered."""
-        return self.scene.film.alpha and not self.channels
+        return self.scene.film.alpha
 
     @property
     def layers(self) -> tuple[str, ...]:
         """What the film has beside the picture, in the order of LAYERS."""
-        wanted = () if self.channels else self.scene.film.layers
-        return tuple(name for name in LAYERS if name in wanted)
+        return tuple(name for name in LAYERS if name in self.scene.film.layers)
 
     @property
     def light_layers(self) -> bool:
@@ -147,7 +141,7 @@ class SceneIndex:
         film = self.scene.film
         wanted = film.filtering != "importance" and self.scene.noise is None
         wanted = wanted and not self.light_layers
-        reaches = filters.reach(film.filter) > 0 and wanted and not self.channels
+        reaches = filters.reach(film.filter) > 0 and wanted
         return reaches or self.light_paths
 
     @property
@@ -168,8 +162,8 @@ class SceneIndex:
 
     @property
     def mode(self) -> str:
-        """The mode of the kernels: channels are no light, and need no wavelengths."""
-        return "rgb" if self.channels else self.scene.film.mode
+        """The mode of the kernels."""
+        return self.scene.film.mode
 
     @property
     def spectral(self) -> bool:
@@ -203,8 +197,6 @@ def _media(scene: Scene, shapes_: tuple[Shape, ...]) -> list[Medium]:
 
 def _phase_kinds(scene: Scene, shapes_: tuple[Shape, ...]) -> tuple[type[Scatterer], ...]:
     """The kinds of phase functions of a scene, in the order of their table."""
-    if getattr(scene.integrator, "channels", ()):
-        return ()
     scattering = (medium for medium in _media(scene, shapes_) if medium.scatters)
     found = {type(leaf) for medium in scattering for leaf in medium.phase.leaves}
     return tuple(cls for cls in PHASE_LEAVES if cls in found)

@@ -108,7 +108,7 @@ class Lowered:
 def lower(
     scene: Scene, texture_budget: int | None = None, former: Lowered | None = None
 ) -> Lowered:
-    """Lower a scene; of the `aov` integrator, for its first channel.
+    """Lower a scene.
 
     texture_budget: [bytes] for images, None for any number. former: of a scene that has much in
     common with this one: it saves time, and what is "auto" stays as chosen. Arrays,
@@ -258,19 +258,19 @@ def _warnings(index: SceneIndex) -> list[str]:
     """What of the scene is not rendered as it says."""
     scene, film = index.scene, index.scene.film
     warnings = list(index.warnings)
-    if index.mode == "rgb" and not index.channels and cameras.dispersive_glass(scene.camera):
+    if index.mode == "rgb" and cameras.dispersive_glass(scene.camera):
         warnings.append("thin_lens.glass: in RGB mode all wavelengths have one focus")
     if getattr(scene.integrator, "light_paths", 0):
         warnings += _left_to_the_camera(index)
     depth = getattr(scene.integrator, "max_depth", -1)
     if depth > DEEPEST:
         warnings.append(f"integrator.max_depth: {depth} counts as {DEEPEST}, the longest path")
-    if index.spectral and not film.bands and not index.channels and not _sees(film):
+    if index.spectral and not film.bands and not _sees(film):
         warnings.append(
             f"film.sensor sees nothing from {film.lambda_min:g} to {film.lambda_max:g} nm, so the"
             " picture is black; ask for film.bands"
         )
-    if not index.channels and next(emissions(index), None) is None:
+    if next(emissions(index), None) is None:
         warnings.append("no light in the scene, so the picture is black: add one to `lights`")
     if film.mode == "rgb" and mt.Fluorescent in index.leaves:
         warnings.append("in rgb mode fluorescent paint has its colour under D65, at most white")

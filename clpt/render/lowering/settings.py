@@ -18,7 +18,7 @@ from clpt.spectra.cie import tanh_ends
 
 MOST_SAMPLE_BITS = 16  # of a zsobol pixel's part of its sequence
 DEEPEST = 4000  # path state has 12 bits for the depth
-DEPTHS = {"direct": 2, "aov": 1}  # of integrators without the parameter
+DEPTHS = {"direct": 2}  # of integrators without the parameter
 
 
 def settings_of(
@@ -77,8 +77,7 @@ def settings_of(
     settings["tanh_min"], settings["tanh_max"] = tanh_ends(density.lo, density.hi)
     settings["bands"] = film.bands
     settings["density"] = density_row
-    matrix = np.eye(3) if index.channels else output_matrix(film, index.mode)
-    scale = 1.0 if index.channels else film_scale(film)
+    matrix, scale = output_matrix(film, index.mode), film_scale(film)
     settings["film_scale"] = scale
     settings["to_first"], settings["to_second"], settings["to_third"] = matrix / scale
     settings["center"], settings["scene_radius"] = sphere

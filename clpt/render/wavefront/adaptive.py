@@ -43,9 +43,6 @@ OPEN = FOREVER  # of a cell whose number of samples is not decided
 def checked(noise: float, features: Features) -> float:
     """Return a limit of noise. Raises SceneError where it makes no sense."""
     check_noise(noise)
-    if features.channel:
-        message = "the values of the integrator aov are no light; leave it out"
-        raise SceneError(message, where="noise")
     if features.light_paths:
         message = "the integrator particle_tracer cannot choose which pixels its paths reach"
         raise SceneError(f"{message}; leave it out, or choose path", where="noise")

@@ -91,15 +91,14 @@ class BounceLoop:
         paths: PathBuffers,
         timings: Timings,
         looped: bool,
-        features_of: Callable[[Lowered], Features],
         which: int,
         cancel_seconds: float | None = None,
     ):
         self.kernels, self.scene, self.paths, self.timings = kernels, scene, paths, timings
         self.device, self.stream, self.looped = scene.device, scene.stream, looped
         self.lanes = self.device.lanes
-        self._features_of, self._which = features_of, which
-        self.is_last = which == len(features_of(scene.lowered).passes) - 1
+        self._which = which
+        self.is_last = which == len(scene.lowered.features.passes) - 1
         self.per_sample = 1 if self.is_last else float(scene.lowered.settings["light_paths"]) or 1
         self._label = "" if self.is_last else "light "
         self._share = strategy.loop_share(self.device)
@@ -197,7 +196,7 @@ class BounceLoop:
         return finished
 
     def _own(self, lowered: Lowered) -> Features:
-        return self._features_of(lowered).passes[self._which]
+        return lowered.features.passes[self._which]
 
     def _bind_stages(self) -> list[Step]:
         features, chosen, label = self.features, self.scene.strategy, self._label
@@ -229,7 +228,7 @@ class BounceLoop:
         return {self._label + name: text for name, text in texts.items()}
 
     def _link(self, lowered: Lowered, chosen: Strategy) -> device.Program:
-        features, layout = self._features_of(lowered), chosen.layout
+        features, layout = lowered.features, chosen.layout
         texts = programs.loop_sources(features, layout, self.lanes, chosen.interleaved)
         known = {"loop": signatures.loop_arguments(features, layout)}
         return device.link(self.device, texts, "loop", known)

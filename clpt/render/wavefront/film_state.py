@@ -40,7 +40,7 @@ class FilmState:
     A sum is 96 bits in two's complement, three words with the lowest first, in units of 2^-48. So
     two states of different samples merge to the state of one run, to the bit, in any order.
 
-    words: (films, halves, 10 to 26, h, w) uint32, one film, or one for each channel of `aov`; of
+    words: (films, halves, 10 to 26, h, w) uint32, one film; of
     each pixel three sums, and the number of its samples; then, where samples serve all pixels whose
     filters hold them, a sum of the filter's values, and with alpha a sum of what is covered; then,
     where light paths are weighed, three sums of theirs, and how many began at the pixel's number.

@@ -6,8 +6,6 @@ any depth. Where paths start at lights beside those from the camera, they take t
 
 from __future__ import annotations
 
-import dataclasses
-import functools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -31,7 +29,6 @@ from clpt.render.wavefront.guide import Guide
 from clpt.render.wavefront.path_buffers import PathBuffers, divide_film
 from clpt.render.wavefront.photons import Photons
 from clpt.render.wavefront.strategy import Strategy, Tuning
-from clpt.scene.integrators import IDS
 
 TURN_SAMPLES = 16  # of a pixel, that each kind of paths takes at a turn; a small film gets more
 TURN_PATHS = 1 << 20
@@ -59,9 +56,8 @@ class Counts:
 class Wavefront:
     """A film of a scene on a device, and `render_samples`, which runs the bounce loop.
 
-    scene, paths: which other wavefronts may share, one after the other; looped: whether a kernel
-    on the device runs the loop; channel: of the `aov` integrator, that the film holds; tuning: for
-    the strategies of other lowerings.
+    scene, paths: what is on the device; looped: whether a kernel on the device runs the loop;
+    tuning: for the strategies of other lowerings.
 
     counts: of rays and samples.
 
@@ -73,11 +69,10 @@ class Wavefront:
         scene: DeviceScene,
         paths: PathBuffers,
         looped: bool,
-        channel: str,
         tuning: Tuning,
     ):
         self.device, self.stream, self.buffers = scene.device, scene.stream, scene.buffers
-        self.scene, self.paths, self.looped, self.channel = scene, paths, looped, channel
+        self.scene, self.paths, self.looped = scene, paths, looped
         self._tuning, self.lanes = tuning, self.device.lanes
         self.timings = Timings(self.device.queue)
         features = self.features
@@ -95,10 +90,9 @@ class Wavefront:
                 **scene.arguments, **paths.arguments, **film.arguments, **own
             },
         )  # fmt: skip
-        own_features = functools.partial(_features_of, channel)
         self.loops = [
             BounceLoop(
-                self.kernels, scene, paths, self.timings, looped, own_features, which,
+                self.kernels, scene, paths, self.timings, looped, which,
                 tuning.cancel_seconds,
             )
             for which in range(len(features.passes))
@@ -155,16 +149,12 @@ class Wavefront:
         in_flight = PathBuffers(
             stream, buffers, settings, divided, blocks, chosen.queued, kinds, footprint
         )
-        return cls(scene, in_flight, looped, lowered.features.channel, tuning)
-
-    def with_channel(self, channel: str) -> Wavefront:
-        """Return a wavefront with another film of the same scene, for a channel of `aov`."""
-        return Wavefront(self.scene, self.paths, self.looped, channel, self._tuning)
+        return cls(scene, in_flight, looped, tuning)
 
     @property
     def features(self) -> Features:
-        """The features of the scene, for the channel of this film."""
-        return _features_of(self.channel, self.scene.lowered)
+        """The features of the scene."""
+        return self.scene.lowered.features
 
     @property
     def has_light_paths(self) -> bool:
@@ -210,8 +200,7 @@ class Wavefront:
 
     def build_ahead(self, lowered: Lowered, chosen: Strategy) -> None:
         """Build the programs that are in use for another lowering, so that no later build fails."""
-        features = _features_of(self.channel, lowered)
-        device.build_all(self.device, programs.film_sources(features, chosen.layout))
+        device.build_all(self.device, programs.film_sources(lowered.features, chosen.layout))
         for loop in self._all_loops:
             loop.build_ahead(lowered, chosen)
 
@@ -241,7 +230,6 @@ class Wavefront:
 
     def enqueue(self, first: int, end: int) -> None:
         """Enqueue that samples first to end - 1 of every pixel are added; wait for nothing."""
-        first, end = self._range(first, end)
         self._train(first, end, looped=True)
         for turn in self._turns(first, end) if self.photons else [(first, end)]:
             for loop in self.loops:
@@ -259,7 +247,6 @@ class Wavefront:
         brought to its end and no other begins: a valid film, whose pixels differ in their number of
         samples. Returns whether all samples were added.
         """
-        first, end = self._range(first, end)
         finished = all(
             self._run(loop, *turn, on_batch)
             for turn in self._turns(first, end)
@@ -395,10 +382,6 @@ class Wavefront:
             else:
                 self.photons.clear()
 
-    def _range(self, first: int, end: int) -> tuple[int, int]:
-        """The numbers among these of samples that the film takes: an id is known by the first."""
-        return (first, max(first, min(end, 1))) if self.channel in IDS else (first, end)
-
     def _note_paths(self, first: int, end: int) -> None:
         """Count the light paths of samples first to end - 1, which are in the film by now."""
         first, end = self.loops[0].numbers(first, end)
@@ -419,10 +402,3 @@ class Wavefront:
             gained.pop("samples")
         for name, n in gained.items():
             setattr(self.counts, name, getattr(self.counts, name) + n)
-
-
-def _features_of(channel: str, lowered: Lowered) -> Features:
-    """The features of a lowering, for a film of a channel."""
-    if lowered.features.channel == channel:
-        return lowered.features
-    return dataclasses.replace(lowered.features, channel=channel)

@@ -207,10 +207,14 @@ def test_integrators(scene):
     assert "second moments" in moment.warnings[0]
     aovs = '<string name="aovs" value="d:depth, n:sh_normal"/>'
     made = scene(f'<integrator type="aov">{aovs}</integrator>')
-    assert made.integrator.channels == ("depth", "shading_normal") and not made.warnings
+    assert made.film.layers == ("depth", "shading_normal") and not made.warnings
+    assert (made.integrator.kind, made.integrator.max_depth) == ("path", 1)
     made = scene(f'<integrator type="aov">{aovs}<integrator type="direct"/></integrator>')
-    assert made.integrator.kind == "direct"
-    assert "left out: d:depth, n:sh_normal" in made.warnings[0]
+    assert made.integrator.kind == "direct" and made.film.layers == ("depth", "shading_normal")
+    assert scene('<integrator type="depth"/>').film.layers == ("depth",)
+    others = '<string name="aovs" value="a:dp_du"/><integrator type="ptracer"/>'
+    made = scene(f'<integrator type="aov">{others}</integrator>')
+    assert made.film.layers == () and "dp_du are left out" in made.warnings[0]
     for name in ("volpath", "volpathmis"):
         assert scene(f'<integrator type="{name}"/>').integrator.kind == "path"
 

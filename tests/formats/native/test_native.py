@@ -69,8 +69,14 @@ def test_an_empty_scene_has_the_defaults(scene):
 
 def test_every_part(scene):
     made = scene(
-        film={"width": 32, "height": 16, "mode": "rgb", "filter": {"type": "tent", "radius": 2}},
-        integrator={"type": "aov", "channels": ["depth", "uv"]},
+        film={
+            "width": 32,
+            "height": 16,
+            "mode": "rgb",
+            "filter": {"type": "tent", "radius": 2},
+            "layers": ["depth", "uv"],
+        },
+        integrator={"type": "path", "max_depth": 1},
         sampler={"type": "independent"},
         spp=7,
         seed=3,
@@ -86,7 +92,7 @@ def test_every_part(scene):
         lights=[{"type": "envmap", "image": "t.png"}],
     )
     assert (made.film.width, made.film.mode, made.film.filter.radius) == (32, "rgb", 2.0)
-    assert made.integrator.channels == ("depth", "uv")
+    assert made.film.layers == ("depth", "uv")
     assert (made.sampler.kind, made.spp, made.seed) == ("independent", 7, 3)
     sphere, mesh, disk = made.shapes
     assert sphere.center == (1, 2, 3)
@@ -95,6 +101,11 @@ def test_every_part(scene):
     assert mesh.to_world[2, 3] == 5
     assert disk.emission.radiance == spectra.RGBIlluminant(1, 2, 3)
     assert made.lights[0].image.name == "t.png"
+
+
+def test_the_integrator_that_is_gone(scene):
+    with pytest.raises(SceneError, match=r"integrator.*layers.*max_depth"):
+        scene(integrator={"type": "aov", "channels": ["depth", "uv"]})
 
 
 TRANSFORMS = [

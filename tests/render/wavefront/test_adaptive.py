@@ -23,7 +23,7 @@ from clpt.render.wavefront.light_rounds import LightRounds
 from clpt.render.wavefront.work_list import FOREVER, inside, pixels, table
 from clpt.scene import Film, Scene, materials
 from clpt.scene.cameras import Perspective
-from clpt.scene.integrators import Aov, Mitchell, ParticleTracer, Path, Vcm
+from clpt.scene.integrators import Mitchell, ParticleTracer, Path, Vcm
 from clpt.scene.lights import Area, Constant
 from clpt.scene.shapes import Rectangle, Sphere
 
@@ -297,7 +297,7 @@ def test_no_noise(renderer, noise):
         renderer.run(1, noise=noise)
 
 
-@pytest.mark.parametrize("integrator", [Aov(channels=("depth",)), ParticleTracer(), Vcm()])
+@pytest.mark.parametrize("integrator", [ParticleTracer(), Vcm()])
 def test_refused(integrator):
     features = lower(bulb(integrator=integrator)).features
     with pytest.raises(SceneError, match=f"noise: .*{integrator.kind}"):

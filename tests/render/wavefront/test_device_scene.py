@@ -14,7 +14,6 @@ from clpt.render.editing import parameter_patch, rebuild
 from clpt.render.lowering.scene import lower
 from clpt.render.wavefront.wavefront import Wavefront
 from clpt.scene import Scene
-from clpt.scene.integrators import Aov
 from clpt.scene.materials import Diffuse
 
 
@@ -47,16 +46,6 @@ def test_nobody_can_write_to_a_lowered_scene(cornell: Scene) -> None:
         lowered.settings["seed"] = 1
     with pytest.raises(dataclasses.FrozenInstanceError):
         lowered.glass_row = 1  # type: ignore[misc]
-
-
-def test_channels_share_a_scene_and_count_by_themselves(cornell: Scene) -> None:
-    views = dataclasses.replace(cornell, integrator=Aov(channels=("depth", "albedo")))
-    with clpt.Renderer(views) as renderer:
-        depth, albedo = renderer.wavefronts
-        assert depth.scene is albedo.scene and depth.paths is albedo.paths
-        for samples in (2, 4):
-            renderer.run(2)
-            assert depth.counts.samples == albedo.counts.samples == samples * 24 * 20
 
 
 def test_two_wavefronts_share_a_lowered_scene(cornell: Scene) -> None:

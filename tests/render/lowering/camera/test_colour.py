@@ -10,10 +10,7 @@ import pytest
 from clpt import spectra
 from clpt.errors import SceneError
 from clpt.render.lowering.camera.colour import output_matrix
-from clpt.render.lowering.scene import lower
-from clpt.scene import Film, Scene
-from clpt.scene.cameras import Perspective
-from clpt.scene.integrators import Aov
+from clpt.scene import Film
 from clpt.spectra import Sensor, cie, spaces
 
 CURVES = tuple(spectra.Tabulated(cie.GRID, row) for row in cie.cie_xyz(cie.GRID, "1964").T)
@@ -66,13 +63,6 @@ def test_the_same_colour_in_every_space() -> None:
         for space in spaces.SPACES
     ]
     np.testing.assert_allclose(xyz, np.broadcast_to(np.eye(3), (len(xyz), 3, 3)), atol=1e-9)
-
-
-def test_values_of_the_aov_integrator_stay_as_they_are() -> None:
-    film = Film(width=4, height=4, white_balance="A", output_space="acescg", bands=5)
-    made = lower(Scene(camera=Perspective(), film=film, integrator=Aov()))
-    rows = [made.settings[name].tolist() for name in ("to_first", "to_second", "to_third")]
-    assert rows == np.eye(3).tolist() and not made.features.bands
 
 
 @pytest.mark.parametrize(

@@ -21,11 +21,12 @@ from clpt.render.lowering.scene import lower
 from clpt.scene import Scene, cameras, integrators, lights, materials, shapes
 from clpt.scene.textures import MeshAttribute
 from tests.kernels.harness import opened
+from tests.renders.support import layers_of
 
 RNG = np.random.default_rng(11)
 PLACE = T.translate([0.1, -0.2, 0.3]) @ T.rotate([1, 2, 3], 40.0) @ T.scale(1.2)
 COLOURS = RNG.random((40, 3)).astype(np.float32)
-CHANNELS = ("position", "geometric_normal", "albedo", "primitive_id")
+LAYERS = ("position", "geometric_normal", "albedo", "primitive_id")
 PAINT = materials.Diffuse(reflectance=MeshAttribute(name="vertex_color"))
 MANY = shapes.Spheres(
     centers=RNG.normal(size=(40, 3)).astype(np.float32),
@@ -40,9 +41,10 @@ SQUARE = shapes.Rectangle(to_world=T.scale(0.3))
 SCENE = Scene(
     camera=cameras.Orthographic(to_world=T.look_at([0, 0, 9], [0, 0, 0], [0, 1, 0]) @ T.scale(2)),
     shapes=[MANY, shapes.Sphere(center=(0.5, 0.5, 1.0), radius=0.4), SQUARE, FEW],
-    # Ids are those of the pixels' centres: so are the other channels, by a narrow filter.
-    film=integrators.Film(width=48, height=48, mode="rgb", filter=integrators.Box(radius=0.01)),
-    integrator=integrators.Aov(channels=CHANNELS),
+    film=integrators.Film(
+        width=48, height=48, mode="rgb", filter=integrators.Box(radius=0.01), layers=LAYERS
+    ),
+    integrator=integrators.Path(max_depth=1, light_paths=0),
 )
 
 
@@ -59,8 +61,8 @@ def nearest(balls: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.nda
 @pytest.mark.parametrize("layout", [pytest.param("brute", marks=pytest.mark.slow), "wide8"])
 def test_rays_meet_the_nearest_sphere(layout: str) -> None:
     """Place, normal, number and colour of what is met, against float64."""
-    image = clpt.render(SCENE, spp=1, layout=layout).reshape(48 * 48, -1)
-    found = dict(zip(CHANNELS, np.split(image, [3, 6, 9], axis=1), strict=True))
+    layers = layers_of(SCENE, 1, layout=layout)
+    found = {name: layer.reshape(48 * 48, -1) for name, layer in layers.items()}
     position = found["position"].astype(np.float64)
     single = np.array([[0.5, 0.5, 1.0, 0.4]])
     all_balls = np.concatenate([spheres.balls(MANY), single, spheres.balls(FEW)])

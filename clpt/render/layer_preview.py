@@ -1,23 +1,11 @@
-"""The values of the `aov` integrator as people can see them."""
+"""Layers as people can see them."""
 
 from __future__ import annotations
-
-from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 Image = NDArray[np.float32]
-COLUMNS = 4  # of pictures in the sheet
-
-
-def sheet(layers: Mapping[str, Image]) -> Image:
-    """Return all layers side by side as colours in [0, 1], (h, w, 3) float32."""
-    shown = [viewable(name, layer) for name, layer in layers.items()]
-    columns = min(COLUMNS, len(shown))
-    shown += [np.zeros_like(shown[0])] * (-len(shown) % columns)
-    rows = [np.hstack(shown[at : at + columns]) for at in range(0, len(shown), columns)]
-    return np.vstack(rows)
 
 
 def viewable(name: str, layer: Image) -> Image:
