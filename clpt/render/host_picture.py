@@ -87,6 +87,10 @@ class HostPicture:
         """How many samples each pixel has, (h, w) float32."""
         return self._samples(self._films[0])
 
+    def light_paths_per_pixel(self) -> float:
+        """How many paths have begun at lights for each pixel."""
+        return self._light_paths(self._films[0])
+
     def _colours(self, words: Words) -> Image:
         total = _means(words, 0) * self._mean(words)
         if self.form.weighed:

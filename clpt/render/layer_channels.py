@@ -97,8 +97,9 @@ def channels_of(layers: Mapping[str, Image], names: str = "clpt") -> dict[str, I
             of_pairs = cryptomatte.SHORT_LETTERS if blender else cryptomatte.LETTERS
             made |= cryptomatte.channels_of(prefix, image, of_pairs)
             continue
-        letters = LAYERS[_owner(name)].channels
-        made |= {f"{prefix}.{letter}": image[..., i] for i, letter in enumerate(letters)}
+        layer = LAYERS[_owner(name)]
+        before = "" if layer.plain and names == "clpt" else f"{prefix}."
+        made |= {f"{before}{letter}": image[..., i] for i, letter in enumerate(layer.channels)}
     return made
 
 

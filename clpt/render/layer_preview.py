@@ -14,7 +14,7 @@ def viewable(name: str, layer: Image) -> Image:
         return layer
     if name.endswith("_normal"):
         return layer * np.float32(0.5) + np.float32(0.5)
-    if name == "depth":  # the nearest point is white, one twice as far half as bright
+    if name in ("depth", "z"):  # the nearest point is white, one twice as far half as bright
         near = np.min(layer, where=layer > 0, initial=np.inf)
         return np.repeat(np.divide(near, layer, where=layer > 0, out=np.zeros_like(layer)), 3, 2)
     if name.endswith(

@@ -31,6 +31,9 @@ class Pictured(Protocol):
     def samples_per_pixel(self) -> Image:
         """How many samples each pixel has, (h, w) float32."""
 
+    def light_paths_per_pixel(self) -> float:
+        """How many paths have begun at lights for each pixel."""
+
     def halves(self) -> tuple[Image, Image]:
         """The pictures of even and of odd samples, (h, w, 3) float32 each."""
 
@@ -91,7 +94,11 @@ def _light(form: PictureForm, words: Words, picture: Pictured) -> dict[str, dict
     if not names:
         return {}
     sums = numbers(np.moveaxis(words, 1, 0)).reshape(-1, 3, *words.shape[2:])
-    means = sums / np.maximum(picture.samples_per_pixel(), 1.0)
+    samples = picture.samples_per_pixel()
+    means = sums[: len(sums) // (1 + form.weighed)] / np.maximum(samples, 1.0)
+    if form.weighed:
+        paths = max(picture.light_paths_per_pixel(), 1e-30)
+        means = means + sums[len(means) :] * ((samples > 0) / np.float32(paths))
     colours = np.einsum("ij,njhw->nhwi", np.asarray(form.to_output), means).astype(np.float32)
     found: dict[str, dict[str, Image]] = {}
     for i, name in enumerate(names):  # of which groups come last

@@ -141,6 +141,11 @@ class Pictures(DeviceOwner):
         return np.ascontiguousarray(self.wavefronts[0].film.picture.get()[..., 3])
 
     @synchronized
+    def light_paths_per_pixel(self) -> float:
+        """How many paths have begun at lights for each pixel."""
+        return self.wavefronts[0].light_paths_per_pixel
+
+    @synchronized
     def halves(self) -> tuple[Image, Image]:
         """Return two independent pictures, of the even and of the odd samples; wait for them.
 

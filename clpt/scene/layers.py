@@ -21,13 +21,14 @@ class Layer:
     has met; the "light" of all samples; a "matte": names that its first 64 samples have met, and
     how often; "film": nothing, it is made of the film. blender: its name in Blender, or one after
     Blender's manner. denoising: of the first surface that is neither a mirror nor smooth glass,
-    else of the first.
+    else of the first. plain: its channels have no layer's name before them in an .exr.
     """
 
     channels: str
     blender: str
     form: Form = "near"
     denoising: bool = False
+    plain: bool = False
 
     @property
     def is_colour(self) -> bool:
@@ -44,6 +45,7 @@ LAYERS = {
     "shading_normal": Layer("XYZ", "Normal"),
     "geometric_normal": Layer("XYZ", "Geometric Normal"),
     "depth": Layer("Z", "Denoising Depth", "long"),
+    "z": Layer("Z", "Depth", "long", plain=True),
     "position": Layer("XYZ", "Position", "long"),
     "uv": Layer("UV", "UV", "long"),
     "shape_id": Layer("X", "IndexOB", "id"),

@@ -1,6 +1,7 @@
 /* Light beside the picture, by the surfaces that it has met and by the lights that it comes from: sums over all samples
  * as those of the film, LIGHT_LAYERS pictures of nine streams of words (core/fixed.cl). Each part of a path's light is
- * added when it is found. The sums of all groups, and direct with indirect light, are the picture. */
+ * added when it is found. The sums of all groups, and direct with indirect light, are the picture. Where paths start at
+ * lights too, as many pictures follow of what these bring, which are divided by the number of light paths. */
 #include "film/sums.cl"
 #define LIGHT_PICTURE_WORDS 9
 
@@ -21,6 +22,27 @@ inline void light_layer_sum(Scene scene, mask m, integer pixel_index, integer pi
     }
 }
 
+/* Adds light from the light in row `row` of `lights`, after as many surfaces, to the layers from picture `first` on. */
+inline void light_layers_sum(Scene scene, mask m, integer pixel_index, integer surfaces, integer row, int first, vec3 v,
+                             global uint *light_layers)
+{
+    m = m & (fabs(v.x) + fabs(v.y) + fabs(v.z) < FIXED_LARGEST); /* false for what is not finite */
+    if (!any(m)) return;
+    v = sel3(m, v, v3(0.0f, 0.0f, 0.0f));
+    mask direct = surfaces <= 1;
+#if LIGHT_LAYER_DIRECT
+    light_layer_sum(scene, m & direct, pixel_index, (integer)(first + LIGHT_LAYER_DIRECT - 1), v, light_layers);
+#endif
+#if LIGHT_LAYER_INDIRECT
+    light_layer_sum(scene, m & !direct, pixel_index, (integer)(first + LIGHT_LAYER_INDIRECT - 1), v, light_layers);
+#endif
+#if LIGHT_LAYER_GROUPS
+    integer group = to_integer(gather(scene.distributions, LIGHT_GROUPS + sel_i(m, row, (integer)(0))));
+    light_layer_sum(scene, m, pixel_index, first + LIGHT_LAYER_GROUPS - 1 + group, v, light_layers);
+#endif
+}
+
+#if !LIGHT_PATHS
 /* Adds light that arrives at the camera from the light in row `row` of `lights`, after as many surfaces. */
 inline void light_layers_add(Scene scene, Slab path, uint at, mask m, integer surfaces, integer row, Spectrum light,
                              global uint *light_layers)
@@ -31,19 +53,6 @@ inline void light_layers_add(Scene scene, Slab path, uint at, mask m, integer su
     lambdas = wavelengths_sample(scene, sampler_pair(begun, (natural)(DIMENSION_WAVELENGTH)).x);
 #endif
     vec3 v = scale3(film_value(scene, light, lambdas), load_path_weight(path, at) * scene.settings->film_scale);
-    m = m & (fabs(v.x) + fabs(v.y) + fabs(v.z) < FIXED_LARGEST); /* false for what is not finite */
-    if (!any(m)) return;
-    v = sel3(m, v, v3(0.0f, 0.0f, 0.0f));
-    integer pixel_index = load_path_pixel_index(path, at);
-    mask direct = surfaces <= 1;
-#if LIGHT_LAYER_DIRECT
-    light_layer_sum(scene, m & direct, pixel_index, (integer)(LIGHT_LAYER_DIRECT - 1), v, light_layers);
-#endif
-#if LIGHT_LAYER_INDIRECT
-    light_layer_sum(scene, m & !direct, pixel_index, (integer)(LIGHT_LAYER_INDIRECT - 1), v, light_layers);
-#endif
-#if LIGHT_LAYER_GROUPS
-    integer group = to_integer(gather(scene.distributions, LIGHT_GROUPS + sel_i(m, row, (integer)(0))));
-    light_layer_sum(scene, m, pixel_index, LIGHT_LAYER_GROUPS - 1 + group, v, light_layers);
-#endif
+    light_layers_sum(scene, m, load_path_pixel_index(path, at), surfaces, row, 0, v, light_layers);
 }
+#endif

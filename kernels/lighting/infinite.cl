@@ -20,13 +20,19 @@ inline Spectrum infinite_gather(Scene scene, vec3 p, vec3 hemisphere, vec3 d, re
     return sum;
 }
 
-#if LIGHT_LAYERS /* which know of no paths from lights */
+#if LIGHT_LAYERS
 /* What one infinite light adds. */
-inline Spectrum infinite_weighed(Scene scene, int row, vec3 p, vec3 hemisphere, vec3 d, real pdf, Wavelengths lambdas)
+inline Spectrum infinite_weighed(Scene scene, int row, vec3 p, vec3 hemisphere, vec3 d, real pdf, real rival,
+                                 Wavelengths lambdas)
 {
     Spectrum radiance;
     real other;
     infinite_light(scene, row, p, hemisphere, d, lambdas, &radiance, &other);
-    return spectrum_scale(radiance, sel(pdf < 0.0f, (real)(1.0f), mis_weight(pdf, other)));
+    real w = sel(pdf < 0.0f, (real)(1.0f), mis_weight(pdf, other));
+#if WEIGHS_LIGHT_PATHS
+    real emission = light_path_pdf(scene, (integer)(row), p, d, (real)(FAR), neg3(d));
+    w = mis_weight_of_three(pdf, other, rival * emission);
+#endif
+    return spectrum_scale(radiance, w);
 }
 #endif

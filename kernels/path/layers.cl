@@ -16,6 +16,16 @@ inline vec3 layer_albedo(Scene scene, Scattering scatter, Wavelengths lambdas, S
     return scale3(film_value(scene, albedo, lambdas), weight);
 }
 
+#if LAYER_Z
+/* How far a point is from the camera along its axis, the third column of `to_world` [m]. */
+inline real layer_z(Scene scene, vec3 p)
+{
+    global const float *m = (global const float *)scene.camera;
+    float length = sqrt(m[2] * m[2] + m[6] * m[6] + m[10] * m[10]);
+    return ((p.x - m[3]) * m[2] + (p.y - m[7]) * m[6] + (p.z - m[11]) * m[10]) / length;
+}
+#endif
+
 /* Adds what the `met` paths see here. Returns the paths' state, which says whether denoisers have got theirs. */
 inline integer layers_record(Scene scene, Slab path, uint at, LAYER_ARGS, mask met, Vertex v, Scattering scatter,
                              integer state)
@@ -42,6 +52,9 @@ inline integer layers_record(Scene scene, Slab path, uint at, LAYER_ARGS, mask m
 #endif
 #if LAYER_DEPTH
     layer_put_long(words + LAYER_DEPTH, first, (v.t + path_null_distance(path, at)) * weight);
+#endif
+#if LAYER_Z
+    layer_put_long(words + LAYER_Z, first, layer_z(scene, v.s.p) * weight);
 #endif
 #if LAYER_POSITION
     layer_put_long(words + LAYER_POSITION, first, v.s.p.x * weight);

@@ -50,13 +50,14 @@ inline void sky_layers(Scene scene, Slab path, uint at, PathEnd end, Wavelengths
     real pdf = load_path_pdf(path, at);
     vec3 d = sel3(sky, load_path_d(path, at), v3(0.0f, 0.0f, 1.0f));
     vec3 from = madd3(d, -path_null_distance(path, at), load_path_o(path, at)), side = path_hemisphere(path, at);
+    real rival = path_rival(path, at, end.depth);
     Spectrum beta = load_path_beta(path, at);
 #if USES_ABSORPTION
     integer medium = sel_i(sky, MEDIUM_LEFT(load_path_medium(path, at)), (integer)(0));
     beta = spectrum_mul(beta, medium_transmittance(scene, medium, (real)(FAR), lambdas));
 #endif
     for (int row = 0; row < scene.settings->infinite_count; row++) {
-        Spectrum light = spectrum_mul(beta, infinite_weighed(scene, row, from, side, d, pdf, lambdas));
+        Spectrum light = spectrum_mul(beta, infinite_weighed(scene, row, from, side, d, pdf, rival, lambdas));
         light_layers_add(scene, path, at, sky, end.depth, (integer)(row), light, light_layers);
     }
 }

@@ -6,6 +6,7 @@
 #include "generated/shadow_ray.cl"
 #include "film/spread.cl"
 #include "film/work_list.cl"
+#include "generated/light_layers.cl"
 
 STAGE(splat)(SLAB_ARGS, SCENE_ARGS, JOIN_ARGS STAGE_AT_ARG)
 {
@@ -29,6 +30,15 @@ STAGE(splat)(SLAB_ARGS, SCENE_ARGS, JOIN_ARGS STAGE_AT_ARG)
         vec2 offset = {seen.x - floor(seen.x) - 0.5f, seen.y - floor(seen.y) - 0.5f};
         Spread spread = spread_point(scene, to_integer(floor(seen.x)), to_integer(floor(seen.y)), offset);
         Light light = {colour, 0, accepted, value, lambdas, scale};
+#if LIGHT_LAYERS
+        integer surfaces = (load_path_state(path, at) & PATH_DEPTH) - 1, row = load_path_light(path, at);
+        for (int i = 0; i < SPREAD_PIXELS; i++) {
+            integer pixel_index;
+            real f;
+            mask there = accepted & spread_pixel(settings, spread, i, &pixel_index, &f);
+            light_layers_sum(scene, there, pixel_index, surfaces, row, LIGHT_LAYERS, scale3(colour, f), light_layers);
+        }
+#endif
         integer full = spread_add(scene, SPREAD_PASSED, accepted, accepted, plane, spread, light);
         count(counters, COUNTER_REJECTED, arrives & !accepted, (integer)(1));
         count(counters, COUNTER_FULL, accepted & (full > 0), full);

@@ -96,7 +96,8 @@ def test_layers_are_what_pixels_see():
     normal = np.where(hit[..., None], p, [0.0, 0.0, 1.0])
     colour = np.where(hit[..., None], RED, BLUE)
     expected = {"position": p, "geometric_normal": normal, "shading_normal": normal,
-                "depth": (t + near / d[..., 2])[..., None], "albedo": colour}  # fmt: skip
+                "depth": (t + near / d[..., 2])[..., None],
+                "z": 4.0 - p[..., 2:], "albedo": colour}  # fmt: skip
     for name, values in expected.items():
         np.testing.assert_allclose(made[name][clear], values[clear], atol=3e-3, err_msg=name)
     flat = clear & ~hit

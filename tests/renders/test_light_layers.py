@@ -11,6 +11,8 @@ import pytest
 import clpt
 from clpt import transforms as tf
 from clpt.errors import SceneError
+from clpt.render.lowering.scene import lower
+from clpt.render.wavefront.adaptive import checked
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Auto, Gaussian, Path, Vcm
@@ -51,6 +53,7 @@ def rendered(scene: Scene, samples: int = 32):
     [
         pytest.param(Path(light_paths=0), {}, marks=pytest.mark.slow),
         (Auto(), {"mode": "spectral", "filter": Gaussian(), "white_balance": "A"}),
+        (Path(light_paths=1), {"filter": Gaussian()}),
         pytest.param(Path(light_paths=0, guiding=True), {"alpha": True}, marks=pytest.mark.slow),
     ],
 )
@@ -70,6 +73,23 @@ def test_fluorescent_light_is_seen_at_the_cameras_wavelengths():
     image, layers = rendered(corner(paint=paint, mode="spectral"))
     both = layers["direct"] + layers["indirect"]
     np.testing.assert_allclose(both, image, rtol=1e-4, atol=1e-5)
+
+
+@pytest.mark.slow
+def test_photons_bring_indirect_light():
+    image, layers = rendered(corner(Vcm(), layers=("direct", "indirect")))
+    both = layers["direct"] + layers["indirect"]
+    np.testing.assert_allclose(both, image, rtol=1e-4, atol=1e-5)
+    _, camera = rendered(corner(), 400)
+    for name, values in layers.items():  # to 3 %, the noise of 32 samples
+        assert abs(values.mean() / camera[name].mean() - 1.0) < 0.03
+
+
+def test_limits_of_noise_are_refused():
+    scene = corner(Path(light_paths=1))
+    with pytest.raises(SceneError, match=r"noise: .*in direct; leave it out"):
+        checked(0.1, lower(scene).features)
+    assert lower(dataclasses.replace(scene, integrator=Auto(), noise=0.1)).integrator.kind == "path"
 
 
 def test_a_group_is_what_its_lights_bring():
@@ -95,8 +115,7 @@ def test_a_group_is_what_its_lights_bring():
 @pytest.mark.parametrize(
     ("how", "film", "message"),
     [
-        (Vcm(), {}, "light_paths 0"),
-        (Path(light_paths=1), {}, "light_paths 0"),
+        (Vcm(), {}, "do not know their group"),
         (Path(), {"filtering": "splatting"}, "one pixel"),
     ],
 )

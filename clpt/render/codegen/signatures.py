@@ -142,7 +142,8 @@ def light_layer_args(features: Features) -> dict[str, str]:
 
 def shade_args(features: Features) -> dict[str, str]:
     """Return what shading takes beside slabs and scene."""
-    return {**merge_args(features), **layer_args(features), **light_layer_args(features)}
+    light = {} if features.light_paths else light_layer_args(features)
+    return {**merge_args(features), **layer_args(features), **light}
 
 
 def loop_files(features: Features, layout: str) -> dict[str, str]:

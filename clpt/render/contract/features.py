@@ -131,6 +131,9 @@ class Features:
             filter_reach=reach,
             filter_profile=profile,
             film_group=self.group_words,
+            layers=self.light_layers,
+            light_groups=self.light_groups,
+            light_group_row=self.light_group_row,
         )
         return from_lights, self
 
@@ -192,7 +195,7 @@ class Features:
 
     @property
     def light_pictures(self) -> int:
-        """How many pictures of light there are beside the picture."""
+        """How many pictures of light there are beside the picture, of each group of sums."""
         groups = self.light_groups if "light_groups" in self.light_layers else 1
         return len(self.light_layers) - 1 + groups if self.light_layers else 0
 

@@ -12,7 +12,6 @@ from clpt.render.lowering.geometry.instancing import distinct
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
 from clpt.scene.integrators import (
-    AUTO,
     HAVE_LAYERS,
     Film,
     Filter,
@@ -27,6 +26,7 @@ from clpt.scene.materials import Material
 from clpt.scene.params import params
 from clpt.scene.shapes import Instance, Shape
 
+WITH_AXIS = ("perspective", "thin_lens", "orthographic")
 LARGEST = 1 << 26  # pixels of a film; its tiles are divided in float32, see kernels/film/film.cl
 
 
@@ -58,6 +58,9 @@ def check(scene: Scene) -> None:
     if scene.film.layers and not isinstance(scene.integrator, HAVE_LAYERS):
         names = ", ".join(cls.kind for cls in HAVE_LAYERS)
         raise SceneError(f"only the integrators {names} have layers", where="film.layers")
+    if "z" in scene.film.layers and scene.camera.kind not in WITH_AXIS:
+        message = f"the camera {scene.camera.kind} has no axis for z: ask for depth"
+        raise SceneError(message, where="film.layers")
     _check_light_layers(scene)
     _check_light_paths(scene, shapes_)
     check_bodies([*shapes_, *(one for one in scene.shapes if isinstance(one, Instance))])
@@ -68,9 +71,9 @@ def _check_light_layers(scene: Scene) -> None:
     names = [name for name in scene.film.layers if LAYERS[name].form == "light"]
     if not names:
         return
-    from_lights = getattr(scene.integrator, "light_paths", 0)
-    if isinstance(scene.integrator, Vcm) or from_lights not in (0, AUTO):
-        message = f"{names[0]} is of paths from the camera alone: use path with light_paths 0"
+    how = scene.integrator
+    if isinstance(how, Vcm) and how.merging and "light_groups" in names:
+        message = "photons do not know their group: leave light_groups out, or vcm.merging"
         raise SceneError(message, where="film.layers")
     if scene.film.filtering == "splatting":
         message = f'{names[0]} needs samples that serve one pixel: leave it out, or "importance"'

@@ -46,6 +46,9 @@ def checked(noise: float, features: Features) -> float:
     if features.light_paths:
         message = "the integrator particle_tracer cannot choose which pixels its paths reach"
         raise SceneError(f"{message}; leave it out, or choose path", where="noise")
+    if features.weighed and features.light_layers:
+        message = f"light paths that decide of noise would be in {features.light_layers[0]}"
+        raise SceneError(f"{message}; leave it out, or choose light_paths 0", where="noise")
     if features.merged:
         message = "neighbouring pixels share the photons of the integrator vcm"
         raise SceneError(f"{message}; leave it out, or vcm.merging", where="noise")

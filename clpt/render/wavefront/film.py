@@ -61,7 +61,7 @@ class Film:
             sums["bands"] = SUM_WORDS * self._band_sums * words
             images["band_image"] = 4 * self.band_count * pixels
         self._layer_words, self._mattes = features.layer_words, len(features.mattes)
-        self._light_sums = 3 * features.light_pictures
+        self._light_sums = 3 * features.light_pictures * features.film_groups
         for name, count in (
             ("layers", self._layer_words),
             ("light_layers", SUM_WORDS * self._light_sums),

@@ -162,6 +162,11 @@ class Wavefront:
         return self.features.light_paths or self.features.weighed
 
     @property
+    def light_paths_per_pixel(self) -> float:
+        """How many paths that start at lights there were for each pixel."""
+        return self._samples(0, len(self._paths)).get("light_paths", 0.0)
+
+    @property
     def light_group(self) -> int:
         """Which of a pixel's words is the first that light paths add to."""
         return self.features.passes[0].film_group

@@ -67,8 +67,10 @@ def decided(
         keeps = isinstance(former, Vcm) and isinstance(given, Auto)
         chosen = former if keeps else Path(light_paths=getattr(former, "light_paths", 0))
         reason = "as before the scene was edited"
-    if index.light_layers:
-        chosen, reason = Path(light_paths=0), "layers of light are of paths from the camera"
+    if index.light_layers and index.scene.noise is not None:
+        chosen, reason = Path(light_paths=0), "layers of light have no guides of noise"
+    elif "light_groups" in index.layers and isinstance(chosen, Vcm):
+        chosen, reason = Path(light_paths=chosen.light_paths), "photons do not know their group"
     if getattr(given, "guiding", False):
         chosen, reason = Path(light_paths=0, guiding=True), "directions are guided"
     own = {name: getattr(given, name) for name in ("max_depth", "rr_depth", "hide_lights")}
