@@ -28,6 +28,8 @@ from clpt.view.target import Change, Make, Target, smaller
 PREVIEW_PIXELS = 64_000  # about, of the picture while it moves
 PREVIEW_SAMPLES = 4  # of it, before the whole picture begins
 SLOW = 0.06  # [s] of two previews, beyond which the next ones are smaller
+FAST_PREVIEWS = 4  # after which, where finer ones would be fast too, the next ones are finer
+MUCH_FASTER = 0.5  # of SLOW: so that they do not become coarser at once
 CANCEL_SECONDS = 0.1  # in which a pass ends when something moves
 DIVIDERS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 128, 256)
 PASS_SECONDS = 2.0  # of a pass; and more when the render has lasted, since ends of passes are dear
@@ -88,7 +90,7 @@ class RenderLoop:
         self._frame = self._changes = 0
         self._asked: float | None = None  # when something was that restarts
         self._waited = self._samples = 0.0
-        self._slow_previews = 0
+        self._slow_previews = self._fast_previews = 0
         self._told = 0.0
         self._rates = 0.0, 0.0
         self._closing = False
@@ -194,6 +196,14 @@ class RenderLoop:
             self._resize_preview(next((n for n in DIVIDERS if n >= fitting), DIVIDERS[-1]))
             self._follow(self._preview)  # now, not in a drag
             self._previews_left = 0
+            return
+        finer = finer_divider(self._divider, first_divider(self.scene))
+        would_take = took * (self._divider / finer) ** 2
+        fast = finer < self._divider and would_take < MUCH_FASTER * SLOW
+        self._fast_previews = self._fast_previews + 1 if fast else 0
+        if self._fast_previews >= FAST_PREVIEWS and not self._previews_left:  # not in a drag
+            self._resize_preview(finer)
+            self._follow(self._preview)
 
     def _follow(self, target: Target) -> Renderer:
         """Return a target's renderer, of the present scene; tell viewers that it may take long."""
@@ -203,7 +213,7 @@ class RenderLoop:
 
     def _resize_preview(self, divider: int) -> None:
         self._preview.close()
-        self._divider, self._slow_previews = divider, 0
+        self._divider, self._slow_previews, self._fast_previews = divider, 0, 0
         self._preview = Target(self._make, smaller(divider))
 
     def _render_pass(self) -> None:
@@ -321,3 +331,8 @@ def first_divider(scene: Scene) -> int:
     width, height = scene.film.size
     fitting = (n for n in DIVIDERS if width * height / n**2 <= PREVIEW_PIXELS)
     return next(fitting, DIVIDERS[-1])
+
+
+def finer_divider(divider: int, finest: int) -> int:
+    """Return the next smaller divider, or `finest` where there is none above it."""
+    return max([finest, *(n for n in DIVIDERS if n < divider)])
