@@ -66,11 +66,12 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     if (any(merges)) {
         integer sample = load_path_sample(path, at);
         Spectrum merged = merge_photons(scene, merges, v, scatter, rival, ratio, sample MERGE_PASSED);
-        merged = spectrum_mul(beta, merged);
-        store_path_radiance(path, at, merges, spectrum_add(load_path_radiance(path, at), merged));
 #if LIGHT_LAYERS /* by something sharp, so it has met two surfaces; no groups */
-        light_layers_add(scene, path, at, merges, (integer)(2), (integer)(0), merged, light_layers);
+        Spectrum light = spectrum_mul(beta, merged);
+        light_layers_add(scene, path, at, merges, (integer)(2), (integer)(0), light, light_layers);
 #endif
+        merged = spectrum_add(load_path_radiance(path, at), spectrum_mul(beta, merged));
+        store_path_radiance(path, at, merges, merged);
     }
 #endif
 
