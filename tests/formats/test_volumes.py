@@ -346,3 +346,19 @@ def test_a_volume_of_others() -> None:
     found = volumes.read(SHARED / "assets" / "volumes" / "teapot_cloud" / "teapot_cloud.nvdb")
     assert found.values.shape == (269, 136, 180)
     assert found.values.max() == 50.0
+
+
+def test_alone_in_the_studio(written) -> None:
+    """A file alone: in a box of its size, framed and lit, as thick whatever its numbers mean."""
+    first, second = (
+        load(written(f"{scale}.nvdb", file_bytes({"density": grid_bytes(VALUES * scale)})))
+        for scale in (1, 1000)
+    )
+    assert first.extra["studio"] == {"camera": True, "shapes": 2, "lights": 1}
+    box, cloud = first.shapes[0], first.shapes[0].interior
+    np.testing.assert_allclose(box.to_world @ [-1, -1, -1, 1], cloud.to_world @ [0, 0, 0, 1])
+    np.testing.assert_allclose(box.to_world @ [1, 1, 1, 1], cloud.to_world @ [1, 1, 1, 1])
+    thickness = [one.shapes[0].interior.sigma_t.value for one in (first, second)]
+    assert thickness[0] == pytest.approx(1000 * thickness[1])
+    with pytest.raises(SceneError, match="0 everywhere"):
+        load(written("empty.vol", vol_bytes(0 * VALUES[..., None])))

@@ -18,8 +18,8 @@ MOST_BYTES = 1 << 32  # of a file
 def read(path: str | Path, grid: str = "") -> Volume:
     """Read the density in a file, with its box: float32 values (nx, ny, nz).
 
-    grid: its name in a .nvdb or .vdb of several; "" is "density", else the first. A .npy has the box of the
-    unit cube. Raises SceneError for what is no such file, and for numbers that are negative or not
+    grid: its name in a .nvdb or .vdb of several; "" is "density", else the first. A .npy has the
+    box of the unit cube. Raises SceneError for what is no such file, and for numbers that are negative or not
     finite.
     """
     path = Path(path)

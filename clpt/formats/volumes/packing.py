@@ -24,9 +24,7 @@ def blosc_unpacker() -> Callable[[bytes | memoryview, int], bytes]:
     try:
         import blosc
     except ImportError:
-        message = (
-            "is packed by Blosc: pip install 'clpt[volumes]', or convert it with ZIP"
-        )
+        message = "is packed by Blosc: pip install 'clpt[volumes]', or convert it with ZIP"
         raise SceneError(message) from None
 
     def unpacked(packed: bytes | memoryview, most: int) -> bytes:
