@@ -19,8 +19,8 @@ def read(path: str | Path, grid: str = "") -> Volume:
     """Read the density in a file, with its box: float32 values (nx, ny, nz).
 
     grid: its name in a .nvdb or .vdb of several; "" is "density", else the first. A .npy has the
-    box of the unit cube. Raises SceneError for what is no such file, and for numbers that are negative or not
-    finite.
+    box of the unit cube. Raises SceneError for what is no such file, and for numbers that are
+    negative or not finite.
     """
     path = Path(path)
     reader = READERS.get(path.suffix.lower())
