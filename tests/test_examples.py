@@ -12,7 +12,8 @@ import clpt
 
 FOLDER = Path(__file__).resolve().parents[1] / "examples"
 EXAMPLES = sorted(FOLDER.glob("*.py"))
-LONG = ("custom_material", "deforming_mesh", "nbody")  # quick tests elsewhere have what these show
+# Quick tests elsewhere have what these show.
+LONG = ("custom_material", "deforming_mesh", "nbody", "smoke")
 
 
 @pytest.mark.parametrize(

@@ -23,6 +23,9 @@ FORMATS = {  # the module whose `load` reads files of a suffix, imported when it
     ".ply": "meshes.framing",
     ".stl": "meshes.framing",
     ".off": "meshes.framing",
+    ".vdb": "volumes.framing",
+    ".nvdb": "volumes.framing",
+    ".vol": "volumes.framing",
 }
 WITH_VARIABLES = ("mitsuba", "gltf")
 
@@ -43,7 +46,7 @@ def load(
     missing_textures: Missing = "error",
     **variables: Any,
 ) -> Scene:
-    """Read a scene or a bare mesh; a folder means the scene in it (see IN_FOLDERS).
+    """Read a scene, a bare mesh or a bare density; a folder means the scene in it (see IN_FOLDERS).
 
     `kinds` are materials that are not clpt's own, of which a scene.json may speak. `variables` set
     the `$names` of Mitsuba's XML; of glTF they choose scene, animation and time; of both `camera`

@@ -53,6 +53,15 @@ def cumulus() -> Array:
     return density
 
 
+def cropped(density: Array) -> tuple[Array, Array, Array]:
+    """What is there, with a layer of nothing around, and the corners of its box."""
+    there = np.argwhere(np.rint(255.0 * density) > 0.0)
+    low, high = there.min(axis=0) - 1, there.max(axis=0) + 2
+    corners = (np.array([low, high]) - 0.5 * np.array(SIZE)) / 40.0
+    return density[tuple(map(slice, low, high))], *corners
+
+
 if __name__ == "__main__":
-    made = np.rint(255.0 * cumulus()).astype(np.uint8)
-    np.save(Path(__file__).parent / "density.npy", made)
+    made, low, high = cropped(cumulus())
+    np.save(Path(__file__).parent / "density.npy", np.rint(255.0 * made).astype(np.uint8))
+    print("the box of scene.json is from", low, "to", high)

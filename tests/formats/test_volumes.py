@@ -18,6 +18,7 @@ from clpt.formats.volumes import nvdb, vol
 VERSION = (32 << 21) | (3 << 10) | 3
 SHARED = Path(__file__).resolve().parents[3] / "shared"
 LOW = np.array([-3, 5, 126])  # the index of the lowest value
+PACKED = {"fp4": 4, "fp8": 8, "fp16": 16, "fpn": 0}  # bits of a number
 STEP, ORIGIN = 0.25, np.array([1.0, -2.0, 0.5])
 
 
@@ -25,8 +26,28 @@ def flags(mask: np.ndarray) -> bytes:
     return np.packbits(mask, bitorder="little").tobytes()
 
 
-def grid_bytes(values: np.ndarray, name: str = "density") -> bytes:
-    """A grid of float as a file holds it, with leaves wherever the box of `values` reaches."""
+def leaf_bytes(held: np.ndarray, kind: str, bits: int = 8) -> tuple[int, bytes]:
+    """What is in a leaf of a type: its flags, and its bytes behind the mask. bits: of FpN."""
+    if kind not in PACKED:
+        form = nvdb.LAYOUTS[kind].form
+        return 0, bytes(nvdb.LAYOUTS[kind].values - 80) + held.astype(form).tobytes()
+    width = PACKED[kind] or bits
+    first, step = held.min(), np.ptp(held) / ((1 << width) - 1)
+    codes = np.rint((held - first) / max(step, 1e-30)).astype(np.uint16).ravel()
+    each = codes.view(np.uint8).reshape(512, 2)
+    packed = np.packbits(
+        np.unpackbits(each, axis=1, bitorder="little")[:, :width], bitorder="little"
+    )
+    flags = int(np.log2(width)) << 5 if kind == "fpn" else 0
+    return flags, struct.pack("<2f4H", first, step, 0, 0, 0, 0) + packed.tobytes()
+
+
+def grid_bytes(values: np.ndarray, kind: str = "float", name: str = "density") -> bytes:
+    """A grid as a file holds it, with leaves wherever the box of `values` reaches.
+
+    Every second leaf of the type fpn has 4 bits a number, the others 16.
+    """
+    layout = nvdb.LAYOUTS[kind]
     high = LOW + values.shape - 1
     box = struct.pack("<6i", *LOW, *high)
     leaves: dict[tuple[int, ...], np.ndarray] = {}
@@ -37,24 +58,28 @@ def grid_bytes(values: np.ndarray, name: str = "density") -> bytes:
     lowers = sorted({tuple(np.array(leaf) // 16) for leaf in leaves})
     uppers = sorted({tuple(np.array(lower) // 32) for lower in lowers})
     at_root = nvdb.TREE
-    at_upper = at_root + nvdb.ROOT + nvdb.TILE * len(uppers)
+    at_upper = at_root + layout.root + nvdb.TILE * len(uppers)
     at_lower = at_upper + nvdb.UPPER * len(uppers)
     at_leaf = at_lower + nvdb.LOWER * len(lowers)
     tree = struct.pack(
         "<4q3I3IQ", at_leaf, at_lower, at_upper, at_root, len(leaves), len(lowers), len(uppers),
         0, 0, 0, values.size,
     )  # fmt: skip
-    root = (box + struct.pack("<If", len(uppers), 0.0)).ljust(nvdb.ROOT, b"\0")
-    tiles = upper_bytes = lower_bytes = leaf_bytes = b""
+    root = (box + struct.pack("<I", len(uppers))).ljust(layout.root, b"\0")
+    tiles = upper_bytes = lower_bytes = all_leaves = b""
+    begins = {}
+    for i, (leaf, held) in enumerate(leaves.items()):
+        flags_, data = leaf_bytes(held, kind, 4 if i % 2 else 16)
+        begins[leaf] = at_leaf + len(all_leaves)
+        head = struct.pack("<3i4B", *(np.array(leaf) * 8), 7, 7, 7, flags_)
+        all_leaves += head + b"\xff" * 64 + data
 
-    def node(
-        own: int, inner: list, begin: int, size: int, side: int, of: list, table: int
-    ) -> bytes:
+    def node(own: int, inner: list, where: dict, side: int, table: int) -> bytes:
         child, offsets = np.zeros(side**3, bool), np.zeros(side**3, "<i8")
         for each in inner:
             x, y, z = np.array(each) % side
             child[(x * side + y) * side + z] = True
-            offsets[(x * side + y) * side + z] = begin + size * of.index(each) - own
+            offsets[(x * side + y) * side + z] = where[each] - own
         head = (box + bytes(8) + bytes(side**3 // 8) + flags(child)).ljust(table, b"\0")
         return head + offsets.tobytes()
 
@@ -65,18 +90,15 @@ def grid_bytes(values: np.ndarray, name: str = "density") -> bytes:
             key |= (int(part) % (1 << 20)) << shift
         tiles += struct.pack("<QqIfQ", key, own - at_root, 0, 0.0, 0)
         inner = [one for one in lowers if tuple(np.array(one) // 32) == upper]
-        upper_bytes += node(own, inner, at_lower, nvdb.LOWER, 32, lowers, 8256)
-    names = list(leaves)
+        where = {one: at_lower + nvdb.LOWER * lowers.index(one) for one in inner}
+        upper_bytes += node(own, inner, where, 32, 8256)
     for i, lower in enumerate(lowers):
         own = at_lower + nvdb.LOWER * i
-        inner = [one for one in names if tuple(np.array(one) // 16) == lower]
-        lower_bytes += node(own, inner, at_leaf, nvdb.LEAF, 16, names, 1088)
-    for leaf, held in leaves.items():
-        head = struct.pack("<3i4B", *(np.array(leaf) * 8), 7, 7, 7, 0) + b"\xff" * 64 + bytes(16)
-        leaf_bytes += head + held.tobytes()
+        inner = [one for one in leaves if tuple(np.array(one) // 16) == lower]
+        lower_bytes += node(own, inner, begins, 16, 1088)
     assert len(upper_bytes) == nvdb.UPPER * len(uppers)
     assert len(lower_bytes) == nvdb.LOWER * len(lowers)
-    after = tree + root + tiles + upper_bytes + lower_bytes + leaf_bytes
+    after = tree + root + tiles + upper_bytes + lower_bytes + all_leaves
     moved = [
         struct.pack(
             f"<22{form}", *(np.eye(3) * STEP).ravel(), *(np.eye(3) / STEP).ravel(), *ORIGIN, 1
@@ -85,7 +107,7 @@ def grid_bytes(values: np.ndarray, name: str = "density") -> bytes:
     ]
     head = b"NanoVDB0" + struct.pack("<QIIIIQ", 0, VERSION, 0, 0, 1, nvdb.GRID + len(after))
     head += name.encode().ljust(256, b"\0") + b"".join(moved) + bytes(72)
-    return (head + struct.pack("<II", 2, 1)).ljust(nvdb.GRID, b"\0") + after
+    return (head + struct.pack("<II", 2, nvdb.TYPES.index(kind))).ljust(nvdb.GRID, b"\0") + after
 
 
 def file_bytes(grids: dict[str, bytes], codec: int = 0, size: int | None = None) -> bytes:
@@ -93,6 +115,10 @@ def file_bytes(grids: dict[str, bytes], codec: int = 0, size: int | None = None)
     out = b""
     for name, grid in grids.items():
         packed = zlib.compress(grid) if codec == 1 else grid
+        if codec == 2:
+            import blosc
+
+            packed = blosc.compress(grid, typesize=4)
         packed = struct.pack("<Q", len(packed)) + packed if codec else packed
         meta = struct.pack("<QQ", len(grid) if size is None else size, len(packed)).ljust(
             136, b"\0"
@@ -118,9 +144,11 @@ def written(tmp_path):
     return of
 
 
-@pytest.mark.parametrize("codec", [0, 1])
+@pytest.mark.parametrize("codec", [0, 1, 2])
 def test_nvdb(written, codec: int) -> None:
     """Values across the borders of leaves, lower and upper nodes, and where they are."""
+    if codec == 2:
+        pytest.importorskip("blosc")
     path = written("a.nvdb", file_bytes({"heat": grid_bytes(2 * VALUES), "density": GRID}, codec))
     assert nvdb.names(path) == ("heat", "density")
     found = volumes.read(path)
@@ -135,6 +163,16 @@ def test_nvdb(written, codec: int) -> None:
     assert np.array_equal(volumes.read(bare).values, found.values)
 
 
+@pytest.mark.parametrize("kind", ["double", "half", *PACKED])
+def test_nvdb_types(written, kind: str) -> None:
+    """Numbers of other sizes, and packed ones: within half a step of their leaf."""
+    found = volumes.read(written("a.nvdb", file_bytes({"density": grid_bytes(VALUES, kind)})))
+    step = {"double": 0.0, "half": 2.0**-11, "fp4": 1 / 15, "fpn": 1 / 15, "fp8": 1 / 255}
+    off = np.abs(found.values[1:-1, 1:-1, 1:-1] - VALUES).max()
+    assert off <= 0.501 * step.get(kind, 1 / 65535)
+    assert kind == "double" or off > 1e-6
+
+
 def changed(at: int, form: str, value: float) -> bytes:
     data = bytearray(GRID)
     struct.pack_into(form, data, at, value)
@@ -142,7 +180,7 @@ def changed(at: int, form: str, value: float) -> bytes:
 
 
 ROOT = nvdb.GRID + nvdb.TREE
-LEAF = len(GRID) - nvdb.LEAF
+LEAF = len(GRID) - nvdb.LAYOUTS["float"].leaf
 BROKEN = {
     "is no .nvdb file": b"something else",
     "ends too soon": file_bytes({"density": GRID})[:100],
@@ -156,6 +194,7 @@ BROKEN = {
     "no active values": changed(ROOT, "<i", 1000),
     "at most": changed(ROOT, "<i", -(1 << 30)),
     "a node is beyond": changed(ROOT + nvdb.ROOT + 8, "<q", -(1 << 50)),
+    "is a level set": changed(632, "<I", 1),
     "no inverse": changed(296 + 88, "<d", 0.0),
     "not finite": changed(LEAF + 96, "<f", np.nan),
     "is negative": changed(LEAF + 96, "<f", -1.0),
@@ -178,8 +217,10 @@ def test_bombs_and_missing_codecs(written, monkeypatch) -> None:
     with pytest.raises(SceneError, match="bytes as it says"):
         volumes.read(written("a.nvdb", bytes(data)))
     monkeypatch.setitem(sys.modules, "blosc", None)
-    with pytest.raises(SceneError, match="pip install blosc"):
-        volumes.read(written("b.nvdb", file_bytes({"density": GRID}, codec=2)))
+    bare = bytearray(file_bytes({"density": GRID}))
+    struct.pack_into("<H", bare, 16 + 168, 2)
+    with pytest.raises(SceneError, match=r"clpt\[volumes\]"):
+        volumes.read(written("b.nvdb", bytes(bare)))
 
 
 def test_every_byte_may_be_wrong(written) -> None:
@@ -305,3 +346,19 @@ def test_a_volume_of_others() -> None:
     found = volumes.read(SHARED / "assets" / "volumes" / "teapot_cloud" / "teapot_cloud.nvdb")
     assert found.values.shape == (269, 136, 180)
     assert found.values.max() == 50.0
+
+
+def test_alone_in_the_studio(written) -> None:
+    """A file alone: in a box of its size, framed and lit, as thick whatever its numbers mean."""
+    first, second = (
+        load(written(f"{scale}.nvdb", file_bytes({"density": grid_bytes(VALUES * scale)})))
+        for scale in (1, 1000)
+    )
+    assert first.extra["studio"] == {"camera": True, "shapes": 2, "lights": 1}
+    box, cloud = first.shapes[0], first.shapes[0].interior
+    np.testing.assert_allclose(box.to_world @ [-1, -1, -1, 1], cloud.to_world @ [0, 0, 0, 1])
+    np.testing.assert_allclose(box.to_world @ [1, 1, 1, 1], cloud.to_world @ [1, 1, 1, 1])
+    thickness = [one.shapes[0].interior.sigma_t.value for one in (first, second)]
+    assert thickness[0] == pytest.approx(1000 * thickness[1])
+    with pytest.raises(SceneError, match="0 everywhere"):
+        load(written("empty.vol", vol_bytes(0 * VALUES[..., None])))

@@ -16,6 +16,7 @@ import clpt
 from clpt import transforms as tf
 from clpt.errors import SceneError
 from clpt.formats.volumes import vol
+from clpt.render.lowering import device_grids, grids
 from clpt.scene import Film, Scene, media
 from clpt.scene.cameras import Orthographic
 from clpt.scene.integrators import Box
@@ -128,6 +129,20 @@ def test_light_comes_through() -> None:
     assert_mean(exposures(scene, 16, 64), 0.5 * np.exp(-CHROMATIC * depth), 0.05, 2e-3)
 
 
+def assert_same_bricks(renderer: clpt.Renderer, values: np.ndarray) -> None:
+    """What kernels make of a density on the device has the words that the host makes of it."""
+    scene, stream = renderer.wavefronts[0].scene, renderer.wavefronts[0].stream
+    (grid,) = scene.lowered.device_grids
+    found = stream.read(scene.tables["images"], np.empty_like(scene.lowered.table("images")))
+    host, count = grids.bricks(values), int(np.prod(grid.bricks))
+    there, here = (words[: 2 * count].reshape(-1, 2) for words in (found[grid.first :], host))
+    assert np.array_equal(there[:, 1], here[:, 1])
+    for (begin, _), (own, most) in zip(there, here, strict=True):
+        begin += grid.first
+        points = found[begin : begin + device_grids.POINT_WORDS]
+        assert np.array_equal(points, host[own : own + len(points)] if most else 0 * points)
+
+
 def test_bits_and_updates() -> None:
     """The same bits however a render is split, of arrays on the device, and after an update."""
     medium = media.Grid(density=4.0 * RANDOM, to_world=TURNED, sigma_t=CHROMATIC, albedo=0.9)
@@ -149,6 +164,16 @@ def test_bits_and_updates() -> None:
         renderer.run(12)
         assert np.array_equal(renderer.image(), films[0])
         assert not np.array_equal(before, films[0])
+        assert_same_bricks(renderer, values)
+        renderer.update(scene=with_density(values[::-1].copy()))  # the table holds other words
+        renderer.update(scene=with_density(values))
+        renderer.run(12)
+        assert np.array_equal(renderer.image(), films[0])
+        there[3] = -1.0
+        there[4] = np.nan
+        renderer.update(scene=with_density(there))
+        values[3:5] = 0.0
+        assert_same_bricks(renderer, values)
         there *= 0.0
         renderer.update(scene=with_density(there))
         renderer.run(2)

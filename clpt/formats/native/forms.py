@@ -338,7 +338,7 @@ FORMS: dict[str, Form] = {
         lambda value, writer: writer.image(value),
     ),
     "volume": Form(
-        "name of a `.npy`, `.vol` or `.nvdb` file; of a `.nvdb` with `#name` behind it that grid",
+        "name of a `.npy`, `.vol`, `.nvdb` or `.vdb` file; with `#name` behind it that grid",
         STRING,
         lambda cursor, reader: reader.volume(cursor),
         lambda value, writer: writer.volume(value),

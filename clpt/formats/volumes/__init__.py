@@ -1,4 +1,4 @@
-"""Files of densities: numpy's .npy, Mitsuba's .vol, NanoVDB's .nvdb."""
+"""Files of densities: numpy's .npy, Mitsuba's .vol, NanoVDB's .nvdb, OpenVDB's .vdb."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from clpt.errors import SceneError
-from clpt.formats.volumes import nvdb, vol
+from clpt.formats.volumes import nvdb, vdb, vol
 from clpt.scene.media import Volume, check_density
 from clpt.transforms import IDENTITY
 
@@ -18,9 +18,9 @@ MOST_BYTES = 1 << 32  # of a file
 def read(path: str | Path, grid: str = "") -> Volume:
     """Read the density in a file, with its box: float32 values (nx, ny, nz).
 
-    grid: its name in a .nvdb of several; "" is "density", else the first. A .npy has the box of the
-    unit cube. Raises SceneError for what is no such file, and for numbers that are negative or not
-    finite.
+    grid: its name in a .nvdb or .vdb of several; "" is "density", else the first. A .npy has the
+    box of the unit cube. Raises SceneError for what is no such file, and for numbers that are
+    negative or not finite.
     """
     path = Path(path)
     reader = READERS.get(path.suffix.lower())
@@ -56,4 +56,5 @@ READERS: dict[str, Callable[[Path, str], Volume]] = {
     ".npy": _npy,
     ".vol": lambda path, _: vol.read(path),
     ".nvdb": nvdb.read,
+    ".vdb": vdb.read,
 }

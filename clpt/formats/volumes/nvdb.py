@@ -1,4 +1,4 @@
-"""NanoVDB files (.nvdb) of version 32: fog volumes of float32, without OpenVDB.
+"""NanoVDB files (.nvdb) of version 32: fog volumes of real numbers, without OpenVDB.
 
 A file is a row of segments: a header, the metadata of each grid, the grids, each perhaps packed. A
 grid is a tree in one buffer: a root with tiles, upper nodes of 32^3 lower ones, lower nodes of 16^3
@@ -9,30 +9,56 @@ checked: a file may lie.
 from __future__ import annotations
 
 import struct
-import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from clpt.errors import SceneError
+from clpt.formats.volumes import packing, sparse
 from clpt.scene.media import Volume
 
 SEGMENTS = (b"NanoVDB0", b"NanoVDB2")
 BARE = b"NanoVDB1"  # a grid without segments
 MAJOR = 32
 CODECS = ("none", "ZIP", "BLOSC")
-METADATA, GRID, TREE, ROOT, TILE = 176, 672, 64, 64, 32
-UPPER, LOWER, LEAF = 270_400, 33_856, 2_144
+METADATA, GRID, TREE, TILE = 176, 672, 64, 32
+UPPER, LOWER = 270_400, 33_856
+UPPER_TABLE, LOWER_TABLE = 8_256, 1_088  # where a node's children are told
+MINIMUM, FLAGS, CODES = 80, 15, 96  # of a leaf whose numbers are packed
 MOST_BYTES = 1 << 31  # of a grid, unpacked
-MOST_VALUES = 1 << 28  # of the box of a grid
+LEVEL_SET = 1
 TYPES = (
     "unknown", "float", "double", "int16", "int32", "int64", "vec3f", "vec3d", "mask", "half",
     "uint32", "bool", "rgba8", "fp4", "fp8", "fp16", "fpn", "vec4f", "vec4d",
 )  # fmt: skip
+
+
+class _Layout(NamedTuple):
+    """Where the numbers of a type lie. bits: of a packed number; 0: not packed, -1: it differs."""
+
+    form: str
+    background: int
+    root: int
+    tile: int
+    leaf: int
+    values: int
+    bits: int = 0
+
+
+ROOT = 64
+LAYOUTS = {
+    "float": _Layout("<f4", 28, ROOT, 20, 2_144, 96),
+    "double": _Layout("<f8", 32, 96, 24, 4_224, 128),
+    "half": _Layout("<f2", 28, ROOT, 20, 1_120, 96),
+    "fp4": _Layout("<f4", 28, ROOT, 20, 352, CODES, 4),
+    "fp8": _Layout("<f4", 28, ROOT, 20, 608, CODES, 8),
+    "fp16": _Layout("<f4", 28, ROOT, 20, 1_120, CODES, 16),
+    "fpn": _Layout("<f4", 28, ROOT, 20, CODES, CODES, -1),
+}
 
 
 @dataclass(frozen=True)
@@ -115,6 +141,8 @@ def _unpacked(data: bytes, entry: _Entry) -> bytes:
     if CODECS[entry.codec] == "none":
         made = data[entry.begin : entry.end]
     else:
+        zipped = CODECS[entry.codec] == "ZIP"
+        unpack = packing.inflated if zipped else packing.blosc_unpacker()
         chunks: list[bytes] = []
         at = entry.begin
         while at < entry.end and len(chunks) < 64:
@@ -123,8 +151,7 @@ def _unpacked(data: bytes, entry: _Entry) -> bytes:
                 raise SceneError(f"is damaged: the grid {entry.name!r} goes beyond its end")
             part = data[at + 8 : at + 8 + packed]
             left = entry.size - sum(len(chunk) for chunk in chunks)
-            zipped = CODECS[entry.codec] == "ZIP"
-            chunks.append(_inflated(part, left) if zipped else _of_blosc(part, left))
+            chunks.append(unpack(part, left))
             at += 8 + packed
         made = b"".join(chunks)
     if len(made) != entry.size:
@@ -133,115 +160,140 @@ def _unpacked(data: bytes, entry: _Entry) -> bytes:
     return made
 
 
-def _inflated(packed: bytes, most: int) -> bytes:
-    """What zlib has packed, one byte more than `most` where it is more."""
-    try:
-        return zlib.decompressobj().decompress(packed, most + 1)
-    except zlib.error as error:
-        raise SceneError(f"is damaged: {error}") from None
-
-
-def _of_blosc(packed: bytes, most: int) -> bytes:
-    """What Blosc has packed."""
-    try:
-        import blosc  # type: ignore[import-not-found]
-    except ImportError:
-        message = (
-            "is packed by Blosc: `pip install blosc`, or convert it with the codec ZIP or none"
-        )
-        raise SceneError(message) from None
-    if len(packed) < 16 or struct.unpack_from("<I", packed, 4)[0] > most:
-        raise SceneError("is damaged: a packed part is larger than the grid")
-    try:
-        made: bytes = blosc.decompress(packed)
-    except Exception as error:  # the package has a class of its own
-        raise SceneError(f"is damaged: {error}") from None
-    return made
-
-
 def _volume(grid: bytes) -> Volume:
     """The box of the active values of a grid, with a layer of what is outside around it."""
-    (kind,) = struct.unpack_from("<I", grid, 636)
-    if kind != TYPES.index("float"):
-        name = TYPES[kind] if kind < len(TYPES) else str(kind)
-        raise SceneError(f"is a grid of {name}; read are those of float: convert it")
+    sort, kind = struct.unpack_from("<2I", grid, 632)
+    name = TYPES[kind] if kind < len(TYPES) else str(kind)
+    if name not in LAYOUTS:
+        raise SceneError(f"is a grid of {name}; read are those of {', '.join(LAYOUTS)}: convert it")
+    if sort == LEVEL_SET:
+        raise SceneError("is a level set, which has distances; convert it to a fog volume")
+    layout = LAYOUTS[name]
     root = GRID + _offset(grid, GRID + 24)
-    box = np.frombuffer(grid, "<i4", 6, root).reshape(2, 3).astype(np.int64)
-    tiles, background = struct.unpack_from("<If", grid, root + 24)
-    low, size = box[0], box[1] - box[0] + 1
-    if not (size > 0).all():
-        raise SceneError("has no active values")
-    if np.prod(size.astype(float)) > MOST_VALUES:
-        shape = " x ".join(map(str, size))
-        raise SceneError(f"its box is {shape}; at most {MOST_VALUES:,} values are read")
-    if root + ROOT + TILE * tiles > len(grid):
+    low, high = np.frombuffer(grid, "<i4", 6, root).reshape(2, 3).astype(np.int64)
+    (tiles,) = struct.unpack_from("<I", grid, root + 24)
+    sparse.check_box(low, high)
+    if root + layout.root + TILE * tiles > len(grid):
         raise SceneError("is damaged: its root goes beyond its end")
-    values = np.full(size, background, np.float32)
+    (background,) = np.frombuffer(grid, layout.form, 1, root + layout.background)
+    found = _Found(grid, layout, low, high)
+    keys = set()
     for i in range(tiles):
-        tile = root + ROOT + TILE * i
-        key, child, active, value = struct.unpack_from("<QqIf", grid, tile)
-        at = np.array([_signed(key >> 42), _signed(key >> 21), _signed(key)]) - low
+        tile = root + layout.root + TILE * i
+        key, child, active = struct.unpack_from("<Qqi", grid, tile)
+        (value,) = np.frombuffer(grid, layout.form, 1, tile + layout.tile)
+        if key in keys:
+            raise SceneError("is damaged: two of its tiles have one place")
+        keys.add(key)
+        at = np.array([_signed(key >> 42), _signed(key >> 21), _signed(key)])
         if child:
-            _upper(grid, _within(grid, root + child, UPPER), at, values)
+            found.add_upper(np.array([root + child]), at[None])
         elif active:
-            _put(values, at, 4096, value)
-    around = np.pad(values, 1, constant_values=background)
-    return Volume(around, _box(grid, low - 1.5, size + 2))
+            found.tiles.append(sparse.Tile(at, 4096, float(value)))
+    origins, nodes = found.leaves()
+    leaves = _values(np.frombuffer(grid, np.uint8), layout, nodes)
+    made = float(background)
+    return sparse.volume(low, high, made, found.tiles, origins, leaves, _to_world(grid))
 
 
-def _upper(grid: bytes, node: int, at: NDArray[Any], values: np.ndarray) -> None:
-    """Write the values of an upper node whose lowest index is `at`, from the box's lowest."""
-    for place, child, value in _children(grid, node, 32, 4096, 8256):
-        low = at + 128 * place
-        if child is None:
-            _put(values, low, 128, value)
+class _Found:
+    """The leaves and tiles of a tree that lie in a box."""
+
+    def __init__(self, grid: bytes, layout: _Layout, low: NDArray[Any], high: NDArray[Any]):
+        self._grid, self._layout, self._low, self._high = grid, layout, low, high
+        self.tiles: list[sparse.Tile] = []
+        self._origins: list[NDArray[np.int64]] = [np.zeros((0, 3), np.int64)]
+        self._nodes: list[NDArray[np.int64]] = [np.zeros(0, np.int64)]
+
+    def add_upper(self, nodes: NDArray[np.int64], origins: NDArray[np.int64]) -> None:
+        """Add what is in upper nodes, at bytes (n,), with their lowest indices (n, 3)."""
+        for node, origin in zip(nodes, origins, strict=True):
+            _within(self._grid, int(node), UPPER)
+            self._add_lower(*self._children(int(node), origin, 32, 128, UPPER_TABLE))
+
+    def leaves(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return the lowest indices (n, 3) of leaves, and where they begin (n,)."""
+        return np.concatenate(self._origins), np.concatenate(self._nodes)
+
+    def _add_lower(self, nodes: NDArray[np.int64], origins: NDArray[np.int64]) -> None:
+        for node, origin in zip(nodes, origins, strict=True):
+            _within(self._grid, int(node), LOWER)
+            own, at = self._children(int(node), origin, 16, 8, LOWER_TABLE)
+            self._nodes.append(own)
+            self._origins.append(at)
+
+    def _children(
+        self, node: int, origin: NDArray[np.int64], count: int, side: int, table: int
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return where a node's children begin (n,), and their lowest indices (n, 3).
+
+        count: of children along a side; side: of a child. What else is active becomes tiles.
+        """
+        masks = np.frombuffer(self._grid, np.uint8, count**3 // 4, node + 32).reshape(2, -1)
+        active, child = np.unpackbits(masks, axis=1, bitorder="little").view(bool)
+        used = np.flatnonzero(active | child)
+        at = origin + side * np.stack(np.unravel_index(used, (count,) * 3), axis=1)
+        within = ((at <= self._high) & (at + side > self._low)).all(axis=1)
+        used, at = used[within], at[within]
+        offsets = np.frombuffer(self._grid, "<i8", count**3, node + table)
+        of_table = np.frombuffer(self._grid, self._layout.form, 8 // self._number * count**3,
+                                 node + table)  # fmt: skip
+        for j, low in zip(used, at, strict=True):
+            if not child[j]:
+                value = float(of_table[8 // self._number * j])
+                self.tiles.append(sparse.Tile(low, side, value))
+        inner = child[used]
+        return node + offsets[used[inner]], at[inner]
+
+    @property
+    def _number(self) -> int:
+        return np.dtype(self._layout.form).itemsize
+
+
+def _values(grid: NDArray[np.uint8], layout: _Layout, nodes: NDArray[np.int64]) -> NDArray[Any]:
+    """The values (n, 512) float32 of leaves that begin at the bytes `nodes`."""
+    if not layout.bits:
+        values = _gather(grid, nodes, layout.values, layout.leaf - layout.values)
+        return values.view(layout.form).astype(np.float32, copy=False)
+    first, scale = _gather(grid, nodes, MINIMUM, 8).view("<f4").T
+    if layout.bits > 0:
+        widths = np.full(len(nodes), layout.bits)
+    else:
+        widths = 1 << (_gather(grid, nodes, FLAGS, 1)[:, 0] >> 5).astype(int)
+    values = np.empty((len(nodes), 512), np.float32)
+    for bits in np.unique(widths):
+        if bits > 16:
+            raise SceneError(f"is damaged: a leaf has numbers of {bits} bits")
+        own = widths == bits
+        codes: NDArray[Any] = _gather(grid, nodes[own], CODES, 64 * int(bits))
+        if bits == 16:
+            codes = codes.view("<u2")
         else:
-            _lower(grid, _within(grid, child, LOWER), low, values)
+            shifts = np.arange(0, 8, bits).astype(np.uint8)
+            codes = (codes[:, :, None] >> shifts) & np.uint8((1 << int(bits)) - 1)
+        codes = codes.reshape(-1, 512).astype(np.float32)
+        values[own] = codes * scale[own, None] + first[own, None]
+    return values
 
 
-def _lower(grid: bytes, node: int, at: NDArray[Any], values: np.ndarray) -> None:
-    """The same of a lower node."""
-    for place, child, value in _children(grid, node, 16, 512, 1088):
-        low = at + 8 * place
-        if child is None:
-            _put(values, low, 8, value)
-        else:
-            leaf = _within(grid, child, LEAF)
-            _put(values, low, 8, np.frombuffer(grid, "<f4", 512, leaf + 96).reshape(8, 8, 8))
+def _gather(
+    grid: NDArray[np.uint8], nodes: NDArray[np.int64], begin: int, size: int
+) -> NDArray[np.uint8]:
+    """The `size` bytes that begin so many bytes behind each of `nodes`: (n, size)."""
+    at = nodes + begin
+    if len(at) and not (nodes.min() >= GRID and at.max() <= len(grid) - size):
+        raise SceneError("is damaged: a node is beyond its end")
+    if not len(at):
+        return np.zeros((0, size), np.uint8)
+    return np.lib.stride_tricks.sliding_window_view(grid, size)[at]
 
 
-def _children(
-    grid: bytes, node: int, side: int, mask_bytes: int, table: int
-) -> Iterator[tuple[NDArray[Any], int | None, float]]:
-    """What is in a node: its place, and where its child is, or None and its value."""
-    masks = np.frombuffer(grid, np.uint8, 2 * mask_bytes, node + 32).reshape(2, -1)
-    active, child = np.unpackbits(masks, axis=1, bitorder="little").astype(bool)
-    offsets = np.frombuffer(grid, "<i8", side**3, node + table)
-    numbers = np.frombuffer(grid, "<f4", 2 * side**3, node + table)[::2]
-    for j in np.flatnonzero(active | child):
-        place = np.array([j // side**2, j // side % side, j % side])
-        yield place, node + int(offsets[j]) if child[j] else None, float(numbers[j])
-
-
-def _put(values: np.ndarray, low: NDArray[Any], side: int, part: Any) -> None:
-    """Write a number or (side, side, side) values from `low` on, where that is in the box."""
-    first, last = np.maximum(low, 0), np.minimum(low + side, values.shape)
-    if (first < last).all():
-        there = tuple(map(slice, first, last))
-        whole = isinstance(part, np.ndarray)
-        values[there] = part[tuple(map(slice, first - low, last - low))] if whole else part
-
-
-def _box(grid: bytes, low: NDArray[Any], size: NDArray[Any]) -> NDArray[np.float64]:
-    """The matrix that takes the unit cube to the box from the index `low` on, of so many cells."""
+def _to_world(grid: bytes) -> NDArray[np.float64]:
+    """The matrix (4, 4) from an index to the world."""
     numbers = np.frombuffer(grid, "<f8", 22, 296 + 88)
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = numbers[:9].reshape(3, 3), numbers[18:21]
-    if not np.isfinite(matrix).all() or abs(np.linalg.det(matrix)) == 0.0:
-        raise SceneError("is damaged: its transform has no inverse")
-    unit = np.diag([*size.astype(float), 1.0])
-    unit[:3, 3] = low
-    return matrix @ unit
+    return matrix
 
 
 def _offset(grid: bytes, at: int) -> int:

@@ -93,6 +93,7 @@ def take(wavefronts: Sequence[Wavefront], lowered: Lowered, refit: bool = False)
     paths.set_settings(lowered.settings)
     scene.lowered, scene.strategy, scene.trees = lowered, changes.strategy, staged.trees
     scene.tables |= staged.tables
+    scene.fill_grids()
     paths.queue = staged.queue
     _refit(scene, changes)
     if changes.kernels or changes.boxes or replaced or staged.tables:
@@ -175,12 +176,18 @@ def _write_tables(scene: DeviceScene, lowered: Lowered, new: dict[str, cl.Buffer
     for name in UPLOADED:
         if name in new or name in lowered.zero_copy:
             continue
-        if name in scene.moved_tables:
+        filled = name == "images" and _room(scene.lowered) != _room(lowered)
+        if name in scene.moved_tables or filled:
             scene.stream.write(scene.tables[name], lowered.table(name))
             continue
         words = _words(lowered.table(name))
         for begin, end in ranges(_words(scene.lowered.table(name)), words):
             scene.stream.write(scene.tables[name], words[begin:end], 4 * begin)
+
+
+def _room(lowered: Lowered) -> list[tuple[int, tuple[int, ...]]]:
+    """Where kernels write bricks of densities into `images`."""
+    return [(grid.first, grid.bricks) for grid in lowered.device_grids]
 
 
 def _refit(scene: DeviceScene, changes: _Changes) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from clpt.render.lowering import device_grids
 from clpt.render.lowering.device_arrays import on_host
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.tables import Words, as_words
@@ -15,12 +16,12 @@ MOST = 0xFFFF  # what a point has of the highest density of its brick
 
 
 def row(medium: Grid, encoder: Encoder) -> Words:
-    """Return what stands in the row of a medium behind its coefficients; append its bricks.
-
-    Raises SceneError for a density on a device that is negative or not finite.
-    """
-    words = encoder.cache(bricks, medium.density)
-    first = encoder.store.append("images", words)
+    """Return what stands in the row of a medium behind its coefficients; append its bricks."""
+    if device_grids.stays_there(medium.density):
+        around = _brick_counts(medium.density.shape)
+        first = device_grids.reserve(encoder.store, medium.density, around)
+    else:
+        first = encoder.store.append("images", encoder.cache(bricks, medium.density))
     size = np.array(medium.density.shape)
     to_lattice = np.linalg.inv(np.asarray(medium.to_world, float))
     lattice = size[:, None] * to_lattice[:3] + np.array([0.0, 0.0, 0.0, 0.5])

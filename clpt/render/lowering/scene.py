@@ -26,6 +26,7 @@ from clpt.render.lowering.camera.surroundings import (
 from clpt.render.lowering.camera.wavelengths import Density, density, emissions
 from clpt.render.lowering.checks import check
 from clpt.render.lowering.device_arrays import is_table
+from clpt.render.lowering.device_grids import DeviceGrid
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.features import features_of
 from clpt.render.lowering.geometry import shapes
@@ -67,7 +68,7 @@ class Lowered:
     glass_row: of the camera, see `lower_camera`. integrator: of the scene, or what was chosen;
     reason: why, "" where there was no choice. encoder: what made the tables, for values that are
     edited. cache: what the next lowering need not make again. around: media at the camera, or the
-    matter of bodies.
+    matter of bodies. device_grids: densities whose bricks kernels put into `images`.
     """
 
     features: Features
@@ -88,6 +89,7 @@ class Lowered:
     encoder: Encoder
     cache: LoweringCache
     around: tuple[Any, ...] = ()
+    device_grids: tuple[DeviceGrid, ...] = ()
 
     def __post_init__(self) -> None:
         own = (self.vertices, self.faces, self.tags, self.boxes, self.settings)
@@ -190,6 +192,7 @@ def lower(
         around=around,
         encoder=encoder,
         cache=cache,
+        device_grids=tuple(encoder.store.device_grids),
     )
 
 

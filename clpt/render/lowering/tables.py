@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -19,9 +21,14 @@ def as_words(values: ArrayLike) -> Words:
 
 
 class TableStore:
-    """The read-only tables of a scene, by the names in clpt.records.TABLES."""
+    """The read-only tables of a scene, by the names in clpt.records.TABLES.
+
+    device_grids: densities whose bricks kernels put into `images`, see
+    `clpt.render.lowering.device_grids`.
+    """
 
     def __init__(self) -> None:
+        self.device_grids: list[Any] = []
         self._parts: dict[str, list[np.ndarray]] = {name: [] for name in TABLES}
         self._sizes = dict.fromkeys(TABLES, 0)
 

@@ -10,10 +10,12 @@ import pyopencl as cl
 from clpt import bvh, device
 from clpt.device.buffers import Buffers
 from clpt.records import TABLES
+from clpt.render.lowering.device_grids import POINT_WORDS
 from clpt.render.lowering.scene import Lowered
 from clpt.render.wavefront import trees
 from clpt.render.wavefront.strategy import Strategy
 
+_BRICKS = "motion/brick_density.cl"
 UPLOADED = tuple(name for name in TABLES if name != "instances")  # that one is of the trees
 
 
@@ -45,6 +47,8 @@ class DeviceScene:
         self.trees = trees.build(
             buffers, lowered, self.tables["vertices"], strategy.layout, tree_quality
         )
+        self._building = bvh.Building(self.device, stream=stream)
+        self.fill_grids()
         self.moved_tables: set[str] = set()
         self.tree_refitted = False
 
@@ -52,6 +56,30 @@ class DeviceScene:
     def arguments(self) -> dict[str, Any]:
         """The kernels' arguments by name."""
         return {**self.tables, **self.trees.arguments}
+
+    def fill_grids(self) -> None:
+        """Enqueue that the bricks of densities on a device follow from these.
+
+        A density of another context comes over the host, which waits for it.
+        """
+        for grid in self.lowered.device_grids:
+            values = grid.values
+            if values.context == self.device.context:
+                self.stream.after(values.events)
+                source, begin = values.base_data, values.offset // 4
+            else:
+                source, begin = self.upload("densities", values.get()), 0
+            count = int(np.prod(grid.bricks))
+            common: dict[str, Any] = {
+                "values": source, "begin": begin, "first": grid.first,
+                "bricks_x": grid.bricks[0], "bricks_y": grid.bricks[1],
+                **dict(zip(("nx", "ny", "nz"), values.shape, strict=True)),
+                "images": self.tables["images"],
+            }  # fmt: skip
+            self._building.run_each(_BRICKS, "brick_bounds", count, **common)
+            self._building.run_each(
+                _BRICKS, "brick_points", count * POINT_WORDS, bricks=count, **common
+            )
 
     def upload(self, name: str, table: np.ndarray) -> cl.Buffer:
         """Return a new buffer that holds a table. Raises MemoryBudgetError."""

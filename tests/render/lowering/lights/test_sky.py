@@ -97,6 +97,9 @@ def test_illuminance_is_that_of_days_and_dusks():
     assert 85e3 < sky_ + sun < 120e3 and 0.08 < sky_ / (sky_ + sun) < 0.25
     for elevation, lux in ((0.0, 758.0), (-4.0, 29.9), (-6.0, 3.4)):
         assert 0.75 < xyz(sum(flux(elevation)))[1] / lux < 1.25, elevation
+    # clear evenings by the glossary of the American Meteorological Society
+    for elevation, low, high in ((-0.833, 410.0, 585.0), (-6.0, 2.0, 3.5)):
+        assert low < xyz(sum(flux(elevation)))[1] < high
 
 
 @pytest.mark.slow

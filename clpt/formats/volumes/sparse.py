@@ -1,0 +1,86 @@
+"""From the leaves and tiles of a tree, OpenVDB's or NanoVDB's, to values on one grid."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.errors import SceneError
+from clpt.scene.media import Volume
+
+SIDE = 8  # of a leaf
+MOST_VALUES = 1 << 28  # of the box of a grid
+MOST_AXIS = 1 << 16
+
+
+class Tile(NamedTuple):
+    """A cube of one value."""
+
+    low: NDArray[np.int64]
+    side: int
+    value: float
+
+
+def check_box(low: NDArray[np.int64], high: NDArray[np.int64]) -> None:
+    """Raise SceneError for a box, from its lowest index to its highest, that cannot be read."""
+    size = high - low + 1
+    if not (size > 0).all():
+        raise SceneError("has no active values")
+    if np.prod(size.astype(float)) > MOST_VALUES or (size > MOST_AXIS).any():
+        shape = " x ".join(map(str, size))
+        message = f"its box is {shape}; at most {MOST_VALUES:,} values are read, {MOST_AXIS:,}"
+        raise SceneError(f"{message} along an axis")
+
+
+def volume(
+    low: NDArray[np.int64],
+    high: NDArray[np.int64],
+    background: float,
+    tiles: Iterable[Tile],
+    origins: NDArray[np.int64],
+    leaves: NDArray[np.float32],
+    to_world: NDArray[np.float64],
+) -> Volume:
+    """Return the values of a box, with a layer of what is outside around it.
+
+    low, high: (3,) the lowest and the highest index of the box; origins: (n, 3) the lowest index of
+    each leaf; leaves: (n, 512) their values, z fastest; to_world: 4x4, from an index to the world.
+    Raises SceneError for a box that is empty or too large, and for a matrix without an inverse.
+    """
+    check_box(low, high)
+    if not np.isfinite(to_world).all() or abs(np.linalg.det(to_world)) == 0.0:
+        raise SceneError("is damaged: its transform has no inverse")
+    first = (low - 1) // SIDE
+    counts = (high + 1) // SIDE - first + 1
+    values = np.full(counts * SIDE, background, np.float32)
+    for tile in tiles:
+        begin = np.maximum(tile.low - first * SIDE, 0)
+        end = np.minimum(tile.low - first * SIDE + tile.side, values.shape)
+        if (begin < end).all():
+            values[tuple(map(slice, begin, end))] = tile.value
+    at = origins // SIDE - first
+    within = ((at >= 0) & (at < counts)).all(axis=1)
+    x, y, z = at[within].T
+    blocks = values.reshape([n for count in counts for n in (count, SIDE)])
+    blocks[x, :, y, :, z, :] = leaves[within].reshape(-1, SIDE, SIDE, SIDE)
+    begin = low - 1 - first * SIDE
+    size = high - low + 3
+    whole = values[tuple(map(slice, begin, begin + size))]
+    return Volume(np.ascontiguousarray(_outside(whole, background)), _box(to_world, low, size))
+
+
+def _outside(values: NDArray[np.float32], background: float) -> NDArray[np.float32]:
+    """Put what is outside into the outermost layer."""
+    for axis in range(3):
+        np.moveaxis(values, axis, 0)[[0, -1]] = background
+    return values
+
+
+def _box(to_world: NDArray[np.float64], low: NDArray[Any], size: NDArray[Any]) -> Any:
+    """The matrix that takes the unit cube to the cells of a box and of the layer around it."""
+    unit = np.diag([*size.astype(float), 1.0])
+    unit[:3, 3] = low - 1.5
+    return to_world @ unit
