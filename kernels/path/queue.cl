@@ -60,9 +60,9 @@ called void queue_return(Slab path, Slab shadow, constant BlockWords *words, glo
 /* How many collisions in media paths are taken through in a block at a time. */
 #define WALK 16
 
-/* Whether more than half of a block's lanes wait for kind k, as paths that walk in a medium do; others are put to rest,
- * and *ended keeps their states. */
-called int queue_walks(Slab path, Slab hit, int kind, integer *ended, uint block)
+/* Whether a block of paths that wait for a kind of phase function takes a further step through the medium, the n-th:
+ * while more than half of the lanes wait for it still. Others are put to rest, and *ended keeps their states. */
+called int queue_walks(Slab path, Slab hit, int kind, int n, integer *ended, uint block)
 {
     union { integer all; int each[LANES]; } kinds;
     kinds.all = waiting_kind(path, hit, block);
@@ -71,8 +71,9 @@ called int queue_walks(Slab path, Slab hit, int kind, integer *ended, uint block
     store_path_state(path, block, !walks, (integer)(0));
     int count = 0;
     for (uint i = 0; i < LANES; i++) count += kinds.each[i] == kind;
-    return 2 * count > LANES;
+    return n < WALK && 2 * count > LANES;
 }
+/* Wakes those that were put to rest. */
 called void queue_walked(Slab path, integer ended, uint block)
 {
     store_path_state(path, block, ended != 0, ended);

@@ -87,10 +87,10 @@ def loop_text(features: Features, layout: str, lanes: int, interleaved: bool) ->
     lines += [f"inline void loop_begin{head}uint at)", "{", *_of_each(begins), "}"]
     rests = [calls[1:] for calls in bounces]
     same = _same(rests)
-    own = [
-        _bounce_text(calls[1 + same :], _walk_text(kind, calls, f"blocks_{which}"), f"blocks_{which}")
-        for which, (kind, calls) in enumerate(zip(features.passes, bounces, strict=True))
-    ]
+    own = []
+    for which, (kind, calls) in enumerate(zip(features.passes, bounces, strict=True)):
+        words = f"blocks_{which}"
+        own.append(_bounce_text(calls[1 + same :], _walk_text(kind, calls, words), words))
     lines += [
         f"inline void loop_bounce{head}global uint *queue, uint first, uint end)",
         "{",
@@ -196,7 +196,7 @@ def _bounce_text(calls: list[_Call], walk: list[str], words: str) -> list[str]:
 
 def _walk_text(own: Features, calls: list[_Call], words: str) -> list[str]:
     """Statements that take the camera's paths in media from collision to collision, in a block,
-    while most of its lanes have one: only their end is sorted. Calls: all of a bounce."""
+    while most of its lanes have one; own: their features; calls: all of a bounce."""
     shading = [call for call in calls if call.stage.kernel == "shade"]
     rest = [call for call in calls[1:] if call not in shading]
     join = [call for call in rest if calls.index(call) > calls.index(shading[0])]
@@ -211,7 +211,7 @@ def _walk_text(own: Features, calls: list[_Call], words: str) -> list[str]:
             f"for (uint entry = {begins}; entry < {ends}; entry += LANES) {{",
             "    integer ended = 0;",
             f"    queue_take(path, hit, shadow, &{words}, queue, entry, {ends}, block);",
-            f"    for (uint step = 0; step < WALK && queue_walks(path, hit, {kind}, &ended, block); step++) {{",
+            f"    for (int n = 0; queue_walks(path, hit, {kind}, n, &ended, block); n++) {{",
             f"        {call.at('block')}",
             *(f"        {one.through('block', 'block + LANES')}" for one in again),
             "    }",

@@ -20,12 +20,11 @@ from clpt.scene.shapes import Shape
 MOST_LAMPS = 64  # whose boxes are compared
 
 
-def sealed_media(
-    index: SceneIndex, cached: Callable[..., Any] | None = None
-) -> frozenset[Medium]:
+def sealed_media(index: SceneIndex, cached: Callable[..., Any] | None = None) -> frozenset[Medium]:
     """Return the media inside of boundaries that stop shadow rays, away from all lamps.
 
-    There are none where a ray cannot meet all lights. cached: `LoweringCache`, which keeps the triangles of boundaries.
+    There are none where a ray cannot meet all lights. cached: `LoweringCache`, which keeps the
+    triangles of boundaries.
     """
     scene = index.scene
     if index.nested or any(light.reach != "infinite" for light in scene.lights):
@@ -41,9 +40,9 @@ def sealed_media(
     for medium, bodies in inside.items():
         leaves = {leaf for shape in bodies for leaf in leaves_of(shape.material)}
         stops = not any(leaf.is_null for leaf in leaves)
-        if stops and medium.scatters and medium not in around and len(lamps) <= MOST_LAMPS:
-            if not any(_overlap(bodies, lamp, cached) for lamp in lamps):
-                found.add(medium)
+        alone = medium.scatters and medium not in around and len(lamps) <= MOST_LAMPS
+        if stops and alone and not any(_overlap(bodies, lamp, cached) for lamp in lamps):
+            found.add(medium)
     return frozenset(found)
 
 
