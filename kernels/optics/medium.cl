@@ -9,6 +9,7 @@
  * dims what rays bring through them. Their rows hold sigma_a and sigma_s, and before them the word of their phase
  * function. */
 #define MEDIUM_FLIES 0x40000000
+#define MEDIUM_SEALED 0x08000000 /* no ray to a light leaves it: its boundaries bend light */
 #define MEDIUM_ROW(name) (((name) & 0xffffff) - 1)
 
 /* What is left of light after t metres, t up to FAR; medium_absorption and medium_scattering are generated. */

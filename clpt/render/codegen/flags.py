@@ -83,6 +83,7 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "USES_BODIES": lambda f: f.bodies,
     "SHADOW_MEDIA": lambda f: f.shadow_media,
     "MEDIUM_AIMS": lambda f: f.medium_aims,
+    "SEALED_MEDIA": lambda f: f.sealed_media,
     "USES_DISPERSION": lambda f: f.dispersion and f.mode == "spectral",
     "USES_RATIO": lambda f: (
         f.chromatic_media

@@ -92,6 +92,7 @@ class Features:
     media: bool = False  # inside or outside of shapes, or around the camera
     chromatic_media: bool = False  # of which some extinction depends on the wavelength
     medium_aims: int = 0  # places of lamps near which flights through media end
+    sealed_media: bool = False  # which no ray to a light can leave
     grids: bool = False  # of which some have a density on a grid
     bodies: bool = False  # that may overlap, of different priorities
     glass_lens: bool = False  # of a glass that disperses

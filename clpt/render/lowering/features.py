@@ -26,12 +26,14 @@ def features_of(
     profile: int,
     aimed: bool,
     medium_aims: int,
+    sealed: bool,
 ) -> Features:
     """Return the features of a scene, from what each step of its lowering has met.
 
     profile: where in `distributions` the values of the pixel filter begin;
     aimed: whether light paths aim;
-    medium_aims: places of lamps that flights through media aim at.
+    medium_aims: places of lamps that flights through media aim at; sealed: whether there are media
+    that rays to lights cannot leave.
     """
     scene, textures = index.scene, encoder.textures
     sources = encoder.sources
@@ -80,6 +82,7 @@ def features_of(
         bodies=index.nested,
         chromatic_media=any(medium.is_chromatic for medium in index.media),
         medium_aims=medium_aims,
+        sealed_media=sealed and not (index.weighed or index.guided),
         grids=any(isinstance(medium, Grid) for medium in index.media),
         dispersion=glass_lens or disperses(index.leaves, sources),
         glass_lens=glass_lens,

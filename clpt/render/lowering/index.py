@@ -61,7 +61,7 @@ class SceneIndex:
     def shining(self) -> tuple[str, ...]:
         """The kinds of leaves on shapes that are lights."""
         lights = (shape for shape in self.shapes if shape.emission is not None)
-        found = {cls for shape in lights for cls in _leaves_of(shape.material)}
+        found = {cls for shape in lights for cls in leaves_of(shape.material)}
         return tuple(cls.kind for cls in self.leaves if cls in found)
 
     @property
@@ -182,7 +182,7 @@ def _leaf_kinds(shapes_: tuple[Shape, ...]) -> tuple[type[mt.Material], ...]:
         where = shapes.where(shape)
         if not isinstance(shape.material, mt.Material):
             raise SceneError(f"{shape.material!r} is not a material", where=where)
-        for leaf in _leaves_of(shape.material):
+        for leaf in leaves_of(shape.material):
             found.setdefault(leaf, where)
     if any(shape.priority for shape in shapes_):
         found.setdefault(mt.Null, "")  # a surface within a body of higher priority
@@ -202,8 +202,8 @@ def _phase_kinds(scene: Scene, shapes_: tuple[Shape, ...]) -> tuple[type[Scatter
     return tuple(cls for cls in PHASE_LEAVES if cls in found)
 
 
-def _leaves_of(material: mt.Material) -> Iterator[type[mt.Material]]:
-    """The kinds of leaves that paths may meet where a shape has a material."""
+def leaves_of(material: mt.Material) -> Iterator[type[mt.Material]]:
+    """Return the kinds of leaves that paths may meet where a shape has a material."""
     for part in mt.parts(material):
         if isinstance(part, mt.Mask) or part.no_back:
             yield mt.Null

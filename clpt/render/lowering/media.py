@@ -18,6 +18,7 @@ from clpt.scene.shapes import Shape
 MOST_AIMS = 8  # lamps near which flights end, see kernels/optics/equiangular.cl
 FLIES = 0x40000000  # in a medium's word: the stage `flight` takes rays through it
 GRID = 0x20000000  # a density on a grid multiplies its coefficients
+SEALED = 0x08000000  # no shadow ray leaves it, see sealed.py
 
 
 def medium_aims(lights: LightRows) -> NDArray[np.float32]:
@@ -46,8 +47,15 @@ def medium_aims(lights: LightRows) -> NDArray[np.float32]:
 class MediumWords:
     """Makes the words of media, each once."""
 
-    def __init__(self, index: SceneIndex, encoder: Encoder, materials: MaterialWords):
+    def __init__(
+        self,
+        index: SceneIndex,
+        encoder: Encoder,
+        materials: MaterialWords,
+        sealed: frozenset[Medium] = frozenset(),
+    ):
         self._index, self._encoder, self._materials = index, encoder, materials
+        self._sealed = sealed
         self._words: dict[Medium, int] = {}
         self._has_media = bool(index.media)  # not of an integrator that sees none
 
@@ -72,7 +80,7 @@ class MediumWords:
         rows = [np.array([phase], np.uint32)]
         for name, value in (("absorption", absorbs), ("scattering", scatters)):
             rows.append(self._encoder.named_words("medium", name, value, "coefficient")[0])
-        word = FLIES
+        word = FLIES | (SEALED if medium in self._sealed else 0)
         if isinstance(medium, Grid):
             rows.append(grids.row(medium, self._encoder))
             word |= GRID

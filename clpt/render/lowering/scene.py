@@ -45,6 +45,7 @@ from clpt.render.lowering.lights.lights import LightRows, light_rows
 from clpt.render.lowering.lowering_cache import LoweringCache
 from clpt.render.lowering.materials.material_words import MaterialWords
 from clpt.render.lowering.media import MediumWords, medium_aims
+from clpt.render.lowering.sealed import sealed_media
 from clpt.render.lowering.settings import DEEPEST, settings_of
 from clpt.render.lowering.textures.attributes import Owner, lower_attributes
 from clpt.scene import Scene
@@ -127,7 +128,8 @@ def lower(
     filters.lower_filter(film.filter, encoder.store, index.splatting)
     materials = _begin_materials(index, encoder)
     geometry = lower_geometry(index, encoder, materials)
-    media = MediumWords(index, encoder, materials)
+    sealed = sealed_media(index, cache) if index.media else frozenset()
+    media = MediumWords(index, encoder, materials, sealed)
     sphere = geometry.bounding_sphere()
     lights = _lower_lights(index, encoder, geometry, sphere[1])
     homogeneous = (one for one in index.media if not isinstance(one, Grid))
@@ -162,7 +164,8 @@ def lower(
     )  # fmt: skip
     aimed = len(targets) > 0
     features = features_of(
-        index, encoder, materials, geometry, lights, tabulated, profile, aimed, len(near)
+        index, encoder, materials, geometry, lights, tabulated, profile, aimed, len(near),
+        bool(sealed),
     )  # fmt: skip
     names, for_layers = lower_names(index, geometry, lights, encoder.store)
     features = replace(features, **for_layers)

@@ -38,7 +38,7 @@ def media_around(scene: Scene, cached: Callable[..., Any] | None = None) -> tupl
     """
     if scene.camera.medium is not None:
         return (scene.camera.medium,)
-    bounding = [shape for shape in _every(scene) if _bounds_media(shape)]
+    bounding = [shape for shape in every(scene) if _bounds_media(shape)]
     if not bounding:
         return ()
     p = _origin(scene)
@@ -47,7 +47,7 @@ def media_around(scene: Scene, cached: Callable[..., Any] | None = None) -> tupl
     bounds: dict[Medium, list[NDArray[np.float64]]] = {}
     parts: dict[Medium, list[tuple[float, Shape]]] = {}
     for shape in bounding:
-        low, high = _box(shape, cached)
+        low, high = box(shape, cached)
         for medium, sign in ((shape.interior, 1.0), (shape.exterior, -1.0)):
             if medium is not None:
                 parts.setdefault(medium, []).append((sign, shape))
@@ -76,10 +76,10 @@ def bodies_around(
     as the inner side of a glass does.
     """
     p, turns = _origin(scene), dict[tuple[Any, ...], float]()
-    for shape in _every(scene, lambda one: matter(one) is not None):
+    for shape in every(scene, lambda one: matter(one) is not None):
         own = matter(shape)
         if own is not None:
-            low, high = _box(shape, cached)
+            low, high = box(shape, cached)
             within = ((p >= low) & (p <= high)).all()
             turns[own] = turns.get(own, 0.0) + (_winding(shape, p, cached) if within else 0.0)
     return tuple(own for own, number in turns.items() if number > 0.5)
@@ -110,11 +110,11 @@ def contested(
     matter: as of `bodies_around`; its first entry is the priority.
     """
     boxes: list[tuple[tuple[Any, ...], Shape, NDArray[Any], NDArray[Any]]] = []
-    for shape in _every(scene, lambda one: matter(one) is not None):
+    for shape in every(scene, lambda one: matter(one) is not None):
         own = matter(shape)
         if own is None or len(boxes) >= MOST_COMPARED:
             continue
-        low, high = _box(shape, cached)
+        low, high = box(shape, cached)
         for other, second, other_low, other_high in boxes:
             if other[0] != own[0] or other == own:
                 continue
@@ -129,8 +129,9 @@ def contested(
     return []
 
 
-def _every(scene: Scene, bounds: Callable[[Shape], bool] = _bounds_media) -> Iterator[Shape]:
-    """The shapes of a scene that may bound media, those of instances where they are placed."""
+def every(scene: Scene, bounds: Callable[[Shape], bool] = _bounds_media) -> Iterator[Shape]:
+    """Return the shapes of a scene that may bound media, those of instances where they are
+    placed."""
     for thing in scene.shapes:
         if not isinstance(thing, Instance):
             yield thing
@@ -150,8 +151,8 @@ def _origin(scene: Scene) -> NDArray[np.float64]:
     return near[:3] / near[3]
 
 
-def _box(shape: Shape, cached: Callable[..., Any] | None) -> tuple[NDArray[Any], NDArray[Any]]:
-    """The lowest and the highest corner of a shape's box."""
+def box(shape: Shape, cached: Callable[..., Any] | None) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return the lowest and the highest corner of a shape's box."""
     if isinstance(shape, Sphere) and keeps_its_kind(shape):
         return analytic.bounds(shape)
     if isinstance(shape, Spheres):
