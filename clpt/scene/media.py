@@ -16,12 +16,14 @@ from numpy.typing import NDArray
 from clpt import spectra
 from clpt.errors import SceneError
 from clpt.scene.params import Kind, angular, coefficient, host, quantity, real, reflectance
+from clpt.scene.params import emission as emitted
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.values import Matrix4, SpectrumLike
-from clpt.spectra import RGB, Constant, RGBUnbounded, Spectrum
+from clpt.spectra import RGB, Constant, RGBIlluminant, RGBUnbounded, Spectrum
 from clpt.spectra.spectrum import WIDEST, extremes
 
 MOST_ROWS = 512  # of a table by wavelength
+RADIANCE = "W m^-2 sr^-1 nm^-1"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -190,6 +192,11 @@ class Medium(Kind):
         """Whether its extinction depends on the wavelength."""
         raise NotImplementedError
 
+    @property
+    def light(self) -> Spectrum | None:
+        """The radiance that a body of it too thick to see through would emit; None: no light."""
+        raise NotImplementedError
+
     def coefficients(self, spectral: bool) -> tuple[Spectrum, Spectrum]:
         """Return how much a metre absorbs and scatters [1/m].
 
@@ -207,6 +214,9 @@ class Homogeneous(Medium):
     sigma_t: SpectrumLike = coefficient(0.0, "how much it does of both; 0: the two above say it")
     albedo: SpectrumLike = reflectance(1.0, "share of `sigma_t` that is scattered", textured=False)
     scale: float = real(1.0, "factor of all coefficients", low=0.0)
+    emission: SpectrumLike = emitted(
+        0.0, "what it emits where it absorbs all light; a metre emits sigma_a of it", RADIANCE
+    )
 
     @classmethod
     def from_albedo(
@@ -247,6 +257,12 @@ class Homogeneous(Medium):
     @property
     def scatters(self) -> bool:
         return not _is_zero(self.coefficients(spectral=True)[1])
+
+    @property
+    def light(self) -> Spectrum | None:
+        value: Any = self.emission
+        dark = _is_dark(value) or _is_zero(self.coefficients(spectral=True)[0])
+        return None if dark else _lit(value)
 
     @property
     def is_chromatic(self) -> bool:
@@ -368,6 +384,19 @@ def _is_grey(value: Any) -> bool:
 
 def _is_zero(value: Any) -> bool:
     return _is_grey(value) and not value.to_rgb("unbounded").any()
+
+
+def _is_dark(value: Any) -> bool:
+    """Whether an emission is black."""
+    if isinstance(value, RGB | RGBIlluminant | RGBUnbounded):
+        return max(value.r, value.g, value.b) == 0.0
+    return isinstance(value, Constant) and value.value == 0.0
+
+
+def _lit(value: Any) -> Spectrum:
+    """An emission as a spectrum: a colour is a multiple of D65."""
+    lit: Spectrum = RGBIlluminant(value.r, value.g, value.b) if isinstance(value, RGB) else value
+    return lit
 
 
 PHASE_LEAVES: tuple[type[Phase], ...] = (Isotropic, HenyeyGreenstein, Rayleigh, Draine, Tabulated)

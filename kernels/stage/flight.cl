@@ -94,6 +94,11 @@ STAGE(flight)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
             hero_keep(path, at, gridded, own.ratio);
         }
 #endif
+#if MEDIA_EMIT
+        Spectrum light = medium_emission(scene, sel_i(flies, name, (integer)(0)), m, end, lambdas);
+        light = spectrum_mul(load_path_beta(path, at), light);
+        store_path_radiance(path, at, flies, spectrum_add(load_path_radiance(path, at), light));
+#endif
         store_path_beta(path, at, flies, spectrum_mul(load_path_beta(path, at), weight));
         store_hit_t(hit, at, collides, t);
         store_hit_prim(hit, at, collides, (integer)(0));

@@ -11,7 +11,7 @@ from clpt.errors import UnknownKindError
 from clpt.formats import volumes
 from clpt.formats.pbrt import coated_albedo
 from clpt.formats.pbrt.params import Parameters
-from clpt.formats.pbrt.spectra import spectrum
+from clpt.formats.pbrt.spectra import scaled, spectrum
 from clpt.formats.pbrt.state import Definition, State, nearest
 from clpt.scene.media import Grid, HenyeyGreenstein, Homogeneous, Isotropic, Medium, Volume
 from clpt.spectra import Constant, RGBUnbounded
@@ -45,15 +45,22 @@ def _made(name: str, definition: Definition) -> Medium | None:
         if kind not in ("homogeneous", *GRIDS):
             raise UnknownKindError("medium", kind, ("homogeneous", *GRIDS, *LEFT_OUT))
         density = _density(kind, params, state) if kind in GRIDS else None
-        if "Le" in params or "temperature" in params:
+        if kind in GRIDS and ("Le" in params or "temperature" in params):
             state.warn(params, "its light is left out")
-        params.ignore("Le", "Lescale", "temperature", "temperaturename", "temperatureoffset")
+        params.ignore("temperature", "temperaturename", "temperatureoffset")
         params.ignore("temperaturescale", "temperaturecutoff", "LeScale")
+        light: Any = Constant(0.0)
+        if kind in GRIDS:
+            params.ignore("Le", "Lescale")
+        else:
+            light = spectrum(params, "Le", "emission", state, light)
+            light = scaled(light, params.one("Lescale", "float", 1.0))
         g = params.one("g", "float", 0.0)
         phase = HenyeyGreenstein(g=g) if g else Isotropic()
         scale = params.one("scale", "float", 1.0)
         absorbs, scatters = _coefficients(params, state, density is not None)
         own = {"sigma_a": absorbs, "sigma_s": scatters, "scale": scale, "phase": phase}
+        own["emission"] = light
         made = Homogeneous(**own, name=name)
         if density is not None:
             made = Grid(**own, name=name, density=density)

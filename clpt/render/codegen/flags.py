@@ -80,6 +80,7 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "USES_NULL_SURFACES": lambda f: f.null_surfaces,
     "USES_ABSORPTION": lambda f: f.absorption or f.media,
     "USES_MEDIA": lambda f: f.media,
+    "MEDIA_EMIT": lambda f: f.emissive_media,
     "USES_GRIDS": lambda f: f.grids,
     "USES_BODIES": lambda f: f.bodies,
     "SHADOW_MEDIA": lambda f: f.shadow_media,

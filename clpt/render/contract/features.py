@@ -91,6 +91,7 @@ class Features:
     absorption: bool = False  # inside of a dielectric
     media: bool = False  # inside or outside of shapes, or around the camera
     chromatic_media: bool = False  # of which some extinction depends on the wavelength
+    emissive_media: bool = False  # of which some give out light
     medium_aims: int = 0  # places of lamps near which flights through media end
     grids: bool = False  # of which some have a density on a grid
     bodies: bool = False  # that may overlap, of different priorities

@@ -80,6 +80,7 @@ def features_of(
         bodies=index.nested,
         chromatic_media=any(medium.is_chromatic for medium in index.media),
         medium_aims=medium_aims,
+        emissive_media=bool(index.emitting),
         grids=any(isinstance(medium, Grid) for medium in index.media),
         dispersion=glass_lens or disperses(index.leaves, sources),
         glass_lens=glass_lens,

@@ -70,6 +70,11 @@ class SceneIndex:
         return () if self.channels else tuple(_media(self.scene, self.shapes))
 
     @property
+    def emitting(self) -> tuple[Medium, ...]:
+        """Those of them that give out light."""
+        return tuple(medium for medium in self.media if medium.light is not None)
+
+    @property
     def nested(self) -> bool:
         """Whether bodies may overlap, of different priorities."""
         return not self.channels and any(shape.priority for shape in self.shapes)

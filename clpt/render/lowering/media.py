@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.render.contract.parameter_words import SPECTRUM_WORDS
 from clpt.render.lowering import grids
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.index import SceneIndex
@@ -14,6 +15,7 @@ from clpt.render.lowering.lights.lights import LightRows
 from clpt.render.lowering.materials.material_words import MaterialWords
 from clpt.scene.media import Grid, Medium
 from clpt.scene.shapes import Shape
+from clpt.spectra import Constant
 
 MOST_AIMS = 8  # lamps near which flights end, see kernels/optics/equiangular.cl
 FLIES = 0x40000000  # in a medium's word: the stage `flight` takes rays through it
@@ -70,6 +72,9 @@ class MediumWords:
         phase = self._materials.phase(medium.phase) if medium.scatters else 0
         absorbs, scatters = medium.coefficients(self._index.spectral)
         rows = [np.array([phase], np.uint32)]
+        if self._index.emitting:
+            light = medium.light or Constant(0.0)
+            rows.insert(0, self._encoder.named_words("medium", "light", light, "emission")[0])
         for name, value in (("absorption", absorbs), ("scattering", scatters)):
             rows.append(self._encoder.named_words("medium", name, value, "coefficient")[0])
         word = FLIES
@@ -77,4 +82,4 @@ class MediumWords:
             rows.append(grids.row(medium, self._encoder))
             word |= GRID
         first = self._encoder.store.append("materials", np.concatenate(rows))
-        return word | (2 + first)
+        return word | (2 + first + (SPECTRUM_WORDS if self._index.emitting else 0))
