@@ -19,7 +19,9 @@ from clpt.scene.integrators import Path as PathIntegrator
 from clpt.scene.lights import Constant
 from clpt.scene.materials import Null
 from clpt.scene.shapes import Cube
-from tests.renders.support import assert_mean, exposures, with_film
+from clpt.spectra import cie
+from clpt.spectra.emission import planck
+from tests.renders.support import assert_mean, exposures
 
 LONG = PathIntegrator(max_depth=-1, rr_depth=1000, light_paths=0)
 CHROMATIC = np.array([0.5, 2.0, 3.0])  # [1/m]
@@ -64,3 +66,75 @@ def test_furnace(mode: str) -> None:
     """What emits as much as its surroundings cannot be seen before them, whatever it scatters."""
     medium = media.Homogeneous(sigma_a=0.3 * CHROMATIC, sigma_s=CHROMATIC, emission=1.0)
     assert_mean(exposures(slab(medium, 1.0, mode=mode), 8, 64), 1.0, WITHIN)
+
+
+RANDOM = np.random.default_rng(7).random((19, 7, 12)) ** 2
+RANDOM[8:] *= RANDOM[8:] > 0.4
+HEAT = 1500.0 + 1000.0 * np.random.default_rng(8).random((19, 7, 12))
+BOX = tf.translate([0.1, -0.1, 0.05]) @ tf.rotate([1, 2, 3], 30) @ tf.scale([1.9, 1.1, 1.3])
+BOX = BOX @ tf.translate([-0.5, -0.5, -0.5])
+
+
+def on_line(medium: media.Grid, numbers: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Numbers of a grid at points (n, 3), trilinear; 0 outside of its box."""
+    inverse = np.linalg.inv(medium.to_world)
+    unit = points @ inverse[:3, :3].T + inverse[:3, 3]
+    inside = ((unit >= 0.0) & (unit <= 1.0)).all(axis=1)
+    size = np.array(numbers.shape)
+    at = np.clip(unit * size - 0.5, 0.0, size - 1.0)
+    low = np.minimum(at.astype(int), np.maximum(size - 2, 0))
+    share, sums = at - low, np.zeros(len(at))
+    for corner in np.ndindex(2, 2, 2):
+        weight = np.where(corner, share, 1.0 - share).prod(axis=1)
+        sums += weight * numbers[tuple(np.minimum(low + corner, size - 1).T)]
+    return sums * inside
+
+
+def seen(medium: media.Grid, source, absorbs: np.ndarray, extinction: np.ndarray) -> np.ndarray:
+    """The integral along the picture's ray, in float64; source(points) is (n, k) like the rest."""
+    steps = 20_000
+    t = (np.arange(steps) + 0.5) * (4.0 / steps)
+    points = np.stack([0.1 + 0.0 * t, 0.2 + 0.0 * t, 2.0 - t], axis=1)
+    density = on_line(medium, medium.density, points)[:, None]
+    depth = (np.cumsum(density, axis=0) - 0.5 * density) * (4.0 / steps) * extinction
+    return (np.exp(-depth) * density * absorbs * source(points)).sum(axis=0) * (4.0 / steps)
+
+
+@pytest.mark.parametrize("albedo", [0.0, 0.7])
+def test_constant_grid_is_homogeneous(albedo: float) -> None:
+    """Half a density and twice the coefficients; what is scattered again is left out."""
+    given = {"sigma_t": CHROMATIC, "albedo": albedo, "emission": COLOUR, "scale": 2.0}
+    box = tf.translate([-1.0] * 3) @ tf.scale(2.0)
+    grid = media.Grid(density=np.full((11, 9, 2), 0.5), to_world=box, **given)
+    scene = slab(grid)
+    scene.integrator = PathIntegrator(max_depth=1, light_paths=0)
+    wanted = -COLOUR * (1.0 - albedo) * np.expm1(-2.0 * CHROMATIC)
+    assert_mean(exposures(scene, 8, 64), wanted, WITHIN)
+
+
+@pytest.mark.parametrize("given", ["number", "temperature", "normalised"])
+def test_grid(given: str) -> None:
+    """Numbers on a grid that light is multiplied by, and black bodies."""
+    own = {"emission": COLOUR, "emission_grid": HEAT / 1000.0}
+    if given != "number":
+        own = {"temperature": HEAT, "brightness": 1e-3, "normalised": given == "normalised"}
+    medium = media.Grid(
+        density=3.0 * RANDOM, to_world=BOX, sigma_t=CHROMATIC, albedo=(0.5, 0.2, 0.0), **own
+    )
+    scene = slab(medium)
+    scene.integrator = PathIntegrator(max_depth=1, light_paths=0)
+
+    def source(points: np.ndarray) -> np.ndarray:
+        heat = on_line(medium, HEAT, points)
+        if given == "number":
+            return COLOUR * heat[:, None] / 1000.0
+        kelvin = np.maximum(heat, 1.0)[::20, None]
+        values = 1e-3 * planck(cie.GRID, kelvin)
+        if given == "normalised":
+            peak = planck(2.897771955e6 / kelvin, kelvin)
+            values = values / peak
+        rgb = cie.spectrum_to_xyz(values) @ cie.XYZ_TO_REC709.T
+        return np.repeat(np.maximum(rgb, 0.0), 20, axis=0)
+
+    wanted = seen(medium, source, CHROMATIC * (0.5, 0.8, 1.0), CHROMATIC)
+    assert_mean(exposures(scene, 8, 128), wanted, WITHIN)

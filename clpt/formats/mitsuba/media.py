@@ -12,7 +12,8 @@ from clpt.formats.mitsuba.properties import Context, Properties, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.formats.volumes import vol
 from clpt.scene import media
-from clpt.scene.media import Grid, Homogeneous, Medium, Phase, Volume
+from clpt.scene.media import Grid, Homogeneous, Medium, Phase
+from clpt.scene.volumes import Volume
 from clpt.spectra import RGBUnbounded
 
 

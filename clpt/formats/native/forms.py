@@ -339,8 +339,8 @@ FORMS: dict[str, Form] = {
     ),
     "volume": Form(
         "name of a `.npy`, `.vol` or `.nvdb` file; of a `.nvdb` with `#name` behind it that grid",
-        STRING,
-        lambda cursor, reader: reader.volume(cursor),
+        {"type": ["string", "null"]},
+        lambda cursor, reader: None if cursor.value is None else reader.volume(cursor),
         lambda value, writer: writer.volume(value),
     ),
     "cube_images": Form(

@@ -18,6 +18,7 @@ from clpt.formats.native.cursor import Cursor, parse
 from clpt.formats.native.spectra import find_file, kind_name
 from clpt.scene import Scene, check_noise, integrators, kinds, lights, materials, media, shapes
 from clpt.scene.params import Kind, params
+from clpt.scene.volumes import Volume
 
 ON_SHAPES = tuple(cls.kind for cls in lights.ON_SHAPES)
 KEYS = (
@@ -55,7 +56,7 @@ class _Reader:
         # None while one is being read: it refers to itself then
         self.materials: dict[str, materials.Material | None] = {}
         self.media: dict[str, media.Medium] = {}
-        self.volumes: dict[str, media.Volume] = {}
+        self.volumes: dict[str, Volume] = {}
         self.groups: dict[str, shapes.Group | None] = {}
         self.warnings: list[str] = []
 

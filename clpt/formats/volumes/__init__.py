@@ -9,7 +9,7 @@ import numpy as np
 
 from clpt.errors import SceneError
 from clpt.formats.volumes import nvdb, vol
-from clpt.scene.media import Volume, check_density
+from clpt.scene.volumes import Volume, check_density
 from clpt.transforms import IDENTITY
 
 MOST_BYTES = 1 << 32  # of a file
@@ -39,6 +39,15 @@ def read(path: str | Path, grid: str = "") -> Volume:
     except SceneError as error:
         raise SceneError(error.message, file=path) from None
     return made
+
+
+def names(path: str | Path) -> tuple[str, ...]:
+    """Return the names of the grids of a .nvdb, of any other file none. Raises SceneError."""
+    path = Path(path)
+    try:
+        return nvdb.names(path) if path.suffix.lower() == ".nvdb" else ()
+    except OSError as error:
+        raise SceneError(f"cannot be read: {error.strerror or error}", file=path) from None
 
 
 def _npy(path: Path, grid: str) -> Volume:

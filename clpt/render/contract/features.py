@@ -92,6 +92,8 @@ class Features:
     media: bool = False  # inside or outside of shapes, or around the camera
     chromatic_media: bool = False  # of which some extinction depends on the wavelength
     emissive_media: bool = False  # of which some give out light
+    emissive_grids: bool = False  # of these some have a density on a grid
+    hot_grids: bool = False  # of these some have a temperature
     medium_aims: int = 0  # places of lamps near which flights through media end
     grids: bool = False  # of which some have a density on a grid
     bodies: bool = False  # that may overlap, of different priorities

@@ -81,6 +81,8 @@ def features_of(
         chromatic_media=any(medium.is_chromatic for medium in index.media),
         medium_aims=medium_aims,
         emissive_media=bool(index.emitting),
+        emissive_grids=index.glowing,
+        hot_grids=any(getattr(one, "temperature", None) is not None for one in index.emitting),
         grids=any(isinstance(medium, Grid) for medium in index.media),
         dispersion=glass_lens or disperses(index.leaves, sources),
         glass_lens=glass_lens,

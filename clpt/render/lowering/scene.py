@@ -127,7 +127,7 @@ def lower(
     geometry = lower_geometry(index, encoder, materials)
     media = MediumWords(index, encoder, materials)
     sphere = geometry.bounding_sphere()
-    lights = _lower_lights(index, encoder, geometry, sphere[1])
+    lights = _lower_lights(index, encoder, geometry, sphere[1], media)
     homogeneous = (one for one in index.media if not isinstance(one, Grid))
     near = medium_aims(lights) if any(one.scatters for one in homogeneous) else ()
     encoder.store.append("media", np.array(near, np.float32).view(np.uint32))
@@ -219,11 +219,19 @@ def _begin_materials(index: SceneIndex, encoder: Encoder) -> MaterialWords:
 
 
 def _lower_lights(
-    index: SceneIndex, encoder: Encoder, geometry: Geometry, scene_radius: float
+    index: SceneIndex,
+    encoder: Encoder,
+    geometry: Geometry,
+    scene_radius: float,
+    media: MediumWords,
 ) -> LightRows:
     """Append the rows of `lights`, and note in the rows of shapes which lights they are."""
     tree_from = None if index.light_paths else TREE_FROM
-    lights = light_rows(index.scene.lights, geometry.emitters, encoder, scene_radius, tree_from)
+    for medium in index.emitting:
+        media.word(medium)
+    lights = light_rows(
+        index.scene.lights, geometry.emitters, encoder, scene_radius, tree_from, media.lights
+    )
     encoder.store.append("lights", lights.rows.view(np.uint32))
     if lights.tree is not None:
         encoder.store.append("lights", lights.tree)
