@@ -24,6 +24,7 @@ from clpt.spectra import RGB, Constant, RGBIlluminant, RGBUnbounded, Spectrum
 from clpt.spectra.spectrum import WIDEST, extremes
 
 MOST_ROWS = 512  # of a table by wavelength
+SOOT = 0.26  # E(m), the imaginary part of (m^2 - 1) / (m^2 + 2) without its sign
 COLDEST = 100.0  # [K] below which nothing is seen of a black body
 RADIANCE = "W m^-2 sr^-1 nm^-1"
 
@@ -365,6 +366,35 @@ class Grid(Homogeneous):
         return spectra.Blackbody(hottest, self.brightness) if hottest > COLDEST else None
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Soot(Grid):
+    """The soot of a flame: particles far smaller than the wavelength, which absorb and glow.
+
+    A metre of it absorbs 6 pi E f / lambda (Rayleigh), with the share f of the volume that is soot
+    and E of 0.26, of the index 1.57 - 0.56i (Smyth and Shaddix 1996). Its own coefficients are 0.
+    """
+
+    share: float = real(
+        1e-6, "of the volume that is soot, where the density is 1", low=0.0, high=1.0
+    )
+
+    def check(self) -> None:
+        super().check()
+        for name in ("sigma_a", "sigma_s", "sigma_t"):
+            if not _is_zero(getattr(self, name)):
+                raise SceneError("follows from `share`", where=f"{self.kind}.{name}")
+
+    @property
+    def is_chromatic(self) -> bool:
+        return True
+
+    def coefficients(self, spectral: bool) -> tuple[Spectrum, Spectrum]:
+        factor = 6.0 * np.pi * SOOT * self.share * self.scale
+        if factor == 0.0:
+            return Constant(0.0), Constant(0.0)
+        return spectra.Tabulated(WIDEST, factor / (WIDEST * 1e-9), "hold"), Constant(0.0)
+
+
 def _combined(values: list[Any], combine: Callable[[list[Any]], Any], spectral: bool) -> Spectrum:
     """What becomes of spectra at each wavelength, or of each of three numbers."""
     if all(isinstance(value, Constant) for value in values):
@@ -419,4 +449,4 @@ def _lit(value: Any) -> Spectrum:
 
 PHASE_LEAVES: tuple[type[Phase], ...] = (Isotropic, HenyeyGreenstein, Rayleigh, Draine, Tabulated)
 PHASES: tuple[type[Phase], ...] = (*PHASE_LEAVES, Blend)
-KINDS: tuple[type[Medium], ...] = (Homogeneous, Grid)
+KINDS: tuple[type[Medium], ...] = (Homogeneous, Grid, Soot)

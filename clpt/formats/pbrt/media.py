@@ -80,21 +80,20 @@ def _grid(kind: str, params: Parameters, state: State) -> dict[str, Any]:
         kelvin = _kelvin(volumes.read(path, hot), params)
         return {"density": density, "temperature": _moved(kelvin, state), **BLACK_BODY,
                 "brightness": scale}  # fmt: skip
-    density = _listed(params, "density", state)
-    if density is None:
+    listed = _listed(params, "density", state)
+    if listed is None:
         raise params.error("needs its 'density'")
-    if "temperature" in params:
-        heat = _listed(params, "temperature", state)
+    heat = _listed(params, "temperature", state)
+    if heat is not None:
         if "Le" in params:
             raise params.error("has both 'Le' and 'temperature'")
         if "Lescale" in params:
             state.warn(params, "'Lescale' is left out, where a temperature says what is emitted")
             params.ignore("Lescale")
-        kelvin = None if heat is None else _kelvin(heat, params)
-        return {"density": density, "temperature": kelvin, **BLACK_BODY}
+        return {"density": listed, "temperature": _kelvin(heat, params), **BLACK_BODY}
     params.ignore(*HEAT)
     light = spectrum(params, "Le", "emission", state, Constant(0.0))
-    return {"density": density, "emission": light,
+    return {"density": listed, "emission": light,
             "emission_grid": _listed(params, "Lescale", state)}  # fmt: skip
 
 

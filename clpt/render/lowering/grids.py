@@ -13,7 +13,6 @@ from clpt.render.lowering.device_arrays import on_host
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.tables import Words, as_words
 from clpt.scene.media import Grid
-from clpt.scene.values import Matrix4
 from clpt.scene.volumes import check_density
 from clpt.spectra import cie
 from clpt.spectra.emission import planck
@@ -41,7 +40,7 @@ def row(medium: Grid, encoder: Encoder) -> Words:
     return np.concatenate([counts, as_words(numbers)])
 
 
-def to_lattice(medium: Grid) -> Matrix4:
+def to_lattice(medium: Grid) -> NDArray[np.float64]:
     """The three rows (3, 4) from the world to the lattice, whose box begins at 1/2."""
     size = np.array(medium.density.shape)
     inverse = np.linalg.inv(np.asarray(medium.to_world, float))
