@@ -312,6 +312,7 @@ class Grid(Homogeneous):
         form="volume",
     )
     to_world: Matrix4 = host(np.eye(4), "takes the unit cube to the grid's box")
+    bits: int = host(16, "of a number of the density on the device: 16 or 8")
     emission_grid: Any = host(None, "numbers (nx, ny, nz) that multiply `emission`", form="volume")
     temperature: Any = host(
         None, "of a black body that is the emission, (nx, ny, nz)", "K", form="volume"
@@ -330,6 +331,8 @@ class Grid(Homogeneous):
         check_volume(self.density, f"{self.kind}.density")
         if not abs(np.linalg.det(np.asarray(self.to_world, float)[:3, :3])) > 0.0:
             raise SceneError("has no inverse", where=f"{self.kind}.to_world")
+        if self.bits not in (8, 16):
+            raise SceneError(f"must be 16 or 8, not {self.bits!r}", where=f"{self.kind}.bits")
         if self.temperature is not None and self.emission_grid is not None:
             message = "give `emission_grid` or `temperature`, not both"
             raise SceneError(message, where=self.kind)

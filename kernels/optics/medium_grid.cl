@@ -7,7 +7,7 @@
  * weight as its chance. In `materials` there stand behind a medium's coefficients: the first word in `images`, the
  * number of bricks along x, y and z, a matrix of three rows from the world to the lattice, and the upper corner of the
  * box there; the lower one is (1/2, 1/2, 1/2). In `images` each brick has two words: where its points begin from the
- * first word on, and its highest density. */
+ * first word on, and its highest density. A medium with MEDIUM_BYTES in its name has 8 bits for each number. */
 #define MEDIUM_GRID 0x20000000
 #define GRID_CELLS 8
 #define GRID_POINTS 9
@@ -18,6 +18,9 @@ typedef struct {
     vec3 o, d, inverse;
     real t, end; /* [m] */
     integer first, nx, ny, nz, x, y, z;
+#if USES_BYTES
+    integer packed; /* base-2 logarithm of how many numbers a word holds */
+#endif
 } GridWalk;
 
 /* The brick of a walk: where its points begin, its highest density, where the ray leaves it and along which axis. */
@@ -34,6 +37,11 @@ inline natural grid_key(Scene scene, natural pixel_key, integer sample, integer 
     return hash_natural(pixel_key + hash_natural(key + as_natural(vertex)));
 }
 
+#if USES_BYTES
+#define MEDIUM_BYTES 0x10000000
+#define grid_packed(name) sel_i(((name) & MEDIUM_BYTES) != 0, (integer)(2), (integer)(1))
+#endif
+
 /* Whether the ray from o along d, t metres long, is in the box; where it begins there. */
 inline mask grid_begin(Scene scene, integer name, vec3 o, vec3 d, real t, mask active, GridWalk *w)
 {
@@ -42,6 +50,9 @@ inline mask grid_begin(Scene scene, integer name, vec3 o, vec3 d, real t, mask a
     w->nx = gather_i(scene.materials, at + 1);
     w->ny = gather_i(scene.materials, at + 2);
     w->nz = gather_i(scene.materials, at + 3);
+#if USES_BYTES
+    w->packed = grid_packed(name);
+#endif
     real lo = 0.0f, hi = t;
 #define AXIS(a, n)                                                            \
     vec4 row_##a = gather_w4(scene.materials, at + 4 + 4 * n);                \
@@ -117,8 +128,15 @@ inline real grid_density(Scene scene, GridWalk w, GridBrick b, mask active, natu
     AXIS(y, 10u, GRID_POINTS)
     AXIS(z, 20u, GRID_POINTS * GRID_POINTS)
 #undef AXIS
+#if USES_BYTES
+    mask small = w.packed == 2;
+    integer word = gather_i(scene.images, sel_i(active, b.points + (at >> w.packed), (integer)(0)));
+    integer place = sel_i(small, (at & 3) << 3, (at & 1) << 4), most = sel_i(small, (integer)(0xff), (integer)(0xffff));
+    return to_real((word >> place) & most) / to_real(most);
+#else
     integer word = gather_i(scene.images, sel_i(active, b.points + (at >> 1), (integer)(0)));
     return to_real((word >> ((at & 1) << 4)) & 0xffff) * (1.0f / 65535.0f);
+#endif
 }
 
 inline real grid_length(natural bits) { return -log_r(1.0f - unit_interval(bits)); }

@@ -113,6 +113,9 @@ inline GridWalk grid_point(Scene scene, integer name, integer number, vec3 p, ma
     w.nx = max_i(gather_i(scene.materials, at + 1), (integer)(1));
     w.ny = max_i(gather_i(scene.materials, at + 2), (integer)(1));
     w.nz = gather_i(scene.materials, at + 3);
+#if USES_BYTES
+    w.packed = grid_packed(name);
+#endif
 #define AXIS(a, n)                                                            \
     vec4 row_##a = gather_w4(scene.materials, at + 4 + 4 * n);                \
     w.o.a = row_##a.x * p.x + row_##a.y * p.y + row_##a.z * p.z + row_##a.w;  \

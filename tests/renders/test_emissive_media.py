@@ -112,11 +112,13 @@ def test_constant_grid_is_homogeneous(albedo: float) -> None:
     assert_mean(exposures(scene, 8, 64), wanted, WITHIN)
 
 
-@pytest.mark.parametrize("given", ["number", "temperature", "normalised"])
+@pytest.mark.parametrize("given", ["number", "bytes", "temperature", "normalised"])
 def test_grid(given: str) -> None:
     """Numbers on a grid that light is multiplied by, and black bodies."""
     own = {"emission": COLOUR, "emission_grid": HEAT / 1000.0}
-    if given != "number":
+    if given == "bytes":
+        own["bits"] = 8
+    elif given != "number":
         own = {"temperature": HEAT, "brightness": 1e-3, "normalised": given == "normalised"}
     medium = media.Grid(
         density=3.0 * RANDOM, to_world=BOX, sigma_t=CHROMATIC, albedo=(0.5, 0.2, 0.0), **own
@@ -126,7 +128,7 @@ def test_grid(given: str) -> None:
 
     def source(points: np.ndarray) -> np.ndarray:
         heat = on_line(medium, HEAT, points)
-        if given == "number":
+        if given in ("number", "bytes"):
             return COLOUR * heat[:, None] / 1000.0
         kelvin = np.maximum(heat, 1.0)[::20, None]
         values = 1e-3 * planck(cie.GRID, kelvin)

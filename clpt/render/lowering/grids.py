@@ -19,7 +19,6 @@ from clpt.spectra.emission import planck
 
 CELLS = 8  # of a brick, along an axis
 POINTS = CELLS + 1
-MOST = 0xFFFF  # what a point has of the highest density of its brick
 AT_ONCE = 4096  # bricks
 LEAST = 0.01  # of what a brick would emit whose density and light were spread evenly
 FAINT = 1e-3  # of all light, which bricks may emit that are not lights
@@ -33,7 +32,7 @@ def row(medium: Grid, encoder: Encoder) -> Words:
 
     Raises SceneError for a density on a device that is negative or not finite.
     """
-    words = encoder.cache(bricks, medium.density)
+    words = encoder.cache(bricks, medium.density, medium.bits)
     first = encoder.store.append("images", words)
     numbers = np.concatenate([to_lattice(medium).ravel(), np.array(medium.density.shape) + 0.5])
     counts = np.array([first, *brick_counts(medium.density.shape)], np.uint32)
@@ -47,8 +46,10 @@ def to_lattice(medium: Grid) -> NDArray[np.float64]:
     return size[:, None] * inverse[:3] + np.array([0.0, 0.0, 0.0, 0.5])
 
 
-def bricks(density: object) -> Words:
+def bricks(density: object, bits: int = 16) -> Words:
     """Return the bricks of a density (nx, ny, nz): two words for each, x fastest, then points.
+
+    bits: of a point, 16 or 8.
 
     The points are those of the grid with one more around, as dense as the nearest. Bricks without
     any density have no points.
@@ -56,10 +57,11 @@ def bricks(density: object) -> Words:
     windows = Windows(density)
     most = windows.most
     used = np.flatnonzero(most)
-    scale = MOST / most[used].astype(np.float64)
-    points = np.zeros((len(used), POINTS**3 + 1), np.uint16)
+    scale = (2**bits - 1) / most[used].astype(np.float64)
+    whole = -(-(POINTS**3) * bits // 32) * 32 // bits
+    points = np.zeros((len(used), whole), np.uint16 if bits == 16 else np.uint8)
     for some in _parts(len(used)):
-        points[some, :-1] = np.rint(windows.of(used[some]) * scale[some, None])
+        points[some, : POINTS**3] = np.rint(windows.of(used[some]) * scale[some, None])
     packed = points.view("<u4")
     table = np.zeros((len(most), 2), np.uint32)
     table[used, 0] = 2 * len(most) + packed.shape[1] * np.arange(len(used))

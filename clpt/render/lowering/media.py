@@ -22,6 +22,7 @@ from clpt.spectra import Constant, Spectrum
 
 MOST_AIMS = 8  # lamps near which flights end, see kernels/optics/equiangular.cl
 FLIES = 0x40000000  # in a medium's word: the stage `flight` takes rays through it
+BYTES = 0x10000000  # which has 8 bits for each number
 GRID = 0x20000000  # a density on a grid multiplies its coefficients
 
 
@@ -85,7 +86,7 @@ class MediumWords:
         word = FLIES
         if isinstance(medium, Grid):
             rows.append(grids.row(medium, self._encoder))
-            word |= GRID
+            word |= GRID | (BYTES if medium.bits == 8 else 0)
         before = 2 + (SPECTRUM_WORDS if self._index.emitting else 0)
         word |= before + self._encoder.store.size("materials")
         if isinstance(medium, Grid) and self._index.glowing:
