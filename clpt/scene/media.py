@@ -313,6 +313,10 @@ class Grid(Homogeneous):
     )
     to_world: Matrix4 = host(np.eye(4), "takes the unit cube to the grid's box")
     bits: int = host(16, "of a number of the density on the device: 16 or 8")
+    albedo_grid: Any = host(
+        None, "colours (nx, ny, nz, 3) that multiply what is scattered; the rest is absorbed",
+        form="colour_volume",
+    )  # fmt: skip
     emission_grid: Any = host(None, "numbers (nx, ny, nz) that multiply `emission`", form="volume")
     temperature: Any = host(
         None, "of a black body that is the emission, (nx, ny, nz)", "K", form="volume"
@@ -336,7 +340,7 @@ class Grid(Homogeneous):
         if self.temperature is not None and self.emission_grid is not None:
             message = "give `emission_grid` or `temperature`, not both"
             raise SceneError(message, where=self.kind)
-        for name in ("emission_grid", "temperature"):
+        for name in ("emission_grid", "temperature", "albedo_grid"):
             self._fit(name, own)
 
     def _fit(self, name: str, own: Matrix4) -> None:
@@ -345,7 +349,9 @@ class Grid(Homogeneous):
         if given is None:
             return
         values = given.values if isinstance(given, Volume) else given
-        check_volume(values, where)
+        check_volume(values, where, colours=name == "albedo_grid")
+        if name == "albedo_grid" and not (isinstance(values, np.ndarray) and values.max() <= 1.0):
+            raise SceneError("must be an array of numpy, of numbers up to 1", where=where)
         box = np.asarray(self.to_world, float)
         placed = own @ np.asarray(given.to_world, float) if isinstance(given, Volume) else box
         if values.shape[:3] != self.density.shape or not np.allclose(placed, box, 1e-6, 1e-9):

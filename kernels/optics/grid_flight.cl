@@ -21,6 +21,8 @@ typedef struct {
     real pdf, before; /* [1/sr]; [m] from there to the flight's origin */
     vec3 from, hemisphere;
 } GridOrigin;
+#elif GRIDS_TINTED
+#define GRID_ORIGIN_ARGS , Wavelengths lambdas
 #else
 #define GRID_ORIGIN_ARGS
 #endif
@@ -106,7 +108,12 @@ inline GridFlight grid_flight(Scene scene, integer name, Medium m, vec3 o, vec3 
         if (any(meets)) {
             natural bits = hash_natural(key + count * 0x9e3779b9u), more = hash_natural(bits ^ 0x68bc21ebu);
             real density = grid_density(scene, w, b, meets, more);
-            Spectrum scatters = spectrum_scale(m.sigma_s, density), lacks = spectrum_scale(m.sigma_t, 1.0f - density);
+#if GRIDS_TINTED
+            Spectrum own = grid_scatters(scene, name, w, m.sigma_s, meets, more, lambdas);
+#else
+            Spectrum own = m.sigma_s;
+#endif
+            Spectrum scatters = spectrum_scale(own, density), lacks = spectrum_scale(m.sigma_t, 1.0f - density);
             real chance = spectrum_mean(spectrum_mul(f.ratio, spectrum_div(scatters,
                 spectrum_add(spectrum_add(scatters, lacks), spectrum_of(1e-30f)))));
             more = hash_natural(more ^ 0x2f6e2b1u);

@@ -115,8 +115,8 @@ inline mask grid_next(GridWalk *w, GridBrick b, mask active)
     return inside;
 }
 
-/* Density at t over the brick's highest: of one of the points around, which `bits` choose. */
-inline real grid_density(Scene scene, GridWalk w, GridBrick b, mask active, natural bits)
+/* One of the points around that at t, which `bits` choose: its number in the brick. */
+inline integer grid_corner(GridWalk w, natural bits)
 {
     integer at = 0;
 #define AXIS(a, shift, step)                                                                                 \
@@ -128,6 +128,13 @@ inline real grid_density(Scene scene, GridWalk w, GridBrick b, mask active, natu
     AXIS(y, 10u, GRID_POINTS)
     AXIS(z, 20u, GRID_POINTS * GRID_POINTS)
 #undef AXIS
+    return at;
+}
+
+/* The density there over the brick's highest. */
+inline real grid_density(Scene scene, GridWalk w, GridBrick b, mask active, natural bits)
+{
+    integer at = grid_corner(w, bits);
 #if USES_BYTES
     mask small = w.packed == 2;
     integer word = gather_i(scene.images, sel_i(active, b.points + (at >> w.packed), (integer)(0)));
@@ -174,3 +181,25 @@ inline Spectrum grid_transmittance(Scene scene, integer name, Medium m, vec3 o, 
     }
     return passes;
 }
+
+#if GRIDS_TINTED
+#if GRIDS_EMIT
+#define GRID_ALBEDO (2 * MEDIUM_SCATTERING + 25) /* words from a medium's row: behind optics/medium_grid_light.cl's */
+#else
+#define GRID_ALBEDO (2 * MEDIUM_SCATTERING + 19)
+#endif
+/* What multiplies `scatters`, a medium's sigma_s, at the point that `bits` choose. In `images` each brick has a word,
+ * where its points begin from the first one on, and a point three: a colour, or the coefficients of its curve. */
+inline Spectrum grid_scatters(Scene scene, integer name, GridWalk w, Spectrum scatters, mask active, natural bits,
+                              Wavelengths lambdas)
+{
+    integer first = gather_i(scene.materials, sel_i(active, MEDIUM_ROW(name) + GRID_ALBEDO, (integer)(0)));
+    active = active & (first != 0);
+    integer brick = (w.z * w.ny + w.y) * w.nx + w.x;
+    integer points = first + gather_i(scene.images, sel_i(active, first + brick, (integer)(0)));
+    integer at = sel_i(active, points + 3 * grid_corner(w, bits), (integer)(0));
+    vec4 words = v4(gather_w(scene.images, at), gather_w(scene.images, at + 1), gather_w(scene.images, at + 2),
+                    (real)(1.0f));
+    return spectrum_sel(active, spectrum_mul(scatters, spectrum_constant(words, lambdas)), scatters);
+}
+#endif

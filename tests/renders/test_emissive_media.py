@@ -21,7 +21,7 @@ from clpt.scene.materials import Null
 from clpt.scene.shapes import Cube
 from clpt.spectra import cie
 from clpt.spectra.emission import planck
-from tests.renders.support import assert_mean, exposures
+from tests.renders.support import assert_agree, assert_mean, exposures
 
 LONG = PathIntegrator(max_depth=-1, rr_depth=1000, light_paths=0)
 CHROMATIC = np.array([0.5, 2.0, 3.0])  # [1/m]
@@ -140,3 +140,15 @@ def test_grid(given: str) -> None:
 
     wanted = seen(medium, source, CHROMATIC * (0.5, 0.8, 1.0), CHROMATIC)
     assert_mean(exposures(scene, 8, 128), wanted, WITHIN)
+
+
+def test_albedo_on_a_grid() -> None:
+    """Every point of one albedo is what the medium's own would be; points absorb the rest."""
+    given = {"density": 2.0 * RANDOM, "to_world": BOX, "sigma_t": CHROMATIC}
+    albedo = np.broadcast_to(np.array([0.9, 0.5, 0.7]), (*RANDOM.shape, 3))
+    tinted = media.Grid(**given, albedo=1.0, albedo_grid=albedo)
+    plain = media.Grid(**given, albedo=(0.9, 0.5, 0.7))
+    pictures = [
+        exposures(slab(one, 1.0), 6, 32).mean(axis=(1, 2), keepdims=True) for one in (tinted, plain)
+    ]
+    assert_agree(*pictures, "the albedo on a grid and the medium's own", 2e-4)

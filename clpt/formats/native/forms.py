@@ -37,7 +37,7 @@ class Reader(Protocol):
     def area_light(self, cursor: Cursor) -> Any: ...
     def group(self, cursor: Cursor) -> Any: ...
     def image(self, cursor: Cursor) -> Any: ...
-    def volume(self, cursor: Cursor) -> Any: ...
+    def volume(self, cursor: Cursor, colours: bool = False) -> Any: ...
 
 
 class Writer(Protocol):
@@ -341,6 +341,12 @@ FORMS: dict[str, Form] = {
         "name of a `.npy`, `.vol` or `.nvdb` file; of a `.nvdb` with `#name` behind it that grid",
         {"type": ["string", "null"]},
         lambda cursor, reader: None if cursor.value is None else reader.volume(cursor),
+        lambda value, writer: writer.volume(value),
+    ),
+    "colour_volume": Form(
+        "name of a `.npy` file of an array (nx, ny, nz, 3), or of a `.vol` file of colours",
+        {"type": ["string", "null"]},
+        lambda cursor, reader: None if cursor.value is None else reader.volume(cursor, True),
         lambda value, writer: writer.volume(value),
     ),
     "cube_images": Form(

@@ -125,14 +125,15 @@ class _Reader:
                 self.warnings.append(grey_for(cursor.value))
             return EVEN if cursor.path[-2:] == ("map", "image") else GREY
 
-    def volume(self, cursor: Cursor) -> Any:
-        """Read a density and its box, once for each name."""
+    def volume(self, cursor: Cursor, colours: bool = False) -> Any:
+        """Read a density and its box, or `colours`, once for each name."""
         name = cursor.expect(str, "the name of a file")
         if name not in self.volumes:
             file, _, grid = name.partition("#")
             path = find_file(cursor, file)
             with cursor.locating():
-                self.volumes[name] = volumes.read(path, grid)
+                read = volumes.read_colours(path) if colours else volumes.read(path, grid)
+                self.volumes[name] = read
         return self.volumes[name]
 
     def layer(self, cursor: Cursor) -> Any:

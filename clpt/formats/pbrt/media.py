@@ -17,10 +17,12 @@ from clpt.scene.media import Grid, HenyeyGreenstein, Homogeneous, Isotropic, Med
 from clpt.scene.volumes import Volume
 from clpt.spectra import Constant, RGBUnbounded
 
-GRIDS = ("uniformgrid", "nanovdb")
-LEFT_OUT = ("rgbgrid", "cloud")
+GRIDS = ("uniformgrid", "nanovdb", "rgbgrid")
+LEFT_OUT = ("cloud",)
+GREY = 1e-3  # share by which the extinctions of colours may differ from those of one
 HEAT = ("temperatureoffset", "temperaturecutoff", "temperaturescale")
 BLACK_BODY = {"normalised": True}  # so that it has 1 at its brightest wavelength
+_AROUND = ((1, 1), (1, 1), (1, 1), (0, 0))
 MILK = "Wholemilk"  # of which a medium is that says nothing
 
 
@@ -50,9 +52,13 @@ def _made(name: str, definition: Definition) -> Medium | None:
         g = params.one("g", "float", 0.0)
         phase = HenyeyGreenstein(g=g) if g else Isotropic()
         scale = params.one("scale", "float", 1.0)
-        absorbs, scatters = _coefficients(params, state, kind in GRIDS)
-        own = {"sigma_a": absorbs, "sigma_s": scatters, "scale": scale, "phase": phase}
-        if kind == "homogeneous":
+        own: dict[str, Any] = {"scale": scale, "phase": phase}
+        if kind != "rgbgrid":
+            absorbs, scatters = _coefficients(params, state, kind in GRIDS)
+            own |= {"sigma_a": absorbs, "sigma_s": scatters}
+        if kind == "rgbgrid":
+            made: Medium = Grid(**own, **_coloured(params, state), name=name)
+        elif kind == "homogeneous":
             made = Homogeneous(**own, emission=_light(params, state), name=name)
         else:
             made = Grid(**own, **_grid(kind, params, state), name=name)
@@ -97,6 +103,30 @@ def _grid(kind: str, params: Parameters, state: State) -> dict[str, Any]:
             "emission_grid": _listed(params, "Lescale", state)}  # fmt: skip
 
 
+def _coloured(params: Parameters, state: State) -> dict[str, Any]:
+    """An `rgbgrid`: a density, one colour of extinction, and an albedo on the grid."""
+    parts = [_listed(params, name, state, "rgb") for name in ("sigma_a", "sigma_s")]
+    found = next((part for part in parts if part is not None), None)
+    if found is None:
+        raise params.error("needs its 'sigma_a' or 'sigma_s'")
+    ones = np.pad(np.ones([n - 2 for n in found.values.shape[:3]] + [3], np.float32), _AROUND)
+    absorbs, scatters = (ones if part is None else part.values for part in parts)
+    extinction = (absorbs + scatters).astype(float)
+    most = extinction.max(axis=(0, 1, 2))
+    density = extinction.mean(axis=3) / max(float(most.mean()), 1e-30)
+    if not np.allclose(extinction, density[..., None] * most, GREY, GREY * most.max()):
+        state.warn(params, "its extinction is that of one colour everywhere: its mean")
+    if "Le" in params:
+        state.warn(params, "its light is left out")
+    params.ignore("Le", "Lescale")
+    albedo = scatters / np.maximum(extinction, 1e-30)
+    return {
+        "density": Volume(density.astype(np.float32), found.to_world),
+        "sigma_t": RGBUnbounded(*most.tolist()),
+        "albedo_grid": Volume(np.clip(albedo, 0.0, 1.0).astype(np.float32), found.to_world),
+    }
+
+
 def _kelvin(given: Volume, params: Parameters) -> Volume:
     """A temperature as PBRT scales it."""
     offset = params.one("temperaturecutoff", "float", 0.0)
@@ -109,10 +139,10 @@ def _moved(volume: Volume, state: State) -> Volume:
     return Volume(volume.values, state.ctm @ volume.to_world)
 
 
-def _listed(params: Parameters, name: str, state: State) -> Volume | None:
-    """Numbers on a grid, from a list; a layer of 0 is put around them."""
+def _listed(params: Parameters, name: str, state: State, type_: str = "float") -> Volume | None:
+    """Numbers or colours on a grid, from a list; a layer of 0 is put around them."""
     nx, ny, nz = (params.one(n, "integer", 1) for n in ("nx", "ny", "nz"))
-    values = params.several(name, "float")
+    values = params.several(name, type_)
     if values is None:
         return None
     if min(nx, ny, nz) < 1 or len(values) != nx * ny * nz:
@@ -120,8 +150,10 @@ def _listed(params: Parameters, name: str, state: State) -> Volume | None:
         raise params.error(message)
     low = params.one("p0", "point3", np.zeros(3))
     step = (params.one("p1", "point3", np.ones(3)) - low) / (nx, ny, nz)
-    around = np.pad(np.reshape(values, (nz, ny, nx)).T.astype(np.float32), 1)
-    box = transforms.translate(low - step) @ transforms.scale(step * around.shape)
+    colours = np.shape(values)[1:]
+    cells = np.reshape(values, (nz, ny, nx, *colours)).swapaxes(0, 2).astype(np.float32)
+    around = np.pad(cells, _AROUND[: cells.ndim])
+    box = transforms.translate(low - step) @ transforms.scale(step * around.shape[:3])
     return Volume(around, state.ctm @ box)
 
 

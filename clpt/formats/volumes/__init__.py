@@ -50,13 +50,31 @@ def names(path: str | Path) -> tuple[str, ...]:
         raise SceneError(f"cannot be read: {error.strerror or error}", file=path) from None
 
 
-def _npy(path: Path, grid: str) -> Volume:
+def read_colours(path: str | Path) -> Volume:
+    """Read colours (nx, ny, nz, 3) float32 with their box, of a .npy or a .vol.
+
+    Raises SceneError as `read` does.
+    """
+    path = Path(path)
+    try:
+        if path.suffix.lower() == ".npy":
+            return _npy(path, axes=4)
+        values, box = vol.read_channels(path)
+    except OSError as error:
+        raise SceneError(f"cannot be read: {error.strerror or error}", file=path) from None
+    except SceneError as error:
+        raise SceneError(error.message, file=path) from None
+    return Volume(values, box)
+
+
+def _npy(path: Path, grid: str = "", axes: int = 3) -> Volume:
     try:
         values = np.load(path, mmap_mode="r", allow_pickle=False)
     except (ValueError, EOFError) as error:
         raise SceneError(f"is no .npy file: {error}") from None
-    if not isinstance(values, np.ndarray) or values.ndim != 3 or not values.size:
-        raise SceneError(f"must hold an array (nx, ny, nz), not {getattr(values, 'shape', '')}")
+    if not isinstance(values, np.ndarray) or values.ndim != axes or not values.size:
+        wanted = "(nx, ny, nz)" if axes == 3 else "(nx, ny, nz, 3)"
+        raise SceneError(f"must hold an array {wanted}, not {getattr(values, 'shape', '')}")
     check_density(values, "")
     return Volume(np.ascontiguousarray(values, np.float32), IDENTITY)
 

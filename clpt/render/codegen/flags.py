@@ -86,6 +86,7 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "GRIDS_GLOW": lambda f: f.hot_grids,
     "BRICK_LIGHTS": lambda f: VOLUME in f.lights,
     "USES_GRIDS": lambda f: f.grids,
+    "GRIDS_TINTED": lambda f: f.tinted_grids,
     "USES_BYTES": lambda f: f.byte_grids,
     "USES_BODIES": lambda f: f.bodies,
     "SHADOW_MEDIA": lambda f: f.shadow_media,

@@ -96,6 +96,7 @@ class Features:
     hot_grids: bool = False  # of these some have a temperature
     medium_aims: int = 0  # places of lamps near which flights through media end
     grids: bool = False  # of which some have a density on a grid
+    tinted_grids: bool = False  # of these some have an albedo on a grid
     byte_grids: bool = False  # of these some have 8 bits for each number
     bodies: bool = False  # that may overlap, of different priorities
     glass_lens: bool = False  # of a glass that disperses

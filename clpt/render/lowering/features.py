@@ -84,6 +84,7 @@ def features_of(
         emissive_grids=index.glowing,
         hot_grids=any(getattr(one, "temperature", None) is not None for one in index.emitting),
         grids=any(isinstance(medium, Grid) for medium in index.media),
+        tinted_grids=index.tinted,
         byte_grids=any(isinstance(one, Grid) and one.bits == 8 for one in index.media),
         dispersion=glass_lens or disperses(index.leaves, sources),
         glass_lens=glass_lens,

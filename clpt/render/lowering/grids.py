@@ -14,7 +14,7 @@ from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.tables import Words, as_words
 from clpt.scene.media import Grid
 from clpt.scene.volumes import check_density
-from clpt.spectra import cie
+from clpt.spectra import cie, uplift
 from clpt.spectra.emission import planck
 
 CELLS = 8  # of a brick, along an axis
@@ -67,6 +67,20 @@ def bricks(density: object, bits: int = 16) -> Words:
     table[used, 0] = 2 * len(most) + packed.shape[1] * np.arange(len(used))
     table[:, 1] = as_words(most)
     return np.concatenate([table.ravel(), packed.ravel()])
+
+
+def colours(density: object, albedo: NDArray[Any], spectral: bool) -> Words:
+    """Return the albedo of the bricks that have a density: a word for each, then three a point.
+
+    The first says where its points begin, 0 for nowhere. spectral: they are coefficients of curves.
+    """
+    used = np.flatnonzero(Windows(density).most)
+    channels = [Windows(albedo[..., c]) for c in range(3)]
+    points = np.stack([one.of(used) for one in channels], axis=-1)
+    words = uplift(points) if spectral else points
+    table = np.zeros(len(channels[0].most), np.uint32)
+    table[used] = len(table) + 3 * POINTS**3 * np.arange(len(used))
+    return np.concatenate([table, as_words(words.ravel())])
 
 
 class Windows:

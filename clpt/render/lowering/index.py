@@ -80,6 +80,11 @@ class SceneIndex:
         return any(isinstance(medium, Grid) for medium in self.emitting)
 
     @property
+    def tinted(self) -> bool:
+        """Whether some medium has an albedo on a grid."""
+        return any(getattr(medium, "albedo_grid", None) is not None for medium in self.media)
+
+    @property
     def nested(self) -> bool:
         """Whether bodies may overlap, of different priorities."""
         return not self.channels and any(shape.priority for shape in self.shapes)

@@ -91,8 +91,18 @@ class MediumWords:
         word |= before + self._encoder.store.size("materials")
         if isinstance(medium, Grid) and self._index.glowing:
             rows.append(self._glow(medium, word, absorbs))
+        if isinstance(medium, Grid) and self._index.tinted:
+            rows.append(self._tint(medium))
         self._encoder.store.append("materials", np.concatenate(rows))
         return word
+
+    def _tint(self, medium: Grid) -> Words:
+        """What stands behind that: where the albedo of its bricks begins, 0 for nowhere."""
+        if medium.albedo_grid is None:
+            return np.zeros(1, np.uint32)
+        given = (medium.density, medium.albedo_grid, self._index.spectral)
+        first = self._encoder.store.append("images", self._encoder.cache(grids.colours, *given))
+        return np.array([first], np.uint32)
 
     def _glow(self, medium: Grid, word: int, absorbs: Spectrum) -> Words:
         """What stands behind the row of a grid: what its bricks emit, and which lights they are."""

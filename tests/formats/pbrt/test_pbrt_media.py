@@ -56,3 +56,15 @@ def test_uniform_grid(tmp_path: Path) -> None:
         read(tmp_path, given + '"float temperature" [1 2] "rgb Le" [1 1 1]')
     with pytest.raises(SceneError, match="'Lescale' has 3 numbers"):
         read(tmp_path, given + '"rgb Le" [1 1 1] "float Lescale" [1 2 3]')
+
+
+def test_rgb_grid(tmp_path: Path) -> None:
+    """Grey extinction and an albedo of colours; colours that differ are told."""
+    given = '"string type" "rgbgrid" "integer nx" 2 "rgb sigma_s" [1 2 3 4 5 6] "rgb sigma_a" '
+    found, warnings = read(tmp_path, given + "[3 2 1 4 3 2]")
+    assert not warnings
+    np.testing.assert_allclose(found.density[1:3, 1, 1], (0.5, 1.0))
+    np.testing.assert_allclose(found.albedo_grid[1, 1, 1], (0.25, 0.5, 0.75))
+    np.testing.assert_allclose(found.sigma_t.to_rgb("unbounded"), 8.0)
+    _, warnings = read(tmp_path, given + "[3 2 1 4 3 9]")
+    assert any("one colour" in one for one in warnings)
