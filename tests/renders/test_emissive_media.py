@@ -12,12 +12,13 @@ import pytest
 
 from clpt import spectra
 from clpt import transforms as tf
+from clpt.render.lowering import grids
 from clpt.scene import Film, Scene, media
-from clpt.scene.cameras import Orthographic
+from clpt.scene.cameras import Orthographic, Perspective
 from clpt.scene.integrators import Box
 from clpt.scene.integrators import Path as PathIntegrator
 from clpt.scene.lights import Constant
-from clpt.scene.materials import Null
+from clpt.scene.materials import Diffuse, Null
 from clpt.scene.shapes import Cube
 from clpt.spectra import cie
 from clpt.spectra.emission import planck
@@ -30,6 +31,7 @@ LAMBDAS = np.arange(380.0, 741.0, 5.0)
 ABSORBS = spectra.Tabulated(LAMBDAS, 0.2 + 1e-5 * (LAMBDAS - 400.0) ** 2, "hold")
 GLOWS = spectra.Blackbody(2500.0)
 WITHIN = 0.02
+SLOWLY = ("bytes", "temperature")
 
 
 def slab(medium: media.Medium, light: Any = 0.0, **film: Any) -> Scene:
@@ -53,6 +55,7 @@ def test_slab() -> None:
         np.testing.assert_allclose(got, -COLOUR * np.expm1(-2.0 * scale * CHROMATIC), rtol=2e-5)
 
 
+@pytest.mark.slow
 def test_slab_at_each_wavelength() -> None:
     medium = media.Homogeneous(sigma_a=ABSORBS, emission=GLOWS)
     got = exposures(slab(medium, mode="spectral", bands=6), 8, 64)
@@ -100,7 +103,7 @@ def seen(medium: media.Grid, source, absorbs: np.ndarray, extinction: np.ndarray
     return (np.exp(-depth) * density * absorbs * source(points)).sum(axis=0) * (4.0 / steps)
 
 
-@pytest.mark.parametrize("albedo", [0.0, 0.7])
+@pytest.mark.parametrize("albedo", [pytest.param(0.0, marks=pytest.mark.slow), 0.7])
 def test_constant_grid_is_homogeneous(albedo: float) -> None:
     """Half a density and twice the coefficients; what is scattered again is left out."""
     given = {"sigma_t": CHROMATIC, "albedo": albedo, "emission": COLOUR, "scale": 2.0}
@@ -112,7 +115,9 @@ def test_constant_grid_is_homogeneous(albedo: float) -> None:
     assert_mean(exposures(scene, 8, 64), wanted, WITHIN)
 
 
-@pytest.mark.parametrize("given", ["number", "bytes", "temperature", "normalised"])
+@pytest.mark.parametrize(
+    "given", ["number", *(pytest.param(n, marks=pytest.mark.slow) for n in SLOWLY), "normalised"]
+)
 def test_grid(given: str) -> None:
     """Numbers on a grid that light is multiplied by, and black bodies."""
     own = {"emission": COLOUR, "emission_grid": HEAT / 1000.0}
@@ -142,6 +147,7 @@ def test_grid(given: str) -> None:
     assert_mean(exposures(scene, 8, 128), wanted, WITHIN)
 
 
+@pytest.mark.slow
 def test_albedo_on_a_grid() -> None:
     """Every point of one albedo is what the medium's own would be; points absorb the rest."""
     given = {"density": 2.0 * RANDOM, "to_world": BOX, "sigma_t": CHROMATIC}
@@ -152,3 +158,29 @@ def test_albedo_on_a_grid() -> None:
         exposures(slab(one, 1.0), 6, 32).mean(axis=(1, 2), keepdims=True) for one in (tinted, plain)
     ]
     assert_agree(*pictures, "the albedo on a grid and the medium's own", 2e-4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+def test_bricks_as_lights(mode: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A flame in a room of haze: chosen as a light, or met by chance alone, it lights the same."""
+    flame = media.Soot(
+        density=RANDOM, to_world=tf.scale(0.5) @ BOX, share=3e-7, temperature=HEAT, brightness=0.1
+    )
+    haze = media.Homogeneous(sigma_s=0.3, sigma_a=0.05)
+    scene = slab(flame, mode=mode)
+    box = Cube(material=Null(), interior=flame, exterior=haze, to_world=tf.scale(0.6))
+    walls = Cube(material=Diffuse(reflectance=0.6), interior=haze, to_world=tf.scale(2.0))
+    scene.shapes = [box, walls]
+    scene.camera = Perspective(fov=70.0, to_world=tf.look_at([0.5, 0, 1.8], [0, -1, 0], [0, 1, 0]))
+    scene.integrator = PathIntegrator(max_depth=3, light_paths=0)
+    scene.lights = []
+    pictures = [exposures(scene, 12, 128).mean(axis=(1, 2), keepdims=True)]
+    monkeypatch.setattr(grids.Glow, "brightest", nothing)
+    pictures.append(exposures(scene, 12, 256).mean(axis=(1, 2), keepdims=True))
+    assert_agree(*pictures, "a flame as lights and a flame that is met", 2e-4)
+
+
+def nothing(glow: grids.Glow) -> grids.Glow:
+    """No brick of those that emit."""
+    return grids.Glow(glow.numbers[:0], glow.power[:0], glow.corners[:0], glow.edges[:0])
