@@ -3,8 +3,6 @@
  * surface. So its radiance is c times that, and its density [1/sr] that of the point, t^2 times 1 / V, times c: on
  * average one over the solid angle of the brick. Rays that go through the medium weigh what they gather against that,
  * see optics/grid_flight.cl (Villemin and Hery 2013 sample flames as lights; the weights are ours). */
-#include "generated/textures.cl"
-#include "generated/medium.cl"
 
 real emissive_brick_pdf(EmissiveBrick l, real t) { return l.inverse * l.chord * t * t; }
 

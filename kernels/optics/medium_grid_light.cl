@@ -46,7 +46,7 @@ inline real grid_number(Scene scene, GridWalk w, integer first, mask active)
 }
 
 #if GRIDS_GLOW
-/* Planck's law [W m^-2 sr^-1 nm^-1], times `factor`; normalised: 1 at its highest. at: where words of the grid stand. */
+/* Planck's law [W m^-2 sr^-1 nm^-1], times `factor`; normalised: 1 at its highest. at: of the grid's words. */
 inline Spectrum grid_black_body(Scene scene, integer at, real kelvin, mask normalised, mask active, Wavelengths lambdas)
 {
     real factor = gather_w(scene.materials, at + 3);

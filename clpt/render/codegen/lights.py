@@ -60,6 +60,7 @@ def dispatch_text(
     surfaces = [kind for kind in present if kind in shape_records.RECORDS]
     includes = ["path/surface_flags.cl", "interface/shape.cl", "interface/light.cl", "core/mis.cl"]
     includes += ["lighting/light_choice.cl"]
+    includes += ["generated/textures.cl", "generated/medium.cl"] if VOLUME in others else []
     includes += [f"generated/light/{kind}.cl" for kind in others]
     includes += [f"generated/shape/{kind}.cl" for kind in surfaces]
     includes += ["light/area.cl"] if surfaces else []
