@@ -125,6 +125,9 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
 #if LIGHT_LAYER_GROUPS
     store_path_light(path, at, shine, ls.row);
 #endif
+#if BRICK_LIGHTS
+    store_shadow_into(shadow, at, shine, light_medium(scene, sel_i(shine, ls.row, (integer)(0))));
+#endif
 #if SHADOW_MEDIA
 #if USES_BODIES
     store_shadow_through(shadow, at, shine, bodies_beyond(v.bodies, dot3(s.n, ls.wi) < 0.0f));

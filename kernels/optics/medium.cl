@@ -7,7 +7,8 @@
  *
  * Media that shapes have inside and outside, or the camera around it, have MEDIUM_FLIES in their names: stage/flight.cl
  * dims what rays bring through them. Their rows hold sigma_a and sigma_s, and before them the word of their phase
- * function. */
+ * function. Where some media emit, five words of the radiance that a thick body of each would emit stand before that.
+ */
 #define MEDIUM_FLIES 0x40000000
 #define MEDIUM_SEALED 0x08000000 /* no ray to a light leaves it: its boundaries bend light */
 #define MEDIUM_ROW(name) (((name) & 0xffffff) - 1)
@@ -49,6 +50,25 @@ inline Medium medium_load(Scene scene, integer name, Wavelengths lambdas)
     m.phase = gather_i(scene.materials, row - 1);
     return m;
 }
+
+#if MEDIA_EMIT
+/* What t metres of a medium that is the same everywhere emit, and let through: by Kirchhoff's law a metre emits as much
+ * of `light`, the radiance of a thick body, as it absorbs of any. */
+inline Spectrum medium_emission(Scene scene, integer name, Medium m, real t, Wavelengths lambdas)
+{
+    integer row = max_i(MEDIUM_ROW(name), (integer)(MEDIUM_LIGHT)) - MEDIUM_LIGHT;
+    Spectrum light = medium_light(scene, row, texture_point_nowhere(), lambdas);
+    Spectrum r = spectrum_sub(m.sigma_t, m.sigma_s); /* absorbs, and so emits */
+#define C(c)                                                                             \
+    real depth_##c = m.sigma_t.c * t;                                                    \
+    real some_##c = (1.0f - exp_r(-depth_##c)) / max_r(m.sigma_t.c, (real)(1e-30f));     \
+    r.c = max_r(r.c, (real)(0.0f)) * light.c *                                           \
+          sel(depth_##c > 1e-2f, some_##c, t * (1.0f - depth_##c * (0.5f - depth_##c * (1.0f / 6.0f))));
+    SPECTRUM_EACH(C)
+#undef C
+    return r;
+}
+#endif
 
 /* The names of the media behind the front of a shape and before it; optics/equiangular.cl has what stands before. */
 typedef struct { integer inside, outside; } ShapeMedia;

@@ -10,6 +10,7 @@
 #include "path/ratio.cl"
 #include "generated/textures.cl"
 #include "generated/medium.cl"
+#include "generated/grid_flight.cl"
 #include "optics/equiangular.cl"
 
 #if !USES_BODIES
@@ -82,17 +83,36 @@ STAGE(flight)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
 #else
         Spectrum weight = spectrum_scale(f, 1.0f / max_r(pdf.x, (real)(1e-30f)));
 #endif
+#if MEDIA_EMIT
+        Spectrum light = medium_emission(scene, sel_i(flies, name, (integer)(0)), m, end, lambdas);
+#endif
 #if USES_GRIDS
         mask gridded = flies & ((name & MEDIUM_GRID) != 0);
         if (any(gridded)) {
             natural key = grid_key(scene, load_path_pixel_key(path, at), load_path_sample(path, at), vertex);
-            GridFlight own = grid_flight(scene, name, m, load_path_o(path, at), load_path_d(path, at), end, ratio, u,
-                                         key, gridded);
+            vec3 o = load_path_o(path, at), d = load_path_d(path, at);
+#if GRIDS_EMIT
+            GridOrigin origin;
+            origin.pdf = load_path_pdf(path, at);
+            origin.before = path_null_distance(path, at);
+            origin.from = madd3(d, -origin.before, o);
+            origin.hemisphere = path_hemisphere(path, at);
+            GridFlight own = grid_flight(scene, name, m, o, d, end, ratio, u, key, gridded, lambdas, origin);
+            light = spectrum_sel(gridded, own.light, light);
+#elif GRIDS_TINTED
+            GridFlight own = grid_flight(scene, name, m, o, d, end, ratio, u, key, gridded, lambdas);
+#else
+            GridFlight own = grid_flight(scene, name, m, o, d, end, ratio, u, key, gridded);
+#endif
             weight = spectrum_sel(gridded, own.weight, weight);
             collides = sel_i(gridded, own.collides, collides);
             t = sel(gridded, own.t, t);
             hero_keep(path, at, gridded, own.ratio);
         }
+#endif
+#if MEDIA_EMIT
+        light = spectrum_mul(load_path_beta(path, at), light);
+        store_path_radiance(path, at, flies, spectrum_add(load_path_radiance(path, at), light));
 #endif
         store_path_beta(path, at, flies, spectrum_mul(load_path_beta(path, at), weight));
         store_hit_t(hit, at, collides, t);

@@ -37,7 +37,7 @@ class Reader(Protocol):
     def area_light(self, cursor: Cursor) -> Any: ...
     def group(self, cursor: Cursor) -> Any: ...
     def image(self, cursor: Cursor) -> Any: ...
-    def volume(self, cursor: Cursor) -> Any: ...
+    def volume(self, cursor: Cursor, colours: bool = False) -> Any: ...
 
 
 class Writer(Protocol):
@@ -339,8 +339,14 @@ FORMS: dict[str, Form] = {
     ),
     "volume": Form(
         "name of a `.npy`, `.vol`, `.nvdb` or `.vdb` file; with `#name` behind it that grid",
-        STRING,
-        lambda cursor, reader: reader.volume(cursor),
+        {"type": ["string", "null"]},
+        lambda cursor, reader: None if cursor.value is None else reader.volume(cursor),
+        lambda value, writer: writer.volume(value),
+    ),
+    "colour_volume": Form(
+        "name of a `.npy` file of an array (nx, ny, nz, 3), or of a `.vol` file of colours",
+        {"type": ["string", "null"]},
+        lambda cursor, reader: None if cursor.value is None else reader.volume(cursor, True),
         lambda value, writer: writer.volume(value),
     ),
     "cube_images": Form(

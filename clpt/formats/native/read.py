@@ -18,6 +18,7 @@ from clpt.formats.native.cursor import Cursor, parse
 from clpt.formats.native.spectra import find_file, kind_name
 from clpt.scene import Scene, check_noise, integrators, kinds, lights, materials, media, shapes
 from clpt.scene.params import Kind, params
+from clpt.scene.volumes import Volume
 
 ON_SHAPES = tuple(cls.kind for cls in lights.ON_SHAPES)
 KEYS = (
@@ -55,7 +56,7 @@ class _Reader:
         # None while one is being read: it refers to itself then
         self.materials: dict[str, materials.Material | None] = {}
         self.media: dict[str, media.Medium] = {}
-        self.volumes: dict[str, media.Volume] = {}
+        self.volumes: dict[str, Volume] = {}
         self.groups: dict[str, shapes.Group | None] = {}
         self.warnings: list[str] = []
 
@@ -124,14 +125,15 @@ class _Reader:
                 self.warnings.append(grey_for(cursor.value))
             return EVEN if cursor.path[-2:] == ("map", "image") else GREY
 
-    def volume(self, cursor: Cursor) -> Any:
-        """Read a density and its box, once for each name."""
+    def volume(self, cursor: Cursor, colours: bool = False) -> Any:
+        """Read a density and its box, or `colours`, once for each name."""
         name = cursor.expect(str, "the name of a file")
         if name not in self.volumes:
             file, _, grid = name.partition("#")
             path = find_file(cursor, file)
             with cursor.locating():
-                self.volumes[name] = volumes.read(path, grid)
+                read = volumes.read_colours(path) if colours else volumes.read(path, grid)
+                self.volumes[name] = read
         return self.volumes[name]
 
     def layer(self, cursor: Cursor) -> Any:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from clpt.render.contract.features import Features
+from clpt.render.contract.light_records import VOLUME
 from clpt.render.contract.parameter_words import RERADIATION_STEP
 from clpt.render.contract.texture_records import IMAGES
 from clpt.scene.layers import LAYERS, MATTE_SLOTS, WORDS
@@ -79,7 +80,13 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "USES_NULL_SURFACES": lambda f: f.null_surfaces,
     "USES_ABSORPTION": lambda f: f.absorption or f.media,
     "USES_MEDIA": lambda f: f.media,
+    "MEDIA_EMIT": lambda f: f.emissive_media,
+    "GRIDS_EMIT": lambda f: f.emissive_grids,
+    "GRIDS_GLOW": lambda f: f.hot_grids,
+    "BRICK_LIGHTS": lambda f: VOLUME in f.lights,
     "USES_GRIDS": lambda f: f.grids,
+    "GRIDS_TINTED": lambda f: f.tinted_grids,
+    "USES_BYTES": lambda f: f.byte_grids,
     "USES_BODIES": lambda f: f.bodies,
     "SHADOW_MEDIA": lambda f: f.shadow_media,
     "MEDIUM_AIMS": lambda f: f.medium_aims,

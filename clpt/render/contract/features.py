@@ -91,9 +91,14 @@ class Features:
     absorption: bool = False  # inside of a dielectric
     media: bool = False  # inside or outside of shapes, or around the camera
     chromatic_media: bool = False  # of which some extinction depends on the wavelength
+    emissive_media: bool = False  # of which some give out light
+    emissive_grids: bool = False  # of these some have a density on a grid
+    hot_grids: bool = False  # of these some have a temperature
     medium_aims: int = 0  # places of lamps near which flights through media end
     sealed_media: bool = False  # which no ray to a light can leave
     grids: bool = False  # of which some have a density on a grid
+    tinted_grids: bool = False  # of these some have an albedo on a grid
+    byte_grids: bool = False  # of these some have 8 bits for each number
     bodies: bool = False  # that may overlap, of different priorities
     glass_lens: bool = False  # of a glass that disperses
     bands: bool = False  # a spectral film

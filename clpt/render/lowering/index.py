@@ -15,7 +15,7 @@ from clpt.scene import Scene
 from clpt.scene import materials as mt
 from clpt.scene.integrators import ParticleTracer, Vcm
 from clpt.scene.layers import LAYERS
-from clpt.scene.media import PHASE_LEAVES, Medium
+from clpt.scene.media import PHASE_LEAVES, Grid, Medium
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.shapes import Shape
 
@@ -68,6 +68,21 @@ class SceneIndex:
     def media(self) -> tuple[Medium, ...]:
         """The media of a scene."""
         return tuple(_media(self.scene, self.shapes))
+
+    @property
+    def emitting(self) -> tuple[Medium, ...]:
+        """Those of them that give out light."""
+        return tuple(medium for medium in self.media if medium.light is not None)
+
+    @property
+    def glowing(self) -> bool:
+        """Whether some of these have a density on a grid."""
+        return any(isinstance(medium, Grid) for medium in self.emitting)
+
+    @property
+    def tinted(self) -> bool:
+        """Whether some medium has an albedo on a grid."""
+        return any(getattr(medium, "albedo_grid", None) is not None for medium in self.media)
 
     @property
     def nested(self) -> bool:

@@ -131,7 +131,7 @@ def lower(
     sealed = sealed_media(index, cache) if index.media else frozenset()
     media = MediumWords(index, encoder, materials, sealed)
     sphere = geometry.bounding_sphere()
-    lights = _lower_lights(index, encoder, geometry, sphere[1])
+    lights = _lower_lights(index, encoder, geometry, sphere[1], media)
     homogeneous = (one for one in index.media if not isinstance(one, Grid))
     near = medium_aims(lights) if any(one.scatters for one in homogeneous) else ()
     encoder.store.append("media", np.array(near, np.float32).view(np.uint32))
@@ -225,11 +225,19 @@ def _begin_materials(index: SceneIndex, encoder: Encoder) -> MaterialWords:
 
 
 def _lower_lights(
-    index: SceneIndex, encoder: Encoder, geometry: Geometry, scene_radius: float
+    index: SceneIndex,
+    encoder: Encoder,
+    geometry: Geometry,
+    scene_radius: float,
+    media: MediumWords,
 ) -> LightRows:
     """Append the rows of `lights`, and note in the rows of shapes which lights they are."""
     tree_from = None if index.light_paths else TREE_FROM
-    lights = light_rows(index.scene.lights, geometry.emitters, encoder, scene_radius, tree_from)
+    for medium in index.emitting:
+        media.word(medium)
+    lights = light_rows(
+        index.scene.lights, geometry.emitters, encoder, scene_radius, tree_from, media.lights
+    )
     encoder.store.append("lights", lights.rows.view(np.uint32))
     if lights.tree is not None:
         encoder.store.append("lights", lights.tree)
@@ -268,6 +276,8 @@ def _warnings(index: SceneIndex) -> list[str]:
         warnings.append("thin_lens.glass: in RGB mode all wavelengths have one focus")
     if getattr(scene.integrator, "light_paths", 0):
         warnings += _left_to_the_camera(index)
+    if index.light_layers and index.emitting:
+        warnings.append("film.layers: light that rays gather in media is in no layer of light")
     depth = getattr(scene.integrator, "max_depth", -1)
     if depth > DEEPEST:
         warnings.append(f"integrator.max_depth: {depth} counts as {DEEPEST}, the longest path")
