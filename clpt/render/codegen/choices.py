@@ -50,6 +50,9 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         + ("optics/medium_grid.cl",) * f.grids
         + ("generated/body_index.cl", "optics/bodies.cl") * f.bodies
     ),
+    "generated/light_medium.cl": lambda f, _: (
+        ("generated/textures.cl", "generated/medium.cl") * f.light_media
+    ),
     "generated/shading_frame.cl": lambda f, _: (
         ("generated/normal_map.cl", "path/shading_frame_mapped.cl")
         if f.normal_mapped

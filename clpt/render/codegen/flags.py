@@ -83,6 +83,7 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "USES_GRIDS": lambda f: f.grids,
     "USES_BODIES": lambda f: f.bodies,
     "SHADOW_MEDIA": lambda f: f.shadow_media,
+    "LIGHT_MEDIA": lambda f: f.light_media,
     "MEDIUM_AIMS": lambda f: f.medium_aims,
     "USES_DISPERSION": lambda f: f.dispersion and f.mode == "spectral",
     "USES_RATIO": lambda f: (

@@ -1,4 +1,4 @@
-"""The medium around the camera: found by how often boundaries wind around it.
+"""The medium around the camera, or a light: found by how often boundaries wind around it.
 
 A closed boundary fills the whole sphere of directions around a point inside, 4 pi, and on balance
 nothing of it around a point outside. So a medium fills a point where the shapes that have it inside
@@ -38,10 +38,16 @@ def media_around(scene: Scene, cached: Callable[..., Any] | None = None) -> tupl
     """
     if scene.camera.medium is not None:
         return (scene.camera.medium,)
+    return media_at(scene, camera_origin(scene), cached)
+
+
+def media_at(
+    scene: Scene, p: NDArray[np.float64], cached: Callable[..., Any] | None = None
+) -> tuple[Medium, ...]:
+    """Return the media that boundaries put at a point (3,) [m], of the smallest extent first."""
     bounding = [shape for shape in _every(scene) if _bounds_media(shape)]
     if not bounding:
         return ()
-    p = _origin(scene)
     turns: dict[Medium, float] = {}
     extents: dict[Medium, float] = {}
     bounds: dict[Medium, list[NDArray[np.float64]]] = {}
@@ -75,7 +81,17 @@ def bodies_around(
     matter: of a shape's body, None of a shape that is none. What a body has inside of it faces it,
     as the inner side of a glass does.
     """
-    p, turns = _origin(scene), dict[tuple[Any, ...], float]()
+    return bodies_at(scene, matter, camera_origin(scene), cached)
+
+
+def bodies_at(
+    scene: Scene,
+    matter: Callable[[Shape], tuple[Any, ...] | None],
+    p: NDArray[np.float64],
+    cached: Callable[..., Any] | None = None,
+) -> tuple[tuple[Any, ...], ...]:
+    """Return the matter of the bodies at a point (3,) [m]; matter: as of `bodies_around`."""
+    turns: dict[tuple[Any, ...], float] = {}
     for shape in _every(scene, lambda one: matter(one) is not None):
         own = matter(shape)
         if own is not None:
@@ -141,7 +157,7 @@ def _every(scene: Scene, bounds: Callable[[Shape], bool] = _bounds_media) -> Ite
                 yield dataclasses.replace(shape, to_world=matrix)
 
 
-def _origin(scene: Scene) -> NDArray[np.float64]:
+def camera_origin(scene: Scene) -> NDArray[np.float64]:
     """The point from which a camera sees; of one without, that in the middle of its film."""
     members = MEMBERS[type(scene.camera)](scene.camera, *scene.film.size)
     if "to_world" in members:
@@ -157,7 +173,7 @@ def _box(shape: Shape, cached: Callable[..., Any] | None) -> tuple[NDArray[Any],
     if isinstance(shape, Spheres):
         centers, radii = _balls(shape)
         return (centers - radii[:, None]).min(axis=0), (centers + radii[:, None]).max(axis=0)
-    vertices, faces = _triangles(shape, cached)
+    vertices, faces = triangles_of(shape, cached)
     if not len(faces):
         return np.full(3, np.inf), np.full(3, -np.inf)
     return vertices.min(axis=0), vertices.max(axis=0)
@@ -172,14 +188,14 @@ def _winding(shape: Shape, p: NDArray[np.float64], cached: Callable[..., Any] | 
     if isinstance(shape, Spheres):
         centers, radii = _balls(shape)
         return side * float((np.linalg.norm(p - centers, axis=1) < radii).sum())
-    return winding_number(*_triangles(shape, cached), p)
+    return winding_number(*triangles_of(shape, cached), p)
 
 
 def _volume(shape: Shape, cached: Callable[..., Any] | None) -> float:
     """What a shape encloses [m^3], below 0 of one that faces inward."""
     if isinstance(shape, Spheres):
         return (-1.0 if shape.flip_normals else 1.0) * 4.2 * float((_balls(shape)[1] ** 3).sum())
-    vertices, faces = _triangles(shape, cached)
+    vertices, faces = triangles_of(shape, cached)
     a, b, c = np.moveaxis(np.asarray(vertices, np.float64)[faces], 1, 0)
     return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
 
@@ -207,8 +223,8 @@ def _balls(shape: Spheres) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return rows[:, :3], np.abs(rows[:, 3])
 
 
-def _triangles(shape: Shape, cached: Callable[..., Any] | None) -> Triangles:
-    """The triangles of a shape in the world, or those that stand for it."""
+def triangles_of(shape: Shape, cached: Callable[..., Any] | None = None) -> Triangles:
+    """Return the triangles of a shape in the world, or those that stand for it."""
     if isinstance(shape, Disk):
         shape = _fan(shape)
     elif isinstance(shape, Cylinder | Sphere):

@@ -81,8 +81,8 @@ def _choice(
 ) -> tuple[Integrator, str]:
     """The integrator but for its depths, and why; what is cheap to know is asked first."""
     scene, without = index.scene, Path(light_paths=0)
-    if index.has_media:
-        return without, "light paths do not go through media"
+    if not index.lights_reach:
+        return without, index.lit_media
     if not cameras.is_connected(scene.camera, scene.film.mode):
         return without, "points cannot be joined to this camera"
     if 0 <= scene.integrator.max_depth < FEWEST:  # type: ignore[attr-defined]
