@@ -27,6 +27,7 @@ from clpt.scene.shapes import Cylinder, Disk, Instance, Mesh, Shape, Sphere, Sph
 Triangles = tuple[NDArray[np.float32], NDArray[np.uint32]]
 AROUND = 96  # corners of what stands for a disk
 MOST_COMPARED = 500  # bodies whose boxes are compared
+OPEN = 1e-2  # of its area: what a closed boundary may lack
 CHUNK = 1 << 18  # triangles that are summed at a time
 
 
@@ -69,6 +70,23 @@ def media_at(
             turns[medium] += sum(sign * _winding(shape, p, cached) for sign, shape in own)
     found = [medium for medium, number in turns.items() if number > 0.5]
     return tuple(sorted(found, key=lambda medium: extents[medium]))
+
+
+def open_medium(scene: Scene, cached: Callable[..., Any] | None = None) -> Medium | None:
+    """Return a medium whose boundary has a hole, None where all are closed.
+
+    The areas of a closed surface, each along its normal, add up to nothing.
+    """
+    sums: dict[Medium, NDArray[np.float64]] = {}
+    for shape in _every(scene):
+        area = _areas(shape, cached)
+        for medium, sign in ((shape.interior, 1.0), (shape.exterior, -1.0)):
+            if medium is not None:
+                sums[medium] = sums.get(medium, np.zeros(4)) + (*(sign * area[:3]), area[3])
+    for medium, total in sums.items():
+        if np.linalg.norm(total[:3]) > OPEN * total[3]:
+            return medium
+    return None
 
 
 def bodies_around(
@@ -189,6 +207,16 @@ def _winding(shape: Shape, p: NDArray[np.float64], cached: Callable[..., Any] | 
         centers, radii = _balls(shape)
         return side * float((np.linalg.norm(p - centers, axis=1) < radii).sum())
     return winding_number(*triangles_of(shape, cached), p)
+
+
+def _areas(shape: Shape, cached: Callable[..., Any] | None) -> NDArray[np.float64]:
+    """The sum of a shape's areas along their normals, and of the areas alone (4,) [m^2]."""
+    if isinstance(shape, Spheres):
+        return np.array([0.0, 0.0, 0.0, 4.0 * np.pi * float((_balls(shape)[1] ** 2).sum())])
+    vertices, faces = triangles_of(shape, cached)
+    a, b, c = np.moveaxis(np.asarray(vertices, np.float64)[faces], 1, 0)
+    n = np.cross(b - a, c - a) / 2.0
+    return np.array([*n.sum(axis=0), np.linalg.norm(n, axis=1).sum()])
 
 
 def _volume(shape: Shape, cached: Callable[..., Any] | None) -> float:

@@ -51,10 +51,18 @@ def light_media(
     bodies: where these overlap; sphere: centre and radius of one around the scene [m].
     """
     scene, rows = index.scene, []
+    nothing = np.zeros(2 * len(lights.rows), np.uint32)
+    hole = None if bodies is not None else surroundings.open_medium(scene, cache)
+    unknown = "" if hole is None else (
+        f"the boundary of the medium {hole.name or hole.kind!r} is not closed, so that nobody "
+        "knows whether {} is in it"
+    )
     known = _Known(scene, bodies is not None, cache)
     afar = sphere[0] + AFAR * sphere[1] * np.ones(3)
     for i in row_order(scene.lights):
         lamp = scene.lights[i]
+        if unknown:
+            return LightMedia(nothing, unknown.format(f"lights[{i}]"))
         if lamp.reach == "placed":
             bounds = light_bounds.of_lamp(lamp)
             rows.append((known.at(bounds.low[0]), 1))
@@ -62,14 +70,16 @@ def light_media(
         found = known.at(afar)
         if found:
             reason = f"the light of lights[{i}] comes from infinity, where a medium has no end"
-            return LightMedia(np.zeros(2 * len(lights.rows), np.uint32), reason)
+            return LightMedia(nothing, reason)
         rows.append((found, 1))
     ends = (*lights.first, len(lights.rows))[1:]
     for emitter, first, end in zip(emitters, lights.first, ends, strict=True):
+        if unknown and not _says(emitter.shape):
+            return LightMedia(nothing, unknown.format(shapes.where(emitter.shape)))
         found = _around_shape(emitter, known)
         if found is None:
             reason = f"{shapes.where(emitter.shape)} shines into more than one medium"
-            return LightMedia(np.zeros(2 * len(lights.rows), np.uint32), reason)
+            return LightMedia(nothing, reason)
         rows.append((found, end - first))
     words = []
     for around, count in rows:
@@ -106,7 +116,7 @@ def _around_shape(emitter: Emitter, known: _Known) -> Around | None:
     both = getattr(shape.emission, "two_sided", False)
     if known.nested and matter_of(shape) is not None:
         return None
-    if not known.nested and (shape.interior is not None or shape.exterior is not None):
+    if not known.nested and _says(shape):
         if both and shape.interior is not shape.exterior:
             return None
         return () if shape.exterior is None else (shape.exterior,)
@@ -115,6 +125,11 @@ def _around_shape(emitter: Emitter, known: _Known) -> Around | None:
         points = np.concatenate([points, _before(emitter, -BEFORE)])
     found = [known.at(p) for p in points]
     return found[0] if all(one == found[0] for one in found) else None
+
+
+def _says(shape: Any) -> bool:
+    """Whether a shape says itself in which media it stands."""
+    return shape.interior is not None or shape.exterior is not None
 
 
 def _before(emitter: Emitter, before: float = BEFORE) -> NDArray[np.float64]:
