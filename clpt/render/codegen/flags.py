@@ -32,7 +32,7 @@ def ends_light_paths(features: Features, cls: type[Scatterer]) -> bool:
 
 def gathers_photons(features: Features, cls: type[Scatterer]) -> bool:
     """Whether paths from the camera are merged with photons at a material."""
-    return not (cls.delta or cls.is_null or ends_light_paths(features, cls))
+    return not (cls.delta or cls.is_null or cls.is_phase or ends_light_paths(features, cls))
 
 
 def phase_varies(features: Features, cls: type[Scatterer]) -> bool:

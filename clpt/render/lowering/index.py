@@ -126,7 +126,7 @@ class SceneIndex:
     def merged(self) -> bool:
         """Whether light paths leave photons, which paths from the camera gather."""
         integrator = self.scene.integrator
-        if not isinstance(integrator, Vcm) or self.shifts or self.has_media:
+        if not isinstance(integrator, Vcm) or self.shifts or not self.lights_reach:
             return False
         return integrator.merging and integrator.max_depth not in (1, 2)
 

@@ -41,7 +41,7 @@ from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.layer_names import lower_names
 from clpt.render.lowering.lights.aims import aims
 from clpt.render.lowering.lights.hard_light import decided
-from clpt.render.lowering.lights.light_media import light_media
+from clpt.render.lowering.lights.light_media import NOWHERE, LightMedia, light_media
 from clpt.render.lowering.lights.lights import LightRows, light_rows
 from clpt.render.lowering.lowering_cache import LoweringCache
 from clpt.render.lowering.materials.material_words import MaterialWords
@@ -141,9 +141,9 @@ def lower(
         sides = media.of_shapes(bounding)
     before = former.integrator if former else None
     index, lit = _begin_at_lights(index, geometry, lights, media, bodies, sphere, cache)
-    index, why = decided(index, geometry, encoder, lights, sphere, before)
+    index, why = decided(index, geometry, encoder, lights, sphere, before, lit.scatter)
     if index.has_media and (index.weighed or index.light_paths):
-        encoder.store.append("media", lit)
+        encoder.store.append("media", lit.words)
     encoder.store.append("media", sides)
     around: tuple[Any, ...] = ()
     if bodies is not None:
@@ -209,14 +209,14 @@ def _begin_at_lights(
     bodies: BodyWords | None,
     sphere: tuple[NDArray[np.float64], float],
     cache: LoweringCache,
-) -> tuple[SceneIndex, NDArray[np.uint32]]:
+) -> tuple[SceneIndex, LightMedia]:
     """Return the index with whether paths can start at lights in media, and the lights' media."""
     if not index.has_media or not index.may_have_light_paths:
-        return index, np.zeros(0, np.uint32)
+        return index, NOWHERE
     found = light_media(index, geometry.emitters, lights, media, bodies, sphere, cache)
     if found.refusal and index.light_paths:
         raise SceneError(f"no light paths: {found.refusal}", where="integrator")
-    return replace(index, lit_media=found.refusal), found.words
+    return replace(index, lit_media=found.refusal), found
 
 
 def _lower_film(index: SceneIndex, encoder: Encoder, wavelengths: Density) -> tuple[int, bool, int]:
@@ -316,8 +316,8 @@ def _left_to_the_camera(index: SceneIndex) -> list[str]:
         warnings.append(f"{kind}.{name}: left aside, as {reason}; {names} can, without such glass")
     if getattr(integrator, "merging", False) and not index.merged:
         reason = f"a path needs {photons.FIRST + 1} surfaces"
-        if index.has_media:
-            reason = "photons do not go through media"
+        if not index.lights_reach:
+            reason = index.lit_media
         if index.shifts:
             reason = "fluorescent paint gives light other wavelengths"
         warnings.append(f"{kind}.merging: left aside, as {reason}")

@@ -31,10 +31,14 @@ Around = tuple[Any, ...]  # media, or the matter of bodies
 
 class LightMedia(NamedTuple):
     """words: bodies and medium of each row of lights (2 n,) uint32; refusal: why no paths can start
-    at some light, "" if they can."""
+    at some light, "" if they can; scatter: of each row, whether its light is scattered (n,) bool."""
 
     words: NDArray[np.uint32]
     refusal: str
+    scatter: NDArray[np.bool_]
+
+
+NOWHERE = LightMedia(np.zeros(0, np.uint32), "", np.zeros(0, bool))
 
 
 def light_media(
@@ -51,7 +55,6 @@ def light_media(
     bodies: where these overlap; sphere: centre and radius of one around the scene [m].
     """
     scene, rows = index.scene, []
-    nothing = np.zeros(2 * len(lights.rows), np.uint32)
     hole = None if bodies is not None else surroundings.open_medium(scene, cache)
     unknown = "" if hole is None else (
         f"the boundary of the medium {hole.name or hole.kind!r} is not closed, so that nobody "
@@ -62,7 +65,7 @@ def light_media(
     for i in row_order(scene.lights):
         lamp = scene.lights[i]
         if unknown:
-            return LightMedia(nothing, unknown.format(f"lights[{i}]"))
+            return NOWHERE._replace(refusal=unknown.format(f"lights[{i}]"))
         if lamp.reach == "placed":
             bounds = light_bounds.of_lamp(lamp)
             rows.append((known.at(bounds.low[0]), 1))
@@ -70,25 +73,32 @@ def light_media(
         found = known.at(afar)
         if found:
             reason = f"the light of lights[{i}] comes from infinity, where a medium has no end"
-            return LightMedia(nothing, reason)
+            return NOWHERE._replace(refusal=reason)
         rows.append((found, 1))
     ends = (*lights.first, len(lights.rows))[1:]
     for emitter, first, end in zip(emitters, lights.first, ends, strict=True):
         if unknown and not _says(emitter.shape):
-            return LightMedia(nothing, unknown.format(shapes.where(emitter.shape)))
+            return NOWHERE._replace(refusal=unknown.format(shapes.where(emitter.shape)))
         found = _around_shape(emitter, known)
         if found is None:
             reason = f"{shapes.where(emitter.shape)} shines into more than one medium"
-            return LightMedia(nothing, reason)
+            return NOWHERE._replace(refusal=reason)
         rows.append((found, end - first))
-    words = []
+    words, scatter = [], []
     for around, count in rows:
         if bodies is None:
             own = 0, media.word(next(iter(around), None))
         else:
             own = bodies.around(around, media)
         words += [own] * count
-    return LightMedia(np.array(words, np.uint32).ravel(), "")
+        scatter += [_scatters(around)] * count
+    return LightMedia(np.array(words, np.uint32).ravel(), "", np.array(scatter, bool))
+
+
+def _scatters(around: Around) -> bool:
+    """Whether a medium scatters light, which is the first, or that in the first bodies."""
+    media = (one[-1] if isinstance(one, tuple) else one for one in around[:1])
+    return any(medium is not None and medium.scatters for medium in media)
 
 
 class _Known:
