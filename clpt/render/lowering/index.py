@@ -19,7 +19,6 @@ from clpt.scene.media import PHASE_LEAVES, Medium
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.shapes import Shape
 
-
 UNKNOWN = "its medium was not looked for"
 
 

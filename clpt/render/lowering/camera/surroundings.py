@@ -82,7 +82,8 @@ def open_medium(scene: Scene, cached: Callable[..., Any] | None = None) -> Mediu
         area = _areas(shape, cached)
         for medium, sign in ((shape.interior, 1.0), (shape.exterior, -1.0)):
             if medium is not None:
-                sums[medium] = sums.get(medium, np.zeros(4)) + (*(sign * area[:3]), area[3])
+                signed = area * np.array([sign, sign, sign, 1.0])
+                sums[medium] = sums.get(medium, np.zeros(4)) + signed
     for medium, total in sums.items():
         if np.linalg.norm(total[:3]) > OPEN * total[3]:
             return medium

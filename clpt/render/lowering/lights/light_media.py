@@ -31,7 +31,8 @@ Around = tuple[Any, ...]  # media, or the matter of bodies
 
 class LightMedia(NamedTuple):
     """words: bodies and medium of each row of lights (2 n,) uint32; refusal: why no paths can start
-    at some light, "" if they can; scatter: of each row, whether its light is scattered (n,) bool."""
+    at some light, "" if they can; scatter: of each row, whether its light is scattered, (n,)
+    bool."""
 
     words: NDArray[np.uint32]
     refusal: str
@@ -56,9 +57,13 @@ def light_media(
     """
     scene, rows = index.scene, []
     hole = None if bodies is not None else surroundings.open_medium(scene, cache)
-    unknown = "" if hole is None else (
-        f"the boundary of the medium {hole.name or hole.kind!r} is not closed, so that nobody "
-        "knows whether {} is in it"
+    unknown = (
+        ""
+        if hole is None
+        else (
+            f"the boundary of the medium {hole.name or hole.kind!r} is not closed, so that nobody "
+            "knows whether {} is in it"
+        )
     )
     known = _Known(scene, bodies is not None, cache)
     afar = sphere[0] + AFAR * sphere[1] * np.ones(3)
@@ -79,11 +84,11 @@ def light_media(
     for emitter, first, end in zip(emitters, lights.first, ends, strict=True):
         if unknown and not _says(emitter.shape):
             return NOWHERE._replace(refusal=unknown.format(shapes.where(emitter.shape)))
-        found = _around_shape(emitter, known)
-        if found is None:
+        into = _around_shape(emitter, known)
+        if into is None:
             reason = f"{shapes.where(emitter.shape)} shines into more than one medium"
             return NOWHERE._replace(refusal=reason)
-        rows.append((found, end - first))
+        rows.append((into, end - first))
     words, scatter = [], []
     for around, count in rows:
         if bodies is None:
