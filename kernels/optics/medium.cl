@@ -70,12 +70,22 @@ inline Spectrum medium_emission(Scene scene, integer name, Medium m, real t, Wav
 }
 #endif
 
-/* The names of the media behind the front of a shape and before it; optics/equiangular.cl has what stands before. */
+/* In `media` stand first what optics/equiangular.cl reads, then, where paths start at lights, two words for each row of
+ * `lights`: the bodies around the light and the name of its medium. Then come two words for each shape. */
+#if LIGHT_MEDIA
+#define MEDIA_OF_SHAPES (4 * MEDIUM_AIMS + 2 * scene.settings->light_count)
+inline integer light_medium(Scene scene, integer row) { return gather_i(scene.media, 4 * MEDIUM_AIMS + 2 * row + 1); }
+inline integer light_bodies(Scene scene, integer row) { return gather_i(scene.media, 4 * MEDIUM_AIMS + 2 * row); }
+#else
+#define MEDIA_OF_SHAPES (4 * MEDIUM_AIMS)
+#endif
+
+/* The names of the media behind the front of a shape and before it. */
 typedef struct { integer inside, outside; } ShapeMedia;
 
 inline ShapeMedia shape_media(Scene scene, integer shape)
 {
-    integer row = 4 * MEDIUM_AIMS + 2 * shape;
+    integer row = MEDIA_OF_SHAPES + 2 * shape;
     ShapeMedia m = {gather_i(scene.media, row), gather_i(scene.media, row + 1)};
     return m;
 }

@@ -23,6 +23,14 @@ typedef struct {
 #endif
 } Vertex;
 
+/* |cosine| of a direction d to a surface of normal n, by which densities of its directions become those of points. In
+ * a medium the extinction is in its place: it is the same for light that comes the other way, and counts as 1. */
+#if BSDF_IS_PHASE
+#define VERTEX_COSINE(n, d) ((real)(1.0f))
+#else
+#define VERTEX_COSINE(n, d) fabs(dot3(n, d))
+#endif
+
 /* The material at a vertex, and the random numbers of the vertex. */
 typedef struct {
     Sampler sampler;

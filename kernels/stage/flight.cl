@@ -13,6 +13,8 @@
 #include "generated/grid_flight.cl"
 #include "optics/equiangular.cl"
 
+#define FLIES_NEAR_LAMPS (MEDIUM_AIMS && !LIGHT_PATHS) /* paths from lamps have no reason to stay there */
+
 #if !USES_BODIES
 /* The medium of a ray; one that knows of none is in that of the side of the surface that it meets. */
 inline integer flight_medium(Scene scene, Slab path, Slab hit, uint at, mask met)
@@ -50,7 +52,7 @@ STAGE(flight)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
         vec2 u = sampler_pair(sampler, as_natural(DIMENSION_FLIGHT + vertex));
         mask scatters = flies & (spectrum_max(m.sigma_s) > 0.0f);
         real sigma = spectrum_pick(m.sigma_t, ratio, u.y), end = sel(met, load_hit_t(hit, at), (real)(FAR));
-#if MEDIUM_AIMS
+#if FLIES_NEAR_LAMPS
         real choice = MEDIUM_AIMS > 1 ? sampler_pair(sampler, as_natural(DIMENSION_AIM + vertex)).x : (real)(0.0f);
         Equiangular near = equiangular(scene, load_path_o(path, at), load_path_d(path, at), end,
                                        spectrum_mean(m.sigma_t), choice);
@@ -62,7 +64,7 @@ STAGE(flight)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
         u.x = max_r(u.x - near.share, (real)(0.0f)) / left;
 #endif
         real t = -log_r(max_r(1.0f - u.x, (real)(1e-9f))) / max_r(sigma, (real)(1e-30f));
-#if MEDIUM_AIMS
+#if FLIES_NEAR_LAMPS
         t = sel(aims, by_angle, t);
 #endif
         mask collides = scatters & (t < end);
@@ -70,7 +72,7 @@ STAGE(flight)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
         Spectrum passes = spectrum_exp(spectrum_scale(m.sigma_t, -t));
         Spectrum f = spectrum_sel(collides, spectrum_mul(m.sigma_s, passes), passes);
         Spectrum pdf = spectrum_sel(collides, spectrum_mul(m.sigma_t, passes), passes);
-#if MEDIUM_AIMS
+#if FLIES_NEAR_LAMPS
         real nearby = sel(collides, near.share * equiangular_pdf(near, t), (real)(0.0f));
         pdf = spectrum_add(spectrum_scale(pdf, left), spectrum_of(nearby));
 #endif

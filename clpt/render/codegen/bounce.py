@@ -26,12 +26,12 @@ def order(features: Features, layout: str, lanes: int, interleaved: bool = False
     if features.shows_lights:
         bounce.append(Stage(join, join, tracing))
     bounce.append(Stage("intersect", "intersect", lanes if interleaved else tracing))
+    if features.media:
+        bounce.append(Stage(flight(features), "flight", lanes))
     if deposits(features):
         bounce.append(Stage("deposit", "deposit", lanes))
     if trains(features):
         bounce.append(Stage("train", "train", lanes))
-    if features.media:
-        bounce.append(Stage("flight", "flight", lanes))
     if features.mixtures:
         bounce.append(Stage("mix", "mix_materials", lanes))
     bounce += [Stage(f"shade_{kind}", "shade", lanes) for kind in features.materials]
@@ -59,6 +59,11 @@ def deposits(features: Features) -> bool:
 def trains(features: Features) -> bool:
     """Whether paths leave what a guide learns from."""
     return features.light_paths and features.guided
+
+
+def flight(features: Features) -> str:
+    """Return the program that takes rays through media: that of light paths does without aims."""
+    return "flight_of_light" if features.light_paths and features.medium_aims else "flight"
 
 
 def trace_lanes(layout: str, lanes: int) -> int:

@@ -55,6 +55,9 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         ("generated/lights.cl", "path/met_light.cl") * f.emissive_grids
         + ("optics/grid_flight.cl",) * f.grids
     ),
+    "generated/light_medium.cl": lambda f, _: (
+        ("generated/textures.cl", "generated/medium.cl") * f.light_media
+    ),
     "generated/shading_frame.cl": lambda f, _: (
         ("generated/normal_map.cl", "path/shading_frame_mapped.cl")
         if f.normal_mapped

@@ -32,7 +32,7 @@ def ends_light_paths(features: Features, cls: type[Scatterer]) -> bool:
 
 def gathers_photons(features: Features, cls: type[Scatterer]) -> bool:
     """Whether paths from the camera are merged with photons at a material."""
-    return not (cls.delta or cls.is_null or ends_light_paths(features, cls))
+    return not (cls.delta or cls.is_null or cls.is_phase or ends_light_paths(features, cls))
 
 
 def phase_varies(features: Features, cls: type[Scatterer]) -> bool:
@@ -89,6 +89,7 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "USES_BYTES": lambda f: f.byte_grids,
     "USES_BODIES": lambda f: f.bodies,
     "SHADOW_MEDIA": lambda f: f.shadow_media,
+    "LIGHT_MEDIA": lambda f: f.light_media,
     "MEDIUM_AIMS": lambda f: f.medium_aims,
     "SEALED_MEDIA": lambda f: f.sealed_media,
     "USES_DISPERSION": lambda f: f.dispersion and f.mode == "spectral",

@@ -70,7 +70,7 @@ def _stages(
     if bounce.trains(features):
         texts["train"] = _source("train", files, defines, lanes)
     if features.media:
-        texts["flight"] = _source("flight", files, defines, lanes)
+        texts[bounce.flight(features)] = _source("flight", files, defines, lanes)
     if features.mixtures:
         texts["mix"] = _source("mix", files, defines, lanes)
     return texts

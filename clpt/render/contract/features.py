@@ -124,6 +124,11 @@ class Features:
         return self.media and (self.null_surfaces or self.grids)
 
     @property
+    def light_media(self) -> bool:
+        """Whether media are known around lights, as paths start there."""
+        return self.media and (self.light_paths or self.weighed)
+
+    @property
     def passes(self) -> tuple[Features, ...]:
         """The features of each kind of paths, in their order; those of the film are the last."""
         if self.guided:

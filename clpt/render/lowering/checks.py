@@ -92,11 +92,6 @@ def _check_light_paths(scene: Scene, shapes_: list[Shape]) -> None:
                 )
         return
     spectral = scene.film.mode == "spectral"
-    for shape in shapes_:
-        if shape.interior is not None or shape.exterior is not None or shape.priority:
-            _refuse("a scene without media", shapes.where(shape))
-    if scene.camera.medium is not None:
-        _refuse("a scene without media", "camera.medium")
     if scene.camera.kind not in CONNECTED:
         names = " and ".join(CONNECTED)
         _refuse(f"the cameras {names}, not {scene.camera.kind}", "camera")

@@ -13,11 +13,13 @@ from clpt.render.lowering.geometry import instancing, shapes
 from clpt.render.lowering.geometry.instancing import Placed, Prototype
 from clpt.scene import Scene
 from clpt.scene import materials as mt
-from clpt.scene.integrators import ParticleTracer, Vcm
+from clpt.scene.integrators import Auto, ParticleTracer, Vcm
 from clpt.scene.layers import LAYERS
 from clpt.scene.media import PHASE_LEAVES, Grid, Medium
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.shapes import Shape
+
+UNKNOWN = "its medium was not looked for"
 
 
 @dataclass(frozen=True)
@@ -27,7 +29,8 @@ class SceneIndex:
     shapes: every shape once, those of groups as the group has them; placed: shapes that are lowered
     as they are; prototypes: shapes that instances share; leaves: classes of leaf materials, in the
     order that material words count; normal_mapped: whether a material has a normal or a bump map;
-    warnings: of instances that became triangles.
+    warnings: of instances that became triangles; lit_media: why no paths can start at some light in
+    a medium, "" if they can.
     """
 
     scene: Scene
@@ -37,6 +40,7 @@ class SceneIndex:
     leaves: tuple[type[Scatterer], ...]
     normal_mapped: bool
     warnings: tuple[str, ...]
+    lit_media: str = UNKNOWN
 
     @classmethod
     def of(cls, scene: Scene) -> SceneIndex:
@@ -106,7 +110,18 @@ class SceneIndex:
         Where the scene says "auto" nothing may ask before `hard_light.decided` has chosen.
         """
         wanted: float = getattr(self.scene.integrator, "light_paths", 0)
-        return wanted if (self.joined or self.merged) and not self.has_media else 0
+        return wanted if (self.joined or self.merged) and self.lights_reach else 0
+
+    @property
+    def lights_reach(self) -> bool:
+        """Whether paths from lights know in which medium they start."""
+        return not self.has_media or not self.lit_media
+
+    @property
+    def may_have_light_paths(self) -> bool:
+        """Whether paths start at lights, if they can."""
+        given = self.scene.integrator
+        return isinstance(given, Auto | ParticleTracer) or bool(getattr(given, "light_paths", 0))
 
     @property
     def joined(self) -> bool:
@@ -120,7 +135,7 @@ class SceneIndex:
     def merged(self) -> bool:
         """Whether light paths leave photons, which paths from the camera gather."""
         integrator = self.scene.integrator
-        if not isinstance(integrator, Vcm) or self.shifts or self.has_media:
+        if not isinstance(integrator, Vcm) or self.shifts or not self.lights_reach:
             return False
         return integrator.merging and integrator.max_depth not in (1, 2)
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
+from clpt.errors import SceneError
 from clpt.render.contract import shape_records
 from clpt.render.contract.features import Features
 from clpt.render.contract.layer_names import LayerNames
@@ -41,6 +42,7 @@ from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.layer_names import lower_names
 from clpt.render.lowering.lights.aims import aims
 from clpt.render.lowering.lights.hard_light import decided
+from clpt.render.lowering.lights.light_media import NOWHERE, LightMedia, light_media
 from clpt.render.lowering.lights.lights import LightRows, light_rows
 from clpt.render.lowering.lowering_cache import LoweringCache
 from clpt.render.lowering.materials.material_words import MaterialWords
@@ -136,20 +138,26 @@ def lower(
     near = medium_aims(lights) if any(one.scatters for one in homogeneous) else ()
     encoder.store.append("media", np.array(near, np.float32).view(np.uint32))
     bounding = [shape for _, shape, _, _ in geometry.owners]
+    bodies = BodyWords(index.shapes) if index.nested else None
+    if bodies is not None:
+        sides = bodies.rows(bounding, encoder, materials, media)
+    else:
+        sides = media.of_shapes(bounding)
+    before = former.integrator if former else None
+    index, lit = _begin_at_lights(index, geometry, lights, media, bodies, sphere, cache)
+    index, why = decided(index, geometry, encoder, lights, sphere, before, lit.scatter)
+    if index.has_media and (index.weighed or index.light_paths):
+        encoder.store.append("media", lit.words)
+    encoder.store.append("media", sides)
     around: tuple[Any, ...] = ()
-    if index.nested:
-        bodies = BodyWords(index.shapes)
-        encoder.store.append("media", bodies.rows(bounding, encoder, materials, media))
+    if bodies is not None:
         around = bodies_around(scene, matter_of, cache)
         camera = bodies.around(around, media)
         noted = contested(scene, matter_of, cache)
     else:
-        encoder.store.append("media", media.of_shapes(bounding))
         around = media_around(scene, cache) if index.media else ()
         camera = 0, media.word(next(iter(around), None))
         noted = warnings_of(around)
-    before = former.integrator if former else None
-    index, why = decided(index, geometry, encoder, lights, sphere, before)
     density_row, tabulated, profile = _lower_film(index, encoder, wavelengths)
     targets = aims(index, geometry, sphere[1])
     first_aim = encoder.store.append_floats("distributions", targets)
@@ -197,6 +205,24 @@ def lower(
         cache=cache,
         device_grids=tuple(encoder.store.device_grids),
     )
+
+
+def _begin_at_lights(
+    index: SceneIndex,
+    geometry: Geometry,
+    lights: LightRows,
+    media: MediumWords,
+    bodies: BodyWords | None,
+    sphere: tuple[NDArray[np.float64], float],
+    cache: LoweringCache,
+) -> tuple[SceneIndex, LightMedia]:
+    """Return the index with whether paths can start at lights in media, and the lights' media."""
+    if not index.has_media or not index.may_have_light_paths:
+        return index, NOWHERE
+    found = light_media(index, geometry.emitters, lights, media, bodies, sphere, cache)
+    if found.refusal and index.light_paths:
+        raise SceneError(f"no light paths: {found.refusal}", where="integrator")
+    return replace(index, lit_media=found.refusal), found
 
 
 def _lower_film(index: SceneIndex, encoder: Encoder, wavelengths: Density) -> tuple[int, bool, int]:
@@ -306,9 +332,13 @@ def _left_to_the_camera(index: SceneIndex) -> list[str]:
         warnings.append(f"{kind}.{name}: left aside, as {reason}; {names} can, without such glass")
     if getattr(integrator, "merging", False) and not index.merged:
         reason = f"a path needs {photons.FIRST + 1} surfaces"
+        if not index.lights_reach:
+            reason = index.lit_media
         if index.shifts:
             reason = "fluorescent paint gives light other wavelengths"
         warnings.append(f"{kind}.merging: left aside, as {reason}")
+    if not index.lights_reach:
+        warnings.append(f"{kind}.light_paths: left aside, as {index.lit_media}")
     if index.weighed:
         warnings += [
             f"{kind}.light_paths: none start at lights[{i}], whose light does not fall with "
