@@ -3,13 +3,15 @@
 Lengths are in millimetres here, wavelengths in nm.
 """
 
+from clpt.lenses import paraxial, spots
 from clpt.lenses.coatings import COATINGS
-from clpt.lenses.files import library, names, read
+from clpt.lenses.files import READERS, library, names, read
 from clpt.lenses.paraxial import Cardinal, cardinal
 from clpt.lenses.prescription import Coat, Prescription, Surface
 
 __all__ = [
     "COATINGS",
+    "READERS",
     "Cardinal",
     "Coat",
     "Prescription",
@@ -17,5 +19,7 @@ __all__ = [
     "cardinal",
     "library",
     "names",
+    "paraxial",
     "read",
+    "spots",
 ]

@@ -20,8 +20,8 @@ from tests.kernels.scene_harness import SceneProbe
 BODY = """
     vec2 film = {x[0], x[1]}, lens = {x[2], x[3]};
     Spectrum weight, lambdas = spectrum_of(x[4]);
-    global const LensCamera *camera = (global const LensCamera *)scene.camera;
-    CameraRay ray = lens_ray(scene, camera, film, lens, lambdas, &weight);
+    global const LensCamera *at_camera = (global const LensCamera *)scene.camera;
+    CameraRay ray = lens_ray(scene, at_camera, film, lens, lambdas, &weight);
     r[0] = ray.o.x; r[1] = ray.o.y; r[2] = ray.o.z;
     r[3] = ray.d.x; r[4] = ray.d.y; r[5] = ray.d.z; r[6] = weight.x;
 """
