@@ -41,7 +41,7 @@ def zones(lens: Prescription, distance: float, radius: float) -> Array:
         far = np.asarray(np.where(inside, x, -np.inf).max(axis=1)) + step[:, 0]
         near = np.asarray(np.where(inside, x, np.inf).min(axis=1)) - step[:, 0]
         top = np.where(inside, y, 0.0).max(axis=1) + step[:, 1]
-        low = np.where(any_[:, None], np.stack([near, 0.0 * near], 1), low)
+        low = np.where(any_[:, None], np.stack([near, np.zeros(len(near))], 1), low)
         high = np.where(any_[:, None], np.stack([far, top], 1), high)
     rows = np.zeros((ZONES, 3))
     for i in range(ZONES):

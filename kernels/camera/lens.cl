@@ -79,6 +79,13 @@ inline mask lens_passes(Scene scene, global const LensCamera *camera, LensSurfac
 }
 
 #if LENS_LOSSES
+/* Of the wavelengths that count: where glasses disperse, a ray is the hero's alone. */
+#if CAMERA_DISPERSES
+#define LENS_EACH(F) F(x)
+#else
+#define LENS_EACH(F) SPECTRUM_EACH(F)
+#endif
+
 /* The share of unpolarised light that comes back, by Fresnel's equations or by the films' waves. cosine: of the angle
  * on the film's side. Without absorption it is the same from either side. */
 inline Spectrum lens_reflectance(Scene scene, LensSurface s, real cosine, real near, real far, Wavelengths lambdas)
@@ -95,7 +102,7 @@ inline Spectrum lens_reflectance(Scene scene, LensSurface s, real cosine, real n
         Spectrum at = lambdas;
 #endif
 #define C(c_) Stack CAT(stack_, c_) = stack_on(far, (real)(0.0f), near, c);
-        SPECTRUM_EACH(C)
+        LENS_EACH(C)
 #undef C
         for (int i = 0; any(i < s.coats); ++i) {
             mask there = i < s.coats;
@@ -103,7 +110,7 @@ inline Spectrum lens_reflectance(Scene scene, LensSurface s, real cosine, real n
             Medium film = medium_of(gather(scene.camera, word), (real)(0.0f), near, c);
             real thickness = gather(scene.camera, word + 1);
 #define C(c_) CAT(stack_, c_) = stack_sel(there, stack_layer(CAT(stack_, c_), film, thickness, at.c_), CAT(stack_, c_));
-            SPECTRUM_EACH(C)
+            LENS_EACH(C)
 #undef C
         }
         Medium outer = medium_of(near, (real)(0.0f), near, c);
@@ -114,7 +121,7 @@ inline Spectrum lens_reflectance(Scene scene, LensSurface s, real cosine, real n
             real back = 0.5f * (complex_norm(whole.s.r) + complex_norm(whole.p.r));                           \
             r.c_ = sel(coated, min_r(back, (real)(1.0f)), r.c_);                                              \
         }
-        SPECTRUM_EACH(C)
+        LENS_EACH(C)
 #undef C
     }
     return r;
