@@ -52,7 +52,7 @@ CAMERAS = {
         cameras.ThinLens(to_world=EYE, fov=50, aperture_radius=0.16, focus_distance=4.6),
     ),
     "lens": seen(
-        "A `sonnar` wide open on film 6 cm wide, in focus on the yellow knob: cat's eyes, dark corners.",
+        "A `sonnar` wide open, in focus on the yellow knob: dark corners.",
         cameras.Lens(
             to_world=EYE,
             lens="sonnar",

@@ -2,8 +2,8 @@
 
     python scenes/lens_street/generate.py
 
-scene.json looks through a Sonnar of 1937 without coatings, modern.json through a Planar of 1973 with
-three films on each surface. Both are wide open and focus on the bollard.
+scene.json looks through a Sonnar of 1937 without coatings, modern.json through a Planar of 1973
+with three films on each surface. Both are wide open and focus on the bollard.
 """
 
 from __future__ import annotations
@@ -88,16 +88,18 @@ def scene(lens: JSON) -> JSON:
         "camera": {
             "type": "lens", "focus_distance": FOCUS, "to_world": {"look_at": look}, **lens,
         },
-        "film": {"width": 480, "height": 320, "exposure": 0.8},
+        "film": {"width": 390, "height": 260, "exposure": 0.8},
         "integrator": {"type": "path", "max_depth": 4},
-        "spp": 512,
+        "spp": 224,
         "lights": [{"type": "constant", "radiance": [0.002, 0.003, 0.007]}],
         "materials": {
             "road": {"type": "rough_plastic", "alpha": 0.4, "diffuse_reflectance": 0.06},
             "wall": {"type": "diffuse", "reflectance": [0.3, 0.25, 0.2]},
             "pole": {"type": "diffuse", "reflectance": 0.05},
             "black": {"type": "diffuse", "reflectance": 0.02},
-            "paint": {"type": "rough_plastic", "alpha": 0.1, "diffuse_reflectance": [0.5, 0.03, 0.02]},
+            "paint": {
+                "type": "rough_plastic", "alpha": 0.1, "diffuse_reflectance": [0.5, 0.03, 0.02],
+            },
             "white": {"type": "rough_plastic", "alpha": 0.1, "diffuse_reflectance": 0.75},
         },
         "shapes": [
