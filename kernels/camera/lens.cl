@@ -46,8 +46,8 @@ inline mask lens_meet(LensSurface s, vec3 *o, vec3 d, vec3 *n)
     mask met = inside >= 0.0f;
     vec3 p = v3(x + d.x * t, y + d.y * t, d.z * t);
     *n = v3(c * p.x, c * p.y, (1.0f + s.conic) * c * p.z - 1.0f);
-    if (any(s.bent != 0)) {
-        mask aspheric = s.bent == 2;
+    if (any(s.form != 0)) {
+        mask aspheric = s.form == 2;
         real slope = 0.0f;
         if (any(aspheric)) {
             for (int i = 0; i < 4; ++i) {
@@ -60,7 +60,7 @@ inline mask lens_meet(LensSurface s, vec3 *o, vec3 d, vec3 *n)
             met = met & (!aspheric | (miss < 1e-3f * s.radius));
             *n = sel3(aspheric, v3(p.x * slope, p.y * slope, (real)(-1.0f)), *n);
         }
-        *n = sel3(s.bent != 0, normalize3(*n), *n);
+        *n = sel3(s.form != 0, normalize3(*n), *n);
     }
     p.z += s.z;
     *o = p;

@@ -131,7 +131,7 @@ def _surfaces(
         row["curvature"] = -surface.curvature / unit
         row["conic"], row["radius"] = surface.conic, surface.semi_diameter * unit
         row["stop"] = surface.stop
-        row["bent"] = 2 if any(surface.aspheric) else int(surface.conic != 0.0)
+        row["form"] = 2 if any(surface.aspheric) else int(surface.conic != 0.0)
         row["near_index"], row["far_index"] = indices[i + 1], indices[i]
         row["near_glass"] = rows.get(before[i + 1], -1)
         row["far_glass"] = rows.get(before[i], -1)
