@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from clpt import spectra
-from clpt.formats.native import json_schema, reradiation, sensors
+from clpt.formats.native import json_schema, lenses, reradiation, sensors
 from clpt.formats.native import spectra as json_spectra
 from clpt.formats.native.cursor import Cursor
 from clpt.formats.native.json_schema import NUMBER, NUMBERS, STRING, TRIPLE, Schema, ref
@@ -360,6 +360,12 @@ FORMS: dict[str, Form] = {
         sensors.SCHEMA,
         lambda cursor, _: sensors.read(cursor),
         lambda value, _: sensors.write(value),
+    ),
+    "lens": Form(
+        lenses.WORDS,
+        lenses.SCHEMA,
+        lambda cursor, _: lenses.read(cursor),
+        lambda value, _: lenses.write(value),
     ),
     "material": Form(
         "material, or its name",

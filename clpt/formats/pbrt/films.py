@@ -20,7 +20,7 @@ SPACES = {"srgb": "rec709", "rec2020": "rec2020", "dci-p3": "display_p3"}
 SAMPLERS = (
     "halton", "sobol", "zsobol", "paddedsobol", "pmj02bn", "stratified", "independent",
 )  # fmt: skip
-STORED = ("filename", "savefp16", "diagonal")  # how a file is stored is decided when it is written
+STORED = ("filename", "savefp16")  # how a file is stored is decided when it is written
 SIZE = (("xresolution", 1280), ("yresolution", 720))
 DAYLIGHT = 6500.0  # [K], what pbrt takes a measured sensor's white to be
 
@@ -36,6 +36,7 @@ def film(definition: Definition | None, filter: Definition | None, exposure: flo
     if definition.kind not in FILMS:
         raise UnknownKindError("film", definition.kind, FILMS, **params.location())
     params.ignore(*STORED)
+    diagonal(definition)
     if definition.kind == "gbuffer" and "world" not in params.one(
         "coordinatesystem", "string", "camera"
     ):
@@ -54,6 +55,11 @@ def film(definition: Definition | None, filter: Definition | None, exposure: flo
     if params.one("maxcomponentvalue", "float", math.inf) < math.inf:
         state.warn(params, "'maxcomponentvalue' is left out: bright samples are kept as they are")
     return made_film
+
+
+def diagonal(definition: Definition | None) -> float:
+    """Return the film's diagonal [mm], which only lenses traced by surfaces ask for."""
+    return 35.0 if definition is None else definition.params.above_zero("diagonal", 35.0)
 
 
 def _colour(params: Parameters, state: State, exposure: float) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from clpt.render.contract.camera_records import WEIGHTED
 from clpt.render.contract.features import Features
 from clpt.render.contract.light_records import VOLUME
 from clpt.render.contract.parameter_words import RERADIATION_STEP
@@ -112,6 +113,9 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "USES_GUIDE": lambda f: f.guided,
     "AIMS_LIGHT_PATHS": lambda f: f.aimed,
     "CAMERA_DISPERSES": lambda f: f.glass_lens,
+    "CAMERA_WEIGHS": lambda f: f.camera in WEIGHTED,
+    "LENS_LOSSES": lambda f: f.lens_losses,
+    "LENS_GHOSTS": lambda f: f.lens_ghosts,
     "FILTER_BOX": lambda f: f.filter == "box",
     "FILTER_TAPS": lambda f: f.filter_taps,
     "FILTER_REACH": lambda f: f.filter_reach,

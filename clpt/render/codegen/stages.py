@@ -15,10 +15,25 @@ from clpt.scene.params import device_params, interior_params
 from clpt.scene.scatterer import Scatterer
 
 
-def camera_text(kind: str, glass: bool) -> str:
-    """Return `camera_ray`; glass: the lens is of a glass that disperses."""
+def camera_text(kind: str, glass: bool, losses: bool = False) -> str:
+    """Return `camera_ray`, or `camera_weighted_ray`.
+
+    glass: the lens is of one that disperses; losses: its surfaces reflect.
+    """
     record = camera_records.RECORDS[kind]
     camera = f"(global const {record.name} *)(scene).camera"
+    if kind in camera_records.WEIGHTED:
+        surface = camera_records.LENS_SURFACE
+        return (
+            f"{record.uniform_text()}{surface.row_text()}{surface.spread_text()}"
+            f"#define LENS_SURFACE_WORDS {surface.words}\n"
+            f"#define LENS_GHOST_CELLS {camera_records.GHOST_CELLS}\n"
+            + '#include "optics/film_stack.cl"\n'
+            * losses
+            + f'#include "camera/{kind}.cl"\n'
+            "#define camera_weighted_ray(scene, film, lens, lambdas, weight) "
+            f"{kind}_ray(scene, {camera}, film, lens, lambdas, weight)\n"
+        )
     ray = f"{kind}_ray({camera}, film, lens)"
     if glass:
         row = f"(integer)(({camera})->glass)"

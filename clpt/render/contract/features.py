@@ -101,6 +101,8 @@ class Features:
     byte_grids: bool = False  # of these some have 8 bits for each number
     bodies: bool = False  # that may overlap, of different priorities
     glass_lens: bool = False  # of a glass that disperses
+    lens_losses: bool = False  # surfaces of the camera's lens reflect a part of the light
+    lens_ghosts: bool = False  # and samples follow it
     bands: bool = False  # a spectral film
     alpha: bool = False  # a film that tells what is covered
     layers: tuple[str, ...] = ()  # beside the picture

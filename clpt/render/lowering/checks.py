@@ -6,7 +6,7 @@ from typing import Any, NoReturn
 
 from clpt.errors import SceneError
 from clpt.render.lowering.bodies import check_bodies
-from clpt.render.lowering.camera.cameras import CONNECTED, dispersive_glass
+from clpt.render.lowering.camera.cameras import CONNECTED, dispersive_glasses
 from clpt.render.lowering.geometry import shapes
 from clpt.render.lowering.geometry.instancing import distinct
 from clpt.scene import Scene
@@ -97,7 +97,7 @@ def _check_light_paths(scene: Scene, shapes_: list[Shape]) -> None:
         _refuse(f"the cameras {names}, not {scene.camera.kind}", "camera")
     if scene.film.alpha:
         _refuse("a film without alpha", "film.alpha")
-    if spectral and dispersive_glass(scene.camera) is not None:
+    if spectral and dispersive_glasses(scene.camera):
         _refuse("a lens whose glass does not disperse", "camera.glass")
     for i, light in enumerate(scene.lights):
         if isinstance(light, Point) and not light.falloff:

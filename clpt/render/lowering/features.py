@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from clpt.render.contract import shape_records
 from clpt.render.contract.features import Features, disperses
-from clpt.render.lowering.camera.cameras import dispersive_glass
+from clpt.render.lowering.camera.cameras import dispersive_glasses
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.geometry.geometry import Geometry
 from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.lights.lights import LightRows
 from clpt.render.lowering.materials.material_words import MaterialWords
+from clpt.scene.cameras import Lens
 from clpt.scene.media import Grid
 
 FEW_LIGHTS = 256  # up to which one random number chooses a light and a point on it
@@ -39,7 +40,7 @@ def features_of(
     sources = encoder.sources
     tangents = materials.tangents or index.normal_mapped
     uvs = materials.uvs or geometry.uvs or tangents or "uv" in index.layers
-    glass_lens = index.spectral and bool(dispersive_glass(scene.camera))
+    glass_lens = index.spectral and bool(dispersive_glasses(scene.camera))
     return Features(
         mode=index.mode,
         camera=scene.camera.kind,
@@ -91,6 +92,8 @@ def features_of(
         byte_grids=any(isinstance(one, Grid) and one.bits == 8 for one in index.media),
         dispersion=glass_lens or disperses(index.leaves, sources),
         glass_lens=glass_lens,
+        lens_losses=isinstance(scene.camera, Lens) and scene.camera.reflects,
+        lens_ghosts=isinstance(scene.camera, Lens) and scene.camera.ghosts > 0.0,
         bands=bool(scene.film.bands),
         alpha=index.alpha,
         layers=index.layers,

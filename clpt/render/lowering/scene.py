@@ -68,7 +68,7 @@ class Lowered:
     instances: what trees are built of, see `Geometry`. tables: every other read-only array by name;
     where an instance's tree begins is filled in when trees are built. zero_copy: tables that are
     the caller's buffers. owners: of each row of `shapes`. layer_names: what layers tell of.
-    glass_row: of the camera, see `lower_camera`. integrator: of the scene, or what was chosen;
+    glass_rows: of the camera, see `lower_camera`. integrator: of the scene, or what was chosen;
     reason: why, "" where there was no choice. encoder: what made the tables, for values that are
     edited. cache: what the next lowering need not make again. around: media at the camera, or the
     matter of bodies. device_grids: densities whose bricks kernels put into `images`.
@@ -85,7 +85,7 @@ class Lowered:
     zero_copy: dict[str, Any]
     owners: tuple[Owner, ...]
     layer_names: LayerNames
-    glass_row: int
+    glass_rows: tuple[int, ...]
     warnings: tuple[str, ...]
     integrator: Integrator
     reason: str
@@ -163,7 +163,7 @@ def lower(
     first_aim = encoder.store.append_floats("distributions", targets)
     lower_attributes(geometry.owners, encoder.textures, cache, geometry.single_count)
     encoder.store.append("shapes", shape_words(geometry.rows))
-    glass_row = _lower_camera(index, encoder)
+    glass_rows = _lower_camera(index, encoder)
     ambient_row = _lower_ambient(index, encoder)
     warnings = (
         *_warnings(index), *noted,
@@ -196,7 +196,7 @@ def lower(
         zero_copy=_zero_copy_tables(index, geometry),
         owners=geometry.owners,
         layer_names=names,
-        glass_row=glass_row,
+        glass_rows=glass_rows,
         warnings=warnings,
         integrator=index.scene.integrator,
         reason=why,
@@ -274,16 +274,16 @@ def _lower_lights(
     return lights
 
 
-def _lower_camera(index: SceneIndex, encoder: Encoder) -> int:
-    """Append the camera; return the row in `spectra` of its glass, 0 if none disperses."""
+def _lower_camera(index: SceneIndex, encoder: Encoder) -> tuple[int, ...]:
+    """Append the camera; return the rows in `spectra` of its glasses that disperse."""
     camera, film = index.scene.camera, index.scene.film
-    glass = cameras.dispersive_glass(camera)
-    if glass:
+    glasses = cameras.dispersive_glasses(camera)
+    for glass in glasses:
         encoder.spectra.check_index(glass, f"{camera.kind}.glass")
-    glass_row = encoder.spectra.row(glass) if glass and index.spectral else 0
-    _, words = cameras.lower_camera(camera, film.width, film.height, glass_row)
+    rows = tuple(encoder.spectra.row(glass) for glass in glasses) if index.spectral else ()
+    _, words = cameras.lower_camera(camera, film.width, film.height, rows)
     encoder.store.append_floats("camera", words)
-    return glass_row
+    return rows
 
 
 def _lower_ambient(index: SceneIndex, encoder: Encoder) -> int:
@@ -298,8 +298,8 @@ def _warnings(index: SceneIndex) -> list[str]:
     """What of the scene is not rendered as it says."""
     scene, film = index.scene, index.scene.film
     warnings = list(index.warnings)
-    if index.mode == "rgb" and cameras.dispersive_glass(scene.camera):
-        warnings.append("thin_lens.glass: in RGB mode all wavelengths have one focus")
+    if index.mode == "rgb" and cameras.dispersive_glasses(scene.camera):
+        warnings.append(f"{scene.camera.kind}.glass: in RGB mode all wavelengths have one focus")
     if getattr(scene.integrator, "light_paths", 0):
         warnings += _left_to_the_camera(index)
     if index.light_layers and index.emitting:
