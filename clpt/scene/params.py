@@ -16,6 +16,7 @@ quantity       number, (r, g, b), Spectrum            Spectrum within its limits
 angular        rows of numbers                        AngularTable                no
 real           number, Texture                        real                        yes
 reradiation    Reradiation, None                      Spectrum, its rows' sums    no
+measurement    Measurement, None                      Measurement                 no
 flag           bool                                   int                         no
 choice         one of the names listed                int, the name's position    no
 orders         numbers of orders -n to n              real[17], of -8 to 8        no
@@ -38,6 +39,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from clpt.errors import SceneError
+from clpt.measured import Measurement
 from clpt.spectra import (
     RGB,
     Constant,
@@ -54,7 +56,7 @@ from clpt.spectra.spectrum import check_reach, extremes
 SPECTRUM_ROLES = ("reflectance", "emission", "index", "factor", "coefficient", "quantity")
 DEVICE_ROLES = (
     "reflectance", "emission", "index", "factor", "reradiation", "real", "flag", "choice", "orders",
-    "layers", "quantity", "angular",
+    "layers", "quantity", "angular", "measurement",
 )  # fmt: skip
 # What a host parameter holds. clpt/formats/native/forms.py reads, writes and describes each form.
 HostForm = Literal[
@@ -155,6 +157,11 @@ def angular(doc: str) -> Any:
 def reradiation(default: Any, doc: str) -> Any:
     """Declare a re-radiation matrix; None for no fluorescence."""
     return _field(default, Param("reradiation", doc))
+
+
+def measurement(doc: str) -> Any:
+    """Declare what was measured of a material; None for a matt grey."""
+    return _field(None, Param("measurement", doc))
 
 
 def real(
@@ -309,6 +316,10 @@ def _checked(value: Any, param: Param, where: str) -> Any:
     if param.role == "reradiation":
         if not isinstance(value, (Reradiation, type(None))):
             raise SceneError(f"must be a re-radiation matrix, not {value!r}", where=where)
+        return value
+    if param.role == "measurement":
+        if not isinstance(value, (Measurement, type(None))):
+            raise SceneError(f"must be a measurement, not {value!r}", where=where)
         return value
     if getattr(value, "is_texture", False):
         if not param.textured:

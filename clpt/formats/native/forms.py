@@ -38,6 +38,7 @@ class Reader(Protocol):
     def group(self, cursor: Cursor) -> Any: ...
     def image(self, cursor: Cursor) -> Any: ...
     def volume(self, cursor: Cursor) -> Any: ...
+    def measurement(self, cursor: Cursor) -> Any: ...
 
 
 class Writer(Protocol):
@@ -50,6 +51,7 @@ class Writer(Protocol):
     def group(self, value: Any) -> Any: ...
     def image(self, value: Any) -> Any: ...
     def volume(self, value: Any) -> Any: ...
+    def measurement(self, value: Any) -> Any: ...
 
 
 def plain(value: Any) -> Any:
@@ -342,6 +344,12 @@ FORMS: dict[str, Form] = {
         STRING,
         lambda cursor, reader: reader.volume(cursor),
         lambda value, writer: writer.volume(value),
+    ),
+    "measurement": Form(
+        "name of a `.bsdf` file",
+        STRING,
+        lambda cursor, reader: reader.measurement(cursor),
+        lambda value, writer: writer.measurement(value),
     ),
     "cube_images": Form(
         "name of an image file, or a list of six",

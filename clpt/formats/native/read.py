@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from clpt import spectra
+from clpt import measured, spectra
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
 from clpt.formats import volumes
 from clpt.formats.missing import EVEN, GREY, Missing, grey_for
@@ -56,6 +56,7 @@ class _Reader:
         self.materials: dict[str, materials.Material | None] = {}
         self.media: dict[str, media.Medium] = {}
         self.volumes: dict[str, media.Volume] = {}
+        self.measurements: dict[str, measured.Measurement] = {}
         self.groups: dict[str, shapes.Group | None] = {}
         self.warnings: list[str] = []
 
@@ -133,6 +134,17 @@ class _Reader:
             with cursor.locating():
                 self.volumes[name] = volumes.read(path, grid)
         return self.volumes[name]
+
+    def measurement(self, cursor: Cursor) -> measured.Measurement | None:
+        """Read a measured material, once for each name; null is none."""
+        if cursor.value is None:
+            return None
+        name = cursor.expect(str, "the name of a file")
+        if name not in self.measurements:
+            path = find_file(cursor, name)
+            with cursor.locating():
+                self.measurements[name] = measured.read(path)
+        return self.measurements[name]
 
     def layer(self, cursor: Cursor) -> Any:
         """Read a thin film."""

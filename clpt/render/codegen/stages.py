@@ -116,8 +116,10 @@ def functions_text(cls: type[Scatterer], mode: str, features: Features | None = 
     own, layer = (features.sources_of(kind) if features else {} for kind in (cls.kind, "layer"))
     boundary = thin_films.boundary_text(cls, mode, own, layer)
     roles = {param.role for param in device_params(cls).values()}
-    if "angular" in roles:
-        boundary += '#include "optics/angular_table.cl"\n#include "optics/angular_load.cl"\n'
+    tables = {"angular": ("angular_table", "angular_load")}
+    tables["measurement"] = ("measurement", "measurement_load")
+    for role in tables.keys() & roles:
+        boundary += "".join(f'#include "optics/{name}.cl"\n' for name in tables[role])
     struct, declared = parameters.struct_text(cls, own), _declared_text(cls)
     return f'{boundary}{struct}{declared}#include "{cls.folder}/{cls.kind}.cl"\n'
 

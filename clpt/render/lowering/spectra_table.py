@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from clpt import spectra
 from clpt.errors import SceneError
-from clpt.render.contract.parameter_words import SPECTRUM_WORDS
+from clpt.measured import Measurement
+from clpt.render.contract.parameter_words import MEASUREMENT_WORDS, SPECTRUM_WORDS
 from clpt.render.lowering.camera.wavelengths import Density
-from clpt.render.lowering.materials import reradiation
+from clpt.render.lowering.materials import measurements, reradiation
 from clpt.render.lowering.tables import TableStore, Words, as_words
 from clpt.spectra import (
     RGB,
@@ -73,6 +74,7 @@ class SpectraTable:
         self._store = store
         self.mode, self.lambda_min, self.lambda_max = mode, lambda_min, lambda_max
         self._rows: dict[Any, int] = {}
+        self._measurements: dict[int, tuple[Words, Measurement | None]] = {}
         self._expected_light: NDArray[np.float64] | None = None
         if self.spectral:
             self._add_sensor(sensor or observer("cie1931"), density or Density(*self.range))
@@ -182,6 +184,20 @@ class SpectraTable:
         return np.concatenate([whole, as_words([start, 1.0 / step])]), (
             "rows" if len(rows) > 1 else "row"
         )
+
+    def measurement_words(self, value: Measurement | None) -> Words:
+        """Return the words of a measured material: where its numbers begin, and a spectrum that
+        says which of its colours a wavelength has; see kernels/optics/measurement_load.cl.
+        """
+        if id(value) not in self._measurements:
+            made = measurements.rows(value, self.range if self.spectral else None)
+            words = np.zeros(MEASUREMENT_WORDS, np.uint32)
+            words[0] = self._store.append_floats("distributions", made.values)
+            if self.spectral:
+                numbers = Tabulated(made.wavelengths, np.arange(len(made.wavelengths)), "hold")
+                words[1:] = self._table_words(numbers)
+            self._measurements[id(value)] = words, value
+        return self._measurements[id(value)][0]
 
     def expect_light(self, lights: Iterable[Spectrum]) -> None:
         """Note what light fluorescent materials will meet; see `reradiation.expected`."""

@@ -1,0 +1,74 @@
+"""Measured materials as kernels/optics/measurement.cl reads them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import measured
+from clpt.measured import Measurement
+from clpt.measured.fit import hemispherical
+from clpt.measured.warp import warp
+from clpt.spectra import cie
+from clpt.spectra.spectrum import d65, primaries
+
+Values = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Rows:
+    """The numbers of a measurement, and the wavelengths [nm] of its colours; of rgb none."""
+
+    values: Values
+    wavelengths: NDArray[np.float64]
+
+
+def rows(value: Measurement | None, film: tuple[float, float] | None) -> Rows:
+    """Return what stands in `distributions`; film: its range [nm], None in RGB mode."""
+    given = measured.grey() if value is None else value
+    shown = _in_rgb(given) if film is None else _in_range(given, *film)
+    counts = [len(shown.phi_i), len(shown.theta_i)]
+    for table in (shown.ndf, shown.sigma, shown.vndf, shown.luminance):
+        counts += table.shape[-2:]
+    head = [*counts, shown.spectra.shape[2], int(shown.jacobian) + 2 * shown.reduction]
+    parts = [
+        head, shown.phi_i, shown.theta_i, hemispherical(shown), shown.ndf, shown.sigma,
+        _warped(shown.vndf), _warped(shown.luminance), np.moveaxis(shown.spectra, 2, -1),
+    ]  # fmt: skip
+    flat = np.concatenate([np.asarray(part, np.float32).ravel() for part in parts])
+    return Rows(flat, np.asarray(shown.wavelengths, np.float64))
+
+
+def _warped(density: Values) -> Values:
+    """The slices of a warp: densities, sums along rows, sums over rows."""
+    made = warp(density)
+    flat = [part.reshape(*density.shape[:2], -1) for part in (made.values, made.across, made.down)]
+    return np.concatenate(flat, axis=-1).astype(np.float32)
+
+
+def _in_rgb(given: Measurement) -> Measurement:
+    """The measurement with red, green and blue, which its spectra have under D65."""
+    if not len(given.wavelengths):
+        return given
+    nodes = np.asarray(given.wavelengths, np.float64)
+    hats = np.stack([np.interp(cie.GRID, nodes, hat) for hat in np.eye(len(nodes))])
+    seen = cie.xyz_to_rgb(cie.spectrum_to_xyz(hats * d65().sample(cie.GRID)))
+    colours = np.maximum(np.einsum("ptnyx,nc->ptcyx", given.spectra, seen.astype(np.float32)), 0.0)
+    return replace(given, spectra=colours, wavelengths=np.zeros(0))
+
+
+def _in_range(given: Measurement, low: float, high: float) -> Measurement:
+    """The measurement at those of its wavelengths that a film needs; rgb as three reflectances."""
+    if not len(given.wavelengths):
+        basis = primaries()
+        nodes = np.array(basis[0].lambdas)
+        curves = np.stack([one.sample(nodes) for one in basis]).astype(np.float32)
+        made = np.einsum("ptcyx,cn->ptnyx", given.spectra, curves)
+        given = replace(given, spectra=made, wavelengths=nodes)
+    nodes = given.wavelengths
+    first = max(int(np.searchsorted(nodes, low, "right")) - 1, 0)
+    last = min(int(np.searchsorted(nodes, high, "left")), len(nodes) - 1)
+    kept = slice(min(first, last), last + 1)
+    return replace(given, spectra=given.spectra[:, :, kept], wavelengths=nodes[kept])
