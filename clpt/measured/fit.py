@@ -44,16 +44,16 @@ def fit(
     theta = np.radians(80.0) * np.linspace(0.0, 1.0, 8) if theta_i is None else theta_i
     thetas, phis = np.asarray(theta, np.float64), np.asarray(phi_i, np.float64)
     isotropic = len(phis) <= 2
-    grid = _grid(normals, normals)
-    m = _direction(*grid)
-    ndf, sigma = _facets(f, m, grid, normals, isotropic)
+    x, y = grid(normals, normals)
+    m = direction(x, y)
+    ndf, sigma = _facets(f, m, area(x), normals, isotropic)
     vndf = np.empty((len(phis), len(thetas), normals, normals))
     spectra = np.empty((len(phis), len(thetas), len(wavelengths) or 3, size, size))
     for i, phi in enumerate(phis):
         for j, theta in enumerate(thetas):
-            wo = _spherical(theta, phi)
+            wo = spherical(theta, phi)
             turned = _turned(m, phi) if isotropic else m
-            seen = ndf.ravel() * np.maximum(turned @ wo, 0.0) * _area(grid[0])
+            seen = ndf.ravel() * np.maximum(turned @ wo, 0.0) * area(x)
             vndf[i, j] = seen.reshape(normals, normals)
             spectra[i, j] = _over_square(f, wo, phi * isotropic, vndf[i, j], ndf, sigma, size)
     vndf = warp(vndf).values * (normals - 1) ** 2
@@ -74,13 +74,13 @@ def hemispherical(measurement: Measurement) -> Values:
     at = (np.arange(2 * count) + 0.5) / (2 * count)
     v, u = (axis.ravel() for axis in np.meshgrid(at, at, indexing="ij"))
     x, y, density = sample(warp(measurement.vndf[0, 0]), u, v)
-    wo = _spherical(measurement.theta_i[0], measurement.phi_i[0])
-    m = _turned(_direction(x, y), float(measurement.phi_i[0]) * measurement.isotropic)
+    wo = spherical(measurement.theta_i[0], measurement.phi_i[0])
+    m = _turned(direction(x, y), float(measurement.phi_i[0]) * measurement.isotropic)
     values = bilinear(measurement.spectra[0, 0], u, v)
     if measurement.jacobian:
         facets = bilinear(measurement.ndf, x, y) / 4.0
         values = values * facets / bilinear(measurement.sigma, *_square(wo[None]))
-    solid = np.maximum(_area(x), 1e-6) * 4.0 * np.maximum(m @ wo, 0.0)
+    solid = np.maximum(area(x), 1e-6) * 4.0 * np.maximum(m @ wo, 0.0)
     share = values * solid / np.maximum(density, 1e-30)
     return np.minimum(share.mean(axis=1), 1.0)
 
@@ -96,9 +96,9 @@ def _over_square(
     f: Reflection, wo: Values, turn: float, vndf: Values, ndf: Values, sigma: Values, size: int
 ) -> Values:
     """f cos(theta) over ndf / (4 sigma), (colours, size, size), at a grid of the warped square."""
-    u, v = _grid(size, size)
+    u, v = grid(size, size)
     x, y, _ = sample(warp(vndf), u, v)
-    m = _turned(_direction(x, y), turn)
+    m = _turned(direction(x, y), turn)
     wi = 2.0 * (m @ wo)[:, None] * m - wo
     good = (wi[:, 2] > 0.0) & (m @ wo > 0.0)
     values = np.where(good[:, None], f(np.broadcast_to(wo, wi.shape), wi), 0.0)
@@ -112,13 +112,16 @@ def _over_square(
 
 
 def _facets(
-    f: Reflection, m: Values, grid: tuple[Values, Values], n: int, isotropic: bool
+    f: Reflection, m: Values, solid: Values, n: int, isotropic: bool
 ) -> tuple[Values, Values]:
-    """The distribution of facets [1/sr] and its projected areas, (n, n) each, at directions m."""
-    weight = _area(grid[0]) / (n - 1) ** 2 * _ends(n)
+    """The distribution of facets [1/sr] and its projected areas, (n, n) each, at directions m.
+
+    solid: solid angle over area of the square there.
+    """
+    weight = solid / (n - 1) ** 2 * _ends(n)
     if isotropic:  # one row of directions; the integral goes over all of the square
         rows = slice(0, n)
-        at = _spherical(0.5 * np.pi * np.linspace(0.0, 1.0, n) ** 2, 0.0)
+        at = spherical(0.5 * np.pi * np.linspace(0.0, 1.0, n) ** 2, 0.0)
         fold = np.tile(np.eye(n), (n, 1))
     else:
         rows = slice(0, n * n)
@@ -142,7 +145,7 @@ def _facets(
     return ndf / flat, sigma / flat
 
 
-def _grid(rows: int, columns: int) -> tuple[Values, Values]:
+def grid(rows: int, columns: int) -> tuple[Values, Values]:
     """Corners (rows * columns,) of cells of the unit square: x, y."""
     y, x = np.meshgrid(np.linspace(0, 1, rows), np.linspace(0, 1, columns), indexing="ij")
     return x.ravel(), y.ravel()
@@ -154,14 +157,14 @@ def _ends(n: int) -> Values:
     return np.outer(edge, edge).ravel()
 
 
-def _area(x: Values) -> Values:
+def area(x: Values) -> Values:
     """Solid angle [sr] over area of the square, at its points of that x."""
     return 2.0 * np.pi**2 * x * np.sin(0.5 * np.pi * x * x)
 
 
-def _direction(x: Values, y: Values) -> Values:
+def direction(x: Values, y: Values) -> Values:
     """The direction (n, 3) at points of the square."""
-    return _spherical(0.5 * np.pi * x * x, (2.0 * y - 1.0) * np.pi)
+    return spherical(0.5 * np.pi * x * x, (2.0 * y - 1.0) * np.pi)
 
 
 def _square(w: Values) -> tuple[Values, Values]:
@@ -171,7 +174,7 @@ def _square(w: Values) -> tuple[Values, Values]:
     return np.sqrt(theta * 2.0 / np.pi), (phi + np.pi) / (2.0 * np.pi)
 
 
-def _spherical(theta: ArrayLike, phi: ArrayLike) -> Values:
+def spherical(theta: ArrayLike, phi: ArrayLike) -> Values:
     theta, phi = np.broadcast_arrays(np.asarray(theta, float), np.asarray(phi, float))
     sine = np.sin(theta)
     return np.stack([sine * np.cos(phi), sine * np.sin(phi), np.cos(theta)], axis=-1)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from clpt.errors import SceneError
-from clpt.measured import Measurement
+from clpt.measured import Measurement, MerlTable
 from clpt.scene.params import (
     ORDERS,
     Kind,
@@ -26,6 +26,7 @@ from clpt.scene.params import (
     index,
     layers,
     measurement,
+    merl,
     params,
     per_order,
     real,
@@ -569,6 +570,16 @@ class Measured(Material):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Merl(Material):
+    """A table of MERL (Matusik et al. 2003), from a file `.binary`; isotropic, front side.
+
+    By default a matt grey.
+    """
+
+    data: MerlTable | None = merl("its reflection, as `clpt.measured.read_merl` gives it")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Null(Material):
     """No surface at all: light passes as if it were not there."""
 
@@ -657,6 +668,7 @@ LEAVES = (
     Fluorescent,
     Hair,
     Measured,
+    Merl,
     Null,
 )
 COMPOSITES = (TwoSided, Mask, Blend, NormalMap, BumpMap)

@@ -18,6 +18,7 @@ from clpt.render.lowering.materials.thin_films import film_colours
 from clpt.render.lowering.spectra_table import angular_values
 from clpt.scene.materials import Layer, Material
 from clpt.scene.params import Param, device_params
+from clpt.spectra.spectrum import primaries
 
 COMPONENTS = {"rgb": 3, "spectral": 4}
 LAMBDAS = (532.0, 590.0, 655.0, 441.0)  # [nm], of kinds that ask for them, and of layers
@@ -100,6 +101,8 @@ class Probe:
             extra = self._angular_text(params, len(given))
         elif self._named("measurement"):
             extra = self._measurement_text(params, len(given))
+        elif self._named("merl"):
+            extra = self._merl_text(len(given))
         virtual: dict[str, str | device.Part] = {"probe.cl": self._text(*extra)}
         if self.cls.source is not None:
             virtual[f"{self.cls.folder}/{self.cls.kind}.cl"] = custom_materials.text(self.cls)
@@ -145,14 +148,29 @@ class Probe:
             f"    Measurement data = {made};\n    m.{name} = data;",
         ]
 
+    def _merl_text(self, rows: int) -> list[str]:
+        """What a MerlTable is, and setting m's, which stands in `in` after its rows."""
+        one = np.eye(3)
+        if self.mode == "spectral":
+            one = np.array([curve.sample(LAMBDAS) for curve in primaries()])
+        basis = [", ".join(f"(real)({value:.9e}f)" for value in curve) for curve in one]
+        made = f"{{in + {rows} * n, (integer)(0), {', '.join(f'{{{row}}}' for row in basis)}}}"
+        name = self._named("merl")
+        return [
+            '#include "optics/merl_table.cl"',
+            f"    MerlTable data = {made};\n    m.{name} = data;",
+        ]
+
     def _streamed(self) -> list[tuple[str, Param]]:
-        beside = ("layers", "angular", "measurement")
+        beside = ("layers", "angular", "measurement", "merl")
         return [(k, p) for k, p in device_params(self.cls).items() if p.role not in beside]
 
     def _table(self, params: Mapping[str, Any], layers: Sequence[Layer]) -> NDArray:
         """What stands in `in` after the streams: the layers, or in RGB mode their colours."""
         if self._named("measurement"):
             return self._measurement(params).values
+        if name := self._named("merl"):
+            return measurements.merl_values(params[name])
         if self._named("angular"):
             kind: Any = self.cls(**params)
             return angular_values(*kind.device_rows(self.mode == "spectral")[:2])

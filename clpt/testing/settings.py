@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from clpt.measured import Measurement, fit
+from clpt.measured import Measurement, MerlTable, fit
 from clpt.render.codegen.parameters import array_size, lane_type
 from clpt.scene.materials import Layer
 from clpt.scene.params import Kind, Param, device_params
@@ -114,6 +114,8 @@ def _draw(param: Param, mode: str, rng: np.random.Generator) -> Any:
         return rng.uniform(0.0, 1.0, COMPONENTS[mode])
     if param.role == "measurement":
         return _draw_measurement(rng)
+    if param.role == "merl":
+        return MerlTable(values=rng.uniform(0.05, 1.0, (6, 5, 8, 3)) / np.pi)
     if param.role == "orders":
         return rng.uniform(0.0, 1.0, array_size(param))
     if param.role == "flag":

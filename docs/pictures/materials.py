@@ -25,6 +25,7 @@ from clpt.scene.materials import (
     Mask,
     Material,
     Measured,
+    Merl,
     NormalMap,
     Null,
     Phong,
@@ -157,6 +158,22 @@ def pearl(wo: Any, wi: Any) -> Any:
     turn = 2.0 * np.pi * (2.2 * cosine[:, None] + np.array((0.0, 0.33, 0.67)))
     body = np.array((0.5, 0.45, 0.38)) / np.pi
     return body + facets(wo, wi, 0.3, 0.3) * (0.22 + 0.18 * np.cos(turn))
+
+
+def lacquer(wo: Any, wi: Any) -> Any:
+    """A red body under a clear coat."""
+    _, cosine = halfway(wo, wi)
+    fresnel = 0.04 + 0.96 * (1.0 - cosine[:, None]) ** 5
+    return np.array((0.5, 0.04, 0.02)) / np.pi + fresnel * facets(wo, wi, 0.06, 0.06)
+
+
+def chrome(wo: Any, wi: Any) -> Any:
+    return facets(wo, wi, 0.05, 0.05) * np.array((0.55, 0.56, 0.57))
+
+
+def velour(wo: Any, wi: Any) -> Any:
+    """The velvet in blue."""
+    return velvet(wo, wi)[:, ::-1]
 
 
 def measured_from(f: Callable[[Any, Any], Any]) -> Measured:
@@ -313,6 +330,10 @@ MATERIALS = {
     "measured": three(
         "Velvet, brushed bronze and pearl, each measured from a formula by `clpt.measured.fit`.",
         *map(measured_from, (velvet, bronze, pearl)),
+    ),
+    "merl": three(
+        "Lacquer, chrome and blue cloth, tables made from formulas by `clpt.measured.tabulate`.",
+        *(Merl(data=measured.tabulate(f, (90, 45, 60))) for f in (lacquer, chrome, velour)),
     ),
     "null": three(
         "Between two knobs stands one of `null`: no surface, no shadow.",

@@ -14,15 +14,9 @@ inline MeasuredView measured_view(Measurement data, vec3 wo)
     MeasuredView v;
     v.parts = measurement_parts(data);
     v.wo = measurement_folded(v.parts, wo, wo);
-    v.square = measurement_square(v.wo);
+    v.square = halfway_square(v.wo);
     v.viewers = measurement_viewers(v.parts, data.values, v.square);
     return v;
-}
-
-/* Solid angle of wi over area of the square of halfway directions, at x. */
-inline real measured_area(real x, real sin_m, real cos_om)
-{
-    return max_r(2.0f * PI * PI * x * sin_m, (real)(1e-6f)) * 4.0f * cos_om;
 }
 
 inline Spectrum measured_light(Measurement data, MeasuredView v, vec2 u, vec2 m)
@@ -35,7 +29,7 @@ inline Spectrum measured_light(Measurement data, MeasuredView v, vec2 u, vec2 m)
 /* The halfway direction's point of its square. */
 inline vec2 measured_halfway(MeasuredView v, vec3 m)
 {
-    vec2 p = measurement_square(m);
+    vec2 p = halfway_square(m);
     real turned = p.y - v.square.y + 0.5f;
     p.y = sel(v.parts.isotropic, turned - floor(turned), p.y);
     return p;
@@ -49,13 +43,10 @@ BsdfSample measured_sample(Measured m, vec3 wo, vec3 u)
     real luminance, visible;
     uv = warp_sample(v.parts.luminance, v.viewers, uv, &luminance);
     vec2 p = warp_sample(v.parts.vndf, v.viewers, uv, &visible);
-    real turn = p.y + 0.5f + sel(v.parts.isotropic, v.square.y - 0.5f, (real)(0.0f)), sin_p, cos_p, sin_t, cos_t;
-    sincos_2pi(turn - floor(turn), &sin_p, &cos_p);
-    sincos_2pi(0.25f * p.x * p.x, &sin_t, &cos_t);
-    vec3 h = v3(cos_p * sin_t, sin_p * sin_t, cos_t);
+    vec3 h = halfway_direction(p, sel(v.parts.isotropic, v.square.y - 0.5f, (real)(0.0f)));
     real cos_om = dot3(v.wo, h);
     vec3 wi = sub3(scale3(h, 2.0f * cos_om), v.wo);
-    s.pdf = luminance * visible / measured_area(p.x, sin_t, max_r(cos_om, (real)(1e-6f)));
+    s.pdf = luminance * visible / halfway_area(p.x, h, cos_om);
     mask seen = (wo.z > 0.0f) & (wi.z > 0.0f) & (cos_om > 0.0f) & (s.pdf > 0.0f);
     s.weight = spectrum_scale(measured_light(m.data, v, uv, p), 1.0f / max_r(s.pdf, (real)(1e-30f)));
     s.pdf = sel(seen, s.pdf, (real)(0.0f));
@@ -82,8 +73,8 @@ real measured_pdf(Measured m, vec3 wo, vec3 wi)
     real visible;
     vec2 u = warp_invert(v.parts.vndf, v.viewers, p, &visible);
     real luminance = warp_density(v.parts.luminance, v.viewers, u);
-    real sin_m = sqrt_r(h.x * h.x + h.y * h.y), cos_om = max_r(dot3(v.wo, h), (real)(1e-6f));
-    return sel((wo.z > 0.0f) & (wi.z > 0.0f), visible * luminance / measured_area(p.x, sin_m, cos_om), (real)(0.0f));
+    real solid = halfway_area(p.x, h, dot3(v.wo, h));
+    return sel((wo.z > 0.0f) & (wi.z > 0.0f), visible * luminance / solid, (real)(0.0f));
 }
 
 Spectrum measured_albedo(Measured m) { return measurement_share(m.data); }

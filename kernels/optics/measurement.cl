@@ -1,6 +1,7 @@
 /* What was measured of a material, in the coordinates of Dupuy and Jakob 2018 (clpt/measured/measurement.py). `values`
  * has from `first` on the numbers of MEASUREMENT_HEAD, phi_i, theta_i, the share that each colour reflects, ndf, sigma, the slices of vndf and of luminance,
  * and the spectra: of every viewer, row and column all colours (clpt/render/lowering/materials/measurements.py). */
+#include "optics/halfway_square.cl"
 #include "optics/warp_table.cl"
 #define MEASUREMENT_HEAD 12
 
@@ -68,14 +69,6 @@ inline vec3 measurement_folded(MeasurementParts p, vec3 wo, vec3 w)
     mask turns = (p.reduction >= 2) & (wo.y >= 0.0f);
     mask mirrors = sel_i(p.reduction == 4, (p.reduction == 4) & (wo.x >= 0.0f), turns);
     return v3(sel(mirrors, -w.x, w.x), sel(turns, -w.y, w.y), w.z);
-}
-
-/* The square's point of a direction: root of its angle to z, and its azimuth. */
-inline vec2 measurement_square(vec3 w)
-{
-    real theta = atan2_r(sqrt_r(w.x * w.x + w.y * w.y), w.z);
-    vec2 r = {sqrt_r(theta * (2.0f * INV_PI)), (atan2_r(w.y, w.x) + PI) * INV_2PI};
-    return r;
 }
 
 /* The viewers around wo. */

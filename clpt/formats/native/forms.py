@@ -39,6 +39,7 @@ class Reader(Protocol):
     def image(self, cursor: Cursor) -> Any: ...
     def volume(self, cursor: Cursor) -> Any: ...
     def measurement(self, cursor: Cursor) -> Any: ...
+    def merl(self, cursor: Cursor) -> Any: ...
 
 
 class Writer(Protocol):
@@ -52,6 +53,7 @@ class Writer(Protocol):
     def image(self, value: Any) -> Any: ...
     def volume(self, value: Any) -> Any: ...
     def measurement(self, value: Any) -> Any: ...
+    def merl(self, value: Any) -> Any: ...
 
 
 def plain(value: Any) -> Any:
@@ -350,6 +352,12 @@ FORMS: dict[str, Form] = {
         STRING,
         lambda cursor, reader: reader.measurement(cursor),
         lambda value, writer: writer.measurement(value),
+    ),
+    "merl": Form(
+        "name of a `.binary` file",
+        STRING,
+        lambda cursor, reader: reader.merl(cursor),
+        lambda value, writer: writer.merl(value),
     ),
     "cube_images": Form(
         "name of an image file, or a list of six",

@@ -56,7 +56,7 @@ class _Reader:
         self.materials: dict[str, materials.Material | None] = {}
         self.media: dict[str, media.Medium] = {}
         self.volumes: dict[str, media.Volume] = {}
-        self.measurements: dict[str, measured.Measurement] = {}
+        self.measurements: dict[str, Any] = {}
         self.groups: dict[str, shapes.Group | None] = {}
         self.warnings: list[str] = []
 
@@ -135,15 +135,22 @@ class _Reader:
                 self.volumes[name] = volumes.read(path, grid)
         return self.volumes[name]
 
-    def measurement(self, cursor: Cursor) -> measured.Measurement | None:
+    def measurement(self, cursor: Cursor) -> Any:
         """Read a measured material, once for each name; null is none."""
+        return self._measured(cursor, measured.read)
+
+    def merl(self, cursor: Cursor) -> Any:
+        """Read a table of MERL, once for each name; null is none."""
+        return self._measured(cursor, measured.read_merl)
+
+    def _measured(self, cursor: Cursor, read: Callable[[Path], Any]) -> Any:
         if cursor.value is None:
             return None
         name = cursor.expect(str, "the name of a file")
         if name not in self.measurements:
             path = find_file(cursor, name)
             with cursor.locating():
-                self.measurements[name] = measured.read(path)
+                self.measurements[name] = read(path)
         return self.measurements[name]
 
     def layer(self, cursor: Cursor) -> Any:

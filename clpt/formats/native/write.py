@@ -219,6 +219,14 @@ class _Writer:
             self.files[id(value)] = name
         return self.files[id(value)]
 
+    def merl(self, value: measured.MerlTable) -> str:
+        """Return the name of the file that a table of MERL is written to."""
+        if id(value) not in self.files:
+            name = self.file_name("merl", "binary")
+            measured.write_merl(self.path.parent / name, value)
+            self.files[id(value)] = name
+        return self.files[id(value)]
+
     def copy(self, path: Path) -> str:
         """Copy a file, once; return its name."""
         key = os.path.realpath(path)

@@ -108,6 +108,10 @@ def null_transmittance_text(features: Features) -> str:
     return "".join([*parts, f"#define null_transmittance null_transmittance_{features.mixtures}\n"])
 
 
+# of the roles whose values are tables: what kernels read of them
+TABLES = {"angular": "angular_table", "measurement": "measurement", "merl": "merl_table"}
+
+
 def functions_text(cls: type[Scatterer], mode: str, features: Features | None = None) -> str:
     """Return a kind's struct and functions, with what its boundary needs.
 
@@ -116,10 +120,10 @@ def functions_text(cls: type[Scatterer], mode: str, features: Features | None = 
     own, layer = (features.sources_of(kind) if features else {} for kind in (cls.kind, "layer"))
     boundary = thin_films.boundary_text(cls, mode, own, layer)
     roles = {param.role for param in device_params(cls).values()}
-    tables = {"angular": ("angular_table", "angular_load")}
-    tables["measurement"] = ("measurement", "measurement_load")
-    for role in tables.keys() & roles:
-        boundary += "".join(f'#include "optics/{name}.cl"\n' for name in tables[role])
+    for role, table in TABLES.items():
+        if role in roles:
+            boundary += f'#include "optics/{table}.cl"\n'
+            boundary += f'#include "optics/{role}_load.cl"\n' if features else ""
     struct, declared = parameters.struct_text(cls, own), _declared_text(cls)
     return f'{boundary}{struct}{declared}#include "{cls.folder}/{cls.kind}.cl"\n'
 

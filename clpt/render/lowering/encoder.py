@@ -160,6 +160,8 @@ class Encoder:
             return as_words(np.pad(value, beyond)), "constant"
         if role == "measurement":
             return self.spectra.measurement_words(value), "table"
+        if role == "merl":
+            return self.spectra.merl_words(value), "table"
         if role == "reradiation":
             return self.spectra.reradiation_words(value)
         return self.spectra.words(value, role)

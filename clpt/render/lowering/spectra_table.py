@@ -11,8 +11,12 @@ from numpy.typing import NDArray
 
 from clpt import spectra
 from clpt.errors import SceneError
-from clpt.measured import Measurement
-from clpt.render.contract.parameter_words import MEASUREMENT_WORDS, SPECTRUM_WORDS
+from clpt.measured import Measurement, MerlTable
+from clpt.render.contract.parameter_words import (
+    MEASUREMENT_WORDS,
+    MERL_WORDS,
+    SPECTRUM_WORDS,
+)
 from clpt.render.lowering.camera.wavelengths import Density
 from clpt.render.lowering.materials import measurements, reradiation
 from clpt.render.lowering.tables import TableStore, Words, as_words
@@ -26,7 +30,7 @@ from clpt.spectra import (
     Tabulated,
     observer,
 )
-from clpt.spectra.spectrum import Role, d65, extremes, gridded
+from clpt.spectra.spectrum import Role, d65, extremes, gridded, primaries
 
 STEP = 1.0  # [nm] at most, between the nodes of tabulated spectra
 FEWEST = 100  # cells between the nodes, however narrow the film's range is
@@ -74,7 +78,7 @@ class SpectraTable:
         self._store = store
         self.mode, self.lambda_min, self.lambda_max = mode, lambda_min, lambda_max
         self._rows: dict[Any, int] = {}
-        self._measurements: dict[int, tuple[Words, Measurement | None]] = {}
+        self._measurements: dict[tuple[str, int], tuple[Words, Any]] = {}
         self._expected_light: NDArray[np.float64] | None = None
         if self.spectral:
             self._add_sensor(sensor or observer("cie1931"), density or Density(*self.range))
@@ -189,15 +193,29 @@ class SpectraTable:
         """Return the words of a measured material: where its numbers begin, and a spectrum that
         says which of its colours a wavelength has; see kernels/optics/measurement_load.cl.
         """
-        if id(value) not in self._measurements:
+        key = "measurement", id(value)
+        if key not in self._measurements:
             made = measurements.rows(value, self.range if self.spectral else None)
             words = np.zeros(MEASUREMENT_WORDS, np.uint32)
             words[0] = self._store.append_floats("distributions", made.values)
             if self.spectral:
                 numbers = Tabulated(made.wavelengths, np.arange(len(made.wavelengths)), "hold")
                 words[1:] = self._table_words(numbers)
-            self._measurements[id(value)] = words, value
-        return self._measurements[id(value)][0]
+            self._measurements[key] = words, value
+        return self._measurements[key][0]
+
+    def merl_words(self, value: MerlTable | None) -> Words:
+        """Return the words of a table of MERL: where its numbers begin, and what red, green and
+        blue are in spectral mode; see kernels/optics/merl_load.cl.
+        """
+        key = "merl", id(value)
+        if key not in self._measurements:
+            words = np.zeros(MERL_WORDS, np.uint32)
+            words[0] = self._store.append_floats("distributions", measurements.merl_values(value))
+            if self.spectral:
+                words[1:] = [self.row(one) for one in primaries()]
+            self._measurements[key] = words, value
+        return self._measurements[key][0]
 
     def expect_light(self, lights: Iterable[Spectrum]) -> None:
         """Note what light fluorescent materials will meet; see `reradiation.expected`."""

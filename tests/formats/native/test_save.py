@@ -92,6 +92,7 @@ VALUES: dict[str, Any] = {
     "quantity": 0.4,
     "angular": (1.0, 3.0, 2.0),
     "measurement": measured.grey(),
+    "merl": measured.MerlTable(values=np.full((2, 2, 2, 3), 0.25)),
 }
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from clpt import measured
-from clpt.measured import Measurement
+from clpt.measured import Measurement, MerlTable, merl
 from clpt.measured.fit import hemispherical
 from clpt.measured.warp import warp
 from clpt.spectra import cie
@@ -41,10 +42,22 @@ def rows(value: Measurement | None, film: tuple[float, float] | None) -> Rows:
     return Rows(flat, np.asarray(shown.wavelengths, np.float64))
 
 
-def _warped(density: Values) -> Values:
+def merl_values(value: MerlTable | None) -> Values:
+    """Return what stands in `distributions` for a table of MERL, see kernels/optics/merl_table.cl.
+
+    None is a matt grey.
+    """
+    f = np.full((2, 2, 2, 3), 0.5 / np.pi) if value is None else merl.filled(value)
+    angles, density, share = merl.densities(f)
+    head = [len(angles), *density.shape[1:], *f.shape[:3], *share]
+    parts = [head, angles, _warped(density), f]
+    return np.concatenate([np.asarray(part, np.float32).ravel() for part in parts])
+
+
+def _warped(density: NDArray[Any]) -> Values:
     """The slices of a warp: densities, sums along rows, sums over rows."""
-    made = warp(density)
-    flat = [part.reshape(*density.shape[:2], -1) for part in (made.values, made.across, made.down)]
+    made, slices = warp(density), density.shape[:-2]
+    flat = [part.reshape(*slices, -1) for part in (made.values, made.across, made.down)]
     return np.concatenate(flat, axis=-1).astype(np.float32)
 
 
