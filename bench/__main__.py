@@ -39,6 +39,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "devices": (),
     "checkpoints": (),
     "layers": (),
+    "measured": (),
     "viewing": (),
     "sizes": ("--plot", str(report.RESULTS / "sizes.png")),
 }

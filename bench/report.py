@@ -254,6 +254,7 @@ TABLES: dict[str, Callable[[Sequence[Row]], str]] = {
     "devices": plain,
     "denoising": plain,
     "layers": plain,
+    "measured": plain,
     "startup": startup,
     "viewing": plain,
     "compiling": plain,

@@ -141,7 +141,7 @@ class Probe:
         nodes = self._measurement(params).wavelengths
         at = np.interp(LAMBDAS, nodes, np.arange(len(nodes))) if len(nodes) else np.arange(3.0)
         row = ", ".join(f"(real)({one:.9e}f)" for one in at)
-        made = f"{{in + {rows} * n, (integer)(0), {{{row}}}}}"
+        made = f"{{in + {rows} * n, (integer)(1), {{{row}}}}}"
         name = self._named("measurement")
         return [
             '#include "optics/measurement.cl"',
@@ -154,7 +154,7 @@ class Probe:
         if self.mode == "spectral":
             one = np.array([curve.sample(LAMBDAS) for curve in primaries()])
         basis = [", ".join(f"(real)({value:.9e}f)" for value in curve) for curve in one]
-        made = f"{{in + {rows} * n, (integer)(0), {', '.join(f'{{{row}}}' for row in basis)}}}"
+        made = f"{{in + {rows} * n, (integer)(1), {', '.join(f'{{{row}}}' for row in basis)}}}"
         name = self._named("merl")
         return [
             '#include "optics/merl_table.cl"',
@@ -168,9 +168,9 @@ class Probe:
     def _table(self, params: Mapping[str, Any], layers: Sequence[Layer]) -> NDArray:
         """What stands in `in` after the streams: the layers, or in RGB mode their colours."""
         if self._named("measurement"):
-            return self._measurement(params).values
+            return np.append(0.0, self._measurement(params).values)
         if name := self._named("merl"):
-            return measurements.merl_values(params[name])
+            return np.append(0.0, measurements.merl_values(params[name]))
         if self._named("angular"):
             kind: Any = self.cls(**params)
             return angular_values(*kind.device_rows(self.mode == "spectral")[:2])

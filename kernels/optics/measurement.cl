@@ -7,7 +7,7 @@
 
 typedef struct {
     global const float *values;
-    integer first;
+    integer first; /* above 0 */
     Spectrum row; /* which of the colours each wavelength has, with a fraction */
 } Measurement;
 
@@ -22,7 +22,7 @@ typedef struct {
     integer reduction;            /* of how many equal parts of the azimuths one is stored */
 } MeasurementParts;
 
-inline integer measurement_number(Measurement t, int i) { return to_integer(gather(t.values, t.first + i)); }
+inline integer measurement_number(Measurement t, int i) { return warp_count(t.values, t.first, i); }
 
 inline WarpTable measurement_table(Measurement t, integer first, int i)
 {

@@ -7,7 +7,7 @@
 
 typedef struct {
     global const float *values;
-    integer first;
+    integer first;             /* above 0 */
     Spectrum red, green, blue; /* what each of these is */
 } MerlTable;
 
@@ -18,7 +18,7 @@ typedef struct {
     integer f;                            /* where it begins */
 } MerlParts;
 
-inline integer merl_number(MerlTable t, int i) { return to_integer(gather(t.values, t.first + i)); }
+inline integer merl_number(MerlTable t, int i) { return warp_count(t.values, t.first, i); }
 
 inline MerlParts merl_parts(MerlTable t)
 {
@@ -80,7 +80,8 @@ inline vec3 merl_f(MerlTable t, MerlParts p, vec3 h, vec3 wo, vec3 wi)
     integer j = merl_step(difference * (2.0f * INV_PI), p.difference, &j_along);
     real k_along = x - floor(x);
     integer k = to_integer(floor(x)), near = sel_i(k < 0, p.azimuth - 1, k);
-    integer far = sel_i(k + 1 >= p.azimuth, (integer)(0), k + 1), width = p.azimuth * 3;
+    near = clamp_i(near, p.azimuth - 1);
+    integer far = sel_i(near + 1 >= p.azimuth, (integer)(0), near + 1), width = p.azimuth * 3;
     integer at = p.f + (i * p.difference + j) * width, below = at + p.difference * width;
 #define BETWEEN(row) merl_mixed(merl_read(t, (row) + 3 * near), merl_read(t, (row) + 3 * far), k_along)
     vec3 a = merl_mixed(BETWEEN(at), BETWEEN(at + width), j_along);

@@ -14,6 +14,12 @@ typedef struct {
     mask wide;
 } WarpSlices;
 
+/* A count at the head of a table; where that begins at 0, as in idle lanes, the least, so that what they read exists. */
+inline integer warp_count(global const float *values, integer first, int i)
+{
+    return sel_i(first > 0, to_integer(gather(values, first + i)), (integer)(2));
+}
+
 /* A number of every slice, which are `stride` apart. */
 inline real warp_read(global const float *values, WarpSlices s, integer at, integer stride)
 {

@@ -197,12 +197,18 @@ class SpectraTable:
         if key not in self._measurements:
             made = measurements.rows(value, self.range if self.spectral else None)
             words = np.zeros(MEASUREMENT_WORDS, np.uint32)
-            words[0] = self._store.append_floats("distributions", made.values)
+            words[0] = self._append_table(made.values)
             if self.spectral:
                 numbers = Tabulated(made.wavelengths, np.arange(len(made.wavelengths)), "hold")
                 words[1:] = self._table_words(numbers)
             self._measurements[key] = words, value
         return self._measurements[key][0]
+
+    def _append_table(self, values: NDArray[Any]) -> int:
+        """Append to `distributions`, not as its first: 0 is where idle lanes look."""
+        if not self._store.size("distributions"):
+            self._store.append_floats("distributions", [0.0])
+        return self._store.append_floats("distributions", values)
 
     def merl_words(self, value: MerlTable | None) -> Words:
         """Return the words of a table of MERL: where its numbers begin, and what red, green and
@@ -211,7 +217,7 @@ class SpectraTable:
         key = "merl", id(value)
         if key not in self._measurements:
             words = np.zeros(MERL_WORDS, np.uint32)
-            words[0] = self._store.append_floats("distributions", measurements.merl_values(value))
+            words[0] = self._append_table(measurements.merl_values(value))
             if self.spectral:
                 words[1:] = [self.row(one) for one in primaries()]
             self._measurements[key] = words, value
