@@ -1,10 +1,10 @@
 """What measured materials cost: a picture of one beside that of the metal that it was measured of.
 
 Both are rough metals of the same roughness, on a ball that fills the picture, in even light and by
-a lamp. The measurement is as large as those of Dupuy and Jakob's laboratory: 8 viewers (and 16
-azimuths of each where it is anisotropic), 195 wavelengths, 32 x 32 directions; a table of MERL has 90 x
-90 x 180. Two renderers in one process take the same samples in turns; the share is the median over
-rounds of pairs.
+a lamp. The measurement is as large as those of Dupuy and Jakob's laboratory: 8 viewers, 195
+wavelengths, 32 x 32 directions; where it is anisotropic, 16 azimuths of each viewer, and 24
+wavelengths. A table of MERL has 90 x 90 x 180. Two renderers in one process take the same samples
+in turns; the share is the median over rounds of pairs.
 """
 
 from __future__ import annotations

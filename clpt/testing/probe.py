@@ -170,7 +170,7 @@ class Probe:
         if self._named("measurement"):
             return np.append(0.0, self._measurement(params).values)
         if name := self._named("merl"):
-            return np.append(0.0, measurements.merl_values(params[name]))
+            return np.append(0.0, measurements.merl_rows(params[name]).values)
         if self._named("angular"):
             kind: Any = self.cls(**params)
             return angular_values(*kind.device_rows(self.mode == "spectral")[:2])

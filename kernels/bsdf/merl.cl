@@ -13,7 +13,7 @@ inline MerlView merl_view(MerlTable t, vec3 wo)
 {
     MerlView v;
     v.parts = merl_parts(t);
-    v.viewers = merl_viewers(t, v.parts, atan2_r(sqrt_r(wo.x * wo.x + wo.y * wo.y), wo.z));
+    v.viewers = merl_viewers(v.parts, atan2_r(sqrt_r(wo.x * wo.x + wo.y * wo.y), wo.z));
     v.turned = atan2_r(wo.y, wo.x) * INV_2PI;
     return v;
 }

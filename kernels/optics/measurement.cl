@@ -1,9 +1,13 @@
 /* What was measured of a material, in the coordinates of Dupuy and Jakob 2018 (clpt/measured/measurement.py). `values`
- * has from `first` on the numbers of MEASUREMENT_HEAD, phi_i, theta_i, the share that each colour reflects, ndf, sigma, the slices of vndf and of luminance,
- * and the spectra: of every viewer, row and column all colours (clpt/render/lowering/materials/measurements.py). */
+ * has from `first` on the numbers of MEASUREMENT_HEAD, phi_i and theta_i as `warp_node` reads them, the share that each colour reflects, ndf, sigma, the slices of vndf and of luminance,
+ * and the spectra: of every viewer, row and
+ * column all pairs of neighbouring colours, as two halves in a word (clpt/render/lowering/materials/measurements.py). */
 #include "optics/halfway_square.cl"
 #include "optics/warp_table.cl"
-#define MEASUREMENT_HEAD 12
+#define MEASUREMENT_HEAD 15
+#ifndef MEASUREMENT_COUNT /* where all measurements of a scene have the same, these are constants */
+#define MEASUREMENT_COUNT(t, i) warp_count((t).values, (t).first, i)
+#endif
 
 typedef struct {
     global const float *values;
@@ -14,7 +18,7 @@ typedef struct {
 /* Where its parts begin. */
 typedef struct {
     integer phis, thetas;         /* how many viewers, and where their angles stand */
-    integer phi_i, theta_i, albedo;
+    integer phi_i, theta_i, phi_cells, theta_cells, albedo;
     WarpTable ndf, sigma;         /* of which there are densities alone */
     WarpTable vndf, luminance;
     integer spectra, colours;
@@ -22,30 +26,30 @@ typedef struct {
     integer reduction;            /* of how many equal parts of the azimuths one is stored */
 } MeasurementParts;
 
-inline integer measurement_number(Measurement t, int i) { return warp_count(t.values, t.first, i); }
-
-inline WarpTable measurement_table(Measurement t, integer first, int i)
+inline WarpTable measurement_table(Measurement t, integer first, integer rows, integer columns)
 {
-    WarpTable r = {t.values, first, measurement_number(t, i), measurement_number(t, i + 1)};
+    WarpTable r = {t.values, first, rows, columns};
     return r;
 }
 
 inline MeasurementParts measurement_parts(Measurement t)
 {
     MeasurementParts p;
-    p.phis = measurement_number(t, 0);
-    p.thetas = measurement_number(t, 1);
+    p.phis = MEASUREMENT_COUNT(t, 0);
+    p.thetas = MEASUREMENT_COUNT(t, 1);
     p.phi_i = t.first + MEASUREMENT_HEAD;
-    p.theta_i = p.phi_i + p.phis;
-    p.albedo = p.theta_i + p.thetas;
-    p.colours = measurement_number(t, 10);
-    p.ndf = measurement_table(t, p.albedo + p.colours, 2);
-    p.sigma = measurement_table(t, p.ndf.first + p.ndf.rows * p.ndf.columns, 4);
-    p.vndf = measurement_table(t, p.sigma.first + p.sigma.rows * p.sigma.columns, 6);
+    p.phi_cells = MEASUREMENT_COUNT(t, 12);
+    p.theta_cells = MEASUREMENT_COUNT(t, 13);
+    p.theta_i = p.phi_i + p.phi_cells + p.phis;
+    p.albedo = p.theta_i + p.theta_cells + p.thetas;
+    p.colours = MEASUREMENT_COUNT(t, 10);
+    p.ndf = measurement_table(t, p.albedo + p.colours, MEASUREMENT_COUNT(t, 2), MEASUREMENT_COUNT(t, 3));
+    p.sigma = measurement_table(t, p.ndf.first + p.ndf.rows * p.ndf.columns, MEASUREMENT_COUNT(t, 4), MEASUREMENT_COUNT(t, 5));
+    p.vndf = measurement_table(t, p.sigma.first + p.sigma.rows * p.sigma.columns, MEASUREMENT_COUNT(t, 6), MEASUREMENT_COUNT(t, 7));
     integer viewers = p.phis * p.thetas;
-    p.luminance = measurement_table(t, p.vndf.first + viewers * warp_stride(p.vndf), 8);
+    p.luminance = measurement_table(t, p.vndf.first + viewers * warp_stride(p.vndf), MEASUREMENT_COUNT(t, 8), MEASUREMENT_COUNT(t, 9));
     p.spectra = p.luminance.first + viewers * warp_stride(p.luminance);
-    integer flags = measurement_number(t, 11);
+    integer flags = MEASUREMENT_COUNT(t, 11);
     p.over_density = (flags & 1) != 0;
     p.reduction = flags >> 1;
     p.isotropic = p.phis <= 2;
@@ -76,9 +80,9 @@ inline WarpSlices measurement_viewers(MeasurementParts p, global const float *va
 {
     WarpSlices s;
     real t, f = 0.0f;
-    integer theta = warp_node(values, p.theta_i, p.thetas, 0.5f * PI * wo.x * wo.x, &t), phi = 0;
+    integer theta = warp_node(values, p.theta_i, p.theta_cells, p.thetas, 0.5f * PI * wo.x * wo.x, &t), phi = 0;
     s.wide = p.phis > 1;
-    if (any(s.wide)) phi = warp_node(values, p.phi_i, p.phis, (2.0f * wo.y - 1.0f) * PI, &f);
+    if (any(s.wide)) phi = warp_node(values, p.phi_i, p.phi_cells, p.phis, (2.0f * wo.y - 1.0f) * PI, &f);
     integer next = min_i(theta + 1, p.thetas - 1), near = phi * p.thetas, far = min_i(phi + 1, p.phis - 1) * p.thetas;
     s.index[0] = near + theta;
     s.index[1] = near + next;
@@ -91,34 +95,62 @@ inline WarpSlices measurement_viewers(MeasurementParts p, global const float *va
     return s;
 }
 
+/* A pair of halves, which are not negative, times 2^-112. */
+inline vec2 measurement_halves(real word)
+{
+    natural bits = as_natural(word);
+    vec2 r = {as_real((bits & 0x7fffu) << 13), as_real((bits >> 16 & 0x7fffu) << 13)};
+    return r;
+}
+inline vec2 measurement_mixed(vec2 a, vec2 b, real along)
+{
+    vec2 r = {a.x + along * (b.x - a.x), a.y + along * (b.y - a.y)};
+    return r;
+}
+
+/* Two neighbouring colours of a node, of all slices. */
+inline vec2 measurement_pair(global const float *values, WarpSlices s, integer at, integer stride)
+{
+    vec2 sum = {(real)(0.0f), (real)(0.0f)};
+    int slices = any(s.wide) ? 4 : 2;
+    for (int i = 0; i < slices; i++) {
+        vec2 one = measurement_halves(gather(values, at + s.index[i] * stride));
+        sum.x += s.share[i] * 0x1p112f * one.x;
+        sum.y += s.share[i] * 0x1p112f * one.y;
+    }
+    return sum;
+}
+
 /* The spectra at a point of the second square. */
 inline Spectrum measurement_spectrum(Measurement t, MeasurementParts p, WarpSlices s, vec2 u)
 {
-    real x, y;
+    real x, y, scale = gather(t.values, t.first + 14);
     integer column = warp_cell(u.x, p.luminance.columns, &x), row = warp_cell(u.y, p.luminance.rows, &y);
-    integer width = p.luminance.columns * p.colours, stride = p.luminance.rows * width;
-    integer first = p.spectra + row * width + column * p.colours;
+    integer pairs = max_i(p.colours - 1, (integer)(1)), width = p.luminance.columns * pairs;
+    integer stride = p.luminance.rows * width, first = p.spectra + row * width + column * pairs;
+#define NODE(at) measurement_pair(t.values, s, at, stride)
+#define PAIR(at)                                                                                   \
+    measurement_mixed(measurement_mixed(NODE(at), NODE((at) + pairs), x),                          \
+                      measurement_mixed(NODE((at) + width), NODE((at) + width + pairs), x), y)
     Spectrum r;
-#define NODE(at)                                                                               \
-    warp_between(v4(warp_read(t.values, s, at, stride), warp_read(t.values, s, at + p.colours, stride), \
-                    warp_read(t.values, s, at + width, stride),                                \
-                    warp_read(t.values, s, at + width + p.colours, stride)), x, y)
-#define C(c)                                                                                   \
-    {                                                                                          \
-        integer colour = min_i(to_integer(t.row.c), max_i(p.colours - 2, (integer)(0)));       \
-        real along = t.row.c - to_real(colour);                                                \
-        integer at = first + colour;                                                           \
-        r.c = NODE(at);                                                                        \
-        if (any(along > 0.0f)) {                                                               \
-            integer beside = at + min_i(p.colours - 1 - colour, (integer)(1));                 \
-            real next = NODE(beside);                                                          \
-            r.c += along * (next - r.c);                                                       \
-        }                                                                                      \
+#if SPECTRUM_SIZE == 4
+#define C(c)                                                              \
+    {                                                                     \
+        integer colour = clamp_i(to_integer(t.row.c), pairs - 1);         \
+        vec2 both = PAIR(first + colour);                                 \
+        r.c = both.x + (t.row.c - to_real(colour)) * (both.y - both.x);   \
     }
     SPECTRUM_EACH(C)
 #undef C
+#else
+    vec2 near = PAIR(first), far = PAIR(first + 1);
+    r.x = near.x;
+    r.y = near.y;
+    r.z = far.y;
+#endif
+#undef PAIR
 #undef NODE
-    return r;
+    return spectrum_scale(r, scale);
 }
 
 /* The share of light that is reflected to the first viewer. */

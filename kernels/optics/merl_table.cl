@@ -1,9 +1,12 @@
 /* Isotropic reflection over the halfway and the difference angles (Rusinkiewicz 1998), as MERL measured it. `values` has
- * from `first` on the numbers of MERL_HEAD, the angles of viewers [rad], the slices of a warp for each of them, and
+ * from `first` on the numbers of MERL_HEAD, the slices of a warp for viewers at even angles to the normal, and
  * f [1/sr]: of every halfway angle, difference angle and azimuth its red, green and blue (clpt/measured/merl.py). */
 #include "optics/halfway_square.cl"
 #include "optics/warp_table.cl"
-#define MERL_HEAD 9
+#define MERL_HEAD 10
+#ifndef MERL_COUNT /* where all tables of a scene have the same, these are constants */
+#define MERL_COUNT(t, i) warp_count((t).values, (t).first, i)
+#endif
 
 typedef struct {
     global const float *values;
@@ -13,35 +16,35 @@ typedef struct {
 
 typedef struct {
     WarpTable warp;
-    integer viewers, angles;              /* how many, and where their angles stand */
+    integer viewers;
+    real per_angle; /* of these [1/rad] */
     integer halfway, difference, azimuth; /* steps */
     integer f;                            /* where it begins */
 } MerlParts;
 
-inline integer merl_number(MerlTable t, int i) { return warp_count(t.values, t.first, i); }
-
 inline MerlParts merl_parts(MerlTable t)
 {
     MerlParts p;
-    p.viewers = merl_number(t, 0);
-    p.angles = t.first + MERL_HEAD;
+    p.viewers = MERL_COUNT(t, 0);
+    p.per_angle = gather(t.values, t.first + 9);
     p.warp.values = t.values;
-    p.warp.first = p.angles + p.viewers;
-    p.warp.rows = merl_number(t, 1);
-    p.warp.columns = merl_number(t, 2);
-    p.halfway = merl_number(t, 3);
-    p.difference = merl_number(t, 4);
-    p.azimuth = merl_number(t, 5);
+    p.warp.first = t.first + MERL_HEAD;
+    p.warp.rows = MERL_COUNT(t, 1);
+    p.warp.columns = MERL_COUNT(t, 2);
+    p.halfway = MERL_COUNT(t, 3);
+    p.difference = MERL_COUNT(t, 4);
+    p.azimuth = MERL_COUNT(t, 5);
     p.f = p.warp.first + p.viewers * warp_stride(p.warp);
     return p;
 }
 
 /* The viewers around an angle to the normal. */
-inline WarpSlices merl_viewers(MerlTable t, MerlParts p, real theta)
+inline WarpSlices merl_viewers(MerlParts p, real theta)
 {
     WarpSlices s;
-    real along;
-    s.index[0] = warp_node(t.values, p.angles, p.viewers, theta, &along);
+    real at = clamp_r(theta * p.per_angle, (real)(0.0f), to_real(p.viewers - 1));
+    s.index[0] = min_i(to_integer(at), p.viewers - 2);
+    real along = at - to_real(s.index[0]);
     s.index[1] = min_i(s.index[0] + 1, p.viewers - 1);
     s.index[2] = s.index[3] = (integer)(0);
     s.share[0] = 1.0f - along;

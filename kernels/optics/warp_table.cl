@@ -32,19 +32,20 @@ inline real warp_read(global const float *values, WarpSlices s, integer at, inte
     return r;
 }
 
-/* The last of n - 1 numbers that ascend from `first` on which is not above x, and how far x is to the next, [0, 1]. */
-inline integer warp_node(global const float *values, integer first, integer n, real x, real *along)
+/* The last of n - 1 numbers that ascend from `first` + `cells` on which is not above x, and how far x is to the next,
+ * [0, 1]. Before them stands, for even cells between the first and the last, at which number a cell begins; there is no
+ * more than one in a cell. No loop: so compilers see that functions of one pair of directions have it in common. */
+inline integer warp_node(global const float *values, integer first, integer cells, integer n, real x, real *along)
 {
-    integer low = 0, high = max_i(n - 2, (integer)(0)), last = n - 1;
-    while (any(low < high)) {
-        integer middle = (low + high + 1) >> 1;
-        mask above = gather(values, first + middle) > x, open = low < high;
-        low = sel_i(open & !above, middle, low);
-        high = sel_i(open & above, middle - 1, high);
-    }
-    real a = gather(values, first + low), b = gather(values, first + min_i(low + 1, last));
+    integer nodes = first + cells, most = max_i(n - 2, (integer)(0));
+    real low = gather(values, nodes), high = gather(values, nodes + n - 1);
+    real share = clamp_r((x - low) / max_r(high - low, (real)(1e-20f)), (real)(0.0f), (real)(1.0f));
+    integer cell = min_i(to_integer(share * to_real(cells)), cells - 1);
+    integer i = clamp_i(to_integer(gather(values, first + cell)), most);
+    i = sel_i((i < most) & (gather(values, nodes + i + 1) <= x), i + 1, i);
+    real a = gather(values, nodes + i), b = gather(values, nodes + min_i(i + 1, n - 1));
     *along = clamp_r((x - a) / max_r(b - a, (real)(1e-20f)), (real)(0.0f), (real)(1.0f));
-    return low;
+    return i;
 }
 
 inline integer warp_stride(WarpTable t) { return t.rows * (2 * t.columns + 1); }

@@ -159,9 +159,9 @@ class Encoder:
             beyond = (ORDERS_WORDS - len(value)) // 2
             return as_words(np.pad(value, beyond)), "constant"
         if role == "measurement":
-            return self.spectra.measurement_words(value), "table"
+            return self.spectra.measurement_words(value)
         if role == "merl":
-            return self.spectra.merl_words(value), "table"
+            return self.spectra.merl_words(value)
         if role == "reradiation":
             return self.spectra.reradiation_words(value)
         return self.spectra.words(value, role)

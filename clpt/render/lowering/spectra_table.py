@@ -78,7 +78,7 @@ class SpectraTable:
         self._store = store
         self.mode, self.lambda_min, self.lambda_max = mode, lambda_min, lambda_max
         self._rows: dict[Any, int] = {}
-        self._measurements: dict[tuple[str, int], tuple[Words, Any]] = {}
+        self._measurements: dict[tuple[str, int], tuple[Words, str, Any]] = {}
         self._expected_light: NDArray[np.float64] | None = None
         if self.spectral:
             self._add_sensor(sensor or observer("cie1931"), density or Density(*self.range))
@@ -189,9 +189,10 @@ class SpectraTable:
             "rows" if len(rows) > 1 else "row"
         )
 
-    def measurement_words(self, value: Measurement | None) -> Words:
-        """Return the words of a measured material: where its numbers begin, and a spectrum that
-        says which of its colours a wavelength has; see kernels/optics/measurement_load.cl.
+    def measurement_words(self, value: Measurement | None) -> tuple[Words, str]:
+        """Return the words of a measured material and its source: where its numbers begin, and a
+        spectrum that says which of its colours a wavelength has; kernels/optics/measurement_load.cl
+        reads them.
         """
         key = "measurement", id(value)
         if key not in self._measurements:
@@ -201,8 +202,8 @@ class SpectraTable:
             if self.spectral:
                 numbers = Tabulated(made.wavelengths, np.arange(len(made.wavelengths)), "hold")
                 words[1:] = self._table_words(numbers)
-            self._measurements[key] = words, value
-        return self._measurements[key][0]
+            self._measurements[key] = words, made.source, value
+        return self._measurements[key][:2]
 
     def _append_table(self, values: NDArray[Any]) -> int:
         """Append to `distributions`, not as its first: 0 is where idle lanes look."""
@@ -210,18 +211,19 @@ class SpectraTable:
             self._store.append_floats("distributions", [0.0])
         return self._store.append_floats("distributions", values)
 
-    def merl_words(self, value: MerlTable | None) -> Words:
-        """Return the words of a table of MERL: where its numbers begin, and what red, green and
-        blue are in spectral mode; see kernels/optics/merl_load.cl.
+    def merl_words(self, value: MerlTable | None) -> tuple[Words, str]:
+        """Return the words of a table of MERL and its source: where its numbers begin, and what
+        red, green and blue are in spectral mode; see kernels/optics/merl_load.cl.
         """
         key = "merl", id(value)
         if key not in self._measurements:
+            made = measurements.merl_rows(value)
             words = np.zeros(MERL_WORDS, np.uint32)
-            words[0] = self._append_table(measurements.merl_values(value))
+            words[0] = self._append_table(made.values)
             if self.spectral:
                 words[1:] = [self.row(one) for one in primaries()]
-            self._measurements[key] = words, value
-        return self._measurements[key][0]
+            self._measurements[key] = words, made.source, value
+        return self._measurements[key][:2]
 
     def expect_light(self, lights: Iterable[Spectrum]) -> None:
         """Note what light fluorescent materials will meet; see `reradiation.expected`."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -16,14 +16,24 @@ from clpt.spectra import cie
 from clpt.spectra.spectrum import d65, primaries
 
 Values = NDArray[np.float32]
+LARGEST = 4096.0  # of the halves that stand for spectra
 
 
 @dataclass(frozen=True)
 class Rows:
-    """The numbers of a measurement, and the wavelengths [nm] of its colours; of rgb none."""
+    """The numbers of a measurement.
+
+    counts: those at their head; wavelengths: [nm] of its colours, of rgb none.
+    """
 
     values: Values
-    wavelengths: NDArray[np.float64]
+    counts: tuple[int, ...]
+    wavelengths: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def source(self) -> str:
+        """Where it comes from, by which kernels are made for its counts."""
+        return "table " + " ".join(map(str, self.counts))
 
 
 def rows(value: Measurement | None, film: tuple[float, float] | None) -> Rows:
@@ -33,25 +43,53 @@ def rows(value: Measurement | None, film: tuple[float, float] | None) -> Rows:
     counts = [len(shown.phi_i), len(shown.theta_i)]
     for table in (shown.ndf, shown.sigma, shown.vndf, shown.luminance):
         counts += table.shape[-2:]
-    head = [*counts, shown.spectra.shape[2], int(shown.jacobian) + 2 * shown.reduction]
+    angles = [_guided(nodes) for nodes in (shown.phi_i, shown.theta_i)]
+    counts += [shown.spectra.shape[2], int(shown.jacobian) + 2 * shown.reduction]
+    counts += [
+        len(one) - len(nodes)
+        for one, nodes in zip(angles, (shown.phi_i, shown.theta_i), strict=True)
+    ]
+    scale = max(float(shown.spectra.max()), 1e-30) / LARGEST
     parts = [
-        head, shown.phi_i, shown.theta_i, hemispherical(shown), shown.ndf, shown.sigma,
-        _warped(shown.vndf), _warped(shown.luminance), np.moveaxis(shown.spectra, 2, -1),
+        [*counts, scale], *angles, hemispherical(shown), shown.ndf, shown.sigma,
+        _warped(shown.vndf), _warped(shown.luminance), _halves(shown.spectra / scale),
     ]  # fmt: skip
-    flat = np.concatenate([np.asarray(part, np.float32).ravel() for part in parts])
-    return Rows(flat, np.asarray(shown.wavelengths, np.float64))
+    return Rows(_joined(*parts), tuple(counts), np.asarray(shown.wavelengths, np.float64))
 
 
-def merl_values(value: MerlTable | None) -> Values:
+def _joined(*parts: Any) -> Values:
+    return np.concatenate([np.asarray(part, np.float32).ravel() for part in parts])
+
+
+def _guided(nodes: Values) -> Values:
+    """Angles as `warp_node` of kernels/optics/warp_table.cl reads them."""
+    if len(nodes) == 1:
+        return np.array([0.0, nodes[0]], np.float32)
+    whole = float(nodes[-1] - nodes[0])
+    cells = int(np.ceil(whole / float(np.diff(nodes).min()) * 1.01)) + 1
+    begins = nodes[0] + whole * np.arange(cells) / cells
+    first = np.clip(np.searchsorted(nodes, begins, "right") - 1, 0, len(nodes) - 2)
+    return np.concatenate([first, nodes]).astype(np.float32)
+
+
+def _halves(spectra: NDArray[Any]) -> Values:
+    """Pairs of neighbouring colours of each node, two halves in a word."""
+    last = np.moveaxis(spectra, 2, -1).astype("<f2")
+    if last.shape[-1] == 1:
+        last = np.repeat(last, 2, axis=-1)
+    return np.ascontiguousarray(np.stack([last[..., :-1], last[..., 1:]], -1)).view(np.float32)
+
+
+def merl_rows(value: MerlTable | None) -> Rows:
     """Return what stands in `distributions` for a table of MERL, see kernels/optics/merl_table.cl.
 
     None is a matt grey.
     """
     f = np.full((2, 2, 2, 3), 0.5 / np.pi) if value is None else merl.filled(value)
     angles, density, share = merl.densities(f)
-    head = [len(angles), *density.shape[1:], *f.shape[:3], *share]
-    parts = [head, angles, _warped(density), f]
-    return np.concatenate([np.asarray(part, np.float32).ravel() for part in parts])
+    counts = (len(angles), *density.shape[1:], *f.shape[:3])
+    head = [*counts, *share, 1.0 / angles[1]]
+    return Rows(_joined(head, _warped(density), f), counts)
 
 
 def _warped(density: NDArray[Any]) -> Values:
