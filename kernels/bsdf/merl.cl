@@ -1,6 +1,6 @@
-/* A table that MERL measured (Matusik et al. 2003), front side: f [1/sr] is linear between its centres. Light is sampled
- * by the table itself: by a warp to halfway directions, made of f cos at sixteen angles of the viewer. Of red, green and
- * blue the mean counts, so that no pdf depends on the wavelength. */
+/* A table that MERL measured (Matusik et al. 2003), front side: f [1/sr] is linear between its centres. Light is
+ * sampled by the table itself: by a warp to halfway directions, made of f cos at sixteen angles of the viewer. Of
+ * red, green and blue the mean counts, so that no pdf depends on the wavelength. */
 #include "optics/merl_table.cl"
 
 typedef struct {

@@ -1,7 +1,8 @@
-/* What was measured of a material, in the coordinates of Dupuy and Jakob 2018 (clpt/measured/measurement.py). `values`
- * has from `first` on the numbers of MEASUREMENT_HEAD, phi_i and theta_i as `warp_node` reads them, the share that each colour reflects, ndf, sigma, the slices of vndf and of luminance,
- * and the spectra: of every viewer, row and
- * column all pairs of neighbouring colours, as two halves in a word (clpt/render/lowering/materials/measurements.py). */
+/* What was measured of a material, in the coordinates of Dupuy and Jakob 2018 (clpt/measured/measurement.py).
+ * `values` has from `first` on the numbers of MEASUREMENT_HEAD, phi_i and theta_i as `warp_node` reads them, the
+ * share that each colour reflects, ndf, sigma, the slices of vndf and of luminance, and the spectra: of every
+ * viewer, row and column all pairs of neighbouring colours, as two halves in a word
+ * (clpt/render/lowering/materials/measurements.py). */
 #include "optics/halfway_square.cl"
 #include "optics/warp_table.cl"
 #define MEASUREMENT_HEAD 15
@@ -31,6 +32,8 @@ inline WarpTable measurement_table(Measurement t, integer first, integer rows, i
     WarpTable r = {t.values, first, rows, columns};
     return r;
 }
+#define MEASUREMENT_TABLE(t, first, i) \
+    measurement_table(t, first, MEASUREMENT_COUNT(t, i), MEASUREMENT_COUNT(t, i + 1))
 
 inline MeasurementParts measurement_parts(Measurement t)
 {
@@ -43,11 +46,11 @@ inline MeasurementParts measurement_parts(Measurement t)
     p.theta_i = p.phi_i + p.phi_cells + p.phis;
     p.albedo = p.theta_i + p.theta_cells + p.thetas;
     p.colours = MEASUREMENT_COUNT(t, 10);
-    p.ndf = measurement_table(t, p.albedo + p.colours, MEASUREMENT_COUNT(t, 2), MEASUREMENT_COUNT(t, 3));
-    p.sigma = measurement_table(t, p.ndf.first + p.ndf.rows * p.ndf.columns, MEASUREMENT_COUNT(t, 4), MEASUREMENT_COUNT(t, 5));
-    p.vndf = measurement_table(t, p.sigma.first + p.sigma.rows * p.sigma.columns, MEASUREMENT_COUNT(t, 6), MEASUREMENT_COUNT(t, 7));
+    p.ndf = MEASUREMENT_TABLE(t, p.albedo + p.colours, 2);
+    p.sigma = MEASUREMENT_TABLE(t, p.ndf.first + p.ndf.rows * p.ndf.columns, 4);
+    p.vndf = MEASUREMENT_TABLE(t, p.sigma.first + p.sigma.rows * p.sigma.columns, 6);
     integer viewers = p.phis * p.thetas;
-    p.luminance = measurement_table(t, p.vndf.first + viewers * warp_stride(p.vndf), MEASUREMENT_COUNT(t, 8), MEASUREMENT_COUNT(t, 9));
+    p.luminance = MEASUREMENT_TABLE(t, p.vndf.first + viewers * warp_stride(p.vndf), 8);
     p.spectra = p.luminance.first + viewers * warp_stride(p.luminance);
     integer flags = MEASUREMENT_COUNT(t, 11);
     p.over_density = (flags & 1) != 0;
@@ -129,16 +132,16 @@ inline Spectrum measurement_spectrum(Measurement t, MeasurementParts p, WarpSlic
     integer pairs = max_i(p.colours - 1, (integer)(1)), width = p.luminance.columns * pairs;
     integer stride = p.luminance.rows * width, first = p.spectra + row * width + column * pairs;
 #define NODE(at) measurement_pair(t.values, s, at, stride)
-#define PAIR(at)                                                                                   \
-    measurement_mixed(measurement_mixed(NODE(at), NODE((at) + pairs), x),                          \
+#define PAIR(at)                                                          \
+    measurement_mixed(measurement_mixed(NODE(at), NODE((at) + pairs), x), \
                       measurement_mixed(NODE((at) + width), NODE((at) + width + pairs), x), y)
     Spectrum r;
 #if SPECTRUM_SIZE == 4
-#define C(c)                                                              \
-    {                                                                     \
-        integer colour = clamp_i(to_integer(t.row.c), pairs - 1);         \
-        vec2 both = PAIR(first + colour);                                 \
-        r.c = both.x + (t.row.c - to_real(colour)) * (both.y - both.x);   \
+#define C(c)                                                            \
+    {                                                                   \
+        integer colour = clamp_i(to_integer(t.row.c), pairs - 1);       \
+        vec2 both = PAIR(first + colour);                               \
+        r.c = both.x + (t.row.c - to_real(colour)) * (both.y - both.x); \
     }
     SPECTRUM_EACH(C)
 #undef C
@@ -158,12 +161,12 @@ inline Spectrum measurement_share(Measurement t)
 {
     MeasurementParts p = measurement_parts(t);
     Spectrum r;
-#define C(c)                                                                               \
-    {                                                                                      \
-        integer colour = min_i(to_integer(t.row.c), max_i(p.colours - 2, (integer)(0)));   \
+#define C(c)                                                                                  \
+    {                                                                                         \
+        integer colour = min_i(to_integer(t.row.c), max_i(p.colours - 2, (integer)(0)));      \
         integer at = p.albedo + colour, beside = min_i(p.colours - 1 - colour, (integer)(1)); \
-        real a = gather(t.values, at), b = gather(t.values, at + beside);                  \
-        r.c = a + (t.row.c - to_real(colour)) * (b - a);                                   \
+        real a = gather(t.values, at), b = gather(t.values, at + beside);                     \
+        r.c = a + (t.row.c - to_real(colour)) * (b - a);                                      \
     }
     SPECTRUM_EACH(C)
 #undef C

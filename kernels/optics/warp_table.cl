@@ -14,7 +14,8 @@ typedef struct {
     mask wide;
 } WarpSlices;
 
-/* A count at the head of a table; where that begins at 0, as in idle lanes, the least, so that what they read exists. */
+/* A count at the head of a table; where that begins at 0, as in idle lanes, the least, so that what they read
+ * exists. */
 inline integer warp_count(global const float *values, integer first, int i)
 {
     return sel_i(first > 0, to_integer(gather(values, first + i)), (integer)(2));
