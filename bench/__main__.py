@@ -40,6 +40,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "checkpoints": (),
     "layers": (),
     "lens": (),
+    "measured": (),
     "viewing": (),
     "sizes": ("--plot", str(report.RESULTS / "sizes.png")),
 }

@@ -255,6 +255,7 @@ TABLES: dict[str, Callable[[Sequence[Row]], str]] = {
     "denoising": plain,
     "layers": plain,
     "lens": plain,
+    "measured": plain,
     "startup": startup,
     "viewing": plain,
     "compiling": plain,

@@ -16,7 +16,8 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE, KERNELS = ROOT / "clpt", ROOT / "kernels"
 
 BASE = {
-    "colour", "errors", "layout", "records", "transforms", "images", "output_files", "spectra",
+    "colour", "errors", "layout", "measured", "records", "transforms", "images",
+    "output_files", "spectra",
     "spectral_exr", "tev", "version",
 }  # fmt: skip
 # What a part may import of the others; itself always.

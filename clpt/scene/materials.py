@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from clpt.errors import SceneError
+from clpt.measured import Measurement, MerlTable
 from clpt.scene.params import (
     ORDERS,
     Kind,
@@ -24,6 +25,8 @@ from clpt.scene.params import (
     host,
     index,
     layers,
+    measurement,
+    merl,
     params,
     per_order,
     real,
@@ -550,6 +553,33 @@ class Hair(Material):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Measured(Material):
+    """What was measured of a real surface (Dupuy and Jakob 2018), from a file `.bsdf`; front side.
+
+    By default a matt grey. It is as reciprocal as what was measured, and its numbers are linear in
+    between.
+    """
+
+    reversible = False
+
+    data: Measurement | None = measurement("its reflection, as `clpt.measured.read` gives it")
+
+    @property
+    def uses_tangents(self) -> bool:
+        return self.data is not None and not self.data.isotropic
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Merl(Material):
+    """A table of MERL (Matusik et al. 2003), from a file `.binary`; isotropic, front side.
+
+    By default a matt grey.
+    """
+
+    data: MerlTable | None = merl("its reflection, as `clpt.measured.read_merl` gives it")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Null(Material):
     """No surface at all: light passes as if it were not there."""
 
@@ -637,6 +667,8 @@ LEAVES = (
     Grating,
     Fluorescent,
     Hair,
+    Measured,
+    Merl,
     Null,
 )
 COMPOSITES = (TwoSided, Mask, Blend, NormalMap, BumpMap)

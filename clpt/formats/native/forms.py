@@ -38,6 +38,8 @@ class Reader(Protocol):
     def group(self, cursor: Cursor) -> Any: ...
     def image(self, cursor: Cursor) -> Any: ...
     def volume(self, cursor: Cursor, colours: bool = False) -> Any: ...
+    def measurement(self, cursor: Cursor) -> Any: ...
+    def merl(self, cursor: Cursor) -> Any: ...
 
 
 class Writer(Protocol):
@@ -50,6 +52,8 @@ class Writer(Protocol):
     def group(self, value: Any) -> Any: ...
     def image(self, value: Any) -> Any: ...
     def volume(self, value: Any) -> Any: ...
+    def measurement(self, value: Any) -> Any: ...
+    def merl(self, value: Any) -> Any: ...
 
 
 def plain(value: Any) -> Any:
@@ -348,6 +352,18 @@ FORMS: dict[str, Form] = {
         {"type": ["string", "null"]},
         lambda cursor, reader: None if cursor.value is None else reader.volume(cursor, True),
         lambda value, writer: writer.volume(value),
+    ),
+    "measurement": Form(
+        "name of a `.bsdf` file",
+        STRING,
+        lambda cursor, reader: reader.measurement(cursor),
+        lambda value, writer: writer.measurement(value),
+    ),
+    "merl": Form(
+        "name of a `.binary` file",
+        STRING,
+        lambda cursor, reader: reader.merl(cursor),
+        lambda value, writer: writer.merl(value),
     ),
     "cube_images": Form(
         "name of an image file, or a list of six",

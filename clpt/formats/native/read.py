@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from clpt import spectra
+from clpt import measured, spectra
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
 from clpt.formats import volumes
 from clpt.formats.missing import EVEN, GREY, Missing, grey_for
@@ -57,6 +57,7 @@ class _Reader:
         self.materials: dict[str, materials.Material | None] = {}
         self.media: dict[str, media.Medium] = {}
         self.volumes: dict[str, Volume] = {}
+        self.measurements: dict[str, Any] = {}
         self.groups: dict[str, shapes.Group | None] = {}
         self.warnings: list[str] = []
 
@@ -135,6 +136,24 @@ class _Reader:
                 read = volumes.read_colours(path) if colours else volumes.read(path, grid)
                 self.volumes[name] = read
         return self.volumes[name]
+
+    def measurement(self, cursor: Cursor) -> Any:
+        """Read a measured material, once for each name; null is none."""
+        return self._measured(cursor, measured.read)
+
+    def merl(self, cursor: Cursor) -> Any:
+        """Read a table of MERL, once for each name; null is none."""
+        return self._measured(cursor, measured.read_merl)
+
+    def _measured(self, cursor: Cursor, read: Callable[[Path], Any]) -> Any:
+        if cursor.value is None:
+            return None
+        name = cursor.expect(str, "the name of a file")
+        if name not in self.measurements:
+            path = find_file(cursor, name)
+            with cursor.locating():
+                self.measurements[name] = read(path)
+        return self.measurements[name]
 
     def layer(self, cursor: Cursor) -> Any:
         """Read a thin film."""

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from clpt import images, output_files, spectral_exr
+from clpt import images, measured, output_files, spectral_exr
 from clpt.errors import SceneError
 from clpt.formats.meshes import particles, strands
 from clpt.formats.native import forms
@@ -210,6 +210,22 @@ class _Writer:
             images.write_npy(self.path.parent / name, np.asarray(values, np.float32))
             self.files[id(values)] = name
         return self.files[id(values)]
+
+    def measurement(self, value: measured.Measurement) -> str:
+        """Return the name of the file that a measured material is written to."""
+        if id(value) not in self.files:
+            name = self.file_name("measured", "bsdf")
+            measured.write(self.path.parent / name, value)
+            self.files[id(value)] = name
+        return self.files[id(value)]
+
+    def merl(self, value: measured.MerlTable) -> str:
+        """Return the name of the file that a table of MERL is written to."""
+        if id(value) not in self.files:
+            name = self.file_name("merl", "binary")
+            measured.write_merl(self.path.parent / name, value)
+            self.files[id(value)] = name
+        return self.files[id(value)]
 
     def copy(self, path: Path) -> str:
         """Copy a file, once; return its name."""

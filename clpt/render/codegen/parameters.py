@@ -30,7 +30,7 @@ def lane_type(param: Param) -> str:
     if param.role in SPECTRAL:
         return "Spectrum"
     given = {"real": "real", "orders": "real", "layers": "Layers"}
-    given["angular"] = "AngularTable"
+    given |= {"angular": "AngularTable", "measurement": "Measurement", "merl": "MerlTable"}
     return given.get(param.role, "integer")
 
 
@@ -140,6 +140,10 @@ def _member(
         return [f"{target} = {loaded if 'layers' in present else 'layers_none()'};"]
     if form == "AngularTable":
         return [f"{target} = angular_load(scene, {at}, lambdas);"]
+    if form == "Measurement":
+        return [f"{target} = measurement_load(scene, {at}, lambdas);"]
+    if form == "MerlTable":
+        return [f"{target} = merl_load_table(scene, {at}, lambdas);"]
     if present == {"none"}:
         return [f"{target} = {'spectrum_of(0.0f)' if form == 'Spectrum' else '(real)(0.0f)'};"]
     *own, source = given

@@ -11,7 +11,7 @@ from clpt.render.codegen.dispatch import Case, Function, active, function
 from clpt.render.contract import camera_records
 from clpt.render.contract.features import Features
 from clpt.render.contract.parameter_words import MIXTURE, row_words, words
-from clpt.scene.params import device_params, interior_params
+from clpt.scene.params import MEASURED, device_params, interior_params
 from clpt.scene.scatterer import Scatterer
 
 
@@ -123,6 +123,10 @@ def null_transmittance_text(features: Features) -> str:
     return "".join([*parts, f"#define null_transmittance null_transmittance_{features.mixtures}\n"])
 
 
+# of the roles whose values are tables: what kernels read of them
+TABLES = {"angular": "angular_table", "measurement": "measurement", "merl": "merl_table"}
+
+
 def functions_text(cls: type[Scatterer], mode: str, features: Features | None = None) -> str:
     """Return a kind's struct and functions, with what its boundary needs.
 
@@ -131,10 +135,22 @@ def functions_text(cls: type[Scatterer], mode: str, features: Features | None = 
     own, layer = (features.sources_of(kind) if features else {} for kind in (cls.kind, "layer"))
     boundary = thin_films.boundary_text(cls, mode, own, layer)
     roles = {param.role for param in device_params(cls).values()}
-    if "angular" in roles:
-        boundary += '#include "optics/angular_table.cl"\n#include "optics/angular_load.cl"\n'
+    for role, table in TABLES.items():
+        if role in roles:
+            boundary += _counts_text(role, own.get("data", frozenset()))
+            boundary += f'#include "optics/{table}.cl"\n'
+            boundary += f'#include "optics/{role}_load.cl"\n' if features else ""
     struct, declared = parameters.struct_text(cls, own), _declared_text(cls)
     return f'{boundary}{struct}{declared}#include "{cls.folder}/{cls.kind}.cl"\n'
+
+
+def _counts_text(role: str, sources: frozenset[str]) -> str:
+    """Define the counts at the head of a measurement, where all of a scene have the same."""
+    if role not in MEASURED or len(sources) != 1:
+        return ""
+    _, *counts = next(iter(sources)).split()
+    chosen = " : ".join(f"(i) == {i} ? {count}" for i, count in enumerate(counts))
+    return f"#define {role.upper()}_COUNT(t, i) ((integer)({chosen} : 0))\n"
 
 
 def _declared_text(cls: type[Scatterer]) -> str:

@@ -12,7 +12,7 @@ import pyopencl.array as cl_array
 import pytest
 
 import clpt
-from clpt import device, spectra
+from clpt import device, measured, spectra
 from clpt.errors import SceneError
 from clpt.scene import (
     KINDS,
@@ -92,6 +92,8 @@ VALUES: dict[str, Any] = {
     "text": "vertex_named",
     "quantity": 0.4,
     "angular": (1.0, 3.0, 2.0),
+    "measurement": measured.grey(),
+    "merl": measured.MerlTable(values=np.full((2, 2, 2, 3), 0.25)),
 }
 
 
