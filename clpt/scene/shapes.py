@@ -46,6 +46,12 @@ class Mesh(Shape):
         form="normals",
     )
     uvs: Any = host(None, "(n, 2) float32 per vertex, or None", form="rows2")
+    tangents: Any = host(
+        None,
+        "(n, 4) float32 per vertex, beside normals: the tangent, along u; and 1 or -1, as v is on "
+        "the side of normal x tangent or not; None: from the uvs",
+        form="rows4",
+    )
     attributes: Any = host(
         {},
         "name -> (n, 1 or 3) float32; one row a vertex or a face, as vertex_ or face_ begins it",

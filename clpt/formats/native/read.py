@@ -262,6 +262,7 @@ def _merged(
         faces=part.faces,
         normals=part.normals if entry.normals is None else entry.normals,
         uvs=part.uvs,
+        tangents=part.tangents,
         attributes=part.attributes,
     )
 

@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 
 from clpt.formats.meshes import mesh, particles, strands
+from clpt.formats.meshes.mesh import TANGENTS
 from clpt.formats.native.cursor import Cursor
 from clpt.formats.native.spectra import find_file
 from clpt.scene import shapes
 from clpt.scene.params import Kind
 
-MESH_ARRAYS = ("vertices", "faces", "normals", "uvs")
+MESH_ARRAYS = ("vertices", "faces", "normals", "uvs", "tangents")
 
 
 @dataclass(frozen=True)
@@ -91,11 +92,17 @@ def read_transforms(cursor: Cursor) -> np.ndarray:
     return matrices
 
 
+def _with_tangents(shape: shapes.Mesh) -> dict[str, Any]:
+    """A mesh's attributes, with the tangents as one of them: what is per vertex stays together."""
+    own = dict(shape.attributes)
+    return own if shape.tangents is None else {**own, TANGENTS: shape.tangents}
+
+
 def checked_arrays(cursor: Cursor, shape: shapes.Mesh, warnings: list[str]) -> shapes.Mesh:
     """Check the arrays of a mesh that is given in the JSON itself."""
     if shape.vertices is None or shape.faces is None:
         raise cursor.error("a mesh needs a 'file', or 'vertices' and 'faces'")
-    for name in ("normals", "uvs"):
+    for name in ("normals", "uvs", "tangents"):
         values = getattr(shape, name)
         is_array = values is not None and not isinstance(values, str)
         if is_array and len(values) != len(shape.vertices):
@@ -113,8 +120,10 @@ def checked_arrays(cursor: Cursor, shape: shapes.Mesh, warnings: list[str]) -> s
             None if isinstance(shape.normals, str) else shape.normals,
             shape.uvs,
             warnings,
-            shape.attributes,
+            _with_tangents(shape),
         )
+        if shape.tangents is not None:
+            arrays["tangents"] = arrays["attributes"].pop(TANGENTS)
     if isinstance(shape.normals, str):
         arrays["normals"] = shape.normals
     if not len(arrays["faces"]):

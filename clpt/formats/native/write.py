@@ -17,6 +17,7 @@ import numpy as np
 from clpt import images, output_files, spectral_exr
 from clpt.errors import SceneError
 from clpt.formats.meshes import particles, strands
+from clpt.formats.meshes.mesh import TANGENT_COLUMNS
 from clpt.formats.native import forms
 from clpt.formats.native.shape_files import MESH_ARRAYS, in_file
 from clpt.scene import Scene, kinds, materials, shapes
@@ -289,6 +290,8 @@ def _ply(mesh: shapes.Mesh) -> bytes:
     vertex: list[Any] = [("x", "y", "z", mesh.vertices)]
     vertex += [] if normals is None else [("nx", "ny", "nz", normals)]
     vertex += [] if uvs is None else [("s", "t", uvs)]
+    if mesh.tangents is not None:
+        vertex.append((*TANGENT_COLUMNS, mesh.tangents))
     face: list[Any] = []
     for name, values in mesh.attributes.items():
         element, _, rest = name.partition("_")

@@ -58,6 +58,9 @@ from clpt.scene.shapes import Mesh
 TREE_FROM = 16  # lights from which a tree chooses among them, see bench/lights.py
 
 
+TANGENT_WORDS = 4
+
+
 @dataclass(frozen=True)
 class Lowered:
     """A scene ready for the device: data that nobody writes to, which several devices may share.
@@ -169,6 +172,9 @@ def lower(
     )  # fmt: skip
     names, for_layers = lower_names(index, geometry, lights, encoder.store)
     features = replace(features, **for_layers)
+    if features.tangents and geometry.tangents:
+        row = encoder.store.append_floats("distributions", _vertex_tangents(geometry))
+        features = replace(features, vertex_tangents=row + TANGENT_WORDS)
     settings = settings_of(
         index, geometry, lights, wavelengths, density_row, ambient_row, sphere,
         features.dispersion, (first_aim, len(targets)), camera,
@@ -197,6 +203,15 @@ def lower(
         cache=cache,
         device_grids=tuple(encoder.store.device_grids),
     )
+
+
+def _vertex_tangents(geometry: Geometry) -> NDArray[np.float32]:
+    """Four words for each vertex: those that shapes say, else zero. A row of zeros is before them,
+    so that they begin behind word 0."""
+    words = np.zeros((1 + len(geometry.vertices), TANGENT_WORDS), np.float32)
+    for first, own in geometry.tangents:
+        words[1 + first : 1 + first + len(own)] = own
+    return words
 
 
 def _lower_film(index: SceneIndex, encoder: Encoder, wavelengths: Density) -> tuple[int, bool, int]:

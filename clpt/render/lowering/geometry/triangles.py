@@ -88,6 +88,26 @@ def warnings_of(flat: Sequence[Flat]) -> list[str]:
     return [f"{first}; with those of {len(flat) - 1} more shapes {total:,} in all"]
 
 
+def tangents(shape: shapes.Mesh) -> Points:
+    """Return a mesh's tangents in world space (n, 4) float32: unit vectors, and the side of v.
+
+    The side is that of the shading normal x tangent. A tangent without length stays zero. Raises
+    SceneError for a mesh without normals, and for an array of another shape or not finite.
+    """
+    if shape.normals is None:
+        message = "tangents need normals: a frame has both; leave them out, or give normals"
+        raise SceneError(message, where=where(shape))
+    given = _array(shape, "tangents", 4, len(_array(shape, "vertices", 3)))
+    matrix = placement(shape)
+    made = np.empty_like(given)
+    made[:, :3] = given[:, :3] @ matrix[:3, :3].T
+    length = np.linalg.norm(made[:, :3], axis=1, keepdims=True)
+    made[:, :3] /= np.where(length > 0.0, length, 1.0)
+    turned = transforms.flips_handedness(matrix) != shape.flip_normals
+    made[:, 3] = np.where(given[:, 3] < 0.0, -1.0, 1.0) * (-1.0 if turned else 1.0)
+    return made
+
+
 def attribute(shape: Shape, name: str) -> Points:
     """Return an attribute of a mesh, (n, 1 or 3) float32 per vertex, or per face of `triangulate`.
 
