@@ -1,4 +1,4 @@
-"""Files that a shape of scene.json names in place of its arrays."""
+"""Files that a shape or a lamp of scene.json names in place of its arrays."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from clpt.formats import ies
 from clpt.formats.meshes import mesh, particles, strands
 from clpt.formats.meshes.mesh import TANGENTS
 from clpt.formats.native.cursor import Cursor
 from clpt.formats.native.spectra import find_file
-from clpt.scene import shapes
+from clpt.scene import lights, shapes
 from clpt.scene.params import Kind
 
 MESH_ARRAYS = ("vertices", "faces", "normals", "uvs", "tangents")
@@ -52,6 +53,12 @@ FILES: dict[type[Kind], ShapeFile] = {
     ),
     shapes.Instance: ShapeFile(
         "name of a .npy file", "matrices (n, 3, 4): an instance for each, before `to_world`"
+    ),
+    lights.Goniometric: ShapeFile(
+        "name of an .ies file",
+        "candela by direction, in place of `image`",
+        ("image",),
+        ies.parameters,
     ),
 }
 

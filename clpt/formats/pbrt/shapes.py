@@ -191,10 +191,8 @@ def _patches(params: Parameters, state: State) -> Geometry | None:
     corners = np.arange(4) if corners is None else corners
     if len(corners) % 4 or corners.min(initial=0) < 0 or corners.max(initial=0) >= len(points):
         raise SceneError(f"'indices' must be four a patch, each below {len(points)}")
-    if "emissionfilename" in params:
-        params.ignore("emissionfilename")
-        state.warn(params, "'emissionfilename' is left out: the patch emits evenly")
-    params.ignore("faceIndices")
+    # pbrt samples the patch by that image; what it emits is the light's.
+    params.ignore("emissionfilename", "faceIndices")
     normals, uvs = _per_vertex(params, "N", "normal", points), _uvs(params, points)
     corners = corners.reshape(-1, 4)
     tolerance = np.abs(points[corners] @ np.eye(3)).max(initial=1.0) * 1e-5
