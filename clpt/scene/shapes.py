@@ -157,6 +157,27 @@ class Curves(Shape):
     basis: str = choice("bspline", "what the points mean", BASES)
 
 
+def _ball() -> np.ndarray:
+    """Distances to a sphere of radius 0.35 in the middle of the unit cube, (9, 9, 9) float32."""
+    x, y, z = np.meshgrid(*[np.linspace(-0.5, 0.5, 9)] * 3, indexing="ij")
+    return (np.sqrt(x * x + y * y + z * z) - 0.35).astype(np.float32)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SdfGrid(Shape):
+    """The surface where a signed distance on a grid over the unit cube is zero; as triangles.
+
+    Between the grid's points, which lie on the faces of the cube too, the distance is trilinear.
+    The front is where it is positive.
+    """
+
+    values: Any = host(
+        _ball(), "(nx, ny, nz) float32, below 0 inside; default: a ball", form="grid"
+    )
+    smooth: bool = host(True, "normals are smooth over the cells; False: those of the triangles")
+    pieces: int = host(2, "of the side of a cell that the surface crosses, 1 to 16")
+
+
 @dataclass(frozen=True, eq=False)
 class Group:
     """Shapes that instances place together; by itself it is nowhere in the scene.
@@ -193,4 +214,6 @@ class Instance(Shape):
             raise SceneError(f"must be a group, not {self.group!r}", where="instance.group")
 
 
-KINDS = (Mesh, Sphere, Spheres, Rectangle, Disk, Cube, Cylinder, Curves, Instance)
+KINDS = (
+    Mesh, Sphere, Spheres, Rectangle, Disk, Cube, Cylinder, Curves, SdfGrid, Instance,
+)  # fmt: skip

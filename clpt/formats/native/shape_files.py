@@ -15,6 +15,7 @@ from clpt.formats.meshes import mesh, particles, strands
 from clpt.formats.meshes.mesh import TANGENTS
 from clpt.formats.native.cursor import Cursor
 from clpt.formats.native.spectra import find_file
+from clpt.formats.volumes import distances
 from clpt.scene import lights, shapes
 from clpt.scene.params import Kind
 
@@ -35,6 +36,11 @@ class ShapeFile:
     read: Callable[[Path], dict[str, Any]] | None = None
 
 
+def sdf_grid(path: Path) -> dict[str, Any]:
+    """Read signed distances; the box of a .vol is not read. Raises SceneError."""
+    return {"values": distances(path)}
+
+
 FILES: dict[type[Kind], ShapeFile] = {
     shapes.Mesh: ShapeFile(
         "name of a mesh file", "in place of the arrays", (*MESH_ARRAYS, "attributes")
@@ -53,6 +59,9 @@ FILES: dict[type[Kind], ShapeFile] = {
     ),
     shapes.Instance: ShapeFile(
         "name of a .npy file", "matrices (n, 3, 4): an instance for each, before `to_world`"
+    ),
+    shapes.SdfGrid: ShapeFile(
+        "name of a .npy or .vol file", "signed distances, in place of values", ("values",), sdf_grid
     ),
     lights.Goniometric: ShapeFile(
         "name of an .ies file",

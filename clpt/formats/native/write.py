@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 import json
 import os
 import re
@@ -67,6 +68,7 @@ class _Writer:
         self.array_files: dict[type[Kind], Callable[[Any], str]] = {
             shapes.Mesh: self.mesh,
             shapes.Curves: self.curves,
+            shapes.SdfGrid: self.sdf_grid,
             shapes.Spheres: self.spheres,
         }
         self.materials: dict[str, Any] = {}
@@ -234,6 +236,15 @@ class _Writer:
         """Write centres, radii and attributes; return the file's name."""
         name = self.file_name(spheres.name or "spheres", "npz")
         particles.write(self.path.parent / name, spheres)
+        self.files[name] = name
+        return name
+
+    def sdf_grid(self, grid: shapes.SdfGrid) -> str:
+        """Write signed distances; return the file's name."""
+        name = self.file_name(grid.name or "distances", "npy")
+        stream = io.BytesIO()
+        np.save(stream, np.asarray(grid.values, np.float32))
+        output_files.write(self.path.parent / name, stream.getvalue())
         self.files[name] = name
         return name
 

@@ -79,6 +79,7 @@ VALUES: dict[str, Any] = {
     "normals": "smooth",
     "rows2": POINTS[:, :2].copy(),
     "rows3": POINTS,
+    "grid": RNG.normal(size=(3, 4, 2)).astype(np.float32),
     "rows4": NEEDED[shapes.Curves]["points"],
     "triangles": ROWS,
     "lengths": (4,),

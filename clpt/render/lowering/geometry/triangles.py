@@ -14,6 +14,7 @@ from clpt import transforms
 from clpt.errors import SceneError
 from clpt.render.contract.shape_records import ONE_OF
 from clpt.render.lowering.device_arrays import on_host
+from clpt.render.lowering.geometry import distance_grids
 from clpt.render.lowering.geometry.shapes import Faces, Points, Words, placement, where
 from clpt.render.lowering.geometry.tubes import tubes
 from clpt.scene import shapes
@@ -60,7 +61,9 @@ def triangulate(
     """
     vertices, faces, normals, uvs = _in_world(shape)
     solid = _solid(vertices, faces)
-    warnings_of = not isinstance(shape, shapes.Curves)  # a tube may shrink to a line
+    warnings_of = not isinstance(
+        shape, shapes.Curves | shapes.SdfGrid
+    )  # a tube may shrink to a line
     if warnings_of and not solid.all() and flat is not None:
         flat.append(Flat(where(shape), int(len(solid) - solid.sum()), len(solid)))
     faces = faces if solid.all() else faces[solid]
@@ -184,6 +187,8 @@ def local(shape: Shape) -> tuple[Points, Faces, Points | None, Points | None]:
         return _mesh(shape)
     if isinstance(shape, shapes.Curves):
         return tubes(shape, where(shape))
+    if isinstance(shape, shapes.SdfGrid):
+        return distance_grids.surface(shape, where(shape))
     if shape.kind == "rectangle":
         square = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], np.float32)
         halves = np.array([(0, 1, 2), (0, 2, 3)], np.uint32)
