@@ -13,7 +13,7 @@ from clpt.scene.lights import Light
 from clpt.scene.materials import Diffuse, Material, TwoSided
 from clpt.scene.media import Medium
 from clpt.scene.params import Kind, choice, host
-from clpt.scene.textures import MeshAttribute
+from clpt.scene.textures import Bitmap, MeshAttribute
 from clpt.scene.values import Matrix4, OnDevice, Vector3
 
 SMOOTH = "smooth"  # normals of a mesh: the means of the triangles around a vertex, by their areas
@@ -57,6 +57,12 @@ class Mesh(Shape):
         "name -> (n, 1 or 3) float32; one row a vertex or a face, as vertex_ or face_ begins it",
         form="attributes",
     )
+    subdivision: int = host(0, "levels of Loop subdivision, to the smooth limit surface; 0: none")
+    displacement: Bitmap | None = host(
+        None, "heights by uv, along smooth normals, after subdivision; or None", form="texture"
+    )
+    displacement_scale: float = host(1.0, "factor on them", "m")
+    displacement_edge: float = host(0.05, "longest edge of what is displaced, in the world", "m")
 
     @classmethod
     def from_trimesh(cls, geometry: Any, **parameters: Any) -> Mesh:

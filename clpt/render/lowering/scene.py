@@ -37,6 +37,7 @@ from clpt.render.lowering.geometry.geometry import (
     shape_words,
 )
 from clpt.render.lowering.geometry.instancing import Instances
+from clpt.render.lowering.geometry.refining import is_refined
 from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.layer_names import lower_names
 from clpt.render.lowering.lights.aims import aims
@@ -335,6 +336,8 @@ def _zero_copy_tables(index: SceneIndex, geometry: Geometry) -> dict[str, Any]:
     if len(meshes) != 1 or index.prototypes or not isinstance(meshes[0], Mesh):
         return {}
     mesh = meshes[0]
+    if is_refined(mesh):
+        return {}
     reversed_ = transforms.flips_handedness(shapes.placement(mesh)) != mesh.flip_normals
     wanted = {"uvs": (mesh.uvs, "f")}
     if not reversed_ and len(mesh.faces) == len(geometry.faces):  # no triangle was left out

@@ -14,7 +14,7 @@ from clpt import transforms
 from clpt.errors import SceneError
 from clpt.render.contract.shape_records import ONE_OF
 from clpt.render.lowering.device_arrays import on_host
-from clpt.render.lowering.geometry import distance_grids
+from clpt.render.lowering.geometry import distance_grids, refining
 from clpt.render.lowering.geometry.shapes import Faces, Points, Words, placement, where
 from clpt.render.lowering.geometry.tubes import tubes
 from clpt.scene import shapes
@@ -224,7 +224,8 @@ def _mesh(shape: shapes.Mesh) -> tuple[Points, Faces, Points | None, Points | No
         )
     normals = _normals(shape, vertices, faces)
     uvs = None if shape.uvs is None else _array(shape, "uvs", 2, len(vertices))
-    return vertices, faces.astype(np.uint32, copy=False), normals, uvs
+    parts = vertices, faces.astype(np.uint32, copy=False), normals, uvs
+    return refining.refined(shape, parts, where(shape)) if refining.is_refined(shape) else parts
 
 
 def _normals(shape: shapes.Mesh, vertices: Points, faces: NDArray[Any]) -> Points | None:
