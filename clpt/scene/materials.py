@@ -397,6 +397,13 @@ class GltfSurface(Material):
     base_color: Textured = reflectance(1.0, "colour of base, metal, and of what is let through")
     metallic: TexturedNumber = _share(0.0, "share of the metal", lobe=True)
     roughness: TexturedNumber = _share(1.0, "of reflection and of what is let through")
+    multiple_scattering: float = real(
+        0.0,
+        "share that is kept of what facets reflect to each other, as rough metals do",
+        low=0.0,
+        high=1.0,
+        lobe=True,
+    )
     ior: IndexLike = index(
         1.5, "index of the dielectric; 0: it reflects all but for `specular_color`", zero=True
     )
@@ -410,6 +417,19 @@ class GltfSurface(Material):
     )
     clearcoat: TexturedNumber = _share(0.0, "strength of a coat of index 1.5 over all", lobe=True)
     clearcoat_roughness: TexturedNumber = _share(0.0, "its roughness")
+    clearcoat_apart: float = real(
+        0.0,
+        "1: the coat has normals of its own, not those of a normal map around the material",
+        low=0.0,
+        high=1.0,
+        lobe=True,
+    )
+    clearcoat_normal_x: TexturedNumber = _share(
+        0.5, "normal of such a coat by the surface's, along u: x / 2 + 1/2"
+    )
+    clearcoat_normal_y: TexturedNumber = _share(0.5, "along v, likewise")
+    clearcoat_normal_z: TexturedNumber = _share(1.0, "along the surface's normal, likewise")
+    clearcoat_normal_scale: float = real(1.0, "factor on its x and y", low=-100.0, high=100.0)
     sheen_color: Textured = reflectance(0.0, "colour of fibres under the coat", lobe=True)
     sheen_roughness: TexturedNumber = _share(0.5, "how much fibres lean; at least 0.25")
     transmission: TexturedNumber = _share(
@@ -433,7 +453,7 @@ class GltfSurface(Material):
 
     @property
     def uses_tangents(self) -> bool:
-        return self.anisotropy != 0.0
+        return self.anisotropy != 0.0 or self.clearcoat_apart != 0.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -65,7 +65,8 @@ HostForm = Literal[
     "boolean", "integer", "number", "text", "names", "numbers",
     "vector", "direction", "matrix3", "matrix4",
     "material", "medium", "phase", "texture", "filter", "area_light", "group",
-    "rows2", "rows3", "rows4", "normals", "triangles", "attributes", "number_or_list", "lengths",
+    "rows2", "rows3", "rows4", "grid", "normals", "triangles", "attributes",
+    "number_or_list", "lengths",
     "image", "volume", "colour_volume", "cube_images", "crop", "sensor", "white_balance",
     "number_or_auto", "lens",
 ]  # fmt: skip

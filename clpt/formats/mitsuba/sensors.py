@@ -72,6 +72,28 @@ def sensor(element: Element, context: Context) -> Sensor:
     return Sensor(camera, film, sampler, spp, seed, element.attributes.get("id", ""))
 
 
+def batch(element: Element, context: Context) -> list[Sensor]:
+    """Make the sensors in a <sensor type="batch">: each has its part of the film's width.
+
+    Mitsuba shows them in a row; here each is a camera of its own.
+    """
+    props = Properties(element, context)
+    film = default_film() if (child := props.object("film")) is None else _film(child, context)
+    sampler, spp, seed = _sampler(props.object("sampler"), context)
+    inner = props.objects("sensor")
+    props.ignore("srf")
+    props.finish()
+    if not inner or film.width % len(inner) or film.crop is not None:
+        raise element.error("needs a film whose width is a multiple of its sensors, without a crop")
+    width = film.width // len(inner)
+    context.warn(element, f"its {len(inner)} pictures of {width} pixels are no row: one is shown")
+    part = replace(film, width=width)
+    made = [sensor(one, context) for one in inner]
+    if any(not math.isclose(one.film.width / one.film.height, width / film.height) for one in made):
+        context.warn(element, "sensors whose own films have other sides see more or less")
+    return [replace(one, film=part, sampler=sampler, spp=spp, seed=seed) for one in made]
+
+
 def default_film() -> Film:
     """Mitsuba's film: 768 x 576 with a Gaussian filter."""
     return Film(filter=integrators.Gaussian())

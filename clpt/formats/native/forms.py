@@ -232,6 +232,15 @@ def _number_words(param: Param) -> str:
     return f"number from {param.low:g}" if low else "number"
 
 
+def _grid(cursor: Cursor) -> np.ndarray:
+    """Numbers (nx, ny, nz)."""
+    rows = [[row.numbers() for row in slab.entries()] for slab in cursor.entries()]
+    sizes = {len(slab) for slab in rows}, {len(row) for slab in rows for row in slab}
+    if any(len(size) != 1 for size in sizes):
+        raise cursor.error("must be as many rows of as many numbers in each")
+    return np.array(rows, np.float32)
+
+
 def _number_schema(param: Param) -> Schema:
     limits = {"minimum": param.low, "maximum": param.high}
     return {**NUMBER, **{key: value for key, value in limits.items() if math.isfinite(value)}}
@@ -312,6 +321,11 @@ FORMS: dict[str, Form] = {
         f"number, or `{AUTO}`",
         {"anyOf": [NUMBER, {"const": AUTO}]},
         _number_or_auto,
+    ),
+    "grid": _of_cursor(
+        "rows of rows of numbers",
+        {"type": "array", "items": {"type": "array", "items": NUMBERS}},
+        _grid,
     ),
     "rows2": _rows(2),
     "rows3": _rows(3),

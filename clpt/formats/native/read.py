@@ -163,6 +163,13 @@ class _Reader:
         """Read a light that is not a shape's."""
         if kind_name(cursor, "light", kinds("light")) in ON_SHAPES:
             raise cursor.error("an area light stands in a shape's 'emission'")
+        cls = kinds("light")[kind_name(cursor, "light", kinds("light"))]
+        if cls in shape_files.FILES and "file" in cursor.value:
+            shape_files.check_only_in_file(cursor, cls)
+            made, file = self.object_of(cursor, cls, ("type", "file")), cursor.at("file")
+            path, reader = find_file(file), shape_files.FILES[cls].read
+            with file.locating():
+                return dataclasses.replace(made, **reader(path)) if reader else made
         return self.kind(cursor, "light")
 
     def area_light(self, cursor: Cursor) -> Any:
@@ -283,6 +290,7 @@ def _merged(
         faces=part.faces,
         normals=part.normals if entry.normals is None else entry.normals,
         uvs=part.uvs,
+        tangents=part.tangents,
         attributes=part.attributes,
     )
 

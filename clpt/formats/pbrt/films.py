@@ -16,7 +16,9 @@ from clpt.scene.integrators import MOST_LIGHT_PATHS, Film, Filter, Integrator, S
 
 FILMS = ("rgb", "gbuffer", "spectral")
 GBUFFER = ("albedo", "position", "geometric_normal", "shading_normal", "uv")
-SPACES = {"srgb": "rec709", "rec2020": "rec2020", "dci-p3": "display_p3"}
+SPACES = {
+    "srgb": "rec709", "rec2020": "rec2020", "dci-p3": "display_p3", "aces2065-1": "aces2065_1",
+}  # fmt: skip
 SAMPLERS = (
     "halton", "sobol", "zsobol", "paddedsobol", "pmj02bn", "stratified", "independent",
 )  # fmt: skip
@@ -72,11 +74,7 @@ def _colour(params: Parameters, state: State, exposure: float) -> dict[str, Any]
         balance = balance or DAYLIGHT
     if balance > 0.0:
         given["white_balance"] = balance
-    if state.colour_space in SPACES:
-        given["output_space"] = SPACES[state.colour_space]
-    else:
-        state.warn(params, f"the picture is in Rec. 709, not in {state.colour_space}")
-    return given
+    return {**given, "output_space": SPACES[state.colour_space]}
 
 
 def _bands(params: Parameters) -> dict[str, Any]:

@@ -67,6 +67,25 @@ def read_colours(path: str | Path) -> Volume:
     return Volume(values, box)
 
 
+def distances(path: Path) -> np.ndarray:
+    """Read signed distances (nx, ny, nz) float32 of a .npy or .vol file. Raises SceneError."""
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise SceneError(f"is larger than {MOST_BYTES >> 30} GiB")
+        if path.suffix.lower() == ".vol":
+            return vol.read(path).values
+        values = np.load(path, allow_pickle=False)
+    except OSError as error:
+        raise SceneError(f"cannot be read: {error.strerror or error}", file=path) from None
+    except (ValueError, EOFError) as error:
+        raise SceneError(f"is no .npy file: {error}", file=path) from None
+    except SceneError as error:
+        raise SceneError(error.message, file=path) from None
+    if not isinstance(values, np.ndarray) or values.ndim != 3 or values.dtype.kind not in "fiu":
+        raise SceneError("must hold an array (nx, ny, nz) of numbers", file=path)
+    return np.ascontiguousarray(values, np.float32)
+
+
 def _npy(path: Path, grid: str = "", axes: int = 3) -> Volume:
     try:
         values = np.load(path, mmap_mode="r", allow_pickle=False)

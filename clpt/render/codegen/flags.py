@@ -51,6 +51,12 @@ def filters_at_random(features: Features, cls: type[Scatterer]) -> bool:
     return any(p.linear and "texture" in sources.get(n, ()) for n, p in declared.items())
 
 
+def _has_lobe(features: Features, cls: type[Scatterer], name: str) -> bool:
+    """Whether a material of the scene has a lobe that a parameter of 0 leaves out."""
+    declared, none = device_params(cls), frozenset({"none"})
+    return name in declared and features.sources_of(cls.kind).get(name, none) != none
+
+
 def _layer_place(name: str) -> Callable[[Features], int | bool]:
     """The first word of a layer, False where there is none."""
     return lambda features: features.layer_places.get(name, False)
@@ -75,6 +81,7 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "USES_NORMALS": lambda f: f.normals,
     "USES_UVS": lambda f: f.uvs,
     "USES_TANGENTS": lambda f: f.tangents,
+    "VERTEX_TANGENTS": lambda f: (f.tangents and f.vertex_tangents) or False,
     "USES_ATTRIBUTES": lambda f: f.attributes,
     "USES_ANALYTIC": lambda f: bool(f.analytic),
     "USES_INSTANCES": lambda f: f.instances,
@@ -158,6 +165,7 @@ MATERIAL: dict[str, Callable[[Features, type[Scatterer]], str | int]] = {
     "BSDF_GUIDED": lambda f, cls: f.guided and cls.guided,
     "BSDF_IS_PHASE": lambda f, cls: cls.is_phase,
     "BSDF_BETWEEN_BODIES": lambda f, cls: f.bodies and cls.kind in BETWEEN_BODIES,
+    "BSDF_COAT_APART": lambda f, cls: _has_lobe(f, cls, "clearcoat_apart"),
     "BSDF_IS_NULL": lambda f, cls: cls.is_null and f.null_surfaces,
     "STOCHASTIC_FILTERING": filters_at_random,
     "USES_CHOICE": lambda f, cls: cls.uses_lobe_sample or cls.fluoresces or f.many_lights,

@@ -70,6 +70,7 @@ class Features:
     normals: bool = False
     uvs: bool = False
     tangents: bool = False
+    vertex_tangents: int = 0  # where in `distributions` those lie that meshes say; 0: none does
     attributes: bool = False  # some texture reads what meshes say per vertex or face
     mixtures: int = 0  # how deep masks and blends nest
     normal_mapped: bool = False  # some material has a normal or a bump map

@@ -38,6 +38,7 @@ from clpt.render.lowering.geometry.geometry import (
     shape_words,
 )
 from clpt.render.lowering.geometry.instancing import Instances
+from clpt.render.lowering.geometry.refining import is_refined
 from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.layer_names import lower_names
 from clpt.render.lowering.lights.aims import aims
@@ -58,6 +59,9 @@ from clpt.scene.media import Grid
 from clpt.scene.shapes import Mesh
 
 TREE_FROM = 16  # lights from which a tree chooses among them, see bench/lights.py
+
+
+TANGENT_WORDS = 4
 
 
 @dataclass(frozen=True)
@@ -177,6 +181,9 @@ def lower(
     )  # fmt: skip
     names, for_layers = lower_names(index, geometry, lights, encoder.store)
     features = replace(features, **for_layers)
+    if features.tangents and geometry.tangents:
+        row = encoder.store.append_floats("distributions", _vertex_tangents(geometry))
+        features = replace(features, vertex_tangents=row + TANGENT_WORDS)
     settings = settings_of(
         index, geometry, lights, wavelengths, density_row, ambient_row, sphere,
         features.dispersion, (first_aim, len(targets)), camera,
@@ -223,6 +230,15 @@ def _begin_at_lights(
     if found.refusal and index.light_paths:
         raise SceneError(f"no light paths: {found.refusal}", where="integrator")
     return replace(index, lit_media=found.refusal), found
+
+
+def _vertex_tangents(geometry: Geometry) -> NDArray[np.float32]:
+    """Four words for each vertex: those that shapes say, else zero. A row of zeros is before them,
+    so that they begin behind word 0."""
+    words = np.zeros((1 + len(geometry.vertices), TANGENT_WORDS), np.float32)
+    for first, own in geometry.tangents:
+        words[1 + first : 1 + first + len(own)] = own
+    return words
 
 
 def _lower_film(index: SceneIndex, encoder: Encoder, wavelengths: Density) -> tuple[int, bool, int]:
@@ -360,6 +376,8 @@ def _zero_copy_tables(index: SceneIndex, geometry: Geometry) -> dict[str, Any]:
     if len(meshes) != 1 or index.prototypes or not isinstance(meshes[0], Mesh):
         return {}
     mesh = meshes[0]
+    if is_refined(mesh):
+        return {}
     reversed_ = transforms.flips_handedness(shapes.placement(mesh)) != mesh.flip_normals
     wanted = {"uvs": (mesh.uvs, "f")}
     if not reversed_ and len(mesh.faces) == len(geometry.faces):  # no triangle was left out

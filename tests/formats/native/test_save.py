@@ -40,7 +40,7 @@ GROUP = shapes.Group((shapes.Sphere(radius=0.5),), "group")
 
 NEEDED: dict[type, dict[str, Any]] = {
     shapes.Mesh: {"vertices": POINTS, "faces": ROWS},
-    shapes.Curves: {"points": RNG.random((5, 4)).astype(np.float32), "lengths": (5,)},
+    shapes.Curves: {"points": RNG.random((4, 4)).astype(np.float32), "lengths": (4,)},
     shapes.Spheres: {"centers": POINTS, "radii": np.full(4, 0.5, np.float32)},
     shapes.Instance: {"group": GROUP},
     textures.Bitmap: {"image": TEXELS},
@@ -80,9 +80,10 @@ VALUES: dict[str, Any] = {
     "normals": "smooth",
     "rows2": POINTS[:, :2].copy(),
     "rows3": POINTS,
+    "grid": RNG.normal(size=(3, 4, 2)).astype(np.float32),
     "rows4": NEEDED[shapes.Curves]["points"],
     "triangles": ROWS,
-    "lengths": (5,),
+    "lengths": (4,),
     "number_or_list": 0.5,
     "number_or_auto": "auto",
     "image": TEXELS,

@@ -23,6 +23,13 @@ def scene(tmp_path):
     return of
 
 
+def test_a_gbuffer_has_layers(scene):
+    made = scene('ColorSpace "aces2065-1"\nFilm "gbuffer" "string coordinatesystem" "world"')
+    assert not made.warnings and made.film.output_space == "aces2065_1"
+    assert made.film.layers == ("albedo", "position", "geometric_normal", "shading_normal", "uv")
+    assert "in the world, not the camera" in scene('Film "gbuffer"').warnings[0]
+
+
 def ours(scene, x, y):
     """Origin and direction through a place on the film, as kernels/camera has them."""
     camera, film = scene.camera, scene.film
