@@ -28,8 +28,7 @@ from clpt.render.wavefront.noise_meter import DARK, divide
 Image = NDArray[np.float32]
 Values = NDArray[np.float64]
 
-UNTOLD = {"oidn": 1.0, "statistical": 2.0}  # times what is told is left, see docs/noise.md
-SURE = 0.02  # of the noise before: less is not believed to be left
+SURE = {"oidn": 0.02, "statistical": 0.1}  # of the noise before: less is not believed to be left
 BESIDE = 2  # squares around those that are asked for, which are denoised with them
 AROUND = np.array([1.0, 2.0, 1.0])  # how much squares in a row count beside each other
 
@@ -82,7 +81,9 @@ class DenoisedNoise:
                 for each in (np.ones(x.shape), *errors)
             )
             before = divide(before, count)
-            found[rows, columns, colour] = np.clip(divide(left, count), SURE * before, before)
+            found[rows, columns, colour] = np.clip(
+                divide(left, count), SURE[self._method] * before, before
+            )
         return found.ravel()
 
     def _errors(
@@ -98,7 +99,7 @@ class DenoisedNoise:
         weight = divide(1.0, (np.maximum(0.5 * (da + db), 0.0) + dark) ** 2)
         noise = 0.5 * (a - b) ** 2
         left = 0.5 * ((da - b) ** 2 + (db - a) ** 2) - noise - 0.25 * (da - db) ** 2
-        return weight * left * UNTOLD[self._method], weight * 0.5 * noise
+        return weight * left, weight * 0.5 * noise
 
     def _denoised(
         self, colour: int, halves: tuple[Image, Image], surfaces: list[Image | None]
