@@ -380,28 +380,25 @@ class Soot(Grid):
     """The soot of a flame: particles far smaller than the wavelength, which absorb and glow.
 
     A metre of it absorbs 6 pi E f / lambda (Rayleigh), with the share f of the volume that is soot
-    and E of 0.26, of the index 1.57 - 0.56i (Smyth and Shaddix 1996). Its own coefficients are 0.
+    and E of 0.26, of the index 1.57 - 0.56i (Smyth and Shaddix 1996). The coefficients are those of
+    what is there beside it.
     """
 
     share: float = real(
         1e-6, "of the volume that is soot, where the density is 1", low=0.0, high=1.0
     )
 
-    def check(self) -> None:
-        super().check()
-        for name in ("sigma_a", "sigma_s", "sigma_t"):
-            if not _is_zero(getattr(self, name)):
-                raise SceneError("follows from `share`", where=f"{self.kind}.{name}")
-
     @property
     def is_chromatic(self) -> bool:
         return True
 
     def coefficients(self, spectral: bool) -> tuple[Spectrum, Spectrum]:
+        absorbs, scatters = super().coefficients(spectral)
         factor = 6.0 * np.pi * SOOT * self.share * self.scale
         if factor == 0.0:
-            return Constant(0.0), Constant(0.0)
-        return spectra.Tabulated(WIDEST, factor / (WIDEST * 1e-9), "hold"), Constant(0.0)
+            return absorbs, scatters
+        soot = spectra.Tabulated(WIDEST, factor / (WIDEST * 1e-9), "hold")
+        return _combined([soot, absorbs], sum, spectral), scatters
 
 
 def _combined(values: list[Any], combine: Callable[[list[Any]], Any], spectral: bool) -> Spectrum:

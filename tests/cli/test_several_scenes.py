@@ -43,14 +43,14 @@ def test_what_fails_does_not_stop_the_rest(meshes, capsys):
 
 
 def test_faults_of_ours_do_not_stop_the_rest_either(meshes, monkeypatch, capsys):
-    check = outputs.check_contents
+    metadata = outputs.metadata
 
-    def fail_for_a(paths, scene):
-        check(paths, scene)
-        if scene.name == "a":
+    def fail_for_a(renderer, scene, seconds):
+        if scene.stem == "a":
             raise ZeroDivisionError("of a test")
+        return metadata(renderer, scene, seconds)
 
-    monkeypatch.setattr(outputs, "check_contents", fail_for_a)
+    monkeypatch.setattr(outputs, "metadata", fail_for_a)
     assert run(["render", "a.obj", CORNELL, *COMMON, "-o", "{scene}.npy", "--quiet"]) == 1
     error = capsys.readouterr().err
     assert "clpt: error: a.obj: ZeroDivisionError: of a test (a fault of clpt" in error

@@ -186,10 +186,9 @@ def cardioid() -> tuple[Scene, float, Callable[[Values], Values]]:
     return scene, 1.0 / 3.0, lambda found: power / (found - direct)
 
 
+@pytest.mark.slow
 @with_path_and_photons
-@pytest.mark.parametrize(
-    ("curve", "paths"), [(nephroid, 2e5), pytest.param(cardioid, 5e5, marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize(("curve", "paths"), [(nephroid, 2e5), (cardioid, 5e5)])
 def test_a_ring_has_its_cusp_where_light_has_no_width(way: str, curve: Any, paths: float) -> None:
     """The width of light along the axis is a line from 1 in the middle to 0 at the cusp.
 

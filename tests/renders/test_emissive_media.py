@@ -103,7 +103,8 @@ def seen(medium: media.Grid, source, absorbs: np.ndarray, extinction: np.ndarray
     return (np.exp(-depth) * density * absorbs * source(points)).sum(axis=0) * (4.0 / steps)
 
 
-@pytest.mark.parametrize("albedo", [pytest.param(0.0, marks=pytest.mark.slow), 0.7])
+@pytest.mark.slow
+@pytest.mark.parametrize("albedo", [0.0, 0.7])
 def test_constant_grid_is_homogeneous(albedo: float) -> None:
     """Half a density and twice the coefficients; what is scattered again is left out."""
     given = {"sigma_t": CHROMATIC, "albedo": albedo, "emission": COLOUR, "scale": 2.0}
@@ -116,7 +117,7 @@ def test_constant_grid_is_homogeneous(albedo: float) -> None:
 
 
 @pytest.mark.parametrize(
-    "given", ["number", *(pytest.param(n, marks=pytest.mark.slow) for n in SLOWLY), "normalised"]
+    "given", ["number", *(pytest.param(n, marks=pytest.mark.slow) for n in (*SLOWLY, "normalised"))]
 )
 def test_grid(given: str) -> None:
     """Numbers on a grid that light is multiplied by, and black bodies."""

@@ -38,9 +38,10 @@ def from_above(material, shape, wavelength: float) -> Scene:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "shape",
-    [Rectangle, pytest.param(Disk, marks=pytest.mark.slow)],
+    [Rectangle, Disk],
     ids=["rectangle", "disk"],
 )
 def test_where_a_lamps_first_order_appears(shape):

@@ -133,7 +133,8 @@ def test_the_picture_has_the_same_bits(how):
         assert [n for n in layered.layers() if n in LAYERS] == [n for n in names if n != GROUPS]
 
 
-@pytest.mark.parametrize("film", [{}, *(pytest.param(f, marks=pytest.mark.slow) for f in FILTERED)])
+@pytest.mark.slow
+@pytest.mark.parametrize("film", [{}, *FILTERED])
 def test_layers_have_the_same_bits_however_they_are_rendered(film):
     """All but `variance`, whose halves are other ones."""
     splatting = film and "filtering" not in film
@@ -245,6 +246,7 @@ def test_layers_are_saved_merged_and_written(tmp_path):
             np.testing.assert_array_equal(written[name], values)
 
 
+@pytest.mark.slow
 def test_several_devices_have_the_layers_of_one():
     devices = [dev.choose(threads=1), dev.choose(threads=1)]
     with clpt.MultiRenderer(room(layers=DENOISING), devices) as renderer:

@@ -104,7 +104,7 @@ LIGHTS = {
     "sphere": 30.0, "disk": 10.0, "rectangle": 10.0, "mesh": 20.0, "cylinder": 10.0, "point": 3.0,
     "spot": 8.0, "directional": 2.0, "constant": 1.0, "envmap": 2.0, "cube_map": 1.0,
 }  # fmt: skip
-QUICK = ("spot", "envmap")  # in a point, around all; others on a surface
+QUICK = ("envmap",)  # around all; others in a point or on a surface
 
 
 def still_life(mode: str, on: dict[str, float], camera: Camera | None = None) -> Scene:

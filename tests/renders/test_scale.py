@@ -107,7 +107,7 @@ PLACES = {  # 1e4 m away float32 has steps of 1 mm: there the scene is 400 m wid
 }
 
 
-QUICK = (("wide8", "spectral"), ("gpu", "rgb"))
+QUICK = (("wide8", "rgb"),)
 
 
 def gpu_form() -> dev.Device:

@@ -64,7 +64,7 @@ def agree(cls: type[m.Material], name: str, image: Any, mode: str, **options: An
     assert_agree(*made, f"{cls.kind}.{name}")
 
 
-@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+@pytest.mark.parametrize("mode", ["rgb", pytest.param("spectral", marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     ("cls", "name"),
     [pytest.param(*one, marks=() if one[0] in CHECKED else pytest.mark.slow) for one in LINEAR],

@@ -294,6 +294,7 @@ def test_bits() -> None:
     assert not np.array_equal(picture(with_vcm(caustic(), merging=False), 7), whole)
 
 
+@pytest.mark.slow
 def test_stopped_early_is_as_bright() -> None:
     """A pass that was left has fewer samples of some pixels, and its light paths are all there."""
     scene = with_film(with_vcm(caustic(), max_depth=6, radius=0.05), width=80, height=60)

@@ -258,9 +258,9 @@ class _Writer:
     def sdf_grid(self, grid: shapes.SdfGrid) -> str:
         """Write signed distances; return the file's name."""
         name = self.file_name(grid.name or "distances", "npy")
-        stream = io.BytesIO()
-        np.save(stream, np.asarray(grid.values, np.float32))
-        output_files.write(self.path.parent / name, stream.getvalue())
+        file = io.BytesIO()
+        np.save(file, np.asarray(grid.values, np.float32))
+        output_files.write(self.path.parent / name, file.getvalue())
         self.files[name] = name
         return name
 

@@ -156,7 +156,7 @@ def test_light_of_a_texture_under_d65(read, tmp_path):
 
 def test_text_between_elements_and_the_integrator_of_distances(read):
     made = read('stray <integrator type="depth"/>')
-    assert made.integrator.channels == ("depth",)
+    assert made.film.layers == ("depth",)
 
 
 FLATTENED = '<transform name="to_world"><scale x="2" y="{}" z="0"/></transform>'
