@@ -63,6 +63,7 @@ HostForm = Literal[
     "material", "medium", "phase", "texture", "filter", "area_light", "group",
     "rows2", "rows3", "rows4", "normals", "triangles", "attributes", "number_or_list", "lengths",
     "image", "volume", "cube_images", "crop", "sensor", "white_balance", "number_or_auto",
+    "keys", "shutter",
 ]  # fmt: skip
 ORDERS = 8  # highest order of diffraction, see kernels/optics/diffraction.cl
 ROUNDING = 1e-6  # by which a spectrum may be beyond its limits

@@ -160,7 +160,9 @@ def _shared(features: Features, layout: str) -> Files:
         **signatures.virtual_files(features, layout),
         **parameters.virtual_files(features),
         **choices.virtual_files(features, layout),
-        "generated/camera.cl": stages.camera_text(features.camera, features.glass_lens),
+        "generated/camera.cl": stages.camera_text(
+            features.camera, features.glass_lens, "camera" in features.moving
+        ),
         "generated/connect.cl": stages.connect_text(features),
         "generated/photon.cl": stages.photon_text(features) if features.merged else "",
         "generated/emission.cl": emission.dispatch_text(

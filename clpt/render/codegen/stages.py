@@ -15,16 +15,19 @@ from clpt.scene.params import device_params, interior_params
 from clpt.scene.scatterer import Scatterer
 
 
-def camera_text(kind: str, glass: bool) -> str:
-    """Return `camera_ray`; glass: the lens is of a glass that disperses."""
+def camera_text(kind: str, glass: bool, moves: bool = False) -> str:
+    """Return `camera_ray`; glass: the lens is of a glass that disperses; moves: the camera does."""
     record = camera_records.RECORDS[kind]
     camera = f"(global const {record.name} *)(scene).camera"
     ray = f"{kind}_ray({camera}, film, lens)"
     if glass:
         row = f"(integer)(({camera})->glass)"
         ray = f"{kind}_glass_ray({camera}, film, lens, spectra_row(scene, {row}, lambdas).x)"
+    moving = ""
+    if moves:
+        ray, moving = f"camera_moved(scene, {ray})", '#include "camera/moved.cl"\n'
     return (
-        f'{record.uniform_text()}#include "camera/{kind}.cl"\n'
+        f'{record.uniform_text()}#include "camera/{kind}.cl"\n{moving}'
         f"#define camera_ray(scene, film, lens, lambdas) {ray}\n"
     )
 
@@ -78,6 +81,7 @@ def lights_text(features: Features) -> str:
             densities,
             features.aimed,
             features.light_groups > 0,
+            "lights" in features.moving,
         )
     )
 

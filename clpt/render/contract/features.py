@@ -94,6 +94,9 @@ class Features:
     medium_aims: int = 0  # places of lamps near which flights through media end
     grids: bool = False  # of which some have a density on a grid
     bodies: bool = False  # that may overlap, of different priorities
+    moving: tuple[str, ...] = ()  # while the shutter is open: "camera", "instances", ...
+    motion_scales: bool = False  # some of it scales
+    motion_row: int = 0  # where in `distributions` its table begins
     glass_lens: bool = False  # of a glass that disperses
     bands: bool = False  # a spectral film
     alpha: bool = False  # a film that tells what is covered

@@ -26,12 +26,14 @@ def features_of(
     profile: int,
     aimed: bool,
     medium_aims: int,
+    motion_row: int,
 ) -> Features:
     """Return the features of a scene, from what each step of its lowering has met.
 
     profile: where in `distributions` the values of the pixel filter begin;
     aimed: whether light paths aim;
-    medium_aims: places of lamps that flights through media aim at.
+    medium_aims: places of lamps that flights through media aim at;
+    motion_row: where in `distributions` the table of what moves begins.
     """
     scene, textures = index.scene, encoder.textures
     sources = encoder.sources
@@ -81,6 +83,9 @@ def features_of(
         chromatic_media=any(medium.is_chromatic for medium in index.media),
         medium_aims=medium_aims,
         grids=any(isinstance(medium, Grid) for medium in index.media),
+        moving=moving_parts(index, geometry),
+        motion_scales=index.motions.scales,
+        motion_row=motion_row,
         dispersion=glass_lens or disperses(index.leaves, sources),
         glass_lens=glass_lens,
         bands=bool(scene.film.bands),
@@ -91,3 +96,19 @@ def features_of(
         spectra_step=encoder.spectra.step,
         sources=sources,
     )
+
+
+def moving_parts(index: SceneIndex, geometry: Geometry) -> tuple[str, ...]:
+    """Return what of a scene moves while its shutter is open."""
+    motions = index.motions
+    analytic = {one.number for one in index.placed if one.shape.kind in shape_records.ANALYTIC}
+    placed = {int(number) for prototype in index.prototypes for number in prototype.numbers}
+    lit = {int(geometry.rows[one.shape_row]["number"]) for one in geometry.emitters}
+    numbers = motions.shapes.keys()
+    found = {
+        "camera": motions.camera is not None,
+        "instances": bool(placed & numbers),
+        "shapes": bool(analytic & numbers),
+        "lights": bool(motions.lamps) or bool(lit & numbers),
+    }
+    return tuple(name for name, moves in found.items() if moves)

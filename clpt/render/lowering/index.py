@@ -11,6 +11,7 @@ from clpt.render.contract import custom_materials
 from clpt.render.lowering.camera import cameras, filters
 from clpt.render.lowering.geometry import instancing, shapes
 from clpt.render.lowering.geometry.instancing import Placed, Prototype
+from clpt.render.lowering.motion import Motions
 from clpt.scene import Scene
 from clpt.scene import materials as mt
 from clpt.scene.integrators import ParticleTracer, Vcm
@@ -27,7 +28,7 @@ class SceneIndex:
     shapes: every shape once, those of groups as the group has them; placed: shapes that are lowered
     as they are; prototypes: shapes that instances share; leaves: classes of leaf materials, in the
     order that material words count; normal_mapped: whether a material has a normal or a bump map;
-    warnings: of instances that became triangles.
+    warnings: of instances that became triangles; motions: what moves.
     """
 
     scene: Scene
@@ -37,6 +38,7 @@ class SceneIndex:
     leaves: tuple[type[Scatterer], ...]
     normal_mapped: bool
     warnings: tuple[str, ...]
+    motions: Motions
 
     @classmethod
     def of(cls, scene: Scene) -> SceneIndex:
@@ -45,7 +47,8 @@ class SceneIndex:
         Raises SceneError for an instance that cannot be placed, and for what is not a material.
         """
         warnings: list[str] = []
-        placed, prototypes = instancing.sort(scene.shapes, warnings)
+        motions = Motions.of(scene)
+        placed, prototypes = instancing.sort(scene.shapes, warnings, motions.shapes)
         distinct = tuple(instancing.distinct(scene.shapes))
         return cls(
             scene=scene,
@@ -55,6 +58,7 @@ class SceneIndex:
             leaves=(*_leaf_kinds(distinct), *_phase_kinds(scene, distinct)),
             normal_mapped=any(any_of(shape.material, mt.NormalMapped) for shape in distinct),
             warnings=tuple(warnings),
+            motions=motions,
         )
 
     @property
@@ -91,7 +95,8 @@ class SceneIndex:
         Where the scene says "auto" nothing may ask before `hard_light.decided` has chosen.
         """
         wanted: float = getattr(self.scene.integrator, "light_paths", 0)
-        return wanted if (self.joined or self.merged) and not self.has_media else 0
+        alone = self.has_media or bool(self.motions)
+        return wanted if (self.joined or self.merged) and not alone else 0
 
     @property
     def joined(self) -> bool:
@@ -105,7 +110,7 @@ class SceneIndex:
     def merged(self) -> bool:
         """Whether light paths leave photons, which paths from the camera gather."""
         integrator = self.scene.integrator
-        if not isinstance(integrator, Vcm) or self.shifts or self.has_media:
+        if not isinstance(integrator, Vcm) or self.shifts or self.has_media or self.motions:
             return False
         return integrator.merging and integrator.max_depth not in (1, 2)
 
@@ -113,7 +118,7 @@ class SceneIndex:
     def guided(self) -> bool:
         """Whether directions of the camera's paths are learned from light paths."""
         wanted: bool = getattr(self.scene.integrator, "guiding", False)
-        return wanted and not self.weighed and not self.has_media
+        return wanted and not self.weighed and not self.has_media and not self.motions
 
     @property
     def shifts(self) -> bool:

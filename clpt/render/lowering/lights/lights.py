@@ -6,9 +6,9 @@ an emissive mesh or cube. Infinite lights come first, for the rays that leave th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -45,6 +45,9 @@ class Emitter:
     vertices: shapes.Points | None = None
     faces: shapes.Faces | None = None
     uvs: shapes.Points | None = None
+
+
+Around: TypeAlias = Callable[[int | Emitter, light_bounds.Bounds], light_bounds.Bounds] | None
 
 
 @dataclass(frozen=True)
@@ -98,12 +101,14 @@ def light_rows(
     encoder: Encoder,
     scene_radius: float,
     tree_from: int | None = None,
+    around: Around = None,
 ) -> LightRows:
     """Put the parameters of all lights into the tables, and make the rows of `lights`.
 
     scene_radius: of a sphere around the scene [m]; tree_from: the number of rows from which a tree
-    chooses among them, or 1 / PLACED_LIGHT_WEIGHT of it of lights at places. Raises SceneError for
-    a light that has no place.
+    chooses among them, or 1 / PLACED_LIGHT_WEIGHT of it of lights at places; around: makes bounds
+    of a lamp (by its index) or emitter hold while it moves. Raises SceneError for a light that has
+    no place.
     """
     if encoder.store.append("light_params", blank_row()) != 0:
         raise ValueError("`light_params` must be empty before the lights are put in")
@@ -111,6 +116,12 @@ def light_rows(
     infinite = sum(lamp.kind in INFINITE for lamp in ordered)
     blocks = [_lamp_block(lamp, encoder, scene_radius) for lamp in ordered]
     blocks += [_emitter_block(emitter, encoder) for emitter in emitters]
+    if around is not None:
+        lights_: list[int | Emitter] = [*row_order(lamps), *emitters]
+        blocks = [
+            block._replace(bounds=around(light, block.bounds))
+            for light, block in zip(lights_, blocks, strict=True)
+        ]
     first = np.cumsum([0, *(len(block.rows) for block in blocks)])[len(ordered) : -1]
     rows = np.concatenate([np.zeros(0, LIGHT.dtype), *(block.rows for block in blocks)])
     power = np.concatenate([np.zeros(0), *(block.power for block in blocks)])
