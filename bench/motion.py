@@ -50,9 +50,9 @@ def rates(scenes: list[Scene]) -> list[float]:
     found: list[list[float]] = [[] for _ in scenes]
     for round_ in range(ROUNDS + 1):
         for renderer, own in zip(renderers, found, strict=True):
-            before, began = renderer.stats.rays, time.process_time()
-            renderer.render_samples(SPP)
-            rate = (renderer.stats.rays - before) / (time.process_time() - began)
+            before, began = renderer.wavefronts[0].counts.rays, time.process_time()
+            renderer.run(SPP)
+            rate = (renderer.wavefronts[0].counts.rays - before) / (time.process_time() - began)
             if round_:
                 own.append(rate)
     return [statistics.median(own) for own in found]
@@ -72,7 +72,7 @@ def main() -> None:
         "camera": dataclasses.replace(still, camera=camera),
     }
     found = rates(list(scenes.values()))
-    print(machine.describe() if hasattr(machine, "describe") else "")
+    print(machine.processor())
     for name, rate in zip(scenes, found, strict=True):
         print(f"{name:8} {rate / 1e6:6.2f} M rays/s, {rate / found[0]:.2f} of still")
 

@@ -60,7 +60,7 @@ def _at_rest(number: int, none: str) -> list[str]:
         "o = motion_point_back(motion, o);",
         "d = scale3(motion_back(motion, d), 1.0f / longer);",
         "tmin *= longer;",
-        "tmax *= longer;",
+        "tmax = min_r(tmax * longer, (real)(FAR));",
     ]
 
 

@@ -19,13 +19,14 @@ from clpt.scene import Scene
 from clpt.scene.cameras import Camera, Matrix
 from clpt.scene.lights import Light
 from clpt.scene.motion import Keys, Shutter, arc, decomposed, rotation, slerp
-from clpt.scene.shapes import Shape
+from clpt.scene.shapes import Cylinder, Group, Instance, Shape, Sphere
 
 STEP = 29  # floats of a step between two keys, see kernels/tracing/motion.cl
 TURN = 0.1  # [rad] of a rotation that a box is looked at again
 ROUNDING = 4e-6  # of its coordinates, by which a box is larger than what float32 makes of it
 EVEN = 1e-5  # relative difference of scales from which a motion stretches
 
+ROUND = (Sphere, Cylinder)
 AT_ONCE = Shutter(0.0, 0.0)
 
 Boxes = NDArray[np.float32]
@@ -107,6 +108,9 @@ def _rest(thing: Any, shutter: Shutter) -> Any:
     matrix = thing.motion.at(shutter.open)
     if isinstance(thing, Matrix):
         return replace(thing, motion=None, view=thing.view @ transforms.inverse(matrix))
+    if isinstance(thing, ROUND) and not is_even(thing.motion):
+        still = replace(thing, motion=None)  # which an instance may stretch
+        return Instance(group=Group((still,), thing.kind), to_world=matrix, name=thing.name)
     if hasattr(thing, "to_world"):
         return replace(thing, motion=None, to_world=matrix @ np.asarray(thing.to_world))
     changes: dict[str, Any] = {"motion": None}
