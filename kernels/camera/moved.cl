@@ -1,5 +1,5 @@
 /* A camera that moves: its ray as it was lowered, at the time of the path. */
-#include "generated/motion.cl"
+#include "tracing/motion.cl"
 
 inline CameraRay camera_moved(Scene scene, CameraRay ray)
 {

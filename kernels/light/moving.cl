@@ -1,6 +1,6 @@
 /* Lights that move. A point is taken to where the light was lowered, the light is sampled there, and the sample is
  * brought back. Such a motion keeps angles, so that densities per solid angle stay. */
-#include "generated/motion.cl"
+#include "tracing/motion.cl"
 
 inline Motion motion_of_light(Scene scene, integer row, LightRow l)
 {

@@ -84,6 +84,9 @@ def at_rest(scene: Scene) -> Scene:
                 message = "a shape of a group cannot move in it: give `motion` to its instance"
                 raise SceneError(message, where=shapes.where(inner))
         _check(shape, f"shapes[{i}]")
+        if getattr(shape.emission, "motion", None) is not None:
+            message = "an area light moves with its shape: give `motion` to that"
+            raise SceneError(message, where=shapes.where(shape))
     for i, light in enumerate(scene.lights):
         _check(light, f"lights[{i}]")
     _check(scene.camera, "camera")
