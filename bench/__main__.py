@@ -39,6 +39,8 @@ PARTS: dict[str, tuple[str, ...]] = {
     "devices": (),
     "checkpoints": (),
     "layers": (),
+    "lens": (),
+    "measured": (),
     "viewing": (),
     "sizes": ("--plot", str(report.RESULTS / "sizes.png")),
 }

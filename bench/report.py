@@ -254,6 +254,8 @@ TABLES: dict[str, Callable[[Sequence[Row]], str]] = {
     "devices": plain,
     "denoising": plain,
     "layers": plain,
+    "lens": plain,
+    "measured": plain,
     "startup": startup,
     "viewing": plain,
     "compiling": plain,

@@ -137,6 +137,20 @@ class Record:
             [head, "{", f"    {self.name} r;", *body, "    return r;", "}", ""]
         )
 
+    def spread_text(self) -> str:
+        """Return `name_at(table, at)`: the lane struct with a row that is the same for all lanes;
+        table: of float; at: the row's first word. `row_text` has the struct."""
+        lower = self.snake_name
+        body = []
+        for m in self.members:
+            for i, component in enumerate(TYPES[m.type][3]):
+                value = f"table[at + {m.word + i}]"
+                if m.type in _CASTS:
+                    value = f"as_{'int' if m.type == 'integer' else 'uint'}({value})"
+                body.append(f"    r.{m.name}{component} = {value};")
+        head = f"inline {self.name} {lower}_at(global const float *table, int at)"
+        return "\n".join([head, "{", f"    {self.name} r;", *body, "    return r;", "}", ""])
+
     def keep_text(self) -> str:
         """Return `name_keep(table, at, m, v)`: writes a row where m; `at`: its first word."""
         lower = self.snake_name

@@ -82,6 +82,7 @@ SHADOW = Record(
         "integer",
         "medium at its beginning, where it may go through several; or bodies, where these overlap",
     ),
+    into=("integer", "medium at its end, where a light is a part of that; 0: any"),
     film=(
         "vec2",
         "where the picture shows its beginning, from the corner [pixels]; of light paths",

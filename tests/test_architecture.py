@@ -16,20 +16,22 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE, KERNELS = ROOT / "clpt", ROOT / "kernels"
 
 BASE = {
-    "colour", "errors", "layout", "records", "transforms", "images", "output_files", "spectra",
+    "colour", "errors", "layout", "measured", "records", "transforms", "images",
+    "output_files", "spectra",
     "spectral_exr", "tev", "version",
 }  # fmt: skip
 # What a part may import of the others; itself always.
 MAY_IMPORT = {
     **dict.fromkeys(BASE, BASE),
-    "scene": BASE,
+    "lenses": BASE,
+    "scene": BASE | {"lenses"},
     "device": BASE,
     "bvh": BASE | {"device"},
     "denoise": BASE | {"scene", "device"},
     "rays": BASE | {"device", "bvh"},
     "trimesh_ray": BASE | {"device", "rays"},
-    "render": BASE | {"scene", "device", "bvh", "denoise"},
-    "formats": BASE | {"scene"},
+    "render": BASE | {"lenses", "scene", "device", "bvh", "denoise"},
+    "formats": BASE | {"lenses", "scene"},
     "mie": BASE | {"scene"},
     "view": BASE | {"scene", "device", "denoise", "render", "formats"},
     "benchmark": BASE | {"scene", "device", "bvh", "rays", "render", "formats"},
@@ -158,7 +160,8 @@ def test_who_imports_pyopencl(path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["scene", "formats", "spectra", "layout", "transforms", "images", "spectral_exr"]
+    "name",
+    ["scene", "lenses", "formats", "spectra", "layout", "transforms", "images", "spectral_exr"],
 )
 def test_data_does_not_need_opencl(name: str) -> None:
     """No chain of imports leads from plain data to pyopencl."""

@@ -11,7 +11,7 @@ from .verbosity import verbose_option
 
 COMMANDS = (
     "render", "view", "merge", "warm", "worker", "cluster", "devices", "info", "inspect", "kernels",
-    "mie", "bench",
+    "mie", "lens", "bench",
 )  # fmt: skip
 
 

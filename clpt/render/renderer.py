@@ -448,10 +448,12 @@ class Renderer(Resumable):
         return refusal is None
 
     def _enters_a_medium(self, scene: Scene) -> bool:
-        """Whether the camera of a changed scene is in other media than that of the one before."""
+        """Whether the camera or a light of a changed scene may be in other media than before."""
         lowered = self.wavefronts[0].scene.lowered
         if not lowered.features.media:
             return False
+        if lowered.features.light_media and _lights_moved(self.scene, scene):
+            return True
         readable = resolve_device_arrays(scene, self.device.queue)
         if not lowered.features.bodies:
             return media_around(readable, lowered.cache) != lowered.around
@@ -475,6 +477,25 @@ class Renderer(Resumable):
     def stats(self) -> RenderStats:
         """What the render took so far: numbers of things, bytes by table and tree, seconds."""
         return collect(self.wavefronts, *self._built, dict(self._seconds))
+
+
+def _lights_moved(former: Scene, scene: Scene) -> bool:
+    """Whether lights, or boundaries of their media, may have other places."""
+    pairs = zip(former.shapes, scene.shapes, strict=False)
+    fields = ("to_world", "vertices", "center", "centers", "radius", "group")
+    return (
+        len(former.shapes) != len(scene.shapes)
+        or any(
+            getattr(old, name, None) is not getattr(new, name, None)
+            for old, new in pairs
+            for name in fields
+        )
+        or any(
+            getattr(old, name, None) is not getattr(new, name, None)
+            for old, new in zip(former.lights, scene.lights, strict=False)
+            for name in ("to_world", "position")
+        )
+    )
 
 
 def next_range(first: int, samples: int) -> tuple[int, int]:

@@ -6,10 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from clpt import lenses
+from clpt.errors import SceneError
+from clpt.lenses import Prescription
 from clpt.scene.media import Medium
 from clpt.scene.motion import Keys, Shutter
-from clpt.scene.params import Kind, choice, host, index, real
+from clpt.scene.params import Kind, choice, flag, host, index, real
 from clpt.scene.values import IndexLike, Matrix4
+
+MOST_BLADES = 24
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -52,6 +57,59 @@ class ThinLens(Perspective):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Lens(Camera):
+    """A lens traced surface by surface, with a film behind it; its origin is the film's middle.
+
+    The whole lens moves to focus. Where its glasses disperse, each path has one wavelength.
+    """
+
+    lens: Prescription | str = host("double_gauss", "its surfaces", form="lens")
+    film_width: float = real(0.036, "of the film; its height follows from the picture's", "m", 1e-6)
+    focus_distance: float = real(1e4, "of what is sharp, from the film", "m", low=1e-6)
+    film_shift: float = real(0.0, "of the film away from the lens, out of that focus", "m")
+    f_number: float = real(
+        0.0, "focal length over entrance pupil; 0: as far open as it is", low=0.0
+    )
+    blades: int = host(0, "of the diaphragm, from 3 on; 0: it is round", form="integer")
+    blade_angle: float = real(0.0, "by which the diaphragm is turned", "degrees")
+    losses: bool = flag(False, "surfaces reflect a part of the light, which is lost")
+    coating: str = choice(
+        "none", "of surfaces between glass and air that have none", tuple(lenses.COATINGS)
+    )
+    ghosts: float = real(
+        0.0, "share of the samples that follow light which two surfaces reflect", low=0.0, high=0.9
+    )
+    exposure: str = choice(
+        "relative",
+        "what radiance 1 makes of the film's middle: 1, or its irradiance, as pbrt has it",
+        ("relative", "irradiance"),
+    )
+    unit: float = real(1e-3, "a millimetre of the lens in the scene", "m", low=1e-12)
+
+    def check(self) -> None:
+        if isinstance(self.blades, bool) or not isinstance(self.blades, int):
+            raise SceneError("must be a whole number", where="lens.blades")
+        if not (self.blades == 0 or 3 <= self.blades <= MOST_BLADES):
+            raise SceneError(
+                f"must be 0 or 3 to {MOST_BLADES}, not {self.blades}", where="lens.blades"
+            )
+
+    @property
+    def reflects(self) -> bool:
+        """Whether its surfaces reflect a part of the light."""
+        return self.losses or self.ghosts > 0.0
+
+    @property
+    def prescription(self) -> Prescription:
+        """Its surfaces, from the library if `lens` is a name. Raises SceneError."""
+        if isinstance(self.lens, str):
+            return lenses.library(self.lens)
+        if not isinstance(self.lens, Prescription):
+            raise SceneError(f"must be a name or a prescription, not {self.lens!r}", where="lens")
+        return self.lens
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Orthographic(Camera):
     """Parallel rays along +z; the film spans [-1, 1] in x, scaled by `to_world`."""
 
@@ -76,4 +134,4 @@ class Matrix(Camera):
     projection: Matrix4 = host(np.eye(4), "eye to clip, (4, 4)")
 
 
-KINDS = (Perspective, ThinLens, Orthographic, Spherical, Matrix)
+KINDS = (Perspective, ThinLens, Lens, Orthographic, Spherical, Matrix)

@@ -32,7 +32,7 @@ MOST_DIGESTS = 4096  # up to which each has a digest; more have one together
 WITHOUT_SAMPLES = ("spp", "noise", "name", "warnings", "extra")  # of a scene: they change no sample
 ARRAYS: dict[str, DTypeLike] = {  # how the lowering reads what a host parameter holds, by its form
     "rows2": np.float32, "rows3": np.float32, "rows4": np.float32, "normals": np.float32,
-    "attributes": np.float32, "triangles": np.uint32, "lengths": np.int64,
+    "attributes": np.float32, "grid": np.float32, "triangles": np.uint32, "lengths": np.int64,
 }  # fmt: skip
 FILES = ("image", "cube_images")  # forms of host parameters that may name files
 PIECE = 1 << 20  # bytes of a file that are read at once

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from clpt.errors import SceneError
+from clpt.measured import Measurement, MerlTable
 from clpt.scene.params import (
     ORDERS,
     Kind,
@@ -24,6 +25,8 @@ from clpt.scene.params import (
     host,
     index,
     layers,
+    measurement,
+    merl,
     params,
     per_order,
     real,
@@ -394,6 +397,13 @@ class GltfSurface(Material):
     base_color: Textured = reflectance(1.0, "colour of base, metal, and of what is let through")
     metallic: TexturedNumber = _share(0.0, "share of the metal", lobe=True)
     roughness: TexturedNumber = _share(1.0, "of reflection and of what is let through")
+    multiple_scattering: float = real(
+        0.0,
+        "share that is kept of what facets reflect to each other, as rough metals do",
+        low=0.0,
+        high=1.0,
+        lobe=True,
+    )
     ior: IndexLike = index(
         1.5, "index of the dielectric; 0: it reflects all but for `specular_color`", zero=True
     )
@@ -407,6 +417,19 @@ class GltfSurface(Material):
     )
     clearcoat: TexturedNumber = _share(0.0, "strength of a coat of index 1.5 over all", lobe=True)
     clearcoat_roughness: TexturedNumber = _share(0.0, "its roughness")
+    clearcoat_apart: float = real(
+        0.0,
+        "1: the coat has normals of its own, not those of a normal map around the material",
+        low=0.0,
+        high=1.0,
+        lobe=True,
+    )
+    clearcoat_normal_x: TexturedNumber = _share(
+        0.5, "normal of such a coat by the surface's, along u: x / 2 + 1/2"
+    )
+    clearcoat_normal_y: TexturedNumber = _share(0.5, "along v, likewise")
+    clearcoat_normal_z: TexturedNumber = _share(1.0, "along the surface's normal, likewise")
+    clearcoat_normal_scale: float = real(1.0, "factor on its x and y", low=-100.0, high=100.0)
     sheen_color: Textured = reflectance(0.0, "colour of fibres under the coat", lobe=True)
     sheen_roughness: TexturedNumber = _share(0.5, "how much fibres lean; at least 0.25")
     transmission: TexturedNumber = _share(
@@ -430,7 +453,7 @@ class GltfSurface(Material):
 
     @property
     def uses_tangents(self) -> bool:
-        return self.anisotropy != 0.0
+        return self.anisotropy != 0.0 or self.clearcoat_apart != 0.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -550,6 +573,33 @@ class Hair(Material):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Measured(Material):
+    """What was measured of a real surface (Dupuy and Jakob 2018), from a file `.bsdf`; front side.
+
+    By default a matt grey. It is as reciprocal as what was measured, and its numbers are linear in
+    between.
+    """
+
+    reversible = False
+
+    data: Measurement | None = measurement("its reflection, as `clpt.measured.read` gives it")
+
+    @property
+    def uses_tangents(self) -> bool:
+        return self.data is not None and not self.data.isotropic
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Merl(Material):
+    """A table of MERL (Matusik et al. 2003), from a file `.binary`; isotropic, front side.
+
+    By default a matt grey.
+    """
+
+    data: MerlTable | None = merl("its reflection, as `clpt.measured.read_merl` gives it")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Null(Material):
     """No surface at all: light passes as if it were not there."""
 
@@ -637,6 +687,8 @@ LEAVES = (
     Grating,
     Fluorescent,
     Hair,
+    Measured,
+    Merl,
     Null,
 )
 COMPOSITES = (TwoSided, Mask, Blend, NormalMap, BumpMap)

@@ -16,12 +16,17 @@ from numpy.typing import NDArray
 from clpt import spectra
 from clpt.errors import SceneError
 from clpt.scene.params import Kind, angular, coefficient, host, quantity, real, reflectance
+from clpt.scene.params import emission as emitted
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.values import Matrix4, SpectrumLike
-from clpt.spectra import RGB, Constant, RGBUnbounded, Spectrum
+from clpt.scene.volumes import Volume, check_volume, resampled
+from clpt.spectra import RGB, Constant, RGBIlluminant, RGBUnbounded, Spectrum
 from clpt.spectra.spectrum import WIDEST, extremes
 
 MOST_ROWS = 512  # of a table by wavelength
+SOOT = 0.26  # E(m), the imaginary part of (m^2 - 1) / (m^2 + 2) without its sign
+COLDEST = 100.0  # [K] below which nothing is seen of a black body
+RADIANCE = "W m^-2 sr^-1 nm^-1"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -190,6 +195,11 @@ class Medium(Kind):
         """Whether its extinction depends on the wavelength."""
         raise NotImplementedError
 
+    @property
+    def light(self) -> Spectrum | None:
+        """The radiance that a body of it too thick to see through would emit; None: no light."""
+        raise NotImplementedError
+
     def coefficients(self, spectral: bool) -> tuple[Spectrum, Spectrum]:
         """Return how much a metre absorbs and scatters [1/m].
 
@@ -207,6 +217,9 @@ class Homogeneous(Medium):
     sigma_t: SpectrumLike = coefficient(0.0, "how much it does of both; 0: the two above say it")
     albedo: SpectrumLike = reflectance(1.0, "share of `sigma_t` that is scattered", textured=False)
     scale: float = real(1.0, "factor of all coefficients", low=0.0)
+    emission: SpectrumLike = emitted(
+        0.0, "what it emits where it absorbs all light; a metre emits sigma_a of it", RADIANCE
+    )
 
     @classmethod
     def from_albedo(
@@ -249,6 +262,12 @@ class Homogeneous(Medium):
         return not _is_zero(self.coefficients(spectral=True)[1])
 
     @property
+    def light(self) -> Spectrum | None:
+        value: Any = self.emission
+        dark = _is_dark(value) or _is_zero(self.coefficients(spectral=True)[0])
+        return None if dark else _lit(value)
+
+    @property
     def is_chromatic(self) -> bool:
         given = (self.sigma_a, self.sigma_s, self.sigma_t)
         return not all(map(_is_grey, given))
@@ -271,18 +290,6 @@ def _whole(rows: Any, cosines: Any) -> NDArray[np.float64]:
     return np.pi * ((rows[:, 1:] + rows[:, :-1]) @ np.diff(cosines))
 
 
-@dataclass(frozen=True, eq=False)
-class Volume:
-    """Numbers on a grid, and where its box is.
-
-    values: (nx, ny, nz), in a numpy array or a pyopencl.array.Array; to_world: 4x4, which takes the
-    unit cube from (0, 0, 0) to (1, 1, 1) to the grid's box.
-    """
-
-    values: Any
-    to_world: Matrix4
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Grid(Homogeneous):
     """A homogeneous medium whose coefficients are multiplied by a density on a grid.
@@ -290,6 +297,10 @@ class Grid(Homogeneous):
     The density (nx, ny, nz) is that at the centres of the cells of a box, trilinear between these;
     beyond the outermost ones it is theirs, and outside of the box there is nothing. It is an array
     of numpy or of pyopencl, or a `Volume`, whose box `to_world` then moves; by default it is 1.
+
+    `emission_grid` and `temperature` are the same for its light. An array has the box of the
+    density, and the coarser of both is made as fine as the other. A `Volume` is taken at the points
+    of the density. Where there is a `temperature`, in kelvin, a black body of it is the emission.
 
     Raises SceneError for a density with less or more than three axes, or with numbers that are
     negative or not finite.
@@ -301,34 +312,96 @@ class Grid(Homogeneous):
         form="volume",
     )
     to_world: Matrix4 = host(np.eye(4), "takes the unit cube to the grid's box")
+    bits: int = host(16, "of a number of the density on the device: 16 or 8")
+    albedo_grid: Any = host(
+        None, "colours (nx, ny, nz, 3) that multiply what is scattered; the rest is absorbed",
+        form="colour_volume",
+    )  # fmt: skip
+    emission_grid: Any = host(None, "numbers (nx, ny, nz) that multiply `emission`", form="volume")
+    temperature: Any = host(
+        None, "of a black body that is the emission, (nx, ny, nz)", "K", form="volume"
+    )
+    brightness: float = real(1.0, "factor of what a temperature emits", low=0.0)
+    normalised: bool = host(
+        False, "whether a black body of any temperature has 1 at its brightest wavelength"
+    )
 
     def check(self) -> None:
         super().check()
+        own = np.asarray(self.to_world, float)
         if isinstance(self.density, Volume):
-            moved = np.asarray(self.to_world, float) @ np.asarray(self.density.to_world, float)
-            object.__setattr__(self, "to_world", moved)
+            object.__setattr__(self, "to_world", own @ np.asarray(self.density.to_world, float))
             object.__setattr__(self, "density", self.density.values)
-        where = f"{self.kind}.density"
-        if not hasattr(self.density, "shape"):
-            raise SceneError("must be an array with the axes x, y and z", where=where)
-        if len(self.density.shape) != 3 or not all(self.density.shape):
-            message = f"must be an array (nx, ny, nz), not of the shape {self.density.shape}"
-            raise SceneError(message, where=where)
-        if isinstance(self.density, np.ndarray):
-            check_density(self.density, where)
+        check_volume(self.density, f"{self.kind}.density")
         if not abs(np.linalg.det(np.asarray(self.to_world, float)[:3, :3])) > 0.0:
             raise SceneError("has no inverse", where=f"{self.kind}.to_world")
+        if self.bits not in (8, 16):
+            raise SceneError(f"must be 16 or 8, not {self.bits!r}", where=f"{self.kind}.bits")
+        if self.temperature is not None and self.emission_grid is not None:
+            message = "give `emission_grid` or `temperature`, not both"
+            raise SceneError(message, where=self.kind)
+        for name in ("emission_grid", "temperature", "albedo_grid"):
+            self._fit(name, own)
+
+    def _fit(self, name: str, own: Matrix4) -> None:
+        """Bring numbers to the points of the density, or that to theirs where they are more."""
+        given, where = getattr(self, name), f"{self.kind}.{name}"
+        if given is None:
+            return
+        values = given.values if isinstance(given, Volume) else given
+        check_volume(values, where, colours=name == "albedo_grid")
+        if name == "albedo_grid" and not (isinstance(values, np.ndarray) and values.max() <= 1.0):
+            raise SceneError("must be an array of numpy, of numbers up to 1", where=where)
+        box = np.asarray(self.to_world, float)
+        placed = own @ np.asarray(given.to_world, float) if isinstance(given, Volume) else box
+        if values.shape[:3] != self.density.shape or not np.allclose(placed, box, 1e-6, 1e-9):
+            if not (isinstance(values, np.ndarray) and isinstance(self.density, np.ndarray)):
+                raise SceneError("on a device it must have the density's shape", where=where)
+            finer = np.prod(values.shape[:3]) > np.prod(self.density.shape)
+            if finer and not isinstance(given, Volume):
+                density = resampled(self.density, box, values.shape[:3], box)
+                object.__setattr__(self, "density", density)
+            else:
+                values = resampled(values, placed, self.density.shape, box)
+        object.__setattr__(self, name, values)
+
+    @property
+    def light(self) -> Spectrum | None:
+        if self.temperature is None:
+            return super().light
+        dark = self.brightness == 0.0 or _is_zero(self.coefficients(spectral=True)[0])
+        found = self.temperature
+        hottest = 0.0 if dark else float(np.max(found.get() if hasattr(found, "get") else found))
+        return spectra.Blackbody(hottest, self.brightness) if hottest > COLDEST else None
 
 
-def check_density(values: np.ndarray, where: str) -> None:
-    """Raise SceneError for numbers that no density can be."""
-    if values.dtype.kind not in "fui":
-        raise SceneError(f"must hold numbers, not {values.dtype}", where=where)
-    low, high = float(values.min()), float(values.max())
-    if not (np.isfinite(low) and np.isfinite(high)):
-        raise SceneError("has numbers that are not finite", where=where)
-    if low < 0.0:
-        raise SceneError(f"is negative somewhere: {low:g}", where=where)
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Soot(Grid):
+    """The soot of a flame: particles far smaller than the wavelength, which absorb and glow.
+
+    A metre of it absorbs 6 pi E f / lambda (Rayleigh), with the share f of the volume that is soot
+    and E of 0.26, of the index 1.57 - 0.56i (Smyth and Shaddix 1996). Its own coefficients are 0.
+    """
+
+    share: float = real(
+        1e-6, "of the volume that is soot, where the density is 1", low=0.0, high=1.0
+    )
+
+    def check(self) -> None:
+        super().check()
+        for name in ("sigma_a", "sigma_s", "sigma_t"):
+            if not _is_zero(getattr(self, name)):
+                raise SceneError("follows from `share`", where=f"{self.kind}.{name}")
+
+    @property
+    def is_chromatic(self) -> bool:
+        return True
+
+    def coefficients(self, spectral: bool) -> tuple[Spectrum, Spectrum]:
+        factor = 6.0 * np.pi * SOOT * self.share * self.scale
+        if factor == 0.0:
+            return Constant(0.0), Constant(0.0)
+        return spectra.Tabulated(WIDEST, factor / (WIDEST * 1e-9), "hold"), Constant(0.0)
 
 
 def _combined(values: list[Any], combine: Callable[[list[Any]], Any], spectral: bool) -> Spectrum:
@@ -370,6 +443,19 @@ def _is_zero(value: Any) -> bool:
     return _is_grey(value) and not value.to_rgb("unbounded").any()
 
 
+def _is_dark(value: Any) -> bool:
+    """Whether an emission is black."""
+    if isinstance(value, RGB | RGBIlluminant | RGBUnbounded):
+        return max(value.r, value.g, value.b) == 0.0
+    return isinstance(value, Constant) and value.value == 0.0
+
+
+def _lit(value: Any) -> Spectrum:
+    """An emission as a spectrum: a colour is a multiple of D65."""
+    lit: Spectrum = RGBIlluminant(value.r, value.g, value.b) if isinstance(value, RGB) else value
+    return lit
+
+
 PHASE_LEAVES: tuple[type[Phase], ...] = (Isotropic, HenyeyGreenstein, Rayleigh, Draine, Tabulated)
 PHASES: tuple[type[Phase], ...] = (*PHASE_LEAVES, Blend)
-KINDS: tuple[type[Medium], ...] = (Homogeneous, Grid)
+KINDS: tuple[type[Medium], ...] = (Homogeneous, Grid, Soot)

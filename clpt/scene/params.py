@@ -16,6 +16,8 @@ quantity       number, (r, g, b), Spectrum            Spectrum within its limits
 angular        rows of numbers                        AngularTable                no
 real           number, Texture                        real                        yes
 reradiation    Reradiation, None                      Spectrum, its rows' sums    no
+measurement    Measurement, None                      Measurement                 no
+merl           MerlTable, None                        MerlTable                   no
 flag           bool                                   int                         no
 choice         one of the names listed                int, the name's position    no
 orders         numbers of orders -n to n              real[17], of -8 to 8        no
@@ -38,6 +40,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from clpt.errors import SceneError
+from clpt.measured import Measurement, MerlTable
 from clpt.spectra import (
     RGB,
     Constant,
@@ -54,17 +57,20 @@ from clpt.spectra.spectrum import check_reach, extremes
 SPECTRUM_ROLES = ("reflectance", "emission", "index", "factor", "coefficient", "quantity")
 DEVICE_ROLES = (
     "reflectance", "emission", "index", "factor", "reradiation", "real", "flag", "choice", "orders",
-    "layers", "quantity", "angular",
+    "layers", "quantity", "angular", "measurement",
+    "merl",
 )  # fmt: skip
 # What a host parameter holds. clpt/formats/native/forms.py reads, writes and describes each form.
 HostForm = Literal[
     "boolean", "integer", "number", "text", "names", "numbers",
     "vector", "direction", "matrix3", "matrix4",
     "material", "medium", "phase", "texture", "filter", "area_light", "group",
-    "rows2", "rows3", "rows4", "normals", "triangles", "attributes", "number_or_list", "lengths",
-    "image", "volume", "cube_images", "crop", "sensor", "white_balance", "number_or_auto",
-    "keys", "shutter",
+    "rows2", "rows3", "rows4", "grid", "normals", "triangles", "attributes",
+    "number_or_list", "lengths",
+    "image", "volume", "colour_volume", "cube_images", "crop", "sensor", "white_balance",
+    "number_or_auto", "lens", "keys", "shutter",
 ]  # fmt: skip
+MEASURED = {"measurement": Measurement, "merl": MerlTable}
 ORDERS = 8  # highest order of diffraction, see kernels/optics/diffraction.cl
 ROUNDING = 1e-6  # by which a spectrum may be beyond its limits
 
@@ -156,6 +162,16 @@ def angular(doc: str) -> Any:
 def reradiation(default: Any, doc: str) -> Any:
     """Declare a re-radiation matrix; None for no fluorescence."""
     return _field(default, Param("reradiation", doc))
+
+
+def measurement(doc: str) -> Any:
+    """Declare what was measured of a material; None for a matt grey."""
+    return _field(None, Param("measurement", doc))
+
+
+def merl(doc: str) -> Any:
+    """Declare a table of MERL; None for a matt grey."""
+    return _field(None, Param("merl", doc))
 
 
 def real(
@@ -310,6 +326,11 @@ def _checked(value: Any, param: Param, where: str) -> Any:
     if param.role == "reradiation":
         if not isinstance(value, (Reradiation, type(None))):
             raise SceneError(f"must be a re-radiation matrix, not {value!r}", where=where)
+        return value
+    if param.role in MEASURED:
+        if not isinstance(value, (MEASURED[param.role], type(None))):
+            name = MEASURED[param.role].__name__
+            raise SceneError(f"must be a {name} of clpt.measured, not {value!r}", where=where)
         return value
     if getattr(value, "is_texture", False):
         if not param.textured:

@@ -14,7 +14,7 @@ from clpt.scene.materials import Diffuse, Material, TwoSided
 from clpt.scene.media import Medium
 from clpt.scene.motion import Keys
 from clpt.scene.params import Kind, choice, host
-from clpt.scene.textures import MeshAttribute
+from clpt.scene.textures import Bitmap, MeshAttribute
 from clpt.scene.values import Matrix4, OnDevice, Vector3
 
 SMOOTH = "smooth"  # normals of a mesh: the means of the triangles around a vertex, by their areas
@@ -48,11 +48,23 @@ class Mesh(Shape):
         form="normals",
     )
     uvs: Any = host(None, "(n, 2) float32 per vertex, or None", form="rows2")
+    tangents: Any = host(
+        None,
+        "(n, 4) float32 per vertex, beside normals: the tangent, along u; and 1 or -1, as v is on "
+        "the side of normal x tangent or not; None: from the uvs",
+        form="rows4",
+    )
     attributes: Any = host(
         {},
         "name -> (n, 1 or 3) float32; one row a vertex or a face, as vertex_ or face_ begins it",
         form="attributes",
     )
+    subdivision: int = host(0, "levels of Loop subdivision, to the smooth limit surface; 0: none")
+    displacement: Bitmap | None = host(
+        None, "heights by uv, along smooth normals, after subdivision; or None", form="texture"
+    )
+    displacement_scale: float = host(1.0, "factor on them", "m")
+    displacement_edge: float = host(0.05, "longest edge of what is displaced, in the world", "m")
 
     @classmethod
     def from_trimesh(cls, geometry: Any, **parameters: Any) -> Mesh:
@@ -153,6 +165,27 @@ class Curves(Shape):
     basis: str = choice("bspline", "what the points mean", BASES)
 
 
+def _ball() -> np.ndarray:
+    """Distances to a sphere of radius 0.35 in the middle of the unit cube, (9, 9, 9) float32."""
+    x, y, z = np.meshgrid(*[np.linspace(-0.5, 0.5, 9)] * 3, indexing="ij")
+    return (np.sqrt(x * x + y * y + z * z) - 0.35).astype(np.float32)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SdfGrid(Shape):
+    """The surface where a signed distance on a grid over the unit cube is zero; as triangles.
+
+    Between the grid's points, which lie on the faces of the cube too, the distance is trilinear.
+    The front is where it is positive.
+    """
+
+    values: Any = host(
+        _ball(), "(nx, ny, nz) float32, below 0 inside; default: a ball", form="grid"
+    )
+    smooth: bool = host(True, "normals are smooth over the cells; False: those of the triangles")
+    pieces: int = host(2, "of the side of a cell that the surface crosses, 1 to 16")
+
+
 @dataclass(frozen=True, eq=False)
 class Group:
     """Shapes that instances place together; by itself it is nowhere in the scene.
@@ -189,4 +222,6 @@ class Instance(Shape):
             raise SceneError(f"must be a group, not {self.group!r}", where="instance.group")
 
 
-KINDS = (Mesh, Sphere, Spheres, Rectangle, Disk, Cube, Cylinder, Curves, Instance)
+KINDS = (
+    Mesh, Sphere, Spheres, Rectangle, Disk, Cube, Cylinder, Curves, SdfGrid, Instance,
+)  # fmt: skip

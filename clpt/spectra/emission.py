@@ -35,14 +35,14 @@ class Blackbody(Spectrum):
         if not 0.0 < self.kelvin < np.inf:
             raise SceneError(f"a black body's temperature must be positive, found {self.kelvin} K")
         _check_scale(self.scale)
-        if self.normalised and not _planck(cie.GRID, self.kelvin).max() > 1e-30:
+        if self.normalised and not planck(cie.GRID, self.kelvin).max() > 1e-30:
             raise SceneError(f"a black body of {self.kelvin} K is dark and cannot be normalised")
 
     def sample(self, lambdas: ArrayLike) -> Samples:
-        values = self.scale * _planck(lambdas, self.kelvin)
+        values = self.scale * planck(lambdas, self.kelvin)
         if not self.normalised:
             return values
-        return values / cie.spectrum_to_xyz(_planck(cie.GRID, self.kelvin))[1]
+        return values / cie.spectrum_to_xyz(planck(cie.GRID, self.kelvin))[1]
 
 
 @dataclass(frozen=True, init=False)
@@ -173,9 +173,9 @@ def _check_scale(scale: float) -> None:
         raise SceneError(f"a lamp's scale cannot be {scale:g}")
 
 
-def _planck(lambdas: ArrayLike, kelvin: float) -> Samples:
+def planck(lambdas: ArrayLike, kelvin: ArrayLike) -> Samples:
     """Radiance [W m^-2 sr^-1 nm^-1] of a black body at wavelengths [nm]."""
     metres = np.asarray(lambdas, np.float64) * 1e-9
-    exponent = PLANCK * LIGHT / (metres * BOLTZMANN * kelvin)
+    exponent = PLANCK * LIGHT / (metres * BOLTZMANN * np.asarray(kelvin, np.float64))
     per_metre = 2.0 * PLANCK * LIGHT**2 / metres**5 / np.expm1(np.minimum(exponent, 700.0))
     return 1e-9 * per_metre

@@ -23,9 +23,10 @@ PRIMARIES: dict[str, Chromaticities] = {
     "rec709": cie.REC709_PRIMARIES,  # ITU-R BT.709-6
     "rec2020": ((0.708, 0.292), (0.170, 0.797), (0.131, 0.046)),  # ITU-R BT.2020-2
     "display_p3": ((0.680, 0.320), (0.265, 0.690), (0.150, 0.060)),  # SMPTE EG 432-1, D65
+    "aces2065_1": ((0.7347, 0.2653), (0.0, 1.0), (0.0001, -0.077)),  # AP0, SMPTE ST 2065-1
     "acescg": ((0.713, 0.293), (0.165, 0.830), (0.128, 0.044)),  # AP1, S-2014-004
 }
-WHITES = {"acescg": D60_ACES}
+WHITES = {"aces2065_1": D60_ACES, "acescg": D60_ACES}
 SPACES = (*PRIMARIES, "xyz")
 
 TEMPERATURES = (1000.0, 25000.0)  # [K] that a correlated colour temperature may have

@@ -93,4 +93,4 @@ def _value(value: Any, param: Param, mode: str) -> Any:
         if mode == "rgb":
             return np.asarray(spectrum.to_rgb(RGB_ROLES[param.role]))
         return np.asarray(spectrum.sample(np.array(LAMBDAS)))
-    return value if param.role == "layers" else np.array(value, float)
+    return value if param.role in ("layers", "measurement", "merl") else np.array(value, float)

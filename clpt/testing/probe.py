@@ -13,10 +13,12 @@ from clpt.render.codegen.library import BSDF
 from clpt.render.codegen.parameters import array_size, lane_type, struct_text
 from clpt.render.contract import custom_materials
 from clpt.render.contract.parameter_words import FILM_COSINES
+from clpt.render.lowering.materials import measurements
 from clpt.render.lowering.materials.thin_films import film_colours
 from clpt.render.lowering.spectra_table import angular_values
 from clpt.scene.materials import Layer, Material
 from clpt.scene.params import Param, device_params
+from clpt.spectra.spectrum import primaries
 
 COMPONENTS = {"rgb": 3, "spectral": 4}
 LAMBDAS = (532.0, 590.0, 655.0, 441.0)  # [nm], of kinds that ask for them, and of layers
@@ -94,9 +96,13 @@ class Probe:
             columns.append(np.broadcast_to(np.asarray(value, float), (n, self.components)))
         given = np.concatenate(columns, axis=1).T.astype(np.float32)
         c = self.components
-        extra = self._angular_text(params, len(given))
-        if extra == ["", ""]:
-            extra = self._layers_text(len(layers), len(given))
+        extra = self._layers_text(len(layers), len(given))
+        if self._named("angular"):
+            extra = self._angular_text(params, len(given))
+        elif self._named("measurement"):
+            extra = self._measurement_text(params, len(given))
+        elif self._named("merl"):
+            extra = self._merl_text(len(given))
         virtual: dict[str, str | device.Part] = {"probe.cl": self._text(*extra)}
         if self.cls.source is not None:
             virtual[f"{self.cls.folder}/{self.cls.kind}.cl"] = custom_materials.text(self.cls)
@@ -107,13 +113,12 @@ class Probe:
         named["lobe"] = named["lobe"].astype(int)
         return {k: v[:, 0] if v.shape[1] == 1 else v for k, v in named.items()}
 
-    def _angular(self) -> list[str]:
-        return [k for k, p in device_params(self.cls).items() if p.role == "angular"]
+    def _named(self, role: str) -> str:
+        """The parameter of a role, "" where there is none."""
+        return next((k for k, p in device_params(self.cls).items() if p.role == role), "")
 
     def _angular_text(self, params: Mapping[str, Any], rows: int) -> list[str]:
         """What an AngularTable is, and setting m's, which stands in `in` after its rows."""
-        if not (names := self._angular()):
-            return ["", ""]
         spectral = self.mode == "spectral"
         kind: Any = self.cls(**params)
         cosines, values, start, step = kind.device_rows(spectral)
@@ -124,16 +129,49 @@ class Probe:
         made = f"{{in + {rows} * n, (integer)(0), {counts}, {{{row}}}}}"
         return [
             '#include "optics/angular_table.cl"',
-            f"    AngularTable table = {made};\n    m.{names[0]} = table;",
+            f"    AngularTable table = {made};\n    m.{self._named('angular')} = table;",
+        ]
+
+    def _measurement(self, params: Mapping[str, Any]) -> measurements.Rows:
+        film = (min(LAMBDAS), max(LAMBDAS)) if self.mode == "spectral" else None
+        return measurements.rows(params[self._named("measurement")], film)
+
+    def _measurement_text(self, params: Mapping[str, Any], rows: int) -> list[str]:
+        """What a Measurement is, and setting m's, which stands in `in` after its rows."""
+        nodes = self._measurement(params).wavelengths
+        at = np.interp(LAMBDAS, nodes, np.arange(len(nodes))) if len(nodes) else np.arange(3.0)
+        row = ", ".join(f"(real)({one:.9e}f)" for one in at)
+        made = f"{{in + {rows} * n, (integer)(1), {{{row}}}}}"
+        name = self._named("measurement")
+        return [
+            '#include "optics/measurement.cl"',
+            f"    Measurement data = {made};\n    m.{name} = data;",
+        ]
+
+    def _merl_text(self, rows: int) -> list[str]:
+        """What a MerlTable is, and setting m's, which stands in `in` after its rows."""
+        one = np.eye(3)
+        if self.mode == "spectral":
+            one = np.array([curve.sample(LAMBDAS) for curve in primaries()])
+        basis = [", ".join(f"(real)({value:.9e}f)" for value in curve) for curve in one]
+        made = f"{{in + {rows} * n, (integer)(1), {', '.join(f'{{{row}}}' for row in basis)}}}"
+        name = self._named("merl")
+        return [
+            '#include "optics/merl_table.cl"',
+            f"    MerlTable data = {made};\n    m.{name} = data;",
         ]
 
     def _streamed(self) -> list[tuple[str, Param]]:
-        beside = ("layers", "angular")
+        beside = ("layers", "angular", "measurement", "merl")
         return [(k, p) for k, p in device_params(self.cls).items() if p.role not in beside]
 
     def _table(self, params: Mapping[str, Any], layers: Sequence[Layer]) -> NDArray:
         """What stands in `in` after the streams: the layers, or in RGB mode their colours."""
-        if self._angular():
+        if self._named("measurement"):
+            return np.append(0.0, self._measurement(params).values)
+        if name := self._named("merl"):
+            return np.append(0.0, measurements.merl_rows(params[name]).values)
+        if self._named("angular"):
             kind: Any = self.cls(**params)
             return angular_values(*kind.device_rows(self.mode == "spectral")[:2])
         if not layers:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from clpt.measured import Measurement, MerlTable, fit
 from clpt.render.codegen.parameters import array_size, lane_type
 from clpt.scene.materials import Layer
 from clpt.scene.params import Kind, Param, device_params
@@ -90,9 +91,31 @@ def _draw_layers(rng: np.random.Generator) -> tuple[Layer, ...]:
     return tuple(Layer(eta=e, thickness=t) for e, t in zip(etas, thick, strict=True))
 
 
-def _draw(param: Param, mode: str, rng: np.random.Generator) -> np.ndarray:
+def _draw_measurement(rng: np.random.Generator) -> Measurement:
+    """A material that nobody has measured: random tables around a matt one, every other isotropic.
+
+    It is white where it is brightest.
+    """
+    turns = [0.0] if rng.integers(2) else np.linspace(-np.pi, 0.0, 4)
+    colour = rng.uniform(0.1, 1.0, 3) / np.pi
+    made = fit(
+        lambda wo, wi: np.broadcast_to(colour, wi.shape),
+        theta_i=np.radians([0.0, 40.0, 85.0]), phi_i=turns, normals=12, size=8,
+    )  # fmt: skip
+    noise = rng.uniform(0.2, 1.0, made.spectra.shape).astype(np.float32)
+    shares = rng.uniform(0.2, 1.0, made.luminance.shape).astype(np.float32)
+    return dataclasses.replace(
+        made, spectra=made.spectra * noise, luminance=made.luminance * shares
+    )
+
+
+def _draw(param: Param, mode: str, rng: np.random.Generator) -> Any:
     if lane_type(param) == "Spectrum":
         return rng.uniform(0.0, 1.0, COMPONENTS[mode])
+    if param.role == "measurement":
+        return _draw_measurement(rng)
+    if param.role == "merl":
+        return MerlTable(values=rng.uniform(0.05, 1.0, (6, 5, 8, 3)) / np.pi)
     if param.role == "orders":
         return rng.uniform(0.0, 1.0, array_size(param))
     if param.role == "flag":

@@ -51,6 +51,16 @@ CAMERAS = {
         "`aperture_radius` 0.16, in focus on the yellow knob.",
         cameras.ThinLens(to_world=EYE, fov=50, aperture_radius=0.16, focus_distance=4.6),
     ),
+    "lens": seen(
+        "A `sonnar` wide open, in focus on the yellow knob: dark corners.",
+        cameras.Lens(
+            to_world=EYE,
+            lens="sonnar",
+            unit=5e-3,
+            film_width=0.23,
+            focus_distance=4.6,
+        ),
+    ),
     "orthographic": seen(
         "What is far is as large as what is near.",
         cameras.Orthographic(

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from clpt import spectra
+from clpt import measured, spectra
 from clpt.scene import Scene, integrators, lights, shapes, textures
 from clpt.scene.materials import (
     Blend,
@@ -24,6 +24,8 @@ from clpt.scene.materials import (
     Hair,
     Mask,
     Material,
+    Measured,
+    Merl,
     NormalMap,
     Null,
     Phong,
@@ -119,6 +121,65 @@ def tuft(material: Material, x: float) -> Shapes:
         ),
         shapes.Sphere(center=(x, 0.82, 0), radius=0.36, material=Diffuse(reflectance=0.05)),
     ]
+
+
+def halfway(wo: Any, wi: Any) -> tuple[Any, Any]:
+    """The halfway directions (n, 3), and of each the cosine to wo."""
+    h = wo + wi
+    h /= np.linalg.norm(h, axis=1, keepdims=True)
+    return h, np.sum(h * wo, axis=1)
+
+
+def facets(wo: Any, wi: Any, u: float, v: float) -> Any:
+    """GGX without masking, over 4 cosines as blends of both (n, 1) [1/sr]."""
+    h, _ = halfway(wo, wi)
+    d = 1.0 / (np.pi * u * v * ((h[:, 0] / u) ** 2 + (h[:, 1] / v) ** 2 + h[:, 2] ** 2) ** 2)
+    both = wo[:, 2] + wi[:, 2] - wo[:, 2] * wi[:, 2]
+    return (d / (4.0 * np.maximum(both, 1e-3)))[:, None]
+
+
+def velvet(wo: Any, wi: Any) -> Any:
+    """Dark red, with fibres that shine where it is looked at flatly."""
+    h, _ = halfway(wo, wi)
+    upright = np.exp(-((h[:, 2] / np.sqrt(np.maximum(1.0 - h[:, 2] ** 2, 1e-4)) / 0.5) ** 2))
+    both = wo[:, 2] + wi[:, 2] - wo[:, 2] * wi[:, 2]
+    shine = upright / (4.0 * np.maximum(both, 1e-2))
+    return np.array((0.12, 0.006, 0.012)) / np.pi + shine[:, None] * np.array((0.5, 0.16, 0.17))
+
+
+def bronze(wo: Any, wi: Any) -> Any:
+    """Metal that is rougher around than along."""
+    return facets(wo, wi, 0.12, 0.45) * np.array((0.75, 0.43, 0.2))
+
+
+def pearl(wo: Any, wi: Any) -> Any:
+    """A body of cream under a sheen whose colour turns with the angle between eye and light."""
+    _, cosine = halfway(wo, wi)
+    turn = 2.0 * np.pi * (2.2 * cosine[:, None] + np.array((0.0, 0.33, 0.67)))
+    body = np.array((0.5, 0.45, 0.38)) / np.pi
+    return body + facets(wo, wi, 0.3, 0.3) * (0.22 + 0.18 * np.cos(turn))
+
+
+def lacquer(wo: Any, wi: Any) -> Any:
+    """A red body under a clear coat."""
+    _, cosine = halfway(wo, wi)
+    fresnel = 0.04 + 0.96 * (1.0 - cosine[:, None]) ** 5
+    return np.array((0.5, 0.04, 0.02)) / np.pi + fresnel * facets(wo, wi, 0.06, 0.06)
+
+
+def chrome(wo: Any, wi: Any) -> Any:
+    return facets(wo, wi, 0.05, 0.05) * np.array((0.55, 0.56, 0.57))
+
+
+def velour(wo: Any, wi: Any) -> Any:
+    """The velvet in blue."""
+    return velvet(wo, wi)[:, ::-1]
+
+
+def measured_from(f: Callable[[Any, Any], Any]) -> Measured:
+    quarter = np.linspace(-np.pi, -np.pi / 2.0, 5)
+    viewers = {"phi_i": quarter} if f is bronze else {}
+    return Measured(data=measured.fit(f, normals=48, **viewers))
 
 
 def studs() -> textures.Bitmap:
@@ -265,6 +326,14 @@ MATERIALS = {
         *each(Hair, "sigma_a", (pigment(0.2, 0.1), pigment(0.1, 1.2), pigment(3.0, 0.2))),
         thing=tuft,
         integrator=DEEP,
+    ),
+    "measured": three(
+        "Velvet, brushed bronze and pearl, each measured from a formula by `clpt.measured.fit`.",
+        *map(measured_from, (velvet, bronze, pearl)),
+    ),
+    "merl": three(
+        "Lacquer, chrome and blue cloth, tables made from formulas by `clpt.measured.tabulate`.",
+        *(Merl(data=measured.tabulate(f, (90, 45, 60))) for f in (lacquer, chrome, velour)),
     ),
     "null": three(
         "Between two knobs stands one of `null`: no surface, no shadow.",

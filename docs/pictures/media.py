@@ -63,6 +63,19 @@ MEDIA = {
         _ball((np.arange(9) % 2.0)[None, :, None], 0.0, sigma_s=14.0),
         _ball((1.0 - np.linspace(0.0, 1.0, 24))[None, :, None] ** 2, 1.42, sigma_t=AMBER),
     ),
+    "soot": balls(
+        "soot of 0.01, 0.04 and 0.16 millionths, as hot as a candle",
+        *(
+            media.Soot(
+                density=np.ones((2, 2, 2)),
+                share=share * 1e-8,
+                temperature=np.full((2, 2, 2), 1900.0),
+                brightness=0.3,
+                to_world=translate([x - 0.55, 0.01, -0.55]) @ scale(1.1),
+            )
+            for x, share in ((-1.42, 1.0), (0.0, 4.0), (1.42, 16.0))
+        ),
+    ),
 }
 PHASES = {
     "isotropic": balls(

@@ -84,6 +84,21 @@ def strands() -> list[shapes.Shape]:
     ]
 
 
+def distances() -> list[shapes.Shape]:
+    """A sheet that parts space in two, as thick as a wall, in a ball."""
+    x, y, z = np.meshgrid(*[np.linspace(-1.0, 1.0, 40)] * 3, indexing="ij")
+    a, b, c = (5.5 * v for v in (x, y, z))
+    sheet = np.sin(a) * np.cos(b) + np.sin(b) * np.cos(c) + np.sin(c) * np.cos(a)
+    wall, ball = np.abs(sheet) / 5.5 - 0.06, np.sqrt(x * x + y * y + z * z) - 0.95
+    return [
+        shapes.SdfGrid(
+            values=np.maximum(wall, ball).astype(np.float32),
+            material=TwoSided(front=Diffuse(reflectance=(0.5, 0.28, 0.12))),
+            to_world=translate([-0.85, 0.0, -0.85]) @ scale(1.7),
+        )
+    ]
+
+
 def instances() -> list[shapes.Shape]:
     """A hundred knobs, of which one is held."""
     group = shapes.Group(shapes=(knob(Diffuse(reflectance=(0.55, 0.2, 0.05))),))
@@ -132,5 +147,6 @@ SHAPES = {
         ],
     ),
     "curves": alone("Five hundred strands of six points.", strands),
+    "sdf_grid": alone("A gyroid within a ball, on 40 x 40 x 40 points.", distances),
     "instance": alone("A hundred instances of one knob.", instances),
 }

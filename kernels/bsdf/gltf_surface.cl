@@ -32,6 +32,26 @@ inline GltfPair gltf_pair(GltfSurface m, vec3 wo, vec3 wi)
     return p;
 }
 
+/* The coat's normal, where it has one of its own, and a turned direction in its frame. */
+inline vec3 gltf_coat_normal(GltfSurface m)
+{
+    real scale = 2.0f * m.clearcoat_normal_scale;
+    vec3 n = v3((m.clearcoat_normal_x - 0.5f) * scale, (m.clearcoat_normal_y - 0.5f) * scale,
+                max_r(2.0f * m.clearcoat_normal_z - 1.0f, (real)(0.02f)));
+    n = gltf_turn(m, normalize3(n), (real)(1.0f));
+    return sel3(m.clearcoat_apart > 0.0f, n, v3(0.0f, 0.0f, 1.0f));
+}
+inline vec3 gltf_coated(GltfSurface m, vec3 w)
+{
+    return USES_GLTF_SURFACE_CLEARCOAT_APART ? to_local(frame_of(gltf_coat_normal(m)), w) : w;
+}
+/* What is left of the coat's light where its normal leans away from a direction by more than the surface's does: so
+ * it is reciprocal, and reflects no more than comes. */
+inline real gltf_coat_lean(real coated, real z)
+{
+    return clamp_r(coated / max_r(fabs(z), (real)(1e-6f)), (real)(0.0f), (real)(1.0f));
+}
+
 /* What all functions ask of the parameters. */
 typedef struct {
     Microfacets facets, coat;
@@ -117,6 +137,24 @@ inline Spectrum gltf_reflectance(GltfSurface m, Spectrum f0, real f90, FilmBase 
     return f;
 }
 
+/* What facets send to each other and then out, over what they lose to each other: the mean of Schlick's reflectance,
+ * as often as light meets a facet (Kulla and Conty 2017). */
+inline Spectrum gltf_bounced(GltfSurface m, GltfParts p, Spectrum f0, real f90)
+{
+    FacetAlbedo mean = facet_albedo_mean(p.roughness);
+    real e = mean.a + mean.b;
+    Spectrum v;
+#define C(c)                                                                                            \
+    {                                                                                                   \
+        real f = f0.c + (f90 - f0.c) * (1.0f / 21.0f);                                                  \
+        v.c = m.multiple_scattering * f * f * e / max_r(1.0f - f * (1.0f - e), (real)(1e-3f));          \
+    }
+    SPECTRUM_EACH(C)
+#undef C
+    return v;
+}
+inline real gltf_lost(FacetAlbedo e) { return max_r(1.0f - e.a - e.b, (real)(0.0f)); }
+
 /* What a direction of the dielectric's facets leaves to what lies under them: 1 - E, the directional albedo; and
  * the same with a film. */
 inline Spectrum gltf_left(GltfSurface m, GltfParts p, FacetAlbedo e)
@@ -125,6 +163,8 @@ inline Spectrum gltf_left(GltfSurface m, GltfParts p, FacetAlbedo e)
 #define C(c) v.c = 1.0f - p.base_f0.c * e.a - m.specular * e.b;
     SPECTRUM_EACH(C)
 #undef C
+    if (USES_GLTF_SURFACE_MULTIPLE_SCATTERING)
+        v = spectrum_madd(gltf_bounced(m, p, p.base_f0, m.specular), -gltf_lost(e), v);
     return v;
 }
 inline Spectrum gltf_left_by_film(GltfSurface m, GltfParts p, FacetAlbedo e, real c)
@@ -171,7 +211,7 @@ inline GltfLobes gltf_lobes(GltfSurface m, GltfParts p, vec3 wo)
     real colour = spectrum_mean(m.base_color), c = fabs(wo.z);
     FacetAlbedo e = facet_albedo(c, p.roughness);
     GltfLobes l = {(real)(0.0f), (real)(0.0f), (real)(0.0f), (real)(0.0f), (real)(0.0f)};
-    if (USES_GLTF_SURFACE_CLEARCOAT) l.coat = gltf_coat_albedo(m, wo.z);
+    if (USES_GLTF_SURFACE_CLEARCOAT) l.coat = gltf_coat_albedo(m, gltf_coated(m, wo).z);
     if (USES_GLTF_SURFACE_SHEEN_COLOR)
         l.sheen = (1.0f - l.coat) * gltf_sheen_albedo(m, wo.z) * spectrum_mean(m.sheen_color);
     real rest = max_r(1.0f - l.coat - l.sheen, (real)(0.05f)), film = 0.25f * m.iridescence;
@@ -180,6 +220,8 @@ inline GltfLobes gltf_lobes(GltfSurface m, GltfParts p, vec3 wo)
     l.facets = sel(front, rest * (mirrored + left * p.passed * colour),
                    sel(p.passed > 0.0f, (real)(1.0f), (real)(0.0f)));
     l.scattered = sel(front, rest * left * p.scattered * colour, (real)(0.0f));
+    if (USES_GLTF_SURFACE_MULTIPLE_SCATTERING)
+        l.scattered += sel(front, rest * gltf_lost(e) * spectrum_mean(gltf_bounced(m, p, p.f0, p.f90)), (real)(0.0f));
     l.through = rest * left * p.through * spectrum_mean(m.diffuse_transmission_color);
     real total = l.coat + l.sheen + l.facets + l.scattered + l.through;
     real inv = sel(total > 0.0f, 1.0f / max_r(total, (real)(1e-20f)), (real)(0.0f));
@@ -240,6 +282,11 @@ inline Spectrum gltf_value(GltfSurface m, GltfParts p, vec3 wo, vec3 wi)
     Spectrum under = gltf_under(m, p, cos_o, cos_i, front, crossed & (m.thin == 0));
     real back = sel(front & reflected, p.scattered * cos_i * INV_PI, (real)(0.0f));
     v = spectrum_add(v, spectrum_scale(spectrum_mul(under, m.base_color), back));
+    if (USES_GLTF_SURFACE_MULTIPLE_SCATTERING) {
+        real lost = gltf_lost(facet_albedo(cos_o, p.roughness)) * gltf_lost(facet_albedo(cos_i, p.roughness));
+        lost = lost / max_r(gltf_lost(facet_albedo_mean(p.roughness)), (real)(1e-3f)) * cos_i * INV_PI;
+        v = spectrum_madd(gltf_bounced(m, p, p.f0, p.f90), sel(front & reflected, lost, (real)(0.0f)), v);
+    }
     if (USES_GLTF_SURFACE_DIFFUSE_TRANSMISSION) {
         real passing = sel(crossed, p.through * cos_i * INV_PI, (real)(0.0f));
         v = spectrum_add(v, spectrum_scale(spectrum_mul(under, m.diffuse_transmission_color), passing));
@@ -255,8 +302,16 @@ inline Spectrum gltf_value(GltfSurface m, GltfParts p, vec3 wo, vec3 wi)
         v = spectrum_madd(m.sheen_color, sel(outside, fibres, (real)(0.0f)), v);
     }
     if (USES_GLTF_SURFACE_CLEARCOAT) {
-        real coat = microfacet_visible_pdf(p.coat, wo, h.h) * h.jacobian * microfacet_g1(p.coat, wi, h.h);
+        vec3 coat_o = gltf_coated(m, wo), coat_i = gltf_coated(m, wi), coat_h = gltf_coated(m, h.h);
+        real coat = microfacet_visible_pdf(p.coat, coat_o, coat_h) * h.jacobian * microfacet_g1(p.coat, coat_i, coat_h);
         coat *= m.clearcoat * gltf_schlick((real)(0.04f), (real)(1.0f), fabs(h.o));
+        if (USES_GLTF_SURFACE_CLEARCOAT_APART) {
+            z_o = sel(m.thin != 0, fabs(coat_o.z), coat_o.z);
+            z_i = sel(m.thin != 0, fabs(coat_i.z), coat_i.z);
+            coat *= gltf_coat_lean(coat_o.z, wo.z);
+            coat *= min_r(cos_i / max_r(coat_i.z, (real)(1e-6f)), (real)(1.0f));
+            outside = outside & (coat_o.z > 0.0f) & (coat_i.z > 0.0f);
+        }
         v = spectrum_scale(v, 1.0f - max_r(gltf_coat_albedo(m, z_o), gltf_coat_albedo(m, z_i)));
         v = spectrum_add(v, spectrum_of(sel(h.shading & outside, coat, (real)(0.0f))));
     }
@@ -270,8 +325,13 @@ inline real gltf_density(GltfSurface m, GltfParts p, GltfLobes l, vec3 wo, vec3 
     RefractingFacet h = gltf_facet(m, wo, wi, index);
     real turned = gltf_reflects(m, p, gltf_cosine(m, h.o, index));
     real facets = microfacet_visible_pdf(p.facets, wo, h.h) * sel(crossed, 1.0f - turned, turned) * l.facets;
-    if (USES_GLTF_SURFACE_CLEARCOAT)
-        facets += sel(crossed, (real)(0.0f), microfacet_visible_pdf(p.coat, wo, h.h) * l.coat);
+    if (USES_GLTF_SURFACE_CLEARCOAT) {
+        vec3 coat_h = gltf_coated(m, h.h);
+        real coat = microfacet_visible_pdf(p.coat, gltf_coated(m, wo), coat_h) * l.coat;
+        if (USES_GLTF_SURFACE_CLEARCOAT_APART)
+            coat = sel(coat_h.z > 0.0f, coat, (real)(0.0f));
+        facets += sel(crossed, (real)(0.0f), coat);
+    }
     real back = sel(wo.z > 0.0f, l.sheen * INV_2PI + l.scattered * cosine_hemisphere_pdf(wi.z), (real)(0.0f));
     real pdf = sel(crossed, l.through * cosine_hemisphere_pdf(fabs(wi.z)), back);
     pdf += sel(h.shading, facets * h.jacobian, (real)(0.0f));
@@ -318,7 +378,12 @@ BsdfSample gltf_surface_sample(GltfSurface m, vec3 wo, vec3 u)
     Microfacets d = p.facets;
     d.alpha_u = sel(coat, p.coat.alpha_u, d.alpha_u);
     d.alpha_v = sel(coat, p.coat.alpha_v, d.alpha_v);
-    vec3 h = microfacet_visible(d, scale3(w.wo, sel(up, (real)(1.0f), (real)(-1.0f))), uv);
+    vec3 seen = w.wo;
+    if (USES_GLTF_SURFACE_CLEARCOAT_APART)
+        seen = sel3(coat, gltf_coated(m, w.wo), seen);
+    vec3 h = microfacet_visible(d, scale3(seen, sel(up, (real)(1.0f), (real)(-1.0f))), uv);
+    if (USES_GLTF_SURFACE_CLEARCOAT_APART)
+        h = sel3(coat, to_world(frame_of(gltf_coat_normal(m)), h), h);
     real o = dot3(w.wo, h), thin_z = sel(m.thin != 0, (real)(-1.0f), (real)(1.0f));
     real split = gltf_reflects(m, p, gltf_cosine(m, o, p.eta.x));
     real v = (u.z - before) / max_r(1.0f - before, (real)(1e-6f));

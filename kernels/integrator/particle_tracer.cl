@@ -25,7 +25,7 @@ inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask
     Bsdf m = scatter.bsdf;
     Frame frame = scatter.shading.frame;
     vec3 wo = scatter.wo;
-    real arrives = 1.0f / max_r(fabs(dot3(s.n, v.d)), (real)(1e-6f));
+    real arrives = 1.0f / max_r(VERTEX_COSINE(s.n, v.d), (real)(1e-6f));
 #if WEIGHS_LIGHT_PATHS && !BSDF_IS_NULL
     Rival rival = rival_of_emission(scene, path, at, v, vertex_hemisphere(frame, wo));
 #endif
@@ -37,7 +37,7 @@ inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask
     vec3 to = to_local(frame, neg3(c.d));
     Spectrum f = bsdf_eval(m, to, wo);
     mask shine = active & c.seen & (spectrum_max(f) > 0.0f);
-    real carries = fabs(dot3(s.n, c.d)) * arrives * c.importance * shading_frame_share(scatter.shading, neg3(v.d));
+    real carries = VERTEX_COSINE(s.n, c.d) * arrives * c.importance * shading_frame_share(scatter.shading, neg3(v.d));
 #if WEIGHS_LIGHT_PATHS
     carries *= 1.0f / (1.0f + rival_of_joint(rival, s, c, rival_pdf(m, to, wo), rival_pdf(m, wo, to)));
     mask hidden = mask_of(settings->hide_lights != 0) & (s.light >= 0);
@@ -46,6 +46,13 @@ inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask
     Spectrum value = spectrum_scale(spectrum_mul(beta, f), carries);
     value = vertex_beyond(scene, v, neg3(c.d), c.t, v.lambdas, value);
     connect_camera(shadow, at, active, shine, s, c, value);
+#if SHADOW_MEDIA
+#if USES_BODIES
+    store_shadow_through(shadow, at, shine, bodies_beyond(v.bodies, dot3(s.n, c.d) > 0.0f));
+#else
+    store_shadow_through(shadow, at, shine, vertex_medium(v, neg3(c.d)));
+#endif
+#endif
     state += sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
 #endif
 
@@ -54,10 +61,14 @@ inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask
     BsdfSample bs = hero_sample(m, wo, v3(uv.x, uv.y, scatter.choice.y), &ratio);
     mask next = active & (bs.pdf > 0.0f) & vertex_continues(scene, v);
     vec3 onward = normalize3(to_world(frame, bs.wi));
-    real leaves = fabs(dot3(s.n, onward)) * arrives;
+    real leaves = VERTEX_COSINE(s.n, onward) * arrives;
+#if BSDF_IS_PHASE
+    real adjoint = 1.0f;
+#else
     real adjoint = bs.eta * bs.eta * leaves * fabs(wo.z) / max_r(fabs(bs.wi.z), (real)(1e-6f));
+#endif
     Spectrum carried = spectrum_scale(bs.weight, adjoint);
-#if BSDF_CHROMATIC /* eta differs between the wavelengths */
+#if BSDF_CHROMATIC && !BSDF_IS_PHASE /* eta differs between the wavelengths */
     mask spread = next & ((bs.lobe & LOBE_DELTA) == 0);
     Spectrum exact = spectrum_scale(bsdf_eval(m, bs.wi, wo), leaves / sel(spread, bs.pdf, (real)(1.0f)));
     carried = spectrum_sel(spread, exact, carried);

@@ -83,7 +83,10 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     vec3 hemisphere = vertex_hemisphere(frame, wo);
     vec2 point = sampler_pair(sampler, scatter.dimension + DIMENSION_LIGHT);
     LightSample ls = light_sample_nothing();
-#if BSDF_ABSORBS
+#if BSDF_IS_PHASE && SEALED_MEDIA
+    mask sealed = (v.medium & MEDIUM_SEALED) != 0;
+    if (any(next & !sealed))
+#elif BSDF_ABSORBS
     if (any(next))
 #endif
         ls = light_sample(scene, s.p, hemisphere, scatter.choice.x, point, scatter.lambdas);
@@ -100,6 +103,9 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     real w = sel(ls.pdf < 0.0f, (real)(1.0f), mis_weight(ls.pdf, hero_pdf(m, wo, wi, ratio)));
 #endif
     mask shine = next & (ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
+#if BSDF_IS_PHASE && SEALED_MEDIA
+    shine = shine & !sealed;
+#endif
     w = w / sel(shine, fabs(ls.pdf), (real)(1.0f));
     Spectrum value = spectrum_scale(spectrum_mul(spectrum_mul(beta, f), ls.radiance), w);
     value = vertex_beyond(scene, v, ls.wi, ls.t, scatter.lambdas, value);
@@ -118,6 +124,9 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     shadow_toward(shadow, at, active, shine, s, ls, value);
 #if LIGHT_LAYER_GROUPS
     store_path_light(path, at, shine, ls.row);
+#endif
+#if BRICK_LIGHTS
+    store_shadow_into(shadow, at, shine, light_medium(scene, sel_i(shine, ls.row, (integer)(0))));
 #endif
 #if SHADOW_MEDIA
 #if USES_BODIES
@@ -151,6 +160,9 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
 #if !BSDF_IS_NULL
     path_scattered(path, at, next);
     mask delta = (bs.lobe & LOBE_DELTA) != 0;
+#if USES_LIGHTS && BSDF_IS_PHASE && SEALED_MEDIA /* light that is met has its whole weight */
+    delta = delta | sealed;
+#endif
 #if WEIGHS_LIGHT_PATHS
     bs.pdf = rival_pdf(m, wo, bs.wi);
     real p_back = rival_pdf(m, bs.wi, wo);

@@ -6,6 +6,14 @@
  *
  *   CameraRay <kind>_glass_ray(global const <Kind>Camera *camera, vec2 film, vec2 lens, real index);
  *
+ * A kind whose rays have weights has instead
+ *
+ *   CameraRay <kind>_ray(Scene scene, global const <Kind>Camera *camera, vec2 film, vec2 lens, Wavelengths lambdas,
+ *                        Spectrum *weight);
+ *
+ * with directions for the hero's wavelength, if its glasses disperse. A ray that does not get to the scene has a weight
+ * of 0 and ends at once.
+ *
  * film: position on the film, x and y in [0, 1], y down; lens: a point of the unit square;
  * index: of the glass at the hero's wavelength, for which alone the ray then holds.
  * The struct is a uniform Record in clpt/render/contract/camera_records.py.

@@ -28,6 +28,13 @@
  * estimation finds without noise are noise only, see bench/NOTES.md.) Null surfaces change nothing. Where a material
  * ends light paths (`rival_ends`) the camera's rival is 0.
  *
+ * A vertex may be a collision in a medium. Either side flies to it with a density of transmittance times extinction, to
+ * a surface with one of transmittance. On the way between two vertices the transmittance is the same both ways, and at
+ * a collision the extinction stands where c and c' stand at a surface; all of it cancels, so that c and c' are 1
+ * (VERTEX_COSINE). Where one side is joined to an end and the other has flown, weights leave the transmittance out, as
+ * those of next-event estimation do, and so they do what equiangular sampling changes: any weights that sum to one
+ * serve, and both sides know these.
+ *
  * Where photons are merged (merging/gather.cl) the same path may also be found at x_i, the first vertex from the camera
  * that is not sharp, if some vertex beyond it is: the camera's path and a light path that end there nearly meet. Where
  * light paths are joined to the camera, what it sees by itself they find, sharper: x_i is not x_1 then. With
@@ -47,7 +54,7 @@
 /* The density of a direction, for any of the four wavelengths as the hero: the same number from either end. */
 inline real rival_pdf(Bsdf m, vec3 wo, vec3 wi)
 {
-#if USES_DISPERSION && BSDF_CHROMATIC
+#if BSDF_CHROMATIC && (USES_DISPERSION || BSDF_IS_PHASE)
     return spectrum_mean(bsdf_pdfs(m, wo, wi));
 #else
     return bsdf_pdf(m, wo, wi);
@@ -108,7 +115,7 @@ inline Rival rival_of_camera(Scene scene, Slab path, uint at, Vertex v, Sampler 
         rival = sel(r.first, (real)(0.0f), rival);
 #endif
     }
-    real goes_on = sel(rival_ends(scene, v), (real)(0.0f), 1.0f / max_r(fabs(dot3(v.s.n, v.d)), (real)(1e-7f)));
+    real goes_on = sel(rival_ends(scene, v), (real)(0.0f), 1.0f / max_r(VERTEX_COSINE(v.s.n, v.d), (real)(1e-7f)));
     r.arrives = rival * goes_on;
 #if MERGES
     r.pending = load_path_pending(path, at) * goes_on;
@@ -128,7 +135,7 @@ inline real rival_of_light_sample(Scene scene, Rival r, Surface s, LightSample l
     real chosen = sel(ls.pdf < 0.0f, ls.chance, ls.pdf);
     real emission = light_path_pdf(scene, ls.row, s.p, ls.wi, ls.t, ls.n) / max_r(chosen, (real)(1e-30f));
     real arrives = rival_arrives(r, mask_of(0), p, p_back);
-    real third = rival_limited(arrives * p_back * fabs(dot3(s.n, ls.wi)) * emission);
+    real third = rival_limited(arrives * p_back * VERTEX_COSINE(s.n, ls.wi) * emission);
     return sel(r.first, (real)(0.0f), third);
 }
 
@@ -137,7 +144,7 @@ inline real rival_to_light(Rival r, Surface s, vec3 d, mask delta, real p, real 
 {
     real scatters = sel(r.first, (real)(1.0f), p_back) / max_r(p, (real)(1e-30f));
     real change = sel(delta, sel(r.first, (real)(0.0f), (real)(1.0f)), scatters);
-    return rival_limited(rival_arrives(r, delta, p, p_back) * change * fabs(dot3(s.n, d)));
+    return rival_limited(rival_arrives(r, delta, p, p_back) * change * VERTEX_COSINE(s.n, d));
 }
 
 #if MERGES
@@ -145,7 +152,7 @@ inline real rival_to_light(Rival r, Surface s, vec3 d, mask delta, real p, real 
 inline real rival_pending(Rival r, Surface s, vec3 d, mask delta, real p, real p_back)
 {
     real either = sqrt(sqr(r.pending * p_back) + sqr(r.merges)) / max_r(p, (real)(1e-30f));
-    return sel(rival_sharp(delta, p, p_back), (real)(0.0f), rival_limited(either * fabs(dot3(s.n, d))));
+    return sel(rival_sharp(delta, p, p_back), (real)(0.0f), rival_limited(either * VERTEX_COSINE(s.n, d)));
 }
 #endif
 
@@ -153,7 +160,7 @@ inline real rival_pending(Rival r, Surface s, vec3 d, mask delta, real p, real p
 inline Rival rival_of_emission(Scene scene, Slab path, uint at, Vertex v, vec3 hemisphere)
 {
     Rival r;
-    r.arrives = load_path_rival(path, at) / max_r(fabs(dot3(v.s.n, v.d)), (real)(1e-7f));
+    r.arrives = load_path_rival(path, at) / max_r(VERTEX_COSINE(v.s.n, v.d), (real)(1e-7f));
     r.first = v.depth == 1;
     r.met = mask_of(1);
     r.found = 0.0f;
@@ -167,7 +174,7 @@ inline Rival rival_of_emission(Scene scene, Slab path, uint at, Vertex v, vec3 h
         r.met = !r.first | (row < scene.settings->infinite_count) | (light_at(scene, row).shape >= 0);
     }
 #if MERGES
-    r.pending = load_path_pending(path, at) / max_r(fabs(dot3(v.s.n, v.d)), (real)(1e-7f));
+    r.pending = load_path_pending(path, at) / max_r(VERTEX_COSINE(v.s.n, v.d), (real)(1e-7f));
     r.merges = 0.0f;
 #if BSDF_MERGES
     real area = merging_area(scene, merging_pass(scene, load_path_sample(path, at)));
@@ -183,7 +190,7 @@ inline real rival_to_camera(Rival r, Surface s, vec3 d, mask delta, real p, real
     real back = sel(r.met, p_back, (real)(0.0f));
     real either = sel(r.first, sqrt(sqr(back) + sqr(r.found)), back) / max_r(p, (real)(1e-30f));
     real change = sel(delta, sel(r.met, (real)(1.0f), (real)(0.0f)), either);
-    return rival_limited(r.arrives * change * fabs(dot3(s.n, d)));
+    return rival_limited(r.arrives * change * VERTEX_COSINE(s.n, d));
 }
 
 #if MERGES
@@ -191,7 +198,7 @@ inline real rival_to_camera(Rival r, Surface s, vec3 d, mask delta, real p, real
 inline real rival_merged(Rival r, Surface s, vec3 d, mask delta, real p, real p_back)
 {
     real begun = sel(rival_sharp(delta, p, p_back), r.pending * p_back, r.merges) / max_r(p, (real)(1e-30f));
-    return rival_limited(sel(delta, r.pending, begun) * fabs(dot3(s.n, d)));
+    return rival_limited(sel(delta, r.pending, begun) * VERTEX_COSINE(s.n, d));
 }
 #endif
 
@@ -203,7 +210,7 @@ inline real rival_of_joint(Rival r, Surface s, CameraPoint c, real p, real p_bac
     real chosen = 1.0f / max_r(c.importance, (real)(1e-30f));
     real square = sqr(rival_to_camera(r, s, c.d, mask_of(0), chosen, p));
 #if MERGES
-    real more = rival_limited(r.pending * p * c.importance * fabs(dot3(s.n, c.d)));
+    real more = rival_limited(r.pending * p * c.importance * VERTEX_COSINE(s.n, c.d));
     square += sel(rival_sharp(mask_of(0), p, p_back), sqr(more), (real)(0.0f));
 #endif
     return square;

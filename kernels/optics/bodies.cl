@@ -3,7 +3,7 @@
  * higher their priority. Those around a point are the four bytes of a word, in any order, 0 for none; a fifth is not
  * kept. `media` holds two words for each shape, the number of its body first; behind them two for each number: the name
  * of its medium, and where its index stands in `materials`, 0 where it has none. Number 0 has the material word of a
- * null surface in their place. Before all stands what optics/equiangular.cl reads. */
+ * null surface in their place. What stands before: optics/medium.cl. */
 inline integer bodies_top(integer bodies)
 {
     integer low = max_i(bodies & 0xff, (bodies >> 8) & 0xff);
@@ -26,7 +26,7 @@ inline integer bodies_without(integer bodies, integer body)
 
 inline integer body_word(Scene scene, integer body, int word)
 {
-    return gather_i(scene.media, 4 * MEDIUM_AIMS + 2 * (scene.settings->shape_count + body) + word);
+    return gather_i(scene.media, MEDIA_OF_SHAPES + 2 * (scene.settings->shape_count + body) + word);
 }
 inline integer body_medium(Scene scene, integer body)
 {
@@ -44,7 +44,7 @@ typedef struct {
 inline BodyBoundary body_boundary(Scene scene, integer shape, integer bodies, mask front)
 {
     BodyBoundary b;
-    b.body = gather_i(scene.media, 4 * MEDIUM_AIMS + 2 * shape);
+    b.body = gather_i(scene.media, MEDIA_OF_SHAPES + 2 * shape);
     b.others = sel_i(front | (b.body == 0), bodies, bodies_without(bodies, b.body));
     b.next = bodies_top(b.others);
     b.hidden = (b.body != 0) & (b.next >= b.body);

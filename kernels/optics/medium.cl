@@ -7,8 +7,10 @@
  *
  * Media that shapes have inside and outside, or the camera around it, have MEDIUM_FLIES in their names: stage/flight.cl
  * dims what rays bring through them. Their rows hold sigma_a and sigma_s, and before them the word of their phase
- * function. */
+ * function. Where some media emit, five words of the radiance that a thick body of each would emit stand before that.
+ */
 #define MEDIUM_FLIES 0x40000000
+#define MEDIUM_SEALED 0x08000000 /* no ray to a light leaves it: its boundaries bend light */
 #define MEDIUM_ROW(name) (((name) & 0xffffff) - 1)
 
 /* What is left of light after t metres, t up to FAR; medium_absorption and medium_scattering are generated. */
@@ -49,12 +51,41 @@ inline Medium medium_load(Scene scene, integer name, Wavelengths lambdas)
     return m;
 }
 
-/* The names of the media behind the front of a shape and before it; optics/equiangular.cl has what stands before. */
+#if MEDIA_EMIT
+/* What t metres of a medium that is the same everywhere emit, and let through: by Kirchhoff's law a metre emits as much
+ * of `light`, the radiance of a thick body, as it absorbs of any. */
+inline Spectrum medium_emission(Scene scene, integer name, Medium m, real t, Wavelengths lambdas)
+{
+    integer row = max_i(MEDIUM_ROW(name), (integer)(MEDIUM_LIGHT)) - MEDIUM_LIGHT;
+    Spectrum light = medium_light(scene, row, texture_point_nowhere(), lambdas);
+    Spectrum r = spectrum_sub(m.sigma_t, m.sigma_s); /* absorbs, and so emits */
+#define C(c)                                                                             \
+    real depth_##c = m.sigma_t.c * t;                                                    \
+    real some_##c = (1.0f - exp_r(-depth_##c)) / max_r(m.sigma_t.c, (real)(1e-30f));     \
+    r.c = max_r(r.c, (real)(0.0f)) * light.c *                                           \
+          sel(depth_##c > 1e-2f, some_##c, t * (1.0f - depth_##c * (0.5f - depth_##c * (1.0f / 6.0f))));
+    SPECTRUM_EACH(C)
+#undef C
+    return r;
+}
+#endif
+
+/* In `media` stand first what optics/equiangular.cl reads, then, where paths start at lights, two words for each row of
+ * `lights`: the bodies around the light and the name of its medium. Then come two words for each shape. */
+#if LIGHT_MEDIA
+#define MEDIA_OF_SHAPES (4 * MEDIUM_AIMS + 2 * scene.settings->light_count)
+inline integer light_medium(Scene scene, integer row) { return gather_i(scene.media, 4 * MEDIUM_AIMS + 2 * row + 1); }
+inline integer light_bodies(Scene scene, integer row) { return gather_i(scene.media, 4 * MEDIUM_AIMS + 2 * row); }
+#else
+#define MEDIA_OF_SHAPES (4 * MEDIUM_AIMS)
+#endif
+
+/* The names of the media behind the front of a shape and before it. */
 typedef struct { integer inside, outside; } ShapeMedia;
 
 inline ShapeMedia shape_media(Scene scene, integer shape)
 {
-    integer row = 4 * MEDIUM_AIMS + 2 * shape;
+    integer row = MEDIA_OF_SHAPES + 2 * shape;
     ShapeMedia m = {gather_i(scene.media, row), gather_i(scene.media, row + 1)};
     return m;
 }

@@ -1,14 +1,13 @@
 /* A medium whose coefficients a density multiplies, which is given at the points of a lattice and trilinear between.
  * Bricks of 8^3 cells hold the density of their 9^3 points over the brick's highest, in 16 bits each. A ray goes from
  * brick to brick by integer steps (Amanatides and Woo 1987), and the highest density of each bounds the extinction
- * there. Flights are sampled by delta tracking (Woodcock 1965), rays to lights by ratio tracking (Novak et al. 2014);
- * null collisions are weighed over the path's wavelengths as all else is (Miller, Georgiev and Jarosz 2019).
+ * there. Flights are in optics/grid_flight.cl; rays to lights are dimmed by ratio tracking (Novak et al. 2014).
  *
  * All that follows is linear in the density: one of the eight points around stands for it, each with its trilinear
  * weight as its chance. In `materials` there stand behind a medium's coefficients: the first word in `images`, the
  * number of bricks along x, y and z, a matrix of three rows from the world to the lattice, and the upper corner of the
  * box there; the lower one is (1/2, 1/2, 1/2). In `images` each brick has two words: where its points begin from the
- * first word on, and its highest density. */
+ * first word on, and its highest density. A medium with MEDIUM_BYTES in its name has 8 bits for each number. */
 #define MEDIUM_GRID 0x20000000
 #define GRID_CELLS 8
 #define GRID_POINTS 9
@@ -19,6 +18,9 @@ typedef struct {
     vec3 o, d, inverse;
     real t, end; /* [m] */
     integer first, nx, ny, nz, x, y, z;
+#if USES_BYTES
+    integer packed; /* base-2 logarithm of how many numbers a word holds */
+#endif
 } GridWalk;
 
 /* The brick of a walk: where its points begin, its highest density, where the ray leaves it and along which axis. */
@@ -35,6 +37,11 @@ inline natural grid_key(Scene scene, natural pixel_key, integer sample, integer 
     return hash_natural(pixel_key + hash_natural(key + as_natural(vertex)));
 }
 
+#if USES_BYTES
+#define MEDIUM_BYTES 0x10000000
+#define grid_packed(name) sel_i(((name) & MEDIUM_BYTES) != 0, (integer)(2), (integer)(1))
+#endif
+
 /* Whether the ray from o along d, t metres long, is in the box; where it begins there. */
 inline mask grid_begin(Scene scene, integer name, vec3 o, vec3 d, real t, mask active, GridWalk *w)
 {
@@ -43,6 +50,9 @@ inline mask grid_begin(Scene scene, integer name, vec3 o, vec3 d, real t, mask a
     w->nx = gather_i(scene.materials, at + 1);
     w->ny = gather_i(scene.materials, at + 2);
     w->nz = gather_i(scene.materials, at + 3);
+#if USES_BYTES
+    w->packed = grid_packed(name);
+#endif
     real lo = 0.0f, hi = t;
 #define AXIS(a, n)                                                            \
     vec4 row_##a = gather_w4(scene.materials, at + 4 + 4 * n);                \
@@ -105,8 +115,8 @@ inline mask grid_next(GridWalk *w, GridBrick b, mask active)
     return inside;
 }
 
-/* Density at t over the brick's highest: of one of the points around, which `bits` choose. */
-inline real grid_density(Scene scene, GridWalk w, GridBrick b, mask active, natural bits)
+/* One of the points around that at t, which `bits` choose: its number in the brick. */
+inline integer grid_corner(GridWalk w, natural bits)
 {
     integer at = 0;
 #define AXIS(a, shift, step)                                                                                 \
@@ -118,91 +128,25 @@ inline real grid_density(Scene scene, GridWalk w, GridBrick b, mask active, natu
     AXIS(y, 10u, GRID_POINTS)
     AXIS(z, 20u, GRID_POINTS * GRID_POINTS)
 #undef AXIS
+    return at;
+}
+
+/* The density there over the brick's highest. */
+inline real grid_density(Scene scene, GridWalk w, GridBrick b, mask active, natural bits)
+{
+    integer at = grid_corner(w, bits);
+#if USES_BYTES
+    mask small = w.packed == 2;
+    integer word = gather_i(scene.images, sel_i(active, b.points + (at >> w.packed), (integer)(0)));
+    integer place = sel_i(small, (at & 3) << 3, (at & 1) << 4), most = sel_i(small, (integer)(0xff), (integer)(0xffff));
+    return to_real((word >> place) & most) / to_real(most);
+#else
     integer word = gather_i(scene.images, sel_i(active, b.points + (at >> 1), (integer)(0)));
     return to_real((word >> ((at & 1) << 4)) & 0xffff) * (1.0f / 65535.0f);
+#endif
 }
 
 inline real grid_length(natural bits) { return -log_r(1.0f - unit_interval(bits)); }
-
-/* Where a flight ends, and what its sample weighs; `ratio` as in path/hero.cl. */
-typedef struct {
-    mask collides;
-    real t; /* [m] */
-    Spectrum weight, ratio;
-} GridFlight;
-
-/* After so much of the highest density, times metres, since the last collision the path is as likely as `pdf` at each
- * wavelength, and `value` of light is left; both lack what passes at the least extinction. */
-inline void grid_weigh(Medium m, real thickness, Spectrum value, Spectrum pdf, mask active, GridFlight *f)
-{
-#if USES_RATIO
-    real least = min_r(min_r(m.sigma_t.x, m.sigma_t.y), m.sigma_t.z);
-#if SPECTRUM_SIZE == 4
-    least = min_r(least, m.sigma_t.w);
-#endif
-    Spectrum passes = spectrum_exp(spectrum_scale(spectrum_sub(m.sigma_t, spectrum_of(least)), -thickness));
-    Spectrum pdfs = spectrum_mul(f->ratio, spectrum_mul(pdf, passes));
-    real mean = spectrum_mean(pdfs), inverse = sel(mean > 1e-30f, 1.0f / mean, (real)(0.0f));
-    Spectrum weight = spectrum_scale(spectrum_mul(value, passes), inverse);
-    f->ratio = spectrum_sel(active, spectrum_scale(pdfs, inverse), f->ratio);
-#else
-    Spectrum weight = spectrum_scale(value, 1.0f / max_r(pdf.x, (real)(1e-30f)));
-#endif
-    f->weight = spectrum_sel(active, spectrum_mul(f->weight, weight), f->weight);
-}
-
-/* A flight from o along d through the medium `name`, at most t metres; u: of its first way. */
-inline GridFlight grid_flight(Scene scene, integer name, Medium m, vec3 o, vec3 d, real t, Spectrum ratio, vec2 u,
-                              natural key, mask active)
-{
-    GridFlight f = {mask_of(0), t, spectrum_of(1.0f), ratio};
-    GridWalk w;
-    mask all = active;
-    active = grid_begin(scene, name, o, d, t, active, &w);
-    mask dims = spectrum_max(m.sigma_s) == 0.0f; /* and never scatters: then all wavelengths share the collisions */
-    real most = max_r(spectrum_max(m.sigma_t), (real)(1e-30f)), passed = 0.0f;
-    real sigma = sel(dims, most, max_r(spectrum_pick(m.sigma_t, ratio, u.y), (real)(1e-30f)));
-    real left = -log_r(max_r(1.0f - u.x, (real)(1e-9f))) / sigma;
-    natural count = 0u;
-    while (any(active)) {
-        GridBrick b = grid_brick(scene, w, active);
-        real thick = b.most * (b.exit - w.t);
-        mask meets = active & (thick > left);
-        passed += sel(active & !dims, sel(meets, left, thick), (real)(0.0f));
-        w.t = sel(active, sel(meets, min_r(w.t + left / max_r(b.most, (real)(1e-30f)), b.exit), b.exit), w.t);
-        left -= sel(active, thick, (real)(0.0f));
-        if (any(meets)) {
-            natural bits = hash_natural(key + count * 0x9e3779b9u), more = hash_natural(bits ^ 0x68bc21ebu);
-            real density = grid_density(scene, w, b, meets, more);
-            Spectrum scatters = spectrum_scale(m.sigma_s, density), lacks = spectrum_scale(m.sigma_t, 1.0f - density);
-            real chance = spectrum_mean(spectrum_mul(f.ratio, spectrum_div(scatters,
-                spectrum_add(spectrum_add(scatters, lacks), spectrum_of(1e-30f)))));
-            more = hash_natural(more ^ 0x2f6e2b1u);
-            mask real_one = meets & (unit_interval(more) < chance);
-            chance = 1.0f / max_r(sel(real_one, chance, 1.0f - chance), (real)(1e-30f));
-            Spectrum value = spectrum_scale(spectrum_sel(real_one, scatters, lacks), chance);
-            Spectrum kept = spectrum_sub(spectrum_of(1.0f), spectrum_scale(m.sigma_t, density / most));
-            value = spectrum_sel(dims, kept, value);
-            grid_weigh(m, passed, value, spectrum_sel(dims, spectrum_of(1.0f), m.sigma_t), meets, &f);
-            f.collides = f.collides | real_one;
-            f.t = sel(real_one, w.t, f.t);
-            passed = sel(meets, (real)(0.0f), passed);
-            active = active & !real_one & (spectrum_max(f.weight) > 0.0f);
-            real pick = 0.0f;
-#if USES_RATIO
-            pick = unit_interval(hash_natural(more ^ 0x51ed270bu));
-#endif
-            sigma = sel(dims, most, max_r(spectrum_pick(m.sigma_t, f.ratio, pick), (real)(1e-30f)));
-            left = sel(meets, grid_length(bits) / sigma, left);
-            count += sel_n(meets, (natural)(1u), (natural)(0u));
-        }
-        active = sel_i(meets, active, grid_next(&w, b, active & !meets));
-    }
-#if USES_RATIO
-    grid_weigh(m, passed, spectrum_of(1.0f), spectrum_of(1.0f), all & !f.collides, &f);
-#endif
-    return f;
-}
 
 /* How much of the light passes t metres from o along d through the medium `name`: an estimate. */
 inline Spectrum grid_transmittance(Scene scene, integer name, Medium m, vec3 o, vec3 d, real t, natural key,
@@ -237,3 +181,25 @@ inline Spectrum grid_transmittance(Scene scene, integer name, Medium m, vec3 o, 
     }
     return passes;
 }
+
+#if GRIDS_TINTED
+#if GRIDS_EMIT
+#define GRID_ALBEDO (2 * MEDIUM_SCATTERING + 25) /* words from a medium's row: behind optics/medium_grid_light.cl's */
+#else
+#define GRID_ALBEDO (2 * MEDIUM_SCATTERING + 19)
+#endif
+/* What multiplies `scatters`, a medium's sigma_s, at the point that `bits` choose. In `images` each brick has a word,
+ * where its points begin from the first one on, and a point three: a colour, or the coefficients of its curve. */
+inline Spectrum grid_scatters(Scene scene, integer name, GridWalk w, Spectrum scatters, mask active, natural bits,
+                              Wavelengths lambdas)
+{
+    integer first = gather_i(scene.materials, sel_i(active, MEDIUM_ROW(name) + GRID_ALBEDO, (integer)(0)));
+    active = active & (first != 0);
+    integer brick = (w.z * w.ny + w.y) * w.nx + w.x;
+    integer points = first + gather_i(scene.images, sel_i(active, first + brick, (integer)(0)));
+    integer at = sel_i(active, points + 3 * grid_corner(w, bits), (integer)(0));
+    vec4 words = v4(gather_w(scene.images, at), gather_w(scene.images, at + 1), gather_w(scene.images, at + 2),
+                    (real)(1.0f));
+    return spectrum_sel(active, spectrum_mul(scatters, spectrum_constant(words, lambdas)), scatters);
+}
+#endif

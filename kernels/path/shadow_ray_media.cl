@@ -12,7 +12,12 @@ inline Spectrum shadow_ray_transmittance(TRACE_ARGS, Scene scene, Slab path, Sla
 #if USES_GRIDS
     integer vertex = (load_path_state(path, at) & PATH_DEPTH) + path_nulls(path, at);
     natural key = ~grid_key(scene, load_path_pixel_key(path, at), load_path_sample(path, at), vertex);
+#if BRICK_LIGHTS
+    integer into = sel_i(active, load_shadow_into(shadow, at), (integer)(0));
+    return trace_transmittance(TRACE_PASSED, scene, o, d, t, medium, load_path_lambdas(path, at), active, key, into);
+#else
     return trace_transmittance(TRACE_PASSED, scene, o, d, t, medium, load_path_lambdas(path, at), active, key);
+#endif
 #else
     return trace_transmittance(TRACE_PASSED, scene, o, d, t, medium, load_path_lambdas(path, at), active);
 #endif

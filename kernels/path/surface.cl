@@ -27,6 +27,15 @@ inline vec3 vertex_vec3(global const float *table, integer vertex)
 }
 inline vec2 vertex_vec2(global const float *table, integer vertex) { return gather2(table, vertex * 2); }
 
+#if VERTEX_TANGENTS
+/* The direction of `along`, as long as `other`; of unit length where that has none. */
+inline vec3 tangent_of_length(vec3 along, vec3 other)
+{
+    real length2 = dot3(other, other);
+    return scale3(along, sqrt(sel(length2 > 0.0f, length2, (real)(1.0f)) / max_r(dot3(along, along), (real)(1e-30f))));
+}
+#endif
+
 /* The surface where the ray from `o` along `d` ends. `front` tells which side was hit. A two-sided
  * back has its normals negated, so that the BSDF sees a front. USES_NORMALS, USES_UVS and USES_TANGENTS say
  * what the scene needs; onto_of_shape, size_of_shape, dpdu_of_shape and dpdv_of_shape are generated for its analytic
@@ -77,10 +86,16 @@ inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, 
 #endif
 #if USES_NORMALS
     mask smooth = triangle & ((shape.flags & SHAPE_NORMALS) != 0);
+#if VERTEX_TANGENTS
+    vec3 own_normal = v3(0.0f, 0.0f, 0.0f);
+#endif
     if (any(smooth)) {
         vec3 ns = madd3(vertex_vec3(scene.normals, a), w,
                         madd3(vertex_vec3(scene.normals, b), u, scale3(vertex_vec3(scene.normals, c), v)));
         mask usable = smooth & (dot3(ns, ns) > 1e-12f);
+#if VERTEX_TANGENTS
+        own_normal = ns;
+#endif
 #if USES_INSTANCES
         ns = sel3(placed, instance_normal(space, ns), ns);
 #endif
@@ -108,6 +123,24 @@ inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, 
 #endif
 #endif
     }
+#if VERTEX_TANGENTS
+    mask told = smooth & ((shape.flags & SHAPE_TANGENTS) != 0);
+    if (any(told)) {
+        integer first = (integer)(VERTEX_TANGENTS);
+        vec4 qa = gather4(scene.distributions, first + 4 * a), qb = gather4(scene.distributions, first + 4 * b);
+        vec4 qc = gather4(scene.distributions, first + 4 * c);
+        vec3 along = madd3(v3(qa.x, qa.y, qa.z), w, madd3(v3(qb.x, qb.y, qb.z), u,
+                           scale3(v3(qc.x, qc.y, qc.z), v)));
+        vec3 beside = scale3(cross3(own_normal, along), sel(qa.w < 0.0f, (real)(-1.0f), (real)(1.0f)));
+#if USES_INSTANCES
+        along = sel3(placed, instance_vector(space, along), along);
+        beside = sel3(placed, instance_vector(space, beside), beside);
+#endif
+        told = told & (dot3(beside, beside) > 1e-12f);
+        s.dpdu = sel3(told, tangent_of_length(along, s.dpdu), s.dpdu);
+        s.dpdv = sel3(told, tangent_of_length(beside, s.dpdv), s.dpdv);
+    }
+#endif
 #endif
 #if USES_ANALYTIC
     mask analytic = active & (shape.kind != 0);

@@ -23,6 +23,14 @@ typedef struct {
 #endif
 } Vertex;
 
+/* |cosine| of a direction d to a surface of normal n, by which densities of its directions become those of points. In
+ * a medium the extinction is in its place: it is the same for light that comes the other way, and counts as 1. */
+#if BSDF_IS_PHASE
+#define VERTEX_COSINE(n, d) ((real)(1.0f))
+#else
+#define VERTEX_COSINE(n, d) fabs(dot3(n, d))
+#endif
+
 /* The material at a vertex, and the random numbers of the vertex. */
 typedef struct {
     Sampler sampler;
@@ -99,6 +107,23 @@ inline Vertex vertex_load(Scene scene, Slab path, Slab hit, uint at, mask active
     return v;
 }
 
+#if BSDF_COAT_APART
+/* The material, whose coat's normal is told by the surface's u, v and normal, in the frame where it is shaded. */
+inline Bsdf coat_normal_turned(Bsdf m, Surface s, Frame shaded)
+{
+    Frame own = surface_frame(s);
+    real scale = m.clearcoat_normal_scale, x = (2.0f * m.clearcoat_normal_x - 1.0f) * scale;
+    real y = (2.0f * m.clearcoat_normal_y - 1.0f) * scale;
+    vec3 n = v3(x, sel(dot3(own.t, s.dpdv) < 0.0f, -y, y), 2.0f * m.clearcoat_normal_z - 1.0f);
+    n = to_local(shaded, to_world(own, normalize3(n)));
+    m.clearcoat_normal_x = 0.5f * n.x + 0.5f;
+    m.clearcoat_normal_y = 0.5f * n.y + 0.5f;
+    m.clearcoat_normal_z = 0.5f * n.z + 0.5f;
+    m.clearcoat_normal_scale = 1.0f;
+    return m;
+}
+#endif
+
 /* Loads the material. Where it fluoresces, the `active` paths take the wavelengths by which light comes. */
 inline Scattering vertex_scattering(Scene scene, Slab path, uint at, mask active, Vertex v, Sampler sampler)
 {
@@ -129,6 +154,9 @@ inline Scattering vertex_scattering(Scene scene, Slab path, uint at, mask active
     store_path_lambdas(path, at, active, scatter.lambdas);
 #endif
     scatter.shading = shading_frame_load(scene, v.row, v.s, v.d, scatter.lambdas);
+#if BSDF_COAT_APART
+    scatter.bsdf = coat_normal_turned(scatter.bsdf, v.s, scatter.shading.frame);
+#endif
     scatter.wo = to_local(scatter.shading.frame, neg3(v.d));
     return scatter;
 }

@@ -33,7 +33,7 @@ STAGE(deposit)(SLAB_ARGS, SCENE_ARGS DEPOSIT_ARGS STAGE_AT_ARG)
         Photon photon;
         photon.p = s.p;
         photon.power = load_path_beta(path, at);
-#if USES_DISPERSION
+#if USES_RATIO && SPECTRUM_SIZE == 4 /* whose hero the other path shares */
         photon.ratio = load_path_ratio(path, at);
 #else
         photon.ratio = spectrum_of(1.0f);
@@ -45,6 +45,7 @@ STAGE(deposit)(SLAB_ARGS, SCENE_ARGS DEPOSIT_ARGS STAGE_AT_ARG)
         integer medium = sel_i(active, load_path_medium(path, at), (integer)(0));
         real through = load_hit_t(hit, at) + sel(active, load_path_lead(path, at), (real)(0.0f));
         Wavelengths lambdas = load_path_lambdas(path, at);
+        medium = MEDIUM_LEFT(medium);
         photon.power = spectrum_mul(photon.power, medium_transmittance(scene, medium, through, lambdas));
 #endif
 #if SPECTRUM_SIZE == 4

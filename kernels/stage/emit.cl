@@ -20,6 +20,7 @@
 #include "path/path_end.cl"
 #include "lighting/next_event.cl"
 #include "lighting/light_path.cl"
+#include "generated/light_medium.cl"
 #include "generated/merging.cl"
 
 /* Puts a ray from a light into the slots that `go` on, and, where the camera sees lights, one from it to the camera
@@ -67,7 +68,15 @@ inline integer begin_light_path(Scene scene, Slab path, Slab shadow, uint at, ma
     store_path_null_distance(path, at, go, (real)(0.0f));
 #endif
 #if USES_ABSORPTION
+#if LIGHT_MEDIA
+    integer lit = sel_i(go, r.row, (integer)(0)), medium = light_medium(scene, lit);
+    store_path_medium(path, at, go, medium);
+#if USES_BODIES
+    store_path_bodies(path, at, go, light_bodies(scene, lit));
+#endif
+#else
     store_path_medium(path, at, go, (integer)(0));
+#endif
     store_path_lead(path, at, go, (real)(0.0f));
 #endif
 #if USES_RATIO
@@ -80,6 +89,16 @@ inline integer begin_light_path(Scene scene, Slab path, Slab shadow, uint at, ma
     real cosine = sel(r.away, (real)(1.0f), -dot3(r.n, c.d));
     mask seen = go & c.seen & (cosine > 0.0f) & (spectrum_max(r.seen) > 0.0f);
     mask shine = seen & mask_of(settings->hide_lights == 0);
+#if LIGHT_MEDIA && SHADOW_MEDIA /* a ray from infinity is traced from the camera */
+#if USES_BODIES
+    integer through = sel_i(r.away, (integer)(settings->camera_bodies), light_bodies(scene, lit));
+#else
+    integer through = sel_i(r.away, (integer)(settings->camera_medium), medium);
+#endif
+    store_shadow_through(shadow, at, shine, through);
+#elif LIGHT_MEDIA
+    r.seen = spectrum_mul(r.seen, medium_transmittance(scene, sel_i(go, medium, (integer)(0)), c.t, lambdas));
+#endif
     connect_camera(shadow, at, ended, shine, s, c, spectrum_scale(r.seen, cosine * c.importance));
     state += sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
 #endif

@@ -10,7 +10,10 @@
 #include "path/ratio.cl"
 #include "generated/textures.cl"
 #include "generated/medium.cl"
+#include "generated/grid_flight.cl"
 #include "optics/equiangular.cl"
+
+#define FLIES_NEAR_LAMPS (MEDIUM_AIMS && !LIGHT_PATHS) /* paths from lamps have no reason to stay there */
 
 #if !USES_BODIES
 /* The medium of a ray; one that knows of none is in that of the side of the surface that it meets. */
@@ -49,7 +52,7 @@ STAGE(flight)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
         vec2 u = sampler_pair(sampler, as_natural(DIMENSION_FLIGHT + vertex));
         mask scatters = flies & (spectrum_max(m.sigma_s) > 0.0f);
         real sigma = spectrum_pick(m.sigma_t, ratio, u.y), end = sel(met, load_hit_t(hit, at), (real)(FAR));
-#if MEDIUM_AIMS
+#if FLIES_NEAR_LAMPS
         real choice = MEDIUM_AIMS > 1 ? sampler_pair(sampler, as_natural(DIMENSION_AIM + vertex)).x : (real)(0.0f);
         Equiangular near = equiangular(scene, load_path_o(path, at), load_path_d(path, at), end,
                                        spectrum_mean(m.sigma_t), choice);
@@ -61,7 +64,7 @@ STAGE(flight)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
         u.x = max_r(u.x - near.share, (real)(0.0f)) / left;
 #endif
         real t = -log_r(max_r(1.0f - u.x, (real)(1e-9f))) / max_r(sigma, (real)(1e-30f));
-#if MEDIUM_AIMS
+#if FLIES_NEAR_LAMPS
         t = sel(aims, by_angle, t);
 #endif
         mask collides = scatters & (t < end);
@@ -69,7 +72,7 @@ STAGE(flight)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
         Spectrum passes = spectrum_exp(spectrum_scale(m.sigma_t, -t));
         Spectrum f = spectrum_sel(collides, spectrum_mul(m.sigma_s, passes), passes);
         Spectrum pdf = spectrum_sel(collides, spectrum_mul(m.sigma_t, passes), passes);
-#if MEDIUM_AIMS
+#if FLIES_NEAR_LAMPS
         real nearby = sel(collides, near.share * equiangular_pdf(near, t), (real)(0.0f));
         pdf = spectrum_add(spectrum_scale(pdf, left), spectrum_of(nearby));
 #endif
@@ -82,17 +85,36 @@ STAGE(flight)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
 #else
         Spectrum weight = spectrum_scale(f, 1.0f / max_r(pdf.x, (real)(1e-30f)));
 #endif
+#if MEDIA_EMIT
+        Spectrum light = medium_emission(scene, sel_i(flies, name, (integer)(0)), m, end, lambdas);
+#endif
 #if USES_GRIDS
         mask gridded = flies & ((name & MEDIUM_GRID) != 0);
         if (any(gridded)) {
             natural key = grid_key(scene, load_path_pixel_key(path, at), load_path_sample(path, at), vertex);
-            GridFlight own = grid_flight(scene, name, m, load_path_o(path, at), load_path_d(path, at), end, ratio, u,
-                                         key, gridded);
+            vec3 o = load_path_o(path, at), d = load_path_d(path, at);
+#if GRIDS_EMIT
+            GridOrigin origin;
+            origin.pdf = load_path_pdf(path, at);
+            origin.before = path_null_distance(path, at);
+            origin.from = madd3(d, -origin.before, o);
+            origin.hemisphere = path_hemisphere(path, at);
+            GridFlight own = grid_flight(scene, name, m, o, d, end, ratio, u, key, gridded, lambdas, origin);
+            light = spectrum_sel(gridded, own.light, light);
+#elif GRIDS_TINTED
+            GridFlight own = grid_flight(scene, name, m, o, d, end, ratio, u, key, gridded, lambdas);
+#else
+            GridFlight own = grid_flight(scene, name, m, o, d, end, ratio, u, key, gridded);
+#endif
             weight = spectrum_sel(gridded, own.weight, weight);
             collides = sel_i(gridded, own.collides, collides);
             t = sel(gridded, own.t, t);
             hero_keep(path, at, gridded, own.ratio);
         }
+#endif
+#if MEDIA_EMIT
+        light = spectrum_mul(load_path_beta(path, at), light);
+        store_path_radiance(path, at, flies, spectrum_add(load_path_radiance(path, at), light));
 #endif
         store_path_beta(path, at, flies, spectrum_mul(load_path_beta(path, at), weight));
         store_hit_t(hit, at, collides, t);

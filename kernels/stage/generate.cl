@@ -114,11 +114,19 @@ inline void begin_path(Scene scene, Slab path, uint at, mask go, integer pixel_i
     scene.time = motion_time(scene, sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH)).y);
     store_path_time(path, at, go, scene.time);
 #endif
-    CameraRay ray = camera_ray(scene, position, sampler_pair(sampler, (natural)(DIMENSION_LENS)), lambdas);
+    vec2 lens = sampler_pair(sampler, (natural)(DIMENSION_LENS));
+#if CAMERA_WEIGHS
+    Spectrum weight;
+    CameraRay ray = camera_weighted_ray(scene, position, lens, lambdas, &weight);
+    Spectrum beta = spectrum_mul(camera_start(), weight);
+#else
+    CameraRay ray = camera_ray(scene, position, lens, lambdas);
+    Spectrum beta = camera_start();
+#endif
     store_path_o(path, at, go, ray.o);
     store_path_d(path, at, go, ray.d);
     store_path_lambdas(path, at, go, lambdas);
-    store_path_beta(path, at, go, camera_start());
+    store_path_beta(path, at, go, beta);
     store_path_radiance(path, at, go, spectrum_of((real)(0.0f)));
     store_path_pdf(path, at, go, -ray.far);
     store_path_eta(path, at, go, (real)(1.0f));

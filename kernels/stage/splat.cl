@@ -16,10 +16,17 @@ STAGE(splat)(SLAB_ARGS, SCENE_ARGS, JOIN_ARGS STAGE_AT_ARG)
     real t = load_shadow_t(shadow, at);
     mask active = t > 0.0f;
     if (any(active)) {
+#if SHADOW_MEDIA
+        Spectrum passes = shadow_ray_transmittance(TRACE_PASSED, scene, path, shadow, at, t, active);
+        mask arrives = active & (spectrum_max(passes) > 0.0f);
+        Wavelengths lambdas = load_path_lambdas(path, at);
+        Spectrum value = spectrum_mul(load_shadow_value(shadow, at), passes);
+#else
         real transmittance = shadow_ray_transmittance(TRACE_PASSED, scene, path, shadow, at, t, active);
         mask arrives = active & (transmittance > 0.0f);
         Wavelengths lambdas = load_path_lambdas(path, at);
         Spectrum value = spectrum_scale(load_shadow_value(shadow, at), transmittance);
+#endif
         real scale = settings->film_scale;
         vec3 colour = scale3(film_value(scene, value, lambdas), scale);
         mask accepted = arrives & film_accepts(colour);

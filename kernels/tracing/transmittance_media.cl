@@ -1,5 +1,6 @@
 /* How much of the light between two points passes, where some surfaces transmit a part of it as if nothing were there,
- * and media dim it between them. Each surface is met in turn; it may be where one medium ends and another begins. */
+ * and media dim it between them. Each surface is met in turn; it may be where one medium ends and another begins.
+ * `into` is the medium where it must end, 0 for any. */
 #include "interface/shape.cl"
 #include "generated/textures.cl"
 #include "generated/mixture.cl"
@@ -9,7 +10,11 @@
 #include "generated/null_transmittance.cl"
 
 #if USES_GRIDS
+#if BRICK_LIGHTS
+#define GRID_KEY_ARG , natural key, integer into
+#else
 #define GRID_KEY_ARG , natural key
+#endif
 #else
 #define GRID_KEY_ARG
 #endif
@@ -21,6 +26,9 @@ inline Spectrum trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, rea
 #if USES_BODIES
     integer bodies = medium;
     medium = body_medium(scene, bodies_top(sel_i(active, bodies, (integer)(0))));
+#endif
+#if BRICK_LIGHTS
+    integer last = medium;
 #endif
     while (any(active)) {
         TraceHit h = trace_closest(TRACE_PASSED, scene, o, d, t, active);
@@ -58,6 +66,9 @@ inline Spectrum trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, rea
             ShapeMedia sides = shape_media(scene, row);
             medium = sel_i(active, medium_beyond(medium, sides.inside, sides.outside, front, front), medium);
 #endif
+#if BRICK_LIGHTS
+            last = sel_i(active, medium, last);
+#endif
             /* On along d: beside it, the ray would miss its end, and a round light would shade itself. */
             real on = h.t * (1.0f + SURFACE_ROUNDING) + surface_lead(s, d);
             o = sel3(active, madd3(d, on, o), o);
@@ -65,5 +76,8 @@ inline Spectrum trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, rea
             surfaces++;
         }
     }
+#if BRICK_LIGHTS
+    passes = spectrum_sel((into == 0) | (into == last), passes, spectrum_of(0.0f));
+#endif
     return passes;
 }

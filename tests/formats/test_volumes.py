@@ -362,3 +362,22 @@ def test_alone_in_the_studio(written) -> None:
     assert thickness[0] == pytest.approx(1000 * thickness[1])
     with pytest.raises(SceneError, match="0 everywhere"):
         load(written("empty.vol", vol_bytes(0 * VALUES[..., None])))
+
+
+def test_mitsuba_albedo(written) -> None:
+    """An albedo of colours on a grid, with a density on another or the same everywhere."""
+    albedo = np.random.default_rng(3).random((2, 3, 4, 3), np.float32)
+    written("b.vol", vol_bytes(albedo))
+    written("a.vol", vol_bytes(VALUES[..., None]))
+    volume = '<volume name="albedo" type="gridvolume"><string name="filename" value="b.vol"/>'
+    text = MITSUBA % ""
+    both = text.replace("<float", volume + "</volume><float")
+    medium = load(written("a.xml", both.encode())).shapes[0].interior
+    assert medium.albedo_grid.shape == (*VALUES.shape, 3)
+    assert np.array_equal(medium.density, VALUES)
+    start = text.index("<volume")
+    end = text.index("</volume>") + len("</volume>")
+    alone = text[:start] + volume + "</volume>" + text[end:]
+    medium = load(written("a.xml", alone.encode())).shapes[0].interior
+    np.testing.assert_allclose(medium.albedo_grid, albedo)
+    assert medium.density.shape == albedo.shape[:3]

@@ -47,6 +47,7 @@ inline Lamp lamp(integer row)
 
 #define Scene World
 #define Slab Carried
+#define VERTEX_COSINE(n, d) fabs(dot3(n, d))
 #define bsdf_pdf(m, wo, wi) ((real)(0.0f))
 #define shading_frame_turns(scene, row) (scene).turns
 #define camera_connect(scene, p, away, lens) camera_point(scene)

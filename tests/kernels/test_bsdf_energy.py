@@ -77,6 +77,8 @@ def test_delta_lobes_keep_energy(cls, mode):
 def test_reciprocity(cls, mode):
     if cls is m.Hair:
         pytest.skip("where light meets a fibre is told by wo alone")
+    if cls is m.Measured:
+        pytest.skip("random tables stand for a measurement")
     rng, probe = np.random.default_rng(14), Probe(cls, mode)
     for params in settings(cls, mode, rng, 4):
         wo, wi = checks.clear_pairs(rng)

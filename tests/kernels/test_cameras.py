@@ -9,6 +9,7 @@ import pytest
 
 from clpt import spectra, transforms
 from clpt.errors import SceneError
+from clpt.render.codegen import stages
 from clpt.render.contract import camera_records
 from clpt.render.lowering.camera import cameras
 from clpt.scene import cameras as scene
@@ -17,6 +18,7 @@ from tests.rotation import rotating
 
 BODY = """
     vec2 film = {x[0], x[1]}, lens = {x[2], x[3]};
+    Spectrum weight, lambdas = spectrum_of(x[4]);
     CameraRay ray = RAY((global const RECORD *)scene.camera, film, lens);
     r[0] = ray.o.x; r[1] = ray.o.y; r[2] = ray.o.z;
     r[3] = ray.d.x; r[4] = ray.d.y; r[5] = ray.d.z;
@@ -26,14 +28,15 @@ PLACE = transforms.look_at([3.0, 2.0, -1.5], [0.2, 0.4, 0.1], [0.1, 1.0, 0.2])
 
 @cache
 def _text(kind: str) -> dict[str, str]:
-    record = camera_records.RECORDS[kind]
-    return {"generated/camera.cl": f'{record.uniform_text()}#include "camera/{kind}.cl"\n'}
+    return {"generated/camera.cl": stages.camera_text(kind, False, True)}
 
 
 def rays(camera, width, height, film, lens=None, lanes=8, index=None):
     """Origins and directions (n, 3) at film positions (n, 2); index: of a lens's glass."""
     kind, words = cameras.lower_camera(camera, width, height)
     call = f"{kind}_ray(camera, film, lens)"
+    if kind in camera_records.WEIGHTED:
+        call = f"{kind}_ray(scene, camera, film, lens, lambdas, &weight)"
     if index is not None:
         call = f"{kind}_glass_ray(camera, film, lens, x[4])"
     defines = {"RAY(camera, film, lens)": call, "RECORD": camera_records.RECORDS[kind].name}

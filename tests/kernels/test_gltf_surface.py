@@ -57,8 +57,11 @@ def test_normal_incidence():
         ({"transmission": 1.0}, (0.1,), 0.012),
         ({"clearcoat": 1.0, "clearcoat_roughness": 0.2}, (0.5,), 0.06),
         ({"sheen_color": 0.6, "sheen_roughness": 0.5}, (1.0,), 0.12),
+        ({"metallic": 1.0, "multiple_scattering": 1.0}, (0.6, 1.0), 0.02),
+        ({"ior": 0.0, "multiple_scattering": 1.0}, (0.6, 1.0), 0.02),
+        ({"multiple_scattering": 1.0}, (0.5, 1.0), 0.012),
     ],
-    ids=["diffuse", "leaf", "pane", "glass", "coat", "sheen"],
+    ids=["diffuse", "leaf", "pane", "glass", "coat", "sheen", "metal", "mirror", "bounced"],
 )
 def test_white_furnace(given, roughness, tolerance):
     """White layers lose what the lesser of two transmittances loses, and make nothing."""
@@ -67,6 +70,27 @@ def test_white_furnace(given, roughness, tolerance):
         mean, error = albedos(probe, _params(roughness=r, **given), rng, (5.0, 45.0, 70.0, 80.0))
         assert np.all(mean - 1.0 < 3e-3 + 4.0 * error), (r, mean.max())
         assert np.all(mean > 1.0 - tolerance - 4.0 * error), (r, mean.min())
+
+
+def test_coat_of_its_own_normal():
+    """GGX about another normal, by its formula; what leans away keeps the ratio of cosines."""
+    n = np.array([0.3, -0.2, 1.0]) / np.linalg.norm([0.3, -0.2, 1.0])
+    wo, wi = (np.abs(w) for w in pairs(np.random.default_rng(5), 300))
+    given = {f"clearcoat_normal_{x}": n[i] / 2 + 0.5 for i, x in enumerate("xyz")}
+    given |= {"clearcoat": 0.7, "clearcoat_roughness": 0.4, "clearcoat_apart": 1.0}
+    made = _params(base_color=0.0, specular=0.0, **given)
+    found = Probe(GltfSurface, "rgb")(made, wo, wi, wo)["eval"][:, 0]
+    h = wo + wi
+    h /= np.linalg.norm(h, axis=1, keepdims=True)
+    alpha2 = 0.4**4
+    o, i, m = np.maximum(wo @ n, 1e-9), np.maximum(wi @ n, 1e-9), h @ n
+    d = alpha2 / (np.pi * (m * m * (alpha2 - 1.0) + 1.0) ** 2)
+    masked = [2 * c / (c + np.sqrt(alpha2 + (1 - alpha2) * c * c)) for c in (o, i)]
+    schlick = 0.04 + 0.96 * (1.0 - (wo * h).sum(axis=1)) ** 5
+    f = 0.7 * d * masked[0] * masked[1] * schlick / (4.0 * o * i)
+    lean = np.minimum(o / wo[:, 2], 1.0) * np.minimum(i / wi[:, 2], 1.0)
+    expected = np.where((wo @ n > 0) & (wi @ n > 0), f * lean * wi[:, 2], 0.0)
+    np.testing.assert_allclose(found, expected, rtol=3e-3, atol=1e-5)
 
 
 def _charlie_l(x, a):

@@ -16,7 +16,7 @@ from clpt.errors import SceneError
 from clpt.render.lowering.scene import lower
 from clpt.scene import Film, Scene, media
 from clpt.scene.cameras import Perspective
-from clpt.scene.integrators import Box, ParticleTracer, Path
+from clpt.scene.integrators import Box, Path
 from clpt.scene.lights import Area, Constant, Point
 from clpt.scene.materials import Dielectric, Diffuse, Layer, Null, RoughDielectric
 from clpt.scene.shapes import Disk, Group, Instance, Rectangle, Shape, Sphere
@@ -153,10 +153,3 @@ def test_one_priority_twice_is_told() -> None:
     assert any("'a' and sphere 'b'" in line and "the latter" in line for line in told)
     for apart in (dataclasses.replace(other, to_world=far), dataclasses.replace(other, priority=2)):
         assert not any("overlap" in line for line in lower(scene(one, apart)).warnings)
-
-
-def test_light_paths_meet_no_bodies() -> None:
-    one = scene(Sphere(material=GLASS, priority=1))
-    one.integrator = ParticleTracer()
-    with pytest.raises(SceneError, match="without media"):
-        clpt.render(one, spp=1)

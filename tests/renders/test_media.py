@@ -20,7 +20,7 @@ from clpt import transforms as tf
 from clpt.errors import SceneError
 from clpt.scene import Film, Scene, media
 from clpt.scene.cameras import Perspective, Spherical
-from clpt.scene.integrators import Box, ParticleTracer
+from clpt.scene.integrators import Box
 from clpt.scene.integrators import Path as PathIntegrator
 from clpt.scene.lights import Area, Constant, Point
 from clpt.scene.materials import Dielectric, Diffuse, Null
@@ -222,10 +222,6 @@ def test_what_media_may_be() -> None:
         media.Homogeneous(sigma_a=1.0, sigma_t=1.0)
     with pytest.raises(SceneError, match="outside"):
         media.Homogeneous(sigma_t=1.0, albedo=1.5)
-    scene = ball(media.Homogeneous(sigma_s=1.0))
-    scene.integrator = ParticleTracer()
-    with pytest.raises(SceneError, match="without media"):
-        clpt.render(scene, spp=1)
 
 
 @pytest.mark.parametrize("g, mode", [(0.0, "rgb"), (0.6, "spectral")])

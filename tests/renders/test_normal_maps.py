@@ -17,7 +17,7 @@ from clpt.scene import Film, Scene, integrators
 from clpt.scene import materials as m
 from clpt.scene.cameras import Orthographic
 from clpt.scene.lights import Directional
-from clpt.scene.shapes import Mesh, Rectangle
+from clpt.scene.shapes import Group, Instance, Mesh, Rectangle
 from clpt.scene.textures import Bitmap
 from tests.renders.support import SIGNIFICANCE, agreement
 
@@ -103,6 +103,95 @@ def test_flat_squares() -> None:
     wanted = [expected(n, shadowed) for _, _, n, shadowed in CASES]
     wanted += [expected(normal(0.2, 0.5)), expected(normal(0.2, -0.5))]
     np.testing.assert_allclose(picture, wanted, rtol=3e-3)
+
+
+def test_tangents_as_given() -> None:
+    """The frame is that of the mesh's tangents, whatever its uvs, also in mirrors and instances."""
+    corners = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], np.float32)
+    lean, turn = (0.2, 0.5), tf.rotate([0, 0, 1], 30)
+
+    def square(angle: float, side: float, **more: object) -> Mesh:
+        c, s = np.cos(angle), np.sin(angle)
+        given: dict = {
+            "vertices": corners,
+            "faces": np.array([(0, 1, 2), (0, 2, 3)], np.uint32),
+            "normals": np.tile(np.float32([0, 0, 1]), (4, 1)),
+            "uvs": np.array([(0, 0), (1, 0), (1, 1), (0, 1)], np.float32),
+            "tangents": np.tile(np.float32([c, s, 0, side]), (4, 1)),
+            "material": tilted(*lean, along_v=True),
+        }
+        return Mesh(**{**given, **more})
+
+    def shaded(angle: float, side: float) -> np.ndarray:
+        c, s = np.cos(angle), np.sin(angle)
+        x, y = lean[0], side * lean[1]
+        return np.array([c * x - s * y, s * x + c * y, normal(*lean)[2]])
+
+    mirror = np.diag([-1.0, 1.0, 1.0, 1.0])
+    turned = np.radians(30)
+    flip = np.array([-1.0, 1.0, 1.0])
+    group = Group((square(1.0, 1.0),), "tangents")
+    cases = [  # shape, placement, the normal that is shaded with
+        (square(0.0, 1.0, tangents=None), np.eye(4), shaded(0.0, 1.0)),
+        (square(0.0, 1.0), np.eye(4), shaded(0.0, 1.0)),
+        (square(1.0, 1.0), np.eye(4), shaded(1.0, 1.0)),
+        (square(1.0, -1.0), np.eye(4), shaded(1.0, -1.0)),
+        (square(1.0, 1.0), turn, shaded(1.0 + turned, 1.0)),
+        (square(1.0, 1.0), mirror, flip * shaded(1.0, 1.0)),
+        (square(1.0, -1.0, uvs=None), np.eye(4), shaded(1.0, -1.0)),
+        (Instance(group=group), turn, shaded(1.0 + turned, 1.0)),
+        (Instance(group=group), mirror, flip * shaded(1.0, 1.0)),
+    ]
+    count = len(cases)
+    view = tf.look_at([count, 0, 4], [count, 0, 0], UP) @ tf.scale([count, 1.0, 1.0])
+    placed = [tf.translate([2.0 * i + 1.0, 0.0, 0.0]) @ m for i, (_, m, _) in enumerate(cases)]
+    scene = Scene(
+        camera=Orthographic(to_world=view),
+        shapes=[
+            dataclasses.replace(shape, to_world=own)
+            for (shape, _, _), own in zip(cases, placed, strict=True)
+        ],
+        lights=[Directional(direction=tuple(-LIGHT), irradiance=(np.pi,) * 3)],
+        integrator=integrators.Direct(),
+        film=Film(width=3 * count, height=3, mode="rgb"),
+    )
+    picture = clpt.render(scene, 16)[1, 1::3, 0]
+    np.testing.assert_allclose(picture, [expected(n) for _, _, n in cases], rtol=3e-3)
+    with pytest.raises(SceneError, match="tangents need normals"):
+        lower(Scene(camera=Orthographic(), shapes=[square(0.0, 1.0, normals=None)]))
+
+
+def test_coat_with_normals_of_its_own() -> None:
+    """A coat that says the normals of the map around it is the coat without any of its own."""
+    corners = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], np.float32)
+    n = normal(0.1, 0.3)
+    plain = {"clearcoat": 1.0, "clearcoat_roughness": 0.7, "base_color": (0.5, 0.5, 0.5)}
+    own = {f"clearcoat_normal_{x}": v / 2 + 0.5 for x, v in zip("xyz", n, strict=True)}
+    squares = []
+    for v in (1.0, -1.0):  # of uvs that are mirrored, too
+        for more in ({}, {**own, "clearcoat_apart": 1.0}, {"clearcoat_apart": 1.0}):
+            surface = m.GltfSurface(**plain, **more)
+            squares.append(
+                Mesh(
+                    vertices=corners,
+                    faces=np.array([(0, 1, 2), (0, 2, 3)], np.uint32),
+                    uvs=np.array([(0, 0), (1, 0), (1, v), (0, v)], np.float32),
+                    material=dataclasses.replace(tilted(0.1, 0.3, along_v=True), material=surface),
+                    to_world=tf.translate([2.0 * len(squares) + 1.0, 0.0, 0.0]),
+                )
+            )
+    count = len(squares)
+    view = tf.look_at([count, 0, 4], [count, 0, 0], UP) @ tf.scale([count, 1.0, 1.0])
+    scene = Scene(
+        camera=Orthographic(to_world=view),
+        shapes=squares,
+        lights=[Directional(direction=tuple(-LIGHT), irradiance=(np.pi,) * 3)],
+        integrator=integrators.Direct(),
+        film=Film(width=3 * count, height=3, mode="rgb"),
+    )
+    picture = clpt.render(scene, 16)[1, 1::3, 0]
+    np.testing.assert_allclose(picture[[1, 4]], picture[[0, 3]], rtol=1e-3)
+    assert abs(picture[2] - picture[0]) > 0.01 * picture[0]
 
 
 def test_two_maps_of_a_kind_are_refused() -> None:

@@ -12,6 +12,7 @@ THEIRS = {
     "rec709": "ITU-R BT.709",
     "rec2020": "ITU-R BT.2020",
     "display_p3": "Display P3",
+    "aces2065_1": "ACES2065-1",
     "acescg": "ACEScg",
 }
 

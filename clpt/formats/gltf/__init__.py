@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from clpt.formats.gltf import (
     meshopt,
     motion,
     nodes,
+    variants,
 )  # fmt: skip
 from clpt.formats.gltf.document import Document
 from clpt.formats.meshes import framing
@@ -27,13 +29,15 @@ from clpt.formats.missing import Missing
 from clpt.scene import Scene
 from clpt.scene.shapes import Mesh
 
-VARIABLES = ("time", "animation", "camera", "scene", "shutter")
+VARIABLES = (
+    "time", "animation", "camera", "scene", "shutter", "variant", "lumens", "multiple_scattering",
+)  # fmt: skip
 SUPPORTED = (
     draco.NAME, *meshopt.EXTENSIONS, "KHR_mesh_quantization", "KHR_texture_transform",
     "EXT_texture_webp", lights.NAME, meshes.INSTANCING, *materials.EXTENSIONS,
     "FB_ngon_encoding",  # says which triangles make a polygon: the picture is the same
 )  # fmt: skip
-VARIANTS = "KHR_materials_variants"
+VARIANTS = variants.NAME
 
 __all__ = ["load", "read_mesh"]
 
@@ -44,6 +48,8 @@ def load(path: Path, missing: Missing = "error", /, **variables: Any) -> Scene:
     variables: `time` [s] of an animation (the first, or the `animation` of that number or name);
     without it nodes have their own transforms. `camera` and `scene` choose by number or name.
     `shutter` [s] is how long light comes to the film from `time` on, while nodes move.
+    `variant` chooses among material variants. `lumens`: of a watt, by which punctual lights are
+    divided. `multiple_scattering`: 1 keeps what facets reflect to each other.
     missing: see clpt.load. Raises SceneError with the JSON path of what is wrong.
     """
     if "shutter" in variables:
@@ -104,12 +110,15 @@ def _open(
     path: Path, variables: dict[str, Any], missing: Missing = "error"
 ) -> tuple[Document, nodes.Graph]:
     document = Document(path, missing)
-    _check_extensions(document)
-    checks.check(document)
     unknown = sorted(set(variables) - set(VARIABLES))
     if unknown:
         known = ", ".join(VARIABLES)
         raise SceneError(f"glTF has no variable {unknown[0]!r}; known: {known}", file=path)
+    document.lumens = _number(path, variables, "lumens", 1.0, 1e-6, 1e6)
+    document.multiple_scattering = _number(path, variables, "multiple_scattering", 0.0, 0.0, 1.0)
+    document.variant = variants.chosen(document, _text(variables.get("variant")))
+    _check_extensions(document)
+    checks.check(document)
     pose: nodes.Pose = {}
     if "time" in variables or "animation" in variables:
         chosen = _text(variables.get("animation"))
@@ -126,13 +135,30 @@ def _check_extensions(document: Document) -> None:
             raise document.root.error(message, f"extensionsRequired[{number}]")
     for name in [*document.root.texts("extensionsUsed"), *required]:
         if name == VARIANTS:
-            document.warn("only the default one of its material variants is shown")
+            if document.variant is None and (names := variants.names(document)):
+                known = ", ".join(map(str, names))
+                document.warn(f"the default materials are shown; -D variant=NAME chooses: {known}")
         elif name not in SUPPORTED:
             document.warn(f"extension {name} is not supported and left out")
 
 
 def _text(value: Any) -> str | None:
     return None if value is None else str(value)
+
+
+def _number(
+    path: Path, given: dict[str, Any], name: str, usual: float, low: float, high: float
+) -> float:
+    """A variable as a number within its limits. Raises SceneError."""
+    value = given.get(name, usual)
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = math.nan
+    if not low <= number <= high:
+        message = f"{name} must be a number from {low:g} to {high:g}, not {value!r}"
+        raise SceneError(message, file=path)
+    return number
 
 
 def _seconds(path: Path, value: Any, name: str = "time") -> float:

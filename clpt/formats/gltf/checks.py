@@ -13,7 +13,7 @@ import numpy as np
 
 from clpt.formats.gltf import accessors, cameras, lights
 from clpt.formats.gltf.document import Document, Element
-from clpt.formats.gltf.geometry import types
+from clpt.formats.gltf.geometry import target_types, types
 
 DEEPEST = 32  # of textures within a material
 FLOAT = 5126
@@ -79,8 +79,9 @@ def _mesh(mesh: Element) -> None:
                 number = attributes.index(name, "accessors")
                 accessor = attributes.document.entry("accessors", number)
                 counts.add(accessor.integer("count"))
-                if types(name):
-                    accessor.text("type", choices=types(name))
+                known = (types if attributes is base else target_types)(name)
+                if known:
+                    accessor.text("type", choices=known)
                 if name not in base:
                     raise attributes.error("moves an attribute that the primitive has not", name)
         if len(counts) > 1:

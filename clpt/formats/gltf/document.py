@@ -192,6 +192,8 @@ class Document:
         self.file, self.missing = file, missing
         self.warnings: list[str] = []
         self.uv_sets: list[int] = []  # of the textures that were made since it was cleared
+        self.lumens, self.multiple_scattering = 1.0, 0.0  # see clpt.formats.gltf.load
+        self.variant: int | None = None
         self._made: dict[Any, Any] = {}
         data = _read(file)
         text, self.chunk = _split(file, data) if data[:4] == b"glTF" else (data, None)

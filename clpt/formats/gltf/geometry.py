@@ -13,8 +13,8 @@ from clpt.formats.gltf.document import Element
 
 Floats = NDArray[np.float32]
 TYPES = {  # of the accessors of an attribute, by what its name begins with
-    "POSITION": ("VEC3",), "NORMAL": ("VEC3",), "TEXCOORD": ("VEC2",), "COLOR": ("VEC3", "VEC4"),
-    "JOINTS": ("VEC4",), "WEIGHTS": ("VEC4",),
+    "POSITION": ("VEC3",), "NORMAL": ("VEC3",), "TANGENT": ("VEC4",), "TEXCOORD": ("VEC2",),
+    "COLOR": ("VEC3", "VEC4"), "JOINTS": ("VEC4",), "WEIGHTS": ("VEC4",),
 }  # fmt: skip
 
 
@@ -33,6 +33,11 @@ class Geometry:
 def types(name: str) -> tuple[str, ...]:
     """Return the accessor types that an attribute may have; none if it is not read."""
     return TYPES.get(name.partition("_")[0], ())
+
+
+def target_types(name: str) -> tuple[str, ...]:
+    """Return the accessor types of a morph target's attribute: of a tangent, without its side."""
+    return ("VEC3",) if name == "TANGENT" else types(name)
 
 
 def attribute(name: str, values: NDArray[Any], accessor: Element) -> NDArray[Any]:

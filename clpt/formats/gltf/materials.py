@@ -69,9 +69,6 @@ def _with_normal_map(element: Element, inner: Material) -> Material:
     info = element.child("normalTexture")
     if info is None:
         return inner
-    coat = element.extension(surface.CLEARCOAT)
-    if coat is not None and surface.NORMAL not in coat:
-        coat.warn("the coat has the base's normals, those of the normal map")
     scale = info.number("scale", 1.0)
     return NormalMap(material=inner, map=texture(info, raw=True), scale=scale, along_v=True)
 

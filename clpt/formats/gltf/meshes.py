@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
-from clpt.formats.gltf import materials, skins
+from clpt.formats.gltf import materials, skins, variants
 from clpt.formats.gltf.accessors import floats
 from clpt.formats.gltf.document import Element
 from clpt.formats.gltf.geometry import Geometry
 from clpt.formats.gltf.nodes import Graph, Matrix, compose
 from clpt.formats.gltf.primitives import geometry
-from clpt.formats.meshes.mesh import checked
+from clpt.formats.meshes.mesh import TANGENTS, checked
 from clpt.scene.lights import Area
-from clpt.scene.materials import Material
+from clpt.scene.materials import Material, NormalMap
 from clpt.scene.shapes import Group, Instance, Mesh, Shape
 from clpt.scene.textures import SECOND_UV
 
@@ -170,8 +170,9 @@ def _mesh(owner: Element, primitive: Element, made: Geometry) -> Mesh | None:
         arrays.get("NORMAL"),
         uvs,
         primitive.document.warnings,
-        _attributes(colours, second, surface, len(arrays["POSITION"])),
+        _attributes(colours, second, surface, len(arrays["POSITION"])) | _tangents(arrays, surface),
     )
+    values["tangents"] = values["attributes"].pop(TANGENTS, None)
     if not len(values["faces"]):
         return None
     return Mesh(name=name, material=surface.material, emission=surface.emission, **values)
@@ -180,7 +181,7 @@ def _mesh(owner: Element, primitive: Element, made: Geometry) -> Mesh | None:
 def _surface(primitive: Element, colours: bool) -> Surface:
     """Return the primitive's material, made once for all primitives that have it."""
     document = primitive.document
-    element = primitive.entry("material", "materials")
+    element = variants.material(primitive)
 
     def make() -> Surface:
         document.uv_sets.clear()
@@ -206,6 +207,23 @@ def _uvs(primitive: Element, made: Geometry, surface: Surface) -> list[NDArray[n
         upward = None if uvs is None else uvs * FLIPPED + np.array([0, 1], np.float32)
         result.append(upward)
     return [*result, None][:2]
+
+
+def _tangents(arrays: dict[str, NDArray[Any]], surface: Surface) -> dict[str, NDArray[Any]]:
+    """Return the tangents that a file gives, where the material looks at them."""
+    given = arrays.get("TANGENT")
+    if given is None or "NORMAL" not in arrays or not _looks_at_tangents(surface.material):
+        return {}
+    return {TANGENTS: given.astype(np.float32)}
+
+
+def _looks_at_tangents(material: Any) -> bool:
+    inner = [getattr(material, name, None) for name in ("material", "front")]
+    return (
+        isinstance(material, NormalMap)
+        or getattr(material, "uses_tangents", False)
+        or any(_looks_at_tangents(one) for one in inner if one is not None)
+    )
 
 
 def _attributes(
@@ -238,4 +256,6 @@ def _transformed(part: Mesh, node: Element, to_world: Matrix) -> Mesh | None:
     if not solid.any():
         node.warn("not shown, since its transform leaves no area")
         return None
-    return dataclasses.replace(part, vertices=moved, faces=part.faces[solid], normals=None)
+    return dataclasses.replace(
+        part, vertices=moved, faces=part.faces[solid], normals=None, tangents=None
+    )

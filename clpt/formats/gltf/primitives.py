@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from clpt.formats.gltf import draco
 from clpt.formats.gltf.accessors import COMPONENTS, floats, integers, stored
 from clpt.formats.gltf.document import Element
-from clpt.formats.gltf.geometry import Floats, Geometry, types
+from clpt.formats.gltf.geometry import Floats, Geometry, target_types, types
 
 POINTS, TRIANGLES, STRIP, FAN = 0, 4, 5, 6
 NOT_DRAWN = {0: "points", 1: "lines", 2: "a line loop", 3: "a line strip"}
@@ -84,7 +84,7 @@ def _target(target: Element, vertices: int) -> dict[str, Floats]:
         accessor = target.entry(name, "accessors")
         if accessor is None:
             continue
-        found[name] = floats(accessor, types(name))
+        found[name] = floats(accessor, target_types(name))
         if len(found[name]) != vertices:
             raise target.error(f"has {len(found[name])} elements, not {vertices}", name)
     return found

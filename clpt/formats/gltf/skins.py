@@ -29,7 +29,7 @@ def matrices(skin: Element, to_world: NDArray[np.float64]) -> NDArray[np.float64
 
 
 def apply(primitive: Element, made: Geometry, joints: NDArray[np.float64]) -> None:
-    """Move a primitive's vertices and normals to where its joints take them, in the world."""
+    """Move a primitive's vertices, normals and tangents into the world, as joints take them."""
     pairs = _influences(primitive, made, len(joints))
     if not pairs:
         primitive.warn("has a skin, but no JOINTS_0 and WEIGHTS_0; it stays as it is")
@@ -37,6 +37,8 @@ def apply(primitive: Element, made: Geometry, joints: NDArray[np.float64]) -> No
     normals = made.attributes.get("NORMAL")
     positions = made.attributes["POSITION"].astype(np.float64)
     turned = None if normals is None else normals.astype(np.float64)
+    along = made.attributes.get("TANGENT")
+    along = None if along is None else along.astype(np.float64)
     total = sum(weights.sum(axis=1, keepdims=True) for _, weights in pairs)
     for first in range(0, len(positions), CHUNK):
         part = slice(first, first + CHUNK)
@@ -48,9 +50,13 @@ def apply(primitive: Element, made: Geometry, joints: NDArray[np.float64]) -> No
         positions[part] = moved + blend[:, :3, 3]
         if turned is not None:
             turned[part] = np.einsum("nij,nj->ni", _cofactors(blend[:, :3, :3]), turned[part])
+        if along is not None:
+            along[part, :3] = np.einsum("nij,nj->ni", blend[:, :3, :3], along[part, :3])
     made.attributes["POSITION"] = positions.astype(np.float32)
     if turned is not None:
         made.attributes["NORMAL"] = turned.astype(np.float32)
+    if along is not None:
+        made.attributes["TANGENT"] = along.astype(np.float32)
 
 
 def _influences(

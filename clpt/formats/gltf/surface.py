@@ -21,6 +21,7 @@ CLEARCOAT = "KHR_materials_clearcoat"
 DIFFUSE_TRANSMISSION = "KHR_materials_diffuse_transmission"
 GLOSSINESS = "KHR_materials_pbrSpecularGlossiness"
 NORMAL = "clearcoatNormalTexture"
+AXES = {"x": "r", "y": "g", "z": "b"}  # of a normal, in the channels of its image
 WHITE = (1.0, 1.0, 1.0)
 DARKEST = 1e-4  # attenuation colour: black would absorb all at once
 DENSEST = 1e6  # [1/m]
@@ -39,6 +40,10 @@ def surface(element: Element, colours: bool) -> GltfSurface:
             values |= read(extension)
     _body(element, values)
     _specular_color(element, values)
+    if values.get("clearcoat", 0.0) != 0.0 and "normalTexture" in element:
+        values["clearcoat_apart"] = 1.0  # a coat without a map of its own is smooth
+    if element.document.multiple_scattering:
+        values["multiple_scattering"] = element.document.multiple_scattering
     return GltfSurface(name=element.text("name", ""), **values)
 
 
@@ -124,14 +129,23 @@ def _ior(owner: Element) -> dict[str, Any]:
 
 
 def _clearcoat(owner: Element) -> dict[str, Any]:
-    if NORMAL in owner:
-        owner.warn("the coat has the base's normals", NORMAL)
     return {
         "clearcoat": number(owner, "clearcoatFactor", "clearcoatTexture", "r", 0.0),
         "clearcoat_roughness": number(
             owner, "clearcoatRoughnessFactor", "clearcoatRoughnessTexture", "g", 0.0
         ),
+        **_coat_normals(owner),
     }
+
+
+def _coat_normals(owner: Element) -> dict[str, Any]:
+    """The coat's own normals: those of its texture, else of the surface."""
+    info = owner.child(NORMAL)
+    if info is None:
+        return {}
+    images = {f"clearcoat_normal_{x}": texture(info, raw=True, channel=c) for x, c in AXES.items()}
+    scale = info.number("scale", 1.0)
+    return {"clearcoat_apart": 1.0, "clearcoat_normal_scale": scale, **images}
 
 
 def _sheen(owner: Element) -> dict[str, Any]:

@@ -203,6 +203,8 @@ def _box_corners(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray
 def _corners(thing: shapes.Shape) -> NDArray[np.float64]:
     if isinstance(thing, shapes.Mesh):
         return np.asarray(thing.vertices, np.float64)
+    if isinstance(thing, shapes.SdfGrid):
+        return np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
     depth = (-1.0, 1.0) if isinstance(thing, shapes.Cube) else (0.0,)
     return np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in depth])
 

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     import trimesh  # imported where it is used: it takes a second, which scenes without files save
 
 SUFFIXES = (".obj", ".ply", ".stl", ".off")
+TANGENTS = "vertex tangents"  # among attributes, while a mesh is read
+TANGENT_COLUMNS = ("tx", "ty", "tz", "tw")  # of a PLY file that clpt has written
 COLOURS = ("vertex_color", "face_color")  # attributes that show where no material is named
 DUMMIES = (None, (2, 2))  # sizes of the image in trimesh's default material
 SUMMED = 1 << 20  # triangles whose normals are summed at a time
@@ -208,6 +210,7 @@ def _ply(path: Path, materials: bool, warnings: list[str]) -> Mesh:
     )
     if not len(arrays["faces"]):
         raise SceneError("holds no triangles", file=path)
+    arrays["tangents"] = arrays["attributes"].pop(TANGENTS, None)
     return Mesh(name=path.name, material=_coloured(own) if materials else GREY, **arrays)
 
 
@@ -245,6 +248,10 @@ def _attributes(triangles: ply.Triangles) -> dict[str, NDArray[np.float32]]:
                 scaled = values.dtype == np.uint8
                 linear = images.srgb_to_linear(values / np.float32(255.0)) if scaled else values
                 attributes[f"{element}_{name}"] = linear.astype(np.float32)
+    vertex = triangles.columns["vertex"]
+    if all(name in vertex for name in TANGENT_COLUMNS):
+        columns = [vertex[name] for name in TANGENT_COLUMNS]
+        attributes[TANGENTS] = np.column_stack(columns).astype(np.float32)
     return attributes
 
 

@@ -95,7 +95,10 @@ def _textures(props: Properties) -> list[Element]:
 
 
 def _sensors(props: Properties, context: Context) -> list[sensors.Sensor]:
-    all_sensors = [sensor(element, context) for element in props.objects("sensor")]
+    all_sensors: list[sensors.Sensor] = []
+    for element in props.objects("sensor"):
+        is_batch = element.type == "batch"
+        all_sensors += sensors.batch(element, context) if is_batch else [sensor(element, context)]
     if not all_sensors:
         context.warn(props.element, "has no sensor; a camera that sees everything is used")
     return all_sensors

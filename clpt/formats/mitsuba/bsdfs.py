@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from clpt import spectra
+from clpt import measured, spectra
 from clpt.formats.missing import EVEN, GREY
 from clpt.formats.mitsuba.fluorescence import fluorescent
 from clpt.formats.mitsuba.hair import hair
@@ -230,6 +230,12 @@ def _grating(props: Properties) -> Parameters:
     return {**given, **_metal(props), "reflectance": reflectance(props, "reflectance", 1.0)}
 
 
+def _measured(props: Properties) -> Parameters:
+    child, path = props.named.get("filename", props.element), props.file()
+    with child.locating():
+        return {"data": measured.read(path)}
+
+
 def _null(props: Properties) -> Parameters:
     return {}
 
@@ -312,6 +318,7 @@ PLUGINS: dict[str, tuple[type[Material], Callable[[Properties], Parameters]]] = 
     "grating": (materials.Grating, _grating),
     "fluorescent": (materials.Fluorescent, fluorescent),
     "hair": (materials.Hair, hair),
+    "measured": (materials.Measured, _measured),
     "null": (materials.Null, _null),
     "twosided": (materials.TwoSided, _two_sided),
     "mask": (materials.Mask, _mask),

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 
 from clpt import images, transforms
+from clpt.errors import SceneError
+from clpt.formats import ies
 from clpt.formats.mitsuba.limits import within
 from clpt.formats.mitsuba.media import around
 from clpt.formats.mitsuba.properties import Context, Properties, unknown
@@ -124,6 +126,22 @@ def _aspect(image: Any) -> float:
     return width / height
 
 
+def _ies(props: Properties) -> Parameters:
+    """Ours, see docs/mitsuba_plugins.md: a lamp whose axis, straight down in its file, is -z."""
+    path, scale = props.file(), props.number("scale", 1.0)
+    if scale < 0.0:
+        raise props.element.error("'scale' cannot be negative")
+    try:
+        lamp = ies.parameters(path)
+    except SceneError as error:
+        line = f":{error.line}" if error.line else ""
+        raise props.element.error(f"{path.name}{line}: {error.message}") from None
+    intensity = emission(props, "intensity")
+    image = replace(lamp["image"], image=lamp["image"].image * np.float32(scale))
+    upright = props.placement() @ transforms.rotate([1, 0, 0], 90.0)
+    return {"image": image, "intensity": intensity, "to_world": upright}
+
+
 def _directional(props: Properties) -> Parameters:
     direction = props.vector("direction", None)
     if direction is None:
@@ -195,4 +213,5 @@ PLUGINS: dict[str, tuple[type[Light], Callable[[Properties], Parameters]]] = {
     "constant": (lights.Constant, _constant),
     "envmap": (lights.Envmap, _envmap),
     "sunsky": (lights.Sky, _sky),
+    "ies": (lights.Goniometric, _ies),
 }

@@ -12,7 +12,8 @@ from clpt.formats.mitsuba.properties import Context, Properties, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.formats.volumes import vol
 from clpt.scene import media
-from clpt.scene.media import Grid, Homogeneous, Medium, Phase, Volume
+from clpt.scene.media import Grid, Homogeneous, Medium, Phase
+from clpt.scene.volumes import Volume
 from clpt.spectra import RGBUnbounded
 
 
@@ -98,7 +99,10 @@ def _sggx(props: Properties) -> Phase:
     )
 
 
-def _heterogeneous(props: Properties) -> Medium:
+def _heterogeneous(props: Properties) -> Homogeneous:
+    albedo = _albedo(props)
+    if albedo is not None:
+        return _tinted(props, albedo)
     child = props.named.get("sigma_t")
     volume = None if child is None else props.context.resolve(child)
     even = volume is None or volume.tag != "volume" or volume.type != "gridvolume"
@@ -117,8 +121,46 @@ def _heterogeneous(props: Properties) -> Medium:
     )
 
 
+def _albedo(props: Properties) -> Volume | None:
+    """Take an albedo of colours on a grid."""
+    child = props.named.get("albedo")
+    volume = None if child is None else props.context.resolve(child)
+    if volume is None or volume.tag != "volume" or volume.type != "gridvolume":
+        return None
+    props.take("albedo")
+    values, to_world = props.context.once(volume, lambda one: _grid_values(one, props.context))
+    if values.max() > 1.0:
+        raise volume.error("an albedo cannot exceed 1")
+    return Volume(np.repeat(values, 3 // values.shape[3], axis=3), to_world)
+
+
+def _tinted(props: Properties, albedo: Volume) -> Grid:
+    """A medium whose albedo is on a grid; its density may be one number everywhere."""
+    even = Volume(np.ones(albedo.values.shape[:3], np.float32), albedo.to_world)
+    made = _heterogeneous(props)
+    colour, density = made.sigma_t, made.density if isinstance(made, Grid) else even
+    if isinstance(made, Grid):
+        density = Volume(made.density, made.to_world)
+    return Grid(
+        sigma_t=colour, albedo=1.0, albedo_grid=albedo, density=density, scale=made.scale,
+        phase=made.phase, name=made.name,
+    )  # fmt: skip
+
+
 def _grid_volume(element: Element, context: Context) -> tuple[Any, Volume]:
     """What a <volume type="gridvolume"> has: one colour, and a density that multiplies it."""
+    values, to_world = _grid_values(element, context)
+    most = values.max(axis=(0, 1, 2)).astype(float)
+    if len(most) == 1 or not most.max() > 0.0:
+        return 1.0, Volume(values[..., 0], to_world)
+    density = values.mean(axis=3) / most.mean()
+    if not np.allclose(values, density[..., None] * most, rtol=1e-4, atol=1e-5 * most.max()):
+        raise element.error("its colours differ by more than a factor; give one channel")
+    return RGBUnbounded(*most.tolist()), Volume(density, to_world)
+
+
+def _grid_values(element: Element, context: Context) -> tuple[Any, Any]:
+    """The numbers of a grid, of one channel or three, and where its box is."""
     props = Properties(element, context)
     props.ignore("raw", "accel")
     path, to_world = props.file(), props.placement()
@@ -133,13 +175,7 @@ def _grid_volume(element: Element, context: Context) -> tuple[Any, Volume]:
     props.finish()
     if values.shape[3] not in (1, 3):
         raise element.error(f"its file has {values.shape[3]} channels; read are 1 and 3")
-    most = values.max(axis=(0, 1, 2)).astype(float)
-    if len(most) == 1 or not most.max() > 0.0:
-        return 1.0, Volume(values[..., 0], to_world)
-    density = values.mean(axis=3) / most.mean()
-    if not np.allclose(values, density[..., None] * most, rtol=1e-4, atol=1e-5 * most.max()):
-        raise element.error("its colours differ by more than a factor; give one channel")
-    return RGBUnbounded(*most.tolist()), Volume(density, to_world)
+    return values, to_world
 
 
 MEDIA: dict[str, Callable[[Properties], Medium]] = {

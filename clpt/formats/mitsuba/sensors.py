@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from clpt import lenses
 from clpt.errors import UnknownKindError
 from clpt.formats.mitsuba.media import around
 from clpt.formats.mitsuba.properties import Context, Properties, unknown
@@ -16,10 +17,17 @@ from clpt.formats.mitsuba.xml import Element
 from clpt.scene import cameras, integrators
 from clpt.scene.integrators import Film, Filter, Integrator
 from clpt.scene.motion import Shutter
+from clpt.scene.params import params
 from clpt.spectra import read_sensor, spaces
 from clpt.spectra.sensors import OBSERVERS
 
 FULL_FRAME = math.hypot(36.0, 24.0)  # diagonal of 35 mm film [mm], which focal_length refers to
+LENS_NUMBERS = (
+    "film_width", "focus_distance", "film_shift", "f_number", "blade_angle", "ghosts", "unit",
+)  # fmt: skip
+LENS_CHOICES = {
+    "coating": tuple(lenses.COATINGS), "exposure": params(cameras.Lens)["exposure"].choices,
+}  # fmt: skip
 FILMS = ("hdrfilm", "clptfilm")
 SAMPLERS = ("independent", "stratified", "multijitter", "orthogonal", "ldsampler")
 DEFAULT_SAMPLER = "independent"
@@ -57,7 +65,7 @@ def sensor(element: Element, context: Context) -> Sensor:
     sampler, spp, seed = _sampler(props.object("sampler"), context)
     opens = props.number("shutter_open", 0.0)
     closes = props.number("shutter_close", opens)
-    if element.type != "thinlens":
+    if element.type not in ("thinlens", "lens"):
         props.ignore("focus_distance")
     with element.locating():
         camera = CAMERAS[element.type](props, film)
@@ -65,6 +73,28 @@ def sensor(element: Element, context: Context) -> Sensor:
     camera = replace(camera, medium=around(props), motion=props.motion, shutter=shutter)
     props.finish()
     return Sensor(camera, film, sampler, spp, seed, element.attributes.get("id", ""))
+
+
+def batch(element: Element, context: Context) -> list[Sensor]:
+    """Make the sensors in a <sensor type="batch">: each has its part of the film's width.
+
+    Mitsuba shows them in a row; here each is a camera of its own.
+    """
+    props = Properties(element, context)
+    film = default_film() if (child := props.object("film")) is None else _film(child, context)
+    sampler, spp, seed = _sampler(props.object("sampler"), context)
+    inner = props.objects("sensor")
+    props.ignore("srf")
+    props.finish()
+    if not inner or film.width % len(inner) or film.crop is not None:
+        raise element.error("needs a film whose width is a multiple of its sensors, without a crop")
+    width = film.width // len(inner)
+    context.warn(element, f"its {len(inner)} pictures of {width} pixels are no row: one is shown")
+    part = replace(film, width=width)
+    made = [sensor(one, context) for one in inner]
+    if any(not math.isclose(one.film.width / one.film.height, width / film.height) for one in made):
+        context.warn(element, "sensors whose own films have other sides see more or less")
+    return [replace(one, film=part, sampler=sampler, spp=spp, seed=seed) for one in made]
 
 
 def default_film() -> Film:
@@ -101,6 +131,27 @@ def _glass(props: Properties) -> dict[str, Any]:
     return values
 
 
+def _lens(props: Properties, film: Film) -> cameras.Camera:
+    """Ours, see docs/mitsuba_plugins.md."""
+    placed = props.placement()
+    if not np.allclose(np.linalg.norm(placed[:3, :3], axis=0), 1.0, atol=1e-3):
+        raise props.element.error("to_world must not scale")
+    given: dict[str, Any] = {"to_world": placed}
+    if "filename" in props.named:
+        given["lens"] = lenses.read(props.file())
+    elif "lens" in props.named:
+        given["lens"] = props.text("lens", "", lenses.names())
+    for name in LENS_NUMBERS:
+        if name in props.named:
+            given[name] = props.number(name, 0.0)
+    for name, choices in LENS_CHOICES.items():
+        if name in props.named:
+            given[name] = props.text(name, "", choices)
+    given["blades"] = props.integer("blades", 0)
+    given["losses"] = props.flag("losses", False)
+    return cameras.Lens(**given)
+
+
 def _orthographic(props: Properties, _: Film) -> cameras.Camera:
     near, far = _clip(props)
     return cameras.Orthographic(to_world=props.placement(), near=near, far=far)
@@ -109,6 +160,7 @@ def _orthographic(props: Properties, _: Film) -> cameras.Camera:
 CAMERAS: dict[str, Callable[[Properties, Film], cameras.Camera]] = {
     "perspective": _perspective,
     "thinlens": _thin_lens,
+    "lens": _lens,
     "orthographic": _orthographic,
 }
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from clpt import transforms
 from clpt.errors import SceneError
+from clpt.formats import volumes
 from clpt.formats.meshes import mesh, strands
 from clpt.formats.mitsuba import serialized
 from clpt.formats.mitsuba.bsdfs import bsdf
@@ -24,6 +25,7 @@ from clpt.scene.materials import Diffuse
 from clpt.scene.shapes import Group, Instance, Shape
 
 Parameters = dict[str, Any]
+SDF_PIECES = 4  # of the side of a cell
 UNEVEN = 1e-3  # relative stretch of round shapes that a transform may have
 STRETCH = "stretch"  # no parameter: a transform that the shape takes as an instance
 
@@ -247,6 +249,20 @@ def _curves(props: Properties) -> Parameters:
     return arrays
 
 
+def _sdf_grid(props: Properties) -> Parameters:
+    """Mitsuba's silhouettes are those of the cells' trilinear distance; so are these vertices."""
+    path = props.file()
+    if props.text("normals", "smooth", ("analytic", "smooth")) == "analytic":
+        message = "normals 'analytic' jump where cells meet; they are smooth here"
+        props.context.warn(props.element, message)
+    props.ignore("watertight")
+    try:
+        values = volumes.distances(path)
+    except SceneError as error:
+        raise props.element.error(f"{path.name}: {error.message}") from None
+    return {"values": values, "to_world": props.placement(thin=True), "pieces": SDF_PIECES}
+
+
 PLUGINS: dict[str, tuple[type[Shape], Callable[[Properties], Parameters]]] = {
     "obj": (shapes.Mesh, _obj),
     "ply": (shapes.Mesh, _ply),
@@ -258,4 +274,5 @@ PLUGINS: dict[str, tuple[type[Shape], Callable[[Properties], Parameters]]] = {
     "cylinder": (shapes.Cylinder, _cylinder),
     "bsplinecurve": (shapes.Curves, _bspline_curve),
     "linearcurve": (shapes.Curves, _linear_curve),
+    "sdfgrid": (shapes.SdfGrid, _sdf_grid),
 }

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from clpt import spectra
-from clpt.formats.native import json_schema, motion, reradiation, sensors
+from clpt.formats.native import json_schema, lenses, motion, reradiation, sensors
 from clpt.formats.native import spectra as json_spectra
 from clpt.formats.native.cursor import Cursor
 from clpt.formats.native.json_schema import NUMBER, NUMBERS, STRING, TRIPLE, Schema, ref
@@ -37,7 +37,9 @@ class Reader(Protocol):
     def area_light(self, cursor: Cursor) -> Any: ...
     def group(self, cursor: Cursor) -> Any: ...
     def image(self, cursor: Cursor) -> Any: ...
-    def volume(self, cursor: Cursor) -> Any: ...
+    def volume(self, cursor: Cursor, colours: bool = False) -> Any: ...
+    def measurement(self, cursor: Cursor) -> Any: ...
+    def merl(self, cursor: Cursor) -> Any: ...
 
 
 class Writer(Protocol):
@@ -50,6 +52,8 @@ class Writer(Protocol):
     def group(self, value: Any) -> Any: ...
     def image(self, value: Any) -> Any: ...
     def volume(self, value: Any) -> Any: ...
+    def measurement(self, value: Any) -> Any: ...
+    def merl(self, value: Any) -> Any: ...
 
 
 def plain(value: Any) -> Any:
@@ -228,6 +232,15 @@ def _number_words(param: Param) -> str:
     return f"number from {param.low:g}" if low else "number"
 
 
+def _grid(cursor: Cursor) -> np.ndarray:
+    """Numbers (nx, ny, nz)."""
+    rows = [[row.numbers() for row in slab.entries()] for slab in cursor.entries()]
+    sizes = {len(slab) for slab in rows}, {len(row) for slab in rows for row in slab}
+    if any(len(size) != 1 for size in sizes):
+        raise cursor.error("must be as many rows of as many numbers in each")
+    return np.array(rows, np.float32)
+
+
 def _number_schema(param: Param) -> Schema:
     limits = {"minimum": param.low, "maximum": param.high}
     return {**NUMBER, **{key: value for key, value in limits.items() if math.isfinite(value)}}
@@ -309,6 +322,11 @@ FORMS: dict[str, Form] = {
         {"anyOf": [NUMBER, {"const": AUTO}]},
         _number_or_auto,
     ),
+    "grid": _of_cursor(
+        "rows of rows of numbers",
+        {"type": "array", "items": {"type": "array", "items": NUMBERS}},
+        _grid,
+    ),
     "rows2": _rows(2),
     "rows3": _rows(3),
     "rows4": _rows(4),
@@ -339,9 +357,27 @@ FORMS: dict[str, Form] = {
     ),
     "volume": Form(
         "name of a `.npy`, `.vol`, `.nvdb` or `.vdb` file; with `#name` behind it that grid",
-        STRING,
-        lambda cursor, reader: reader.volume(cursor),
+        {"type": ["string", "null"]},
+        lambda cursor, reader: None if cursor.value is None else reader.volume(cursor),
         lambda value, writer: writer.volume(value),
+    ),
+    "colour_volume": Form(
+        "name of a `.npy` file of an array (nx, ny, nz, 3), or of a `.vol` file of colours",
+        {"type": ["string", "null"]},
+        lambda cursor, reader: None if cursor.value is None else reader.volume(cursor, True),
+        lambda value, writer: writer.volume(value),
+    ),
+    "measurement": Form(
+        "name of a `.bsdf` file",
+        STRING,
+        lambda cursor, reader: reader.measurement(cursor),
+        lambda value, writer: writer.measurement(value),
+    ),
+    "merl": Form(
+        "name of a `.binary` file",
+        STRING,
+        lambda cursor, reader: reader.merl(cursor),
+        lambda value, writer: writer.merl(value),
     ),
     "cube_images": Form(
         "name of an image file, or a list of six",
@@ -354,6 +390,12 @@ FORMS: dict[str, Form] = {
         sensors.SCHEMA,
         lambda cursor, _: sensors.read(cursor),
         lambda value, _: sensors.write(value),
+    ),
+    "lens": Form(
+        lenses.WORDS,
+        lenses.SCHEMA,
+        lambda cursor, _: lenses.read(cursor),
+        lambda value, _: lenses.write(value),
     ),
     "material": Form(
         "material, or its name",

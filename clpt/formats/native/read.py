@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from clpt import spectra
+from clpt import measured, spectra
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
 from clpt.formats import volumes
 from clpt.formats.missing import EVEN, GREY, Missing, grey_for
@@ -18,6 +18,7 @@ from clpt.formats.native.cursor import Cursor, parse
 from clpt.formats.native.spectra import find_file, kind_name
 from clpt.scene import Scene, check_noise, integrators, kinds, lights, materials, media, shapes
 from clpt.scene.params import Kind, params
+from clpt.scene.volumes import Volume
 
 ON_SHAPES = tuple(cls.kind for cls in lights.ON_SHAPES)
 KEYS = (
@@ -55,7 +56,8 @@ class _Reader:
         # None while one is being read: it refers to itself then
         self.materials: dict[str, materials.Material | None] = {}
         self.media: dict[str, media.Medium] = {}
-        self.volumes: dict[str, media.Volume] = {}
+        self.volumes: dict[str, Volume] = {}
+        self.measurements: dict[str, Any] = {}
         self.groups: dict[str, shapes.Group | None] = {}
         self.warnings: list[str] = []
 
@@ -124,15 +126,34 @@ class _Reader:
                 self.warnings.append(grey_for(cursor.value))
             return EVEN if cursor.path[-2:] == ("map", "image") else GREY
 
-    def volume(self, cursor: Cursor) -> Any:
-        """Read a density and its box, once for each name."""
+    def volume(self, cursor: Cursor, colours: bool = False) -> Any:
+        """Read a density and its box, or `colours`, once for each name."""
         name = cursor.expect(str, "the name of a file")
         if name not in self.volumes:
             file, _, grid = name.partition("#")
             path = find_file(cursor, file)
             with cursor.locating():
-                self.volumes[name] = volumes.read(path, grid)
+                read = volumes.read_colours(path) if colours else volumes.read(path, grid)
+                self.volumes[name] = read
         return self.volumes[name]
+
+    def measurement(self, cursor: Cursor) -> Any:
+        """Read a measured material, once for each name; null is none."""
+        return self._measured(cursor, measured.read)
+
+    def merl(self, cursor: Cursor) -> Any:
+        """Read a table of MERL, once for each name; null is none."""
+        return self._measured(cursor, measured.read_merl)
+
+    def _measured(self, cursor: Cursor, read: Callable[[Path], Any]) -> Any:
+        if cursor.value is None:
+            return None
+        name = cursor.expect(str, "the name of a file")
+        if name not in self.measurements:
+            path = find_file(cursor, name)
+            with cursor.locating():
+                self.measurements[name] = read(path)
+        return self.measurements[name]
 
     def layer(self, cursor: Cursor) -> Any:
         """Read a thin film."""
@@ -142,6 +163,13 @@ class _Reader:
         """Read a light that is not a shape's."""
         if kind_name(cursor, "light", kinds("light")) in ON_SHAPES:
             raise cursor.error("an area light stands in a shape's 'emission'")
+        cls = kinds("light")[kind_name(cursor, "light", kinds("light"))]
+        if cls in shape_files.FILES and "file" in cursor.value:
+            shape_files.check_only_in_file(cursor, cls)
+            made, file = self.object_of(cursor, cls, ("type", "file")), cursor.at("file")
+            path, reader = find_file(file), shape_files.FILES[cls].read
+            with file.locating():
+                return dataclasses.replace(made, **reader(path)) if reader else made
         return self.kind(cursor, "light")
 
     def area_light(self, cursor: Cursor) -> Any:
@@ -262,6 +290,7 @@ def _merged(
         faces=part.faces,
         normals=part.normals if entry.normals is None else entry.normals,
         uvs=part.uvs,
+        tangents=part.tangents,
         attributes=part.attributes,
     )
 

@@ -1,4 +1,4 @@
-"""Files that a shape of scene.json names in place of its arrays."""
+"""Files that a shape or a lamp of scene.json names in place of its arrays."""
 
 from __future__ import annotations
 
@@ -10,13 +10,16 @@ from typing import Any
 
 import numpy as np
 
+from clpt.formats import ies
 from clpt.formats.meshes import mesh, particles, strands
+from clpt.formats.meshes.mesh import TANGENTS
 from clpt.formats.native.cursor import Cursor
 from clpt.formats.native.spectra import find_file
-from clpt.scene import shapes
+from clpt.formats.volumes import distances
+from clpt.scene import lights, shapes
 from clpt.scene.params import Kind
 
-MESH_ARRAYS = ("vertices", "faces", "normals", "uvs")
+MESH_ARRAYS = ("vertices", "faces", "normals", "uvs", "tangents")
 
 
 @dataclass(frozen=True)
@@ -31,6 +34,11 @@ class ShapeFile:
     meaning: str
     replaces: tuple[str, ...] = ()
     read: Callable[[Path], dict[str, Any]] | None = None
+
+
+def sdf_grid(path: Path) -> dict[str, Any]:
+    """Read signed distances; the box of a .vol is not read. Raises SceneError."""
+    return {"values": distances(path)}
 
 
 FILES: dict[type[Kind], ShapeFile] = {
@@ -51,6 +59,15 @@ FILES: dict[type[Kind], ShapeFile] = {
     ),
     shapes.Instance: ShapeFile(
         "name of a .npy file", "matrices (n, 3, 4): an instance for each, before `to_world`"
+    ),
+    shapes.SdfGrid: ShapeFile(
+        "name of a .npy or .vol file", "signed distances, in place of values", ("values",), sdf_grid
+    ),
+    lights.Goniometric: ShapeFile(
+        "name of an .ies file",
+        "candela by direction, in place of `image`",
+        ("image",),
+        ies.parameters,
     ),
 }
 
@@ -91,11 +108,17 @@ def read_transforms(cursor: Cursor) -> np.ndarray:
     return matrices
 
 
+def _with_tangents(shape: shapes.Mesh) -> dict[str, Any]:
+    """A mesh's attributes, with the tangents as one of them: what is per vertex stays together."""
+    own = dict(shape.attributes)
+    return own if shape.tangents is None else {**own, TANGENTS: shape.tangents}
+
+
 def checked_arrays(cursor: Cursor, shape: shapes.Mesh, warnings: list[str]) -> shapes.Mesh:
     """Check the arrays of a mesh that is given in the JSON itself."""
     if shape.vertices is None or shape.faces is None:
         raise cursor.error("a mesh needs a 'file', or 'vertices' and 'faces'")
-    for name in ("normals", "uvs"):
+    for name in ("normals", "uvs", "tangents"):
         values = getattr(shape, name)
         is_array = values is not None and not isinstance(values, str)
         if is_array and len(values) != len(shape.vertices):
@@ -113,8 +136,10 @@ def checked_arrays(cursor: Cursor, shape: shapes.Mesh, warnings: list[str]) -> s
             None if isinstance(shape.normals, str) else shape.normals,
             shape.uvs,
             warnings,
-            shape.attributes,
+            _with_tangents(shape),
         )
+        if shape.tangents is not None:
+            arrays["tangents"] = arrays["attributes"].pop(TANGENTS)
     if isinstance(shape.normals, str):
         arrays["normals"] = shape.normals
     if not len(arrays["faces"]):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 import json
 import os
 import re
@@ -14,9 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from clpt import images, output_files, spectral_exr
+from clpt import images, measured, output_files, spectral_exr
 from clpt.errors import SceneError
 from clpt.formats.meshes import particles, strands
+from clpt.formats.meshes.mesh import TANGENT_COLUMNS
 from clpt.formats.native import forms
 from clpt.formats.native.shape_files import MESH_ARRAYS, in_file
 from clpt.scene import Scene, kinds, materials, shapes
@@ -66,6 +68,7 @@ class _Writer:
         self.array_files: dict[type[Kind], Callable[[Any], str]] = {
             shapes.Mesh: self.mesh,
             shapes.Curves: self.curves,
+            shapes.SdfGrid: self.sdf_grid,
             shapes.Spheres: self.spheres,
         }
         self.materials: dict[str, Any] = {}
@@ -211,6 +214,22 @@ class _Writer:
             self.files[id(values)] = name
         return self.files[id(values)]
 
+    def measurement(self, value: measured.Measurement) -> str:
+        """Return the name of the file that a measured material is written to."""
+        if id(value) not in self.files:
+            name = self.file_name("measured", "bsdf")
+            measured.write(self.path.parent / name, value)
+            self.files[id(value)] = name
+        return self.files[id(value)]
+
+    def merl(self, value: measured.MerlTable) -> str:
+        """Return the name of the file that a table of MERL is written to."""
+        if id(value) not in self.files:
+            name = self.file_name("merl", "binary")
+            measured.write_merl(self.path.parent / name, value)
+            self.files[id(value)] = name
+        return self.files[id(value)]
+
     def copy(self, path: Path) -> str:
         """Copy a file, once; return its name."""
         key = os.path.realpath(path)
@@ -233,6 +252,15 @@ class _Writer:
         """Write centres, radii and attributes; return the file's name."""
         name = self.file_name(spheres.name or "spheres", "npz")
         particles.write(self.path.parent / name, spheres)
+        self.files[name] = name
+        return name
+
+    def sdf_grid(self, grid: shapes.SdfGrid) -> str:
+        """Write signed distances; return the file's name."""
+        name = self.file_name(grid.name or "distances", "npy")
+        stream = io.BytesIO()
+        np.save(stream, np.asarray(grid.values, np.float32))
+        output_files.write(self.path.parent / name, stream.getvalue())
         self.files[name] = name
         return name
 
@@ -289,6 +317,8 @@ def _ply(mesh: shapes.Mesh) -> bytes:
     vertex: list[Any] = [("x", "y", "z", mesh.vertices)]
     vertex += [] if normals is None else [("nx", "ny", "nz", normals)]
     vertex += [] if uvs is None else [("s", "t", uvs)]
+    if mesh.tangents is not None:
+        vertex.append((*TANGENT_COLUMNS, mesh.tangents))
     face: list[Any] = []
     for name, values in mesh.attributes.items():
         element, _, rest = name.partition("_")

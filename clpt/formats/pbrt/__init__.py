@@ -37,7 +37,7 @@ def load(path: Path, progress: Progress | None = None, missing: Missing = "error
     chosen = options.get("Sampler")
     sampler, spp, seed = films.sampler(chosen)
     scene = Scene(
-        camera=camera_film.camera(camera, film),
+        camera=camera_film.camera(camera, film, films.diagonal(options.get("Film"))),
         shapes=build_scene.shapes(contents, progress),
         lights=build_scene.lights(contents),
         integrator=films.integrator(options.get("Integrator"), film),

@@ -18,7 +18,7 @@ from clpt.formats.pbrt.lights import area_light, light
 from clpt.formats.pbrt.materials import material
 from clpt.formats.pbrt.media import medium
 from clpt.formats.pbrt.params import Parameters
-from clpt.formats.pbrt.shapes import Geometry, geometry, with_uvs
+from clpt.formats.pbrt.shapes import Geometry, displaced, geometry, with_uvs
 from clpt.formats.pbrt.state import Definition, State, nearest
 from clpt.formats.pbrt.textures import textured
 from clpt.scene.lights import Light
@@ -85,6 +85,9 @@ def _shape(definition: Definition, form: Geometry | None) -> Shape | None:
     if form is None:
         state.warn(params, "left out, since it has no area")
         return None
+    if definition.kind == "plymesh":
+        with params.locating():
+            form = displaced(form, params, state)
     for warning in form.warnings:
         state.warn(params, warning)
     surface = _material(params, state)

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from clpt import transforms
+from clpt import lenses, transforms
 from clpt.errors import UnknownKindError
 from clpt.formats.pbrt.media import medium
 from clpt.formats.pbrt.params import Parameters
@@ -23,19 +23,28 @@ from clpt.scene.integrators import Film
 from clpt.scene.motion import Keys, Shutter
 
 TO_RIGHT = np.diag([-1.0, 1.0, 1.0, 1.0])
+BLADES = {"square": 4, "pentagon": 5}
 FARTHEST = 1e20  # [m], pbrt cuts nothing off; below the FAR of rays that meet nothing
 # pbrt's directions for a map in latitude and longitude, in our camera space.
 ROUND = np.array([[0.0, 0, -1, 0], [0, 1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
 
 
-def camera(definition: Definition, film: Film) -> cameras.Camera:
-    """Make the camera that a Camera directive describes. Raises SceneError."""
-    if definition.kind not in CAMERAS:
-        raise UnknownKindError("camera", definition.kind, CAMERAS, **definition.params.location())
+def camera(definition: Definition, film: Film, diagonal: float) -> cameras.Camera:
+    """Make the camera that a Camera directive describes; diagonal: of the film [mm].
+
+    Raises SceneError.
+    """
+    if definition.kind not in (*CAMERAS, "realistic"):
+        known = (*CAMERAS, "realistic")
+        raise UnknownKindError("camera", definition.kind, known, **definition.params.location())
     params, state = definition.params, definition.state
     exposure_time(params)
     with params.locating():
-        made = _moving(CAMERAS[definition.kind](params, state, film), state)
+        if definition.kind == "realistic":
+            made = _realistic(params, state, film, diagonal)
+        else:
+            made = CAMERAS[definition.kind](params, state, film)
+        made = _moving(made, state)
         shutter = Shutter(*_shutter(params))
     return replace(made, medium=medium(state.outside, params, state), shutter=shutter)
 
@@ -134,13 +143,37 @@ def _spherical(params: Parameters, state: State, film: Film) -> cameras.Camera:
     return cameras.Spherical(to_world=to_world @ ROUND)
 
 
-def _realistic(params: Parameters, state: State, film: Film) -> cameras.Camera:
-    raise params.error("lenses traced surface by surface are not supported; use 'perspective'")
+def _realistic(params: Parameters, state: State, film: Film, diagonal: float) -> cameras.Camera:
+    name = params.one("lensfile", "string", "")
+    if not name:
+        raise params.error("needs a 'lensfile' with the rows of the lens")
+    path = state.existing_file(name)
+    if path.suffix.lower() not in lenses.READERS:
+        raise params.error(f"a lens file ends in {', '.join(lenses.READERS)}, not {path.suffix!r}")
+    lens = lenses.read(path)
+    # pbrt's own default is 1 mm, and it never opens a lens further than its file says.
+    aperture = params.above_zero("aperturediameter", 1.0)
+    largest = 2.0 * lens.surfaces[lens.stop].semi_diameter
+    if aperture > largest:
+        state.warn(params, f"'aperturediameter' is above the lens's {largest:g} mm, which counts")
+    shape = params.one("aperture", "string", "")
+    if shape and shape not in BLADES:
+        state.warn(params, f"the aperture {shape[:40]!r} is left out: it is round")
+    to_world, size = _without_scale(transforms.inverse(state.ctm))
+    return cameras.Lens(
+        lens=lens.with_stop(0.5 * min(aperture, largest)),
+        to_world=to_world @ TO_RIGHT,
+        film_width=1e-3 * size * diagonal * film.width / math.hypot(film.width, film.height),
+        focus_distance=params.above_zero("focusdistance", 10.0) * size,
+        blades=BLADES.get(shape, 0),
+        blade_angle=90.0 if shape == "pentagon" else 45.0,
+        exposure="irradiance",
+        unit=1e-3 * size,
+    )
 
 
 CAMERAS: dict[str, Callable[[Parameters, State, Film], cameras.Camera]] = {
     "perspective": _perspective,
     "orthographic": _orthographic,
     "spherical": _spherical,
-    "realistic": _realistic,
 }

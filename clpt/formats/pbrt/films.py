@@ -16,11 +16,13 @@ from clpt.scene.integrators import MOST_LIGHT_PATHS, Film, Filter, Integrator, S
 
 FILMS = ("rgb", "gbuffer", "spectral")
 GBUFFER = ("albedo", "position", "geometric_normal", "shading_normal", "uv")
-SPACES = {"srgb": "rec709", "rec2020": "rec2020", "dci-p3": "display_p3"}
+SPACES = {
+    "srgb": "rec709", "rec2020": "rec2020", "dci-p3": "display_p3", "aces2065-1": "aces2065_1",
+}  # fmt: skip
 SAMPLERS = (
     "halton", "sobol", "zsobol", "paddedsobol", "pmj02bn", "stratified", "independent",
 )  # fmt: skip
-STORED = ("filename", "savefp16", "diagonal")  # how a file is stored is decided when it is written
+STORED = ("filename", "savefp16")  # how a file is stored is decided when it is written
 SIZE = (("xresolution", 1280), ("yresolution", 720))
 DAYLIGHT = 6500.0  # [K], what pbrt takes a measured sensor's white to be
 
@@ -36,6 +38,7 @@ def film(definition: Definition | None, filter: Definition | None, exposure: flo
     if definition.kind not in FILMS:
         raise UnknownKindError("film", definition.kind, FILMS, **params.location())
     params.ignore(*STORED)
+    diagonal(definition)
     if definition.kind == "gbuffer" and "world" not in params.one(
         "coordinatesystem", "string", "camera"
     ):
@@ -56,6 +59,11 @@ def film(definition: Definition | None, filter: Definition | None, exposure: flo
     return made_film
 
 
+def diagonal(definition: Definition | None) -> float:
+    """Return the film's diagonal [mm], which only lenses traced by surfaces ask for."""
+    return 35.0 if definition is None else definition.params.above_zero("diagonal", 35.0)
+
+
 def _colour(params: Parameters, state: State, exposure: float) -> dict[str, Any]:
     """Take the sensor: what becomes white, and the factor on the picture."""
     sensor = params.one("sensor", "string", "cie1931")
@@ -66,11 +74,7 @@ def _colour(params: Parameters, state: State, exposure: float) -> dict[str, Any]
         balance = balance or DAYLIGHT
     if balance > 0.0:
         given["white_balance"] = balance
-    if state.colour_space in SPACES:
-        given["output_space"] = SPACES[state.colour_space]
-    else:
-        state.warn(params, f"the picture is in Rec. 709, not in {state.colour_space}")
-    return given
+    return {**given, "output_space": SPACES[state.colour_space]}
 
 
 def _bands(params: Parameters) -> dict[str, Any]:

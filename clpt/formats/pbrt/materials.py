@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from clpt import measured
 from clpt.errors import SceneError, UnknownKindError
 from clpt.formats.pbrt import coated_albedo
 from clpt.formats.pbrt.hair import hair
@@ -172,9 +173,10 @@ def _interface(params: Parameters, state: State) -> Material:
 
 
 def _measured(params: Parameters, state: State) -> Material:
-    raise SceneError(
-        f"measured materials are not supported: {params.one('filename', 'string', '')!r}"
-    )
+    name = params.one("filename", "string", "")
+    if not name:
+        raise SceneError("needs a 'filename'")
+    return both(materials.Measured(data=measured.read(state.existing_file(name))))
 
 
 MAKERS: dict[str, Callable[[Parameters, State], Material]] = {

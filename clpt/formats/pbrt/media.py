@@ -11,13 +11,18 @@ from clpt.errors import UnknownKindError
 from clpt.formats import volumes
 from clpt.formats.pbrt import coated_albedo
 from clpt.formats.pbrt.params import Parameters
-from clpt.formats.pbrt.spectra import spectrum
+from clpt.formats.pbrt.spectra import scaled, spectrum
 from clpt.formats.pbrt.state import Definition, State, nearest
-from clpt.scene.media import Grid, HenyeyGreenstein, Homogeneous, Isotropic, Medium, Volume
+from clpt.scene.media import Grid, HenyeyGreenstein, Homogeneous, Isotropic, Medium
+from clpt.scene.volumes import Volume
 from clpt.spectra import Constant, RGBUnbounded
 
-GRIDS = ("uniformgrid", "nanovdb")
-LEFT_OUT = ("rgbgrid", "cloud")
+GRIDS = ("uniformgrid", "nanovdb", "rgbgrid")
+LEFT_OUT = ("cloud",)
+GREY = 1e-3  # share by which the extinctions of colours may differ from those of one
+HEAT = ("temperatureoffset", "temperaturecutoff", "temperaturescale")
+BLACK_BODY = {"normalised": True}  # so that it has 1 at its brightest wavelength
+_AROUND = ((1, 1), (1, 1), (1, 1), (0, 0))
 MILK = "Wholemilk"  # of which a medium is that says nothing
 
 
@@ -44,39 +49,111 @@ def _made(name: str, definition: Definition) -> Medium | None:
             return None
         if kind not in ("homogeneous", *GRIDS):
             raise UnknownKindError("medium", kind, ("homogeneous", *GRIDS, *LEFT_OUT))
-        density = _density(kind, params, state) if kind in GRIDS else None
-        if "Le" in params or "temperature" in params:
-            state.warn(params, "its light is left out")
-        params.ignore("Le", "Lescale", "temperature", "temperaturename", "temperatureoffset")
-        params.ignore("temperaturescale", "temperaturecutoff", "LeScale")
         g = params.one("g", "float", 0.0)
         phase = HenyeyGreenstein(g=g) if g else Isotropic()
         scale = params.one("scale", "float", 1.0)
-        absorbs, scatters = _coefficients(params, state, density is not None)
-        own = {"sigma_a": absorbs, "sigma_s": scatters, "scale": scale, "phase": phase}
-        made = Homogeneous(**own, name=name)
-        if density is not None:
-            made = Grid(**own, name=name, density=density)
+        own: dict[str, Any] = {"scale": scale, "phase": phase}
+        if kind != "rgbgrid":
+            absorbs, scatters = _coefficients(params, state, kind in GRIDS)
+            own |= {"sigma_a": absorbs, "sigma_s": scatters}
+        if kind == "rgbgrid":
+            made: Medium = Grid(**own, **_coloured(params, state), name=name)
+        elif kind == "homogeneous":
+            made = Homogeneous(**own, emission=_light(params, state), name=name)
+        else:
+            made = Grid(**own, **_grid(kind, params, state), name=name)
     for given in params.unused():
         state.warn(params, f"{given.name!r} is left out")
     return made
 
 
-def _density(kind: str, params: Parameters, state: State) -> Volume:
-    """The density of a medium in the world; a layer without any is put around it."""
+def _light(params: Parameters, state: State) -> Any:
+    """What a homogeneous medium emits."""
+    light = spectrum(params, "Le", "emission", state, Constant(0.0))
+    return scaled(light, params.one("Lescale", "float", 1.0))
+
+
+def _grid(kind: str, params: Parameters, state: State) -> dict[str, Any]:
+    """The density of a medium in the world, and its light."""
     if kind == "nanovdb":
         path = state.existing_file(params.one("filename", "string", ""))
-        found = volumes.read(path, params.one("gridname", "string", "density"))
-        return Volume(found.values, state.ctm @ found.to_world)
+        density = _moved(volumes.read(path, params.one("gridname", "string", "density")), state)
+        hot = params.one("temperaturename", "string", "temperature")
+        scale = params.one("LeScale", "float", 1.0)
+        if hot not in volumes.names(path) or not scale > 0.0:
+            params.ignore(*HEAT)
+            return {"density": density}
+        kelvin = _kelvin(volumes.read(path, hot), params)
+        return {"density": density, "temperature": _moved(kelvin, state), **BLACK_BODY,
+                "brightness": scale}  # fmt: skip
+    listed = _listed(params, "density", state)
+    if listed is None:
+        raise params.error("needs its 'density'")
+    heat = _listed(params, "temperature", state)
+    if heat is not None:
+        if "Le" in params:
+            raise params.error("has both 'Le' and 'temperature'")
+        if "Lescale" in params:
+            state.warn(params, "'Lescale' is left out, where a temperature says what is emitted")
+            params.ignore("Lescale")
+        return {"density": listed, "temperature": _kelvin(heat, params), **BLACK_BODY}
+    params.ignore(*HEAT)
+    light = spectrum(params, "Le", "emission", state, Constant(0.0))
+    return {"density": listed, "emission": light,
+            "emission_grid": _listed(params, "Lescale", state)}  # fmt: skip
+
+
+def _coloured(params: Parameters, state: State) -> dict[str, Any]:
+    """An `rgbgrid`: a density, one colour of extinction, and an albedo on the grid."""
+    parts = [_listed(params, name, state, "rgb") for name in ("sigma_a", "sigma_s")]
+    found = next((part for part in parts if part is not None), None)
+    if found is None:
+        raise params.error("needs its 'sigma_a' or 'sigma_s'")
+    ones = np.pad(np.ones([n - 2 for n in found.values.shape[:3]] + [3], np.float32), _AROUND)
+    absorbs, scatters = (ones if part is None else part.values for part in parts)
+    extinction = (absorbs + scatters).astype(float)
+    most = extinction.max(axis=(0, 1, 2))
+    density = extinction.mean(axis=3) / max(float(most.mean()), 1e-30)
+    if not np.allclose(extinction, density[..., None] * most, GREY, GREY * most.max()):
+        state.warn(params, "its extinction is that of one colour everywhere: its mean")
+    if "Le" in params:
+        state.warn(params, "its light is left out")
+    params.ignore("Le", "Lescale")
+    albedo = scatters / np.maximum(extinction, 1e-30)
+    return {
+        "density": Volume(density.astype(np.float32), found.to_world),
+        "sigma_t": RGBUnbounded(*most.tolist()),
+        "albedo_grid": Volume(np.clip(albedo, 0.0, 1.0).astype(np.float32), found.to_world),
+    }
+
+
+def _kelvin(given: Volume, params: Parameters) -> Volume:
+    """A temperature as PBRT scales it."""
+    offset = params.one("temperaturecutoff", "float", 0.0)
+    offset = params.one("temperatureoffset", "float", offset)
+    scale = params.one("temperaturescale", "float", 1.0)
+    return Volume(np.maximum((given.values - offset) * scale, 0.0), given.to_world)
+
+
+def _moved(volume: Volume, state: State) -> Volume:
+    return Volume(volume.values, state.ctm @ volume.to_world)
+
+
+def _listed(params: Parameters, name: str, state: State, type_: str = "float") -> Volume | None:
+    """Numbers or colours on a grid, from a list; a layer of 0 is put around them."""
     nx, ny, nz = (params.one(n, "integer", 1) for n in ("nx", "ny", "nz"))
-    values = params.several("density", "float")
-    if values is None or min(nx, ny, nz) < 1 or len(values) != nx * ny * nz:
-        count = 0 if values is None else len(values)
-        raise params.error(f"nx, ny and nz are {nx}, {ny}, {nz}, 'density' has {count} numbers")
+    values = params.several(name, type_)
+    if values is None:
+        return None
+    if min(nx, ny, nz) < 1 or len(values) != nx * ny * nz:
+        message = f"nx, ny and nz are {nx}, {ny}, {nz}, {name!r} has {len(values)} numbers"
+        raise params.error(message)
     low = params.one("p0", "point3", np.zeros(3))
     step = (params.one("p1", "point3", np.ones(3)) - low) / (nx, ny, nz)
-    around = np.pad(np.reshape(values, (nz, ny, nx)).T.astype(np.float32), 1)
-    box = transforms.translate(low - step) @ transforms.scale(step * around.shape)
+    colours = np.shape(values)[1:]
+    cells = np.reshape(values, (nz, ny, nx, *colours)).swapaxes(0, 2).astype(np.float32)
+    around = np.pad(cells, _AROUND[: cells.ndim])
+    box = transforms.translate(low - step) @ transforms.scale(step * around.shape[:3])
     return Volume(around, state.ctm @ box)
 
 

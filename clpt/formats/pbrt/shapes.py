@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -18,11 +18,13 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.errors import SceneError, UnknownKindError
 from clpt.formats.meshes import mesh, ply
-from clpt.formats.pbrt import curves, subdivision, surfaces
+from clpt.formats.pbrt import curves, surfaces
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.state import Definition, State
-from clpt.scene import shapes
+from clpt.formats.pbrt.textures import textured
+from clpt.scene import shapes, subdivision
 from clpt.scene.shapes import Shape
+from clpt.scene.textures import Bitmap
 
 Parts = dict[str, Any]
 QUADRICS = ("cylinder", "disk", "sphere")
@@ -154,15 +156,29 @@ def with_uvs(made: Geometry) -> Geometry:
 def _ply(params: Parameters, state: State) -> Geometry | None:
     name = params.one("filename", "string", "")
     path = state.existing_file(name)
-    if "displacement" in params:
-        params.ignore("displacement", "edgelength", "uvscale")
-        state.warn(params, "'displacement' is left out: the mesh stays as it is in its file")
-    params.ignore("edgelength")
     try:
         arrays = ply.read(path)
-        return _mesh(arrays.vertices, arrays.faces, arrays.normals, arrays.uvs, arrays.warnings)
+        made = _mesh(arrays.vertices, arrays.faces, arrays.normals, arrays.uvs, arrays.warnings)
+        params.ignore("displacement", "edgelength", "uvscale")  # see displaced
+        return made
     except SceneError as error:
         raise SceneError(f"{path.name}: {error.message}") from None
+
+
+def displaced(made: Geometry, params: Parameters, state: State) -> Geometry:
+    """Return a `plymesh`, displaced by an image if it has a texture for that."""
+    edge, scale = params.above_zero("edgelength", 1.0), params.above_zero("uvscale", 1.0)
+    if "displacement" not in params:
+        return made
+    heights = textured(params, "displacement", "real", state, 0.0)
+    uv = isinstance(heights, Bitmap) and heights.mapping == "uv"
+    if not uv or made.parts["uvs"] is None:
+        reason = "it is no image by uv" if not uv else "the mesh has no uv"
+        made.warnings.append(f"'displacement' is left out, as {reason}")
+        return made
+    heights = replace(heights, to_uv=np.asarray(heights.to_uv) @ np.diag([scale, scale, 1.0]))
+    made.parts |= {"displacement": heights, "displacement_edge": edge}
+    return made
 
 
 def _loop(params: Parameters, state: State) -> Geometry | None:
@@ -191,10 +207,8 @@ def _patches(params: Parameters, state: State) -> Geometry | None:
     corners = np.arange(4) if corners is None else corners
     if len(corners) % 4 or corners.min(initial=0) < 0 or corners.max(initial=0) >= len(points):
         raise SceneError(f"'indices' must be four a patch, each below {len(points)}")
-    if "emissionfilename" in params:
-        params.ignore("emissionfilename")
-        state.warn(params, "'emissionfilename' is left out: the patch emits evenly")
-    params.ignore("faceIndices")
+    # pbrt samples the patch by that image; what it emits is the light's.
+    params.ignore("emissionfilename", "faceIndices")
     normals, uvs = _per_vertex(params, "N", "normal", points), _uvs(params, points)
     corners = corners.reshape(-1, 4)
     tolerance = np.abs(points[corners] @ np.eye(3)).max(initial=1.0) * 1e-5

@@ -217,7 +217,11 @@ def _octaves(params: Parameters) -> dict[str, Any]:
 
 
 def _ptex(form: str, params: Parameters, state: State) -> Any:
-    raise params.error(f"Ptex textures are not supported: {params.one('filename', 'string', '')!r}")
+    name = params.one("filename", "string", "")
+    raise params.error(
+        f"Ptex textures are not supported: {name!r} has an image for each face of a mesh of "
+        "quadrilaterals, and meshes are triangles here; bake it into an image by uv"
+    )
 
 
 def _mapping(params: Parameters, state: State, before: Any = IDENTITY_UV) -> dict[str, Any]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from clpt.errors import SceneError
 from clpt.formats.volumes import nvdb, vdb, vol
-from clpt.scene.media import Volume, check_density
+from clpt.scene.volumes import Volume, check_density
 from clpt.transforms import IDENTITY
 
 MOST_BYTES = 1 << 32  # of a file
@@ -41,13 +41,59 @@ def read(path: str | Path, grid: str = "") -> Volume:
     return made
 
 
-def _npy(path: Path, grid: str) -> Volume:
+def names(path: str | Path) -> tuple[str, ...]:
+    """Return the names of the grids of a .nvdb, of any other file none. Raises SceneError."""
+    path = Path(path)
+    try:
+        return nvdb.names(path) if path.suffix.lower() == ".nvdb" else ()
+    except OSError as error:
+        raise SceneError(f"cannot be read: {error.strerror or error}", file=path) from None
+
+
+def read_colours(path: str | Path) -> Volume:
+    """Read colours (nx, ny, nz, 3) float32 with their box, of a .npy or a .vol.
+
+    Raises SceneError as `read` does.
+    """
+    path = Path(path)
+    try:
+        if path.suffix.lower() == ".npy":
+            return _npy(path, axes=4)
+        values, box = vol.read_channels(path)
+    except OSError as error:
+        raise SceneError(f"cannot be read: {error.strerror or error}", file=path) from None
+    except SceneError as error:
+        raise SceneError(error.message, file=path) from None
+    return Volume(values, box)
+
+
+def distances(path: Path) -> np.ndarray:
+    """Read signed distances (nx, ny, nz) float32 of a .npy or .vol file. Raises SceneError."""
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise SceneError(f"is larger than {MOST_BYTES >> 30} GiB")
+        if path.suffix.lower() == ".vol":
+            return vol.read(path).values
+        values = np.load(path, allow_pickle=False)
+    except OSError as error:
+        raise SceneError(f"cannot be read: {error.strerror or error}", file=path) from None
+    except (ValueError, EOFError) as error:
+        raise SceneError(f"is no .npy file: {error}", file=path) from None
+    except SceneError as error:
+        raise SceneError(error.message, file=path) from None
+    if not isinstance(values, np.ndarray) or values.ndim != 3 or values.dtype.kind not in "fiu":
+        raise SceneError("must hold an array (nx, ny, nz) of numbers", file=path)
+    return np.ascontiguousarray(values, np.float32)
+
+
+def _npy(path: Path, grid: str = "", axes: int = 3) -> Volume:
     try:
         values = np.load(path, mmap_mode="r", allow_pickle=False)
     except (ValueError, EOFError) as error:
         raise SceneError(f"is no .npy file: {error}") from None
-    if not isinstance(values, np.ndarray) or values.ndim != 3 or not values.size:
-        raise SceneError(f"must hold an array (nx, ny, nz), not {getattr(values, 'shape', '')}")
+    if not isinstance(values, np.ndarray) or values.ndim != axes or not values.size:
+        wanted = "(nx, ny, nz)" if axes == 3 else "(nx, ny, nz, 3)"
+        raise SceneError(f"must hold an array {wanted}, not {getattr(values, 'shape', '')}")
     check_density(values, "")
     return Volume(np.ascontiguousarray(values, np.float32), IDENTITY)
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from clpt.errors import SceneError
 from clpt.formats.volumes import packing, sparse
-from clpt.scene.media import Volume
+from clpt.scene.volumes import Volume
 
 SEGMENTS = (b"NanoVDB0", b"NanoVDB2")
 BARE = b"NanoVDB1"  # a grid without segments

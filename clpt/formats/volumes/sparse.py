@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.errors import SceneError
-from clpt.scene.media import Volume
+from clpt.scene.volumes import Volume
 
 SIDE = 8  # of a leaf
 MOST_VALUES = 1 << 28  # of the box of a grid

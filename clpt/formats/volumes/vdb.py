@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from clpt.errors import SceneError
 from clpt.formats.volumes import packing, sparse
-from clpt.scene.media import Volume
+from clpt.scene.volumes import Volume
 
 MAGIC = b" BDV\0\0\0\0"
 OLDEST = 222  # the version since which nodes leave out what is inactive

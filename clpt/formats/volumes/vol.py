@@ -9,7 +9,7 @@ import numpy as np
 
 from clpt import transforms
 from clpt.errors import SceneError
-from clpt.scene.media import Volume
+from clpt.scene.volumes import Volume
 
 HEADER = struct.Struct("<3sB5i6f")
 FLOAT32 = 1  # the only encoding that Mitsuba 3 reads

@@ -24,6 +24,7 @@ NEEDED = {
     "bodies": "USES_BODIES",
     "lead": "USES_ABSORPTION",
     "through": "SHADOW_MEDIA",
+    "into": "BRICK_LIGHTS",
     "rival": "WEIGHS_LIGHT_PATHS",
     "pending": "MERGES",
     "expected": "USES_GUIDE",

@@ -26,12 +26,12 @@ def order(features: Features, layout: str, lanes: int, interleaved: bool = False
     if features.shows_lights:
         bounce.append(Stage(join, join, tracing))
     bounce.append(Stage("intersect", "intersect", lanes if interleaved else tracing))
+    if features.media:
+        bounce.append(Stage(flight(features), "flight", lanes))
     if deposits(features):
         bounce.append(Stage("deposit", "deposit", lanes))
     if trains(features):
         bounce.append(Stage("train", "train", lanes))
-    if features.media:
-        bounce.append(Stage("flight", "flight", lanes))
     if features.mixtures:
         bounce.append(Stage("mix", "mix_materials", lanes))
     bounce += [Stage(f"shade_{kind}", "shade", lanes) for kind in features.materials]
@@ -61,6 +61,11 @@ def trains(features: Features) -> bool:
     return features.light_paths and features.guided
 
 
+def flight(features: Features) -> str:
+    """Return the program that takes rays through media: that of light paths does without aims."""
+    return "flight_of_light" if features.light_paths and features.medium_aims else "flight"
+
+
 def trace_lanes(layout: str, lanes: int) -> int:
     """How many rays a work-item traces: those of one path, but where there is no tree."""
     return lanes if layout == "brute" else 1
@@ -87,13 +92,16 @@ def loop_text(features: Features, layout: str, lanes: int, interleaved: bool) ->
     lines += [f"inline void loop_begin{head}uint at)", "{", *_of_each(begins), "}"]
     rests = [calls[1:] for calls in bounces]
     same = _same(rests)
-    own = [_bounce_text(rest[same:], f"blocks_{which}") for which, rest in enumerate(rests)]
+    own = []
+    for which, (kind, calls) in enumerate(zip(features.passes, bounces, strict=True)):
+        words = f"blocks_{which}"
+        own.append(_bounce_text(calls[1 + same :], _walk_text(kind, calls, words), words))
     lines += [
         f"inline void loop_bounce{head}global uint *queue, uint first, uint end)",
         "{",
         "    SLABS",
         "    uint starts[BSDF_COUNT + 1], block = settings->slots + get_global_id(0) * LANES;",
-        *indented(*_bounce_text(rests[0][:same], "")),
+        *indented(*_bounce_text(rests[0][:same], [], "")),
         *_of_each(own),
         "}",
     ]
@@ -119,6 +127,11 @@ class _Call:
         """Return the call for the slots from `slot` on."""
         own = "".join(f", {passed}" for _, passed in self.args)
         return f"loop_{self.stage.program}(SLAB_PASSED, SCENE_PASSED{own}, {slot});"
+
+    def through(self, first: str, end: str) -> str:
+        """Return the statement that calls it for a range of slots."""
+        step = "LANES" if self.stage.lanes > 1 else "1"
+        return f"for (uint at = {first}; at < {end}; at += {step}) {self.at('at')}"
 
 
 def _call(features: Features, own: Features, layout: str, stage: Stage, which: int) -> _Call:
@@ -158,29 +171,57 @@ def _of_each(texts: list[list[str]]) -> list[str]:
     return indented(*rows)
 
 
-def _bounce_text(calls: list[_Call], words: str) -> list[str]:
-    """Statements that take slots through stages; words: of a slot's state, which are sorted."""
+def _bounce_text(calls: list[_Call], walk: list[str], words: str) -> list[str]:
+    """Statements that take slots through stages; walk: what is done before shading; words: of a
+    slot's state, which are sorted."""
     shading = [call for call in calls if call.stage.kernel == "shade"]
+    sort = "queue_sort(path, hit, queue, starts, first, end);"
     lines = []
     for call in calls:
-        step = "LANES" if call.stage.lanes > 1 else "1"
-        plain = f"for (uint at = first; at < end; at += {step}) {call.at('at')}"
         if call not in shading:
-            lines.append(plain)
+            lines.append(call.through("first", "end"))
             continue
         kind = shading.index(call)
         if kind == 0:
-            lines.append("queue_sort(path, hit, queue, starts, first, end);")
+            lines += [sort, *walk, *([sort] if walk else [])]
         begins, ends = f"starts[{kind}]", f"starts[{kind + 1}]"
         lines += [
             f"if (queue_is_dense({ends} - {begins}, end - first)) {{",
-            f"    {plain}",
+            f"    {call.through('first', 'end')}",
             "} else {",
             f"    for (uint entry = {begins}; entry < {ends}; entry += LANES) {{",
             f"        queue_take(path, hit, shadow, &{words}, queue, entry, {ends}, block);",
             f"        {call.at('block')}",
             f"        queue_return(path, shadow, &{words}, queue, entry, {ends}, block);",
             "    }",
+            "}",
+        ]
+    return lines
+
+
+def _walk_text(own: Features, calls: list[_Call], words: str) -> list[str]:
+    """Statements that take the camera's paths in media from collision to collision, in a block,
+    while most of its lanes have one; own: their features; calls: all of a bounce."""
+    shading = [call for call in calls if call.stage.kernel == "shade"]
+    rest = [call for call in calls[1:] if call not in shading]
+    join = [call for call in rest if calls.index(call) > calls.index(shading[0])]
+    phases = {cls.kind for cls in own.leaves if cls.is_phase and not own.light_paths}
+    lines = []
+    for kind, call in enumerate(shading):
+        if call.stage.program.removeprefix("shade_") not in phases:
+            continue
+        begins, ends = f"starts[{kind}]", f"starts[{kind + 1}]"
+        again = [*join, *(one for one in rest if one not in join)]
+        lines += [
+            f"for (uint entry = {begins}; entry < {ends}; entry += LANES) {{",
+            "    integer ended = 0;",
+            f"    queue_take(path, hit, shadow, &{words}, queue, entry, {ends}, block);",
+            f"    for (int n = 0; queue_walks(path, hit, {kind}, n, &ended, block); n++) {{",
+            f"        {call.at('block')}",
+            *(f"        {one.through('block', 'block + LANES')}" for one in again),
+            "    }",
+            "    queue_walked(path, ended, block);",
+            f"    queue_return_walk(path, hit, &{words}, queue, entry, {ends}, block);",
             "}",
         ]
     return lines

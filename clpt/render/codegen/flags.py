@@ -9,7 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from clpt.render.contract.camera_records import WEIGHTED
 from clpt.render.contract.features import Features
+from clpt.render.contract.light_records import VOLUME
 from clpt.render.contract.parameter_words import RERADIATION_STEP
 from clpt.render.contract.texture_records import IMAGES
 from clpt.scene.layers import LAYERS, MATTE_SLOTS, WORDS
@@ -31,7 +33,7 @@ def ends_light_paths(features: Features, cls: type[Scatterer]) -> bool:
 
 def gathers_photons(features: Features, cls: type[Scatterer]) -> bool:
     """Whether paths from the camera are merged with photons at a material."""
-    return not (cls.delta or cls.is_null or ends_light_paths(features, cls))
+    return not (cls.delta or cls.is_null or cls.is_phase or ends_light_paths(features, cls))
 
 
 def phase_varies(features: Features, cls: type[Scatterer]) -> bool:
@@ -47,6 +49,12 @@ def filters_at_random(features: Features, cls: type[Scatterer]) -> bool:
         return False
     sources, declared = features.sources_of(cls.kind), device_params(cls)
     return any(p.linear and "texture" in sources.get(n, ()) for n, p in declared.items())
+
+
+def _has_lobe(features: Features, cls: type[Scatterer], name: str) -> bool:
+    """Whether a material of the scene has a lobe that a parameter of 0 leaves out."""
+    declared, none = device_params(cls), frozenset({"none"})
+    return name in declared and features.sources_of(cls.kind).get(name, none) != none
 
 
 def _layer_place(name: str) -> Callable[[Features], int | bool]:
@@ -73,6 +81,7 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "USES_NORMALS": lambda f: f.normals,
     "USES_UVS": lambda f: f.uvs,
     "USES_TANGENTS": lambda f: f.tangents,
+    "VERTEX_TANGENTS": lambda f: (f.tangents and f.vertex_tangents) or False,
     "USES_ATTRIBUTES": lambda f: f.attributes,
     "USES_ANALYTIC": lambda f: bool(f.analytic),
     "USES_INSTANCES": lambda f: f.instances,
@@ -84,10 +93,18 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "USES_NULL_SURFACES": lambda f: f.null_surfaces,
     "USES_ABSORPTION": lambda f: f.absorption or f.media,
     "USES_MEDIA": lambda f: f.media,
+    "MEDIA_EMIT": lambda f: f.emissive_media,
+    "GRIDS_EMIT": lambda f: f.emissive_grids,
+    "GRIDS_GLOW": lambda f: f.hot_grids,
+    "BRICK_LIGHTS": lambda f: VOLUME in f.lights,
     "USES_GRIDS": lambda f: f.grids,
+    "GRIDS_TINTED": lambda f: f.tinted_grids,
+    "USES_BYTES": lambda f: f.byte_grids,
     "USES_BODIES": lambda f: f.bodies,
     "SHADOW_MEDIA": lambda f: f.shadow_media,
+    "LIGHT_MEDIA": lambda f: f.light_media,
     "MEDIUM_AIMS": lambda f: f.medium_aims,
+    "SEALED_MEDIA": lambda f: f.sealed_media,
     "USES_DISPERSION": lambda f: f.dispersion and f.mode == "spectral",
     "USES_RATIO": lambda f: (
         f.chromatic_media
@@ -108,6 +125,9 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "USES_GUIDE": lambda f: f.guided,
     "AIMS_LIGHT_PATHS": lambda f: f.aimed,
     "CAMERA_DISPERSES": lambda f: f.glass_lens,
+    "CAMERA_WEIGHS": lambda f: f.camera in WEIGHTED,
+    "LENS_LOSSES": lambda f: f.lens_losses,
+    "LENS_GHOSTS": lambda f: f.lens_ghosts,
     "FILTER_BOX": lambda f: f.filter == "box",
     "FILTER_TAPS": lambda f: f.filter_taps,
     "FILTER_REACH": lambda f: f.filter_reach,
@@ -150,6 +170,7 @@ MATERIAL: dict[str, Callable[[Features, type[Scatterer]], str | int]] = {
     "BSDF_GUIDED": lambda f, cls: f.guided and cls.guided,
     "BSDF_IS_PHASE": lambda f, cls: cls.is_phase,
     "BSDF_BETWEEN_BODIES": lambda f, cls: f.bodies and cls.kind in BETWEEN_BODIES,
+    "BSDF_COAT_APART": lambda f, cls: _has_lobe(f, cls, "clearcoat_apart"),
     "BSDF_IS_NULL": lambda f, cls: cls.is_null and f.null_surfaces,
     "STOCHASTIC_FILTERING": filters_at_random,
     "USES_CHOICE": lambda f, cls: cls.uses_lobe_sample or cls.fluoresces or f.many_lights,

@@ -15,6 +15,7 @@ from clpt.render.contract.light_records import (
     LINE,
     RECORDS,
     VALUES,
+    VOLUME,
     WIDTH,
 )
 
@@ -60,6 +61,7 @@ def dispatch_text(
     surfaces = [kind for kind in present if kind in shape_records.RECORDS]
     includes = ["path/surface_flags.cl", "interface/shape.cl", "interface/light.cl", "core/mis.cl"]
     includes += ["lighting/light_choice.cl"]
+    includes += ["generated/textures.cl", "generated/medium.cl"] if VOLUME in others else []
     includes += [f"generated/light/{kind}.cl" for kind in others]
     includes += [f"generated/shape/{kind}.cl" for kind in surfaces]
     includes += ["light/area.cl"] if surfaces else []
@@ -74,6 +76,7 @@ def dispatch_text(
         _sample_text(others, surfaces, textured, two_sided, tree, weighed, aimed, grouped, moving)
     )
     parts += [_pdf_text(surfaces, tree, moving), densities]
+    parts += [_brick_pdf_text(tree)] if VOLUME in present else []
     parts += _infinite_text([kind for kind in others if kind in INFINITE], tree, moving)
     return "\n".join(parts) + "\n"
 
@@ -182,7 +185,7 @@ def _sample_text(
         ]
     pmf = "pmf" if tree else "l.pmf"
     rows.append(f"s = light_chosen(s, {pmf});")
-    if weighed or grouped:
+    if weighed or grouped or VOLUME in others:
         rows.append("s.row = row;")
     if weighed:
         rows.append(f"s.chance = {pmf};")
@@ -216,6 +219,14 @@ def _pdf_text(surfaces: list[str], tree: bool, moving: bool) -> str:
         tuple(before),
         f"value * {pmf_text(tree)}",
     ).text()
+
+
+def _brick_pdf_text(tree: bool) -> str:
+    """The same for a point of a medium that emits, at a distance t from p."""
+    head = "real brick_light_pdf(Scene scene, integer row, vec3 p, vec3 hemisphere, real t)"
+    rows = ["LightRow l = light_at(scene, row);", "mask m = mask_of(1);"]
+    rows.append(f"return emissive_brick_pdf({row_text(VOLUME)}, t) * {pmf_text(tree)};")
+    return function(head, *rows)
 
 
 def pmf_text(tree: bool) -> str:

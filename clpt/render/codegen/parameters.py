@@ -30,7 +30,7 @@ def lane_type(param: Param) -> str:
     if param.role in SPECTRAL:
         return "Spectrum"
     given = {"real": "real", "orders": "real", "layers": "Layers"}
-    given["angular"] = "AngularTable"
+    given |= {"angular": "AngularTable", "measurement": "Measurement", "merl": "MerlTable"}
     return given.get(param.role, "integer")
 
 
@@ -140,6 +140,10 @@ def _member(
         return [f"{target} = {loaded if 'layers' in present else 'layers_none()'};"]
     if form == "AngularTable":
         return [f"{target} = angular_load(scene, {at}, lambdas);"]
+    if form == "Measurement":
+        return [f"{target} = measurement_load(scene, {at}, lambdas);"]
+    if form == "MerlTable":
+        return [f"{target} = merl_load_table(scene, {at}, lambdas);"]
     if present == {"none"}:
         return [f"{target} = {'spectrum_of(0.0f)' if form == 'Spectrum' else '(real)(0.0f)'};"]
     *own, source = given
@@ -188,10 +192,12 @@ def medium_text(sources: Mapping[str, frozenset[str]]) -> str:
     """Return `medium_absorption(scene, at, point, lambdas)`: five words of `materials`.
 
     sources: of "absorption"; where there is "scattering", `medium_scattering` reads what stands
-    MEDIUM_SCATTERING words behind it.
+    MEDIUM_SCATTERING words behind it, where there is "light" `medium_light` what stands
+    MEDIUM_LIGHT words before it.
     """
     coefficient = Param("coefficient", "")
     head = f"#define MEDIUM_SCATTERING {SPECTRUM_WORDS}\n" if "scattering" in sources else ""
+    head += f"#define MEDIUM_LIGHT {1 + SPECTRUM_WORDS}\n" if "light" in sources else ""
     return head + "".join(
         value_text(f"medium_{name}", coefficient, own) for name, own in sources.items()
     )
@@ -199,10 +205,11 @@ def medium_text(sources: Mapping[str, frozenset[str]]) -> str:
 
 def _medium_sources(features: Features) -> dict[str, frozenset[str]]:
     names = ("absorption", "scattering") if features.media else ("absorption",)
+    light = {"light": features.sources_of("medium")["light"]} if features.emissive_media else {}
     return {
         name: frozenset(source for _, found, source in features.sources if found == name)
         for name in names
-    }
+    } | light
 
 
 def virtual_files(features: Features) -> dict[str, str]:

@@ -70,7 +70,7 @@ def _stages(
     if bounce.trains(features):
         texts["train"] = _source("train", files, defines, lanes)
     if features.media:
-        texts["flight"] = _source("flight", files, defines, lanes)
+        texts[bounce.flight(features)] = _source("flight", files, defines, lanes)
     if features.mixtures:
         texts["mix"] = _source("mix", files, defines, lanes)
     return texts
@@ -161,7 +161,7 @@ def _shared(features: Features, layout: str) -> Files:
         **parameters.virtual_files(features),
         **choices.virtual_files(features, layout),
         "generated/camera.cl": stages.camera_text(
-            features.camera, features.glass_lens, "camera" in features.moving
+            features.camera, features.glass_lens, features.lens_losses, "camera" in features.moving
         ),
         "generated/connect.cl": stages.connect_text(features),
         "generated/photon.cl": stages.photon_text(features) if features.merged else "",

@@ -11,25 +11,42 @@ from clpt.render.codegen.dispatch import Case, Function, active, function
 from clpt.render.contract import camera_records
 from clpt.render.contract.features import Features
 from clpt.render.contract.parameter_words import MIXTURE, row_words, words
-from clpt.scene.params import device_params, interior_params
+from clpt.scene.params import MEASURED, device_params, interior_params
 from clpt.scene.scatterer import Scatterer
 
 
-def camera_text(kind: str, glass: bool, moves: bool = False) -> str:
-    """Return `camera_ray`; glass: the lens is of a glass that disperses; moves: the camera does."""
+def camera_text(kind: str, glass: bool, losses: bool = False, moves: bool = False) -> str:
+    """Return `camera_ray`, or `camera_weighted_ray`.
+
+    glass: the lens is of one that disperses; losses: its surfaces reflect; moves: the camera does.
+    """
     record = camera_records.RECORDS[kind]
     camera = f"(global const {record.name} *)(scene).camera"
+    moving = '#include "camera/moved.cl"\n' * moves
+    if kind in camera_records.WEIGHTED:
+        surface = camera_records.LENS_SURFACE
+        return (
+            f"{record.uniform_text()}{surface.row_text()}{surface.spread_text()}"
+            f"#define LENS_SURFACE_WORDS {surface.words}\n"
+            f"#define LENS_GHOST_CELLS {camera_records.GHOST_CELLS}\n"
+            + '#include "optics/film_stack.cl"\n'
+            * losses
+            + f'#include "camera/{kind}.cl"\n{moving}'
+            "#define camera_weighted_ray(scene, film, lens, lambdas, weight) "
+            f"{_moved(f'{kind}_ray(scene, {camera}, film, lens, lambdas, weight)', moves)}\n"
+        )
     ray = f"{kind}_ray({camera}, film, lens)"
     if glass:
         row = f"(integer)(({camera})->glass)"
         ray = f"{kind}_glass_ray({camera}, film, lens, spectra_row(scene, {row}, lambdas).x)"
-    moving = ""
-    if moves:
-        ray, moving = f"camera_moved(scene, {ray})", '#include "camera/moved.cl"\n'
     return (
         f'{record.uniform_text()}#include "camera/{kind}.cl"\n{moving}'
-        f"#define camera_ray(scene, film, lens, lambdas) {ray}\n"
+        f"#define camera_ray(scene, film, lens, lambdas) {_moved(ray, moves)}\n"
     )
+
+
+def _moved(ray: str, moves: bool) -> str:
+    return f"camera_moved(scene, {ray})" if moves else ray
 
 
 def connect_text(features: Features) -> str:
@@ -112,6 +129,10 @@ def null_transmittance_text(features: Features) -> str:
     return "".join([*parts, f"#define null_transmittance null_transmittance_{features.mixtures}\n"])
 
 
+# of the roles whose values are tables: what kernels read of them
+TABLES = {"angular": "angular_table", "measurement": "measurement", "merl": "merl_table"}
+
+
 def functions_text(cls: type[Scatterer], mode: str, features: Features | None = None) -> str:
     """Return a kind's struct and functions, with what its boundary needs.
 
@@ -120,10 +141,22 @@ def functions_text(cls: type[Scatterer], mode: str, features: Features | None = 
     own, layer = (features.sources_of(kind) if features else {} for kind in (cls.kind, "layer"))
     boundary = thin_films.boundary_text(cls, mode, own, layer)
     roles = {param.role for param in device_params(cls).values()}
-    if "angular" in roles:
-        boundary += '#include "optics/angular_table.cl"\n#include "optics/angular_load.cl"\n'
+    for role, table in TABLES.items():
+        if role in roles:
+            boundary += _counts_text(role, own.get("data", frozenset()))
+            boundary += f'#include "optics/{table}.cl"\n'
+            boundary += f'#include "optics/{role}_load.cl"\n' if features else ""
     struct, declared = parameters.struct_text(cls, own), _declared_text(cls)
     return f'{boundary}{struct}{declared}#include "{cls.folder}/{cls.kind}.cl"\n'
+
+
+def _counts_text(role: str, sources: frozenset[str]) -> str:
+    """Define the counts at the head of a measurement, where all of a scene have the same."""
+    if role not in MEASURED or len(sources) != 1:
+        return ""
+    _, *counts = next(iter(sources)).split()
+    chosen = " : ".join(f"(i) == {i} ? {count}" for i, count in enumerate(counts))
+    return f"#define {role.upper()}_COUNT(t, i) ((integer)({chosen} : 0))\n"
 
 
 def _declared_text(cls: type[Scatterer]) -> str:

@@ -18,6 +18,9 @@ _PINHOLE = {
     "far": _FAR,
 }
 
+WEIGHTED = ("lens",)  # cameras whose rays have weights
+GHOST_CELLS = 1024  # of equal probability, from which pairs of reflecting surfaces are drawn
+
 RECORDS: dict[str, Record] = {
     "perspective": Record("PerspectiveCamera", "A pinhole.", **_PINHOLE),
     "thin_lens": Record(
@@ -29,6 +32,25 @@ RECORDS: dict[str, Record] = {
         focal_length=("real", "at the design wavelength [m]"),
         power=("real", "index - 1 of the glass at that wavelength"),
         glass=("integer", "row in `spectra` of a glass that disperses"),
+    ),
+    "lens": Record(
+        "LensCamera",
+        "A lens of surfaces. Behind it follow tables; where: their first words, from to_world on.",
+        to_world=_TO_WORLD,
+        extent=("vec2", "width and height of the film [m]"),
+        back=("real", "from the film to the last surface [m]"),
+        exposure=("real", "by which irradiance is multiplied [1/sr]"),
+        surfaces=("integer", "where the rows of LensSurface begin, from the film on"),
+        count=("integer", "of surfaces"),
+        zones=("integer", "where the ellipses begin that rings of the film see"),
+        zones_per_metre=("real", "rings in a metre of the film's radius"),
+        last_zone=("integer", "number of the outermost ring"),
+        blades=("integer", "of the diaphragm; 0: it is round"),
+        blade_normals=("integer", "where the blades' normals begin"),
+        blade_distance=("real", "of a blade from the axis, in radii of the stop"),
+        ghosts=("real", "share of samples that are reflected twice"),
+        ghost_cells=("integer", "where the pairs of surfaces begin that they are drawn from"),
+        rear_radius=("real", "of the last surface [m]"),
     ),
     "orthographic": Record(
         "OrthographicCamera",
@@ -50,3 +72,21 @@ RECORDS: dict[str, Record] = {
         near_y=("spectrum", "and per y"),
     ),
 }
+
+LENS_SURFACE = Record(
+    "LensSurface",
+    "A surface of a lens in camera space, lengths in metres; curvatures as seen from the film.",
+    z=("real", "of the vertex, the film's being 0"),
+    curvature=("real", "above 0 where the centre is on the scene's side"),
+    conic=("real", "constant; 0: a sphere"),
+    radius=("real", "half the diameter"),
+    form=("integer", "0: a sphere or a plane, 1: a conic, 2: with aspheric terms"),
+    stop=("integer", "1: the diaphragm is here"),
+    near_index=("real", "on the film's side"),
+    far_index=("real", "on the scene's side"),
+    near_glass=("integer", "row in `spectra` of a glass that disperses, else -1"),
+    far_glass=("integer", "the same, on the scene's side"),
+    coats=("integer", "films on it"),
+    first_coat=("integer", "where these begin: index and thickness [nm], from the scene on"),
+    **{f"a{i}": ("real", f"sag [m] of (r / radius)^{2 * i + 4}") for i in range(8)},
+)

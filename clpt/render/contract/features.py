@@ -70,6 +70,7 @@ class Features:
     normals: bool = False
     uvs: bool = False
     tangents: bool = False
+    vertex_tangents: int = 0  # where in `distributions` those lie that meshes say; 0: none does
     attributes: bool = False  # some texture reads what meshes say per vertex or face
     mixtures: int = 0  # how deep masks and blends nest
     normal_mapped: bool = False  # some material has a normal or a bump map
@@ -91,13 +92,21 @@ class Features:
     absorption: bool = False  # inside of a dielectric
     media: bool = False  # inside or outside of shapes, or around the camera
     chromatic_media: bool = False  # of which some extinction depends on the wavelength
+    emissive_media: bool = False  # of which some give out light
+    emissive_grids: bool = False  # of these some have a density on a grid
+    hot_grids: bool = False  # of these some have a temperature
     medium_aims: int = 0  # places of lamps near which flights through media end
+    sealed_media: bool = False  # which no ray to a light can leave
     grids: bool = False  # of which some have a density on a grid
+    tinted_grids: bool = False  # of these some have an albedo on a grid
+    byte_grids: bool = False  # of these some have 8 bits for each number
     bodies: bool = False  # that may overlap, of different priorities
     moving: tuple[str, ...] = ()  # while the shutter is open: "camera", "instances", ...
     motion_scales: bool = False  # some of it scales
     motion_row: int = 0  # where in `distributions` its table begins
     glass_lens: bool = False  # of a glass that disperses
+    lens_losses: bool = False  # surfaces of the camera's lens reflect a part of the light
+    lens_ghosts: bool = False  # and samples follow it
     bands: bool = False  # a spectral film
     alpha: bool = False  # a film that tells what is covered
     layers: tuple[str, ...] = ()  # beside the picture
@@ -119,6 +128,11 @@ class Features:
     def shadow_media(self) -> bool:
         """Whether rays to lights may go through several media."""
         return self.media and (self.null_surfaces or self.grids)
+
+    @property
+    def light_media(self) -> bool:
+        """Whether media are known around lights, as paths start there."""
+        return self.media and (self.light_paths or self.weighed)
 
     @property
     def passes(self) -> tuple[Features, ...]:

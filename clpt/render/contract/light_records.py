@@ -141,9 +141,22 @@ COMPUTED: dict[str, Record] = {
     **SKY_RECORDS,
 }
 DECLARED = {cls.kind: cls for cls in LIGHTS if cls.reach != "surface" and cls.kind not in COMPUTED}
+VOLUME = "emissive_brick"  # what of a grid emits: eight cells along each axis
 RECORDS: dict[str, Record] = {
     **{kind: declared_record(cls) for kind, cls in DECLARED.items()},
     **COMPUTED,
+    VOLUME: Record(
+        "EmissiveBrick",
+        "A brick of a grid that emits.",
+        medium=("integer", "the medium, see kernels/optics/medium.cl"),
+        number=("integer", "of the brick, see kernels/optics/medium_grid.cl"),
+        corner=("vec3", "[m]"),
+        x=("vec3", "edges from there [m]"),
+        y=("vec3", ""),
+        z=("vec3", ""),
+        chord=("real", "mean length of the lines through it [m]"),
+        inverse=("real", "of its volume [1/m^3]"),
+    ),
 }
 # A ray that leaves the scene meets INFINITE lights; PLACED ones have a position.
 INFINITE = (
@@ -160,7 +173,8 @@ BASES = {
     "image_spot": "spot",
 }  # whose functions a kind uses
 
-KINDS = (*RECORDS, *shape_records.RECORDS)  # LightRow.kind is a position in this tuple
+# LightRow.kind is a position in this tuple
+KINDS = (*(kind for kind in RECORDS if kind != VOLUME), *shape_records.RECORDS, VOLUME)
 NODE = Record(
     "LightNode",
     "A node of the tree over lights; children of a node are a group, neighbours in the table.",

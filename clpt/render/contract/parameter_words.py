@@ -22,6 +22,8 @@ SPECTRUM_WORDS = 5  # x y z w and where the value comes from: 0 here, > 0 textur
 REAL_WORDS = 2  # the value, and 0 or 1 + the texture
 ORDERS_WORDS = 2 * ORDERS + 1
 ANGULAR_WORDS = 5  # of the table: first value, cosines, rows; first wavelength, rows a nm
+MEASUREMENT_WORDS = 1 + SPECTRUM_WORDS  # its first number; which colour a wavelength has
+MERL_WORDS = 4  # its first number; rows of what red, green and blue are
 LAYERS_WORDS = 2  # where the layers lie, see clpt.render.lowering.materials.thin_films; how many
 
 
@@ -31,6 +33,7 @@ def words(param: Param) -> int:
         return SPECTRUM_WORDS
     given = {"real": REAL_WORDS, "orders": ORDERS_WORDS, "layers": LAYERS_WORDS}
     given["angular"] = ANGULAR_WORDS
+    given |= {"measurement": MEASUREMENT_WORDS, "merl": MERL_WORDS}
     return given.get(param.role, 1)
 
 

@@ -165,6 +165,8 @@ class Moving:
             if device_matrix:
                 raise CannotMove(f"{name} is no triangles, and its transform is on the device")
             return self._plan_analytic(ranges, new)
+        if getattr(ranges.shape, "tangents", None) is not None:
+            raise CannotMove(f"{name} has tangents of its own, which lie in the world")
         count = ranges.vertices[1]
         for field_name in ("vertices", "normals"):
             values = getattr(new, field_name, None)

@@ -7,12 +7,13 @@ from typing import Any
 
 from clpt.render.editing.rebuild import ranges
 from clpt.render.editing.scene_edit import Replacements
-from clpt.render.lowering.camera.cameras import dispersive_glass, lower_camera
+from clpt.render.lowering.camera.cameras import dispersive_glasses, lower_camera
 from clpt.render.lowering.geometry.instancing import distinct
 from clpt.render.lowering.lights.aims import is_sharp
 from clpt.render.lowering.materials.material_words import CLEAR
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene import Scene
+from clpt.scene.cameras import Camera, Lens
 from clpt.scene.materials import COMPOSITES, Material
 from clpt.scene.params import params
 
@@ -34,12 +35,14 @@ def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> str | None:
         return "bodies that overlap know each other's indices"
     camera = None
     if scene.camera is not former.camera:
-        if dispersive_glass(scene.camera) != dispersive_glass(former.camera):
+        if dispersive_glasses(scene.camera) != dispersive_glasses(former.camera):
             return "the camera's lens is of another glass"
-        film, row = scene.film, lowered.glass_row
-        kind, camera = lower_camera(scene.camera, film.width, film.height, row)
-        if kind != lowered.features.camera:
+        film, rows_ = scene.film, lowered.glass_rows
+        kind, camera = lower_camera(scene.camera, film.width, film.height, rows_)
+        if kind != lowered.features.camera or len(camera) != len(lowered.tables["camera"]):
             return "the camera is of another kind"
+        if _reflects(scene.camera) != _reflects(former.camera):
+            return "the camera's lens reflects, or no more"
     rows: list[tuple[int, Any]] = []
     for old, new in pairs:
         changed = lowered.encoder.replaced(old, new, "materials")
@@ -48,6 +51,11 @@ def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> str | None:
         rows += changed
     _write(on_device, camera, rows)
     return None
+
+
+def _reflects(camera: Camera) -> tuple[bool, bool]:
+    """What of reflections in its lens a camera's text has."""
+    return (camera.reflects, camera.ghosts > 0.0) if isinstance(camera, Lens) else (False, False)
 
 
 def _write(on_device: DeviceScene, camera: Any, rows: list[tuple[int, Any]]) -> None:

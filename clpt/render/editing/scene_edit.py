@@ -79,6 +79,8 @@ def edit_scene(
         edit.change(shape, field, new)
         if getattr(shape, "normals", None) is not None:  # which belong to the former vertices
             edit.change(shape, "normals", SMOOTH)
+        if getattr(shape, "tangents", None) is not None:
+            edit.change(shape, "tangents", None)
     return edit.edited_scene(), edit.replacements()
 
 

@@ -6,7 +6,7 @@ from typing import Any, NoReturn
 
 from clpt.errors import SceneError
 from clpt.render.lowering.bodies import check_bodies
-from clpt.render.lowering.camera.cameras import CONNECTED, dispersive_glass
+from clpt.render.lowering.camera.cameras import CONNECTED, dispersive_glasses
 from clpt.render.lowering.geometry import shapes
 from clpt.render.lowering.geometry.instancing import distinct
 from clpt.render.lowering.motion import Motions
@@ -98,17 +98,12 @@ def _check_light_paths(scene: Scene, shapes_: list[Shape]) -> None:
                 )
         return
     spectral = scene.film.mode == "spectral"
-    for shape in shapes_:
-        if shape.interior is not None or shape.exterior is not None or shape.priority:
-            _refuse("a scene without media", shapes.where(shape))
-    if scene.camera.medium is not None:
-        _refuse("a scene without media", "camera.medium")
     if scene.camera.kind not in CONNECTED:
         names = " and ".join(CONNECTED)
         _refuse(f"the cameras {names}, not {scene.camera.kind}", "camera")
     if scene.film.alpha:
         _refuse("a film without alpha", "film.alpha")
-    if spectral and dispersive_glass(scene.camera) is not None:
+    if spectral and dispersive_glasses(scene.camera):
         _refuse("a lens whose glass does not disperse", "camera.glass")
     for i, light in enumerate(scene.lights):
         if isinstance(light, Point) and not light.falloff:

@@ -15,6 +15,7 @@ COLUMNS: dict[str, tuple[int, type]] = {
     "vertices": (3, np.float32),
     "normals": (3, np.float32),
     "uvs": (2, np.float32),
+    "tangents": (4, np.float32),
     "faces": (3, np.uint32),
     "centers": (3, np.float32),
     "radii": (0, np.float32),

@@ -9,6 +9,7 @@ import numpy as np
 import pyopencl.array as cl_array
 
 from clpt.render.lowering.tables import TableStore
+from clpt.scene.media import Grid
 
 POINT_WORDS = 365  # of a brick, see kernels/motion/brick_density.cl
 
@@ -25,9 +26,13 @@ class DeviceGrid:
     first: int
 
 
-def stays_there(density: Any) -> bool:
-    """Return whether kernels read a density where it is: float32 on a device, z fastest."""
-    return (
+def stays_there(medium: Grid) -> bool:
+    """Return whether kernels read a density where it is: float32 on a device, z fastest, in 16 bits
+    a point, without colours or light."""
+    density: Any = medium.density
+    more = (medium.albedo_grid, medium.emission_grid, medium.temperature)
+    plain = medium.bits == 16 and medium.light is None and all(one is None for one in more)
+    return plain and (
         isinstance(density, cl_array.Array)
         and density.dtype == np.float32
         and bool(density.flags.c_contiguous)

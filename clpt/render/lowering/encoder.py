@@ -158,6 +158,10 @@ class Encoder:
         if role == "orders":
             beyond = (ORDERS_WORDS - len(value)) // 2
             return as_words(np.pad(value, beyond)), "constant"
+        if role == "measurement":
+            return self.spectra.measurement_words(value)
+        if role == "merl":
+            return self.spectra.merl_words(value)
         if role == "reradiation":
             return self.spectra.reradiation_words(value)
         return self.spectra.words(value, role)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from clpt.render.contract import shape_records
 from clpt.render.contract.features import Features, disperses
-from clpt.render.lowering.camera.cameras import dispersive_glass
+from clpt.render.lowering.camera.cameras import dispersive_glasses
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.geometry.geometry import Geometry
 from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.lights.lights import LightRows
 from clpt.render.lowering.materials.material_words import MaterialWords
+from clpt.scene.cameras import Lens
 from clpt.scene.media import Grid
 
 FEW_LIGHTS = 256  # up to which one random number chooses a light and a point on it
@@ -26,20 +27,22 @@ def features_of(
     profile: int,
     aimed: bool,
     medium_aims: int,
+    sealed: bool,
     motion_row: int,
 ) -> Features:
     """Return the features of a scene, from what each step of its lowering has met.
 
     profile: where in `distributions` the values of the pixel filter begin;
     aimed: whether light paths aim;
-    medium_aims: places of lamps that flights through media aim at;
+    medium_aims: places of lamps that flights through media aim at; sealed: whether there are media
+    that rays to lights cannot leave;
     motion_row: where in `distributions` the table of what moves begins.
     """
     scene, textures = index.scene, encoder.textures
     sources = encoder.sources
     tangents = materials.tangents or index.normal_mapped
     uvs = materials.uvs or geometry.uvs or tangents or "uv" in index.layers
-    glass_lens = index.spectral and bool(dispersive_glass(scene.camera))
+    glass_lens = index.spectral and bool(dispersive_glasses(scene.camera))
     return Features(
         mode=index.mode,
         camera=scene.camera.kind,
@@ -82,12 +85,20 @@ def features_of(
         bodies=index.nested,
         chromatic_media=any(medium.is_chromatic for medium in index.media),
         medium_aims=medium_aims,
+        sealed_media=sealed and not (index.weighed or index.guided),
+        emissive_media=bool(index.emitting),
+        emissive_grids=index.glowing,
+        hot_grids=any(getattr(one, "temperature", None) is not None for one in index.emitting),
         grids=any(isinstance(medium, Grid) for medium in index.media),
         moving=moving_parts(index, geometry),
         motion_scales=index.motions.scales,
         motion_row=motion_row,
+        tinted_grids=index.tinted,
+        byte_grids=any(isinstance(one, Grid) and one.bits == 8 for one in index.media),
         dispersion=glass_lens or disperses(index.leaves, sources),
         glass_lens=glass_lens,
+        lens_losses=isinstance(scene.camera, Lens) and scene.camera.reflects,
+        lens_ghosts=isinstance(scene.camera, Lens) and scene.camera.ghosts > 0.0,
         bands=bool(scene.film.bands),
         alpha=index.alpha,
         layers=index.layers,

@@ -14,11 +14,13 @@ from clpt.render.lowering.geometry.instancing import Placed, Prototype
 from clpt.render.lowering.motion import Motions
 from clpt.scene import Scene
 from clpt.scene import materials as mt
-from clpt.scene.integrators import ParticleTracer, Vcm
+from clpt.scene.integrators import Auto, ParticleTracer, Vcm
 from clpt.scene.layers import LAYERS
-from clpt.scene.media import PHASE_LEAVES, Medium
+from clpt.scene.media import PHASE_LEAVES, Grid, Medium
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.shapes import Shape
+
+UNKNOWN = "its medium was not looked for"
 
 
 @dataclass(frozen=True)
@@ -28,7 +30,8 @@ class SceneIndex:
     shapes: every shape once, those of groups as the group has them; placed: shapes that are lowered
     as they are; prototypes: shapes that instances share; leaves: classes of leaf materials, in the
     order that material words count; normal_mapped: whether a material has a normal or a bump map;
-    warnings: of instances that became triangles; motions: what moves.
+    warnings: of instances that became triangles; motions: what moves; lit_media: why no paths can
+    start at some light in a medium, "" if they can.
     """
 
     scene: Scene
@@ -39,6 +42,7 @@ class SceneIndex:
     normal_mapped: bool
     warnings: tuple[str, ...]
     motions: Motions
+    lit_media: str = UNKNOWN
 
     @classmethod
     def of(cls, scene: Scene) -> SceneIndex:
@@ -65,13 +69,28 @@ class SceneIndex:
     def shining(self) -> tuple[str, ...]:
         """The kinds of leaves on shapes that are lights."""
         lights = (shape for shape in self.shapes if shape.emission is not None)
-        found = {cls for shape in lights for cls in _leaves_of(shape.material)}
+        found = {cls for shape in lights for cls in leaves_of(shape.material)}
         return tuple(cls.kind for cls in self.leaves if cls in found)
 
     @property
     def media(self) -> tuple[Medium, ...]:
         """The media of a scene."""
         return tuple(_media(self.scene, self.shapes))
+
+    @property
+    def emitting(self) -> tuple[Medium, ...]:
+        """Those of them that give out light."""
+        return tuple(medium for medium in self.media if medium.light is not None)
+
+    @property
+    def glowing(self) -> bool:
+        """Whether some of these have a density on a grid."""
+        return any(isinstance(medium, Grid) for medium in self.emitting)
+
+    @property
+    def tinted(self) -> bool:
+        """Whether some medium has an albedo on a grid."""
+        return any(getattr(medium, "albedo_grid", None) is not None for medium in self.media)
 
     @property
     def nested(self) -> bool:
@@ -95,8 +114,19 @@ class SceneIndex:
         Where the scene says "auto" nothing may ask before `hard_light.decided` has chosen.
         """
         wanted: float = getattr(self.scene.integrator, "light_paths", 0)
-        alone = self.has_media or bool(self.motions)
-        return wanted if (self.joined or self.merged) and not alone else 0
+        return wanted if (self.joined or self.merged) and self.lights_reach else 0
+
+    @property
+    def lights_reach(self) -> bool:
+        """Whether paths can start at lights: none moves, and they know their medium."""
+        return not self.motions and (not self.has_media or not self.lit_media)
+
+    @property
+    def may_have_light_paths(self) -> bool:
+        """Whether paths start at lights, if they can."""
+        given = self.scene.integrator
+        wanted = bool(getattr(given, "light_paths", 0))
+        return not self.motions and (isinstance(given, Auto | ParticleTracer) or wanted)
 
     @property
     def joined(self) -> bool:
@@ -110,7 +140,7 @@ class SceneIndex:
     def merged(self) -> bool:
         """Whether light paths leave photons, which paths from the camera gather."""
         integrator = self.scene.integrator
-        if not isinstance(integrator, Vcm) or self.shifts or self.has_media or self.motions:
+        if not isinstance(integrator, Vcm) or self.shifts or not self.lights_reach:
             return False
         return integrator.merging and integrator.max_depth not in (1, 2)
 
@@ -187,7 +217,7 @@ def _leaf_kinds(shapes_: tuple[Shape, ...]) -> tuple[type[mt.Material], ...]:
         where = shapes.where(shape)
         if not isinstance(shape.material, mt.Material):
             raise SceneError(f"{shape.material!r} is not a material", where=where)
-        for leaf in _leaves_of(shape.material):
+        for leaf in leaves_of(shape.material):
             found.setdefault(leaf, where)
     if any(shape.priority for shape in shapes_):
         found.setdefault(mt.Null, "")  # a surface within a body of higher priority
@@ -207,8 +237,8 @@ def _phase_kinds(scene: Scene, shapes_: tuple[Shape, ...]) -> tuple[type[Scatter
     return tuple(cls for cls in PHASE_LEAVES if cls in found)
 
 
-def _leaves_of(material: mt.Material) -> Iterator[type[mt.Material]]:
-    """The kinds of leaves that paths may meet where a shape has a material."""
+def leaves_of(material: mt.Material) -> Iterator[type[mt.Material]]:
+    """Return the kinds of leaves that paths may meet where a shape has a material."""
     for part in mt.parts(material):
         if isinstance(part, mt.Mask) or part.no_back:
             yield mt.Null

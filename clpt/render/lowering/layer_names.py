@@ -66,6 +66,7 @@ def _groups(index: SceneIndex, geometry: Geometry, lights: LightRows) -> list[st
     """The group of each row of `lights`."""
     lamps: Any = index.scene.lights
     groups = [lamps[i].group or REST for i in row_order(lamps)]
+    groups += [REST] * (next(iter(lights.first), len(lights.rows)) - len(groups))  # of media
     ends = (*lights.first, len(lights.rows))[1:]
     for emitter, first, end in zip(geometry.emitters, lights.first, ends, strict=True):
         emission: Any = emitter.shape.emission

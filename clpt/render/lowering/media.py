@@ -3,21 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.render.contract.parameter_words import SPECTRUM_WORDS
 from clpt.render.lowering import grids
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.index import SceneIndex
+from clpt.render.lowering.lights.brick_lights import BrickLights
 from clpt.render.lowering.lights.lights import LightRows
 from clpt.render.lowering.materials.material_words import MaterialWords
+from clpt.render.lowering.tables import Words, as_words
 from clpt.scene.media import Grid, Medium
 from clpt.scene.shapes import Shape
+from clpt.spectra import Constant, Spectrum
 
 MOST_AIMS = 8  # lamps near which flights end, see kernels/optics/equiangular.cl
 FLIES = 0x40000000  # in a medium's word: the stage `flight` takes rays through it
+BYTES = 0x10000000  # which has 8 bits for each number
 GRID = 0x20000000  # a density on a grid multiplies its coefficients
+SEALED = 0x08000000  # no shadow ray leaves it, see sealed.py
 
 
 def medium_aims(lights: LightRows) -> NDArray[np.float32]:
@@ -46,9 +53,18 @@ def medium_aims(lights: LightRows) -> NDArray[np.float32]:
 class MediumWords:
     """Makes the words of media, each once."""
 
-    def __init__(self, index: SceneIndex, encoder: Encoder, materials: MaterialWords):
+    def __init__(
+        self,
+        index: SceneIndex,
+        encoder: Encoder,
+        materials: MaterialWords,
+        sealed: frozenset[Medium] = frozenset(),
+    ):
         self._index, self._encoder, self._materials = index, encoder, materials
+        self._sealed = sealed
         self._words: dict[Medium, int] = {}
+        self.lights: list[BrickLights] = []  # of media whose words are made
+        self._row = len(index.scene.lights)  # in `lights`, of the next brick
         self._has_media = bool(index.media)  # not of an integrator that sees none
 
     def word(self, medium: Medium | None) -> int:
@@ -70,11 +86,58 @@ class MediumWords:
         phase = self._materials.phase(medium.phase) if medium.scatters else 0
         absorbs, scatters = medium.coefficients(self._index.spectral)
         rows = [np.array([phase], np.uint32)]
+        if self._index.emitting:
+            light = medium.light or Constant(0.0)
+            rows.insert(0, self._encoder.named_words("medium", "light", light, "emission")[0])
         for name, value in (("absorption", absorbs), ("scattering", scatters)):
             rows.append(self._encoder.named_words("medium", name, value, "coefficient")[0])
-        word = FLIES
+        word = FLIES | (SEALED if medium in self._sealed else 0)
         if isinstance(medium, Grid):
             rows.append(grids.row(medium, self._encoder))
-            word |= GRID
-        first = self._encoder.store.append("materials", np.concatenate(rows))
-        return word | (2 + first)
+            word |= GRID | (BYTES if medium.bits == 8 else 0)
+        before = 2 + (SPECTRUM_WORDS if self._index.emitting else 0)
+        word |= before + self._encoder.store.size("materials")
+        if isinstance(medium, Grid) and self._index.glowing:
+            rows.append(self._glow(medium, word, absorbs))
+        if isinstance(medium, Grid) and self._index.tinted:
+            rows.append(self._tint(medium))
+        self._encoder.store.append("materials", np.concatenate(rows))
+        return word
+
+    def _tint(self, medium: Grid) -> Words:
+        """What stands behind that: where the albedo of its bricks begins, 0 for nowhere."""
+        if medium.albedo_grid is None:
+            return np.zeros(1, np.uint32)
+        given = (medium.density, medium.albedo_grid, self._index.spectral)
+        first = self._encoder.store.append("images", self._encoder.cache(grids.colours, *given))
+        return np.array([first], np.uint32)
+
+    def _glow(self, medium: Grid, word: int, absorbs: Spectrum) -> Words:
+        """What stands behind the row of a grid: what its bricks emit, and which lights they are."""
+        words = np.zeros(grids.GLOW_WORDS, np.uint32)
+        light: Any = medium.light
+        store = self._encoder.store
+        if light is None:
+            return words
+        rgb = np.asarray(absorbs.to_rgb("unbounded"), float)
+        source, table = medium.emission_grid, None
+        if medium.temperature is not None:
+            source = medium.temperature
+            table = grids.black_bodies(medium, light.kelvin)
+            words[1] = 2 if medium.normalised else 1
+            words[4] = store.append_floats("distributions", table[:, 1:])
+            words[3], words[5] = as_words([medium.brightness, (len(table) - 1) / light.kelvin])
+            table = np.stack([table[:, 0], table[:, 1:].mean(axis=1)], axis=1)
+        else:
+            rgb = rgb * np.asarray(light.to_rgb("emission"), float)
+        if source is not None:
+            words[2] = store.append("images", self._encoder.cache(grids.bricks, source))
+        glow = grids.glow(medium, max(float(rgb.mean()), 1e-30), table)
+        bright = glow.brightest()
+        rows = np.zeros(np.prod(grids.brick_counts(medium.density.shape)), np.int32)
+        rows[glow.numbers] = -1
+        rows[bright.numbers] = 1 + self._row + np.arange(len(bright.numbers))
+        words[0] = store.append("images", rows.view(np.uint32))
+        self._row += len(bright.numbers)
+        self.lights.append(BrickLights(word, bright))
+        return words

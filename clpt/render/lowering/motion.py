@@ -190,7 +190,8 @@ def shutter_words(shutter: Shutter) -> NDArray[np.float32]:
 def lower_motion(motions: Motions, scene: Scene, rows: list[int], store: TableStore) -> int:
     """Append the table of what moves to `distributions`; return where it begins.
 
-    rows: the index of each light that is no shape, in the order of their rows.
+    rows: the index of each light that is no shape, in the order of their rows; -1: one that does
+    not move.
     """
     head = 4
     first = store.size("distributions")

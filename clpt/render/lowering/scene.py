@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
+from clpt.errors import SceneError
 from clpt.render.contract import shape_records
 from clpt.render.contract.features import Features
 from clpt.render.contract.layer_names import LayerNames
@@ -37,16 +38,19 @@ from clpt.render.lowering.geometry.geometry import (
     shape_words,
 )
 from clpt.render.lowering.geometry.instancing import Instances
+from clpt.render.lowering.geometry.refining import is_refined
 from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.layer_names import lower_names
 from clpt.render.lowering.lights.aims import aims
 from clpt.render.lowering.lights.hard_light import decided
 from clpt.render.lowering.lights.light_bounds import Bounds
+from clpt.render.lowering.lights.light_media import NOWHERE, LightMedia, light_media
 from clpt.render.lowering.lights.lights import Around, Emitter, LightRows, light_rows, row_order
 from clpt.render.lowering.lowering_cache import LoweringCache
 from clpt.render.lowering.materials.material_words import MaterialWords
 from clpt.render.lowering.media import MediumWords, medium_aims
 from clpt.render.lowering.motion import at_rest, corners, lower_motion, swept
+from clpt.render.lowering.sealed import sealed_media
 from clpt.render.lowering.settings import DEEPEST, settings_of
 from clpt.render.lowering.textures.attributes import Owner, lower_attributes
 from clpt.scene import Scene
@@ -59,6 +63,9 @@ from clpt.scene.shapes import Mesh
 TREE_FROM = 16  # lights from which a tree chooses among them, see bench/lights.py
 
 
+TANGENT_WORDS = 4
+
+
 @dataclass(frozen=True)
 class Lowered:
     """A scene ready for the device: data that nobody writes to, which several devices may share.
@@ -67,7 +74,7 @@ class Lowered:
     instances: what trees are built of, see `Geometry`. tables: every other read-only array by name;
     where an instance's tree begins is filled in when trees are built. zero_copy: tables that are
     the caller's buffers. owners: of each row of `shapes`. layer_names: what layers tell of.
-    glass_row: of the camera, see `lower_camera`. integrator: of the scene, or what was chosen;
+    glass_rows: of the camera, see `lower_camera`. integrator: of the scene, or what was chosen;
     reason: why, "" where there was no choice. encoder: what made the tables, for values that are
     edited. cache: what the next lowering need not make again. around: media at the camera, or the
     matter of bodies. device_grids: densities whose bricks kernels put into `images`.
@@ -84,7 +91,7 @@ class Lowered:
     zero_copy: dict[str, Any]
     owners: tuple[Owner, ...]
     layer_names: LayerNames
-    glass_row: int
+    glass_rows: tuple[int, ...]
     warnings: tuple[str, ...]
     integrator: Integrator
     reason: str
@@ -130,33 +137,40 @@ def lower(
     filters.lower_filter(film.filter, encoder.store, index.splatting)
     materials = _begin_materials(index, encoder)
     geometry = lower_geometry(index, encoder, materials)
-    media = MediumWords(index, encoder, materials)
+    sealed = sealed_media(index, cache) if index.media else frozenset()
+    media = MediumWords(index, encoder, materials, sealed)
     sphere = geometry.bounding_sphere()
-    lights = _lower_lights(index, encoder, geometry, sphere[1])
+    lights = _lower_lights(index, encoder, geometry, sphere[1], media)
     homogeneous = (one for one in index.media if not isinstance(one, Grid))
     near = medium_aims(lights) if any(one.scatters for one in homogeneous) else ()
     encoder.store.append("media", np.array(near, np.float32).view(np.uint32))
     bounding = [shape for _, shape, _, _ in geometry.owners]
+    bodies = BodyWords(index.shapes) if index.nested else None
+    if bodies is not None:
+        sides = bodies.rows(bounding, encoder, materials, media)
+    else:
+        sides = media.of_shapes(bounding)
+    before = former.integrator if former else None
+    index, lit = _begin_at_lights(index, geometry, lights, media, bodies, sphere, cache)
+    index, why = decided(index, geometry, encoder, lights, sphere, before, lit.scatter)
+    if index.has_media and (index.weighed or index.light_paths):
+        encoder.store.append("media", lit.words)
+    encoder.store.append("media", sides)
     around: tuple[Any, ...] = ()
-    if index.nested:
-        bodies = BodyWords(index.shapes)
-        encoder.store.append("media", bodies.rows(bounding, encoder, materials, media))
+    if bodies is not None:
         around = bodies_around(scene, matter_of, cache)
         camera = bodies.around(around, media)
         noted = contested(scene, matter_of, cache)
     else:
-        encoder.store.append("media", media.of_shapes(bounding))
         around = media_around(scene, cache) if index.media else ()
         camera = 0, media.word(next(iter(around), None))
         noted = warnings_of(around)
-    before = former.integrator if former else None
-    index, why = decided(index, geometry, encoder, lights, sphere, before)
     density_row, tabulated, profile = _lower_film(index, encoder, wavelengths)
     targets = aims(index, geometry, sphere[1])
     first_aim = encoder.store.append_floats("distributions", targets)
     lower_attributes(geometry.owners, encoder.textures, cache, geometry.single_count)
     encoder.store.append("shapes", shape_words(geometry.rows))
-    glass_row = _lower_camera(index, encoder)
+    glass_rows = _lower_camera(index, encoder)
     ambient_row = _lower_ambient(index, encoder)
     warnings = (
         *_warnings(index), *noted,
@@ -167,13 +181,17 @@ def lower(
     motion_row = 0
     if index.motions:
         rows = row_order(scene.lights)
+        rows += [-1] * ((*lights.first, len(lights.rows))[0] - len(rows))  # bricks of media
         motion_row = lower_motion(index.motions, scene, rows, encoder.store)
     features = features_of(
         index, encoder, materials, geometry, lights, tabulated, profile, aimed, len(near),
-        motion_row,
+        bool(sealed), motion_row,
     )  # fmt: skip
     names, for_layers = lower_names(index, geometry, lights, encoder.store)
     features = replace(features, **for_layers)
+    if features.tangents and geometry.tangents:
+        row = encoder.store.append_floats("distributions", _vertex_tangents(geometry))
+        features = replace(features, vertex_tangents=row + TANGENT_WORDS)
     settings = settings_of(
         index, geometry, lights, wavelengths, density_row, ambient_row, sphere,
         features.dispersion, (first_aim, len(targets)), camera,
@@ -193,7 +211,7 @@ def lower(
         zero_copy=_zero_copy_tables(index, geometry),
         owners=geometry.owners,
         layer_names=names,
-        glass_row=glass_row,
+        glass_rows=glass_rows,
         warnings=warnings,
         integrator=index.scene.integrator,
         reason=why,
@@ -202,6 +220,33 @@ def lower(
         cache=cache,
         device_grids=tuple(encoder.store.device_grids),
     )
+
+
+def _begin_at_lights(
+    index: SceneIndex,
+    geometry: Geometry,
+    lights: LightRows,
+    media: MediumWords,
+    bodies: BodyWords | None,
+    sphere: tuple[NDArray[np.float64], float],
+    cache: LoweringCache,
+) -> tuple[SceneIndex, LightMedia]:
+    """Return the index with whether paths can start at lights in media, and the lights' media."""
+    if not index.has_media or not index.may_have_light_paths:
+        return index, NOWHERE
+    found = light_media(index, geometry.emitters, lights, media, bodies, sphere, cache)
+    if found.refusal and index.light_paths:
+        raise SceneError(f"no light paths: {found.refusal}", where="integrator")
+    return replace(index, lit_media=found.refusal), found
+
+
+def _vertex_tangents(geometry: Geometry) -> NDArray[np.float32]:
+    """Four words for each vertex: those that shapes say, else zero. A row of zeros is before them,
+    so that they begin behind word 0."""
+    words = np.zeros((1 + len(geometry.vertices), TANGENT_WORDS), np.float32)
+    for first, own in geometry.tangents:
+        words[1 + first : 1 + first + len(own)] = own
+    return words
 
 
 def _lower_film(index: SceneIndex, encoder: Encoder, wavelengths: Density) -> tuple[int, bool, int]:
@@ -230,13 +275,25 @@ def _begin_materials(index: SceneIndex, encoder: Encoder) -> MaterialWords:
 
 
 def _lower_lights(
-    index: SceneIndex, encoder: Encoder, geometry: Geometry, scene_radius: float
+    index: SceneIndex,
+    encoder: Encoder,
+    geometry: Geometry,
+    scene_radius: float,
+    media: MediumWords,
 ) -> LightRows:
     """Append the rows of `lights`, and note in the rows of shapes which lights they are."""
     tree_from = None if index.light_paths else TREE_FROM
+    for medium in index.emitting:
+        media.word(medium)
     around = _light_bounds(index, geometry) if index.motions else None
     lights = light_rows(
-        index.scene.lights, geometry.emitters, encoder, scene_radius, tree_from, around
+        index.scene.lights,
+        geometry.emitters,
+        encoder,
+        scene_radius,
+        tree_from,
+        media.lights,
+        around,
     )
     encoder.store.append("lights", lights.rows.view(np.uint32))
     if lights.tree is not None:
@@ -266,16 +323,16 @@ def _light_bounds(index: SceneIndex, geometry: Geometry) -> Around:
     return around
 
 
-def _lower_camera(index: SceneIndex, encoder: Encoder) -> int:
-    """Append the camera; return the row in `spectra` of its glass, 0 if none disperses."""
+def _lower_camera(index: SceneIndex, encoder: Encoder) -> tuple[int, ...]:
+    """Append the camera; return the rows in `spectra` of its glasses that disperse."""
     camera, film = index.scene.camera, index.scene.film
-    glass = cameras.dispersive_glass(camera)
-    if glass:
+    glasses = cameras.dispersive_glasses(camera)
+    for glass in glasses:
         encoder.spectra.check_index(glass, f"{camera.kind}.glass")
-    glass_row = encoder.spectra.row(glass) if glass and index.spectral else 0
-    _, words = cameras.lower_camera(camera, film.width, film.height, glass_row)
+    rows = tuple(encoder.spectra.row(glass) for glass in glasses) if index.spectral else ()
+    _, words = cameras.lower_camera(camera, film.width, film.height, rows)
     encoder.store.append_floats("camera", words)
-    return glass_row
+    return rows
 
 
 def _lower_ambient(index: SceneIndex, encoder: Encoder) -> int:
@@ -290,12 +347,14 @@ def _warnings(index: SceneIndex) -> list[str]:
     """What of the scene is not rendered as it says."""
     scene, film = index.scene, index.scene.film
     warnings = list(index.warnings)
-    if index.mode == "rgb" and cameras.dispersive_glass(scene.camera):
-        warnings.append("thin_lens.glass: in RGB mode all wavelengths have one focus")
+    if index.mode == "rgb" and cameras.dispersive_glasses(scene.camera):
+        warnings.append(f"{scene.camera.kind}.glass: in RGB mode all wavelengths have one focus")
     if index.motions:
         warnings += _of_motion(index)
     elif getattr(scene.integrator, "light_paths", 0):
         warnings += _left_to_the_camera(index)
+    if index.light_layers and index.emitting:
+        warnings.append("film.layers: light that rays gather in media is in no layer of light")
     depth = getattr(scene.integrator, "max_depth", -1)
     if depth > DEEPEST:
         warnings.append(f"integrator.max_depth: {depth} counts as {DEEPEST}, the longest path")
@@ -318,8 +377,19 @@ def _of_motion(index: SceneIndex) -> list[str]:
         warnings.append(
             f"{integrator.kind}.light_paths: left aside, as no light paths start where things move"
         )
+    if getattr(integrator, "merging", False):
+        warnings.append(f"{integrator.kind}.merging: left aside, as photons have no time")
+    if getattr(integrator, "guiding", False):
+        warnings.append(f"{integrator.kind}.guiding: left aside, as light paths have no time")
     if index.has_media and index.motions.camera is not None:
         warnings.append("camera.motion: the media around the camera are those where it was lowered")
+    for i in index.motions.shapes:
+        shape: Any = index.scene.shapes[i]
+        inner = getattr(getattr(shape, "group", None), "shapes", (shape,))
+        if any(isinstance(one, Grid) for s in inner for one in (s.interior, s.exterior)):
+            warnings.append(
+                f"{shapes.where(shape)}.motion: its boundary moves, the grid of its medium stays"
+            )
     return warnings
 
 
@@ -336,9 +406,13 @@ def _left_to_the_camera(index: SceneIndex) -> list[str]:
         warnings.append(f"{kind}.{name}: left aside, as {reason}; {names} can, without such glass")
     if getattr(integrator, "merging", False) and not index.merged:
         reason = f"a path needs {photons.FIRST + 1} surfaces"
+        if not index.lights_reach:
+            reason = index.lit_media
         if index.shifts:
             reason = "fluorescent paint gives light other wavelengths"
         warnings.append(f"{kind}.merging: left aside, as {reason}")
+    if not index.lights_reach:
+        warnings.append(f"{kind}.light_paths: left aside, as {index.lit_media}")
     if index.weighed:
         warnings += [
             f"{kind}.light_paths: none start at lights[{i}], whose light does not fall with "
@@ -360,6 +434,8 @@ def _zero_copy_tables(index: SceneIndex, geometry: Geometry) -> dict[str, Any]:
     if len(meshes) != 1 or index.prototypes or not isinstance(meshes[0], Mesh):
         return {}
     mesh = meshes[0]
+    if is_refined(mesh):
+        return {}
     reversed_ = transforms.flips_handedness(shapes.placement(mesh)) != mesh.flip_normals
     wanted = {"uvs": (mesh.uvs, "f")}
     if not reversed_ and len(mesh.faces) == len(geometry.faces):  # no triangle was left out

@@ -11,9 +11,14 @@ from numpy.typing import NDArray
 
 from clpt import spectra
 from clpt.errors import SceneError
-from clpt.render.contract.parameter_words import SPECTRUM_WORDS
+from clpt.measured import Measurement, MerlTable
+from clpt.render.contract.parameter_words import (
+    MEASUREMENT_WORDS,
+    MERL_WORDS,
+    SPECTRUM_WORDS,
+)
 from clpt.render.lowering.camera.wavelengths import Density
-from clpt.render.lowering.materials import reradiation
+from clpt.render.lowering.materials import measurements, reradiation
 from clpt.render.lowering.tables import TableStore, Words, as_words
 from clpt.spectra import (
     RGB,
@@ -25,7 +30,7 @@ from clpt.spectra import (
     Tabulated,
     observer,
 )
-from clpt.spectra.spectrum import Role, d65, extremes, gridded
+from clpt.spectra.spectrum import Role, d65, extremes, gridded, primaries
 
 STEP = 1.0  # [nm] at most, between the nodes of tabulated spectra
 FEWEST = 100  # cells between the nodes, however narrow the film's range is
@@ -73,6 +78,7 @@ class SpectraTable:
         self._store = store
         self.mode, self.lambda_min, self.lambda_max = mode, lambda_min, lambda_max
         self._rows: dict[Any, int] = {}
+        self._measurements: dict[tuple[str, int], tuple[Words, str, Any]] = {}
         self._expected_light: NDArray[np.float64] | None = None
         if self.spectral:
             self._add_sensor(sensor or observer("cie1931"), density or Density(*self.range))
@@ -182,6 +188,42 @@ class SpectraTable:
         return np.concatenate([whole, as_words([start, 1.0 / step])]), (
             "rows" if len(rows) > 1 else "row"
         )
+
+    def measurement_words(self, value: Measurement | None) -> tuple[Words, str]:
+        """Return the words of a measured material and its source: where its numbers begin, and a
+        spectrum that says which of its colours a wavelength has; kernels/optics/measurement_load.cl
+        reads them.
+        """
+        key = "measurement", id(value)
+        if key not in self._measurements:
+            made = measurements.rows(value, self.range if self.spectral else None)
+            words = np.zeros(MEASUREMENT_WORDS, np.uint32)
+            words[0] = self._append_table(made.values)
+            if self.spectral:
+                numbers = Tabulated(made.wavelengths, np.arange(len(made.wavelengths)), "hold")
+                words[1:] = self._table_words(numbers)
+            self._measurements[key] = words, made.source, value
+        return self._measurements[key][:2]
+
+    def _append_table(self, values: NDArray[Any]) -> int:
+        """Append to `distributions`, not as its first: 0 is where idle lanes look."""
+        if not self._store.size("distributions"):
+            self._store.append_floats("distributions", [0.0])
+        return self._store.append_floats("distributions", values)
+
+    def merl_words(self, value: MerlTable | None) -> tuple[Words, str]:
+        """Return the words of a table of MERL and its source: where its numbers begin, and what
+        red, green and blue are in spectral mode; see kernels/optics/merl_load.cl.
+        """
+        key = "merl", id(value)
+        if key not in self._measurements:
+            made = measurements.merl_rows(value)
+            words = np.zeros(MERL_WORDS, np.uint32)
+            words[0] = self._append_table(made.values)
+            if self.spectral:
+                words[1:] = [self.row(one) for one in primaries()]
+            self._measurements[key] = words, made.source, value
+        return self._measurements[key][:2]
 
     def expect_light(self, lights: Iterable[Spectrum]) -> None:
         """Note what light fluorescent materials will meet; see `reradiation.expected`."""

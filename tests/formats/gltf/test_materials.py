@@ -193,6 +193,55 @@ def test_emission(shape):
     assert gone.emission.radiance.second.value == gone.material.front.opacity == 0.0
 
 
+def _tangent_document(build, width=4):
+    along = [[0, 1, 0, -1][:width]] * 3
+    top = {"images": [{"uri": _uri(PIXEL)}], "textures": [{"source": 0}]}
+    document = build(materials=[{"normalTexture": {"index": 0}}, {}], **top)
+    attributes = {
+        "TEXCOORD_0": document.accessor([(0, 0), (1, 0), (0, 1)]),
+        "NORMAL": document.accessor([(0, 0, 1)] * 3),
+        "TANGENT": document.accessor(along),
+    }
+    return document.mesh(material=0, attributes=attributes).mesh(material=1, attributes=attributes)
+
+
+def test_tangents_are_those_of_the_file(build, read):
+    """Where a material looks at them; they are saved and read again."""
+    document = _tangent_document(build)
+    document.json["nodes"] = [{"mesh": 0}, {"mesh": 1}]
+    document.json["scenes"] = [{"nodes": [0, 1]}]
+    mapped, plain = read(document).shapes[:2]
+    np.testing.assert_array_equal(mapped.tangents, [[0, 1, 0, -1]] * 3)
+    assert plain.tangents is None
+    with pytest.raises(SceneError, match=r"accessors\[\d\].*VEC3"):
+        read(_tangent_document(build, 3))
+
+
+def test_variants_and_units_by_choice(build, read):
+    """-D variant, lumens and multiple_scattering; wrong ones are errors."""
+    name, lights = "KHR_materials_variants", "KHR_lights_punctual"
+    document = build(materials=[{"name": "a"}, {"name": "b"}])
+    variants = {"extensions": {name: {"mappings": [{"material": 1, "variants": [1]}]}}}
+    document.mesh(material=0, **variants)
+    document.json["extensions"] = {
+        name: {"variants": [{"name": "first"}, {"name": "second"}]},
+        lights: {"lights": [{"type": "point", "intensity": 683.0}]},
+    }
+    document.json["extensionsUsed"] = [name, lights]
+    document.json["nodes"] += [{"extensions": {lights: {"light": 0}}}]
+    document.json["scenes"] = [{"nodes": [0, 1]}]
+    usual = read(document)
+    assert usual.shapes[0].material.front.name == "a" and "first, second" in usual.warnings[0]
+    chosen = read(document, variant="second", lumens=683, multiple_scattering="1")
+    surface = chosen.shapes[0].material.front
+    assert (surface.name, surface.multiple_scattering, chosen.warnings) == ("b", 1.0, [])
+    strengths = [scene.lights[0].intensity.r for scene in (usual, chosen)]
+    assert strengths == pytest.approx([683.0, 1.0])
+    for wrong in ({"variant": "third"}, {"lumens": 0}, {"multiple_scattering": "much"}):
+        with pytest.raises(SceneError, match=next(iter(wrong))):
+            read(document, **wrong)
+
+
 @pytest.mark.parametrize(
     ("material", "place"),
     [
@@ -208,6 +257,17 @@ def test_refused(shape, material, place):
         shape(material)
 
 
-def test_what_is_passed_over_is_told(shape):
-    coat = _extension("clearcoat", clearcoatNormalTexture={"index": 0})
-    assert any("clearcoatNormalTexture" in note for note in shape(coat)[1])
+def test_normals_of_a_coat(shape):
+    """A coat has those of its texture, else of the surface, and never those of the base's map."""
+    own = _extension(
+        "clearcoat", clearcoatFactor=1, clearcoatNormalTexture={"index": 0, "scale": 2}
+    )
+    made, notes = shape(own)
+    surface = made.material.front
+    assert not notes and surface.clearcoat_apart == 1.0 and surface.clearcoat_normal_scale == 2.0
+    channels = [getattr(surface, f"clearcoat_normal_{x}").channel for x in "xyz"]
+    assert channels == ["r", "g", "b"] and surface.uses_tangents
+    smooth = _extension("clearcoat", clearcoatFactor=1) | {"normalTexture": {"index": 0}}
+    inner = _front(shape(smooth)).material
+    assert inner.clearcoat_apart == 1.0 and inner.clearcoat_normal_z == 1.0
+    assert _front(shape(_extension("clearcoat", clearcoatFactor=1))).clearcoat_apart == 0.0

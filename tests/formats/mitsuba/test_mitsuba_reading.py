@@ -269,3 +269,23 @@ def test_round_shapes_may_be_scaled_turned_mirrored_and_a_cylinder_lengthened(re
         f'<shape type="cylinder">{ends}{along}</shape>'
     )
     assert len(made.shapes) == 3 and not made.warnings
+
+
+def test_a_batch_of_sensors(tmp_path):
+    """Each has its share of the film; --camera chooses, and a warning tells that it is no row."""
+    inner = '<sensor type="perspective" id="{}"><film type="hdrfilm"/></sensor>'
+    film = '<film type="hdrfilm"><integer name="width" value="{}"/>'
+    film += '<integer name="height" value="48"/></film>'
+    path = tmp_path / "a.xml"
+
+    def written(width):
+        batch = inner.format("left") + inner.format("right") + film.format(width)
+        path.write_text(f'<scene version="3.0.0"><sensor type="batch">{batch}</sensor></scene>')
+        return path
+
+    scene = load(written(128), camera="right")
+    assert (scene.film.width, scene.film.height) == (64, 48)
+    assert [name.split()[-1] for name in scene.extra["cameras"]] == ["left", "right"]
+    assert any("no row" in warning for warning in scene.warnings)
+    with pytest.raises(SceneError, match=r"a\.xml:1.*multiple of its sensors"):
+        load(written(127))

@@ -12,7 +12,7 @@ import pyopencl.array as cl_array
 import pytest
 
 import clpt
-from clpt import device, spectra
+from clpt import device, measured, spectra
 from clpt.errors import SceneError
 from clpt.scene import (
     KINDS,
@@ -41,7 +41,7 @@ GROUP = shapes.Group((shapes.Sphere(radius=0.5),), "group")
 
 NEEDED: dict[type, dict[str, Any]] = {
     shapes.Mesh: {"vertices": POINTS, "faces": ROWS},
-    shapes.Curves: {"points": RNG.random((5, 4)).astype(np.float32), "lengths": (5,)},
+    shapes.Curves: {"points": RNG.random((4, 4)).astype(np.float32), "lengths": (4,)},
     shapes.Spheres: {"centers": POINTS, "radii": np.full(4, 0.5, np.float32)},
     shapes.Instance: {"group": GROUP},
     textures.Bitmap: {"image": TEXELS},
@@ -51,6 +51,7 @@ NEEDED: dict[type, dict[str, Any]] = {
 }
 # Some value of a form or role that is not the default, whatever that is.
 VALUES: dict[str, Any] = {
+    "lens": "planar",
     "reflectance": (0.25, 0.5, 0.125),
     "emission": (2.0, 3.0, 4.0),
     "index": "diamond",
@@ -82,9 +83,10 @@ VALUES: dict[str, Any] = {
     "normals": "smooth",
     "rows2": POINTS[:, :2].copy(),
     "rows3": POINTS,
+    "grid": RNG.normal(size=(3, 4, 2)).astype(np.float32),
     "rows4": NEEDED[shapes.Curves]["points"],
     "triangles": ROWS,
-    "lengths": (5,),
+    "lengths": (4,),
     "number_or_list": 0.5,
     "number_or_auto": "auto",
     "image": TEXELS,
@@ -94,6 +96,8 @@ VALUES: dict[str, Any] = {
     "text": "vertex_named",
     "quantity": 0.4,
     "angular": (1.0, 3.0, 2.0),
+    "measurement": measured.grey(),
+    "merl": measured.MerlTable(values=np.full((2, 2, 2, 3), 0.25)),
 }
 
 

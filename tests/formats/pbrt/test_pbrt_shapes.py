@@ -8,9 +8,8 @@ import pytest
 from clpt import transforms
 from clpt.errors import SceneError
 from clpt.formats import load
-from clpt.formats.pbrt import subdivision
 from clpt.render.lowering.geometry import triangles
-from clpt.scene import shapes
+from clpt.scene import shapes, subdivision
 from clpt.scene.materials import Mask, Null, TwoSided
 
 QUAD = '"point3 P" [0 0 0 2 0 0 2 1 0 0 1 0] "integer indices" [0 1 2 0 2 3]'

@@ -23,6 +23,13 @@ def scene(tmp_path):
     return of
 
 
+def test_a_gbuffer_has_layers(scene):
+    made = scene('ColorSpace "aces2065-1"\nFilm "gbuffer" "string coordinatesystem" "world"')
+    assert not made.warnings and made.film.output_space == "aces2065_1"
+    assert made.film.layers == ("albedo", "position", "geometric_normal", "shading_normal", "uv")
+    assert "in the world, not the camera" in scene('Film "gbuffer"').warnings[0]
+
+
 def ours(scene, x, y):
     """Origin and direction through a place on the film, as kernels/camera has them."""
     camera, film = scene.camera, scene.film
@@ -190,6 +197,26 @@ def test_a_radius_that_is_not_given_suits_the_picture(scene):
         scene('Integrator "sppm" "float radius" 0')
 
 
+def test_a_lens_of_surfaces(scene, tmp_path):
+    (tmp_path / "a.dat").write_text("0 1 0 8\n60 4 1.6 20\n-60 1 1.0 20\n")
+    text = 'Scale 0.5 0.5 0.5\nCamera "realistic" "string lensfile" "a.dat"'
+    film = '\nFilm "rgb" "integer xresolution" 40 "integer yresolution" 30 "float diagonal" 50'
+    made = scene(text + ' "float aperturediameter" 3 "float focusdistance" 2' + film)
+    lens = made.camera
+    assert lens.prescription.surfaces[0].semi_diameter == 1.5
+    assert lens.prescription.surfaces[1].radius == 60.0
+    # The scale is of world to camera: what is a metre there is two here.
+    np.testing.assert_allclose(
+        [lens.film_width, lens.focus_distance, lens.unit], [0.08, 4.0, 2e-3], rtol=1e-12
+    )
+    assert lens.exposure == "irradiance" and not made.warnings
+    made = scene(text + ' "float aperturediameter" 30 "string aperture" "pentagon"')
+    assert made.camera.blades == 5 and "above the lens's 8 mm" in made.warnings[0]
+    (tmp_path / "a.dat").write_text("60 4 1.6 20\n-60 1 1.0\n")
+    with pytest.raises(SceneError, match=r"a\.dat:2: a row has 4 numbers"):
+        scene(text)
+
+
 def test_samplers_and_integrators(scene):
     made = scene('Sampler "stratified" "integer xsamples" 3 "integer ysamples" 5\nOption "seed" 7')
     assert (made.spp, made.seed, type(made.sampler)) == (15, 7, integrators.Sobol)
@@ -203,7 +230,7 @@ def test_samplers_and_integrators(scene):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ('Camera "realistic"', "'perspective'"),
+        ('Camera "realistic"', "needs a 'lensfile'"),
         ('Camera "perspective" "float fov" 180', "between 0 and 180"),
         ('Camera "perspective" "float shutterclose" 0', "does not open"),
         ('Camera "fisheye"', "unknown camera"),

@@ -45,7 +45,7 @@ def test_nobody_can_write_to_a_lowered_scene(cornell: Scene) -> None:
     with pytest.raises(ValueError, match="read-only"):
         lowered.settings["seed"] = 1
     with pytest.raises(dataclasses.FrozenInstanceError):
-        lowered.glass_row = 1  # type: ignore[misc]
+        lowered.glass_rows = (1,)  # type: ignore[misc]
 
 
 def test_two_wavefronts_share_a_lowered_scene(cornell: Scene) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,22 +13,25 @@ from numpy.typing import NDArray
 from clpt import spectra, transforms
 from clpt.errors import SceneError
 from clpt.render.contract.camera_records import RECORDS
-from clpt.scene.cameras import Camera, Matrix, Orthographic, Perspective, Spherical, ThinLens
+from clpt.render.lowering.camera import lens
+from clpt.scene.cameras import Camera, Lens, Matrix, Orthographic, Perspective, Spherical, ThinLens
 from clpt.spectra import Constant, Spectrum
 
 CONNECTED = ("perspective", "thin_lens")  # cameras that a point can be joined to
 DESIGN_WAVELENGTH = 587.56  # [nm], the helium line d, at which a lens's focal length is given
 
 
-def dispersive_glass(camera: Camera) -> Spectrum | None:
-    """Return the index of a lens's glass, or None where it is the same at all wavelengths."""
+def dispersive_glasses(camera: Camera) -> tuple[Spectrum, ...]:
+    """Return the indices of a camera's glasses that differ between wavelengths, each once."""
+    if isinstance(camera, Lens):
+        return lens.glasses(camera)
     index = spectra.index(getattr(camera, "glass", Constant(1.0)))
-    return None if isinstance(index, Constant) else index
+    return () if isinstance(index, Constant) else (index,)
 
 
 def is_connected(camera: Camera, mode: str) -> bool:
     """Return whether paths from lights can be joined to a camera, in the mode of the film."""
-    return camera.kind in CONNECTED and (mode == "rgb" or dispersive_glass(camera) is None)
+    return camera.kind in CONNECTED and (mode == "rgb" or not dispersive_glasses(camera))
 
 
 @dataclass(frozen=True)
@@ -47,27 +50,33 @@ class View:
 
 def view_of(camera: Camera, width: int, height: int) -> View | None:
     """Return what a camera sees, None if not from a point; width, height: of the film [pixels]."""
-    lens = MEMBERS[type(camera)](camera, width, height)
-    if "extent" not in lens:
+    if isinstance(camera, Lens):
         return None
-    matrix, extent = lens["to_world"], lens["extent"]
+    pinhole = MEMBERS[type(camera)](camera, width, height)
+    if "extent" not in pinhole:
+        return None
+    matrix, extent = pinhole["to_world"], pinhole["extent"]
     return View(matrix[:3, 3], matrix[:3, 2], extent[0], math.atan(math.hypot(*extent) / 2.0))
 
 
 def lower_camera(
-    camera: Camera, width: int, height: int, glass_row: int = 0
+    camera: Camera, width: int, height: int, glass_rows: Sequence[int] = ()
 ) -> tuple[str, NDArray[np.float32]]:
-    """Return a camera's kind and the words (n,) float32 of its record.
+    """Return a camera's kind and the words (n,) float32 of its record and what follows it.
 
-    width, height: of the film [pixels]; glass_row: in `spectra`, of its `dispersive_glass`. Raises
-    SceneError for a matrix or a glass that cannot be used.
+    width, height: of the film [pixels]; glass_rows: in `spectra`, of its `dispersive_glasses`; none
+    where all wavelengths have one index. Raises SceneError for a matrix, a glass or a lens that
+    cannot be used.
     """
+    rows = dict(zip(dispersive_glasses(camera), glass_rows, strict=False))
+    if isinstance(camera, Lens):
+        return camera.kind, lens.lens_words(camera, _rigid(camera), width, height, rows)
     record = RECORDS[camera.kind]
     words = np.zeros((), record.dtype)
     for name, value in MEMBERS[type(camera)](camera, width, height).items():
         words[name] = value
-    if dispersive_glass(camera) is not None:
-        words["glass"] = glass_row
+    for row in rows.values():
+        words["glass"] = row
     return camera.kind, words.reshape(1).view(np.float32)
 
 
@@ -118,14 +127,14 @@ def _pinhole(camera: Perspective, width: int, height: int) -> dict[str, Any]:
 
 def _thin_lens(camera: ThinLens, width: int, height: int) -> dict[str, Any]:
     names = ("aperture_radius", "focus_distance", "focal_length")
-    lens = {name: getattr(camera, name) for name in names}
-    glass = dispersive_glass(camera)
-    power = 1.0 if glass is None else float(glass.sample(DESIGN_WAVELENGTH)) - 1.0
+    values = {name: getattr(camera, name) for name in names}
+    glass = dispersive_glasses(camera)
+    power = float(glass[0].sample(DESIGN_WAVELENGTH)) - 1.0 if glass else 1.0
     if power < 1e-3:
         raise SceneError(
             f"its index must be above 1, not {power + 1.0:.4g}", where="thin_lens.glass"
         )
-    return {**_pinhole(camera, width, height), **lens, "power": power}
+    return {**_pinhole(camera, width, height), **values, "power": power}
 
 
 def _orthographic(camera: Orthographic, width: int, height: int) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The medium around the camera: found by how often boundaries wind around it.
+"""The medium around the camera, or a light: found by how often boundaries wind around it.
 
 A closed boundary fills the whole sphere of directions around a point inside, 4 pi, and on balance
 nothing of it around a point outside. So a medium fills a point where the shapes that have it inside
@@ -27,6 +27,7 @@ from clpt.scene.shapes import Cylinder, Disk, Instance, Mesh, Shape, Sphere, Sph
 Triangles = tuple[NDArray[np.float32], NDArray[np.uint32]]
 AROUND = 96  # corners of what stands for a disk
 MOST_COMPARED = 500  # bodies whose boxes are compared
+OPEN = 1e-2  # of its area: what a closed boundary may lack
 CHUNK = 1 << 18  # triangles that are summed at a time
 
 
@@ -38,16 +39,22 @@ def media_around(scene: Scene, cached: Callable[..., Any] | None = None) -> tupl
     """
     if scene.camera.medium is not None:
         return (scene.camera.medium,)
-    bounding = [shape for shape in _every(scene) if _bounds_media(shape)]
+    return media_at(scene, camera_origin(scene), cached)
+
+
+def media_at(
+    scene: Scene, p: NDArray[np.float64], cached: Callable[..., Any] | None = None
+) -> tuple[Medium, ...]:
+    """Return the media that boundaries put at a point (3,) [m], of the smallest extent first."""
+    bounding = [shape for shape in every(scene) if _bounds_media(shape)]
     if not bounding:
         return ()
-    p = _origin(scene)
     turns: dict[Medium, float] = {}
     extents: dict[Medium, float] = {}
     bounds: dict[Medium, list[NDArray[np.float64]]] = {}
     parts: dict[Medium, list[tuple[float, Shape]]] = {}
     for shape in bounding:
-        low, high = _box(shape, cached)
+        low, high = box(shape, cached)
         for medium, sign in ((shape.interior, 1.0), (shape.exterior, -1.0)):
             if medium is not None:
                 parts.setdefault(medium, []).append((sign, shape))
@@ -65,6 +72,24 @@ def media_around(scene: Scene, cached: Callable[..., Any] | None = None) -> tupl
     return tuple(sorted(found, key=lambda medium: extents[medium]))
 
 
+def open_medium(scene: Scene, cached: Callable[..., Any] | None = None) -> Medium | None:
+    """Return a medium whose boundary has a hole, None where all are closed.
+
+    The areas of a closed surface, each along its normal, add up to nothing.
+    """
+    sums: dict[Medium, NDArray[np.float64]] = {}
+    for shape in every(scene):
+        area = _areas(shape, cached)
+        for medium, sign in ((shape.interior, 1.0), (shape.exterior, -1.0)):
+            if medium is not None:
+                signed = area * np.array([sign, sign, sign, 1.0])
+                sums[medium] = sums.get(medium, np.zeros(4)) + signed
+    for medium, total in sums.items():
+        if np.linalg.norm(total[:3]) > OPEN * total[3]:
+            return medium
+    return None
+
+
 def bodies_around(
     scene: Scene,
     matter: Callable[[Shape], tuple[Any, ...] | None],
@@ -75,11 +100,21 @@ def bodies_around(
     matter: of a shape's body, None of a shape that is none. What a body has inside of it faces it,
     as the inner side of a glass does.
     """
-    p, turns = _origin(scene), dict[tuple[Any, ...], float]()
-    for shape in _every(scene, lambda one: matter(one) is not None):
+    return bodies_at(scene, matter, camera_origin(scene), cached)
+
+
+def bodies_at(
+    scene: Scene,
+    matter: Callable[[Shape], tuple[Any, ...] | None],
+    p: NDArray[np.float64],
+    cached: Callable[..., Any] | None = None,
+) -> tuple[tuple[Any, ...], ...]:
+    """Return the matter of the bodies at a point (3,) [m]; matter: as of `bodies_around`."""
+    turns: dict[tuple[Any, ...], float] = {}
+    for shape in every(scene, lambda one: matter(one) is not None):
         own = matter(shape)
         if own is not None:
-            low, high = _box(shape, cached)
+            low, high = box(shape, cached)
             within = ((p >= low) & (p <= high)).all()
             turns[own] = turns.get(own, 0.0) + (_winding(shape, p, cached) if within else 0.0)
     return tuple(own for own, number in turns.items() if number > 0.5)
@@ -110,11 +145,11 @@ def contested(
     matter: as of `bodies_around`; its first entry is the priority.
     """
     boxes: list[tuple[tuple[Any, ...], Shape, NDArray[Any], NDArray[Any]]] = []
-    for shape in _every(scene, lambda one: matter(one) is not None):
+    for shape in every(scene, lambda one: matter(one) is not None):
         own = matter(shape)
         if own is None or len(boxes) >= MOST_COMPARED:
             continue
-        low, high = _box(shape, cached)
+        low, high = box(shape, cached)
         for other, second, other_low, other_high in boxes:
             if other[0] != own[0] or other == own:
                 continue
@@ -129,8 +164,9 @@ def contested(
     return []
 
 
-def _every(scene: Scene, bounds: Callable[[Shape], bool] = _bounds_media) -> Iterator[Shape]:
-    """The shapes of a scene that may bound media, those of instances where they are placed."""
+def every(scene: Scene, bounds: Callable[[Shape], bool] = _bounds_media) -> Iterator[Shape]:
+    """Return the shapes of a scene that may bound media, those of instances where they are
+    placed."""
     for thing in scene.shapes:
         if not isinstance(thing, Instance):
             yield thing
@@ -141,7 +177,7 @@ def _every(scene: Scene, bounds: Callable[[Shape], bool] = _bounds_media) -> Ite
                 yield dataclasses.replace(shape, to_world=matrix)
 
 
-def _origin(scene: Scene) -> NDArray[np.float64]:
+def camera_origin(scene: Scene) -> NDArray[np.float64]:
     """The point from which a camera sees; of one without, that in the middle of its film."""
     members = MEMBERS[type(scene.camera)](scene.camera, *scene.film.size)
     if "to_world" in members:
@@ -150,14 +186,14 @@ def _origin(scene: Scene) -> NDArray[np.float64]:
     return near[:3] / near[3]
 
 
-def _box(shape: Shape, cached: Callable[..., Any] | None) -> tuple[NDArray[Any], NDArray[Any]]:
-    """The lowest and the highest corner of a shape's box."""
+def box(shape: Shape, cached: Callable[..., Any] | None) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return the lowest and the highest corner of a shape's box."""
     if isinstance(shape, Sphere) and keeps_its_kind(shape):
         return analytic.bounds(shape)
     if isinstance(shape, Spheres):
         centers, radii = _balls(shape)
         return (centers - radii[:, None]).min(axis=0), (centers + radii[:, None]).max(axis=0)
-    vertices, faces = _triangles(shape, cached)
+    vertices, faces = triangles_of(shape, cached)
     if not len(faces):
         return np.full(3, np.inf), np.full(3, -np.inf)
     return vertices.min(axis=0), vertices.max(axis=0)
@@ -172,14 +208,24 @@ def _winding(shape: Shape, p: NDArray[np.float64], cached: Callable[..., Any] | 
     if isinstance(shape, Spheres):
         centers, radii = _balls(shape)
         return side * float((np.linalg.norm(p - centers, axis=1) < radii).sum())
-    return winding_number(*_triangles(shape, cached), p)
+    return winding_number(*triangles_of(shape, cached), p)
+
+
+def _areas(shape: Shape, cached: Callable[..., Any] | None) -> NDArray[np.float64]:
+    """The sum of a shape's areas along their normals, and of the areas alone (4,) [m^2]."""
+    if isinstance(shape, Spheres):
+        return np.array([0.0, 0.0, 0.0, 4.0 * np.pi * float((_balls(shape)[1] ** 2).sum())])
+    vertices, faces = triangles_of(shape, cached)
+    a, b, c = np.moveaxis(np.asarray(vertices, np.float64)[faces], 1, 0)
+    n = np.cross(b - a, c - a) / 2.0
+    return np.array([*n.sum(axis=0), np.linalg.norm(n, axis=1).sum()])
 
 
 def _volume(shape: Shape, cached: Callable[..., Any] | None) -> float:
     """What a shape encloses [m^3], below 0 of one that faces inward."""
     if isinstance(shape, Spheres):
         return (-1.0 if shape.flip_normals else 1.0) * 4.2 * float((_balls(shape)[1] ** 3).sum())
-    vertices, faces = _triangles(shape, cached)
+    vertices, faces = triangles_of(shape, cached)
     a, b, c = np.moveaxis(np.asarray(vertices, np.float64)[faces], 1, 0)
     return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
 
@@ -207,8 +253,8 @@ def _balls(shape: Spheres) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return rows[:, :3], np.abs(rows[:, 3])
 
 
-def _triangles(shape: Shape, cached: Callable[..., Any] | None) -> Triangles:
-    """The triangles of a shape in the world, or those that stand for it."""
+def triangles_of(shape: Shape, cached: Callable[..., Any] | None = None) -> Triangles:
+    """Return the triangles of a shape in the world, or those that stand for it."""
     if isinstance(shape, Disk):
         shape = _fan(shape)
     elif isinstance(shape, Cylinder | Sphere):

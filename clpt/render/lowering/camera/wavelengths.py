@@ -164,6 +164,7 @@ def emissions(index: SceneIndex) -> Iterator[Spectrum]:
         for name, param in declared.items():
             if param.role == "emission":
                 yield _emitted(getattr(source, name))
+    yield from (medium.light for medium in index.emitting if medium.light is not None)
 
 
 def _emitted(value: Any) -> Spectrum:

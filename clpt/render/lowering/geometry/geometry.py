@@ -26,6 +26,7 @@ from clpt.render.lowering.textures.attributes import Owner
 
 SWEPT_CELLS = 4  # of the hull of what moves, see `instancing.hull_points`
 SHAPE_NORMALS, SHAPE_UVS, SHAPE_TWO_SIDED, SHAPE_ONE_LIGHT, SHAPE_MANY = 1, 2, 4, 8, 16
+SHAPE_TANGENTS = 32
 
 Triangles = tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.uint32]]
 
@@ -39,7 +40,7 @@ class Geometry:
     triangle: the world's before those of groups; boxes (k, 2, 3) float32: of analytic shapes;
     world_vertices: how many vertices are not a group's; first_analytic: a row; single_count:
     analytic shapes that are one each; analytic: their kinds; normals, uvs: whether a shape needs
-    them.
+    them; tangents: of shapes that say their own, each with its first vertex.
     """
 
     rows: tuple[np.ndarray, ...]
@@ -56,6 +57,7 @@ class Geometry:
     analytic: frozenset[str]
     normals: bool
     uvs: bool
+    tangents: tuple[tuple[int, NDArray[np.float32]], ...]
     warnings: tuple[str, ...]
 
     def bounding_sphere(self) -> tuple[NDArray[np.float64], float]:
@@ -117,6 +119,7 @@ def lower_geometry(index: SceneIndex, encoder: Encoder, materials: MaterialWords
         analytic=frozenset(one.shape.kind for one in others),
         normals=builder.normals,
         uvs=builder.uvs,
+        tangents=tuple(builder.tangents),
         warnings=tuple(triangles.warnings_of(builder.flat)),
     )
 
@@ -139,6 +142,7 @@ class _Builder:
     face_count: int = 0
     normals: bool = False
     uvs: bool = False
+    tangents: list[tuple[int, np.ndarray]] = field(default_factory=list)
 
     def add(self, one: Placed) -> None:
         """Append a shape's row; its triangles, or its parameters, go into the tables."""
@@ -189,6 +193,11 @@ class _Builder:
         self.encoder.store.append_floats("normals", zeros if normals is None else normals)
         self.encoder.store.append_floats("uvs", zeros[:, :2] if uvs is None else uvs)
         self.normals |= normals is not None
+        if getattr(shape, "tangents", None) is not None:
+            row["flags"] |= SHAPE_TANGENTS
+            own = (*shapes.geometry(shape), shape.tangents)
+            along = self.encoder.cache(triangles.tangents, shape, by=own)
+            self.tangents.append((self.vertex_count, along))
         moved = faces + np.uint32(self.vertex_count)
         self.parts.append((vertices, moved, len(self.rows)))
         self.vertex_count += len(vertices)

@@ -14,6 +14,7 @@ from clpt import transforms
 from clpt.errors import SceneError
 from clpt.render.contract.shape_records import ONE_OF
 from clpt.render.lowering.device_arrays import on_host
+from clpt.render.lowering.geometry import distance_grids, refining
 from clpt.render.lowering.geometry.shapes import Faces, Points, Words, placement, where
 from clpt.render.lowering.geometry.tubes import tubes
 from clpt.scene import shapes
@@ -60,7 +61,9 @@ def triangulate(
     """
     vertices, faces, normals, uvs = _in_world(shape)
     solid = _solid(vertices, faces)
-    warnings_of = not isinstance(shape, shapes.Curves)  # a tube may shrink to a line
+    warnings_of = not isinstance(
+        shape, shapes.Curves | shapes.SdfGrid
+    )  # a tube may shrink to a line
     if warnings_of and not solid.all() and flat is not None:
         flat.append(Flat(where(shape), int(len(solid) - solid.sum()), len(solid)))
     faces = faces if solid.all() else faces[solid]
@@ -86,6 +89,26 @@ def warnings_of(flat: Sequence[Flat]) -> list[str]:
         return [first]
     total = sum(one.count for one in flat)
     return [f"{first}; with those of {len(flat) - 1} more shapes {total:,} in all"]
+
+
+def tangents(shape: shapes.Mesh) -> Points:
+    """Return a mesh's tangents in world space (n, 4) float32: unit vectors, and the side of v.
+
+    The side is that of the shading normal x tangent. A tangent without length stays zero. Raises
+    SceneError for a mesh without normals, and for an array of another shape or not finite.
+    """
+    if shape.normals is None:
+        message = "tangents need normals: a frame has both; leave them out, or give normals"
+        raise SceneError(message, where=where(shape))
+    given = _array(shape, "tangents", 4, len(_array(shape, "vertices", 3)))
+    matrix = placement(shape)
+    made = np.empty_like(given)
+    made[:, :3] = given[:, :3] @ matrix[:3, :3].T
+    length = np.linalg.norm(made[:, :3], axis=1, keepdims=True)
+    made[:, :3] /= np.where(length > 0.0, length, 1.0)
+    turned = transforms.flips_handedness(matrix) != shape.flip_normals
+    made[:, 3] = np.where(given[:, 3] < 0.0, -1.0, 1.0) * (-1.0 if turned else 1.0)
+    return made
 
 
 def attribute(shape: Shape, name: str) -> Points:
@@ -164,6 +187,8 @@ def local(shape: Shape) -> tuple[Points, Faces, Points | None, Points | None]:
         return _mesh(shape)
     if isinstance(shape, shapes.Curves):
         return tubes(shape, where(shape))
+    if isinstance(shape, shapes.SdfGrid):
+        return distance_grids.surface(shape, where(shape))
     if shape.kind == "rectangle":
         square = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], np.float32)
         halves = np.array([(0, 1, 2), (0, 2, 3)], np.uint32)
@@ -199,7 +224,8 @@ def _mesh(shape: shapes.Mesh) -> tuple[Points, Faces, Points | None, Points | No
         )
     normals = _normals(shape, vertices, faces)
     uvs = None if shape.uvs is None else _array(shape, "uvs", 2, len(vertices))
-    return vertices, faces.astype(np.uint32, copy=False), normals, uvs
+    parts = vertices, faces.astype(np.uint32, copy=False), normals, uvs
+    return refining.refined(shape, parts, where(shape)) if refining.is_refined(shape) else parts
 
 
 def _normals(shape: shapes.Mesh, vertices: Points, faces: NDArray[Any]) -> Points | None:

@@ -51,18 +51,20 @@ def decided(
     lights: LightRows,
     sphere: Ball,
     former: Integrator | None = None,
+    scattered: NDArray[np.bool_] | None = None,
 ) -> tuple[SceneIndex, str]:
     """Return the index with the integrator that "auto" stands for, and the reason as a sentence.
 
     The sentence is empty where the scene leaves no choice. sphere: centre and radius of one around
     the scene [m]; former: what a renderer has chosen that goes on with this scene, whose film has a
-    place for light paths or none. Raises SceneError for an image light that is broken.
+    place for light paths or none; scattered: of each row of `lights` whether it is in a medium that
+    scatters; none or None: no light is. Raises SceneError for an image light that is broken.
     """
     given: Any = index.scene.integrator
     if not isinstance(given, Auto) and getattr(given, "light_paths", None) != AUTO:
         return index, ""
     if former is None:
-        chosen, reason = _choice(index, geometry, encoder, lights, sphere)
+        chosen, reason = _choice(index, geometry, encoder, lights, sphere, scattered)
     else:
         keeps = isinstance(former, Vcm) and isinstance(given, Auto)
         chosen = former if keeps else Path(light_paths=getattr(former, "light_paths", 0))
@@ -79,19 +81,27 @@ def decided(
 
 
 def _choice(
-    index: SceneIndex, geometry: Geometry, encoder: Encoder, lights: LightRows, sphere: Ball
+    index: SceneIndex,
+    geometry: Geometry,
+    encoder: Encoder,
+    lights: LightRows,
+    sphere: Ball,
+    scattered: NDArray[np.bool_] | None,
 ) -> tuple[Integrator, str]:
     """The integrator but for its depths, and why; what is cheap to know is asked first."""
     scene, without = index.scene, Path(light_paths=0)
     if index.motions:
         return without, "light paths do not start from what moves"
-    if index.has_media:
-        return without, "light paths do not go through media"
+    if not index.lights_reach:
+        return without, index.lit_media
     if not cameras.is_connected(scene.camera, scene.film.mode):
         return without, "points cannot be joined to this camera"
     if 0 <= scene.integrator.max_depth < FEWEST:  # type: ignore[attr-defined]
         return without, "the longest path is too short for a caustic"
-    sharp = _first_with(index.shapes, is_sharp)
+    in_fog = _in_fog(index, geometry, encoder, lights, sphere, scattered)
+    if in_fog is not None:
+        return in_fog
+    sharp = _first_with((one for one in index.shapes if not _hides(one)), is_sharp)
     if sharp is None:
         return without, "nothing is sharp"
     if _first_with((one for one in index.shapes if one.emission is None), _is_dull) is None:
@@ -109,10 +119,42 @@ def _choice(
         return Path(light_paths=number), reason
     if scene.noise is not None:
         return Path(light_paths=number), f"{reason}; noise is not measured with photons"
-    if index.shifts or _share_seen(index, geometry) < SEEN:
+    if index.has_media or index.shifts or _share_seen(index, geometry) < SEEN:
         return Path(light_paths=number), reason
     whole = max(1, int(number))
     return Vcm(light_paths=whole), f"{reason}; the camera sees what is sharp"
+
+
+def _in_fog(
+    index: SceneIndex,
+    geometry: Geometry,
+    encoder: Encoder,
+    lights: LightRows,
+    sphere: Ball,
+    scattered: NDArray[np.bool_] | None,
+) -> tuple[Integrator, str] | None:
+    """The integrator where small lights are in media that scatter, None where they are not.
+
+    Near such a light much is scattered that the camera's paths find by chance alone.
+    """
+    if scattered is None or not scattered.any():
+        return None
+    share = lights.power / max(lights.power.sum(), 1e-300)
+    small = [
+        (name, share[rows][scattered[rows]].sum())
+        for name, _, _, rows in _small_rows(index, geometry, encoder, lights, sphere)
+    ]
+    power = sum(part for _, part in small)
+    if power < FEW:
+        return None
+    name = next(name for name, part in small if part)
+    number = SOME if power >= MOSTLY else FEW
+    return Path(light_paths=number), f"{name} is a small light in a medium that scatters"
+
+
+def _hides(shape: Shape) -> bool:
+    """Whether what goes into a shape is scattered there, so that it makes no caustic."""
+    return shape.interior is not None and shape.interior.scatters
 
 
 def _is_enclosed(geometry: Geometry, place: NDArray[np.float64] | None) -> bool:
@@ -175,6 +217,14 @@ def _small_lights(
     index: SceneIndex, geometry: Geometry, encoder: Encoder, lights: LightRows, sphere: Ball
 ) -> Iterator[tuple[str, NDArray[np.float64] | None, float]]:
     """The names of small lights, where they are [m], and the share of all light that is theirs."""
+    for name, place, share, _ in _small_rows(index, geometry, encoder, lights, sphere):
+        yield name, place, share
+
+
+def _small_rows(
+    index: SceneIndex, geometry: Geometry, encoder: Encoder, lights: LightRows, sphere: Ball
+) -> Iterator[tuple[str, NDArray[np.float64] | None, float, slice]]:
+    """The same, and their rows in `lights`."""
     lamps, share = index.scene.lights, lights.power / max(lights.power.sum(), 1e-300)
     for row, i in enumerate(row_order(lamps)):
         lamp = lamps[i]
@@ -187,14 +237,15 @@ def _small_lights(
         if small:
             bounds = light_bounds.of_lamp(lamp)
             place = (bounds.low + bounds.high)[0] / 2.0 if lamp.reach == "placed" else None
-            yield f"lights[{i}]", place, float(share[row])
+            yield f"lights[{i}]", place, float(share[row]), slice(row, row + 1)
     middle, radius = sphere
     ends = (*lights.first, len(share))[1:]
     for emitter, first, end in zip(geometry.emitters, lights.first, ends, strict=True):
         area, place = _area_and_place(emitter, encoder)
         far = max(float(np.linalg.norm(place - middle)), NEAR * radius)
         if area < SMALL * 4.0 * np.pi * far**2:
-            yield shapes.where(emitter.shape), place, float(share[first:end].sum())
+            rows = slice(first, end)
+            yield shapes.where(emitter.shape), place, float(share[rows].sum()), rows
 
 
 def _area_and_place(emitter: Emitter, encoder: Encoder) -> tuple[float, NDArray[Any]]:

@@ -16,10 +16,11 @@ from numpy.typing import ArrayLike, NDArray
 from clpt.errors import SceneError
 from clpt.records import LIGHT
 from clpt.render.contract import shape_records
-from clpt.render.contract.light_records import ALONG, BOTH, FRONT, INFINITE, KINDS
+from clpt.render.contract.light_records import ALONG, BOTH, FRONT, INFINITE, KINDS, VOLUME
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.geometry import analytic, shapes, spheres, triangles
 from clpt.render.lowering.lights import light_bounds, light_tree
+from clpt.render.lowering.lights.brick_lights import BrickLights
 from clpt.render.lowering.lights.non_shape_lights import blank_row, brightness, lower_lamp
 from clpt.render.lowering.lights.triangle_means import triangle_means
 from clpt.render.lowering.lowering_cache import content
@@ -101,28 +102,33 @@ def light_rows(
     encoder: Encoder,
     scene_radius: float,
     tree_from: int | None = None,
+    volumes: Sequence[BrickLights] = (),
     around: Around = None,
 ) -> LightRows:
     """Put the parameters of all lights into the tables, and make the rows of `lights`.
 
     scene_radius: of a sphere around the scene [m]; tree_from: the number of rows from which a tree
-    chooses among them, or 1 / PLACED_LIGHT_WEIGHT of it of lights at places; around: makes bounds
-    of a lamp (by its index) or emitter hold while it moves. Raises SceneError for a light that has
-    no place.
+    chooses among them, or 1 / PLACED_LIGHT_WEIGHT of it of lights at places; volumes: bricks of
+    media, whose rows follow those of the lamps; around: makes bounds of a lamp (by its index) or
+    emitter hold while it moves. Raises SceneError for a light that has no place.
     """
     if encoder.store.append("light_params", blank_row()) != 0:
         raise ValueError("`light_params` must be empty before the lights are put in")
     ordered = [lamps[i] for i in row_order(lamps)]
     infinite = sum(lamp.kind in INFINITE for lamp in ordered)
     blocks = [_lamp_block(lamp, encoder, scene_radius) for lamp in ordered]
+    blocks += [_brick_block(bricks, encoder) for bricks in volumes]
+    before = len(blocks)
     blocks += [_emitter_block(emitter, encoder) for emitter in emitters]
     if around is not None:
-        lights_: list[int | Emitter] = [*row_order(lamps), *emitters]
-        blocks = [
+        own: list[int | Emitter] = [*row_order(lamps), *emitters]
+        moved = [*blocks[: len(ordered)], *blocks[before:]]
+        moved = [
             block._replace(bounds=around(light, block.bounds))
-            for light, block in zip(lights_, blocks, strict=True)
+            for light, block in zip(own, moved, strict=True)
         ]
-    first = np.cumsum([0, *(len(block.rows) for block in blocks)])[len(ordered) : -1]
+        blocks[: len(ordered)], blocks[before:] = moved[: len(ordered)], moved[len(ordered) :]
+    first = np.cumsum([0, *(len(block.rows) for block in blocks)])[before:-1]
     rows = np.concatenate([np.zeros(0, LIGHT.dtype), *(block.rows for block in blocks)])
     power = np.concatenate([np.zeros(0), *(block.power for block in blocks)])
     tree = None
@@ -175,6 +181,12 @@ def _lamp_block(lamp: Light, encoder: Encoder, scene_radius: float) -> Block:
     row = _block(1, made.kind, made.row, made.radiance, -1)
     bounds = light_bounds.of_lamp(lamp)
     return Block(row, np.array([made.power]), bounds, np.array([made.importance]))
+
+
+def _brick_block(bricks: BrickLights, encoder: Encoder) -> Block:
+    """The rows of a medium that emits."""
+    at = bricks.rows(encoder)
+    return Block(_block(len(at), VOLUME, at, 0, -1), bricks.glow.power, bricks.bounds())
 
 
 def _emitter_block(emitter: Emitter, encoder: Encoder) -> Block:

@@ -1,6 +1,6 @@
 """Thin films in RGB mode: a table of the colours that they reflect and let through.
 
-In spectral mode the kernels sum the waves themselves (kernels/optics/thin_film.cl). In RGB mode
+In spectral mode the kernels sum the waves themselves (kernels/optics/film_stack.cl). In RGB mode
 there are no waves to sum: the host does it for every angle, and thickness where a texture varies
 it, and integrates what is reflected and what goes through over the wavelengths of D65, as an RGB
 renderer sees all reflectances. Belcour and Barla 2017 integrate on the device, by a Fourier series
@@ -81,7 +81,7 @@ def film_shares(
     indices: complex, (wavelengths,) each, of the medium where light is, of the films, and of the
     medium behind them; thicknesses [nm] of the films; tangential (angles, wavelengths): the index
     times the sine where light is; lambdas [nm]. Two arrays (angles, wavelengths) float64.
-    As kernels/optics/thin_film.cl, whose sources these are.
+    As kernels/optics/film_stack.cl, whose sources these are.
     """
     beta = np.minimum(tangential.real, indices[0].real * math.sqrt(1.0 - 1e-12))
     q = [np.sqrt(n**2 - beta**2) for n in indices]

@@ -1,0 +1,86 @@
+"""`clpt lens`: what a lens does near its axis, its section and its spots."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+from rich.table import Table
+
+from .. import lenses
+from ..errors import SceneError
+from ..lenses.glasses import LINE_C, LINE_D, LINE_F
+from .extras import extra
+from .output_console import output_console
+
+
+@click.command()
+@click.argument("lens")
+@click.option(
+    "--wavelengths", default=f"{LINE_F},{LINE_D},{LINE_C}", show_default=True, metavar="A,B,...",
+    help="At which it is looked at [nm].",
+)  # fmt: skip
+@click.option(
+    "--fields", default="0,10,20", show_default=True, metavar="A,B,...",
+    help="Angles of the points whose spots are drawn [degrees].",
+)  # fmt: skip
+@click.option("--f-number", type=float, help="To which the stop closes; as far open as it is.")
+@click.option(
+    "--plot", type=click.Path(path_type=Path),
+    help="The section with rays, and spot diagrams, .png, .svg or .pdf.",
+)  # fmt: skip
+def lens(
+    lens: str, wavelengths: str, fields: str, f_number: float | None, plot: Path | None
+) -> None:
+    """Tell of LENS: a file (.dat, .zmx, .txt) or a name of the library.
+
+    Lengths are in millimetres; pupils stand behind the first and the last surface. A spot's size is
+    the root of its mean squared radius.
+    """
+    made = lenses.read(lens) if Path(lens).suffix else lenses.library(lens)
+    if f_number is not None:
+        made = made.with_stop(lenses.paraxial.stop_radius(made, f_number))
+    waves = _numbers(wavelengths, "--wavelengths", 200.0, 2000.0)
+    angles = _numbers(fields, "--fields", -89.0, 89.0)
+    console = output_console()
+    console.print(
+        f"{made.name}, {len(made.surfaces)} surfaces" + f"; {made.source}" * bool(made.source)
+    )
+    table = Table(box=None, pad_edge=False)
+    headings = ("nm", "focal length", "back focus", "f-number", "entrance pupil", "exit pupil")
+    for heading in headings:
+        table.add_column(heading, justify="right")
+    for wavelength in waves:
+        found = lenses.cardinal(made, wavelength)
+        table.add_row(
+            f"{wavelength:g}", f"{found.focal_length:.5g}", f"{found.back_focus:.5g}",
+            f"{found.f_number:.4g}", f"{2.0 * found.entrance_radius:.4g} at {found.entrance:.4g}",
+            f"{2.0 * found.exit_radius:.4g} at {found.exit:.4g}",
+        )  # fmt: skip
+    console.print(table)
+    spots = Table(box=None, pad_edge=False)
+    for heading in ("degrees", "nm", "spot [um]", "light through"):
+        spots.add_column(heading, justify="right")
+    for angle in angles:
+        for wavelength in waves:
+            spot = lenses.spots.spot(made, angle, wavelength)
+            size = f"{spot.radius * 1e3:.4g}" if len(spot.points) else "-"
+            spots.add_row(f"{angle:g}", f"{wavelength:g}", size, f"{spot.through:.3f}")
+    console.print(spots)
+    if plot is not None:
+        with extra("plot", "a plot"):
+            from . import lens_plot  # here: matplotlib is an extra, and slow to import
+
+        lens_plot.write(plot, made, waves, angles)
+        click.echo(str(plot), err=True)
+
+
+def _numbers(text: str, option: str, low: float, high: float) -> list[float]:
+    try:
+        values = [float(part) for part in text.split(",")]
+        if not 1 <= len(values) <= 12 or not all(low <= value <= high for value in values):
+            raise ValueError
+    except ValueError:
+        message = f"{text!r} is no list of 1 to 12 numbers from {low:g} to {high:g}"
+        raise SceneError(message, where=option) from None
+    return values

@@ -1,0 +1,189 @@
+"""Lamps as their makers measure them: IES files (ANSI/IES LM-63-1986 to -2019), as a table of
+directions of a `goniometric` light.
+
+Values of the picture are photometric then: 1 cd at a distance of 1 m shows 1 / pi on white.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.errors import SceneError
+from clpt.scene.textures import Bitmap
+
+ROWS, COLUMNS = 360, 720  # of the image: half degrees
+MOST_VALUES = 1 << 22
+MOST_BYTES = 1 << 26
+AROUND = ((0, 90), (0, 180), (0, 360), (90, 270))
+TYPES = {2: "B", 3: "A"}  # of photometry, about axes that lie; 1 is C, about the vertical
+# keys of what follows TILT, in their order
+HEADER = (
+    "lamps", "lumens", "multiplier", "vertical", "horizontal", "photometry", "units", "width",
+    "length", "height", "ballast", "future", "watts",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Photometry:
+    """What an IES file says.
+
+    vertical (v,): angles from straight down, 0 to 180; horizontal (h,): about the vertical, 0 to
+    360 [degrees]; candela (h, v): intensity there [cd].
+    """
+
+    vertical: NDArray[np.float64]
+    horizontal: NDArray[np.float64]
+    candela: NDArray[np.float64]
+
+    def intensity(self, vertical: Any, horizontal: Any) -> NDArray[np.float64]:
+        """Return the intensity [cd] at angles [degrees] that broadcast; 0 where none was measured.
+
+        Between the angles it is linear; what is measured of a half or a quarter is mirrored.
+        """
+        v, h = np.broadcast_arrays(np.asarray(vertical, float), np.asarray(horizontal, float))
+        h = np.mod(h, 360.0)
+        last = self.horizontal[-1]
+        if last <= 180.0:
+            h = np.where(h > 180.0, 360.0 - h, h)
+        if last <= 90.0:
+            h = np.where(h > 90.0, 180.0 - h, h)
+        if self.horizontal[0] > 0.0:
+            h = np.where(h < 90.0, 180.0 - h, np.where(h > 270.0, 540.0 - h, h))
+        column, x = _between(self.horizontal, h)
+        row, y = _between(self.vertical, v)
+        near = np.minimum(column + 1, len(self.horizontal) - 1)
+        down = np.minimum(row + 1, len(self.vertical) - 1)
+        first = self.candela[column, row] * (1.0 - y) + self.candela[column, down] * y
+        second = self.candela[near, row] * (1.0 - y) + self.candela[near, down] * y
+        measured = (v >= self.vertical[0] - 1e-9) & (v <= self.vertical[-1] + 1e-9)
+        return np.where(measured, first * (1.0 - x) + second * x, 0.0)
+
+
+def read(path: Path) -> Photometry:
+    """Read an IES file. Raises SceneError with the line of what is broken or not supported."""
+    return _Reader(path).photometry()
+
+
+def parameters(path: Path) -> dict[str, Any]:
+    """Return the `image` of a Goniometric: candela by direction.
+
+    In the light's own space -y is straight down, the vertical angle 0; horizontal angles go from
+    +z to +x. Raises SceneError as `read` does.
+    """
+    lamp = read(path)
+    vertical = 180.0 - (np.arange(ROWS) + 0.5) / ROWS * 180.0
+    around = COLUMNS if len(lamp.horizontal) > 1 else 1
+    horizontal = (0.5 - (np.arange(around) + 0.5) / around) * 360.0
+    values = lamp.intensity(vertical[:, None], horizontal)
+    image = values[:, :, None].astype(np.float32)
+    return {"image": Bitmap(image=image, raw=True, wrap="repeat", wrap_v="clamp")}
+
+
+def _between(angles: NDArray[np.float64], at: Any) -> tuple[Any, Any]:
+    """The angle before each of `at`, and how far it is on the way to the next."""
+    index = np.clip(np.searchsorted(angles, at, "right") - 1, 0, max(len(angles) - 2, 0))
+    if len(angles) == 1:
+        return index, np.zeros(np.shape(at))
+    low, high = angles[index], angles[index + 1]
+    return index, np.clip((at - low) / (high - low), 0.0, 1.0)
+
+
+class _Reader:
+    """The lines of a file, then its numbers, each with its line."""
+
+    def __init__(self, path: Path):
+        self.path, self.line = path, 1
+        try:
+            if path.stat().st_size > MOST_BYTES:
+                self.fail(f"is larger than the {MOST_BYTES >> 20} MiB that are read")
+            self.lines = path.read_text("latin-1").splitlines()
+        except OSError as error:
+            raise SceneError(f"cannot be read: {error.strerror}", file=path) from None
+
+    def fail(self, message: str) -> NoReturn:
+        raise SceneError(message, file=self.path, line=self.line)
+
+    def photometry(self) -> Photometry:
+        tilt = next((i for i, one in enumerate(self.lines) if one.strip()[:5] == "TILT="), None)
+        if tilt is None:
+            self.fail("is no IES file: it has no line TILT=")
+        self.line = tilt + 1
+        kind = self.lines[tilt].strip()[5:].strip().upper()
+        self.numbers = self._numbers(tilt + 1)
+        if kind == "INCLUDE":
+            self._many("lamp's tilt", 1)
+            pairs = self._count("angles of tilt")
+            self._many("tilt", 2 * pairs)
+        elif kind != "NONE":
+            self.fail(f"TILT={kind[:40]} is a file of its own; write TILT=NONE or INCLUDE")
+        head = dict(zip(HEADER[:3], self._many("header", 3), strict=True))
+        sizes = [self._count(f"{name} angles") for name in ("vertical", "horizontal")]
+        if math.prod(sizes) > MOST_VALUES:
+            self.fail(
+                f"{sizes[0]} x {sizes[1]} values are more than the {MOST_VALUES} that are read"
+            )
+        rest = self._many("header", len(HEADER) - 5)
+        photometry, ballast = rest[0], rest[5]
+        if photometry in TYPES:
+            self.fail(f"photometry of type {TYPES[int(photometry)]}; only type C is supported")
+        if photometry != 1.0:
+            self.fail(f"the type of photometry is 1, 2 or 3, not {photometry:g}")
+        vertical, horizontal = (
+            self._angles(name, n) for name, n in zip(("vertical", "horizontal"), sizes, strict=True)
+        )
+        if vertical[0] < -1e-9 or vertical[-1] > 180.0 + 1e-9:
+            self.fail("vertical angles must lie between 0 and 180 degrees")
+        self._check_around(horizontal)
+        values = self._many("candela", math.prod(sizes))
+        candela = np.array(values).reshape(sizes[1], sizes[0]) * head["multiplier"] * ballast
+        if not (np.isfinite(candela).all() and (candela >= 0.0).all() and candela.any()):
+            self.fail("candela must not be negative, and not all zero")
+        return Photometry(vertical, horizontal, candela)
+
+    def _check_around(self, angles: NDArray[np.float64]) -> None:
+        """What is measured goes around whole, or is a half or a quarter of it."""
+        if len(angles) == 1:
+            return
+        ends = angles[[0, -1]]
+        if not any(np.abs(ends - known).max() < 1e-6 for known in AROUND):
+            found = f"{angles[0]:g} to {angles[-1]:g}"
+            message = "horizontal angles go from 0 to 90, 180 or 360, or from 90 to 270 degrees"
+            self.fail(f"{message}, not from {found}")
+
+    def _angles(self, name: str, count: int) -> NDArray[np.float64]:
+        angles = np.array(self._many(f"{name} angles", count))
+        if not (np.diff(angles) > 0.0).all():
+            self.fail(f"{name} angles must rise")
+        return angles
+
+    def _numbers(self, first: int) -> Iterator[float]:
+        for number, text in enumerate(self.lines[first:], first + 1):
+            for word in text.replace(",", " ").split():
+                self.line = number
+                try:
+                    value = float(word)
+                except ValueError:
+                    value = math.nan
+                if not math.isfinite(value):
+                    self.fail(f"{word[:20]!r} is no number")
+                yield value
+
+    def _many(self, what: str, count: int) -> list[float]:
+        values = [value for _, value in zip(range(count), self.numbers, strict=False)]
+        if len(values) < count:
+            self.line = len(self.lines)
+            self.fail(f"ends early: {len(values)} of {count} numbers of its {what}")
+        return values
+
+    def _count(self, what: str) -> int:
+        value = self._many(f"number of {what}", 1)[0]
+        if value != int(value) or not 1 <= value <= MOST_VALUES:
+            self.fail(f"the number of {what} must be a whole one from 1, not {value:g}")
+        return int(value)

@@ -1,0 +1,128 @@
+"""A camera's lens in scene.json: a name, a file, or its surfaces [mm]."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from clpt import lenses, spectra
+from clpt.formats.native import spectra as json_spectra
+from clpt.formats.native.cursor import Cursor
+from clpt.formats.native.json_schema import NUMBER, NUMBERS, STRING, Schema, object_of, ref
+from clpt.formats.native.spectra import find_file
+from clpt.lenses import Coat, Prescription, Surface
+from clpt.lenses.glasses import by_number
+from clpt.spectra import Constant, Spectrum
+
+WORDS = (
+    "a name of the library, the name of a `.dat`, `.zmx` or `.txt` file, or"
+    ' `{"surfaces": [...]}`, see [lenses](lenses.md)'
+)
+LENGTHS = ("radius", "thickness", "semi_diameter", "conic")
+
+
+def read(cursor: Cursor) -> Prescription | str:
+    """Return a lens: its name in the library, or what it is made of. Raises SceneError."""
+    if isinstance(cursor.value, str):
+        if cursor.value in lenses.names():
+            return cursor.value
+        if "." not in cursor.value:
+            with cursor.locating():
+                lenses.library(cursor.value)
+        path = find_file(cursor)
+        with cursor.locating():
+            return lenses.read(path)
+    cursor.expect(dict, "a name or a lens")
+    cursor.check_keys("lens", ("surfaces", "name", "source"), ("surfaces",))
+    surfaces = []
+    for entry in cursor.at("surfaces").entries():
+        surfaces.append(_surface(entry))
+    texts = {k: cursor.at(k).expect(str) for k in ("name", "source") if k in cursor.value}
+    with cursor.locating():
+        return Prescription(tuple(surfaces), **texts)
+
+
+def _surface(cursor: Cursor) -> Surface:
+    cursor.check_keys(
+        "surface", (*LENGTHS, "glass", "aspheric", "coating", "stop"), ("semi_diameter",)
+    )
+    given: dict[str, Any] = {k: cursor.at(k).number() for k in LENGTHS if k in cursor.value}
+    if "glass" in cursor.value:
+        given["glass"] = _glass(cursor.at("glass"))
+    if "aspheric" in cursor.value:
+        given["aspheric"] = tuple(cursor.at("aspheric").numbers())
+    if "coating" in cursor.value:
+        given["coating"] = tuple(_coat(each) for each in cursor.at("coating").entries())
+    if "stop" in cursor.value:
+        given["stop"] = cursor.at("stop").expect(bool)
+    surface = Surface(**{"radius": 0.0, "thickness": 0.0, **given})
+    with cursor.locating():
+        surface.check()
+    return surface
+
+
+def _glass(cursor: Cursor) -> Spectrum:
+    """An index as elsewhere, or its number at the line d and an Abbe number."""
+    if isinstance(cursor.value, list) and len(cursor.value) == 2:
+        with cursor.locating():
+            return by_number(*cursor.numbers(2))
+    found = json_spectra.read(cursor, "index")
+    return Constant(found) if isinstance(found, (int, float)) else spectra.index(found)
+
+
+def _coat(cursor: Cursor) -> Coat:
+    cursor.check_keys("film", ("index", "thickness"), ("index", "thickness"))
+    found = json_spectra.read(cursor.at("index"), "index")
+    index = Constant(found) if isinstance(found, (int, float)) else spectra.index(found)
+    return Coat(index, cursor.at("thickness").number())
+
+
+def write(lens: Prescription | str) -> Any:
+    """Return what stands for a lens in JSON, such that `read` gives it back."""
+    if isinstance(lens, str):
+        return lens
+    texts = {k: getattr(lens, k) for k in ("name", "source") if getattr(lens, k)}
+    return {**texts, "surfaces": [_written(surface) for surface in lens.surfaces]}
+
+
+def _written(surface: Surface) -> dict[str, Any]:
+    made: dict[str, Any] = {k: getattr(surface, k) for k in LENGTHS}
+    made["glass"] = json_spectra.write(surface.glass, "index")
+    if surface.aspheric:
+        made["aspheric"] = list(surface.aspheric)
+    if surface.coating:
+        made["coating"] = [
+            {"index": json_spectra.write(film.index, "index"), "thickness": film.thickness}
+            for film in surface.coating
+        ]
+    if surface.stop:
+        made["stop"] = True
+    return made
+
+
+def _schema() -> Schema:
+    index = {"anyOf": [ref("spectrum_index"), {**NUMBERS, "minItems": 2, "maxItems": 2}]}
+    film = object_of(
+        {"index": ref("spectrum_index"), "thickness": {**NUMBER, "description": "[nm]"}},
+        ["index", "thickness"],
+    )
+    surface = object_of(
+        {
+            "radius": {**NUMBER, "description": "[mm]; 0: a plane"},
+            "thickness": {**NUMBER, "description": "to the next surface [mm]"},
+            "semi_diameter": {**NUMBER, "description": "[mm]"},
+            "conic": {**NUMBER, "description": "0: a sphere, -1: a parabola"},
+            "glass": {**index, "description": "behind it; two numbers: n_d and V_d"},
+            "aspheric": {**NUMBERS, "description": "of r^4, r^6, ... in mm"},
+            "coating": {"type": "array", "items": film, "description": "from the front on"},
+            "stop": {"type": "boolean"},
+        },
+        ["semi_diameter"],
+    )
+    whole = object_of(
+        {"name": STRING, "source": STRING, "surfaces": {"type": "array", "items": surface}},
+        ["surfaces"],
+    )
+    return {"anyOf": [{**STRING, "description": "of the library, or a file"}, whole]}
+
+
+SCHEMA = _schema()

@@ -1,0 +1,165 @@
+"""What a lens is made of: surfaces from the front to the film, as patents and lens files list them.
+
+Lengths are in millimetres. A radius is above 0 where the centre lies behind the surface; 0 is a
+plane. Light that makes a picture meets the first surface first.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from clpt.errors import SceneError
+from clpt.lenses.glasses import AIR, LINE_D
+from clpt.spectra import Constant, Spectrum
+
+MOST_SURFACES = 100
+MOST_TERMS = 8  # aspheric, of r^4 to r^18
+MOST_COATS = 6
+
+
+@dataclass(frozen=True)
+class Coat:
+    """One thin film of a coating: its index, and its thickness [nm]."""
+
+    index: Spectrum
+    thickness: float
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """One surface.
+
+    radius, thickness to the next one, semi_diameter: [mm]; glass: behind it; conic: 0 is a sphere,
+    -1 a parabola; aspheric: factors of r^4, r^6, ... [mm^-3, mm^-5, ...] that are added to the
+    sag; coating: its films from the front; stop: whether the diaphragm stands here.
+    """
+
+    radius: float
+    thickness: float
+    glass: Spectrum = AIR
+    semi_diameter: float = 0.0
+    conic: float = 0.0
+    aspheric: tuple[float, ...] = ()
+    coating: tuple[Coat, ...] = ()
+    stop: bool = False
+
+    @property
+    def curvature(self) -> float:
+        """1 / radius [1/mm]; of a plane 0."""
+        return 0.0 if self.radius == 0.0 else 1.0 / self.radius
+
+    def check(self) -> None:
+        """Raise SceneError for numbers that no surface has."""
+        numbers = (self.radius, self.thickness, self.semi_diameter, self.conic, *self.aspheric)
+        if not all(map(math.isfinite, numbers)):
+            raise SceneError("a number is not finite")
+        if not self.semi_diameter > 0.0:
+            raise SceneError(f"a semi-diameter must be above 0, not {self.semi_diameter:g}")
+        if (
+            self.radius
+            and (1.0 + self.conic) * (self.semi_diameter / self.radius) ** 2 > 1.0 + 1e-6
+        ):
+            raise SceneError(
+                f"a surface of radius {self.radius:g} cannot reach to its semi-diameter"
+                f" {self.semi_diameter:g}"
+            )
+        if len(self.aspheric) > MOST_TERMS:
+            raise SceneError(f"at most {MOST_TERMS} aspheric terms, not {len(self.aspheric)}")
+        if len(self.coating) > MOST_COATS:
+            raise SceneError(f"at most {MOST_COATS} films in a coating, not {len(self.coating)}")
+        index = float(self.glass.sample(LINE_D))
+        if not 1.0 - 1e-3 <= index <= 5.0:
+            raise SceneError(f"an index lies between 1 and 5, not {index:g}")
+
+
+@dataclass(frozen=True, eq=False)
+class Prescription:
+    """A lens: its surfaces from the front to the film, a name, and where the numbers are from."""
+
+    surfaces: tuple[Surface, ...]
+    name: str = ""
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        if not 1 <= len(self.surfaces) <= MOST_SURFACES:
+            count = len(self.surfaces)
+            raise SceneError(f"a lens has 1 to {MOST_SURFACES} surfaces, not {count}")
+        for i, surface in enumerate(self.surfaces, 1):
+            try:
+                surface.check()
+            except SceneError as error:
+                raise SceneError(f"surface {i}: {error.message}", where=error.where) from None
+        stops = sum(surface.stop for surface in self.surfaces)
+        if stops != 1:
+            raise SceneError(f"a lens has one stop, not {stops}")
+        if self.surfaces[-1].glass != AIR:
+            raise SceneError("behind its last surface a lens must end in air")
+        for i, surface in enumerate(self.surfaces[:-1], 1):
+            if not surface.thickness >= 0.0:
+                raise SceneError(f"surface {i}: its thickness {surface.thickness:g} is below 0")
+
+    @cached_property
+    def stop(self) -> int:
+        """The number of the surface where the diaphragm stands, from 0."""
+        return next(i for i, surface in enumerate(self.surfaces) if surface.stop)
+
+    @cached_property
+    def vertices(self) -> tuple[float, ...]:
+        """Where the surfaces stand along the axis, from the first one towards the film [mm]."""
+        places = [0.0]
+        for surface in self.surfaces[:-1]:
+            places.append(places[-1] + surface.thickness)
+        return tuple(places)
+
+    @property
+    def length(self) -> float:
+        """From the first to the last surface [mm]."""
+        return self.vertices[-1]
+
+    @property
+    def disperses(self) -> bool:
+        """Whether the index of one of its glasses differs between wavelengths."""
+        return any(not isinstance(surface.glass, Constant) for surface in self.surfaces)
+
+    def indices(self, wavelength: float) -> list[float]:
+        """Return the index in front of the lens and behind each surface, at a wavelength [nm]."""
+        return [1.0, *(float(surface.glass.sample(wavelength)) for surface in self.surfaces)]
+
+    def scaled(self, factor: float) -> Prescription:
+        """Return the same lens in another size; coatings stay as they are."""
+        return replace(self, surfaces=tuple(_scaled(each, factor) for each in self.surfaces))
+
+    def with_stop(self, semi_diameter: float) -> Prescription:
+        """Return the lens with a stop of another semi-diameter [mm]."""
+        surfaces = list(self.surfaces)
+        surfaces[self.stop] = replace(surfaces[self.stop], semi_diameter=semi_diameter)
+        return replace(self, surfaces=tuple(surfaces))
+
+    def with_coating(self, coating: Sequence[Coat]) -> Prescription:
+        """Return the lens with a coating on each surface between air and glass that has none.
+
+        coating: from the air to the glass.
+        """
+        before: Spectrum = AIR
+        surfaces = []
+        for surface in self.surfaces:
+            films = surface.coating
+            if not films and before != surface.glass and AIR in (before, surface.glass):
+                films = tuple(coating) if before == AIR else tuple(reversed(coating))
+            surfaces.append(replace(surface, coating=films))
+            before = surface.glass
+        return replace(self, surfaces=tuple(surfaces))
+
+
+def _scaled(surface: Surface, factor: float) -> Surface:
+    aspheric = tuple(a * factor ** -(3.0 + 2.0 * i) for i, a in enumerate(surface.aspheric))
+    return replace(
+        surface,
+        radius=surface.radius * factor,
+        thickness=surface.thickness * factor,
+        semi_diameter=surface.semi_diameter * factor,
+        aspheric=aspheric,
+    )

@@ -1,0 +1,73 @@
+"""Spot diagrams: where the light of a far point meets the film."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.lenses.glasses import LINE_D
+from clpt.lenses.paraxial import cardinal
+from clpt.lenses.prescription import Prescription
+from clpt.lenses.tracing import Rays, trace
+
+Array = NDArray[np.float64]
+RINGS = 24
+
+
+@dataclass(frozen=True)
+class Spot:
+    """Points (n, 2) where a far point's light meets the film [mm], each of the same power.
+
+    through: part of the light into the entrance pupil that gets there.
+    """
+
+    points: Array
+    through: float
+
+    @property
+    def radius(self) -> float:
+        """Root mean square distance from their middle [mm]."""
+        return float(np.sqrt(np.mean(np.sum((self.points - self.points.mean(axis=0)) ** 2, 1))))
+
+
+def pupil_points(rings: int = RINGS) -> Array:
+    """Return points (n, 2) evenly over the unit disk: 6 i + 3 on the ring i."""
+    made = []
+    for i in range(rings):
+        turns = 2.0 * math.pi * (np.arange(6 * i + 3) + 0.5) / (6 * i + 3)
+        made.append((i + 0.5) / rings * np.stack([np.cos(turns), np.sin(turns)], 1))
+    return np.concatenate(made)
+
+
+def bundle(lens: Prescription, angle: float, wide: float = 1.0, rings: int = RINGS) -> Rays:
+    """Return parallel rays to the entrance pupil, from a point at an angle [degrees] in y.
+
+    wide: times the pupil's paraxial radius, as pupils of wide lenses grow off the axis.
+    """
+    found = cardinal(lens)
+    slope = math.tan(math.radians(angle))
+    disk = wide * found.entrance_radius * pupil_points(rings)
+    o = np.column_stack([disk, np.full(len(disk), found.entrance)])
+    d = np.array([[0.0, slope, 1.0]])
+    # From a plane square to the rays, in front of all glass.
+    far = found.entrance + lens.length + 10.0 * found.entrance_radius
+    rays = Rays.of(o, d)
+    rays.o -= rays.d * (far / rays.d[:, 2:])
+    return rays
+
+
+def spot(
+    lens: Prescription, angle: float, wavelength: float = LINE_D, distance: float | None = None
+) -> Spot:
+    """Return the spot of a far point at an angle [degrees] and a wavelength [nm].
+
+    distance: from the last surface to the film [mm]; None: the paraxial focus at the line d.
+    """
+    away = cardinal(lens).back_focus if distance is None else distance
+    rays = trace(lens, bundle(lens, angle), wavelength)
+    at = (lens.length + away - rays.o[:, 2]) / rays.d[:, 2]
+    points = (rays.o + at[:, None] * rays.d)[rays.alive, :2]
+    return Spot(points, float(rays.alive.mean()))

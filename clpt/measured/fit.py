@@ -1,0 +1,186 @@
+"""Measuring a function: the Measurement of any reflection f, by the method of Dupuy and Jakob 2018.
+
+What the surface sends back to where light comes from tells the distribution of its microfacets
+(Dupuy et al. 2015): f(w, w) cos(w) = ndf(w) / (4 sigma(w)) up to a factor, and sigma is an integral
+of ndf, so that ndf is the eigenvector of a matrix that is not negative. Visible normals follow, and
+f is stored over the square that they warp.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from clpt.errors import SceneError
+from clpt.measured.measurement import Measurement
+from clpt.measured.warp import Values, bilinear, sample, warp
+
+# f(wo, wi) [1/sr] of unit directions (n, 3), z along the normal, wo to the viewer: (n, colours)
+Reflection = Callable[[Values, Values], NDArray]
+STEPS = 64  # of the power iteration
+FEWEST = 64  # azimuths of the integral of ndf
+
+
+def fit(
+    f: Reflection,
+    wavelengths: Sequence[float] = (),
+    *,
+    theta_i: ArrayLike | None = None,
+    phi_i: ArrayLike = (0.0,),
+    normals: int = 64,
+    size: int = 32,
+    description: str = "",
+) -> Measurement:
+    """Return the measurement of a reflection.
+
+    wavelengths: [nm] of the colours of f; none where these are red, green and blue. theta_i, phi_i:
+    of the viewers [rad], by default 8 from 0 to 80 degrees and one azimuth, for an isotropic f;
+    else azimuths from -pi on, over all of the circle, a half or a quarter of it. normals, size:
+    rows and columns of the tables of facets, and of f. Raises SceneError.
+    """
+    theta = np.radians(80.0) * np.linspace(0.0, 1.0, 8) if theta_i is None else theta_i
+    thetas, phis = np.asarray(theta, np.float64), np.asarray(phi_i, np.float64)
+    isotropic = len(phis) <= 2
+    x, y = grid(normals, normals)
+    m = direction(x, y)
+    ndf, sigma = _facets(f, m, area(x), normals, isotropic)
+    vndf = np.empty((len(phis), len(thetas), normals, normals))
+    spectra = np.empty((len(phis), len(thetas), len(wavelengths) or 3, size, size))
+    for i, phi in enumerate(phis):
+        for j, theta in enumerate(thetas):
+            wo = spherical(theta, phi)
+            turned = _turned(m, phi) if isotropic else m
+            seen = ndf.ravel() * np.maximum(turned @ wo, 0.0) * area(x)
+            vndf[i, j] = seen.reshape(normals, normals)
+            spectra[i, j] = _over_square(f, wo, phi * isotropic, vndf[i, j], ndf, sigma, size)
+    vndf = warp(vndf).values * (normals - 1) ** 2
+    luminance = spectra.mean(axis=2)
+    luminance /= np.maximum(luminance.mean(axis=(-2, -1), keepdims=True), 1e-30)
+    return Measurement(
+        phi_i=phis, theta_i=thetas, ndf=ndf, sigma=sigma, vndf=vndf, luminance=luminance,
+        spectra=spectra, wavelengths=np.asarray(wavelengths), description=description,
+    )  # fmt: skip
+
+
+def hemispherical(measurement: Measurement) -> Values:
+    """Return the share of light (colours,) that is reflected to the first viewer; at most 1.
+
+    It is the mean of f cos(theta) over the density of visible normals, which light is mirrored at.
+    """
+    count = measurement.luminance.shape[-1]
+    at = (np.arange(2 * count) + 0.5) / (2 * count)
+    v, u = (axis.ravel() for axis in np.meshgrid(at, at, indexing="ij"))
+    x, y, density = sample(warp(measurement.vndf[0, 0]), u, v)
+    wo = spherical(measurement.theta_i[0], measurement.phi_i[0])
+    m = _turned(direction(x, y), float(measurement.phi_i[0]) * measurement.isotropic)
+    values = bilinear(measurement.spectra[0, 0], u, v)
+    if measurement.jacobian:
+        facets = bilinear(measurement.ndf, x, y) / 4.0
+        values = values * facets / bilinear(measurement.sigma, *_square(wo[None]))
+    solid = np.maximum(area(x), 1e-6) * 4.0 * np.maximum(m @ wo, 0.0)
+    share = values * solid / np.maximum(density, 1e-30)
+    return np.minimum(share.mean(axis=1), 1.0)
+
+
+@cache
+def grey() -> Measurement:
+    """Return the measurement of a matt surface that reflects half of all light."""
+    even = np.full(3, 0.5 / np.pi)
+    return fit(lambda wo, wi: np.broadcast_to(even, wi.shape), normals=24, size=16)
+
+
+def _over_square(
+    f: Reflection, wo: Values, turn: float, vndf: Values, ndf: Values, sigma: Values, size: int
+) -> Values:
+    """f cos(theta) over ndf / (4 sigma), (colours, size, size), at a grid of the warped square."""
+    u, v = grid(size, size)
+    x, y, _ = sample(warp(vndf), u, v)
+    m = _turned(direction(x, y), turn)
+    wi = 2.0 * (m @ wo)[:, None] * m - wo
+    good = (wi[:, 2] > 0.0) & (m @ wo > 0.0)
+    values = np.where(good[:, None], f(np.broadcast_to(wo, wi.shape), wi), 0.0)
+    values = values * np.maximum(wi[:, 2:], 0.0)
+    if not np.isfinite(values).all() or (values < 0.0).any():
+        raise SceneError("the reflection to measure is negative or not finite")
+    there = _square(wo[None])
+    density = bilinear(ndf, x, y) / (4.0 * bilinear(sigma, *there))
+    made = np.divide(values, density[:, None], np.zeros_like(values), where=density[:, None] > 0)
+    return made.T.reshape(-1, size, size)
+
+
+def _facets(
+    f: Reflection, m: Values, solid: Values, n: int, isotropic: bool
+) -> tuple[Values, Values]:
+    """The distribution of facets [1/sr] and its projected areas, (n, n) each, at directions m.
+
+    solid: solid angle over area of the square there.
+    """
+    weight = solid / (n - 1) ** 2 * _ends(n)
+    if isotropic:  # one row of directions; the integral goes over all of the square
+        rows = slice(0, n)
+        at = spherical(0.5 * np.pi * np.linspace(0.0, 1.0, n) ** 2, 0.0)
+        fold = np.tile(np.eye(n), (n, 1))
+    else:
+        rows = slice(0, n * n)
+        at, fold = m, np.eye(n * n)
+    at = at[rows].copy()
+    at[:, 2] = np.maximum(at[:, 2], 1e-3)  # at the horizon nothing is sent back
+    at /= np.linalg.norm(at, axis=1, keepdims=True)
+    back = np.asarray(f(at, at), np.float64).mean(axis=1) * at[:, 2]
+    back *= np.isfinite(back)
+    if not (back > 0.0).any():
+        raise SceneError("nothing is sent back to where light comes from: it cannot be measured")
+    kernel = (np.maximum(at @ m.T, 0.0) * weight) @ fold
+    ndf = np.ones(len(at))
+    for _ in range(STEPS):
+        ndf = back * (kernel @ ndf)
+        ndf /= ndf.max()
+    sigma = kernel @ ndf
+    ndf = np.tile(ndf, (n, 1)) if isotropic else ndf.reshape(n, n)
+    sigma = np.tile(sigma, (n, 1)) if isotropic else sigma.reshape(n, n)
+    flat = (weight * ndf.ravel()) @ m[:, 2]  # the facets' areas seen from above are 1
+    return ndf / flat, sigma / flat
+
+
+def grid(rows: int, columns: int) -> tuple[Values, Values]:
+    """Corners (rows * columns,) of cells of the unit square: x, y."""
+    y, x = np.meshgrid(np.linspace(0, 1, rows), np.linspace(0, 1, columns), indexing="ij")
+    return x.ravel(), y.ravel()
+
+
+def _ends(n: int) -> Values:
+    """Weights (n * n,) of the trapezoidal rule."""
+    edge = np.where((np.arange(n) == 0) | (np.arange(n) == n - 1), 0.5, 1.0)
+    return np.outer(edge, edge).ravel()
+
+
+def area(x: Values) -> Values:
+    """Solid angle [sr] over area of the square, at its points of that x."""
+    return 2.0 * np.pi**2 * x * np.sin(0.5 * np.pi * x * x)
+
+
+def direction(x: Values, y: Values) -> Values:
+    """The direction (n, 3) at points of the square."""
+    return spherical(0.5 * np.pi * x * x, (2.0 * y - 1.0) * np.pi)
+
+
+def _square(w: Values) -> tuple[Values, Values]:
+    """The points of the square of directions (n, 3)."""
+    theta = np.arctan2(np.hypot(w[:, 0], w[:, 1]), w[:, 2])
+    phi = np.arctan2(w[:, 1], w[:, 0])
+    return np.sqrt(theta * 2.0 / np.pi), (phi + np.pi) / (2.0 * np.pi)
+
+
+def spherical(theta: ArrayLike, phi: ArrayLike) -> Values:
+    theta, phi = np.broadcast_arrays(np.asarray(theta, float), np.asarray(phi, float))
+    sine = np.sin(theta)
+    return np.stack([sine * np.cos(phi), sine * np.sin(phi), np.cos(theta)], axis=-1)
+
+
+def _turned(w: Values, phi: float) -> Values:
+    """Directions (n, 3) turned about z."""
+    c, s = np.cos(phi), np.sin(phi)
+    return w @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])

@@ -1,0 +1,166 @@
+"""Tables of MERL (Matusik et al. 2003): isotropic reflection by halfway and difference angles.
+
+A file `.binary` has three int32, by default 90 x 90 x 180, then float64 for red, green and blue:
+over the halfway direction's angle to the normal, whose root is in even steps, the angle from it to
+the light, and the azimuth of that, up to pi (Rusinkiewicz 1998).
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import output_files
+from clpt.errors import SceneError
+from clpt.measured.fit import Reflection, area, direction, grid, spherical
+from clpt.measured.warp import Values, sample, warp
+
+STEPS = (90, 90, 180)  # of the published files
+SCALES = np.array([1.0, 1.15, 1.66]) / 1500.0  # of the numbers in a file [1/sr]
+MOST_VALUES = 1 << 24
+VIEWERS, ROWS, COLUMNS = 16, 32, 64  # of the table by which light is sampled
+EVEN = 0.05  # share of light that is sampled by the cosine alone
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MerlTable:
+    """A reflection f [1/sr], (halfway, difference, azimuths, 3) float32, linear in between.
+
+    A number below 0 says that no light meets the surface so. Raises SceneError for another shape,
+    for numbers that are not finite, and where none is from 0 on.
+    """
+
+    values: NDArray[Any]
+
+    def __post_init__(self) -> None:
+        made = np.asarray(self.values, np.float32)
+        if made.ndim != 4 or made.shape[3] != 3 or min(made.shape) < 2:
+            raise SceneError(f"must be (halfway, difference, azimuths, 3), not {made.shape}")
+        if made.size > 3 * MOST_VALUES:
+            raise SceneError(f"has {made.size:,} numbers; at most {3 * MOST_VALUES:,} are read")
+        if not np.isfinite(made).all():
+            raise SceneError("has a number that is not finite")
+        if (made < 0.0).all():
+            raise SceneError("has no number from 0 on")
+        object.__setattr__(self, "values", made)
+
+
+def read(path: str | Path) -> MerlTable:
+    """Read a table. Raises SceneError for what is none."""
+    path = Path(path)
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise SceneError(f"cannot be read: {error.strerror or error}", file=path) from None
+    shape = struct.unpack_from("<3i", data) if len(data) >= 12 else (0, 0, 0)
+    if min(shape) < 2 or (count := math.prod(shape)) > MOST_VALUES:
+        shown = " x ".join(map(str, shape))
+        raise SceneError(f"is no table of MERL: it cannot be {shown}", file=path)
+    if len(data) != 12 + 24 * count:
+        message = f"must have {12 + 24 * count:,} bytes by its header, found {len(data):,}"
+        raise SceneError(message, file=path)
+    numbers = np.frombuffer(data, "<f8", 3 * count, 12).reshape(3, *shape)
+    try:
+        with np.errstate(over="ignore"):
+            return MerlTable(values=np.moveaxis(numbers, 0, -1) * SCALES)
+    except SceneError as error:
+        raise SceneError(error.message, file=path) from None
+
+
+def write(path: str | Path, table: MerlTable) -> None:
+    """Write a table, so that `read` gives it back but for rounding. Raises SceneError."""
+    numbers = np.moveaxis(table.values / SCALES, -1, 0).astype("<f8")
+    head = struct.pack("<3i", *table.values.shape[:3])
+    try:
+        output_files.write(path, head + numbers.tobytes())
+    except OSError as error:
+        raise SceneError(f"cannot be written: {error.strerror}", file=Path(path)) from None
+
+
+def tabulate(f: Reflection, steps: tuple[int, int, int] = STEPS) -> MerlTable:
+    """Return the table of an isotropic f(wo, wi), which gives red, green and blue (n, 3) [1/sr]."""
+    at = [(np.arange(n) + 0.5) / n for n in steps]
+    halfway, difference, phi = (axis.ravel() for axis in np.meshgrid(*at, indexing="ij"))
+    halfway, difference, phi = 0.5 * np.pi * halfway**2, 0.5 * np.pi * difference, np.pi * phi
+    across, up = np.sin(difference) * np.cos(phi), np.cos(difference)
+    sine, cosine = np.sin(halfway), np.cos(halfway)
+    wi = np.stack([cosine * across + sine * up, np.sin(difference) * np.sin(phi)], axis=1)
+    wi = np.column_stack([wi, cosine * up - sine * across])
+    h = np.stack([sine, 0.0 * sine, cosine], axis=1)
+    wo = 2.0 * up[:, None] * h - wi
+    lit = (wo[:, 2] > 0.0) & (wi[:, 2] > 0.0)
+    values = np.full((len(lit), 3), -1.0)
+    values[lit] = f(wo[lit], wi[lit])
+    return MerlTable(values=values.reshape(*steps, 3))
+
+
+def filled(table: MerlTable) -> NDArray[Any]:
+    """The values; where no light meets the surface so, those nearer to the mirror's direction."""
+    values = table.values.copy()
+    for i in range(1, values.shape[1]):
+        values[:, i] = np.where(values[:, i] < 0.0, values[:, i - 1], values[:, i])
+    return np.maximum(values, 0.0)
+
+
+def densities(values: NDArray[Any]) -> tuple[Values, Values, Values]:
+    """How light is sampled: angles of viewers (n,) [rad], densities over the square of halfway
+    directions (n, rows, columns), and the share of light (3,) that a viewer along the normal sees.
+
+    values: of `filled`. Of the brightest of neighbours each, so that nothing bright is missed.
+    """
+    x, y = grid(ROWS, COLUMNS)
+    angles = 0.5 * np.pi * (np.arange(VIEWERS) / (VIEWERS - 0.75))
+    made = np.empty((VIEWERS, ROWS, COLUMNS))
+    for i, theta in enumerate(angles):
+        wo, light, solid = _seen(values, theta, x, y)
+        brightness = (light.mean(axis=1) * solid).reshape(ROWS, COLUMNS)
+        even = (np.maximum(wo, 0.0) * solid).reshape(ROWS, COLUMNS)
+        shares = [_widest(one) / max(one.mean(), 1e-30) for one in (brightness, even)]
+        made[i] = (1.0 - EVEN) * shares[0] + EVEN * shares[1]
+    at = (np.arange(128) + 0.5) / 128
+    v, u = (axis.ravel() for axis in np.meshgrid(at, at, indexing="ij"))
+    x, y, density = sample(warp(made[0]), u, v)
+    _, light, solid = _seen(values, 0.0, x, y)
+    share = (light * (solid / np.maximum(density, 1e-30))[:, None]).mean(axis=0)
+    return angles, made, np.minimum(share, 1.0)
+
+
+def _seen(
+    values: NDArray[Any], theta: float, x: Values, y: Values
+) -> tuple[Values, Values, Values]:
+    """At halfway directions: cosine of wi, f cos (n, 3), solid angle over area of the square."""
+    wo = spherical(theta, 0.0)
+    m = direction(x, y)
+    cosine = m @ wo
+    wi = 2.0 * cosine[:, None] * m - wo
+    lit = (wi[:, 2] > 0.0) & (cosine > 0.0)
+    solid = np.where(lit, area(x) * 4.0 * np.maximum(cosine, 0.0), 0.0)
+    light = _nearest(values, m, wo, wi) * np.maximum(wi[:, 2:], 0.0)
+    return wi[:, 2], light * lit[:, None], solid
+
+
+def _nearest(values: NDArray[Any], m: Values, wo: Values, wi: Values) -> Values:
+    """The table's nearest values (n, 3) at halfway directions m."""
+    halfway = np.arctan2(np.hypot(m[:, 0], m[:, 1]), m[:, 2])
+    difference = np.arctan2(np.linalg.norm(wi - wo, axis=1), np.linalg.norm(wi + wo, axis=1))
+    turn = np.arctan2(m[:, 1], m[:, 0])
+    c, s = np.cos(turn), np.sin(turn)
+    along = wi[:, 0] * c + wi[:, 1] * s
+    side = wi[:, 1] * c - wi[:, 0] * s
+    phi = np.arctan2(side, np.cos(halfway) * along - np.sin(halfway) * wi[:, 2])
+    at = np.sqrt(halfway * 2.0 / np.pi), difference * 2.0 / np.pi, (phi / np.pi) % 1.0
+    cells = [np.clip((a * n).astype(int), 0, n - 1) for a, n in zip(at, values.shape, strict=False)]
+    return np.asarray(values[tuple(cells)], np.float64)
+
+
+def _widest(values: Values) -> Values:
+    """The largest of each value and its eight neighbours; rows go around."""
+    rows = np.maximum(values, np.maximum(np.roll(values, 1, 0), np.roll(values, -1, 0)))
+    padded = np.pad(rows, ((0, 0), (1, 1)), "edge")
+    return np.maximum(rows, np.maximum(padded[:, 2:], padded[:, :-2]))

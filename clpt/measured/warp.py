@@ -1,0 +1,85 @@
+"""Warps: the unit square to itself, so that even points follow a density that is a bilinear table.
+
+A table is (..., rows, columns): x goes over the columns, y over the rows. Its leading axes are
+parameters, between which density and warp are linear (Dupuy and Jakob 2018, section 4.2).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Values = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Warp:
+    """A density of integral 1, values (..., rows, columns), and its integrals.
+
+    across: (..., rows, columns), along a row up to a column, in steps of columns; down: (...,
+    rows), over all rows above, in the end 1.
+    """
+
+    values: Values
+    across: Values
+    down: Values
+
+
+def warp(values: ArrayLike) -> Warp:
+    """Make a warp of values that are not negative; where all of a table are 0, it is even."""
+    given = np.asarray(values, np.float64)
+    given = np.where((given > 0.0).any(axis=(-2, -1), keepdims=True), given, 1.0)
+    across = _running(given)
+    down = _running(across[..., -1])
+    whole = down[..., -1:]
+    return Warp(given / whole[..., None], across / whole[..., None], down / whole)
+
+
+def _running(values: Values) -> Values:
+    steps = np.cumsum(0.5 * (values[..., 1:] + values[..., :-1]), axis=-1)
+    return np.concatenate([np.zeros_like(values[..., :1]), steps], axis=-1)
+
+
+def bilinear(table: Values, x: Values, y: Values) -> Values:
+    """Values (..., n) of a table (..., rows, columns) at points (n,) of the unit square."""
+    (column, s), (row, t) = _cell(x, table.shape[-1]), _cell(y, table.shape[-2])
+    upper = table[..., row, column] * (1.0 - s) + table[..., row, column + 1] * s
+    lower = table[..., row + 1, column] * (1.0 - s) + table[..., row + 1, column + 1] * s
+    return upper * (1.0 - t) + lower * t
+
+
+def _cell(x: Values, nodes: int) -> tuple[NDArray[np.int64], Values]:
+    at = np.clip(x, 0.0, 1.0) * (nodes - 1)
+    cell = np.minimum(at.astype(np.int64), nodes - 2)
+    return cell, at - cell
+
+
+def sample(of: Warp, u: Values, v: Values) -> tuple[Values, Values, Values]:
+    """Take points (n,) of the unit square to x, y and their density, by one table."""
+    rows, columns = of.values.shape
+    row = np.clip(np.searchsorted(of.down, v, "right") - 1, 0, rows - 2)
+    ends = of.across[row, -1], of.across[row + 1, -1]
+    t = _linear((v - of.down[row]) / _above(of.down[row + 1] - of.down[row]), *ends)
+    sums = of.across[row] * (1.0 - t)[:, None] + of.across[row + 1] * t[:, None]
+    left = u * sums[:, -1]
+    column = np.clip((sums <= left[:, None]).sum(axis=1) - 1, 0, columns - 2)
+    pick = np.arange(len(row))
+    near = of.values[row] * (1.0 - t)[:, None] + of.values[row + 1] * t[:, None]
+    below, above = sums[pick, column], sums[pick, column + 1]
+    a, b = near[pick, column], near[pick, column + 1]
+    s = _linear((left - below) / _above(above - below), a, b)
+    density = (a + s * (b - a)) * (rows - 1) * (columns - 1)
+    return (column + s) / (columns - 1), (row + t) / (rows - 1), density
+
+
+def _linear(u: Values, a: Values, b: Values) -> Values:
+    """x with density proportional to a (1 - x) + b x."""
+    u = np.clip(u, 0.0, 1.0)
+    root = np.sqrt(a * a + u * (b * b - a * a))
+    return np.where(a + root > 0.0, u * (a + b) / _above(a + root), u)
+
+
+def _above(x: Values) -> Values:
+    return np.maximum(x, 1e-300)

@@ -1,0 +1,46 @@
+"""Bricks of grids that emit, as rows of `lights`: kernels/light/emissive_brick.cl."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from clpt.render.contract.light_records import RECORDS, VOLUME
+from clpt.render.lowering.encoder import Encoder
+from clpt.render.lowering.grids import Glow
+from clpt.render.lowering.lights.light_bounds import Bounds
+
+
+@dataclass(frozen=True)
+class BrickLights:
+    """The bricks of a medium that are lights; word: of the medium."""
+
+    word: int
+    glow: Glow
+
+    def rows(self, encoder: Encoder) -> np.ndarray:
+        """Append a record for each brick; return the first word of each in `light_params`."""
+        glow, record = self.glow, RECORDS[VOLUME]
+        words = np.zeros(len(glow.numbers), record.dtype)
+        across = np.cross(glow.edges[:, [1, 2, 0]], glow.edges[:, [2, 0, 1]])
+        surface = 2.0 * np.linalg.norm(across, axis=2).sum(axis=1)
+        volume = np.abs(np.linalg.det(glow.edges))
+        words["medium"], words["number"], words["corner"] = self.word, glow.numbers, glow.corners
+        for axis, name in enumerate("xyz"):
+            words[name] = glow.edges[:, axis]
+        words["chord"], words["inverse"] = 4.0 * volume / surface, 1.0 / volume
+        first = encoder.store.append("light_params", words.view(np.uint32))
+        return first + record.words * np.arange(len(words))
+
+    def bounds(self) -> Bounds:
+        """Boxes around the bricks, which shine in all directions."""
+        corners, edges = self.glow.corners, self.glow.edges
+        count = len(corners)
+        return Bounds(
+            corners + np.minimum(edges, 0.0).sum(axis=1),
+            corners + np.maximum(edges, 0.0).sum(axis=1),
+            np.tile([0.0, 0.0, 1.0], (count, 1)),
+            np.full(count, np.pi), np.full(count, np.pi / 2.0), np.full(count, False),
+            np.full(count, True),
+        )  # fmt: skip

@@ -1,0 +1,172 @@
+"""The media around lights, where paths that start there begin: words of the table `media`.
+
+A lamp at a place is in what boundaries put there. A shape shines into what its `exterior` names,
+else into what is at some points just before it: these must agree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.render.lowering.bodies import BodyWords, matter_of
+from clpt.render.lowering.camera import surroundings
+from clpt.render.lowering.geometry import analytic, shapes
+from clpt.render.lowering.index import SceneIndex
+from clpt.render.lowering.lights import light_bounds
+from clpt.render.lowering.lights.lights import Emitter, LightRows, row_order
+from clpt.render.lowering.lowering_cache import LoweringCache
+from clpt.render.lowering.media import MediumWords
+from clpt.scene import Scene
+
+POINTS = 6  # of a shape that shines
+BEFORE = 1e-4  # how far before it they are, over its size
+AFAR = 1e4  # radii of the scene: a place that stands for infinity
+
+Around = tuple[Any, ...]  # media, or the matter of bodies
+
+
+class LightMedia(NamedTuple):
+    """words: bodies and medium of each row of lights (2 n,) uint32; refusal: why no paths can start
+    at some light, "" if they can; scatter: of each row, whether its light is scattered, (n,)
+    bool."""
+
+    words: NDArray[np.uint32]
+    refusal: str
+    scatter: NDArray[np.bool_]
+
+
+NOWHERE = LightMedia(np.zeros(0, np.uint32), "", np.zeros(0, bool))
+
+
+def light_media(
+    index: SceneIndex,
+    emitters: Sequence[Emitter],
+    lights: LightRows,
+    media: MediumWords,
+    bodies: BodyWords | None,
+    sphere: tuple[NDArray[np.float64], float],
+    cache: LoweringCache,
+) -> LightMedia:
+    """Return the media around all lights of a scene that has media.
+
+    bodies: where these overlap; sphere: centre and radius of one around the scene [m].
+    """
+    scene, rows = index.scene, []
+    if index.emitting:
+        name = index.emitting[0].name or index.emitting[0].kind
+        return NOWHERE._replace(
+            refusal=f"no path starts in the medium {name!r}, which gives out light"
+        )
+    hole = None if bodies is not None else surroundings.open_medium(scene, cache)
+    unknown = (
+        ""
+        if hole is None
+        else (
+            f"the boundary of the medium {hole.name or hole.kind!r} is not closed, so that nobody "
+            "knows whether {} is in it"
+        )
+    )
+    known = _Known(scene, bodies is not None, cache)
+    afar = sphere[0] + AFAR * sphere[1] * np.ones(3)
+    for i in row_order(scene.lights):
+        lamp = scene.lights[i]
+        if unknown:
+            return NOWHERE._replace(refusal=unknown.format(f"lights[{i}]"))
+        if lamp.reach == "placed":
+            bounds = light_bounds.of_lamp(lamp)
+            rows.append((known.at(bounds.low[0]), 1))
+            continue
+        found = known.at(afar)
+        if found:
+            reason = f"the light of lights[{i}] comes from infinity, where a medium has no end"
+            return NOWHERE._replace(refusal=reason)
+        rows.append((found, 1))
+    ends = (*lights.first, len(lights.rows))[1:]
+    for emitter, first, end in zip(emitters, lights.first, ends, strict=True):
+        if unknown and not _says(emitter.shape):
+            return NOWHERE._replace(refusal=unknown.format(shapes.where(emitter.shape)))
+        into = _around_shape(emitter, known)
+        if into is None:
+            reason = f"{shapes.where(emitter.shape)} shines into more than one medium"
+            return NOWHERE._replace(refusal=reason)
+        rows.append((into, end - first))
+    words, scatter = [], []
+    for around, count in rows:
+        if bodies is None:
+            own = 0, media.word(next(iter(around), None))
+        else:
+            own = bodies.around(around, media)
+        words += [own] * count
+        scatter += [_scatters(around)] * count
+    return LightMedia(np.array(words, np.uint32).ravel(), "", np.array(scatter, bool))
+
+
+def _scatters(around: Around) -> bool:
+    """Whether a medium scatters light, which is the first, or that in the first bodies."""
+    media = (one[-1] if isinstance(one, tuple) else one for one in around[:1])
+    return any(medium is not None and medium.scatters for medium in media)
+
+
+class _Known:
+    """What is at points of a scene."""
+
+    def __init__(self, scene: Scene, nested: bool, cache: LoweringCache):
+        self.scene, self.nested, self.cache = scene, nested, cache
+        # A camera's medium that no boundary holds is wherever there is no other.
+        self.rest: Around = ()
+        named = scene.camera.medium
+        if named is not None and not nested:
+            origin = surroundings.camera_origin(scene)
+            self.rest = () if named in surroundings.media_at(scene, origin, cache) else (named,)
+
+    def at(self, p: NDArray[np.float64]) -> Around:
+        """The media at a point (3,) [m], that which counts first; or the bodies."""
+        if self.nested:
+            return surroundings.bodies_at(self.scene, matter_of, p, self.cache)
+        return surroundings.media_at(self.scene, p, self.cache)[:1] or self.rest
+
+
+def _around_shape(emitter: Emitter, known: _Known) -> Around | None:
+    """What a shape shines into, None if that is not the same everywhere."""
+    shape: Any = emitter.shape
+    both = getattr(shape.emission, "two_sided", False)
+    if known.nested and matter_of(shape) is not None:
+        return None
+    if not known.nested and _says(shape):
+        if both and shape.interior is not shape.exterior:
+            return None
+        return () if shape.exterior is None else (shape.exterior,)
+    points = _before(emitter)
+    if both:
+        points = np.concatenate([points, _before(emitter, -BEFORE)])
+    found = [known.at(p) for p in points]
+    return found[0] if all(one == found[0] for one in found) else None
+
+
+def _says(shape: Any) -> bool:
+    """Whether a shape says itself in which media it stands."""
+    return shape.interior is not None or shape.exterior is not None
+
+
+def _before(emitter: Emitter, before: float = BEFORE) -> NDArray[np.float64]:
+    """Some points before a shape that shines, or behind it (n, 3) [m]."""
+    shape, vertices, faces = emitter.shape, emitter.vertices, emitter.faces
+    six = np.concatenate([np.eye(3), -np.eye(3)])
+    if shape.kind == "sphere" and vertices is None:
+        low, high = analytic.bounds(shape)
+        before *= -1.0 if shape.flip_normals else 1.0
+        return (low + high) / 2.0 + (0.5 + before) * (high - low) * six
+    if vertices is not None and faces is None:
+        balls = np.asarray(vertices, np.float64)[:: max(1, len(vertices) // POINTS)]
+        return (balls[:, None, :3] + (1.0 + before) * balls[:, None, 3:] * six).reshape(-1, 3)
+    if vertices is None or faces is None:
+        vertices, faces = surroundings.triangles_of(shape)
+    chosen = np.asarray(faces)[:: max(1, len(faces) // POINTS)]
+    a, b, c = np.moveaxis(np.asarray(vertices, np.float64)[chosen], 1, 0)
+    n = np.cross(b - a, c - a)
+    size = np.sqrt(np.linalg.norm(n, axis=1, keepdims=True))
+    return (a + b + c) / 3.0 + before * n / np.maximum(size, 1e-30)

@@ -1,0 +1,36 @@
+/* A brick of a medium that emits: eight cells along each axis of its grid. A point of it is chosen evenly. What the
+ * point emits into a metre counts as if it came from all of the brick's mean chord c, four times its volume over its
+ * surface. So its radiance is c times that, and its density [1/sr] that of the point, t^2 times 1 / V, times c: on
+ * average one over the solid angle of the brick. Rays that go through the medium weigh what they gather against that,
+ * see optics/grid_flight.cl (Villemin and Hery 2013 sample flames as lights; the weights are ours). */
+
+real emissive_brick_pdf(EmissiveBrick l, real t) { return l.inverse * l.chord * t * t; }
+
+LightSample emissive_brick_sample(EmissiveBrick l, Scene scene, vec3 p, vec2 u, Wavelengths lambdas)
+{
+    natural bits = hash_natural(as_natural(u.x) ^ hash_natural(as_natural(u.y)));
+    real third = unit_interval(bits);
+    vec3 q = madd3(l.x, u.x, madd3(l.y, u.y, madd3(l.z, third, l.corner)));
+    vec3 to = sub3(q, p);
+    mask known = l.medium != 0;
+    real t = sqrt(max_r(dot3(to, to), (real)(1e-20f)));
+    GridWalk w = grid_point(scene, l.medium, l.number, q, known);
+    GridBrick b = grid_brick(scene, w, known);
+    Medium m = medium_load(scene, sel_i(known, l.medium, (integer)(0)), lambdas);
+    Spectrum emits = grid_emission(scene, l.medium, m, w, b, known, hash_natural(bits ^ 0x3c6ef372u), lambdas);
+    LightSample s = light_sample_nothing();
+    s.wi = scale3(to, 1.0f / t);
+    s.t = t;
+    s.radiance = spectrum_scale(emits, l.chord);
+    s.pdf = sel(known & (spectrum_max(emits) > 0.0f), emissive_brick_pdf(l, t), (real)(0.0f));
+    return s;
+}
+
+/* The medium that a row of `lights` is a part of, 0 for any other light. */
+inline integer light_medium(Scene scene, integer row)
+{
+    LightRow l = light_at(scene, row);
+    mask part = l.kind == LIGHT_EMISSIVE_BRICK;
+    integer medium = gather_i(scene.light_params, sel_i(part, l.params, (integer)(0)));
+    return sel_i(part, medium, (integer)(0));
+}

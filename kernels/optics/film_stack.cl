@@ -1,0 +1,112 @@
+/* A stack of thin films between two media: Fresnel's amplitudes at each boundary, and the endless
+ * reflections between the boundaries summed as a geometric series, from the base upward (Airy 1833;
+ * Rouard 1937; Parratt 1954). Nothing in it grows with an absorbing film, so that it is stable.
+ *
+ * An index is n + i k, a wave exp(i (q z - omega t)) with q = n cos [in units of the vacuum's wave
+ * number]; 2 pi q thickness / wavelength is its phase. Born and Wolf 1999, 1.6.4 and 14.4. With Y = q
+ * for s- and Y = q / n^2 for p-polarised light, a boundary's amplitude is (Y - Y') / (Y + Y'). */
+typedef struct { real re, im; } Complex;
+
+inline Complex complex_of(real re, real im)
+{
+    Complex r = {re, im};
+    return r;
+}
+inline Complex complex_add(Complex a, Complex b) { return complex_of(a.re + b.re, a.im + b.im); }
+inline Complex complex_sub(Complex a, Complex b) { return complex_of(a.re - b.re, a.im - b.im); }
+inline Complex complex_mul(Complex a, Complex b)
+{
+    return complex_of(a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re);
+}
+inline real complex_norm(Complex a) { return a.re * a.re + a.im * a.im; } /* |a|^2 */
+inline Complex complex_div(Complex a, Complex b)
+{
+    real inv = 1.0f / max_r(complex_norm(b), (real)(1e-30f));
+    return complex_of((a.re * b.re + a.im * b.im) * inv, (a.im * b.re - a.re * b.im) * inv);
+}
+/* The root with re, im >= 0 of a number with im >= 0: a wave that goes on, or dies away. */
+inline Complex complex_sqrt(Complex a)
+{
+    real large = sqrt(0.5f * (sqrt(complex_norm(a)) + fabs(a.re)));
+    real small = 0.5f * a.im / max_r(large, (real)(1e-15f));
+    return complex_of(sel(a.re < 0.0f, small, large), sel(a.re < 0.0f, large, small));
+}
+
+/* What a medium is to a wave of given direction: Y of both polarisations; q is that of s. */
+typedef struct { Complex s, p; } Medium;
+
+/* Medium of index eta + i k; the wave came in at cosine c from a medium of index `from`. */
+inline Medium medium_of(real eta, real k, real from, real c)
+{
+    Complex index2 = complex_of(eta * eta - k * k, 2.0f * eta * k);
+    Medium m;
+    m.s = complex_sqrt(complex_of((eta - from) * (eta + from) - k * k + sqr(from * c), index2.im));
+    m.p = complex_div(m.s, index2);
+    return m;
+}
+
+/* One polarisation's wave at the top of what has been stacked: the amplitude that comes back, and
+ * the share of power that goes down to a base that does not absorb. */
+typedef struct { Complex r; real t; } Wave;
+
+/* Puts a medium on top. The powers' ratio Re Y' / Re Y is dealt out over all boundaries as |Y'| / |Y|,
+ * so that grazing light divides nothing by zero. */
+inline Wave wave_cross(Wave w, Complex above, Complex below)
+{
+    Complex sum = complex_add(above, below), difference = complex_sub(above, below);
+    Complex d = complex_add(sum, complex_mul(difference, w.r));
+    w.r = complex_div(complex_add(difference, complex_mul(sum, w.r)), d);
+    real passed = 4.0f * sqrt(complex_norm(above) * complex_norm(below));
+    w.t *= passed / max_r(complex_norm(d), (real)(1e-30f));
+    return w;
+}
+/* Down through the topmost medium and up again: there and back `turns` of phase, |amplitude| `left`. */
+inline Wave wave_through(Wave w, real turns, real left)
+{
+    real s, c;
+    sincos_2pi(turns - floor(turns), &s, &c);
+    w.r = complex_mul(w.r, complex_of(left * c, left * s));
+    w.t *= left;
+    return w;
+}
+
+/* All that is stacked so far, at one wavelength. */
+typedef struct { Medium top; Wave s, p; } Stack;
+
+inline Stack stack_on(real eta, real k, real from, real c)
+{
+    Stack a;
+    a.top = medium_of(eta, k, from, c);
+    a.s.r = a.p.r = complex_of((real)(0.0f), (real)(0.0f));
+    a.s.t = a.p.t = sel(a.top.s.re > 0.0f, (real)(1.0f), (real)(0.0f)); /* totally reflected: nothing */
+    return a;
+}
+inline Stack stack_cross(Stack a, Medium above)
+{
+    a.s = wave_cross(a.s, above.s, a.top.s);
+    a.p = wave_cross(a.p, above.p, a.top.p);
+    a.top = above;
+    return a;
+}
+/* Lengths [nm]. */
+inline Stack stack_layer(Stack a, Medium layer, real thickness, real lambda)
+{
+    a = stack_cross(a, layer);
+    real waves = 2.0f * thickness / lambda;
+    real turns = layer.s.re * waves, left = exp2_r(layer.s.im * waves * -9.06472028f); /* -2 pi / ln 2 */
+    a.s = wave_through(a.s, turns, left);
+    a.p = wave_through(a.p, turns, left);
+    return a;
+}
+inline Wave wave_sel(mask m, Wave a, Wave b)
+{
+    Wave w = {{sel(m, a.r.re, b.r.re), sel(m, a.r.im, b.r.im)}, sel(m, a.t, b.t)};
+    return w;
+}
+inline Stack stack_sel(mask m, Stack a, Stack b)
+{
+    Stack r = {{{sel(m, a.top.s.re, b.top.s.re), sel(m, a.top.s.im, b.top.s.im)},
+                {sel(m, a.top.p.re, b.top.p.re), sel(m, a.top.p.im, b.top.p.im)}},
+               wave_sel(m, a.s, b.s), wave_sel(m, a.p, b.p)};
+    return r;
+}

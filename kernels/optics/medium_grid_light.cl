@@ -1,0 +1,138 @@
+/* What a medium on a grid emits: as much of a radiance as it absorbs of any (Kirchhoff). That is the medium's, times
+ * numbers on the grid, or that of a black body whose temperature is on the grid. Both have points as the density, and
+ * are trilinear between; as Planck's law is not linear all eight points around count.
+ *
+ * In `materials` there stand behind the row of a grid: the first word in `images` of a table with a word for each
+ * brick, 0 where all is dark: 1 + the row of `lights` that it is, 0 if it emits nothing, -1 if it is no light; 0, 1 for
+ * black bodies, or 2 where these are normalised; the first word in `images` of the grid's bricks, 0 for none; a
+ * factor of black bodies; of these in RGB mode the first float of their colours in `distributions`, and how many there
+ * are to a kelvin. */
+#define GRID_LIGHT (2 * MEDIUM_SCATTERING + 19) /* words from a medium's row */
+
+inline integer grid_brick_number(GridWalk w) { return (w.z * w.ny + w.y) * w.nx + w.x; }
+
+/* The word of the walk's brick in that table. */
+inline integer grid_light_row(Scene scene, integer name, GridWalk w, mask active)
+{
+    integer table = gather_i(scene.materials, sel_i(active, MEDIUM_ROW(name) + GRID_LIGHT, (integer)(0)));
+    active = active & (table != 0);
+    integer row = gather_i(scene.images, sel_i(active, table + grid_brick_number(w), (integer)(0)));
+    return sel_i(active, row, (integer)(0));
+}
+
+/* The number at the walk's point in bricks that begin at word `first` of `images`. */
+inline real grid_number(Scene scene, GridWalk w, integer first, mask active)
+{
+    integer at = sel_i(active, first + 2 * grid_brick_number(w), (integer)(0));
+    integer points = first + gather_i(scene.images, at);
+    real most = gather_w(scene.images, at + 1), sum = 0.0f;
+    active = active & (most > 0.0f);
+#define AXIS(a)                                                                                              \
+    real p_##a = clamp_r(w.o.a + w.t * w.d.a - to_real(GRID_CELLS * w.a), (real)(0.0f), (real)(GRID_CELLS)); \
+    integer c_##a = clamp_i(to_integer(p_##a), (integer)(GRID_CELLS - 1));                                   \
+    p_##a -= to_real(c_##a);
+    AXIS(x)
+    AXIS(y)
+    AXIS(z)
+#undef AXIS
+    integer corner = (c_z * GRID_POINTS + c_y) * GRID_POINTS + c_x;
+    for (int i = 0; i < 8; i++) {
+        integer point = corner + ((i >> 2) * GRID_POINTS + ((i >> 1) & 1)) * GRID_POINTS + (i & 1);
+        integer word = gather_i(scene.images, sel_i(active, points + (point >> 1), (integer)(0)));
+        real share = (i & 1 ? p_x : 1.0f - p_x) * (i & 2 ? p_y : 1.0f - p_y) * (i & 4 ? p_z : 1.0f - p_z);
+        sum += share * to_real((word >> ((point & 1) << 4)) & 0xffff);
+    }
+    return sel(active, sum * most * (1.0f / 65535.0f), (real)(0.0f));
+}
+
+#if GRIDS_GLOW
+/* Planck's law [W m^-2 sr^-1 nm^-1], times `factor`; normalised: 1 at its highest. at: of the grid's words. */
+inline Spectrum grid_black_body(Scene scene, integer at, real kelvin, mask normalised, mask active, Wavelengths lambdas)
+{
+    real factor = gather_w(scene.materials, at + 3);
+    mask hot = active & (kelvin > 1.0f);
+    kelvin = sel(hot, kelvin, (real)(1.0f));
+#if SPECTRUM_SIZE == 4
+    real t2 = kelvin * kelvin, top = 4.0956747e-15f * t2 * t2 * kelvin;
+    factor *= sel(normalised, 1.0f / top, (real)(1.0f));
+    Spectrum r;
+#define C(c)                                                                                        \
+    real nm_##c = lambdas.c, m2_##c = nm_##c * nm_##c;                                              \
+    real less_##c = exp_r(-min_r(1.438776877e7f / (nm_##c * kelvin), (real)(80.0f)));               \
+    r.c = sel(hot, factor * 1.191042972e20f / (m2_##c * m2_##c * nm_##c) * less_##c / (1.0f - less_##c), (real)(0.0f));
+    SPECTRUM_EACH(C)
+#undef C
+    return r;
+#else
+    real place = kelvin * gather_w(scene.materials, at + 5);
+    integer cell = clamp_i(to_integer(place), (integer)(1022));
+    real share = clamp_r(place - to_real(cell), (real)(0.0f), (real)(1.0f));
+    integer first = sel_i(hot, gather_i(scene.materials, at + 4) + 3 * cell, (integer)(0));
+    Spectrum r;
+#define C(c, i)                                                             \
+    real low_##c = gather(scene.distributions, first + i);                  \
+    r.c = sel(hot, low_##c + share * (gather(scene.distributions, first + 3 + i) - low_##c), (real)(0.0f));
+    C(x, 0)
+    C(y, 1)
+    C(z, 2)
+#undef C
+    return r;
+#endif
+}
+#endif
+
+/* What a metre emits at the walk's point [W m^-3 sr^-1 nm^-1]: an estimate, by the density of one point around. */
+inline Spectrum grid_emission(Scene scene, integer name, Medium m, GridWalk w, GridBrick b, mask active, natural bits,
+                              Wavelengths lambdas)
+{
+    integer row = sel_i(active, MEDIUM_ROW(name), (integer)(MEDIUM_LIGHT)), at = sel_i(active, row + GRID_LIGHT, row);
+    real density = b.most * grid_density(scene, w, b, active & (b.most > 0.0f), bits);
+    integer source = sel_i(active, gather_i(scene.materials, at + 2), (integer)(0));
+    real number = sel(source != 0, grid_number(scene, w, source, active & (source != 0)), (real)(1.0f));
+    Spectrum light = spectrum_scale(medium_light(scene, row - MEDIUM_LIGHT, texture_point_nowhere(), lambdas), number);
+#if GRIDS_GLOW
+    integer kind = gather_i(scene.materials, at + 1);
+    mask glows = active & (kind != 0);
+    if (any(glows)) {
+        light = spectrum_sel(glows, grid_black_body(scene, at, number, kind == 2, glows, lambdas), light);
+    }
+#endif
+    Spectrum scatters = m.sigma_s;
+#if GRIDS_TINTED
+    scatters = grid_scatters(scene, name, w, scatters, active, bits, lambdas);
+#endif
+    Spectrum absorbs = spectrum_sub(m.sigma_t, scatters);
+#define C(c) light.c *= max_r(absorbs.c, (real)(0.0f)) * density;
+    SPECTRUM_EACH(C)
+#undef C
+    return light;
+}
+
+/* The point p of a brick, as a walk that stays there. */
+inline GridWalk grid_point(Scene scene, integer name, integer number, vec3 p, mask active)
+{
+    integer at = sel_i(active, MEDIUM_ROW(name) + 2 * MEDIUM_SCATTERING, (integer)(0));
+    GridWalk w;
+    w.first = gather_i(scene.materials, at);
+    w.nx = max_i(gather_i(scene.materials, at + 1), (integer)(1));
+    w.ny = max_i(gather_i(scene.materials, at + 2), (integer)(1));
+    w.nz = gather_i(scene.materials, at + 3);
+#if USES_BYTES
+    w.packed = grid_packed(name);
+#endif
+#define AXIS(a, n)                                                            \
+    vec4 row_##a = gather_w4(scene.materials, at + 4 + 4 * n);                \
+    w.o.a = row_##a.x * p.x + row_##a.y * p.y + row_##a.z * p.z + row_##a.w;  \
+    w.d.a = 0.0f;                                                             \
+    w.inverse.a = 1.0f;
+    AXIS(x, 0)
+    AXIS(y, 1)
+    AXIS(z, 2)
+#undef AXIS
+    w.x = number % w.nx;
+    w.y = (number / w.nx) % w.ny;
+    w.z = number / (w.nx * w.ny);
+    w.t = 0.0f;
+    w.end = 0.0f;
+    return w;
+}

@@ -1,0 +1,98 @@
+"""Media that no ray to a light leaves: which they are, and that pictures do not change by it."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import clpt
+from clpt import transforms as tf
+from clpt.render.lowering import scene as lowering
+from clpt.scene import Film, Scene, lights, media
+from clpt.scene import materials as m
+from clpt.scene.cameras import Perspective
+from clpt.scene.integrators import Box
+from clpt.scene.integrators import Path as PathIntegrator
+from clpt.scene.shapes import Rectangle, Shape, Sphere
+
+MILK = media.Homogeneous(sigma_s=20.0)
+ABOVE = Rectangle(
+    to_world=tf.translate([0, 3, 0]) @ tf.rotate([1, 0, 0], 90), emission=lights.Area(radiance=5.0)
+)
+SKY = lights.Constant(radiance=0.5)
+
+
+def glass(*shapes: Shape, material: m.Material | None = None, light: lights.Light = SKY) -> Scene:
+    """A ball of milk under a lamp and a sky, with more around it."""
+    ball = Sphere(material=material or m.Dielectric(int_ior=1.33), interior=MILK)
+    return Scene(
+        camera=Perspective(fov=40.0, to_world=tf.look_at([0, 1, 4], [0, 0, 0], [0, 1, 0])),
+        shapes=[ball, ABOVE, *shapes],
+        lights=[light],
+        film=Film(width=24, height=24, filter=Box()),
+        integrator=PathIntegrator(max_depth=64),
+    )
+
+
+SMALL = Sphere(radius=0.1, emission=lights.Area(radiance=5.0))
+SCENES = {
+    "glass": (glass(), True),
+    "rough": (glass(material=m.RoughDielectric()), True),
+    "null": (glass(material=m.Null()), False),
+    "holes": (glass(material=m.Mask(opacity=0.5, material=m.Dielectric())), False),
+    "lamp inside": (glass(SMALL), False),
+    "lamp beside": (glass(dataclasses.replace(SMALL, center=(2.0, 0.0, 0.0))), True),
+    "point": (glass(light=lights.Point(position=(0.0, 5.0, 0.0))), False),
+    "outside too": (glass(Sphere(center=(5, 0, 0), exterior=MILK)), False),
+    "priorities": (glass(Sphere(center=(0.5, 0, 0), material=m.Dielectric(), priority=2)), False),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_which_are_sealed(name: str) -> None:
+    scene, sealed = SCENES[name]
+    assert lowering.lower(scene).features.sealed_media == sealed
+
+
+def test_not_beside_light_paths() -> None:
+    """These are weighed against rays to lights."""
+    scene = dataclasses.replace(glass(), integrator=PathIntegrator(guiding=True, light_paths=0))
+    features = lowering.lower(scene).features
+    assert not (features.sealed_media and (features.guided or features.weighed))
+
+
+@pytest.mark.slow
+def test_same_bits(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A ray to a light brings nothing where it is stopped; neither do blocks of walking paths."""
+    scene = glass()
+    sealed = clpt.render(scene, 4)
+    stages = clpt.Renderer(scene, looped=False)
+    stages.run(4)
+    np.testing.assert_array_equal(stages.image(), sealed)
+    monkeypatch.setattr(lowering, "sealed_media", lambda *_: frozenset())
+    assert not lowering.lower(scene).features.sealed_media
+    np.testing.assert_array_equal(clpt.render(scene, 4), sealed)
+    assert sealed.std() > 0.01
+
+
+def means(scene: Scene, seed: int) -> np.ndarray:
+    """Of 32 pictures of 4 samples."""
+    seeds = range(seed, seed + 32)
+    return np.array([clpt.render(dataclasses.replace(scene, seed=i), 4).mean() for i in seeds])
+
+
+@pytest.mark.slow
+def test_a_lamp_that_moves_in_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wherever boxes say that lamps are: what is met by chance has its whole weight.
+
+    The significance is that of two means of 32 pictures, 4 standard errors.
+    """
+    scene = glass(dataclasses.replace(SMALL, radius=0.4), material=m.Null())
+    plain = means(scene, 0)
+    monkeypatch.setattr(lowering, "sealed_media", lambda *_: frozenset([MILK]))
+    assert lowering.lower(scene).features.sealed_media
+    met = means(scene, 100)
+    error = np.hypot(plain.std(ddof=1), met.std(ddof=1)) / np.sqrt(32.0)
+    assert abs(plain.mean() - met.mean()) < 4.0 * error

@@ -1,0 +1,119 @@
+"""Pictures through a lens of surfaces, as a scene file, a pinhole and an edit have them."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+import clpt
+from clpt import spectra
+from clpt import transforms as tf
+from clpt.errors import SceneError
+from clpt.formats import load, native
+from clpt.lenses import Coat, Prescription, Surface
+from clpt.render.lowering.scene import lower
+from clpt.scene import Film, Scene
+from clpt.scene.cameras import Lens, Perspective
+from clpt.scene.integrators import Box
+from clpt.scene.lights import Constant
+from clpt.scene.materials import Diffuse
+from clpt.scene.shapes import Sphere
+
+HOLE = Prescription((Surface(0.0, 50.0, semi_diameter=0.02, stop=True),), "a hole")
+PLACE = tf.look_at([0.3, 0.2, -1.0], [0.0, 0.0, 5.0], [0.0, 1.0, 0.0])
+
+
+def scene(camera, **film) -> Scene:
+    """Balls under an even sky."""
+    rng = np.random.default_rng(2)
+    balls = [
+        Sphere(
+            center=tuple(rng.uniform([-2, -1, 3], [2, 1, 8])),
+            radius=0.4,
+            material=Diffuse(reflectance=tuple(rng.random(3))),
+        )
+        for _ in range(12)
+    ]
+    made = Film(width=48, height=32, filter=Box(), mode="rgb", **film)
+    return Scene(camera=camera, shapes=balls, lights=[Constant(radiance=1.0)], film=made)
+
+
+def test_a_hole_is_a_perspective_camera():
+    """Its picture is that of a pinhole 50 mm in front of the film, times cos^4."""
+    fov = 2.0 * np.degrees(np.arctan(18.0 / 50.0))
+    ours = Lens(lens=HOLE, to_world=PLACE @ tf.translate([0.0, 0.0, -0.05]))
+    a, b = (
+        clpt.render(scene(camera), spp=64)[..., :3]
+        for camera in (Perspective(fov=fov, to_world=PLACE, near=0.0), ours)
+    )
+    x, y = (((np.arange(n) + 0.5) / n - 0.5) * size for n, size in ((48, 36.0), (32, 24.0)))
+    cos4 = (1.0 + (x[None] ** 2 + y[:, None] ** 2) / 2500.0) ** -2.0
+    difference = b / cos4[..., None] - a
+    assert abs(difference.mean()) < 0.003 and np.median(np.abs(difference)) < 0.02
+    assert np.std(a) > 0.1  # what is compared is there
+
+
+def test_edits_give_the_picture_of_a_new_start():
+    first = scene(Lens(focus_distance=6.0))
+    second = dataclasses.replace(first, camera=Lens(focus_distance=3.0, f_number=4.0))
+    with clpt.Renderer(first) as renderer:
+        renderer.run(2)
+        renderer.update(camera=second.camera)
+        renderer.run(4)
+        edited = renderer.image()
+    np.testing.assert_array_equal(edited, clpt.render(second, spp=4))
+
+
+def test_what_a_scene_needs_of_the_kernels():
+    spectral = dataclasses.replace(scene(Lens()), film=Film(width=8, height=8))
+    assert lower(spectral).features.glass_lens and lower(spectral).features.dispersion
+    flat = dataclasses.replace(spectral, camera=Lens(lens="fisheye", ghosts=0.1))
+    features = lower(flat).features
+    assert not features.glass_lens and features.lens_losses and features.lens_ghosts
+
+
+def test_scene_files(tmp_path):
+    glass = spectra.glass("sf11")
+    lens = Prescription(
+        (
+            Surface(50.0, 3.0, glass, 8.0, -0.4, (1e-6,), (Coat(spectra.Constant(1.38), 99.0),)),
+            Surface(0.0, 2.0, semi_diameter=8.0),
+            Surface(0.0, 0.0, semi_diameter=6.0, stop=True),
+        ),
+        "one",
+        "mine",
+    )
+    camera = Lens(lens=lens, blades=7, coating="multi", unit=2e-3)
+    native.save(scene(camera), tmp_path / "scene.json")
+    again = load(tmp_path / "scene.json").camera
+    assert isinstance(again, Lens) and again.blades == 7 and again.unit == 2e-3
+    for a, b in zip(again.prescription.surfaces, lens.surfaces, strict=True):
+        assert dataclasses.astuple(a) == dataclasses.astuple(b)
+    text = json.loads((tmp_path / "scene.json").read_text())
+    (tmp_path / "a.dat").write_text("0 1 0 8\n60 4 1.6 20\n-60 1 1.0 20\n")
+    for value, stop in (("planar", 6), ("a.dat", 0)):
+        text["camera"]["lens"] = value
+        (tmp_path / "b.json").write_text(json.dumps(text))
+        assert load(tmp_path / "b.json").camera.prescription.stop == stop
+
+
+@pytest.mark.parametrize(
+    ("lens", "message"),
+    [
+        ("planer", r"scene\.json:5: camera\.lens: unknown lens 'planer'; did you mean 'planar'"),
+        ("no.dat", r"no\.dat"),
+        ({"surfaces": []}, r"1 to 100 surfaces"),
+        ({"surfaces": [{"radius": 3}]}, r"surfaces\[0\]: needs the parameter 'semi_diameter'"),
+        ({"surfaces": [{"semi_diameter": 1, "radios": 1}]}, "no parameter 'radios'"),
+        ({"surfaces": [{"semi_diameter": 9, "radius": 1}]}, "cannot reach"),
+        ({"surfaces": [{"semi_diameter": 9, "glass": [1.5, 1.0]}]}, "Abbe number lies"),
+    ],
+)
+def test_broken_scene_files(tmp_path, lens, message):
+    text = json.dumps({"camera": {"type": "lens", "blades": 5, "lens": lens}}, indent=1)
+    (tmp_path / "scene.json").write_text(text)
+    with pytest.raises(SceneError, match=message):
+        load(tmp_path / "scene.json")
