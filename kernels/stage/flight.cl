@@ -51,11 +51,13 @@ STAGE(flight)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
         integer vertex = (state & PATH_DEPTH) + path_nulls(path, at);
         vec2 u = sampler_pair(sampler, as_natural(DIMENSION_FLIGHT + vertex));
         mask scatters = flies & (spectrum_max(m.sigma_s) > 0.0f);
-        real sigma = spectrum_pick(m.sigma_t, ratio, u.y), end = sel(met, load_hit_t(hit, at), (real)(FAR));
+        /* The medium begins at the surface, before the ray's origin, which lies off it. */
+        real lead = sel(flies, load_path_lead(path, at), (real)(0.0f));
+        vec3 d = load_path_d(path, at), o = madd3(d, -lead, load_path_o(path, at));
+        real sigma = spectrum_pick(m.sigma_t, ratio, u.y), end = sel(met, load_hit_t(hit, at) + lead, (real)(FAR));
 #if FLIES_NEAR_LAMPS
         real choice = MEDIUM_AIMS > 1 ? sampler_pair(sampler, as_natural(DIMENSION_AIM + vertex)).x : (real)(0.0f);
-        Equiangular near = equiangular(scene, load_path_o(path, at), load_path_d(path, at), end,
-                                       spectrum_mean(m.sigma_t), choice);
+        Equiangular near = equiangular(scene, o, d, end, spectrum_mean(m.sigma_t), choice);
 #if USES_GRIDS
         near.share = sel((name & MEDIUM_GRID) != 0, (real)(0.0f), near.share);
 #endif
@@ -92,11 +94,10 @@ STAGE(flight)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
         mask gridded = flies & ((name & MEDIUM_GRID) != 0);
         if (any(gridded)) {
             natural key = grid_key(scene, load_path_pixel_key(path, at), load_path_sample(path, at), vertex);
-            vec3 o = load_path_o(path, at), d = load_path_d(path, at);
 #if GRIDS_EMIT
             GridOrigin origin;
             origin.pdf = load_path_pdf(path, at);
-            origin.before = path_null_distance(path, at);
+            origin.before = path_null_distance(path, at) - lead;
             origin.from = madd3(d, -origin.before, o);
             origin.hemisphere = path_hemisphere(path, at);
             GridFlight own = grid_flight(scene, name, m, o, d, end, ratio, u, key, gridded, lambdas, origin);
@@ -117,7 +118,7 @@ STAGE(flight)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
         store_path_radiance(path, at, flies, spectrum_add(load_path_radiance(path, at), light));
 #endif
         store_path_beta(path, at, flies, spectrum_mul(load_path_beta(path, at), weight));
-        store_hit_t(hit, at, collides, t);
+        store_hit_t(hit, at, collides, t - lead);
         store_hit_prim(hit, at, collides, (integer)(0));
         store_hit_material(hit, at, collides, m.phase);
     }

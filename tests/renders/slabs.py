@@ -7,7 +7,7 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-NODES = 24  # cosines of a hemisphere
+NODES = 48  # cosines of a hemisphere
 THIN = 2.0**-26  # optical depth of the layer that doubling begins with
 FEEBLE = 1e-9  # weight of the straight direction: it is there for the beam
 

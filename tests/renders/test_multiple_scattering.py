@@ -22,10 +22,9 @@ from tests.renders.support import assert_mean, exposures
 
 ALBEDOS = (0.6, 0.95, 1.0)  # of the three colours
 WITHIN = 0.05  # relative; most of it is noise
-WIDE = 600.0  # much wider, and what rays leave out at a surface would be seen
-ALLOWED = 1e-3  # what they leave out so
+WIDE = 2e5  # rays begin off surfaces by its rounding, which flights take into account
 QUICK = (2.0, 0.7)
-CASES = [(0.3, 0.0), (2.0, 0.7), (2.0, -0.4), (8.0, 0.0), (4.0, 0.8)]  # optical depth, g
+CASES = [(0.3, 0.0), (2.0, 0.7), (2.0, -0.4), (8.0, 0.0), (8.0, 0.9)]  # optical depth, g
 
 
 def slab(depth: float, g: float, albedo=ALBEDOS, mu0: float = 1.0) -> Scene:
@@ -61,11 +60,11 @@ def test_slabs(depth: float, g: float) -> None:
     """Radiance above and below a slab, of three albedos, also where nothing is absorbed."""
     told = [slabs.beam_on_slab(depth, albedo, g) for albedo in ALBEDOS]
     mu = told[0][0]
-    nodes = (5, 20) if (depth, g) != QUICK else (20,)
+    nodes, spp = ((10, 40), 1024) if (depth, g) != QUICK else ((40,), 64)
     for node in nodes:
         for side, number in ((1.0, 1), (-1.0, 2)):
             expected = [one[number][node] for one in told]
-            found = seen(slab(depth, g), depth, side * mu[node])
+            found = seen(slab(depth, g), depth, side * mu[node], spp=spp)
             assert_mean(found, expected, WITHIN)
 
 
@@ -76,7 +75,7 @@ def test_half_space(mu: float, mu0: float) -> None:
     albedo = (0.3, 0.8, 0.98)
     expected = [slabs.half_space(mu, mu0, one) for one in albedo]
     scene = slab(60.0, 0.0, albedo, mu0)
-    assert_mean(seen(scene, 60.0, mu, azimuth=0.7), expected, WITHIN, ALLOWED)
+    assert_mean(seen(scene, 60.0, mu, azimuth=0.7), expected, WITHIN)
 
 
 @pytest.mark.slow
@@ -97,7 +96,7 @@ def test_disort(depth: float, g: float) -> None:
         place = 0.0 if mu[node] > 0.0 else depth
         expected = [float(np.asarray(one[-1](place, azimuth))[node]) for one in told]
         scene = slab(depth, g, mu0=mu0)
-        assert_mean(seen(scene, depth, mu[node], azimuth), expected, WITHIN, ALLOWED)
+        assert_mean(seen(scene, depth, mu[node], azimuth), expected, WITHIN)
 
 
 def test_the_references() -> None:
