@@ -15,7 +15,7 @@ from clpt import transforms
 from clpt.errors import SceneError
 from clpt.render.lowering import motion
 from clpt.render.lowering.scene import lower
-from clpt.scene import Scene, cameras, integrators, lights, materials, shapes
+from clpt.scene import Scene, cameras, integrators, lights, materials, media, shapes
 from clpt.scene.motion import Keys, Shutter, decomposed, rotation
 
 TIMES = np.linspace(0.0, 1.0, 5)
@@ -39,9 +39,11 @@ def slide(first: Any, last: Any) -> Keys:
 
 
 def scene(things: Any, lamps: Any, shutter: Shutter | None, **camera: Any) -> Scene:
-    given = {"to_world": LOOK, "fov": 40.0, **camera}
+    kind = camera.get("kind", cameras.Perspective)
+    given = {"to_world": LOOK, **({} if kind is cameras.Lens else {"fov": 40.0}), **camera}
+    given.pop("kind", None)
     return Scene(
-        camera=cameras.Perspective(shutter=shutter, **given),
+        camera=kind(shutter=shutter, **given),
         shapes=list(things),
         lights=list(lamps),
         film=integrators.Film(width=32, height=32, mode="rgb", filter=integrators.Box()),
@@ -64,6 +66,29 @@ STRETCHED = Keys(
     [np.eye(4), transforms.rotate([0, 0, 1], 40) @ transforms.scale([1.5, 0.5, 1.0])],
 )
 AMBIENT = lights.Constant(radiance=0.3)
+AIR = materials.Null()
+FLAME = media.Grid(
+    density=np.random.default_rng(3).random((24, 24, 24)),
+    to_world=transforms.translate([-1.3, -1, -1]) @ transforms.scale(2),
+    sigma_a=0.5,
+    emission=1.0,
+)
+BRUSHED = shapes.Mesh(
+    vertices=[[-1, -1, 0], [-1, 1, 0], [1, 1, 0], [1, -1, 0]],
+    faces=[[0, 1, 2], [0, 2, 3]],
+    normals=[[0, 0, -1]] * 4,
+    tangents=[[1, 1, 0, 1]] * 4,
+    material=materials.TwoSided(
+        front=materials.RoughConductor(eta=1.5, k=4.0, alpha_u=0.08, alpha_v=0.5)
+    ),
+    motion=turn([0, 0.3, 1], 80),
+)
+FLAT = shapes.Rectangle(
+    to_world=transforms.translate([0, 1.2, -1])
+    @ transforms.rotate([1, 0, 0], 90)
+    @ transforms.scale(0.5),
+    emission=lights.Area(radiance=4.0, two_sided=True),
+)
 CASES: dict[str, tuple[Any, Any, dict[str, Any]]] = {
     "turning": ((shapes.Cube(material=GREY, motion=turn([0, 0.3, 1], 300)),), (AMBIENT,), {}),
     "scaling": (
@@ -121,6 +146,32 @@ CASES: dict[str, tuple[Any, Any, dict[str, Any]]] = {
             ),
         },
     ),
+    "lens": (
+        (shapes.Sphere(radius=0.4, material=GREY), FLAT),
+        (),
+        {
+            "kind": cameras.Lens,
+            "losses": True,
+            "to_world": np.eye(4),
+            "motion": Keys(
+                [0.0, 1.0], [LOOK, transforms.look_at([0.4, 0.3, -5], [0, 0, 0], [0.1, 1, 0])]
+            ),
+        },
+    ),
+    "flame": (
+        (
+            shapes.Cube(to_world=transforms.translate([-0.3, 0, 0]), material=AIR, interior=FLAME),
+            shapes.Sphere(
+                center=(1.2, 0, 0),
+                radius=0.15,
+                emission=lights.Area(radiance=3.0),
+                motion=slide([0, -1, 0], [0, 1, 0]),
+            ),
+        ),
+        (),
+        {},
+    ),
+    "tangents": ((BRUSHED,), (AMBIENT, lights.Point(position=(1, 2, -3), intensity=10.0)), {}),
     "sky": (
         (shapes.Sphere(radius=0.6, material=GREY),),
         (
@@ -299,6 +350,25 @@ def test_what_cannot_move_is_refused() -> None:
     )
     with pytest.raises(SceneError, match="nothing moves"):
         lower(tracer)
+
+
+def test_what_is_left_aside_is_told() -> None:
+    things, lamps, camera = CASES["flame"]
+    whole = scene([*things, WALL], lamps, Shutter(0.0, 1.0), **camera)
+    told = {
+        "path.light_paths: left aside": integrators.Path(light_paths=1),
+        "path.guiding: left aside": integrators.Path(guiding=True),
+        "vcm.merging: left aside": integrators.Vcm(),
+    }
+    for line, integrator in told.items():
+        lowered = lower(dataclasses.replace(whole, integrator=integrator))
+        assert sum(w.startswith(line) for w in lowered.warnings) == 1, lowered.warnings
+        assert not lowered.features.passes[0].light_paths and not lowered.features.merged
+    cube = dataclasses.replace(things[0], motion=turn([0, 1, 0], 10))
+    assert any(
+        "the grid of its medium stays" in w
+        for w in lower(scene([cube], [AMBIENT], Shutter())).warnings
+    )
 
 
 def test_scene_file(tmp_path: Path) -> None:
