@@ -14,7 +14,9 @@ import statistics
 import time
 from typing import Any
 
+import click
 import numpy as np
+from rich.table import Table
 
 import clpt
 from bench import machine
@@ -58,7 +60,9 @@ def rates(scenes: list[Scene]) -> list[float]:
     return [statistics.median(own) for own in found]
 
 
-def main() -> None:
+@click.command(help=__doc__)
+@click.option("--json", "path", help="Append records to this file.")
+def main(path: str | None) -> None:
     turn = Keys([0.0, 1.0], [tf.rotate([0, 1, 0], a) for a in (0, 30)])
     slide = Keys([0.0, 1.0], [np.eye(4), tf.translate([1.0, 0, 0])])
     still = copies(None)
@@ -72,9 +76,15 @@ def main() -> None:
         "camera": dataclasses.replace(still, camera=camera),
     }
     found = rates(list(scenes.values()))
-    print(machine.processor())
-    for name, rate in zip(scenes, found, strict=True):
-        print(f"{name:8} {rate / 1e6:6.2f} M rays/s, {rate / found[0]:.2f} of still")
+    rows: list[dict[str, object]] = [
+        {"scene": name, "Mrays/s": round(rate / 1e6, 2), "of still": round(rate / found[0], 3)}
+        for name, rate in zip(scenes, found, strict=True)
+    ]
+    machine.append(path, "motion", [{**machine.circumstances(), **row} for row in rows])
+    table = Table("scene", "Mrays/s", "of still")
+    for row in rows:
+        table.add_row(*(str(value) for value in row.values()))
+    machine.console().print(table)
 
 
 if __name__ == "__main__":

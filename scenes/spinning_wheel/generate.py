@@ -78,17 +78,17 @@ def scene() -> JSON:
         "type": "disk", "material": "ground",
         "to_world": [{"scale": 40}, {"rotate": {"axis": [1, 0, 0], "angle": -90}}],
     }  # fmt: skip
-    look = {"origin": [-1.2, 1.5, 8.2], "target": [0.0, 2.05, 0], "up": [0, 1, 0]}
+    look = {"origin": [-1.2, 1.5, 8.2], "target": [0.0, 2.2, 0], "up": [0, 1, 0]}
     return {
         "$schema": "../schema.json",
         "name": "spinning_wheel",
         "camera": {
-            "type": "perspective", "fov": 40, "to_world": {"look_at": look},
+            "type": "perspective", "fov": 42, "to_world": {"look_at": look},
             "shutter": {"open": 0, "close": 1, "shape": [0.4, 1, 1, 1, 0.4]},
         },
-        "film": {"width": 512, "height": 448, "filter": {"type": "blackman_harris"}},
+        "film": {"width": 416, "height": 364, "filter": {"type": "blackman_harris"}},
         "integrator": {"type": "path", "max_depth": 6},
-        "spp": 256,
+        "spp": 192,
         "materials": {
             "steel": {"type": "two_sided", "front": {
                 "type": "rough_conductor", "eta": 2.6, "k": 3.4, "alpha_u": 0.25, "alpha_v": 0.25,
