@@ -5,7 +5,6 @@ from __future__ import annotations
 import gzip
 import time
 
-import numpy as np
 import pytest
 
 from clpt import transforms
