@@ -84,7 +84,8 @@ class Period(Duration):
 @click.option("--spp", type=click.IntRange(1, 2**31 - 1), help="Samples per pixel.")
 @click.option(
     "--noise", type=click.FloatRange(0.0), metavar="SHARE",
-    help="Stop sampling pixels with less noise, such as 0.02 of their light; 0: never.",
+    help="Stop sampling pixels with less noise, such as 0.02 of their light, after --denoise "
+    "if that is given; 0: never.",
 )  # fmt: skip
 @click.option("--time", "limit", type=Duration(), help="Stop after 30s, 5m, 1h30m.")
 @click.option(

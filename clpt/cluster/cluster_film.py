@@ -156,7 +156,7 @@ class ClusterFilm(FilmKeeping):
             raise SceneError(message, where="noise")
         local = self.developed()
         tracer = FarmTracer(local, self._take_selection)
-        begun = Adaptive(local.wavefronts[0], tracer)
+        begun = local.adaptively(tracer, self.denoise)
         if arrays:
             begun.restore(arrays)
         else:

@@ -73,7 +73,7 @@ class ClusterRenderer(ClusterFilm):
         check_options(scene, options)
         self.denoise = options.pop("denoise", None)
         scene = needs.prepared(scene, self.denoise)
-        options |= {"halves": True} if self.denoise == "statistical" else {}
+        options |= {"halves": True} if needs.halves(scene, self.denoise) else {}
         unknown = options.keys() - set(tasks.OPTIONS)
         if unknown:
             raise TypeError(f"the option {min(unknown)!r} is of one device, not of a cluster")

@@ -87,8 +87,9 @@ class AdaptiveCrew:
             first = crew.first
             try:
                 first.show(self.base)
-                wavefront = first.renderer.wavefronts[0]
-                begun = Adaptive(wavefront, _AdaptiveTracer(wavefront, self))
+                renderer = first.renderer
+                tracer = _AdaptiveTracer(renderer.wavefronts[0], self)
+                begun = renderer.adaptively(tracer, renderer.denoise)
                 if self._arrays:
                     begun.restore(self._arrays)
                 break

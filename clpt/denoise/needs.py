@@ -45,10 +45,18 @@ def prepared(scene: Scene, method: str | None) -> Scene:
     return dataclasses.replace(scene, film=film)
 
 
-def remarks(integrator: Integrator, sampler: Sampler, splats: bool) -> list[str]:
+def halves(scene: Scene, method: str | None) -> bool:
+    """Whether even and odd samples are kept apart: they tell the error of a denoised picture."""
+    return method == "statistical" or (method is not None and scene.noise is not None)
+
+
+def remarks(
+    integrator: Integrator, sampler: Sampler, splats: bool, noise_before: bool = False
+) -> list[str]:
     """Return why a denoised picture may keep noise, for people.
 
-    integrator: that renders it; splats: whether samples serve several pixels.
+    integrator: that renders it; splats: whether samples serve several pixels; noise_before: whether
+    a limit of noise is for the picture before it is denoised.
     """
     advice = "denoisers take what noise they share for detail"
     found = []
@@ -63,6 +71,11 @@ def remarks(integrator: Integrator, sampler: Sampler, splats: bool) -> list[str]
         found.append(
             f"with the sampler {sampler.kind} neighbouring pixels err together, and {advice}: "
             "choose sobol"
+        )
+    if noise_before:
+        found.append(
+            "with light paths the limit of noise is for the picture before it is denoised; set "
+            "light_paths to 0 for what is left afterwards"
         )
     if isinstance(integrator, ParticleTracer):
         found.append("particle_tracer has no layers, so edges in the picture are less sharp")

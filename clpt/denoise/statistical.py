@@ -73,6 +73,27 @@ class Statistical:
         pairs = self._download(once, both.shape), self._download(twice, both.shape), both
         first, second, noisy = (pair.mean(axis=2)[..., :3] for pair in pairs)
         self.colours = self._mixed(first, second, noisy)
+        self._both = both
+
+    def halves(self) -> tuple[Image, Image]:
+        """Return both halves without most of their noise, (h, w, 3) float32 each.
+
+        The values of one half alone decide which of its pixels are alike, and of both halves only
+        how much noise there is around: so the noise of a denoised half is its own.
+        """
+        even, odd = (self._half(self._both[:, :, i]) for i in range(2))
+        return even, odd
+
+    def _half(self, noisy: Image) -> Image:
+        twice_over, averages = np.stack([noisy, noisy], axis=2), []
+        values = self._upload(np.ascontiguousarray(noisy))
+        for which in (0, 1):
+            guide, _ = self._guide(twice_over, which)
+            variance = self._download(self._guides[which][1], noisy.shape)
+            made = self._average(which, values, 1, (guide, self._upload(2.0 * variance)))
+            averages.append(self._download(made, noisy.shape))
+            twice_over = np.stack([averages[0], averages[0]], axis=2)
+        return self._mixed(*(image[..., :3] for image in (*averages, noisy)))
 
     def bands(self, image: Image) -> Image:
         """Return a picture (h, w, n) float32 of the same samples without most of its noise."""
@@ -105,9 +126,14 @@ class Statistical:
         )  # fmt: skip
         return guide, self._blurred(variance, NOISE_RADIUS, LEAST_VARIANCES[which])
 
-    def _average(self, which: int, values: Any, count: int) -> Any:
-        """Averages of `count` vectors a pixel; which: by the first or the second guide."""
-        (guide, variance), (albedo, normal) = self._guides[which], self._surfaces
+    def _average(
+        self, which: int, values: Any, count: int, by: tuple[Any, Any] | None = None
+    ) -> Any:
+        """Averages of `count` vectors a pixel; which: the first time or the second.
+
+        by: a guide and its variance, in the place of those of both halves.
+        """
+        (guide, variance), (albedo, normal) = by or self._guides[which], self._surfaces
         made = self._allocate(count)
         self._run(
             "denoise_average", guide=guide, variance=variance, albedo=albedo, normal=normal,

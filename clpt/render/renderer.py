@@ -106,7 +106,7 @@ class Renderer(Resumable):
             queued=options.get("queued"),
             looped=options.get("looped", None if queue is None else True),
             tree_quality=options.get("tree_quality", "high"),
-            halves=options.get("halves", False) or self.denoise == "statistical",
+            halves=options.get("halves", False) or needs.halves(scene, self.denoise),
             cancel_seconds=options.get("cancel_seconds"),
         )
         self.wavefronts = [first]
@@ -122,7 +122,8 @@ class Renderer(Resumable):
         self._progress = progress
         if self.denoise is not None:
             splats = first.features.filter_reach > 0
-            self.warnings += needs.remarks(lowered.integrator, scene.sampler, splats)
+            weighed = scene.noise is not None and first.features.weighed
+            self.warnings += needs.remarks(lowered.integrator, scene.sampler, splats, weighed)
         self._moving: Moving | None = None
         self._adaptive: adaptive.Adaptive | None = None
         log.info("ready in %.2f s", self._seconds["ready"])
@@ -190,7 +191,7 @@ class Renderer(Resumable):
 
         noise: leave pixels as soon as the noise around them is as low, relative to the picture,
         such as 0.02; `samples` is then the most that a pixel gets, see
-        clpt.render.wavefront.adaptive.
+        clpt.render.wavefront.adaptive. A renderer with `denoise` counts what is left after that.
         progress: called every few milliseconds to seconds; if it returns False the run stops soon,
         as after `cancel`. Returns whether it came to its end. What progress raises, or Ctrl+C in
         it, is raised when the paths in flight have ended. The film is whole after a stop too: its
@@ -244,7 +245,7 @@ class Renderer(Resumable):
             return finished
         noise = adaptive.checked(noise, self.wavefronts[0].features)
         if self._adaptive is None:
-            self._adaptive = adaptive.Adaptive(self.wavefronts[0])
+            self._adaptive = self.adaptively(None, self.denoise)
             self._adaptive.skip(first)
         return self._adaptive.run(end, noise, on_batch)
 

@@ -13,6 +13,7 @@ import numpy as np
 from clpt import device as dev
 from clpt.errors import SceneError
 from clpt.render.contract import custom_materials
+from clpt.render.denoised_noise import DenoisedNoise
 from clpt.render.editing.scene_edit import resolve_device_arrays
 from clpt.render.film_keeping import FilmKeeping
 from clpt.render.layers import white_paper
@@ -28,6 +29,7 @@ from clpt.render.saved_film import (
 )
 from clpt.render.wavefront.adaptive import Adaptive
 from clpt.render.wavefront.film_state import FilmState, Ranges
+from clpt.render.wavefront.tracer import Tracer
 from clpt.scene import Scene
 from clpt.scene.fingerprint import Fingerprint, Plain, fingerprint
 from clpt.scene.integrators import PIXELWISE
@@ -139,6 +141,20 @@ class Resumable(FilmKeeping, Pictures):
             "tree_quality": first.scene.tree_quality,
         }
 
+    def adaptively(self, tracer: Tracer | None, denoise: str | None) -> Adaptive:
+        """Return adaptive sampling of this film, which begins.
+
+        tracer: adds the samples; denoise: a denoiser: noise is then what it leaves. Light paths
+        have their noise before. Raises SceneError where halves are wanted and not kept.
+        """
+        first = self.wavefronts[0]
+        if denoise is None or first.features.weighed:
+            return Adaptive(first, tracer)
+        if first.film.halves != 2:
+            message = "what is left after denoising is told by even and odd samples apart"
+            raise SceneError(f"{message}; give the scene `noise`, or halves=True", where="noise")
+        return Adaptive(first, tracer, DenoisedNoise(self, denoise).measure)
+
     @synchronized
     def restore(self, saved: SavedFilm) -> None:
         """Go on from a saved film, as `load_state` does. Raises SceneError."""
@@ -148,7 +164,7 @@ class Resumable(FilmKeeping, Pictures):
             raise SceneError("the film has another form than this scene's")
         adaptive = None
         if saved.adaptive:
-            adaptive = Adaptive(self.wavefronts[0])
+            adaptive = self.adaptively(None, self.denoise)
             try:
                 adaptive.restore(saved.adaptive)
             except (KeyError, ValueError) as error:

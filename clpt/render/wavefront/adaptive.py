@@ -11,12 +11,15 @@ a cell has finished and its partner has not, the cell is sampled on as the partn
 these samples do not go into the picture.
 
 Light paths, where the scene has them, reach all pixels: see clpt.render.wavefront.light_rounds.
+
+For a picture that is denoised what is left after that decides, see clpt.render.denoised_noise. That
+falls slower than noise does while samples are added, so nothing is decided ahead.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -68,12 +71,18 @@ class Adaptive:
     beside it.
 
     noise: the limit; next: (cells,) the first sample that a cell's pixels do not have;
-    stop: (cells,) how many samples they will have. tracer: adds samples to the film.
+    stop: (cells,) how many samples they will have. tracer: adds samples to the film. left: returns
+    what relative variance is left in cells after denoising, of a picture that is denoised.
     """
 
-    def __init__(self, wavefront: Wavefront, tracer: Tracer | None = None):
+    def __init__(
+        self,
+        wavefront: Wavefront,
+        tracer: Tracer | None = None,
+        left: Callable[[NDArray[np.bool_]], Values] | None = None,
+    ):
         self.wavefront, self._meter = wavefront, NoiseMeter(wavefront)
-        self._tracer = tracer or Tracer(wavefront)
+        self._tracer, self._left = tracer or Tracer(wavefront), left
         self._pixels = self._meter.pixels
         count = len(self._pixels)
         self._partner = _partners(self._pixels, self._meter.across)
@@ -202,8 +211,13 @@ class Adaptive:
         """Estimate the relative variance of a sample in these cells."""
         if not cells.any():
             return
-        relative = self._meter.measure(cells)
-        known = cells & (self._measured_at > 0)
+        if self._left is None:
+            relative = self._meter.measure(cells)
+            known = cells & (self._measured_at > 0)
+        elif self._level < 2 * LEAST:
+            return
+        else:
+            relative, known = self._left(cells), cells
         self._variance[known] = self._level * relative[known]
         self._measured_at[cells] = self._level
 
@@ -215,7 +229,8 @@ class Adaptive:
             limit = self._lights.left_over(limit, self._known_variance)[self._partner]
         measured_at = self._measured_at[self._partner]
         needed = divide(self._variance[self._partner], limit)
-        sure = (self.stop == OPEN) & (needed <= AHEAD * measured_at) & (self._pixels > 0)
+        ahead = AHEAD if self._left is None else 1
+        sure = (self.stop == OPEN) & (needed <= ahead * measured_at) & (self._pixels > 0)
         step = np.maximum(measured_at // STEPS, 1)
         wanted = np.ceil(np.where(sure, needed, 0.0) / step) * step
         self.stop[sure] = np.maximum(wanted, measured_at)[sure]

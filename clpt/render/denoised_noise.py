@@ -1,0 +1,142 @@
+"""What is left of noise after denoising, cell by cell, for adaptive sampling.
+
+Both halves of the samples are denoised. The noise of a half is independent of the other half, so
+the distance of a denoised half from the other one tells its error, blur included: with halves a
+and b, and d of them denoised, the square of (d(a) + d(b)) / 2 - truth is on average
+
+    ((d(a) - b)^2 + (d(b) - a)^2) / 2 - (a - b)^2 / 2 - (d(a) - d(b))^2 / 4
+
+The two colours of the chessboard (clpt.render.wavefront.adaptive) are denoised apart, each in a
+picture of half the width. So what is told of one colour's pixels does not depend on the samples of
+the other, whose numbers it decides.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import device
+from clpt.denoise import needs
+from clpt.denoise.oidn import LUMINANCE, Oidn
+from clpt.denoise.statistical import Statistical
+from clpt.render.wavefront.cells import SIDE
+from clpt.render.wavefront.noise_meter import DARK, divide
+
+Image = NDArray[np.float32]
+Values = NDArray[np.float64]
+
+SURE = {"oidn": 0.02, "statistical": 0.1}  # of the noise before: less is not believed to be left
+BESIDE = 2  # squares around those that are asked for, which are denoised with them
+AROUND = np.array([1.0, 2.0, 1.0])  # how much squares in a row count beside each other
+
+
+class Halved(Protocol):
+    """A renderer with halves."""
+
+    device: device.Device
+
+    def halves(self) -> tuple[Image, Image]: ...
+    def layers(self) -> dict[str, Image]: ...
+
+
+class DenoisedNoise:
+    """Tells how far the picture of a renderer is from the truth once it is denoised.
+
+    method: a name of clpt.denoise.needs.METHODS.
+    """
+
+    def __init__(self, renderer: Halved, method: str):
+        self._renderer, self._method = renderer, method
+        self._oidn: dict[int, tuple[list[Image | None], Oidn]] = {}  # of each colour
+
+    def measure(self, cells: NDArray[np.bool_]) -> Values:
+        """Return the mean square of the relative error of luminance left in cells, (cells,).
+
+        cells: that are asked for; others may be 0. An error is relative to the denoised light;
+        light that is darker than a hundredth of the picture's mean counts as if it were so bright.
+        One square tells little, so those around it count too. What is left is no more than the
+        noise before, which pixels of one colour alone may hide, as their edges are rough. Raises
+        DeviceError where the denoiser fails.
+        """
+        halves, layers = self._renderer.halves(), self._renderer.layers()
+        height, width = halves[0].shape[:2]
+        down, across = -(-height // SIDE), -(-width // SIDE)
+        dark = DARK * max(float(np.mean(halves[0] + halves[1]) / 2.0), 0.0)
+        found = np.zeros((down, across, 2))
+        rows, columns = (_part(cells.reshape(found.shape).any(axis=(2, axis))) for axis in (1, 0))
+        part = tuple(slice(each.start * SIDE, each.stop * SIDE) for each in (rows, columns))
+        surfaces = [layers[name][part] if name in layers else None for name in needs.LAYERS]
+        even, odd = (np.nan_to_num(half[part]) for half in halves)
+        for colour in range(2):
+            y, x, inside = _pixels(even.shape[0], even.shape[1], colour)
+            beside = [None if image is None else image[y, x] for image in surfaces]
+            squares = (y // SIDE * (columns.stop - columns.start) + x // SIDE)[inside]
+            errors = self._errors(colour, (even[y, x], odd[y, x]), beside, dark)
+            shape = found[rows, columns, 0].shape
+            count, left, before = (
+                _around(np.bincount(squares, each[inside], shape[0] * shape[1]).reshape(shape))
+                for each in (np.ones(x.shape), *errors)
+            )
+            before = divide(before, count)
+            found[rows, columns, colour] = np.clip(
+                divide(left, count), SURE[self._method] * before, before
+            )
+        return found.ravel()
+
+    def _errors(
+        self,
+        colour: int,
+        halves: tuple[Image, Image],
+        surfaces: list[Image | None],
+        dark: float,
+    ) -> tuple[Values, Values]:
+        """Squares of the relative error after denoising and before, (h, w) float64 each."""
+        denoised = self._denoised(colour, halves, surfaces)
+        a, b, da, db = ((image @ LUMINANCE).astype(float) for image in (*halves, *denoised))
+        weight = divide(1.0, (np.maximum(0.5 * (da + db), 0.0) + dark) ** 2)
+        noise = 0.5 * (a - b) ** 2
+        left = 0.5 * ((da - b) ** 2 + (db - a) ** 2) - noise - 0.25 * (da - db) ** 2
+        return weight * left, weight * 0.5 * noise
+
+    def _denoised(
+        self, colour: int, halves: tuple[Image, Image], surfaces: list[Image | None]
+    ) -> tuple[Image, Image]:
+        if self._method == "statistical":
+            return Statistical(self._renderer.device, halves, *surfaces).halves()
+        former, oidn = self._oidn.get(colour, ([], None))
+        same = len(former) > 0 and all(
+            np.array_equal(a, b)
+            for a, b in zip(former, surfaces, strict=True)
+            if a is not None and b is not None
+        )
+        if oidn is None or not same:  # layers are of the first samples, and then stay
+            oidn = Oidn(*surfaces)
+            self._oidn[colour] = surfaces, oidn
+        return oidn.colours(halves[0]), oidn.colours(halves[1])
+
+
+def _part(asked: NDArray[np.bool_]) -> slice:
+    """Return the rows or columns of squares that are asked for, and what a denoiser sees beside."""
+    found = np.flatnonzero(asked)
+    return slice(max(int(found[0]) - BESIDE, 0), min(int(found[-1]) + 1 + BESIDE, len(asked)))
+
+
+def _pixels(height: int, width: int, colour: int) -> tuple[Any, Any, NDArray[np.bool_]]:
+    """Return y, x of a colour's pixels, and which are there, (h, half the width) each.
+
+    A row with a pixel less has its last one twice.
+    """
+    y = np.broadcast_to(np.arange(height)[:, None], (height, -(-width // 2)))
+    x = 2 * np.arange(-(-width // 2)) + (y + colour) % 2
+    inside = x < width
+    return y, np.where(inside, x, np.maximum(x - 2, 0)), inside
+
+
+def _around(sums: NDArray[Any]) -> Values:
+    """The sums of squares (rows, columns), with those around each."""
+    padded = np.pad(sums, 1)
+    rows = sum(AROUND[i] * padded[i : i + sums.shape[0]] for i in range(3))
+    return np.asarray(sum(AROUND[i] * rows[:, i : i + sums.shape[1]] for i in range(3)))
