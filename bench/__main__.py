@@ -41,6 +41,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "layers": (),
     "lens": (),
     "measured": (),
+    "motion": (),
     "viewing": (),
     "sizes": ("--plot", str(report.RESULTS / "sizes.png")),
 }

@@ -256,6 +256,7 @@ TABLES: dict[str, Callable[[Sequence[Row]], str]] = {
     "layers": plain,
     "lens": plain,
     "measured": plain,
+    "motion": plain,
     "startup": startup,
     "viewing": plain,
     "compiling": plain,

@@ -44,6 +44,7 @@ PATH = Record(
     pending=("real", "what joins it if the next surface is sharp, see kernels/lighting/rivals.cl"),
     expected=("real", "light that a guide knows where the path met it first, times throughput"),
     light=("integer", "row in `lights` of the light where the path began"),
+    time=("real", "when the path's light comes to the film, see clpt.scene.motion [s]"),
     state=("integer", "PATH_ bits and depth, see kernels/path/path_state.cl"),
     pixel_index=("integer", "where the film stores the path's pixel, see kernels/film/pixel.cl"),
     pixel_key=("natural", "number by which the sampler knows that pixel of the whole film"),

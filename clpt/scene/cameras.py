@@ -10,6 +10,7 @@ from clpt import lenses
 from clpt.errors import SceneError
 from clpt.lenses import Prescription
 from clpt.scene.media import Medium
+from clpt.scene.motion import Keys, Shutter
 from clpt.scene.params import Kind, choice, flag, host, index, real
 from clpt.scene.values import IndexLike, Matrix4
 
@@ -22,6 +23,10 @@ class Camera(Kind):
 
     to_world: Matrix4 = host(np.eye(4), "camera to world, (4, 4)")
     medium: Medium | None = host(None, "around the camera; None: none", form="medium")
+    motion: Keys | None = host(None, "moves it after `to_world`; None: still", form="keys")
+    shutter: Shutter | None = host(
+        None, "when light comes to the film; None: at 0 s alone", form="shutter"
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

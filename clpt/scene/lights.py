@@ -9,6 +9,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from clpt.errors import SceneError
+from clpt.scene.motion import Keys
 from clpt.scene.params import Kind, choice, emission, flag, host, real, reflectance
 from clpt.scene.values import ImageLike, Matrix4, SpectrumLike, Textured, Vector3
 
@@ -28,6 +29,9 @@ class Light(Kind):
 
     reach: ClassVar[Reach] = "placed"
 
+    motion: Keys | None = host(
+        None, "moves it after its place; None: still; of an area light its shape moves", form="keys"
+    )
     group: str = host("", "lights of one name share a layer of `light_groups`")
 
 

@@ -12,6 +12,7 @@ from clpt.errors import SceneError
 from clpt.scene.lights import Light
 from clpt.scene.materials import Diffuse, Material, TwoSided
 from clpt.scene.media import Medium
+from clpt.scene.motion import Keys
 from clpt.scene.params import Kind, choice, host
 from clpt.scene.textures import Bitmap, MeshAttribute
 from clpt.scene.values import Matrix4, OnDevice, Vector3
@@ -30,6 +31,7 @@ class Shape(Kind):
     exterior: Medium | None = host(None, "medium before its front; None: none", form="medium")
     priority: int = host(0, "where bodies overlap, that of the highest fills the place")
     to_world: Matrix4 | OnDevice = host(np.eye(4), "placement, (4, 4)")
+    motion: Keys | None = host(None, "moves it after `to_world`; None: still", form="keys")
     flip_normals: bool = host(False, "turn the front to the other side")
     name: str = host("", "for messages")
 

@@ -17,8 +17,9 @@
 #define path_nulls(path, at) ((integer)(0))
 #endif
 
-/* Dimensions of a sample, in pairs: film, lens, wavelength, then DIMENSIONS_A_VERTEX per surface that is met, null
- * ones among them; beyond all these DIMENSION_TEXEL, DIMENSION_FLIGHT and DIMENSION_AIM, one pair per surface each. */
+/* Dimensions of a sample, in pairs: film, lens, wavelength and time, then DIMENSIONS_A_VERTEX per surface that is met,
+ * null ones among them; beyond all these DIMENSION_TEXEL, DIMENSION_FLIGHT and DIMENSION_AIM, one pair per surface
+ * each. */
 #define DIMENSION_FILM 0
 #define DIMENSION_LENS 1
 #define DIMENSION_WAVELENGTH 2

@@ -3,6 +3,7 @@
 #include "path/surface_flags.cl"
 #include "tracing/trace_hit.cl"
 #include "generated/instances.cl"
+#include "generated/motion.cl"
 
 typedef struct {
     vec3 p;       /* on it, but for the rounding of p itself [m] */
@@ -144,11 +145,23 @@ inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, 
 #if USES_ANALYTIC
     mask analytic = active & (shape.kind != 0);
     if (any(analytic)) {
+#if MOVES_SHAPES
+        Motion motion = motion_of_shape(scene, shape.number);
+        vec3 rest = onto_of_shape(scene, shape, prim, motion_point_back(motion, madd3(d, h.t, o)));
+        s.p = sel3(analytic, motion_point(motion, rest), s.p);
+#else
         s.p = sel3(analytic, onto_of_shape(scene, shape, prim, madd3(d, h.t, o)), s.p);
+#endif
         s.size = sel(analytic, size_of_shape(scene, shape, prim), s.size);
 #if USES_TANGENTS
+#if MOVES_SHAPES
+        vec3 dpdu = dpdu_of_shape(scene, shape, prim, rest, s.uv), dpdv = dpdv_of_shape(scene, shape, prim, rest, s.uv);
+        s.dpdu = sel3(analytic, motion_vector(motion, dpdu), s.dpdu);
+        s.dpdv = sel3(analytic, motion_vector(motion, dpdv), s.dpdv);
+#else
         s.dpdu = sel3(analytic, dpdu_of_shape(scene, shape, prim, s.p, s.uv), s.dpdu);
         s.dpdv = sel3(analytic, dpdv_of_shape(scene, shape, prim, s.p, s.uv), s.dpdv);
+#endif
 #endif
     }
 #endif

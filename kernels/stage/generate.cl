@@ -8,6 +8,7 @@
 #include "interface/camera.cl"
 #include "generated/camera.cl"
 #include "film/work_list.cl"
+#include "generated/motion.cl"
 #include "generated/exposure.cl"
 #include "interface/shape.cl"
 #include "interface/light.cl"
@@ -109,6 +110,10 @@ inline void begin_path(Scene scene, Slab path, uint at, mask go, integer pixel_i
     u = merging_wavelength(scene, u, sample);
 #endif
     Wavelengths lambdas = wavelengths_sample(scene, u);
+#if USES_MOTION
+    scene.time = motion_time(scene, sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH)).y);
+    store_path_time(path, at, go, scene.time);
+#endif
     vec2 lens = sampler_pair(sampler, (natural)(DIMENSION_LENS));
 #if CAMERA_WEIGHS
     Spectrum weight;
@@ -155,6 +160,9 @@ STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
     SLABS
     SCENE
     STAGE_AT
+#if USES_MOTION
+    scene.time = load_path_time(path, at);
+#endif
     PathEnd end = path_end(path, hit, at);
 #if USES_INFINITE /* light from all around is gathered here */
     int due = path_end_of_half(end);

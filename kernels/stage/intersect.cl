@@ -15,6 +15,9 @@ STAGE(intersect)(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS STAGE_AT_ARG)
     integer state = load_path_state(path, at);
     mask active = (state & PATH_ALIVE) != 0;
     if (any(active)) {
+#if USES_MOTION
+        scene.time = load_path_time(path, at);
+#endif
         vec3 o = load_path_o(path, at), d = load_path_d(path, at);
         real far = sel((state & PATH_DEPTH) == 0, -load_path_pdf(path, at), (real)(FAR));
         TraceHit h = trace_closest(TRACE_PASSED, scene, o, d, far, active);

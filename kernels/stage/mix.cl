@@ -21,6 +21,9 @@ STAGE(mix_materials)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
     mask active = ((state & PATH_ALIVE) != 0) & (load_hit_prim(hit, at) >= 0);
     mask open = active & (MATERIAL_KIND(word) == MIXTURE);
     if (any(open)) {
+#if USES_MOTION
+        scene.time = load_path_time(path, at);
+#endif
         mask front, chosen = open;
         Surface s = surface_load(scene, hit, at, open, load_path_o(path, at), load_path_d(path, at), &front);
         Wavelengths lambdas = load_path_lambdas(path, at);

@@ -44,6 +44,9 @@ STAGE(shade)(SLAB_ARGS, SCENE_ARGS SHADE_ARGS WHICH_ARG QUEUE_ARGS)
 #if QUEUED
     uint entry = get_global_id(0);
     if (entry < queue_counts[BSDF_KIND]) {
+#if USES_MOTION
+        scene.time = load_path_time(path, queue[queue_starts[BSDF_KIND] + entry]);
+#endif
         integrator_vertex(scene, path, hit, shadow, queue[queue_starts[BSDF_KIND] + entry], mask_of(1) SHADE_PASSED);
     }
 #else
@@ -51,6 +54,9 @@ STAGE(shade)(SLAB_ARGS, SCENE_ARGS SHADE_ARGS WHICH_ARG QUEUE_ARGS)
     mask active = ((load_path_state(path, at) & PATH_ALIVE) != 0) & (load_hit_prim(hit, at) >= 0);
 #if BSDF_COUNT > 1
     active = active & (MATERIAL_KIND(load_hit_material(hit, at)) == BSDF_KIND);
+#endif
+#if USES_MOTION
+    scene.time = load_path_time(path, at);
 #endif
     if (any(active)) integrator_vertex(scene, path, hit, shadow, at, active SHADE_PASSED WHICH_PASSED);
 #endif

@@ -1,6 +1,7 @@
 /* One ray and one instance: the ray is transformed into the group's space and goes through its tree by
  * LAYOUT(verb). Its direction keeps the length that it gets, so that t is the world's. */
 #include "tracing/instances.cl"
+#include "generated/motion.cl"
 
 /* If the instance at row `at` is met between tmin and hit->t, 1 is returned and the hit becomes that one,
  * still in the group's space. With `first_only` the hit stays. */
@@ -8,6 +9,9 @@ inline int instance_meet(global const float *nodes, global const float *leaves, 
                          vec3 d, float tmin, TriHit *hit, int first_only)
 {
     InstanceRow i = instance_row_row(scene.instances, (int)at * INSTANCE_ROW_WORDS);
+#if MOVES_INSTANCES
+    i = motion_of_instance(scene, i);
+#endif
     vec3 s = {o.x - i.origin.x, o.y - i.origin.y, o.z - i.origin.z};
     vec3 p = {dot3(i.x, s), dot3(i.y, s), dot3(i.z, s)}, v = {dot3(i.x, d), dot3(i.y, d), dot3(i.z, d)};
     nodes += (ulong)i.nodes * 8;

@@ -1,5 +1,7 @@
 /* From the space of a group to the world, by an InstanceRow, whose x, y and z are the rows of the inverse: of the
  * matrix from the world to the group. They are scaled first, so that neither tiny nor huge instances leave float. */
+#include "generated/motion.cl"
+
 typedef struct { vec3 x, y, z, origin; real scale; } InstanceFrame;
 
 inline real instance_size(vec3 v) { return fabs(v.x) + fabs(v.y) + fabs(v.z); }
@@ -8,6 +10,9 @@ inline InstanceFrame instance_frame(Scene scene, mask placed, integer instance)
 {
     integer row = sel_i(placed, instance - 1, (integer)(0)) * INSTANCE_ROW_WORDS;
     InstanceRow i = instance_row_row(scene.instances, row);
+#if MOVES_INSTANCES
+    i = motion_of_instance(scene, i);
+#endif
     real size = instance_size(i.x) + instance_size(i.y) + instance_size(i.z), scale = 1.0f / size;
     InstanceFrame f = {scale3(i.x, scale), scale3(i.y, scale), scale3(i.z, scale), i.origin, scale};
     return f;

@@ -18,6 +18,7 @@ from clpt.formats.gltf import (
     materials,
     meshes,
     meshopt,
+    motion,
     nodes,
     variants,
 )  # fmt: skip
@@ -29,7 +30,7 @@ from clpt.scene import Scene
 from clpt.scene.shapes import Mesh
 
 VARIABLES = (
-    "time", "animation", "camera", "scene", "variant", "lumens", "multiple_scattering",
+    "time", "animation", "camera", "scene", "shutter", "variant", "lumens", "multiple_scattering",
 )  # fmt: skip
 SUPPORTED = (
     draco.NAME, *meshopt.EXTENSIONS, "KHR_mesh_quantization", "KHR_texture_transform",
@@ -46,10 +47,22 @@ def load(path: Path, missing: Missing = "error", /, **variables: Any) -> Scene:
 
     variables: `time` [s] of an animation (the first, or the `animation` of that number or name);
     without it nodes have their own transforms. `camera` and `scene` choose by number or name.
+    `shutter` [s] is how long light comes to the film from `time` on, while nodes move.
     `variant` chooses among material variants. `lumens`: of a watt, by which punctual lights are
     divided. `multiple_scattering`: 1 keeps what facets reflect to each other.
     missing: see clpt.load. Raises SceneError with the JSON path of what is wrong.
     """
+    if "shutter" in variables:
+        length = _seconds(path, variables["shutter"], "shutter")
+        if not 0.0 <= length < float("inf"):
+            raise SceneError(f"the shutter {length:g} s must be from zero", file=path)
+        time = _seconds(path, variables.get("time", 0.0))
+        others = {name: value for name, value in variables.items() if name != "shutter"}
+        if length > 0.0:
+            return motion.between(
+                lambda t: load(path, missing, **{**others, "time": t}), time, length
+            )
+        variables = {**others, "time": time}
     document, graph = _open(path, variables, missing)
     chosen = cameras.chosen(graph, _text(variables.get("camera")))
     shapes = meshes.shapes(graph)
@@ -148,8 +161,8 @@ def _number(
     return number
 
 
-def _seconds(path: Path, value: Any) -> float:
+def _seconds(path: Path, value: Any, name: str = "time") -> float:
     try:
         return float(value)
     except ValueError:
-        raise SceneError(f"the time {value!r} is no number", file=path) from None
+        raise SceneError(f"the {name} {value!r} is no number", file=path) from None

@@ -54,7 +54,7 @@ def _make(
     props.ignore("sampling_weight")
     around(props)  # a ray to it knows its medium from where it begins
     with element.locating():
-        made = cls(**within(cls, read(props), props))
+        made = cls(**within(cls, read(props), props), motion=props.motion)
     props.finish()
     return made
 

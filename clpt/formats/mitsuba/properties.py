@@ -15,10 +15,11 @@ from clpt import transforms
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
 from clpt.formats.missing import GREY, Missing, grey_for
 from clpt.formats.mitsuba.xml import MAX_NESTING, Document, Element
+from clpt.scene.motion import Keys
 
 VALUES = {
     "integer", "float", "string", "boolean", "vector", "point", "rgb", "srgb", "spectrum",
-    "transform",
+    "transform", "animation",
 }  # fmt: skip
 OBJECTS = {
     "integrator", "sensor", "sampler", "film", "rfilter", "bsdf", "texture", "emitter", "shape",
@@ -101,6 +102,7 @@ class Properties:
         self.named: dict[str, Element] = {}
         self.nested: list[Element] = []
         self.read: list[str] = []
+        self.motion: Keys | None = None  # of an <animation> that was taken as a transform
         for child in element.children:
             if child.tag == "alias":
                 continue
@@ -221,9 +223,15 @@ class Properties:
         return tuple(triple(child, "value", 0.0).tolist())
 
     def matrix(self, name: str) -> transforms.Matrix:
-        """Take a transform, (4, 4) float64; the identity where it is not given."""
+        """Take a transform, (4, 4) float64; the identity where it is not given.
+
+        An <animation> in its place is the identity, followed by `motion`.
+        """
         child = self.take(name)
         if child is None:
+            return np.eye(4)
+        if child.tag == "animation":
+            self.motion = self._keys(child)
             return np.eye(4)
         self._expect(child, "transform")
         for step in child.children:
@@ -233,6 +241,18 @@ class Properties:
                     step, "its axis is not of unit length: a shear in Mitsuba 3, a rotation here"
                 )
         return transform(child)
+
+    def _keys(self, animation: Element) -> Keys:
+        """The keys of an <animation>: each <transform> in it has a time [s]."""
+        times: list[float] = []
+        for key in animation.children:
+            self._expect(key, "transform")
+            times.append(numbers(key, "time", 1)[0])
+            if len(times) > 1 and not times[-1] > times[-2]:
+                message = f"its time must be later than {times[-2]:g} s, that of the key before"
+                raise key.error(message)
+        with animation.locating():
+            return Keys(times, [transform(key) for key in animation.children])
 
     def placement(self, name: str = "to_world", *, thin: bool = False) -> transforms.Matrix:
         """Take a transform that can be inverted.

@@ -16,6 +16,7 @@ from clpt.formats.mitsuba.properties import Context, Properties, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene import cameras, integrators
 from clpt.scene.integrators import Film, Filter, Integrator
+from clpt.scene.motion import Shutter
 from clpt.scene.params import params
 from clpt.spectra import read_sensor, spaces
 from clpt.spectra.sensors import OBSERVERS
@@ -62,12 +63,14 @@ def sensor(element: Element, context: Context) -> Sensor:
     props = Properties(element, context)
     film = default_film() if (child := props.object("film")) is None else _film(child, context)
     sampler, spp, seed = _sampler(props.object("sampler"), context)
-    props.ignore("shutter_open", "shutter_close")
+    opens = props.number("shutter_open", 0.0)
+    closes = props.number("shutter_close", opens)
     if element.type not in ("thinlens", "lens"):
         props.ignore("focus_distance")
     with element.locating():
         camera = CAMERAS[element.type](props, film)
-    camera = replace(camera, medium=around(props))
+        shutter = Shutter(opens, closes)
+    camera = replace(camera, medium=around(props), motion=props.motion, shutter=shutter)
     props.finish()
     return Sensor(camera, film, sampler, spp, seed, element.attributes.get("id", ""))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -82,6 +83,7 @@ def shape(element: Element, context: Context) -> Shape:
         if stretch is not None:
             group = Group((made,), made.name or made.kind)
             made = Instance(group=group, to_world=stretch, name=made.name)
+        made = replace(made, motion=props.motion)
     props.finish()
     return made
 
@@ -93,8 +95,9 @@ def _instance(element: Element, context: Context) -> Shape:
         raise element.error('needs a <shape type="shapegroup">, or a <ref> to one')
     name = element.attributes.get("id", "")
     with element.locating():
+        to_world = props.placement(thin=True)
         made = Instance(
-            group=_group(group, context), to_world=props.placement(thin=True), name=name
+            group=_group(group, context), to_world=to_world, motion=props.motion, name=name
         )
     props.finish()
     return made

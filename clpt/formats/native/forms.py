@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from clpt import spectra
-from clpt.formats.native import json_schema, lenses, reradiation, sensors
+from clpt.formats.native import json_schema, lenses, motion, reradiation, sensors
 from clpt.formats.native import spectra as json_spectra
 from clpt.formats.native.cursor import Cursor
 from clpt.formats.native.json_schema import NUMBER, NUMBERS, STRING, TRIPLE, Schema, ref
@@ -426,6 +426,18 @@ FORMS: dict[str, Form] = {
         ref("filter"),
         lambda cursor, reader: reader.kind(cursor, "filter"),
         lambda value, writer: writer.kind(value),
+    ),
+    "keys": Form(
+        "list of [keys](motion.md#keys), or none",
+        {"anyOf": [ref("keys"), {"type": "null"}]},
+        lambda cursor, _: motion.keys(cursor),
+        lambda value, _: motion.write_keys(value),
+    ),
+    "shutter": Form(
+        "[shutter](motion.md#the-shutter)",
+        {"anyOf": [ref("shutter"), {"type": "null"}]},
+        lambda cursor, _: motion.shutter(cursor),
+        lambda value, _: motion.write_shutter(value),
     ),
     "area_light": Form(
         "`area` or `directional_area` light",

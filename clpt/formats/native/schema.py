@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from clpt import output_files, spectra
-from clpt.formats.native import forms
+from clpt.formats.native import forms, motion
 from clpt.formats.native.json_schema import (
     NUMBER,
     NUMBERS,
@@ -38,7 +38,13 @@ def schema() -> Schema:
     defs: Schema = {category: _category(category) for category in KINDS}
     defs |= {f"spectrum_{role}": _spectrum(role) for role in SPECTRUM_ROLES}
     defs["reradiation"] = _reradiation()
-    defs |= {"spectrum": _typed_spectra(), "step": _step(), "transform": _transform()}
+    defs |= {
+        "spectrum": _typed_spectra(),
+        "step": _step(),
+        "keys": motion.KEYS_SCHEMA,
+        "shutter": motion.SHUTTER_SCHEMA,
+        "transform": _transform(),
+    }
     film, defs["layer"] = _untyped(integrators.Film), _untyped(materials.Layer)
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -5,8 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
+from clpt import transforms
 from clpt.formats.pbrt.curves import joined
 from clpt.formats.pbrt.files import Contents
 from clpt.formats.pbrt.layered import body
@@ -46,7 +50,8 @@ def shapes(contents: Contents, progress: Progress | None) -> list[Shape]:
             raise use.params.error(f"there is no object {use.kind!r}{hint}")
         if groups[use.kind].shapes:
             with use.params.locating():
-                result.append(Instance(group=groups[use.kind], to_world=use.state.ctm))
+                whole = Instance(group=groups[use.kind], to_world=use.state.ctm)
+                result.append(_moving(whole, use.state))
     return result
 
 
@@ -96,12 +101,22 @@ def _shape(definition: Definition, form: Geometry | None) -> Shape | None:
             state.warn(params, "textures run around and along curves, not along and across")
         form = with_uvs(form)
     with params.locating():
-        return form.made(
+        made = form.made(
             material=surface,
             emission=emission,
             interior=_body(params, state) or medium(state.inside, params, state),
             exterior=medium(state.outside, params, state),
         )
+        return _moving(made, state)
+
+
+def _moving(shape: Shape, state: State) -> Shape:
+    """The shape with the keys of the transforms that it was defined in."""
+    keys = state.motion()
+    if keys is None:
+        return shape
+    own = transforms.inverse(state.ctm) @ np.asarray(shape.to_world)
+    return replace(shape, to_world=own, motion=keys)
 
 
 def _material(source: Parameters, state: State) -> Material:

@@ -20,6 +20,7 @@ from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.state import Definition, State
 from clpt.scene import cameras
 from clpt.scene.integrators import Film
+from clpt.scene.motion import Keys, Shutter
 
 TO_RIGHT = np.diag([-1.0, 1.0, 1.0, 1.0])
 BLADES = {"square": 4, "pentagon": 5}
@@ -43,15 +44,32 @@ def camera(definition: Definition, film: Film, diagonal: float) -> cameras.Camer
             made = _realistic(params, state, film, diagonal)
         else:
             made = CAMERAS[definition.kind](params, state, film)
-    return replace(made, medium=medium(state.outside, params, state))
+        made = _moving(made, state)
+        shutter = Shutter(*_shutter(params))
+    return replace(made, medium=medium(state.outside, params, state), shutter=shutter)
+
+
+def _moving(camera: cameras.Camera, state: State) -> cameras.Camera:
+    """The camera with the keys of the transforms that it was defined in."""
+    if state.motion() is None or state.end is None:
+        return camera
+    keys = [_without_scale(transforms.inverse(matrix))[0] for matrix in (state.ctm, state.end)]
+    own = transforms.inverse(keys[0]) @ camera.to_world
+    return replace(camera, to_world=own, motion=Keys(state.shared.times, keys))
 
 
 def exposure_time(params: Parameters) -> float:
-    """Take the time [s] for which the shutter is open; what moves meanwhile is left out."""
-    time = params.one("shutterclose", "float", 1.0) - params.one("shutteropen", "float", 0.0)
+    """Take the time [s] for which the shutter is open."""
+    opens, closes = _shutter(params)
+    time = closes - opens
     if not time > 0.0:
         raise params.error("the shutter does not open: 'shutterclose' must be above 'shutteropen'")
     return float(time)
+
+
+def _shutter(params: Parameters) -> tuple[float, float]:
+    """Take when the shutter opens and closes [s]."""
+    return params.one("shutteropen", "float", 0.0), params.one("shutterclose", "float", 1.0)
 
 
 def _window(params: Parameters, film: Film) -> tuple[float, float, float, float]:

@@ -119,7 +119,7 @@ def joined(things: Iterable[Shape]) -> Iterator[Shape]:
 
 def _shared(shape: Shape) -> tuple[Any, ...] | None:
     """What curves that may be one have in common."""
-    if not isinstance(shape, Curves):
+    if not isinstance(shape, Curves) or shape.motion is not None:
         return None
     placed = np.asarray(shape.to_world).tobytes()
     return id(shape.material), id(shape.emission), shape.flip_normals, placed

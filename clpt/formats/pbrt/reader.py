@@ -73,9 +73,9 @@ class _Reader(TransformDirectives):
 
     def world_begin(self) -> None:
         self.only(False)
-        self.in_world, self.state.active = True, True
-        self.state.ctm = np.eye(4)
-        self.contents.shared.systems["world"] = np.eye(4)
+        self.in_world, self.state.active = True, (True, True)
+        self.state.ctm, self.state.end = np.eye(4), None
+        self.contents.shared.systems["world"] = np.eye(4), None
 
     def option(self) -> None:
         """Camera, Film and the like."""
@@ -83,9 +83,11 @@ class _Reader(TransformDirectives):
         name = self.name
         self.contents.options[name] = self._definition(f'{name} "{{}}"')
         if name == "Camera":
-            if transforms.is_singular(self.state.ctm):
+            ctm, end = self.state.ctm, self.state.end
+            if transforms.is_singular(ctm) or (end is not None and transforms.is_singular(end)):
                 raise SceneError("the camera's transform cannot be inverted")
-            self.contents.shared.systems["camera"] = transforms.inverse(self.state.ctm)
+            last = None if end is None else transforms.inverse(end)
+            self.contents.shared.systems["camera"] = transforms.inverse(ctm), last
 
     def set_option(self) -> None:
         name = self.lexer.string("an option").split()[-1:]
@@ -195,6 +197,9 @@ class _Reader(TransformDirectives):
         self.only(True)
         shapes = self.contents.shapes if self.object is None else self.object
         definition = self._definition('Shape "{}"', "shape")
+        if self.object is not None and definition.state.motion() is not None:
+            self.warn_once("a shape of an object stays where it is at the first time")
+            definition.state.end = None
         if self.object is not None and definition.state.area_light is not None:
             self.warn_once(
                 "shapes of an object emit no light in pbrt: its AreaLightSource is ignored"

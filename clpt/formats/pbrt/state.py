@@ -16,6 +16,7 @@ from clpt.errors import SceneError
 from clpt.formats.missing import Missing, grey_for
 from clpt.formats.pbrt.params import Parameter, Parameters
 from clpt.scene.materials import Material
+from clpt.scene.motion import Keys
 
 TARGETS = ("shape", "light", "material", "medium", "texture")
 
@@ -41,7 +42,10 @@ class Shared:
     textures: dict[tuple[str, str], Definition] = field(default_factory=dict)
     materials: dict[str, Definition] = field(default_factory=dict)
     media: dict[str, Definition] = field(default_factory=dict)
-    systems: dict[str, transforms.Matrix] = field(default_factory=dict)
+    systems: dict[str, tuple[transforms.Matrix, transforms.Matrix | None]] = field(
+        default_factory=dict
+    )
+    times: tuple[float, float] = (0.0, 1.0)  # of both transforms [s]
     files: dict[str, State] = field(default_factory=dict)  # the names, and where each stands
     made: dict[Any, Any] = field(default_factory=dict)
     make_material: Callable[..., Material] | None = None
@@ -73,10 +77,17 @@ class State:
     material: Definition | str | None = None
     area_light: Definition | None = None
     reverse: bool = False
-    active: bool = True  # whether transforms count for the start of the exposure
+    end: transforms.Matrix | None = None  # object to world at the last time; None: as `ctm`
+    active: tuple[bool, bool] = (True, True)  # whether transforms count for the first and last time
     inside: str = ""
     outside: str = ""
     defaults: dict[str, tuple[Parameter, ...]] = field(default_factory=dict)
+
+    def motion(self) -> Keys | None:
+        """Return the keys of what the transforms move, None: it is still. Raises SceneError."""
+        if self.end is None or np.array_equal(self.end, self.ctm):
+            return None
+        return Keys(self.shared.times, np.stack([self.ctm, self.end]))
 
     def copy(self) -> State:
         """Return a state of its own, which shares the definitions."""

@@ -14,13 +14,20 @@ class TransformDirectives(Files):
     """The directives that change `state.ctm`."""
 
     def _concat(self, matrix: transforms.Matrix) -> None:
-        self._set(self.state.ctm @ matrix)
+        end = None if self.state.end is None else self.state.end @ matrix
+        self._set(self.state.ctm @ matrix, end)
 
-    def _set(self, matrix: transforms.Matrix) -> None:
-        if not np.isfinite(matrix).all():
+    def _set(self, matrix: transforms.Matrix, end: transforms.Matrix | None = None) -> None:
+        """Set the transforms that are active; end: at the last time, None for the same."""
+        end = matrix if end is None else end
+        if not (np.isfinite(matrix).all() and np.isfinite(end).all()):
             raise SceneError("the transform is not finite any more")
-        if self.state.active:
-            self.state.ctm = matrix
+        state = self.state
+        at_first, at_last = state.active
+        former = state.ctm if state.end is None else state.end
+        end = end if at_last else former
+        state.ctm = matrix if at_first else state.ctm
+        state.end = None if end is state.ctm else end
 
     def identity(self) -> None:
         self._set(np.eye(4))
@@ -50,22 +57,23 @@ class TransformDirectives(Files):
         return self.lexer.numbers(16, self.name).reshape(4, 4).T.copy()
 
     def coordinate_system(self) -> None:
-        self.contents.shared.systems[self.lexer.string("a name")] = self.state.ctm
+        self.contents.shared.systems[self.lexer.string("a name")] = self.state.ctm, self.state.end
 
     def coord_sys_transform(self) -> None:
         name = self.lexer.string("a name")
         systems = self.contents.shared.systems
         if name not in systems:
             raise SceneError(f"there is no coordinate system {name!r}{nearest(name, systems)}")
-        self.state.ctm = systems[name]
+        self._set(*systems[name])
 
     def active_transform(self) -> None:
         which = self.lexer.next("All, StartTime or EndTime").decode("utf-8", "replace")
         if which not in ("All", "StartTime", "EndTime"):
             raise SceneError(f"{which[:40]!r} is none of All, StartTime, EndTime")
-        self.state.active = which != "EndTime"
-        if which != "All":
-            self.warn_once("motion is left out: all stands as when the shutter opens")
+        self.state.active = which != "EndTime", which != "StartTime"
 
     def transform_times(self) -> None:
-        self.lexer.numbers(2, "TransformTimes")
+        first, last = self.lexer.numbers(2, "TransformTimes").tolist()
+        if not last > first:
+            raise SceneError(f"the last time, {last:g} s, must be after the first, {first:g} s")
+        self.contents.shared.times = first, last

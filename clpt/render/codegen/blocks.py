@@ -12,7 +12,7 @@ CHANGED = (
     "o", "d", "beta", "radiance", "lambdas", "pdf", "sampled_hemisphere", "null_distance", "nulls",
     "ratio", "eta", "medium", "bodies", "lead", "rival", "pending", "expected", "state",
 )  # fmt: skip
-READ = ("weight", "light", "pixel_index", "pixel_key", "sample")  # and not changed
+READ = ("weight", "light", "time", "pixel_index", "pixel_key", "sample")  # and not changed
 # members that a scene has only with a flag, or one of two
 NEEDED = {
     "lambdas": "SPECTRAL",
@@ -30,6 +30,7 @@ NEEDED = {
     "expected": "USES_GUIDE",
     "weight": "LIGHT_PATHS USES_LAYERS LIGHT_LAYERS",
     "light": "WEIGHS_LIGHT_PATHS",
+    "time": "USES_MOTION",
     "pixel_index": "LIGHT_PATHS USES_LAYERS LIGHT_LAYERS",
     "film": "LIGHT_PATHS",
     "instance": "USES_INSTANCES",

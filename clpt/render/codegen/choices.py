@@ -72,6 +72,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         (f"bvh/{bvh.shapes_layout(layout)}.cl", "bvh/shapes.cl") * bool(f.analytic)
     ),
     "generated/instances.cl": lambda f, _: ("tracing/instances.cl",) * f.instances,
+    "generated/motion.cl": lambda f, _: ("tracing/motion.cl",) * bool(f.moving),
     "generated/instance_traversal.cl": lambda f, layout: (
         (f"tracing/instances_{layout}.cl", "tracing/trace_instances.cl") * f.instances
     ),

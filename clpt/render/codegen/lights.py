@@ -40,13 +40,14 @@ def dispatch_text(
     densities: str = "",
     aimed: bool = False,
     grouped: bool = False,
+    moving: bool = False,
 ) -> str:
     """Return the functions over all lights, for the kinds in the scene (`LightRows.kinds`).
 
     textured: some emission is a texture, so that triangles need the uv of their mesh; two_sided:
     some shape emits from its back too; tree: the rows are followed by a tree that chooses among
     them; densities: the functions that weigh light paths, where there are some; aimed: some of
-    these start toward what is sharp; grouped: a sample tells its light.
+    these start toward what is sharp; grouped: a sample tells its light; moving: some lights move.
     It includes the files of `virtual_files`, here and in clpt.render.codegen.shapes.
 
     light_sample(scene, p, hemisphere, pick, u, lambdas): chooses a light and a direction to it
@@ -64,16 +65,19 @@ def dispatch_text(
     includes += [f"generated/light/{kind}.cl" for kind in others]
     includes += [f"generated/shape/{kind}.cl" for kind in surfaces]
     includes += ["light/area.cl"] if surfaces else []
+    includes += ["light/moving.cl"] if moving else []
     parts = [f"#define LIGHT_ROW_WORDS {LIGHT.words}", f"#define SHAPE_ROW_WORDS {SHAPE.words}"]
     parts += [f"#define LIGHT_{kind.upper()} {KINDS.index(kind)}" for kind in present]
     parts += [f'#include "{name}"' for name in includes]
     parts += _tree_text() if tree else []
     parts.append(_sides_text(two_sided))
     weighed = bool(densities)
-    parts.append(_sample_text(others, surfaces, textured, two_sided, tree, weighed, aimed, grouped))
-    parts += [_pdf_text(surfaces, tree), densities]
+    parts.append(
+        _sample_text(others, surfaces, textured, two_sided, tree, weighed, aimed, grouped, moving)
+    )
+    parts += [_pdf_text(surfaces, tree, moving), densities]
     parts += [_brick_pdf_text(tree)] if VOLUME in present else []
-    parts += _infinite_text([kind for kind in others if kind in INFINITE], tree)
+    parts += _infinite_text([kind for kind in others if kind in INFINITE], tree, moving)
     return "\n".join(parts) + "\n"
 
 
@@ -130,6 +134,7 @@ def _sample_text(
     weighed: bool,
     aimed: bool,
     grouped: bool,
+    moving: bool,
 ) -> str:
     kinds = [*others, *surfaces]
     head = (
@@ -147,6 +152,13 @@ def _sample_text(
     else:
         rows = [f"integer row = light_pick(scene, {number}, u.y);"]
     rows += ["LightRow l = light_at(scene, row);", "LightSample s = light_sample_nothing();"]
+    if moving:
+        rows += [
+            "Motion motion = motion_of_light(scene, row, l);",
+            "vec3 seen_from = p;",
+            "p = motion_point_back(motion, p);",
+            "hemisphere = motion_back_unit(motion, hemisphere);",
+        ]
     for kind in others:
         seen = "hemisphere" if kind in INFINITE else "p"
         sampled = f"{kind}_sample({row_text(kind)}, scene, {seen}, u, lambdas)"
@@ -160,6 +172,9 @@ def _sample_text(
         sampled = f"ShapeSample r = {kind}_sample({row_text(kind)}, p, u);"
         point = point_text(kind, "r.uv") if textured else ()
         rows += choose("q", "ShapeSample", Case(kind_test(kind, kinds), "r", (sampled, *point)))
+    if moving:
+        rows.append("s = light_moved(motion, s);")
+        rows += ["q = area_moved(motion, q);", "p = seen_from;"] if surfaces else []
     if two_sided:
         rows.append(f"q = area_turned(q, l.emission_mode == {BOTH});")
     if surfaces:
@@ -179,16 +194,29 @@ def _sample_text(
     return function(head, *rows, "return s;")
 
 
-def _pdf_text(surfaces: list[str], tree: bool) -> str:
+def _pdf_text(surfaces: list[str], tree: bool, moving: bool) -> str:
+    at, along, far, front = ("p", "wi", "t", "n")
+    before = ["LightRow l = light_at(scene, row);"]
+    if moving and surfaces:
+        at, along, far, front = ("rest", "along", "far", "front")
+        before += [
+            "Motion motion = motion_of_light(scene, row, l);",
+            "vec3 rest = motion_point_back(motion, p), along = motion_back_unit(motion, wi);",
+            "vec3 front = motion_front_back(motion, n);",
+            "real far = t * motion_length_back(motion, wi);",
+        ]
     return Function(
         "real light_pdf(Scene scene, integer row, vec3 p, vec3 hemisphere, vec3 wi, real t, "
         "vec3 n)",
         "0.0f",
         [
-            Case(kind_test(kind, surfaces), f"{kind}_pdf({row_text(kind)}, p, wi, t, n)")
+            Case(
+                kind_test(kind, surfaces),
+                f"{kind}_pdf({row_text(kind)}, {at}, {along}, {far}, {front})",
+            )
             for kind in surfaces
         ],
-        ("LightRow l = light_at(scene, row);",),
+        tuple(before),
         f"value * {pmf_text(tree)}",
     ).text()
 
@@ -206,7 +234,7 @@ def pmf_text(tree: bool) -> str:
     return "light_tree_pmf(scene, (integer)(row), p, hemisphere)" if tree else "l.pmf"
 
 
-def _infinite_text(kinds: list[str], tree: bool) -> list[str]:
+def _infinite_text(kinds: list[str], tree: bool, moving: bool) -> list[str]:
     """`row` is the same in all lanes."""
     if not kinds:
         return []
@@ -215,6 +243,13 @@ def _infinite_text(kinds: list[str], tree: bool) -> list[str]:
         "*radiance = spectrum_of(0.0f);",
         "*pdf = 0.0f;",
     ]
+    if moving:
+        rows += [
+            "vec3 tree_hemisphere = hemisphere;",
+            "Motion motion = motion_of_light(scene, (integer)(row), l);",
+            "d = motion_back_unit(motion, d);",
+            "hemisphere = motion_back_unit(motion, hemisphere);",
+        ]
     for kind in kinds:
         rows += masked(
             kind_test(kind, kinds),
@@ -222,6 +257,7 @@ def _infinite_text(kinds: list[str], tree: bool) -> list[str]:
             f"*radiance = spectrum_sel(m, {kind}_radiance(light, scene, d, lambdas), *radiance);",
             f"*pdf = sel(m, {kind}_pdf(light, scene, hemisphere, d), *pdf);",
         )
+    rows += ["hemisphere = tree_hemisphere;"] if moving else []
     rows.append(f"*pdf *= {pmf_text(tree)};")
     head = (
         "void infinite_light(Scene scene, int row, vec3 p, vec3 hemisphere, vec3 d, "

@@ -161,7 +161,7 @@ def _shared(features: Features, layout: str) -> Files:
         **parameters.virtual_files(features),
         **choices.virtual_files(features, layout),
         "generated/camera.cl": stages.camera_text(
-            features.camera, features.glass_lens, features.lens_losses
+            features.camera, features.glass_lens, features.lens_losses, "camera" in features.moving
         ),
         "generated/connect.cl": stages.connect_text(features),
         "generated/photon.cl": stages.photon_text(features) if features.merged else "",

@@ -23,8 +23,13 @@ def hit_text(features: Features) -> str:
     if not features.analytic:
         return ""
     word = {member.name: member.word for member in SHAPE.members}
+    moves = "shapes" in features.moving
+    answer = "none =" if moves else "return"
+    none = "ShapeHit none = {FAR, {0.0f, 0.0f, 1.0f}, {0.0f, 0.0f}};"
+    moved = _at_rest(word["number"], none) if moves else []
+    back = _in_motion() if moves else [none]
     cases = [
-        f"if (kind == {_number(kind)}) return {ONE_OF.get(kind, kind)}_intersect("
+        f"if (kind == {_number(kind)}) {answer} {ONE_OF.get(kind, kind)}_intersect("
         f"{_row_text(kind, 'params')}, o, d, tmin, tmax);"
         for kind in features.analytic
     ]
@@ -36,12 +41,35 @@ def hit_text(features: Features) -> str:
         "global const uint *shape = scene.shapes + row * SHAPE_ROW_WORDS;",
         f"int kind = (int)shape[{word['kind']}];",
         f"integer params = (int)shape[{word['params']}];",
+        *moved,
         *cases,
-        "ShapeHit none = {FAR, {0.0f, 0.0f, 1.0f}, {0.0f, 0.0f}};",
+        *back,
         "return none;",
     ]
-    files = f'#include "tracing/shape_rows_{rows}.cl"\n'
+    files = '#include "generated/motion.cl"\n' * moves
+    files += f'#include "tracing/shape_rows_{rows}.cl"\n'
     return _includes(features) + files + function(signature, *body)
+
+
+def _at_rest(number: int, none: str) -> list[str]:
+    """Statements that turn the ray to where a shape that moves was lowered."""
+    return [
+        none,
+        f"Motion motion = motion_of_shape(scene, (integer)((int)shape[{number}]));",
+        "real longer = motion_length_back(motion, d);",
+        "o = motion_point_back(motion, o);",
+        "d = scale3(motion_back(motion, d), 1.0f / longer);",
+        "tmin *= longer;",
+        "tmax = min_r(tmax * longer, (real)(FAR));",
+    ]
+
+
+def _in_motion() -> list[str]:
+    """Statements that bring a hit back to the world."""
+    return [
+        "none.t = sel(none.t < tmax, none.t / longer, (real)(FAR));",
+        "none.n = normalize3(motion_normal(motion, none.n));",
+    ]
 
 
 def points_text(features: Features) -> str:

@@ -15,13 +15,14 @@ from clpt.scene.params import MEASURED, device_params, interior_params
 from clpt.scene.scatterer import Scatterer
 
 
-def camera_text(kind: str, glass: bool, losses: bool = False) -> str:
+def camera_text(kind: str, glass: bool, losses: bool = False, moves: bool = False) -> str:
     """Return `camera_ray`, or `camera_weighted_ray`.
 
-    glass: the lens is of one that disperses; losses: its surfaces reflect.
+    glass: the lens is of one that disperses; losses: its surfaces reflect; moves: the camera does.
     """
     record = camera_records.RECORDS[kind]
     camera = f"(global const {record.name} *)(scene).camera"
+    moving = '#include "camera/moved.cl"\n' * moves
     if kind in camera_records.WEIGHTED:
         surface = camera_records.LENS_SURFACE
         return (
@@ -30,18 +31,22 @@ def camera_text(kind: str, glass: bool, losses: bool = False) -> str:
             f"#define LENS_GHOST_CELLS {camera_records.GHOST_CELLS}\n"
             + '#include "optics/film_stack.cl"\n'
             * losses
-            + f'#include "camera/{kind}.cl"\n'
+            + f'#include "camera/{kind}.cl"\n{moving}'
             "#define camera_weighted_ray(scene, film, lens, lambdas, weight) "
-            f"{kind}_ray(scene, {camera}, film, lens, lambdas, weight)\n"
+            f"{_moved(f'{kind}_ray(scene, {camera}, film, lens, lambdas, weight)', moves)}\n"
         )
     ray = f"{kind}_ray({camera}, film, lens)"
     if glass:
         row = f"(integer)(({camera})->glass)"
         ray = f"{kind}_glass_ray({camera}, film, lens, spectra_row(scene, {row}, lambdas).x)"
     return (
-        f'{record.uniform_text()}#include "camera/{kind}.cl"\n'
-        f"#define camera_ray(scene, film, lens, lambdas) {ray}\n"
+        f'{record.uniform_text()}#include "camera/{kind}.cl"\n{moving}'
+        f"#define camera_ray(scene, film, lens, lambdas) {_moved(ray, moves)}\n"
     )
+
+
+def _moved(ray: str, moves: bool) -> str:
+    return f"camera_moved(scene, {ray})" if moves else ray
 
 
 def connect_text(features: Features) -> str:
@@ -93,6 +98,7 @@ def lights_text(features: Features) -> str:
             densities,
             features.aimed,
             features.light_groups > 0,
+            "lights" in features.moving,
         )
     )
 

@@ -101,6 +101,9 @@ class Features:
     tinted_grids: bool = False  # of these some have an albedo on a grid
     byte_grids: bool = False  # of these some have 8 bits for each number
     bodies: bool = False  # that may overlap, of different priorities
+    moving: tuple[str, ...] = ()  # while the shutter is open: "camera", "instances", ...
+    motion_scales: bool = False  # some of it scales
+    motion_row: int = 0  # where in `distributions` its table begins
     glass_lens: bool = False  # of a glass that disperses
     lens_losses: bool = False  # surfaces of the camera's lens reflect a part of the light
     lens_ghosts: bool = False  # and samples follow it

@@ -119,7 +119,7 @@ def _members(name: str, param: Param) -> dict[str, str]:
     if param.role == "host":
         placement = {member: type_ for member, (type_, _) in _PLACEMENT.items()}
         forms = {"vector": {name: "vec3"}, "direction": {name: "vec3"}, "matrix4": placement}
-        forms["text"] = {}  # a name is for the host alone
+        forms |= {"text": {}, "keys": {}}  # for the host alone
         if param.form not in forms:
             raise TypeError(f"a light cannot declare {name!r} as a host parameter of this form")
         return forms[param.form]

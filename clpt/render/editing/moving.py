@@ -114,6 +114,8 @@ class Moving:
         """What enqueues a move. Raises CannotMove."""
         if any(one.light_paths for one in self.target.lowered.features.passes):
             raise CannotMove("light is traced from lights, whose choice follows from the shapes")
+        if any(shape.motion is not None for shape in scene.shapes):
+            raise CannotMove("shapes move while the shutter is open")
         numbers = {id(shape): number for number, shape in enumerate(scene.shapes)}
         actions: list[Action] = []
         instances: list[tuple[int, Shape]] = []

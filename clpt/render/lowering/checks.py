@@ -9,6 +9,8 @@ from clpt.render.lowering.bodies import check_bodies
 from clpt.render.lowering.camera.cameras import CONNECTED, dispersive_glasses
 from clpt.render.lowering.geometry import shapes
 from clpt.render.lowering.geometry.instancing import distinct
+from clpt.render.lowering.motion import Motions
+from clpt.render.lowering.motion import check as check_motion
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
 from clpt.scene.integrators import (
@@ -63,6 +65,10 @@ def check(scene: Scene) -> None:
         raise SceneError(message, where="film.layers")
     _check_light_layers(scene)
     _check_light_paths(scene, shapes_)
+    motions = Motions.of(scene)
+    check_motion(scene, motions)
+    if motions and isinstance(scene.integrator, ParticleTracer):
+        _refuse("a scene in which nothing moves while the shutter is open", "integrator")
     check_bodies([*shapes_, *(one for one in scene.shapes if isinstance(one, Instance))])
 
 

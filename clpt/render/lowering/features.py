@@ -28,13 +28,15 @@ def features_of(
     aimed: bool,
     medium_aims: int,
     sealed: bool,
+    motion_row: int,
 ) -> Features:
     """Return the features of a scene, from what each step of its lowering has met.
 
     profile: where in `distributions` the values of the pixel filter begin;
     aimed: whether light paths aim;
     medium_aims: places of lamps that flights through media aim at; sealed: whether there are media
-    that rays to lights cannot leave.
+    that rays to lights cannot leave;
+    motion_row: where in `distributions` the table of what moves begins.
     """
     scene, textures = index.scene, encoder.textures
     sources = encoder.sources
@@ -88,6 +90,9 @@ def features_of(
         emissive_grids=index.glowing,
         hot_grids=any(getattr(one, "temperature", None) is not None for one in index.emitting),
         grids=any(isinstance(medium, Grid) for medium in index.media),
+        moving=moving_parts(index, geometry),
+        motion_scales=index.motions.scales,
+        motion_row=motion_row,
         tinted_grids=index.tinted,
         byte_grids=any(isinstance(one, Grid) and one.bits == 8 for one in index.media),
         dispersion=glass_lens or disperses(index.leaves, sources),
@@ -102,3 +107,19 @@ def features_of(
         spectra_step=encoder.spectra.step,
         sources=sources,
     )
+
+
+def moving_parts(index: SceneIndex, geometry: Geometry) -> tuple[str, ...]:
+    """Return what of a scene moves while its shutter is open."""
+    motions = index.motions
+    analytic = {one.number for one in index.placed if one.shape.kind in shape_records.ANALYTIC}
+    placed = {int(number) for prototype in index.prototypes for number in prototype.numbers}
+    lit = {int(geometry.rows[one.shape_row]["number"]) for one in geometry.emitters}
+    numbers = motions.shapes.keys()
+    found = {
+        "camera": motions.camera is not None,
+        "instances": bool(placed & numbers),
+        "shapes": bool(analytic & numbers),
+        "lights": bool(motions.lamps) or bool(lit & numbers),
+    }
+    return tuple(name for name, moves in found.items() if moves)

@@ -11,6 +11,7 @@ from clpt.render.contract import custom_materials
 from clpt.render.lowering.camera import cameras, filters
 from clpt.render.lowering.geometry import instancing, shapes
 from clpt.render.lowering.geometry.instancing import Placed, Prototype
+from clpt.render.lowering.motion import Motions
 from clpt.scene import Scene
 from clpt.scene import materials as mt
 from clpt.scene.integrators import Auto, ParticleTracer, Vcm
@@ -29,8 +30,8 @@ class SceneIndex:
     shapes: every shape once, those of groups as the group has them; placed: shapes that are lowered
     as they are; prototypes: shapes that instances share; leaves: classes of leaf materials, in the
     order that material words count; normal_mapped: whether a material has a normal or a bump map;
-    warnings: of instances that became triangles; lit_media: why no paths can start at some light in
-    a medium, "" if they can.
+    warnings: of instances that became triangles; motions: what moves; lit_media: why no paths can
+    start at some light in a medium, "" if they can.
     """
 
     scene: Scene
@@ -40,6 +41,7 @@ class SceneIndex:
     leaves: tuple[type[Scatterer], ...]
     normal_mapped: bool
     warnings: tuple[str, ...]
+    motions: Motions
     lit_media: str = UNKNOWN
 
     @classmethod
@@ -49,7 +51,8 @@ class SceneIndex:
         Raises SceneError for an instance that cannot be placed, and for what is not a material.
         """
         warnings: list[str] = []
-        placed, prototypes = instancing.sort(scene.shapes, warnings)
+        motions = Motions.of(scene)
+        placed, prototypes = instancing.sort(scene.shapes, warnings, motions.shapes)
         distinct = tuple(instancing.distinct(scene.shapes))
         return cls(
             scene=scene,
@@ -59,6 +62,7 @@ class SceneIndex:
             leaves=(*_leaf_kinds(distinct), *_phase_kinds(scene, distinct)),
             normal_mapped=any(any_of(shape.material, mt.NormalMapped) for shape in distinct),
             warnings=tuple(warnings),
+            motions=motions,
         )
 
     @property
@@ -114,14 +118,15 @@ class SceneIndex:
 
     @property
     def lights_reach(self) -> bool:
-        """Whether paths from lights know in which medium they start."""
-        return not self.has_media or not self.lit_media
+        """Whether paths can start at lights: none moves, and they know their medium."""
+        return not self.motions and (not self.has_media or not self.lit_media)
 
     @property
     def may_have_light_paths(self) -> bool:
         """Whether paths start at lights, if they can."""
         given = self.scene.integrator
-        return isinstance(given, Auto | ParticleTracer) or bool(getattr(given, "light_paths", 0))
+        wanted = bool(getattr(given, "light_paths", 0))
+        return not self.motions and (isinstance(given, Auto | ParticleTracer) or wanted)
 
     @property
     def joined(self) -> bool:
@@ -143,7 +148,7 @@ class SceneIndex:
     def guided(self) -> bool:
         """Whether directions of the camera's paths are learned from light paths."""
         wanted: bool = getattr(self.scene.integrator, "guiding", False)
-        return wanted and not self.weighed and not self.has_media
+        return wanted and not self.weighed and not self.has_media and not self.motions
 
     @property
     def shifts(self) -> bool:

@@ -43,17 +43,19 @@ from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.layer_names import lower_names
 from clpt.render.lowering.lights.aims import aims
 from clpt.render.lowering.lights.hard_light import decided
+from clpt.render.lowering.lights.light_bounds import Bounds
 from clpt.render.lowering.lights.light_media import NOWHERE, LightMedia, light_media
-from clpt.render.lowering.lights.lights import LightRows, light_rows
+from clpt.render.lowering.lights.lights import Around, Emitter, LightRows, light_rows, row_order
 from clpt.render.lowering.lowering_cache import LoweringCache
 from clpt.render.lowering.materials.material_words import MaterialWords
 from clpt.render.lowering.media import MediumWords, medium_aims
+from clpt.render.lowering.motion import at_rest, corners, lower_motion, swept
 from clpt.render.lowering.sealed import sealed_media
 from clpt.render.lowering.settings import DEEPEST, settings_of
 from clpt.render.lowering.textures.attributes import Owner, lower_attributes
 from clpt.scene import Scene
 from clpt.scene import materials as mt
-from clpt.scene.integrators import Film, Integrator
+from clpt.scene.integrators import AUTO, Film, Integrator
 from clpt.scene.lights import Point
 from clpt.scene.media import Grid
 from clpt.scene.shapes import Mesh
@@ -125,6 +127,7 @@ def lower(
 
     Raises SceneError where the scene makes no sense: it names the shape, light or material.
     """
+    scene = at_rest(scene)
     check(scene)
     index, film = SceneIndex.of(scene), scene.film
     cache = LoweringCache(former.cache if former else None)
@@ -175,9 +178,14 @@ def lower(
         *encoder.textures.finish(),
     )  # fmt: skip
     aimed = len(targets) > 0
+    motion_row = 0
+    if index.motions:
+        rows = row_order(scene.lights)
+        rows += [-1] * ((*lights.first, len(lights.rows))[0] - len(rows))  # bricks of media
+        motion_row = lower_motion(index.motions, scene, rows, encoder.store)
     features = features_of(
         index, encoder, materials, geometry, lights, tabulated, profile, aimed, len(near),
-        bool(sealed),
+        bool(sealed), motion_row,
     )  # fmt: skip
     names, for_layers = lower_names(index, geometry, lights, encoder.store)
     features = replace(features, **for_layers)
@@ -277,8 +285,15 @@ def _lower_lights(
     tree_from = None if index.light_paths else TREE_FROM
     for medium in index.emitting:
         media.word(medium)
+    around = _light_bounds(index, geometry) if index.motions else None
     lights = light_rows(
-        index.scene.lights, geometry.emitters, encoder, scene_radius, tree_from, media.lights
+        index.scene.lights,
+        geometry.emitters,
+        encoder,
+        scene_radius,
+        tree_from,
+        media.lights,
+        around,
     )
     encoder.store.append("lights", lights.rows.view(np.uint32))
     if lights.tree is not None:
@@ -288,6 +303,24 @@ def _lower_lights(
         row["light"] = first
         row["flags"] |= SHAPE_ONE_LIGHT if whole else 0
     return lights
+
+
+def _light_bounds(index: SceneIndex, geometry: Geometry) -> Around:
+    """What makes bounds of lights hold while they move: boxes of their ways, and all directions."""
+    motions = index.motions
+
+    def around(light: int | Emitter, bounds: Bounds) -> Bounds:
+        if isinstance(light, Emitter):
+            keys = motions.shapes.get(int(geometry.rows[light.shape_row]["number"]))
+        else:
+            keys = motions.lamps.get(light)
+        if keys is None:
+            return bounds
+        points = corners(np.stack([bounds.low, bounds.high], axis=1))
+        low, high = swept(keys, points, motions.shutter).astype(np.float64).transpose(1, 0, 2)
+        return replace(bounds, low=low, high=high, theta_o=np.full(len(low), np.pi))
+
+    return around
 
 
 def _lower_camera(index: SceneIndex, encoder: Encoder) -> tuple[int, ...]:
@@ -316,7 +349,9 @@ def _warnings(index: SceneIndex) -> list[str]:
     warnings = list(index.warnings)
     if index.mode == "rgb" and cameras.dispersive_glasses(scene.camera):
         warnings.append(f"{scene.camera.kind}.glass: in RGB mode all wavelengths have one focus")
-    if getattr(scene.integrator, "light_paths", 0):
+    if index.motions:
+        warnings += _of_motion(index)
+    elif getattr(scene.integrator, "light_paths", 0):
         warnings += _left_to_the_camera(index)
     if index.light_layers and index.emitting:
         warnings.append("film.layers: light that rays gather in media is in no layer of light")
@@ -332,6 +367,29 @@ def _warnings(index: SceneIndex) -> list[str]:
         warnings.append("no light in the scene, so the picture is black: add one to `lights`")
     if film.mode == "rgb" and mt.Fluorescent in index.leaves:
         warnings.append("in rgb mode fluorescent paint has its colour under D65, at most white")
+    return warnings
+
+
+def _of_motion(index: SceneIndex) -> list[str]:
+    """What is left aside where something moves."""
+    integrator, warnings = index.scene.integrator, []
+    if getattr(integrator, "light_paths", 0) not in (0, AUTO):
+        warnings.append(
+            f"{integrator.kind}.light_paths: left aside, as no light paths start where things move"
+        )
+    if getattr(integrator, "merging", False):
+        warnings.append(f"{integrator.kind}.merging: left aside, as photons have no time")
+    if getattr(integrator, "guiding", False):
+        warnings.append(f"{integrator.kind}.guiding: left aside, as light paths have no time")
+    if index.has_media and index.motions.camera is not None:
+        warnings.append("camera.motion: the media around the camera are those where it was lowered")
+    for i in index.motions.shapes:
+        shape: Any = index.scene.shapes[i]
+        inner = getattr(getattr(shape, "group", None), "shapes", (shape,))
+        if any(isinstance(one, Grid) for s in inner for one in (s.interior, s.exterior)):
+            warnings.append(
+                f"{shapes.where(shape)}.motion: its boundary moves, the grid of its medium stays"
+            )
     return warnings
 
 

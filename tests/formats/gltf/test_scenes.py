@@ -159,6 +159,20 @@ def test_interpolations(read, build, how, values, at, expected):
     assert np.isclose(corners(read(made, time=at).shapes[0])[0, 0, 0], expected, atol=1e-6)
 
 
+def test_a_shutter_makes_keys(read, build):
+    made = animated(build, "translation", [1.0, 3.0], [[0, 0, 0], [4, 0, 0]])
+    scene = read(made, time=1.5, shutter="0.5")
+    keys = scene.shapes[0].motion
+    assert (scene.camera.shutter.open, scene.camera.shutter.close) == (1.5, 2.0)
+    assert scene.camera.motion is None and scene.shapes[-1].motion is None
+    assert np.allclose(keys.at(1.75)[:3, 3], [1.5, 0, 0]) and keys.times[-1] == 2.0
+    assert read(made, time=1.5, shutter=0).shapes[0].motion is None
+    with pytest.raises(SceneError, match="shutter -1 s must be from zero"):
+        read(made, shutter=-1)
+    with pytest.raises(SceneError, match="the shutter 'x' is no number"):
+        read(made, shutter="x")
+
+
 def test_rotations_take_the_shorter_way(read, build):
     turn = [0, 0, -math.sin(math.pi / 4), -math.cos(math.pi / 4)]  # 90 degrees, w below 0
     made = animated(build, "rotation", [0.0, 1.0], [[0, 0, 0, 1], turn])

@@ -25,6 +25,7 @@ from clpt.scene import (
     shapes,
     textures,
 )
+from clpt.scene.motion import Keys, Shutter
 from clpt.scene.params import Kind, Param, defaults, params
 from clpt.spectra import reradiation
 
@@ -73,6 +74,8 @@ VALUES: dict[str, Any] = {
     "area_light": lights.Area(radiance=3.0),
     "medium": media.Homogeneous(sigma_s=2.0, phase=media.HenyeyGreenstein(g=0.4), name="fog"),
     "phase": media.Rayleigh(),
+    "keys": Keys([0.0, 1.0], [np.eye(4), np.diag([2.0, 2.0, 2.0, 1.0])]),
+    "shutter": Shutter(0.5, 1.5, "triangle"),
     "crop": (1, 2, 3, 4),
     "sensor": SENSOR,
     "white_balance": (0.3, 0.35),

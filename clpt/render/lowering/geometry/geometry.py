@@ -9,18 +9,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt import transforms
 from clpt.bvh.build import MOST
 from clpt.errors import SceneError
 from clpt.records import SHAPE
 from clpt.render.contract import shape_records
+from clpt.render.lowering import motion
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.geometry import analytic, instancing, shapes, spheres, triangles
 from clpt.render.lowering.geometry.instancing import Instances, Placed, Prototype
 from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.lights.lights import Emitter
 from clpt.render.lowering.materials.material_words import MaterialWords
+from clpt.render.lowering.motion import Motions
 from clpt.render.lowering.textures.attributes import Owner
 
+SWEPT_CELLS = 4  # of the hull of what moves, see `instancing.hull_points`
 SHAPE_NORMALS, SHAPE_UVS, SHAPE_TWO_SIDED, SHAPE_ONE_LIGHT, SHAPE_MANY = 1, 2, 4, 8, 16
 SHAPE_TANGENTS = 32
 
@@ -80,7 +84,7 @@ def lower_geometry(index: SceneIndex, encoder: Encoder, materials: MaterialWords
     others = [one for one in index.placed if one.shape.kind in kinds]
     others.sort(key=lambda one: one.shape.kind in shape_records.ONE_OF)
     single = [one for one in others if one.shape.kind not in shape_records.ONE_OF]
-    builder = _Builder(encoder, materials, len(single))
+    builder = _Builder(encoder, materials, len(single), index.motions)
     for one in meshes:
         builder.add(one)
     world_vertices = builder.vertex_count
@@ -89,7 +93,7 @@ def lower_geometry(index: SceneIndex, encoder: Encoder, materials: MaterialWords
     first_analytic = len(builder.rows)
     for one in others:
         builder.add(one)
-    boxes = [analytic.bounds(one.shape) for one in single]
+    boxes = [builder.around(one, np.array([analytic.bounds(one.shape)])) for one in single]
     vertices, faces, tags = builder.concatenated()
     return Geometry(
         rows=tuple(builder.rows),
@@ -98,7 +102,14 @@ def lower_geometry(index: SceneIndex, encoder: Encoder, materials: MaterialWords
         faces=faces,
         tags=tags,
         boxes=np.concatenate(
-            [np.array(boxes, np.float32).reshape(-1, 2, 3), spheres.boxes(builder.balls)]
+            [
+                np.zeros((0, 2, 3), np.float32),
+                *boxes,
+                *(
+                    builder.around(one, spheres.boxes([balls]))
+                    for one, balls in zip(others[len(single) :], builder.balls, strict=True)
+                ),
+            ]
         ),
         instances=instances,
         emitters=tuple(builder.emitters),
@@ -120,6 +131,7 @@ class _Builder:
     encoder: Encoder
     materials: MaterialWords
     single_count: int
+    motions: Motions
     rows: list[np.ndarray] = field(default_factory=list)
     owners: list[Owner] = field(default_factory=list)
     emitters: list[Emitter] = field(default_factory=list)
@@ -153,6 +165,12 @@ class _Builder:
             values = vars(shape.emission).values()
             self.uvs |= any(getattr(value, "is_texture", False) for value in values)
         self.rows.append(row)
+
+    def around(self, one: Placed, boxes: NDArray[Any]) -> NDArray[np.float32]:
+        """Boxes (n, 2, 3) of a shape, and where it moves around all that they sweep."""
+        if one.number not in self.motions.shapes:
+            return np.asarray(boxes, np.float32)
+        return self.motions.swept(one.number, boxes)
 
     def _add_balls(self, shape: Any, row: np.ndarray) -> tuple[Any, Any, Any]:
         """Append many spheres; return them in the place of vertices."""
@@ -189,12 +207,20 @@ class _Builder:
     def share(self, prototype: Prototype) -> instancing.Shared:
         """Append the rows of shapes that instances share, and their triangles once."""
         before, first = len(self.parts), self.face_count
+        number = int(prototype.numbers[0]) if prototype.moves else 0
         for shape in prototype.shapes:
-            self.add(Placed(shape, 0))
+            self.add(Placed(shape, number))
         own = self.parts[before:]
         whole, centre = instancing.centred(np.concatenate([v for v, _, _ in own]))
         points = instancing.hull_points(whole)
         placed, boxes = instancing.place(prototype.to_world, prototype.numbers, points, centre)
+        moving = [i for i, n in enumerate(prototype.numbers) if int(n) in self.motions.shapes]
+        if moving:
+            coarse = instancing.hull_points(whole, SWEPT_CELLS).astype(np.float64) + centre
+            for i in moving:
+                keys = self.motions.shapes[int(prototype.numbers[i])]
+                swept = transforms.transform_points(prototype.to_world[i], coarse)
+                boxes[i] = motion.swept(keys, swept[None], self.motions.shutter)[0]
         ends = np.cumsum([len(v) for v, _, _ in own])[:-1]
         self.parts[before:] = [
             (moved, faces, number)

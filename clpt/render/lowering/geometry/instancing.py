@@ -7,7 +7,7 @@ many ordinary shapes: lights, analytic shapes, and what is instanced only once.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -41,12 +41,14 @@ class Placed:
 class Prototype:
     """Shapes of triangles that several instances share.
 
-    to_world: (k, 4, 4) float64, of each instance; numbers: (k,), which of the scene's shapes it is.
+    to_world: (k, 4, 4) float64, of each instance; numbers: (k,), which of the scene's shapes it is;
+    moves: it is a shape of its own, which moves.
     """
 
     shapes: tuple[Shape, ...]
     to_world: Matrices
     numbers: NDArray[np.int32]
+    moves: bool = False
 
 
 @dataclass(frozen=True)
@@ -100,9 +102,12 @@ def distinct(things: Iterable[Shape]) -> Iterator[Shape]:
             yield from thing.group.shapes
 
 
-def sort(things: Sequence[Shape], warnings: list[str]) -> tuple[list[Placed], list[Prototype]]:
+def sort(
+    things: Sequence[Shape], warnings: list[str], moving: Collection[int] = ()
+) -> tuple[list[Placed], list[Prototype]]:
     """Return the shapes that are lowered as they are, and those that are shared.
 
+    moving: indices of those that move. Their triangles are instances, each with its own.
     A sphere or tube that an instance stretches becomes a mesh; a line about it goes to `warnings`.
     Raises SceneError for an instance whose transform is singular, a projection, or stretches many
     spheres.
@@ -113,6 +118,8 @@ def sort(things: Sequence[Shape], warnings: list[str]) -> tuple[list[Placed], li
     for number, thing in enumerate(things):
         if isinstance(thing, Instance):
             groups.setdefault(id(thing.group), (thing.group, []))[1].append(number)
+        elif number in moving and thing.kind not in shape_records.ANALYTIC:
+            prototypes.append(_alone(thing, number))
         else:
             placed.append(Placed(thing, number))
     for group, numbers in groups.values():
@@ -121,9 +128,9 @@ def sort(things: Sequence[Shape], warnings: list[str]) -> tuple[list[Placed], li
         for shape in group.shapes:
             whole = Prototype((shape,), to_world, np.array(numbers, np.int32))
             if shape.kind in shape_records.ANALYTIC:
-                placed += _analytic(shape, whole, prototypes, warnings)
+                placed += _analytic(shape, whole, prototypes, warnings, moving)
             elif shape.emission is not None or len(numbers) == 1:
-                placed += _copies(shape, whole)
+                placed += _own(_copies(shape, whole), prototypes, moving)
             else:
                 shared.append(shape)
         if shared:
@@ -156,8 +163,25 @@ def _copies(shape: Shape, whole: Prototype) -> list[Placed]:
     ]
 
 
+def _alone(shape: Shape, number: int) -> Prototype:
+    """A shape that moves by itself."""
+    return Prototype((shape,), np.eye(4)[None], np.array([number], np.int32), moves=True)
+
+
+def _own(
+    copies: list[Placed], prototypes: list[Prototype], moving: Collection[int]
+) -> list[Placed]:
+    """The copies that are still; those that move become prototypes."""
+    prototypes += [_alone(one.shape, one.number) for one in copies if one.number in moving]
+    return [one for one in copies if one.number not in moving]
+
+
 def _analytic(
-    shape: Any, whole: Prototype, prototypes: list[Prototype], warnings: list[str]
+    shape: Any,
+    whole: Prototype,
+    prototypes: list[Prototype],
+    warnings: list[str],
+    moving: Collection[int],
 ) -> list[Placed]:
     """An analytic shape for every instance; where it is stretched, as triangles."""
     copies = _copies(shape, whole)
@@ -175,7 +199,7 @@ def _analytic(
     mesh = tessellate(shape)
     others = Prototype((mesh,), whole.to_world[stretched], whole.numbers[stretched])
     if shape.emission is not None or count == 1:
-        return kept + _copies(mesh, others)
+        return kept + _own(_copies(mesh, others), prototypes, moving)
     prototypes.append(others)
     return kept
 
@@ -230,8 +254,8 @@ def _boxes(points: shapes.Points, linear: Matrices, rows: NDArray[Any]) -> NDArr
     return boxes.astype(np.float32)
 
 
-def hull_points(vertices: shapes.Points) -> shapes.Points:
-    """Return points (p, 3) whose hull holds the vertices and is little larger, p at most 8 CELLS^2.
+def hull_points(vertices: shapes.Points, cells: int = CELLS) -> shapes.Points:
+    """Return points (p, 3) whose hull holds the vertices and is little larger, p at most 8 cells^2.
 
     They are the corners of a box around the vertices in each column of a grid.
     """
@@ -239,8 +263,8 @@ def hull_points(vertices: shapes.Points) -> shapes.Points:
         return vertices
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     size = np.where(high > low, high - low, 1.0)
-    cell = np.minimum((vertices - low) / size * CELLS, CELLS - 1).astype(np.int64)
-    columns, index = np.unique(cell[:, 0] * CELLS + cell[:, 1], return_inverse=True)
+    cell = np.minimum((vertices - low) / size * cells, cells - 1).astype(np.int64)
+    columns, index = np.unique(cell[:, 0] * cells + cell[:, 1], return_inverse=True)
     lows = np.full((len(columns), 3), np.inf, np.float32)
     highs = np.full((len(columns), 3), -np.inf, np.float32)
     np.minimum.at(lows, index, vertices)

@@ -90,6 +90,8 @@ def _choice(
 ) -> tuple[Integrator, str]:
     """The integrator but for its depths, and why; what is cheap to know is asked first."""
     scene, without = index.scene, Path(light_paths=0)
+    if index.motions:
+        return without, "light paths do not start from what moves"
     if not index.lights_reach:
         return without, index.lit_media
     if not cameras.is_connected(scene.camera, scene.film.mode):

@@ -6,9 +6,9 @@ an emissive mesh or cube. Infinite lights come first, for the rays that leave th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -46,6 +46,9 @@ class Emitter:
     vertices: shapes.Points | None = None
     faces: shapes.Faces | None = None
     uvs: shapes.Points | None = None
+
+
+Around: TypeAlias = Callable[[int | Emitter, light_bounds.Bounds], light_bounds.Bounds] | None
 
 
 @dataclass(frozen=True)
@@ -100,12 +103,14 @@ def light_rows(
     scene_radius: float,
     tree_from: int | None = None,
     volumes: Sequence[BrickLights] = (),
+    around: Around = None,
 ) -> LightRows:
     """Put the parameters of all lights into the tables, and make the rows of `lights`.
 
     scene_radius: of a sphere around the scene [m]; tree_from: the number of rows from which a tree
     chooses among them, or 1 / PLACED_LIGHT_WEIGHT of it of lights at places; volumes: bricks of
-    media, whose rows follow those of the lamps. Raises SceneError for a light that has no place.
+    media, whose rows follow those of the lamps; around: makes bounds of a lamp (by its index) or
+    emitter hold while it moves. Raises SceneError for a light that has no place.
     """
     if encoder.store.append("light_params", blank_row()) != 0:
         raise ValueError("`light_params` must be empty before the lights are put in")
@@ -115,6 +120,14 @@ def light_rows(
     blocks += [_brick_block(bricks, encoder) for bricks in volumes]
     before = len(blocks)
     blocks += [_emitter_block(emitter, encoder) for emitter in emitters]
+    if around is not None:
+        own: list[int | Emitter] = [*row_order(lamps), *emitters]
+        moved = [*blocks[: len(ordered)], *blocks[before:]]
+        moved = [
+            block._replace(bounds=around(light, block.bounds))
+            for light, block in zip(own, moved, strict=True)
+        ]
+        blocks[: len(ordered)], blocks[before:] = moved[: len(ordered)], moved[len(ordered) :]
     first = np.cumsum([0, *(len(block.rows) for block in blocks)])[before:-1]
     rows = np.concatenate([np.zeros(0, LIGHT.dtype), *(block.rows for block in blocks)])
     power = np.concatenate([np.zeros(0), *(block.power for block in blocks)])

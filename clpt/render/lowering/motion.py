@@ -1,0 +1,259 @@
+"""Motion on its way to the device: what is still, the tracks of what moves, and boxes around it."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import transforms
+from clpt.errors import SceneError
+from clpt.render.lowering.geometry import shapes
+from clpt.render.lowering.tables import TableStore
+from clpt.scene import Scene
+from clpt.scene.cameras import Camera, Matrix
+from clpt.scene.lights import Light
+from clpt.scene.motion import Keys, Shutter, arc, decomposed, rotation, slerp
+from clpt.scene.shapes import Cylinder, Group, Instance, Shape, Sphere
+
+STEP = 29  # floats of a step between two keys, see kernels/tracing/motion.cl
+TURN = 0.1  # [rad] of a rotation that a box is looked at again
+ROUNDING = 4e-6  # of its coordinates, by which a box is larger than what float32 makes of it
+EVEN = 1e-5  # relative difference of scales from which a motion stretches
+
+ROUND = (Sphere, Cylinder)
+AT_ONCE = Shutter(0.0, 0.0)
+
+Boxes = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Motions:
+    """What moves while the shutter of a scene is open.
+
+    shapes, lamps: keys by index in the scene's shapes and lights; camera: its keys, or None.
+    """
+
+    shutter: Shutter
+    shapes: Mapping[int, Keys]
+    lamps: Mapping[int, Keys]
+    camera: Keys | None
+
+    @classmethod
+    def of(cls, scene: Scene) -> Motions:
+        """Return the motions of a scene of which `at_rest` has made still what does not move."""
+        of_shapes = {i: s.motion for i, s in enumerate(scene.shapes) if s.motion is not None}
+        of_lamps = {i: s.motion for i, s in enumerate(scene.lights) if s.motion is not None}
+        return cls(scene.camera.shutter or AT_ONCE, of_shapes, of_lamps, scene.camera.motion)
+
+    def __bool__(self) -> bool:
+        return bool(self.shapes or self.lamps or self.camera)
+
+    @property
+    def scales(self) -> bool:
+        """Whether something is scaled, or mirrored, while it moves."""
+        every = [*self.shapes.values(), *self.lamps.values(), self.camera]
+        return any(keys is not None and not is_rigid(keys) for keys in every)
+
+    def swept(self, number: int, boxes: NDArray[Any]) -> Boxes:
+        """Return boxes (n, 2, 3) around those of one of the scene's shapes while it moves."""
+        return swept(self.shapes[number], corners(boxes), self.shutter)
+
+
+def at_rest(scene: Scene) -> Scene:
+    """Return a scene in which only that has keys that moves while the shutter is open.
+
+    What else has some is put where it is when the shutter opens; a scene without keys is returned
+    as it is. Raises SceneError for keys on a shape of a group, and on lights that cannot move.
+    """
+    changes: dict[str, Any] = {}
+    things = (*scene.shapes, *scene.lights, scene.camera)
+    if not all(isinstance(thing, (Shape, Light, Camera)) for thing in things):
+        return scene  # which is refused
+    shutter = scene.camera.shutter or AT_ONCE
+    if not isinstance(shutter, Shutter):
+        raise SceneError(f"must be a Shutter, not {shutter!r}", where="camera.shutter")
+    for i, shape in enumerate(scene.shapes):
+        for inner in getattr(getattr(shape, "group", None), "shapes", ()):
+            if inner.motion is not None:
+                message = "a shape of a group cannot move in it: give `motion` to its instance"
+                raise SceneError(message, where=shapes.where(inner))
+        _check(shape, f"shapes[{i}]")
+        if getattr(shape.emission, "motion", None) is not None:
+            message = "an area light moves with its shape: give `motion` to that"
+            raise SceneError(message, where=shapes.where(shape))
+    for i, light in enumerate(scene.lights):
+        _check(light, f"lights[{i}]")
+    _check(scene.camera, "camera")
+    for name, parts in (("shapes", scene.shapes), ("lights", scene.lights)):
+        if any(part.motion is not None for part in parts):
+            changes[name] = [_rest(part, shutter) for part in parts]
+    camera = _rest(scene.camera, shutter)
+    if camera is not scene.camera:
+        changes["camera"] = camera
+    return replace(scene, **changes) if changes else scene
+
+
+def _check(thing: Any, where: str) -> None:
+    if not isinstance(thing.motion, (Keys, type(None))):
+        raise SceneError(f"must be Keys, not {thing.motion!r}", where=f"{where}.motion")
+
+
+def _rest(thing: Any, shutter: Shutter) -> Any:
+    """A shape, light or camera without keys, if it does not move while the shutter is open."""
+    if thing.motion is None or _moves(thing.motion, shutter):
+        return thing
+    matrix = thing.motion.at(shutter.open)
+    if isinstance(thing, Matrix):
+        return replace(thing, motion=None, view=thing.view @ transforms.inverse(matrix))
+    if isinstance(thing, ROUND) and not is_even(thing.motion):
+        still = replace(thing, motion=None)  # which an instance may stretch
+        return Instance(group=Group((still,), thing.kind), to_world=matrix, name=thing.name)
+    if hasattr(thing, "to_world"):
+        return replace(thing, motion=None, to_world=matrix @ np.asarray(thing.to_world))
+    changes: dict[str, Any] = {"motion": None}
+    if hasattr(thing, "position"):
+        changes["position"] = tuple(transforms.transform_points(matrix, thing.position))
+    if hasattr(thing, "direction"):
+        changes["direction"] = tuple(transforms.transform_vectors(matrix, thing.direction))
+    return replace(thing, **changes)
+
+
+def _moves(keys: Keys, shutter: Shutter) -> bool:
+    """Whether what has keys is elsewhere at some time while the shutter is open."""
+    times = [t for t in keys.times if shutter.open < t < shutter.close]
+    found = [keys.at(t) for t in (shutter.open, *times, shutter.close)]
+    return any(not np.array_equal(matrix, found[0]) for matrix in found)
+
+
+def check(scene: Scene, motions: Motions) -> None:
+    """Raise SceneError for lights that move as they cannot."""
+    for i, keys in motions.lamps.items():
+        if not is_rigid(keys):
+            message = "a light may be moved and turned, not scaled or mirrored"
+            raise SceneError(message, where=f"lights[{i}].motion")
+    for i, keys in motions.shapes.items():
+        shape: Any = scene.shapes[i]
+        inner = getattr(getattr(shape, "group", None), "shapes", (shape,))
+        if any(one.emission is not None for one in inner) and not is_even(keys):
+            message = "a shape that emits light may be scaled evenly, not stretched"
+            raise SceneError(message, where=f"{shapes.where(shape)}.motion")
+
+
+def is_rigid(keys: Keys) -> bool:
+    """Whether keys neither scale nor mirror."""
+    parts = (decomposed(matrix)[2] for matrix in keys.transforms)
+    return all(np.allclose(part, np.eye(3), atol=1e-6) for part in parts)
+
+
+def is_even(keys: Keys) -> bool:
+    """Whether keys keep angles."""
+    parts = (decomposed(matrix)[2] for matrix in keys.transforms)
+    return all(np.allclose(p, p[0, 0] * np.eye(3), atol=EVEN * abs(p[0, 0])) for p in parts)
+
+
+def track(keys: Keys | None) -> NDArray[np.float32]:
+    """Return the track of keys, or of what does not move: see kernels/tracing/motion.cl."""
+    times: Any = (0.0, 1.0) if keys is None else keys.times
+    matrices: Any = np.stack([np.eye(4)] * 2) if keys is None else keys.transforms
+    words = np.zeros(1 + STEP * (len(times) - 1), np.float32)
+    words[:1] = np.array([len(times) - 1], np.int32).view(np.float32)
+    upper = np.triu_indices(3)
+    for i in range(len(times) - 1):
+        step = words[1 + STEP * i : 1 + STEP * (i + 1)]
+        (t0, q0, s0), (t1, q1, s1) = (decomposed(matrices[k]) for k in (i, i + 1))
+        across, angle = arc(q0, q1)
+        step[0], step[1] = times[i], 1.0 / (times[i + 1] - times[i])
+        step[2:5], step[5:8], step[8:12], step[12:16] = t0, t1 - t0, q0, across
+        step[16] = angle / (2.0 * math.pi)
+        step[17:23], step[23:29] = s0[upper], (s1 - s0)[upper]
+    return words
+
+
+def shutter_words(shutter: Shutter) -> NDArray[np.float32]:
+    """Return the number of steps of a shutter, when it opens and for how long it is open, and for
+    each step the share of light before it and its density at both ends."""
+    density = shutter.density()
+    shares = (density[1:] + density[:-1]) / 2.0
+    shares, density = shares / shares.sum(), density / shares.mean()
+    before = np.cumsum([0.0, *shares[:-1]])
+    rows = np.column_stack([before, density[:-1], density[1:]])
+    head = [len(shares), shutter.open, shutter.close - shutter.open]
+    return np.concatenate([head, rows.ravel()]).astype(np.float32)
+
+
+def lower_motion(motions: Motions, scene: Scene, rows: list[int], store: TableStore) -> int:
+    """Append the table of what moves to `distributions`; return where it begins.
+
+    rows: the index of each light that is no shape, in the order of their rows; -1: one that does
+    not move.
+    """
+    head = 4
+    first = store.size("distributions")
+    parts = [np.zeros(head, np.float32), shutter_words(motions.shutter), track(None)]
+    still = head + len(parts[1])
+    at = still + len(parts[-1])
+    places: dict[int, int] = {}
+
+    def place(keys: Keys | None) -> int:
+        nonlocal at
+        if keys is None:
+            return first + still
+        if id(keys) not in places:
+            parts.append(track(keys))
+            places[id(keys)] = first + at
+            at += len(parts[-1])
+        return places[id(keys)]
+
+    camera = place(motions.camera)
+    of_shapes = [place(motions.shapes.get(i)) for i in range(len(scene.shapes))] or [first + still]
+    of_lamps = [place(motions.lamps.get(i)) for i in rows] or [first + still]
+    maps = np.array([*of_shapes, *of_lamps], np.int32).view(np.float32)
+    heads = [first + head, camera, first + at, first + at + len(of_shapes)]
+    parts[0] = np.array(heads, np.int32).view(np.float32)
+    # a kernel reads one step beyond the last
+    parts += [maps, np.zeros(STEP + 1, np.float32)]
+    return store.append_floats("distributions", np.concatenate(parts))
+
+
+def corners(boxes: NDArray[Any]) -> NDArray[np.float64]:
+    """Return the corners (n, 8, 3) of boxes (n, 2, 3)."""
+    index = np.array([[bit >> axis & 1 for axis in range(3)] for bit in range(8)])
+    return np.asarray(boxes, np.float64)[:, index, np.arange(3)]
+
+
+def swept(keys: Keys, points: NDArray[np.float64], shutter: Shutter) -> Boxes:
+    """Return boxes (n, 2, 3) around the hulls of points (n, p, 3) that move while it is open.
+
+    Between two looks a point leaves their chord by at most h^2 / 8 of its second derivative, by
+    which the boxes are larger.
+    """
+    low = np.full((len(points), 3), np.inf)
+    high = -low
+    grown = np.zeros((len(points), 1))
+    times = [t for t in keys.times if shutter.open < t < shutter.close]
+    ends = [shutter.open, *times, shutter.close]
+    for begin, end in itertools.pairwise(ends):
+        (t0, q0, s0), (t1, q1, s1) = (decomposed(keys.at(t)) for t in (begin, end))
+        angle = 2.0 * arc(q0, q1)[1]
+        steps = max(2, math.ceil(angle / TURN))
+        for i in range(steps + 1):
+            a = i / steps
+            linear = rotation(slerp(q0, q1, a)) @ (s0 + a * (s1 - s0))
+            moved = points @ linear.T + (t0 + a * (t1 - t0))
+            low = np.minimum(low, moved.min(axis=1))
+            high = np.maximum(high, moved.max(axis=1))
+        reach, shorter = (np.linalg.norm(points @ s, axis=2).max(axis=1) for s in (s0, s1))
+        reach = np.maximum(reach, shorter)[:, None]
+        grows = np.linalg.norm(points @ (s1 - s0), axis=2).max(axis=1)[:, None]
+        chord = (angle * angle * reach + 2.0 * angle * grows) / (8.0 * steps * steps)
+        grown = np.maximum(grown, chord)
+    size = np.maximum(np.abs(low), np.abs(high)).max(axis=1, keepdims=True)
+    origin = np.linalg.norm(keys.transforms[:, :3, 3], axis=1).max()
+    pad = grown + ROUNDING * (size + origin + np.abs(points).max(axis=(1, 2))[:, None])
+    return np.stack([low - pad, high + pad], axis=1).astype(np.float32)
