@@ -9,11 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Sheet
 from matplotlib.lines import Line2D
 
-from .. import output_files
 from ..benchmark import PARTS
 from ..benchmark.figures import SECONDS, Figure
 from ..errors import SceneError
-from .plots import FAINT, FORMATS, INK, LINES, PAPER
+from .plots import FAINT, FORMATS, INK, LINES, PAPER, save
 
 SPAN = 30.0  # between the smallest and the largest stage, from which the scale is logarithmic
 BAR, HEAD = 0.25, 0.9  # [inches] of a figure, and of a panel's title and axis
@@ -53,11 +52,7 @@ def write(path: Path, title: str, figures: Sequence[Figure], then: Mapping[int, 
             [mark], ["in the record compared with"], frameon=False, labelcolor=INK, fontsize=9,
             loc="outside lower right",
         )  # fmt: skip
-    try:
-        with output_files.replacing(path) as partial:
-            sheet.savefig(partial)
-    except OSError as error:
-        raise SceneError(f"cannot be written: {error}", file=path) from error
+    save(sheet, path)
 
 
 def _panel(

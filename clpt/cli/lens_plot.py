@@ -9,12 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
-from .. import output_files
 from ..errors import SceneError
 from ..lenses import Prescription, cardinal, spots
 from ..lenses.glasses import AIR, LINE_D
 from ..lenses.tracing import Rays, intersect, refract, sag
-from .plots import FAINT, FORMATS, INK, LINES, PAPER, strip
+from .plots import FAINT, FORMATS, INK, LINES, PAPER, save, strip
 
 GLASS = "#cfe3ee"
 RAYS = 7  # drawn of each point
@@ -34,11 +33,7 @@ def write(path: Path, lens: Prescription, waves: list[float], angles: list[float
     found = cardinal(lens)
     title = f"{lens.name}: f = {found.focal_length:.4g} mm, f/{found.f_number:.3g}"
     figure.suptitle(title, x=0.012, ha="left", color=INK, weight="bold", size=11)
-    try:
-        with output_files.replacing(path) as partial:
-            figure.savefig(partial)
-    except OSError as error:
-        raise SceneError(f"cannot be written: {error}", file=path) from error
+    save(figure, path)
 
 
 def _section(axes: Axes, lens: Prescription, angles: list[float]) -> None:

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from .. import output_files
 from ..errors import SceneError
-from .plots import FAINT, FORMATS, INK, PAPER, strip
+from .plots import FAINT, FORMATS, INK, PAPER, save, strip
 
 MOST_CURVES = 12
 
@@ -35,8 +34,4 @@ def write(path: Path, medium: Any, title: str) -> None:
     axes.grid(color=FAINT, lw=0.6)
     axes.legend(fontsize=7, ncols=2, frameon=False)
     figure.suptitle(title, x=0.012, ha="left", color=INK, weight="bold", size=11)
-    try:
-        with output_files.replacing(path) as partial:
-            figure.savefig(partial)
-    except OSError as error:
-        raise SceneError(f"cannot be written: {error}", file=path) from error
+    save(figure, path)

@@ -36,11 +36,7 @@ def write(path: Path, image: ImageContents, values: dict[Pixel, np.ndarray]) -> 
     figure = Figure(figsize=(8.0, 4.6), dpi=120, facecolor=PAPER, layout="constrained")
     (_spectra if image.lambdas is not None else _bars)(figure, image, values)
     figure.suptitle(image.path.name, x=0.012, ha="left", color=INK, weight="bold", size=11)
-    try:
-        with output_files.replacing(path) as partial:
-            figure.savefig(partial)
-    except OSError as error:
-        raise SceneError(f"cannot be written: {error}", file=path) from error
+    save(figure, path)
 
 
 def strip(lambdas: np.ndarray) -> np.ndarray:
@@ -128,3 +124,12 @@ def _dress(axes: Axes, quantity: str) -> None:
     for name, side in axes.spines.items():
         side.set_visible(name == "bottom")
         side.set_color(INK)
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write a figure. Raises SceneError where that cannot be done."""
+    try:
+        with output_files.replacing(path) as partial:
+            figure.savefig(partial)
+    except OSError as error:
+        raise SceneError(f"cannot be written: {error}", file=path) from error

@@ -47,14 +47,15 @@ called void queue_take(Slab path, Slab hit, Slab shadow, constant BlockWords *wo
 #endif
 }
 
-/* Brings back what shading may have changed. */
-called void queue_return(Slab path, Slab shadow, constant BlockWords *words, global const uint *queue, uint entry,
-                         uint end, uint block)
+/* Brings back what may have changed: of paths, and `more_count` words of another slab, the shadow rays after shading, or
+ * the hits after a walk, whose shadow rays have been tested. */
+called void queue_return(Slab path, Slab more, constant BlockWords *words, constant uchar *more_words, uint more_count,
+                         global const uint *queue, uint entry, uint end, uint block)
 {
     integer index = LANE_INDEX + (int)entry, slots = gather_i(queue, min_i(index, (integer)((int)end - 1)));
     mask active = index < (int)end;
     for (uint i = 0; i < words->changed; i++) slab_scatter(path, words->path_words[i], block, slots, active);
-    for (uint i = 0; i < words->shadow; i++) slab_scatter(shadow, words->shadow_words[i], block, slots, active);
+    for (uint i = 0; i < more_count; i++) slab_scatter(more, more_words[i], block, slots, active);
 }
 
 /* How many collisions in media paths are taken through in a block at a time. */
@@ -77,14 +78,4 @@ called int queue_walks(Slab path, Slab hit, int kind, int n, integer *ended, uin
 called void queue_walked(Slab path, integer ended, uint block)
 {
     store_path_state(path, block, ended != 0, ended);
-}
-
-/* Brings back what a walk may have changed; its shadow rays have been tested. */
-called void queue_return_walk(Slab path, Slab hit, constant BlockWords *words, global const uint *queue, uint entry,
-                              uint end, uint block)
-{
-    integer index = LANE_INDEX + (int)entry, slots = gather_i(queue, min_i(index, (integer)((int)end - 1)));
-    mask active = index < (int)end;
-    for (uint i = 0; i < words->changed; i++) slab_scatter(path, words->path_words[i], block, slots, active);
-    for (uint i = 0; i < words->hit; i++) slab_scatter(hit, words->hit_words[i], block, slots, active);
 }

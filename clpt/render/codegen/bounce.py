@@ -192,11 +192,17 @@ def _bounce_text(calls: list[_Call], walk: list[str], words: str) -> list[str]:
             f"    for (uint entry = {begins}; entry < {ends}; entry += LANES) {{",
             f"        queue_take(path, hit, shadow, &{words}, queue, entry, {ends}, block);",
             f"        {call.at('block')}",
-            f"        queue_return(path, shadow, &{words}, queue, entry, {ends}, block);",
+            f"        {_return_text('shadow', words, ends)}",
             "    }",
             "}",
         ]
     return lines
+
+
+def _return_text(slab: str, words: str, ends: str) -> str:
+    """The statement that brings back paths and a slab."""
+    own = f"{words}.{slab}_words, {words}.{slab}"
+    return f"queue_return(path, {slab}, &{words}, {own}, queue, entry, {ends}, block);"
 
 
 def _walk_text(own: Features, calls: list[_Call], words: str) -> list[str]:
@@ -221,7 +227,7 @@ def _walk_text(own: Features, calls: list[_Call], words: str) -> list[str]:
             *(f"        {one.through('block', 'block + LANES')}" for one in again),
             "    }",
             "    queue_walked(path, ended, block);",
-            f"    queue_return_walk(path, hit, &{words}, queue, entry, {ends}, block);",
+            f"    {_return_text('hit', words, ends)}",
             "}",
         ]
     return lines
