@@ -248,9 +248,11 @@ class Queries:
         texts = {
             "generated/layout.cl": traversal_text(self.layout, all_hits),
             "generated/instance_traversal.cl": self._instances_text(),
+            "generated/motion.cl": "",  # instances stand still
         }
         defines = {
             "USES_INSTANCES": int(self.instanced),
+            "MOVES_INSTANCES": 0,
             "INSTANCE_ROW_WORDS": INSTANCE.words,
             "LANES": 1,
         }
