@@ -47,8 +47,8 @@ called void queue_take(Slab path, Slab hit, Slab shadow, constant BlockWords *wo
 #endif
 }
 
-/* Brings back what may have changed: of paths, and `more_count` words of another slab, the shadow rays after shading, or
- * the hits after a walk, whose shadow rays have been tested. */
+/* Brings back what may have changed: of paths, and `more_count` words of another slab. These are shadow rays after
+ * shading, and hits after a walk, whose shadow rays have been tested. */
 called void queue_return(Slab path, Slab more, constant BlockWords *words, constant uchar *more_words, uint more_count,
                          global const uint *queue, uint entry, uint end, uint block)
 {
