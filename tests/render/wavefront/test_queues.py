@@ -64,7 +64,8 @@ kernel void probe(SLAB_ARGS, global const uint *queue, uint entry, uint end, uin
     store_path_pdf(path, block, all, load_path_pdf(path, block) * 2.0f);
     store_shadow_t(shadow, block, all, load_shadow_t(shadow, block) * 2.0f);
     store_hit_t(hit, block, all, (real)(-1.0f));
-    queue_return(path, shadow, &blocks_0, blocks_0.shadow_words, blocks_0.shadow, queue, entry, end, block);
+    constant uchar *words = blocks_0.shadow_words;
+    queue_return(path, shadow, &blocks_0, words, blocks_0.shadow, queue, entry, end, block);
 }
 """,
 }
