@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import contextlib
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -27,27 +28,19 @@ def read(path: str | Path, grid: str = "") -> Volume:
     if reader is None:
         message = f"unknown format {path.suffix!r} of a density; known: {' '.join(READERS)}"
         raise SceneError(message, file=path)
-    try:
-        if path.stat().st_size > MOST_BYTES:
-            raise SceneError(f"is larger than {MOST_BYTES >> 30} GiB", file=path)
+    with _reading(path):
         made = reader(path, grid)
         check_density(made.values, "")
-    except OSError as error:
-        raise SceneError(f"cannot be read: {error.strerror or error}", file=path) from None
-    except MemoryError:
-        raise SceneError("does not fit in memory", file=path) from None
-    except SceneError as error:
-        raise SceneError(error.message, file=path) from None
     return made
 
 
 def names(path: str | Path) -> tuple[str, ...]:
     """Return the names of the grids of a .nvdb, of any other file none. Raises SceneError."""
     path = Path(path)
-    try:
-        return nvdb.names(path) if path.suffix.lower() == ".nvdb" else ()
-    except OSError as error:
-        raise SceneError(f"cannot be read: {error.strerror or error}", file=path) from None
+    if path.suffix.lower() != ".nvdb":
+        return ()
+    with _reading(path):
+        return nvdb.names(path)
 
 
 def read_colours(path: str | Path) -> Volume:
@@ -56,37 +49,43 @@ def read_colours(path: str | Path) -> Volume:
     Raises SceneError as `read` does.
     """
     path = Path(path)
-    try:
+    with _reading(path):
         if path.suffix.lower() == ".npy":
             return _npy(path, axes=4)
-        values, box = vol.read_channels(path)
-    except OSError as error:
-        raise SceneError(f"cannot be read: {error.strerror or error}", file=path) from None
-    except SceneError as error:
-        raise SceneError(error.message, file=path) from None
-    return Volume(values, box)
+        return Volume(*vol.read_channels(path))
 
 
 def distances(path: Path) -> np.ndarray:
     """Read signed distances (nx, ny, nz) float32 of a .npy or .vol file. Raises SceneError."""
+    with _reading(path):
+        if path.suffix.lower() == ".vol":
+            return vol.read(path).values
+        return np.ascontiguousarray(_array(path), np.float32)
+
+
+@contextlib.contextmanager
+def _reading(path: Path) -> Iterator[None]:
+    """Name the file in what goes wrong while it is read; refuse one that is too large."""
     try:
         if path.stat().st_size > MOST_BYTES:
             raise SceneError(f"is larger than {MOST_BYTES >> 30} GiB")
-        if path.suffix.lower() == ".vol":
-            return vol.read(path).values
-        values = np.load(path, allow_pickle=False)
+        yield
     except OSError as error:
         raise SceneError(f"cannot be read: {error.strerror or error}", file=path) from None
-    except (ValueError, EOFError) as error:
-        raise SceneError(f"is no .npy file: {error}", file=path) from None
+    except MemoryError:
+        raise SceneError("does not fit in memory", file=path) from None
     except SceneError as error:
         raise SceneError(error.message, file=path) from None
-    if not isinstance(values, np.ndarray) or values.ndim != 3 or values.dtype.kind not in "fiu":
-        raise SceneError("must hold an array (nx, ny, nz) of numbers", file=path)
-    return np.ascontiguousarray(values, np.float32)
 
 
 def _npy(path: Path, grid: str = "", axes: int = 3) -> Volume:
+    values = _array(path, axes)
+    check_density(values, "")
+    return Volume(np.ascontiguousarray(values, np.float32), IDENTITY)
+
+
+def _array(path: Path, axes: int = 3) -> np.ndarray:
+    """The numbers of a .npy file, of three axes, or of four with colours."""
     try:
         values = np.load(path, mmap_mode="r", allow_pickle=False)
     except (ValueError, EOFError) as error:
@@ -94,8 +93,9 @@ def _npy(path: Path, grid: str = "", axes: int = 3) -> Volume:
     if not isinstance(values, np.ndarray) or values.ndim != axes or not values.size:
         wanted = "(nx, ny, nz)" if axes == 3 else "(nx, ny, nz, 3)"
         raise SceneError(f"must hold an array {wanted}, not {getattr(values, 'shape', '')}")
-    check_density(values, "")
-    return Volume(np.ascontiguousarray(values, np.float32), IDENTITY)
+    if values.dtype.kind not in "fui":
+        raise SceneError(f"must hold numbers, not {values.dtype}")
+    return values
 
 
 READERS: dict[str, Callable[[Path, str], Volume]] = {

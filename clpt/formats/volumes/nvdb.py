@@ -80,11 +80,8 @@ def read(path: Path, grid: str = "") -> Volume:
     data = path.read_bytes()
     try:
         entries = list(_entries(data))
-        names = [entry.name for entry in entries]
-        wanted = grid or ("density" if "density" in names else names[0])
-        if wanted not in names:
-            raise SceneError(f"has no grid {wanted!r}; it has {', '.join(map(repr, names))}")
-        return _volume(_unpacked(data, entries[names.index(wanted)]))
+        chosen = sparse.chosen([entry.name for entry in entries], grid)
+        return _volume(_unpacked(data, entries[chosen]))
     except SceneError:  # which is a ValueError too
         raise
     except (struct.error, IndexError, ValueError):  # whatever leads beyond the bytes

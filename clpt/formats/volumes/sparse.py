@@ -24,6 +24,19 @@ class Tile(NamedTuple):
     value: float
 
 
+def chosen(names: list[str], grid: str) -> int:
+    """Return which grid of a file is read: the named one; "" is "density", else the first.
+
+    Raises SceneError where there is none.
+    """
+    if not names:
+        raise SceneError("has no grid")
+    wanted = grid or ("density" if "density" in names else names[0])
+    if wanted not in names:
+        raise SceneError(f"has no grid {wanted!r}; it has {', '.join(map(repr, names))}")
+    return names.index(wanted)
+
+
 def check_box(low: NDArray[np.int64], high: NDArray[np.int64]) -> None:
     """Raise SceneError for a box, from its lowest index to its highest, that cannot be read."""
     size = high - low + 1

@@ -83,12 +83,8 @@ def read(path: Path, grid: str = "") -> Volume:
     data = path.read_bytes()
     try:
         entries = list(_entries(data))
-        held = [entry.name for entry in entries]
-        wanted = grid or ("density" if "density" in held else held[0] if held else "")
-        if wanted not in held:
-            names = ", ".join(map(repr, held))
-            raise SceneError(f"has no grid {wanted!r}; it has {names}" if held else "has no grid")
-        return _volume(data, entries, entries[held.index(wanted)])
+        chosen = sparse.chosen([entry.name for entry in entries], grid)
+        return _volume(data, entries, entries[chosen])
     except SceneError:  # which is a ValueError too
         raise
     except (struct.error, IndexError, ValueError, OverflowError):
