@@ -144,6 +144,7 @@ def test_direct_light_inside(integrator: str, mode: str) -> None:
     assert_mean(exposures(scene, 8, 32), [expected] * 3, 0.01, 2e-3)
 
 
+@pytest.mark.slow
 def test_sky_is_infinitely_far() -> None:
     """Below an endless surface of what absorbs, all light is lost; above clear glass, none."""
     for a, expected in ((0.5, 0.0), (0.0, 1.0)):

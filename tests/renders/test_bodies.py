@@ -63,6 +63,7 @@ SAME = {
 }
 
 
+@pytest.mark.slow
 def test_as_three_boundaries_by_hand() -> None:
     """A glass of milk, of which each may displace the other; two glasses are one."""
     reference = exposures(scene(*HAND), 8, 128)

@@ -238,6 +238,7 @@ def burning_mirror(shield: float, pixels: int = 16) -> Scene:
     return bench(view, [paraboloid(), disk], sun, pixels, pixels)
 
 
+@pytest.mark.slow
 @every_way
 def test_a_parabolic_mirror_gathers_all_light(way: str) -> None:
     """In a disk at the focus, which faces the mirror: E pi a^2 less the disk's shadow, .3 %.

@@ -47,6 +47,7 @@ def bitmap(rgb: Any, bytes_: bool) -> Bitmap:
     return Bitmap(image=made.astype(np.float32))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["rgb", pytest.param("spectral", marks=pytest.mark.slow)])
 def test_products_are_of_rgb(mode: str) -> None:
     """Of a texture (of floats, of bytes), the vertices and a factor; under D65, and as light."""

@@ -84,6 +84,7 @@ NUMBERS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["rgb", pytest.param("spectral", marks=pytest.mark.slow)])
 def test_a_number_is_white_light(mode: str) -> None:
     """D65 times the number, on a shape as in the sky, in textures as without."""

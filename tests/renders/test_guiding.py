@@ -153,6 +153,7 @@ def test_same_bits_however_samples_are_split() -> None:
     assert np.array_equal(parts[0].image(), whole)
 
 
+@pytest.mark.slow
 def test_a_crop_has_the_bits_of_the_whole() -> None:
     """A guide learns from the same light paths whatever the film is."""
     scene = guided(caustic())

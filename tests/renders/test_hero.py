@@ -72,7 +72,7 @@ def bending(kind: type[materials.Material]) -> str | None:
 
 
 KINDS = [kind for kind in materials.LEAVES if bending(kind)]
-QUICK = (materials.CoatedConductor,)
+QUICK = (materials.Dielectric,)
 
 
 @pytest.mark.parametrize(

@@ -395,6 +395,7 @@ def test_same_bits_after_a_merge(number: float) -> None:
     assert np.array_equal(parts[0].image(), picture(scene, 7))
 
 
+@pytest.mark.slow
 def test_halves_are_the_whole() -> None:
     renderer = clpt.Renderer(with_light_paths(caustic()), narrow(), halves=True)
     renderer.run(6)

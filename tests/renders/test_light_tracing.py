@@ -167,7 +167,7 @@ def test_lights_that_throw_images_and_shine_from_both_sides() -> None:
     both(dataclasses.replace(scene, shapes=shapes, lights=thrown), 16, "thrown")
 
 
-@pytest.mark.parametrize("depth", [1, 2, 3])
+@pytest.mark.parametrize("depth", [1, *(pytest.param(d, marks=pytest.mark.slow) for d in (2, 3))])
 def test_depths(depth: int) -> None:
     both(still_life("rgb", {"sphere": 30.0, "spot": 8.0}), 16, f"depth {depth}", depth=depth)
 

@@ -128,7 +128,7 @@ LAMPS = {
 }
 
 
-@pytest.mark.parametrize("lamps", LAMPS)
+@pytest.mark.parametrize("lamps", [pytest.param("near", marks=pytest.mark.slow), "three"])
 def test_light_scattered_once_is_an_integral_over_the_ray(lamps: str) -> None:
     """Of lamps in haze that flights end near: sigma_s p I / r^2 exp(-sigma_t (t + r))."""
     sigma, albedo, g, end = np.array([0.05, 0.2, 0.3]), 0.8, 0.5, 10.0
@@ -224,7 +224,9 @@ def test_what_media_may_be() -> None:
         media.Homogeneous(sigma_t=1.0, albedo=1.5)
 
 
-@pytest.mark.parametrize("g, mode", [(0.0, "rgb"), (0.6, "spectral")])
+@pytest.mark.parametrize(
+    "g, mode", [(0.0, "rgb"), pytest.param(0.6, "spectral", marks=pytest.mark.slow)]
+)
 def test_albedo_of_a_thick_body(g: float, mode: str) -> None:
     """It reflects what was asked for, of even light: 2 mu R(mu) summed over the cosines mu."""
     wanted = (0.8, 0.5, 0.2)
@@ -251,7 +253,15 @@ def test_albedo_of_a_thick_body(g: float, mode: str) -> None:
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the benchmark's scenes are not there")
-@pytest.mark.parametrize("name", ["iso_a0.99_t2", "hg8_a0.9_t2", "rayleigh_a0.99_t2", "iso_a1_t2"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "iso_a0.99_t2",
+        "hg8_a0.9_t2",
+        "iso_a1_t2",
+        pytest.param("rayleigh_a0.99_t2", marks=pytest.mark.slow),
+    ],
+)
 def test_slab_against_adding_and_doubling(name: str) -> None:
     """Reflectance of a slab seen from above, under radiance 1."""
     case = json.loads((SHARED / "references" / "slab.json").read_text())["cases"][name]

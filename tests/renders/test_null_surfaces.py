@@ -60,6 +60,7 @@ def test_a_point_light_through_screens(layout: str) -> None:
     assert_mean(images, [expected] * 3, 0.02, 2e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["rgb", pytest.param("spectral", marks=pytest.mark.slow)])
 def test_lights_that_both_ways_find(mode: str) -> None:
     """A sphere and the sky, by shadow rays and by paths that pass: together as one alone would."""
@@ -126,7 +127,11 @@ DEPTHS = [  # integrators, and the least depth at which they see a lit wall
 ]
 
 
-@pytest.mark.parametrize("integrator", DEPTHS, ids=lambda i: i.kind)
+@pytest.mark.parametrize(
+    "integrator",
+    [DEPTHS[0], *(pytest.param(i, marks=pytest.mark.slow) for i in DEPTHS[1:])],
+    ids=lambda i: i.kind,
+)
 def test_holes_are_no_depth(integrator: Integrator) -> None:
     """A hundred holes cost no `max_depth`, and no light: a wall at 2 m, whatever is before it."""
     scene = carded(integrator, 100)
@@ -147,6 +152,7 @@ def test_a_stack_of_more_than_a_path_crosses_is_black() -> None:
     assert exposures(carded(Path(max_depth=2), 1100), 2, 1).max() == 0.0
 
 
+@pytest.mark.slow
 def test_what_lies_behind_a_hole_is_the_first_surface() -> None:
     """Depth of the wall from the near plane at 1 mm, not of the nearest card."""
     scene = with_film(carded(Path(max_depth=1, light_paths=0), 20), layers="depth")

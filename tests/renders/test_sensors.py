@@ -38,7 +38,9 @@ def sky(light: object, *, sampler: Any = None, **film: Any) -> Scene:
 
 
 @pytest.mark.parametrize("name", ["cie1931", "cie1964"])
-@pytest.mark.parametrize("light", [COLOUR, LINES], ids=["smooth", "lines"])
+@pytest.mark.parametrize(
+    "light", [COLOUR, pytest.param(LINES, marks=pytest.mark.slow)], ids=["smooth", "lines"]
+)
 def test_observers(name: str, light: Tabulated) -> None:
     """XYZ of a light, by either density of wavelengths."""
     images = exposures(sky(light, sensor=name, output_space="xyz"), 24, 64)

@@ -50,7 +50,11 @@ def test_what_is_splatted():
     assert not SceneIndex.of(dataclasses.replace(scene, noise=0.1)).splatting
 
 
-@pytest.mark.parametrize("chosen", WIDE, ids=lambda f: f.kind)
+@pytest.mark.parametrize(
+    "chosen",
+    [pytest.param(f, marks=() if f.kind == "lanczos" else pytest.mark.slow) for f in WIDE],
+    ids=lambda f: f.kind,
+)
 def test_an_even_sky_is_even(chosen):
     """To float32 at the first sample, also at the film's edges, where samples lie beyond them."""
     with clpt.Renderer(sky(0.7, filter=chosen, alpha=True)) as renderer:
@@ -74,6 +78,7 @@ def test_bright_light_and_many_samples():
             assert renderer.wavefronts[0].counts.full == 0
 
 
+@pytest.mark.slow
 def test_the_mean_is_that_of_importance_sampling(scenes: Path):
     """Welch's tests over all pixels at SIGNIFICANCE; and the noise is lower."""
     film = {"width": 12, "height": 9, "mode": "rgb", "filter": it.Gaussian()}
@@ -84,6 +89,7 @@ def test_the_mean_is_that_of_importance_sampling(scenes: Path):
     assert ours.var(axis=0).mean() < 0.6 * reference.var(axis=0).mean()
 
 
+@pytest.mark.slow
 def test_bands_of_an_even_sky():
     film = {"mode": "spectral", "bands": 3, "filter": it.Tent()}
     scene = dataclasses.replace(sky(1.0, **film), lights=[lights.Constant(radiance="E")])
