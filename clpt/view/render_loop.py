@@ -158,11 +158,11 @@ class RenderLoop:
         """Note that the end of the render has moved."""
         self._offered = False
 
-    def cancel(self) -> None:
-        """Let a pass end soon."""
+    def cancel(self, discard: bool = False) -> None:
+        """Let a pass end soon; discard: the picture so far is of no use."""
         if self._asked is None:
             self._asked = time.perf_counter()
-        self._full.cancel()
+        self._full.cancel(discard)
 
     def stop(self) -> None:
         """Let all work end soon, for good."""
@@ -252,8 +252,11 @@ class RenderLoop:
                     self._offer(renderer, 1)
             return not self._closing
 
-        renderer.run(size, tell, noise=self.scene.noise)
+        finished = renderer.run(size, tell, noise=self.scene.noise)
         self._offered = False
+        if not finished and renderer.samples == 0:  # it was discarded: this picture begins again
+            self._begins = True
+            return
         if self._errors.wants(self._samples):
             self._errors.note(renderer.film.get())
 

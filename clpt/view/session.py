@@ -107,7 +107,7 @@ class Session(CameraWork):
             self._wake.notify_all()
         command = COMMANDS.get(request.name)  # None for what the probe asks for
         if command is not None and command.restarts:
-            self._loop.cancel()
+            self._loop.cancel(discard=True)
 
     def watched(self, viewers: int) -> None:
         """Note how many viewers there are; when the last one has left the render waits."""
