@@ -105,7 +105,8 @@ def test_what_moves_is_told_in_pixels(camera):
     assert shown.shape == (SIZE, SIZE, 3) and 0.7 < shown.max() <= 1.0
 
 
-@pytest.mark.parametrize("kind", [Perspective, pytest.param(Orthographic, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [Perspective, Orthographic])
 def test_a_plane_that_slides(kind):
     """Across the axis each of its points goes f d / z pixels from the shutter's opening to its
     closing, whenever it is seen; a quarter and three quarters of the keys' time."""
@@ -125,6 +126,7 @@ def test_a_plane_that_slides(kind):
     np.testing.assert_allclose(motion[..., 2:] - motion[..., :2], whole, atol=1e-3)
 
 
+@pytest.mark.slow
 def test_what_stands_still_does_not_move():
     assert not rendered(scene(still=True))["motion"].any()
 
