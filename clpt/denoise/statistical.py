@@ -35,8 +35,7 @@ class Statistical:
     """Denoises pictures of one view.
 
     on: where; halves: (h, w, 3) float32 each, of even and of odd samples; albedo, normal: likewise,
-    or None. colours: (h, w, 3) float32, their picture without most of its noise; error: (h, w)
-    float32, what is left in it, relative to its light.
+    or None. colours: (h, w, 3) float32, their picture without most of its noise.
 
     Raises KernelBuildError, MemoryBudgetError.
     """
@@ -69,7 +68,6 @@ class Statistical:
         self._guides.append(self._guide(self._download(once, both.shape), 1))
         twice = self._average(1, given, 2)
         self._shares = self._decide(given, once, twice)
-        self.error = np.ascontiguousarray(self._shares[..., 3])
         pairs = self._download(once, both.shape), self._download(twice, both.shape), both
         first, second, noisy = (pair.mean(axis=2)[..., :3] for pair in pairs)
         self.colours = self._mixed(first, second, noisy)
@@ -94,6 +92,35 @@ class Statistical:
             averages.append(self._download(made, noisy.shape))
             twice_over = np.stack([averages[0], averages[0]], axis=2)
         return self._mixed(*(image[..., :3] for image in (*averages, noisy)))
+
+    def error(self) -> Image:
+        """Return what is left in the picture, relative to its light, (h, w) float32: the root of
+        the mean square over the pixels around.
+
+        With independent halves a and b, and d of them denoised apart, the square of
+        (d(a) + d(b)) / 2 - truth is on average
+
+            ((d(a) - b)^2 + (d(b) - a)^2) / 2 - (a - b)^2 / 2 - (d(a) - d(b))^2 / 4
+
+        Even and odd samples of a Sobol sequence keep off each other: their (a - b)^2 is up to twice
+        their noise, and this is too low. So it is no less than the noise of both that is left,
+        (d(a) - d(b))^2 / 4, where it is that for the same reason which is too large. What was
+        measured is in bench/NOTES.md. It takes twice the time of the picture.
+        """
+        a, b = (self._both[:, :, i, :3].astype(float) for i in range(2))
+        of_a, of_b = (half.astype(float) for half in self.halves())
+
+        def square(image: NDArray[np.float64]) -> NDArray[np.float64]:
+            return np.asarray(np.mean(image**2, axis=2))
+
+        light = self.colours.mean(axis=2, dtype=float) ** 2 + (DARK * self._light) ** 2
+        noise = 0.25 * square(of_a - of_b)
+        left = 0.5 * (square(of_a - b) + square(of_b - a) - square(a - b)) - noise
+        both = np.zeros((*left.shape, 4), np.float32)
+        both[..., 0], both[..., 1] = left / light, noise / light
+        blurred = self._blurred(self._upload(both), ERROR_RADIUS, 0.0)
+        around = self._download(blurred, both.shape)
+        return np.sqrt(np.maximum(around[..., 0], around[..., 1]))
 
     def bands(self, image: Image) -> Image:
         """Return a picture (h, w, n) float32 of the same samples without most of its noise."""
@@ -143,7 +170,7 @@ class Statistical:
         return made
 
     def _decide(self, halves: Any, once: Any, twice: Any) -> Image:
-        """How much of each picture is taken, and the error, (h, w, 4)."""
+        """How much of each picture is taken, (h, w, 4), the last one 0."""
         errors, shares = self._allocate(1), self._allocate(1)
         self._run(
             "denoise_errors", flat=True, halves=halves, once=once, twice=twice, errors=errors,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -43,8 +44,7 @@ class DenoisedPicture:
     film has them, see clpt.denoise.needs. A film of bands is denoised in all of them, and its
     colours by themselves. The picture is not in the promise of equal bits.
 
-    text: how it was denoised, for headers of files; error: of `statistical`, (h, w) float32, what
-    is left in the colours, relative to their light; else None.
+    text: how it was denoised, for headers of files.
 
     Raises UnknownKindError for a method, SceneError where the
     denoiser is not installed, DeviceError where it fails.
@@ -59,7 +59,7 @@ class DenoisedPicture:
         surfaces = [self._layers.get(name) for name in needs.LAYERS]
         with_layers = [name for name in needs.LAYERS if name in self._layers]
         name = self.method
-        self.error: Image | None = None
+        self._made: Statistical | None = None
         if self.method == "oidn":
             with Oidn(*surfaces) as oidn:
                 name += f" {oidn.version}"
@@ -67,8 +67,8 @@ class DenoisedPicture:
                 bands = oidn.bands(self._image) if self.form.bands else None
         else:
             on = getattr(source, "device", None) or device.choose()
-            made = Statistical(on, self._halves(), *surfaces)
-            self._colours, self.error = made.colours, made.error
+            self._made = made = Statistical(on, self._halves(), *surfaces)
+            self._colours = made.colours
             bands = made.bands(self._image) if self.form.bands else None
         alpha = self._image[..., 3:] if self.form.alpha else self._image[..., :0]
         self._denoised = np.concatenate([self._colours, alpha], axis=2) if bands is None else bands
@@ -101,6 +101,11 @@ class DenoisedPicture:
     def noisy(self) -> Image:
         """The picture as it was before, in three colours, (h, w, 3) float32."""
         return self._noisy
+
+    @cached_property
+    def error(self) -> Image | None:
+        """What is left in the colours, relative to their light, (h, w) float32; None of `oidn`."""
+        return None if self._made is None else self._made.error()
 
     @property
     def beside(self) -> dict[str, Image]:

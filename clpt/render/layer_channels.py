@@ -98,8 +98,11 @@ def channels_of(layers: Mapping[str, Image], names: str = "clpt") -> dict[str, I
             made |= cryptomatte.channels_of(prefix, image, of_pairs)
             continue
         layer = LAYERS[_owner(name)]
-        before = "" if layer.plain and names == "clpt" else f"{prefix}."
-        made |= {f"{before}{letter}": image[..., i] for i, letter in enumerate(layer.channels)}
+        own = layer.exr if names == "clpt" else ()
+        for i, letter in enumerate(layer.channels):
+            turned = names == "blender" and letter in layer.flipped
+            channel = own[i] if own else f"{prefix}.{letter}"
+            made[channel] = -image[..., i] if turned else image[..., i]
     return made
 
 

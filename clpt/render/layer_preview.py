@@ -9,7 +9,7 @@ Image = NDArray[np.float32]
 
 
 def viewable(name: str, layer: Image) -> Image:
-    """Return values (h, w, 1 to 3) as colours in [0, 1], (h, w, 3) float32."""
+    """Return values (h, w, 1 to 4) as colours in [0, 1], (h, w, 3) float32."""
     if name.endswith("albedo"):
         return layer
     if name.endswith("_normal"):
@@ -23,5 +23,11 @@ def viewable(name: str, layer: Image) -> Image:
         hue = layer * np.float32(0.618034) + np.arange(3, dtype=np.float32) / np.float32(3.0)
         shown = 0.5 + 0.5 * np.cos(2 * np.pi * hue)
         return np.where(layer < 0, 0.0, shown).astype(np.float32)
+    if name == "motion":  # the hue is whereto, the brightness how far, of the farthest
+        moved = layer[..., 2:] - layer[..., :2]
+        turn = np.arctan2(moved[..., 1:], moved[..., :1])
+        far = np.linalg.norm(moved, axis=2, keepdims=True)
+        wheel = 0.5 + 0.5 * np.cos(turn - 2 * np.pi / 3 * np.arange(3))
+        return (wheel * (far / max(float(far.max()), 1e-6))).astype(np.float32)
     cells = np.mod(layer, np.float32(1.0))  # positions and uv: the colours repeat in every unit
     return np.pad(cells, ((0, 0), (0, 0), (0, 3 - cells.shape[2])))

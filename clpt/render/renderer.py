@@ -52,6 +52,10 @@ MOST_SAMPLES = 2**31 - 1
 TEXTURE_SHARE = 0.5  # of a device's free memory, for bitmaps
 
 
+class _Discarded(Exception):
+    """A run ends at once, and its film is of no use."""
+
+
 class Renderer(Resumable):
     """Renders a scene; its picture so far is available at any time.
 
@@ -76,7 +80,7 @@ class Renderer(Resumable):
         super().__init__()
         check_scene(scene)
         check_options(scene, options)
-        self._stop = threading.Event()
+        self._stop, self._discards = threading.Event(), False
         self.denoise = options.get("denoise")
         self.scene = scene = needs.prepared(scene, self.denoise)
         queue, threads = options.get("queue"), options.get("threads")
@@ -212,6 +216,8 @@ class Renderer(Resumable):
             pixels = self.wavefronts[0].paths.pixels * len(counts)
             seconds = time.perf_counter() - start
             rays = sum(c.rays for c in counts)
+            if self._stop.is_set() and self._discards:
+                raise _Discarded
             if self._stop.is_set() or progress is None:
                 return not self._stop.is_set()
             try:
@@ -222,13 +228,18 @@ class Renderer(Resumable):
                 return False
 
         if self._stop.is_set():  # before it began: nothing is taken
+            self._discards = False
             self._stop.clear()
             return False
         try:
             finished = self._render_samples(first, end, noise, on_batch)
             self._taken = join_ranges(self._taken, ((first, end),))
+        except _Discarded:
+            self.reset()
+            return False
         finally:
             self._seconds_rendered += time.perf_counter() - start
+            self._discards = False
             self._stop.clear()
         if raised:
             raise raised.pop()
@@ -268,12 +279,14 @@ class Renderer(Resumable):
         """The share of the pixels that would get more samples, 1 but for `run` with `noise`."""
         return 1.0 if self._adaptive is None else self._adaptive.active
 
-    def cancel(self) -> None:
+    def cancel(self, *, discard: bool = False) -> None:
         """Let the `run` of another thread, or else the next one, stop soon and return False.
 
-        A step is not stopped. It may be called from anywhere, also from a signal's handler, and
-        waits for nothing.
+        discard: the film is of no use any more: paths in flight are left as they are, which is
+        sooner, and a run that has begun leaves the film as after `reset`. A step is not stopped.
+        It may be called from anywhere, also from a signal's handler, and waits for nothing.
         """
+        self._discards = discard
         self._stop.set()
 
     @synchronized

@@ -21,14 +21,16 @@ class Layer:
     has met; the "light" of all samples; a "matte": names that its first 64 samples have met, and
     how often; "film": nothing, it is made of the film. blender: its name in Blender, or one after
     Blender's manner. denoising: of the first surface that is neither a mirror nor smooth glass,
-    else of the first. plain: its channels have no layer's name before them in an .exr.
+    else of the first. exr: what an .exr calls its channels, where other programs expect names that
+    are not the layer's, a dot and `channels`. flipped: the channels whose sign Blender turns.
     """
 
     channels: str
     blender: str
     form: Form = "near"
     denoising: bool = False
-    plain: bool = False
+    exr: tuple[str, ...] = ()
+    flipped: str = ""
 
     @property
     def is_colour(self) -> bool:
@@ -45,9 +47,16 @@ LAYERS = {
     "shading_normal": Layer("XYZ", "Normal"),
     "geometric_normal": Layer("XYZ", "Geometric Normal"),
     "depth": Layer("Z", "Denoising Depth", "long"),
-    "z": Layer("Z", "Depth", "long", plain=True),
+    "z": Layer("Z", "Depth", "long", exr=("Z",)),
     "position": Layer("XYZ", "Position", "long"),
     "uv": Layer("UV", "UV", "long"),
+    "motion": Layer(
+        "XYZW",
+        "Vector",
+        "long",
+        exr=("backward.u", "backward.v", "forward.u", "forward.v"),
+        flipped="ZW",
+    ),
     "shape_id": Layer("X", "IndexOB", "id"),
     "primitive_id": Layer("X", "IndexPrimitive", "id"),
     "material_id": Layer("X", "IndexMA", "id"),

@@ -40,7 +40,7 @@ class Legend:
 
 
 def layer(name: str, values: NDArray[np.float32]) -> Bytes:
-    """Return a layer (h, w, 1 to 3) as people can see it, (h, w, 3) uint8."""
+    """Return a layer (h, w, 1 to 4) as people can see it, (h, w, 3) uint8."""
     return images.to_srgb8(viewable(name, values))
 
 

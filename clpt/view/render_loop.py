@@ -81,8 +81,9 @@ class RenderLoop:
         options = {"cancel_seconds": CANCEL_SECONDS, **options}
         self._make = partial(Renderer, device=device, **options)
         self._divider = first_divider(scene)
-        whole = self._make if make is None else partial(make, **options)
-        self._full = Target(whole, lambda scene: scene)
+        self._whole = self._make if make is None else partial(make, **options)
+        self._limits: str | None = None  # the denoiser after which the limit of noise holds
+        self._full = Target(self._make_whole, lambda scene: scene)
         self._preview = Target(self._make, smaller(self._divider))
         self._previews_left, self._begins = PREVIEW_SAMPLES, True
         self._stale = self._offered = False
@@ -95,8 +96,15 @@ class RenderLoop:
         self._rates = 0.0, 0.0
         self._closing = False
 
-    def begin(self, scene: Scene, change: Change) -> None:
-        """Render another scene from now on."""
+    def begin(self, scene: Scene, change: Change, denoise: str | None = None) -> None:
+        """Render another scene from now on.
+
+        denoise: the denoiser that the picture is for: a limit of noise is for what that leaves.
+        """
+        limits = None if scene.noise is None else denoise
+        if limits != self._limits:
+            self._full.close()  # what a renderer keeps for it is decided when it is made
+            self._limits = limits
         if (scene.film.width, scene.film.height) != (self.scene.film.width, self.scene.film.height):
             self._resize_preview(first_divider(scene))
         self.scene = scene
@@ -150,11 +158,11 @@ class RenderLoop:
         """Note that the end of the render has moved."""
         self._offered = False
 
-    def cancel(self) -> None:
-        """Let a pass end soon."""
+    def cancel(self, discard: bool = False) -> None:
+        """Let a pass end soon; discard: the picture so far is of no use."""
         if self._asked is None:
             self._asked = time.perf_counter()
-        self._full.cancel()
+        self._full.cancel(discard)
 
     def stop(self) -> None:
         """Let all work end soon, for good."""
@@ -205,6 +213,9 @@ class RenderLoop:
             self._resize_preview(finer)
             self._follow(self._preview)
 
+    def _make_whole(self, scene: Scene) -> Renderer:
+        return self._whole(scene, denoise=self._limits)
+
     def _follow(self, target: Target) -> Renderer:
         """Return a target's renderer, of the present scene; tell viewers that it may take long."""
         if target.is_slow:
@@ -241,8 +252,11 @@ class RenderLoop:
                     self._offer(renderer, 1)
             return not self._closing
 
-        renderer.run(size, tell, noise=self.scene.noise)
+        finished = renderer.run(size, tell, noise=self.scene.noise)
         self._offered = False
+        if not finished and renderer.samples == 0:  # it was discarded: this picture begins again
+            self._begins = True
+            return
         if self._errors.wants(self._samples):
             self._errors.note(renderer.film.get())
 

@@ -18,7 +18,7 @@ from clpt.view import maps, panels, views
 from clpt.view.camera_work import CameraWork, Reply
 from clpt.view.commands import COMMANDS, CommandError, Request
 from clpt.view.look import Look
-from clpt.view.pictures import Display
+from clpt.view.pictures import METHOD, Display
 from clpt.view.probe import Probe, Question
 from clpt.view.render_loop import Outlet, RenderLoop
 from clpt.view.saving import Folder
@@ -107,7 +107,7 @@ class Session(CameraWork):
             self._wake.notify_all()
         command = COMMANDS.get(request.name)  # None for what the probe asks for
         if command is not None and command.restarts:
-            self._loop.cancel()
+            self._loop.cancel(discard=True)
 
     def watched(self, viewers: int) -> None:
         """Note how many viewers there are; when the last one has left the render waits."""
@@ -239,7 +239,10 @@ class Session(CameraWork):
         """Render another scene, as it is looked at."""
         self.scene = scene
         self._loop.shows = self.look.shows
-        self._loop.begin(self.look.apply(scene), change)
+        self._begin(self.look.apply(scene), change)
+
+    def _begin(self, shown: Scene, change: Change) -> None:
+        self._loop.begin(shown, change, METHOD if self.look.denoises else None)
 
     def _display(self) -> dict[str, Any]:
         display = self._loop.display
@@ -397,7 +400,7 @@ class Session(CameraWork):
         before = self._loop.scene.noise
         shown = dataclasses.replace(self._loop.scene, spp=spp, noise=noise)
         if noise != before:  # filters and light paths may depend on it
-            self._loop.begin(shown, Change(whole=True))
+            self._begin(shown, Change(whole=True))
         else:
             self._loop.scene = shown
             self._loop.wants_more()

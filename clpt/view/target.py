@@ -90,10 +90,13 @@ class Target:
             self.close()  # another film, which a renderer cannot get
             self.renderer = self.make(variant)
 
-    def cancel(self) -> None:
-        """Let a run end soon."""
-        if self.renderer is not None:
-            self.renderer.cancel()
+    def cancel(self, discard: bool = False) -> None:
+        """Let a run end soon; discard: its picture is of no use, and may be emptied."""
+        renderer = self.renderer
+        if discard and isinstance(renderer, Renderer):
+            renderer.cancel(discard=True)
+        elif renderer is not None:
+            renderer.cancel()
 
     def close(self) -> None:
         """Give the device's memory back."""

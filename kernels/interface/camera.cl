@@ -14,6 +14,13 @@
  * with directions for the hero's wavelength, if its glasses disperse. A ray that does not get to the scene has a weight
  * of 0 and ends at once.
  *
+ * A kind that has an axis also has kernels/camera/<kind>_screen.cl with
+ *
+ *   vec2 <kind>_screen(global const <Kind>Camera *camera, vec3 p, mask away, mask *seen);
+ *
+ * where on the film the point p is, or where `away` what is infinitely far along the unit vector p. `seen` becomes 0
+ * where it is nowhere, as behind the camera; a lens counts as its middle.
+ *
  * film: position on the film, x and y in [0, 1], y down; lens: a point of the unit square;
  * index: of the glass at the hero's wavelength, for which alone the ray then holds.
  * The struct is a uniform Record in clpt/render/contract/camera_records.py.

@@ -80,7 +80,7 @@ kernel void denoise_errors(global const float4 *halves, global const float4 *onc
 }
 
 /* How much of both averages and of the noisy picture makes the least error: inverse to what each has. errors: around
- * each pixel; shares: of these three, then the relative error that is left. */
+ * each pixel; shares: of these three, then 0. */
 kernel void denoise_shares(global const float4 *errors, global float4 *shares)
 {
     size_t i = get_global_id(0);
@@ -89,6 +89,5 @@ kernel void denoise_shares(global const float4 *errors, global float4 *shares)
     float one = 1.0f / (first * first + 1e-20f), other = 1.0f / (second * second + 1e-20f);
     float best = fmin(first, second), kept = noise > 0.0f ? noise / (noise + best) : 1.0f;
     one = one / (one + other);
-    float left = kept * kept * best + (1.0f - kept) * (1.0f - kept) * noise;
-    shares[i] = (float4)(kept * one, kept * (1.0f - one), 1.0f - kept, sqrt(left));
+    shares[i] = (float4)(kept * one, kept * (1.0f - one), 1.0f - kept, 0.0f);
 }

@@ -174,7 +174,11 @@ STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
         integer pixel_index = load_path_pixel_index(path, at), sample = load_path_sample(path, at);
         add_sample(scene, path, at, BEGIN_PASSED, end, slot, pixel_index, sample);
 #if USES_LAYERS
-        layers_count(scene, path, at, layers, end.ended & end.begun & (end.depth == 0));
+        mask unseen = end.ended & end.begun & (end.depth == 0);
+        layers_count(scene, path, at, layers, unseen);
+#if SCREEN_MOTION
+        layers_of_sky(scene, path, at, layers, unseen);
+#endif
 #endif
         NextSample next = next_sample(settings, work_list, samples, slot, end.ended, end.begun, pixel_index, sample);
         if (any(next.leaves)) {

@@ -258,6 +258,35 @@ def test_a_client_that_ends_goes_on(how, two, tmp_path, monkeypatch):
     assert digests[0] == digests[1]
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["oidn", "statistical"])
+def test_a_limit_after_denoising_is_that_of_one_process(method, two, tmp_path, monkeypatch):
+    """The client denoises both halves of the merged film and decides: to the film of one process,
+    also from the command line. Without a denoiser it decides otherwise."""
+    if method == "oidn":
+        pytest.importorskip("pyoidn", reason="Open Image Denoise is not installed")
+    given = dataclasses.replace(plan(), noise=NOISE)
+    with clpt.Renderer(given, threads=1, denoise=method) as one:
+        one.run(MOST, noise=NOISE)
+        wanted, picture = tasks.film_digest(one.film_state()), one.denoised()
+        samples = one.film_state().samples
+        assert samples.max() > 16 and samples.min() < MOST
+    with ClusterRenderer(given, two.client, denoise=method) as renderer:
+        assert renderer.run(MOST, noise=NOISE)
+        assert digest(renderer) == wanted
+        made = clpt.DenoisedPicture(renderer)
+        np.testing.assert_allclose(made.image(), picture, rtol=1e-3, atol=1e-5)
+    with clpt.Renderer(given, threads=1, halves=True) as one:
+        one.run(MOST, noise=NOISE)
+        assert (one.film_state().samples != samples).any()
+    monkeypatch.chdir(tmp_path)
+    noisy = ["--noise", "0.1", "--spp", "200", "--denoise", method]
+    assert render(*noisy, "--cluster", two.address, "-o", "a.film") == 0
+    assert render(*noisy, "-o", "b.film") == 0
+    films = [film_file.read(name).film for name in ("a.film", "b.film")]
+    assert tasks.film_digest(films[0]) == tasks.film_digest(films[1])
+
+
 def test_the_command_line(two, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     on = ["--cluster", two.address]

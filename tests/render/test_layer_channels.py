@@ -76,10 +76,14 @@ def test_names_of_blender():
     made = channels_of(pictures(), "blender")
     for name in (
         "Position.X", "Denoising Albedo.R", "Denoising Normal.Z", "IndexOB.X", "IndexMA.X",
-        "Combined_key.G", "CryptoObject00.r", "CryptoMaterial02.a", "Debug Sample Count.X",
+        "Vector.W", "Combined_key.G", "CryptoObject00.r", "CryptoMaterial02.a",
+        "Debug Sample Count.X",
     ):  # fmt: skip
         assert f"ViewLayer.{name}" in made
     assert all(name.startswith("ViewLayer.") for name in made)
+    ours = channels_of(pictures())  # there vectors to the next picture point back
+    for name, own, sign in (("X", "backward.u", 1), ("W", "forward.v", -1)):
+        np.testing.assert_array_equal(made[f"ViewLayer.Vector.{name}"], sign * ours[own])
 
 
 def test_a_spectral_file_has_layers_too(tmp_path, capsys):

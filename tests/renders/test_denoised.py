@@ -17,8 +17,10 @@ from clpt.errors import SceneError, UnknownKindError
 from clpt.scene.integrators import (
     Film,
     Gaussian,
+    Independent,
     ParticleTracer,
     Path,
+    Sobol,
     Vcm,
     Whitted,
     Zsobol,
@@ -162,6 +164,30 @@ def test_the_statistical_denoiser_needs_no_package(statistical, monkeypatch):
     made = clpt.DenoisedPicture(statistical)
     assert grain(made.image()) < grain(statistical.image()) / 2
     assert made.text.startswith("statistical with") and made.error.shape == (32, 32)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sampler", [Sobol(), Independent()])
+def test_the_told_error_is_that_beside_a_reference(sampler):
+    """The root of the mean square over a picture is within 40 % of the true one, but for the worst
+    hundredth of pixels: these have light that no sample has seen."""
+    scene = clpt.load(SCENE)
+    scene.film = dataclasses.replace(scene.film, width=128, height=128, mode="rgb", bands=0)
+    scene.integrator, scene.sampler = Path(light_paths=0), sampler
+    with clpt.Renderer(dataclasses.replace(scene, seed=9), denoise="statistical") as renderer:
+        renderer.run(2048)
+        truth = renderer.colours().astype(float)
+    with clpt.Renderer(scene, denoise="statistical") as renderer:
+        for samples in (16, 48):
+            renderer.run(samples)
+            made = clpt.DenoisedPicture(renderer)
+            wrong = np.mean((made.colours() - truth) ** 2, axis=2)
+            light = made.colours().mean(axis=2) ** 2 + (0.1 * truth.mean()) ** 2
+            both = (np.square(made.error), wrong / light)
+            told, true = (
+                np.sqrt(np.sort(each.ravel())[: -each.size // 100].mean()) for each in both
+            )
+            assert 0.7 < told / true < 1.4, (samples, told, true)
 
 
 def test_the_picture_of_a_film_is_denoised_alike(statistical):

@@ -193,6 +193,27 @@ def test_what_stops_a_run():
         assert renderer.run(3) and renderer.samples == 9
 
 
+@pytest.mark.parametrize("looped", [None, False])
+def test_a_run_that_is_discarded_leaves_nothing(looped):
+    """Its paths are left in flight; the next run has the bits of a new renderer's."""
+    scene = sky(width=40, height=40)
+    with clpt.Renderer(scene, slots=64, looped=looped) as renderer:
+        renderer.run(5)
+
+        def discard(_: object) -> None:
+            renderer.cancel(discard=True)
+
+        assert not renderer.run(4096, discard) and renderer.samples == 0
+        assert not renderer.film.get().any()
+        assert renderer.run(3) and renderer.samples == 3
+        found = renderer.film.get()
+        renderer.cancel(discard=True)  # before a run: nothing is lost
+        assert not renderer.run(2) and renderer.samples == 3
+    with clpt.Renderer(scene, slots=64, looped=looped) as fresh:
+        fresh.run(3)
+        np.testing.assert_array_equal(found, fresh.film.get())
+
+
 @pytest.mark.parametrize("number", [-1, 0.5, True, "2", 2**31])
 def test_no_first_sample(number):
     with pytest.raises(SceneError, match=r"first_sample|samples"):

@@ -386,6 +386,27 @@ def test_the_picture_can_be_denoised(opened, audience, on) -> None:
     assert np.array_equal(audience.rest()[1], noisy)
 
 
+def test_a_limit_of_noise_is_for_what_denoising_leaves(opened, audience, on) -> None:
+    """Once the picture is denoised: then each pixel has the samples of `clpt render --denoise`."""
+    pytest.importorskip("pyoidn", reason="Open Image Denoise is not installed")
+    scene = dataclasses.replace(small(spp=64), noise=0.12)
+    session = opened(scene)
+    audience.rest()
+    before = session._loop.renderer().samples_per_pixel()
+    ask(session, audience, "shows", name="denoised")
+    header, _ = audience.rest()
+    assert header["shows"] == "denoised"
+    found = session._loop.renderer().samples_per_pixel()
+    with Renderer(scene, on, denoise="oidn") as renderer:
+        renderer.run(64, noise=0.12)
+        expected = renderer.samples_per_pixel()
+    assert np.array_equal(found, expected)
+    assert not np.array_equal(found, before)
+    ask(session, audience, "stop_at", spp=8, noise=None)
+    audience.rest()
+    assert (session._loop.renderer().samples_per_pixel() == 8.0).all()
+
+
 def test_layers_and_maps_take_the_place_of_the_picture(opened, audience, on) -> None:
     """A layer that the film has not begins the render again; a map does not."""
     session = opened(small())

@@ -25,9 +25,11 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/gather.cl": lambda f, _: (
         ("generated/photon.cl", "merging/gather.cl") * (f.merged and not f.light_paths)
     ),
-    "generated/layer_sums.cl": lambda f, _: ("film/layers.cl",) * (f.layer_words > 0),
+    "generated/layer_sums.cl": lambda f, _: (
+        ("film/layers.cl",) * (f.layer_words > 0) + _screen_motion(f)
+    ),
     "generated/layers.cl": lambda f, _: (
-        ("generated/layer_args.cl", "path/layers.cl") * (f.layer_words > 0)
+        ("generated/layer_args.cl", *_screen_motion(f), "path/layers.cl") * (f.layer_words > 0)
     ),
     "generated/light_layers.cl": lambda f, _: (
         ("generated/light_layer_args.cl", "generated/sampler.cl", "film/light_layers.cl")
@@ -77,6 +79,12 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         (f"tracing/instances_{layout}.cl", "tracing/trace_instances.cl") * f.instances
     ),
 }
+
+
+def _screen_motion(features: Features) -> tuple[str, ...]:
+    """How what is seen moves across the film, where a layer tells it."""
+    files = ("interface/camera.cl", "generated/camera.cl", "generated/screen.cl")
+    return (*files, "path/screen_motion.cl") * features.screen_motion
 
 
 def _passing(features: Features) -> str:

@@ -137,7 +137,10 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "FILM_WEIGHTS": lambda f: f.film_weights,
     "USES_LAYERS": lambda f: f.layer_words > 0,
     "LAYER_IDS": lambda f: any(LAYERS[name].form == "id" for name in f.layers),
-    "NAMES_SURFACES": lambda f: any(LAYERS[name].form in ("id", "matte") for name in f.layers),
+    "NAMES_SURFACES": lambda f: (
+        f.screen_motion or any(LAYERS[name].form in ("id", "matte") for name in f.layers)
+    ),
+    "SCREEN_MOTION": lambda f: f.screen_motion,
     "MATTES": lambda f: len(f.mattes) or False,
     "MATTE_SLOTS": lambda f: bool(f.mattes) and MATTE_SLOTS,
     "MATTE_OBJECT": lambda f: _number("crypto_object", f.mattes),

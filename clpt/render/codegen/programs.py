@@ -164,6 +164,7 @@ def _shared(features: Features, layout: str) -> Files:
             features.camera, features.glass_lens, features.lens_losses, "camera" in features.moving
         ),
         "generated/connect.cl": stages.connect_text(features),
+        "generated/screen.cl": stages.screen_text(features),
         "generated/photon.cl": stages.photon_text(features) if features.merged else "",
         "generated/emission.cl": emission.dispatch_text(
             features.lights, textured, features.two_sided_lights, features.aimed

@@ -62,6 +62,18 @@ def connect_text(features: Features) -> str:
     )
 
 
+def screen_text(features: Features) -> str:
+    """Return `camera_screen`, where on the film a point is seen, for the layer of motion."""
+    if not features.screen_motion:
+        return ""
+    kind = features.camera
+    camera = f"(global const {camera_records.RECORDS[kind].name} *)(scene).camera"
+    return (
+        f'#include "camera/{kind}_screen.cl"\n#define camera_screen(scene, p, away, seen) '
+        f"{kind}_screen({camera}, p, away, seen)\n"
+    )
+
+
 def photon_text(features: Features) -> str:
     """Return the struct of a photon, and `photon_met(kind)`: whether one is kept at a material, or
     at a mixture, of which no part is chosen yet."""

@@ -201,6 +201,11 @@ class Features:
         return 1 + sum(LAYERS[name].words for name in self.layers)
 
     @property
+    def screen_motion(self) -> bool:
+        """Whether a layer tells how what is seen moves across the film, and anything may."""
+        return "motion" in self.layers and bool(self.moving)
+
+    @property
     def mattes(self) -> tuple[str, ...]:
         """The layers that are lists of names."""
         return self._layers_of("matte")

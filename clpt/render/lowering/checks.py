@@ -60,9 +60,11 @@ def check(scene: Scene) -> None:
     if scene.film.layers and not isinstance(scene.integrator, HAVE_LAYERS):
         names = ", ".join(cls.kind for cls in HAVE_LAYERS)
         raise SceneError(f"only the integrators {names} have layers", where="film.layers")
-    if "z" in scene.film.layers and scene.camera.kind not in WITH_AXIS:
-        message = f"the camera {scene.camera.kind} has no axis for z: ask for depth"
-        raise SceneError(message, where="film.layers")
+    if scene.camera.kind not in WITH_AXIS:
+        for name, instead in (("z", ": ask for depth"), ("motion", "")):
+            if name in scene.film.layers:
+                message = f"the camera {scene.camera.kind} has no axis for {name}{instead}"
+                raise SceneError(message, where="film.layers")
     _check_light_layers(scene)
     _check_light_paths(scene, shapes_)
     motions = Motions.of(scene)

@@ -164,7 +164,9 @@ class BounceLoop:
         """Trace the paths of samples first to end - 1 of every pixel, and wait.
 
         on_batch is called every few iterations with the counters; if it returns False, every path
-        is brought to its end and no other begins. Returns whether all paths were traced.
+        is brought to its end and no other begins. What it raises is raised when the device has done
+        what it was given; paths are left in flight then, and the film is not whole. Returns whether
+        all paths were traced.
         """
         steps = self._batch()
         begin, numbers = steps[0].bound, self.numbers(first, end)
@@ -184,7 +186,13 @@ class BounceLoop:
                 continue
             counters, event = reads.popleft()
             device.wait(event)
-            if not on_batch(counters) and finished:
+            try:
+                goes_on = on_batch(counters)
+            except BaseException:
+                for _, later in reads:
+                    device.wait(later)
+                raise
+            if not goes_on and finished:
                 begin.set_args(samples=(numbers[0], numbers[0]))
                 finished = False
             if counters[0] >= self.paths.slots:

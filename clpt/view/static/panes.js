@@ -122,7 +122,7 @@ export function renderPane(state, connection, figures) {
   return [
     section("Render", true,
       row("samples", "of every pixel, at most", number(state.spp, { whole: true, label: "samples" }, (spp) => stop(Math.max(1, spp), state.noise))),
-      row("noise", "pixels with less get no more samples; empty: all get as many", choice([["all samples", null], ["5 %", 0.05], ["2 %", 0.02], ["1 %", 0.01], ["0.5 %", 0.005], ...(state.noise && ![0.05, 0.02, 0.01, 0.005].includes(state.noise) ? [[`${short(100 * state.noise)} %`, state.noise]] : [])], state.noise, (noise) => stop(state.spp, noise), "noise")),
+      row("noise", `pixels with less${state.look.denoises ? " after denoising" : ""} get no more samples; empty: all get as many`, choice([["all samples", null], ["5 %", 0.05], ["2 %", 0.02], ["1 %", 0.01], ["0.5 %", 0.005], ...(state.noise && ![0.05, 0.02, 0.01, 0.005].includes(state.noise) ? [[`${short(100 * state.noise)} %`, state.noise]] : [])], state.noise, (noise) => stop(state.spp, noise), "noise")),
       h("div", { class: "buttons" }, h("button", { onclick: () => connection.send("pause", { paused: !state.paused }) }, state.paused ? "go on" : "pause"),
         h("button", { onclick: () => connection.send("restart") }, "begin again"),
         state.look.region ? h("button", { onclick: () => connection.send("region") }, "whole picture") : null)),
