@@ -73,6 +73,93 @@ class Keys:
         return matrix
 
 
+@dataclass(frozen=True, eq=False)
+class Deformation:
+    """Points that move by themselves: where each is at times [s], linear in between.
+
+    points: (k, n, 3) for k times and n vertices of a mesh, or centres of spheres; (k, n, 4) with the
+    radii, of points of curves too. normals: (k, n, 3) of a mesh's vertices, or None. Both become
+    float32. Before the first time and after the last one nothing moves.
+
+    Raises SceneError for times that do not ascend, arrays of other shapes, and values that are not
+    finite.
+    """
+
+    times: Sequence[float]
+    points: Any
+    normals: Any = None
+
+    def __post_init__(self) -> None:
+        where = "deformation"
+        try:
+            times = np.asarray(self.times, np.float64).reshape(-1)
+        except (TypeError, ValueError) as error:
+            raise SceneError(f"its times are not numbers: {error}", where=where) from error
+        if not len(times):
+            raise SceneError("must have at least one key", where=where)
+        check_times(times.tolist(), where)
+        points = _keyed(self.points, f"{where}.points", len(times), (3, 4))
+        normals = self.normals
+        if normals is not None:
+            normals = _keyed(normals, f"{where}.normals", len(times), (3,))
+            if normals.shape[1] != points.shape[1]:
+                found = f"{normals.shape[1]} for {points.shape[1]} points"
+                raise SceneError(f"needs as many normals as points, found {found}", where=where)
+        object.__setattr__(self, "times", tuple(times.tolist()))
+        object.__setattr__(self, "points", points)
+        object.__setattr__(self, "normals", normals)
+
+    def at(self, time: float) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
+        """Return the points (n, 3 or 4) float32 at a time [s], and the normals (n, 3) or None."""
+        times: Any = self.times
+        i = int(np.searchsorted(times, time, "right")) - 1
+        if i < 0 or i >= len(times) - 1:
+            share, i, j = 0.0, max(i, 0), max(i, 0)
+        else:
+            share, j = (time - times[i]) / (times[i + 1] - times[i]), i + 1
+        found = []
+        for values in (self.points, self.normals):
+            still = values is None or share == 0.0
+            one = None if values is None else values[i]
+            both = one if still else (1.0 - share) * values[i] + share * values[j]
+            found.append(None if both is None else np.asarray(both, np.float32))
+        return found[0], found[1]  # type: ignore[return-value]
+
+    def while_open(self, shutter: Shutter) -> tuple[float, ...]:
+        """Return the times at which points change their way, from when it opens to when it closes;
+        one time if they stand still."""
+        inner = [t for t in self.times if shutter.open < t < shutter.close]
+        times = (shutter.open, *inner, shutter.close)
+        first, turned = self.at(times[0])
+        for time in times[1:]:
+            points, normals = self.at(time)
+            same = np.array_equal(points, first)
+            if not same or (normals is not None and not np.array_equal(normals, turned)):
+                return times
+        return times[:1]
+
+
+def _keyed(values: Any, where: str, count: int, widths: tuple[int, ...]) -> NDArray[np.float32]:
+    """An array (count, n, one of widths) float32. Raises SceneError."""
+    rows = [getattr(one, "shape", None) or np.shape(one) for one in values]
+    odd = next((i for i, shape in enumerate(rows) if shape != rows[0]), None)
+    if odd is not None:
+        message = f"key {odd} has {rows[odd]} where the first has {rows[0]}: all must have as many"
+        raise SceneError(message, where=where)
+    try:
+        found = np.asarray(values, np.float32)
+    except (TypeError, ValueError) as error:
+        raise SceneError(f"are not numbers: {error}", where=where) from error
+    if found.ndim != 3 or len(found) != count or found.shape[2] not in widths:
+        columns = " or ".join(map(str, widths))
+        message = f"must be ({count}, n, {columns}) for {count} times, found {found.shape}"
+        raise SceneError(message, where=where)
+    wrong = ~np.isfinite(found).all(axis=(1, 2))
+    if wrong.any():
+        raise SceneError(f"key {int(np.argmax(wrong))} is not finite", where=where)
+    return found
+
+
 def check_times(times: Sequence[float], where: str) -> None:
     """Raise SceneError for times that are not finite or do not ascend."""
     for i, time in enumerate(times):

@@ -87,6 +87,7 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "USES_INSTANCES": lambda f: f.instances,
     "USES_MOTION": lambda f: bool(f.moving),
     "MOVES_INSTANCES": lambda f: "instances" in f.moving,
+    "MOVES_VERTICES": lambda f: "vertices" in f.moving,
     "MOVES_SHAPES": lambda f: "shapes" in f.moving,
     "MOTION_SCALES": lambda f: f.motion_scales,
     "MOTION_ROW": lambda f: bool(f.moving) and f.motion_row,

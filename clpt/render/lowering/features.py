@@ -121,5 +121,6 @@ def moving_parts(index: SceneIndex, geometry: Geometry) -> tuple[str, ...]:
         "instances": bool(placed & numbers),
         "shapes": bool(analytic & numbers),
         "lights": bool(motions.lamps) or bool(lit & numbers),
+        "vertices": any(count > 1 for count in geometry.keys.values()),
     }
     return tuple(name for name, moves in found.items() if moves)
