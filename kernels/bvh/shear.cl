@@ -34,11 +34,8 @@ inline float shear_edge(float px, float py, float qx, float qy)
     return px * qy - py * qx;
 }
 
-/* Whether the ray's line meets a triangle, whose nine coordinates stand `step` floats apart; where, and
- * the barycentrics of vertices 1 and 2. */
-#define SHEAR_INTERSECT(name, space) \
-inline int name(const Shear *s, space const float *v, uint step, float *t, float *b1, float *b2) \
-{ \
+/* The body of a function that tests one triangle, see `shear_intersect`. */
+#define SHEAR_INTERSECT \
     float az = v[s->kz * step] - s->oz, bz = v[(3 + s->kz) * step] - s->oz; \
     float cz = v[(6 + s->kz) * step] - s->oz; \
     float ax = mad(-s->x, az, v[s->kx * step] - s->ox), ay = mad(-s->y, az, v[s->ky * step] - s->oy); \
@@ -51,6 +48,12 @@ inline int name(const Shear *s, space const float *v, uint step, float *t, float
     *t = (e0 * az + e1 * bz + e2 * cz) * s->z * inverse; \
     *b1 = e1 * inverse; \
     *b2 = e2 * inverse; \
-    return (e0 >= 0.0f && e1 >= 0.0f && e2 >= 0.0f) || (e0 <= 0.0f && e1 <= 0.0f && e2 <= 0.0f); \
+    return (e0 >= 0.0f && e1 >= 0.0f && e2 >= 0.0f) || (e0 <= 0.0f && e1 <= 0.0f && e2 <= 0.0f);
+
+/* Whether the ray's line meets a triangle, whose nine coordinates stand `step` floats apart; where, and
+ * the barycentrics of vertices 1 and 2. */
+inline int shear_intersect(const Shear *s, global const float *v, uint step, float *t, float *b1,
+                           float *b2)
+{
+    SHEAR_INTERSECT
 }
-SHEAR_INTERSECT(shear_intersect, global)

@@ -64,12 +64,8 @@ inline float8 wide8_edge(float8 px, float8 py, float8 qx, float8 qy)
     return px * qy - py * qx;
 }
 
-/* The triangles of a block that the ray meets between tmin and t; at what distances, times `det`.
- * bvh/shear.cl tells why nothing slips between two of them. */
-#define WIDE8_TRIANGLES(name, space) \
-inline Mask8 name(space const float *block, const Wide8Ray *r, float t, float8 *distance, float8 *det) \
-{ \
-    space const float8 *b = (space const float8 *)block; \
+/* The body of a function that tests the triangles of a block, whose rows are b[0] to b[8]. */
+#define WIDE8_TRIANGLES \
     const Shear *s = &r->shear; \
     float8 az = b[s->kz] - s->oz, bz = b[3 + s->kz] - s->oz, cz = b[6 + s->kz] - s->oz; \
     float8 ax = b[s->kx] - s->ox - s->x * az, ay = b[s->ky] - s->oy - s->y * az; \
@@ -84,9 +80,16 @@ inline Mask8 name(space const float *block, const Wide8Ray *r, float t, float8 *
     q = as_float8(as_int8(q) ^ sign); \
     *distance = q; \
     *det = sum; \
-    return mask8(inside & (q > r->tmin * sum) & (q < t * sum)); \
+    return mask8(inside & (q > r->tmin * sum) & (q < t * sum));
+
+/* The triangles of a block that the ray meets between tmin and t; at what distances, times `det`.
+ * bvh/shear.cl tells why nothing slips between two of them. */
+inline Mask8 wide8_triangles(global const float *block, const Wide8Ray *r, float t, float8 *distance,
+                             float8 *det)
+{
+    global const float8 *b = (global const float8 *)block;
+    WIDE8_TRIANGLES
 }
-WIDE8_TRIANGLES(wide8_triangles, global)
 
 /* The hit record of one triangle of a block, computed again for that one alone. */
 inline TriHit wide8_hit(global const float *leaves, uint slot, float t, const Wide8Ray *r)

@@ -7,8 +7,6 @@
 #define KEYED_NODE 64 /* floats of a node, and of a block */
 #define KEYED_LEAF 88
 
-WIDE8_TRIANGLES(wide8_keyed_triangles, private)
-
 inline float8 wide8_keyed_row(global const float8 *rows, uint i, float share)
 {
     return keyed_row(rows[i], rows[i + KEYED_NODE / 8], share);
@@ -32,10 +30,10 @@ inline Mask8 wide8_keyed_boxes(global const float *node, float share, const Wide
 inline Mask8 wide8_keyed_block(global const float *block, float share, const Wide8Ray *r, float t, float8 *distance,
                                float8 *det)
 {
-    union { float8 rows[9]; float at[72]; } made;
     global const float8 *rows = (global const float8 *)block;
-    for (uint i = 0; i < 9; i++) made.rows[i] = keyed_row(rows[i], rows[i + KEYED_LEAF / 8], share);
-    return wide8_keyed_triangles(made.at, r, t, distance, det);
+    float8 b[9];
+    for (uint i = 0; i < 9; i++) b[i] = keyed_row(rows[i], rows[i + KEYED_LEAF / 8], share);
+    WIDE8_TRIANGLES
 }
 
 inline TriHit wide8_keyed_hit(global const float *leaves, float share, uint slot, float t, const Wide8Ray *r)

@@ -80,7 +80,11 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         (f"bvh/{layout}_keyed.cl",) * ("vertices" in f.moving and layout != "brute")
     ),
     "generated/instance_traversal.cl": lambda f, layout: (
-        (f"tracing/instances_{layout}.cl", "tracing/trace_instances.cl") * f.instances
+        (
+            f"tracing/instances_{'few' if f.few_instances else layout}.cl",
+            "tracing/trace_instances.cl",
+        )
+        * f.instances
     ),
 }
 

@@ -85,6 +85,8 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "USES_ATTRIBUTES": lambda f: f.attributes,
     "USES_ANALYTIC": lambda f: bool(f.analytic),
     "USES_INSTANCES": lambda f: f.instances,
+    "ONLY_INSTANCES": lambda f: f.only_instances,
+    "FEW_INSTANCES": lambda f: f.few_instances or False,
     "USES_MOTION": lambda f: bool(f.moving),
     "MOVES_INSTANCES": lambda f: "instances" in f.moving,
     "MOVES_VERTICES": lambda f: "vertices" in f.moving,
