@@ -166,6 +166,9 @@ class Curves(Shape):
         (), "points of each strand, in their order; empty: all are of one", form="lengths"
     )
     basis: str = choice("bspline", "what the points mean", BASES)
+    deformation: Deformation | None = host(
+        None, "where the points are at times; None: still", form="deformation"
+    )
 
 
 def _ball() -> np.ndarray:
