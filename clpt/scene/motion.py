@@ -141,15 +141,15 @@ class Deformation:
 
 def _keyed(values: Any, where: str, count: int, widths: tuple[int, ...]) -> NDArray[np.float32]:
     """An array (count, n, one of widths) float32. Raises SceneError."""
-    rows = [getattr(one, "shape", None) or np.shape(one) for one in values]
-    odd = next((i for i, shape in enumerate(rows) if shape != rows[0]), None)
-    if odd is not None:
-        message = f"key {odd} has {rows[odd]} where the first has {rows[0]}: all must have as many"
-        raise SceneError(message, where=where)
     try:
-        found = np.asarray(values, np.float32)
+        rows = [np.shape(one) for one in values]
+        odd = next((i for i, shape in enumerate(rows) if shape != rows[0]), None)
+        found = np.asarray(values if odd is None else (), np.float32)
     except (TypeError, ValueError) as error:
         raise SceneError(f"are not numbers: {error}", where=where) from error
+    if odd is not None:
+        message = f"key {odd} has {rows[odd]}, the first {rows[0]}: all must have as many"
+        raise SceneError(message, where=where)
     if found.ndim != 3 or len(found) != count or found.shape[2] not in widths:
         columns = " or ".join(map(str, widths))
         message = f"must be ({count}, n, {columns}) for {count} times, found {found.shape}"

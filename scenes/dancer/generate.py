@@ -191,7 +191,7 @@ def pose(time: float) -> dict[str, np.ndarray]:
     whip = 0.5 - 0.5 * math.cos(2.0 * math.pi * time / 1.2)  # from 0 to 1 and back
     lean = quaternion(z, -4.0)
     return {
-        "root": quaternion(y, TURN * time + 165.0),
+        "root": quaternion(y, TURN * time + 117.0),
         "hips": lean,
         "spine": quaternion(x, -4.0),
         "chest": product(quaternion(z, 5.0), quaternion(x, -4.0)),
@@ -348,7 +348,7 @@ def main() -> None:
         "nodes": nodes, "meshes": meshes, "materials": materials, "skins": [skin],
         "animations": [{"name": "turn", "channels": channels, "samplers": samplers}],
         "cameras": [
-            {"type": "perspective", "perspective": {"yfov": 0.44, "aspectRatio": 0.75,
+            {"type": "perspective", "perspective": {"yfov": 0.46, "aspectRatio": 0.75,
                                                     "znear": 0.1}}
         ],
         "buffers": [{"byteLength": len(binary.data)}],

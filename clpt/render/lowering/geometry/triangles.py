@@ -92,7 +92,8 @@ def keyed(
     if getattr(shape, "deformation", None) is None:
         at_all = [_in_world(shape)] * count
     else:
-        at_all = [_in_world(at_time(shape, time)) for time in times]
+        alike = [at_time(shape, time) for time in times]
+        at_all = [_in_world(one, alike) for one in alike]
     vertices, faces, _, uvs = at_all[0]
     if any(not np.array_equal(one[1], faces) for one in at_all):
         raise SceneError("its triangles are others at other times", where=where(shape))
@@ -200,10 +201,12 @@ def attribute(shape: Shape, name: str) -> Points:
     return values[_solid(vertices, faces)] if per_face else values
 
 
-def _in_world(shape: Shape) -> tuple[Points, Faces, Points | None, Points | None]:
-    """Vertices, faces, normals and uvs after the transform."""
+def _in_world(
+    shape: Shape, alike: Sequence[Any] = ()
+) -> tuple[Points, Faces, Points | None, Points | None]:
+    """Vertices, faces, normals and uvs after the transform; alike: the shape at several times."""
     matrix = placement(shape)
-    vertices, faces, normals, uvs = local(shape)
+    vertices, faces, normals, uvs = local(shape, alike)
     if not np.array_equal(matrix, transforms.IDENTITY):
         vertices = transforms.transform_points(matrix, vertices).astype(np.float32)
         if not np.isfinite(vertices).all():
@@ -245,12 +248,17 @@ def triangle_rows(vertices: Points, faces: Faces) -> Words:
     return np.ascontiguousarray(np.hstack([v0, v1 - v0, v2 - v0, side])).view(np.uint32)
 
 
-def local(shape: Shape) -> tuple[Points, Faces, Points | None, Points | None]:
-    """Return vertices, faces, normals and uvs before the transform, as `triangulate` does."""
+def local(
+    shape: Shape, alike: Sequence[Any] = ()
+) -> tuple[Points, Faces, Points | None, Points | None]:
+    """Return vertices, faces, normals and uvs before the transform, as `triangulate` does.
+
+    alike: the shape at several times, at all of which the faces are the same.
+    """
     if isinstance(shape, shapes.Mesh):
         return _mesh(shape)
     if isinstance(shape, shapes.Curves):
-        return tubes(shape, where(shape))
+        return tubes(shape, where(shape), alike)
     if isinstance(shape, shapes.SdfGrid):
         return distance_grids.surface(shape, where(shape))
     if shape.kind == "rectangle":
