@@ -3,8 +3,9 @@
     python -m bench.motion
 
 1,000 copies of a ball with bumps (20,000 triangles) that turn by 30 degrees while the shutter is
-open, the same that move by half their size, and a camera that moves before copies that do not; and beside one such ball of
-half a million triangles, the same that swells to 1.5 of its size and twists, by two keys.
+open, the same that move by half their size, and a camera that moves before copies that do not.
+Then one such ball of half a million triangles beside the same that swells to 1.5 of its size and
+twists, by two keys.
 Rays are counted by processor time; pictures of the two kinds take turns.
 """
 

@@ -6,7 +6,7 @@ import logging
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise, zip_longest
+from itertools import chain, pairwise, repeat
 from typing import get_args
 
 import numpy as np
@@ -142,14 +142,14 @@ def build_parts(
     """Build a tree for each run of triangles, in shared buffers.
 
     counts: the lengths of the runs, one after the other; triangles count from 0 in each. Returns
-    the trees, and the offsets of the nodes and leaves of each, (n, 2) uint32 [32 bytes]. keys: of each
-    run how many rows a vertex has, see clpt.bvh.keyed; corners: the vertices on the host, for runs
-    of several. The other parameters are those of `build`, which raises alike.
+    the trees, and the offsets of the nodes and leaves of each, (n, 2) uint32 [32 bytes]. keys: of
+    each run how many rows a vertex has, see clpt.bvh.keyed; corners: the vertices on the host, for
+    runs of several. The other parameters are those of `build`, which raises alike.
     """
     start = time.perf_counter()
     trees, building = [], Building(device)
     runs = pairwise(np.cumsum([0, *counts]).tolist())
-    for (i, j), rows in zip_longest(runs, keys, fillvalue=1):
+    for (i, j), rows in zip(runs, chain(keys, repeat(1)), strict=False):
         building = Building(device, building.stream)
         if rows > 1 and corners is not None:
             _check_reach(corners, "a vertex")

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt import transforms
 from clpt.errors import SceneError
 
 SHAPES = {"box": (1.0, 1.0), "triangle": (0.0, 1.0, 0.0)}  # of shutters, by name
@@ -77,9 +78,9 @@ class Keys:
 class Deformation:
     """Points that move by themselves: where each is at times [s], linear in between.
 
-    points: (k, n, 3) for k times and n vertices of a mesh, or centres of spheres; (k, n, 4) with the
-    radii, of points of curves too. normals: (k, n, 3) of a mesh's vertices, or None. Both become
-    float32. Before the first time and after the last one nothing moves.
+    points: (k, n, 3) for k times and n vertices of a mesh, (k, n, 4) for points of curves with the
+    radii. normals: (k, n, 3) of a mesh's vertices, or None. Both become float32.
+    Before the first time and after the last one nothing moves.
 
     Raises SceneError for times that do not ascend, arrays of other shapes, and values that are not
     finite.
@@ -134,7 +135,8 @@ class Deformation:
         for time in times[1:]:
             points, normals = self.at(time)
             same = np.array_equal(points, first)
-            if not same or (normals is not None and not np.array_equal(normals, turned)):
+            bent = normals is not None and turned is not None
+            if not same or (bent and not np.array_equal(np.asarray(normals), np.asarray(turned))):
                 return times
         return times[:1]
 
@@ -158,6 +160,32 @@ def _keyed(values: Any, where: str, count: int, widths: tuple[int, ...]) -> NDAr
     if wrong.any():
         raise SceneError(f"key {int(np.argmax(wrong))} is not finite", where=where)
     return found
+
+
+def placement(thing: Any) -> NDArray[np.float64] | None:
+    """Return where a shape, light or camera is, (4, 4); None for what is at no place."""
+    if hasattr(thing, "to_world"):
+        return np.asarray(thing.to_world, np.float64)
+    if hasattr(thing, "position"):
+        return transforms.translate(thing.position)
+    if hasattr(thing, "direction"):
+        d = np.asarray(thing.direction, np.float64)
+        up = [0.0, 1.0, 0.0] if abs(d[1]) < 0.9 * np.linalg.norm(d) else [1.0, 0.0, 0.0]
+        return transforms.look_at([0.0, 0.0, 0.0], d, up)
+    return None
+
+
+def through(thing: Any, times: Sequence[float], placements: Any) -> Any:
+    """Return a shape, light or camera that is at placements (k, 4, 4) at times [s], by keys.
+
+    It turns about its own origin. Raises SceneError as `Keys` does.
+    """
+    keys = Keys(times, placements)
+    if hasattr(thing, "to_world"):
+        return replace(thing, to_world=np.eye(4), motion=keys)
+    if hasattr(thing, "position"):
+        return replace(thing, position=(0.0, 0.0, 0.0), motion=keys)
+    return replace(thing, direction=(0.0, 0.0, 1.0), motion=keys)
 
 
 def check_times(times: Sequence[float], where: str) -> None:

@@ -1,7 +1,7 @@
 """Writes a dancer with a skeleton as glTF: she turns on one toe, and her skirt swings by a morph.
 
     python scenes/dancer/generate.py
-    clpt render scenes/dancer/dancer.glb -D time=0.7 -D shutter=0.05 -s 512 -o dancer.png
+    clpt render scenes/dancer/dancer.glb -D time=0.7 -D shutter=0.05 --spp 512 -o dancer.png
 
 Limbs are tubes around bones, whose rings follow two joints where these meet. All keys of the
 animation are a tenth of a second apart.
@@ -59,8 +59,13 @@ def weights_along(share: np.ndarray, joints: list[str], ends: list[float], blend
 
 
 def tube(
-    points: list[Any], radii: list[Any], joints: list[str], ends: list[float], blend: float = 0.12,
-    rings: int = 40, sides: int = 20,
+    points: list[Any],
+    radii: list[Any],
+    joints: list[str],
+    ends: list[float],
+    blend: float = 0.12,
+    rings: int = 40,
+    sides: int = 20,
 ) -> dict[str, Any]:
     """A tube around a line of points; radii: one or (across, along z) for each of them."""
     line = np.array(points, float)
@@ -278,7 +283,9 @@ def main() -> None:
               extensions={"KHR_materials_emissive_strength": {"emissiveStrength": 16.0}}),
     ]  # fmt: skip
     parts = figure()
-    body = [binary.part(parts[name], i) for i, name in enumerate(("skin", "hair", "shoes", "dress"))]
+    body = [
+        binary.part(parts[name], i) for i, name in enumerate(("skin", "hair", "shoes", "dress"))
+    ]
     weights = np.zeros((22 * 96, len(NAMES)))
     weights[:, NAMES.index("hips")] = 1.0
     hanging, flying = grid(skirt(0.0), weights), grid(skirt(1.0), weights)
@@ -310,7 +317,7 @@ def main() -> None:
     bind[:, :3, 3] = -PLACES
     skin = {"joints": list(range(len(NAMES))), "skeleton": 0}
     skin["inverseBindMatrices"] = binary.add(bind.transpose(0, 2, 1).reshape(-1, 16), "MAT4", 5126)
-    view = [0.0, 1.16, 5.2]
+    view = [-0.22, 1.16, 5.2]
     meshes = [
         {"name": "body", "primitives": body},
         {"name": "skirt", "primitives": [cloth], "weights": [0.6]},

@@ -13,17 +13,19 @@ import pytest
 import clpt
 from clpt import transforms
 from clpt.errors import SceneError
+from clpt.render.editing.blurring import between
 from clpt.render.lowering.scene import lower
 from clpt.scene import Scene, cameras, integrators, lights, materials, shapes, textures
-from clpt.scene.motion import Deformation, Shutter
+from clpt.scene.motion import Deformation, Keys, Shutter
 from tests.renders.test_motion import ball
 
 DANCER = Path(__file__).parents[2] / "scenes" / "dancer" / "dancer.glb"
 BALL, FACES, _ = ball(48, 0.25)
+OPEN = Shutter(0.0, 1.0)
 GROWS = Deformation([0.0, 1.0], [BALL, 3.0 * BALL])
 
 
-def scene(things: Any, shutter: Shutter | None = Shutter()) -> Scene:
+def scene(things: Any, shutter: Shutter | None = OPEN) -> Scene:
     camera = cameras.Orthographic(to_world=transforms.translate([0, 0, -3]), shutter=shutter)
     return Scene(
         camera=camera,
@@ -77,6 +79,75 @@ def test_a_shutter_without_length_is_still() -> None:
     assert np.array_equal(found, expected)
     for shutter, moves in ((at_once, ()), (Shutter(2, 3), ()), (Shutter(0, 0.1), ("vertices",))):
         assert lower(scene([mesh()], shutter)).features.moving == moves
+
+
+def test_motion_between_two_scenes() -> None:
+    """What changes has keys at both ends of the time; what does not, or cannot, is as it is."""
+    cube, lamp = shapes.Cube(), lights.Point(position=(0, 1, 0))
+    points = np.array([[0, 0, 0, 0.1], [0, 1, 0, 0.1]])
+    strand = shapes.Curves(points=points, basis="linear")
+    ball_ = mesh(deformation=None)
+    glows = mesh(deformation=None, emission=lights.Area(), name="glows")
+    placed = shapes.Instance(group=shapes.Group((ball_,)))
+    former = scene([cube, ball_, placed, glows, strand], Shutter(1.0, 2.0))
+    former = dataclasses.replace(former, lights=[lamp])
+    bent = dataclasses.replace(ball_, vertices=2 * BALL)
+    things = [
+        cube,
+        bent,
+        dataclasses.replace(placed, group=shapes.Group((bent,))),
+        dataclasses.replace(glows, vertices=2 * BALL),
+        dataclasses.replace(strand, points=points + 1),
+    ]
+    aside = dataclasses.replace(former.camera, to_world=transforms.translate([1, 0, -3]))
+    new = dataclasses.replace(
+        former,
+        shapes=things,
+        lights=[dataclasses.replace(lamp, position=(1, 1, 0))],
+        camera=aside,
+    )
+    moving, warnings = between(former, new)
+    assert len(warnings) == 1 and "'glows': its vertices do not move" in warnings[0]
+    assert moving.shapes[0] is cube and moving.shapes[3] is things[3]
+    for keys in (moving.shapes[1], moving.shapes[2].group.shapes[0]):
+        assert keys.deformation.times == (1.0, 2.0)
+        assert np.array_equal(keys.deformation.points, [BALL, 2 * BALL])
+    assert np.allclose(moving.shapes[4].deformation.points[1], points + 1)
+    assert np.allclose(moving.lights[0].motion.at(1.5)[:3, 3], [0.5, 1, 0])
+    assert np.allclose(moving.camera.motion.at(1.5)[:3, 3], [0.5, 0, -3])
+    assert set(lower(moving).features.moving) == {"camera", "lights", "vertices"}
+
+
+@pytest.mark.slow
+def test_updates_move_from_the_last_to_this() -> None:
+    """The same bits as keys that say so; then from there, and afterwards nothing moves."""
+    cube = shapes.Cube(to_world=transforms.scale(0.2), name="cube")
+    plain = scene([mesh(deformation=None, name="ball"), cube])
+    place = transforms.translate([0.5, 0, 0]) @ transforms.rotate([0, 0, 1], 30) @ cube.to_world
+    turned = dataclasses.replace(
+        cube, to_world=np.eye(4), motion=Keys([0.0, 1.0], [cube.to_world, place])
+    )
+    with clpt.Renderer(plain) as renderer:
+
+        def picture() -> np.ndarray:
+            renderer.run(4)
+            return np.array(renderer.image())
+
+        renderer.update(vertices={"ball": 3 * BALL}, transforms={"cube": place}, motion=True)
+        keyed = scene([mesh(), turned])
+        assert np.array_equal(picture(), np.asarray(clpt.render(keyed, 4)))
+        renderer.update(vertices={"ball": BALL}, motion=True)
+        lowered = renderer.wavefronts[0].scene.lowered
+        assert lowered.features.moving == ("vertices",)  # the cube has come to rest
+        corners = lowered.vertices[-2 * len(BALL) :].reshape(-1, 2, 3)
+        assert np.allclose(corners[:, 0], 3 * corners[:, 1], atol=1e-5)
+        renderer.update(transforms={"cube": cube.to_world})
+        assert np.array_equal(picture(), np.asarray(clpt.render(plain, 4)))
+    with clpt.Renderer(scene([cube], None)) as renderer:
+        with pytest.raises(SceneError, match="the shutter is open"):
+            renderer.update(transforms={"cube": place}, motion=True)
+        with pytest.raises(SceneError, match="there were 1, now 2"):
+            renderer.update(scene=scene([cube, cube]), motion=True)
 
 
 def test_keys_between() -> None:

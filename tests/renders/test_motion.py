@@ -85,7 +85,6 @@ BRUSHED = shapes.Mesh(
 )
 
 
-
 def ball(rings: int, radius: float = 1.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Vertices, faces and uvs of a ball of triangles about z."""
     u, v = np.meshgrid(np.linspace(0, 1, 2 * rings + 1), np.linspace(1e-3, 1 - 1e-3, rings + 1))
@@ -116,7 +115,11 @@ BENT = shapes.Mesh(
     ),
     deformation=Deformation(
         [0.0, 0.3, 1.0],
-        [BALL, twisted(BALL, 1.0, [1.2, 0.8, 1.0]), twisted(BALL, -0.5) + [0.6, 0.2, 0.0]],
+        [
+            BALL,
+            twisted(BALL, 1.0, [1.2, 0.8, 1.0]),
+            twisted(BALL, -0.5) + np.array([0.6, 0.2, 0.0]),
+        ],
     ),
 )
 CHECKED = dataclasses.replace(

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import transforms
 from clpt.errors import SceneError
 from clpt.scene import Scene
-from clpt.scene.motion import Deformation, Keys, Shutter
+from clpt.scene.motion import Deformation, Shutter, placement, through
 from clpt.scene.shapes import Group, Instance, Mesh
 
 KEYS = 9  # in the time for which the shutter is open
@@ -118,37 +117,14 @@ def _step(points: NDArray[np.float32]) -> int:
 def _moving(ways: Sequence[Any], times: Matrix, warnings: list[str], where: str) -> Any:
     """A thing at its first time with keys, if it is elsewhere at others."""
     first = ways[0]
-    placed = [_placement(way) for way in ways]
+    placed = [placement(way) for way in ways]
     if any(matrix is None for matrix in placed):
         return first
     matrices = np.stack([matrix for matrix in placed if matrix is not None])
     if np.array_equal(matrices, np.broadcast_to(matrices[0], matrices.shape)):
         return first
     try:
-        keys = Keys(times.tolist(), matrices)
-        return _at_origin(first, keys)
+        return through(first, times.tolist(), matrices)
     except SceneError as error:
         warnings.append(f"shutter: {where} stays as at `time`: {error}")
         return first
-
-
-def _placement(thing: Any) -> Matrix | None:
-    """Where a shape, light or camera is, (4, 4); None for what is at no place."""
-    if hasattr(thing, "to_world"):
-        return np.asarray(thing.to_world, np.float64)
-    if hasattr(thing, "position"):
-        return transforms.translate(thing.position)
-    if hasattr(thing, "direction"):
-        d = np.asarray(thing.direction, np.float64)
-        up = [0.0, 1.0, 0.0] if abs(d[1]) < 0.9 * np.linalg.norm(d) else [1.0, 0.0, 0.0]
-        return transforms.look_at([0.0, 0.0, 0.0], d, up)
-    return None
-
-
-def _at_origin(thing: Any, keys: Keys) -> Any:
-    """A thing as it is before the placements that are its keys."""
-    if hasattr(thing, "to_world"):
-        return dataclasses.replace(thing, to_world=np.eye(4), motion=keys)
-    if hasattr(thing, "position"):
-        return dataclasses.replace(thing, position=(0.0, 0.0, 0.0), motion=keys)
-    return dataclasses.replace(thing, direction=(0.0, 0.0, 1.0), motion=keys)

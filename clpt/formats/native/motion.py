@@ -34,7 +34,8 @@ POINTS = ("points", "normals")
 DEFORMATION_SCHEMA: Schema = {
     "anyOf": [
         object_of(
-            {"file": {**STRING, "description": "name of a .npz of times, points, normals"}}, ["file"]
+            {"file": {**STRING, "description": "name of a .npz of times, points, normals"}},
+            ["file"],
         ),
         {
             "type": "array",

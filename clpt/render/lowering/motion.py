@@ -100,10 +100,11 @@ def at_rest(scene: Scene) -> Scene:
     for i, light in enumerate(scene.lights):
         _check(light, f"lights[{i}]")
     _check(scene.camera, "camera")
-    things = _undeformed(scene.shapes, shutter)
-    if any(new is not old for new, old in zip(things, scene.shapes, strict=True)):
-        changes["shapes"] = things
-    for name, parts in (("shapes", things), ("lights", scene.lights)):
+    bent: list[Any] = _undeformed(scene.shapes, shutter)
+    if any(new is not old for new, old in zip(bent, scene.shapes, strict=True)):
+        changes["shapes"] = bent
+    lists: tuple[tuple[str, Sequence[Any]], ...] = (("shapes", bent), ("lights", scene.lights))
+    for name, parts in lists:
         if any(part.motion is not None for part in parts):
             changes[name] = [_rest(part, shutter) for part in parts]
     camera = _rest(scene.camera, shutter)
@@ -286,8 +287,8 @@ def lower_motion(motions: Motions, scene: Scene, rows: list[int], store: TableSt
 
 
 def _deformations(motions: Motions, count: int, first: int) -> NDArray[np.float32]:
-    """For each shape the word of its steps, and these: how many, and for each when it begins and one
-    over how long it takes; none for what does not deform. See kernels/tracing/vertex_keys.cl."""
+    """For each shape the word of its steps, and these: how many, and for each when it begins and
+    one over how long it takes; none for what does not deform: kernels/tracing/vertex_keys.cl."""
     places, parts, at = np.full(count, first + count, np.int32), [np.zeros(3, np.float32)], 3
     made: dict[tuple[float, ...], int] = {}
     for number, times in motions.deforming.items():

@@ -21,7 +21,7 @@ from clpt.scene import shapes
 from clpt.scene.motion import Deformation
 from clpt.scene.shapes import Shape
 
-POINTS = {"mesh": "vertices", "curves": "points", "spheres": "centers"}  # what a deformation moves
+POINTS = {"mesh": "vertices", "curves": "points"}  # what a deformation moves
 SUMMED = 1 << 20  # triangles whose normals are summed at a time
 
 CHUNK = 1 << 16  # triangles that are looked at at a time: what is made of them stays in the cache
@@ -94,7 +94,7 @@ def keyed(
     else:
         alike = [at_time(shape, time) for time in times]
         at_all = [_in_world(one, alike) for one in alike]
-    vertices, faces, _, uvs = at_all[0]
+    _, faces, _, uvs = at_all[0]
     if any(not np.array_equal(one[1], faces) for one in at_all):
         raise SceneError("its triangles are others at other times", where=where(shape))
     solid = np.any([_solid(one[0], faces) for one in at_all], axis=0)
