@@ -410,9 +410,9 @@ class Renderer(Resumable):
             new = dataclasses.replace(new, camera=camera)
         parameters_only = quick and not transforms and not vertices
         if not (parameters_only and self._patch(new)):
-            shown, told = between(self.scene, new) if motion else (new, [])
+            shown, remarks = between(self.scene, new) if motion else (new, [])
             self._rebuild(shown, events, refit=scene is None)
-            self.warnings += told
+            self.warnings += remarks
             self._blurred = motion
         self.scene = new
         self._successors.note(replaced)

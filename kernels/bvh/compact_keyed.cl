@@ -35,7 +35,7 @@ inline uint compact_keyed_boxes(const CompactRay *r, float t, const CompactKey *
 #define LOW(k) (half_ ? (uint3)(k->c.y, k->c.w, k->d.y) : (uint3)(k->c.x, k->c.z, k->d.x))
 #define HIGH(k) (half_ ? (uint3)(k->d.w, k->e.y, k->e.w) : (uint3)(k->d.z, k->e.x, k->e.z))
     uint3 p_low = LOW(p), p_high = HIGH(p), q_low = LOW(q), q_high = HIGH(q);
-#define PLANES(back, axis, side)                                                                           \
+#define PLANES(back, axis, side)                                                                             \
     compact_keyed_planes((back) ? p_high.axis : p_low.axis, (back) ? q_high.axis : q_low.axis, p->step.axis, \
                          p->begin.axis, q->step.axis, q->begin.axis, share, side)
     float4 entry = compact_max(compact_max(PLANES(x, x, -1.0f), PLANES(y, y, -1.0f)),

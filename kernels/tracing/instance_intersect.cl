@@ -23,9 +23,9 @@ inline int instance_meet(global const float *nodes, global const float *leaves, 
         nodes += k.key * KEYED_NODE;
         leaves += k.key * KEYED_LEAF;
         if (first_only) return KEYED(occluded)(nodes, leaves, (uint)k.count, k.share, p, v, tmin, hit->t);
-        TriHit bent = KEYED(closest)(nodes, leaves, (uint)k.count, k.share, p, v, tmin, hit->t);
-        if (bent.prim == BVH_MISS) return 0;
-        *hit = bent;
+        TriHit met = KEYED(closest)(nodes, leaves, (uint)k.count, k.share, p, v, tmin, hit->t);
+        if (met.prim == BVH_MISS) return 0;
+        *hit = met;
         return 1;
     }
 #endif

@@ -1,6 +1,6 @@
-/* Vertices that move by themselves: each has a row for every key, side by side, and moves linearly from one to the next.
- * The table of tracing/motion.cl says at MOTION_ROW + 4 where for each shape the word of its steps is: how many, and for
- * each when it begins [s] and one over how long it takes; none where it does not deform. */
+/* Vertices that move by themselves: each has a row for every key, side by side, and moves linearly from one to the
+ * next. The table of tracing/motion.cl says at MOTION_ROW + 4 where for each shape the word of its steps is: how many,
+ * and for each when it begins [s] and one over how long it takes; none where it does not deform. */
 typedef struct {
     integer count, key, next; /* rows of a vertex; the one before the time; from it to the one after it */
     real share;               /* of the way between these */
