@@ -27,3 +27,14 @@ inline vec3 vertex_keyed(global const float *table, integer vertex, VertexKeys k
     integer at = 3 * (vertex + k.key);
     return madd3(gather3(table, at), 1.0f - k.share, scale3(gather3(table, at + 3 * k.next), k.share));
 }
+
+/* Where the point of a triangle with the barycentrics u, v of its vertices 1 and 2 is at a time, before what its instance
+ * does; number: of the scene's shape. */
+inline vec3 vertex_point(Scene scene, integer number, integer prim, real u, real v, real time)
+{
+    VertexKeys k = vertex_keys(scene, number, time);
+    vec3 corners = gather3((global const float *)scene.faces, 3 * prim);
+    vec3 a = vertex_keyed(scene.vertices, as_integer(corners.x), k);
+    vec3 b = vertex_keyed(scene.vertices, as_integer(corners.y), k);
+    return madd3(a, 1.0f - u - v, madd3(b, u, scale3(vertex_keyed(scene.vertices, as_integer(corners.z), k), v)));
+}
