@@ -28,8 +28,8 @@ inline vec3 vertex_keyed(global const float *table, integer vertex, VertexKeys k
     return madd3(gather3(table, at), 1.0f - k.share, scale3(gather3(table, at + 3 * k.next), k.share));
 }
 
-/* Where the point of a triangle with the barycentrics u, v of its vertices 1 and 2 is at a time, before what its instance
- * does; number: of the scene's shape. */
+/* Where the point of a triangle with the barycentrics u, v of its vertices 1 and 2 is at a time, before what its
+ * instance does; number: of the scene's shape. */
 inline vec3 vertex_point(Scene scene, integer number, integer prim, real u, real v, real time)
 {
     VertexKeys k = vertex_keys(scene, number, time);

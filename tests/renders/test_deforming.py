@@ -91,7 +91,8 @@ def test_motion_between_two_scenes() -> None:
     ball_ = mesh(deformation=None)
     glows = mesh(deformation=None, emission=lights.Area(), name="glows")
     placed = shapes.Instance(group=shapes.Group((ball_,)))
-    former = scene([cube, ball_, placed, glows, strand], Shutter(1.0, 2.0))
+    dust = shapes.Spheres(centers=points)
+    former = scene([cube, ball_, placed, glows, strand, dust], Shutter(1.0, 2.0))
     former = dataclasses.replace(former, lights=[lamp])
     bent = dataclasses.replace(ball_, vertices=2 * BALL)
     things = [
@@ -100,6 +101,7 @@ def test_motion_between_two_scenes() -> None:
         dataclasses.replace(placed, group=shapes.Group((bent,))),
         dataclasses.replace(glows, vertices=2 * BALL),
         dataclasses.replace(strand, points=points + 1),
+        dataclasses.replace(dust, centers=points + 1),
     ]
     aside = dataclasses.replace(former.camera, to_world=transforms.translate([1, 0, -3]))
     new = dataclasses.replace(
@@ -109,7 +111,8 @@ def test_motion_between_two_scenes() -> None:
         camera=aside,
     )
     moving, warnings = between(former, new)
-    assert len(warnings) == 1 and "'glows': its vertices do not move" in warnings[0]
+    assert len(warnings) == 2 and "'glows': its vertices do not move" in warnings[0]
+    assert "spheres: its centers do not move" in warnings[1]
     assert moving.shapes[0] is cube and moving.shapes[3] is things[3]
     for keys in (moving.shapes[1], moving.shapes[2].group.shapes[0]):
         assert keys.deformation.times == (1.0, 2.0)

@@ -12,7 +12,7 @@ from clpt.render.lowering.device_arrays import on_host
 from clpt.render.lowering.geometry import shapes
 from clpt.scene import Scene
 from clpt.scene.motion import Deformation, Shutter, placement, through
-from clpt.scene.shapes import Curves, Group, Instance, Mesh
+from clpt.scene.shapes import Curves, Group, Instance, Mesh, Spheres
 
 POINTS = ((Mesh, "vertices"), (Curves, "points"))
 
@@ -74,6 +74,8 @@ class _Way:
 
     def deformed(self, old: Any, new: Any) -> Any:
         """A shape with keys of its points, if these are others than before."""
+        if isinstance(new, Spheres) and getattr(old, "centers", None) is not new.centers:
+            self.warnings.append(f"{shapes.where(new)}: its centers do not move, they are as now")
         kind, name = next((x for x in POINTS if isinstance(new, x[0])), (None, ""))
         if kind is None or not isinstance(old, kind) or new.deformation is not None:
             return new
