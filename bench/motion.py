@@ -4,6 +4,8 @@
 
 1,000 copies of a ball with bumps (20,000 triangles) that turn by 30 degrees while the shutter is
 open, the same that move by half their size, and a camera that moves before copies that do not.
+Then one such ball of half a million triangles beside the same that swells to 1.5 of its size and
+twists, by two keys.
 Rays are counted by processor time; pictures of the two kinds take turns.
 """
 
@@ -23,7 +25,7 @@ from bench import machine
 from bench.instancing import bumpy, scene
 from clpt import transforms as tf
 from clpt.scene import Scene
-from clpt.scene.motion import Keys, Shutter
+from clpt.scene.motion import Deformation, Keys, Shutter
 from clpt.scene.shapes import Group, Instance
 
 COUNT, ROUNDS, SPP = 1000, 5, 8
@@ -41,6 +43,25 @@ def copies(motion: Keys | None) -> Scene:
             keys = Keys(motion.times, [place @ matrix for matrix in motion.transforms])
         things.append(Instance(group=group, to_world=np.eye(4) if keys else place, motion=keys))
     made = scene(things)
+    return dataclasses.replace(
+        made, camera=dataclasses.replace(made.camera, shutter=Shutter(0.0, 1.0))
+    )
+
+
+def one_ball(deforms: bool) -> Scene:
+    """A large ball, which swells and twists about its axis while the shutter is open, or not."""
+    ball = bumpy(500)
+    if deforms:
+        points = np.asarray(ball.vertices)
+        angles = 0.4 * points[:, 1]
+        c, s = np.cos(angles), np.sin(angles)
+        twisted = [c * points[:, 0] + s * points[:, 2], points[:, 1]]
+        twisted.append(c * points[:, 2] - s * points[:, 0])
+        last = 1.5 * np.stack(twisted, axis=1)
+        ball = dataclasses.replace(ball, deformation=Deformation([0.0, 1.0], [points, last]))
+    else:  # as large as the other one is on average
+        ball = dataclasses.replace(ball, to_world=tf.scale(1.25))
+    made = scene([ball], side=3.0)
     return dataclasses.replace(
         made, camera=dataclasses.replace(made.camera, shutter=Shutter(0.0, 1.0))
     )
@@ -75,11 +96,14 @@ def main(path: str | None) -> None:
         "moving": copies(slide),
         "camera": dataclasses.replace(still, camera=camera),
     }
-    found = rates(list(scenes.values()))
-    rows: list[dict[str, object]] = [
-        {"scene": name, "Mrays/s": round(rate / 1e6, 2), "of still": round(rate / found[0], 3)}
-        for name, rate in zip(scenes, found, strict=True)
-    ]
+    balls = {"one ball": one_ball(False), "deforming": one_ball(True)}
+    rows: list[dict[str, object]] = []
+    for some in (scenes, balls):
+        found = rates(list(some.values()))
+        rows += [
+            {"scene": name, "Mrays/s": round(rate / 1e6, 2), "of still": round(rate / found[0], 3)}
+            for name, rate in zip(some, found, strict=True)
+        ]
     machine.append(path, "motion", [{**machine.circumstances(), **row} for row in rows])
     table = Table("scene", "Mrays/s", "of still")
     for row in rows:

@@ -6,7 +6,7 @@ import logging
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from itertools import chain, pairwise, repeat
 from typing import get_args
 
 import numpy as np
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..device import Device
 from ..errors import SceneError
 from .building import Array, Building
+from .keyed import keyed
 from .layouts import BOX_LAYOUTS, LAYOUTS, Mesh, Part, Quality
 
 log = logging.getLogger(__name__)
@@ -135,17 +136,26 @@ def build_parts(
     counts: Sequence[int],
     layout: str,
     quality: Quality = "high",
+    keys: Sequence[int] = (),
+    corners: NDArray | None = None,
 ) -> tuple[Bvh, NDArray[np.uint32]]:
     """Build a tree for each run of triangles, in shared buffers.
 
     counts: the lengths of the runs, one after the other; triangles count from 0 in each. Returns
-    the trees, and the offsets of the nodes and leaves of each, (n, 2) uint32 [32 bytes]. The other
-    parameters are those of `build`, which raises alike.
+    the trees, and the offsets of the nodes and leaves of each, (n, 2) uint32 [32 bytes]. keys: of
+    each run how many rows a vertex has, see clpt.bvh.keyed; corners: the vertices on the host, for
+    runs of several. The other parameters are those of `build`, which raises alike.
     """
     start = time.perf_counter()
     trees, building = [], Building(device)
-    for i, j in pairwise(np.cumsum([0, *counts]).tolist()):
+    runs = pairwise(np.cumsum([0, *counts]).tolist())
+    for (i, j), rows in zip(runs, chain(keys, repeat(1)), strict=False):
         building = Building(device, building.stream)
+        if rows > 1 and corners is not None:
+            _check_reach(corners, "a vertex")
+            packed = keyed(building, corners, faces[i:j], tags[i:j], rows, layout, quality)
+            trees.append(Bvh(layout, j - i, packed.buffers, (packed.part,), packed.stats))
+            continue
         trees.append(_build(building, vertices, faces[i:j], tags[i:j], layout, quality))
     if len(trees) == 1:
         return trees[0], np.zeros((1, 2), np.uint32)

@@ -249,6 +249,7 @@ class Queries:
             "generated/layout.cl": traversal_text(self.layout, all_hits),
             "generated/instance_traversal.cl": self._instances_text(),
             "generated/motion.cl": "",  # instances stand still
+            "generated/keyed_layout.cl": "",
         }
         defines = {
             "USES_INSTANCES": int(self.instanced),

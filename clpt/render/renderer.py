@@ -16,6 +16,7 @@ from clpt import device as dev
 from clpt.denoise import needs
 from clpt.errors import DeviceError, SceneError
 from clpt.render.editing import parameter_patch, rebuild
+from clpt.render.editing.blurring import between
 from clpt.render.editing.moving import Moving
 from clpt.render.editing.scene_edit import (
     MaterialKey,
@@ -129,6 +130,7 @@ class Renderer(Resumable):
             weighed = scene.noise is not None and first.features.weighed
             self.warnings += needs.remarks(lowered.integrator, scene.sampler, splats, weighed)
         self._moving: Moving | None = None
+        self._blurred = False  # by keys that `scene` does not have
         self._adaptive: adaptive.Adaptive | None = None
         log.info("ready in %.2f s", self._seconds["ready"])
 
@@ -369,6 +371,7 @@ class Renderer(Resumable):
         transforms: Mapping[ShapeKey, Any] | None = None,
         vertices: Mapping[ShapeKey, Any] | None = None,
         scene: Scene | None = None,
+        motion: bool = False,
         wait_for: dev.Events = None,
     ) -> cl.Event:
         """Bring what changed to the device, and begin again at sample 0.
@@ -379,7 +382,9 @@ class Renderer(Resumable):
         the shape, its name, or its index in `scene.shapes`. A shape or material that the renderer
         had at first remains the key of whatever has replaced it. scene: another scene of the same
         film, for any other change; arrays and images that it shares with the present one are taken
-        to be unchanged.
+        to be unchanged. motion: what changes place, of shapes, lights and the camera, moves from
+        where it was to where it is, and so do vertices, while the shutter of the camera is open;
+        the next update goes on from there. The scene is lowered again then, and once more after.
 
         The first of three ways that is possible is taken:
 
@@ -402,7 +407,8 @@ class Renderer(Resumable):
         check_changes(camera, materials=materials, transforms=transforms, vertices=vertices)
         events = list(wait_for or ())
         self.wavefronts[0].stream.after(events)
-        moves = scene is None and bool(transforms or vertices)
+        quick = scene is None and not (motion or self._blurred)
+        moves = quick and bool(transforms or vertices)
         if moves and self._move(transforms or {}, vertices or {}):
             transforms = vertices = None
             event = self.reset()  # also if the other changes are refused
@@ -415,9 +421,12 @@ class Renderer(Resumable):
             replaced |= more
         if camera is not None:
             new = dataclasses.replace(new, camera=camera)
-        parameters_only = scene is None and not transforms and not vertices
+        parameters_only = quick and not transforms and not vertices
         if not (parameters_only and self._patch(new)):
-            self._rebuild(new, events, refit=scene is None)
+            shown, remarks = between(self.scene, new) if motion else (new, [])
+            self._rebuild(shown, events, refit=scene is None)
+            self.warnings += remarks
+            self._blurred = motion
         self.scene = new
         self._successors.note(replaced)
         return self.reset()

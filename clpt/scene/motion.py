@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt import transforms
 from clpt.errors import SceneError
 
 SHAPES = {"box": (1.0, 1.0), "triangle": (0.0, 1.0, 0.0)}  # of shutters, by name
@@ -71,6 +72,120 @@ class Keys:
         matrix[:3, :3] = rotation(slerp(q0, q1, a)) @ (s0 + a * (s1 - s0))
         matrix[:3, 3] = t0 + a * (t1 - t0)
         return matrix
+
+
+@dataclass(frozen=True, eq=False)
+class Deformation:
+    """Points that move by themselves: where each is at times [s], linear in between.
+
+    points: (k, n, 3) for k times and n vertices of a mesh, (k, n, 4) for points of curves with the
+    radii. normals: (k, n, 3) of a mesh's vertices, or None. Both become float32.
+    Before the first time and after the last one nothing moves.
+
+    Raises SceneError for times that do not ascend, arrays of other shapes, and values that are not
+    finite.
+    """
+
+    times: Sequence[float]
+    points: Any
+    normals: Any = None
+
+    def __post_init__(self) -> None:
+        where = "deformation"
+        try:
+            times = np.asarray(self.times, np.float64).reshape(-1)
+        except (TypeError, ValueError) as error:
+            raise SceneError(f"its times are not numbers: {error}", where=where) from error
+        if not len(times):
+            raise SceneError("must have at least one key", where=where)
+        check_times(times.tolist(), where)
+        points = _keyed(self.points, f"{where}.points", len(times), (3, 4))
+        normals = self.normals
+        if normals is not None:
+            normals = _keyed(normals, f"{where}.normals", len(times), (3,))
+            if normals.shape[1] != points.shape[1]:
+                found = f"{normals.shape[1]} for {points.shape[1]} points"
+                raise SceneError(f"needs as many normals as points, found {found}", where=where)
+        object.__setattr__(self, "times", tuple(times.tolist()))
+        object.__setattr__(self, "points", points)
+        object.__setattr__(self, "normals", normals)
+
+    def at(self, time: float) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
+        """Return the points (n, 3 or 4) float32 at a time [s], and the normals (n, 3) or None."""
+        times: Any = self.times
+        i = int(np.searchsorted(times, time, "right")) - 1
+        if i < 0 or i >= len(times) - 1:
+            share, i, j = 0.0, max(i, 0), max(i, 0)
+        else:
+            share, j = (time - times[i]) / (times[i + 1] - times[i]), i + 1
+        found = []
+        for values in (self.points, self.normals):
+            still = values is None or share == 0.0
+            one = None if values is None else values[i]
+            both = one if still else (1.0 - share) * values[i] + share * values[j]
+            found.append(None if both is None else np.asarray(both, np.float32))
+        return found[0], found[1]  # type: ignore[return-value]
+
+    def while_open(self, shutter: Shutter) -> tuple[float, ...]:
+        """Return the times at which points change their way, from when it opens to when it closes;
+        one time if they stand still."""
+        inner = [t for t in self.times if shutter.open < t < shutter.close]
+        times = (shutter.open, *inner, shutter.close)
+        first, turned = self.at(times[0])
+        for time in times[1:]:
+            points, normals = self.at(time)
+            same = np.array_equal(points, first)
+            bent = normals is not None and turned is not None
+            if not same or (bent and not np.array_equal(np.asarray(normals), np.asarray(turned))):
+                return times
+        return times[:1]
+
+
+def _keyed(values: Any, where: str, count: int, widths: tuple[int, ...]) -> NDArray[np.float32]:
+    """An array (count, n, one of widths) float32. Raises SceneError."""
+    try:
+        rows = [np.shape(one) for one in values]
+        odd = next((i for i, shape in enumerate(rows) if shape != rows[0]), None)
+        found = np.asarray(values if odd is None else (), np.float32)
+    except (TypeError, ValueError) as error:
+        raise SceneError(f"are not numbers: {error}", where=where) from error
+    if odd is not None:
+        message = f"key {odd} has {rows[odd]}, the first {rows[0]}: all must have as many"
+        raise SceneError(message, where=where)
+    if found.ndim != 3 or len(found) != count or found.shape[2] not in widths:
+        columns = " or ".join(map(str, widths))
+        message = f"must be ({count}, n, {columns}) for {count} times, found {found.shape}"
+        raise SceneError(message, where=where)
+    wrong = ~np.isfinite(found).all(axis=(1, 2))
+    if wrong.any():
+        raise SceneError(f"key {int(np.argmax(wrong))} is not finite", where=where)
+    return found
+
+
+def placement(thing: Any) -> NDArray[np.float64] | None:
+    """Return where a shape, light or camera is, (4, 4); None for what is at no place."""
+    if hasattr(thing, "to_world"):
+        return np.asarray(thing.to_world, np.float64)
+    if hasattr(thing, "position"):
+        return transforms.translate(thing.position)
+    if hasattr(thing, "direction"):
+        d = np.asarray(thing.direction, np.float64)
+        up = [0.0, 1.0, 0.0] if abs(d[1]) < 0.9 * np.linalg.norm(d) else [1.0, 0.0, 0.0]
+        return transforms.look_at([0.0, 0.0, 0.0], d, up)
+    return None
+
+
+def through(thing: Any, times: Sequence[float], placements: Any) -> Any:
+    """Return a shape, light or camera that is at placements (k, 4, 4) at times [s], by keys.
+
+    It turns about its own origin. Raises SceneError as `Keys` does.
+    """
+    keys = Keys(times, placements)
+    if hasattr(thing, "to_world"):
+        return replace(thing, to_world=np.eye(4), motion=keys)
+    if hasattr(thing, "position"):
+        return replace(thing, position=(0.0, 0.0, 0.0), motion=keys)
+    return replace(thing, direction=(0.0, 0.0, 1.0), motion=keys)
 
 
 def check_times(times: Sequence[float], where: str) -> None:

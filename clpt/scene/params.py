@@ -68,7 +68,7 @@ HostForm = Literal[
     "rows2", "rows3", "rows4", "grid", "normals", "triangles", "attributes",
     "number_or_list", "lengths",
     "image", "volume", "colour_volume", "cube_images", "crop", "sensor", "white_balance",
-    "number_or_auto", "lens", "keys", "shutter",
+    "number_or_auto", "lens", "keys", "deformation", "shutter",
 ]  # fmt: skip
 MEASURED = {"measurement": Measurement, "merl": MerlTable}
 ORDERS = 8  # highest order of diffraction, see kernels/optics/diffraction.cl

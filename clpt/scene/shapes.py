@@ -12,7 +12,7 @@ from clpt.errors import SceneError
 from clpt.scene.lights import Light
 from clpt.scene.materials import Diffuse, Material, TwoSided
 from clpt.scene.media import Medium
-from clpt.scene.motion import Keys
+from clpt.scene.motion import Deformation, Keys
 from clpt.scene.params import Kind, choice, host
 from clpt.scene.textures import Bitmap, MeshAttribute
 from clpt.scene.values import Matrix4, OnDevice, Vector3
@@ -58,6 +58,9 @@ class Mesh(Shape):
         {},
         "name -> (n, 1 or 3) float32; one row a vertex or a face, as vertex_ or face_ begins it",
         form="attributes",
+    )
+    deformation: Deformation | None = host(
+        None, "where the vertices are at times; None: still", form="deformation"
     )
     subdivision: int = host(0, "levels of Loop subdivision, to the smooth limit surface; 0: none")
     displacement: Bitmap | None = host(
@@ -163,6 +166,9 @@ class Curves(Shape):
         (), "points of each strand, in their order; empty: all are of one", form="lengths"
     )
     basis: str = choice("bspline", "what the points mean", BASES)
+    deformation: Deformation | None = host(
+        None, "where the points are at times; None: still", form="deformation"
+    )
 
 
 def _ball() -> np.ndarray:

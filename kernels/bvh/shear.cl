@@ -34,22 +34,26 @@ inline float shear_edge(float px, float py, float qx, float qy)
     return px * qy - py * qx;
 }
 
+/* The body of a function that tests one triangle, see `shear_intersect`. */
+#define SHEAR_INTERSECT                                                                               \
+    float az = v[s->kz * step] - s->oz, bz = v[(3 + s->kz) * step] - s->oz;                           \
+    float cz = v[(6 + s->kz) * step] - s->oz;                                                         \
+    float ax = mad(-s->x, az, v[s->kx * step] - s->ox), ay = mad(-s->y, az, v[s->ky * step] - s->oy); \
+    float bx = mad(-s->x, bz, v[(3 + s->kx) * step] - s->ox);                                         \
+    float by = mad(-s->y, bz, v[(3 + s->ky) * step] - s->oy);                                         \
+    float cx = mad(-s->x, cz, v[(6 + s->kx) * step] - s->ox);                                         \
+    float cy = mad(-s->y, cz, v[(6 + s->ky) * step] - s->oy);                                         \
+    float e0 = shear_edge(cx, cy, bx, by), e1 = shear_edge(ax, ay, cx, cy);                           \
+    float e2 = shear_edge(bx, by, ax, ay), inverse = 1.0f / (e0 + e1 + e2);                           \
+    *t = (e0 * az + e1 * bz + e2 * cz) * s->z * inverse;                                              \
+    *b1 = e1 * inverse;                                                                               \
+    *b2 = e2 * inverse;                                                                               \
+    return (e0 >= 0.0f && e1 >= 0.0f && e2 >= 0.0f) || (e0 <= 0.0f && e1 <= 0.0f && e2 <= 0.0f);
+
 /* Whether the ray's line meets a triangle, whose nine coordinates stand `step` floats apart; where, and
  * the barycentrics of vertices 1 and 2. */
 inline int shear_intersect(const Shear *s, global const float *v, uint step, float *t, float *b1,
                            float *b2)
 {
-    float az = v[s->kz * step] - s->oz, bz = v[(3 + s->kz) * step] - s->oz;
-    float cz = v[(6 + s->kz) * step] - s->oz;
-    float ax = mad(-s->x, az, v[s->kx * step] - s->ox), ay = mad(-s->y, az, v[s->ky * step] - s->oy);
-    float bx = mad(-s->x, bz, v[(3 + s->kx) * step] - s->ox);
-    float by = mad(-s->y, bz, v[(3 + s->ky) * step] - s->oy);
-    float cx = mad(-s->x, cz, v[(6 + s->kx) * step] - s->ox);
-    float cy = mad(-s->y, cz, v[(6 + s->ky) * step] - s->oy);
-    float e0 = shear_edge(cx, cy, bx, by), e1 = shear_edge(ax, ay, cx, cy);
-    float e2 = shear_edge(bx, by, ax, ay), inverse = 1.0f / (e0 + e1 + e2);
-    *t = (e0 * az + e1 * bz + e2 * cz) * s->z * inverse;
-    *b1 = e1 * inverse;
-    *b2 = e2 * inverse;
-    return (e0 >= 0.0f && e1 >= 0.0f && e2 >= 0.0f) || (e0 <= 0.0f && e1 <= 0.0f && e2 <= 0.0f);
+    SHEAR_INTERSECT
 }

@@ -64,27 +64,31 @@ inline float8 wide8_edge(float8 px, float8 py, float8 qx, float8 qy)
     return px * qy - py * qx;
 }
 
+/* The body of a function that tests the triangles of a block, whose rows are b[0] to b[8]. */
+#define WIDE8_TRIANGLES                                                                              \
+    const Shear *s = &r->shear;                                                                      \
+    float8 az = b[s->kz] - s->oz, bz = b[3 + s->kz] - s->oz, cz = b[6 + s->kz] - s->oz;              \
+    float8 ax = b[s->kx] - s->ox - s->x * az, ay = b[s->ky] - s->oy - s->y * az;                     \
+    float8 bx = b[3 + s->kx] - s->ox - s->x * bz, by = b[3 + s->ky] - s->oy - s->y * bz;             \
+    float8 cx = b[6 + s->kx] - s->ox - s->x * cz, cy = b[6 + s->ky] - s->oy - s->y * cz;             \
+    float8 u = wide8_edge(cx, cy, bx, by), v = wide8_edge(ax, ay, cx, cy);                           \
+    float8 w = wide8_edge(bx, by, ax, ay);                                                           \
+    int8 inside = (wide8_min(wide8_min(u, v), w) >= 0.0f) | (wide8_max(wide8_max(u, v), w) <= 0.0f); \
+    float8 sum = u + v + w, q = (u * az + v * bz + w * cz) * s->z;                                   \
+    int8 sign = as_int8(sum) & (int8)(0x80000000);                                                   \
+    sum = as_float8(as_int8(sum) ^ sign);                                                            \
+    q = as_float8(as_int8(q) ^ sign);                                                                \
+    *distance = q;                                                                                   \
+    *det = sum;                                                                                      \
+    return mask8(inside & (q > r->tmin * sum) & (q < t * sum));
+
 /* The triangles of a block that the ray meets between tmin and t; at what distances, times `det`.
  * bvh/shear.cl tells why nothing slips between two of them. */
 inline Mask8 wide8_triangles(global const float *block, const Wide8Ray *r, float t, float8 *distance,
                              float8 *det)
 {
     global const float8 *b = (global const float8 *)block;
-    const Shear *s = &r->shear;
-    float8 az = b[s->kz] - s->oz, bz = b[3 + s->kz] - s->oz, cz = b[6 + s->kz] - s->oz;
-    float8 ax = b[s->kx] - s->ox - s->x * az, ay = b[s->ky] - s->oy - s->y * az;
-    float8 bx = b[3 + s->kx] - s->ox - s->x * bz, by = b[3 + s->ky] - s->oy - s->y * bz;
-    float8 cx = b[6 + s->kx] - s->ox - s->x * cz, cy = b[6 + s->ky] - s->oy - s->y * cz;
-    float8 u = wide8_edge(cx, cy, bx, by), v = wide8_edge(ax, ay, cx, cy);
-    float8 w = wide8_edge(bx, by, ax, ay);
-    int8 inside = (wide8_min(wide8_min(u, v), w) >= 0.0f) | (wide8_max(wide8_max(u, v), w) <= 0.0f);
-    float8 sum = u + v + w, q = (u * az + v * bz + w * cz) * s->z;
-    int8 sign = as_int8(sum) & (int8)(0x80000000);
-    sum = as_float8(as_int8(sum) ^ sign);
-    q = as_float8(as_int8(q) ^ sign);
-    *distance = q;
-    *det = sum;
-    return mask8(inside & (q > r->tmin * sum) & (q < t * sum));
+    WIDE8_TRIANGLES
 }
 
 /* The hit record of one triangle of a block, computed again for that one alone. */

@@ -27,6 +27,22 @@ inline vec3 vertex_vec3(global const float *table, integer vertex)
 }
 inline vec2 vertex_vec2(global const float *table, integer vertex) { return gather2(table, vertex * 2); }
 
+#if MOVES_VERTICES
+/* The rows of a shape's vertices at the time; the first where it does not deform. */
+inline VertexKeys vertex_keys_of(Scene scene, ShapeRow shape, mask active)
+{
+    mask deforms = active & ((shape.flags & SHAPE_DEFORMS) != 0);
+    VertexKeys still = {(integer)(1), (integer)(0), (integer)(0), (real)(0.0f)};
+    if (!any(deforms)) return still;
+    VertexKeys k = vertex_keys(scene, sel_i(deforms, shape.number, (integer)(0)), scene.time);
+    k.count = sel_i(deforms, k.count, still.count);
+    k.key = sel_i(deforms, k.key, still.key);
+    k.next = sel_i(deforms, k.next, still.next);
+    k.share = sel(deforms, k.share, still.share);
+    return k;
+}
+#endif
+
 #if VERTEX_TANGENTS
 /* The direction of `along`, as long as `other`; of unit length where that has none. */
 inline vec3 tangent_of_length(vec3 along, vec3 other)
@@ -84,14 +100,20 @@ inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, 
     integer a = as_integer(corners.x), b = as_integer(corners.y), c = as_integer(corners.z);
     real u = s.uv.x, v = s.uv.y, w = 1.0f - u - v;
 #endif
+#if MOVES_VERTICES && (USES_NORMALS || USES_TANGENTS)
+    VertexKeys keys = vertex_keys_of(scene, shape, active);
+#define VERTEX_VEC3(table, vertex) vertex_keyed(table, vertex, keys)
+#else
+#define VERTEX_VEC3(table, vertex) vertex_vec3(table, vertex)
+#endif
 #if USES_NORMALS
     mask smooth = triangle & ((shape.flags & SHAPE_NORMALS) != 0);
 #if VERTEX_TANGENTS
     vec3 own_normal = v3(0.0f, 0.0f, 0.0f);
 #endif
     if (any(smooth)) {
-        vec3 ns = madd3(vertex_vec3(scene.normals, a), w,
-                        madd3(vertex_vec3(scene.normals, b), u, scale3(vertex_vec3(scene.normals, c), v)));
+        vec3 ns = madd3(VERTEX_VEC3(scene.normals, a), w,
+                        madd3(VERTEX_VEC3(scene.normals, b), u, scale3(VERTEX_VEC3(scene.normals, c), v)));
         mask usable = smooth & (dot3(ns, ns) > 1e-12f);
 #if VERTEX_TANGENTS
         own_normal = ns;
@@ -109,8 +131,8 @@ inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, 
         s.uv.x = sel(mapped, ta.x * w + tb.x * u + tc.x * v, s.uv.x);
         s.uv.y = sel(mapped, ta.y * w + tb.y * u + tc.y * v, s.uv.y);
 #if USES_TANGENTS
-        vec3 pa = vertex_vec3(scene.vertices, a);
-        vec3 e1 = sub3(vertex_vec3(scene.vertices, b), pa), e2 = sub3(vertex_vec3(scene.vertices, c), pa);
+        vec3 pa = VERTEX_VEC3(scene.vertices, a);
+        vec3 e1 = sub3(VERTEX_VEC3(scene.vertices, b), pa), e2 = sub3(VERTEX_VEC3(scene.vertices, c), pa);
         real du1 = tb.x - ta.x, dv1 = tb.y - ta.y, du2 = tc.x - ta.x, dv2 = tc.y - ta.y;
         real det = du1 * dv2 - dv1 * du2;
         mask regular = mapped & (fabs(det) > 1e-20f);
@@ -168,6 +190,7 @@ inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, 
     *front = dot3(s.n, d) < 0.0f;
     /* Each normal is turned to the viewer by itself: where they disagree, as at the silhouette of a coarse
      * mesh, a BSDF that saw its back would be black. */
+#undef VERTEX_VEC3
     mask both = (shape.flags & SHAPE_TWO_SIDED) != 0;
     s.flipped = both & (dot3(s.ns, d) > 0.0f);
     s.n = sel3(both & !*front, neg3(s.n), s.n);

@@ -5,6 +5,7 @@
 #define SHAPE_TWO_SIDED 4  /* the back is shaded as if it were a front */
 #define SHAPE_MANY 16      /* a primitive is one of its spheres; attributes are per sphere */
 #define SHAPE_TANGENTS 32  /* its vertices have tangents of their own */
+#define SHAPE_DEFORMS 64   /* its vertices move by themselves */
 
 
 /* A material word names a leaf: its kind in the upper 8 bits, the first word of its row below. */

@@ -2,6 +2,7 @@
  * LAYOUT(verb). Its direction keeps the length that it gets, so that t is the world's. */
 #include "tracing/instances.cl"
 #include "generated/motion.cl"
+#include "generated/keyed_layout.cl"
 
 /* If the instance at row `at` is met between tmin and hit->t, 1 is returned and the hit becomes that one,
  * still in the group's space. With `first_only` the hit stays. */
@@ -16,6 +17,18 @@ inline int instance_meet(global const float *nodes, global const float *leaves, 
     vec3 p = {dot3(i.x, s), dot3(i.y, s), dot3(i.z, s)}, v = {dot3(i.x, d), dot3(i.y, d), dot3(i.z, d)};
     nodes += (ulong)i.nodes * 8;
     leaves += (ulong)i.leaves * 8;
+#if MOVES_VERTICES
+    VertexKeys k = vertex_keys(scene, i.number, scene.time);
+    if (k.count > 1) {
+        nodes += k.key * KEYED_NODE;
+        leaves += k.key * KEYED_LEAF;
+        if (first_only) return KEYED(occluded)(nodes, leaves, (uint)k.count, k.share, p, v, tmin, hit->t);
+        TriHit met = KEYED(closest)(nodes, leaves, (uint)k.count, k.share, p, v, tmin, hit->t);
+        if (met.prim == BVH_MISS) return 0;
+        *hit = met;
+        return 1;
+    }
+#endif
     if (first_only) return LAYOUT(occluded)(nodes, leaves, p.x, p.y, p.z, v.x, v.y, v.z, tmin, hit->t);
     TriHit own = LAYOUT(closest)(nodes, leaves, p.x, p.y, p.z, v.x, v.y, v.z, tmin, hit->t);
     if (own.prim == BVH_MISS) return 0;

@@ -9,7 +9,11 @@
 
 inline TraceHit trace_closest(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real far, mask active)
 {
+#if ONLY_INSTANCES
+    TriHit t = tri_miss(far);
+#else
     TriHit t = LAYOUT(closest)(nodes, leaves, o.x, o.y, o.z, d.x, d.y, d.z, 0.0f, far);
+#endif
     TraceHit h = {t.t, t.u, t.v, {t.nx, t.ny, t.nz}, t.plane, t.side, as_int(t.prim), as_int(t.tag)};
 #if USES_INSTANCES
     instances_closest(nodes, leaves, instance_nodes, scene, o, d, t, &h);
@@ -32,7 +36,9 @@ inline TraceHit trace_closest(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real far,
 }
 inline mask trace_occluded(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real t, mask active)
 {
+#if !ONLY_INSTANCES
     if (LAYOUT(occluded)(nodes, leaves, o.x, o.y, o.z, d.x, d.y, d.z, 0.0f, t)) return 1;
+#endif
 #if USES_INSTANCES
     if (instances_occluded(nodes, leaves, instance_nodes, scene, o, d, t)) return 1;
 #endif

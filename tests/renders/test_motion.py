@@ -15,8 +15,8 @@ from clpt import transforms
 from clpt.errors import SceneError
 from clpt.render.lowering import motion
 from clpt.render.lowering.scene import lower
-from clpt.scene import Scene, cameras, integrators, lights, materials, media, shapes
-from clpt.scene.motion import Keys, Shutter, decomposed, rotation
+from clpt.scene import Scene, cameras, integrators, lights, materials, media, shapes, textures
+from clpt.scene.motion import Deformation, Keys, Shutter, decomposed, rotation
 
 TIMES = np.linspace(0.0, 1.0, 5)
 GREY = materials.TwoSided(front=materials.Diffuse(reflectance=0.5))
@@ -82,6 +82,70 @@ BRUSHED = shapes.Mesh(
         front=materials.RoughConductor(eta=1.5, k=4.0, alpha_u=0.08, alpha_v=0.5)
     ),
     motion=turn([0, 0.3, 1], 80),
+)
+
+
+def ball(rings: int, radius: float = 1.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Vertices, faces and uvs of a ball of triangles about z."""
+    u, v = np.meshgrid(np.linspace(0, 1, 2 * rings + 1), np.linspace(1e-3, 1 - 1e-3, rings + 1))
+    azimuth, polar = 2 * np.pi * u, np.pi * v
+    points = [np.cos(azimuth) * np.sin(polar), np.sin(azimuth) * np.sin(polar), np.cos(polar)]
+    first = (np.arange(rings)[:, None] * (2 * rings + 1) + np.arange(2 * rings)).reshape(-1, 1)
+    corners = first + np.array([0, 2 * rings + 1, 1, 1, 2 * rings + 1, 2 * rings + 2])
+    uvs = np.stack([u, v], axis=-1).reshape(-1, 2)
+    return radius * np.stack(points, axis=-1).reshape(-1, 3), corners.reshape(-1, 3), uvs
+
+
+def twisted(points: np.ndarray, turns: float, size: Any = 1.0) -> np.ndarray:
+    """Points turned about y the more, the higher they are, and scaled."""
+    angle = turns * points[:, 1]
+    c, s = np.cos(angle), np.sin(angle)
+    x, y, z = points.T
+    return np.stack([c * x + s * z, y, c * z - s * x], axis=1) * size
+
+
+BALL, FACES, UVS = ball(12, 0.7)
+BENT = shapes.Mesh(
+    vertices=BALL,
+    faces=FACES,
+    uvs=UVS,
+    normals="smooth",
+    material=materials.TwoSided(
+        front=materials.RoughConductor(eta=1.5, k=3.0, alpha_u=0.1, alpha_v=0.4)
+    ),
+    deformation=Deformation(
+        [0.0, 0.3, 1.0],
+        [
+            BALL,
+            twisted(BALL, 1.0, [1.2, 0.8, 1.0]),
+            twisted(BALL, -0.5) + np.array([0.6, 0.2, 0.0]),
+        ],
+    ),
+)
+CHECKED = dataclasses.replace(
+    BENT,
+    material=materials.TwoSided(
+        front=materials.Diffuse(
+            reflectance=textures.Checkerboard(
+                color0=0.1, color1=0.8, to_uv=np.diag([6.0, 6.0, 1.0])
+            )
+        )
+    ),
+    motion=turn([0, 0.3, 1], 60),
+)
+HAIR = shapes.Curves(
+    points=(STRAND := np.array([[x, y, 0, 0.08] for x in (-0.6, 0, 0.6) for y in (-1, 0, 0.5, 1)])),
+    lengths=(4, 4, 4),
+    material=GREY,
+    deformation=Deformation(
+        [0.0, 1.0], [STRAND, STRAND + np.outer(STRAND[:, 1] ** 2, [0.5, 0, 0.2, 0.02])]
+    ),
+)
+SHARED = shapes.Group(
+    shapes=(
+        dataclasses.replace(BENT, to_world=transforms.scale(0.4), material=GREY),
+        shapes.Cube(to_world=transforms.scale([0.5, 0.05, 0.05]), material=GREY),
+    )
 )
 FLAT = shapes.Rectangle(
     to_world=transforms.translate([0, 1.2, -1])
@@ -171,6 +235,21 @@ CASES: dict[str, tuple[Any, Any, dict[str, Any]]] = {
         (),
         {},
     ),
+    "deforming": ((BENT,), (AMBIENT, lights.Point(position=(1, 2, -3), intensity=10.0)), {}),
+    "checked": ((CHECKED, shapes.Cube(to_world=transforms.scale(0.2))), (AMBIENT,), {}),
+    "curves": ((HAIR,), (AMBIENT,), {}),
+    "shared": (
+        [
+            shapes.Instance(
+                group=SHARED,
+                to_world=transforms.translate([x, 0, 0]) @ transforms.rotate([0, 1, 0], 40 * x),
+                motion=turn([0, 0, 1], 20) if x > 0.5 else None,
+            )
+            for x in (-0.9, 0, 0.9)
+        ],
+        (AMBIENT,),
+        {},
+    ),
     "tangents": ((BRUSHED,), (AMBIENT, lights.Point(position=(1, 2, -3), intensity=10.0)), {}),
     "sky": (
         (shapes.Sphere(radius=0.6, material=GREY),),
@@ -222,7 +301,7 @@ def test_a_picture_is_the_mean_of_still_ones(name: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("layout", ["binary", "wide8", "compact", "brute"])
-@pytest.mark.parametrize("name", ["instances", "analytic", "lamps"])
+@pytest.mark.parametrize("name", ["instances", "analytic", "lamps", "checked", "shared"])
 def test_every_layout_holds_motion(name: str, layout: str) -> None:
     things, lamps, camera = CASES[name]
     whole = scene([*things, WALL], lamps, Shutter(0.0, 1.0), **camera)

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import transforms
 from clpt.errors import SceneError
 from clpt.scene import Scene
-from clpt.scene.motion import Keys, Shutter
-from clpt.scene.shapes import Mesh
+from clpt.scene.motion import Deformation, Shutter, placement, through
+from clpt.scene.shapes import Group, Instance, Mesh
 
 KEYS = 9  # in the time for which the shutter is open
+NEAR = 1e-3  # of a mesh's size, by which a vertex may be off its way between keys
 
 Matrix = NDArray[np.float64]
 
@@ -23,7 +23,8 @@ Matrix = NDArray[np.float64]
 def between(load: Callable[[float], Scene], time: float, length: float) -> Scene:
     """Return the scene at a time [s], whose nodes move while a shutter is open for `length` [s].
 
-    load: gives the scene at a time. Skins and morphs stay as they are at `time`, with a warning.
+    load: gives the scene at a time. What skins and morphs move has as few keys as keep vertices
+    within NEAR of the mesh's size of where they are at KEYS times.
     """
     times = np.linspace(time, time + length, KEYS)
     scenes = [load(float(t)) for t in times]
@@ -33,19 +34,13 @@ def between(load: Callable[[float], Scene], time: float, length: float) -> Scene
         return dataclasses.replace(scene, warnings=warnings)
     added = scene.extra["studio"]  # what stands still, see clpt.formats.meshes.framing
     own = len(scene.shapes) - added["shapes"]
-    shapes: list[Any] = [
-        _moving([one.shapes[i] for one in scenes], times, warnings, f"shapes[{i}]")
-        for i in range(own)
-    ]
+    groups: dict[int, Group] = {}
+    shapes: list[Any] = []
+    for i in range(own):
+        ways = [one.shapes[i] for one in scenes]
+        moved = _moving(ways, times, warnings, f"shapes[{i}]")
+        shapes.append(_deforming(moved, ways, times, warnings, groups))
     shapes += scene.shapes[own:]
-    bent = sum(
-        isinstance(first, Mesh)
-        and isinstance(last, Mesh)
-        and not np.array_equal(np.asarray(first.vertices), np.asarray(last.vertices))
-        for first, last in zip(scene.shapes, scenes[-1].shapes, strict=True)
-    )
-    if bent:
-        warnings.append(f"shutter: the vertices of {bent} meshes (skins, morphs) stay as at `time`")
     lights: list[Any] = list(scene.lights)
     camera: Any = scene.camera
     if not added["lights"]:
@@ -62,40 +57,74 @@ def between(load: Callable[[float], Scene], time: float, length: float) -> Scene
     )
 
 
+def _deforming(
+    shape: Any,
+    ways: Sequence[Any],
+    times: Matrix,
+    warnings: list[str],
+    groups: dict[int, Group],
+) -> Any:
+    """A shape with keys of its vertices, if they are elsewhere at other times.
+
+    ways: the shape at all times; groups: those of instances, by that of the first time.
+    """
+    if isinstance(shape, Instance) and all(isinstance(way, Instance) for way in ways):
+        first = ways[0].group
+        if id(first) not in groups:
+            at_all = zip(*(way.group.shapes for way in ways), strict=False)
+            parts = [_deforming(one[0], one, times, warnings, groups) for one in at_all]
+            same = all(new is old for new, old in zip(parts, first.shapes, strict=False))
+            groups[id(first)] = first if same else dataclasses.replace(first, shapes=tuple(parts))
+        return dataclasses.replace(shape, group=groups[id(first)])
+    if not (isinstance(shape, Mesh) and all(isinstance(way, Mesh) for way in ways)):
+        return shape
+    name = f"shutter: {f'mesh {shape.name!r}' if shape.name else 'a mesh'} stays as at `time`"
+    if any(not np.array_equal(way.faces, shape.faces) for way in ways):
+        warnings.append(f"{name}: its triangles are others at other times")
+        return shape
+    points = np.stack([np.asarray(way.vertices) for way in ways])
+    normals = None
+    if all(way.normals is not None for way in ways):
+        normals = np.stack([np.asarray(way.normals) for way in ways])
+    if not np.ptp(points, axis=0).any() and (normals is None or not np.ptp(normals, axis=0).any()):
+        return shape
+    if shape.emission is not None:
+        warnings.append(f"{name}, as it emits light: what deforms cannot")
+        return shape
+    step = _step(points)
+    normals = None if normals is None else normals[::step]
+    keys = Deformation(times[::step].tolist(), points[::step], normals)
+    return dataclasses.replace(shape, deformation=keys)
+
+
+def _step(points: NDArray[np.float32]) -> int:
+    """Of keys at even times (k, n, 3) every which is enough, k - 1 a power of two."""
+    last = len(points) - 1
+    allowed = NEAR * float(np.ptp(points.reshape(-1, 3), axis=0).max())
+    step = last
+    while step > 1:
+        share = np.arange(step)[:, None, None] / step
+        far = 0.0
+        for first in range(0, last, step):
+            between = points[first] * (1.0 - share) + points[first + step] * share
+            far = max(far, float(np.abs(points[first : first + step] - between).max()))
+        if far <= allowed:
+            break
+        step //= 2
+    return step
+
+
 def _moving(ways: Sequence[Any], times: Matrix, warnings: list[str], where: str) -> Any:
     """A thing at its first time with keys, if it is elsewhere at others."""
     first = ways[0]
-    placed = [_placement(way) for way in ways]
+    placed = [placement(way) for way in ways]
     if any(matrix is None for matrix in placed):
         return first
     matrices = np.stack([matrix for matrix in placed if matrix is not None])
     if np.array_equal(matrices, np.broadcast_to(matrices[0], matrices.shape)):
         return first
     try:
-        keys = Keys(times.tolist(), matrices)
-        return _at_origin(first, keys)
+        return through(first, times.tolist(), matrices)
     except SceneError as error:
         warnings.append(f"shutter: {where} stays as at `time`: {error}")
         return first
-
-
-def _placement(thing: Any) -> Matrix | None:
-    """Where a shape, light or camera is, (4, 4); None for what is at no place."""
-    if hasattr(thing, "to_world"):
-        return np.asarray(thing.to_world, np.float64)
-    if hasattr(thing, "position"):
-        return transforms.translate(thing.position)
-    if hasattr(thing, "direction"):
-        d = np.asarray(thing.direction, np.float64)
-        up = [0.0, 1.0, 0.0] if abs(d[1]) < 0.9 * np.linalg.norm(d) else [1.0, 0.0, 0.0]
-        return transforms.look_at([0.0, 0.0, 0.0], d, up)
-    return None
-
-
-def _at_origin(thing: Any, keys: Keys) -> Any:
-    """A thing as it is before the placements that are its keys."""
-    if hasattr(thing, "to_world"):
-        return dataclasses.replace(thing, to_world=np.eye(4), motion=keys)
-    if hasattr(thing, "position"):
-        return dataclasses.replace(thing, position=(0.0, 0.0, 0.0), motion=keys)
-    return dataclasses.replace(thing, direction=(0.0, 0.0, 1.0), motion=keys)

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import io
+import zipfile
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from clpt import output_files
 from clpt.formats.native.cursor import Cursor
-from clpt.formats.native.json_schema import NUMBER, NUMBERS, Schema, ref
+from clpt.formats.native.json_schema import NUMBER, NUMBERS, STRING, Schema, object_of, ref
+from clpt.formats.native.spectra import find_file
 from clpt.formats.native.transforms import matrix
-from clpt.scene.motion import SHAPES, Keys, Shutter
+from clpt.scene.motion import SHAPES, Deformation, Keys, Shutter
 
 MEMBERS = ("open", "close", "shape")
 KEYS_SCHEMA: Schema = {
@@ -24,6 +29,29 @@ KEYS_SCHEMA: Schema = {
         "required": ["time", "transform"],
         "additionalProperties": False,
     },
+}
+POINTS = ("points", "normals")
+DEFORMATION_SCHEMA: Schema = {
+    "anyOf": [
+        object_of(
+            {"file": {**STRING, "description": "name of a .npz of times, points, normals"}},
+            ["file"],
+        ),
+        {
+            "type": "array",
+            "minItems": 1,
+            "items": {
+                "type": "object",
+                "properties": {
+                    "time": {**NUMBER, "description": "[s]; they ascend"},
+                    "points": {"type": "array", "items": NUMBERS},
+                    "normals": {"type": "array", "items": NUMBERS},
+                },
+                "required": ["time", "points"],
+                "additionalProperties": False,
+            },
+        },
+    ]
 }
 SHUTTER_SCHEMA: Schema = {
     "type": "object",
@@ -58,6 +86,58 @@ def write_keys(value: Keys) -> list[dict[str, Any]]:
         {"time": time, "transform": rows.tolist()}
         for time, rows in zip(value.times, value.transforms, strict=True)
     ]
+
+
+def deformation(cursor: Cursor) -> Deformation | None:
+    """Return the keys of points, None for null. Raises SceneError."""
+    if cursor.value is None:
+        return None
+    if isinstance(cursor.value, dict):
+        cursor.check_keys("deformation", ("file",), ("file",))
+        return _from_file(cursor.at("file"))
+    times: list[float] = []
+    points, normals = [], []
+    for entry in cursor.entries():
+        entry.check_keys("key", ("time", *POINTS), ("time", "points"))
+        times.append(entry.at("time").number())
+        if len(times) > 1 and not times[-1] > times[-2]:
+            message = f"must be later than {times[-2]:g} s, the key before"
+            raise entry.at("time").error(message)
+        points.append([row.numbers() for row in entry.at("points").entries()])
+        if len(points[-1]) != len(points[0]):
+            message = f"has {len(points[-1])} points where the first key has {len(points[0])}"
+            raise entry.at("points").error(message)
+        if "normals" in entry.value:
+            normals.append([row.numbers(3) for row in entry.at("normals").entries()])
+        if normals and len(normals) != len(times):
+            raise entry.error("needs normals at every key, or at none")
+    with cursor.locating():
+        return Deformation(times, points, normals or None)
+
+
+def _from_file(cursor: Cursor) -> Deformation:
+    """Return the keys of points in a .npz file."""
+    path = find_file(cursor)
+    try:
+        with np.load(path, allow_pickle=False) as held:
+            arrays = {name: held[name] for name in ("times", *POINTS) if name in held.files}
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise cursor.error(f"is no .npz file: {error}") from None
+    for name in ("times", "points"):
+        if name not in arrays:
+            raise cursor.error(f"has no array {name!r}")
+    with cursor.locating():
+        return Deformation(**arrays)
+
+
+def write_deformation(value: Deformation, path: Path) -> None:
+    """Write keys of points as a .npz file."""
+    held = {"times": np.asarray(value.times), "points": value.points}
+    if value.normals is not None:
+        held["normals"] = value.normals
+    file = io.BytesIO()
+    np.savez_compressed(file, **held)
+    output_files.write(path, file.getvalue())
 
 
 def shutter(cursor: Cursor) -> Shutter | None:

@@ -42,6 +42,7 @@ def schema() -> Schema:
         "spectrum": _typed_spectra(),
         "step": _step(),
         "keys": motion.KEYS_SCHEMA,
+        "deformation": motion.DEFORMATION_SCHEMA,
         "shutter": motion.SHUTTER_SCHEMA,
         "transform": _transform(),
     }

@@ -19,10 +19,11 @@ from clpt import images, measured, output_files, spectral_exr
 from clpt.errors import SceneError
 from clpt.formats.meshes import particles, strands
 from clpt.formats.meshes.mesh import TANGENT_COLUMNS
-from clpt.formats.native import forms
+from clpt.formats.native import forms, motion
 from clpt.formats.native.shape_files import MESH_ARRAYS, in_file
 from clpt.scene import Scene, kinds, materials, shapes
 from clpt.scene.media import Medium
+from clpt.scene.motion import Deformation
 from clpt.scene.params import Kind, defaults, params
 
 MANY = 16  # from so many instances in a row on, a file holds their matrices
@@ -238,6 +239,14 @@ class _Writer:
             shutil.copyfile(path, self.path.parent / name)
             self.files[key] = name
         return self.files[key]
+
+    def deformation(self, value: Deformation) -> dict[str, str]:
+        """Write keys of points, once; return what names their file."""
+        if id(value) not in self.files:
+            name = self.file_name("deformation", "npz")
+            motion.write_deformation(value, self.path.parent / name)
+            self.files[id(value)] = name
+        return {"file": self.files[id(value)]}
 
     def curves(self, curves: shapes.Curves) -> str:
         """Write strands, unless another shape shares them; return the file's name."""

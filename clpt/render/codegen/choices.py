@@ -74,9 +74,19 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         (f"bvh/{bvh.shapes_layout(layout)}.cl", "bvh/shapes.cl") * bool(f.analytic)
     ),
     "generated/instances.cl": lambda f, _: ("tracing/instances.cl",) * f.instances,
-    "generated/motion.cl": lambda f, _: ("tracing/motion.cl",) * bool(f.moving),
+    "generated/motion.cl": lambda f, _: (
+        ("tracing/motion.cl",) * bool(f.moving)
+        + ("tracing/vertex_keys.cl",) * ("vertices" in f.moving)
+    ),
+    "generated/keyed_layout.cl": lambda f, layout: (
+        (f"bvh/{layout}_keyed.cl",) * ("vertices" in f.moving and layout != "brute")
+    ),
     "generated/instance_traversal.cl": lambda f, layout: (
-        (f"tracing/instances_{layout}.cl", "tracing/trace_instances.cl") * f.instances
+        (
+            f"tracing/instances_{'few' if f.few_instances else layout}.cl",
+            "tracing/trace_instances.cl",
+        )
+        * f.instances
     ),
 }
 

@@ -67,6 +67,8 @@ class Features:
     texture_depth: int = 0  # how many values their programs stack
     analytic: tuple[str, ...] = ()
     instances: bool = False
+    only_instances: bool = False  # all triangles are of groups
+    few_instances: int = 0  # how many, if a ray goes to each without a tree
     normals: bool = False
     uvs: bool = False
     tangents: bool = False

@@ -116,6 +116,8 @@ class Moving:
             raise CannotMove("light is traced from lights, whose choice follows from the shapes")
         if any(shape.motion is not None for shape in scene.shapes):
             raise CannotMove("shapes move while the shutter is open")
+        if "vertices" in self.target.lowered.features.moving:
+            raise CannotMove("vertices move while the shutter is open")
         numbers = {id(shape): number for number, shape in enumerate(scene.shapes)}
         actions: list[Action] = []
         instances: list[tuple[int, Shape]] = []

@@ -107,10 +107,12 @@ def _changes(wavefront: Wavefront, lowered: Lowered, refit: bool) -> _Changes:
     scene = wavefront.scene
     former, strategy = scene.lowered, wavefront.choose_strategy(lowered)
     groups = former.instances.triangles != lowered.instances.triangles
+    groups |= former.instances.keys != lowered.instances.keys
     faces = not (_same(former.faces, lowered.faces) and _same(former.tags, lowered.tags))
     moved = "vertices" in scene.moved_tables or not _same(former.vertices, lowered.vertices)
     triangles = strategy.layout != scene.strategy.layout or groups or faces
-    triangles |= not refit and (moved or scene.tree_refitted)
+    keyed = any(count > 1 for count in lowered.instances.keys)
+    triangles |= (keyed or not refit) and (moved or scene.tree_refitted)
     parts = zip(vars(former.instances).values(), vars(lowered.instances).values(), strict=True)
     instances = not all(_same(*map(np.asarray, pair)) for pair in parts)
     boxes = instances or bool(scene.moved_tables) or not _same(former.boxes, lowered.boxes)

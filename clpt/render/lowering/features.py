@@ -14,6 +14,7 @@ from clpt.scene.cameras import Lens
 from clpt.scene.media import Grid
 
 FEW_LIGHTS = 256  # up to which one random number chooses a light and a point on it
+FEW_INSTANCES = 2  # up to which rays go to each, where some deform
 INTEGRATORS = {"direct": "path", "vcm": "path"}  # kinds that have the kernels of another one
 
 
@@ -62,6 +63,8 @@ def features_of(
         attributes=bool(textures.attributes),
         analytic=tuple(kind for kind in shape_records.ANALYTIC if kind in geometry.analytic),
         instances=bool(index.prototypes),
+        only_instances=bool(index.prototypes) and not geometry.world_vertices,
+        few_instances=_few(index, geometry),
         normals=geometry.normals,
         uvs=uvs,
         tangents=tangents,
@@ -109,6 +112,12 @@ def features_of(
     )
 
 
+def _few(index: SceneIndex, geometry: Geometry) -> int:
+    """Return how many instances there are, if so few that a tree over them does not pay."""
+    count = len(geometry.instances.rows)
+    return count if index.motions.deforming and count <= FEW_INSTANCES else 0
+
+
 def moving_parts(index: SceneIndex, geometry: Geometry) -> tuple[str, ...]:
     """Return what of a scene moves while its shutter is open."""
     motions = index.motions
@@ -121,5 +130,6 @@ def moving_parts(index: SceneIndex, geometry: Geometry) -> tuple[str, ...]:
         "instances": bool(placed & numbers),
         "shapes": bool(analytic & numbers),
         "lights": bool(motions.lamps) or bool(lit & numbers),
+        "vertices": any(count > 1 for count in geometry.keys.values()),
     }
     return tuple(name for name, moves in found.items() if moves)

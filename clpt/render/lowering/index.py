@@ -52,7 +52,7 @@ class SceneIndex:
         """
         warnings: list[str] = []
         motions = Motions.of(scene)
-        placed, prototypes = instancing.sort(scene.shapes, warnings, motions.shapes)
+        placed, prototypes = instancing.sort(scene.shapes, warnings, motions.moving)
         distinct = tuple(instancing.distinct(scene.shapes))
         return cls(
             scene=scene,

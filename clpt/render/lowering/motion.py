@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from clpt import transforms
 from clpt.errors import SceneError
-from clpt.render.lowering.geometry import shapes
+from clpt.render.lowering.geometry import shapes, triangles
 from clpt.render.lowering.tables import TableStore
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera, Matrix
@@ -36,23 +36,33 @@ Boxes = NDArray[np.float32]
 class Motions:
     """What moves while the shutter of a scene is open.
 
-    shapes, lamps: keys by index in the scene's shapes and lights; camera: its keys, or None.
+    shapes, lamps: keys by index in the scene's shapes and lights; camera: its keys, or None;
+    deforming: for shapes and instances with points that move by themselves, by index, the times
+    between which they do so linearly, from when the shutter opens to when it closes.
     """
 
     shutter: Shutter
     shapes: Mapping[int, Keys]
     lamps: Mapping[int, Keys]
     camera: Keys | None
+    deforming: Mapping[int, tuple[float, ...]]
 
     @classmethod
     def of(cls, scene: Scene) -> Motions:
         """Return the motions of a scene of which `at_rest` has made still what does not move."""
         of_shapes = {i: s.motion for i, s in enumerate(scene.shapes) if s.motion is not None}
         of_lamps = {i: s.motion for i, s in enumerate(scene.lights) if s.motion is not None}
-        return cls(scene.camera.shutter or AT_ONCE, of_shapes, of_lamps, scene.camera.motion)
+        shutter = scene.camera.shutter or AT_ONCE
+        deforming = {i: _times(s, shutter) for i, s in enumerate(scene.shapes) if _deforms(s)}
+        return cls(shutter, of_shapes, of_lamps, scene.camera.motion, deforming)
 
     def __bool__(self) -> bool:
-        return bool(self.shapes or self.lamps or self.camera)
+        return bool(self.shapes or self.lamps or self.camera or self.deforming)
+
+    @property
+    def moving(self) -> frozenset[int]:
+        """The indices of shapes and instances that move or deform."""
+        return frozenset({*self.shapes, *self.deforming})
 
     @property
     def scales(self) -> bool:
@@ -90,13 +100,65 @@ def at_rest(scene: Scene) -> Scene:
     for i, light in enumerate(scene.lights):
         _check(light, f"lights[{i}]")
     _check(scene.camera, "camera")
-    for name, parts in (("shapes", scene.shapes), ("lights", scene.lights)):
+    bent: list[Any] = _undeformed(scene.shapes, shutter)
+    if any(new is not old for new, old in zip(bent, scene.shapes, strict=True)):
+        changes["shapes"] = bent
+    lists: tuple[tuple[str, Sequence[Any]], ...] = (("shapes", bent), ("lights", scene.lights))
+    for name, parts in lists:
         if any(part.motion is not None for part in parts):
             changes[name] = [_rest(part, shutter) for part in parts]
     camera = _rest(scene.camera, shutter)
     if camera is not scene.camera:
         changes["camera"] = camera
     return replace(scene, **changes) if changes else scene
+
+
+def _members(shape: Any) -> tuple[Any, ...]:
+    """A shape, or those that an instance places."""
+    return tuple(getattr(getattr(shape, "group", None), "shapes", (shape,)))
+
+
+def _deforms(shape: Any) -> bool:
+    return any(getattr(one, "deformation", None) is not None for one in _members(shape))
+
+
+def _times(shape: Any, shutter: Shutter) -> tuple[float, ...]:
+    """The times between which all points of a shape or instance move linearly."""
+    found = [getattr(one, "deformation", None) for one in _members(shape)]
+    return tuple(sorted({t for one in found if one is not None for t in one.while_open(shutter)}))
+
+
+def _undeformed(things: Sequence[Shape], shutter: Shutter) -> list[Shape]:
+    """Shapes and instances, of which those have deformations whose points move while it is open."""
+    groups: dict[int, Group] = {}
+    made: list[Shape] = []
+    for thing in things:
+        if not _deforms(thing):
+            made.append(thing)
+        elif isinstance(thing, Instance):
+            group = thing.group
+            if id(group) not in groups:
+                inner = tuple(_opening(one, shutter) for one in group.shapes)
+                groups[id(group)] = replace(group, shapes=inner)
+            made.append(replace(thing, group=groups[id(group)]))
+        else:
+            made.append(_opening(thing, shutter))
+    return made
+
+
+def _opening(shape: Any, shutter: Shutter) -> Any:
+    """A shape with its points where they are when the shutter opens; what stands still then has no
+    deformation. Raises SceneError for one that is not of the shape's points."""
+    given = getattr(shape, "deformation", None)
+    if given is None:
+        return shape
+    triangles.check_deformation(shape)
+    still = len(given.while_open(shutter)) == 1
+    if not still and shape.emission is not None:
+        message = "a shape that emits light cannot deform: leave one of the two out"
+        raise SceneError(message, where=f"{shapes.where(shape)}.deformation")
+    changes = {} if still else {"deformation": given}
+    return replace(triangles.at_time(shape, shutter.open), **changes)
 
 
 def _check(thing: Any, where: str) -> None:
@@ -193,7 +255,7 @@ def lower_motion(motions: Motions, scene: Scene, rows: list[int], store: TableSt
     rows: the index of each light that is no shape, in the order of their rows; -1: one that does
     not move.
     """
-    head = 4
+    head = 4 + bool(motions.deforming)
     first = store.size("distributions")
     parts = [np.zeros(head, np.float32), shutter_words(motions.shutter), track(None)]
     still = head + len(parts[1])
@@ -215,10 +277,29 @@ def lower_motion(motions: Motions, scene: Scene, rows: list[int], store: TableSt
     of_lamps = [place(motions.lamps.get(i)) for i in rows] or [first + still]
     maps = np.array([*of_shapes, *of_lamps], np.int32).view(np.float32)
     heads = [first + head, camera, first + at, first + at + len(of_shapes)]
+    if motions.deforming:
+        heads.append(first + at + len(maps))
+        maps = np.concatenate([maps, _deformations(motions, len(scene.shapes), heads[-1])])
     parts[0] = np.array(heads, np.int32).view(np.float32)
     # a kernel reads one step beyond the last
     parts += [maps, np.zeros(STEP + 1, np.float32)]
     return store.append_floats("distributions", np.concatenate(parts))
+
+
+def _deformations(motions: Motions, count: int, first: int) -> NDArray[np.float32]:
+    """For each shape the word of its steps, and these: how many, and for each when it begins and
+    one over how long it takes; none for what does not deform: kernels/tracing/vertex_keys.cl."""
+    places, parts, at = np.full(count, first + count, np.int32), [np.zeros(3, np.float32)], 3
+    made: dict[tuple[float, ...], int] = {}
+    for number, times in motions.deforming.items():
+        if times not in made:
+            made[times] = first + count + at
+            steps = np.array([len(times) - 1], np.int32).view(np.float32)
+            rows = np.column_stack([times[:-1], 1.0 / np.diff(times)]).astype(np.float32)
+            parts.append(np.concatenate([steps, rows.ravel()]))
+            at += len(parts[-1])
+        places[number] = made[times]
+    return np.concatenate([places.view(np.float32), *parts])
 
 
 def corners(boxes: NDArray[Any]) -> NDArray[np.float64]:

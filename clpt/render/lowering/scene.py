@@ -168,7 +168,7 @@ def lower(
     density_row, tabulated, profile = _lower_film(index, encoder, wavelengths)
     targets = aims(index, geometry, sphere[1])
     first_aim = encoder.store.append_floats("distributions", targets)
-    lower_attributes(geometry.owners, encoder.textures, cache, geometry.single_count)
+    lower_attributes(geometry.owners, encoder.textures, cache, geometry.single_count, geometry.keys)
     encoder.store.append("shapes", shape_words(geometry.rows))
     glass_rows = _lower_camera(index, encoder)
     ambient_row = _lower_ambient(index, encoder)

@@ -73,8 +73,9 @@ def build(
         counts = [len(lowered.faces) - sum(instances.triangles), *instances.triangles]
         points = vertices if len(lowered.faces) else lowered.vertices
         triangles, offsets = bvh.build_parts(
-            buffers.device, points, lowered.faces, lowered.tags, counts, layout, quality
-        )
+            buffers.device, points, lowered.faces, lowered.tags, counts, layout, quality,
+            (1, *instances.keys), lowered.vertices,
+        )  # fmt: skip
     else:
         triangles, offsets = former.triangles, former.offsets
     boxes = {}

@@ -25,7 +25,7 @@ from clpt.scene import (
     shapes,
     textures,
 )
-from clpt.scene.motion import Keys, Shutter
+from clpt.scene.motion import Deformation, Keys, Shutter
 from clpt.scene.params import Kind, Param, defaults, params
 from clpt.spectra import reradiation
 
@@ -75,6 +75,7 @@ VALUES: dict[str, Any] = {
     "medium": media.Homogeneous(sigma_s=2.0, phase=media.HenyeyGreenstein(g=0.4), name="fog"),
     "phase": media.Rayleigh(),
     "keys": Keys([0.0, 1.0], [np.eye(4), np.diag([2.0, 2.0, 2.0, 1.0])]),
+    "deformation": Deformation([0.5, 1.5], np.arange(18.0).reshape(2, 3, 3)),
     "shutter": Shutter(0.5, 1.5, "triangle"),
     "crop": (1, 2, 3, 4),
     "sensor": SENSOR,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -26,7 +26,7 @@ from clpt.render.lowering.textures.attributes import Owner
 
 SWEPT_CELLS = 4  # of the hull of what moves, see `instancing.hull_points`
 SHAPE_NORMALS, SHAPE_UVS, SHAPE_TWO_SIDED, SHAPE_ONE_LIGHT, SHAPE_MANY = 1, 2, 4, 8, 16
-SHAPE_TANGENTS = 32
+SHAPE_TANGENTS, SHAPE_DEFORMS = 32, 64
 
 Triangles = tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.uint32]]
 
@@ -40,7 +40,8 @@ class Geometry:
     triangle: the world's before those of groups; boxes (k, 2, 3) float32: of analytic shapes;
     world_vertices: how many vertices are not a group's; first_analytic: a row; single_count:
     analytic shapes that are one each; analytic: their kinds; normals, uvs: whether a shape needs
-    them; tangents: of shapes that say their own, each with its first vertex.
+    them; tangents: of shapes that say their own, each with its first vertex; keys: by the first
+    vertex of a shape how many rows each of its vertices has, where that is not one.
     """
 
     rows: tuple[np.ndarray, ...]
@@ -59,6 +60,7 @@ class Geometry:
     uvs: bool
     tangents: tuple[tuple[int, NDArray[np.float32]], ...]
     warnings: tuple[str, ...]
+    keys: Mapping[int, int] = field(default_factory=dict)
 
     def bounding_sphere(self) -> tuple[NDArray[np.float64], float]:
         """Return centre and radius of a sphere around the scene; a unit one if it is empty."""
@@ -121,6 +123,7 @@ def lower_geometry(index: SceneIndex, encoder: Encoder, materials: MaterialWords
         uvs=builder.uvs,
         tangents=tuple(builder.tangents),
         warnings=tuple(triangles.warnings_of(builder.flat)),
+        keys=builder.keys,
     )
 
 
@@ -143,9 +146,13 @@ class _Builder:
     normals: bool = False
     uvs: bool = False
     tangents: list[tuple[int, np.ndarray]] = field(default_factory=list)
+    keys: dict[int, int] = field(default_factory=dict)
 
-    def add(self, one: Placed) -> None:
-        """Append a shape's row; its triangles, or its parameters, go into the tables."""
+    def add(self, one: Placed, times: Sequence[float] = ()) -> None:
+        """Append a shape's row; its triangles, or its parameters, go into the tables.
+
+        times: at which the vertices have rows, for what belongs to something that deforms.
+        """
         shape: Any = one.shape
         row = np.zeros((), SHAPE.dtype)
         row["number"], row["light"] = one.number, -1
@@ -154,7 +161,7 @@ class _Builder:
         row["flags"] = SHAPE_TWO_SIDED if two_sided else 0
         self.owners.append((row, shape, self.vertex_count, self.face_count))
         if shape.kind not in shape_records.ANALYTIC:
-            corners = self._add_triangles(shape, row)
+            corners = self._add_triangles(shape, row, times)
         else:
             row["kind"] = 1 + shape_records.ANALYTIC.index(shape.kind)
             row["params"] = self.encoder.store.append("geometry", analytic.row(shape))
@@ -181,9 +188,17 @@ class _Builder:
         self.encoder.store.append_floats("spheres", balls)
         return balls, None, None
 
-    def _add_triangles(self, shape: Any, row: np.ndarray) -> tuple[Any, Any, Any]:
+    def _add_triangles(
+        self, shape: Any, row: np.ndarray, times: Sequence[float]
+    ) -> tuple[Any, Any, Any]:
         """Append a shape's triangles; return their vertices, faces and uvs."""
-        made = self.encoder.cache(triangles.counted, shape, by=shapes.geometry(shape))
+        by = shapes.geometry(shape)
+        if times:
+            row["flags"] |= SHAPE_DEFORMS
+            self.keys[self.vertex_count] = len(times)
+            made = self.encoder.cache(triangles.keyed, shape, times, by=(*by, times))
+        else:
+            made = self.encoder.cache(triangles.counted, shape, by=by)
         vertices, faces, normals, uvs, flat = made
         self.flat += flat
         row["prim"] = self.face_count
@@ -193,7 +208,7 @@ class _Builder:
         self.encoder.store.append_floats("normals", zeros if normals is None else normals)
         self.encoder.store.append_floats("uvs", zeros[:, :2] if uvs is None else uvs)
         self.normals |= normals is not None
-        if getattr(shape, "tangents", None) is not None:
+        if getattr(shape, "tangents", None) is not None and not times:
             row["flags"] |= SHAPE_TANGENTS
             own = (*shapes.geometry(shape), shape.tangents)
             along = self.encoder.cache(triangles.tangents, shape, by=own)
@@ -207,9 +222,10 @@ class _Builder:
     def share(self, prototype: Prototype) -> instancing.Shared:
         """Append the rows of shapes that instances share, and their triangles once."""
         before, first = len(self.parts), self.face_count
-        number = int(prototype.numbers[0]) if prototype.moves else 0
+        times = self.motions.deforming.get(int(prototype.numbers[0]), ())
+        number = int(prototype.numbers[0]) if prototype.moves or times else 0
         for shape in prototype.shapes:
-            self.add(Placed(shape, number))
+            self.add(Placed(shape, number), times)
         own = self.parts[before:]
         whole, centre = instancing.centred(np.concatenate([v for v, _, _ in own]))
         points = instancing.hull_points(whole)
@@ -227,7 +243,8 @@ class _Builder:
             for moved, (_, faces, number) in zip(np.split(whole, ends), own, strict=True)
         ]
         placed["prim"] = first
-        return instancing.Shared(placed, boxes, self.face_count - first, centre)
+        count = max(len(times), 1)
+        return instancing.Shared(placed, boxes, self.face_count - first, centre, count)
 
     def concatenated(self) -> Triangles:
         """Return all vertices, faces and tags."""

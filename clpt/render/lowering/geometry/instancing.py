@@ -56,13 +56,15 @@ class Shared:
     """A prototype as the device has it.
 
     rows: (k,) of INSTANCE.dtype; boxes: (k, 2, 3) float32 in the world; triangles: their number;
-    middle: (3,) of the group's box, where its triangles have their origin.
+    middle: (3,) of the group's box, where its triangles have their origin; keys: rows of each
+    vertex.
     """
 
     rows: NDArray[Any]
     boxes: NDArray[np.float32]
     triangles: int
     centre: NDArray[np.float64]
+    keys: int = 1
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ class Instances:
     """All instances of a scene.
 
     rows: (k,) of INSTANCE.dtype; boxes: (k, 2, 3) float32; prototypes: (k,), what each places;
-    triangles, middles: of each prototype.
+    triangles, middles: of each prototype; keys: rows that each of its vertices has, one a time.
     """
 
     rows: NDArray[Any]
@@ -78,6 +80,7 @@ class Instances:
     prototypes: NDArray[np.intp]
     triangles: tuple[int, ...]
     centres: tuple[NDArray[np.float64], ...]
+    keys: tuple[int, ...] = ()
 
 
 def concatenated(parts: Sequence[Shared]) -> Instances:
@@ -88,6 +91,7 @@ def concatenated(parts: Sequence[Shared]) -> Instances:
         np.repeat(np.arange(len(parts)), [len(part.rows) for part in parts]),
         tuple(part.triangles for part in parts),
         tuple(part.centre for part in parts),
+        tuple(part.keys for part in parts),
     )
 
 

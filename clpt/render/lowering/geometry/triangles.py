@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -18,8 +18,10 @@ from clpt.render.lowering.geometry import distance_grids, refining
 from clpt.render.lowering.geometry.shapes import Faces, Points, Words, placement, where
 from clpt.render.lowering.geometry.tubes import tubes
 from clpt.scene import shapes
+from clpt.scene.motion import Deformation
 from clpt.scene.shapes import Shape
 
+POINTS = {"mesh": "vertices", "curves": "points"}  # what a deformation moves
 SUMMED = 1 << 20  # triangles whose normals are summed at a time
 
 CHUNK = 1 << 16  # triangles that are looked at at a time: what is made of them stays in the cache
@@ -76,6 +78,69 @@ def counted(
     """Return what `triangulate` does, and whether it left some out."""
     flat: list[Flat] = []
     return *triangulate(shape, flat), tuple(flat)
+
+
+def keyed(
+    shape: Shape, times: Sequence[float]
+) -> tuple[Points, Faces, Points | None, Points | None, tuple[Flat, ...]]:
+    """Return what `counted` does at k times [s]: a row of each vertex for every time, together.
+
+    vertices, normals (k n, 3), uvs (k n, 2) float32; faces (m, 3) uint32 name the first row of a
+    vertex. Triangles are left out that have no area at any time. Raises as `triangulate` does.
+    """
+    count = len(times)
+    if getattr(shape, "deformation", None) is None:
+        at_all = [_in_world(shape)] * count
+    else:
+        alike = [at_time(shape, time) for time in times]
+        at_all = [_in_world(one, alike) for one in alike]
+    _, faces, _, uvs = at_all[0]
+    if any(not np.array_equal(one[1], faces) for one in at_all):
+        raise SceneError("its triangles are others at other times", where=where(shape))
+    solid = np.any([_solid(one[0], faces) for one in at_all], axis=0)
+    flat = [] if solid.all() else [Flat(where(shape), int((~solid).sum()), len(solid))]
+    normals: Any = None
+    if at_all[0][2] is not None:
+        normals = np.stack([np.asarray(one[2]) for one in at_all], axis=1).reshape(-1, 3)
+    return (
+        np.stack([one[0] for one in at_all], axis=1).reshape(-1, 3),
+        np.ascontiguousarray(faces[solid] * np.uint32(count)),
+        normals,
+        None if uvs is None else np.repeat(uvs, count, axis=0),
+        tuple(flat),
+    )
+
+
+def at_time(shape: Any, time: float) -> Any:
+    """Return a shape with a deformation as it is at a time [s], which does not deform."""
+    points, normals = shape.deformation.at(time)
+    changes: dict[str, Any] = {POINTS[shape.kind]: points, "deformation": None}
+    if hasattr(shape, "normals"):
+        changes |= {"normals": shape.normals if normals is None else normals, "tangents": None}
+    return replace(shape, **changes)
+
+
+def check_deformation(shape: Any) -> None:
+    """Raise SceneError for a deformation that is not one of the shape's points."""
+    given, place = shape.deformation, f"{where(shape)}.deformation"
+    if not isinstance(given, Deformation):
+        raise SceneError(f"must be a Deformation, not {given!r}", where=place)
+    name = POINTS[shape.kind]
+    if getattr(shape, name) is None:
+        raise SceneError(f"a {shape.kind} that deforms needs {name} too", where=place)
+    own = np.shape(on_host(getattr(shape, name)))
+    if given.points.shape[1:] != own:
+        message = f"its keys have {given.points.shape[1:]} where {name} are {own}"
+        raise SceneError(message, where=place)
+    if shape.kind != "mesh":
+        if given.normals is not None:
+            raise SceneError(f"{shape.kind} take no normals", where=place)
+        return
+    if given.normals is None and shape.normals is not None and not smooth(shape):
+        message = "needs normals at each time, as the mesh has some; or give it normals='smooth'"
+        raise SceneError(message, where=place)
+    if shape.displacement is not None:
+        raise SceneError("a mesh with displacement cannot deform", where=place)
 
 
 def warnings_of(flat: Sequence[Flat]) -> list[str]:
@@ -136,10 +201,12 @@ def attribute(shape: Shape, name: str) -> Points:
     return values[_solid(vertices, faces)] if per_face else values
 
 
-def _in_world(shape: Shape) -> tuple[Points, Faces, Points | None, Points | None]:
-    """Vertices, faces, normals and uvs after the transform."""
+def _in_world(
+    shape: Shape, alike: Sequence[Any] = ()
+) -> tuple[Points, Faces, Points | None, Points | None]:
+    """Vertices, faces, normals and uvs after the transform; alike: the shape at several times."""
     matrix = placement(shape)
-    vertices, faces, normals, uvs = local(shape)
+    vertices, faces, normals, uvs = local(shape, alike)
     if not np.array_equal(matrix, transforms.IDENTITY):
         vertices = transforms.transform_points(matrix, vertices).astype(np.float32)
         if not np.isfinite(vertices).all():
@@ -181,12 +248,17 @@ def triangle_rows(vertices: Points, faces: Faces) -> Words:
     return np.ascontiguousarray(np.hstack([v0, v1 - v0, v2 - v0, side])).view(np.uint32)
 
 
-def local(shape: Shape) -> tuple[Points, Faces, Points | None, Points | None]:
-    """Return vertices, faces, normals and uvs before the transform, as `triangulate` does."""
+def local(
+    shape: Shape, alike: Sequence[Any] = ()
+) -> tuple[Points, Faces, Points | None, Points | None]:
+    """Return vertices, faces, normals and uvs before the transform, as `triangulate` does.
+
+    alike: the shape at several times, at all of which the faces are the same.
+    """
     if isinstance(shape, shapes.Mesh):
         return _mesh(shape)
     if isinstance(shape, shapes.Curves):
-        return tubes(shape, where(shape))
+        return tubes(shape, where(shape), alike)
     if isinstance(shape, shapes.SdfGrid):
         return distance_grids.surface(shape, where(shape))
     if shape.kind == "rectangle":

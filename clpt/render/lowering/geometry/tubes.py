@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -25,18 +26,21 @@ LEAST = {"linear": 2, "bspline": 4, "bezier": 4}  # points of a strand
 TO_BEZIER = np.array([[1, 4, 1, 0], [0, 4, 2, 0], [0, 2, 4, 0], [0, 1, 4, 1]]) / 6.0
 
 
-def tubes(shape: Curves, name: str) -> tuple[Any, Any, Any, Any]:
+def tubes(shape: Curves, name: str, alike: Sequence[Curves] = ()) -> tuple[Any, Any, Any, Any]:
     """Return the tubes as vertices, faces, normals and uvs, before the transform.
 
     vertices, normals (n, 3) float32; faces (m, 3) uint32, seen from outside; uvs (n, 2) float32, u
     around, v along, from 0 to 1 over all pieces of all strands. A tube is a little wider than its
-    curve, so that it covers the same area, seen from the side from all around.
+    curve, so that it covers the same area, seen from the side from all around. alike: the same
+    strands at other times, whose tubes are to have the same faces.
 
     Raises SceneError for points that are no curves.
     """
     spans, strand = _spans(shape, name)
     linear = shape.basis == "linear"
     parts = np.ones(len(spans), np.int64) if linear else _pieces(spans)
+    for other in () if linear else alike:
+        parts = np.maximum(parts, _pieces(_spans(other, name)[0]))
     last = np.append(strand[1:] != strand[:-1], True)
     rings = parts + (np.ones_like(last) if linear else last)
     starts = np.cumsum(rings) - rings
@@ -45,7 +49,7 @@ def tubes(shape: Curves, name: str) -> tuple[Any, Any, Any, Any]:
     center, slope = _bezier(spans, span, t)
     tangent = _tangents(center[:, :3], slope, strand[span])
     lower = np.flatnonzero(strand[span[1:]] == strand[span[:-1]])
-    if linear:  # what bridges a bend; nothing where there is none
+    if linear and not alike:  # what bridges a bend; nothing where there is none
         same = np.einsum("ij,ij->i", tangent[lower], tangent[lower + 1]) > 1.0 - 1e-9
         lower = lower[(span[lower] == span[lower + 1]) | ~same]
     sides = int(np.clip(TRIANGLES // (2 * len(lower)), *SIDES))

@@ -7,7 +7,7 @@ scene, and how many words each takes. A colour takes four words, as a texel does
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -26,11 +26,16 @@ Owner = tuple[np.ndarray, Shape, int, int]  # a row of `shapes`, its shape, firs
 
 
 def lower_attributes(
-    owners: Iterable[Owner], textures: TextureTable, cache: LoweringCache, single_count: int = 0
+    owners: Iterable[Owner],
+    textures: TextureTable,
+    cache: LoweringCache,
+    single_count: int = 0,
+    keys: Mapping[int, int] | None = None,
 ) -> None:
     """Put what the textures of shapes ask of them into the tables, and its index into their rows.
 
-    single_count: see clpt.records.SETTINGS.
+    single_count: see clpt.records.SETTINGS; keys: rows of each vertex of a shape, by its first
+    vertex, where that is not one.
 
     Raises SceneError for a shape that lacks what its material or light asks for.
     """
@@ -53,7 +58,10 @@ def lower_attributes(
                 given = (shape, name, role, textures.spectra.spectral)
                 value = getattr(shape, "attributes", {})[name]
                 own = (*shapes.geometry(shape), value, *given[1:])
-                at = store.append("attributes", cache(_words, *given, by=own))
+                made = cache(_words, *given, by=own)
+                if keys and first_vertex in keys and not per_face(name):
+                    made = np.repeat(made.reshape(-1, words), keys[first_vertex], axis=0).ravel()
+                at = store.append("attributes", made)
                 directory[number] = at - words * first, words
         row["attributes"] = store.append("attributes", directory.view(np.uint32))
 

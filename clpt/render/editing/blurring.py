@@ -1,0 +1,114 @@
+"""Motion from one picture to the next: a scene and the one before it become keys of one scene."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from clpt.errors import SceneError
+from clpt.render.lowering.device_arrays import on_host
+from clpt.render.lowering.geometry import shapes
+from clpt.scene import Scene
+from clpt.scene.motion import Deformation, Shutter, placement, through
+from clpt.scene.shapes import Curves, Group, Instance, Mesh, Spheres
+
+POINTS = ((Mesh, "vertices"), (Curves, "points"))
+
+
+def between(former: Scene, scene: Scene) -> tuple[Scene, list[str]]:
+    """Return a scene whose things move from where they were to where they are, and warnings.
+
+    The shutter of its camera says when: at `open` all is as in `former`, at `close` as in `scene`.
+    Shapes and lights belong together by their places in the lists. What has a motion of its own
+    keeps that.
+
+    Raises SceneError without a shutter, and for another number of shapes or lights.
+    """
+    shutter = scene.camera.shutter
+    if not isinstance(shutter, Shutter) or not shutter.close > shutter.open:
+        message = "motion needs a time for which the shutter is open: camera.shutter"
+        raise SceneError(message, where="camera.shutter")
+    for name in ("shapes", "lights"):
+        counts = [len(getattr(one, name)) for one in (former, scene)]
+        if counts[0] != counts[1]:
+            message = (
+                f"motion needs what is in both scenes: there were {counts[0]}, now {counts[1]}"
+            )
+            raise SceneError(message, where=name)
+    way = _Way((shutter.open, shutter.close))
+    things = [way.shape(a, b) for a, b in zip(former.shapes, scene.shapes, strict=True)]
+    lamps = [way.moved(a, b, "light") for a, b in zip(former.lights, scene.lights, strict=True)]
+    camera = way.moved(former.camera, scene.camera, "camera")
+    return replace(scene, shapes=things, lights=lamps, camera=camera), way.warnings
+
+
+class _Way:
+    """From one scene to the next, between two times [s]."""
+
+    def __init__(self, times: tuple[float, float]):
+        self.times, self.warnings = times, list[str]()
+        self.groups: dict[tuple[int, int], Group] = {}
+
+    def shape(self, old: Any, new: Any) -> Any:
+        """A shape that moves, and whose points do."""
+        if old is new:
+            return new
+        made = self.moved(old, new, shapes.where(new))
+        if isinstance(new, Instance) and isinstance(old, Instance):
+            group = self.group(old.group, new.group)
+            return made if group is new.group else replace(made, group=group)
+        return self.deformed(old, made)
+
+    def group(self, old: Group, new: Group) -> Group:
+        """A group whose shapes' points move."""
+        if old is new or len(old.shapes) != len(new.shapes):
+            return new
+        key = id(old), id(new)
+        if key not in self.groups:
+            pairs = zip(old.shapes, new.shapes, strict=True)
+            inner = tuple(self.deformed(a, b) for a, b in pairs)
+            self.groups[key] = replace(new, shapes=inner)
+        return self.groups[key]
+
+    def deformed(self, old: Any, new: Any) -> Any:
+        """A shape with keys of its points, if these are others than before."""
+        if isinstance(new, Spheres) and getattr(old, "centers", None) is not new.centers:
+            self.warnings.append(f"{shapes.where(new)}: its centers do not move, they are as now")
+        kind, name = next((x for x in POINTS if isinstance(new, x[0])), (None, ""))
+        if kind is None or not isinstance(old, kind) or new.deformation is not None:
+            return new
+        was, now = getattr(old, name), getattr(new, name)
+        if was is now:
+            return new
+        first, last = (np.asarray(on_host(values), np.float32) for values in (was, now))
+        if np.array_equal(first, last):
+            return new
+        if first.shape != last.shape or new.emission is not None:
+            why = "emits light" if new.emission is not None else f"had {len(first)} of them"
+            self.warnings.append(f"{shapes.where(new)}: its {name} do not move, as it {why}")
+            return new
+        normals = [getattr(one, "normals", None) for one in (old, new)]
+        given = all(n is not None and not isinstance(n, str) for n in normals)
+        turned = np.stack([np.asarray(on_host(n)) for n in normals]) if given else None
+        return replace(new, deformation=Deformation(self.times, [first, last], turned))
+
+    def moved(self, old: Any, new: Any, name: str) -> Any:
+        """A thing with keys of its transform, if it is elsewhere than before."""
+        if old is new or type(old) is not type(new) or new.motion is not None:
+            return new
+        was, now = (placement(_read(one)) for one in (old, new))
+        if was is None or now is None or np.array_equal(was, now):
+            return new
+        try:
+            return through(new, self.times, [was, now])
+        except SceneError as error:
+            self.warnings.append(f"{name}: does not move: {error}")
+            return new
+
+
+def _read(thing: Any) -> Any:
+    """A thing whose transform is on the host."""
+    matrix = getattr(thing, "to_world", None)
+    return thing if matrix is None else replace(thing, to_world=on_host(matrix))
