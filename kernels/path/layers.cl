@@ -65,10 +65,19 @@ inline integer layers_record(Scene scene, Slab path, uint at, LAYER_ARGS, mask m
     layer_put_long(words + LAYER_UV, first, v.s.uv.x * weight);
     layer_put_long(words + LAYER_UV + 3, first, v.s.uv.y * weight);
 #endif
-#if SCREEN_MOTION && BSDF_IS_PHASE /* media stand still */
-    screen_motion_put(words + LAYER_MOTION, first, screen_motion(scene, (integer)(-1), v.s.p, mask_of(0)), weight);
-#elif SCREEN_MOTION
-    screen_motion_put(words + LAYER_MOTION, first, screen_motion(scene, v.object, v.s.p, mask_of(0)), weight);
+#if SCREEN_MOTION
+#if BSDF_IS_PHASE /* media stand still */
+    integer mover = -1;
+#else
+    integer mover = v.object;
+#endif
+#if MOVES_VERTICES
+    vec3 first_p = add3(v.s.p, v.s.to_open), last_p = add3(v.s.p, v.s.to_close);
+#else
+    vec3 first_p = v.s.p, last_p = v.s.p;
+#endif
+    screen_motion_put(words + LAYER_MOTION, first,
+                      screen_motion(scene, mover, v.s.p, first_p, last_p, mask_of(0)), weight);
 #elif LAYER_MOTION
     for (int i = 0; i < 12; i++) words[LAYER_MOTION + i] = 0;
 #endif

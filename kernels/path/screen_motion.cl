@@ -27,17 +27,17 @@ inline vec2 screen_at_time(Scene scene, vec3 p, mask away, real time, mask *seen
 }
 
 /* object: the shape that is seen, below 0 for what stands still; p: the point, or where `away` the unit vector to what
- * is infinitely far. Nothing moves that is behind the camera at one of the three times. */
-inline ScreenMotion screen_motion(Scene scene, integer object, vec3 p, mask away)
+ * is infinitely far; first, last: p, but that the shape has deformed as when the shutter opens and closes. Nothing
+ * moves that is behind the camera at one of the three times. */
+inline ScreenMotion screen_motion(Scene scene, integer object, vec3 p, vec3 first, vec3 last, mask away)
 {
     global const float *shutter = scene.distributions + as_int(scene.distributions[MOTION_ROW]);
     real opens = shutter[1], closes = shutter[1] + shutter[2];
-    vec3 first = p, last = p;
     mask moves = !away & (object >= 0), seen = mask_of(1);
     if (any(moves)) {
         integer number = sel_i(moves, object, (integer)(0));
-        first = sel3(moves, point_at_time(scene, number, p, opens), p);
-        last = sel3(moves, point_at_time(scene, number, p, closes), p);
+        first = sel3(moves, point_at_time(scene, number, first, opens), first);
+        last = sel3(moves, point_at_time(scene, number, last, closes), last);
     }
     vec2 at = screen_at_time(scene, p, away, scene.time, &seen);
     vec2 before = screen_at_time(scene, first, away, opens, &seen);
@@ -67,7 +67,7 @@ inline void layers_of_sky(Scene scene, Slab path, uint at, global uint *layers, 
     if (!any(m)) return;
     integer words[12];
     vec3 d = sel3(m, load_path_d(path, at), v3(0.0f, 0.0f, 1.0f));
-    ScreenMotion s = screen_motion(scene, (integer)(-1), d, mask_of(1));
+    ScreenMotion s = screen_motion(scene, (integer)(-1), d, d, d, mask_of(1));
     screen_motion_put(words, m, s, layer_weight(path, at));
     layers_add(scene, layers + LAYER_MOTION, m, load_path_pixel_index(path, at), words, 12);
 }

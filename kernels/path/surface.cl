@@ -19,6 +19,9 @@ typedef struct {
     integer attributes, face; /* of triangles, see texturing/texture_point.cl */
     vec2 b;
 #endif
+#if SCREEN_MOTION && MOVES_VERTICES
+    vec3 to_open, to_close; /* from p to where the deforming shape has the point when the shutter opens and closes [m] */
+#endif
 } Surface;
 
 inline vec3 vertex_vec3(global const float *table, integer vertex)
@@ -87,6 +90,24 @@ inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, 
 #if USES_INSTANCES
     mask placed = active & (h.instance > 0);
     InstanceFrame space = instance_frame(scene, placed, h.instance);
+#endif
+#if SCREEN_MOTION && MOVES_VERTICES
+    s.to_open = v3(0.0f, 0.0f, 0.0f);
+    s.to_close = s.to_open;
+    mask deforms = active & ((shape.flags & SHAPE_DEFORMS) != 0);
+    if (any(deforms)) {
+        integer number = sel_i(deforms, shape.number, (integer)(0)), face = sel_i(deforms, prim, (integer)(0));
+        global const float *shutter = scene.distributions + as_int(scene.distributions[MOTION_ROW]);
+        vec3 now = vertex_point(scene, number, face, h.u, h.v, scene.time);
+        vec3 first = sub3(vertex_point(scene, number, face, h.u, h.v, (real)(shutter[1])), now);
+        vec3 last = sub3(vertex_point(scene, number, face, h.u, h.v, (real)(shutter[1] + shutter[2])), now);
+#if USES_INSTANCES
+        first = sel3(placed, instance_vector(space, first), first);
+        last = sel3(placed, instance_vector(space, last), last);
+#endif
+        s.to_open = sel3(deforms, first, s.to_open);
+        s.to_close = sel3(deforms, last, s.to_close);
+    }
 #endif
     mask emits = active & (shape.light >= 0);
     if (any(emits)) {
@@ -216,6 +237,10 @@ inline Surface surface_of_point(vec3 p)
     s.attributes = 0;
     s.face = 0;
     s.b = s.uv;
+#endif
+#if SCREEN_MOTION && MOVES_VERTICES
+    s.to_open = s.n;
+    s.to_close = s.n;
 #endif
     return s;
 }

@@ -14,7 +14,7 @@ from clpt.render.layer_preview import viewable
 from clpt.scene import Film, Scene, lights, materials, shapes
 from clpt.scene.cameras import Lens, Orthographic, Perspective
 from clpt.scene.integrators import Box, Path
-from clpt.scene.motion import Keys, Shutter
+from clpt.scene.motion import Deformation, Keys, Shutter
 
 SIZE = 24
 GREY = materials.Diffuse(reflectance=0.5)
@@ -106,14 +106,24 @@ def test_what_moves_is_told_in_pixels(camera):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("deforms", [False, True])
 @pytest.mark.parametrize("kind", [Perspective, Orthographic])
-def test_a_plane_that_slides(kind):
+def test_a_plane_that_slides(kind, deforms):
     """Across the axis each of its points goes f d / z pixels from the shutter's opening to its
     closing, whenever it is seen; a quarter and three quarters of the keys' time."""
     slides = keys(tf.translate([-1, 0, 0]), tf.translate([1, 0.5, 0]))
-    plane = shapes.Rectangle(
-        to_world=tf.rotate([0, 1, 0], 180) @ tf.scale(9), material=GREY, motion=slides
-    )
+    wide = tf.rotate([0, 1, 0], 180) @ tf.scale(9)
+    plane = shapes.Rectangle(to_world=wide, material=GREY, motion=slides)
+    if deforms:  # each vertex by itself, half of the way, and the whole the other half
+        flat = np.array([[-9, -9, 0], [9, -9, 0], [9, 9, 0], [-9, 9, 0]], np.float32)
+        half = np.array([1, 0.25, 0], np.float32)
+        plane = shapes.Mesh(
+            vertices=flat,
+            faces=[[0, 2, 1], [0, 3, 2]],
+            material=GREY,
+            deformation=Deformation([0.0, 1.0], [flat, flat + half]),
+            motion=keys(tf.translate([-1, 0, 0]), tf.translate([0, 0.25, 0])),
+        )
     shutter = Shutter(0.25, 0.75)
     if kind is Orthographic:
         view = Orthographic(to_world=LOOK @ tf.scale([2, 2, 1]), shutter=shutter)
