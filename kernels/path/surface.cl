@@ -20,7 +20,7 @@ typedef struct {
     vec2 b;
 #endif
 #if SCREEN_MOTION && MOVES_VERTICES
-    vec3 to_open, to_close; /* from p to where the deforming shape has the point when the shutter opens and closes [m] */
+    vec3 to_open, to_close; /* from p to where what deforms has the point when the shutter opens, closes [m] */
 #endif
 } Surface;
 
