@@ -26,6 +26,8 @@ from clpt.spectra.spectrum import WIDEST, extremes
 MOST_ROWS = 512  # of a table by wavelength
 SOOT = 0.26  # E(m), the imaginary part of (m^2 - 1) / (m^2 + 2) without its sign
 COLDEST = 100.0  # [K] below which nothing is seen of a black body
+OCTAVE = 1.99  # how much finer each octave of a cloud's noise is than the one before
+CLOUD_LEAST, CLOUD_MOST, CLOUD_FINEST = 32, 256, 1024  # points along a cloud's longest side
 RADIANCE = "W m^-2 sr^-1 nm^-1"
 
 
@@ -291,7 +293,88 @@ def _whole(rows: Any, cosines: Any) -> NDArray[np.float64]:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Grid(Homogeneous):
+class Lattice(Homogeneous):
+    """Base of media whose coefficients a density multiplies, at points of a lattice in a box."""
+
+    to_world: Matrix4 = host(np.eye(4), "takes the unit cube to the grid's box")
+
+    @property
+    def size(self) -> tuple[int, ...]:
+        """The number of points along x, y and z."""
+        raise NotImplementedError
+
+    @property
+    def box(self) -> NDArray[np.float64]:
+        """A matrix (4, 4) from the unit cube to the box in the world."""
+        return np.asarray(self.to_world, float)
+
+    def check(self) -> None:
+        """Raise SceneError for a box without an inside."""
+        super().check()
+        if not abs(np.linalg.det(self.box[:3, :3])) > 0.0:
+            raise SceneError("has no inverse", where=f"{self.kind}.to_world")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Cloud(Lattice):
+    """A homogeneous medium whose coefficients are multiplied by the density of a cloud.
+
+    That is PBRT's, from Perlin's noise: five octaves, at places that two more shift. In the cloud's
+    own space y is the height. Up to 1/2 it fills with density, and at 1 it ends. `to_world` takes
+    that space to the world, `low` and `high` are the corners of the cloud's box there.
+
+    The density is worked out on the device at the points of a lattice, `resolution` along the
+    longest side of the box. That takes two bytes a point.
+
+    Raises SceneError for a box without an inside, and for a lattice too fine.
+    """
+
+    density: float = real(1.0, "how much of the noise becomes cloud", low=0.0)
+    wispiness: float = real(1.0, "how much the noise is shifted", low=0.0, high=100.0)
+    frequency: float = real(5.0, "cells of the first octave along a unit length", low=0.0, high=1e4)
+    low: Any = host((0.0, 0.0, 0.0), "a corner of the box", form="vector")
+    high: Any = host((1.0, 1.0, 1.0), "the opposite one", form="vector")
+    resolution: int = host(
+        0, "points along the longest side of the box; 0: two for each cell of the finest octave, "
+        f"from {CLOUD_LEAST} to {CLOUD_MOST}"
+    )  # fmt: skip
+
+    def check(self) -> None:
+        for name in ("low", "high"):
+            found = np.asarray(getattr(self, name), float)
+            if found.shape != (3,) or not np.isfinite(found).all():
+                raise SceneError("must be three numbers", where=f"{self.kind}.{name}")
+        corners = np.array([self.low, self.high], float)
+        object.__setattr__(self, "low", tuple(corners.min(axis=0).tolist()))
+        object.__setattr__(self, "high", tuple(corners.max(axis=0).tolist()))
+        if not (self._sides > 0.0).all():
+            raise SceneError("the box is flat: it equals `low`", where=f"{self.kind}.high")
+        if not 0 <= self.resolution <= CLOUD_FINEST:
+            message = f"must be 0 to {CLOUD_FINEST}, not {self.resolution!r}"
+            raise SceneError(message, where=f"{self.kind}.resolution")
+        super().check()
+
+    @property
+    def _sides(self) -> NDArray[np.float64]:
+        sides: NDArray[np.float64] = np.asarray(self.high, float) - np.asarray(self.low, float)
+        return sides
+
+    @property
+    def size(self) -> tuple[int, ...]:
+        sides = self._sides
+        wanted = 2.0 * self.frequency * OCTAVE**4 * sides.max()
+        along = self.resolution or int(np.clip(np.ceil(wanted), CLOUD_LEAST, CLOUD_MOST))
+        return tuple(int(n) for n in np.maximum(np.rint(along * sides / sides.max()), 1))
+
+    @property
+    def box(self) -> NDArray[np.float64]:
+        own = np.diag([*self._sides, 1.0])
+        own[:3, 3] = self.low
+        return np.asarray(self.to_world, float) @ own
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Grid(Lattice):
     """A homogeneous medium whose coefficients are multiplied by a density on a grid.
 
     The density (nx, ny, nz) is that at the centres of the cells of a box, trilinear between these;
@@ -311,7 +394,6 @@ class Grid(Homogeneous):
         "numbers (nx, ny, nz) that multiply the coefficients",
         form="volume",
     )
-    to_world: Matrix4 = host(np.eye(4), "takes the unit cube to the grid's box")
     bits: int = host(16, "of a number of the density on the device: 16 or 8")
     albedo_grid: Any = host(
         None, "colours (nx, ny, nz, 3) that multiply what is scattered; the rest is absorbed",
@@ -326,15 +408,18 @@ class Grid(Homogeneous):
         False, "whether a black body of any temperature has 1 at its brightest wavelength"
     )
 
+    @property
+    def size(self) -> tuple[int, ...]:
+        found: tuple[int, ...] = self.density.shape
+        return found
+
     def check(self) -> None:
-        super().check()
         own = np.asarray(self.to_world, float)
         if isinstance(self.density, Volume):
             object.__setattr__(self, "to_world", own @ np.asarray(self.density.to_world, float))
             object.__setattr__(self, "density", self.density.values)
+        super().check()
         check_volume(self.density, f"{self.kind}.density")
-        if not abs(np.linalg.det(np.asarray(self.to_world, float)[:3, :3])) > 0.0:
-            raise SceneError("has no inverse", where=f"{self.kind}.to_world")
         if self.bits not in (8, 16):
             raise SceneError(f"must be 16 or 8, not {self.bits!r}", where=f"{self.kind}.bits")
         if self.temperature is not None and self.emission_grid is not None:
@@ -455,4 +540,4 @@ def _lit(value: Any) -> Spectrum:
 
 PHASE_LEAVES: tuple[type[Phase], ...] = (Isotropic, HenyeyGreenstein, Rayleigh, Draine, Tabulated)
 PHASES: tuple[type[Phase], ...] = (*PHASE_LEAVES, Blend)
-KINDS: tuple[type[Medium], ...] = (Homogeneous, Grid, Soot)
+KINDS: tuple[type[Medium], ...] = (Homogeneous, Grid, Cloud, Soot)

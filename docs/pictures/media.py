@@ -63,6 +63,20 @@ MEDIA = {
         _ball((np.arange(9) % 2.0)[None, :, None], 0.0, sigma_s=14.0),
         _ball((1.0 - np.linspace(0.0, 1.0, 24))[None, :, None] ** 2, 1.42, sigma_t=AMBER),
     ),
+    "cloud": balls(
+        "`wispiness` of 0, 1 and 4; `density` of 1, 2 and 4",
+        *(
+            media.Cloud(
+                sigma_s=60.0,
+                wispiness=wispiness,
+                density=density,
+                low=(0.0, 0.3, 0.0),
+                high=(1.0, 1.0, 1.0),
+                to_world=translate([x - 0.55, -0.33, -0.55]) @ scale([1.1, 1.45, 1.1]),
+            )
+            for x, wispiness, density in ((-1.42, 0.0, 1.0), (0.0, 1.0, 2.0), (1.42, 4.0, 4.0))
+        ),
+    ),
     "soot": balls(
         "soot of 0.01, 0.04 and 0.16 millionths, as hot as a candle",
         *(

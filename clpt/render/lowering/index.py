@@ -16,7 +16,7 @@ from clpt.scene import Scene
 from clpt.scene import materials as mt
 from clpt.scene.integrators import Auto, ParticleTracer, Vcm
 from clpt.scene.layers import LAYERS
-from clpt.scene.media import PHASE_LEAVES, Grid, Medium
+from clpt.scene.media import PHASE_LEAVES, Lattice, Medium
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.shapes import Shape
 
@@ -85,7 +85,7 @@ class SceneIndex:
     @property
     def glowing(self) -> bool:
         """Whether some of these have a density on a grid."""
-        return any(isinstance(medium, Grid) for medium in self.emitting)
+        return any(isinstance(medium, Lattice) for medium in self.emitting)
 
     @property
     def tinted(self) -> bool:

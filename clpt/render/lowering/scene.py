@@ -57,7 +57,7 @@ from clpt.scene import Scene
 from clpt.scene import materials as mt
 from clpt.scene.integrators import AUTO, Film, Integrator
 from clpt.scene.lights import Point
-from clpt.scene.media import Grid
+from clpt.scene.media import Lattice
 from clpt.scene.shapes import Mesh
 
 TREE_FROM = 16  # lights from which a tree chooses among them, see bench/lights.py
@@ -141,7 +141,7 @@ def lower(
     media = MediumWords(index, encoder, materials, sealed)
     sphere = geometry.bounding_sphere()
     lights = _lower_lights(index, encoder, geometry, sphere[1], media)
-    homogeneous = (one for one in index.media if not isinstance(one, Grid))
+    homogeneous = (one for one in index.media if not isinstance(one, Lattice))
     near = medium_aims(lights) if any(one.scatters for one in homogeneous) else ()
     encoder.store.append("media", np.array(near, np.float32).view(np.uint32))
     bounding = [shape for _, shape, _, _ in geometry.owners]
@@ -386,7 +386,7 @@ def _of_motion(index: SceneIndex) -> list[str]:
     for i in index.motions.shapes:
         shape: Any = index.scene.shapes[i]
         inner = getattr(getattr(shape, "group", None), "shapes", (shape,))
-        if any(isinstance(one, Grid) for s in inner for one in (s.interior, s.exterior)):
+        if any(isinstance(one, Lattice) for s in inner for one in (s.interior, s.exterior)):
             warnings.append(
                 f"{shapes.where(shape)}.motion: its boundary moves, the grid of its medium stays"
             )

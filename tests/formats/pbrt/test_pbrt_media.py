@@ -68,3 +68,17 @@ def test_rgb_grid(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.sigma_t.to_rgb("unbounded"), 8.0)
     _, warnings = read(tmp_path, given + "[3 2 1 4 3 9]")
     assert any("one colour" in one for one in warnings)
+
+
+def test_cloud(tmp_path: Path) -> None:
+    """Its numbers are those of PBRT; what it does not say has PBRT's defaults."""
+    given = '"string type" "cloud" "float density" 2 "float wispiness" 0.5 "float frequency" 4 '
+    given += '"point3 p0" [-1 0 0] "point3 p1" [1 2 3] "float g" 0.5'
+    found, warnings = read(tmp_path, given)
+    assert not warnings
+    assert isinstance(found, media.Cloud)
+    assert (found.density, found.wispiness, found.frequency) == (2.0, 0.5, 4.0)
+    np.testing.assert_allclose(found.box @ (0.5, 0.5, 0.5, 1.0), (0.0, 1.0, 1.5, 1.0))
+    np.testing.assert_allclose(found.coefficients(spectral=False)[0].to_rgb("unbounded"), 1.0)
+    found, _ = read(tmp_path, '"string type" "cloud"')
+    assert (found.density, found.wispiness, found.frequency) == (1.0, 1.0, 5.0)
