@@ -26,6 +26,7 @@ from clpt.spectra.spectrum import WIDEST, extremes
 MOST_ROWS = 512  # of a table by wavelength
 SOOT = 0.26  # E(m), the imaginary part of (m^2 - 1) / (m^2 + 2) without its sign
 COLDEST = 100.0  # [K] below which nothing is seen of a black body
+ON_POINTS = ("emission_grid", "temperature", "albedo_grid", "colour_grid")  # of a `Grid`
 OCTAVE = 1.99  # how much finer each octave of a cloud's noise is than the one before
 CLOUD_LEAST, CLOUD_MOST, CLOUD_FINEST = 32, 256, 1024  # points along a cloud's longest side
 RADIANCE = "W m^-2 sr^-1 nm^-1"
@@ -399,6 +400,10 @@ class Grid(Lattice):
         None, "colours (nx, ny, nz, 3) that multiply what is scattered; the rest is absorbed",
         form="colour_volume",
     )  # fmt: skip
+    colour_grid: Any = host(
+        None, "colours (nx, ny, nz, 3) up to 1 that multiply the extinction",
+        form="colour_volume",
+    )  # fmt: skip
     emission_grid: Any = host(None, "numbers (nx, ny, nz) that multiply `emission`", form="volume")
     temperature: Any = host(
         None, "of a black body that is the emission, (nx, ny, nz)", "K", form="volume"
@@ -425,7 +430,7 @@ class Grid(Lattice):
         if self.temperature is not None and self.emission_grid is not None:
             message = "give `emission_grid` or `temperature`, not both"
             raise SceneError(message, where=self.kind)
-        for name in ("emission_grid", "temperature", "albedo_grid"):
+        for name in ON_POINTS:
             self._fit(name, own)
 
     def _fit(self, name: str, own: Matrix4) -> None:
@@ -434,8 +439,9 @@ class Grid(Lattice):
         if given is None:
             return
         values = given.values if isinstance(given, Volume) else given
-        check_volume(values, where, colours=name == "albedo_grid")
-        if name == "albedo_grid" and not (isinstance(values, np.ndarray) and values.max() <= 1.0):
+        coloured = name in ("albedo_grid", "colour_grid")
+        check_volume(values, where, colours=coloured)
+        if coloured and not (isinstance(values, np.ndarray) and values.max() <= 1.0):
             raise SceneError("must be an array of numpy, of numbers up to 1", where=where)
         box = np.asarray(self.to_world, float)
         placed = own @ np.asarray(given.to_world, float) if isinstance(given, Volume) else box
@@ -449,6 +455,10 @@ class Grid(Lattice):
             else:
                 values = resampled(values, placed, self.density.shape, box)
         object.__setattr__(self, name, values)
+
+    @property
+    def is_chromatic(self) -> bool:
+        return self.colour_grid is not None or super().is_chromatic
 
     @property
     def light(self) -> Spectrum | None:

@@ -102,10 +102,8 @@ STAGE(flight)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
             origin.hemisphere = path_hemisphere(path, at);
             GridFlight own = grid_flight(scene, name, m, o, d, end, ratio, u, key, gridded, lambdas, origin);
             light = spectrum_sel(gridded, own.light, light);
-#elif GRIDS_TINTED
-            GridFlight own = grid_flight(scene, name, m, o, d, end, ratio, u, key, gridded, lambdas);
 #else
-            GridFlight own = grid_flight(scene, name, m, o, d, end, ratio, u, key, gridded);
+            GridFlight own = grid_flight(scene, name, m, o, d, end, ratio, u, key, gridded GRID_TINT_PASSED);
 #endif
             weight = spectrum_sel(gridded, own.weight, weight);
             collides = sel_i(gridded, own.collides, collides);

@@ -18,7 +18,6 @@ from clpt.scene.volumes import Volume
 from clpt.spectra import Constant, RGBUnbounded
 
 GRIDS = ("uniformgrid", "nanovdb", "rgbgrid", "cloud")
-GREY = 1e-3  # share by which the extinctions of colours may differ from those of one
 HEAT = ("temperatureoffset", "temperaturecutoff", "temperaturescale")
 BLACK_BODY = {"normalised": True}  # so that it has 1 at its brightest wavelength
 _AROUND = ((1, 1), (1, 1), (1, 1), (0, 0))
@@ -114,7 +113,7 @@ def _grid(kind: str, params: Parameters, state: State) -> dict[str, Any]:
 
 
 def _coloured(params: Parameters, state: State) -> dict[str, Any]:
-    """An `rgbgrid`: a density, one colour of extinction, and an albedo on the grid."""
+    """An `rgbgrid`: a density, its colours where these differ, and an albedo on the grid."""
     parts = [_listed(params, name, state, "rgb") for name in ("sigma_a", "sigma_s")]
     found = next((part for part in parts if part is not None), None)
     if found is None:
@@ -122,17 +121,15 @@ def _coloured(params: Parameters, state: State) -> dict[str, Any]:
     ones = np.pad(np.ones([n - 2 for n in found.values.shape[:3]] + [3], np.float32), _AROUND)
     absorbs, scatters = (ones if part is None else part.values for part in parts)
     extinction = (absorbs + scatters).astype(float)
-    most = extinction.max(axis=(0, 1, 2))
-    density = extinction.mean(axis=3) / max(float(most.mean()), 1e-30)
-    if not np.allclose(extinction, density[..., None] * most, GREY, GREY * most.max()):
-        state.warn(params, "its extinction is that of one colour everywhere: its mean")
+    sigma_t, density, colours = volumes.factored(extinction)
     if "Le" in params:
         state.warn(params, "its light is left out")
     params.ignore("Le", "Lescale")
     albedo = scatters / np.maximum(extinction, 1e-30)
     return {
-        "density": Volume(density.astype(np.float32), found.to_world),
-        "sigma_t": RGBUnbounded(*most.tolist()),
+        "density": Volume(density, found.to_world),
+        "colour_grid": None if colours is None else Volume(colours, found.to_world),
+        "sigma_t": sigma_t,
         "albedo_grid": Volume(np.clip(albedo, 0.0, 1.0).astype(np.float32), found.to_world),
     }
 

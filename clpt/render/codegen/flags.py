@@ -102,6 +102,7 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "BRICK_LIGHTS": lambda f: VOLUME in f.lights,
     "USES_GRIDS": lambda f: f.grids,
     "GRIDS_TINTED": lambda f: f.tinted_grids,
+    "GRIDS_COLOURED": lambda f: f.coloured_grids,
     "USES_BYTES": lambda f: f.byte_grids,
     "USES_BODIES": lambda f: f.bodies,
     "SHADOW_MEDIA": lambda f: f.shadow_media,

@@ -11,7 +11,7 @@ import pyopencl.array as cl_array
 from numpy.typing import NDArray
 
 from clpt.render.lowering.tables import TableStore
-from clpt.scene.media import Cloud, Grid
+from clpt.scene.media import ON_POINTS, Cloud, Grid
 
 POINT_WORDS = 365  # of a brick, see kernels/motion/brick_density.cl
 
@@ -43,7 +43,7 @@ def stays_there(medium: Grid) -> bool:
     """Return whether kernels read a density where it is: float32 on a device, z fastest, in 16 bits
     a point, without colours or light."""
     density: Any = medium.density
-    more = (medium.albedo_grid, medium.emission_grid, medium.temperature)
+    more = [getattr(medium, name) for name in ON_POINTS]
     plain = medium.bits == 16 and medium.light is None and all(one is None for one in more)
     return plain and (
         isinstance(density, cl_array.Array)

@@ -79,13 +79,13 @@ def bricks(density: object, bits: int = 16) -> Words:
     return np.concatenate([table.ravel(), packed.ravel()])
 
 
-def colours(density: object, albedo: NDArray[Any], spectral: bool) -> Words:
-    """Return the albedo of the bricks that have a density: a word for each, then three a point.
+def colours(density: object, values: NDArray[Any], spectral: bool) -> Words:
+    """Return the colours of the bricks that have a density: a word for each, then three a point.
 
     The first says where its points begin, 0 for nowhere. spectral: they are coefficients of curves.
     """
     used = np.flatnonzero(Windows(density).most)
-    channels = [Windows(albedo[..., c]) for c in range(3)]
+    channels = [Windows(values[..., c]) for c in range(3)]
     points = np.stack([one.of(used) for one in channels], axis=-1)
     words = uplift(points) if spectral else points
     table = np.zeros(len(channels[0].most), np.uint32)

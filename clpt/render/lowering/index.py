@@ -93,6 +93,11 @@ class SceneIndex:
         return any(getattr(medium, "albedo_grid", None) is not None for medium in self.media)
 
     @property
+    def coloured(self) -> bool:
+        """Whether the extinction of some medium has colours on a grid."""
+        return any(getattr(medium, "colour_grid", None) is not None for medium in self.media)
+
+    @property
     def nested(self) -> bool:
         """Whether bodies may overlap, of different priorities."""
         return any(shape.priority for shape in self.shapes)

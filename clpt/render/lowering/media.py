@@ -100,15 +100,18 @@ class MediumWords:
         if isinstance(medium, Lattice) and self._index.glowing:
             rows.append(self._glow(medium, word, absorbs))
         if isinstance(medium, Lattice) and self._index.tinted:
-            rows.append(self._tint(medium))
+            rows.append(self._tint(medium, "albedo_grid"))
+        if isinstance(medium, Lattice) and self._index.coloured:
+            rows.append(self._tint(medium, "colour_grid"))
         self._encoder.store.append("materials", np.concatenate(rows))
         return word
 
-    def _tint(self, medium: Lattice) -> Words:
-        """What stands behind that: where the albedo of its bricks begins, 0 for nowhere."""
-        if not isinstance(medium, Grid) or medium.albedo_grid is None:
+    def _tint(self, medium: Lattice, name: str) -> Words:
+        """What stands behind that: where the colours of its bricks begin, 0 for nowhere."""
+        colours = getattr(medium, name, None)
+        if not isinstance(medium, Grid) or colours is None:
             return np.zeros(1, np.uint32)
-        given = (medium.density, medium.albedo_grid, self._index.spectral)
+        given = (medium.density, colours, self._index.spectral)
         first = self._encoder.store.append("images", self._encoder.cache(grids.colours, *given))
         return np.array([first], np.uint32)
 
