@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -15,12 +16,30 @@ from numpy.typing import NDArray
 
 from clpt import spectra
 from clpt.errors import SceneError
-from clpt.scene.params import Kind, angular, coefficient, host, quantity, real, reflectance
+from clpt.scene.energy import check_reradiation
+from clpt.scene.params import (
+    Kind,
+    angular,
+    coefficient,
+    host,
+    quantity,
+    real,
+    reflectance,
+    reradiation,
+)
 from clpt.scene.params import emission as emitted
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.values import Matrix4, SpectrumLike
 from clpt.scene.volumes import Volume, check_volume, resampled
-from clpt.spectra import RGB, Constant, RGBIlluminant, RGBUnbounded, Spectrum
+from clpt.spectra import (
+    RGB,
+    Constant,
+    Fluorophore,
+    Reradiation,
+    RGBIlluminant,
+    RGBUnbounded,
+    Spectrum,
+)
 from clpt.spectra.spectrum import WIDEST, extremes
 
 MOST_ROWS = 512  # of a table by wavelength
@@ -182,6 +201,48 @@ class Rayleigh(Phase):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Reradiating(Phase):
+    """The same in all directions, of light that also comes from shorter wavelengths than it leaves.
+
+    Of what collides the share `reflectance` keeps its wavelength, and `reradiation` tells what is
+    given out at others. For particles that collide with all wavelengths alike; `dyed` makes one for
+    what absorbs by wavelength. In RGB mode it has the colour that it has under D65, at most white.
+    """
+
+    fluoresces = True
+
+    reflectance: SpectrumLike = reflectance(
+        0.5, "share of the light that keeps its wavelength", textured=False
+    )
+    reradiation: Reradiation | None = reradiation(None, "what is given out at other wavelengths")
+    amount: float = real(1.0, "factor on the re-radiation", low=0.0, high=1.0)
+
+    def check(self) -> None:
+        """Raise SceneError where more light would leave than comes."""
+        if self.reradiation is not None and not isinstance(self.reradiation, PerCollision):
+            check_reradiation(self.kind, self.reflectance, self.reradiation, self.amount)
+
+
+@dataclass(frozen=True, eq=False)
+class PerCollision(Reradiation):
+    """What a dye gives out, over the collisions of the wavelength that leaves.
+
+    factor: the dye's absorption where that of `dye` is 1, over the collisions, a spectrum.
+    """
+
+    dye: Reradiation
+    factor: Spectrum
+
+    @property
+    def table(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        out, into, values = self.dye.table
+        return out, into, values * self.factor.sample(out)[:, None]
+
+    def on_nodes(self, nodes: NDArray[np.float64]) -> NDArray[np.float64]:
+        return self.dye.on_nodes(nodes) * self.factor.sample(nodes)[:, None]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Medium(Kind):
     """Base of all media."""
 
@@ -192,6 +253,13 @@ class Medium(Kind):
     def scatters(self) -> bool:
         """Whether it scatters light of any wavelength."""
         raise NotImplementedError
+
+    def collisions(self, spectral: bool) -> Phase:
+        """Return what becomes of light that collides.
+
+        spectral: whether it has wavelengths, or three numbers.
+        """
+        return self.phase
 
     @property
     def is_chromatic(self) -> bool:
@@ -286,6 +354,92 @@ class Homogeneous(Medium):
             return a, s
         scaled = [_combined([value], lambda v: self.scale * v[0], spectral) for value in (a, s)]
         return scaled[0], scaled[1]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Dyed(Homogeneous):
+    """A homogeneous medium with a dye in it, which gives out light at longer wavelengths.
+
+    A metre absorbs `strength` times the dye's `absorption`, beside what the medium does. For the
+    photons absorbed the dye gives out its quantum yield, by its emission, in all directions alike
+    (Mojzik et al. 2018). Elastic scattering beside it is alike in all directions too. In RGB mode
+    the dye only absorbs.
+
+    Raises SceneError for another re-radiation than that of a dye, and for a `phase` beside it.
+    """
+
+    dye: Reradiation | None = reradiation(None, "a fluorophore")
+    strength: float = real(
+        1.0, "how much a metre absorbs [1/m] where the dye's absorption is 1", low=0.0
+    )
+
+    def check(self) -> None:
+        super().check()
+        if self.dye is None:
+            return
+        if not isinstance(self.dye, Fluorophore):
+            message = "must be a dye: `absorption`, `emission` and `quantum_yield`"
+            raise SceneError(message, where=f"{self.kind}.dye")
+        if not isinstance(self.phase, Isotropic):
+            message = "a medium with a dye scatters alike in all directions: leave it out"
+            raise SceneError(message, where=f"{self.kind}.phase")
+        if not _is_dark(self.emission):
+            message = "a medium with a dye gives out no light by itself: leave it out"
+            raise SceneError(message, where=f"{self.kind}.emission")
+
+    @property
+    def glows(self) -> bool:
+        """Whether it has a dye that gives out light."""
+        dye = self.dye
+        given = isinstance(dye, Fluorophore) and dye.quantum_yield > 0.0
+        return given and self.strength * self.scale > 0.0
+
+    @property
+    def is_chromatic(self) -> bool:
+        return self.dye is not None or super().is_chromatic
+
+    def coefficients(self, spectral: bool) -> tuple[Spectrum, Spectrum]:
+        """Return the rest of the extinction, and how much a metre sends on [1/m].
+
+        The latter, the collisions, are what it scatters and what the dye gives out where light is
+        the same at all wavelengths. The former may be below zero: the dye takes light at others.
+        """
+        absorbs, scatters = super().coefficients(spectral)
+        dye, strength = self.dye, self.strength * self.scale
+        if not isinstance(dye, Fluorophore) or strength == 0.0:
+            return absorbs, scatters
+        taken = _combined([absorbs, dye.absorption], lambda v: v[0] + strength * v[1], spectral)
+        if not spectral or not self.glows:
+            return taken, scatters
+        given = self._given
+        return (
+            _combined([taken, given], lambda v: v[0] - strength * v[1], spectral),
+            _combined([scatters, given], lambda v: v[0] + strength * v[1], spectral),
+        )
+
+    def collisions(self, spectral: bool) -> Phase:
+        return self._collisions if spectral and self.glows else self.phase
+
+    @cached_property
+    def _collisions(self) -> Phase:
+        dye: Any = self.dye
+        scatters, sent = super().coefficients(True)[1], self.coefficients(True)[1]
+        strength = self.strength * self.scale
+        over = np.maximum(sent.sample(WIDEST), 1e-30)
+        elastic = np.clip(scatters.sample(WIDEST) / over, 0.0, 1.0)
+        factor = np.where(over > 1e-30, strength / over, 0.0)
+        return Reradiating(
+            reflectance=spectra.Tabulated(WIDEST, elastic, "hold"),
+            reradiation=PerCollision(dye, spectra.Tabulated(WIDEST, factor, "hold")),
+        )
+
+    @property
+    def _given(self) -> Spectrum:
+        """What it gives out at a wavelength, where light is the same at all."""
+        dye: Any = self.dye
+        out, into, values = dye.table
+        sums = 0.5 * (values[:, 1:] + values[:, :-1]) @ np.diff(into)
+        return spectra.Tabulated(out, sums)
 
 
 def _whole(rows: Any, cosines: Any) -> NDArray[np.float64]:
@@ -548,6 +702,13 @@ def _lit(value: Any) -> Spectrum:
     return lit
 
 
-PHASE_LEAVES: tuple[type[Phase], ...] = (Isotropic, HenyeyGreenstein, Rayleigh, Draine, Tabulated)
+PHASE_LEAVES: tuple[type[Phase], ...] = (
+    Isotropic,
+    HenyeyGreenstein,
+    Rayleigh,
+    Draine,
+    Reradiating,
+    Tabulated,
+)
 PHASES: tuple[type[Phase], ...] = (*PHASE_LEAVES, Blend)
-KINDS: tuple[type[Medium], ...] = (Homogeneous, Grid, Cloud, Soot)
+KINDS: tuple[type[Medium], ...] = (Homogeneous, Grid, Cloud, Dyed, Soot)

@@ -97,6 +97,7 @@ def features_of(
         motion_scales=index.motions.scales,
         motion_row=motion_row,
         tinted_grids=index.tinted,
+        dyed_media=index.dyed,
         coloured_grids=index.coloured,
         byte_grids=any(isinstance(one, Grid) and one.bits == 8 for one in index.media),
         dispersion=glass_lens or disperses(index.leaves, sources),

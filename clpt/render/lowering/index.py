@@ -98,6 +98,11 @@ class SceneIndex:
         return any(getattr(medium, "colour_grid", None) is not None for medium in self.media)
 
     @property
+    def dyed(self) -> bool:
+        """Whether some medium has a dye that gives out light."""
+        return self.spectral and any(getattr(medium, "glows", False) for medium in self.media)
+
+    @property
     def nested(self) -> bool:
         """Whether bodies may overlap, of different priorities."""
         return any(shape.priority for shape in self.shapes)
@@ -238,7 +243,8 @@ def _media(scene: Scene, shapes_: tuple[Shape, ...]) -> list[Medium]:
 def _phase_kinds(scene: Scene, shapes_: tuple[Shape, ...]) -> tuple[type[Scatterer], ...]:
     """The kinds of phase functions of a scene, in the order of their table."""
     scattering = (medium for medium in _media(scene, shapes_) if medium.scatters)
-    found = {type(leaf) for medium in scattering for leaf in medium.phase.leaves}
+    phases = [medium.collisions(scene.film.mode == "spectral") for medium in scattering]
+    found = {type(leaf) for phase in phases for leaf in phase.leaves}
     return tuple(cls for cls in PHASE_LEAVES if cls in found)
 
 

@@ -16,7 +16,7 @@ from clpt.render.lowering.lights.brick_lights import BrickLights
 from clpt.render.lowering.lights.lights import LightRows
 from clpt.render.lowering.materials.material_words import MaterialWords
 from clpt.render.lowering.tables import Words, as_words
-from clpt.scene.media import Grid, Lattice, Medium
+from clpt.scene.media import Dyed, Grid, Lattice, Medium
 from clpt.scene.shapes import Shape
 from clpt.spectra import Constant, Spectrum
 
@@ -24,6 +24,7 @@ MOST_AIMS = 8  # lamps near which flights end, see kernels/optics/equiangular.cl
 FLIES = 0x40000000  # in a medium's word: the stage `flight` takes rays through it
 BYTES = 0x10000000  # which has 8 bits for each number
 GRID = 0x20000000  # a density on a grid multiplies its coefficients
+DYED = 0x04000000  # with a dye that gives out light
 SEALED = 0x08000000  # no shadow ray leaves it, see sealed.py
 
 
@@ -83,7 +84,9 @@ class MediumWords:
         return np.array(sides, np.uint32)
 
     def _new_word(self, medium: Medium) -> int:
-        phase = self._materials.phase(medium.phase) if medium.scatters else 0
+        phase = (
+            self._materials.phase(medium.collisions(self._index.spectral)) if medium.scatters else 0
+        )
         absorbs, scatters = medium.coefficients(self._index.spectral)
         rows = [np.array([phase], np.uint32)]
         if self._index.emitting:
@@ -92,6 +95,8 @@ class MediumWords:
         for name, value in (("absorption", absorbs), ("scattering", scatters)):
             rows.append(self._encoder.named_words("medium", name, value, "coefficient")[0])
         word = FLIES | (SEALED if medium in self._sealed else 0)
+        if isinstance(medium, Dyed) and medium.glows and self._index.spectral:
+            word |= DYED
         if isinstance(medium, Lattice):
             rows.append(grids.row(medium, self._encoder))
             word |= GRID | (BYTES if getattr(medium, "bits", 16) == 8 else 0)

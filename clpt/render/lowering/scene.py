@@ -267,7 +267,7 @@ def _lower_film(index: SceneIndex, encoder: Encoder, wavelengths: Density) -> tu
 
 def _begin_materials(index: SceneIndex, encoder: Encoder) -> MaterialWords:
     """Append what idle lanes read as a material, and make the maker of material words."""
-    if index.spectral and mt.Fluorescent in index.leaves:
+    if index.shifts:
         encoder.spectra.expect_light(emissions(index))
     longest = max(map(row_words, (*mt.LEAVES, *index.leaves)))
     encoder.store.append("materials", np.zeros(longest, np.uint32))
@@ -367,6 +367,8 @@ def _warnings(index: SceneIndex) -> list[str]:
         warnings.append("no light in the scene, so the picture is black: add one to `lights`")
     if film.mode == "rgb" and mt.Fluorescent in index.leaves:
         warnings.append("in rgb mode fluorescent paint has its colour under D65, at most white")
+    if film.mode == "rgb" and any(getattr(medium, "glows", False) for medium in index.media):
+        warnings.append("in rgb mode dyes in media only absorb: ask for the spectral mode")
     return warnings
 
 
@@ -409,7 +411,7 @@ def _left_to_the_camera(index: SceneIndex) -> list[str]:
         if not index.lights_reach:
             reason = index.lit_media
         if index.shifts:
-            reason = "fluorescent paint gives light other wavelengths"
+            reason = "what fluoresces gives light other wavelengths"
         warnings.append(f"{kind}.merging: left aside, as {reason}")
     if not index.lights_reach:
         warnings.append(f"{kind}.light_paths: left aside, as {index.lit_media}")
