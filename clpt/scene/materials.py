@@ -10,10 +10,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from clpt.errors import SceneError
 from clpt.measured import Measurement, MerlTable
+from clpt.scene.energy import check_reradiation
 from clpt.scene.params import (
     ORDERS,
     Kind,
@@ -40,7 +39,6 @@ from clpt.spectra import Reradiation, Spectrum
 
 DISTRIBUTIONS = ("ggx", "beckmann")
 FILMS = "thin films on the surface, from the outside in"
-MEASURED = 0.02  # how much more light than comes may leave, by the noise of a measurement
 
 
 def pigment(eumelanin: float, pheomelanin: float) -> tuple[float, ...]:
@@ -533,15 +531,7 @@ class Fluorescent(Material):
         if self.reradiation is None or not isinstance(self.reflectance, Spectrum):
             return
         amount = self.amount if isinstance(self.amount, float) else 1.0
-        into = self.reradiation.table[1]
-        total = self.reflectance.sample(into) + amount * self.reradiation.emitted(into)
-        most = int(np.argmax(total))
-        if total[most] > 1.0 + MEASURED:
-            raise SceneError(
-                f"of the light at {into[most]:g} nm, {total[most]:.3f} would leave the surface; "
-                "lower the reflectance, the yield or the amount",
-                where=f"{self.kind}.reradiation",
-            )
+        check_reradiation(self.kind, self.reflectance, self.reradiation, amount)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

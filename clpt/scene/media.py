@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -15,17 +16,38 @@ from numpy.typing import NDArray
 
 from clpt import spectra
 from clpt.errors import SceneError
-from clpt.scene.params import Kind, angular, coefficient, host, quantity, real, reflectance
+from clpt.scene.energy import check_reradiation
+from clpt.scene.params import (
+    Kind,
+    angular,
+    coefficient,
+    host,
+    quantity,
+    real,
+    reflectance,
+    reradiation,
+)
 from clpt.scene.params import emission as emitted
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.values import Matrix4, SpectrumLike
 from clpt.scene.volumes import Volume, check_volume, resampled
-from clpt.spectra import RGB, Constant, RGBIlluminant, RGBUnbounded, Spectrum
+from clpt.spectra import (
+    RGB,
+    Constant,
+    Fluorophore,
+    Reradiation,
+    RGBIlluminant,
+    RGBUnbounded,
+    Spectrum,
+)
 from clpt.spectra.spectrum import WIDEST, extremes
 
 MOST_ROWS = 512  # of a table by wavelength
 SOOT = 0.26  # E(m), the imaginary part of (m^2 - 1) / (m^2 + 2) without its sign
 COLDEST = 100.0  # [K] below which nothing is seen of a black body
+ON_POINTS = ("emission_grid", "temperature", "albedo_grid", "colour_grid")  # of a `Grid`
+OCTAVE = 1.99  # how much finer each octave of a cloud's noise is than the one before
+CLOUD_LEAST, CLOUD_MOST, CLOUD_FINEST = 32, 256, 1024  # points along a cloud's longest side
 RADIANCE = "W m^-2 sr^-1 nm^-1"
 
 
@@ -179,6 +201,48 @@ class Rayleigh(Phase):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Reradiating(Phase):
+    """The same in all directions, of light that also comes from shorter wavelengths than it leaves.
+
+    Of what collides the share `reflectance` keeps its wavelength, and `reradiation` tells what is
+    given out at others. For particles that collide with all wavelengths alike; `dyed` makes one for
+    what absorbs by wavelength. In RGB mode it has the colour that it has under D65, at most white.
+    """
+
+    fluoresces = True
+
+    reflectance: SpectrumLike = reflectance(
+        0.5, "share of the light that keeps its wavelength", textured=False
+    )
+    reradiation: Reradiation | None = reradiation(None, "what is given out at other wavelengths")
+    amount: float = real(1.0, "factor on the re-radiation", low=0.0, high=1.0)
+
+    def check(self) -> None:
+        """Raise SceneError where more light would leave than comes."""
+        if self.reradiation is not None and not isinstance(self.reradiation, PerCollision):
+            check_reradiation(self.kind, self.reflectance, self.reradiation, self.amount)
+
+
+@dataclass(frozen=True, eq=False)
+class PerCollision(Reradiation):
+    """What a dye gives out, over the collisions of the wavelength that leaves.
+
+    factor: the dye's absorption where that of `dye` is 1, over the collisions, a spectrum.
+    """
+
+    dye: Reradiation
+    factor: Spectrum
+
+    @property
+    def table(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        out, into, values = self.dye.table
+        return out, into, values * self.factor.sample(out)[:, None]
+
+    def on_nodes(self, nodes: NDArray[np.float64]) -> NDArray[np.float64]:
+        return self.dye.on_nodes(nodes) * self.factor.sample(nodes)[:, None]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Medium(Kind):
     """Base of all media."""
 
@@ -189,6 +253,13 @@ class Medium(Kind):
     def scatters(self) -> bool:
         """Whether it scatters light of any wavelength."""
         raise NotImplementedError
+
+    def collisions(self, spectral: bool) -> Phase:
+        """Return what becomes of light that collides.
+
+        spectral: whether it has wavelengths, or three numbers.
+        """
+        return self.phase
 
     @property
     def is_chromatic(self) -> bool:
@@ -285,13 +356,180 @@ class Homogeneous(Medium):
         return scaled[0], scaled[1]
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Dyed(Homogeneous):
+    """A homogeneous medium with a dye in it, which gives out light at longer wavelengths.
+
+    A metre absorbs `strength` times the dye's `absorption`, beside what the medium does. For the
+    photons absorbed the dye gives out its quantum yield, by its emission, in all directions alike
+    (Mojzik et al. 2018). Elastic scattering beside it is alike in all directions too. In RGB mode
+    the dye only absorbs.
+
+    Raises SceneError for another re-radiation than that of a dye, and for a `phase` beside it.
+    """
+
+    dye: Reradiation | None = reradiation(None, "a fluorophore")
+    strength: float = real(
+        1.0, "how much a metre absorbs [1/m] where the dye's absorption is 1", low=0.0
+    )
+
+    def check(self) -> None:
+        super().check()
+        if self.dye is None:
+            return
+        if not isinstance(self.dye, Fluorophore):
+            message = "must be a dye: `absorption`, `emission` and `quantum_yield`"
+            raise SceneError(message, where=f"{self.kind}.dye")
+        if not isinstance(self.phase, Isotropic):
+            message = "a medium with a dye scatters alike in all directions: leave it out"
+            raise SceneError(message, where=f"{self.kind}.phase")
+        if not _is_dark(self.emission):
+            message = "a medium with a dye gives out no light by itself: leave it out"
+            raise SceneError(message, where=f"{self.kind}.emission")
+
+    @property
+    def glows(self) -> bool:
+        """Whether it has a dye that gives out light."""
+        dye = self.dye
+        given = isinstance(dye, Fluorophore) and dye.quantum_yield > 0.0
+        return given and self.strength * self.scale > 0.0
+
+    @property
+    def is_chromatic(self) -> bool:
+        return self.dye is not None or super().is_chromatic
+
+    def coefficients(self, spectral: bool) -> tuple[Spectrum, Spectrum]:
+        """Return the rest of the extinction, and how much a metre sends on [1/m].
+
+        The latter, the collisions, are what it scatters and what the dye gives out where light is
+        the same at all wavelengths. The former may be below zero: the dye takes light at others.
+        """
+        absorbs, scatters = super().coefficients(spectral)
+        dye, strength = self.dye, self.strength * self.scale
+        if not isinstance(dye, Fluorophore) or strength == 0.0:
+            return absorbs, scatters
+        taken = _combined([absorbs, dye.absorption], lambda v: v[0] + strength * v[1], spectral)
+        if not spectral or not self.glows:
+            return taken, scatters
+        given = self._given
+        return (
+            _combined([taken, given], lambda v: v[0] - strength * v[1], spectral),
+            _combined([scatters, given], lambda v: v[0] + strength * v[1], spectral),
+        )
+
+    def collisions(self, spectral: bool) -> Phase:
+        return self._collisions if spectral and self.glows else self.phase
+
+    @cached_property
+    def _collisions(self) -> Phase:
+        dye: Any = self.dye
+        scatters, sent = super().coefficients(True)[1], self.coefficients(True)[1]
+        strength = self.strength * self.scale
+        over = np.maximum(sent.sample(WIDEST), 1e-30)
+        elastic = np.clip(scatters.sample(WIDEST) / over, 0.0, 1.0)
+        factor = np.where(over > 1e-30, strength / over, 0.0)
+        return Reradiating(
+            reflectance=spectra.Tabulated(WIDEST, elastic, "hold"),
+            reradiation=PerCollision(dye, spectra.Tabulated(WIDEST, factor, "hold")),
+        )
+
+    @property
+    def _given(self) -> Spectrum:
+        """What it gives out at a wavelength, where light is the same at all."""
+        dye: Any = self.dye
+        out, into, values = dye.table
+        sums = 0.5 * (values[:, 1:] + values[:, :-1]) @ np.diff(into)
+        return spectra.Tabulated(out, sums)
+
+
 def _whole(rows: Any, cosines: Any) -> NDArray[np.float64]:
     """Integrals over directions of rows (m, n) that are linear between cosines (n,)."""
     return np.pi * ((rows[:, 1:] + rows[:, :-1]) @ np.diff(cosines))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Grid(Homogeneous):
+class Lattice(Homogeneous):
+    """Base of media whose coefficients a density multiplies, at points of a lattice in a box."""
+
+    to_world: Matrix4 = host(np.eye(4), "takes the unit cube to the grid's box")
+
+    @property
+    def size(self) -> tuple[int, ...]:
+        """The number of points along x, y and z."""
+        raise NotImplementedError
+
+    @property
+    def box(self) -> NDArray[np.float64]:
+        """A matrix (4, 4) from the unit cube to the box in the world."""
+        return np.asarray(self.to_world, float)
+
+    def check(self) -> None:
+        """Raise SceneError for a box without an inside."""
+        super().check()
+        if not abs(np.linalg.det(self.box[:3, :3])) > 0.0:
+            raise SceneError("has no inverse", where=f"{self.kind}.to_world")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Cloud(Lattice):
+    """A homogeneous medium whose coefficients are multiplied by the density of a cloud.
+
+    That is PBRT's, from Perlin's noise: five octaves, at places that two more shift. In the cloud's
+    own space y is the height. Up to 1/2 it fills with density, and at 1 it ends. `to_world` takes
+    that space to the world, `low` and `high` are the corners of the cloud's box there.
+
+    The density is worked out on the device at the points of a lattice, `resolution` along the
+    longest side of the box. That takes two bytes a point.
+
+    Raises SceneError for a box without an inside, and for a lattice too fine.
+    """
+
+    density: float = real(1.0, "how much of the noise becomes cloud", low=0.0)
+    wispiness: float = real(1.0, "how much the noise is shifted", low=0.0, high=100.0)
+    frequency: float = real(5.0, "cells of the first octave along a unit length", low=0.0, high=1e4)
+    low: Any = host((0.0, 0.0, 0.0), "a corner of the box", form="vector")
+    high: Any = host((1.0, 1.0, 1.0), "the opposite one", form="vector")
+    resolution: int = host(
+        0, "points along the longest side of the box; 0: two for each cell of the finest octave, "
+        f"from {CLOUD_LEAST} to {CLOUD_MOST}"
+    )  # fmt: skip
+
+    def check(self) -> None:
+        for name in ("low", "high"):
+            found = np.asarray(getattr(self, name), float)
+            if found.shape != (3,) or not np.isfinite(found).all():
+                raise SceneError("must be three numbers", where=f"{self.kind}.{name}")
+        corners = np.array([self.low, self.high], float)
+        object.__setattr__(self, "low", tuple(corners.min(axis=0).tolist()))
+        object.__setattr__(self, "high", tuple(corners.max(axis=0).tolist()))
+        if not (self._sides > 0.0).all():
+            raise SceneError("the box is flat: it equals `low`", where=f"{self.kind}.high")
+        if not 0 <= self.resolution <= CLOUD_FINEST:
+            message = f"must be 0 to {CLOUD_FINEST}, not {self.resolution!r}"
+            raise SceneError(message, where=f"{self.kind}.resolution")
+        super().check()
+
+    @property
+    def _sides(self) -> NDArray[np.float64]:
+        sides: NDArray[np.float64] = np.asarray(self.high, float) - np.asarray(self.low, float)
+        return sides
+
+    @property
+    def size(self) -> tuple[int, ...]:
+        sides = self._sides
+        wanted = 2.0 * self.frequency * OCTAVE**4 * sides.max()
+        along = self.resolution or int(np.clip(np.ceil(wanted), CLOUD_LEAST, CLOUD_MOST))
+        return tuple(int(n) for n in np.maximum(np.rint(along * sides / sides.max()), 1))
+
+    @property
+    def box(self) -> NDArray[np.float64]:
+        own = np.diag([*self._sides, 1.0])
+        own[:3, 3] = self.low
+        return np.asarray(self.to_world, float) @ own
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Grid(Lattice):
     """A homogeneous medium whose coefficients are multiplied by a density on a grid.
 
     The density (nx, ny, nz) is that at the centres of the cells of a box, trilinear between these;
@@ -311,10 +549,13 @@ class Grid(Homogeneous):
         "numbers (nx, ny, nz) that multiply the coefficients",
         form="volume",
     )
-    to_world: Matrix4 = host(np.eye(4), "takes the unit cube to the grid's box")
     bits: int = host(16, "of a number of the density on the device: 16 or 8")
     albedo_grid: Any = host(
         None, "colours (nx, ny, nz, 3) that multiply what is scattered; the rest is absorbed",
+        form="colour_volume",
+    )  # fmt: skip
+    colour_grid: Any = host(
+        None, "colours (nx, ny, nz, 3) up to 1 that multiply the extinction",
         form="colour_volume",
     )  # fmt: skip
     emission_grid: Any = host(None, "numbers (nx, ny, nz) that multiply `emission`", form="volume")
@@ -326,21 +567,24 @@ class Grid(Homogeneous):
         False, "whether a black body of any temperature has 1 at its brightest wavelength"
     )
 
+    @property
+    def size(self) -> tuple[int, ...]:
+        found: tuple[int, ...] = self.density.shape
+        return found
+
     def check(self) -> None:
-        super().check()
         own = np.asarray(self.to_world, float)
         if isinstance(self.density, Volume):
             object.__setattr__(self, "to_world", own @ np.asarray(self.density.to_world, float))
             object.__setattr__(self, "density", self.density.values)
+        super().check()
         check_volume(self.density, f"{self.kind}.density")
-        if not abs(np.linalg.det(np.asarray(self.to_world, float)[:3, :3])) > 0.0:
-            raise SceneError("has no inverse", where=f"{self.kind}.to_world")
         if self.bits not in (8, 16):
             raise SceneError(f"must be 16 or 8, not {self.bits!r}", where=f"{self.kind}.bits")
         if self.temperature is not None and self.emission_grid is not None:
             message = "give `emission_grid` or `temperature`, not both"
             raise SceneError(message, where=self.kind)
-        for name in ("emission_grid", "temperature", "albedo_grid"):
+        for name in ON_POINTS:
             self._fit(name, own)
 
     def _fit(self, name: str, own: Matrix4) -> None:
@@ -349,8 +593,9 @@ class Grid(Homogeneous):
         if given is None:
             return
         values = given.values if isinstance(given, Volume) else given
-        check_volume(values, where, colours=name == "albedo_grid")
-        if name == "albedo_grid" and not (isinstance(values, np.ndarray) and values.max() <= 1.0):
+        coloured = name in ("albedo_grid", "colour_grid")
+        check_volume(values, where, colours=coloured)
+        if coloured and not (isinstance(values, np.ndarray) and values.max() <= 1.0):
             raise SceneError("must be an array of numpy, of numbers up to 1", where=where)
         box = np.asarray(self.to_world, float)
         placed = own @ np.asarray(given.to_world, float) if isinstance(given, Volume) else box
@@ -364,6 +609,10 @@ class Grid(Homogeneous):
             else:
                 values = resampled(values, placed, self.density.shape, box)
         object.__setattr__(self, name, values)
+
+    @property
+    def is_chromatic(self) -> bool:
+        return self.colour_grid is not None or super().is_chromatic
 
     @property
     def light(self) -> Spectrum | None:
@@ -453,6 +702,13 @@ def _lit(value: Any) -> Spectrum:
     return lit
 
 
-PHASE_LEAVES: tuple[type[Phase], ...] = (Isotropic, HenyeyGreenstein, Rayleigh, Draine, Tabulated)
+PHASE_LEAVES: tuple[type[Phase], ...] = (
+    Isotropic,
+    HenyeyGreenstein,
+    Rayleigh,
+    Draine,
+    Reradiating,
+    Tabulated,
+)
 PHASES: tuple[type[Phase], ...] = (*PHASE_LEAVES, Blend)
-KINDS: tuple[type[Medium], ...] = (Homogeneous, Grid, Soot)
+KINDS: tuple[type[Medium], ...] = (Homogeneous, Grid, Cloud, Dyed, Soot)

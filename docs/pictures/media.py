@@ -11,20 +11,22 @@ from clpt.scene import Scene, integrators, media, shapes
 from clpt.scene.materials import Null
 from clpt.transforms import scale, translate
 
+from .materials import blue_lamp, dye
 from .studio import PLACES, Array, Picture, studio
 
+BLUE: dict[str, Any] = {"mode": "spectral", "lamps": blue_lamp(), "dim": 0.05}
 WHITE, AMBER, WINE = (5.0, 5.0, 5.0), (1.5, 4.0, 9.0), (0.4, 5.0, 4.4)
 
 
-def balls(caption: str, *made: media.Medium, spp: int = 128) -> Picture:
-    """Balls of three media, from left to right."""
+def balls(caption: str, *made: media.Medium, spp: int = 128, **lit: Any) -> Picture:
+    """Balls of three media, from left to right; lit: of `studio`."""
 
     def scene() -> Scene:
         things = [
             shapes.Sphere(center=(x, 0.56, 0.0), radius=0.55, material=Null(), interior=medium)
             for medium, x in zip(made, PLACES, strict=True)
         ]
-        made_scene = studio(list(things))
+        made_scene = studio(list(things), **lit)
         made_scene.integrator = integrators.Path(max_depth=100)
         return made_scene
 
@@ -63,6 +65,28 @@ MEDIA = {
         _ball((np.arange(9) % 2.0)[None, :, None], 0.0, sigma_s=14.0),
         _ball((1.0 - np.linspace(0.0, 1.0, 24))[None, :, None] ** 2, 1.42, sigma_t=AMBER),
     ),
+    "cloud": balls(
+        "`wispiness` of 0, 1 and 4; `density` of 1, 2 and 4",
+        *(
+            media.Cloud(
+                sigma_s=60.0,
+                wispiness=wispiness,
+                density=density,
+                low=(0.0, 0.3, 0.0),
+                high=(1.0, 1.0, 1.0),
+                to_world=translate([x - 0.55, -0.33, -0.55]) @ scale([1.1, 1.45, 1.1]),
+            )
+            for x, wispiness, density in ((-1.42, 0.0, 1.0), (0.0, 1.0, 2.0), (1.42, 4.0, 4.0))
+        ),
+    ),
+    "dyed": balls(
+        "under a blue lamp: `strength` of 0.5, 4 and 32 of a dye that gives out orange",
+        *(
+            media.Dyed(dye=dye()["reradiation"], strength=strength, sigma_s=0.3)
+            for strength in (0.5, 4.0, 32.0)
+        ),
+        **BLUE,
+    ),
     "soot": balls(
         "soot of 0.01, 0.04 and 0.16 millionths, as hot as a candle",
         *(
@@ -95,6 +119,19 @@ PHASES = {
     "draine": _phases(
         "`g` of 0.6 and `alpha` of 0, 1 and 30",
         *(media.Draine(g=0.6, alpha=alpha) for alpha in (0.0, 1.0, 30.0)),
+    ),
+    "reradiating": balls(
+        "under a blue lamp: `amount` of 0, 0.4 and 1 of a dye that gives out orange",
+        *(
+            media.Homogeneous(
+                sigma_s=6.0,
+                phase=media.Reradiating(
+                    reflectance=0.3, reradiation=dye()["reradiation"], amount=amount
+                ),
+            )
+            for amount in (0.0, 0.4, 1.0)
+        ),
+        **BLUE,
     ),
     "tabulated": balls(
         "drops of water of 0.05, 0.5 and 5 um of radius, by `clpt mie`",

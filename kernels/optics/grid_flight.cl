@@ -21,10 +21,8 @@ typedef struct {
     real pdf, before; /* [1/sr]; [m] from there to the flight's origin */
     vec3 from, hemisphere;
 } GridOrigin;
-#elif GRIDS_TINTED
-#define GRID_ORIGIN_ARGS , Wavelengths lambdas
 #else
-#define GRID_ORIGIN_ARGS
+#define GRID_ORIGIN_ARGS GRID_TINT_ARGS
 #endif
 
 /* After so much of the highest density, times metres, since the last collision the path is as likely as `pdf` at each
@@ -108,19 +106,20 @@ inline GridFlight grid_flight(Scene scene, integer name, Medium m, vec3 o, vec3 
         if (any(meets)) {
             natural bits = hash_natural(key + count * 0x9e3779b9u), more = hash_natural(bits ^ 0x68bc21ebu);
             real density = grid_density(scene, w, b, meets, more);
-#if GRIDS_TINTED
-            Spectrum own = grid_scatters(scene, name, w, m.sigma_s, meets, more, lambdas);
+            Medium own = grid_medium(scene, name, m, w, meets, more GRID_TINT_PASSED);
+            Spectrum scatters = spectrum_scale(own.sigma_s, density);
+#if GRIDS_COLOURED
+            Spectrum lacks = spectrum_sub(m.sigma_t, spectrum_scale(own.sigma_t, density));
 #else
-            Spectrum own = m.sigma_s;
+            Spectrum lacks = spectrum_scale(m.sigma_t, 1.0f - density);
 #endif
-            Spectrum scatters = spectrum_scale(own, density), lacks = spectrum_scale(m.sigma_t, 1.0f - density);
             real chance = spectrum_mean(spectrum_mul(f.ratio, spectrum_div(scatters,
                 spectrum_add(spectrum_add(scatters, lacks), spectrum_of(1e-30f)))));
             more = hash_natural(more ^ 0x2f6e2b1u);
             mask real_one = meets & (unit_interval(more) < chance);
             chance = 1.0f / max_r(sel(real_one, chance, 1.0f - chance), (real)(1e-30f));
             Spectrum value = spectrum_scale(spectrum_sel(real_one, scatters, lacks), chance);
-            Spectrum kept = spectrum_sub(spectrum_of(1.0f), spectrum_scale(m.sigma_t, density / most));
+            Spectrum kept = spectrum_sub(spectrum_of(1.0f), spectrum_scale(own.sigma_t, density / most));
             value = spectrum_sel(dims, kept, value);
             grid_weigh(m, passed, value, spectrum_sel(dims, spectrum_of(1.0f), m.sigma_t), meets, &f);
             f.collides = f.collides | real_one;

@@ -148,14 +148,66 @@ inline real grid_density(Scene scene, GridWalk w, GridBrick b, mask active, natu
 
 inline real grid_length(natural bits) { return -log_r(1.0f - unit_interval(bits)); }
 
+#if GRIDS_TINTED || GRIDS_COLOURED
+#if GRIDS_EMIT
+#define GRID_ALBEDO (2 * MEDIUM_SCATTERING + 25) /* words from a medium's row: behind optics/medium_grid_light.cl's */
+#else
+#define GRID_ALBEDO (2 * MEDIUM_SCATTERING + 19)
+#endif
+#if GRIDS_TINTED
+#define GRID_COLOUR (GRID_ALBEDO + 1)
+#else
+#define GRID_COLOUR GRID_ALBEDO
+#endif
+/* The colour at the point that `bits` choose, of those that word `at` of a medium's row tells; 1 where there are none.
+ * In `images` each brick has a word, where its points begin from the first one on, and a point three: a colour, or the
+ * coefficients of its curve. */
+inline Spectrum grid_tint(Scene scene, integer name, int at, GridWalk w, mask active, natural bits, Wavelengths lambdas)
+{
+    integer first = gather_i(scene.materials, sel_i(active, MEDIUM_ROW(name) + at, (integer)(0)));
+    active = active & (first != 0);
+    integer brick = (w.z * w.ny + w.y) * w.nx + w.x;
+    integer points = first + gather_i(scene.images, sel_i(active, first + brick, (integer)(0)));
+    integer point = sel_i(active, points + 3 * grid_corner(w, bits), (integer)(0));
+    vec4 words = v4(gather_w(scene.images, point), gather_w(scene.images, point + 1),
+                    gather_w(scene.images, point + 2), (real)(1.0f));
+    return spectrum_sel(active, spectrum_constant(words, lambdas), spectrum_of(1.0f));
+}
+#endif
+
+/* The medium at the point that `bits` choose, where its density is 1: albedo and extinction may have colours there.
+ * These are at most 1, so that the highest density of a brick bounds the extinction at all wavelengths. */
+#if GRIDS_TINTED || GRIDS_COLOURED
+#define GRID_TINT_ARGS , Wavelengths lambdas
+#define GRID_TINT_PASSED , lambdas
+#else
+#define GRID_TINT_ARGS
+#define GRID_TINT_PASSED
+#endif
+inline Medium grid_medium(Scene scene, integer name, Medium m, GridWalk w, mask active, natural bits GRID_TINT_ARGS)
+{
+#if GRIDS_COLOURED
+    Spectrum colour = grid_tint(scene, name, GRID_COLOUR, w, active, bits, lambdas);
+    m.sigma_s = spectrum_mul(m.sigma_s, colour);
+    m.sigma_t = spectrum_mul(m.sigma_t, colour);
+#endif
+#if GRIDS_TINTED
+    m.sigma_s = spectrum_mul(m.sigma_s, grid_tint(scene, name, GRID_ALBEDO, w, active, bits, lambdas));
+#endif
+    return m;
+}
+
 /* How much of the light passes t metres from o along d through the medium `name`: an estimate. */
 inline Spectrum grid_transmittance(Scene scene, integer name, Medium m, vec3 o, vec3 d, real t, natural key,
-                                   mask active)
+                                   mask active GRID_TINT_ARGS)
 {
     GridWalk w;
     active = grid_begin(scene, name, o, d, t, active, &w);
     real most = max_r(spectrum_max(m.sigma_t), (real)(1e-30f)), inverse = 1.0f / most;
-    Spectrum share = spectrum_scale(m.sigma_t, inverse), passes = spectrum_of(1.0f);
+    Spectrum passes = spectrum_of(1.0f);
+#if !GRIDS_COLOURED
+    Spectrum share = spectrum_scale(m.sigma_t, inverse);
+#endif
     natural count = 1u, bits = hash_natural(key);
     real left = grid_length(bits) * inverse;
     while (any(active)) {
@@ -168,6 +220,10 @@ inline Spectrum grid_transmittance(Scene scene, integer name, Medium m, vec3 o, 
             bits = hash_natural(key + count * 0x9e3779b9u);
             natural more = hash_natural(bits ^ 0x68bc21ebu);
             real density = grid_density(scene, w, b, meets, more);
+#if GRIDS_COLOURED
+            Spectrum share = grid_medium(scene, name, m, w, meets, more GRID_TINT_PASSED).sigma_t;
+            share = spectrum_scale(share, inverse);
+#endif
             Spectrum kept = spectrum_sub(spectrum_of(1.0f), spectrum_scale(share, density));
             passes = spectrum_sel(meets, spectrum_mul(passes, kept), passes);
             mask staked = meets & (spectrum_max(passes) < GRID_ROULETTE);
@@ -181,25 +237,3 @@ inline Spectrum grid_transmittance(Scene scene, integer name, Medium m, vec3 o, 
     }
     return passes;
 }
-
-#if GRIDS_TINTED
-#if GRIDS_EMIT
-#define GRID_ALBEDO (2 * MEDIUM_SCATTERING + 25) /* words from a medium's row: behind optics/medium_grid_light.cl's */
-#else
-#define GRID_ALBEDO (2 * MEDIUM_SCATTERING + 19)
-#endif
-/* What multiplies `scatters`, a medium's sigma_s, at the point that `bits` choose. In `images` each brick has a word,
- * where its points begin from the first one on, and a point three: a colour, or the coefficients of its curve. */
-inline Spectrum grid_scatters(Scene scene, integer name, GridWalk w, Spectrum scatters, mask active, natural bits,
-                              Wavelengths lambdas)
-{
-    integer first = gather_i(scene.materials, sel_i(active, MEDIUM_ROW(name) + GRID_ALBEDO, (integer)(0)));
-    active = active & (first != 0);
-    integer brick = (w.z * w.ny + w.y) * w.nx + w.x;
-    integer points = first + gather_i(scene.images, sel_i(active, first + brick, (integer)(0)));
-    integer at = sel_i(active, points + 3 * grid_corner(w, bits), (integer)(0));
-    vec4 words = v4(gather_w(scene.images, at), gather_w(scene.images, at + 1), gather_w(scene.images, at + 2),
-                    (real)(1.0f));
-    return spectrum_sel(active, spectrum_mul(scatters, spectrum_constant(words, lambdas)), scatters);
-}
-#endif

@@ -52,7 +52,13 @@ inline real reradiation_sample(Scene scene, integer table, real out, real u, rea
  * each a quarter further, so that they stay exchangeable: which is the hero makes no difference. A
  * wavelength stays in proportion to the light that is to be expected either way, but not too seldom: from
  * the third surface on with r^(3/2) at least (0.9 at most), so that the squares of weights shrink by
- * r^(1/2) a bounce, while they could grow for ever between walls that give out much. */
+ * r^(1/2) a bounce, while they could grow for ever between walls that give out much. In a medium r is a share of
+ * collisions, of which there are more than light is taken: there it is 3 r, as light may be scattered many times. */
+#if BSDF_IS_PHASE
+#define SHIFT_LEAST(r) (3.0f * (r))
+#else
+#define SHIFT_LEAST(r) ((r) * sqrt_r(r))
+#endif
 inline Wavelengths reradiation_shift(Scene scene, integer table, Spectrum *elastic, Spectrum *glow, real amount,
                                      Wavelengths lambdas, real u, integer depth)
 {
@@ -65,7 +71,7 @@ inline Wavelengths reradiation_shift(Scene scene, integer table, Spectrum *elast
         integer cell = shift_cell(scene, lambdas.c, &t);                                                        \
         real kept = r * shift_between(scene, table + cell, t);                                                  \
         real given = amount * shift_between(scene, table + (SHIFT_CELLS + 1) + cell, t);                        \
-        real least = sel(depth > 1, min_r(r * sqrt_r(r), (real)(0.9f)), 0.25f * min_r(r, (real)(1.0f)));        \
+        real least = sel(depth > 1, min_r(SHIFT_LEAST(r), (real)(0.9f)), 0.25f * min_r(r, (real)(1.0f)));       \
         real stay = max_r(kept / max_r(kept + given, (real)(1e-20f)), least);                                   \
         stay = sel(g > 0.0f, stay, (real)(1.0f));                                                               \
         mask moves = v >= stay;                                                                                 \

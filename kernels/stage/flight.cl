@@ -65,7 +65,16 @@ STAGE(flight)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
         real left = 1.0f - near.share, by_angle = equiangular_distance(near, u.x / max_r(near.share, (real)(1e-9f)));
         u.x = max_r(u.x - near.share, (real)(0.0f)) / left;
 #endif
+#if USES_DYES
+        DyeFlight dye = dye_flight(name, m, end);
+        mask glows = scatters & (u.x < dye.share);
+        real by_dye = dye_distance(dye, u.x / max_r(dye.share, (real)(1e-9f)));
+        u.x = max_r(u.x - dye.share, (real)(0.0f)) / (1.0f - dye.share);
+#endif
         real t = -log_r(max_r(1.0f - u.x, (real)(1e-9f))) / max_r(sigma, (real)(1e-30f));
+#if USES_DYES
+        t = sel(glows, by_dye, t);
+#endif
 #if FLIES_NEAR_LAMPS
         t = sel(aims, by_angle, t);
 #endif
@@ -74,6 +83,10 @@ STAGE(flight)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
         Spectrum passes = spectrum_exp(spectrum_scale(m.sigma_t, -t));
         Spectrum f = spectrum_sel(collides, spectrum_mul(m.sigma_s, passes), passes);
         Spectrum pdf = spectrum_sel(collides, spectrum_mul(m.sigma_t, passes), passes);
+#if USES_DYES
+        real dyes = sel(collides, dye.share * dye_pdf(dye, t), (real)(0.0f));
+        pdf = spectrum_add(spectrum_scale(pdf, 1.0f - dye.share), spectrum_of(dyes));
+#endif
 #if FLIES_NEAR_LAMPS
         real nearby = sel(collides, near.share * equiangular_pdf(near, t), (real)(0.0f));
         pdf = spectrum_add(spectrum_scale(pdf, left), spectrum_of(nearby));
@@ -102,10 +115,8 @@ STAGE(flight)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
             origin.hemisphere = path_hemisphere(path, at);
             GridFlight own = grid_flight(scene, name, m, o, d, end, ratio, u, key, gridded, lambdas, origin);
             light = spectrum_sel(gridded, own.light, light);
-#elif GRIDS_TINTED
-            GridFlight own = grid_flight(scene, name, m, o, d, end, ratio, u, key, gridded, lambdas);
 #else
-            GridFlight own = grid_flight(scene, name, m, o, d, end, ratio, u, key, gridded);
+            GridFlight own = grid_flight(scene, name, m, o, d, end, ratio, u, key, gridded GRID_TINT_PASSED);
 #endif
             weight = spectrum_sel(gridded, own.weight, weight);
             collides = sel_i(gridded, own.collides, collides);

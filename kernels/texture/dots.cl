@@ -1,6 +1,6 @@
 /* One within round dots, zero elsewhere, as pbrt's dots: of the cells of uv around whole numbers half have
  * a dot of radius 0.35, put somewhere in it by noise. */
-#include "texturing/perlin_noise.cl"
+#include "core/perlin_noise.cl"
 
 inline real dots_value(Dots t, Scene scene, TexturePoint point)
 {

@@ -1,6 +1,6 @@
 /* Marble as pbrt has it: along y runs a sine, disturbed by noise, through a row of cubic Bezier curves
  * between nine colours, 1.5 times their brightness. */
-#include "texturing/perlin_noise.cl"
+#include "core/perlin_noise.cl"
 
 /* The colours between which it lies, from word `first`, and how far along. */
 inline integer marble_at(Marble t, Scene scene, TexturePoint point, real *along)

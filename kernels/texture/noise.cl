@@ -1,7 +1,7 @@
 /* Numbers that vary in space: sums of Perlin's noise (2002) as pbrt has them. fbm sums octaves, each 1.99
  * times as fine and `roughness` as strong; wrinkled sums their absolute values; windy is a height of waves
  * times the strength of gusts. All octaves are summed: samples of a pixel average what is finer than it. */
-#include "texturing/perlin_noise.cl"
+#include "core/perlin_noise.cl"
 
 inline real noise_value(Noise t, Scene scene, TexturePoint point)
 {

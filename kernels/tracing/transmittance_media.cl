@@ -40,7 +40,8 @@ inline Spectrum trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, rea
         if (any(gridded)) {
             Medium m = medium_load(scene, sel_i(gridded, medium, (integer)(0)), lambdas);
             natural own = hash_natural(key + 1u + (uint)surfaces);
-            dims = spectrum_sel(gridded, grid_transmittance(scene, medium, m, o, d, way, own, gridded), dims);
+            Spectrum passed = grid_transmittance(scene, medium, m, o, d, way, own, gridded GRID_TINT_PASSED);
+            dims = spectrum_sel(gridded, passed, dims);
         }
 #endif
         passes = spectrum_mul(passes, dims);

@@ -33,6 +33,7 @@ SETTINGS = {
             (0.97, 1.0),
         )
     ],
+    media.Reradiating: [{"reflectance": 1.0, "reradiation": 0.0, "amount": 1.0}],
     media.Tabulated: [
         {"values": (1.0, 1.0)},
         {"values": BUMPS},

@@ -237,5 +237,5 @@ def test_the_picture_does_not_depend_on_lanes() -> None:
 
 
 def test_too_much_light_is_refused() -> None:
-    with pytest.raises(SceneError, match="would leave the surface"):
+    with pytest.raises(SceneError, match="would leave"):
         Fluorescent(reflectance=0.9, reradiation=DYE)

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyopencl.array as cl_array
 import pytest
 
 import clpt
+from clpt import spectra
 from clpt import transforms as tf
 from clpt.errors import SceneError
 from clpt.formats.volumes import vol
@@ -24,6 +26,7 @@ from clpt.scene.integrators import Path as PathIntegrator
 from clpt.scene.lights import Constant, Directional
 from clpt.scene.materials import Diffuse, Null
 from clpt.scene.shapes import Cube, Rectangle
+from clpt.spectra import uplift
 from tests.renders.support import assert_agree, assert_mean, exposures, pictures_of_parts, with_film
 
 CHROMATIC = np.array([0.5, 2.0, 3.0])  # [1/m]
@@ -57,9 +60,15 @@ def scene_of(medium: media.Medium, max_depth: int = -1, light: float = 1.0) -> S
     )
 
 
-def optical_depth(medium: media.Grid, origin: np.ndarray, to: np.ndarray) -> float:
-    """The integral of the density along a line, in float64 by 200,000 steps."""
+def optical_depth(
+    medium: media.Grid, origin: np.ndarray, to: np.ndarray, values: np.ndarray | None = None
+) -> Any:
+    """The integral of the density along a line, in float64 by 200,000 steps.
+
+    values: in its place, (nx, ny, nz, ...).
+    """
     steps = 200_000
+    values = np.asarray(medium.density, float) if values is None else values
     t = (np.arange(steps) + 0.5) / steps
     points = origin + t[:, None] * (to - origin)
     inverse = np.linalg.inv(medium.to_world)
@@ -69,12 +78,12 @@ def optical_depth(medium: media.Grid, origin: np.ndarray, to: np.ndarray) -> flo
     at = np.clip(unit[inside] * size - 0.5, 0.0, size - 1.0)
     low = np.minimum(at.astype(int), np.maximum(size - 2, 0))
     share = at - low
-    sums = np.zeros(len(at))
+    sums = np.zeros(values.shape[3:])
     for corner in np.ndindex(2, 2, 2):
         weight = np.where(corner, share, 1.0 - share).prod(axis=1)
         index = np.minimum(low + corner, size - 1)
-        sums += weight * medium.density[tuple(index.T)]
-    return float(sums.sum() * np.linalg.norm(to - origin) / steps)
+        sums += np.tensordot(weight, values[tuple(index.T)], 1)
+    return sums * np.linalg.norm(to - origin) / steps
 
 
 @pytest.mark.parametrize("name", ["slab", "wedge", "random"])
@@ -87,6 +96,54 @@ def test_transmittance(name: str) -> None:
     assert 0.5 < depth < 2.0
     got = exposures(scene_of(medium, max_depth=1), 16, 256)
     assert_mean(got, np.exp(-CHROMATIC * depth), 0.08)
+
+
+@pytest.mark.parametrize("mode", ["rgb", pytest.param("spectral", marks=pytest.mark.slow)])
+def test_colours_of_extinction(mode: str) -> None:
+    """exp(-optical depth) with colours on the grid, in RGB and for each wavelength, both ways."""
+    colours = np.random.default_rng(7).random((*RANDOM.shape, 3)) ** 2
+    medium = media.Grid(
+        density=3.0 * RANDOM, colour_grid=colours, to_world=TURNED, sigma_t=2.0, albedo=0.5
+    )
+    start, middle = np.array([0.07, 0.11, 5.0]), np.array([0.15, 0.02, 0.0])
+    ends = start, 2.0 * middle - start
+    depths = 2.0 * optical_depth(medium, *ends, 3.0 * RANDOM[..., None] * colours)
+    assert depths.min() > 0.3
+    assert np.ptp(depths) > 0.1
+    scene = scene_of(medium, max_depth=1)
+    if mode == "rgb":
+        assert_mean(exposures(scene, 16, 128), np.exp(-depths), 0.08)
+        black = dataclasses.replace(medium, albedo=0.0)  # its flights share all collisions
+        assert_mean(exposures(scene_of(black), 8, 64), np.exp(-depths), 0.08)
+        return
+    lambdas = np.linspace(400.0, 700.0, 3 * 16, endpoint=False) + 3.125
+    c = uplift(colours).astype(float)[..., None, :] @ np.array([lambdas**2, lambdas, lambdas**0])
+    sigmoids = 0.5 + c[..., 0, :] / (2.0 * np.sqrt(1.0 + c[..., 0, :] ** 2))
+    curves = 2.0 * optical_depth(medium, *ends, 3.0 * RANDOM[..., None] * sigmoids)
+    film = {"mode": "spectral", "bands": 3, "lambda_min": 400.0, "lambda_max": 700.0}
+    expected = np.exp(-curves).reshape(3, 16).mean(axis=1)
+    scene = with_film(scene, **film)
+    scene.lights[0] = Constant(radiance=spectra.Constant(1.0))
+    assert_mean(exposures(scene, 16, 256), expected, 0.08)
+
+
+def test_even_colours_are_one_colour() -> None:
+    """Colours that are the same everywhere are those of the medium; both furnaces are white."""
+    share = np.broadcast_to(CHROMATIC / 3.0, (*RANDOM.shape, 3))
+    given = {"density": 2.0 * RANDOM, "to_world": TURNED}
+    coloured = media.Grid(**given, sigma_t=3.0, albedo=0.8, colour_grid=share)
+    pictures = [
+        exposures(scene_of(one), 16, 64).mean(axis=(1, 2), keepdims=True)
+        for one in (coloured, media.Grid(**given, sigma_t=CHROMATIC, albedo=0.8))
+    ]
+    assert_agree(*pictures, "colours on the grid, and one colour", 2e-4)
+    colours = np.random.default_rng(8).random((*RANDOM.shape, 3))
+    white = media.Grid(**given, sigma_s=4.0, colour_grid=colours)
+    scene = scene_of(white)
+    scene.lights = [Constant(radiance=1.0), scene.lights[1]]
+    assert_mean(exposures(scene, 8, 128), 1.0, WITHIN)
+    with pytest.raises(SceneError, match="up to 1"):
+        media.Grid(**given, colour_grid=2.0 * colours)
 
 
 @pytest.mark.parametrize("mode", ["rgb", pytest.param("spectral", marks=pytest.mark.slow)])

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from clpt.formats import volumes
 from clpt.formats.mitsuba import spectra
 from clpt.formats.mitsuba.properties import Context, Properties, unknown
 from clpt.formats.mitsuba.xml import Element
@@ -14,7 +15,6 @@ from clpt.formats.volumes import vol
 from clpt.scene import media
 from clpt.scene.media import Grid, Homogeneous, Medium, Phase
 from clpt.scene.volumes import Volume
-from clpt.spectra import RGBUnbounded
 
 
 def medium(element: Element, context: Context) -> Medium:
@@ -109,15 +109,14 @@ def _heterogeneous(props: Properties) -> Homogeneous:
     if even or volume is None:  # constvolume, or a number
         return _homogeneous(props)
     props.take("sigma_t")
-    colour, density = props.context.once(volume, lambda one: _grid_volume(one, props.context))
+    given = props.context.once(volume, lambda one: _grid_volume(one, props.context))
     medium = _homogeneous(props)
     return Grid(
-        sigma_t=colour,
+        **given,
         albedo=medium.albedo,
         scale=medium.scale,
         phase=medium.phase,
         name=medium.name,
-        density=density,
     )
 
 
@@ -137,26 +136,24 @@ def _albedo(props: Properties) -> Volume | None:
 def _tinted(props: Properties, albedo: Volume) -> Grid:
     """A medium whose albedo is on a grid; its density may be one number everywhere."""
     even = Volume(np.ones(albedo.values.shape[:3], np.float32), albedo.to_world)
-    made = _heterogeneous(props)
-    colour, density = made.sigma_t, made.density if isinstance(made, Grid) else even
+    made, density, colours = _heterogeneous(props), even, None
     if isinstance(made, Grid):
-        density = Volume(made.density, made.to_world)
+        density, colours = Volume(made.density, made.to_world), made.colour_grid
     return Grid(
-        sigma_t=colour, albedo=1.0, albedo_grid=albedo, density=density, scale=made.scale,
+        sigma_t=made.sigma_t, albedo=1.0, albedo_grid=albedo, density=density, scale=made.scale,
+        colour_grid=None if colours is None else Volume(colours, density.to_world),
         phase=made.phase, name=made.name,
     )  # fmt: skip
 
 
-def _grid_volume(element: Element, context: Context) -> tuple[Any, Volume]:
-    """What a <volume type="gridvolume"> has: one colour, and a density that multiplies it."""
+def _grid_volume(element: Element, context: Context) -> dict[str, Any]:
+    """What a <volume type="gridvolume"> has: a density, one colour or some on the grid."""
     values, to_world = _grid_values(element, context)
-    most = values.max(axis=(0, 1, 2)).astype(float)
-    if len(most) == 1 or not most.max() > 0.0:
-        return 1.0, Volume(values[..., 0], to_world)
-    density = values.mean(axis=3) / most.mean()
-    if not np.allclose(values, density[..., None] * most, rtol=1e-4, atol=1e-5 * most.max()):
-        raise element.error("its colours differ by more than a factor; give one channel")
-    return RGBUnbounded(*most.tolist()), Volume(density, to_world)
+    if values.shape[3] == 1:
+        return {"sigma_t": 1.0, "density": Volume(values[..., 0], to_world)}
+    sigma_t, density, colours = volumes.factored(values)
+    placed = None if colours is None else Volume(colours, to_world)
+    return {"sigma_t": sigma_t, "density": Volume(density, to_world), "colour_grid": placed}
 
 
 def _grid_values(element: Element, context: Context) -> tuple[Any, Any]:

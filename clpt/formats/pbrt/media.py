@@ -13,13 +13,11 @@ from clpt.formats.pbrt import coated_albedo
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.spectra import scaled, spectrum
 from clpt.formats.pbrt.state import Definition, State, nearest
-from clpt.scene.media import Grid, HenyeyGreenstein, Homogeneous, Isotropic, Medium
+from clpt.scene.media import Cloud, Grid, HenyeyGreenstein, Homogeneous, Isotropic, Medium
 from clpt.scene.volumes import Volume
 from clpt.spectra import Constant, RGBUnbounded
 
-GRIDS = ("uniformgrid", "nanovdb", "rgbgrid")
-LEFT_OUT = ("cloud",)
-GREY = 1e-3  # share by which the extinctions of colours may differ from those of one
+GRIDS = ("uniformgrid", "nanovdb", "rgbgrid", "cloud")
 HEAT = ("temperatureoffset", "temperaturecutoff", "temperaturescale")
 BLACK_BODY = {"normalised": True}  # so that it has 1 at its brightest wavelength
 _AROUND = ((1, 1), (1, 1), (1, 1), (0, 0))
@@ -27,7 +25,7 @@ MILK = "Wholemilk"  # of which a medium is that says nothing
 
 
 def medium(name: str, source: Parameters, state: State) -> Medium | None:
-    """Return the medium of a name, made once; None of "", and where it is left out."""
+    """Return the medium of a name, made once; None of ""."""
     if not name:
         return None
     definition = state.shared.media.get(name)
@@ -40,15 +38,12 @@ def medium(name: str, source: Parameters, state: State) -> Medium | None:
     return one
 
 
-def _made(name: str, definition: Definition) -> Medium | None:
+def _made(name: str, definition: Definition) -> Medium:
     params, state = definition.params, definition.state
     kind = params.one("type", "string", "homogeneous")
     with params.locating():
-        if kind in LEFT_OUT:
-            state.warn(params, f"a medium of the type {kind!r} is left out")
-            return None
         if kind not in ("homogeneous", *GRIDS):
-            raise UnknownKindError("medium", kind, ("homogeneous", *GRIDS, *LEFT_OUT))
+            raise UnknownKindError("medium", kind, ("homogeneous", *GRIDS))
         g = params.one("g", "float", 0.0)
         phase = HenyeyGreenstein(g=g) if g else Isotropic()
         scale = params.one("scale", "float", 1.0)
@@ -60,6 +55,8 @@ def _made(name: str, definition: Definition) -> Medium | None:
             made: Medium = Grid(**own, **_coloured(params, state), name=name)
         elif kind == "homogeneous":
             made = Homogeneous(**own, emission=_light(params, state), name=name)
+        elif kind == "cloud":
+            made = Cloud(**own, **_cloud(params, state), name=name)
         else:
             made = Grid(**own, **_grid(kind, params, state), name=name)
     for given in params.unused():
@@ -71,6 +68,18 @@ def _light(params: Parameters, state: State) -> Any:
     """What a homogeneous medium emits."""
     light = spectrum(params, "Le", "emission", state, Constant(0.0))
     return scaled(light, params.one("Lescale", "float", 1.0))
+
+
+def _cloud(params: Parameters, state: State) -> dict[str, Any]:
+    """The density of a `cloud`, whose space is that of its medium."""
+    return {
+        "density": params.one("density", "float", 1.0),
+        "wispiness": params.one("wispiness", "float", 1.0),
+        "frequency": params.one("frequency", "float", 5.0),
+        "low": params.one("p0", "point3", np.zeros(3)),
+        "high": params.one("p1", "point3", np.ones(3)),
+        "to_world": state.ctm,
+    }
 
 
 def _grid(kind: str, params: Parameters, state: State) -> dict[str, Any]:
@@ -104,7 +113,7 @@ def _grid(kind: str, params: Parameters, state: State) -> dict[str, Any]:
 
 
 def _coloured(params: Parameters, state: State) -> dict[str, Any]:
-    """An `rgbgrid`: a density, one colour of extinction, and an albedo on the grid."""
+    """An `rgbgrid`: a density, its colours where these differ, and an albedo on the grid."""
     parts = [_listed(params, name, state, "rgb") for name in ("sigma_a", "sigma_s")]
     found = next((part for part in parts if part is not None), None)
     if found is None:
@@ -112,17 +121,15 @@ def _coloured(params: Parameters, state: State) -> dict[str, Any]:
     ones = np.pad(np.ones([n - 2 for n in found.values.shape[:3]] + [3], np.float32), _AROUND)
     absorbs, scatters = (ones if part is None else part.values for part in parts)
     extinction = (absorbs + scatters).astype(float)
-    most = extinction.max(axis=(0, 1, 2))
-    density = extinction.mean(axis=3) / max(float(most.mean()), 1e-30)
-    if not np.allclose(extinction, density[..., None] * most, GREY, GREY * most.max()):
-        state.warn(params, "its extinction is that of one colour everywhere: its mean")
+    sigma_t, density, colours = volumes.factored(extinction)
     if "Le" in params:
         state.warn(params, "its light is left out")
     params.ignore("Le", "Lescale")
     albedo = scatters / np.maximum(extinction, 1e-30)
     return {
-        "density": Volume(density.astype(np.float32), found.to_world),
-        "sigma_t": RGBUnbounded(*most.tolist()),
+        "density": Volume(density, found.to_world),
+        "colour_grid": None if colours is None else Volume(colours, found.to_world),
+        "sigma_t": sigma_t,
         "albedo_grid": Volume(np.clip(albedo, 0.0, 1.0).astype(np.float32), found.to_world),
     }
 

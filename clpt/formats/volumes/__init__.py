@@ -5,15 +5,19 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clpt.errors import SceneError
 from clpt.formats.volumes import nvdb, vdb, vol
 from clpt.scene.volumes import Volume, check_density
+from clpt.spectra import RGBUnbounded
 from clpt.transforms import IDENTITY
 
 MOST_BYTES = 1 << 32  # of a file
+_GREY = 1e-4  # share by which colours may differ from multiples of one
 
 
 def read(path: str | Path, grid: str = "") -> Volume:
@@ -53,6 +57,25 @@ def read_colours(path: str | Path) -> Volume:
         if path.suffix.lower() == ".npy":
             return _npy(path, axes=4)
         return Volume(*vol.read_channels(path))
+
+
+def factored(
+    values: NDArray[Any],
+) -> tuple[RGBUnbounded, NDArray[np.float32], NDArray[np.float32] | None]:
+    """Return an extinction of colours (nx, ny, nz, 3) as what a `Grid` has of it.
+
+    That is one colour, a density (nx, ny, nz), and None where their product is all; else white, the
+    highest of each three numbers, and what share of it each is (nx, ny, nz, 3).
+    """
+    values = np.asarray(values, np.float64)
+    most = values.max(axis=(0, 1, 2))
+    density = values.mean(axis=3) / max(float(most.mean()), 1e-30)
+    if np.allclose(values, density[..., None] * most, _GREY, 1e-5 * most.max()):
+        return RGBUnbounded(*most.tolist()), density.astype(np.float32), None
+    highest = values.max(axis=3)
+    colours = values / np.maximum(highest, 1e-30)[..., None]
+    white = RGBUnbounded(1.0, 1.0, 1.0)
+    return white, highest.astype(np.float32), colours.astype(np.float32)
 
 
 def distances(path: Path) -> np.ndarray:

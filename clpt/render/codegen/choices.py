@@ -49,6 +49,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     ),
     "generated/medium.cl": lambda f, _: (
         ("generated/medium_coefficients.cl", "optics/medium.cl") * (f.absorption or f.media)
+        + ("optics/dye_flight.cl",) * f.dyed_media
         + ("optics/medium_grid.cl",) * f.grids
         + ("optics/medium_grid_light.cl",) * f.emissive_grids
         + ("generated/body_index.cl", "optics/bodies.cl") * f.bodies

@@ -39,7 +39,8 @@ def gathers_photons(features: Features, cls: type[Scatterer]) -> bool:
 def phase_varies(features: Features, cls: type[Scatterer]) -> bool:
     """Whether a phase function of a scene differs between wavelengths."""
     found = features.sources_of(cls.kind).values()
-    return cls.is_phase and any(source not in ("grey", "row") for one in found for source in one)
+    varies = cls.is_phase and cls.chromatic
+    return varies and any(source not in ("grey", "row") for one in found for source in one)
 
 
 def filters_at_random(features: Features, cls: type[Scatterer]) -> bool:
@@ -102,6 +103,8 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "BRICK_LIGHTS": lambda f: VOLUME in f.lights,
     "USES_GRIDS": lambda f: f.grids,
     "GRIDS_TINTED": lambda f: f.tinted_grids,
+    "USES_DYES": lambda f: f.dyed_media,
+    "GRIDS_COLOURED": lambda f: f.coloured_grids,
     "USES_BYTES": lambda f: f.byte_grids,
     "USES_BODIES": lambda f: f.bodies,
     "SHADOW_MEDIA": lambda f: f.shadow_media,

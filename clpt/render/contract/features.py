@@ -101,6 +101,8 @@ class Features:
     sealed_media: bool = False  # which no ray to a light can leave
     grids: bool = False  # of which some have a density on a grid
     tinted_grids: bool = False  # of these some have an albedo on a grid
+    dyed_media: bool = False  # of media some have a dye that gives out light
+    coloured_grids: bool = False  # of these some have colours of their extinction on a grid
     byte_grids: bool = False  # of these some have 8 bits for each number
     bodies: bool = False  # that may overlap, of different priorities
     moving: tuple[str, ...] = ()  # while the shutter is open: "camera", "instances", ...

@@ -25,6 +25,7 @@ from clpt.scene.integrators import (
 from clpt.scene.layers import LAYERS
 from clpt.scene.lights import ON_SHAPES, DirectionalArea, Light, Point
 from clpt.scene.materials import Material
+from clpt.scene.media import Medium
 from clpt.scene.params import params
 from clpt.scene.shapes import Instance, Shape
 
@@ -113,12 +114,20 @@ def _check_light_paths(scene: Scene, shapes_: list[Shape]) -> None:
     for shape in shapes_:
         if spectral and _has(shape.material, "fluoresces"):
             _refuse("materials that keep the wavelength", shapes.where(shape))
+        inside = (shape.interior, shape.exterior)
+        if spectral and any(_gives_other_light(medium) for medium in inside):
+            _refuse("media that keep the wavelength", shapes.where(shape))
         if _has(shape.material, "no_back"):
             _refuse("materials that are reciprocal, which hair is not", shapes.where(shape))
 
 
 def _refuse(needed: str, where: str) -> NoReturn:
     raise SceneError(f"particle_tracer needs {needed}", where=where)
+
+
+def _gives_other_light(medium: Medium | None) -> bool:
+    """Whether a medium gives light other wavelengths."""
+    return medium is not None and any(one.fluoresces for one in medium.collisions(True).leaves)
 
 
 def _has(material: Any, trait: str) -> bool:

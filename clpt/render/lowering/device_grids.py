@@ -1,27 +1,40 @@
-"""Densities that lie on a device: lowering leaves room for their bricks, which kernels fill."""
+"""Densities that kernels put into bricks, for which lowering leaves room: those that lie on a
+device, and those of clouds, which are worked out there."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import pyopencl.array as cl_array
+from numpy.typing import NDArray
 
 from clpt.render.lowering.tables import TableStore
-from clpt.scene.media import Grid
+from clpt.scene.media import ON_POINTS, Cloud, Grid
 
 POINT_WORDS = 365  # of a brick, see kernels/motion/brick_density.cl
 
 
 @dataclass(frozen=True, eq=False)
-class DeviceGrid:
-    """A density on a device, and where its bricks begin in `images`.
+class CloudDensity:
+    """The density of a cloud at points; numbers: see kernels/motion/cloud_density.cl, float32."""
 
-    values: (nx, ny, nz) float32; bricks: their number along each axis.
+    shape: tuple[int, ...]
+    numbers: NDArray[np.float32]
+
+
+Values: TypeAlias = cl_array.Array | CloudDensity
+
+
+@dataclass(frozen=True, eq=False)
+class DeviceGrid:
+    """A density that kernels put into bricks, and where these begin in `images`.
+
+    values: (nx, ny, nz) float32, or what makes them; bricks: their number along each axis.
     """
 
-    values: cl_array.Array
+    values: Values
     bricks: tuple[int, ...]
     first: int
 
@@ -30,7 +43,7 @@ def stays_there(medium: Grid) -> bool:
     """Return whether kernels read a density where it is: float32 on a device, z fastest, in 16 bits
     a point, without colours or light."""
     density: Any = medium.density
-    more = (medium.albedo_grid, medium.emission_grid, medium.temperature)
+    more = [getattr(medium, name) for name in ON_POINTS]
     plain = medium.bits == 16 and medium.light is None and all(one is None for one in more)
     return plain and (
         isinstance(density, cl_array.Array)
@@ -39,9 +52,18 @@ def stays_there(medium: Grid) -> bool:
     )
 
 
-def reserve(store: TableStore, density: cl_array.Array, bricks: tuple[int, ...]) -> int:
+def cloud_density(cloud: Cloud) -> CloudDensity:
+    """Return what makes the density of a cloud, at the centres of the cells of its box."""
+    step = (np.asarray(cloud.high, float) - np.asarray(cloud.low, float)) / cloud.size
+    first = np.asarray(cloud.low, float) + 0.5 * step
+    own = (cloud.density, cloud.wispiness, cloud.frequency)
+    return CloudDensity(cloud.size, np.array([*first, *step, *own], np.float32))
+
+
+def reserve(store: TableStore, density: Values, bricks: tuple[int, ...]) -> int:
     """Append room for the bricks of a density to `images`; return its first word."""
     count = int(np.prod(bricks))
     first = store.append("images", np.zeros(count * (2 + POINT_WORDS), np.uint32))
-    store.device_grids.append(DeviceGrid(density.view(), bricks, first))
+    own = density if isinstance(density, CloudDensity) else density.view()
+    store.device_grids.append(DeviceGrid(own, bricks, first))
     return first

@@ -11,7 +11,7 @@ from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.lights.lights import LightRows
 from clpt.render.lowering.materials.material_words import MaterialWords
 from clpt.scene.cameras import Lens
-from clpt.scene.media import Grid
+from clpt.scene.media import Grid, Lattice
 
 FEW_LIGHTS = 256  # up to which one random number chooses a light and a point on it
 FEW_INSTANCES = 2  # up to which rays go to each, where some deform
@@ -92,11 +92,13 @@ def features_of(
         emissive_media=bool(index.emitting),
         emissive_grids=index.glowing,
         hot_grids=any(getattr(one, "temperature", None) is not None for one in index.emitting),
-        grids=any(isinstance(medium, Grid) for medium in index.media),
+        grids=any(isinstance(medium, Lattice) for medium in index.media),
         moving=moving_parts(index, geometry),
         motion_scales=index.motions.scales,
         motion_row=motion_row,
         tinted_grids=index.tinted,
+        dyed_media=index.dyed,
+        coloured_grids=index.coloured,
         byte_grids=any(isinstance(one, Grid) and one.bits == 8 for one in index.media),
         dispersion=glass_lens or disperses(index.leaves, sources),
         glass_lens=glass_lens,

@@ -13,7 +13,7 @@ from clpt.render.lowering import device_grids
 from clpt.render.lowering.device_arrays import on_host
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.tables import Words, as_words
-from clpt.scene.media import Grid
+from clpt.scene.media import Cloud, Grid, Lattice
 from clpt.scene.volumes import check_density
 from clpt.spectra import cie, uplift
 from clpt.spectra.emission import planck
@@ -28,26 +28,31 @@ BODIES = 1024  # temperatures in a table of black bodies
 PEAK = 4.0956747e-15  # highest radiance of a black body over T^5 [W m^-2 sr^-1 nm^-1 K^-5]
 
 
-def row(medium: Grid, encoder: Encoder) -> Words:
+def row(medium: Lattice, encoder: Encoder) -> Words:
     """Return what stands in the row of a medium behind its coefficients; append its bricks.
 
     Raises SceneError for a density that is negative or not finite, but on a device.
     """
-    counts = brick_counts(medium.density.shape)
-    if device_grids.stays_there(medium):
+    counts = brick_counts(medium.size)
+    if isinstance(medium, Cloud):
+        density = device_grids.cloud_density(medium)
+        first = device_grids.reserve(encoder.store, density, counts)
+    elif not isinstance(medium, Grid):
+        raise TypeError(medium.kind)
+    elif device_grids.stays_there(medium):
         first = device_grids.reserve(encoder.store, medium.density, counts)
     else:
         words = encoder.cache(bricks, medium.density, medium.bits)
         first = encoder.store.append("images", words)
-    numbers = np.concatenate([to_lattice(medium).ravel(), np.array(medium.density.shape) + 0.5])
+    numbers = np.concatenate([to_lattice(medium).ravel(), np.array(medium.size) + 0.5])
     bricks_at = np.array([first, *counts], np.uint32)
     return np.concatenate([bricks_at, as_words(numbers)])
 
 
-def to_lattice(medium: Grid) -> NDArray[np.float64]:
+def to_lattice(medium: Lattice) -> NDArray[np.float64]:
     """The three rows (3, 4) from the world to the lattice, whose box begins at 1/2."""
-    size = np.array(medium.density.shape)
-    inverse = np.linalg.inv(np.asarray(medium.to_world, float))
+    size = np.array(medium.size)
+    inverse = np.linalg.inv(medium.box)
     return size[:, None] * inverse[:3] + np.array([0.0, 0.0, 0.0, 0.5])
 
 
@@ -74,13 +79,13 @@ def bricks(density: object, bits: int = 16) -> Words:
     return np.concatenate([table.ravel(), packed.ravel()])
 
 
-def colours(density: object, albedo: NDArray[Any], spectral: bool) -> Words:
-    """Return the albedo of the bricks that have a density: a word for each, then three a point.
+def colours(density: object, values: NDArray[Any], spectral: bool) -> Words:
+    """Return the colours of the bricks that have a density: a word for each, then three a point.
 
     The first says where its points begin, 0 for nowhere. spectral: they are coefficients of curves.
     """
     used = np.flatnonzero(Windows(density).most)
-    channels = [Windows(albedo[..., c]) for c in range(3)]
+    channels = [Windows(values[..., c]) for c in range(3)]
     points = np.stack([one.of(used) for one in channels], axis=-1)
     words = uplift(points) if spectral else points
     table = np.zeros(len(channels[0].most), np.uint32)
@@ -167,10 +172,10 @@ def glow(medium: Grid, strength: float, brightness: NDArray[np.float64] | None) 
             light = np.interp(light, *brightness.T)
         both = (dense * light) @ share
         means[some] = np.maximum(both, LEAST * (dense @ share) * (light @ share))
-    counts = brick_counts(medium.density.shape)
+    counts = brick_counts(medium.size)
     z, y, x = np.unravel_index(numbers, counts[::-1])
     low = CELLS * np.stack([x, y, z], axis=1).astype(np.float64)
-    end = np.minimum(low + CELLS, np.array(medium.density.shape) + 0.5)
+    end = np.minimum(low + CELLS, np.array(medium.size) + 0.5)
     low = np.maximum(low, 0.5)
     lattice = np.vstack([to_lattice(medium), [0.0, 0.0, 0.0, 1.0]])
     world = np.linalg.inv(lattice)

@@ -16,7 +16,7 @@ from clpt.scene import Scene
 from clpt.scene import materials as mt
 from clpt.scene.integrators import Auto, ParticleTracer, Vcm
 from clpt.scene.layers import LAYERS
-from clpt.scene.media import PHASE_LEAVES, Grid, Medium
+from clpt.scene.media import PHASE_LEAVES, Lattice, Medium
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.shapes import Shape
 
@@ -85,12 +85,22 @@ class SceneIndex:
     @property
     def glowing(self) -> bool:
         """Whether some of these have a density on a grid."""
-        return any(isinstance(medium, Grid) for medium in self.emitting)
+        return any(isinstance(medium, Lattice) for medium in self.emitting)
 
     @property
     def tinted(self) -> bool:
         """Whether some medium has an albedo on a grid."""
         return any(getattr(medium, "albedo_grid", None) is not None for medium in self.media)
+
+    @property
+    def coloured(self) -> bool:
+        """Whether the extinction of some medium has colours on a grid."""
+        return any(getattr(medium, "colour_grid", None) is not None for medium in self.media)
+
+    @property
+    def dyed(self) -> bool:
+        """Whether some medium has a dye that gives out light."""
+        return self.spectral and any(getattr(medium, "glows", False) for medium in self.media)
 
     @property
     def nested(self) -> bool:
@@ -233,7 +243,8 @@ def _media(scene: Scene, shapes_: tuple[Shape, ...]) -> list[Medium]:
 def _phase_kinds(scene: Scene, shapes_: tuple[Shape, ...]) -> tuple[type[Scatterer], ...]:
     """The kinds of phase functions of a scene, in the order of their table."""
     scattering = (medium for medium in _media(scene, shapes_) if medium.scatters)
-    found = {type(leaf) for medium in scattering for leaf in medium.phase.leaves}
+    phases = [medium.collisions(scene.film.mode == "spectral") for medium in scattering]
+    found = {type(leaf) for phase in phases for leaf in phase.leaves}
     return tuple(cls for cls in PHASE_LEAVES if cls in found)
 
 

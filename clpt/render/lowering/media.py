@@ -16,7 +16,7 @@ from clpt.render.lowering.lights.brick_lights import BrickLights
 from clpt.render.lowering.lights.lights import LightRows
 from clpt.render.lowering.materials.material_words import MaterialWords
 from clpt.render.lowering.tables import Words, as_words
-from clpt.scene.media import Grid, Medium
+from clpt.scene.media import Dyed, Grid, Lattice, Medium
 from clpt.scene.shapes import Shape
 from clpt.spectra import Constant, Spectrum
 
@@ -24,6 +24,7 @@ MOST_AIMS = 8  # lamps near which flights end, see kernels/optics/equiangular.cl
 FLIES = 0x40000000  # in a medium's word: the stage `flight` takes rays through it
 BYTES = 0x10000000  # which has 8 bits for each number
 GRID = 0x20000000  # a density on a grid multiplies its coefficients
+DYED = 0x04000000  # with a dye that gives out light
 SEALED = 0x08000000  # no shadow ray leaves it, see sealed.py
 
 
@@ -83,7 +84,9 @@ class MediumWords:
         return np.array(sides, np.uint32)
 
     def _new_word(self, medium: Medium) -> int:
-        phase = self._materials.phase(medium.phase) if medium.scatters else 0
+        phase = (
+            self._materials.phase(medium.collisions(self._index.spectral)) if medium.scatters else 0
+        )
         absorbs, scatters = medium.coefficients(self._index.spectral)
         rows = [np.array([phase], np.uint32)]
         if self._index.emitting:
@@ -92,32 +95,41 @@ class MediumWords:
         for name, value in (("absorption", absorbs), ("scattering", scatters)):
             rows.append(self._encoder.named_words("medium", name, value, "coefficient")[0])
         word = FLIES | (SEALED if medium in self._sealed else 0)
-        if isinstance(medium, Grid):
+        if isinstance(medium, Dyed) and medium.glows and self._index.spectral:
+            word |= DYED
+        if isinstance(medium, Lattice):
             rows.append(grids.row(medium, self._encoder))
-            word |= GRID | (BYTES if medium.bits == 8 else 0)
+            word |= GRID | (BYTES if getattr(medium, "bits", 16) == 8 else 0)
         before = 2 + (SPECTRUM_WORDS if self._index.emitting else 0)
         word |= before + self._encoder.store.size("materials")
-        if isinstance(medium, Grid) and self._index.glowing:
+        if isinstance(medium, Lattice) and self._index.glowing:
             rows.append(self._glow(medium, word, absorbs))
-        if isinstance(medium, Grid) and self._index.tinted:
-            rows.append(self._tint(medium))
+        if isinstance(medium, Lattice) and self._index.tinted:
+            rows.append(self._tint(medium, "albedo_grid"))
+        if isinstance(medium, Lattice) and self._index.coloured:
+            rows.append(self._tint(medium, "colour_grid"))
         self._encoder.store.append("materials", np.concatenate(rows))
         return word
 
-    def _tint(self, medium: Grid) -> Words:
-        """What stands behind that: where the albedo of its bricks begins, 0 for nowhere."""
-        if medium.albedo_grid is None:
+    def _tint(self, medium: Lattice, name: str) -> Words:
+        """What stands behind that: where the colours of its bricks begin, 0 for nowhere."""
+        colours = getattr(medium, name, None)
+        if not isinstance(medium, Grid) or colours is None:
             return np.zeros(1, np.uint32)
-        given = (medium.density, medium.albedo_grid, self._index.spectral)
+        given = (medium.density, colours, self._index.spectral)
         first = self._encoder.store.append("images", self._encoder.cache(grids.colours, *given))
         return np.array([first], np.uint32)
 
-    def _glow(self, medium: Grid, word: int, absorbs: Spectrum) -> Words:
+    def _glow(self, medium: Lattice, word: int, absorbs: Spectrum) -> Words:
         """What stands behind the row of a grid: what its bricks emit, and which lights they are."""
         words = np.zeros(grids.GLOW_WORDS, np.uint32)
         light: Any = medium.light
         store = self._encoder.store
         if light is None:
+            return words
+        if not isinstance(medium, Grid):  # none of its bricks is a light
+            rows = np.full(np.prod(grids.brick_counts(medium.size)), -1, np.int32)
+            words[0] = store.append("images", rows.view(np.uint32))
             return words
         rgb = np.asarray(absorbs.to_rgb("unbounded"), float)
         source, table = medium.emission_grid, None
@@ -134,7 +146,7 @@ class MediumWords:
             words[2] = store.append("images", self._encoder.cache(grids.bricks, source))
         glow = grids.glow(medium, max(float(rgb.mean()), 1e-30), table)
         bright = glow.brightest()
-        rows = np.zeros(np.prod(grids.brick_counts(medium.density.shape)), np.int32)
+        rows = np.zeros(np.prod(grids.brick_counts(medium.size)), np.int32)
         rows[glow.numbers] = -1
         rows[bright.numbers] = 1 + self._row + np.arange(len(bright.numbers))
         words[0] = store.append("images", rows.view(np.uint32))

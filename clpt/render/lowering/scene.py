@@ -57,7 +57,7 @@ from clpt.scene import Scene
 from clpt.scene import materials as mt
 from clpt.scene.integrators import AUTO, Film, Integrator
 from clpt.scene.lights import Point
-from clpt.scene.media import Grid
+from clpt.scene.media import Lattice
 from clpt.scene.shapes import Mesh
 
 TREE_FROM = 16  # lights from which a tree chooses among them, see bench/lights.py
@@ -141,7 +141,7 @@ def lower(
     media = MediumWords(index, encoder, materials, sealed)
     sphere = geometry.bounding_sphere()
     lights = _lower_lights(index, encoder, geometry, sphere[1], media)
-    homogeneous = (one for one in index.media if not isinstance(one, Grid))
+    homogeneous = (one for one in index.media if not isinstance(one, Lattice))
     near = medium_aims(lights) if any(one.scatters for one in homogeneous) else ()
     encoder.store.append("media", np.array(near, np.float32).view(np.uint32))
     bounding = [shape for _, shape, _, _ in geometry.owners]
@@ -267,7 +267,7 @@ def _lower_film(index: SceneIndex, encoder: Encoder, wavelengths: Density) -> tu
 
 def _begin_materials(index: SceneIndex, encoder: Encoder) -> MaterialWords:
     """Append what idle lanes read as a material, and make the maker of material words."""
-    if index.spectral and mt.Fluorescent in index.leaves:
+    if index.shifts:
         encoder.spectra.expect_light(emissions(index))
     longest = max(map(row_words, (*mt.LEAVES, *index.leaves)))
     encoder.store.append("materials", np.zeros(longest, np.uint32))
@@ -367,6 +367,8 @@ def _warnings(index: SceneIndex) -> list[str]:
         warnings.append("no light in the scene, so the picture is black: add one to `lights`")
     if film.mode == "rgb" and mt.Fluorescent in index.leaves:
         warnings.append("in rgb mode fluorescent paint has its colour under D65, at most white")
+    if film.mode == "rgb" and any(getattr(medium, "glows", False) for medium in index.media):
+        warnings.append("in rgb mode dyes in media only absorb: ask for the spectral mode")
     return warnings
 
 
@@ -386,7 +388,7 @@ def _of_motion(index: SceneIndex) -> list[str]:
     for i in index.motions.shapes:
         shape: Any = index.scene.shapes[i]
         inner = getattr(getattr(shape, "group", None), "shapes", (shape,))
-        if any(isinstance(one, Grid) for s in inner for one in (s.interior, s.exterior)):
+        if any(isinstance(one, Lattice) for s in inner for one in (s.interior, s.exterior)):
             warnings.append(
                 f"{shapes.where(shape)}.motion: its boundary moves, the grid of its medium stays"
             )
@@ -409,7 +411,7 @@ def _left_to_the_camera(index: SceneIndex) -> list[str]:
         if not index.lights_reach:
             reason = index.lit_media
         if index.shifts:
-            reason = "fluorescent paint gives light other wavelengths"
+            reason = "what fluoresces gives light other wavelengths"
         warnings.append(f"{kind}.merging: left aside, as {reason}")
     if not index.lights_reach:
         warnings.append(f"{kind}.light_paths: left aside, as {index.lit_media}")

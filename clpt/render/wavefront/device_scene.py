@@ -10,12 +10,14 @@ import pyopencl as cl
 from clpt import bvh, device
 from clpt.device.buffers import Buffers
 from clpt.records import TABLES
-from clpt.render.lowering.device_grids import POINT_WORDS
+from clpt.render.lowering.device_grids import POINT_WORDS, CloudDensity, Values
 from clpt.render.lowering.scene import Lowered
+from clpt.render.lowering.textures.noise import PERMUTATION
 from clpt.render.wavefront import trees
 from clpt.render.wavefront.strategy import Strategy
 
 _BRICKS = "motion/brick_density.cl"
+_CLOUD = "motion/cloud_density.cl"
 UPLOADED = tuple(name for name in TABLES if name != "instances")  # that one is of the trees
 
 
@@ -58,28 +60,39 @@ class DeviceScene:
         return {**self.tables, **self.trees.arguments}
 
     def fill_grids(self) -> None:
-        """Enqueue that the bricks of densities on a device follow from these.
+        """Enqueue that the bricks of densities on a device, and of clouds, follow from these.
 
         A density of another context comes over the host, which waits for it.
         """
         for grid in self.lowered.device_grids:
-            values = grid.values
-            if values.context == self.device.context:
-                self.stream.after(values.events)
-                source, begin = values.base_data, values.offset // 4
-            else:
-                source, begin = self.upload("densities", values.get()), 0
+            source, begin = self._density(grid.values)
             count = int(np.prod(grid.bricks))
             common: dict[str, Any] = {
                 "values": source, "begin": begin, "first": grid.first,
                 "bricks_x": grid.bricks[0], "bricks_y": grid.bricks[1],
-                **dict(zip(("nx", "ny", "nz"), values.shape, strict=True)),
+                **dict(zip(("nx", "ny", "nz"), grid.values.shape, strict=True)),
                 "images": self.tables["images"],
             }  # fmt: skip
             self._building.run_each(_BRICKS, "brick_bounds", count, **common)
             self._building.run_each(
                 _BRICKS, "brick_points", count * POINT_WORDS, bricks=count, **common
             )
+
+    def _density(self, values: Values) -> tuple[cl.Buffer, int]:
+        """A buffer with a density, and the first number of it there."""
+        if isinstance(values, CloudDensity):
+            made = self.buffers.allocate("the density of a cloud", 4 * int(np.prod(values.shape)))
+            self._building.run_each(
+                _CLOUD, "cloud_density", int(np.prod(values.shape)),
+                numbers=self.upload("clouds", values.numbers),
+                permutation=self.upload("noise", PERMUTATION),
+                **dict(zip(("nx", "ny", "nz"), values.shape, strict=True)), values=made,
+            )  # fmt: skip
+            return made, 0
+        if values.context == self.device.context:
+            self.stream.after(values.events)
+            return values.base_data, values.offset // 4
+        return self.upload("densities", values.get()), 0
 
     def upload(self, name: str, table: np.ndarray) -> cl.Buffer:
         """Return a new buffer that holds a table. Raises MemoryBudgetError."""

@@ -66,5 +66,23 @@ def test_rgb_grid(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.density[1:3, 1, 1], (0.5, 1.0))
     np.testing.assert_allclose(found.albedo_grid[1, 1, 1], (0.25, 0.5, 0.75))
     np.testing.assert_allclose(found.sigma_t.to_rgb("unbounded"), 8.0)
-    _, warnings = read(tmp_path, given + "[3 2 1 4 3 9]")
-    assert any("one colour" in one for one in warnings)
+    found, warnings = read(tmp_path, given + "[3 2 1 4 3 9]")
+    assert not warnings
+    extinction = found.density[..., None] * found.colour_grid * found.sigma_t.to_rgb("unbounded")
+    np.testing.assert_allclose(extinction[1:3, 1, 1], [[4, 4, 4], [8, 8, 15]], rtol=1e-6)
+    scattered = (extinction * found.albedo_grid)[1:3, 1, 1]
+    np.testing.assert_allclose(scattered, [[1, 2, 3], [4, 5, 6]], rtol=1e-6)
+
+
+def test_cloud(tmp_path: Path) -> None:
+    """Its numbers are those of PBRT; what it does not say has PBRT's defaults."""
+    given = '"string type" "cloud" "float density" 2 "float wispiness" 0.5 "float frequency" 4 '
+    given += '"point3 p0" [-1 0 0] "point3 p1" [1 2 3] "float g" 0.5'
+    found, warnings = read(tmp_path, given)
+    assert not warnings
+    assert isinstance(found, media.Cloud)
+    assert (found.density, found.wispiness, found.frequency) == (2.0, 0.5, 4.0)
+    np.testing.assert_allclose(found.box @ (0.5, 0.5, 0.5, 1.0), (0.0, 1.0, 1.5, 1.0))
+    np.testing.assert_allclose(found.coefficients(spectral=False)[0].to_rgb("unbounded"), 1.0)
+    found, _ = read(tmp_path, '"string type" "cloud"')
+    assert (found.density, found.wispiness, found.frequency) == (1.0, 1.0, 5.0)

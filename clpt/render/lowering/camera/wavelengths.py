@@ -130,6 +130,10 @@ def _glow(index: SceneIndex, nodes: Values) -> Callable[[Spectrum], Values]:
     cells = int(np.ceil((film.lambda_max - film.lambda_min) / STEP - 1e-9))
     into = np.linspace(film.lambda_min, film.lambda_max, cells + 1)
     found = {id(m): m for shape in index.shapes for m in _fluorescent(shape.material)}
+    for medium in index.media:
+        phases = medium.phase.leaves
+        given = [getattr(one, "reradiation", None) for one in phases]
+        found |= {id(m): m for m in (*given, getattr(medium, "dye", None)) if m is not None}
     whole = np.zeros((len(nodes), len(into)))
     for matrix in found.values():
         whole += (into[1] - into[0]) * matrix.sample(nodes[:, None], into[None, :])
