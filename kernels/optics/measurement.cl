@@ -113,7 +113,7 @@ inline Spectrum measurement_spectrum(Measurement t, MeasurementParts p, WarpSlic
     integer width = p.luminance.columns * p.thetas, stride = pairs * nodes;
     integer first = p.spectra + row * width + column * p.thetas;
 #define NODE(at) warp_read_halves(t.values, s, at, stride)
-#define PAIR(at)                                                 \
+#define PAIR(at)                                               \
     warp_mixed(warp_mixed(NODE(at), NODE((at) + p.thetas), x), \
                warp_mixed(NODE((at) + width), NODE((at) + width + p.thetas), x), y)
     Spectrum r;
@@ -121,7 +121,7 @@ inline Spectrum measurement_spectrum(Measurement t, MeasurementParts p, WarpSlic
 #define C(c)                                                            \
     {                                                                   \
         integer colour = clamp_i(to_integer(t.row.c), pairs - 1);       \
-        vec2 both = PAIR(first + colour * nodes);                               \
+        vec2 both = PAIR(first + colour * nodes);                       \
         r.c = both.x + (t.row.c - to_real(colour)) * (both.y - both.x); \
     }
     SPECTRUM_EACH(C)
